@@ -1,0 +1,18 @@
+# All that differs in the build between Catch2 2.13 (Debian 12) and 3.7 (Debian 13). Gives
+# tfdude_add_tests().
+find_package(Catch2 REQUIRED)
+include(Catch)
+
+# tfdude_add_tests(target LABELS label... [TIMEOUT seconds] SOURCES file... [LIBRARIES target...]): one
+# Catch2 binary, each of its test cases a ctest test.
+function(tfdude_add_tests target)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "LABELS;SOURCES;LIBRARIES" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 60)
+  endif()
+  add_executable(${target} ${ARG_SOURCES})
+  target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests)
+  target_link_libraries(${target} PRIVATE tfdude Catch2::Catch2WithMain tfdude_options ${ARG_LIBRARIES})
+  catch_discover_tests(${target} TEST_PREFIX "${target}: "
+    PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
+endfunction()

@@ -1,0 +1,46 @@
+# All that differs in the build between Fast DDS 2.9 (Debian 12) and 3.1 (Debian 13): the names of the
+# package and its targets, and the names of what fastddsgen writes. Gives the target tfdude_fastdds and
+# the function tfdude_generate_idl().
+find_package(fastcdr REQUIRED)
+find_package(fastdds QUIET)
+if(fastdds_FOUND)
+  set(TFDUDE_FASTDDS_MAJOR 3)
+  set(_fastdds_target fastdds)
+else()
+  find_package(fastrtps 2.9 REQUIRED)
+  set(TFDUDE_FASTDDS_MAJOR 2)
+  set(_fastdds_target fastrtps)
+endif()
+add_library(tfdude_fastdds INTERFACE)
+target_link_libraries(tfdude_fastdds INTERFACE ${_fastdds_target} fastcdr)
+target_compile_definitions(tfdude_fastdds INTERFACE TFDUDE_FASTDDS_MAJOR=${TFDUDE_FASTDDS_MAJOR})
+
+find_program(FASTDDSGEN fastddsgen REQUIRED)
+
+# tfdude_generate_idl(target file.idl): generates C++ of an IDL file into the build tree as an object
+# library, whose headers are system headers to whoever links it.
+function(tfdude_generate_idl target idl)
+  get_filename_component(name ${idl} NAME_WE)
+  set(dir ${CMAKE_CURRENT_BINARY_DIR}/generated)
+  file(MAKE_DIRECTORY ${dir})
+  if(TFDUDE_FASTDDS_MAJOR EQUAL 2)
+    set(sources ${dir}/${name}.cxx ${dir}/${name}PubSubTypes.cxx)
+    set(headers ${dir}/${name}.h ${dir}/${name}PubSubTypes.h)
+    set(flags -cs)
+  else()
+    set(sources ${dir}/${name}PubSubTypes.cxx ${dir}/${name}TypeObjectSupport.cxx)
+    set(headers ${dir}/${name}.hpp ${dir}/${name}PubSubTypes.hpp ${dir}/${name}CdrAux.hpp
+                ${dir}/${name}CdrAux.ipp ${dir}/${name}TypeObjectSupport.hpp)
+    set(flags -cs)
+  endif()
+  add_custom_command(
+    OUTPUT ${sources} ${headers}
+    COMMAND ${FASTDDSGEN} ${flags} -replace -d ${dir} ${CMAKE_CURRENT_SOURCE_DIR}/${idl} > ${dir}/fastddsgen.log
+    DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${idl}
+    COMMENT "fastddsgen ${idl}"
+    VERBATIM)
+  add_library(${target} OBJECT ${sources} ${headers})
+  target_include_directories(${target} SYSTEM PUBLIC ${dir})
+  target_link_libraries(${target} PUBLIC tfdude_fastdds)
+  target_compile_options(${target} PRIVATE -w)
+endfunction()

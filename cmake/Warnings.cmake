@@ -1,0 +1,12 @@
+# Warnings and sanitizers for our own code, as an interface target.
+add_library(tfdude_options INTERFACE)
+target_compile_options(tfdude_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wold-style-cast
+  -Wnon-virtual-dtor -Woverloaded-virtual -Werror=return-type -Werror=unused-result)
+if(TFDUDE_WERROR)
+  target_compile_options(tfdude_options INTERFACE -Werror)
+endif()
+if(TFDUDE_SANITIZE)
+  add_compile_options(-fsanitize=${TFDUDE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${TFDUDE_SANITIZE})
+endif()

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <utility>
+
+namespace tfdude {
+
+/// What went wrong, by what a caller can do about it. The numbers travel on the wire: never reuse one.
+enum class Errc : std::uint8_t {
+  kInvalidInput = 1,      ///< a field breaks its rule; the message names the field
+  kUnknownFrame = 2,      ///< no frame of that id
+  kUnknownStart = 3,      ///< lookup: no frame of the first id
+  kUnknownEnd = 4,        ///< lookup: no frame of the second id
+  kUnknownParent = 5,     ///< add, move: no frame of the parent's id
+  kUnknownPartition = 6,  ///< no partition of that name
+  kAlreadyExists = 7,     ///< add: the id is taken
+  kNotConnected = 8,      ///< lookup: the frames have no common root
+  kCycle = 9,             ///< move: the new parent lies below the frame
+  kNotOwner = 10,         ///< the partition asked does not own the edge (any more); healed by a retry
+  kPartitionTaken = 11,   ///< another live daemon serves a partition of this name
+  kUnreachable = 12,      ///< the owner is known to be down
+  kTimeout = 13,          ///< the owner did not answer in time
+  kConfig = 14,           ///< a file (configuration, profile) is missing or broken
+  kTransport = 15,        ///< the transport could not be set up
+};
+
+/// The stable snake_case name of a code, as the command line prints it in JSON.
+[[nodiscard]] std::string_view to_string(Errc code);
+
+/// An error for people: the message names the frame, the partition and the value concerned.
+struct Error {
+  Errc code;
+  std::string message;
+};
+
+template <class T>
+using Result = tl::expected<T, Error>;
+
+/// Builds the failing side of any Result.
+[[nodiscard]] inline tl::unexpected<Error> fail(Errc code, std::string message) {
+  return tl::unexpected<Error>(Error{code, std::move(message)});
+}
+
+/// The same error with the place it happened in put in front: "frame 'arm_1': stddev[2]: ...".
+[[nodiscard]] inline tl::unexpected<Error> fail_at(const std::string& place, const Error& error) {
+  return fail(error.code, place + ": " + error.message);
+}
+
+}  // namespace tfdude

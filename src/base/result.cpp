@@ -1,0 +1,41 @@
+#include "tfdude/base/result.hpp"
+
+namespace tfdude {
+
+std::string_view to_string(Errc code) {
+  switch (code) {
+    case Errc::kInvalidInput:
+      return "invalid_input";
+    case Errc::kUnknownFrame:
+      return "unknown_frame";
+    case Errc::kUnknownStart:
+      return "unknown_start";
+    case Errc::kUnknownEnd:
+      return "unknown_end";
+    case Errc::kUnknownParent:
+      return "unknown_parent";
+    case Errc::kUnknownPartition:
+      return "unknown_partition";
+    case Errc::kAlreadyExists:
+      return "already_exists";
+    case Errc::kNotConnected:
+      return "not_connected";
+    case Errc::kCycle:
+      return "cycle";
+    case Errc::kNotOwner:
+      return "not_owner";
+    case Errc::kPartitionTaken:
+      return "partition_taken";
+    case Errc::kUnreachable:
+      return "unreachable";
+    case Errc::kTimeout:
+      return "timeout";
+    case Errc::kConfig:
+      return "config";
+    case Errc::kTransport:
+      return "transport";
+  }
+  return "unknown";
+}
+
+}  // namespace tfdude

@@ -1,0 +1,195 @@
+#include "tfdude/math/covariance.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace tfdude {
+namespace {
+
+constexpr double kSymmetryTolerance = 1e-9;
+// Smallest eigenvalue allowed of the matrix scaled to a unit diagonal, so that metres and radians of
+// very different size are judged alike.
+constexpr double kPsdTolerance = 1e-9;
+// Pivots above this leave no doubt about the sign of the smallest eigenvalue.
+constexpr double kClearPivot = 1e-7;
+
+std::string element(std::size_t row, std::size_t column) {
+  return "covariance[" + std::to_string(row) + "][" + std::to_string(column) + "]";
+}
+
+// Scales to a unit diagonal, in place. A row of variance zero must be zero all along.
+Result<void> scale_to_unit_diagonal(Matrix6d& m, Twist& scale) {
+  for (int i = 0; i < 6; ++i) scale[i] = m(i, i) > 0 ? 1.0 / std::sqrt(m(i, i)) : 0.0;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      if (i == j || m(i, j) == 0) continue;
+      const bool zero_variance = scale[i] == 0 || scale[j] == 0;
+      const double correlation = m(i, j) * scale[i] * scale[j];
+      if (zero_variance || !(std::abs(correlation) <= 1.0 + kPsdTolerance)) {
+        return fail(Errc::kInvalidInput,
+                    element(static_cast<std::size_t>(i), static_cast<std::size_t>(j)) +
+                        " is larger than its variances allow: not positive semi-definite");
+      }
+    }
+  }
+  m = scale.asDiagonal() * m * scale.asDiagonal();
+  return {};
+}
+
+// True where a Cholesky factorization goes through with clear pivots: the fast answer for most.
+bool clearly_psd(const Matrix6d& unit) {
+  Matrix6d L = unit;
+  for (int k = 0; k < 6; ++k) {
+    if (unit(k, k) == 0) continue;  // a zero row, checked before
+    if (L(k, k) < kClearPivot) return false;
+    for (int i = k + 1; i < 6; ++i) {
+      const double factor = L(i, k) / L(k, k);
+      for (int j = i; j < 6; ++j) L(j, i) -= factor * L(j, k);
+    }
+  }
+  return true;
+}
+
+// The matrix as it is, or with eigenvalues lifted to zero that rounding made negative.
+Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
+  const Matrix6d sigma = Covariance::trusted(upper).matrix();
+  Matrix6d unit = sigma;
+  Twist scale;
+  if (auto ok = scale_to_unit_diagonal(unit, scale); !ok) return tl::unexpected(ok.error());
+  if (clearly_psd(unit)) return upper;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(unit);
+  const double smallest = solver.eigenvalues()[0];
+  if (!(smallest >= -kPsdTolerance)) {
+    return fail(Errc::kInvalidInput, "covariance is not positive semi-definite: the smallest eigenvalue "
+                                     "of its correlation matrix is " +
+                                         std::to_string(smallest));
+  }
+  if (smallest >= 0) return upper;
+  const Twist lifted = solver.eigenvalues().cwiseMax(0.0);
+  const Twist back = scale.unaryExpr([](double s) { return s > 0 ? 1.0 / s : 0.0; });
+  const Matrix6d psd = solver.eigenvectors() * lifted.asDiagonal() * solver.eigenvectors().transpose();
+  return Covariance::trusted(Matrix6d(back.asDiagonal() * psd * back.asDiagonal())).upper();
+}
+
+}  // namespace
+
+Result<Covariance> Covariance::from_matrix(const Matrix6d& matrix) {
+  const double largest = matrix.cwiseAbs().maxCoeff();
+  Upper upper{};
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = i; j < 6; ++j) {
+      const double above = matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      const double below = matrix(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(i));
+      if (std::abs(above - below) > kSymmetryTolerance * largest) {
+        return fail(Errc::kInvalidInput, element(i, j) + " and " + element(j, i) +
+                                             " differ: the covariance is not symmetric");
+      }
+      upper[upper_index(i, j)] = 0.5 * (above + below);
+    }
+  }
+  return from_upper(upper);
+}
+
+Result<Covariance> Covariance::from_upper(const Upper& upper) {
+  bool diagonal = true;
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = i; j < 6; ++j) {
+      const double value = upper[upper_index(i, j)];
+      if (!std::isfinite(value)) {
+        return fail(Errc::kInvalidInput, element(i, j) + " is not a finite number");
+      }
+      if (i == j && value < 0) {
+        return fail(Errc::kInvalidInput, element(i, j) + " is a negative variance");
+      }
+      if (std::abs(value) > kMaxVariance) {
+        return fail(Errc::kInvalidInput, element(i, j) + " is beyond 1e18");
+      }
+      diagonal = diagonal && (i == j || value == 0);
+    }
+  }
+  if (diagonal) return trusted(upper);
+  const auto psd = checked_psd(upper);
+  if (!psd) return tl::unexpected(psd.error());
+  return trusted(*psd);
+}
+
+Result<Covariance> Covariance::from_stddev(const std::array<double, 6>& stddev) {
+  Upper upper{};
+  for (std::size_t i = 0; i < 6; ++i) {
+    const std::string field = "stddev[" + std::to_string(i) + "]";
+    if (!std::isfinite(stddev[i])) return fail(Errc::kInvalidInput, field + " is not a finite number");
+    if (stddev[i] < 0) return fail(Errc::kInvalidInput, field + " is negative");
+    if (stddev[i] > std::sqrt(kMaxVariance)) return fail(Errc::kInvalidInput, field + " is beyond 1e9");
+    upper[upper_index(i, i)] = stddev[i] * stddev[i];
+  }
+  return trusted(upper);
+}
+
+Covariance Covariance::trusted(const Upper& upper) {
+  Covariance sigma;
+  sigma.upper_ = upper;
+  return sigma;
+}
+
+Covariance Covariance::trusted(const Matrix6d& symmetric) {
+  Covariance sigma;
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = i; j < 6; ++j) {
+      sigma.upper_[upper_index(i, j)] =
+          symmetric(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  }
+  return sigma;
+}
+
+Matrix6d Covariance::matrix() const {
+  Matrix6d m;
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = i; j < 6; ++j) {
+      const double value = upper_[upper_index(i, j)];
+      m(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = value;
+      m(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(i)) = value;
+    }
+  }
+  return m;
+}
+
+std::array<double, 6> Covariance::stddev() const {
+  std::array<double, 6> s{};
+  for (std::size_t i = 0; i < 6; ++i) s[i] = std::sqrt(std::max(0.0, upper_[upper_index(i, i)]));
+  return s;
+}
+
+Covariance Covariance::transported(const Pose& X) const {
+  // Σ = [P, C; Cᵀ, Q] turned by R, then sheared by T = [t]×: C += T Q, P += T Cᵀ_old + C_new Tᵀ.
+  using Eigen::Matrix3d;
+  const auto& u = upper_;
+  Matrix3d P;
+  Matrix3d C;
+  Matrix3d Q;
+  P << u[0], u[1], u[2], u[1], u[6], u[7], u[2], u[7], u[11];
+  C << u[3], u[4], u[5], u[8], u[9], u[10], u[12], u[13], u[14];
+  Q << u[15], u[16], u[17], u[16], u[18], u[19], u[17], u[19], u[20];
+  const Matrix3d R = X.rotation().toRotationMatrix();
+  const Matrix3d T = skew(X.translation());
+  P = R * P * R.transpose();
+  C = R * C * R.transpose();
+  Q = R * Q * R.transpose();
+  const Matrix3d C_new = C + T * Q;
+  const Matrix3d P_new = P + T * C.transpose() + C_new * T.transpose();
+  return trusted(Upper{P_new(0, 0), P_new(0, 1), P_new(0, 2), C_new(0, 0), C_new(0, 1), C_new(0, 2),
+                       P_new(1, 1), P_new(1, 2), C_new(1, 0), C_new(1, 1), C_new(1, 2), P_new(2, 2),
+                       C_new(2, 0), C_new(2, 1), C_new(2, 2), Q(0, 0), Q(0, 1), Q(0, 2), Q(1, 1),
+                       Q(1, 2), Q(2, 2)});
+}
+
+Covariance& Covariance::operator+=(const Covariance& other) {
+  for (std::size_t i = 0; i < kSize; ++i) upper_[i] += other.upper_[i];
+  return *this;
+}
+
+Covariance operator+(Covariance a, const Covariance& b) { return a += b; }
+
+}  // namespace tfdude
