@@ -1,0 +1,47 @@
+#include "tree/epoch.hpp"
+
+#include <limits>
+
+namespace tfdude::epoch {
+
+std::atomic<std::uint64_t> current{1};
+
+namespace {
+
+std::atomic<Reader*> all_readers{nullptr};
+
+Reader* take_reader() {
+  for (Reader* r = all_readers.load(std::memory_order_acquire); r != nullptr; r = r->next) {
+    bool expected = false;
+    if (r->taken.compare_exchange_strong(expected, true, std::memory_order_acq_rel)) return r;
+  }
+  auto* r = new Reader;
+  r->next = all_readers.load(std::memory_order_relaxed);
+  while (!all_readers.compare_exchange_weak(r->next, r, std::memory_order_release)) {
+  }
+  return r;
+}
+
+// Hands the reader back when its thread ends.
+struct Lease {
+  Reader* reader = take_reader();
+  ~Lease() { reader->taken.store(false, std::memory_order_release); }
+};
+
+}  // namespace
+
+Reader& this_thread() {
+  thread_local Lease lease;
+  return *lease.reader;
+}
+
+std::uint64_t safe_below() {
+  std::uint64_t oldest = std::numeric_limits<std::uint64_t>::max();
+  for (Reader* r = all_readers.load(std::memory_order_seq_cst); r != nullptr; r = r->next) {
+    const std::uint64_t announced = r->announced.load(std::memory_order_seq_cst);
+    if (announced != 0 && announced < oldest) oldest = announced;
+  }
+  return oldest;
+}
+
+}  // namespace tfdude::epoch

@@ -1,0 +1,221 @@
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+#include "tree/forest_impl.hpp"
+
+namespace tfdude {
+namespace {
+
+tl::unexpected<Error> unknown_start(std::string_view id) {
+  return fail(Errc::kUnknownStart, "no frame " + quoted(id) + " to start from");
+}
+
+tl::unexpected<Error> unknown_end(std::string_view id) {
+  return fail(Errc::kUnknownEnd, "no frame " + quoted(id) + " to end at");
+}
+
+tl::unexpected<Error> not_connected(const Version& a, const Version& b) {
+  return fail(Errc::kNotConnected, "frames " + quoted(a.name->text) + " and " +
+                                       quoted(b.name->text) + " have no common root");
+}
+
+}  // namespace
+
+const Version* Forest::Impl::named(std::string_view id, std::uint64_t commit) const {
+  const Name* name = ids_.find(id);
+  if (name == nullptr) return nullptr;
+  const Version* version = at(name->slot, commit);
+  return version->name == name ? version : nullptr;
+}
+
+const Version* Forest::Impl::of(Handle frame, std::uint64_t commit) const {
+  if (frame.slot >= slots_.size()) return nullptr;
+  const Version* version = at(frame.slot, commit);
+  return version->present() && version->name->generation == frame.generation ? version : nullptr;
+}
+
+Result<Transform> Forest::Impl::walk(const Version* a, const Version* b, std::uint64_t commit,
+                                     Absent absent) const {
+  const Version* const start = a;
+  const Version* const end = b;
+  Climb climb_a;
+  Climb climb_b;
+  while (a != b) {
+    const bool from_a = a->depth >= b->depth;
+    const Version*& here = from_a ? a : b;
+    const bool top = absent == Absent::kEnds ? here->depth == 0 : here->parent == kNoSlot;
+    if (top) return not_connected(*start, *end);
+    if (!here->held()) {
+      return fail(Errc::kNotOwner,
+                  "the edge of " + quoted(here->name->text) + " is held by another partition");
+    }
+    (from_a ? climb_a : climb_b).up(static_cast<const HeldVersion*>(here)->X_PC);
+    here = at(here->parent, commit);
+  }
+  return join(climb_a, climb_b);
+}
+
+FrameInfo Forest::Impl::info_of(const Version& version, std::uint64_t commit) const {
+  FrameInfo info;
+  info.id = version.name->text;
+  info.owner = version.owner;
+  if (version.parent != kNoSlot) {
+    const Version* parent = at(version.parent, commit);
+    info.parent = parent->name->text;
+    info.attached = parent->present();
+  }
+  return info;
+}
+
+Forest::Forest() : impl_(std::make_unique<Impl>()) {}
+Forest::~Forest() = default;
+
+Result<Transform> Forest::lookup(std::string_view a, std::string_view b) const {
+  const epoch::Guard guard;
+  const std::uint64_t commit = impl_->snapshot();
+  const Version* start = impl_->present(a, commit);
+  if (start == nullptr) return unknown_start(a);
+  const Version* end = impl_->present(b, commit);
+  if (end == nullptr) return unknown_end(b);
+  return impl_->walk(start, end, commit, Impl::Absent::kEnds);
+}
+
+Result<Transform> Forest::lookup(Handle a, Handle b) const {
+  const epoch::Guard guard;
+  const std::uint64_t commit = impl_->snapshot();
+  const Version* start = impl_->of(a, commit);
+  if (start == nullptr) return fail(Errc::kUnknownStart, "the first frame was removed");
+  const Version* end = impl_->of(b, commit);
+  if (end == nullptr) return fail(Errc::kUnknownEnd, "the second frame was removed");
+  return impl_->walk(start, end, commit, Impl::Absent::kEnds);
+}
+
+Result<Transform> Forest::lookup_segment(std::string_view from, std::string_view to) const {
+  const epoch::Guard guard;
+  const std::uint64_t commit = impl_->snapshot();
+  const Version* start = impl_->named(from, commit);
+  if (start == nullptr) return unknown_start(from);
+  const Version* end = impl_->named(to, commit);
+  if (end == nullptr) return unknown_end(to);
+  return impl_->walk(start, end, commit, Impl::Absent::kMayPass);
+}
+
+Result<std::vector<Segment>> Forest::segments(std::string_view a, std::string_view b) const {
+  const epoch::Guard guard;
+  const std::uint64_t commit = impl_->snapshot();
+  const Version* start = impl_->present(a, commit);
+  if (start == nullptr) return unknown_start(a);
+  const Version* end = impl_->present(b, commit);
+  if (end == nullptr) return unknown_end(b);
+  const Version* up = start;
+  const Version* down = end;
+  std::vector<Segment> runs;
+  std::vector<const Version*> descent;  // the edges below the common ancestor towards b, from b
+  const auto append = [&runs](const Version& edge, const Version& from, const Version& to) {
+    if (runs.empty() || runs.back().owner != edge.owner) {
+      runs.push_back({edge.owner, from.name->text, {}});
+    }
+    runs.back().to = to.name->text;
+  };
+  while (up != down) {
+    const bool from_a = up->depth >= down->depth;
+    const Version*& here = from_a ? up : down;
+    if (here->depth == 0) return not_connected(*start, *end);
+    const Version* parent = impl_->at(here->parent, commit);
+    if (from_a) {
+      append(*here, *here, *parent);
+    } else {
+      descent.push_back(here);
+    }
+    here = parent;
+  }
+  for (auto edge = descent.rbegin(); edge != descent.rend(); ++edge) {
+    append(**edge, *up, **edge);
+    up = *edge;
+  }
+  return runs;
+}
+
+std::optional<Handle> Forest::find(std::string_view id) const {
+  const epoch::Guard guard;
+  const Version* version = impl_->present(id, impl_->snapshot());
+  if (version == nullptr) return std::nullopt;
+  return Handle{version->slot, version->name->generation};
+}
+
+bool Forest::holds(std::string_view id) const {
+  const epoch::Guard guard;
+  const Version* version = impl_->named(id, impl_->snapshot());
+  return version != nullptr && version->held();
+}
+
+std::optional<FrameInfo> Forest::info(std::string_view id) const {
+  const epoch::Guard guard;
+  const std::uint64_t commit = impl_->snapshot();
+  const Version* version = impl_->present(id, commit);
+  if (version == nullptr) return std::nullopt;
+  return impl_->info_of(*version, commit);
+}
+
+Result<Transform> Forest::value(std::string_view id) const {
+  const epoch::Guard guard;
+  const Version* version = impl_->present(id, impl_->snapshot());
+  if (version == nullptr) return fail(Errc::kUnknownFrame, "no frame " + quoted(id));
+  if (!version->held()) {
+    return fail(Errc::kNotOwner, "frame " + quoted(id) + " is held by another partition");
+  }
+  return static_cast<const HeldVersion*>(version)->X_PC;
+}
+
+std::vector<FrameInfo> Forest::frames() const {
+  const epoch::Guard guard;
+  const std::uint64_t commit = impl_->snapshot();
+  std::vector<FrameInfo> all;
+  for (std::uint32_t slot = 0; slot < impl_->slots_.size(); ++slot) {
+    const Version* version = impl_->at(slot, commit);
+    if (version->present()) all.push_back(impl_->info_of(*version, commit));
+  }
+  return all;
+}
+
+std::vector<FrameInfo> Forest::subtree(std::string_view id) const {
+  const std::lock_guard lock(impl_->mutex_);
+  const epoch::Guard guard;
+  const std::uint64_t commit = impl_->snapshot();
+  const Version* top = impl_->present(id, commit);
+  std::vector<FrameInfo> all;
+  if (top == nullptr) return all;
+  for (const std::uint32_t slot : impl_->graph_.subtree(top->slot, [](auto) { return true; })) {
+    all.push_back(impl_->info_of(impl_->newest(slot), commit));
+  }
+  return all;
+}
+
+Result<std::vector<std::string>> Forest::children(std::string_view id) const {
+  const std::lock_guard lock(impl_->mutex_);
+  const Version* version = impl_->newest_named(id);
+  if (version == nullptr || !version->present()) {
+    return fail(Errc::kUnknownFrame, "no frame " + quoted(id));
+  }
+  std::vector<std::string> ids;
+  impl_->graph_.for_each_child(version->slot, [&](std::uint32_t child) {
+    ids.push_back(impl_->newest(child).name->text);
+  });
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+std::vector<std::string> Forest::roots() const {
+  std::vector<std::string> ids;
+  for (FrameInfo& frame : frames()) {
+    if (!frame.attached) ids.push_back(std::move(frame.id));
+  }
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+std::uint64_t Forest::structure_version() const {
+  return impl_->structure_version_.load(std::memory_order_acquire);
+}
+
+}  // namespace tfdude

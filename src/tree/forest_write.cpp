@@ -1,0 +1,288 @@
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+#include "tree/forest_impl.hpp"
+
+namespace tfdude {
+namespace {
+
+tl::unexpected<Error> unknown_frame(std::string_view id) {
+  return fail(Errc::kUnknownFrame, "no frame " + quoted(id));
+}
+
+}  // namespace
+
+const Version* Forest::Impl::newest_named(std::string_view id) const {
+  const Name* name = ids_.find(id);
+  return name != nullptr ? &newest(name->slot) : nullptr;
+}
+
+Result<std::uint32_t> Forest::Impl::held_slot(std::string_view id) const {
+  const Version* version = newest_named(id);
+  if (version == nullptr || !version->present()) return unknown_frame(id);
+  if (!version->held()) {
+    return fail(Errc::kNotOwner, "frame " + quoted(id) + " is held by another partition");
+  }
+  return version->slot;
+}
+
+Result<void> Forest::Impl::check_no_cycle(std::string_view id, std::string_view parent) const {
+  const Version* top = newest_named(id);
+  const Version* above = parent.empty() ? nullptr : newest_named(parent);
+  while (top != nullptr && above != nullptr && above != top) {
+    above = above->parent == kNoSlot ? nullptr : &newest(above->parent);
+  }
+  if (id == parent || (top != nullptr && above == top)) {
+    return fail(Errc::kCycle, "frame " + quoted(id) + " cannot hang under " + quoted(parent) +
+                                  ", which lies below it");
+  }
+  return {};
+}
+
+std::uint32_t Forest::Impl::intern(std::string_view id) {
+  if (id.empty()) return kNoSlot;
+  if (const Name* known = ids_.find(id)) return known->slot;
+  std::uint32_t slot = 0;
+  if (free_slots_.empty()) {
+    Version* nobody = remote_pool_.take();
+    *nobody = Version{};
+    slot = slots_.append(nobody);
+  } else {
+    slot = free_slots_.back();
+    free_slots_.pop_back();
+  }
+  const Name* name = ids_.insert(id, slot, next_generation_++);
+  push_remote(slot).name = name;
+  return slot;
+}
+
+template <class T>
+T& Forest::Impl::push(VersionPool<T>& pool, std::uint32_t slot) {
+  auto& head = slots_[slot];
+  Version* old = head.load(std::memory_order_relaxed);
+  T* fresh = pool.take();
+  fresh->commit = committed_.load(std::memory_order_relaxed) + 1;
+  fresh->older = old;
+  fresh->name = old->name;
+  fresh->parent = old->parent;
+  fresh->depth = old->depth;
+  fresh->owner = old->owner;
+  fresh->slot = slot;
+  superseded_.push_back(old);
+  // Readers skip the fresh version by its number until commit(), so the rest may be filled in later.
+  head.store(fresh, std::memory_order_release);
+  return *fresh;
+}
+
+HeldVersion& Forest::Impl::push_held(std::uint32_t slot, const Transform& X_PC) {
+  HeldVersion& fresh = push(held_pool_, slot);
+  fresh.owner = kHeldHere;
+  fresh.X_PC = X_PC;
+  return fresh;
+}
+
+Version& Forest::Impl::push_remote(std::uint32_t slot) { return push(remote_pool_, slot); }
+
+void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
+  const std::uint32_t old_parent = fresh.parent;
+  if (old_parent != kNoSlot) graph_.unlink(old_parent, fresh.slot);
+  if (parent != kNoSlot) {
+    graph_.ensure(std::max(parent, fresh.slot));
+    graph_.link(parent, fresh.slot);
+  }
+  fresh.parent = parent;
+  fresh.depth = parent == kNoSlot ? 0 : newest(parent).depth + 1;
+  renew_depths(fresh.slot);
+  if (old_parent != kNoSlot) release_if_unused(old_parent);
+}
+
+void Forest::Impl::make_absent(std::uint32_t slot) {
+  Version& fresh = push_remote(slot);
+  const std::uint32_t parent = fresh.parent;
+  if (parent != kNoSlot) graph_.unlink(parent, slot);
+  fresh.parent = kNoSlot;
+  fresh.depth = Version::kAbsent;
+  renew_depths(slot);
+  if (parent != kNoSlot) release_if_unused(parent);
+  release_if_unused(slot);
+}
+
+void Forest::Impl::renew_depths(std::uint32_t top) {
+  graph_.ensure(top);
+  const auto stale = [this](std::uint32_t child) {
+    const Version& version = newest(child);
+    if (version.depth == newest(version.parent).depth + 1) return false;
+    Version& fresh = version.held()
+                         ? push_held(child, static_cast<const HeldVersion&>(version).X_PC)
+                         : push_remote(child);
+    fresh.depth = newest(version.parent).depth + 1;
+    return true;
+  };
+  (void)graph_.subtree(top, stale);
+}
+
+void Forest::Impl::release_if_unused(std::uint32_t slot) {
+  graph_.ensure(slot);
+  const Version& version = newest(slot);
+  if (version.present() || version.name == nullptr || !graph_.is_leaf(slot)) return;
+  released_names_.push_back(version.name);
+  push_remote(slot).name = nullptr;
+}
+
+void Forest::Impl::commit() {
+  committed_.store(committed_.load(std::memory_order_relaxed) + 1, std::memory_order_seq_cst);
+  const std::uint64_t tag = epoch::retire_tag();
+  for (Version* version : superseded_) {
+    if (version->held()) {
+      held_pool_.retire(version, tag);
+    } else {
+      remote_pool_.retire(version, tag);
+    }
+  }
+  superseded_.clear();
+  // Only now: a reader of the commit before may still reach a name through the version it sees.
+  for (const Name* name : released_names_) {
+    free_slots_.push_back(name->slot);
+    ids_.erase(name);
+  }
+  released_names_.clear();
+  if (held_pool_.waiting() + remote_pool_.waiting() > kCollectAt) collect();
+}
+
+void Forest::Impl::commit_structure() {
+  commit();
+  structure_version_.fetch_add(1, std::memory_order_release);
+}
+
+void Forest::Impl::collect() {
+  const std::uint64_t below = epoch::safe_below();
+  held_pool_.collect(below);
+  remote_pool_.collect(below);
+  ids_.collect(below);
+}
+
+Result<void> Forest::add(std::string_view id, std::string_view parent, const Transform& X_PC,
+                         MissingParent rule) {
+  if (auto ok = check_id(id, "id"); !ok) return ok;
+  if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
+  const std::lock_guard lock(impl_->mutex_);
+  const Version* there = impl_->newest_named(id);
+  if (there != nullptr && there->present()) {
+    return fail(Errc::kAlreadyExists, "frame " + quoted(id) + " exists already");
+  }
+  if (!parent.empty() && rule == MissingParent::kRefuse) {
+    const Version* above = impl_->newest_named(parent);
+    if (above == nullptr || !above->present()) {
+      return fail(Errc::kUnknownParent,
+                  "no frame " + quoted(parent) + " to be the parent of " + quoted(id));
+    }
+  }
+  if (auto ok = impl_->check_no_cycle(id, parent); !ok) return ok;
+  const std::uint32_t slot = impl_->intern(id);
+  const std::uint32_t parent_slot = impl_->intern(parent);
+  impl_->relink(impl_->push_held(slot, X_PC), parent_slot);
+  impl_->commit_structure();
+  return {};
+}
+
+Result<std::vector<std::string>> Forest::remove(std::string_view id) {
+  const std::lock_guard lock(impl_->mutex_);
+  const auto top = impl_->held_slot(id);
+  if (!top) return tl::unexpected(top.error());
+  impl_->graph_.ensure(*top);
+  const auto slots = impl_->graph_.subtree(
+      *top, [&](std::uint32_t child) { return impl_->newest(child).held(); });
+  std::vector<std::string> removed;
+  removed.reserve(slots.size());
+  for (const std::uint32_t slot : slots) removed.push_back(impl_->newest(slot).name->text);
+  for (auto slot = slots.rbegin(); slot != slots.rend(); ++slot) impl_->make_absent(*slot);
+  impl_->commit_structure();
+  return removed;
+}
+
+Result<void> Forest::update(std::string_view id, const Transform& X_PC) {
+  const std::lock_guard lock(impl_->mutex_);
+  const auto slot = impl_->held_slot(id);
+  if (!slot) return tl::unexpected(slot.error());
+  impl_->push_held(*slot, X_PC);
+  impl_->commit();
+  return {};
+}
+
+Result<void> Forest::update(Handle frame, const Transform& X_PC) {
+  const std::lock_guard lock(impl_->mutex_);
+  const Version* version =
+      frame.slot < impl_->slots_.size() ? &impl_->newest(frame.slot) : nullptr;
+  if (version == nullptr || !version->present() || version->name->generation != frame.generation) {
+    return fail(Errc::kUnknownFrame, "the frame of this handle was removed");
+  }
+  if (!version->held()) {
+    return fail(Errc::kNotOwner,
+                "frame " + quoted(version->name->text) + " is held by another partition");
+  }
+  impl_->push_held(frame.slot, X_PC);
+  impl_->commit();
+  return {};
+}
+
+Result<void> Forest::update(const std::vector<EdgeUpdate>& edges) {
+  const std::lock_guard lock(impl_->mutex_);
+  for (const EdgeUpdate& edge : edges) {
+    if (const auto slot = impl_->held_slot(edge.id); !slot) return tl::unexpected(slot.error());
+  }
+  for (const EdgeUpdate& edge : edges) impl_->push_held(*impl_->held_slot(edge.id), edge.X_PC);
+  impl_->commit();
+  return {};
+}
+
+Result<void> Forest::move(std::string_view id, std::string_view parent,
+                          const std::optional<Transform>& X_PC) {
+  if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
+  const std::lock_guard lock(impl_->mutex_);
+  const auto slot = impl_->held_slot(id);
+  if (!slot) return tl::unexpected(slot.error());
+  if (!parent.empty()) {
+    const Version* above = impl_->newest_named(parent);
+    if (above == nullptr || !above->present()) {
+      return fail(Errc::kUnknownParent,
+                  "no frame " + quoted(parent) + " to be the parent of " + quoted(id));
+    }
+  }
+  if (auto ok = impl_->check_no_cycle(id, parent); !ok) return ok;
+  const std::uint32_t parent_slot = impl_->intern(parent);
+  const auto& old = static_cast<const HeldVersion&>(impl_->newest(*slot));
+  impl_->relink(impl_->push_held(*slot, X_PC.value_or(old.X_PC)), parent_slot);
+  impl_->commit_structure();
+  return {};
+}
+
+Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Owner owner) {
+  if (auto ok = check_id(id, "id"); !ok) return ok;
+  if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
+  const std::lock_guard lock(impl_->mutex_);
+  const Version* there = impl_->newest_named(id);
+  if (there != nullptr && there->held()) {
+    return fail(Errc::kAlreadyExists, "frame " + quoted(id) + " is held here");
+  }
+  const auto acyclic = impl_->check_no_cycle(id, parent);
+  const std::uint32_t slot = impl_->intern(id);
+  const std::uint32_t parent_slot = acyclic ? impl_->intern(parent) : kNoSlot;
+  const Version& old = impl_->newest(slot);
+  if (!old.present() || old.owner != owner || old.parent != parent_slot) {
+    Version& fresh = impl_->push_remote(slot);
+    fresh.owner = owner;
+    impl_->relink(fresh, parent_slot);
+    impl_->commit_structure();
+  }
+  return acyclic;
+}
+
+void Forest::drop_remote(std::string_view id, Owner owner) {
+  const std::lock_guard lock(impl_->mutex_);
+  const Version* there = impl_->newest_named(id);
+  if (there == nullptr || !there->present() || there->owner != owner || owner == kHeldHere) return;
+  impl_->make_absent(there->slot);
+  impl_->commit_structure();
+}
+
+}  // namespace tfdude

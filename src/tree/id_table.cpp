@@ -1,0 +1,90 @@
+#include "tree/id_table.hpp"
+
+#include <algorithm>
+#include <functional>
+
+#include "tree/epoch.hpp"
+
+namespace tfdude {
+namespace {
+
+// Stands where a name was, so that probing goes on past it.
+const Name kTombstone;
+
+std::size_t hash_of(std::string_view id) { return std::hash<std::string_view>{}(id); }
+
+}  // namespace
+
+IdTable::IdTable() : table_(new Table(64)) {}
+
+IdTable::~IdTable() {
+  Table* table = table_.load(std::memory_order_relaxed);
+  for (auto& cell : table->cells) {
+    const Name* name = cell.load(std::memory_order_relaxed);
+    if (name != &kTombstone) delete name;
+  }
+  delete table;
+}
+
+const Name* IdTable::find(std::string_view id) const {
+  const std::size_t hash = hash_of(id);
+  const Table& table = *table_.load(std::memory_order_seq_cst);
+  for (std::size_t i = hash & table.mask;; i = (i + 1) & table.mask) {
+    const Name* name = table.cells[i].load(std::memory_order_seq_cst);
+    if (name == nullptr) return nullptr;
+    if (name != &kTombstone && name->hash == hash && name->text == id) return name;
+  }
+}
+
+const Name* IdTable::insert(std::string_view id, std::uint32_t slot, std::uint32_t generation) {
+  Table* table = table_.load(std::memory_order_relaxed);
+  if ((used_ + 1) * 3 > table->cells.size() * 2) {
+    grow();
+    table = table_.load(std::memory_order_relaxed);
+  }
+  const auto* name = new Name{std::string(id), hash_of(id), slot, generation};
+  place(*table, name);
+  ++names_;
+  ++used_;
+  return name;
+}
+
+void IdTable::erase(const Name* name) {
+  Table& table = *table_.load(std::memory_order_relaxed);
+  for (std::size_t i = name->hash & table.mask;; i = (i + 1) & table.mask) {
+    if (table.cells[i].load(std::memory_order_relaxed) != name) continue;
+    table.cells[i].store(&kTombstone, std::memory_order_seq_cst);
+    break;
+  }
+  --names_;
+  limbo_.push_back({epoch::retire_tag(), std::unique_ptr<const Name>(name), nullptr});
+}
+
+void IdTable::collect(std::uint64_t safe_below) {
+  const auto first_kept =
+      std::find_if(limbo_.begin(), limbo_.end(), [&](const Limbo& l) { return l.tag >= safe_below; });
+  limbo_.erase(limbo_.begin(), first_kept);
+}
+
+void IdTable::grow() {
+  // Sized by what lives, so that a table full of tombstones is cleaned rather than doubled.
+  std::size_t capacity = 64;
+  while (capacity < (names_ + 1) * 3) capacity *= 2;
+  auto fresh = std::make_unique<Table>(capacity);
+  Table* old = table_.load(std::memory_order_relaxed);
+  for (auto& cell : old->cells) {
+    const Name* name = cell.load(std::memory_order_relaxed);
+    if (name != nullptr && name != &kTombstone) place(*fresh, name);
+  }
+  used_ = names_;
+  table_.store(fresh.release(), std::memory_order_seq_cst);
+  limbo_.push_back({epoch::retire_tag(), nullptr, std::unique_ptr<Table>(old)});
+}
+
+void IdTable::place(Table& table, const Name* name) {
+  std::size_t i = name->hash & table.mask;
+  while (table.cells[i].load(std::memory_order_relaxed) != nullptr) i = (i + 1) & table.mask;
+  table.cells[i].store(name, std::memory_order_release);
+}
+
+}  // namespace tfdude

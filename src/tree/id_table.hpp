@@ -1,0 +1,61 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tfdude {
+
+/// An interned id and the slot it stands for. Immutable once it is in the table.
+struct Name {
+  std::string text;
+  std::size_t hash = 0;
+  std::uint32_t slot = 0;
+  std::uint32_t generation = 0;
+};
+
+/// Id to Name: open addressing, found without a lock under an epoch::Guard, changed by one writer at a
+/// time. What a change makes unreachable waits in limbo until no reader can see it.
+class IdTable {
+ public:
+  IdTable();
+  ~IdTable();
+  IdTable(const IdTable&) = delete;
+  IdTable& operator=(const IdTable&) = delete;
+
+  [[nodiscard]] const Name* find(std::string_view id) const;
+
+  /// The id must not be in the table.
+  const Name* insert(std::string_view id, std::uint32_t slot, std::uint32_t generation);
+
+  /// The name must be in the table.
+  void erase(const Name* name);
+
+  /// Frees what no reader can see any more.
+  void collect(std::uint64_t safe_below);
+
+ private:
+  struct Table {
+    explicit Table(std::size_t capacity) : mask(capacity - 1), cells(capacity) {}
+    std::size_t mask;
+    std::vector<std::atomic<const Name*>> cells;
+  };
+  struct Limbo {
+    std::uint64_t tag;
+    std::unique_ptr<const Name> name;
+    std::unique_ptr<Table> table;
+  };
+
+  void grow();
+  static void place(Table& table, const Name* name);
+
+  std::atomic<Table*> table_;
+  std::size_t names_ = 0;
+  std::size_t used_ = 0;  // names and tombstones
+  std::vector<Limbo> limbo_;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,139 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "tfdude/math/transform.hpp"
+#include "tfdude/tree/forest.hpp"
+#include "tree/epoch.hpp"
+#include "tree/id_table.hpp"
+
+namespace tfdude {
+
+inline constexpr std::uint32_t kNoSlot = 0xFFFFFFFF;
+
+/// What one commit says of the frame in one slot. Immutable once its commit is visible.
+struct Version {
+  std::uint64_t commit = 0;
+  Version* older = nullptr;
+  const Name* name = nullptr;  // null: the slot stands for no id
+  std::uint32_t parent = kNoSlot;
+  std::int32_t depth = kAbsent;  // parent's + 1, so 0 where there is none or it is absent
+  Owner owner = kHeldHere;
+  std::uint32_t slot = kNoSlot;
+  // Bookkeeping of the pool, not for readers.
+  std::uint64_t retire_tag = 0;
+  Version* next = nullptr;
+
+  /// The depth of a slot whose name others give as their parent, while no such frame is there.
+  static constexpr std::int32_t kAbsent = -1;
+
+  [[nodiscard]] bool present() const { return depth != kAbsent; }
+  /// Whether this is a HeldVersion.
+  [[nodiscard]] bool held() const { return present() && owner == kHeldHere; }
+};
+
+/// A version of an edge whose value is held here.
+struct HeldVersion : Version {
+  Transform X_PC;
+};
+
+/// Blocks of one version type, reused in the order in which readers let go of them. One writer at a time.
+template <class T>
+class VersionPool {
+ public:
+  T* take() {
+    if (free_ == nullptr) grow();
+    Version* taken = free_;
+    free_ = taken->next;
+    return static_cast<T*>(taken);
+  }
+
+  /// Queues what a commit superseded; `tag` from epoch::retire_tag().
+  void retire(Version* version, std::uint64_t tag) {
+    version->retire_tag = tag;
+    version->next = nullptr;
+    (last_ != nullptr ? last_->next : first_) = version;
+    last_ = version;
+    ++waiting_;
+  }
+
+  void collect(std::uint64_t safe_below) {
+    while (first_ != nullptr && first_->retire_tag < safe_below) {
+      Version* version = first_;
+      first_ = version->next;
+      if (first_ == nullptr) last_ = nullptr;
+      version->next = free_;
+      free_ = version;
+      --waiting_;
+    }
+  }
+
+  [[nodiscard]] std::size_t waiting() const { return waiting_; }
+
+ private:
+  static constexpr std::size_t kBlock = 64;
+
+  void grow() {
+    blocks_.push_back(std::make_unique<std::array<T, kBlock>>());
+    for (T& version : *blocks_.back()) {
+      version.next = free_;
+      free_ = &version;
+    }
+  }
+
+  std::vector<std::unique_ptr<std::array<T, kBlock>>> blocks_;
+  Version* free_ = nullptr;
+  Version* first_ = nullptr;
+  Version* last_ = nullptr;
+  std::size_t waiting_ = 0;
+};
+
+/// The newest version of each slot. Grows without moving what readers look at: segment k holds
+/// 1024 · 2^k slots.
+class SlotArray {
+ public:
+  SlotArray() = default;
+  ~SlotArray() {
+    for (auto& segment : segments_) delete[] segment.load(std::memory_order_relaxed);
+  }
+  SlotArray(const SlotArray&) = delete;
+  SlotArray& operator=(const SlotArray&) = delete;
+
+  using Head = std::atomic<Version*>;
+
+  [[nodiscard]] Head& operator[](std::uint32_t slot) const {
+    const std::uint32_t biased = slot + kFirst;
+    const int segment = 31 - __builtin_clz(biased) - kFirstBits;
+    Head* heads = segments_[static_cast<std::size_t>(segment)].load(std::memory_order_acquire);
+    return heads[biased - (kFirst << segment)];
+  }
+
+  [[nodiscard]] std::uint32_t size() const { return size_.load(std::memory_order_acquire); }
+
+  /// The next slot, `first` its first version; one writer at a time.
+  std::uint32_t append(Version* first) {
+    const std::uint32_t slot = size_.load(std::memory_order_relaxed);
+    const std::uint32_t biased = slot + kFirst;
+    const int segment = 31 - __builtin_clz(biased) - kFirstBits;
+    auto& memory = segments_[static_cast<std::size_t>(segment)];
+    if (memory.load(std::memory_order_relaxed) == nullptr) {
+      memory.store(new Head[kFirst << segment](), std::memory_order_release);
+    }
+    first->slot = slot;
+    (*this)[slot].store(first, std::memory_order_release);
+    size_.store(slot + 1, std::memory_order_release);
+    return slot;
+  }
+
+ private:
+  static constexpr int kFirstBits = 10;
+  static constexpr std::uint32_t kFirst = 1U << kFirstBits;
+  std::array<std::atomic<Head*>, 22> segments_{};
+  std::atomic<std::uint32_t> size_{0};
+};
+
+}  // namespace tfdude
