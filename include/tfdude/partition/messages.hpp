@@ -1,0 +1,99 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "tfdude/base/result.hpp"
+#include "tfdude/math/transform.hpp"
+#include "tfdude/tree/forest.hpp"
+
+// What participants say to each other, free of any transport. idl/tfdude.idl has the same on the wire.
+namespace tfdude {
+
+/// Who speaks: given by the transport, unique in a domain, new at every start.
+using PeerId = std::array<std::uint8_t, 12>;
+
+struct AddRequest {
+  std::string parent;  ///< empty: a root
+  Transform X_PC;
+};
+
+/// Removes frames with all that the asked partition owns below them.
+struct RemoveRequest {
+  std::vector<std::string> tops;
+};
+
+struct UpdateRequest {
+  std::vector<EdgeUpdate> edges;  ///< at least one
+};
+
+struct MoveRequest {
+  std::string parent;             ///< empty: becomes a root
+  std::optional<Transform> X_PC;  ///< kept where absent
+};
+
+struct PathEnds {
+  std::string from;
+  std::string to;
+};
+
+struct LookupRequest {
+  std::vector<PathEnds> segments;  ///< at least one
+};
+
+/// A request to one partition.
+struct Request {
+  /// Counts the requests of one peer; a repeated number is answered again but not applied again.
+  std::uint32_t sequence = 0;
+  /// The frame concerned, by which a reader filters: one that the partition owns, or the new one of an add.
+  std::string id;
+  std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest> body;
+};
+
+struct Done {};
+
+struct Reply {
+  std::uint32_t sequence = 0;
+  /// The partition's structure after the request; a directory that has this epoch shows its effect.
+  std::uint64_t epoch = 0;
+  /// Done, or why not, or one transform a segment.
+  std::variant<Done, Error, std::vector<Transform>> body;
+};
+
+/// Edge values streamed without a reply; applied as one commit by each owner of some of them.
+struct Update {
+  std::vector<EdgeUpdate> edges;
+};
+
+struct PageEntry {
+  std::string id;
+  std::string parent;  ///< empty: a root
+};
+
+/// A piece of a partition's structure. Each page is replaced as a whole, so that a frame costs its page
+/// and not the directory, and a late joiner reads pages and not frames.
+struct Page {
+  std::string partition;
+  std::uint32_t number = 0;
+  std::uint64_t incarnation = 0;
+  /// Once this page has come, all of the partition's structure up to this epoch has.
+  std::uint64_t epoch = 0;
+  std::vector<PageEntry> entries;
+};
+
+/// That a partition is served, and by whom. Its writer's liveliness is the partition's.
+struct Presence {
+  std::string partition;
+  /// When its process took the name [ns since the UNIX epoch]; the later is the newer.
+  std::uint64_t incarnation = 0;
+  std::string host;
+  std::uint32_t pid = 0;
+  std::uint32_t pages = 0;  ///< how many pages its structure has
+  bool serving = false;     ///< false: the name is only being claimed yet
+};
+
+}  // namespace tfdude

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tfdude/partition/directory.hpp"
+#include "tfdude/partition/messages.hpp"
+#include "tfdude/tree/forest.hpp"
+
+// Who must be asked what: an operation as one part for each partition that it concerns, all of which may
+// be asked at the same time. Everything is answered from the caller's directory, without sending.
+// All errors are those that no request needs to find out; kUnreachable names the partition.
+namespace tfdude {
+
+/// One partition's part of an operation.
+struct Part {
+  Owner owner = kHeldHere;
+  Request request;  ///< without a sequence number
+};
+
+/// A lookup: the parts, and where the answers stand on the path.
+struct LookupPlan {
+  std::vector<Segment> segments;  ///< in the order of the path; empty where it begins where it ends
+  std::vector<Part> parts;        ///< each with its owner's segments in the order of the path
+};
+
+/// @param partition  the new frame's owner; empty: that of its parent
+/// @return kAlreadyExists, kUnknownParent, kUnknownPartition, kInvalidInput, kUnreachable.
+[[nodiscard]] Result<Part> route_add(const Forest& forest, const Directory& directory,
+                                     const std::string& id, const AddRequest& request,
+                                     const std::string& partition);
+
+/// The frame and all below it, each partition told of those subtrees that it owns. The first part is
+/// that of the frame itself.
+/// @return kUnknownFrame, kUnreachable.
+[[nodiscard]] Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& directory,
+                                                     const std::string& id);
+
+/// @return kUnknownFrame, kUnreachable.
+[[nodiscard]] Result<std::vector<Part>> route_update(const Forest& forest, const Directory& directory,
+                                                     const std::vector<EdgeUpdate>& edges);
+
+/// @return kUnknownFrame, kUnknownParent, kCycle, kUnreachable.
+[[nodiscard]] Result<Part> route_move(const Forest& forest, const Directory& directory,
+                                      const std::string& id, const MoveRequest& request);
+
+/// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable.
+[[nodiscard]] Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory,
+                                              const std::string& a, const std::string& b);
+
+/// X_AB of the answers to a plan's parts (same order); identity where the plan has none.
+/// @return kNotOwner where an answer has not as many transforms as it was asked for.
+[[nodiscard]] Result<Transform> assemble(const LookupPlan& plan,
+                                         const std::vector<std::vector<Transform>>& answers);
+
+}  // namespace tfdude
