@@ -1,0 +1,154 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tfdude/base/result.hpp"
+#include "tfdude/base/time.hpp"
+#include "tfdude/partition/directory.hpp"
+#include "tfdude/partition/partition.hpp"
+#include "tfdude/transport/transport.hpp"
+#include "tfdude/tree/forest.hpp"
+
+namespace tfdude {
+
+/// How a participant joins.
+struct Options {
+  std::uint32_t domain = 0;  ///< DDS domain: participants of different domains do not meet; 0 to 232
+  std::string profile;       ///< XML file of DDS profiles; empty: the built-in ones
+  Milliseconds timeout{1000};  ///< how long a call waits for the partitions that it asks
+  /// How long a new participant looks round at most before it says that a frame is not there. It waits
+  /// this long only where it meets nobody or somebody is slow to tell what it owns.
+  Milliseconds discovery{1000};
+};
+
+/// A frame and where it stands.
+struct Frame {
+  std::string id;
+  std::string parent;     ///< empty: a root
+  std::string partition;  ///< the owner
+  bool attached = false;  ///< its parent is there
+};
+
+/// One partition's share of a path.
+struct PathSegment {
+  std::string partition;
+  std::string from;
+  std::string to;
+};
+
+class Participant;
+
+/// A process's access to all frames of a domain. See Node for a process that owns frames.
+///
+/// Frames are found in this process's replica of the structure, so that what is not there is known
+/// without asking; requests go straight to the owners.
+///
+/// @par Thread safety  All functions may be called from any thread; each waits for its own answer only.
+/// @par Errors  Every function may also fail with kUnreachable (a partition concerned is known to be
+///   down), kTimeout (one did not answer in time, named in the message) or kNotOwner (the structure kept
+///   changing while asked); those are left out below.
+class Client {
+ public:
+  /// Joins a domain over DDS; does not wait for anybody.
+  /// @return kConfig (profile), kTransport, kInvalidInput (domain).
+  [[nodiscard]] static Result<Client> open(const Options& options = {});
+
+  /// Joins over any transport.
+  [[nodiscard]] static Result<Client> open(std::unique_ptr<Transport> transport,
+                                           const Options& options = {});
+
+  Client(Client&&) noexcept;
+  Client& operator=(Client&&) noexcept;
+  ~Client();
+
+  /// Adds a frame; an empty parent makes a root.
+  /// @param partition  its owner; empty: its parent's (or, on a Node without a parent, this node's)
+  /// @return kAlreadyExists, kUnknownParent, kUnknownPartition, kInvalidInput.
+  [[nodiscard]] Result<void> add(const std::string& id, const std::string& parent,
+                                 const Transform& X_PC, const std::string& partition = {});
+
+  /// Removes a frame and all below it, whoever owns them; all partitions concerned are told at once.
+  /// Where a partition does not answer, the others' frames are removed none the less.
+  /// @return kUnknownFrame.
+  [[nodiscard]] Result<void> remove(const std::string& id);
+
+  /// Gives the edge from a frame's parent to the frame a new value, acknowledged by its owner. On a Node an
+  /// own edge costs no network, no lock that readers know, no allocation.
+  /// @return kUnknownFrame.
+  [[nodiscard]] Result<void> update(const std::string& id, const Transform& X_PC);
+  [[nodiscard]] Result<void> update(Handle frame, const Transform& X_PC);
+
+  /// Many edges: each owner applies its share as one, so that nobody sees half of it.
+  [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
+
+  /// Streams new edge values to their owners, unacknowledged: the path for joints at 1 kHz and more. A
+  /// share that an owner cannot take in time may be lost, never torn.
+  /// @return kUnknownFrame.
+  [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges);
+
+  /// Hangs a frame with all below it under a new parent (empty: makes it a root); it stays its owner's.
+  /// @param X_PC  the new edge's value; where absent, the old edge's is kept
+  /// @return kUnknownFrame, kUnknownParent, kCycle.
+  [[nodiscard]] Result<void> move(const std::string& id, const std::string& parent,
+                                  const std::optional<Transform>& X_PC = std::nullopt);
+
+  /// X_AB, the pose of frame b in frame a, with the covariance of its right perturbation, expressed in b.
+  /// Edges are taken as independent; first order. On a Node a path of own edges costs no network, no lock
+  /// and no allocation; else one round trip, whatever the number of partitions on the path.
+  /// @return kUnknownStart, kUnknownEnd, kNotConnected.
+  [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b);
+  [[nodiscard]] Result<Transform> lookup(Handle a, Handle b);
+
+  /// Finds a frame once, for calls that then need no hashing. @return kUnknownFrame.
+  [[nodiscard]] Result<Handle> find(std::string_view id);
+
+  /// Which partitions a lookup asks, in the order of the path; empty where a is b.
+  /// @return kUnknownStart, kUnknownEnd, kNotConnected.
+  [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b);
+
+  /// Empty for a root. @return kUnknownFrame.
+  [[nodiscard]] Result<std::string> parent(const std::string& id);
+  /// Sorted. @return kUnknownFrame.
+  [[nodiscard]] Result<std::vector<std::string>> children(const std::string& id);
+  /// Frames without a parent that is there; sorted.
+  [[nodiscard]] std::vector<std::string> roots();
+  [[nodiscard]] bool exists(const std::string& id);
+  /// All frames, sorted by id.
+  [[nodiscard]] std::vector<Frame> frames();
+  /// All partitions, also those that are not reachable now; sorted by name.
+  [[nodiscard]] std::vector<PartitionInfo> partitions();
+
+ protected:
+  explicit Client(std::unique_ptr<Participant> participant);
+  std::unique_ptr<Participant> participant_;
+};
+
+/// A process that owns a partition of the frames and serves it to others, from its own threads; the rest
+/// as for Client.
+class Node : public Client {
+ public:
+  /// Joins a domain over DDS, makes sure that nobody serves the partition, takes the frames (in any order;
+  /// parents may be missing yet or belong to others) and serves them.
+  /// @return kPartitionTaken (naming host and process), the first bad frame's error, as Client::open.
+  [[nodiscard]] static Result<Node> open(const std::string& partition,
+                                         const std::vector<FrameSpec>& frames = {},
+                                         const Options& options = {});
+
+  /// Joins over any transport.
+  [[nodiscard]] static Result<Node> open(std::unique_ptr<Transport> transport,
+                                         const std::string& partition,
+                                         const std::vector<FrameSpec>& frames = {},
+                                         const Options& options = {});
+
+  [[nodiscard]] const std::string& partition() const;
+
+ private:
+  using Client::Client;
+};
+
+}  // namespace tfdude
