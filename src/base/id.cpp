@@ -37,17 +37,17 @@ Result<void> check_id(std::string_view id, std::string_view what) {
   const std::string field(what);
   if (id.empty()) return fail(Errc::kInvalidInput, field + " is empty");
   if (id.size() > kMaxIdBytes) {
-    return fail(Errc::kInvalidInput, field + " " + quoted(id.substr(0, 40)) + "... has " +
+    return fail(Errc::kInvalidInput, field + " " + quote(id.substr(0, 40)) + "... has " +
                                          std::to_string(id.size()) + " bytes, at most " +
                                          std::to_string(kMaxIdBytes) + " are allowed");
   }
   for (std::size_t i = 0; i < id.size();) {
     const CodePoint point = decode(id.substr(i));
     if (point.bytes == 0) {
-      return fail(Errc::kInvalidInput, field + " " + quoted(id) + " is not valid UTF-8");
+      return fail(Errc::kInvalidInput, field + " " + quote(id) + " is not valid UTF-8");
     }
     if (is_control(point.value)) {
-      return fail(Errc::kInvalidInput, field + " " + quoted(id) + " holds a control character");
+      return fail(Errc::kInvalidInput, field + " " + quote(id) + " holds a control character");
     }
     i += point.bytes;
   }
@@ -58,12 +58,12 @@ Result<void> check_partition_name(std::string_view name) {
   if (auto ok = check_id(name, "partition"); !ok) return ok;
   if (const auto at = name.find_first_of("*?[],"); at != std::string_view::npos) {
     return fail(Errc::kInvalidInput,
-                "partition " + quoted(name) + " holds '" + name[at] + "', which DDS gives a meaning");
+                "partition " + quote(name) + " holds '" + name[at] + "', which DDS gives a meaning");
   }
   return {};
 }
 
-std::string quoted(std::string_view text) {
+std::string quote(std::string_view text) {
   std::string out = "'";
   for (std::size_t i = 0; i < text.size();) {
     const CodePoint point = decode(text.substr(i));

@@ -68,13 +68,14 @@ void Directory::apply(const Page& page) {
   partition.epoch = std::max(partition.epoch, page.epoch);
 }
 
-void Directory::lost(std::string_view partition, std::uint64_t incarnation, Time now) {
+bool Directory::lost(std::string_view partition, std::uint64_t incarnation, Time now) {
   const auto number = owner(partition);
-  if (!number || *number == kHeldHere) return;
+  if (!number || *number == kHeldHere) return false;
   Known& gone = partitions_[*number];
-  if (gone.incarnation != incarnation || !gone.info.reachable) return;
+  if (gone.incarnation != incarnation || !gone.info.reachable) return false;
   gone.info.reachable = false;
   gone.info.since = now;
+  return true;
 }
 
 void Directory::claim(const PageEntry& entry, Owner owner) {

@@ -35,15 +35,21 @@ Result<void> Partition::load(const std::vector<FrameSpec>& frames) {
 }
 
 Reply Partition::answer(const PeerId& peer, const Request& request) {
+  if (std::holds_alternative<LookupRequest>(request.body)) return answer(request);
+  if (auto before = replies_.find(peer, request.sequence)) return *std::move(before);
+  Reply reply = answer(request);
+  replies_.put(peer, reply);
+  return reply;
+}
+
+Reply Partition::answer(const Request& request) {
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
     return answer_lookup(request.sequence, *lookup);
   }
-  if (auto before = replies_.find(peer, request.sequence)) return *std::move(before);
   Reply reply;
   reply.sequence = request.sequence;
   if (auto done = apply(request); !done) reply.body = std::move(done.error());
   reply.epoch = pages_.epoch();
-  replies_.put(peer, reply);
   return reply;
 }
 
@@ -56,8 +62,8 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
     const auto X = forest_.lookup_segment(segment.from, segment.to);
     if (!X) {
       // Whatever is missing, the caller's picture of the structure is not (or no longer) the owner's.
-      reply.body = Error{Errc::kNotOwner, "partition " + quoted(name_) + " does not own the path from " +
-                                              quoted(segment.from) + " to " + quoted(segment.to) +
+      reply.body = Error{Errc::kNotOwner, "partition " + quote(name_) + " does not own the path from " +
+                                              quote(segment.from) + " to " + quote(segment.to) +
                                               ": " + X.error().message};
       return reply;
     }
@@ -134,7 +140,7 @@ std::size_t Partition::apply(const Update& update) {
 Error Partition::at_home(Error error, std::string_view id) const {
   if (error.code != Errc::kUnknownFrame && error.code != Errc::kNotOwner) return error;
   return {Errc::kNotOwner,
-          "partition " + quoted(name_) + " does not own frame " + quoted(id) + " (any more)"};
+          "partition " + quote(name_) + " does not own frame " + quote(id) + " (any more)"};
 }
 
 }  // namespace tfdude

@@ -8,7 +8,7 @@ namespace tfdude {
 namespace {
 
 tl::unexpected<Error> unknown_frame(std::string_view id) {
-  return fail(Errc::kUnknownFrame, "no frame " + quoted(id));
+  return fail(Errc::kUnknownFrame, "no frame " + quote(id));
 }
 
 Result<void> check_reachable(const Directory& directory, Owner owner) {
@@ -16,17 +16,17 @@ Result<void> check_reachable(const Directory& directory, Owner owner) {
   const PartitionInfo& info = directory.info(owner);
   const auto since = std::chrono::duration_cast<std::chrono::milliseconds>(info.since.time_since_epoch());
   return fail(Errc::kUnreachable,
-              "partition " + quoted(info.name) + " (host " + info.host + ", pid " +
+              "partition " + quote(info.name) + " (host " + info.host + ", pid " +
                   std::to_string(info.pid) + ") is not reachable since " +
                   std::to_string(since.count() / 1000) + "." +
                   std::to_string(1000 + since.count() % 1000).substr(1) + " s of the UNIX epoch");
 }
 
-Part& part_of(std::vector<Part>& parts, Owner owner) {
+Part& part_of(std::vector<Part>& parts, const Directory& directory, Owner owner) {
   const auto known = std::find_if(parts.begin(), parts.end(),
                                   [owner](const Part& part) { return part.owner == owner; });
   if (known != parts.end()) return *known;
-  parts.push_back({owner, {}});
+  parts.push_back({owner, directory.name(owner), {}});
   return parts.back();
 }
 
@@ -42,23 +42,23 @@ Result<void> check_all_reachable(const Directory& directory, const std::vector<P
 Result<Part> route_add(const Forest& forest, const Directory& directory, const std::string& id,
                        const AddRequest& request, const std::string& partition) {
   if (auto ok = check_id(id, "id"); !ok) return tl::unexpected(ok.error());
-  if (forest.exists(id)) return fail(Errc::kAlreadyExists, "frame " + quoted(id) + " exists already");
+  if (forest.exists(id)) return fail(Errc::kAlreadyExists, "frame " + quote(id) + " exists already");
   const auto parent = forest.info(request.parent);
   if (!request.parent.empty() && !parent) {
     return fail(Errc::kUnknownParent,
-                "no frame " + quoted(request.parent) + " to be the parent of " + quoted(id));
+                "no frame " + quote(request.parent) + " to be the parent of " + quote(id));
   }
   Owner owner = parent ? parent->owner : kHeldHere;
   if (!partition.empty()) {
     const auto named = directory.owner(partition);
-    if (!named) return fail(Errc::kUnknownPartition, "no partition " + quoted(partition));
+    if (!named) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
     owner = *named;
   } else if (request.parent.empty() && directory.name(kHeldHere).empty()) {
     return fail(Errc::kInvalidInput,
-                "frame " + quoted(id) + " needs a parent or a partition to belong to");
+                "frame " + quote(id) + " needs a parent or a partition to belong to");
   }
   if (auto ok = check_reachable(directory, owner); !ok) return tl::unexpected(ok.error());
-  return Part{owner, Request{0, id, request}};
+  return Part{owner, directory.name(owner), Request{0, id, request}};
 }
 
 Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& directory,
@@ -70,7 +70,7 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
     const auto parent = forest.info(frame.parent);
     const bool top = frame.id == id || !parent || parent->owner != frame.owner;
     if (!top) continue;
-    Request& request = part_of(parts, frame.owner).request;
+    Request& request = part_of(parts, directory, frame.owner).request;
     if (request.id.empty()) {
       request.id = frame.id;
       request.body = RemoveRequest{};
@@ -87,7 +87,7 @@ Result<std::vector<Part>> route_update(const Forest& forest, const Directory& di
   for (const EdgeUpdate& edge : edges) {
     const auto frame = forest.info(edge.id);
     if (!frame) return unknown_frame(edge.id);
-    Request& request = part_of(parts, frame->owner).request;
+    Request& request = part_of(parts, directory, frame->owner).request;
     if (request.id.empty()) {
       request.id = edge.id;
       request.body = UpdateRequest{};
@@ -104,16 +104,16 @@ Result<Part> route_move(const Forest& forest, const Directory& directory, const 
   if (!frame) return unknown_frame(id);
   if (!request.parent.empty() && !forest.exists(request.parent)) {
     return fail(Errc::kUnknownParent,
-                "no frame " + quoted(request.parent) + " to be the parent of " + quoted(id));
+                "no frame " + quote(request.parent) + " to be the parent of " + quote(id));
   }
   for (auto above = forest.info(request.parent); above; above = forest.info(above->parent)) {
     if (above->id == id) {
-      return fail(Errc::kCycle, "frame " + quoted(id) + " cannot hang under " +
-                                    quoted(request.parent) + ", which lies below it");
+      return fail(Errc::kCycle, "frame " + quote(id) + " cannot hang under " +
+                                    quote(request.parent) + ", which lies below it");
     }
   }
   if (auto ok = check_reachable(directory, frame->owner); !ok) return tl::unexpected(ok.error());
-  return Part{frame->owner, Request{0, id, request}};
+  return Part{frame->owner, directory.name(frame->owner), Request{0, id, request}};
 }
 
 Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory, const std::string& a,
@@ -122,7 +122,7 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
   if (!segments) return tl::unexpected(segments.error());
   LookupPlan plan{*std::move(segments), {}};
   for (const Segment& segment : plan.segments) {
-    Request& request = part_of(plan.parts, segment.owner).request;
+    Request& request = part_of(plan.parts, directory, segment.owner).request;
     if (request.id.empty()) {
       // Of the two ends, the one that the segment's owner owns: where it goes up, the lower one.
       const auto from = forest.info(segment.from);
@@ -142,8 +142,8 @@ Result<Transform> assemble(const LookupPlan& plan, const std::vector<std::vector
     for (std::size_t i = 0; i < plan.parts.size(); ++i) {
       if (plan.parts[i].owner != segment.owner) continue;
       if (i >= answers.size() || taken[i] >= answers[i].size()) {
-        return fail(Errc::kNotOwner, "the path from " + quoted(segment.from) + " to " +
-                                         quoted(segment.to) + " was not answered");
+        return fail(Errc::kNotOwner, "the path from " + quote(segment.from) + " to " +
+                                         quote(segment.to) + " was not answered");
       }
       X_AB = compose(X_AB, answers[i][taken[i]++]);
       break;

@@ -7,16 +7,16 @@ namespace tfdude {
 namespace {
 
 tl::unexpected<Error> unknown_start(std::string_view id) {
-  return fail(Errc::kUnknownStart, "no frame " + quoted(id) + " to start from");
+  return fail(Errc::kUnknownStart, "no frame " + quote(id) + " to start from");
 }
 
 tl::unexpected<Error> unknown_end(std::string_view id) {
-  return fail(Errc::kUnknownEnd, "no frame " + quoted(id) + " to end at");
+  return fail(Errc::kUnknownEnd, "no frame " + quote(id) + " to end at");
 }
 
 tl::unexpected<Error> not_connected(const Version& a, const Version& b) {
-  return fail(Errc::kNotConnected, "frames " + quoted(a.name->text) + " and " +
-                                       quoted(b.name->text) + " have no common root");
+  return fail(Errc::kNotConnected, "frames " + quote(a.name->text) + " and " +
+                                       quote(b.name->text) + " have no common root");
 }
 
 }  // namespace
@@ -47,7 +47,7 @@ Result<Transform> Forest::Impl::walk(const Version* a, const Version* b, std::ui
     if (top) return not_connected(*start, *end);
     if (!here->held()) {
       return fail(Errc::kNotOwner,
-                  "the edge of " + quoted(here->name->text) + " is held by another partition");
+                  "the edge of " + quote(here->name->text) + " is held by another partition");
     }
     (from_a ? climb_a : climb_b).up(static_cast<const HeldVersion*>(here)->X_PC);
     here = at(here->parent, commit);
@@ -157,12 +157,20 @@ std::optional<FrameInfo> Forest::info(std::string_view id) const {
   return impl_->info_of(*version, commit);
 }
 
+std::optional<FrameInfo> Forest::info(Handle frame) const {
+  const epoch::Guard guard;
+  const std::uint64_t commit = impl_->snapshot();
+  const Version* version = impl_->of(frame, commit);
+  if (version == nullptr) return std::nullopt;
+  return impl_->info_of(*version, commit);
+}
+
 Result<Transform> Forest::value(std::string_view id) const {
   const epoch::Guard guard;
   const Version* version = impl_->present(id, impl_->snapshot());
-  if (version == nullptr) return fail(Errc::kUnknownFrame, "no frame " + quoted(id));
+  if (version == nullptr) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
   if (!version->held()) {
-    return fail(Errc::kNotOwner, "frame " + quoted(id) + " is held by another partition");
+    return fail(Errc::kNotOwner, "frame " + quote(id) + " is held by another partition");
   }
   return static_cast<const HeldVersion*>(version)->X_PC;
 }
@@ -195,7 +203,7 @@ Result<std::vector<std::string>> Forest::children(std::string_view id) const {
   const std::lock_guard lock(impl_->mutex_);
   const Version* version = impl_->newest_named(id);
   if (version == nullptr || !version->present()) {
-    return fail(Errc::kUnknownFrame, "no frame " + quoted(id));
+    return fail(Errc::kUnknownFrame, "no frame " + quote(id));
   }
   std::vector<std::string> ids;
   impl_->graph_.for_each_child(version->slot, [&](std::uint32_t child) {

@@ -7,7 +7,7 @@ namespace tfdude {
 namespace {
 
 tl::unexpected<Error> unknown_frame(std::string_view id) {
-  return fail(Errc::kUnknownFrame, "no frame " + quoted(id));
+  return fail(Errc::kUnknownFrame, "no frame " + quote(id));
 }
 
 }  // namespace
@@ -21,7 +21,7 @@ Result<std::uint32_t> Forest::Impl::held_slot(std::string_view id) const {
   const Version* version = newest_named(id);
   if (version == nullptr || !version->present()) return unknown_frame(id);
   if (!version->held()) {
-    return fail(Errc::kNotOwner, "frame " + quoted(id) + " is held by another partition");
+    return fail(Errc::kNotOwner, "frame " + quote(id) + " is held by another partition");
   }
   return version->slot;
 }
@@ -33,7 +33,7 @@ Result<void> Forest::Impl::check_no_cycle(std::string_view id, std::string_view 
     above = above->parent == kNoSlot ? nullptr : &newest(above->parent);
   }
   if (id == parent || (top != nullptr && above == top)) {
-    return fail(Errc::kCycle, "frame " + quoted(id) + " cannot hang under " + quoted(parent) +
+    return fail(Errc::kCycle, "frame " + quote(id) + " cannot hang under " + quote(parent) +
                                   ", which lies below it");
   }
   return {};
@@ -168,13 +168,13 @@ Result<void> Forest::add(std::string_view id, std::string_view parent, const Tra
   const std::lock_guard lock(impl_->mutex_);
   const Version* there = impl_->newest_named(id);
   if (there != nullptr && there->present()) {
-    return fail(Errc::kAlreadyExists, "frame " + quoted(id) + " exists already");
+    return fail(Errc::kAlreadyExists, "frame " + quote(id) + " exists already");
   }
   if (!parent.empty() && rule == MissingParent::kRefuse) {
     const Version* above = impl_->newest_named(parent);
     if (above == nullptr || !above->present()) {
       return fail(Errc::kUnknownParent,
-                  "no frame " + quoted(parent) + " to be the parent of " + quoted(id));
+                  "no frame " + quote(parent) + " to be the parent of " + quote(id));
     }
   }
   if (auto ok = impl_->check_no_cycle(id, parent); !ok) return ok;
@@ -218,7 +218,7 @@ Result<void> Forest::update(Handle frame, const Transform& X_PC) {
   }
   if (!version->held()) {
     return fail(Errc::kNotOwner,
-                "frame " + quoted(version->name->text) + " is held by another partition");
+                "frame " + quote(version->name->text) + " is held by another partition");
   }
   impl_->push_held(frame.slot, X_PC);
   impl_->commit();
@@ -245,7 +245,7 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
     const Version* above = impl_->newest_named(parent);
     if (above == nullptr || !above->present()) {
       return fail(Errc::kUnknownParent,
-                  "no frame " + quoted(parent) + " to be the parent of " + quoted(id));
+                  "no frame " + quote(parent) + " to be the parent of " + quote(id));
     }
   }
   if (auto ok = impl_->check_no_cycle(id, parent); !ok) return ok;
@@ -262,7 +262,7 @@ Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Ow
   const std::lock_guard lock(impl_->mutex_);
   const Version* there = impl_->newest_named(id);
   if (there != nullptr && there->held()) {
-    return fail(Errc::kAlreadyExists, "frame " + quoted(id) + " is held here");
+    return fail(Errc::kAlreadyExists, "frame " + quote(id) + " is held here");
   }
   const auto acyclic = impl_->check_no_cycle(id, parent);
   const std::uint32_t slot = impl_->intern(id);

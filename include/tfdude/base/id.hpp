@@ -21,6 +21,6 @@ inline constexpr std::size_t kMaxIdBytes = 255;
 [[nodiscard]] Result<void> check_partition_name(std::string_view name);
 
 /// The text in single quotes with everything unprintable escaped, fit for a message or a log line.
-[[nodiscard]] std::string quoted(std::string_view text);
+[[nodiscard]] std::string quote(std::string_view text);
 
 }  // namespace tfdude

@@ -39,7 +39,8 @@ class Directory {
   void apply(const Page& page);
 
   /// The partition's participant has gone; its structure is kept.
-  void lost(std::string_view partition, std::uint64_t incarnation, Time now);
+  /// @return false where this is not news
+  bool lost(std::string_view partition, std::uint64_t incarnation, Time now);
 
   /// This process released a frame that it held: another's claim to it may show now.
   void released(const std::string& id);

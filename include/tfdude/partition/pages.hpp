@@ -32,6 +32,7 @@ class Pages {
   /// The pages to publish since the last call, in the order in which to publish them.
   [[nodiscard]] std::vector<Page> take_changed();
 
+  [[nodiscard]] std::size_t frame_count() const { return page_of_.size(); }
   [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(pages_.size()); }
 
  private:

@@ -23,7 +23,7 @@ struct FrameSpec {
 /// The rules of an owner: what it answers to each request, and what it publishes of its structure.
 ///
 /// @par Thread safety  The caller serializes all functions that change the structure, answer() among
-///   them, with those of the directory; answer_lookup() and update() may run beside anything.
+///   them, with those of the directory; answer_lookup() and apply() may run beside anything.
 class Partition {
  public:
   Partition(std::string name, std::uint64_t incarnation, Forest& forest, Directory& directory);
@@ -37,14 +37,11 @@ class Partition {
   /// Answers any request of a peer; a repeated one as before.
   [[nodiscard]] Reply answer(const PeerId& peer, const Request& request);
 
+  /// Answers a request of the owner's own process.
+  [[nodiscard]] Reply answer(const Request& request);
+
   /// Answers a request that reads.
   [[nodiscard]] Reply answer_lookup(std::uint32_t sequence, const LookupRequest& lookup) const;
-
-  /// What the owner's own process asks.
-  [[nodiscard]] Result<void> add(const std::string& id, const AddRequest& request);
-  [[nodiscard]] Result<void> remove(const RemoveRequest& request);
-  [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request);
-  [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
 
   /// Applies those edges of a stream that are owned here, as one commit.
   /// @return how many
@@ -53,9 +50,14 @@ class Partition {
   /// The pages to publish since the last call.
   [[nodiscard]] std::vector<Page> take_pages() { return pages_.take_changed(); }
   [[nodiscard]] std::uint32_t page_count() const { return pages_.count(); }
+  [[nodiscard]] std::size_t frame_count() const { return pages_.frame_count(); }
 
  private:
   [[nodiscard]] Result<void> apply(const Request& request);
+  [[nodiscard]] Result<void> add(const std::string& id, const AddRequest& request);
+  [[nodiscard]] Result<void> remove(const RemoveRequest& request);
+  [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request);
+  [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
   [[nodiscard]] Error at_home(Error error, std::string_view id) const;
 
   std::string name_;

@@ -17,7 +17,8 @@ namespace tfdude {
 /// One partition's part of an operation.
 struct Part {
   Owner owner = kHeldHere;
-  Request request;  ///< without a sequence number
+  std::string partition;  ///< the owner's name
+  Request request;        ///< without a sequence number
 };
 
 /// A lookup: the parts, and where the answers stand on the path.

@@ -122,6 +122,7 @@ class Forest {
   /// True for a frame held here. Allocation-free, lock-free: fit for a filter.
   [[nodiscard]] bool holds(std::string_view id) const;
   [[nodiscard]] std::optional<FrameInfo> info(std::string_view id) const;
+  [[nodiscard]] std::optional<FrameInfo> info(Handle frame) const;
   /// The value of a held edge. @return kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<Transform> value(std::string_view id) const;
 

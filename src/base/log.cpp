@@ -1,0 +1,16 @@
+#include "base/log.hpp"
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+namespace tfdude {
+
+spdlog::logger& log() {
+  static const std::shared_ptr<spdlog::logger> logger = [] {
+    auto registered = spdlog::get("tfdude");
+    return registered ? registered : spdlog::stderr_color_mt("tfdude");
+  }();
+  return *logger;
+}
+
+}  // namespace tfdude

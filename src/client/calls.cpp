@@ -1,0 +1,68 @@
+#include "client/calls.hpp"
+
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+
+Calls::Call::Call(Calls& calls, const std::vector<std::string>& partitions) : calls_(calls) {
+  const std::lock_guard lock(calls_.mutex_);
+  entries_.reserve(partitions.size());
+  for (const std::string& partition : partitions) {
+    const std::uint32_t sequence = ++calls_.last_sequence_;
+    calls_.waiting_.emplace(sequence, Waiting{this, entries_.size()});
+    entries_.push_back({partition, sequence, std::nullopt});
+  }
+}
+
+Calls::Call::~Call() {
+  const std::lock_guard lock(calls_.mutex_);
+  for (const Entry& entry : entries_) calls_.waiting_.erase(entry.sequence);
+}
+
+bool Calls::Call::complete() const {
+  return std::all_of(entries_.begin(), entries_.end(),
+                     [](const Entry& entry) { return entry.reply.has_value(); });
+}
+
+bool Calls::Call::wait_until(Clock::time_point deadline) {
+  std::unique_lock lock(calls_.mutex_);
+  return arrived_.wait_until(lock, deadline, [this] { return complete(); });
+}
+
+bool Calls::Call::waits(std::size_t entry) const {
+  const std::lock_guard lock(calls_.mutex_);
+  return !entries_[entry].reply.has_value();
+}
+
+void Calls::Call::give_up(std::size_t entry, Error error) {
+  const std::lock_guard lock(calls_.mutex_);
+  if (entries_[entry].reply) return;
+  entries_[entry].reply = Reply{entries_[entry].sequence, 0, std::move(error)};
+}
+
+void Calls::on_reply(const Reply& reply) {
+  const std::lock_guard lock(mutex_);
+  const auto waiting = waiting_.find(reply.sequence);
+  if (waiting == waiting_.end()) return;
+  Call& call = *waiting->second.call;
+  auto& entry = call.entries_[waiting->second.entry];
+  if (entry.reply) return;
+  entry.reply = reply;
+  if (call.complete()) call.arrived_.notify_one();
+}
+
+void Calls::on_lost(const std::string& partition) {
+  const std::lock_guard lock(mutex_);
+  for (auto& [sequence, waiting] : waiting_) {
+    auto& entry = waiting.call->entries_[waiting.entry];
+    if (entry.partition != partition || entry.reply) continue;
+    entry.reply = Reply{sequence, 0,
+                        Error{Errc::kUnreachable,
+                              "partition " + quote(partition) + " went away while it was asked"}};
+    if (waiting.call->complete()) waiting.call->arrived_.notify_one();
+  }
+}
+
+}  // namespace tfdude

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "tfdude/partition/messages.hpp"
+
+namespace tfdude {
+
+/// The requests that wait for their replies. A call asks several partitions at once and waits for all.
+/// @par Thread safety  All functions; a Call belongs to the thread that waits for it.
+class Calls {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  struct Entry {
+    std::string partition;
+    std::uint32_t sequence = 0;
+    std::optional<Reply> reply;
+  };
+
+  /// Registered with Calls from begin() until it is destroyed.
+  class Call {
+   public:
+    Call(Calls& calls, const std::vector<std::string>& partitions);
+    ~Call();
+    Call(const Call&) = delete;
+    Call& operator=(const Call&) = delete;
+
+    [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
+
+    /// Waits until all replies have come; false at the deadline.
+    [[nodiscard]] bool wait_until(Clock::time_point deadline);
+
+    /// Whether this entry still lacks its reply.
+    [[nodiscard]] bool waits(std::size_t entry) const;
+
+    /// Ends the wait for one entry without a reply from outside.
+    void give_up(std::size_t entry, Error error);
+
+   private:
+    friend class Calls;
+    [[nodiscard]] bool complete() const;
+
+    Calls& calls_;
+    std::vector<Entry> entries_;
+    std::condition_variable arrived_;
+  };
+
+  /// A reply came; unknown and repeated ones are dropped.
+  void on_reply(const Reply& reply);
+
+  /// A partition has gone: what waits for it fails now.
+  void on_lost(const std::string& partition);
+
+ private:
+  struct Waiting {
+    Call* call;
+    std::size_t entry;
+  };
+
+  mutable std::mutex mutex_;
+  std::uint32_t last_sequence_ = 0;
+  std::unordered_map<std::uint32_t, Waiting> waiting_;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,113 @@
+#include "tfdude/client/client.hpp"
+
+#include "client/participant.hpp"
+#include "tfdude/base/id.hpp"
+#include "tfdude/transport/fastdds.hpp"
+
+namespace tfdude {
+
+Client::Client(std::unique_ptr<Participant> participant) : participant_(std::move(participant)) {}
+Client::Client(Client&&) noexcept = default;
+Client& Client::operator=(Client&&) noexcept = default;
+Client::~Client() = default;
+
+Result<Client> Client::open(const Options& options) {
+  auto transport = make_fastdds_transport({options.domain, options.profile, {}, nullptr});
+  if (!transport) return tl::unexpected(std::move(transport.error()));
+  return open(*std::move(transport), options);
+}
+
+Result<Client> Client::open(std::unique_ptr<Transport> transport, const Options& options) {
+  auto participant = std::make_unique<Participant>(std::move(transport), std::string(), options);
+  if (auto started = participant->start(); !started) return tl::unexpected(std::move(started.error()));
+  return Client(std::move(participant));
+}
+
+Result<void> Client::add(const std::string& id, const std::string& parent, const Transform& X_PC,
+                         const std::string& partition) {
+  return participant_->add(id, {parent, X_PC}, partition);
+}
+
+Result<void> Client::remove(const std::string& id) { return participant_->remove(id); }
+
+Result<void> Client::update(const std::string& id, const Transform& X_PC) {
+  if (participant_->forest().update(id, X_PC)) return {};
+  return participant_->update({{id, X_PC}});
+}
+
+Result<void> Client::update(Handle frame, const Transform& X_PC) {
+  if (participant_->forest().update(frame, X_PC)) return {};
+  const auto info = participant_->forest().info(frame);
+  if (!info) return fail(Errc::kUnknownFrame, "the frame of this handle was removed");
+  return participant_->update({{info->id, X_PC}});
+}
+
+Result<void> Client::update(const std::vector<EdgeUpdate>& edges) { return participant_->update(edges); }
+
+Result<void> Client::publish(const std::vector<EdgeUpdate>& edges) { return participant_->publish(edges); }
+
+Result<void> Client::move(const std::string& id, const std::string& parent,
+                          const std::optional<Transform>& X_PC) {
+  return participant_->move(id, {parent, X_PC});
+}
+
+Result<Transform> Client::lookup(std::string_view a, std::string_view b) {
+  return participant_->lookup(a, b);
+}
+
+Result<Transform> Client::lookup(Handle a, Handle b) { return participant_->lookup(a, b); }
+
+Result<Handle> Client::find(std::string_view id) {
+  return participant_->when_known([&]() -> Result<Handle> {
+    const auto handle = participant_->forest().find(id);
+    if (!handle) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+    return *handle;
+  });
+}
+
+Result<std::vector<PathSegment>> Client::path(std::string_view a, std::string_view b) {
+  return participant_->path(a, b);
+}
+
+Result<std::string> Client::parent(const std::string& id) {
+  return participant_->info(id).map([](const FrameInfo& info) { return info.parent; });
+}
+
+Result<std::vector<std::string>> Client::children(const std::string& id) {
+  participant_->settle();
+  return participant_->forest().children(id);
+}
+
+std::vector<std::string> Client::roots() {
+  participant_->settle();
+  return participant_->forest().roots();
+}
+
+bool Client::exists(const std::string& id) { return participant_->info(id).has_value(); }
+
+std::vector<Frame> Client::frames() { return participant_->frames(); }
+
+std::vector<PartitionInfo> Client::partitions() { return participant_->partitions(); }
+
+Result<Node> Node::open(const std::string& partition, const std::vector<FrameSpec>& frames,
+                        const Options& options) {
+  if (auto ok = check_partition_name(partition); !ok) return tl::unexpected(std::move(ok.error()));
+  auto transport = make_fastdds_transport({options.domain, options.profile, partition, nullptr});
+  if (!transport) return tl::unexpected(std::move(transport.error()));
+  return open(*std::move(transport), partition, frames, options);
+}
+
+Result<Node> Node::open(std::unique_ptr<Transport> transport, const std::string& partition,
+                        const std::vector<FrameSpec>& frames, const Options& options) {
+  if (auto ok = check_partition_name(partition); !ok) return tl::unexpected(std::move(ok.error()));
+  auto participant = std::make_unique<Participant>(std::move(transport), partition, options);
+  if (auto started = participant->start(); !started) return tl::unexpected(std::move(started.error()));
+  if (auto serving = participant->serve(frames); !serving) {
+    return tl::unexpected(std::move(serving.error()));
+  }
+  return Node(std::move(participant));
+}
+
+const std::string& Node::partition() const { return participant_->partition_name(); }
+
+}  // namespace tfdude

@@ -1,0 +1,306 @@
+#include "client/participant.hpp"
+
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+namespace {
+
+// A reply that is lost with its repetition by the transport is asked for again after this long, then twice
+// as long, up to the second.
+constexpr Milliseconds kFirstRepeat{20};
+constexpr Milliseconds kLastRepeat{160};
+
+// How long the structure may take to reach us where a reply says that ours is old.
+constexpr Milliseconds kStructureDelay{100};
+
+// How often a new participant asks itself whether it has met everybody.
+constexpr Milliseconds kLookAround{2};
+
+Time wall_clock() { return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now()); }
+
+}  // namespace
+
+Participant::Participant(std::unique_ptr<Transport> transport, std::string partition,
+                         const Options& options)
+    : options_(options),
+      directory_(forest_, std::move(partition)),
+      settle_deadline_(Clock::now() + options.discovery),
+      transport_(std::move(transport)) {}
+
+Participant::~Participant() { transport_->stop(); }
+
+Result<void> Participant::start() { return transport_->start(*this); }
+
+bool Participant::may_appear(Errc code) {
+  switch (code) {
+    case Errc::kUnknownFrame:
+    case Errc::kUnknownStart:
+    case Errc::kUnknownEnd:
+    case Errc::kUnknownParent:
+    case Errc::kUnknownPartition:
+    case Errc::kNotConnected:
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool Participant::settled() {
+  if (settled_.load(std::memory_order_relaxed)) return true;
+  bool known = Clock::now() >= settle_deadline_;
+  if (!known && transport_->settled()) {
+    const std::lock_guard lock(structure_mutex_);
+    known = directory_.complete();
+  }
+  if (known) settled_.store(true, std::memory_order_relaxed);
+  return known;
+}
+
+void Participant::wait_for_news() {
+  std::unique_lock lock(structure_mutex_);
+  structure_changed_.wait_for(lock, kLookAround);
+}
+
+void Participant::settle() {
+  while (!settled()) wait_for_news();
+}
+
+void Participant::await_structure_change(std::uint64_t version) {
+  std::unique_lock lock(structure_mutex_);
+  structure_changed_.wait_for(lock, kStructureDelay,
+                              [&] { return forest_.structure_version() != version; });
+}
+
+// So that whoever changed something finds it changed. Past the deadline the change is made all the same.
+void Participant::await_epoch(const Part& part, std::uint64_t epoch, Clock::time_point deadline) {
+  std::unique_lock lock(structure_mutex_);
+  structure_changed_.wait_until(lock, deadline, [&] {
+    return directory_.epoch(part.owner) >= epoch || !directory_.reachable(part.owner);
+  });
+}
+
+void Participant::send(Calls::Call& call, std::size_t entry, const Request& request,
+                       Clock::time_point deadline) {
+  if (auto sent = transport_->send(call.entries()[entry].partition, request, deadline); !sent) {
+    call.give_up(entry, std::move(sent.error()));
+  }
+}
+
+void Participant::wait_for_replies(Calls::Call& call, const std::vector<const Request*>& requests,
+                                   Clock::time_point deadline) {
+  Milliseconds pause = kFirstRepeat;
+  while (!call.wait_until(std::min(deadline, Clock::now() + pause))) {
+    const bool over = Clock::now() >= deadline;
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+      if (!call.waits(i)) continue;
+      if (!over) {
+        send(call, i, *requests[i], deadline);
+        continue;
+      }
+      call.give_up(i, Error{Errc::kTimeout, "partition " + quote(call.entries()[i].partition) +
+                                                " did not answer within " +
+                                                std::to_string(options_.timeout.count()) + " ms"});
+    }
+    pause = std::min(2 * pause, kLastRepeat);
+  }
+}
+
+std::vector<Reply> Participant::ask(std::vector<Part>& parts, Clock::time_point deadline) {
+  std::vector<std::string> partitions;
+  for (const Part& part : parts) {
+    if (part.owner == kHeldHere) continue;
+    partitions.push_back(part.partition);
+    transport_->prepare(part.partition);
+  }
+  Calls::Call call(calls_, partitions);
+  std::vector<const Request*> requests;
+  for (Part& part : parts) {
+    if (part.owner == kHeldHere) continue;
+    const std::size_t entry = requests.size();
+    part.request.sequence = call.entries()[entry].sequence;
+    requests.push_back(&part.request);
+    send(call, entry, part.request, deadline);
+  }
+  std::vector<Reply> replies(parts.size());
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (parts[i].owner == kHeldHere) replies[i] = answer_here(parts[i].request);
+  }
+  wait_for_replies(call, requests, deadline);
+  std::size_t entry = 0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (parts[i].owner != kHeldHere) replies[i] = *call.entries()[entry++].reply;
+  }
+  return replies;
+}
+
+Result<void> Participant::change(std::vector<Part>& parts) {
+  const auto deadline = Clock::now() + options_.timeout;
+  const std::vector<Reply> replies = ask(parts, deadline);
+  Result<void> outcome;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (const auto* error = std::get_if<Error>(&replies[i].body)) {
+      if (outcome) outcome = tl::unexpected(*error);
+    } else if (parts[i].owner != kHeldHere) {
+      await_epoch(parts[i], replies[i].epoch, deadline);
+    }
+  }
+  return outcome;
+}
+
+Result<void> Participant::add(const std::string& id, const AddRequest& request,
+                              const std::string& partition) {
+  return healed([&] { return route_add(forest_, directory_, id, request, partition); },
+                [&](Part& part) {
+                  std::vector<Part> parts{std::move(part)};
+                  return change(parts);
+                });
+}
+
+Result<void> Participant::remove(const std::string& id) {
+  bool asked = false;
+  auto removed = healed([&] { return route_remove(forest_, directory_, id); },
+                        [&](std::vector<Part>& parts) {
+                          asked = true;
+                          return change(parts);
+                        });
+  // Gone by the time of a second attempt: what was asked for has come to be.
+  if (!removed && asked && removed.error().code == Errc::kUnknownFrame) return {};
+  return removed;
+}
+
+Result<void> Participant::move(const std::string& id, const MoveRequest& request) {
+  return healed([&] { return route_move(forest_, directory_, id, request); },
+                [&](Part& part) {
+                  std::vector<Part> parts{std::move(part)};
+                  return change(parts);
+                });
+}
+
+Result<void> Participant::update(const std::vector<EdgeUpdate>& edges) {
+  if (edges.empty() || forest_.update(edges)) return {};
+  return healed([&] { return route_update(forest_, directory_, edges); },
+                [&](std::vector<Part>& parts) { return change(parts); });
+}
+
+Result<void> Participant::publish(const std::vector<EdgeUpdate>& edges) {
+  if (edges.empty() || forest_.update(edges)) return {};
+  auto parts = routed([&] { return route_update(forest_, directory_, edges); });
+  if (!parts) return tl::unexpected(std::move(parts.error()));
+  const auto deadline = Clock::now() + options_.timeout;
+  for (Part& part : *parts) {
+    Update update{std::move(std::get<UpdateRequest>(part.request.body).edges)};
+    auto sent = part.owner == kHeldHere ? forest_.update(update.edges)
+                                        : transport_->send(part.partition, update, deadline);
+    if (!sent) return sent;
+  }
+  return {};
+}
+
+Result<Transform> Participant::lookup(std::string_view a, std::string_view b) {
+  if (auto local = forest_.lookup(a, b)) return local;
+  const std::string start(a);
+  const std::string end(b);
+  return healed([&] { return route_lookup(forest_, directory_, start, end); },
+                [&](LookupPlan& plan) -> Result<Transform> {
+                  std::vector<std::vector<Transform>> answers;
+                  for (Reply& reply : ask(plan.parts, Clock::now() + options_.timeout)) {
+                    if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(*error);
+                    auto* transforms = std::get_if<std::vector<Transform>>(&reply.body);
+                    answers.push_back(transforms != nullptr ? std::move(*transforms)
+                                                            : std::vector<Transform>());
+                  }
+                  return assemble(plan, answers);
+                });
+}
+
+Result<Transform> Participant::lookup(Handle a, Handle b) {
+  if (auto local = forest_.lookup(a, b)) return local;
+  const auto start = forest_.info(a);
+  if (!start) return fail(Errc::kUnknownStart, "the first frame was removed");
+  const auto end = forest_.info(b);
+  if (!end) return fail(Errc::kUnknownEnd, "the second frame was removed");
+  return lookup(start->id, end->id);
+}
+
+Result<std::vector<PathSegment>> Participant::path(std::string_view a, std::string_view b) {
+  return routed([&]() -> Result<std::vector<PathSegment>> {
+    auto segments = forest_.segments(a, b);
+    if (!segments) return tl::unexpected(std::move(segments.error()));
+    std::vector<PathSegment> path;
+    for (Segment& segment : *segments) {
+      path.push_back({directory_.name(segment.owner), std::move(segment.from), std::move(segment.to)});
+    }
+    return path;
+  });
+}
+
+Result<FrameInfo> Participant::info(const std::string& id) {
+  return when_known([&]() -> Result<FrameInfo> {
+    auto info = forest_.info(id);
+    if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+    return *std::move(info);
+  });
+}
+
+std::vector<Frame> Participant::frames() {
+  settle();
+  std::vector<FrameInfo> infos = forest_.frames();
+  std::vector<Frame> frames;
+  frames.reserve(infos.size());
+  const std::lock_guard lock(structure_mutex_);
+  for (FrameInfo& info : infos) {
+    frames.push_back({std::move(info.id), std::move(info.parent), directory_.name(info.owner),
+                      info.attached});
+  }
+  std::sort(frames.begin(), frames.end(), [](const Frame& a, const Frame& b) { return a.id < b.id; });
+  return frames;
+}
+
+std::vector<PartitionInfo> Participant::partitions() {
+  settle();
+  const std::lock_guard lock(structure_mutex_);
+  auto all = directory_.partitions();
+  if (partition_ == nullptr) return all;
+  for (PartitionInfo& info : all) {
+    if (info.name != partition_->name()) continue;
+    info.host = presence_.host;
+    info.pid = presence_.pid;
+    info.frames = partition_->frame_count();
+  }
+  return all;
+}
+
+void Participant::on_page(const Page& page) {
+  {
+    const std::lock_guard lock(structure_mutex_);
+    directory_.apply(page);
+  }
+  structure_changed_.notify_all();
+}
+
+void Participant::on_presence(const Presence& presence) {
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (presence.partition == directory_.name(kHeldHere)) {
+      if (presence.incarnation != presence_.incarnation) rival_ = presence;
+    } else {
+      directory_.apply(presence, wall_clock());
+    }
+  }
+  structure_changed_.notify_all();
+}
+
+void Participant::on_lost(const std::string& partition, std::uint64_t incarnation) {
+  bool news = false;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (rival_ && partition == rival_->partition && rival_->incarnation == incarnation) rival_.reset();
+    news = directory_.lost(partition, incarnation, wall_clock());
+  }
+  structure_changed_.notify_all();
+  if (news) calls_.on_lost(partition);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,131 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "client/calls.hpp"
+#include "tfdude/client/client.hpp"
+#include "tfdude/partition/routing.hpp"
+#include "tfdude/transport/transport.hpp"
+
+namespace tfdude {
+
+/// One participant: its forest, directory, partition (if it owns one) and transport, wired together.
+///
+/// Locks, in the order in which they may be taken: publish_mutex_, structure_mutex_. No lock is held while
+/// a call waits for others; structure_mutex_ is not held while anything is sent.
+class Participant final : public TransportHandler {
+ public:
+  /// @param partition  the one that it is to own; empty: none
+  Participant(std::unique_ptr<Transport> transport, std::string partition, const Options& options);
+  ~Participant() override;
+
+  [[nodiscard]] Result<void> start();
+
+  /// Makes this participant the owner of its partition (participant_serve.cpp).
+  [[nodiscard]] Result<void> serve(const std::vector<FrameSpec>& frames);
+
+  // What Client offers.
+  [[nodiscard]] Result<void> add(const std::string& id, const AddRequest& request,
+                                 const std::string& partition);
+  [[nodiscard]] Result<void> remove(const std::string& id);
+  [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request);
+  [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
+  [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges);
+  [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b);
+  [[nodiscard]] Result<Transform> lookup(Handle a, Handle b);
+  [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b);
+  [[nodiscard]] Result<FrameInfo> info(const std::string& id);
+  [[nodiscard]] std::vector<Frame> frames();
+  [[nodiscard]] std::vector<PartitionInfo> partitions();
+
+  /// Waits until all that was there at the start is known, or the time for it is over.
+  void settle();
+
+  /// Runs an operation that may fail for what is not known yet; repeats it until it is known for sure.
+  template <class Operation>
+  auto when_known(Operation operation) -> decltype(operation()) {
+    while (true) {
+      const bool certain = settled();
+      auto result = operation();
+      if (result || certain || !may_appear(result.error().code)) return result;
+      wait_for_news();
+    }
+  }
+
+  Forest& forest() { return forest_; }
+  [[nodiscard]] const std::string& partition_name() const { return directory_.name(kHeldHere); }
+
+  // TransportHandler
+  void on_request(const PeerId& from, const Request& request) override;
+  void on_reply(const Reply& reply) override { calls_.on_reply(reply); }
+  void on_update(const Update& update) override;
+  void on_page(const Page& page) override;
+  void on_presence(const Presence& presence) override;
+  void on_lost(const std::string& partition, std::uint64_t incarnation) override;
+  [[nodiscard]] bool owns(std::string_view id) const override { return forest_.holds(id); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  static bool may_appear(Errc code);
+  [[nodiscard]] bool settled();
+  void wait_for_news();
+
+  // Plans under structure_mutex_.
+  template <class Route>
+  auto routed(Route route) -> decltype(route()) {
+    return when_known([&] {
+      const std::lock_guard lock(structure_mutex_);
+      return route();
+    });
+  }
+
+  /// Plans, asks, and plans again where the structure has changed meanwhile.
+  template <class Route, class Ask, class Plan = typename std::invoke_result_t<Route>::value_type>
+  std::invoke_result_t<Ask, Plan&> healed(Route route, Ask ask) {
+    for (int attempt = 1;; ++attempt) {
+      const std::uint64_t version = forest_.structure_version();
+      auto plan = routed(route);
+      if (!plan) return tl::unexpected(std::move(plan.error()));
+      auto result = ask(*plan);
+      if (result || result.error().code != Errc::kNotOwner || attempt == kAttempts) return result;
+      await_structure_change(version);
+    }
+  }
+  static constexpr int kAttempts = 3;
+
+  [[nodiscard]] Result<void> change(std::vector<Part>& parts);
+  [[nodiscard]] std::vector<Reply> ask(std::vector<Part>& parts, Clock::time_point deadline);
+  [[nodiscard]] Reply answer_here(const Request& request);
+  void send(Calls::Call& call, std::size_t entry, const Request& request, Clock::time_point deadline);
+  void wait_for_replies(Calls::Call& call, const std::vector<const Request*>& requests,
+                        Clock::time_point deadline);
+  void await_structure_change(std::uint64_t version);
+  void await_epoch(const Part& part, std::uint64_t epoch, Clock::time_point deadline);
+  void publish_structure();
+  [[nodiscard]] Result<void> claim_name();
+
+  const Options options_;
+  Forest forest_;
+  std::mutex structure_mutex_;  // directory_, partition_, rival_
+  std::condition_variable structure_changed_;
+  Directory directory_;
+  std::unique_ptr<Partition> partition_;  // set once, before the transport serves
+  Presence presence_;
+  std::optional<Presence> rival_;
+  std::mutex publish_mutex_;
+  Calls calls_;
+  std::atomic<bool> settled_{false};
+  Clock::time_point settle_deadline_;
+  std::unique_ptr<Transport> transport_;  // last: stops before the rest goes
+};
+
+}  // namespace tfdude

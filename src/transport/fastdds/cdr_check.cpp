@@ -1,0 +1,160 @@
+#include "transport/fastdds/cdr_check.hpp"
+
+namespace tfdude::fastdds {
+namespace detail {
+
+CdrWalk::CdrWalk(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {
+  // The encapsulation: two bytes of kind (0: big-endian, 1: little-endian plain CDR), two of options.
+  constexpr std::size_t kHeader = 4;
+  if (data == nullptr || size < kHeader || data[0] != 0 || data[1] > 1) {
+    good_ = false;
+    return;
+  }
+  big_endian_ = data[1] == 0;
+  data_ += kHeader;  // alignment counts from here
+  size_ -= kHeader;
+}
+
+void CdrWalk::skip(std::size_t bytes, std::size_t alignment) {
+  const std::size_t start = (at_ + alignment - 1) / alignment * alignment;
+  good_ = good_ && start <= size_ && bytes <= size_ - start;
+  if (good_) at_ = start + bytes;
+}
+
+std::uint8_t CdrWalk::octet() {
+  skip(1, 1);
+  return good_ ? data_[at_ - 1] : 0;
+}
+
+std::uint32_t CdrWalk::ulong() {
+  skip(4, 4);
+  if (!good_) return 0;
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    value |= static_cast<std::uint32_t>(data_[at_ - 4 + i]) << (8 * (big_endian_ ? 3 - i : i));
+  }
+  return value;
+}
+
+// Length with the closing zero, then the bytes; a zero inside would hide what follows it.
+std::string_view CdrWalk::string(std::size_t max_bytes) {
+  const std::uint32_t length = ulong();
+  if (!good_ || length == 0) return {};
+  if (length - 1 > max_bytes) good_ = false;
+  skip(length, 1);
+  if (!good_) return {};
+  const std::string_view text(reinterpret_cast<const char*>(data_ + at_ - length), length - 1);
+  if (data_[at_ - 1] != 0 || text.find('\0') != std::string_view::npos) good_ = false;
+  return text;
+}
+
+std::string_view CdrWalk::edge() {
+  const std::string_view child = id();
+  transform();
+  return child;
+}
+
+}  // namespace detail
+
+namespace {
+
+using detail::CdrWalk;
+
+constexpr std::size_t kMaxMessage = 4096;
+
+void request_body(CdrWalk& walk) {
+  switch (walk.octet()) {
+    case 1:  // add
+    case 5:  // move and update
+      walk.id();
+      walk.transform();
+      break;
+    case 2:  // remove
+      walk.sequence([&] { walk.id(); });
+      break;
+    case 3:  // update
+      walk.transform();
+      walk.sequence([&] { walk.edge(); });
+      break;
+    case 4:  // move
+      walk.id();
+      break;
+    case 6:  // lookup
+      walk.sequence([&] {
+        walk.id();
+        walk.id();
+      });
+      break;
+    default:
+      walk.skip(static_cast<std::size_t>(-1), 1);  // no such request
+  }
+}
+
+}  // namespace
+
+bool read_request_head(const std::uint8_t* data, std::size_t size, RequestHead& head) {
+  CdrWalk walk(data, size);
+  head.id = walk.id();
+  request_body(walk);
+  head.addressee = walk.ulong();
+  walk.ulong();
+  return walk.good();
+}
+
+bool well_formed_request(const std::uint8_t* data, std::size_t size) {
+  RequestHead head;
+  return read_request_head(data, size, head);
+}
+
+bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
+  CdrWalk walk(data, size);
+  walk.skip(8, 8);
+  walk.ulong();
+  switch (walk.octet()) {
+    case 1:
+      walk.octet();
+      walk.string(kMaxMessage);
+      break;
+    case 2:
+      walk.sequence([&] { walk.transform(); });
+      break;
+    case 3:
+      walk.octet();
+      break;
+    default:
+      return false;
+  }
+  return walk.good();
+}
+
+bool well_formed_update(const std::uint8_t* data, std::size_t size) {
+  CdrWalk walk(data, size);
+  walk.sequence([&] { walk.edge(); });
+  return walk.good();
+}
+
+bool well_formed_page(const std::uint8_t* data, std::size_t size) {
+  CdrWalk walk(data, size);
+  walk.id();
+  walk.ulong();
+  walk.skip(8, 8);
+  walk.skip(8, 8);
+  walk.sequence([&] {
+    walk.id();
+    walk.id();
+  });
+  return walk.good();
+}
+
+bool well_formed_presence(const std::uint8_t* data, std::size_t size) {
+  CdrWalk walk(data, size);
+  walk.id();
+  walk.skip(8, 8);
+  walk.string(255);
+  walk.ulong();
+  walk.ulong();
+  walk.octet();
+  return walk.good();
+}
+
+}  // namespace tfdude::fastdds

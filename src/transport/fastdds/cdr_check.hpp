@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+// Reads the bytes of samples without deserializing them: whether they are well formed (every length within
+// the bytes that are there and within the bounds of idl/tfdude.idl), and what a filter needs of them. The
+// generated code checks neither bounds nor discriminators, and allocates what a length says.
+namespace tfdude::fastdds {
+
+[[nodiscard]] bool well_formed_request(const std::uint8_t* data, std::size_t size);
+[[nodiscard]] bool well_formed_reply(const std::uint8_t* data, std::size_t size);
+[[nodiscard]] bool well_formed_update(const std::uint8_t* data, std::size_t size);
+[[nodiscard]] bool well_formed_page(const std::uint8_t* data, std::size_t size);
+[[nodiscard]] bool well_formed_presence(const std::uint8_t* data, std::size_t size);
+
+/// What a filter must know of a request; the id points into the sample.
+struct RequestHead {
+  std::string_view id;
+  std::uint32_t addressee = 0;
+};
+
+/// @return false if the request is not well formed.
+[[nodiscard]] bool read_request_head(const std::uint8_t* data, std::size_t size, RequestHead& head);
+
+/// Calls a predicate with the id of each edge of an update until it says true.
+/// @return whether it did; false if the update is not well formed so far.
+template <class Predicate>
+[[nodiscard]] bool any_edge(const std::uint8_t* data, std::size_t size, Predicate predicate);
+
+/// FNV-1a, 32 bits: how a request names the partition that it is addressed to.
+[[nodiscard]] constexpr std::uint32_t addressee_of(std::string_view partition) {
+  std::uint32_t hash = 2166136261U;
+  for (const char c : partition) hash = (hash ^ static_cast<std::uint8_t>(c)) * 16777619U;
+  return hash;
+}
+
+namespace detail {
+
+/// Walks over CDR (plain, either byte order). Past the end, or out of bounds, all further steps fail.
+class CdrWalk {
+ public:
+  CdrWalk(const std::uint8_t* data, std::size_t size);
+
+  [[nodiscard]] bool good() const { return good_; }
+  std::uint8_t octet();
+  std::uint32_t ulong();
+  void skip(std::size_t bytes, std::size_t alignment);
+  std::string_view string(std::size_t max_bytes);
+  /// Reads a sequence's length, then calls element() as often, as long as all is good.
+  template <class Element>
+  void sequence(Element element) {
+    const std::uint32_t length = ulong();
+    if (length > kMaxElements) good_ = false;
+    for (std::uint32_t i = 0; i < length && good_; ++i) element();
+  }
+
+  std::string_view id() { return string(255); }
+  void transform() { skip(28 * 8, 8); }
+  std::string_view edge();
+
+ private:
+  static constexpr std::uint32_t kMaxElements = 4096;
+
+  const std::uint8_t* data_;
+  std::size_t size_;
+  std::size_t at_ = 0;
+  bool big_endian_ = false;
+  bool good_ = true;
+};
+
+}  // namespace detail
+
+template <class Predicate>
+bool any_edge(const std::uint8_t* data, std::size_t size, Predicate predicate) {
+  detail::CdrWalk walk(data, size);
+  bool found = false;
+  walk.sequence([&] {
+    const std::string_view id = walk.edge();
+    if (!found && walk.good()) found = predicate(id);
+  });
+  return found && walk.good();
+}
+
+}  // namespace tfdude::fastdds

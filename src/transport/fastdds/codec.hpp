@@ -1,0 +1,28 @@
+#pragma once
+
+#include <functional>
+#include <string_view>
+
+#include "tfdude/base/result.hpp"
+#include "tfdude/partition/messages.hpp"
+#include "transport/fastdds/compat.hpp"
+
+// Between the messages of the partition layer and what travels. What comes in is checked field by field: an
+// error says which frame and field.
+namespace tfdude::fastdds {
+
+[[nodiscard]] wire::Request to_wire(const Request& request, std::string_view partition);
+[[nodiscard]] wire::Reply to_wire(const Reply& reply);
+[[nodiscard]] wire::Update to_wire(const Update& update);
+[[nodiscard]] wire::Page to_wire(const Page& page);
+[[nodiscard]] wire::Presence to_wire(const Presence& presence);
+
+[[nodiscard]] Result<Request> from_wire(const wire::Request& sample);
+[[nodiscard]] Result<Reply> from_wire(const wire::Reply& sample);
+/// Only those edges that the predicate accepts by their id; the others are not even checked.
+[[nodiscard]] Result<Update> from_wire(const wire::Update& sample,
+                                       const std::function<bool(std::string_view)>& accept);
+[[nodiscard]] Result<Page> from_wire(const wire::Page& sample);
+[[nodiscard]] Result<Presence> from_wire(const wire::Presence& sample);
+
+}  // namespace tfdude::fastdds

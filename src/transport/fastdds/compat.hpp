@@ -1,0 +1,185 @@
+#pragma once
+
+// All that differs in the source between Fast DDS 2.9 (Debian 12) and 3.1 (Debian 13).
+
+#if TFDUDE_FASTDDS_MAJOR == 2
+#include <fastdds/dds/core/policy/QosPolicies.hpp>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <fastdds/dds/log/Log.hpp>
+#include <fastdds/dds/log/StdoutErrConsumer.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
+#include <fastdds/dds/topic/ContentFilteredTopic.hpp>
+#include <fastdds/dds/topic/IContentFilter.hpp>
+#include <fastdds/dds/topic/IContentFilterFactory.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
+#include <fastrtps/attributes/LibrarySettingsAttributes.h>
+#include <fastrtps/xmlparser/XMLProfileManager.h>
+
+#include <tfdudePubSubTypes.h>
+#else
+#include <fastdds/LibrarySettings.hpp>
+#include <fastdds/dds/core/ReturnCode.hpp>
+#include <fastdds/dds/core/policy/QosPolicies.hpp>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <fastdds/dds/log/Log.hpp>
+#include <fastdds/dds/log/StdoutErrConsumer.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
+#include <fastdds/dds/topic/ContentFilteredTopic.hpp>
+#include <fastdds/dds/topic/IContentFilter.hpp>
+#include <fastdds/dds/topic/IContentFilterFactory.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
+
+#include <tfdudePubSubTypes.hpp>
+#endif
+
+#include <cstdint>
+#include <string>
+
+namespace tfdude::fastdds {
+
+namespace edds = eprosima::fastdds::dds;
+
+#if TFDUDE_FASTDDS_MAJOR == 2
+
+namespace ertps = eprosima::fastrtps::rtps;
+using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
+using ParticipantInfo = ertps::ParticipantDiscoveryInfo;
+
+inline bool ok(const ReturnCode& code) { return code == ReturnCode::RETCODE_OK; }
+inline const ReturnCode kBadParameter = ReturnCode::RETCODE_BAD_PARAMETER;
+inline const ReturnCode kDone = ReturnCode::RETCODE_OK;
+
+inline bool write(edds::DataWriter& writer, void* data) { return writer.write(data); }
+
+inline void switch_intraprocess_off() {
+  eprosima::fastrtps::LibrarySettingsAttributes settings;
+  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
+  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+}
+
+/// Tells of participants that come and go: met(guid prefix, name) and left(guid prefix).
+template <class Observer>
+class ParticipantListener final : public edds::DomainParticipantListener {
+ public:
+  explicit ParticipantListener(Observer& observer) : observer_(observer) {}
+
+  void on_participant_discovery(edds::DomainParticipant*, ParticipantInfo&& info) override {
+    const auto& prefix = info.info.m_guid.guidPrefix;
+    if (info.status == ParticipantInfo::DISCOVERED_PARTICIPANT) {
+      observer_.met(prefix, info.info.m_participantName.to_string());
+    } else if (info.status != ParticipantInfo::CHANGED_QOS_PARTICIPANT) {
+      observer_.left(prefix);
+    }
+  }
+
+ private:
+  Observer& observer_;
+};
+
+/// A generated type that refuses payloads which are not well formed before it deserializes them, whose key is
+/// computed without the buffer that the generated code shares between threads, and which
+/// preallocates for usual samples, not for the largest.
+template <class Generated, bool (*kWellFormed)(const std::uint8_t*, std::size_t)>
+class CheckedType final : public Generated {
+ public:
+  CheckedType() { this->m_typeSize = kUsualSize; }
+
+  bool deserialize(ertps::SerializedPayload_t* payload, void* data) override {
+    return kWellFormed(payload->data, payload->length) && Generated::deserialize(payload, data);
+  }
+
+  bool getKey(void* data, ertps::InstanceHandle_t* handle, bool force_md5) override {
+    thread_local Generated own_buffer;
+    return own_buffer.getKey(data, handle, force_md5);
+  }
+
+ private:
+  static constexpr std::uint32_t kUsualSize = 512;
+};
+
+#else
+
+namespace ertps = eprosima::fastdds::rtps;
+using ReturnCode = edds::ReturnCode_t;
+
+inline bool ok(ReturnCode code) { return code == edds::RETCODE_OK; }
+inline const ReturnCode kBadParameter = edds::RETCODE_BAD_PARAMETER;
+inline const ReturnCode kDone = edds::RETCODE_OK;
+
+inline bool write(edds::DataWriter& writer, void* data) { return ok(writer.write(data)); }
+
+inline void switch_intraprocess_off() {
+  eprosima::fastdds::LibrarySettings settings;
+  settings.intraprocess_delivery = eprosima::fastdds::INTRAPROCESS_OFF;
+  edds::DomainParticipantFactory::get_instance()->set_library_settings(settings);
+}
+
+template <class Observer>
+class ParticipantListener final : public edds::DomainParticipantListener {
+ public:
+  explicit ParticipantListener(Observer& observer) : observer_(observer) {}
+
+  void on_participant_discovery(edds::DomainParticipant*, ertps::ParticipantDiscoveryStatus reason,
+                                const edds::ParticipantBuiltinTopicData& info, bool&) override {
+    const auto& prefix = info.guid.guidPrefix;
+    if (reason == ertps::ParticipantDiscoveryStatus::DISCOVERED_PARTICIPANT) {
+      observer_.met(prefix, info.participant_name.to_string());
+    } else if (reason != ertps::ParticipantDiscoveryStatus::CHANGED_QOS_PARTICIPANT) {
+      observer_.left(prefix);
+    }
+  }
+
+ private:
+  Observer& observer_;
+};
+
+template <class Generated, bool (*kWellFormed)(const std::uint8_t*, std::size_t)>
+class CheckedType final : public Generated {
+ public:
+  CheckedType() { this->max_serialized_type_size = kUsualSize; }
+
+  bool deserialize(ertps::SerializedPayload_t& payload, void* data) override {
+    return kWellFormed(payload.data, payload.length) && Generated::deserialize(payload, data);
+  }
+
+  bool compute_key(ertps::SerializedPayload_t& payload, ertps::InstanceHandle_t& handle,
+                   bool force_md5) override {
+    thread_local Generated own_buffer;
+    return kWellFormed(payload.data, payload.length) &&
+           own_buffer.compute_key(payload, handle, force_md5);
+  }
+
+  bool compute_key(const void* const data, ertps::InstanceHandle_t& handle, bool force_md5) override {
+    thread_local Generated own_buffer;
+    return own_buffer.compute_key(data, handle, force_md5);
+  }
+
+ private:
+  static constexpr std::uint32_t kUsualSize = 512;
+};
+
+#endif
+
+}  // namespace tfdude::fastdds

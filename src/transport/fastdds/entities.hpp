@@ -1,0 +1,113 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "transport/fastdds/compat.hpp"
+#include "transport/fastdds/profiles.hpp"
+
+// DDS entities with a lifetime. Each may be null inside where the library could not make it: good() tells.
+namespace tfdude::fastdds {
+
+using Deadline = std::chrono::steady_clock::time_point;
+
+/// A writer with a publisher of its own, hence in a DDS partition of its own.
+class Outlet final : public edds::DataWriterListener {
+ public:
+  /// @param partition  DDS partition; empty: the default one
+  Outlet(edds::DomainParticipant& participant, edds::Topic& topic, const std::string& partition,
+         const std::string& profile);
+  ~Outlet() override;
+  Outlet(const Outlet&) = delete;
+  Outlet& operator=(const Outlet&) = delete;
+
+  [[nodiscard]] bool good() const { return writer_ != nullptr; }
+
+  /// Waits until a reader has been met; false at the deadline.
+  [[nodiscard]] bool wait_until_matched(Deadline deadline);
+
+  /// A sample of the topic's type. Thread-safe.
+  bool write(void* sample) { return fastdds::write(*writer_, sample); }
+
+  void on_publication_matched(edds::DataWriter*, const edds::PublicationMatchedStatus& status) override;
+
+ private:
+  edds::DomainParticipant& participant_;
+  edds::Publisher* publisher_ = nullptr;
+  edds::DataWriter* writer_ = nullptr;
+  std::mutex mutex_;
+  std::condition_variable matched_;
+  int readers_ = 0;
+};
+
+/// A reader with a subscriber of its own, hence in a DDS partition of its own. Samples are handed on one at a
+/// time, in the order of their arrival.
+template <class Sample>
+class Inlet : public edds::DataReaderListener {
+ public:
+  /// What to call. A writer is named by its participant; +1: matched, or alive again; -1: no more.
+  struct Calls {
+    std::function<void(const Sample&, const ertps::GuidPrefix_t& from)> on_sample;
+    std::function<void(const ertps::GuidPrefix_t& writer, int change)> on_matched;
+    std::function<void(const ertps::GuidPrefix_t& writer, int change)> on_alive;
+  };
+
+  Inlet(edds::DomainParticipant& participant, edds::TopicDescription& topic,
+        const std::string& partition, const std::string& profile, Calls calls)
+      : participant_(participant), calls_(std::move(calls)) {
+    edds::SubscriberQos qos = participant.get_default_subscriber_qos();
+    if (!partition.empty()) qos.partition().push_back(partition.c_str());
+    subscriber_ = participant.create_subscriber(qos);
+    if (subscriber_ == nullptr) return;
+    reader_ = subscriber_->create_datareader(&topic, reader_qos(*subscriber_, profile), this);
+  }
+
+  ~Inlet() override { close(); }
+  Inlet(const Inlet&) = delete;
+  Inlet& operator=(const Inlet&) = delete;
+
+  [[nodiscard]] bool good() const { return reader_ != nullptr; }
+
+  void close() {
+    if (reader_ != nullptr) subscriber_->delete_datareader(reader_);
+    if (subscriber_ != nullptr) participant_.delete_subscriber(subscriber_);
+    reader_ = nullptr;
+    subscriber_ = nullptr;
+  }
+
+  void on_data_available(edds::DataReader* reader) override {
+    const std::lock_guard lock(mutex_);
+    edds::SampleInfo info;
+    while (ok(reader->take_next_sample(&sample_, &info))) {
+      if (info.valid_data) calls_.on_sample(sample_, info.sample_identity.writer_guid().guidPrefix);
+    }
+  }
+
+  void on_subscription_matched(edds::DataReader*,
+                               const edds::SubscriptionMatchedStatus& status) override {
+    if (!calls_.on_matched || status.current_count_change == 0) return;
+    calls_.on_matched(ertps::iHandle2GUID(status.last_publication_handle).guidPrefix,
+                      status.current_count_change);
+  }
+
+  void on_liveliness_changed(edds::DataReader*,
+                             const edds::LivelinessChangedStatus& status) override {
+    if (!calls_.on_alive || status.alive_count_change == 0) return;
+    calls_.on_alive(ertps::iHandle2GUID(status.last_publication_handle).guidPrefix,
+                    status.alive_count_change);
+  }
+
+ private:
+  edds::DomainParticipant& participant_;
+  const Calls calls_;
+  std::mutex mutex_;  // of sample_; the library may call from several threads
+  Sample sample_;
+  edds::Subscriber* subscriber_ = nullptr;
+  edds::DataReader* reader_ = nullptr;
+};
+
+}  // namespace tfdude::fastdds

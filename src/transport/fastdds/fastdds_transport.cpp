@@ -1,0 +1,331 @@
+#include "transport/fastdds/fastdds_transport.hpp"
+
+#include <utility>
+
+#include "base/log.hpp"
+#include "tfdude/base/id.hpp"
+#include "transport/fastdds/topics.hpp"
+
+namespace tfdude::fastdds {
+namespace {
+
+constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
+
+tl::unexpected<Error> not_created(const char* what) {
+  return fail(Errc::kTransport, std::string("Fast DDS could not create ") + what);
+}
+
+void prepare_library() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    switch_intraprocess_off();
+    edds::Log::ClearConsumers();
+    edds::Log::RegisterConsumer(std::make_unique<edds::StdoutErrConsumer>());
+  });
+}
+
+}  // namespace
+
+FastDdsTransport::FastDdsTransport(FastDdsOptions options)
+    : options_(std::move(options)),
+      counters_(options_.counters ? options_.counters : std::make_shared<FastDdsCounters>()) {}
+
+Result<void> FastDdsTransport::start(TransportHandler& handler) {
+  handler_ = &handler;
+  prepare_library();
+  if (auto loaded = load_profiles(options_.profile); !loaded) return loaded;
+  worker_.emplace();
+  if (auto created = create_participant(); !created) return created;
+  return create_endpoints();
+}
+
+Result<void> FastDdsTransport::create_participant() {
+  edds::DomainParticipantQos qos = participant_qos();
+  qos.name(participant_name(options_.partition));
+  qos.properties().properties().emplace_back("fastdds.ignore_local_endpoints", "true");
+  participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
+      options_.domain, qos, &participant_listener_, edds::StatusMask::none());
+  if (participant_ == nullptr) {
+    return fail(Errc::kTransport, "Fast DDS could not join domain " + std::to_string(options_.domain));
+  }
+  self_ = peer_of(participant_->guid().guidPrefix);
+  topics_.presence = create_topic(kPresenceTopic, edds::TypeSupport(new PresenceType));
+  topics_.directory = create_topic(kDirectoryTopic, edds::TypeSupport(new PageType));
+  topics_.reply = create_topic(kReplyTopic, edds::TypeSupport(new ReplyType));
+  topics_.request = create_topic(kRequestTopic, edds::TypeSupport(new RequestType));
+  topics_.update = create_topic(kUpdateTopic, edds::TypeSupport(new UpdateType));
+  const bool all = topics_.presence != nullptr && topics_.directory != nullptr &&
+                   topics_.reply != nullptr && topics_.request != nullptr &&
+                   topics_.update != nullptr;
+  return all ? Result<void>() : not_created("the topics");
+}
+
+edds::Topic* FastDdsTransport::create_topic(const char* name, edds::TypeSupport type) {
+  if (!ok(type.register_type(participant_))) return nullptr;
+  return participant_->create_topic(name, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
+}
+
+Result<void> FastDdsTransport::create_endpoints() {
+  using Prefix = ertps::GuidPrefix_t;
+  presence_ = std::make_unique<Inlet<wire::Presence>>(
+      *participant_, *topics_.presence, std::string(), "presence_reader",
+      Inlet<wire::Presence>::Calls{
+          [this](const wire::Presence& sample, const Prefix& from) { take_presence(sample, from); },
+          [this](const Prefix& from, int change) { presence_matched(from, change); },
+          [this](const Prefix& from, int change) { presence_alive(from, change); }});
+  pages_ = std::make_unique<Inlet<wire::Page>>(
+      *participant_, *topics_.directory, std::string(), "directory_reader",
+      Inlet<wire::Page>::Calls{[this](const wire::Page& sample, const Prefix&) { take_page(sample); },
+                               nullptr, nullptr});
+  replies_ = std::make_unique<Inlet<wire::Reply>>(
+      *participant_, *topics_.reply, reply_partition(self_), "call_reader",
+      Inlet<wire::Reply>::Calls{
+          [this](const wire::Reply& sample, const Prefix&) { take_reply(sample); }, nullptr, nullptr});
+  if (!presence_->good() || !pages_->good() || !replies_->good()) return not_created("the readers");
+  if (options_.partition.empty()) return {};
+  presence_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.presence, std::string(),
+                                              "presence_writer");
+  directory_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.directory, std::string(),
+                                               "directory_writer");
+  if (!presence_outlet_->good() || !directory_outlet_->good()) return not_created("the writers");
+  return {};
+}
+
+edds::ContentFilteredTopic* FastDdsTransport::create_filtered(edds::Topic* topic,
+                                                              const std::string& partition) {
+  return participant_->create_contentfilteredtopic(topic->get_name() + " of " + partition, topic,
+                                                   partition, {}, OwnedFilters::kClassName);
+}
+
+Result<void> FastDdsTransport::serve(const std::string& partition) {
+  using Prefix = ertps::GuidPrefix_t;
+  filters_ = std::make_unique<OwnedFilters>(partition, *handler_, *counters_);
+  if (!ok(participant_->register_content_filter_factory(OwnedFilters::kClassName, filters_.get()))) {
+    return not_created("the filter");
+  }
+  auto* requests = create_filtered(topics_.request, partition);
+  auto* updates = create_filtered(topics_.update, partition);
+  if (requests == nullptr || updates == nullptr) return not_created("the filtered topics");
+  // A peer that meets our reader is going to ask: its reply's writer is made while its request travels.
+  const auto asker_matched = [this](const Prefix& from, int change) {
+    if (change > 0) worker_->post([this, peer = peer_of(from)] { open_reply_outlet(peer); });
+  };
+  requests_ = std::make_unique<Inlet<wire::Request>>(
+      *participant_, *requests, partition, "call_reader",
+      Inlet<wire::Request>::Calls{
+          [this](const wire::Request& sample, const Prefix& from) { take_request(sample, from); },
+          asker_matched, nullptr});
+  updates_ = std::make_unique<Inlet<wire::Update>>(
+      *participant_, *updates, partition, "update_reader",
+      Inlet<wire::Update>::Calls{
+          [this](const wire::Update& sample, const Prefix&) { take_update(sample); }, nullptr, nullptr});
+  if (!requests_->good() || !updates_->good()) return not_created("the readers");
+  return {};
+}
+
+void FastDdsTransport::stop() {
+  if (participant_ == nullptr) return;
+  participant_->set_listener(nullptr);
+  requests_.reset();
+  updates_.reset();
+  replies_.reset();
+  pages_.reset();
+  presence_.reset();
+  worker_->stop();
+  reply_outlets_.clear();
+  request_outlets_.clear();
+  update_outlets_.clear();
+  directory_outlet_.reset();
+  presence_outlet_.reset();
+  participant_->delete_contained_entities();
+  edds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+  participant_ = nullptr;
+}
+
+// --- sending ---
+
+void FastDdsTransport::announce(const Presence& presence) {
+  wire::Presence sample = to_wire(presence);
+  presence_outlet_->write(&sample);
+}
+
+void FastDdsTransport::publish(const Page& page) {
+  wire::Page sample = to_wire(page);
+  if (!directory_outlet_->write(&sample)) {
+    log().error("page {} of partition {} could not be published", page.number, page.partition);
+  }
+}
+
+std::shared_ptr<Outlet> FastDdsTransport::outlet(Outlets& outlets, edds::Topic* topic,
+                                                 const std::string& partition, const char* profile) {
+  const std::lock_guard lock(outlets_mutex_);
+  auto& entry = outlets[partition];
+  if (entry == nullptr) entry = std::make_shared<Outlet>(*participant_, *topic, partition, profile);
+  return entry;
+}
+
+void FastDdsTransport::prepare(const std::string& partition) {
+  (void)outlet(request_outlets_, topics_.request, partition, "call_writer");
+}
+
+Result<void> FastDdsTransport::send(const std::string& partition, const Request& request,
+                                    Deadline deadline) {
+  const auto to = outlet(request_outlets_, topics_.request, partition, "call_writer");
+  wire::Request sample = to_wire(request, partition);
+  return send(*to, partition, &sample, deadline);
+}
+
+Result<void> FastDdsTransport::send(const std::string& partition, const Update& update,
+                                    Deadline deadline) {
+  const auto to = outlet(update_outlets_, topics_.update, partition, "update_writer");
+  wire::Update sample = to_wire(update);
+  return send(*to, partition, &sample, deadline);
+}
+
+Result<void> FastDdsTransport::send(Outlet& outlet, const std::string& partition, void* sample,
+                                    Deadline deadline) {
+  if (!outlet.good()) return not_created("a writer");
+  if (!outlet.wait_until_matched(deadline)) {
+    return fail(Errc::kTimeout, "partition " + quote(partition) + " was not met in time in domain " +
+                                    std::to_string(options_.domain));
+  }
+  if (!outlet.write(sample)) {
+    return fail(Errc::kTimeout, "partition " + quote(partition) + " does not take what is sent to it");
+  }
+  return {};
+}
+
+// --- replying ---
+
+std::shared_ptr<Outlet> FastDdsTransport::reply_outlet(const PeerId& peer) {
+  const std::shared_lock lock(reply_mutex_);
+  const auto known = reply_outlets_.find(peer);
+  return known != reply_outlets_.end() ? known->second : nullptr;
+}
+
+void FastDdsTransport::open_reply_outlet(const PeerId& peer) {
+  if (reply_outlet(peer) != nullptr) return;
+  auto opened = std::make_shared<Outlet>(*participant_, *topics_.reply, reply_partition(peer),
+                                         "call_writer");
+  const std::unique_lock lock(reply_mutex_);
+  reply_outlets_.emplace(peer, std::move(opened));
+}
+
+void FastDdsTransport::reply(const PeerId& to, const Reply& reply) {
+  wire::Reply sample = to_wire(reply);
+  if (const auto outlet = reply_outlet(to)) {
+    if (outlet->good()) outlet->write(&sample);
+    return;
+  }
+  worker_->post([this, to, late = std::move(sample)]() mutable {
+    open_reply_outlet(to);
+    if (const auto outlet = reply_outlet(to); outlet->good()) outlet->write(&late);
+  });
+}
+
+// A callback may hold the outlet still; the worker then waits for it, so as to be the one who deletes it.
+void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
+  peers_.left(prefix);
+  worker_->post([this, peer = peer_of(prefix)] {
+    std::shared_ptr<Outlet> outlet;
+    {
+      const std::unique_lock lock(reply_mutex_);
+      const auto known = reply_outlets_.find(peer);
+      if (known == reply_outlets_.end()) return;
+      outlet = std::move(known->second);
+      reply_outlets_.erase(known);
+    }
+    while (outlet.use_count() > 1) std::this_thread::yield();
+  });
+}
+
+// --- receiving ---
+
+void FastDdsTransport::take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from) {
+  const PeerId peer = peer_of(from);
+  auto request = from_wire(sample);
+  if (request) {
+    handler_->on_request(peer, *request);
+    return;
+  }
+  log_refused(kRequestTopic, request.error());
+  reply(peer, Reply{sample.sequence_number(), 0, std::move(request.error())});
+}
+
+void FastDdsTransport::take_update(const wire::Update& sample) {
+  const auto update = from_wire(sample, [this](std::string_view id) { return handler_->owns(id); });
+  if (update) {
+    handler_->on_update(*update);
+  } else {
+    log_refused(kUpdateTopic, update.error());
+  }
+}
+
+void FastDdsTransport::take_reply(const wire::Reply& sample) {
+  auto reply = from_wire(sample);
+  if (reply) {
+    handler_->on_reply(*reply);
+  } else {
+    log_refused(kReplyTopic, reply.error());
+    handler_->on_reply(Reply{sample.sequence_number(), sample.epoch(), std::move(reply.error())});
+  }
+}
+
+void FastDdsTransport::take_page(const wire::Page& sample) {
+  const auto page = from_wire(sample);
+  if (page) {
+    handler_->on_page(*page);
+  } else {
+    log_refused(kDirectoryTopic, page.error());
+  }
+}
+
+void FastDdsTransport::take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from) {
+  const auto presence = from_wire(sample);
+  if (!presence) {
+    log_refused(kPresenceTopic, presence.error());
+    return;
+  }
+  {
+    const std::lock_guard lock(presences_mutex_);
+    presences_[peer_of(from)] = *presence;
+  }
+  handler_->on_presence(*presence);
+  peers_.present(from);
+}
+
+void FastDdsTransport::presence_matched(const ertps::GuidPrefix_t& from, int change) {
+  if (change > 0) return;
+  presence_alive(from, change);
+  const std::lock_guard lock(presences_mutex_);
+  presences_.erase(peer_of(from));
+}
+
+void FastDdsTransport::presence_alive(const ertps::GuidPrefix_t& from, int change) {
+  Presence presence;
+  {
+    const std::lock_guard lock(presences_mutex_);
+    const auto known = presences_.find(peer_of(from));
+    if (known == presences_.end()) return;
+    presence = known->second;
+  }
+  if (change > 0) {
+    handler_->on_presence(presence);
+  } else {
+    handler_->on_lost(presence.partition, presence.incarnation);
+  }
+}
+
+}  // namespace tfdude::fastdds
+
+namespace tfdude {
+
+Result<std::unique_ptr<Transport>> make_fastdds_transport(const FastDdsOptions& options) {
+  if (options.domain > fastdds::kMaxDomain) {
+    return fail(Errc::kInvalidInput, "domain " + std::to_string(options.domain) + " is not within 0 to " +
+                                         std::to_string(fastdds::kMaxDomain));
+  }
+  return std::make_unique<fastdds::FastDdsTransport>(options);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <shared_mutex>
+#include <string>
+
+#include "tfdude/transport/fastdds.hpp"
+#include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/entities.hpp"
+#include "transport/fastdds/owned_filter.hpp"
+#include "transport/fastdds/peers.hpp"
+#include "transport/fastdds/worker.hpp"
+
+namespace tfdude::fastdds {
+
+/// Requests and updates travel in the DDS partition named like the tf-dude partition, replies in one of the
+/// peer's own, presence and directory in the default one. A sender keeps a writer for each partition, and
+/// an owner one for each peer, so that whatever is sent reaches only whom it concerns.
+class FastDdsTransport final : public Transport {
+ public:
+  explicit FastDdsTransport(FastDdsOptions options);
+  ~FastDdsTransport() override { stop(); }
+
+  Result<void> start(TransportHandler& handler) override;
+  void stop() override;
+  Result<void> serve(const std::string& partition) override;
+  void announce(const Presence& presence) override;
+  void publish(const Page& page) override;
+  void prepare(const std::string& partition) override;
+  Result<void> send(const std::string& partition, const Request& request, Deadline deadline) override;
+  Result<void> send(const std::string& partition, const Update& update, Deadline deadline) override;
+  void reply(const PeerId& to, const Reply& reply) override;
+  bool settled() const override { return peers_.settled(); }
+  Milliseconds settle_time() const override { return Milliseconds(400); }
+
+  // Of ParticipantListener, from a thread of the library.
+  void met(const ertps::GuidPrefix_t& prefix, const std::string& name) { peers_.met(prefix, name); }
+  void left(const ertps::GuidPrefix_t& prefix);
+
+ private:
+  struct Topics {
+    edds::Topic* request = nullptr;
+    edds::Topic* reply = nullptr;
+    edds::Topic* update = nullptr;
+    edds::Topic* directory = nullptr;
+    edds::Topic* presence = nullptr;
+  };
+  using Outlets = std::map<std::string, std::shared_ptr<Outlet>>;
+
+  Result<void> create_participant();
+  Result<void> create_endpoints();
+  edds::Topic* create_topic(const char* name, edds::TypeSupport type);
+  edds::ContentFilteredTopic* create_filtered(edds::Topic* topic, const std::string& partition);
+
+  std::shared_ptr<Outlet> outlet(Outlets& outlets, edds::Topic* topic, const std::string& partition,
+                                 const char* profile);
+  std::shared_ptr<Outlet> reply_outlet(const PeerId& peer);
+  void open_reply_outlet(const PeerId& peer);
+  Result<void> send(Outlet& outlet, const std::string& partition, void* sample, Deadline deadline);
+
+  void take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from);
+  void take_update(const wire::Update& sample);
+  void take_reply(const wire::Reply& sample);
+  void take_page(const wire::Page& sample);
+  void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from);
+  void presence_matched(const ertps::GuidPrefix_t& from, int change);
+  void presence_alive(const ertps::GuidPrefix_t& from, int change);
+
+  const FastDdsOptions options_;
+  const std::shared_ptr<FastDdsCounters> counters_;
+  TransportHandler* handler_ = nullptr;
+  Peers peers_;
+
+  ParticipantListener<FastDdsTransport> participant_listener_{*this};
+  edds::DomainParticipant* participant_ = nullptr;
+  PeerId self_{};
+  Topics topics_;
+
+  std::mutex presences_mutex_;
+  std::map<PeerId, Presence> presences_;  // as last heard of each participant
+
+  std::mutex outlets_mutex_;
+  Outlets request_outlets_;
+  Outlets update_outlets_;
+  std::shared_mutex reply_mutex_;
+  std::map<PeerId, std::shared_ptr<Outlet>> reply_outlets_;
+
+  std::unique_ptr<OwnedFilters> filters_;
+  std::unique_ptr<Outlet> presence_outlet_;
+  std::unique_ptr<Outlet> directory_outlet_;
+  std::unique_ptr<Inlet<wire::Request>> requests_;
+  std::unique_ptr<Inlet<wire::Update>> updates_;
+  std::unique_ptr<Inlet<wire::Reply>> replies_;
+  std::unique_ptr<Inlet<wire::Page>> pages_;
+  std::unique_ptr<Inlet<wire::Presence>> presence_;
+  std::optional<Worker> worker_;
+};
+
+}  // namespace tfdude::fastdds

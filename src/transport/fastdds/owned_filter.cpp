@@ -1,0 +1,51 @@
+#include "transport/fastdds/owned_filter.hpp"
+
+#include <string_view>
+
+#include "transport/fastdds/cdr_check.hpp"
+#include "transport/fastdds/topics.hpp"
+
+namespace tfdude::fastdds {
+
+OwnedFilters::OwnedFilters(const std::string& partition, const TransportHandler& handler,
+                           FastDdsCounters& counters)
+    : view_{addressee_of(partition), handler, counters} {}
+
+bool OwnedFilters::Requests::evaluate(const SerializedPayload& payload, const FilterSampleInfo&,
+                                      const GUID_t&) const {
+  view_.counters.requests_arrived.fetch_add(1, std::memory_order_relaxed);
+  RequestHead head;
+  if (!read_request_head(payload.data, payload.length, head)) {
+    count_malformed(view_.counters, kRequestTopic);
+    return false;
+  }
+  const bool passes = head.addressee == view_.addressee || view_.handler.owns(head.id);
+  if (passes) view_.counters.requests_passed.fetch_add(1, std::memory_order_relaxed);
+  return passes;
+}
+
+bool OwnedFilters::Updates::evaluate(const SerializedPayload& payload, const FilterSampleInfo&,
+                                     const GUID_t&) const {
+  view_.counters.updates_arrived.fetch_add(1, std::memory_order_relaxed);
+  if (!well_formed_update(payload.data, payload.length)) {
+    count_malformed(view_.counters, kUpdateTopic);
+    return false;
+  }
+  const bool passes = any_edge(payload.data, payload.length,
+                               [this](std::string_view id) { return view_.handler.owns(id); });
+  if (passes) view_.counters.updates_passed.fetch_add(1, std::memory_order_relaxed);
+  return passes;
+}
+
+ReturnCode OwnedFilters::create_content_filter(const char* filter_class_name, const char* type_name,
+                                               const edds::TopicDataType*, const char*,
+                                               const ParameterSeq&, edds::IContentFilter*& filter) {
+  if (std::string_view(filter_class_name) != kClassName) return kBadParameter;
+  const bool of_requests = std::string_view(type_name) == RequestType().getName();
+  filter = of_requests ? static_cast<edds::IContentFilter*>(&requests_) : &updates_;
+  return kDone;
+}
+
+ReturnCode OwnedFilters::delete_content_filter(const char*, edds::IContentFilter*) { return kDone; }
+
+}  // namespace tfdude::fastdds

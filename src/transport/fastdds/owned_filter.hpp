@@ -1,0 +1,71 @@
+#pragma once
+
+#include <string>
+
+#include "tfdude/transport/fastdds.hpp"
+#include "tfdude/transport/transport.hpp"
+#include "transport/fastdds/compat.hpp"
+
+// The library's interfaces have no virtual destructor; the classes here are final and never deleted through
+// them.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wnon-virtual-dtor"
+
+namespace tfdude::fastdds {
+
+/// The filters between a partition's readers and the wire: they let pass what concerns a frame that the
+/// partition owns, and requests addressed to it by name; they drop what is not well formed. Evaluated at
+/// the reader, on the bytes, against the live set of owned frames: the announced expression, the partition's
+/// name, never changes.
+class OwnedFilters final : public edds::IContentFilterFactory {
+ public:
+  /// The name under which the class is registered and announced.
+  static constexpr const char* kClassName = "tfdude.owned";
+
+  /// The handler and the counters outlive this.
+  OwnedFilters(const std::string& partition, const TransportHandler& handler,
+               FastDdsCounters& counters);
+
+  ReturnCode create_content_filter(const char* filter_class_name, const char* type_name,
+                                   const edds::TopicDataType* data_type, const char* expression,
+                                   const ParameterSeq& parameters,
+                                   edds::IContentFilter*& filter) override;
+  ReturnCode delete_content_filter(const char* filter_class_name,
+                                   edds::IContentFilter* filter) override;
+
+ private:
+  /// What both filters look at.
+  struct View {
+    std::uint32_t addressee;
+    const TransportHandler& handler;
+    FastDdsCounters& counters;
+  };
+
+  class Requests final : public edds::IContentFilter {
+   public:
+    explicit Requests(const View& view) : view_(view) {}
+    bool evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
+                  const GUID_t& reader) const override;
+
+   private:
+    const View& view_;
+  };
+
+  class Updates final : public edds::IContentFilter {
+   public:
+    explicit Updates(const View& view) : view_(view) {}
+    bool evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
+                  const GUID_t& reader) const override;
+
+   private:
+    const View& view_;
+  };
+
+  const View view_;
+  Requests requests_{view_};
+  Updates updates_{view_};
+};
+
+}  // namespace tfdude::fastdds
+
+#pragma GCC diagnostic pop

@@ -1,0 +1,56 @@
+#include "transport/fastdds/peers.hpp"
+
+#include <algorithm>
+
+namespace tfdude::fastdds {
+namespace {
+
+constexpr const char* kServer = "tfdude serving ";
+constexpr const char* kClient = "tfdude client";
+
+}  // namespace
+
+PeerId peer_of(const ertps::GuidPrefix_t& prefix) {
+  PeerId peer{};
+  std::copy_n(prefix.value, peer.size(), peer.begin());
+  return peer;
+}
+
+std::string reply_partition(const PeerId& peer) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string name = "tfdude-peer-";
+  for (const std::uint8_t byte : peer) {
+    name += kDigits[byte >> 4U];
+    name += kDigits[byte & 15U];
+  }
+  return name;
+}
+
+std::string participant_name(const std::string& partition) {
+  return partition.empty() ? kClient : kServer + partition;
+}
+
+void Peers::met(const ertps::GuidPrefix_t& prefix, const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  last_met_ = Clock::now();
+  if (name.rfind(kServer, 0) == 0) servers_.emplace(peer_of(prefix), false);
+}
+
+void Peers::left(const ertps::GuidPrefix_t& prefix) {
+  const std::lock_guard lock(mutex_);
+  servers_.erase(peer_of(prefix));
+}
+
+void Peers::present(const ertps::GuidPrefix_t& prefix) {
+  const std::lock_guard lock(mutex_);
+  servers_[peer_of(prefix)] = true;
+}
+
+bool Peers::settled() const {
+  const std::lock_guard lock(mutex_);
+  return !servers_.empty() && Clock::now() - last_met_ >= kQuiet &&
+         std::all_of(servers_.begin(), servers_.end(),
+                     [](const auto& server) { return server.second; });
+}
+
+}  // namespace tfdude::fastdds

@@ -1,0 +1,92 @@
+#include "transport/fastdds/profiles.hpp"
+
+#include <fstream>
+#include <functional>
+#include <mutex>
+#include <set>
+
+#include "tfdude/base/id.hpp"
+#include "transport/fastdds/builtin_profiles.hpp"
+
+namespace tfdude::fastdds {
+namespace {
+
+constexpr const char* kPrefix = "tfdude_";
+constexpr const char* kBuiltinPrefix = "tfdude_builtin_";
+
+edds::DomainParticipantFactory& factory() { return *edds::DomainParticipantFactory::get_instance(); }
+
+// Fast DDS keeps profiles by name for the whole process and refuses a name twice, so the built-in ones
+// get names of their own, and each file is loaded once.
+std::string renamed_builtin() {
+  std::string xml = kBuiltinProfiles;
+  const std::string from = kPrefix;
+  const std::string to = kBuiltinPrefix;
+  for (auto at = xml.find(from); at != std::string::npos; at = xml.find(from, at + to.size())) {
+    xml.replace(at, from.size(), to);
+  }
+  return xml;
+}
+
+void fill(const std::string& name, const std::function<ReturnCode(const std::string&)>& read) {
+  if (!ok(read(kPrefix + name))) (void)read(kBuiltinPrefix + name);
+}
+
+}  // namespace
+
+Result<void> load_profiles(const std::string& file) {
+  static std::mutex mutex;
+  static std::set<std::string> loaded;
+  const std::lock_guard lock(mutex);
+  if (loaded.insert("").second) {
+    const std::string xml = renamed_builtin();
+    if (!ok(factory().load_XML_profiles_string(xml.data(), xml.size()))) {
+      loaded.erase("");
+      return fail(Errc::kConfig, "the built-in DDS profiles could not be read");
+    }
+  }
+  if (file.empty() || loaded.count(file) != 0) return {};
+  if (!std::ifstream(file).good()) {
+    return fail(Errc::kConfig, "profile file " + quote(file) + " cannot be opened");
+  }
+  if (!ok(factory().load_XML_profiles_file(file))) {
+    return fail(Errc::kConfig, "profile file " + quote(file) +
+                                   " is not a valid Fast DDS profile file (or repeats the names of one "
+                                   "loaded before)");
+  }
+  loaded.insert(file);
+  return {};
+}
+
+edds::DomainParticipantQos participant_qos() {
+  edds::DomainParticipantQos qos;
+  fill("participant", [&](const std::string& name) {
+    return factory().get_participant_qos_from_profile(name, qos);
+  });
+  return qos;
+}
+
+edds::DataWriterQos writer_qos(edds::Publisher& publisher, const std::string& name) {
+  edds::DataWriterQos qos;
+  fill(name, [&](const std::string& profile) {
+    return publisher.get_datawriter_qos_from_profile(profile, qos);
+  });
+  // Writers evaluate no filters: in Fast DDS 2.9 and 3.1 the map of filters is changed without a lock
+  // while a write goes through it, and crashes as readers come and go.
+  qos.writer_resource_limits().reader_filters_allocation.initial = 0;
+  qos.writer_resource_limits().reader_filters_allocation.maximum = 0;
+  // Once the history is full, each write would carry a heartbeat that wakes every reader for an answer;
+  // the periodic one is enough to repeat what was lost.
+  if (name == "call_writer") qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
+  return qos;
+}
+
+edds::DataReaderQos reader_qos(edds::Subscriber& subscriber, const std::string& name) {
+  edds::DataReaderQos qos;
+  fill(name, [&](const std::string& profile) {
+    return subscriber.get_datareader_qos_from_profile(profile, qos);
+  });
+  return qos;
+}
+
+}  // namespace tfdude::fastdds

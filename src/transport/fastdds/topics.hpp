@@ -1,0 +1,28 @@
+#pragma once
+
+#include "tfdude/transport/fastdds.hpp"
+#include "transport/fastdds/cdr_check.hpp"
+#include "transport/fastdds/compat.hpp"
+
+// The topics by name and type, and what becomes of samples that are refused.
+namespace tfdude::fastdds {
+
+inline constexpr const char* kRequestTopic = "tfdude/request";
+inline constexpr const char* kReplyTopic = "tfdude/reply";
+inline constexpr const char* kUpdateTopic = "tfdude/update";
+inline constexpr const char* kDirectoryTopic = "tfdude/directory";
+inline constexpr const char* kPresenceTopic = "tfdude/presence";
+
+using RequestType = CheckedType<wire::RequestPubSubType, well_formed_request>;
+using ReplyType = CheckedType<wire::ReplyPubSubType, well_formed_reply>;
+using UpdateType = CheckedType<wire::UpdatePubSubType, well_formed_update>;
+using PageType = CheckedType<wire::PagePubSubType, well_formed_page>;
+using PresenceType = CheckedType<wire::PresencePubSubType, well_formed_presence>;
+
+/// Counts a sample that was dropped as not well formed, and logs the 1st, 2nd, 4th, 8th...
+void count_malformed(FastDdsCounters& counters, const char* topic);
+
+/// Logs why the content of a well-formed sample was refused.
+void log_refused(const char* topic, const Error& error);
+
+}  // namespace tfdude::fastdds

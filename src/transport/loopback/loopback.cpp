@@ -1,0 +1,195 @@
+#include "tfdude/transport/loopback.hpp"
+
+#include <algorithm>
+#include <map>
+#include <mutex>
+#include <shared_mutex>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+
+/// Who is there, and what late joiners must be told. Handlers are called under a shared lock (so that
+/// stop() can wait for them); they may send, hence the lock is taken once a thread.
+class LoopbackNetwork::Hub {
+ public:
+  struct Member {
+    PeerId id{};
+    TransportHandler* handler = nullptr;
+    std::string serves;
+    std::optional<Presence> presence;
+    std::map<std::uint32_t, Page> pages;
+  };
+
+  /// Calls the handler of each member chosen while none can leave.
+  template <class Choose, class Call>
+  std::size_t deliver(Choose choose, Call call) {
+    std::vector<std::shared_ptr<Member>> chosen;
+    {
+      const std::lock_guard lock(members_mutex_);
+      for (const auto& member : members_) {
+        if (choose(*member)) chosen.push_back(member);
+      }
+    }
+    std::size_t reached = 0;
+    for (const auto& member : chosen) {
+      if (calling_ > 0) {
+        reached += call_if_there(*member, call);
+      } else {
+        const std::shared_lock lock(leaving_);
+        ++calling_;
+        reached += call_if_there(*member, call);
+        --calling_;
+      }
+    }
+    return reached;
+  }
+
+  std::shared_ptr<Member> join(TransportHandler& handler) {
+    auto member = std::make_shared<Member>();
+    member->handler = &handler;
+    const std::lock_guard lock(members_mutex_);
+    ++joined_;
+    for (std::size_t i = 0; i < sizeof joined_; ++i) {
+      member->id[i] = static_cast<std::uint8_t>(joined_ >> (8 * i));
+    }
+    members_.push_back(member);
+    return member;
+  }
+
+  void leave(const std::shared_ptr<Member>& member) {
+    {
+      const std::lock_guard lock(members_mutex_);
+      members_.erase(std::remove(members_.begin(), members_.end(), member), members_.end());
+    }
+    {
+      // Waits until no call into a handler is under way.
+      const std::unique_lock lock(leaving_);
+      member->handler = nullptr;
+    }
+    if (!member->presence) return;
+    deliver([](const Member&) { return true; },
+            [&](TransportHandler& handler) {
+              handler.on_lost(member->presence->partition, member->presence->incarnation);
+            });
+  }
+
+  /// What all others have announced and published, for one who joins.
+  std::pair<std::vector<Presence>, std::vector<Page>> published(const Member& except) {
+    std::pair<std::vector<Presence>, std::vector<Page>> all;
+    const std::lock_guard lock(members_mutex_);
+    for (const auto& member : members_) {
+      if (member.get() == &except) continue;
+      if (member->presence) all.first.push_back(*member->presence);
+      for (const auto& [number, page] : member->pages) all.second.push_back(page);
+    }
+    return all;
+  }
+
+  std::mutex members_mutex_;  // of the list and of what the members say; never held during a call
+
+ private:
+  template <class Call>
+  static std::size_t call_if_there(const Member& member, Call& call) {
+    if (member.handler == nullptr) return 0;
+    call(*member.handler);
+    return 1;
+  }
+
+  std::vector<std::shared_ptr<Member>> members_;
+  std::uint64_t joined_ = 0;
+  std::shared_mutex leaving_;
+  static thread_local int calling_;
+};
+
+thread_local int LoopbackNetwork::Hub::calling_ = 0;
+
+class LoopbackTransport final : public Transport {
+ public:
+  explicit LoopbackTransport(std::shared_ptr<LoopbackNetwork::Hub> hub) : hub_(std::move(hub)) {}
+  ~LoopbackTransport() override { stop(); }
+
+  Result<void> start(TransportHandler& handler) override {
+    self_ = hub_->join(handler);
+    const auto [presences, pages] = hub_->published(*self_);
+    for (const Presence& presence : presences) handler.on_presence(presence);
+    for (const Page& page : pages) handler.on_page(page);
+    return {};
+  }
+
+  void stop() override {
+    if (self_ == nullptr) return;
+    hub_->leave(self_);
+    self_ = nullptr;
+  }
+
+  Result<void> serve(const std::string& partition) override {
+    const std::lock_guard lock(hub_->members_mutex_);
+    self_->serves = partition;
+    return {};
+  }
+
+  void announce(const Presence& presence) override {
+    {
+      const std::lock_guard lock(hub_->members_mutex_);
+      self_->presence = presence;
+    }
+    tell_others([&](TransportHandler& handler) { handler.on_presence(presence); });
+  }
+
+  void publish(const Page& page) override {
+    {
+      const std::lock_guard lock(hub_->members_mutex_);
+      self_->pages[page.number] = page;
+    }
+    tell_others([&](TransportHandler& handler) { handler.on_page(page); });
+  }
+
+  void prepare(const std::string&) override {}
+
+  Result<void> send(const std::string& partition, const Request& request, Deadline) override {
+    return send_to(partition, [&](TransportHandler& handler) { handler.on_request(self_->id, request); });
+  }
+
+  Result<void> send(const std::string& partition, const Update& update, Deadline) override {
+    return send_to(partition, [&](TransportHandler& handler) { handler.on_update(update); });
+  }
+
+  void reply(const PeerId& to, const Reply& reply) override {
+    hub_->deliver([&](const auto& member) { return member.id == to; },
+                  [&](TransportHandler& handler) { handler.on_reply(reply); });
+  }
+
+  bool settled() const override { return true; }
+  Milliseconds settle_time() const override { return Milliseconds(0); }
+
+ private:
+  using Member = LoopbackNetwork::Hub::Member;
+
+  template <class Call>
+  void tell_others(Call call) {
+    hub_->deliver([self = self_.get()](const Member& member) { return &member != self; }, call);
+  }
+
+  template <class Call>
+  Result<void> send_to(const std::string& partition, Call call) {
+    const auto reached = hub_->deliver(
+        [&](const Member& member) { return !partition.empty() && member.serves == partition; }, call);
+    if (reached == 0) {
+      return fail(Errc::kTimeout, "partition " + quote(partition) + " is not there to be asked");
+    }
+    return {};
+  }
+
+  std::shared_ptr<LoopbackNetwork::Hub> hub_;
+  std::shared_ptr<Member> self_;
+};
+
+LoopbackNetwork::LoopbackNetwork() : hub_(std::make_shared<Hub>()) {}
+
+std::unique_ptr<Transport> LoopbackNetwork::join() { return std::make_unique<LoopbackTransport>(hub_); }
+
+}  // namespace tfdude
