@@ -12,6 +12,10 @@ constexpr double kSymmetryTolerance = 1e-9;
 // Smallest eigenvalue allowed of the matrix scaled to a unit diagonal, so that metres and radians of
 // very different size are judged alike.
 constexpr double kPsdTolerance = 1e-9;
+// An axis is scaled as if it had at least this share of the largest variance in metres (in radians).
+// The library's own results are semi-definite to rounding of that largest variance, 1e-12 at worst: an
+// axis that is known exactly but for rounding must not be judged by its rounding error.
+constexpr double kAxisShare = 1e-3;
 // Pivots above this leave no doubt about the sign of the smallest eigenvalue.
 constexpr double kClearPivot = 1e-7;
 
@@ -19,9 +23,20 @@ std::string element(std::size_t row, std::size_t column) {
   return "covariance[" + std::to_string(row) + "][" + std::to_string(column) + "]";
 }
 
-// Scales to a unit diagonal, in place. A row of variance zero must be zero all along.
+// The variances to judge a matrix by: its own, but those far below the largest of their unit are raised.
+Twist judged_variances(const Twist& variances) {
+  Twist judged;
+  judged.head<3>() = variances.head<3>().cwiseMax(kAxisShare * variances.head<3>().maxCoeff());
+  judged.tail<3>() = variances.tail<3>().cwiseMax(kAxisShare * variances.tail<3>().maxCoeff());
+  return judged;
+}
+
+// Scales to a unit diagonal (or less, see kAxisShare), in place. If all three variances of a unit are
+// zero, their rows must be zero all along.
 Result<void> scale_to_unit_diagonal(Matrix6d& m, Twist& scale) {
-  for (int i = 0; i < 6; ++i) scale[i] = m(i, i) > 0 ? 1.0 / std::sqrt(m(i, i)) : 0.0;
+  scale = judged_variances(m.diagonal()).unaryExpr([](double variance) {
+    return variance > 0 ? 1.0 / std::sqrt(variance) : 0.0;
+  });
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j < 6; ++j) {
       if (i == j || m(i, j) == 0) continue;
@@ -42,7 +57,7 @@ Result<void> scale_to_unit_diagonal(Matrix6d& m, Twist& scale) {
 bool clearly_psd(const Matrix6d& unit) {
   Matrix6d L = unit;
   for (int k = 0; k < 6; ++k) {
-    if (unit(k, k) == 0) continue;  // a zero row, checked before
+    if (unit.col(k).isZero(0)) continue;
     if (L(k, k) < kClearPivot) return false;
     for (int i = k + 1; i < 6; ++i) {
       const double factor = L(i, k) / L(k, k);
@@ -93,6 +108,11 @@ Result<Covariance> Covariance::from_matrix(const Matrix6d& matrix) {
 }
 
 Result<Covariance> Covariance::from_upper(const Upper& upper) {
+  Twist variances;
+  for (std::size_t i = 0; i < 6; ++i) {
+    variances[static_cast<Eigen::Index>(i)] = upper[upper_index(i, i)];
+  }
+  const Twist least = -kPsdTolerance * judged_variances(variances);
   bool diagonal = true;
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = i; j < 6; ++j) {
@@ -100,13 +120,13 @@ Result<Covariance> Covariance::from_upper(const Upper& upper) {
       if (!std::isfinite(value)) {
         return fail(Errc::kInvalidInput, element(i, j) + " is not a finite number");
       }
-      if (i == j && value < 0) {
+      if (i == j && value < std::min(0.0, least[static_cast<Eigen::Index>(i)])) {
         return fail(Errc::kInvalidInput, element(i, j) + " is a negative variance");
       }
       if (std::abs(value) > kMaxVariance) {
         return fail(Errc::kInvalidInput, element(i, j) + " is beyond 1e18");
       }
-      diagonal = diagonal && (i == j || value == 0);
+      diagonal = diagonal && (i == j ? value >= 0 : value == 0);
     }
   }
   if (diagonal) return trusted(upper);

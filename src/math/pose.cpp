@@ -8,7 +8,7 @@ namespace tfdude {
 namespace {
 
 // Below this squared angle the closed forms lose digits to cancellation; two terms of the series are
-// then exact to rounding (the next is of relative size θ⁴/1000).
+// then exact to rounding (the next is of relative size θ⁴/360 or less) unless said otherwise.
 constexpr double kSmallAngleSquared = 1e-6;
 
 constexpr double kQuaternionTolerance = 1e-3;
@@ -96,9 +96,10 @@ Twist log(const Pose& X) {
   const double angle = 2.0 * std::atan2(s, q.w());
   const double angle2 = angle * angle;
   const bool small = angle2 < kSmallAngleSquared;
-  // θ = 2 atan2(s, w) · vec/s; for small s, 2/w · (1 - s²/(3w²)) · vec.
-  const double scale =
-      small ? 2.0 / q.w() * (1.0 - s * s / (3.0 * q.w() * q.w())) : angle / s;
+  // θ = 2 atan2(s, w) · vec/s; for small s, 2/w · (1 - r/3 + r²/5) · vec with r = s²/w². This series
+  // converges slowly: without its third term the angle would keep 14 digits only.
+  const double r = s * s / (q.w() * q.w());
+  const double scale = small ? 2.0 / q.w() * (1.0 - r / 3.0 + r * r / 5.0) : angle / s;
   const Eigen::Vector3d theta = scale * q.vec();
   // (1 - (θ/2) cot(θ/2)) / θ²
   const double d = small ? 1.0 / 12.0 + angle2 / 720.0 : (1.0 - 0.5 * angle * q.w() / s) / angle2;
@@ -137,7 +138,13 @@ Eigen::Vector3d to_rpy(const Eigen::Quaterniond& rotation) {
   const double cos_pitch = std::hypot(R(0, 0), R(1, 0));
   const double pitch = std::atan2(-R(2, 0), cos_pitch);
   if (cos_pitch < kGimbalLock) return {0.0, pitch, std::atan2(-R(0, 1), R(1, 1))};
-  return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
+  const double yaw = std::atan2(R(1, 0), R(0, 0));
+  // Roll of what is left once the yaw is taken back, Rz(-yaw) R: near gimbal lock its error makes up
+  // for that of the yaw, where atan2(R(2, 1), R(2, 2)) would add one of its own.
+  const double c = std::cos(yaw);
+  const double s = std::sin(yaw);
+  const double roll = std::atan2(s * R(0, 2) - c * R(1, 2), c * R(1, 1) - s * R(0, 1));
+  return {roll, pitch, yaw};
 }
 
 }  // namespace tfdude

@@ -29,7 +29,9 @@ class Covariance {
   [[nodiscard]] static Result<Covariance> from_matrix(const Matrix6d& matrix);
 
   /// @return as from_matrix. Negative eigenvalues within 1e-9 of the scaled matrix, as decimal
-  ///   rounding makes them, are lifted to zero.
+  ///   rounding makes them, are lifted to zero. Scaled is each axis by its own variance, but by no less
+  ///   than 1e-3 of the largest in its unit (m² or rad²): below 1e-12 of that one everything is taken
+  ///   for rounding, so that results of the library are always accepted again.
   [[nodiscard]] static Result<Covariance> from_upper(const Upper& upper);
 
   /// Independent errors along the six axes: three standard deviations [m], then three [rad].

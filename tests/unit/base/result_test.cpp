@@ -1,0 +1,73 @@
+#include "tfdude/base/result.hpp"
+
+#include <set>
+#include <string>
+
+#include "support/catch.hpp"
+
+namespace tfdude {
+namespace {
+
+struct Named {
+  Errc code;
+  int number;
+  std::string_view name;
+};
+
+// Both the numbers (wire) and the names (JSON) are promises to others.
+constexpr Named kCodes[] = {
+    {Errc::kInvalidInput, 1, "invalid_input"},
+    {Errc::kUnknownFrame, 2, "unknown_frame"},
+    {Errc::kUnknownStart, 3, "unknown_start"},
+    {Errc::kUnknownEnd, 4, "unknown_end"},
+    {Errc::kUnknownParent, 5, "unknown_parent"},
+    {Errc::kUnknownPartition, 6, "unknown_partition"},
+    {Errc::kAlreadyExists, 7, "already_exists"},
+    {Errc::kNotConnected, 8, "not_connected"},
+    {Errc::kCycle, 9, "cycle"},
+    {Errc::kNotOwner, 10, "not_owner"},
+    {Errc::kPartitionTaken, 11, "partition_taken"},
+    {Errc::kUnreachable, 12, "unreachable"},
+    {Errc::kTimeout, 13, "timeout"},
+    {Errc::kConfig, 14, "config"},
+    {Errc::kTransport, 15, "transport"},
+};
+
+TEST_CASE("codes keep their numbers and names") {
+  for (const Named& expected : kCodes) {
+    CAPTURE(expected.number);
+    CHECK(static_cast<int>(expected.code) == expected.number);
+    CHECK(to_string(expected.code) == expected.name);
+  }
+}
+
+TEST_CASE("the names of all codes are distinct") {
+  std::set<std::string_view> names;
+  int known = 0;
+  // All 256 values, so that a code added without a name, or to this table, is noticed.
+  for (int number = 0; number < 256; ++number) {
+    const std::string_view name = to_string(static_cast<Errc>(number));
+    if (name == "unknown") continue;
+    names.insert(name);
+    ++known;
+  }
+  CHECK(known == static_cast<int>(std::size(kCodes)));
+  CHECK(static_cast<int>(names.size()) == known);
+}
+
+TEST_CASE("fail carries the code and the message") {
+  const Result<int> result = fail(Errc::kCycle, "arm is below hand");
+  REQUIRE_FALSE(result);
+  CHECK(result.error().code == Errc::kCycle);
+  CHECK(result.error().message == "arm is below hand");
+}
+
+TEST_CASE("fail_at puts the place in front and keeps the code") {
+  const Result<int> result = fail_at("frame 'arm'", Error{Errc::kTimeout, "no answer"});
+  REQUIRE_FALSE(result);
+  CHECK(result.error().code == Errc::kTimeout);
+  CHECK(result.error().message == "frame 'arm': no answer");
+}
+
+}  // namespace
+}  // namespace tfdude
