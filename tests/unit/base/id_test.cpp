@@ -114,22 +114,22 @@ TEST_CASE("a partition name holds nothing DDS would expand") {
 }
 
 TEST_CASE("quoted shows text as it is and escapes the rest") {
-  CHECK(quoted("") == "''");
-  CHECK(quoted("arm_1") == "'arm_1'");
-  CHECK(quoted("\xE2\x82\xAC") == "'\xE2\x82\xAC'");
-  CHECK(quoted(std::string_view("a\0b", 3)) == "'a\\x00b'");
-  CHECK(quoted("\x1b[31m") == "'\\x1b[31m'");
-  CHECK(quoted("\x7F") == "'\\x7f'");
-  CHECK(quoted("\xC2\x85") == "'\\xc2\\x85'");
-  CHECK(quoted("\xE2\x82") == "'\\xe2\\x82'");
-  CHECK(quoted("\xED\xA0\x80") == "'\\xed\\xa0\\x80'");
+  CHECK(quote("") == "''");
+  CHECK(quote("arm_1") == "'arm_1'");
+  CHECK(quote("\xE2\x82\xAC") == "'\xE2\x82\xAC'");
+  CHECK(quote(std::string_view("a\0b", 3)) == "'a\\x00b'");
+  CHECK(quote("\x1b[31m") == "'\\x1b[31m'");
+  CHECK(quote("\x7F") == "'\\x7f'");
+  CHECK(quote("\xC2\x85") == "'\\xc2\\x85'");
+  CHECK(quote("\xE2\x82") == "'\\xe2\\x82'");
+  CHECK(quote("\xED\xA0\x80") == "'\\xed\\xa0\\x80'");
 }
 
 TEST_CASE("what quoted returns is always a printable line") {
   const int lead = GENERATE(range(0, 256));
   for (int second = 0; second < 256; ++second) {
     const std::string text = {static_cast<char>(lead), static_cast<char>(second)};
-    if (const auto ok = check_id(quoted(text), "text"); !ok) {
+    if (const auto ok = check_id(quote(text), "text"); !ok) {
       CAPTURE(lead, second);
       FAIL(ok.error().message);
     }
