@@ -57,8 +57,8 @@ Result<void> check_id(std::string_view id, std::string_view what) {
 Result<void> check_partition_name(std::string_view name) {
   if (auto ok = check_id(name, "partition"); !ok) return ok;
   if (const auto at = name.find_first_of("*?[],"); at != std::string_view::npos) {
-    return fail(Errc::kInvalidInput,
-                "partition " + quoted(name) + " holds '" + name[at] + "', which DDS gives a meaning");
+    return fail(Errc::kInvalidInput, "partition " + quoted(name) + " holds '" + name[at] +
+                                         "', which DDS gives a meaning");
   }
   return {};
 }

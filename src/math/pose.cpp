@@ -7,8 +7,8 @@
 namespace tfdude {
 namespace {
 
-// Below this squared angle the closed forms lose digits to cancellation; two terms of the series are
-// then exact to rounding (the next is of relative size θ⁴/1000).
+// Below this squared angle the closed forms lose digits to cancellation; two terms of the series
+// are then exact to rounding (the next is of relative size θ⁴/1000).
 constexpr double kSmallAngleSquared = 1e-6;
 
 constexpr double kQuaternionTolerance = 1e-3;
@@ -20,7 +20,8 @@ Result<Pose> Pose::create(const Eigen::Quaterniond& rotation, const Eigen::Vecto
   for (int i = 0; i < 4; ++i) {
     const double value = rotation.coeffs()[i];
     if (!std::isfinite(value)) {
-      return fail(Errc::kInvalidInput, std::string("rotation.") + kAxes[i] + " is not a finite number");
+      return fail(Errc::kInvalidInput,
+                  std::string("rotation.") + kAxes[i] + " is not a finite number");
     }
   }
   for (int i = 0; i < 3; ++i) {
@@ -34,8 +35,8 @@ Result<Pose> Pose::create(const Eigen::Quaterniond& rotation, const Eigen::Vecto
   }
   const double norm = rotation.norm();
   if (!(std::abs(norm - 1.0) <= kQuaternionTolerance)) {
-    return fail(Errc::kInvalidInput,
-                "rotation has the norm " + std::to_string(norm) + ", not that of a unit quaternion");
+    return fail(Errc::kInvalidInput, "rotation has the norm " + std::to_string(norm) +
+                                         ", not that of a unit quaternion");
   }
   return trusted(Eigen::Quaterniond(rotation.coeffs() / norm), translation);
 }
@@ -97,8 +98,7 @@ Twist log(const Pose& X) {
   const double angle2 = angle * angle;
   const bool small = angle2 < kSmallAngleSquared;
   // θ = 2 atan2(s, w) · vec/s; for small s, 2/w · (1 - s²/(3w²)) · vec.
-  const double scale =
-      small ? 2.0 / q.w() * (1.0 - s * s / (3.0 * q.w() * q.w())) : angle / s;
+  const double scale = small ? 2.0 / q.w() * (1.0 - s * s / (3.0 * q.w() * q.w())) : angle / s;
   const Eigen::Vector3d theta = scale * q.vec();
   // (1 - (θ/2) cot(θ/2)) / θ²
   const double d = small ? 1.0 / 12.0 + angle2 / 720.0 : (1.0 - 0.5 * angle * q.w() / s) / angle2;
