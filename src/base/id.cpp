@@ -1,7 +1,6 @@
 #include "tfdude/base/id.hpp"
 
 #include <cstdint>
-#include <cstdio>
 
 namespace tfdude {
 namespace {
@@ -64,13 +63,15 @@ Result<void> check_partition_name(std::string_view name) {
 }
 
 std::string quoted(std::string_view text) {
+  constexpr std::string_view kHexDigits = "0123456789abcdef";
   std::string out = "'";
   for (std::size_t i = 0; i < text.size();) {
     const CodePoint point = decode(text.substr(i));
     if (point.bytes == 0 || is_control(point.value)) {
-      char escaped[5];
-      std::snprintf(escaped, sizeof escaped, "\\x%02x", static_cast<std::uint8_t>(text[i]));
-      out += escaped;
+      const auto byte = static_cast<std::uint8_t>(text[i]);
+      out += "\\x";
+      out += kHexDigits[byte >> 4U];
+      out += kHexDigits[byte & 0xFU];
       ++i;
     } else {
       out += text.substr(i, point.bytes);
