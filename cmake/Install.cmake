@@ -1,1 +1,33 @@
+# Installs the library as the CMake package "tfdude" (find_package(tfdude), target tfdude::tfdude), the
+# programs, and what they need at run time.
+include(CMakePackageConfigHelpers)
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/tfdude)
 
+install(TARGETS tfdude EXPORT tfdudeTargets FILE_SET HEADERS)
+install(EXPORT tfdudeTargets NAMESPACE tfdude:: DESTINATION ${package_dir})
+configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/tfdudeConfig.cmake.in
+  ${CMAKE_BINARY_DIR}/tfdudeConfig.cmake INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/tfdudeConfigVersion.cmake
+  COMPATIBILITY SameMajorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/tfdudeConfig.cmake ${CMAKE_BINARY_DIR}/tfdudeConfigVersion.cmake
+  DESTINATION ${package_dir})
+
+# The programs look for the library beside themselves, so that the prefix may be moved.
+file(RELATIVE_PATH bin_to_lib ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
+foreach(program tfduded tfdude_cli)
+  if(TARGET ${program})
+    set_target_properties(${program} PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
+    install(TARGETS ${program})
+  endif()
+endforeach()
+
+foreach(folder profiles examples)
+  if(EXISTS ${CMAKE_SOURCE_DIR}/${folder})
+    install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude)
+  endif()
+endforeach()
+if(EXISTS ${CMAKE_SOURCE_DIR}/apps/tfdude/completion.bash)
+  install(FILES apps/tfdude/completion.bash RENAME tfdude
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+endif()
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tfdude)

@@ -1,7 +1,6 @@
 #include "tfdude/base/id.hpp"
 
 #include <cstdint>
-#include <cstdio>
 
 namespace tfdude {
 namespace {
@@ -57,20 +56,22 @@ Result<void> check_id(std::string_view id, std::string_view what) {
 Result<void> check_partition_name(std::string_view name) {
   if (auto ok = check_id(name, "partition"); !ok) return ok;
   if (const auto at = name.find_first_of("*?[],"); at != std::string_view::npos) {
-    return fail(Errc::kInvalidInput,
-                "partition " + quote(name) + " holds '" + name[at] + "', which DDS gives a meaning");
+    return fail(Errc::kInvalidInput, "partition " + quote(name) + " holds '" + name[at] +
+                                         "', which DDS gives a meaning");
   }
   return {};
 }
 
 std::string quote(std::string_view text) {
+  constexpr std::string_view kHexDigits = "0123456789abcdef";
   std::string out = "'";
   for (std::size_t i = 0; i < text.size();) {
     const CodePoint point = decode(text.substr(i));
     if (point.bytes == 0 || is_control(point.value)) {
-      char escaped[5];
-      std::snprintf(escaped, sizeof escaped, "\\x%02x", static_cast<std::uint8_t>(text[i]));
-      out += escaped;
+      const auto byte = static_cast<std::uint8_t>(text[i]);
+      out += "\\x";
+      out += kHexDigits[byte >> 4U];
+      out += kHexDigits[byte & 0xFU];
       ++i;
     } else {
       out += text.substr(i, point.bytes);

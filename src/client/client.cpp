@@ -1,8 +1,9 @@
 #include "tfdude/client/client.hpp"
 
-#include "client/participant.hpp"
 #include "tfdude/base/id.hpp"
 #include "tfdude/transport/fastdds.hpp"
+
+#include "client/participant.hpp"
 
 namespace tfdude {
 
@@ -19,7 +20,8 @@ Result<Client> Client::open(const Options& options) {
 
 Result<Client> Client::open(std::unique_ptr<Transport> transport, const Options& options) {
   auto participant = std::make_unique<Participant>(std::move(transport), std::string(), options);
-  if (auto started = participant->start(); !started) return tl::unexpected(std::move(started.error()));
+  if (auto started = participant->start(); !started)
+    return tl::unexpected(std::move(started.error()));
   return Client(std::move(participant));
 }
 
@@ -42,9 +44,13 @@ Result<void> Client::update(Handle frame, const Transform& X_PC) {
   return participant_->update({{info->id, X_PC}});
 }
 
-Result<void> Client::update(const std::vector<EdgeUpdate>& edges) { return participant_->update(edges); }
+Result<void> Client::update(const std::vector<EdgeUpdate>& edges) {
+  return participant_->update(edges);
+}
 
-Result<void> Client::publish(const std::vector<EdgeUpdate>& edges) { return participant_->publish(edges); }
+Result<void> Client::publish(const std::vector<EdgeUpdate>& edges) {
+  return participant_->publish(edges);
+}
 
 Result<void> Client::move(const std::string& id, const std::string& parent,
                           const std::optional<Transform>& X_PC) {
@@ -101,7 +107,8 @@ Result<Node> Node::open(std::unique_ptr<Transport> transport, const std::string&
                         const std::vector<FrameSpec>& frames, const Options& options) {
   if (auto ok = check_partition_name(partition); !ok) return tl::unexpected(std::move(ok.error()));
   auto participant = std::make_unique<Participant>(std::move(transport), partition, options);
-  if (auto started = participant->start(); !started) return tl::unexpected(std::move(started.error()));
+  if (auto started = participant->start(); !started)
+    return tl::unexpected(std::move(started.error()));
   if (auto serving = participant->serve(frames); !serving) {
     return tl::unexpected(std::move(serving.error()));
   }

@@ -18,7 +18,9 @@ constexpr Milliseconds kStructureDelay{100};
 // How often a new participant asks itself whether it has met everybody.
 constexpr Milliseconds kLookAround{2};
 
-Time wall_clock() { return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now()); }
+Time wall_clock() {
+  return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
+}
 
 }  // namespace
 
@@ -206,7 +208,8 @@ Result<Transform> Participant::lookup(std::string_view a, std::string_view b) {
                 [&](LookupPlan& plan) -> Result<Transform> {
                   std::vector<std::vector<Transform>> answers;
                   for (Reply& reply : ask(plan.parts, Clock::now() + options_.timeout)) {
-                    if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(*error);
+                    if (auto* error = std::get_if<Error>(&reply.body))
+                      return tl::unexpected(*error);
                     auto* transforms = std::get_if<std::vector<Transform>>(&reply.body);
                     answers.push_back(transforms != nullptr ? std::move(*transforms)
                                                             : std::vector<Transform>());
@@ -230,7 +233,8 @@ Result<std::vector<PathSegment>> Participant::path(std::string_view a, std::stri
     if (!segments) return tl::unexpected(std::move(segments.error()));
     std::vector<PathSegment> path;
     for (Segment& segment : *segments) {
-      path.push_back({directory_.name(segment.owner), std::move(segment.from), std::move(segment.to)});
+      path.push_back(
+          {directory_.name(segment.owner), std::move(segment.from), std::move(segment.to)});
     }
     return path;
   });
@@ -251,10 +255,11 @@ std::vector<Frame> Participant::frames() {
   frames.reserve(infos.size());
   const std::lock_guard lock(structure_mutex_);
   for (FrameInfo& info : infos) {
-    frames.push_back({std::move(info.id), std::move(info.parent), directory_.name(info.owner),
-                      info.attached});
+    frames.push_back(
+        {std::move(info.id), std::move(info.parent), directory_.name(info.owner), info.attached});
   }
-  std::sort(frames.begin(), frames.end(), [](const Frame& a, const Frame& b) { return a.id < b.id; });
+  std::sort(frames.begin(), frames.end(),
+            [](const Frame& a, const Frame& b) { return a.id < b.id; });
   return frames;
 }
 
@@ -296,7 +301,8 @@ void Participant::on_lost(const std::string& partition, std::uint64_t incarnatio
   bool news = false;
   {
     const std::lock_guard lock(structure_mutex_);
-    if (rival_ && partition == rival_->partition && rival_->incarnation == incarnation) rival_.reset();
+    if (rival_ && partition == rival_->partition && rival_->incarnation == incarnation)
+      rival_.reset();
     news = directory_.lost(partition, incarnation, wall_clock());
   }
   structure_changed_.notify_all();

@@ -10,10 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "client/calls.hpp"
 #include "tfdude/client/client.hpp"
 #include "tfdude/partition/routing.hpp"
 #include "tfdude/transport/transport.hpp"
+
+#include "client/calls.hpp"
 
 namespace tfdude {
 
@@ -105,7 +106,8 @@ class Participant final : public TransportHandler {
   [[nodiscard]] Result<void> change(std::vector<Part>& parts);
   [[nodiscard]] std::vector<Reply> ask(std::vector<Part>& parts, Clock::time_point deadline);
   [[nodiscard]] Reply answer_here(const Request& request);
-  void send(Calls::Call& call, std::size_t entry, const Request& request, Clock::time_point deadline);
+  void send(Calls::Call& call, std::size_t entry, const Request& request,
+            Clock::time_point deadline);
   void wait_for_replies(Calls::Call& call, const std::vector<const Request*>& requests,
                         Clock::time_point deadline);
   void await_structure_change(std::uint64_t version);

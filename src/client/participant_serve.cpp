@@ -1,9 +1,9 @@
+#include <array>
 #include <unistd.h>
 
-#include <array>
+#include "tfdude/base/id.hpp"
 
 #include "client/participant.hpp"
-#include "tfdude/base/id.hpp"
 
 namespace tfdude {
 namespace {
@@ -13,7 +13,8 @@ constexpr Milliseconds kPredecessorGone{1500};
 
 std::uint64_t nanoseconds_since_epoch() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+  return static_cast<std::uint64_t>(
+      std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
 }
 
 std::string host_name() {
@@ -28,14 +29,14 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   const std::string name = partition_name();
   {
     const std::lock_guard lock(structure_mutex_);
-    presence_ = {name, nanoseconds_since_epoch(), host_name(), static_cast<std::uint32_t>(getpid()), 0,
-                 false};
+    presence_ = {name,        nanoseconds_since_epoch(),
+                 host_name(), static_cast<std::uint32_t>(getpid()),
+                 0,           false};
   }
   if (auto claimed = claim_name(); !claimed) return claimed;
   {
     const std::lock_guard lock(structure_mutex_);
-    auto partition =
-        std::make_unique<Partition>(name, presence_.incarnation, forest_, directory_);
+    auto partition = std::make_unique<Partition>(name, presence_.incarnation, forest_, directory_);
     if (auto loaded = partition->load(frames); !loaded) return loaded;
     partition_ = std::move(partition);
     presence_.pages = partition_->page_count();

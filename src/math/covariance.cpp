@@ -1,16 +1,17 @@
 #include "tfdude/math/covariance.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <string>
+
+#include <Eigen/Eigenvalues>
 
 namespace tfdude {
 namespace {
 
 constexpr double kSymmetryTolerance = 1e-9;
-// Smallest eigenvalue allowed of the matrix scaled to a unit diagonal, so that metres and radians of
-// very different size are judged alike.
+// Smallest eigenvalue allowed of the matrix scaled to a unit diagonal, so that metres and radians
+// of very different size are judged alike.
 constexpr double kPsdTolerance = 1e-9;
 // An axis is scaled as if it had at least this share of the largest variance in metres (in radians).
 // The library's own results are semi-definite to rounding of that largest variance, 1e-12 at worst: an
@@ -77,14 +78,16 @@ Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(unit);
   const double smallest = solver.eigenvalues()[0];
   if (!(smallest >= -kPsdTolerance)) {
-    return fail(Errc::kInvalidInput, "covariance is not positive semi-definite: the smallest eigenvalue "
-                                     "of its correlation matrix is " +
-                                         std::to_string(smallest));
+    return fail(Errc::kInvalidInput,
+                "covariance is not positive semi-definite: the smallest eigenvalue "
+                "of its correlation matrix is " +
+                    std::to_string(smallest));
   }
   if (smallest >= 0) return upper;
   const Twist lifted = solver.eigenvalues().cwiseMax(0.0);
   const Twist back = scale.unaryExpr([](double s) { return s > 0 ? 1.0 / s : 0.0; });
-  const Matrix6d psd = solver.eigenvectors() * lifted.asDiagonal() * solver.eigenvectors().transpose();
+  const Matrix6d psd =
+      solver.eigenvectors() * lifted.asDiagonal() * solver.eigenvectors().transpose();
   return Covariance::trusted(Matrix6d(back.asDiagonal() * psd * back.asDiagonal())).upper();
 }
 
@@ -139,9 +142,11 @@ Result<Covariance> Covariance::from_stddev(const std::array<double, 6>& stddev) 
   Upper upper{};
   for (std::size_t i = 0; i < 6; ++i) {
     const std::string field = "stddev[" + std::to_string(i) + "]";
-    if (!std::isfinite(stddev[i])) return fail(Errc::kInvalidInput, field + " is not a finite number");
+    if (!std::isfinite(stddev[i]))
+      return fail(Errc::kInvalidInput, field + " is not a finite number");
     if (stddev[i] < 0) return fail(Errc::kInvalidInput, field + " is negative");
-    if (stddev[i] > std::sqrt(kMaxVariance)) return fail(Errc::kInvalidInput, field + " is beyond 1e9");
+    if (stddev[i] > std::sqrt(kMaxVariance))
+      return fail(Errc::kInvalidInput, field + " is beyond 1e9");
     upper[upper_index(i, i)] = stddev[i] * stddev[i];
   }
   return trusted(upper);
@@ -201,8 +206,8 @@ Covariance Covariance::transported(const Pose& X) const {
   const Matrix3d P_new = P + T * C.transpose() + C_new * T.transpose();
   return trusted(Upper{P_new(0, 0), P_new(0, 1), P_new(0, 2), C_new(0, 0), C_new(0, 1), C_new(0, 2),
                        P_new(1, 1), P_new(1, 2), C_new(1, 0), C_new(1, 1), C_new(1, 2), P_new(2, 2),
-                       C_new(2, 0), C_new(2, 1), C_new(2, 2), Q(0, 0), Q(0, 1), Q(0, 2), Q(1, 1),
-                       Q(1, 2), Q(2, 2)});
+                       C_new(2, 0), C_new(2, 1), C_new(2, 2), Q(0, 0),     Q(0, 1),     Q(0, 2),
+                       Q(1, 1),     Q(1, 2),     Q(2, 2)});
 }
 
 Covariance& Covariance::operator+=(const Covariance& other) {

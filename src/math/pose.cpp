@@ -20,7 +20,8 @@ Result<Pose> Pose::create(const Eigen::Quaterniond& rotation, const Eigen::Vecto
   for (int i = 0; i < 4; ++i) {
     const double value = rotation.coeffs()[i];
     if (!std::isfinite(value)) {
-      return fail(Errc::kInvalidInput, std::string("rotation.") + kAxes[i] + " is not a finite number");
+      return fail(Errc::kInvalidInput,
+                  std::string("rotation.") + kAxes[i] + " is not a finite number");
     }
   }
   for (int i = 0; i < 3; ++i) {
@@ -34,8 +35,8 @@ Result<Pose> Pose::create(const Eigen::Quaterniond& rotation, const Eigen::Vecto
   }
   const double norm = rotation.norm();
   if (!(std::abs(norm - 1.0) <= kQuaternionTolerance)) {
-    return fail(Errc::kInvalidInput,
-                "rotation has the norm " + std::to_string(norm) + ", not that of a unit quaternion");
+    return fail(Errc::kInvalidInput, "rotation has the norm " + std::to_string(norm) +
+                                         ", not that of a unit quaternion");
   }
   return trusted(Eigen::Quaterniond(rotation.coeffs() / norm), translation);
 }

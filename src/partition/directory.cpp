@@ -158,8 +158,8 @@ std::optional<Presence> Directory::serving(std::string_view partition) const {
   const auto number = owner(partition);
   if (!number || *number == kHeldHere || !reachable(*number)) return std::nullopt;
   const Known& there = partitions_[*number];
-  return Presence{there.info.name, there.incarnation, there.info.host, there.info.pid,
-                  there.page_count, true};
+  return Presence{there.info.name, there.incarnation, there.info.host,
+                  there.info.pid,  there.page_count,  true};
 }
 
 }  // namespace tfdude

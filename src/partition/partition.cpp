@@ -16,7 +16,8 @@ Overloaded(Visitors...) -> Overloaded<Visitors...>;
 
 }  // namespace
 
-Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest, Directory& directory)
+Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest,
+                     Directory& directory)
     : name_(std::move(name)), forest_(forest), directory_(directory), pages_(name_, incarnation) {}
 
 Result<void> Partition::load(const std::vector<FrameSpec>& frames) {
@@ -62,9 +63,10 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
     const auto X = forest_.lookup_segment(segment.from, segment.to);
     if (!X) {
       // Whatever is missing, the caller's picture of the structure is not (or no longer) the owner's.
-      reply.body = Error{Errc::kNotOwner, "partition " + quote(name_) + " does not own the path from " +
-                                              quote(segment.from) + " to " + quote(segment.to) +
-                                              ": " + X.error().message};
+      reply.body =
+          Error{Errc::kNotOwner, "partition " + quote(name_) + " does not own the path from " +
+                                     quote(segment.from) + " to " + quote(segment.to) + ": " +
+                                     X.error().message};
       return reply;
     }
     transforms.push_back(*X);

@@ -14,7 +14,8 @@ tl::unexpected<Error> unknown_frame(std::string_view id) {
 Result<void> check_reachable(const Directory& directory, Owner owner) {
   if (owner == kHeldHere || directory.reachable(owner)) return {};
   const PartitionInfo& info = directory.info(owner);
-  const auto since = std::chrono::duration_cast<std::chrono::milliseconds>(info.since.time_since_epoch());
+  const auto since =
+      std::chrono::duration_cast<std::chrono::milliseconds>(info.since.time_since_epoch());
   return fail(Errc::kUnreachable,
               "partition " + quote(info.name) + " (host " + info.host + ", pid " +
                   std::to_string(info.pid) + ") is not reachable since " +
@@ -42,7 +43,8 @@ Result<void> check_all_reachable(const Directory& directory, const std::vector<P
 Result<Part> route_add(const Forest& forest, const Directory& directory, const std::string& id,
                        const AddRequest& request, const std::string& partition) {
   if (auto ok = check_id(id, "id"); !ok) return tl::unexpected(ok.error());
-  if (forest.exists(id)) return fail(Errc::kAlreadyExists, "frame " + quote(id) + " exists already");
+  if (forest.exists(id))
+    return fail(Errc::kAlreadyExists, "frame " + quote(id) + " exists already");
   const auto parent = forest.info(request.parent);
   if (!request.parent.empty() && !parent) {
     return fail(Errc::kUnknownParent,
@@ -116,8 +118,8 @@ Result<Part> route_move(const Forest& forest, const Directory& directory, const 
   return Part{frame->owner, directory.name(frame->owner), Request{0, id, request}};
 }
 
-Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory, const std::string& a,
-                                const std::string& b) {
+Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory,
+                                const std::string& a, const std::string& b) {
   auto segments = forest.segments(a, b);
   if (!segments) return tl::unexpected(segments.error());
   LookupPlan plan{*std::move(segments), {}};
@@ -135,7 +137,8 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
   return plan;
 }
 
-Result<Transform> assemble(const LookupPlan& plan, const std::vector<std::vector<Transform>>& answers) {
+Result<Transform> assemble(const LookupPlan& plan,
+                           const std::vector<std::vector<Transform>>& answers) {
   std::vector<std::size_t> taken(answers.size(), 0);
   Transform X_AB;
   for (const Segment& segment : plan.segments) {

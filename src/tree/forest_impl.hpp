@@ -3,6 +3,7 @@
 #include <mutex>
 
 #include "tfdude/tree/forest.hpp"
+
 #include "tree/epoch.hpp"
 #include "tree/graph.hpp"
 #include "tree/id_table.hpp"
@@ -20,7 +21,9 @@ class Forest::Impl {
  public:
   // --- reading, under an epoch::Guard (forest_read.cpp) ---
 
-  [[nodiscard]] std::uint64_t snapshot() const { return committed_.load(std::memory_order_seq_cst); }
+  [[nodiscard]] std::uint64_t snapshot() const {
+    return committed_.load(std::memory_order_seq_cst);
+  }
 
   /// What the slot held at that commit.
   [[nodiscard]] const Version* at(std::uint32_t slot, std::uint64_t commit) const {

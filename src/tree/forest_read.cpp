@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "tfdude/base/id.hpp"
+
 #include "tree/forest_impl.hpp"
 
 namespace tfdude {
@@ -15,8 +16,8 @@ tl::unexpected<Error> unknown_end(std::string_view id) {
 }
 
 tl::unexpected<Error> not_connected(const Version& a, const Version& b) {
-  return fail(Errc::kNotConnected, "frames " + quote(a.name->text) + " and " +
-                                       quote(b.name->text) + " have no common root");
+  return fail(Errc::kNotConnected, "frames " + quote(a.name->text) + " and " + quote(b.name->text) +
+                                       " have no common root");
 }
 
 }  // namespace
@@ -206,9 +207,8 @@ Result<std::vector<std::string>> Forest::children(std::string_view id) const {
     return fail(Errc::kUnknownFrame, "no frame " + quote(id));
   }
   std::vector<std::string> ids;
-  impl_->graph_.for_each_child(version->slot, [&](std::uint32_t child) {
-    ids.push_back(impl_->newest(child).name->text);
-  });
+  impl_->graph_.for_each_child(
+      version->slot, [&](std::uint32_t child) { ids.push_back(impl_->newest(child).name->text); });
   std::sort(ids.begin(), ids.end());
   return ids;
 }

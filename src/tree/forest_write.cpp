@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "tfdude/base/id.hpp"
+
 #include "tree/forest_impl.hpp"
 
 namespace tfdude {
@@ -190,8 +191,8 @@ Result<std::vector<std::string>> Forest::remove(std::string_view id) {
   const auto top = impl_->held_slot(id);
   if (!top) return tl::unexpected(top.error());
   impl_->graph_.ensure(*top);
-  const auto slots = impl_->graph_.subtree(
-      *top, [&](std::uint32_t child) { return impl_->newest(child).held(); });
+  const auto slots =
+      impl_->graph_.subtree(*top, [&](std::uint32_t child) { return impl_->newest(child).held(); });
   std::vector<std::string> removed;
   removed.reserve(slots.size());
   for (const std::uint32_t slot : slots) removed.push_back(impl_->newest(slot).name->text);
@@ -211,8 +212,7 @@ Result<void> Forest::update(std::string_view id, const Transform& X_PC) {
 
 Result<void> Forest::update(Handle frame, const Transform& X_PC) {
   const std::lock_guard lock(impl_->mutex_);
-  const Version* version =
-      frame.slot < impl_->slots_.size() ? &impl_->newest(frame.slot) : nullptr;
+  const Version* version = frame.slot < impl_->slots_.size() ? &impl_->newest(frame.slot) : nullptr;
   if (version == nullptr || !version->present() || version->name->generation != frame.generation) {
     return fail(Errc::kUnknownFrame, "the frame of this handle was removed");
   }

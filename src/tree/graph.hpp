@@ -1,8 +1,9 @@
 #pragma once
 
-#include <boost/graph/adjacency_list.hpp>
 #include <cstdint>
 #include <vector>
+
+#include <boost/graph/adjacency_list.hpp>
 
 namespace tfdude {
 

@@ -61,8 +61,8 @@ void IdTable::erase(const Name* name) {
 }
 
 void IdTable::collect(std::uint64_t safe_below) {
-  const auto first_kept =
-      std::find_if(limbo_.begin(), limbo_.end(), [&](const Limbo& l) { return l.tag >= safe_below; });
+  const auto first_kept = std::find_if(limbo_.begin(), limbo_.end(),
+                                       [&](const Limbo& l) { return l.tag >= safe_below; });
   limbo_.erase(limbo_.begin(), first_kept);
 }
 

@@ -8,6 +8,7 @@
 
 #include "tfdude/math/transform.hpp"
 #include "tfdude/tree/forest.hpp"
+
 #include "tree/epoch.hpp"
 #include "tree/id_table.hpp"
 

@@ -1,11 +1,12 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
 #include <sstream>
 #include <string>
+
+#include <Eigen/Core>
 
 #include "tfdude/math/transform.hpp"
 

@@ -1,12 +1,13 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <random>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "tfdude/math/transform.hpp"
 

@@ -16,8 +16,8 @@ inline constexpr std::size_t kMaxIdBytes = 255;
 /// @return kInvalidInput naming `what` and the reason.
 [[nodiscard]] Result<void> check_id(std::string_view id, std::string_view what);
 
-/// Checks a partition name: an id without the wildcards `*?[]` and without a comma, since the name is
-/// also the name of a DDS partition, where those mean something else.
+/// Checks a partition name: an id without the wildcards `*?[]` and without a comma, since the name
+/// is also the name of a DDS partition, where those mean something else.
 [[nodiscard]] Result<void> check_partition_name(std::string_view name);
 
 /// The text in single quotes with everything unprintable escaped, fit for a message or a log line.

@@ -3,12 +3,14 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <tl/expected.hpp>
 #include <utility>
+
+#include <tl/expected.hpp>
 
 namespace tfdude {
 
-/// What went wrong, by what a caller can do about it. The numbers travel on the wire: never reuse one.
+/// What went wrong, by what a caller can do about it. The numbers travel on the wire: never reuse
+/// one.
 enum class Errc : std::uint8_t {
   kInvalidInput = 1,      ///< a field breaks its rule; the message names the field
   kUnknownFrame = 2,      ///< no frame of that id
@@ -19,7 +21,7 @@ enum class Errc : std::uint8_t {
   kAlreadyExists = 7,     ///< add: the id is taken
   kNotConnected = 8,      ///< lookup: the frames have no common root
   kCycle = 9,             ///< move: the new parent lies below the frame
-  kNotOwner = 10,         ///< the partition asked does not own the edge (any more); healed by a retry
+  kNotOwner = 10,         ///< the partition asked does not own the edge now; healed by a retry
   kPartitionTaken = 11,   ///< another live daemon serves a partition of this name
   kUnreachable = 12,      ///< the owner is known to be down
   kTimeout = 13,          ///< the owner did not answer in time

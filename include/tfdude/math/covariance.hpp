@@ -1,20 +1,22 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
+
+#include <Eigen/Core>
 
 #include "tfdude/base/result.hpp"
 #include "tfdude/math/pose.hpp"
 
 namespace tfdude {
 
-/// Largest variance that is accepted [m² or rad²]; with kMaxTranslation it keeps every chain finite.
+/// Largest variance that is accepted [m² or rad²]; with kMaxTranslation it keeps every chain
+/// finite.
 inline constexpr double kMaxVariance = 1e18;
 
-/// Covariance of the right perturbation X = X̄ · Exp(ξ), ξ = (ρ, θ): 6x6, translation first [m², m·rad,
-/// rad²], expressed in the child frame. Symmetric by construction (the upper triangle is what is kept)
-/// and positive semi-definite to rounding at all times: what comes from outside enters through the
-/// from_...() functions.
+/// Covariance of the right perturbation X = X̄ · Exp(ξ), ξ = (ρ, θ): 6x6, translation first [m²,
+/// m·rad, rad²], expressed in the child frame. Symmetric by construction (the upper triangle is
+/// what is kept) and positive semi-definite to rounding at all times: what comes from outside
+/// enters through the from_...() functions.
 class Covariance {
  public:
   static constexpr std::size_t kSize = 21;

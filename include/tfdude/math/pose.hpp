@@ -11,12 +11,12 @@ namespace tfdude {
 using Twist = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-/// Largest translation component that is accepted [m]: beyond the Moon's orbit, and small enough that
-/// no chain of edges can overflow.
+/// Largest translation component that is accepted [m]: beyond the Moon's orbit, and small enough
+/// that no chain of edges can overflow.
 inline constexpr double kMaxTranslation = 1e9;
 
-/// X_AB, the pose of frame B in frame A: p_A = X_AB · p_B. A rigid transform whose rotation is a unit
-/// quaternion at all times: what comes from outside enters through create().
+/// X_AB, the pose of frame B in frame A: p_A = X_AB · p_B. A rigid transform whose rotation is a
+/// unit quaternion at all times: what comes from outside enters through create().
 /// Trivially copyable, without alignment demands, so that it may be shared between builds.
 class Pose {
  public:
@@ -26,7 +26,8 @@ class Pose {
   /// Checks what comes from outside.
   /// @param rotation     R_AB; normalized if its norm is within 1e-3 of one
   /// @param translation  origin of B in A [m]
-  /// @return kInvalidInput naming the field: NaN, infinity, not of unit length, beyond kMaxTranslation.
+  /// @return kInvalidInput naming the field: NaN, infinity, not of unit length, beyond
+  ///   kMaxTranslation.
   [[nodiscard]] static Result<Pose> create(const Eigen::Quaterniond& rotation,
                                            const Eigen::Vector3d& translation);
 
@@ -57,7 +58,8 @@ class Pose {
 /// Exponential map, ξ = (ρ, θ) to SE(3). Solà et al., arXiv:1812.01537, Eqs. 172 and 174.
 [[nodiscard]] Pose exp(const Twist& xi);
 
-/// Logarithm with |θ| ≤ π; exact at identity and at π. Solà et al., arXiv:1812.01537, Eqs. 173, 174.
+/// Logarithm with |θ| ≤ π; exact at identity and at π. Solà et al., arXiv:1812.01537, Eqs. 173,
+/// 174.
 [[nodiscard]] Twist log(const Pose& X);
 
 /// Ad(X), with X · Exp(ξ) · X⁻¹ = Exp(Ad(X) ξ); for (ρ, θ) it is [R, [t]×R; 0, R].

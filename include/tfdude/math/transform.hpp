@@ -5,25 +5,28 @@
 
 namespace tfdude {
 
-/// A pose X_AB with the covariance of its right perturbation, expressed in B: the value of an edge and
-/// the answer to a lookup. 28 doubles, trivially copyable; valid at all times, as its parts are.
+/// A pose X_AB with the covariance of its right perturbation, expressed in B: the value of an edge
+/// and the answer to a lookup. 28 doubles, trivially copyable; valid at all times, as its parts
+/// are.
 struct Transform {
   Pose pose;
   Covariance covariance;
 };
 
-/// X_AC of X_AB and X_BC with independent errors, first order: Σ_AC = Ad(X_BC⁻¹) Σ_AB Ad(X_BC⁻¹)ᵀ + Σ_BC.
-/// Barfoot & Furgale 2014, Eq. 40 to second order, written for the right perturbation.
+/// X_AC of X_AB and X_BC with independent errors, first order: Σ_AC = Ad(X_BC⁻¹) Σ_AB Ad(X_BC⁻¹)ᵀ +
+/// Σ_BC. Barfoot & Furgale 2014, Eq. 40 to second order, written for the right perturbation.
 [[nodiscard]] Transform compose(const Transform& X_AB, const Transform& X_BC);
 
-/// X_BA of X_AB, first order (and exact for the perturbation's distribution): Σ_BA = Ad(X_AB) Σ_AB Ad(X_AB)ᵀ.
+/// X_BA of X_AB, first order (and exact for the perturbation's distribution): Σ_BA = Ad(X_AB) Σ_AB
+/// Ad(X_AB)ᵀ.
 [[nodiscard]] Transform inverse(const Transform& X_AB);
 
 /// X_AB of X_WA and X_WB with independent errors: compose(inverse(X_WA), X_WB).
 [[nodiscard]] Transform between(const Transform& X_WA, const Transform& X_WB);
 
-/// The way from a frame S up towards its root, added up in S itself: the sum Σ Ad(X_SC) Σ_C Ad(X_SC)ᵀ over
-/// the edges climbed (C the child of each) needs one adjoint an edge, whatever follows, and no buffer.
+/// The way from a frame S up towards its root, added up in S itself: the sum Σ Ad(X_SC) Σ_C
+/// Ad(X_SC)ᵀ over the edges climbed (C the child of each) needs one adjoint an edge, whatever
+/// follows, and no buffer.
 class Climb {
  public:
   /// Goes up one edge: X_PC is its value, C the frame reached so far, P the frame reached then.

@@ -8,19 +8,19 @@
 
 namespace tfdude {
 
-/// A transform as people write it, in a configuration file or on the command line. What is left out is
-/// identity or zero.
+/// A transform as people write it, in a configuration file or on the command line. What is left out
+/// is identity or zero.
 struct TransformSpec {
-  std::optional<std::array<double, 3>> xyz;      ///< translation [m]
-  std::optional<std::array<double, 3>> rpy;      ///< fixed axes X, Y, Z as in URDF [rad]
-  std::optional<std::array<double, 4>> quat;     ///< x, y, z, w
-  std::optional<std::array<double, 6>> stddev;   ///< three [m], three [rad]
-  std::optional<Covariance::Upper> cov;          ///< upper triangle row by row
+  std::optional<std::array<double, 3>> xyz;     ///< translation [m]
+  std::optional<std::array<double, 3>> rpy;     ///< fixed axes X, Y, Z as in URDF [rad]
+  std::optional<std::array<double, 4>> quat;    ///< x, y, z, w
+  std::optional<std::array<double, 6>> stddev;  ///< three [m], three [rad]
+  std::optional<Covariance::Upper> cov;         ///< upper triangle row by row
 
   [[nodiscard]] bool empty() const { return !xyz && !rpy && !quat && !stddev && !cov; }
 
-  /// @return kInvalidInput naming the field: both rpy and quat, both stddev and cov, or a field that
-  ///   Pose::create or Covariance refuse.
+  /// @return kInvalidInput naming the field: both rpy and quat, both stddev and cov, or a field
+  ///   that Pose::create or Covariance refuse.
   [[nodiscard]] Result<Transform> build() const;
 };
 

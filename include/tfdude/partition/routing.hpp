@@ -36,11 +36,13 @@ struct LookupPlan {
 /// The frame and all below it, each partition told of those subtrees that it owns. The first part is
 /// that of the frame itself.
 /// @return kUnknownFrame, kUnreachable.
-[[nodiscard]] Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& directory,
+[[nodiscard]] Result<std::vector<Part>> route_remove(const Forest& forest,
+                                                     const Directory& directory,
                                                      const std::string& id);
 
 /// @return kUnknownFrame, kUnreachable.
-[[nodiscard]] Result<std::vector<Part>> route_update(const Forest& forest, const Directory& directory,
+[[nodiscard]] Result<std::vector<Part>> route_update(const Forest& forest,
+                                                     const Directory& directory,
                                                      const std::vector<EdgeUpdate>& edges);
 
 /// @return kUnknownFrame, kUnknownParent, kCycle, kUnreachable.

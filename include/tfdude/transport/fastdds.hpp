@@ -30,6 +30,7 @@ struct FastDdsOptions {
 /// the whole process, since it calls handlers under the library's locks, and sends its log to standard
 /// error.
 /// @return kInvalidInput (domain). start() may fail with kConfig (profile) and kTransport.
-[[nodiscard]] Result<std::unique_ptr<Transport>> make_fastdds_transport(const FastDdsOptions& options);
+[[nodiscard]] Result<std::unique_ptr<Transport>> make_fastdds_transport(
+    const FastDdsOptions& options);
 
 }  // namespace tfdude

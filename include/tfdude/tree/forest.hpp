@@ -71,7 +71,8 @@ class Forest {
 
   /// Adds a frame; an empty parent makes a root. O(1) for a leaf, O(n) where n frames wait for it.
   /// @return kAlreadyExists, kUnknownParent, kCycle, kInvalidInput (id).
-  [[nodiscard]] Result<void> add(std::string_view id, std::string_view parent, const Transform& X_PC,
+  [[nodiscard]] Result<void> add(std::string_view id, std::string_view parent,
+                                 const Transform& X_PC,
                                  MissingParent rule = MissingParent::kRefuse);
 
   /// Removes a held frame and all held frames below it that are reached through held ones. O(removed).

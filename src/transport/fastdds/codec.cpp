@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+
 #include "transport/fastdds/cdr_check.hpp"
 
 namespace tfdude::fastdds {
@@ -272,7 +273,8 @@ Result<Update> from_wire(const wire::Update& sample,
 }
 
 Result<Page> from_wire(const wire::Page& sample) {
-  Page page{string_of(sample.partition()), sample.number(), sample.incarnation(), sample.epoch(), {}};
+  Page page{
+      string_of(sample.partition()), sample.number(), sample.incarnation(), sample.epoch(), {}};
   if (auto ok = check_partition_name(page.partition); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
@@ -281,7 +283,8 @@ Result<Page> from_wire(const wire::Page& sample) {
     PageEntry read{string_of(entry.id()), string_of(entry.parent())};
     if (auto ok = check_id(read.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
     if (!read.parent.empty()) {
-      if (auto ok = check_id(read.parent, "parent"); !ok) return tl::unexpected(std::move(ok.error()));
+      if (auto ok = check_id(read.parent, "parent"); !ok)
+        return tl::unexpected(std::move(ok.error()));
     }
     page.entries.push_back(std::move(read));
   }

@@ -5,6 +5,7 @@
 
 #include "tfdude/base/result.hpp"
 #include "tfdude/partition/messages.hpp"
+
 #include "transport/fastdds/compat.hpp"
 
 // Between the messages of the partition layer and what travels. What comes in is checked field by field: an

@@ -3,6 +3,8 @@
 // All that differs in the source between Fast DDS 2.9 (Debian 12) and 3.1 (Debian 13).
 
 #if TFDUDE_FASTDDS_MAJOR == 2
+#include <tfdudePubSubTypes.h>
+
 #include <fastdds/dds/core/policy/QosPolicies.hpp>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -25,8 +27,6 @@
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <fastrtps/attributes/LibrarySettingsAttributes.h>
 #include <fastrtps/xmlparser/XMLProfileManager.h>
-
-#include <tfdudePubSubTypes.h>
 #else
 #include <fastdds/LibrarySettings.hpp>
 #include <fastdds/dds/core/ReturnCode.hpp>
@@ -50,7 +50,6 @@
 #include <fastdds/dds/topic/IContentFilterFactory.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
-
 #include <tfdudePubSubTypes.hpp>
 #endif
 
@@ -171,7 +170,8 @@ class CheckedType final : public Generated {
            own_buffer.compute_key(payload, handle, force_md5);
   }
 
-  bool compute_key(const void* const data, ertps::InstanceHandle_t& handle, bool force_md5) override {
+  bool compute_key(const void* const data, ertps::InstanceHandle_t& handle,
+                   bool force_md5) override {
     thread_local Generated own_buffer;
     return own_buffer.compute_key(data, handle, force_md5);
   }

@@ -33,7 +33,8 @@ class Outlet final : public edds::DataWriterListener {
   /// A sample of the topic's type. Thread-safe.
   bool write(void* sample) { return fastdds::write(*writer_, sample); }
 
-  void on_publication_matched(edds::DataWriter*, const edds::PublicationMatchedStatus& status) override;
+  void on_publication_matched(edds::DataWriter*,
+                              const edds::PublicationMatchedStatus& status) override;
 
  private:
   edds::DomainParticipant& participant_;

@@ -2,8 +2,9 @@
 
 #include <utility>
 
-#include "base/log.hpp"
 #include "tfdude/base/id.hpp"
+
+#include "base/log.hpp"
 #include "transport/fastdds/topics.hpp"
 
 namespace tfdude::fastdds {
@@ -46,7 +47,8 @@ Result<void> FastDdsTransport::create_participant() {
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
       options_.domain, qos, &participant_listener_, edds::StatusMask::none());
   if (participant_ == nullptr) {
-    return fail(Errc::kTransport, "Fast DDS could not join domain " + std::to_string(options_.domain));
+    return fail(Errc::kTransport,
+                "Fast DDS could not join domain " + std::to_string(options_.domain));
   }
   self_ = peer_of(participant_->guid().guidPrefix);
   topics_.presence = create_topic(kPresenceTopic, edds::TypeSupport(new PresenceType));
@@ -75,16 +77,18 @@ Result<void> FastDdsTransport::create_endpoints() {
           [this](const Prefix& from, int change) { presence_alive(from, change); }});
   pages_ = std::make_unique<Inlet<wire::Page>>(
       *participant_, *topics_.directory, std::string(), "directory_reader",
-      Inlet<wire::Page>::Calls{[this](const wire::Page& sample, const Prefix&) { take_page(sample); },
-                               nullptr, nullptr});
+      Inlet<wire::Page>::Calls{
+          [this](const wire::Page& sample, const Prefix&) { take_page(sample); }, nullptr,
+          nullptr});
   replies_ = std::make_unique<Inlet<wire::Reply>>(
       *participant_, *topics_.reply, reply_partition(self_), "call_reader",
       Inlet<wire::Reply>::Calls{
-          [this](const wire::Reply& sample, const Prefix&) { take_reply(sample); }, nullptr, nullptr});
+          [this](const wire::Reply& sample, const Prefix&) { take_reply(sample); }, nullptr,
+          nullptr});
   if (!presence_->good() || !pages_->good() || !replies_->good()) return not_created("the readers");
   if (options_.partition.empty()) return {};
-  presence_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.presence, std::string(),
-                                              "presence_writer");
+  presence_outlet_ =
+      std::make_unique<Outlet>(*participant_, *topics_.presence, std::string(), "presence_writer");
   directory_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.directory, std::string(),
                                                "directory_writer");
   if (!presence_outlet_->good() || !directory_outlet_->good()) return not_created("the writers");
@@ -100,7 +104,8 @@ edds::ContentFilteredTopic* FastDdsTransport::create_filtered(edds::Topic* topic
 Result<void> FastDdsTransport::serve(const std::string& partition) {
   using Prefix = ertps::GuidPrefix_t;
   filters_ = std::make_unique<OwnedFilters>(partition, *handler_, *counters_);
-  if (!ok(participant_->register_content_filter_factory(OwnedFilters::kClassName, filters_.get()))) {
+  if (!ok(participant_->register_content_filter_factory(OwnedFilters::kClassName,
+                                                        filters_.get()))) {
     return not_created("the filter");
   }
   auto* requests = create_filtered(topics_.request, partition);
@@ -118,7 +123,8 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
   updates_ = std::make_unique<Inlet<wire::Update>>(
       *participant_, *updates, partition, "update_reader",
       Inlet<wire::Update>::Calls{
-          [this](const wire::Update& sample, const Prefix&) { take_update(sample); }, nullptr, nullptr});
+          [this](const wire::Update& sample, const Prefix&) { take_update(sample); }, nullptr,
+          nullptr});
   if (!requests_->good() || !updates_->good()) return not_created("the readers");
   return {};
 }
@@ -157,7 +163,8 @@ void FastDdsTransport::publish(const Page& page) {
 }
 
 std::shared_ptr<Outlet> FastDdsTransport::outlet(Outlets& outlets, edds::Topic* topic,
-                                                 const std::string& partition, const char* profile) {
+                                                 const std::string& partition,
+                                                 const char* profile) {
   const std::lock_guard lock(outlets_mutex_);
   auto& entry = outlets[partition];
   if (entry == nullptr) entry = std::make_shared<Outlet>(*participant_, *topic, partition, profile);
@@ -186,11 +193,13 @@ Result<void> FastDdsTransport::send(Outlet& outlet, const std::string& partition
                                     Deadline deadline) {
   if (!outlet.good()) return not_created("a writer");
   if (!outlet.wait_until_matched(deadline)) {
-    return fail(Errc::kTimeout, "partition " + quote(partition) + " was not met in time in domain " +
+    return fail(Errc::kTimeout, "partition " + quote(partition) +
+                                    " was not met in time in domain " +
                                     std::to_string(options_.domain));
   }
   if (!outlet.write(sample)) {
-    return fail(Errc::kTimeout, "partition " + quote(partition) + " does not take what is sent to it");
+    return fail(Errc::kTimeout,
+                "partition " + quote(partition) + " does not take what is sent to it");
   }
   return {};
 }
@@ -205,8 +214,8 @@ std::shared_ptr<Outlet> FastDdsTransport::reply_outlet(const PeerId& peer) {
 
 void FastDdsTransport::open_reply_outlet(const PeerId& peer) {
   if (reply_outlet(peer) != nullptr) return;
-  auto opened = std::make_shared<Outlet>(*participant_, *topics_.reply, reply_partition(peer),
-                                         "call_writer");
+  auto opened =
+      std::make_shared<Outlet>(*participant_, *topics_.reply, reply_partition(peer), "call_writer");
   const std::unique_lock lock(reply_mutex_);
   reply_outlets_.emplace(peer, std::move(opened));
 }
@@ -280,7 +289,8 @@ void FastDdsTransport::take_page(const wire::Page& sample) {
   }
 }
 
-void FastDdsTransport::take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from) {
+void FastDdsTransport::take_presence(const wire::Presence& sample,
+                                     const ertps::GuidPrefix_t& from) {
   const auto presence = from_wire(sample);
   if (!presence) {
     log_refused(kPresenceTopic, presence.error());
@@ -322,7 +332,8 @@ namespace tfdude {
 
 Result<std::unique_ptr<Transport>> make_fastdds_transport(const FastDdsOptions& options) {
   if (options.domain > fastdds::kMaxDomain) {
-    return fail(Errc::kInvalidInput, "domain " + std::to_string(options.domain) + " is not within 0 to " +
+    return fail(Errc::kInvalidInput, "domain " + std::to_string(options.domain) +
+                                         " is not within 0 to " +
                                          std::to_string(fastdds::kMaxDomain));
   }
   return std::make_unique<fastdds::FastDdsTransport>(options);

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "tfdude/transport/fastdds.hpp"
+
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/owned_filter.hpp"
@@ -30,7 +31,8 @@ class FastDdsTransport final : public Transport {
   void announce(const Presence& presence) override;
   void publish(const Page& page) override;
   void prepare(const std::string& partition) override;
-  Result<void> send(const std::string& partition, const Request& request, Deadline deadline) override;
+  Result<void> send(const std::string& partition, const Request& request,
+                    Deadline deadline) override;
   Result<void> send(const std::string& partition, const Update& update, Deadline deadline) override;
   void reply(const PeerId& to, const Reply& reply) override;
   bool settled() const override { return peers_.settled(); }

@@ -4,6 +4,7 @@
 
 #include "tfdude/transport/fastdds.hpp"
 #include "tfdude/transport/transport.hpp"
+
 #include "transport/fastdds/compat.hpp"
 
 // The library's interfaces have no virtual destructor; the classes here are final and never deleted through

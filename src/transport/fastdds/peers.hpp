@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tfdude/partition/messages.hpp"
+
 #include "transport/fastdds/compat.hpp"
 
 namespace tfdude::fastdds {

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "tfdude/base/id.hpp"
+
 #include "transport/fastdds/builtin_profiles.hpp"
 
 namespace tfdude::fastdds {
@@ -14,7 +15,9 @@ namespace {
 constexpr const char* kPrefix = "tfdude_";
 constexpr const char* kBuiltinPrefix = "tfdude_builtin_";
 
-edds::DomainParticipantFactory& factory() { return *edds::DomainParticipantFactory::get_instance(); }
+edds::DomainParticipantFactory& factory() {
+  return *edds::DomainParticipantFactory::get_instance();
+}
 
 // Fast DDS keeps profiles by name for the whole process and refuses a name twice, so the built-in ones
 // get names of their own, and each file is loaded once.
@@ -50,9 +53,10 @@ Result<void> load_profiles(const std::string& file) {
     return fail(Errc::kConfig, "profile file " + quote(file) + " cannot be opened");
   }
   if (!ok(factory().load_XML_profiles_file(file))) {
-    return fail(Errc::kConfig, "profile file " + quote(file) +
-                                   " is not a valid Fast DDS profile file (or repeats the names of one "
-                                   "loaded before)");
+    return fail(Errc::kConfig,
+                "profile file " + quote(file) +
+                    " is not a valid Fast DDS profile file (or repeats the names of one "
+                    "loaded before)");
   }
   loaded.insert(file);
   return {};

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "tfdude/base/result.hpp"
+
 #include "transport/fastdds/compat.hpp"
 
 // QoS by the names of profiles/tfdude.xml, without their prefix: "participant", "call_writer"...

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "tfdude/transport/fastdds.hpp"
+
 #include "transport/fastdds/cdr_check.hpp"
 #include "transport/fastdds/compat.hpp"
 

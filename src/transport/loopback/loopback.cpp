@@ -151,7 +151,8 @@ class LoopbackTransport final : public Transport {
   void prepare(const std::string&) override {}
 
   Result<void> send(const std::string& partition, const Request& request, Deadline) override {
-    return send_to(partition, [&](TransportHandler& handler) { handler.on_request(self_->id, request); });
+    return send_to(partition,
+                   [&](TransportHandler& handler) { handler.on_request(self_->id, request); });
   }
 
   Result<void> send(const std::string& partition, const Update& update, Deadline) override {
@@ -177,7 +178,8 @@ class LoopbackTransport final : public Transport {
   template <class Call>
   Result<void> send_to(const std::string& partition, Call call) {
     const auto reached = hub_->deliver(
-        [&](const Member& member) { return !partition.empty() && member.serves == partition; }, call);
+        [&](const Member& member) { return !partition.empty() && member.serves == partition; },
+        call);
     if (reached == 0) {
       return fail(Errc::kTimeout, "partition " + quote(partition) + " is not there to be asked");
     }
@@ -190,6 +192,8 @@ class LoopbackTransport final : public Transport {
 
 LoopbackNetwork::LoopbackNetwork() : hub_(std::make_shared<Hub>()) {}
 
-std::unique_ptr<Transport> LoopbackNetwork::join() { return std::make_unique<LoopbackTransport>(hub_); }
+std::unique_ptr<Transport> LoopbackNetwork::join() {
+  return std::make_unique<LoopbackTransport>(hub_);
+}
 
 }  // namespace tfdude

@@ -1,6 +1,5 @@
 #include "tfdude/math/covariance.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -8,6 +7,8 @@
 #include <set>
 #include <string>
 #include <type_traits>
+
+#include <Eigen/Eigenvalues>
 
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"

@@ -1,12 +1,14 @@
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <functional>
 #include <sstream>
 #include <string>
 
+#include <Eigen/Cholesky>
+
+#include "tfdude/math/transform.hpp"
+
 #include "support/catch.hpp"
 #include "support/random.hpp"
-#include "tfdude/math/transform.hpp"
 
 namespace tfdude {
 namespace {

@@ -1,10 +1,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tfdude/math/pose.hpp"
+
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
-#include "tfdude/math/pose.hpp"
 
 namespace tfdude {
 namespace {

@@ -1,9 +1,10 @@
 #include "tfdude/math/transform.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <functional>
 #include <type_traits>
 #include <vector>
+
+#include <Eigen/Eigenvalues>
 
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"

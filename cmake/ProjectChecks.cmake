@@ -1,0 +1,20 @@
+# Tests of the project itself rather than of its code: the layers, and that the installed package works.
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
+
+add_test(NAME "layers: sources" COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py)
+add_test(NAME "layers: the check itself"
+  COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py --self-test)
+set_tests_properties("layers: sources" "layers: the check itself" PROPERTIES LABELS unit TIMEOUT 60)
+
+set(consumer_flags "")
+if(TFDUDE_SANITIZE)
+  set(consumer_flags -fsanitize=${TFDUDE_SANITIZE})
+endif()
+add_test(NAME "install: consumer"
+  COMMAND ${CMAKE_COMMAND}
+    -D BUILD_DIR=${CMAKE_BINARY_DIR}
+    -D CONFIG=$<CONFIG>
+    -D CXX=${CMAKE_CXX_COMPILER}
+    -D CXX_FLAGS=${consumer_flags}
+    -P ${CMAKE_SOURCE_DIR}/tests/install_consumer/run.cmake)
+set_tests_properties("install: consumer" PROPERTIES LABELS install TIMEOUT 300)

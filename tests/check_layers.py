@@ -1,0 +1,233 @@
+#!/usr/bin/env python3
+"""Enforces the layers: check_layers.py [--root DIR], or --self-test to check this check.
+
+A layer may include headers of itself and of the layers before it. What is foreign to a layer (DDS,
+YAML, threads, the clock ...) stays where the tables below put it. Tests and benchmarks are exempt.
+"""
+
+import argparse
+import pathlib
+import re
+import sys
+import tempfile
+import unittest
+
+LAYERS = ["base", "math", "tree", "partition", "transport", "client", "apps"]
+SUFFIXES = {".hpp", ".cpp", ".h", ".cc", ".ipp"}
+DDS_FOLDER = "src/transport/fastdds/"
+
+# (what, pattern of the include, folders or files that may include it)
+CONFINED = [
+    ("Boost", r"boost/", ["src/tree/graph.hpp"]),
+    ("DDS", r"(fastdds|fastrtps|fastcdr)/", [DDS_FOLDER]),
+    ("yaml-cpp", r"yaml-cpp/", ["src/client/"]),
+    ("CLI11", r"CLI/", ["apps/"]),
+    ("nlohmann", r"nlohmann/", ["apps/"]),
+]
+# (what, pattern of the include, layers that must do without it)
+BARRED = [
+    ("threads", r"(thread|future|condition_variable)$", ["math", "tree", "partition"]),
+    ("locks and atomics", r"(mutex|shared_mutex|atomic)$", ["math", "partition"]),
+    ("input and output", r"(iostream|fstream|spdlog/.*)$", ["math", "tree", "partition"]),
+]
+CLOCK = re.compile(r"::\s*now\s*\(|\b(clock_gettime|gettimeofday)\b|\btime\s*\(\s*(nullptr|NULL|0)\s*\)")
+CLOCKLESS = ["base", "math", "tree", "partition"]
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
+COMMENT_OR_LITERAL = re.compile(
+    r'//[^\n]*|/\*.*?\*/|R"([^(\s]*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"', re.DOTALL)
+
+
+def strip_comments(text, literals_too=False):
+    """Blanks comments (and literals), keeping the lines where they are."""
+    def blank(match):
+        comment = match.group().startswith("/")
+        return re.sub(r"[^\n]", " ", match.group()) if comment or literals_too else match.group()
+    return COMMENT_OR_LITERAL.sub(blank, text)
+
+
+def layer_of(path):
+    """The layer of a file of the project; None for one that lies in no layer."""
+    match = re.match(r"(?:include/tfdude|src)/([^/]+)/|(apps)/", path)
+    name = match and (match[1] or match[2])
+    return name if name in LAYERS else None
+
+
+class Checker:
+    def __init__(self, root):
+        self.root = pathlib.Path(root)
+        self.files = {
+            path.relative_to(self.root).as_posix(): path.read_text(encoding="utf-8")
+            for folder in ("include", "src", "apps")
+            for path in sorted((self.root / folder).rglob("*"))
+            if path.suffix in SUFFIXES and path.is_file()}
+        self.generated = {
+            idl.stem + tail
+            for idl in (self.root / "idl").glob("*.idl")
+            for part in ("", "PubSubTypes", "CdrAux", "TypeObjectSupport")
+            for tail in (part + ".h", part + ".hpp", part + ".ipp")}
+        self.findings = []
+
+    def report(self, path, position, rule, message):
+        line = self.files[path].count("\n", 0, position) + 1 if position is not None else 1
+        self.findings.append((rule, f"{path}:{line}: [{rule}] {message}"))
+
+    def resolve(self, path, name):
+        """The project's file that an include names, the way the compiler would find it; or None."""
+        here = path.rsplit("/", 1)[0]
+        for folder in (here, "include", "src"):
+            parts = []
+            for part in f"{folder}/{name}".split("/"):
+                if part == ".." and parts:
+                    parts.pop()
+                elif part != ".":
+                    parts.append(part)
+            if "/".join(parts) in self.files:
+                return "/".join(parts)
+        return None
+
+    def check_include(self, path, layer, position, name):
+        target = self.resolve(path, name)
+        if target is None and name.startswith("tfdude/"):
+            target = "include/" + name  # a header that is not there (yet) still has its layer
+        if target is not None:
+            self.check_own(path, layer, position, name, target)
+            return
+        if name.rsplit("/", 1)[-1] in self.generated and not path.startswith(DDS_FOLDER):
+            self.report(path, position, "confined", f"<{name}> is generated: only in {DDS_FOLDER}")
+        for what, pattern, places in CONFINED:
+            if re.match(pattern, name) and not any(path.startswith(place) for place in places):
+                self.report(path, position, "confined", f"<{name}>: {what} only in {', '.join(places)}")
+        for what, pattern, layers in BARRED:
+            if re.match(pattern, name) and layer in layers:
+                self.report(path, position, "barred", f"<{name}>: {layer} does without {what}")
+        standard = "/" not in name and "." not in name
+        if layer == "math" and not standard and not name.startswith("Eigen/"):
+            self.report(path, position, "math", f"<{name}>: math knows only Eigen, base and std")
+
+    def check_own(self, path, layer, position, name, target):
+        other = layer_of(target)
+        if other is None or LAYERS.index(other) > LAYERS.index(layer):
+            self.report(path, position, "arrow", f'{layer} may not include "{name}" of {other}')
+        if path.startswith("include/") and not target.startswith("include/"):
+            self.report(path, position, "public", f'a public header includes the private "{name}"')
+        if target.startswith(DDS_FOLDER) and not path.startswith(DDS_FOLDER):
+            self.report(path, position, "confined", f'"{name}" may bring DDS along: only in {DDS_FOLDER}')
+
+    def check_listed(self):
+        """Each public header is in the file set: installed, and compiled alone by the dev preset."""
+        listing = self.root / "src/CMakeLists.txt"
+        listed = listing.read_text(encoding="utf-8") if listing.exists() else ""
+        for path in self.files:
+            if path.startswith("include/") and path.removeprefix("include/") not in listed:
+                self.report(path, None, "listed", "is not in the header list of src/CMakeLists.txt")
+
+    def run(self):
+        for path, text in self.files.items():
+            layer = layer_of(path)
+            if layer is None:
+                self.report(path, None, "place", "lies in no layer's folder")
+                continue
+            for match in INCLUDE.finditer(strip_comments(text)):
+                self.check_include(path, layer, match.start(1), match.group(1))
+            if layer in CLOCKLESS:
+                for match in CLOCK.finditer(strip_comments(text, literals_too=True)):
+                    self.report(path, match.start(), "clock", f"{layer} is handed the time, it reads no clock")
+        self.check_listed()
+        return self.findings
+
+
+class SelfTest(unittest.TestCase):
+    """Every rule must find its violation, and nothing where there is none."""
+
+    CLEAN = {
+        "idl/wire.idl": "",
+        "src/CMakeLists.txt": "tfdude/base/id.hpp tfdude/math/pose.hpp tfdude/tree/forest.hpp",
+        "include/tfdude/base/id.hpp": "#include <string>\n#include <tl/expected.hpp>\n",
+        "include/tfdude/math/pose.hpp": '#include <Eigen/Core>\n#include "tfdude/base/id.hpp"\n',
+        "include/tfdude/tree/forest.hpp": '#include <mutex>\n#include "tfdude/math/pose.hpp"\n',
+        "src/tree/graph.hpp": "#include <boost/graph/adjacency_list.hpp>\n",
+        "src/tree/forest.cpp": '#include "graph.hpp"\n#include "tree/graph.hpp"\n#include <atomic>\n',
+        "src/math/pose.cpp": '// ::now() and #include <thread>\n/*\n#include <mutex>\n*/\nauto s = "x::now()";\n',
+        "src/transport/fastdds/wire.cpp": '#include <fastdds/dds/core.hpp>\n#include "wire.h"\n',
+        "src/transport/fastdds/entity.hpp": "#include <fastdds/dds/core.hpp>\n",
+        "src/client/client.cpp": '#include <yaml-cpp/yaml.h>\nauto t = Clock::now();\n#include <thread>\n',
+        "apps/tfdude/main.cpp": '#include <CLI/CLI.hpp>\n#include <nlohmann/json.hpp>\n#include "tool.hpp"\n',
+        "apps/tfdude/tool.hpp": '#include "tfdude/tree/forest.hpp"\n',
+    }
+    # (rule, file, text)
+    VIOLATIONS = [
+        ("arrow", "src/base/a.cpp", '#include "tfdude/math/pose.hpp"\n'),
+        ("arrow", "src/math/a.cpp", '#include "tree/graph.hpp"\n'),
+        ("arrow", "src/math/a.cpp", '#include "../tree/graph.hpp"\n'),
+        ("arrow", "src/tree/a.cpp", "#include <tfdude/partition/not_there.hpp>\n"),
+        ("arrow", "src/partition/a.cpp", '#  include "tfdude/transport/port.hpp"\n'),
+        ("arrow", "src/transport/a.cpp", '#include "tfdude/client/client.hpp"\n'),
+        ("arrow", "src/client/a.cpp", '#include "../../apps/tfdude/tool.hpp"\n'),
+        ("arrow", "src/client/a.cpp", '#include "tfdude/unheard_of/a.hpp"\n'),
+        ("public", "include/tfdude/tree/forest.hpp", '#include "tree/graph.hpp"\n'),
+        ("confined", "src/tree/a.cpp", "#include <boost/graph/graph_traits.hpp>\n"),
+        ("confined", "src/client/a.cpp", "#include <fastdds/dds/core.hpp>\n"),
+        ("confined", "src/transport/loopback/a.cpp", "#include <fastrtps/types.h>\n"),
+        ("confined", "src/transport/a.cpp", "#include <fastcdr/Cdr.h>\n"),
+        ("confined", "src/client/a.cpp", '#include "wirePubSubTypes.h"\n'),
+        ("confined", "src/client/a.cpp", "#include <generated/wire.hpp>\n"),
+        ("confined", "apps/tfdude/a.cpp", '#include "transport/fastdds/entity.hpp"\n'),
+        ("confined", "apps/tfdude/a.cpp", "#include <yaml-cpp/yaml.h>\n"),
+        ("confined", "src/client/a.cpp", "#include <CLI/CLI.hpp>\n"),
+        ("confined", "src/client/a.cpp", "#include <nlohmann/json.hpp>\n"),
+        ("math", "src/math/a.cpp", "#include <tl/expected.hpp>\n"),
+        ("math", "src/math/a.cpp", "#include <unistd.h>\n"),
+        ("barred", "src/partition/a.cpp", "int a;  // fine\n#include <thread>\n"),
+        ("barred", "src/math/a.cpp", "#include <mutex>\n"),
+        ("barred", "src/partition/a.cpp", "#include <atomic>\n"),
+        ("barred", "src/tree/a.cpp", "#include <thread>\n"),
+        ("barred", "src/partition/a.cpp", "#include <spdlog/spdlog.h>\n"),
+        ("clock", "src/partition/a.cpp", "auto t = std::chrono::system_clock::now();\n"),
+        ("clock", "src/tree/a.cpp", "auto t = Clock::now ();\n"),
+        ("clock", "src/math/a.cpp", "auto t = std::time(nullptr);\n"),
+        ("place", "src/a.cpp", "int a;\n"),
+        ("place", "src/unheard_of/a.cpp", "int a;\n"),
+        ("listed", "include/tfdude/tree/unlisted.hpp", "\n"),
+    ]
+
+    def findings(self, changes):
+        with tempfile.TemporaryDirectory() as root:
+            for path, text in {**self.CLEAN, **changes}.items():
+                file = pathlib.Path(root, path).resolve()
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_text(text, encoding="utf-8")
+            return Checker(root).run()
+
+    def test_clean_tree_has_no_findings(self):
+        self.assertEqual(self.findings({}), [])
+
+    def test_each_violation_is_found(self):
+        for rule, path, text in self.VIOLATIONS:
+            with self.subTest(path=path, text=text):
+                rules = {found for found, _ in self.findings({path: text})}
+                self.assertIn(rule, rules)
+                self.assertLessEqual(rules, {rule, "listed"})
+
+    def test_line_is_named(self):
+        self.assertIn(":2: ", self.findings({"src/base/a.cpp": '\n#include "tfdude/math/pose.hpp"\n'})[0][1])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--root", default=pathlib.Path(__file__).resolve().parent.parent)
+    parser.add_argument("--self-test", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.self_test:
+        unittest.main(argv=[sys.argv[0]])
+    checker = Checker(arguments.root)
+    findings = checker.run()
+    for _, message in findings:
+        print(message)
+    if not checker.files:
+        sys.exit(f"check_layers: no sources under {arguments.root}")
+    sys.exit(f"{len(findings)} violations" if findings else 0)
+
+
+if __name__ == "__main__":
+    main()
