@@ -31,7 +31,7 @@ const Version* Forest::Impl::named(std::string_view id, std::uint64_t commit) co
 const Version* Forest::Impl::of(Handle frame, std::uint64_t commit) const {
   if (frame.slot >= slots_.size()) return nullptr;
   const Version* version = at(frame.slot, commit);
-  return version->present() && version->name->generation == frame.generation ? version : nullptr;
+  return version->present() && version->generation == frame.generation ? version : nullptr;
 }
 
 Result<Transform> Forest::Impl::walk(const Version* a, const Version* b, std::uint64_t commit,
@@ -140,7 +140,7 @@ std::optional<Handle> Forest::find(std::string_view id) const {
   const epoch::Guard guard;
   const Version* version = impl_->present(id, impl_->snapshot());
   if (version == nullptr) return std::nullopt;
-  return Handle{version->slot, version->name->generation};
+  return Handle{version->slot, version->generation};
 }
 
 bool Forest::holds(std::string_view id) const {
