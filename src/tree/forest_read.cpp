@@ -40,17 +40,22 @@ Result<Transform> Forest::Impl::walk(const Version* a, const Version* b, std::ui
   const Version* const end = b;
   Climb climb_a;
   Climb climb_b;
+  // An edge held by another; from there on only the errors matter, and kNotConnected goes first.
+  const Version* elsewhere = nullptr;
   while (a != b) {
     const bool from_a = a->depth >= b->depth;
     const Version*& here = from_a ? a : b;
     const bool top = absent == Absent::kEnds ? here->depth == 0 : here->parent == kNoSlot;
     if (top) return not_connected(*start, *end);
-    if (!here->held()) {
-      return fail(Errc::kNotOwner,
-                  "the edge of " + quoted(here->name->text) + " is held by another partition");
+    if (!here->held()) elsewhere = here;
+    if (elsewhere == nullptr) {
+      (from_a ? climb_a : climb_b).up(static_cast<const HeldVersion*>(here)->X_PC);
     }
-    (from_a ? climb_a : climb_b).up(static_cast<const HeldVersion*>(here)->X_PC);
     here = at(here->parent, commit);
+  }
+  if (elsewhere != nullptr) {
+    return fail(Errc::kNotOwner,
+                "the edge of " + quoted(elsewhere->name->text) + " is held by another partition");
   }
   return join(climb_a, climb_b);
 }
