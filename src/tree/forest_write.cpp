@@ -261,6 +261,8 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
 Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Owner owner) {
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
+  // A version that counts as held carries a value, which there is none of.
+  if (owner == kHeldHere) return fail(Errc::kInvalidInput, "owner is this very forest");
   const std::lock_guard lock(impl_->mutex_);
   const Version* there = impl_->newest_named(id);
   if (there != nullptr && there->held()) {
