@@ -16,8 +16,8 @@ namespace tfdude::testing {
   const Eigen::Vector3d t = X.translation();
   const Eigen::Quaterniond q = X.rotation();
   std::ostringstream out;
-  out << std::setprecision(16) << "(" << t.x() << ", " << t.y() << ", " << t.z() << ") m, [" << q.x()
-      << ", " << q.y() << ", " << q.z() << ", " << q.w() << "]";
+  out << std::setprecision(16) << "(" << t.x() << ", " << t.y() << ", " << t.z() << ") m, ["
+      << q.x() << ", " << q.y() << ", " << q.z() << ", " << q.w() << "]";
   return out.str();
 }
 
@@ -29,7 +29,8 @@ namespace tfdude::testing {
 }
 
 /// Angle [rad] between two rotations; a quaternion and its negative are the same rotation.
-[[nodiscard]] inline double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
+[[nodiscard]] inline double angle_between(const Eigen::Quaterniond& a,
+                                          const Eigen::Quaterniond& b) {
   const Eigen::Quaterniond d = a.conjugate() * b;
   return 2.0 * std::atan2(d.vec().norm(), std::abs(d.w()));
 }
@@ -46,10 +47,11 @@ namespace tfdude::testing {
   return out.str();
 }
 
-/// Empty if no element differs by more than `tol` relative to the largest variances of its rows: metres
-/// are judged by metres and radians by radians, whatever the axes. A NaN is always a difference.
-[[nodiscard]] inline std::string covariance_diff(const Covariance& actual, const Covariance& expected,
-                                                 double tol) {
+/// Empty if no element differs by more than `tol` relative to the largest variances of its rows:
+/// metres are judged by metres and radians by radians, whatever the axes. A NaN is always a
+/// difference.
+[[nodiscard]] inline std::string covariance_diff(const Covariance& actual,
+                                                 const Covariance& expected, double tol) {
   const Matrix6d a = actual.matrix();
   const Matrix6d e = expected.matrix();
   const double metres = std::sqrt(e.diagonal().head<3>().maxCoeff());
@@ -74,8 +76,7 @@ namespace tfdude::testing {
 [[nodiscard]] inline std::string transform_diff(const Transform& actual, const Transform& expected,
                                                 double pose_tol, double covariance_tol) {
   const std::string pose = pose_diff(actual.pose, expected.pose, pose_tol);
-  const std::string sigma =
-      covariance_diff(actual.covariance, expected.covariance, covariance_tol);
+  const std::string sigma = covariance_diff(actual.covariance, expected.covariance, covariance_tol);
   return pose.empty() || sigma.empty() ? pose + sigma : pose + "\n" + sigma;
 }
 
