@@ -17,7 +17,8 @@ Reader* take_reader() {
   }
   auto* r = new Reader;
   r->next = all_readers.load(std::memory_order_relaxed);
-  while (!all_readers.compare_exchange_weak(r->next, r, std::memory_order_release)) {
+  // seq_cst, as the announcements: a scan that misses this reader comes before all that it reads.
+  while (!all_readers.compare_exchange_weak(r->next, r, std::memory_order_seq_cst)) {
   }
   return r;
 }

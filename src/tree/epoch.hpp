@@ -31,7 +31,8 @@ class Guard {
  public:
   Guard() : reader_(this_thread()) {
     if (reader_.depth++ == 0) {
-      reader_.announced.store(current.load(std::memory_order_relaxed), std::memory_order_seq_cst);
+      // acquire: who announces the epoch after a tag also sees the unlinking before it.
+      reader_.announced.store(current.load(std::memory_order_acquire), std::memory_order_seq_cst);
     }
   }
   ~Guard() {

@@ -32,7 +32,7 @@ const Version* Forest::Impl::named(std::string_view id, std::uint64_t commit) co
 const Version* Forest::Impl::of(Handle frame, std::uint64_t commit) const {
   if (frame.slot >= slots_.size()) return nullptr;
   const Version* version = at(frame.slot, commit);
-  return version->present() && version->name->generation == frame.generation ? version : nullptr;
+  return version->present() && version->generation == frame.generation ? version : nullptr;
 }
 
 Result<Transform> Forest::Impl::walk(const Version* a, const Version* b, std::uint64_t commit,
@@ -41,17 +41,22 @@ Result<Transform> Forest::Impl::walk(const Version* a, const Version* b, std::ui
   const Version* const end = b;
   Climb climb_a;
   Climb climb_b;
+  // An edge held by another; from there on only the errors matter, and kNotConnected goes first.
+  const Version* elsewhere = nullptr;
   while (a != b) {
     const bool from_a = a->depth >= b->depth;
     const Version*& here = from_a ? a : b;
     const bool top = absent == Absent::kEnds ? here->depth == 0 : here->parent == kNoSlot;
     if (top) return not_connected(*start, *end);
-    if (!here->held()) {
-      return fail(Errc::kNotOwner,
-                  "the edge of " + quote(here->name->text) + " is held by another partition");
+    if (!here->held()) elsewhere = here;
+    if (elsewhere == nullptr) {
+      (from_a ? climb_a : climb_b).up(static_cast<const HeldVersion*>(here)->X_PC);
     }
-    (from_a ? climb_a : climb_b).up(static_cast<const HeldVersion*>(here)->X_PC);
     here = at(here->parent, commit);
+  }
+  if (elsewhere != nullptr) {
+    return fail(Errc::kNotOwner,
+                "the edge of " + quote(elsewhere->name->text) + " is held by another partition");
   }
   return join(climb_a, climb_b);
 }
@@ -141,7 +146,7 @@ std::optional<Handle> Forest::find(std::string_view id) const {
   const epoch::Guard guard;
   const Version* version = impl_->present(id, impl_->snapshot());
   if (version == nullptr) return std::nullopt;
-  return Handle{version->slot, version->name->generation};
+  return Handle{version->slot, version->generation};
 }
 
 bool Forest::holds(std::string_view id) const {

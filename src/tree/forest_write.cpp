@@ -52,7 +52,7 @@ std::uint32_t Forest::Impl::intern(std::string_view id) {
     slot = free_slots_.back();
     free_slots_.pop_back();
   }
-  const Name* name = ids_.insert(id, slot, next_generation_++);
+  const Name* name = ids_.insert(id, slot);
   push_remote(slot).name = name;
   return slot;
 }
@@ -69,6 +69,7 @@ T& Forest::Impl::push(VersionPool<T>& pool, std::uint32_t slot) {
   fresh->depth = old->depth;
   fresh->owner = old->owner;
   fresh->slot = slot;
+  fresh->generation = old->generation;
   superseded_.push_back(old);
   // Readers skip the fresh version by its number until commit(), so the rest may be filled in later.
   head.store(fresh, std::memory_order_release);
@@ -86,6 +87,7 @@ Version& Forest::Impl::push_remote(std::uint32_t slot) { return push(remote_pool
 
 void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
   const std::uint32_t old_parent = fresh.parent;
+  if (!fresh.present()) fresh.generation = next_generation_++;
   if (old_parent != kNoSlot) graph_.unlink(old_parent, fresh.slot);
   if (parent != kNoSlot) {
     graph_.ensure(std::max(parent, fresh.slot));
@@ -213,7 +215,7 @@ Result<void> Forest::update(std::string_view id, const Transform& X_PC) {
 Result<void> Forest::update(Handle frame, const Transform& X_PC) {
   const std::lock_guard lock(impl_->mutex_);
   const Version* version = frame.slot < impl_->slots_.size() ? &impl_->newest(frame.slot) : nullptr;
-  if (version == nullptr || !version->present() || version->name->generation != frame.generation) {
+  if (version == nullptr || !version->present() || version->generation != frame.generation) {
     return fail(Errc::kUnknownFrame, "the frame of this handle was removed");
   }
   if (!version->held()) {
@@ -259,6 +261,8 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
 Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Owner owner) {
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
+  // A version that counts as held carries a value, which there is none of.
+  if (owner == kHeldHere) return fail(Errc::kInvalidInput, "owner is this very forest");
   const std::lock_guard lock(impl_->mutex_);
   const Version* there = impl_->newest_named(id);
   if (there != nullptr && there->held()) {

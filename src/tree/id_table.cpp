@@ -36,13 +36,13 @@ const Name* IdTable::find(std::string_view id) const {
   }
 }
 
-const Name* IdTable::insert(std::string_view id, std::uint32_t slot, std::uint32_t generation) {
+const Name* IdTable::insert(std::string_view id, std::uint32_t slot) {
   Table* table = table_.load(std::memory_order_relaxed);
   if ((used_ + 1) * 3 > table->cells.size() * 2) {
     grow();
     table = table_.load(std::memory_order_relaxed);
   }
-  const auto* name = new Name{std::string(id), hash_of(id), slot, generation};
+  const auto* name = new Name{std::string(id), hash_of(id), slot};
   place(*table, name);
   ++names_;
   ++used_;

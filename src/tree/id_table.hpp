@@ -14,7 +14,6 @@ struct Name {
   std::string text;
   std::size_t hash = 0;
   std::uint32_t slot = 0;
-  std::uint32_t generation = 0;
 };
 
 /// Id to Name: open addressing, found without a lock under an epoch::Guard, changed by one writer at a
@@ -29,7 +28,7 @@ class IdTable {
   [[nodiscard]] const Name* find(std::string_view id) const;
 
   /// The id must not be in the table.
-  const Name* insert(std::string_view id, std::uint32_t slot, std::uint32_t generation);
+  const Name* insert(std::string_view id, std::uint32_t slot);
 
   /// The name must be in the table.
   void erase(const Name* name);

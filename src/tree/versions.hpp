@@ -25,6 +25,8 @@ struct Version {
   std::int32_t depth = kAbsent;  // parent's + 1, so 0 where there is none or it is absent
   Owner owner = kHeldHere;
   std::uint32_t slot = kNoSlot;
+  std::uint32_t generation =
+      0;  // which frame it is; new whenever one appears, even under a kept name
   // Bookkeeping of the pool, not for readers.
   std::uint64_t retire_tag = 0;
   Version* next = nullptr;

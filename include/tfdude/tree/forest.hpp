@@ -96,7 +96,7 @@ class Forest {
   // --- frames held elsewhere: structure only ---
 
   /// Notes that `owner` holds a frame, new or known. A held frame is not touched.
-  /// @return kAlreadyExists (it is held here), kCycle (kept as a root), kInvalidInput (id).
+  /// @return kAlreadyExists (it is held here), kCycle (kept as a root), kInvalidInput (id, owner).
   [[nodiscard]] Result<void> put_remote(std::string_view id, std::string_view parent, Owner owner);
 
   /// Forgets a frame if `owner` holds it.

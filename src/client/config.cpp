@@ -1,0 +1,325 @@
+#include "tfdude/client/config.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+
+#include <yaml-cpp/yaml.h>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/math/transform_spec.hpp"
+
+namespace tfdude {
+namespace {
+
+// Longest file that is read: room for half a million frames, and an end to /dev/zero.
+constexpr std::size_t kMaxFileBytes = std::size_t{64} << 20U;
+
+constexpr std::array<std::string_view, 2> kFileKeys = {"partition", "frames"};
+constexpr std::array<std::string_view, 7> kFrameKeys = {"id",   "parent", "xyz", "rpy",
+                                                        "quat", "stddev", "cov"};
+
+// A key's value; where there is none, it is the key that has a place in the file.
+struct Field {
+  YAML::Node value;
+  YAML::Mark mark;
+};
+
+// What a mapping holds, by key.
+using Fields = std::map<std::string, Field, std::less<>>;
+
+bool is_quoted(const YAML::Node& scalar) { return scalar.Tag() == "!"; }
+
+// YAML's own spellings of infinity and NaN in those that from_chars() knows; "+1" without its plus.
+std::string plain_number(const std::string& text) {
+  std::string number = text.substr(!text.empty() && text[0] == '+' ? 1 : 0);
+  const std::size_t sign = !number.empty() && number[0] == '-' ? 1 : 0;
+  const std::string rest = number.substr(sign);
+  for (const char* word : {".inf", ".Inf", ".INF", ".nan", ".NaN", ".NAN"}) {
+    if (rest == word) number.erase(sign, 1);
+  }
+  return number;
+}
+
+// The key whose line a complaint of TransformSpec::build() belongs to.
+std::string_view blamed_key(const std::string& message, const TransformSpec& spec) {
+  const auto starts = [&](std::string_view word) { return message.rfind(word, 0) == 0; };
+  if (starts("translation")) return "xyz";
+  if (starts("rpy")) return "rpy";
+  if (starts("rotation")) return "quat";
+  if (starts("stddev")) return "stddev";
+  if (starts("covariance")) return spec.cov ? "cov" : "stddev";
+  return {};
+}
+
+// Reads the nodes of one file; the name is for messages.
+class Reader {
+ public:
+  explicit Reader(std::string name) : name_(std::move(name)) {}
+
+  [[nodiscard]] Result<void> check_bytes(const std::string& text) const;
+  [[nodiscard]] Result<Config> config(const YAML::Node& root) const;
+  [[nodiscard]] tl::unexpected<Error> error(Errc code, const YAML::Mark& mark,
+                                            const std::string& message) const;
+
+ private:
+  template <std::size_t N>
+  [[nodiscard]] Result<Fields> fields(const YAML::Node& map,
+                                      const std::array<std::string_view, N>& allowed,
+                                      const std::string& what) const;
+  [[nodiscard]] Result<std::string> text(const Field& field, const std::string& what) const;
+  [[nodiscard]] Result<double> number(const YAML::Node& node, const std::string& what) const;
+  template <std::size_t N>
+  [[nodiscard]] Result<void> numbers(const Fields& fields, std::string_view key,
+                                     const std::string& place,
+                                     std::optional<std::array<double, N>>& out) const;
+  [[nodiscard]] Result<FrameSpec> frame(const YAML::Node& node, std::size_t index) const;
+  [[nodiscard]] Result<std::string> id(const Fields& fields, std::string_view key,
+                                       const std::string& place) const;
+  [[nodiscard]] Result<Transform> transform(const YAML::Node& node, const Fields& fields,
+                                            const std::string& place) const;
+
+  std::string name_;
+};
+
+tl::unexpected<Error> Reader::error(Errc code, const YAML::Mark& mark,
+                                    const std::string& message) const {
+  const std::string line = mark.is_null() ? "" : ":" + std::to_string(mark.line + 1);
+  return fail(code, name_ + line + ": " + message);
+}
+
+// YAML allows no control characters, and yaml-cpp takes some of them for the end of the file.
+Result<void> Reader::check_bytes(const std::string& text) const {
+  int line = 1;
+  for (const char c : text) {
+    if (c == '\n') ++line;
+    if ((c >= 0 && c < ' ' && c != '\n' && c != '\r' && c != '\t') || c == '\x7f') {
+      return fail(Errc::kConfig, name_ + ":" + std::to_string(line) +
+                                     ": holds the control character " +
+                                     tfdude::quote(std::string_view(&c, 1)));
+    }
+  }
+  return {};
+}
+
+template <std::size_t N>
+Result<Fields> Reader::fields(const YAML::Node& map, const std::array<std::string_view, N>& allowed,
+                              const std::string& what) const {
+  std::string known;
+  for (const auto key : allowed) known.append(known.empty() ? "" : ", ").append(key);
+  if (!map.IsMap()) {
+    return error(Errc::kConfig, map.Mark(), what + " is not a mapping with the keys " + known);
+  }
+  Fields fields;
+  for (const auto& entry : map) {
+    const YAML::Node& key_node = entry.first;
+    if (!key_node.IsScalar()) {
+      return error(Errc::kConfig, key_node.Mark(), what + ": a key is not plain text");
+    }
+    const std::string& key = key_node.Scalar();
+    if (std::find(allowed.begin(), allowed.end(), key) == allowed.end()) {
+      return error(Errc::kConfig, key_node.Mark(),
+                   what + ": unknown key " + tfdude::quote(key) + "; known are " + known);
+    }
+    const YAML::Mark mark = entry.second.IsNull() ? key_node.Mark() : entry.second.Mark();
+    if (!fields.emplace(key, Field{entry.second, mark}).second) {
+      return error(Errc::kConfig, key_node.Mark(), what + ": " + key + " is given twice");
+    }
+  }
+  return fields;
+}
+
+Result<std::string> Reader::text(const Field& field, const std::string& what) const {
+  if (field.value.IsNull()) return error(Errc::kConfig, field.mark, what + " has no value");
+  if (!field.value.IsScalar()) return error(Errc::kConfig, field.mark, what + " is not text");
+  return field.value.Scalar();
+}
+
+Result<double> Reader::number(const YAML::Node& node, const std::string& what) const {
+  if (!node.IsScalar() || is_quoted(node)) {
+    return error(Errc::kConfig, node.Mark(), what + " is not a number");
+  }
+  const std::string written = plain_number(node.Scalar());
+  double value = 0;
+  const auto [end, code] = std::from_chars(written.data(), written.data() + written.size(), value);
+  if (code == std::errc::result_out_of_range) {
+    return error(Errc::kInvalidInput, node.Mark(),
+                 what + " is " + node.Scalar() + ", which no double can hold");
+  }
+  if (code != std::errc() || end != written.data() + written.size()) {
+    return error(Errc::kConfig, node.Mark(),
+                 what + " is " + tfdude::quote(node.Scalar()) + ", which is not a number");
+  }
+  if (!std::isfinite(value)) {
+    return error(Errc::kInvalidInput, node.Mark(), what + " is not a finite number");
+  }
+  return value;
+}
+
+template <std::size_t N>
+Result<void> Reader::numbers(const Fields& fields, std::string_view key, const std::string& place,
+                             std::optional<std::array<double, N>>& out) const {
+  const auto found = fields.find(key);
+  if (found == fields.end()) return {};
+  const YAML::Node& list = found->second.value;
+  const std::string what = place + ": " + found->first;
+  if (!list.IsSequence() || list.size() != N) {
+    const std::string has =
+        list.IsSequence() ? " has " + std::to_string(list.size()) + ", not " : " is not a list of ";
+    return error(Errc::kConfig, found->second.mark, what + has + std::to_string(N) + " numbers");
+  }
+  out.emplace();
+  for (std::size_t i = 0; i < N; ++i) {
+    const auto value = number(list[i], what + "[" + std::to_string(i) + "]");
+    if (!value) return tl::unexpected(value.error());
+    (*out)[i] = *value;
+  }
+  return {};
+}
+
+Result<std::string> Reader::id(const Fields& fields, std::string_view key,
+                               const std::string& place) const {
+  const Field& field = fields.find(key)->second;
+  auto value = text(field, place + ": " + std::string(key));
+  if (!value) return value;
+  if (const auto ok = check_id(*value, key); !ok) {
+    return error(ok.error().code, field.mark, place + ": " + ok.error().message);
+  }
+  return value;
+}
+
+Result<Transform> Reader::transform(const YAML::Node& node, const Fields& fields,
+                                    const std::string& place) const {
+  TransformSpec spec;
+  const auto read = numbers(fields, "xyz", place, spec.xyz)
+                        .and_then([&] { return numbers(fields, "rpy", place, spec.rpy); })
+                        .and_then([&] { return numbers(fields, "quat", place, spec.quat); })
+                        .and_then([&] { return numbers(fields, "stddev", place, spec.stddev); })
+                        .and_then([&] { return numbers(fields, "cov", place, spec.cov); });
+  if (!read) return tl::unexpected(read.error());
+  auto X_PC = spec.build();
+  if (X_PC) return X_PC;
+  const std::string& message = X_PC.error().message;
+  const std::string_view key = blamed_key(message, spec);
+  const auto field = fields.find(key);
+  const bool named = message.rfind(std::string(key) + "[", 0) == 0 ||
+                     message.find("both given") != std::string::npos;
+  return error(X_PC.error().code, field == fields.end() ? node.Mark() : field->second.mark,
+               place + ": " + (named ? "" : std::string(key) + ": ") + message);
+}
+
+Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index) const {
+  const std::string nth = "frames[" + std::to_string(index) + "]";
+  // The message of a bad key names the frame too, where the id can be made out.
+  const auto is_id = [](const auto& entry) {
+    return entry.first.IsScalar() && entry.first.Scalar() == "id";
+  };
+  std::string place = nth;
+  if (node.IsMap()) {
+    const auto found = std::find_if(node.begin(), node.end(), is_id);
+    if (found != node.end() && found->second.IsScalar() && check_id(found->second.Scalar(), "id")) {
+      place = "frame " + tfdude::quote(found->second.Scalar());
+    }
+  }
+  const auto entries = fields(node, kFrameKeys, place);
+  if (!entries) return tl::unexpected(entries.error());
+  if (entries->find("id") == entries->end()) {
+    return error(Errc::kConfig, node.Mark(), place + ": id is missing");
+  }
+  FrameSpec spec;
+  auto own_id = id(*entries, "id", place);
+  if (!own_id) return tl::unexpected(own_id.error());
+  spec.id = *std::move(own_id);
+  if (entries->find("parent") != entries->end()) {
+    auto parent = id(*entries, "parent", place);
+    if (!parent) return tl::unexpected(parent.error());
+    spec.parent = *std::move(parent);
+  }
+  auto X_PC = transform(node, *entries, place);
+  if (!X_PC) return tl::unexpected(X_PC.error());
+  spec.X_PC = *X_PC;
+  return spec;
+}
+
+Result<Config> Reader::config(const YAML::Node& root) const {
+  const auto entries = fields(root, kFileKeys, "the file");
+  if (!entries) return tl::unexpected(entries.error());
+  Config config;
+  if (const auto found = entries->find("partition"); found != entries->end()) {
+    auto name = text(found->second, "partition");
+    if (!name) return tl::unexpected(name.error());
+    if (const auto ok = check_partition_name(*name); !ok) {
+      return error(ok.error().code, found->second.mark, ok.error().message);
+    }
+    config.partition = *std::move(name);
+  }
+  const auto found = entries->find("frames");
+  if (found == entries->end()) return config;
+  const YAML::Node& list = found->second.value;
+  if (!list.IsSequence()) return error(Errc::kConfig, found->second.mark, "frames is not a list");
+  std::unordered_map<std::string, int> line_of;
+  for (const YAML::Node& node : list) {
+    auto spec = frame(node, config.frames.size());
+    if (!spec) return tl::unexpected(spec.error());
+    const auto [known, fresh] = line_of.emplace(spec->id, node.Mark().line + 1);
+    if (!fresh) {
+      return error(Errc::kInvalidInput, node.Mark(),
+                   "frame " + tfdude::quote(spec->id) + ": id is taken by the frame in line " +
+                       std::to_string(known->second));
+    }
+    config.frames.push_back(*std::move(spec));
+  }
+  return config;
+}
+
+}  // namespace
+
+Result<Config> parse_config(const std::string& text, const std::string& name) {
+  const Reader reader(name);
+  if (auto ok = reader.check_bytes(text); !ok) return tl::unexpected(ok.error());
+  try {
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.empty() || documents[0].IsNull()) {
+      return fail(Errc::kConfig, name + ": is empty");
+    }
+    if (documents.size() > 1) {
+      return reader.error(Errc::kConfig, documents[1].Mark(), "holds more than one YAML document");
+    }
+    return reader.config(documents[0]);
+  } catch (const YAML::Exception& e) {
+    return reader.error(Errc::kConfig, e.mark, "not YAML: " + e.msg);
+  } catch (const std::exception& e) {
+    return fail(Errc::kConfig, name + ": " + e.what());
+  }
+}
+
+Result<Config> load_config(const std::string& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) {
+    return fail(Errc::kConfig, path + ": is a directory");
+  }
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return fail(Errc::kConfig, path + ": cannot be opened: " + std::strerror(errno));
+  std::string text;
+  std::array<char, 65536> block;
+  while (file) {
+    file.read(block.data(), block.size());
+    text.append(block.data(), static_cast<std::size_t>(file.gcount()));
+    if (text.size() > kMaxFileBytes) return fail(Errc::kConfig, path + ": is longer than 64 MiB");
+  }
+  if (file.bad()) return fail(Errc::kConfig, path + ": cannot be read: " + std::strerror(errno));
+  return parse_config(text, path);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace tfdude::testing {
+
+/// What the calling thread allocates from here on. Only in binaries that link allocation_guard.cpp,
+/// which replaces the global operator new and delete, also those of shared libraries.
+class AllocationGuard {
+ public:
+  AllocationGuard();
+
+  /// Allocations since the guard was made.
+  [[nodiscard]] std::uint64_t allocations() const;
+
+  /// Bytes allocated less bytes freed since the guard was made.
+  [[nodiscard]] std::int64_t live_bytes() const;
+
+ private:
+  std::uint64_t allocations_at_start_;
+  std::int64_t live_bytes_at_start_;
+};
+
+}  // namespace tfdude::testing
