@@ -1,0 +1,216 @@
+#include "commands.hpp"
+
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+
+#include "render.hpp"
+
+namespace tfdude::cli {
+namespace {
+
+void print(const std::string& text) {
+  std::fputs(text.c_str(), stdout);
+  std::fflush(stdout);
+}
+
+int answer(const Arguments& arguments, const nlohmann::json& json, const std::string& text) {
+  print(arguments.json ? dump(json) + "\n" : text);
+  return kDone;
+}
+
+int done(const Result<void>& result, const Arguments& arguments, const std::string& what) {
+  if (!result) return report(result.error(), arguments);
+  return answer(arguments, {{"done", what}, {"id", arguments.id}},
+                what + " " + arguments.id + "\n");
+}
+
+// A list of ids, a line each.
+int list(const Arguments& arguments, const char* key, const std::vector<std::string>& ids) {
+  std::string text;
+  for (const std::string& id : ids) text += id + "\n";
+  return answer(arguments, {{key, ids}}, text);
+}
+
+// Where nobody serves anything, nobody has answered.
+int none_there(Client& client, const Arguments& arguments, bool found) {
+  if (found || !client.partitions().empty()) return kDone;
+  return report({Errc::kUnreachable,
+                 "no partition answers in domain " + std::to_string(arguments.options.domain)},
+                arguments);
+}
+
+int refuse(Client& client, const Error& error, const Arguments& arguments) {
+  switch (error.code) {
+    case Errc::kUnknownFrame:
+    case Errc::kUnknownStart:
+    case Errc::kUnknownEnd:
+    case Errc::kUnknownParent:
+    case Errc::kUnknownPartition:
+      if (const int status = none_there(client, arguments, false); status != kDone) return status;
+      break;
+    default:
+      break;
+  }
+  return report(error, arguments);
+}
+
+int print_lookup(Client& client, const Arguments& arguments) {
+  const auto X_AB = client.lookup(arguments.id, arguments.other);
+  if (!X_AB) return refuse(client, X_AB.error(), arguments);
+  std::vector<std::string> partitions;
+  if (arguments.json) {
+    const auto path = client.path(arguments.id, arguments.other);
+    if (path) {
+      for (const PathSegment& segment : *path) partitions.push_back(segment.partition);
+    }
+  }
+  return answer(arguments, lookup_json(arguments.id, arguments.other, *X_AB, partitions),
+                describe(*X_AB, arguments.covariance));
+}
+
+}  // namespace
+
+int report(const Error& error, const Arguments& arguments) {
+  if (arguments.json) {
+    print(dump({{"error", {{"code", to_string(error.code)}, {"message", error.message}}}}) + "\n");
+  } else {
+    std::fprintf(stderr, "tfdude: %s\n", error.message.c_str());
+  }
+  switch (error.code) {
+    case Errc::kTimeout:
+    case Errc::kUnreachable:
+      return kNoAnswer;
+    case Errc::kConfig:
+      return kWrongUsage;
+    default:
+      return kRefused;
+  }
+}
+
+int run_tree(Client& client, const Arguments& arguments) {
+  const auto frames = client.frames();
+  if (const int status = none_there(client, arguments, !frames.empty()); status != kDone)
+    return status;
+  std::vector<std::string> unreachable;
+  for (const PartitionInfo& partition : client.partitions()) {
+    if (!partition.reachable) unreachable.push_back(partition.name);
+  }
+  nlohmann::json json = nlohmann::json::array();
+  for (const Frame& frame : frames) json.push_back(frame_json(frame));
+  return answer(arguments, {{"frames", json}}, draw_tree(frames, unreachable));
+}
+
+int run_frames(Client& client, const Arguments& arguments) {
+  const auto frames = client.frames();
+  if (const int status = none_there(client, arguments, !frames.empty()); status != kDone)
+    return status;
+  nlohmann::json json = nlohmann::json::array();
+  std::string text;
+  for (const Frame& frame : frames) {
+    json.push_back(frame_json(frame));
+    text += frame.id + "\n";
+  }
+  return answer(arguments, {{"frames", json}}, text);
+}
+
+int run_partitions(Client& client, const Arguments& arguments) {
+  const auto partitions = client.partitions();
+  if (const int status = none_there(client, arguments, !partitions.empty()); status != kDone) {
+    return status;
+  }
+  nlohmann::json json = nlohmann::json::array();
+  std::string text;
+  for (const PartitionInfo& partition : partitions) {
+    json.push_back(partition_json(partition));
+    text += partition.name + "  frames " + std::to_string(partition.frames) + "  host " +
+            partition.host + "  pid " + std::to_string(partition.pid) +
+            (partition.reachable ? "\n" : "  unreachable\n");
+  }
+  return answer(arguments, {{"partitions", json}}, text);
+}
+
+int run_add(Client& client, const Arguments& arguments) {
+  const auto X_PC = arguments.spec.build();
+  if (!X_PC)
+    return report({X_PC.error().code, "frame '" + arguments.id + "': " + X_PC.error().message},
+                  arguments);
+  const auto added = client.add(arguments.id, arguments.parent, *X_PC, arguments.partition);
+  return added ? done(added, arguments, "added") : refuse(client, added.error(), arguments);
+}
+
+int run_update(Client& client, const Arguments& arguments) {
+  const auto X_PC = arguments.spec.build();
+  if (!X_PC)
+    return report({X_PC.error().code, "frame '" + arguments.id + "': " + X_PC.error().message},
+                  arguments);
+  const auto updated = client.update(arguments.id, *X_PC);
+  return updated ? done(updated, arguments, "updated") : refuse(client, updated.error(), arguments);
+}
+
+int run_remove(Client& client, const Arguments& arguments) {
+  const auto removed = client.remove(arguments.id);
+  return removed ? done(removed, arguments, "removed") : refuse(client, removed.error(), arguments);
+}
+
+int run_move(Client& client, const Arguments& arguments) {
+  std::optional<Transform> X_PC;
+  if (!arguments.spec.empty()) {
+    const auto built = arguments.spec.build();
+    if (!built)
+      return report({built.error().code, "frame '" + arguments.id + "': " + built.error().message},
+                    arguments);
+    X_PC = *built;
+  }
+  const auto moved = client.move(arguments.id, arguments.parent, X_PC);
+  return moved ? done(moved, arguments, "moved") : refuse(client, moved.error(), arguments);
+}
+
+int run_lookup(Client& client, const Arguments& arguments) {
+  return print_lookup(client, arguments);
+}
+
+int run_parent(Client& client, const Arguments& arguments) {
+  const auto parent = client.parent(arguments.id);
+  if (!parent) return refuse(client, parent.error(), arguments);
+  const auto json = parent->empty() ? nlohmann::json() : nlohmann::json(*parent);
+  return answer(arguments, {{"id", arguments.id}, {"parent", json}},
+                (parent->empty() ? "(root)" : *parent) + "\n");
+}
+
+int run_children(Client& client, const Arguments& arguments) {
+  const auto children = client.children(arguments.id);
+  if (!children) return refuse(client, children.error(), arguments);
+  return list(arguments, "children", *children);
+}
+
+int run_roots(Client& client, const Arguments& arguments) {
+  const auto roots = client.roots();
+  if (const int status = none_there(client, arguments, !roots.empty()); status != kDone)
+    return status;
+  return list(arguments, "roots", roots);
+}
+
+int run_exists(Client& client, const Arguments& arguments) {
+  const bool exists = client.exists(arguments.id);
+  if (const int status = none_there(client, arguments, exists); status != kDone) return status;
+  answer(arguments, {{"id", arguments.id}, {"exists", exists}}, exists ? "yes\n" : "no\n");
+  return exists ? kDone : kRefused;
+}
+
+int run_watch(Client& client, const Arguments& arguments) {
+  sigset_t stop_signals;
+  sigemptyset(&stop_signals);
+  sigaddset(&stop_signals, SIGINT);
+  sigaddset(&stop_signals, SIGTERM);
+  const double period = 1.0 / arguments.rate;
+  const timespec pause{
+      static_cast<std::time_t>(period),
+      static_cast<long>((period - static_cast<double>(static_cast<std::time_t>(period))) * 1e9)};
+  do {
+    (void)print_lookup(client, arguments);
+  } while (sigtimedwait(&stop_signals, nullptr, &pause) < 0);
+  return kDone;
+}
+
+}  // namespace tfdude::cli

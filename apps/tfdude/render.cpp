@@ -1,0 +1,117 @@
+#include "render.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <map>
+
+namespace tfdude::cli {
+namespace {
+
+constexpr double kDegrees = 57.29577951308232;
+
+template <class... Values>
+std::string format(const char* pattern, Values... values) {
+  std::array<char, 256> text{};
+  std::snprintf(text.data(), text.size(), pattern, values...);
+  return text.data();
+}
+
+using Children = std::map<std::string, std::vector<const Frame*>>;
+
+struct TreeDrawing {
+  const Children& children;
+  const std::vector<std::string>& unreachable;
+  std::string text;
+
+  void draw(const Frame& frame, const std::string& indent, const char* branch, const char* below) {
+    text += indent + branch + frame.id + "  [" + frame.partition;
+    if (std::count(unreachable.begin(), unreachable.end(), frame.partition) > 0) {
+      text += ", unreachable";
+    }
+    text += "]";
+    if (!frame.parent.empty() && !frame.attached) text += "  (waits for '" + frame.parent + "')";
+    text += "\n";
+    const auto found = children.find(frame.id);
+    if (found == children.end()) return;
+    for (const Frame* child : found->second) {
+      const bool last = child == found->second.back();
+      draw(*child, indent + below, last ? "└─ " : "├─ ", last ? "   " : "│  ");
+    }
+  }
+};
+
+}  // namespace
+
+std::string draw_tree(const std::vector<Frame>& frames,
+                      const std::vector<std::string>& unreachable) {
+  Children children;
+  for (const Frame& frame : frames) {
+    if (frame.attached) children[frame.parent].push_back(&frame);
+  }
+  TreeDrawing drawing{children, unreachable, {}};
+  for (const Frame& frame : frames) {
+    if (!frame.attached) drawing.draw(frame, "", "", "");
+  }
+  return drawing.text;
+}
+
+std::string describe(const Transform& X_AB, bool with_covariance) {
+  const Eigen::Vector3d t = X_AB.pose.translation();
+  const Eigen::Quaterniond q = X_AB.pose.rotation();
+  const Eigen::Vector3d rpy = to_rpy(q) * kDegrees;
+  const auto s = X_AB.covariance.stddev();
+  std::string text = format("translation  %.6f  %.6f  %.6f  m\n", t.x(), t.y(), t.z());
+  text += format("quaternion   %.6f  %.6f  %.6f  %.6f  (x y z w)\n", q.x(), q.y(), q.z(), q.w());
+  text += format("rpy          %.4f  %.4f  %.4f  deg\n", rpy.x(), rpy.y(), rpy.z());
+  text += format("std dev      %.6f  %.6f  %.6f  m   %.4f  %.4f  %.4f  deg\n", s[0], s[1], s[2],
+                 s[3] * kDegrees, s[4] * kDegrees, s[5] * kDegrees);
+  if (!with_covariance) return text;
+  text += "covariance   (translation first, of the right perturbation; m, rad)\n";
+  const Matrix6d sigma = X_AB.covariance.matrix();
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column < 6; ++column) text += format(" % .6e", sigma(row, column));
+    text += "\n";
+  }
+  return text;
+}
+
+nlohmann::json lookup_json(const std::string& a, const std::string& b, const Transform& X_AB,
+                           const std::vector<std::string>& partitions) {
+  const Eigen::Vector3d t = X_AB.pose.translation();
+  const Eigen::Quaterniond q = X_AB.pose.rotation();
+  const Matrix6d sigma = X_AB.covariance.matrix();
+  nlohmann::json rows = nlohmann::json::array();
+  for (int row = 0; row < 6; ++row) {
+    nlohmann::json line = nlohmann::json::array();
+    for (int column = 0; column < 6; ++column) line.push_back(sigma(row, column));
+    rows.push_back(std::move(line));
+  }
+  return {{"from", a},
+          {"to", b},
+          {"translation", {t.x(), t.y(), t.z()}},
+          {"rotation", {q.x(), q.y(), q.z(), q.w()}},
+          {"covariance", std::move(rows)},
+          {"partitions", partitions}};
+}
+
+nlohmann::json frame_json(const Frame& frame) {
+  return {{"id", frame.id},
+          {"parent", frame.parent.empty() ? nlohmann::json() : nlohmann::json(frame.parent)},
+          {"partition", frame.partition},
+          {"attached", frame.attached}};
+}
+
+nlohmann::json partition_json(const PartitionInfo& partition) {
+  return {{"name", partition.name},
+          {"host", partition.host},
+          {"pid", partition.pid},
+          {"frames", partition.frames},
+          {"reachable", partition.reachable}};
+}
+
+std::string dump(const nlohmann::json& json) {
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace tfdude::cli

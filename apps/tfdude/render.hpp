@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "tfdude/client/client.hpp"
+
+// Answers as text for people, and as JSON for programs.
+namespace tfdude::cli {
+
+/// All frames as trees, each with its owner. @param reachable  the partitions that answer
+[[nodiscard]] std::string draw_tree(const std::vector<Frame>& frames,
+                                    const std::vector<std::string>& unreachable);
+
+[[nodiscard]] std::string describe(const Transform& X_AB, bool with_covariance);
+
+[[nodiscard]] nlohmann::json lookup_json(const std::string& a, const std::string& b,
+                                         const Transform& X_AB,
+                                         const std::vector<std::string>& partitions);
+[[nodiscard]] nlohmann::json frame_json(const Frame& frame);
+[[nodiscard]] nlohmann::json partition_json(const PartitionInfo& partition);
+
+/// One line of JSON; what is not valid UTF-8 is replaced.
+[[nodiscard]] std::string dump(const nlohmann::json& json);
+
+}  // namespace tfdude::cli
