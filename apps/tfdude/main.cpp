@@ -19,18 +19,15 @@ using Command = std::function<int(Client&, const Arguments&)>;
 
 void add_pose_options(CLI::App& command, Arguments& arguments) {
   auto& spec = arguments.spec;
-  command.add_option("--xyz", spec.xyz, "translation [m]")->type_name("X Y Z")->expected(3);
+  command.add_option("--xyz", spec.xyz, "translation [m]")->type_name("X Y Z");
   auto* rpy = command.add_option("--rpy", spec.rpy, "rotation about fixed axes X, Y, Z [rad]");
-  rpy->type_name("R P Y")->expected(3);
+  rpy->type_name("R P Y");
   command.add_option("--quat", spec.quat, "rotation as unit quaternion")
       ->type_name("X Y Z W")
-      ->expected(4)
       ->excludes(rpy);
   auto* stddev =
       command.add_option("--stddev", spec.stddev, "standard deviations [m m m rad rad rad]");
-  stddev->expected(6);
   command.add_option("--cov", spec.cov, "upper triangle of the covariance row by row")
-      ->expected(21)
       ->excludes(stddev);
 }
 

@@ -33,6 +33,8 @@ bool Directory::advance(Known& partition, Owner owner, std::uint64_t incarnation
     partition.page_count = 0;
     partition.info.frames = 0;
     partition.incarnation = incarnation;
+    // Whoever tells something new of an incarnation lives, even where the presence comes after a page.
+    partition.info.reachable = true;
   }
   return true;
 }
@@ -46,7 +48,7 @@ void Directory::apply(const Presence& presence, Time now) {
   PartitionInfo& info = partition.info;
   info.host = presence.host;
   info.pid = presence.pid;
-  if (!info.reachable) info.since = now;
+  if (!info.reachable || info.since == Time{}) info.since = now;
   info.reachable = true;
 }
 

@@ -24,7 +24,7 @@ namespace tfdude::fastdds {
 class Peers {
  public:
   /// Whatever answers a newcomer has answered, as a rule, once nobody new was met for this long.
-  static constexpr std::chrono::milliseconds kQuiet{40};
+  static constexpr std::chrono::milliseconds kQuiet{200};
 
   void met(const ertps::GuidPrefix_t& prefix, const std::string& name);
   void left(const ertps::GuidPrefix_t& prefix);
