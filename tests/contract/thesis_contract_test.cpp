@@ -1,0 +1,142 @@
+// The function tests of the thesis, once over each transport: two owners and a client without frames.
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+#include "tfdude/client/config.hpp"
+#include "tfdude/transport/fastdds.hpp"
+#include "tfdude/transport/loopback.hpp"
+
+#include "support/catch.hpp"
+#include "support/pose_diff.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+/// Gives each participant of one test a transport of the same network.
+using Join = std::function<std::unique_ptr<Transport>(const std::string& partition)>;
+
+Join join_loopback() {
+  auto network = std::make_shared<LoopbackNetwork>();
+  return [network](const std::string&) { return network->join(); };
+}
+
+Join join_fastdds() {
+  // Tests of one machine that run side by side must not meet.
+  static std::atomic<std::uint32_t> tests{0};
+  const std::uint32_t domain = 20 + (static_cast<std::uint32_t>(getpid()) * 7 + tests++) % 200;
+  return [domain](const std::string& partition) {
+    return *make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, partition, nullptr});
+  };
+}
+
+struct Robot {
+  explicit Robot(const Join& join) {
+    robot.emplace(*Node::open(join("robot"), "robot",
+                              load_config(TFDUDE_EXAMPLES "/thesis/robot.yaml")->frames));
+    arms.emplace(*Node::open(join("arms"), "arms",
+                             load_config(TFDUDE_EXAMPLES "/thesis/arms.yaml")->frames));
+    client.emplace(*Client::open(join("")));
+  }
+  std::vector<Client*> all() { return {&*robot, &*arms, &*client}; }
+
+  std::optional<Node> robot;
+  std::optional<Node> arms;
+  std::optional<Client> client;
+};
+
+const Transform kX{exp((Twist() << 0.1, -0.2, 0.3, 0.4, 0.5, -0.6).finished()),
+                   *Covariance::from_stddev({1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3})};
+
+Join joined_by(int transport) { return transport == 0 ? join_loopback() : join_fastdds(); }
+
+}  // namespace
+
+TEST_CASE("everybody looks up every pair as one tree would") {
+  const int transport = GENERATE(0, 1);
+  Robot r(joined_by(transport));
+  Forest oracle;
+  for (const char* file : {"/thesis/robot.yaml", "/thesis/arms.yaml"}) {
+    const auto config = load_config(std::string(TFDUDE_EXAMPLES) + file);
+    for (const FrameSpec& frame : config->frames) {
+      REQUIRE(oracle.add(frame.id, frame.parent, frame.X_PC, Forest::MissingParent::kAllow));
+    }
+  }
+  const auto frames = r.client->frames();
+  REQUIRE(frames.size() == 9);
+  for (Client* caller : r.all()) {
+    for (const Frame& a : frames) {
+      for (const Frame& b : frames) {
+        const auto X_AB = caller->lookup(a.id, b.id);
+        REQUIRE(X_AB);
+        CHECK(testing::transform_diff(*X_AB, *oracle.lookup(a.id, b.id), 1e-9) == "");
+      }
+    }
+  }
+}
+
+TEST_CASE("frames are added, updated and moved from anywhere") {
+  const int transport = GENERATE(0, 1);
+  Robot r(joined_by(transport));
+  for (Client* caller : r.all()) {
+    REQUIRE(caller->add("tool", "camera", kX));
+    REQUIRE(caller->add("hand", "arm_2", kX));
+    CHECK(testing::transform_diff(*caller->lookup("camera", "tool"), kX, 1e-12) == "");
+    CHECK(testing::transform_diff(*caller->lookup("arm_2", "hand"), kX, 1e-12) == "");
+    CHECK(caller->add("hand", "camera", kX).error().code == Errc::kAlreadyExists);
+    const auto before = caller->frames().size();
+    CHECK(caller->add("x", "missing", kX).error().code == Errc::kUnknownParent);
+    CHECK(caller->frames().size() == before);
+    REQUIRE(caller->update({{"tool", inverse(kX)}, {"hand", inverse(kX)}, {"arm_1", kX}}));
+    CHECK(testing::transform_diff(*caller->lookup("robot_1", "arm_1"), kX, 1e-12) == "");
+    CHECK(testing::transform_diff(*caller->lookup("arm_2", "hand"), inverse(kX), 1e-12) == "");
+    REQUIRE(caller->move("hand", "camera"));
+    CHECK(*caller->parent("hand") == "camera");
+    CHECK(caller->move("robot_1", "hand_left").error().code == Errc::kCycle);
+    REQUIRE(caller->remove("tool"));
+    REQUIRE(caller->remove("hand"));
+  }
+}
+
+TEST_CASE("a removal takes all below it, and an emptied partition lives on") {
+  const int transport = GENERATE(0, 1);
+  Robot r(joined_by(transport));
+  REQUIRE(r.arms->remove("robot_2"));
+  CHECK_FALSE(r.arms->exists("camera"));
+  REQUIRE(r.robot->remove("arm_left"));
+  CHECK_FALSE(r.robot->exists("hand_left"));
+  REQUIRE(r.client->remove("robot_1"));
+  CHECK(r.client->frames().size() == 1);
+  REQUIRE(r.client->add("arm_1", "world", kX, "arms"));
+  CHECK(testing::transform_diff(*r.client->lookup("world", "arm_1"), kX, 1e-12) == "");
+}
+
+TEST_CASE("unknown start, unknown end and no common root are three errors") {
+  const int transport = GENERATE(0, 1);
+  Robot r(joined_by(transport));
+  REQUIRE(r.client->add("island", "", kX, "arms"));
+  for (Client* caller : r.all()) {
+    CHECK(caller->lookup("nope", "world").error().code == Errc::kUnknownStart);
+    CHECK(caller->lookup("world", "nope").error().code == Errc::kUnknownEnd);
+  }
+  CHECK(r.client->lookup("world", "island").error().code == Errc::kNotConnected);
+}
+
+TEST_CASE("a partition has one owner at a time") {
+  const int transport = GENERATE(0, 1);
+  const Join join = joined_by(transport);
+  std::optional<Node> first(*Node::open(join("arms"), "arms"));
+  const auto second = Node::open(join("arms"), "arms");
+  REQUIRE_FALSE(second);
+  CHECK(second.error().code == Errc::kPartitionTaken);
+  CHECK(second.error().message.find(std::to_string(getpid())) != std::string::npos);
+}
+
+}  // namespace tfdude
