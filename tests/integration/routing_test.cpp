@@ -1,0 +1,44 @@
+// That a request wakes its owner only: counted below the readers, before the filters.
+
+#include <memory>
+#include <string>
+#include <unistd.h>
+
+#include "tfdude/client/client.hpp"
+#include "tfdude/transport/fastdds.hpp"
+
+#include "support/catch.hpp"
+
+namespace tfdude {
+namespace {
+
+struct Counted {
+  Counted(std::uint32_t domain, const std::string& partition, const std::string& frame)
+      : node(*Node::open(
+            *make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, partition, counters}),
+            partition, {{frame, "", {}}})) {}
+
+  std::shared_ptr<FastDdsCounters> counters = std::make_shared<FastDdsCounters>();
+  Node node;
+};
+
+}  // namespace
+
+TEST_CASE("who does not own the frame receives nothing") {
+  const std::uint32_t domain = 20 + static_cast<std::uint32_t>(getpid()) % 200;
+  Counted owner(domain, "owner", "a");
+  Counted other(domain, "other", "b");
+  auto client =
+      *Client::open(*make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, "", nullptr}));
+  constexpr std::uint64_t kCalls = 100;
+  for (std::uint64_t i = 0; i < kCalls; ++i) {
+    REQUIRE(client.update("a", {}));
+    REQUIRE(other.node.update("a", {}));
+  }
+  CHECK(owner.counters->requests_arrived >= 2 * kCalls);
+  CHECK(owner.counters->requests_passed == owner.counters->requests_arrived);
+  CHECK(other.counters->requests_arrived == 0);
+  CHECK(other.counters->updates_arrived == 0);
+}
+
+}  // namespace tfdude
