@@ -7,9 +7,8 @@
 namespace tfdude {
 namespace {
 
-// A reply that is lost with its repetition by the transport is asked for again after this long, then twice
-// as long, up to the second.
-constexpr Milliseconds kFirstRepeat{20};
+// A request without a reply is sent again after this long, then twice as long, up to the second.
+constexpr Milliseconds kFirstRepeat{5};
 constexpr Milliseconds kLastRepeat{160};
 
 // How long the structure may take to reach us where a reply says that ours is old.

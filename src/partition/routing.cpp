@@ -14,21 +14,27 @@ tl::unexpected<Error> unknown_frame(std::string_view id) {
 Result<void> check_reachable(const Directory& directory, Owner owner) {
   if (owner == kHeldHere || directory.reachable(owner)) return {};
   const PartitionInfo& info = directory.info(owner);
-  const auto since =
-      std::chrono::duration_cast<std::chrono::milliseconds>(info.since.time_since_epoch());
-  return fail(Errc::kUnreachable,
-              "partition " + quote(info.name) + " (host " + info.host + ", pid " +
-                  std::to_string(info.pid) + ") is not reachable since " +
-                  std::to_string(since.count() / 1000) + "." +
-                  std::to_string(1000 + since.count() % 1000).substr(1) + " s of the UNIX epoch");
+  return fail(Errc::kUnreachable, "partition " + quote(info.name) + " (host " + info.host +
+                                      ", pid " + std::to_string(info.pid) +
+                                      ") is not reachable since " + to_string(info.since));
 }
 
-Part& part_of(std::vector<Part>& parts, const Directory& directory, Owner owner) {
+// The owner's part, made where it is not there yet: about this id, with an empty body of this kind.
+template <class Body>
+Body& body_for(std::vector<Part>& parts, const Directory& directory, Owner owner,
+               const std::string& id) {
   const auto known = std::find_if(parts.begin(), parts.end(),
                                   [owner](const Part& part) { return part.owner == owner; });
-  if (known != parts.end()) return *known;
-  parts.push_back({owner, directory.name(owner), {}});
-  return parts.back();
+  if (known != parts.end()) return std::get<Body>(known->request.body);
+  parts.push_back({owner, directory.name(owner), Request{0, id, Body{}}});
+  return std::get<Body>(parts.back().request.body);
+}
+
+Result<void> check_size(const Part& part, std::size_t items, const char* what) {
+  if (part.owner == kHeldHere || items <= kMaxItems) return {};
+  return fail(Errc::kInvalidInput, "partition " + quote(part.partition) + " is asked for " +
+                                       std::to_string(items) + " " + what +
+                                       " at once, of at most " + std::to_string(kMaxItems));
 }
 
 Result<void> check_all_reachable(const Directory& directory, const std::vector<Part>& parts) {
@@ -72,14 +78,13 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
     const auto parent = forest.info(frame.parent);
     const bool top = frame.id == id || !parent || parent->owner != frame.owner;
     if (!top) continue;
-    Request& request = part_of(parts, directory, frame.owner).request;
-    if (request.id.empty()) {
-      request.id = frame.id;
-      request.body = RemoveRequest{};
-    }
-    std::get<RemoveRequest>(request.body).tops.push_back(frame.id);
+    body_for<RemoveRequest>(parts, directory, frame.owner, frame.id).tops.push_back(frame.id);
   }
   if (auto ok = check_all_reachable(directory, parts); !ok) return tl::unexpected(ok.error());
+  for (const Part& part : parts) {
+    const auto& tops = std::get<RemoveRequest>(part.request.body).tops;
+    if (auto ok = check_size(part, tops.size(), "subtrees"); !ok) return tl::unexpected(ok.error());
+  }
   return parts;
 }
 
@@ -89,14 +94,13 @@ Result<std::vector<Part>> route_update(const Forest& forest, const Directory& di
   for (const EdgeUpdate& edge : edges) {
     const auto frame = forest.info(edge.id);
     if (!frame) return unknown_frame(edge.id);
-    Request& request = part_of(parts, directory, frame->owner).request;
-    if (request.id.empty()) {
-      request.id = edge.id;
-      request.body = UpdateRequest{};
-    }
-    std::get<UpdateRequest>(request.body).edges.push_back(edge);
+    body_for<UpdateRequest>(parts, directory, frame->owner, edge.id).edges.push_back(edge);
   }
   if (auto ok = check_all_reachable(directory, parts); !ok) return tl::unexpected(ok.error());
+  for (const Part& part : parts) {
+    const auto& share = std::get<UpdateRequest>(part.request.body).edges;
+    if (auto ok = check_size(part, share.size(), "edges"); !ok) return tl::unexpected(ok.error());
+  }
   return parts;
 }
 
@@ -124,16 +128,18 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
   if (!segments) return tl::unexpected(segments.error());
   LookupPlan plan{*std::move(segments), {}};
   for (const Segment& segment : plan.segments) {
-    Request& request = part_of(plan.parts, directory, segment.owner).request;
-    if (request.id.empty()) {
-      // Of the two ends, the one that the segment's owner owns: where it goes up, the lower one.
-      const auto from = forest.info(segment.from);
-      request.id = from && from->owner == segment.owner ? segment.from : segment.to;
-      request.body = LookupRequest{};
-    }
-    std::get<LookupRequest>(request.body).segments.push_back({segment.from, segment.to});
+    // Of the two ends, the one that the segment's owner owns: where it goes up, the lower one.
+    const auto from = forest.info(segment.from);
+    const auto& id = from && from->owner == segment.owner ? segment.from : segment.to;
+    body_for<LookupRequest>(plan.parts, directory, segment.owner, id)
+        .segments.push_back({segment.from, segment.to});
   }
   if (auto ok = check_all_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
+  for (const Part& part : plan.parts) {
+    const auto& share = std::get<LookupRequest>(part.request.body).segments;
+    if (auto ok = check_size(part, share.size(), "segments"); !ok)
+      return tl::unexpected(ok.error());
+  }
   return plan;
 }
 

@@ -129,6 +129,23 @@ TEST_CASE("unknown start, unknown end and no common root are three errors") {
   CHECK(r.client->lookup("world", "island").error().code == Errc::kNotConnected);
 }
 
+TEST_CASE("an update has any number of edges up to the limit") {
+  const int transport = GENERATE(0, 1);
+  Robot r(joined_by(transport));
+  const std::size_t count = GENERATE(as<std::size_t>{}, 3, 100, kMaxItems, kMaxItems + 1);
+  const std::vector<EdgeUpdate> edges(count, EdgeUpdate{"arm_2", kX});
+  const auto updated = r.client->update(edges);
+  if (count <= kMaxItems) {
+    REQUIRE(updated);
+    CHECK(testing::transform_diff(*r.client->lookup("arm_1", "arm_2"), kX, 1e-12) == "");
+    return;
+  }
+  REQUIRE_FALSE(updated);
+  CHECK(updated.error().code == Errc::kInvalidInput);
+  CHECK(updated.error().message.find("'arms'") != std::string::npos);
+  CHECK(updated.error().message.find(std::to_string(kMaxItems)) != std::string::npos);
+}
+
 TEST_CASE("a partition has one owner at a time") {
   const int transport = GENERATE(0, 1);
   const Join join = joined_by(transport);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <string>
 
 namespace tfdude {
 
@@ -9,5 +10,8 @@ namespace tfdude {
 using Time = std::chrono::time_point<std::chrono::system_clock, std::chrono::nanoseconds>;
 
 using Milliseconds = std::chrono::milliseconds;
+
+/// For people: "2026-11-21 14:03:59.125 UTC".
+[[nodiscard]] std::string to_string(Time time);
 
 }  // namespace tfdude

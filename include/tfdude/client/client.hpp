@@ -84,7 +84,8 @@ class Client {
   [[nodiscard]] Result<void> update(const std::string& id, const Transform& X_PC);
   [[nodiscard]] Result<void> update(Handle frame, const Transform& X_PC);
 
-  /// Many edges: each owner applies its share as one, so that nobody sees half of it.
+  /// Many edges: each owner applies its share as one, so that nobody sees half of it. Another process takes
+  /// at most kMaxItems edges at once.
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
 
   /// Streams new edge values to their owners, unacknowledged: the path for joints at 1 kHz and more. A

@@ -17,6 +17,9 @@ namespace tfdude {
 /// Who speaks: given by the transport, unique in a domain, new at every start.
 using PeerId = std::array<std::uint8_t, 12>;
 
+/// The most edges, subtrees, segments or entries that one message holds.
+inline constexpr std::size_t kMaxItems = 4096;
+
 struct AddRequest {
   std::string parent;  ///< empty: a root
   Transform X_PC;

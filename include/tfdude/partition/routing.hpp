@@ -11,7 +11,8 @@
 
 // Who must be asked what: an operation as one part for each partition that it concerns, all of which may
 // be asked at the same time. Everything is answered from the caller's directory, without sending.
-// All errors are those that no request needs to find out; kUnreachable names the partition.
+// All errors are those that no request needs to find out; kUnreachable names the partition, kInvalidInput
+// what is more than one request holds.
 namespace tfdude {
 
 /// One partition's part of an operation.
@@ -35,12 +36,12 @@ struct LookupPlan {
 
 /// The frame and all below it, each partition told of those subtrees that it owns. The first part is
 /// that of the frame itself.
-/// @return kUnknownFrame, kUnreachable.
+/// @return kUnknownFrame, kUnreachable, kInvalidInput.
 [[nodiscard]] Result<std::vector<Part>> route_remove(const Forest& forest,
                                                      const Directory& directory,
                                                      const std::string& id);
 
-/// @return kUnknownFrame, kUnreachable.
+/// @return kUnknownFrame, kUnreachable, kInvalidInput.
 [[nodiscard]] Result<std::vector<Part>> route_update(const Forest& forest,
                                                      const Directory& directory,
                                                      const std::vector<EdgeUpdate>& edges);
@@ -49,7 +50,7 @@ struct LookupPlan {
 [[nodiscard]] Result<Part> route_move(const Forest& forest, const Directory& directory,
                                       const std::string& id, const MoveRequest& request);
 
-/// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable.
+/// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable, kInvalidInput.
 [[nodiscard]] Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory,
                                               const std::string& a, const std::string& b);
 

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "tfdude/partition/messages.hpp"
+
 // Reads the bytes of samples without deserializing them: whether they are well formed (every length within
 // the bytes that are there and within the bounds of idl/tfdude.idl), and what a filter needs of them. The
 // generated code checks neither bounds nor discriminators, and allocates what a length says.
@@ -52,7 +54,7 @@ class CdrWalk {
   template <class Element>
   void sequence(Element element) {
     const std::uint32_t length = ulong();
-    if (length > kMaxElements) good_ = false;
+    if (length > kMaxItems) good_ = false;
     for (std::uint32_t i = 0; i < length && good_; ++i) element();
   }
 
@@ -61,8 +63,6 @@ class CdrWalk {
   std::string_view edge();
 
  private:
-  static constexpr std::uint32_t kMaxElements = 4096;
-
   const std::uint8_t* data_;
   std::size_t size_;
   std::size_t at_ = 0;

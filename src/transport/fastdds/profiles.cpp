@@ -31,6 +31,10 @@ std::string renamed_builtin() {
   return xml;
 }
 
+// Samples are of very different sizes. Fast DDS 2.9 takes one that is larger than was preallocated under this
+// policy and the dynamic one only, whatever it calls the others.
+constexpr auto kMemoryPolicy = ertps::DYNAMIC_REUSABLE_MEMORY_MODE;
+
 void fill(const std::string& name, const std::function<ReturnCode(const std::string&)>& read) {
   if (!ok(read(kPrefix + name))) (void)read(kBuiltinPrefix + name);
 }
@@ -79,9 +83,7 @@ edds::DataWriterQos writer_qos(edds::Publisher& publisher, const std::string& na
   // while a write goes through it, and crashes as readers come and go.
   qos.writer_resource_limits().reader_filters_allocation.initial = 0;
   qos.writer_resource_limits().reader_filters_allocation.maximum = 0;
-  // Once the history is full, each write would carry a heartbeat that wakes every reader for an answer;
-  // the periodic one is enough to repeat what was lost.
-  if (name == "call_writer") qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
+  qos.endpoint().history_memory_policy = kMemoryPolicy;
   return qos;
 }
 
@@ -90,6 +92,7 @@ edds::DataReaderQos reader_qos(edds::Subscriber& subscriber, const std::string& 
   fill(name, [&](const std::string& profile) {
     return subscriber.get_datareader_qos_from_profile(profile, qos);
   });
+  qos.endpoint().history_memory_policy = kMemoryPolicy;
   return qos;
 }
 

@@ -1,0 +1,23 @@
+#include "tfdude/base/time.hpp"
+
+#include <array>
+#include <cstdio>
+#include <ctime>
+
+namespace tfdude {
+
+std::string to_string(Time time) {
+  const auto milliseconds = std::chrono::floor<Milliseconds>(time.time_since_epoch());
+  const auto seconds = std::chrono::floor<std::chrono::seconds>(milliseconds);
+  const auto since_epoch = static_cast<std::time_t>(seconds.count());
+  std::tm parts{};
+  gmtime_r(&since_epoch, &parts);
+  std::array<char, 64> date{};
+  const std::size_t length = std::strftime(date.data(), date.size(), "%Y-%m-%d %H:%M:%S", &parts);
+  std::array<char, 16> fraction{};
+  std::snprintf(fraction.data(), fraction.size(), ".%03d UTC",
+                static_cast<int>((milliseconds - seconds).count()));
+  return std::string(date.data(), length) + fraction.data();
+}
+
+}  // namespace tfdude
