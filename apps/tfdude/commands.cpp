@@ -55,6 +55,10 @@ int refuse(Client& client, const Error& error, const Arguments& arguments) {
   return report(error, arguments);
 }
 
+int refuse_pose(const Error& error, const Arguments& arguments) {
+  return report({error.code, "frame '" + arguments.id + "': " + error.message}, arguments);
+}
+
 int print_lookup(Client& client, const Arguments& arguments) {
   const auto X_AB = client.lookup(arguments.id, arguments.other);
   if (!X_AB) return refuse(client, X_AB.error(), arguments);
@@ -132,18 +136,14 @@ int run_partitions(Client& client, const Arguments& arguments) {
 
 int run_add(Client& client, const Arguments& arguments) {
   const auto X_PC = arguments.spec.build();
-  if (!X_PC)
-    return report({X_PC.error().code, "frame '" + arguments.id + "': " + X_PC.error().message},
-                  arguments);
+  if (!X_PC) return refuse_pose(X_PC.error(), arguments);
   const auto added = client.add(arguments.id, arguments.parent, *X_PC, arguments.partition);
   return added ? done(added, arguments, "added") : refuse(client, added.error(), arguments);
 }
 
 int run_update(Client& client, const Arguments& arguments) {
   const auto X_PC = arguments.spec.build();
-  if (!X_PC)
-    return report({X_PC.error().code, "frame '" + arguments.id + "': " + X_PC.error().message},
-                  arguments);
+  if (!X_PC) return refuse_pose(X_PC.error(), arguments);
   const auto updated = client.update(arguments.id, *X_PC);
   return updated ? done(updated, arguments, "updated") : refuse(client, updated.error(), arguments);
 }
@@ -157,9 +157,7 @@ int run_move(Client& client, const Arguments& arguments) {
   std::optional<Transform> X_PC;
   if (!arguments.spec.empty()) {
     const auto built = arguments.spec.build();
-    if (!built)
-      return report({built.error().code, "frame '" + arguments.id + "': " + built.error().message},
-                    arguments);
+    if (!built) return refuse_pose(built.error(), arguments);
     X_PC = *built;
   }
   const auto moved = client.move(arguments.id, arguments.parent, X_PC);

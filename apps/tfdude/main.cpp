@@ -105,6 +105,7 @@ int run(const Arguments& arguments, const Command& command) {
 
 }  // namespace
 
+// NOLINTNEXTLINE(bugprone-exception-escape): nothing but a lack of memory, which should end it
 int main(int argc, char** argv) {
   Arguments arguments;
   Command command;

@@ -19,41 +19,52 @@ std::string format(const char* pattern, Values... values) {
 
 using Children = std::map<std::string, std::vector<const Frame*>>;
 
-struct TreeDrawing {
-  const Children& children;
-  const std::vector<std::string>& unreachable;
-  std::string text;
-
-  void draw(const Frame& frame, const std::string& indent, const char* branch, const char* below) {
-    text += indent + branch + frame.id + "  [" + frame.partition;
-    if (std::count(unreachable.begin(), unreachable.end(), frame.partition) > 0) {
-      text += ", unreachable";
-    }
-    text += "]";
-    if (!frame.parent.empty() && !frame.attached) text += "  (waits for '" + frame.parent + "')";
-    text += "\n";
-    const auto found = children.find(frame.id);
-    if (found == children.end()) return;
-    for (const Frame* child : found->second) {
-      const bool last = child == found->second.back();
-      draw(*child, indent + below, last ? "└─ " : "├─ ", last ? "   " : "│  ");
-    }
-  }
+// A frame that is to be drawn, and what stands before it and before those below it.
+struct Line {
+  const Frame* frame;
+  std::string before;
+  std::string before_children;
 };
+
+std::string label(const Frame& frame, const std::vector<std::string>& unreachable) {
+  std::string text = frame.id + "  [" + frame.partition;
+  if (std::count(unreachable.begin(), unreachable.end(), frame.partition) > 0) {
+    text += ", unreachable";
+  }
+  text += "]";
+  if (!frame.parent.empty() && !frame.attached) text += "  (waits for '" + frame.parent + "')";
+  return text + "\n";
+}
 
 }  // namespace
 
 std::string draw_tree(const std::vector<Frame>& frames,
                       const std::vector<std::string>& unreachable) {
   Children children;
+  std::vector<Line> to_draw;  // the next one last
   for (const Frame& frame : frames) {
-    if (frame.attached) children[frame.parent].push_back(&frame);
+    if (frame.attached) {
+      children[frame.parent].push_back(&frame);
+    } else {
+      to_draw.push_back({&frame, "", ""});
+    }
   }
-  TreeDrawing drawing{children, unreachable, {}};
-  for (const Frame& frame : frames) {
-    if (!frame.attached) drawing.draw(frame, "", "", "");
+  std::reverse(to_draw.begin(), to_draw.end());
+  std::string text;
+  while (!to_draw.empty()) {
+    const Line line = std::move(to_draw.back());
+    to_draw.pop_back();
+    text += line.before + label(*line.frame, unreachable);
+    const auto found = children.find(line.frame->id);
+    if (found == children.end()) continue;
+    const auto& below = found->second;
+    for (auto child = below.rbegin(); child != below.rend(); ++child) {
+      const bool last = child == below.rbegin();
+      to_draw.push_back({*child, line.before_children + (last ? "└─ " : "├─ "),
+                         line.before_children + (last ? "   " : "│  ")});
+    }
   }
-  return drawing.text;
+  return text;
 }
 
 std::string describe(const Transform& X_AB, bool with_covariance) {

@@ -64,6 +64,7 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
 
 }  // namespace
 
+// NOLINTNEXTLINE(bugprone-exception-escape): nothing but a lack of memory, which should end it
 int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app{"tfduded: owns a partition of the coordinate frames and serves it over DDS"};

@@ -6,11 +6,11 @@
 namespace tfdude {
 
 spdlog::logger& log() {
-  static const std::shared_ptr<spdlog::logger> logger = [] {
+  static const std::shared_ptr<spdlog::logger> kLogger = [] {
     auto registered = spdlog::get("tfdude");
     return registered ? registered : spdlog::stderr_color_mt("tfdude");
   }();
-  return *logger;
+  return *kLogger;
 }
 
 }  // namespace tfdude

@@ -5,12 +5,12 @@
 #include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <unordered_map>
 #include <utility>
 
@@ -121,19 +121,22 @@ Result<Fields> Reader::fields(const YAML::Node& map, const std::array<std::strin
     return error(Errc::kConfig, map.Mark(), what + " is not a mapping with the keys " + known);
   }
   Fields fields;
+  const auto about = [&](std::string_view rest) { return std::string(what).append(rest); };
   for (const auto& entry : map) {
     const YAML::Node& key_node = entry.first;
     if (!key_node.IsScalar()) {
-      return error(Errc::kConfig, key_node.Mark(), what + ": a key is not plain text");
+      return error(Errc::kConfig, key_node.Mark(), about(": a key is not plain text"));
     }
     const std::string& key = key_node.Scalar();
     if (std::find(allowed.begin(), allowed.end(), key) == allowed.end()) {
-      return error(Errc::kConfig, key_node.Mark(),
-                   what + ": unknown key " + tfdude::quote(key) + "; known are " + known);
+      return error(
+          Errc::kConfig, key_node.Mark(),
+          about(": unknown key ").append(tfdude::quote(key)).append("; known are ") + known);
     }
     const YAML::Mark mark = entry.second.IsNull() ? key_node.Mark() : entry.second.Mark();
     if (!fields.emplace(key, Field{entry.second, mark}).second) {
-      return error(Errc::kConfig, key_node.Mark(), what + ": " + key + " is given twice");
+      return error(Errc::kConfig, key_node.Mark(),
+                   about(": ").append(key).append(" is given twice"));
     }
   }
   return fields;
@@ -308,17 +311,18 @@ Result<Config> load_config(const std::string& path) {
   if (std::filesystem::is_directory(path, ignored)) {
     return fail(Errc::kConfig, path + ": is a directory");
   }
+  const auto reason = [] { return std::generic_category().message(errno); };
   errno = 0;
   std::ifstream file(path, std::ios::binary);
-  if (!file) return fail(Errc::kConfig, path + ": cannot be opened: " + std::strerror(errno));
+  if (!file) return fail(Errc::kConfig, path + ": cannot be opened: " + reason());
   std::string text;
-  std::array<char, 65536> block;
+  std::array<char, 65536> block{};
   while (file) {
     file.read(block.data(), block.size());
     text.append(block.data(), static_cast<std::size_t>(file.gcount()));
     if (text.size() > kMaxFileBytes) return fail(Errc::kConfig, path + ": is longer than 64 MiB");
   }
-  if (file.bad()) return fail(Errc::kConfig, path + ": cannot be read: " + std::strerror(errno));
+  if (file.bad()) return fail(Errc::kConfig, path + ": cannot be read: " + reason());
   return parse_config(text, path);
 }
 

@@ -27,6 +27,8 @@ class Participant final : public TransportHandler {
   /// @param partition  the one that it is to own; empty: none
   Participant(std::unique_ptr<Transport> transport, std::string partition, const Options& options);
   ~Participant() override;
+  Participant(const Participant&) = delete;
+  Participant& operator=(const Participant&) = delete;
 
   [[nodiscard]] Result<void> start();
 

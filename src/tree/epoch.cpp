@@ -4,10 +4,11 @@
 
 namespace tfdude::epoch {
 
-std::atomic<std::uint64_t> current{1};
+std::atomic<std::uint64_t> current{1};  // NOLINT(*-avoid-non-const-global-variables): as declared
 
 namespace {
 
+// NOLINTNEXTLINE(*-avoid-non-const-global-variables): a thread reads several trees, and is one reader
 std::atomic<Reader*> all_readers{nullptr};
 
 Reader* take_reader() {
@@ -25,8 +26,12 @@ Reader* take_reader() {
 
 // Hands the reader back when its thread ends.
 struct Lease {
-  Reader* reader = take_reader();
+  Lease() = default;
   ~Lease() { reader->taken.store(false, std::memory_order_release); }
+  Lease(const Lease&) = delete;
+  Lease& operator=(const Lease&) = delete;
+
+  Reader* reader = take_reader();
 };
 
 }  // namespace

@@ -24,7 +24,8 @@ struct alignas(64) Reader {
 Reader& this_thread();
 
 /// The epoch to announce; starts at 1.
-extern std::atomic<std::uint64_t> current;
+extern std::atomic<std::uint64_t>
+    current;  // NOLINT(*-avoid-non-const-global-variables): readers of all trees share it
 
 /// While one lives, nothing that its thread can reach is reused.
 class Guard {

@@ -268,7 +268,7 @@ Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Ow
   if (there != nullptr && there->held()) {
     return fail(Errc::kAlreadyExists, "frame " + quote(id) + " is held here");
   }
-  const auto acyclic = impl_->check_no_cycle(id, parent);
+  auto acyclic = impl_->check_no_cycle(id, parent);
   const std::uint32_t slot = impl_->intern(id);
   const std::uint32_t parent_slot = acyclic ? impl_->intern(parent) : kNoSlot;
   const Version& old = impl_->newest(slot);

@@ -63,6 +63,8 @@ class Client {
   [[nodiscard]] static Result<Client> open(std::unique_ptr<Transport> transport,
                                            const Options& options = {});
 
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
   ~Client();

@@ -23,7 +23,7 @@ class ReplyCache {
 
  private:
   struct Peer {
-    PeerId id;
+    PeerId id{};
     std::array<std::optional<Reply>, kPerPeer> replies;  // by sequence modulo kPerPeer
   };
   using Peers = std::list<Peer>;  // the last to ask first

@@ -43,6 +43,7 @@ std::string_view CdrWalk::string(std::size_t max_bytes) {
   if (length - 1 > max_bytes) good_ = false;
   skip(length, 1);
   if (!good_) return {};
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): bytes as characters
   const std::string_view text(reinterpret_cast<const char*>(data_ + at_ - length), length - 1);
   if (data_[at_ - 1] != 0 || text.find('\0') != std::string_view::npos) good_ = false;
   return text;

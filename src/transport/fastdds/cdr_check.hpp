@@ -59,7 +59,7 @@ class CdrWalk {
   }
 
   std::string_view id() { return string(255); }
-  void transform() { skip(28 * 8, 8); }
+  void transform() { skip(28 * sizeof(double), 8); }
   std::string_view edge();
 
  private:

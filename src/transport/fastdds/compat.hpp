@@ -67,8 +67,8 @@ using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 using ParticipantInfo = ertps::ParticipantDiscoveryInfo;
 
 inline bool ok(const ReturnCode& code) { return code == ReturnCode::RETCODE_OK; }
-inline const ReturnCode kBadParameter = ReturnCode::RETCODE_BAD_PARAMETER;
-inline const ReturnCode kDone = ReturnCode::RETCODE_OK;
+inline ReturnCode bad_parameter() { return ReturnCode::RETCODE_BAD_PARAMETER; }
+inline ReturnCode done() { return ReturnCode::RETCODE_OK; }
 
 inline bool write(edds::DataWriter& writer, void* data) { return writer.write(data); }
 
@@ -100,13 +100,13 @@ class ParticipantListener final : public edds::DomainParticipantListener {
 /// A generated type that refuses payloads which are not well formed before it deserializes them, whose key is
 /// computed without the buffer that the generated code shares between threads, and which
 /// preallocates for usual samples, not for the largest.
-template <class Generated, bool (*kWellFormed)(const std::uint8_t*, std::size_t)>
+template <class Generated, bool (*WellFormed)(const std::uint8_t*, std::size_t)>
 class CheckedType final : public Generated {
  public:
   CheckedType() { this->m_typeSize = kUsualSize; }
 
   bool deserialize(ertps::SerializedPayload_t* payload, void* data) override {
-    return kWellFormed(payload->data, payload->length) && Generated::deserialize(payload, data);
+    return WellFormed(payload->data, payload->length) && Generated::deserialize(payload, data);
   }
 
   bool getKey(void* data, ertps::InstanceHandle_t* handle, bool force_md5) override {
@@ -124,8 +124,8 @@ namespace ertps = eprosima::fastdds::rtps;
 using ReturnCode = edds::ReturnCode_t;
 
 inline bool ok(ReturnCode code) { return code == edds::RETCODE_OK; }
-inline const ReturnCode kBadParameter = edds::RETCODE_BAD_PARAMETER;
-inline const ReturnCode kDone = edds::RETCODE_OK;
+inline ReturnCode bad_parameter() { return edds::RETCODE_BAD_PARAMETER; }
+inline ReturnCode done() { return edds::RETCODE_OK; }
 
 inline bool write(edds::DataWriter& writer, void* data) { return ok(writer.write(data)); }
 
@@ -154,19 +154,19 @@ class ParticipantListener final : public edds::DomainParticipantListener {
   Observer& observer_;
 };
 
-template <class Generated, bool (*kWellFormed)(const std::uint8_t*, std::size_t)>
+template <class Generated, bool (*WellFormed)(const std::uint8_t*, std::size_t)>
 class CheckedType final : public Generated {
  public:
   CheckedType() { this->max_serialized_type_size = kUsualSize; }
 
   bool deserialize(ertps::SerializedPayload_t& payload, void* data) override {
-    return kWellFormed(payload.data, payload.length) && Generated::deserialize(payload, data);
+    return WellFormed(payload.data, payload.length) && Generated::deserialize(payload, data);
   }
 
   bool compute_key(ertps::SerializedPayload_t& payload, ertps::InstanceHandle_t& handle,
                    bool force_md5) override {
     thread_local Generated own_buffer;
-    return kWellFormed(payload.data, payload.length) &&
+    return WellFormed(payload.data, payload.length) &&
            own_buffer.compute_key(payload, handle, force_md5);
   }
 

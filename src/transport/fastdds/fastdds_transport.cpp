@@ -62,7 +62,7 @@ Result<void> FastDdsTransport::create_participant() {
   return all ? Result<void>() : not_created("the topics");
 }
 
-edds::Topic* FastDdsTransport::create_topic(const char* name, edds::TypeSupport type) {
+edds::Topic* FastDdsTransport::create_topic(const char* name, const edds::TypeSupport& type) {
   if (!ok(type.register_type(participant_))) return nullptr;
   return participant_->create_topic(name, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
 }
@@ -190,7 +190,7 @@ Result<void> FastDdsTransport::send(const std::string& partition, const Update& 
 }
 
 Result<void> FastDdsTransport::send(Outlet& outlet, const std::string& partition, void* sample,
-                                    Deadline deadline) {
+                                    Deadline deadline) const {
   if (!outlet.good()) return not_created("a writer");
   if (!outlet.wait_until_matched(deadline)) {
     return fail(Errc::kTimeout, "partition " + quote(partition) +

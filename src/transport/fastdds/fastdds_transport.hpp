@@ -24,6 +24,8 @@ class FastDdsTransport final : public Transport {
  public:
   explicit FastDdsTransport(FastDdsOptions options);
   ~FastDdsTransport() override { stop(); }
+  FastDdsTransport(const FastDdsTransport&) = delete;
+  FastDdsTransport& operator=(const FastDdsTransport&) = delete;
 
   Result<void> start(TransportHandler& handler) override;
   void stop() override;
@@ -54,14 +56,15 @@ class FastDdsTransport final : public Transport {
 
   Result<void> create_participant();
   Result<void> create_endpoints();
-  edds::Topic* create_topic(const char* name, edds::TypeSupport type);
+  edds::Topic* create_topic(const char* name, const edds::TypeSupport& type);
   edds::ContentFilteredTopic* create_filtered(edds::Topic* topic, const std::string& partition);
 
   std::shared_ptr<Outlet> outlet(Outlets& outlets, edds::Topic* topic, const std::string& partition,
                                  const char* profile);
   std::shared_ptr<Outlet> reply_outlet(const PeerId& peer);
   void open_reply_outlet(const PeerId& peer);
-  Result<void> send(Outlet& outlet, const std::string& partition, void* sample, Deadline deadline);
+  Result<void> send(Outlet& outlet, const std::string& partition, void* sample,
+                    Deadline deadline) const;
 
   void take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from);
   void take_update(const wire::Update& sample);

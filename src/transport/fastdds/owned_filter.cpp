@@ -40,12 +40,14 @@ bool OwnedFilters::Updates::evaluate(const SerializedPayload& payload, const Fil
 ReturnCode OwnedFilters::create_content_filter(const char* filter_class_name, const char* type_name,
                                                const edds::TopicDataType*, const char*,
                                                const ParameterSeq&, edds::IContentFilter*& filter) {
-  if (std::string_view(filter_class_name) != kClassName) return kBadParameter;
+  if (std::string_view(filter_class_name) != kClassName) return bad_parameter();
   const bool of_requests = std::string_view(type_name) == RequestType().getName();
   filter = of_requests ? static_cast<edds::IContentFilter*>(&requests_) : &updates_;
-  return kDone;
+  return done();
 }
 
-ReturnCode OwnedFilters::delete_content_filter(const char*, edds::IContentFilter*) { return kDone; }
+ReturnCode OwnedFilters::delete_content_filter(const char*, edds::IContentFilter*) {
+  return done();
+}
 
 }  // namespace tfdude::fastdds

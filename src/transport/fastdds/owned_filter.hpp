@@ -8,7 +8,7 @@
 #include "transport/fastdds/compat.hpp"
 
 // The library's interfaces have no virtual destructor; the classes here are final and never deleted through
-// them.
+// them. NOLINTBEGIN(cppcoreguidelines-virtual-class-destructor)
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wnon-virtual-dtor"
 
@@ -45,8 +45,8 @@ class OwnedFilters final : public edds::IContentFilterFactory {
   class Requests final : public edds::IContentFilter {
    public:
     explicit Requests(const View& view) : view_(view) {}
-    bool evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
-                  const GUID_t& reader) const override;
+    [[nodiscard]] bool evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
+                                const GUID_t& reader) const override;
 
    private:
     const View& view_;
@@ -55,8 +55,8 @@ class OwnedFilters final : public edds::IContentFilterFactory {
   class Updates final : public edds::IContentFilter {
    public:
     explicit Updates(const View& view) : view_(view) {}
-    bool evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
-                  const GUID_t& reader) const override;
+    [[nodiscard]] bool evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
+                                const GUID_t& reader) const override;
 
    private:
     const View& view_;
@@ -69,4 +69,5 @@ class OwnedFilters final : public edds::IContentFilterFactory {
 
 }  // namespace tfdude::fastdds
 
+// NOLINTEND(cppcoreguidelines-virtual-class-destructor)
 #pragma GCC diagnostic pop
