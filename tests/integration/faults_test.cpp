@@ -12,6 +12,7 @@
 
 #include "support/catch.hpp"
 #include "support/test_domain.hpp"
+#include "support/thesis.hpp"
 
 namespace tfdude {
 namespace {
@@ -21,16 +22,10 @@ using testing::await_ready;
 using testing::eventually;
 using testing::finish;
 using testing::in_time;
+using testing::kArmsFile;
+using testing::kRobotFile;
 using testing::Process;
-
-const std::string kRobotFile = TFDUDE_EXAMPLES "/thesis/robot.yaml";
-const std::string kArmsFile = TFDUDE_EXAMPLES "/thesis/arms.yaml";
-
-struct Daemons {
-  testing::TestDomain domain;
-  Process robot = domain.serve(kRobotFile);
-  std::optional<Process> arms = domain.serve(kArmsFile);
-};
+using testing::ThesisDaemons;
 
 /// Far longer than a partition may be silent, and shorter than DDS takes to give up a participant.
 constexpr Milliseconds kPatience{2000};
@@ -60,7 +55,7 @@ std::string host() {
 }  // namespace
 
 TEST_CASE("faults: who needs a killed daemon is told at once, and others do not notice") {
-  Daemons d;
+  ThesisDaemons d;
   auto client = *Client::open(d.domain.options(kPatience));
   REQUIRE(client.lookup("world", "hand_left"));
   d.arms->signal(SIGKILL);
@@ -89,7 +84,7 @@ TEST_CASE("faults: an owner is told of a killed daemon, and goes on with its own
 }
 
 TEST_CASE("faults: a killed daemon that is started again is asked again") {
-  Daemons d;
+  ThesisDaemons d;
   auto client = *Client::open(d.domain.options());
   for (int round = 0; round < 3; ++round) {
     const auto before = client.lookup("world", "hand_left");
@@ -109,7 +104,7 @@ TEST_CASE("faults: a killed daemon that is started again is asked again") {
 }
 
 TEST_CASE("faults: a hanging partition costs its caller the time-out, and recovers") {
-  Daemons d;
+  ThesisDaemons d;
   // Shorter than it takes to notice that a partition is gone.
   auto client = *Client::open(d.domain.options(Milliseconds(50)));
   REQUIRE(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
@@ -156,7 +151,7 @@ TEST_CASE("faults: a partition that DDS had given up is met again") {
 }
 
 TEST_CASE("faults: a second daemon of the same name is refused") {
-  Daemons d;
+  ThesisDaemons d;
   Process second = d.domain.start_daemon({"--config", kArmsFile});
   const auto result = finish(second);
   CHECK(result.status != 0);
@@ -191,7 +186,7 @@ TEST_CASE("faults: of two daemons of one name at the same instant exactly one se
 
 TEST_CASE("faults: a daemon that is told to stop says goodbye and exits well") {
   const int signal = GENERATE(2, 15);  // SIGINT, SIGTERM
-  Daemons d;
+  ThesisDaemons d;
   auto client = *Client::open(d.domain.options(kPatience));
   REQUIRE(client.lookup("world", "hand_left"));
   d.arms->signal(signal);

@@ -1,5 +1,7 @@
 // The function tests of the thesis with daemons in processes of their own.
 
+#include "support/thesis.hpp"
+
 #include <array>
 #include <optional>
 #include <string>
@@ -18,14 +20,13 @@ namespace tfdude {
 namespace {
 
 using testing::eventually;
+using testing::kArmsFile;
+using testing::kRobotFile;
 using testing::lookups_diff;
 using testing::Oracle;
 using testing::Process;
 using testing::structure_diff;
 using testing::transform_diff;
-
-const std::string kRobotFile = TFDUDE_EXAMPLES "/thesis/robot.yaml";
-const std::string kArmsFile = TFDUDE_EXAMPLES "/thesis/arms.yaml";
 
 const Transform kX{exp((Twist() << 0.1, -0.2, 0.3, 0.4, 0.5, -0.6).finished()),
                    *Covariance::from_stddev({1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3})};

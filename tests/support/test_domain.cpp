@@ -50,10 +50,12 @@ Options TestDomain::options(Milliseconds timeout) const {
 
 std::vector<std::string> TestDomain::command(const char* program,
                                              const std::vector<std::string>& arguments) const {
-  std::vector<std::string> command{program, "--domain", std::to_string(number_)};
-  if (std::count(arguments.begin(), arguments.end(), "--profile") == 0) {
-    command.insert(command.end(), {"--profile", TFDUDE_LOOPBACK_PROFILE});
-  }
+  const auto given = [&](const char* option) {
+    return std::count(arguments.begin(), arguments.end(), option) > 0;
+  };
+  std::vector<std::string> command{program};
+  if (!given("--domain")) command.insert(command.end(), {"--domain", std::to_string(number_)});
+  if (!given("--profile")) command.insert(command.end(), {"--profile", TFDUDE_LOOPBACK_PROFILE});
   command.insert(command.end(), arguments.begin(), arguments.end());
   return command;
 }
