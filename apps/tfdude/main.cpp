@@ -124,6 +124,10 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    const auto unknown = app.remaining();
+    if (app.get_subcommands().empty() && !unknown.empty()) {
+      std::fprintf(stderr, "tfdude: no command '%s'\n", unknown.front().c_str());
+    }
     return app.exit(error) == 0 ? cli::kDone : cli::kWrongUsage;
   }
   arguments.options.timeout = Milliseconds(timeout_ms);

@@ -33,6 +33,9 @@ class Outlet final : public edds::DataWriterListener {
   /// A sample of the topic's type. Thread-safe.
   bool write(void* sample) { return fastdds::write(*writer_, sample); }
 
+  /// Says that the writer lives, where its liveliness is a manual one.
+  void assert_liveliness() { (void)writer_->assert_liveliness(); }
+
   void on_publication_matched(edds::DataWriter*,
                               const edds::PublicationMatchedStatus& status) override;
 

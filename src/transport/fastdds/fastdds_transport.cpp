@@ -12,6 +12,9 @@ namespace {
 
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
 
+// A fifth of the lease of the presence's liveliness.
+constexpr Milliseconds kAliveEvery{100};
+
 tl::unexpected<Error> not_created(const char* what) {
   return fail(Errc::kTransport, std::string("Fast DDS could not create ") + what);
 }
@@ -73,7 +76,7 @@ Result<void> FastDdsTransport::create_endpoints() {
       *participant_, *topics_.presence, std::string(), "presence_reader",
       Inlet<wire::Presence>::Calls{
           [this](const wire::Presence& sample, const Prefix& from) { take_presence(sample, from); },
-          [this](const Prefix& from, int change) { presence_matched(from, change); },
+          [this](const Prefix& from, int change) { presence_alive(from, change); },
           [this](const Prefix& from, int change) { presence_alive(from, change); }});
   pages_ = std::make_unique<Inlet<wire::Page>>(
       *participant_, *topics_.directory, std::string(), "directory_reader",
@@ -92,6 +95,7 @@ Result<void> FastDdsTransport::create_endpoints() {
   directory_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.directory, std::string(),
                                                "directory_writer");
   if (!presence_outlet_->good() || !directory_outlet_->good()) return not_created("the writers");
+  worker_->repeat(kAliveEvery, [this] { presence_outlet_->assert_liveliness(); });
   return {};
 }
 
@@ -298,19 +302,24 @@ void FastDdsTransport::take_presence(const wire::Presence& sample,
   }
   {
     const std::lock_guard lock(presences_mutex_);
+    if (presence->serving) forget_predecessors(*presence);
     presences_[peer_of(from)] = *presence;
   }
   handler_->on_presence(*presence);
   peers_.present(from);
 }
 
-void FastDdsTransport::presence_matched(const ertps::GuidPrefix_t& from, int change) {
-  if (change > 0) return;
-  presence_alive(from, change);
-  const std::lock_guard lock(presences_mutex_);
-  presences_.erase(peer_of(from));
+// Who serves a partition has outlived those who did before.
+void FastDdsTransport::forget_predecessors(const Presence& presence) {
+  for (auto known = presences_.begin(); known != presences_.end();) {
+    const bool gone = known->second.partition == presence.partition &&
+                      known->second.incarnation < presence.incarnation;
+    known = gone ? presences_.erase(known) : std::next(known);
+  }
 }
 
+// Whoever was silent for so long that it was taken for gone is met again, but what it said before is not
+// delivered a second time: hence nothing is forgotten as it goes.
 void FastDdsTransport::presence_alive(const ertps::GuidPrefix_t& from, int change) {
   Presence presence;
   {
@@ -321,6 +330,7 @@ void FastDdsTransport::presence_alive(const ertps::GuidPrefix_t& from, int chang
   }
   if (change > 0) {
     handler_->on_presence(presence);
+    peers_.present(from);
   } else {
     handler_->on_lost(presence.partition, presence.incarnation);
   }

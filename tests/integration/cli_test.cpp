@@ -1,0 +1,185 @@
+// Each command of the command line: what it prints for people, what for programs, and its exit status.
+
+#include <algorithm>
+#include <csignal>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "support/catch.hpp"
+#include "support/thesis.hpp"
+
+namespace tfdude {
+namespace {
+
+using Catch::Matchers::Contains;
+using nlohmann::json;
+using testing::CliResult;
+using testing::eventually;
+using testing::in_time;
+using testing::Process;
+using testing::ThesisDaemons;
+using Arguments = std::vector<std::string>;
+
+/// What a command prints for people, where all is well.
+std::string text(const ThesisDaemons& d, const Arguments& arguments) {
+  const CliResult result = d.domain.cli(arguments);
+  INFO(result.err);
+  CHECK(result.status == 0);
+  CHECK(result.err.empty());
+  return result.out;
+}
+
+/// One line of JSON, and nothing else.
+json parse_line(const CliResult& result) {
+  CHECK(std::count(result.out.begin(), result.out.end(), '\n') == 1);
+  return json::parse(result.out);
+}
+
+json object(const ThesisDaemons& d, Arguments arguments) {
+  arguments.insert(arguments.begin(), "--json");
+  const CliResult result = d.domain.cli(arguments);
+  INFO(result.err);
+  CHECK(result.status == 0);
+  return parse_line(result);
+}
+
+const std::vector<std::string> kCommands = {
+    "tree",   "frames", "partitions", "roots",  "parent", "children", "exists",
+    "lookup", "watch",  "add",        "update", "remove", "move",
+};
+
+}  // namespace
+
+TEST_CASE("cli: questions are answered for people") {
+  const ThesisDaemons d;
+  CHECK(text(d, {"tree"}) ==
+        "world  [robot]\n"
+        "└─ robot_1  [robot]\n"
+        "   ├─ arm_1  [arms]\n"
+        "   │  ├─ arm_2  [arms]\n"
+        "   │  ├─ arm_left  [arms]\n"
+        "   │  │  └─ hand_left  [arms]\n"
+        "   │  └─ arm_right  [arms]\n"
+        "   └─ robot_2  [robot]\n"
+        "      └─ camera  [robot]\n");
+  CHECK(text(d, {"frames"}) ==
+        "arm_1\narm_2\narm_left\narm_right\ncamera\nhand_left\nrobot_1\nrobot_2\nworld\n");
+  const std::string partitions = text(d, {"partitions"});
+  CHECK_THAT(partitions, Contains("arms  frames 5"));
+  CHECK_THAT(partitions, Contains("pid " + std::to_string(d.robot.pid())));
+  CHECK(text(d, {"roots"}) == "world\n");
+  CHECK(text(d, {"parent", "arm_1"}) == "robot_1\n");
+  CHECK(text(d, {"parent", "world"}) == "(root)\n");
+  CHECK(text(d, {"children", "robot_1"}) == "arm_1\nrobot_2\n");
+  CHECK(text(d, {"exists", "camera"}) == "yes\n");
+  const CliResult missing = d.domain.cli({"exists", "nowhere"});
+  CHECK(missing.status == 1);
+  CHECK(missing.out == "no\n");
+  const std::string brief = text(d, {"lookup", "world", "robot_1"});
+  CHECK_THAT(brief, Contains("translation  2.400000  -1.150000  0.080000  m\n"));
+  CHECK_THAT(brief, Contains("rpy          0.2292  -0.6303  35.5234  deg\n"));
+  CHECK_THAT(brief, Contains("std dev      0.020000  0.030000  0.005000  m"));
+  CHECK_THAT(brief, !Contains("covariance"));
+  CHECK_THAT(text(d, {"lookup", "world", "hand_left", "--cov"}), Contains("\ncovariance "));
+}
+
+TEST_CASE("cli: questions are answered for programs") {
+  const ThesisDaemons d;
+  const json frames = object(d, {"frames"}).at("frames");
+  REQUIRE(frames.size() == 9);
+  CHECK(frames[0] ==
+        json({{"id", "arm_1"}, {"parent", "robot_1"}, {"partition", "arms"}, {"attached", true}}));
+  CHECK(frames[8] ==
+        json({{"id", "world"}, {"parent", nullptr}, {"partition", "robot"}, {"attached", false}}));
+  CHECK(object(d, {"tree"}).at("frames") == frames);
+  const json partitions = object(d, {"partitions"}).at("partitions");
+  REQUIRE(partitions.size() == 2);
+  CHECK(partitions[0].at("name") == "arms");
+  CHECK(partitions[0].at("frames") == 5);
+  CHECK(partitions[0].at("pid") == d.arms->pid());
+  CHECK(partitions[0].at("reachable") == true);
+  CHECK(partitions[0].at("host").get<std::string>() != "");
+  CHECK(object(d, {"roots"}) == json({{"roots", {"world"}}}));
+  CHECK(object(d, {"parent", "arm_1"}) == json({{"id", "arm_1"}, {"parent", "robot_1"}}));
+  CHECK(object(d, {"parent", "world"}).at("parent").is_null());
+  CHECK(object(d, {"children", "robot_1"}) == json({{"children", {"arm_1", "robot_2"}}}));
+  CHECK(object(d, {"exists", "camera"}) == json({{"id", "camera"}, {"exists", true}}));
+  const CliResult missing = d.domain.cli({"--json", "exists", "nowhere"});
+  CHECK(missing.status == 1);
+  CHECK(parse_line(missing) == json({{"id", "nowhere"}, {"exists", false}}));
+  const json lookup = object(d, {"lookup", "camera", "hand_left"});
+  CHECK(lookup.at("from") == "camera");
+  CHECK(lookup.at("to") == "hand_left");
+  CHECK(lookup.at("translation").size() == 3);
+  CHECK(lookup.at("rotation").size() == 4);
+  CHECK(lookup.at("covariance").size() == 6);
+  CHECK(lookup.at("partitions") == json({"robot", "arms"}));
+  const CliResult refused = d.domain.cli({"lookup", "camera", "nowhere", "--json"});
+  CHECK(refused.status == 1);
+  const json error = parse_line(refused).at("error");
+  CHECK(error.at("code") == "unknown_end");
+  CHECK_THAT(error.at("message").get<std::string>(), Contains("'nowhere'"));
+}
+
+TEST_CASE("cli: changes are made and confirmed") {
+  const ThesisDaemons d;
+  CHECK(text(d, {"add", "tool", "--parent", "camera", "--xyz", "0.1", "0", "-0.2"}) ==
+        "added tool\n");
+  CHECK(object(d, {"add", "island", "--parent", "", "--partition", "arms"}) ==
+        json({{"done", "added"}, {"id", "island"}}));
+  CHECK(object(d, {"lookup", "camera", "tool"}).at("translation") == json({0.1, 0.0, -0.2}));
+  CHECK(text(d, {"roots"}) == "island\nworld\n");
+  CHECK(text(d, {"update", "tool", "--quat", "0", "0", "1", "0", "--stddev", "0.5", "0", "0", "0",
+                 "0", "0"}) == "updated tool\n");
+  const json updated = object(d, {"lookup", "camera", "tool"});
+  CHECK(updated.at("rotation") == json({0.0, 0.0, 1.0, 0.0}));
+  CHECK(updated.at("covariance")[0][0] == 0.25);
+  // A move keeps the edge's value, or takes a new one.
+  CHECK(text(d, {"move", "tool", "--parent", "island"}) == "moved tool\n");
+  CHECK(text(d, {"parent", "tool"}) == "island\n");
+  CHECK(object(d, {"lookup", "island", "tool"}).at("covariance")[0][0] == 0.25);
+  CHECK(object(d, {"move", "tool", "--parent", "arm_1", "--xyz", "1", "2", "3"}) ==
+        json({{"done", "moved"}, {"id", "tool"}}));
+  CHECK(object(d, {"lookup", "arm_1", "tool"}).at("translation") == json({1.0, 2.0, 3.0}));
+  CHECK(text(d, {"remove", "arm_1"}) == "removed arm_1\n");
+  CHECK(text(d, {"frames"}) == "camera\nisland\nrobot_1\nrobot_2\nworld\n");
+}
+
+TEST_CASE("cli: watch looks up again and again, and survives what it watches") {
+  ThesisDaemons d;
+  Process watch = d.domain.start_cli({"--json", "watch", "world", "hand_left", "--rate", "50"});
+  const auto lines = [&watch] {
+    (void)watch.runs();
+    return std::count(watch.out().begin(), watch.out().end(), '\n');
+  };
+  REQUIRE(eventually([&] { return lines() >= 3; }));
+  CHECK(json::parse(*watch.wait_for_line("{", in_time())).at("to") == "hand_left");
+  d.arms->signal(SIGSTOP);
+  const auto complaint = watch.wait_for_line("{\"error\"", in_time());
+  REQUIRE(complaint);
+  CHECK_THAT(*complaint, Contains("'arms'"));
+  d.arms->signal(SIGCONT);
+  const auto before = std::count(watch.out().begin(), watch.out().end(), '\n');
+  CHECK(eventually([&] {
+    return lines() > before && watch.out().rfind("{\"cov") > watch.out().rfind("{\"err");
+  }));
+  watch.signal(SIGINT);
+  CHECK(watch.wait(in_time()) == 0);
+}
+
+TEST_CASE("cli: every command has help with an example") {
+  const testing::TestDomain domain;
+  const CliResult all = domain.cli({"--help"});
+  CHECK(all.status == 0);
+  for (const std::string& command : kCommands) {
+    CHECK_THAT(all.out, Contains("\n  " + command + " "));
+    const CliResult help = domain.cli({command, "--help"});
+    CHECK(help.status == 0);
+    CHECK(help.err.empty());
+    CHECK_THAT(help.out, Contains("Example: tfdude ") && Contains(command));
+  }
+}
+
+}  // namespace tfdude

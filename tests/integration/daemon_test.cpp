@@ -1,0 +1,81 @@
+// What a daemon says where it cannot serve.
+
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/thesis.hpp"
+
+namespace tfdude {
+namespace {
+
+using Catch::Matchers::Contains;
+using testing::CliResult;
+using testing::TemporaryDirectory;
+using testing::TestDomain;
+
+struct Refusal {
+  std::vector<std::string> arguments;
+  std::vector<std::string> names;  // what the message must name
+};
+
+}  // namespace
+
+TEST_CASE("daemon: what it cannot serve it refuses by name, without being ready") {
+  const TestDomain domain;
+  const TemporaryDirectory directory;
+  const auto config = [&directory](const std::string& name, const std::string& text) {
+    return directory.write(name, "partition: legs\nframes:\n" + text);
+  };
+  const std::vector<Refusal> refusals = {
+      {{}, {"--partition"}},
+      {{"--nonsense"}, {"--nonsense"}},
+      {{"--partition", "le*gs"}, {"le*gs", "'*'"}},
+      {{"--partition", "legs\n"}, {"legs\\x0a", "control character"}},
+      {{"--partition", std::string(256, 'x')}, {"256 bytes"}},
+      {{"--partition", "legs", "--domain", "233"}, {"233", "232"}},
+      {{"--partition", "legs", "--domain", "far"}, {"--domain", "far"}},
+      {{"--partition", "legs", "--profile", "/nowhere/profile.xml"}, {"/nowhere/profile.xml"}},
+      {{"--partition", "legs", "--profile", directory.write("broken.xml", "<profiles><")},
+       {"broken.xml"}},
+      {{"--config", "/nowhere/legs.yaml"}, {"/nowhere/legs.yaml", "No such file"}},
+      {{"--partition", "legs", "--config", testing::kArmsFile}, {"'arms'", "'legs'"}},
+      {{"--config", config("key.yaml", "  - id: knee\n    colour: red\n")},
+       {"key.yaml:4", "'knee'", "'colour'"}},
+      {{"--config", config("quat.yaml", "  - {id: knee, quat: [1, 1, 0, 0]}\n")},
+       {"quat.yaml:3", "'knee'", "quat"}},
+      {{"--config", config("cov.yaml", "  - {id: knee, stddev: [1, 1, 1, 1, 1, .nan]}\n")},
+       {"cov.yaml:3", "'knee'", "stddev[5]"}},
+      {{"--config", config("twice.yaml", "  - id: knee\n  - id: knee\n")},
+       {"twice.yaml:4", "'knee'"}},
+      {{"--config", config("cycle.yaml", "  - {id: a, parent: b}\n  - {id: b, parent: a}\n")},
+       {"'legs'", "'b'"}},
+      {{"--config", directory.write("text.yaml", "frames: [\n")}, {"text.yaml", "YAML"}},
+  };
+  for (const Refusal& refusal : refusals) {
+    testing::Process daemon = domain.start_daemon(refusal.arguments);
+    const CliResult result = testing::finish(daemon);
+    INFO(result.err);
+    CHECK(result.status != 0);
+    CHECK(result.status < 128);
+    CHECK(result.out.empty());
+    for (const std::string& name : refusal.names) CHECK_THAT(result.err, Contains(name));
+  }
+}
+
+TEST_CASE("daemon: it says how many frames it serves, which may be none") {
+  const TestDomain domain;
+  const TemporaryDirectory directory;
+  testing::Process legs = domain.start_daemon({"--partition", "legs"});
+  CHECK(testing::await_ready(legs) == "ready partition=legs frames=0");
+  testing::Process arms = domain.start_daemon({"--config", testing::kArmsFile});
+  CHECK(testing::await_ready(arms) == "ready partition=arms frames=5");
+  const CliResult help = [&] {
+    testing::Process asked = domain.start_daemon({"--help"});
+    return testing::finish(asked);
+  }();
+  CHECK(help.status == 0);
+  CHECK_THAT(help.out, Contains("Example: tfduded "));
+}
+
+}  // namespace tfdude

@@ -1,0 +1,200 @@
+// What happens as daemons die, hang, come back, or want the same name.
+
+#include <csignal>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/catch.hpp"
+#include "support/test_domain.hpp"
+#include "support/thesis.hpp"
+
+namespace tfdude {
+namespace {
+
+using Catch::Matchers::Contains;
+using testing::await_ready;
+using testing::eventually;
+using testing::finish;
+using testing::in_time;
+using testing::kArmsFile;
+using testing::kRobotFile;
+using testing::Process;
+using testing::ThesisDaemons;
+
+/// Far longer than a partition may be silent, and shorter than DDS takes to give up a participant.
+constexpr Milliseconds kPatience{2000};
+
+/// Calls that need the partition "arms" fail before their time is over and say why; others work.
+void check_arms_missing(Client& client) {
+  const auto lookup = client.lookup("world", "hand_left");
+  const auto update = client.update("arm_1", {});
+  const auto add = client.add("tool", "arm_2", {});
+  const auto remove = client.remove("robot_1");
+  for (const auto& result : {lookup.map([](const Transform&) {}), update, add, remove}) {
+    REQUIRE_FALSE(result);
+    CHECK(result.error().code == Errc::kUnreachable);
+    CHECK_THAT(result.error().message, Contains("'arms'"));
+  }
+  CHECK(client.lookup("world", "camera"));
+  CHECK(client.update("robot_2", {}));
+  CHECK(client.exists("robot_1"));
+}
+
+std::string host() {
+  std::string name(256, '\0');
+  gethostname(name.data(), name.size());
+  return name.c_str();
+}
+
+}  // namespace
+
+TEST_CASE("faults: who needs a killed daemon is told at once, and others do not notice") {
+  ThesisDaemons d;
+  auto client = *Client::open(d.domain.options(kPatience));
+  REQUIRE(client.lookup("world", "hand_left"));
+  d.arms->signal(SIGKILL);
+  check_arms_missing(client);
+  check_arms_missing(client);
+  const auto partitions = client.partitions();
+  REQUIRE(partitions.size() == 2);
+  CHECK(partitions[0].name == "arms");
+  CHECK_FALSE(partitions[0].reachable);
+  CHECK(partitions[1].reachable);
+}
+
+TEST_CASE("faults: an owner is told of a killed daemon, and goes on with its own frames") {
+  testing::TestDomain domain;
+  Process arms = domain.serve(kArmsFile);
+  auto robot =
+      *Node::open("robot", {{"world", "", {}}, {"robot_1", "world", {}}}, domain.options());
+  REQUIRE(eventually([&] { return robot.lookup("world", "hand_left").has_value(); }));
+  arms.signal(SIGKILL);
+  const auto lost = robot.lookup("world", "hand_left");
+  REQUIRE_FALSE(lost);
+  CHECK(lost.error().code == Errc::kUnreachable);
+  CHECK_THAT(lost.error().message, Contains("'arms'"));
+  CHECK(robot.lookup("world", "robot_1"));
+  CHECK(robot.add("tool", "robot_1", {}));
+}
+
+TEST_CASE("faults: a killed daemon that is started again is asked again") {
+  ThesisDaemons d;
+  auto client = *Client::open(d.domain.options());
+  for (int round = 0; round < 3; ++round) {
+    const auto before = client.lookup("world", "hand_left");
+    REQUIRE(before);
+    REQUIRE(client.add("tool", "hand_left", {}));
+    d.arms->signal(SIGKILL);
+    REQUIRE(d.arms->wait(in_time()) == 128 + SIGKILL);
+    d.arms.emplace(d.domain.serve(kArmsFile));
+    // What was added to the predecessor is gone with it.
+    REQUIRE(eventually([&] { return client.exists("hand_left") && !client.exists("tool"); }));
+    const auto after = client.lookup("world", "hand_left");
+    INFO((after ? "" : after.error().message));
+    REQUIRE(after);
+    CHECK(after->pose.matrix() == before->pose.matrix());
+    CHECK(client.partitions()[0].pid == static_cast<std::uint32_t>(d.arms->pid()));
+  }
+}
+
+TEST_CASE("faults: a hanging partition costs its caller the time-out, and recovers") {
+  ThesisDaemons d;
+  // Shorter than it takes to notice that a partition is gone.
+  auto client = *Client::open(d.domain.options(Milliseconds(50)));
+  REQUIRE(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
+  d.arms->signal(SIGSTOP);
+  const auto late = client.lookup("world", "hand_left");
+  REQUIRE_FALSE(late);
+  CHECK(late.error().code == Errc::kTimeout);
+  CHECK_THAT(late.error().message, Contains("'arms'"));
+  CHECK(eventually([&] {
+    const auto lost = client.lookup("world", "hand_left");
+    return !lost && lost.error().code == Errc::kUnreachable;
+  }));
+  d.arms->signal(SIGCONT);
+  CHECK(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
+}
+
+TEST_CASE("faults: a partition that DDS had given up is met again") {
+  // Its participant is given up earlier than its presence.
+  std::ifstream file(TFDUDE_LOOPBACK_PROFILE);
+  std::string profile(std::istreambuf_iterator<char>(file), {});
+  const std::string lease = "<leaseDuration><sec>3</sec></leaseDuration>";
+  const auto at = profile.find(lease);
+  REQUIRE(at != std::string::npos);
+  profile.replace(at, lease.size(), "<leaseDuration><nanosec>300000000</nanosec></leaseDuration>");
+  const testing::TemporaryDirectory directory;
+  testing::TestDomain domain;
+  Process robot = domain.serve(kRobotFile);
+  Process arms = domain.start_daemon(
+      {"--config", kArmsFile, "--profile", directory.write("hasty.xml", profile)});
+  await_ready(arms);
+  auto client = *Client::open(domain.options(kPatience));
+  for (int round = 0; round < 3; ++round) {
+    REQUIRE(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
+    arms.signal(SIGSTOP);
+    CHECK(eventually([&] {
+      const auto lost = client.lookup("world", "hand_left");
+      return !lost && lost.error().code == Errc::kUnreachable;
+    }));
+    arms.signal(SIGCONT);
+  }
+  CHECK(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
+  CHECK(eventually([&] { return client.add("tool", "hand_left", {}).has_value(); }));
+  CHECK(client.exists("tool"));
+}
+
+TEST_CASE("faults: a second daemon of the same name is refused") {
+  ThesisDaemons d;
+  Process second = d.domain.start_daemon({"--config", kArmsFile});
+  const auto result = finish(second);
+  CHECK(result.status != 0);
+  CHECK(result.out.empty());
+  CHECK_THAT(result.err, Contains("'arms'"));
+  CHECK_THAT(result.err, Contains("host " + host()));
+  CHECK_THAT(result.err, Contains("process " + std::to_string(d.arms->pid())));
+  CHECK(d.arms->runs());
+  CHECK(d.domain.cli({"lookup", "world", "hand_left"}).status == 0);
+}
+
+TEST_CASE("faults: of two daemons of one name at the same instant exactly one serves") {
+  for (int round = 0; round < 4; ++round) {
+    testing::TestDomain domain;
+    std::vector<Process> daemons;
+    for (int i = 0; i < 2; ++i) daemons.push_back(domain.start_daemon({"--config", kArmsFile}));
+    REQUIRE(eventually([&] { return !daemons[0].runs() || !daemons[1].runs(); }));
+    const std::size_t loser = daemons[0].runs() ? 1 : 0;
+    Process& winner = daemons[1 - loser];
+    await_ready(winner);
+    const auto lost = finish(daemons[loser]);
+    CHECK(lost.status != 0);
+    CHECK(lost.out.empty());
+    CHECK_THAT(lost.err, Contains("process " + std::to_string(winner.pid())));
+    auto client = *Client::open(domain.options());
+    CHECK(client.lookup("arm_1", "hand_left"));
+    const auto partitions = client.partitions();
+    REQUIRE(partitions.size() == 1);
+    CHECK(partitions[0].pid == static_cast<std::uint32_t>(winner.pid()));
+  }
+}
+
+TEST_CASE("faults: a daemon that is told to stop says goodbye and exits well") {
+  const int signal = GENERATE(2, 15);  // SIGINT, SIGTERM
+  ThesisDaemons d;
+  auto client = *Client::open(d.domain.options(kPatience));
+  REQUIRE(client.lookup("world", "hand_left"));
+  d.arms->signal(signal);
+  CHECK(d.arms->wait(in_time()) == 0);
+  check_arms_missing(client);
+  // Its name is free at once.
+  d.arms.emplace(d.domain.serve(kArmsFile));
+  CHECK(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
+}
+
+}  // namespace tfdude

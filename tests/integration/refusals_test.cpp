@@ -1,0 +1,201 @@
+// What the command line says, and with which exit status, where something cannot be done.
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "tfdude/transport/fastdds.hpp"
+
+#include "support/catch.hpp"
+#include "support/thesis.hpp"
+
+namespace tfdude {
+namespace {
+
+using Catch::Matchers::Contains;
+using nlohmann::json;
+using testing::CliResult;
+using testing::TemporaryDirectory;
+using testing::TestDomain;
+using testing::ThesisDaemons;
+using Arguments = std::vector<std::string>;
+
+/// A participant that seems to serve a partition, and never answers.
+class MutePartition final : public TransportHandler {
+ public:
+  MutePartition(const TestDomain& domain, const std::string& name, const std::string& frame)
+      : transport_(
+            *make_fastdds_transport({domain.number(), TFDUDE_LOOPBACK_PROFILE, name, nullptr})) {
+    REQUIRE(transport_->start(*this));
+    REQUIRE(transport_->serve(name));
+    transport_->publish({name, 0, 1, 1, {{frame, ""}}});
+    transport_->announce({name, 1, "here", 1, 1, true});
+  }
+
+  void on_request(const PeerId&, const Request&) override {}
+  void on_reply(const Reply&) override {}
+  void on_update(const Update&) override {}
+  void on_page(const Page&) override {}
+  void on_presence(const Presence&) override {}
+  void on_lost(const std::string&, std::uint64_t) override {}
+  [[nodiscard]] bool owns(std::string_view) const override { return true; }
+
+ private:
+  std::unique_ptr<Transport> transport_;
+};
+
+struct Refusal {
+  Arguments arguments;
+  std::string code;
+  std::vector<std::string> names;  // what the message must name
+};
+
+const std::string kLongId(256, 'x');
+
+// Each breaks one rule.
+const std::vector<Refusal> kRefusals = {
+    {{"add", "", "--parent", "camera"}, "invalid_input", {"id", "empty"}},
+    {{"add", kLongId, "--parent", "camera"}, "invalid_input", {"id", "256 bytes", "255"}},
+    {{"add", "a\nb", "--parent", "camera"}, "invalid_input", {"'a\\x0ab'", "control character"}},
+    {{"add", "a\xff", "--parent", "camera"}, "invalid_input", {"'a\\xff'", "UTF-8"}},
+    {{"add", "tool", "--parent", "camera", "--quat", "1", "1", "0", "0"},
+     "invalid_input",
+     {"'tool'", "rotation", "unit"}},
+    {{"add", "tool", "--parent", "camera", "--xyz", "0", "nan", "0"},
+     "invalid_input",
+     {"'tool'", "translation.y", "finite"}},
+    {{"update", "camera", "--xyz", "0", "0", "inf"},
+     "invalid_input",
+     {"'camera'", "translation.z", "finite"}},
+    {{"update", "arm_1", "--rpy", "nan", "0", "0"}, "invalid_input", {"'arm_1'", "rpy[0]"}},
+    {{"update", "arm_1", "--stddev", "1", "1", "1", "1", "1", "-1"},
+     "invalid_input",
+     {"'arm_1'", "stddev[5]", "negative"}},
+    // A correlation of two: not positive semi-definite.
+    {{"update", "camera", "--cov", "1", "2", "0", "0", "0", "0", "1", "0", "0",
+      "0",      "0",      "1",     "0", "0", "0", "1", "0", "0", "1", "0", "1"},
+     "invalid_input",
+     {"'camera'", "covariance"}},
+    {{"move", "camera", "--parent", "arm_1", "--quat", "2", "0", "0", "0"},
+     "invalid_input",
+     {"'camera'", "rotation"}},
+    {{"move", "robot_1", "--parent", "hand_left"}, "cycle", {"'robot_1'", "'hand_left'"}},
+    {{"move", "arm_1", "--parent", "arm_1"}, "cycle", {"'arm_1'"}},
+    {{"move", "arm_1", "--parent", "nowhere"}, "unknown_parent", {"'arm_1'", "'nowhere'"}},
+    {{"add", "camera", "--parent", "world"}, "already_exists", {"'camera'"}},
+    {{"add", "tool", "--parent", "nowhere"}, "unknown_parent", {"'tool'", "'nowhere'"}},
+    {{"add", "tool", "--parent", "world", "--partition", "legs"}, "unknown_partition", {"'legs'"}},
+    {{"update", "nowhere", "--xyz", "0", "0", "0"}, "unknown_frame", {"'nowhere'"}},
+    {{"remove", "nowhere"}, "unknown_frame", {"'nowhere'"}},
+    {{"parent", "nowhere"}, "unknown_frame", {"'nowhere'"}},
+    {{"children", "nowhere"}, "unknown_frame", {"'nowhere'"}},
+    {{"lookup", "nowhere", "world"}, "unknown_start", {"'nowhere'"}},
+};
+
+/// All that can be seen: the structure and each edge's value.
+std::string snapshot(Client& client) {
+  std::string all;
+  for (const Frame& frame : client.frames()) {
+    all += frame.id + " " + frame.parent + " " + frame.partition + "\n";
+    if (frame.parent.empty()) continue;
+    const auto X_PC = client.lookup(frame.parent, frame.id);
+    REQUIRE(X_PC);
+    const Eigen::IOFormat exact(17);
+    std::ostringstream value;
+    value << X_PC->pose.matrix().format(exact) << X_PC->covariance.matrix().format(exact);
+    all += value.str();
+  }
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("cli: what breaks a rule is refused by name and changes nothing") {
+  const ThesisDaemons d;
+  auto client = *Client::open(d.domain.options());
+  const std::string before = snapshot(client);
+  for (const Refusal& refusal : kRefusals) {
+    Arguments arguments = refusal.arguments;
+    const CliResult plain = d.domain.cli(arguments);
+    INFO("tfdude " << arguments[0] << " " << arguments[1] << ": " << plain.err);
+    CHECK(plain.status == 1);
+    CHECK(plain.out.empty());
+    for (const std::string& name : refusal.names) CHECK_THAT(plain.err, Contains(name));
+    arguments.insert(arguments.begin(), "--json");
+    const CliResult program = d.domain.cli(arguments);
+    CHECK(program.status == 1);
+    CHECK(json::parse(program.out).at("error").at("code") == refusal.code);
+  }
+  CHECK(snapshot(client) == before);
+}
+
+TEST_CASE("cli: wrong usage is 2") {
+  const ThesisDaemons d;
+  const TemporaryDirectory directory;
+  const std::vector<Refusal> wrong = {
+      {{}, "", {"subcommand"}},
+      {{"nonsense"}, "", {"nonsense"}},
+      {{"lookup"}, "", {"A"}},
+      {{"lookup", "world"}, "", {"B"}},
+      {{"lookup", "world", "camera", "arm_1"}, "", {"arm_1"}},
+      {{"add", "tool"}, "", {"--parent"}},
+      {{"add", "tool", "--parent", "camera", "--xyz", "1", "two", "3"}, "", {"--xyz", "two"}},
+      {{"add", "tool", "--parent", "camera", "--xyz", "1", "2"}, "", {"--xyz"}},
+      {{"update", "camera", "--quat", "0", "0", "0", "1", "--rpy", "0", "0", "0"}, "", {"--quat"}},
+      {{"watch", "world", "camera", "--rate", "0"}, "", {"--rate"}},
+      {{"tree", "--timeout", "soon"}, "", {"--timeout", "soon"}},
+      {{"tree", "--profile", "/nowhere/profile.xml"}, "", {"/nowhere/profile.xml"}},
+      {{"tree", "--profile", directory.write("broken.xml", "<profiles><")}, "", {"broken.xml"}},
+      {{"tree", "--domain", "233"}, "", {"233", "232"}},
+      {{"tree", "--domain", "-1"}, "", {"--domain", "-1"}},
+  };
+  for (const Refusal& usage : wrong) {
+    const CliResult result = d.domain.cli(usage.arguments);
+    INFO(result.err);
+    CHECK(result.status == 2);
+    CHECK(result.out.empty());
+    for (const std::string& name : usage.names) CHECK_THAT(result.err, Contains(name));
+  }
+}
+
+TEST_CASE("cli: no answer is 3") {
+  const TestDomain domain;
+  const std::vector<Arguments> commands = {
+      {"tree"},        {"frames"},           {"partitions"},
+      {"roots"},       {"parent", "a"},      {"children", "a"},
+      {"exists", "a"}, {"lookup", "a", "b"}, {"add", "b", "--parent", "a"},
+      {"update", "a"}, {"remove", "a"},      {"move", "a", "--parent", "b"}};
+  for (const Arguments& command : commands) {
+    const CliResult result = domain.cli(command);
+    INFO(command[0]);
+    CHECK(result.status == 3);
+    CHECK_THAT(result.err, Contains("domain " + std::to_string(domain.number())));
+  }
+  const CliResult program = domain.cli({"--json", "tree"});
+  CHECK(program.status == 3);
+  CHECK(json::parse(program.out).at("error").at("code") == "unreachable");
+}
+
+TEST_CASE("cli: a partition that does not answer is 3 and named") {
+  const TestDomain domain;
+  const MutePartition mute(domain, "mute", "statue");
+  const std::vector<Arguments> commands = {{"update", "statue"},
+                                           {"remove", "statue"},
+                                           {"add", "nose", "--parent", "statue"},
+                                           {"move", "statue", "--parent", ""}};
+  for (Arguments command : commands) {
+    const CliResult result = domain.cli(command);
+    INFO(command[0]);
+    CHECK(result.status == 3);
+    CHECK_THAT(result.err, Contains("'mute'"));
+    command.insert(command.begin(), {"--json", "--timeout", "300"});
+    const CliResult program = domain.cli(command);
+    CHECK(program.status == 3);
+    const json error = json::parse(program.out).at("error");
+    CHECK(error.at("code") == "timeout");
+    CHECK_THAT(error.at("message").get<std::string>(), Contains("'mute'") && Contains("300 ms"));
+  }
+}
+
+}  // namespace tfdude

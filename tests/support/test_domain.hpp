@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/process.hpp"
+
+namespace tfdude::testing {
+
+/// What a run of the command line gave.
+struct CliResult {
+  int status = -1;
+  std::string out;
+  std::string err;
+};
+
+/// A DDS domain that no other test uses now, on this computer only, and the service's programs in it.
+class TestDomain {
+ public:
+  TestDomain();
+  ~TestDomain();
+  TestDomain(const TestDomain&) = delete;
+  TestDomain& operator=(const TestDomain&) = delete;
+
+  [[nodiscard]] std::uint32_t number() const { return number_; }
+
+  /// For clients in the test's process. The time-out is long, so that a busy machine is not an error.
+  [[nodiscard]] Options options(Milliseconds timeout = Milliseconds(20000)) const;
+
+  /// Starts a daemon; await_ready() tells when it serves.
+  [[nodiscard]] Process start_daemon(const std::vector<std::string>& arguments) const;
+  /// Starts a daemon for a configuration, and waits until it serves.
+  [[nodiscard]] Process serve(const std::string& config) const;
+
+  [[nodiscard]] Process start_cli(const std::vector<std::string>& arguments) const;
+  /// @throws std::runtime_error where it does not end.
+  [[nodiscard]] CliResult cli(const std::vector<std::string>& arguments) const;
+
+ private:
+  [[nodiscard]] std::vector<std::string> command(const char* program,
+                                                 const std::vector<std::string>& arguments) const;
+
+  std::uint32_t number_ = 0;
+  int claim_ = -1;
+};
+
+/// @return the line by which a daemon says that it serves
+/// @throws std::runtime_error with what it wrote where it does not come to that.
+std::string await_ready(Process& daemon);
+
+/// Waits for the end of a process. @throws std::runtime_error where it does not end.
+CliResult finish(Process& process);
+
+}  // namespace tfdude::testing
