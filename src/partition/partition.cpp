@@ -118,6 +118,7 @@ Result<void> Partition::move(const std::string& id, const MoveRequest& request) 
   }
   pages_.put(id, request.parent);
   pages_.close_epoch();
+  directory_.moved();
   return {};
 }
 
