@@ -176,7 +176,7 @@ TEST_CASE("an id has at most 255 bytes, its closing zero, and no other") {
   CHECK(move(Cdr().string(std::string(255, 'h'))));
   CHECK_FALSE(move(Cdr().string(std::string(256, 'h'))));
   CHECK_FALSE(move(Cdr().string(std::string("ha\0nd", 5))));
-  CHECK_FALSE(move(Cdr().string("hand", 4)));  // ends without a zero
+  CHECK_FALSE(move(Cdr().ulong(4).octet('h').octet('a').octet('n').octet('d')));  // no zero
   CHECK_FALSE(move(Cdr().string("hand", 0xffffffff)));
   CHECK_FALSE(move(Cdr().string("hand", 0x80000000)));
 }
