@@ -11,7 +11,8 @@ function(tfdude_add_tests target)
     set(ARG_TIMEOUT 60)
   endif()
   add_executable(${target} ${ARG_SOURCES})
-  target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests)
+  # Private headers too: the library hides no symbols.
+  target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests ${CMAKE_SOURCE_DIR}/src)
   target_link_libraries(${target} PRIVATE tfdude Catch2::Catch2WithMain tfdude_options ${ARG_LIBRARIES})
   catch_discover_tests(${target} TEST_PREFIX "${target}: "
     PROPERTIES TIMEOUT ${ARG_TIMEOUT})

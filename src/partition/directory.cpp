@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <unordered_set>
+#include <utility>
 
 namespace tfdude {
 
@@ -25,15 +26,16 @@ Directory::Known& Directory::known(const std::string& partition, Owner& owner) {
 bool Directory::advance(Known& partition, Owner owner, std::uint64_t incarnation) {
   if (incarnation < partition.incarnation) return false;
   if (incarnation > partition.incarnation) {
-    for (const auto& [number, ids] : partition.pages) {
-      for (const std::string& id : ids) unclaim(id, owner);
-    }
+    for (const auto& [id, count] : partition.listed) unclaim(id, owner);
+    partition.listed.clear();
     partition.pages.clear();
     partition.epoch = 0;
     partition.page_count = 0;
     partition.info.frames = 0;
     partition.incarnation = incarnation;
-    // Whoever tells something new of an incarnation lives, even where the presence comes after a page.
+    // Whoever tells something new of an incarnation lives, even where the presence, which is handed
+    // the time, comes after a page.
+    if (!partition.info.reachable) partition.info.since = Time{};
     partition.info.reachable = true;
   }
   return true;
@@ -44,6 +46,7 @@ void Directory::apply(const Presence& presence, Time now) {
   Owner owner = kHeldHere;
   Known& partition = known(presence.partition, owner);
   if (owner == kHeldHere || !advance(partition, owner, presence.incarnation)) return;
+  mend();
   partition.page_count = presence.pages;
   PartitionInfo& info = partition.info;
   info.host = presence.host;
@@ -56,18 +59,36 @@ void Directory::apply(const Page& page) {
   Owner owner = kHeldHere;
   Known& partition = known(page.partition, owner);
   if (owner == kHeldHere || !advance(partition, owner, page.incarnation)) return;
-  std::vector<std::string>& ids = partition.pages[page.number];
   std::unordered_set<std::string_view> stays;
   for (const PageEntry& entry : page.entries) stays.insert(entry.id);
-  for (const std::string& id : ids) {
-    if (stays.count(id) == 0) unclaim(id, owner);
+  for (const PageEntry& entry : std::exchange(partition.pages[page.number], {})) {
+    leave_page(partition, owner, entry.id, stays.count(entry.id) != 0);
   }
-  for (const PageEntry& entry : page.entries) claim(entry, owner);
-  partition.info.frames += page.entries.size();
-  partition.info.frames -= ids.size();
-  ids.clear();
-  for (const PageEntry& entry : page.entries) ids.push_back(entry.id);
+  for (const PageEntry& entry : page.entries) {
+    ++partition.listed[entry.id];
+    claim(entry, owner);
+  }
+  partition.pages[page.number] = page.entries;
+  partition.info.frames = partition.listed.size();
   partition.epoch = std::max(partition.epoch, page.epoch);
+  mend();
+}
+
+// An id is no longer where it was; unless the same page lists it again, another page or nobody has it.
+void Directory::leave_page(Known& partition, Owner owner, const std::string& id, bool stays) {
+  const auto listed = partition.listed.find(id);
+  const bool elsewhere = --listed->second > 0;
+  if (!elsewhere) partition.listed.erase(listed);
+  if (stays) return;
+  if (!elsewhere) {
+    unclaim(id, owner);
+    return;
+  }
+  for (const auto& [number, entries] : partition.pages) {
+    for (const PageEntry& entry : entries) {
+      if (entry.id == id) claim(entry, owner);
+    }
+  }
 }
 
 bool Directory::lost(std::string_view partition, std::uint64_t incarnation, Time now) {
@@ -88,10 +109,10 @@ void Directory::claim(const PageEntry& entry, Owner owner) {
       shadow(entry.id, {owner, entry.parent});
       return;
     }
-    shadow(entry.id, {there->owner, there->parent});
+    const auto cut = cut_.find(entry.id);
+    shadow(entry.id, cut != cut_.end() ? cut->second : Claim{there->owner, there->parent});
   }
-  // A parent below its own child is a conflict of two owners: the frame is then kept as a root.
-  (void)forest_.put_remote(entry.id, entry.parent, owner);
+  put(entry.id, {owner, entry.parent});
 }
 
 void Directory::unclaim(const std::string& id, Owner owner) {
@@ -106,10 +127,14 @@ void Directory::unclaim(const std::string& id, Owner owner) {
     }
   }
   forest_.drop_remote(id, owner);
+  cut_.erase(id);
   promote(id);
 }
 
-void Directory::released(const std::string& id) { promote(id); }
+void Directory::released(const std::string& id) {
+  promote(id);
+  mend();
+}
 
 void Directory::promote(const std::string& id) {
   const auto claims = shadowed_.find(id);
@@ -118,7 +143,7 @@ void Directory::promote(const std::string& id) {
   const auto least = std::min_element(
       others.begin(), others.end(),
       [this](const Claim& a, const Claim& b) { return name(a.owner) < name(b.owner); });
-  (void)forest_.put_remote(id, least->parent, least->owner);
+  put(id, *least);
   others.erase(least);
   if (others.empty()) shadowed_.erase(claims);
 }
@@ -132,6 +157,20 @@ void Directory::shadow(const std::string& id, Claim claim) {
   } else {
     claims.push_back(std::move(claim));
   }
+}
+
+void Directory::put(const std::string& id, const Claim& claim) {
+  const auto done = forest_.put_remote(id, claim.parent, claim.owner);
+  if (!done && done.error().code == Errc::kCycle) {
+    cut_[id] = claim;
+  } else {
+    cut_.erase(id);
+  }
+}
+
+// Hangs frames where they belong that could not hang there before. None, but for conflicts.
+void Directory::mend() {
+  for (const auto& [id, claim] : std::exchange(cut_, {})) put(id, claim);
 }
 
 std::optional<Owner> Directory::owner(std::string_view partition) const {

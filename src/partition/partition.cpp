@@ -118,13 +118,18 @@ Result<void> Partition::move(const std::string& id, const MoveRequest& request) 
   }
   pages_.put(id, request.parent);
   pages_.close_epoch();
+  directory_.moved();
   return {};
 }
 
 Result<void> Partition::update(const std::vector<EdgeUpdate>& edges) {
   auto updated = forest_.update(edges);
-  if (!updated) return tl::unexpected(at_home(std::move(updated.error()), edges.front().id));
-  return {};
+  if (updated) return {};
+  // It fails for nothing but a frame that is not held.
+  const auto foreign = std::find_if(edges.begin(), edges.end(), [this](const EdgeUpdate& edge) {
+    return !forest_.holds(edge.id);
+  });
+  return tl::unexpected(at_home(std::move(updated.error()), foreign->id));
 }
 
 std::size_t Partition::apply(const Update& update) {

@@ -145,18 +145,24 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
 
 Result<Transform> assemble(const LookupPlan& plan,
                            const std::vector<std::vector<Transform>>& answers) {
+  if (answers.size() != plan.parts.size()) {
+    return fail(Errc::kNotOwner, std::to_string(answers.size()) + " partitions of " +
+                                     std::to_string(plan.parts.size()) + " answered");
+  }
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    const auto& asked = std::get<LookupRequest>(plan.parts[i].request.body).segments;
+    if (answers[i].size() == asked.size()) continue;
+    return fail(Errc::kNotOwner, "partition " + quote(plan.parts[i].partition) + " gave " +
+                                     std::to_string(answers[i].size()) + " transforms for " +
+                                     std::to_string(asked.size()) + " segments");
+  }
   std::vector<std::size_t> taken(answers.size(), 0);
   Transform X_AB;
   for (const Segment& segment : plan.segments) {
-    for (std::size_t i = 0; i < plan.parts.size(); ++i) {
-      if (plan.parts[i].owner != segment.owner) continue;
-      if (i >= answers.size() || taken[i] >= answers[i].size()) {
-        return fail(Errc::kNotOwner, "the path from " + quote(segment.from) + " to " +
-                                         quote(segment.to) + " was not answered");
-      }
-      X_AB = compose(X_AB, answers[i][taken[i]++]);
-      break;
-    }
+    const auto part = std::find_if(plan.parts.begin(), plan.parts.end(),
+                                   [&](const Part& asked) { return asked.owner == segment.owner; });
+    const auto i = static_cast<std::size_t>(part - plan.parts.begin());
+    X_AB = compose(X_AB, answers[i][taken[i]++]);
   }
   return X_AB;
 }

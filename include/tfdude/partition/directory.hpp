@@ -45,6 +45,9 @@ class Directory {
   /// This process released a frame that it held: another's claim to it may show now.
   void released(const std::string& id);
 
+  /// This process moved a frame that it holds: another's frame may hang below it now.
+  void moved() { mend(); }
+
   /// The number under which the forest knows a partition; kHeldHere for the own one.
   [[nodiscard]] std::optional<Owner> owner(std::string_view partition) const;
   [[nodiscard]] const std::string& name(Owner owner) const { return partitions_[owner].info.name; }
@@ -69,7 +72,9 @@ class Directory {
     std::uint64_t incarnation = 0;
     std::uint64_t epoch = 0;
     std::uint32_t page_count = 0;
-    std::map<std::uint32_t, std::vector<std::string>> pages;  // the ids on each
+    std::map<std::uint32_t, std::vector<PageEntry>> pages;
+    // How many pages list an id: a frame that changes its page may come before it goes.
+    std::unordered_map<std::string, std::size_t> listed;
   };
   struct Claim {
     Owner owner;
@@ -78,16 +83,22 @@ class Directory {
 
   Known& known(const std::string& partition, Owner& owner);
   bool advance(Known& partition, Owner owner, std::uint64_t incarnation);
+  void leave_page(Known& partition, Owner owner, const std::string& id, bool stays);
   void claim(const PageEntry& entry, Owner owner);
   void unclaim(const std::string& id, Owner owner);
   void promote(const std::string& id);
   void shadow(const std::string& id, Claim claim);
+  void put(const std::string& id, const Claim& claim);
+  void mend();
 
   Forest& forest_;
   std::vector<Known> partitions_;  // by Owner; the first is the own
   std::unordered_map<std::string, Owner> owners_;
   // Frames that several partitions claim: all claims but the one in force, that of the least name.
   std::unordered_map<std::string, std::vector<Claim>> shadowed_;
+  // Claims in force whose parent lies below the frame, which is kept as a root: a conflict of two owners,
+  // as a rule only until another page comes.
+  std::map<std::string, Claim> cut_;
 };
 
 }  // namespace tfdude

@@ -26,6 +26,11 @@ std::uint8_t CdrWalk::octet() {
   return good_ ? data_[at_ - 1] : 0;
 }
 
+// The generated code throws at any other value.
+void CdrWalk::boolean() {
+  if (octet() > 1) good_ = false;
+}
+
 std::uint32_t CdrWalk::ulong() {
   skip(4, 4);
   if (!good_) return 0;
@@ -154,7 +159,7 @@ bool well_formed_presence(const std::uint8_t* data, std::size_t size) {
   walk.string(255);
   walk.ulong();
   walk.ulong();
-  walk.octet();
+  walk.boolean();
   return walk.good();
 }
 

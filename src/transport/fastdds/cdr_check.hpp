@@ -47,6 +47,7 @@ class CdrWalk {
 
   [[nodiscard]] bool good() const { return good_; }
   std::uint8_t octet();
+  void boolean();
   std::uint32_t ulong();
   void skip(std::size_t bytes, std::size_t alignment);
   std::string_view string(std::size_t max_bytes);

@@ -10,8 +10,8 @@
 
 #include "support/allocation_guard.hpp"
 #include "support/catch.hpp"
+#include "support/forest_support.hpp"
 #include "support/random.hpp"
-#include "unit/tree/forest_support.hpp"
 
 namespace tfdude {
 namespace {

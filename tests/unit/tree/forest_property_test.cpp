@@ -10,8 +10,8 @@
 #include "tfdude/tree/forest.hpp"
 
 #include "support/catch.hpp"
+#include "support/forest_support.hpp"
 #include "support/random.hpp"
-#include "unit/tree/forest_support.hpp"
 #include "unit/tree/naive_forest.hpp"
 
 namespace tfdude {

@@ -4,7 +4,7 @@
 #include <type_traits>
 
 #include "support/catch.hpp"
-#include "unit/tree/forest_support.hpp"
+#include "support/forest_support.hpp"
 
 namespace tfdude {
 namespace {

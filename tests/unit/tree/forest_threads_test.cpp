@@ -12,8 +12,8 @@
 #include "tfdude/tree/forest.hpp"
 
 #include "support/catch.hpp"
+#include "support/forest_support.hpp"
 #include "support/random.hpp"
-#include "unit/tree/forest_support.hpp"
 
 namespace tfdude {
 namespace {

@@ -1,0 +1,139 @@
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "support/random.hpp"
+#include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/topics.hpp"
+
+// Samples as bytes: what DDS would carry.
+namespace tfdude::testing {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// What a writer of this type would send.
+template <class Type, class Sample>
+[[nodiscard]] Bytes serialized(Sample sample) {
+  Type type;
+#if TFDUDE_FASTDDS_MAJOR == 2
+  fastdds::ertps::SerializedPayload_t payload(type.getSerializedSizeProvider(&sample)());
+  if (!type.serialize(&sample, &payload)) return {};
+#else
+  constexpr auto kFormat = fastdds::edds::DataRepresentationId::XCDR_DATA_REPRESENTATION;
+  fastdds::ertps::SerializedPayload_t payload(type.calculate_serialized_size(&sample, kFormat));
+  if (!type.serialize(&sample, payload, kFormat)) return {};
+#endif
+  return {payload.data, payload.data + payload.length};
+}
+
+/// What a reader of this type would make of the bytes; false where it refuses them. They are copied to a
+/// place of exactly their size, so that AddressSanitizer sees every step beyond.
+template <class Type, class Sample>
+[[nodiscard]] bool deserialized(const Bytes& bytes, Sample& sample) {
+  const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());
+  std::copy(bytes.begin(), bytes.end(), exact.get());
+  struct Borrowed : fastdds::ertps::SerializedPayload_t {
+    ~Borrowed() { data = nullptr; }  // not the payload's to free
+  } payload;
+  payload.data = exact.get();
+  payload.length = static_cast<std::uint32_t>(bytes.size());
+  payload.max_size = payload.length;
+  Type type;
+#if TFDUDE_FASTDDS_MAJOR == 2
+  return type.deserialize(&payload, &sample);
+#else
+  return type.deserialize(payload, &sample);
+#endif
+}
+
+/// One message of each kind, and what its topic does with bytes.
+struct WireKind {
+  std::string name;
+  Bytes valid;
+  bool (*well_formed)(const std::uint8_t* data, std::size_t size);
+  bool (*take)(
+      const Bytes& bytes);  ///< reads as a participant does, up to the message; false: refused
+};
+
+template <class Type, class Sample>
+bool take(const Bytes& bytes) {
+  Sample sample;
+  if (!deserialized<Type>(bytes, sample)) return false;
+  if constexpr (std::is_same_v<Sample, wire::Update>) {
+    (void)fastdds::from_wire(sample, [](std::string_view) { return true; });
+  } else {
+    (void)fastdds::from_wire(sample);
+  }
+  return true;
+}
+
+[[nodiscard]] inline std::vector<Request> requests(Random& random) {
+  const auto edge = [&](const std::string& id) { return EdgeUpdate{id, random.transform()}; };
+  return {{1, "hand", AddRequest{"arm", random.transform()}},
+          {2, "hand", AddRequest{"", random.transform()}},
+          {3, "hand", RemoveRequest{{"hand", "arm_1", "\xc3\xa4rmel"}}},
+          {4, "hand", UpdateRequest{{edge("hand")}}},
+          {5, "hand", UpdateRequest{{edge("hand"), edge("arm"), edge("x")}}},
+          {6, "hand", MoveRequest{"arm", std::nullopt}},
+          {7, "hand", MoveRequest{"", random.transform()}},
+          {8, "hand", LookupRequest{{{"hand", "arm"}, {"camera", "world"}}}},
+          {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), std::nullopt}}};
+}
+
+[[nodiscard]] inline std::vector<Reply> replies(Random& random) {
+  return {{1, 10, Done{}},
+          {2, 18446744073709551615ULL, Error{Errc::kCycle, "no, \xc3\xa4 \x07 \xff"}},
+          {3, 0, Error{Errc::kTransport, ""}},
+          {4, 30, std::vector<Transform>{}},
+          {5, 40, std::vector<Transform>{random.transform(), Transform(), random.transform()}}};
+}
+
+[[nodiscard]] inline std::vector<Update> updates(Random& random) {
+  return {{},
+          {{{"hand", random.transform()}}},
+          {{{"a", random.transform()}, {"ab", Transform()}, {"abc", random.transform()}}}};
+}
+
+[[nodiscard]] inline std::vector<Page> pages() {
+  return {{"robot", 0, 1, 2, {}},
+          {"robot", 7, 18446744073709551615ULL, 3, {{"world", ""}, {"base", "world"}}},
+          {std::string(255, 'r'), 4294967295U, 0, 0, {{std::string(255, 'i'), "p"}}}};
+}
+
+[[nodiscard]] inline std::vector<Presence> presences() {
+  return {{"robot", 1, "tower", 4711, 3, true},
+          {"r", 18446744073709551615ULL, std::string(255, 'h'), 4294967295U, 4294967295U, false}};
+}
+
+[[nodiscard]] inline std::vector<WireKind> wire_kinds(Random& random) {
+  using namespace fastdds;  // NOLINT(google-build-using-namespace): all of it is used, here only
+  std::vector<WireKind> kinds;
+  for (const Request& one : requests(random)) {
+    kinds.push_back({"request " + std::to_string(one.sequence),
+                     serialized<RequestType>(to_wire(one, "robot")), well_formed_request,
+                     take<RequestType, wire::Request>});
+  }
+  for (const Reply& one : replies(random)) {
+    kinds.push_back({"reply " + std::to_string(one.sequence), serialized<ReplyType>(to_wire(one)),
+                     well_formed_reply, take<ReplyType, wire::Reply>});
+  }
+  for (const Update& one : updates(random)) {
+    kinds.push_back({"update of " + std::to_string(one.edges.size()),
+                     serialized<UpdateType>(to_wire(one)), well_formed_update,
+                     take<UpdateType, wire::Update>});
+  }
+  for (const Page& one : pages()) {
+    kinds.push_back({"page " + std::to_string(one.number), serialized<PageType>(to_wire(one)),
+                     well_formed_page, take<PageType, wire::Page>});
+  }
+  for (const Presence& one : presences()) {
+    kinds.push_back({"presence " + std::to_string(one.pid), serialized<PresenceType>(to_wire(one)),
+                     well_formed_presence, take<PresenceType, wire::Presence>});
+  }
+  return kinds;
+}
+
+}  // namespace tfdude::testing

@@ -1,0 +1,141 @@
+#include "tfdude/render.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+
+namespace tfdude::cli {
+namespace {
+
+using nlohmann::json;
+
+// Turned by (10, -20, 90) degrees, at (1, -2, 3); standard deviations of 1 to 3 cm and 1 to 3 degrees.
+Transform example() {
+  constexpr double kDegree = 0.017453292519943295;
+  return {*Pose::create(from_rpy(10 * kDegree, -20 * kDegree, 90 * kDegree), {1, -2, 3}),
+          *Covariance::from_stddev({0.01, 0.02, 0.03, kDegree, 2 * kDegree, 3 * kDegree})};
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::istringstream in(text);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
+// ---- draw_tree
+
+TEST_CASE("nothing draws as nothing") { CHECK(draw_tree({}, {}).empty()); }
+
+TEST_CASE("a tree is drawn with its branches and owners") {
+  const std::vector<Frame> frames{{"arm", "base", "arms", true},   {"base", "world", "robot", true},
+                                  {"hand", "arm", "arms", true},   {"lamp", "world", "robot", true},
+                                  {"mast", "base", "robot", true}, {"top", "mast", "robot", true},
+                                  {"world", "", "robot", false}};
+  CHECK(draw_tree(frames, {}) ==
+        "world  [robot]\n"
+        "├─ base  [robot]\n"
+        "│  ├─ arm  [arms]\n"
+        "│  │  └─ hand  [arms]\n"
+        "│  └─ mast  [robot]\n"
+        "│     └─ top  [robot]\n"
+        "└─ lamp  [robot]\n");
+}
+
+TEST_CASE("who does not answer and what waits for its parent is marked") {
+  const std::vector<Frame> frames{{"hand", "arm", "arms", false},
+                                  {"ring", "hand", "legs", true},
+                                  {"world", "", "robot", false}};
+  CHECK(draw_tree(frames, {"legs", "wings"}) ==
+        "hand  [arms]  (waits for 'arm')\n"
+        "└─ ring  [legs, unreachable]\n"
+        "world  [robot]\n");
+}
+
+// ---- describe
+
+TEST_CASE("a transform is described in metres and degrees") {
+  CHECK(lines_of(describe(example(), false)) ==
+        std::vector<std::string>{
+            "translation  1.000000  -2.000000  3.000000  m",
+            "quaternion   0.183013  -0.061628  0.704416  0.683013  (x y z w)",
+            "rpy          10.0000  -20.0000  90.0000  deg",
+            "std dev      0.010000  0.020000  0.030000  m   1.0000  2.0000  3.0000  deg"});
+}
+
+TEST_CASE("a covariance follows as a matrix where it is asked for") {
+  Transform X = example();
+  Covariance::Upper upper = X.covariance.upper();
+  upper[upper_index(0, 1)] = -1e-5;
+  X.covariance = *Covariance::from_upper(upper);
+  const auto lines = lines_of(describe(X, true));
+  REQUIRE(lines.size() == 11);
+  CHECK(lines[4].find("translation first") != std::string::npos);
+  for (std::size_t row = 0; row < 6; ++row) {
+    std::istringstream in(lines[5 + row]);
+    for (int column = 0; column < 6; ++column) {
+      double value = -1;
+      REQUIRE(in >> value);
+      const double expected = X.covariance.matrix()(static_cast<int>(row), column);
+      CHECK(std::abs(value - expected) <= 1e-6 * std::abs(expected));
+    }
+  }
+  CHECK(lines[5].find("-1.000000e-05") != std::string::npos);
+}
+
+TEST_CASE("extreme values are written out in full") {
+  const Transform X{*Pose::create(Eigen::Quaterniond::Identity(), {-1e9, 1e9, 1e-9}),
+                    *Covariance::from_stddev({1e9, 0, 0, 1e9, 0, 0})};
+  const std::string text = describe(X, true);
+  CHECK(text.find("translation  -1000000000.000000  1000000000.000000  0.000000  m\n") == 0);
+  CHECK(text.find("1.000000e+18") != std::string::npos);
+  CHECK(lines_of(text).size() == 11);
+}
+
+// ---- JSON
+
+TEST_CASE("a lookup as JSON has all digits") {
+  const Transform X = example();
+  const json answer = json::parse(dump(lookup_json("world", "hand", X, {"robot", "arms"})));
+  CHECK(answer["from"] == "world");
+  CHECK(answer["to"] == "hand");
+  CHECK(answer["partitions"] == json({"robot", "arms"}));
+  CHECK(answer["translation"] == json({1.0, -2.0, 3.0}));
+  const Eigen::Quaterniond q = X.pose.rotation();
+  CHECK(answer["rotation"] == json({q.x(), q.y(), q.z(), q.w()}));
+  REQUIRE(answer["covariance"].size() == 6);
+  for (std::size_t i = 0; i < 36; ++i) {
+    CHECK(answer["covariance"][i / 6][i % 6] ==
+          X.covariance.upper()[upper_index(std::min(i / 6, i % 6), std::max(i / 6, i % 6))]);
+  }
+  CHECK(lookup_json("a", "a", Transform(), {})["partitions"] == json::array());
+}
+
+TEST_CASE("a frame as JSON has null for no parent") {
+  CHECK(frame_json({"world", "", "robot", false}) ==
+        json({{"id", "world"}, {"parent", nullptr}, {"partition", "robot"}, {"attached", false}}));
+  CHECK(frame_json({"hand", "arm", "arms", true})["parent"] == "arm");
+}
+
+TEST_CASE("a partition as JSON says who and where") {
+  PartitionInfo info;
+  info.name = "arms";
+  info.host = "tower";
+  info.pid = 7;
+  info.frames = 3;
+  CHECK(
+      partition_json(info) ==
+      json({{"name", "arms"}, {"host", "tower"}, {"pid", 7}, {"frames", 3}, {"reachable", false}}));
+}
+
+TEST_CASE("JSON is one line, whatever the texts hold") {
+  const std::string text = dump({{"message", "a\nb \xff \"c\" \xc3\xa4"}});
+  CHECK(text == "{\"message\":\"a\\nb \xef\xbf\xbd \\\"c\\\" \xc3\xa4\"}");
+}
+
+}  // namespace
+}  // namespace tfdude::cli

@@ -1,0 +1,270 @@
+#include "tfdude/partition/directory.hpp"
+
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/replica.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::presence_of;
+using testing::Replica;
+using Lines = std::vector<std::string>;
+
+constexpr Time kNow{std::chrono::seconds(100)};
+constexpr Time kLater{std::chrono::seconds(200)};
+
+// Page 0 of a partition with one page an epoch; the incarnation is 1.
+Page page_of(const std::string& partition, std::vector<PageEntry> entries,
+             std::uint64_t incarnation = 1) {
+  return {partition, 0, incarnation, 1, std::move(entries)};
+}
+
+TEST_CASE("a directory knows its own partition, and nobody else at first") {
+  const Replica robot("robot");
+  CHECK(robot.directory.owner("robot") == kHeldHere);
+  CHECK(robot.directory.name(kHeldHere) == "robot");
+  CHECK(robot.directory.reachable(kHeldHere));
+  CHECK_FALSE(robot.directory.owner("arms"));
+  CHECK(robot.directory.partitions().size() == 1);
+  CHECK(robot.directory.complete());
+
+  const Replica client;
+  CHECK_FALSE(client.directory.owner(""));
+  CHECK(client.directory.partitions().empty());
+}
+
+TEST_CASE("a presence tells who serves a partition, from where and since when") {
+  Replica replica;
+  replica.directory.apply(presence_of("arms", 7, 2), kNow);
+  replica.directory.apply(presence_of("arms", 7, 2), kLater);
+  const auto arms = replica.directory.owner("arms");
+  REQUIRE(arms);
+  CHECK(replica.directory.name(*arms) == "arms");
+  CHECK(replica.directory.reachable(*arms));
+  const PartitionInfo& info = replica.directory.info(*arms);
+  CHECK(info.host == "host-of-arms");
+  CHECK(info.pid == 4711);
+  CHECK(info.since == kNow);
+  const auto serving = replica.directory.serving("arms");
+  REQUIRE(serving);
+  CHECK(serving->incarnation == 7);
+  CHECK(serving->pages == 2);
+  CHECK(serving->serving);
+}
+
+TEST_CASE("who only claims a name yet serves nothing") {
+  Replica replica;
+  Presence claim = presence_of("arms", 7, 0);
+  claim.serving = false;
+  replica.directory.apply(claim, kNow);
+  CHECK_FALSE(replica.directory.owner("arms"));
+  CHECK(replica.directory.partitions().empty());
+}
+
+TEST_CASE("what others say of the own partition changes nothing") {
+  Replica robot("robot");
+  robot.directory.apply(presence_of("robot", 99, 1), kNow);
+  robot.directory.apply(page_of("robot", {{"world", ""}}, 99));
+  CHECK_FALSE(robot.directory.lost("robot", 99, kNow));
+  CHECK(robot.structure().empty());
+  CHECK(robot.directory.reachable(kHeldHere));
+  CHECK_FALSE(robot.directory.serving("robot"));
+}
+
+TEST_CASE("a page replaces what it listed before") {
+  Replica replica;
+  replica.directory.apply(page_of("arms", {{"arm", "world"}, {"hand", "arm"}, {"tool", "hand"}}));
+  CHECK(replica.structure() ==
+        Lines{"arm < world @ arms", "hand < arm @ arms, attached", "tool < hand @ arms, attached"});
+  CHECK(replica.directory.info(*replica.directory.owner("arms")).frames == 3);
+  replica.directory.apply(page_of("arms", {{"arm", "base"}, {"tool", "arm"}}));
+  CHECK(replica.structure() == Lines{"arm < base @ arms", "tool < arm @ arms, attached"});
+  CHECK(replica.directory.info(*replica.directory.owner("arms")).frames == 2);
+}
+
+TEST_CASE("a frame that changes its page stays, whichever page comes first") {
+  const Page old_page{"arms", 1, 1, 1, {{"hand", "arm"}}};
+  const Page new_page{"arms", 0, 1, 1, {{"hand", "wrist"}}};
+  const Page emptied{"arms", 1, 1, 2, {}};
+  const Lines moved{"hand < wrist @ arms"};
+  Replica replica;
+  SECTION("the new page first") {
+    replica.apply({old_page, new_page, emptied});
+    CHECK(replica.structure() == moved);
+  }
+  SECTION("the old page first") {
+    replica.apply({old_page, emptied, new_page});
+    CHECK(replica.structure() == moved);
+  }
+  SECTION("the old page's last state is late") {
+    replica.apply({new_page, old_page, emptied});
+    CHECK(replica.structure() == moved);
+  }
+  CHECK(replica.directory.info(*replica.directory.owner("arms")).frames == 1);
+}
+
+TEST_CASE("an epoch is known once its last page has come, and never goes back") {
+  Replica replica;
+  replica.directory.apply(Page{"arms", 0, 1, 4, {}});
+  const Owner arms = *replica.directory.owner("arms");
+  CHECK(replica.directory.epoch(arms) == 4);
+  replica.directory.apply(Page{"arms", 1, 1, 3, {}});
+  CHECK(replica.directory.epoch(arms) == 4);
+  replica.directory.apply(Page{"arms", 0, 2, 1, {}});
+  CHECK(replica.directory.epoch(arms) == 1);
+}
+
+TEST_CASE("a partition that went away keeps its structure and is marked") {
+  Replica replica;
+  replica.directory.apply(presence_of("arms", 1, 1), kNow);
+  replica.directory.apply(page_of("arms", {{"hand", ""}}));
+  CHECK(replica.directory.lost("arms", 1, kLater));
+  const Owner arms = *replica.directory.owner("arms");
+  CHECK(replica.structure() == Lines{"hand <  @ arms"});
+  CHECK_FALSE(replica.directory.reachable(arms));
+  CHECK(replica.directory.info(arms).since == kLater);
+  CHECK_FALSE(replica.directory.serving("arms"));
+  CHECK(replica.directory.complete());
+  SECTION("once is enough") { CHECK_FALSE(replica.directory.lost("arms", 1, kLater)); }
+  SECTION("it may come back as it was") {
+    replica.directory.apply(presence_of("arms", 1, 1), kLater + std::chrono::seconds(1));
+    CHECK(replica.directory.reachable(arms));
+    CHECK(replica.directory.info(arms).since == kLater + std::chrono::seconds(1));
+  }
+}
+
+TEST_CASE("the loss of somebody unknown, or of an earlier life, is no news") {
+  Replica replica;
+  CHECK_FALSE(replica.directory.lost("arms", 1, kNow));
+  replica.directory.apply(presence_of("arms", 2, 0), kNow);
+  CHECK_FALSE(replica.directory.lost("arms", 1, kNow));
+  CHECK(replica.directory.reachable(*replica.directory.owner("arms")));
+}
+
+TEST_CASE("a new incarnation replaces the old one, whose late pages change nothing") {
+  Replica replica;
+  replica.directory.apply(presence_of("arms", 1, 1), kNow);
+  replica.directory.apply(page_of("arms", {{"hand", ""}, {"tool", "hand"}}));
+  replica.directory.lost("arms", 1, kNow);
+  const Owner arms = *replica.directory.owner("arms");
+  SECTION("the presence first") { replica.directory.apply(presence_of("arms", 2, 1), kLater); }
+  SECTION("a page first") {
+    replica.directory.apply(page_of("arms", {}, 2));
+    CHECK(replica.directory.reachable(arms));
+    replica.directory.apply(presence_of("arms", 2, 1), kLater);
+  }
+  CHECK(replica.structure().empty());
+  CHECK(replica.directory.reachable(arms));
+  CHECK(replica.directory.info(arms).since == kLater);
+  CHECK(replica.directory.info(arms).frames == 0);
+  replica.directory.apply(page_of("arms", {{"ghost", ""}}, 1));
+  replica.directory.apply(presence_of("arms", 1, 9), kLater);
+  CHECK(replica.structure().empty());
+  CHECK(replica.directory.serving("arms")->incarnation == 2);
+  replica.directory.apply(page_of("arms", {{"fist", ""}}, 2));
+  CHECK(replica.structure() == Lines{"fist <  @ arms"});
+}
+
+TEST_CASE("a directory is complete when all pages of all reachable partitions have come") {
+  Replica replica;
+  replica.directory.apply(presence_of("arms", 1, 2), kNow);
+  CHECK_FALSE(replica.directory.complete());
+  replica.directory.apply(Page{"arms", 1, 1, 1, {}});
+  replica.directory.apply(Page{"arms", 1, 1, 2, {}});
+  CHECK_FALSE(replica.directory.complete());
+  replica.directory.apply(Page{"arms", 0, 1, 2, {}});
+  CHECK(replica.directory.complete());
+  replica.directory.apply(presence_of("legs", 1, 1), kNow);
+  CHECK_FALSE(replica.directory.complete());
+  replica.directory.lost("legs", 1, kNow);
+  CHECK(replica.directory.complete());
+}
+
+TEST_CASE("of two claims to a frame the lesser name has it, the other gets it when that goes") {
+  const Page of_arms = page_of("arms", {{"hand", "arm"}});
+  const Page of_legs = page_of("legs", {{"hand", "foot"}});
+  const Page of_wings = page_of("wings", {{"hand", "tip"}});
+  Replica replica;
+  if (GENERATE(true, false)) {
+    replica.apply({of_arms, of_wings, of_legs});
+  } else {
+    replica.apply({of_wings, of_legs, of_arms});
+  }
+  CHECK(replica.structure() == Lines{"hand < arm @ arms"});
+  replica.directory.apply(page_of("legs", {{"hand", "knee"}}));
+  CHECK(replica.structure() == Lines{"hand < arm @ arms"});
+  SECTION("the claim in force goes first") {
+    replica.directory.apply(page_of("arms", {}));
+    CHECK(replica.structure() == Lines{"hand < knee @ legs"});
+    replica.directory.apply(page_of("legs", {}));
+    CHECK(replica.structure() == Lines{"hand < tip @ wings"});
+    replica.directory.apply(page_of("wings", {}));
+    CHECK(replica.structure().empty());
+  }
+  SECTION("the shadowed claims go first") {
+    replica.directory.apply(page_of("legs", {}));
+    replica.directory.apply(page_of("wings", {}, 2));
+    CHECK(replica.structure() == Lines{"hand < arm @ arms"});
+    replica.directory.apply(page_of("arms", {}));
+    CHECK(replica.structure().empty());
+  }
+}
+
+TEST_CASE("a frame held here is its holder's until it is released") {
+  Replica robot("robot");
+  REQUIRE(robot.forest.add("hand", "", along_x(1)));
+  robot.directory.apply(page_of("arms", {{"hand", "arm"}}));
+  CHECK(robot.structure() == Lines{"hand <  @ robot"});
+  REQUIRE(robot.forest.remove("hand"));
+  robot.directory.released("hand");
+  CHECK(robot.structure() == Lines{"hand < arm @ arms"});
+}
+
+TEST_CASE("frames that hung below each other meanwhile end up where they belong") {
+  // hand was moved away from below foot, then foot below hand; the second is heard of first.
+  const Page foot_moved = page_of("legs", {{"foot", "hand"}});
+  const Page hand_moved = page_of("arms", {{"hand", ""}});
+  const Lines both{"foot < hand @ legs, attached", "hand <  @ arms"};
+  Replica replica;
+  replica.directory.apply(page_of("legs", {{"foot", ""}}));
+  replica.directory.apply(page_of("arms", {{"hand", "foot"}}));
+  SECTION("of two others") {
+    replica.directory.apply(foot_moved);
+    CHECK(replica.structure() == Lines{"foot <  @ legs", "hand < foot @ arms, attached"});
+    SECTION("by a page") { replica.directory.apply(hand_moved); }
+    SECTION("by a new incarnation") { replica.directory.apply(page_of("arms", {{"hand", ""}}, 2)); }
+    CHECK(replica.structure() == both);
+  }
+  SECTION("while a lesser name claims it") {
+    replica.directory.apply(foot_moved);
+    replica.directory.apply(page_of("chest", {{"foot", "rib"}}));
+    replica.directory.apply(hand_moved);
+    replica.directory.apply(page_of("chest", {}));
+    CHECK(replica.structure() == both);
+  }
+}
+
+TEST_CASE("frames that hung below held ones meanwhile end up where they belong") {
+  Replica arms("arms");
+  arms.directory.apply(page_of("legs", {{"foot", ""}}));
+  REQUIRE(arms.forest.add("hand", "foot", along_x(1)));
+  arms.directory.apply(page_of("legs", {{"foot", "hand"}}));
+  SECTION("by a move") {
+    REQUIRE(arms.forest.move("hand", ""));
+    arms.directory.moved();
+    CHECK(arms.structure() == Lines{"foot < hand @ legs, attached", "hand <  @ arms"});
+  }
+  SECTION("by a removal") {
+    REQUIRE(arms.forest.remove("hand"));
+    arms.directory.released("hand");
+    CHECK(arms.structure() == Lines{"foot < hand @ legs"});
+  }
+}
+
+}  // namespace
+}  // namespace tfdude

@@ -1,0 +1,159 @@
+#include "tfdude/partition/pages.hpp"
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/random.hpp"
+#include "support/replica.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::lines_diff;
+using testing::Random;
+using testing::Replica;
+using Structure = std::map<std::string, std::string>;  // id to parent
+using Numbers = std::vector<std::uint32_t>;
+
+Numbers numbers_of(const std::vector<Page>& pages) {
+  Numbers numbers;
+  for (const Page& page : pages) numbers.push_back(page.number);
+  return numbers;
+}
+
+Structure structure_of(const std::vector<Page>& pages) {
+  Structure structure;
+  for (const Page& page : pages) {
+    for (const PageEntry& entry : page.entries) structure[entry.id] = entry.parent;
+  }
+  return structure;
+}
+
+void put_numbered(Pages& pages, std::size_t first, std::size_t count) {
+  for (std::size_t i = first; i < first + count; ++i) pages.put("f" + std::to_string(i), "");
+}
+
+TEST_CASE("a new structure has no pages and nothing to publish") {
+  Pages pages("robot", 7);
+  CHECK(pages.count() == 0);
+  CHECK(pages.frame_count() == 0);
+  CHECK(pages.epoch() == 0);
+  CHECK(pages.take_changed().empty());
+}
+
+TEST_CASE("a page says whose it is, of which life, and what is on it") {
+  Pages pages("robot", 7);
+  pages.put("world", "");
+  pages.put("base", "world");
+  CHECK(pages.close_epoch() == 1);
+  const auto changed = pages.take_changed();
+  REQUIRE(changed.size() == 1);
+  CHECK(changed[0].partition == "robot");
+  CHECK(changed[0].incarnation == 7);
+  CHECK(changed[0].number == 0);
+  CHECK(changed[0].epoch == 1);
+  CHECK(structure_of(changed) == Structure{{"base", "world"}, {"world", ""}});
+}
+
+TEST_CASE("a page is full at 60 frames, and the next frame opens another") {
+  Pages pages("robot", 1);
+  put_numbered(pages, 0, Pages::kPageSize);
+  CHECK(pages.count() == 1);
+  put_numbered(pages, Pages::kPageSize, 1);
+  CHECK(pages.count() == 2);
+  const auto changed = pages.take_changed();
+  REQUIRE(changed.size() == 2);
+  CHECK(changed[0].entries.size() == 60);
+  CHECK(changed[1].entries.size() == 1);
+}
+
+TEST_CASE("only pages that changed since the last time are published") {
+  Pages pages("robot", 1);
+  put_numbered(pages, 0, 3 * Pages::kPageSize);
+  CHECK(numbers_of(pages.take_changed()) == Numbers{0, 1, 2});
+  CHECK(pages.take_changed().empty());
+  pages.put("f70", "f0");
+  CHECK(numbers_of(pages.take_changed()) == Numbers{1});
+  pages.erase("f0");
+  pages.erase("f179");
+  CHECK(numbers_of(pages.take_changed()) == Numbers{0, 2});
+  pages.erase("nobody");
+  CHECK(pages.take_changed().empty());
+}
+
+TEST_CASE("room on a page is used again, also after the page was empty") {
+  Pages pages("robot", 1);
+  put_numbered(pages, 0, 2 * Pages::kPageSize);
+  for (std::size_t i = 0; i < Pages::kPageSize; ++i) pages.erase("f" + std::to_string(i));
+  CHECK(pages.frame_count() == Pages::kPageSize);
+  const auto emptied = pages.take_changed();
+  CHECK(numbers_of(emptied) == Numbers{0, 1});
+  CHECK(emptied[0].entries.empty());
+  put_numbered(pages, 1000, Pages::kPageSize);
+  CHECK(pages.count() == 2);
+  CHECK(numbers_of(pages.take_changed()) == Numbers{0});
+  pages.put("one more", "");
+  CHECK(pages.count() == 3);
+}
+
+TEST_CASE("only the last page completes the epoch") {
+  Pages pages("robot", 1);
+  put_numbered(pages, 0, 2 * Pages::kPageSize);
+  CHECK(pages.close_epoch() == 1);
+  auto changed = pages.take_changed();
+  REQUIRE(changed.size() == 2);
+  CHECK(changed[0].epoch == 0);
+  CHECK(changed[1].epoch == 1);
+  pages.put("f0", "f1");
+  CHECK(pages.close_epoch() == 2);
+  pages.put("f100", "f1");
+  CHECK(pages.close_epoch() == 3);
+  changed = pages.take_changed();
+  REQUIRE(changed.size() == 2);
+  CHECK(changed[0].epoch == 1);
+  CHECK(changed[1].epoch == 3);
+}
+
+TEST_CASE("a replica fed with the pages in order has the owner's structure") {
+  Random random(0x9a6e5);
+  INFO("seed " << random.seed());
+  Pages pages("robot", 1);
+  Structure owned;
+  Replica replica;
+  constexpr int kSteps = 3000;
+  for (int step = 0; step < kSteps; ++step) {
+    // Several changes at a time, some of the same frame: it may have left one page for another between.
+    std::string id = "f" + std::to_string(random.index(300));
+    for (std::size_t changes = 1 + random.index(3); changes > 0; --changes) {
+      if (random.index(3) > 0) id = "f" + std::to_string(random.index(300));
+      if (random.index(5) < 3) {
+        const std::string parent = "p" + std::to_string(random.index(10));
+        pages.put(id, parent);
+        owned[id] = parent;
+      } else {
+        pages.erase(id);
+        owned.erase(id);
+      }
+      pages.close_epoch();
+    }
+    for (const Page& page : pages.take_changed()) {
+      REQUIRE(page.entries.size() <= Pages::kPageSize);
+      replica.directory.apply(page);
+    }
+    std::vector<std::string> expected;
+    for (const auto& [owned_id, parent] : owned)
+      expected.push_back(owned_id + " < " + parent + " @ robot");
+    INFO("step " << step);
+    REQUIRE(lines_diff(replica.structure(), expected) == "");
+    REQUIRE(pages.frame_count() == owned.size());
+  }
+  const Owner robot = *replica.directory.owner("robot");
+  CHECK(replica.directory.epoch(robot) == pages.epoch());
+  CHECK(replica.directory.info(robot).frames == owned.size());
+  CHECK(pages.count() >= 3);
+}
+
+}  // namespace
+}  // namespace tfdude

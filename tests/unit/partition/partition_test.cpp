@@ -1,0 +1,320 @@
+#include "tfdude/partition/partition.hpp"
+
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/replica.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::outcome;
+using testing::Replica;
+using testing::x_of;
+using Lines = std::vector<std::string>;
+
+// The partition "arms" of a process that also knows world and base of "robot".
+struct Arms : Replica {
+  Arms() : Replica("arms"), partition("arms", 1, forest, directory) {
+    directory.apply(Page{"robot", 0, 1, 1, {{"world", ""}, {"base", "world"}}});
+  }
+
+  // base - arm +- hand - tool
+  //            +- camera
+  void plant() {
+    REQUIRE(partition.load({{"arm", "base", along_x(1)},
+                            {"hand", "arm", along_x(10)},
+                            {"tool", "hand", along_x(100)},
+                            {"camera", "arm", along_x(1000)}}));
+    (void)partition.take_pages();
+  }
+
+  template <class Body>
+  Reply ask(const std::string& id, Body body) {
+    return partition.answer(Request{++sequence, id, std::move(body)});
+  }
+
+  Partition partition;
+  std::uint32_t sequence = 0;
+};
+
+// "ok", or the error's name and message.
+std::string said(const Reply& reply) {
+  const auto* error = std::get_if<Error>(&reply.body);
+  return error == nullptr ? "ok" : std::string(to_string(error->code)) + ": " + error->message;
+}
+
+// ---- load
+
+TEST_CASE("a configuration's frames are taken in any order, with parents of others or of nobody") {
+  Arms arms;
+  REQUIRE(arms.partition.load(
+      {{"tool", "hand", along_x(3)}, {"arm", "base", along_x(1)}, {"hand", "arm", along_x(2)}}));
+  REQUIRE(arms.partition.load({{"lamp", "ceiling", along_x(1)}, {"island", "", along_x(1)}}));
+  CHECK(arms.structure() == Lines{"arm < base @ arms, attached", "base < world @ robot, attached",
+                                  "hand < arm @ arms, attached", "island <  @ arms",
+                                  "lamp < ceiling @ arms", "tool < hand @ arms, attached",
+                                  "world <  @ robot"});
+  CHECK(x_of(arms.forest.lookup("arm", "tool")) == 5);
+  CHECK(arms.partition.frame_count() == 5);
+  CHECK(arms.partition.page_count() == 1);
+}
+
+TEST_CASE("of a configuration with a bad frame nothing is taken, and the frame is named") {
+  struct Bad {
+    std::vector<FrameSpec> frames;
+    std::string error;
+    std::string named;
+  };
+  const std::vector<Bad> all{
+      {{{"a", "", {}}, {"b", "a", {}}, {"a", "", {}}}, "already_exists", "'a'"},
+      {{{"a", "", {}}, {"base", "", {}}}, "already_exists", "'base'"},
+      {{{"a", "", {}}, {"b\n", "a", {}}}, "invalid_input", "id"},
+      {{{"a", "", {}}, {"", "a", {}}}, "invalid_input", "id"},
+      {{{"a", "", {}}, {"b", std::string(256, 'p'), {}}}, "invalid_input", "parent"},
+      {{{"a", "b", {}}, {"b", "a", {}}}, "cycle", "'b'"},
+      {{{"b", "a", {}}, {"a", "a", {}}}, "cycle", "'a'"},
+  };
+  for (const Bad& bad : all) {
+    Arms arms;
+    const Lines before = arms.structure();
+    const auto loaded = arms.partition.load(bad.frames);
+    CHECK(outcome(loaded) == bad.error);
+    CAPTURE(loaded.error().message);
+    CHECK(loaded.error().message.find(bad.named) != std::string::npos);
+    CHECK(arms.structure() == before);
+    CHECK(arms.partition.frame_count() == 0);
+    CHECK(arms.partition.take_pages().empty());
+    // What was taken back can be taken again.
+    CHECK(outcome(arms.partition.load({{"a", "", {}}, {"b", "a", {}}})) == "ok");
+  }
+}
+
+TEST_CASE("what is loaded is published once, as one epoch") {
+  Arms arms;
+  std::vector<FrameSpec> frames;
+  for (int i = 0; i < 100; ++i) frames.push_back({"f" + std::to_string(i), "arm", {}});
+  REQUIRE(arms.partition.load(frames));
+  const auto pages = arms.partition.take_pages();
+  REQUIRE(pages.size() == 2);
+  CHECK(pages[0].epoch == 0);
+  CHECK(pages[1].epoch == 1);
+  CHECK(arms.partition.take_pages().empty());
+  Replica other;
+  other.apply(pages);
+  CHECK(other.forest.frames().size() == 100);
+}
+
+// ---- add
+
+TEST_CASE("a frame is added below an own one, another's one, or as a root") {
+  Arms arms;
+  arms.plant();
+  CHECK(said(arms.ask("finger", AddRequest{"hand", along_x(5)})) == "ok");
+  CHECK(said(arms.ask("rail", AddRequest{"world", along_x(6)})) == "ok");
+  CHECK(said(arms.ask("island", AddRequest{"", along_x(7)})) == "ok");
+  CHECK(x_of(arms.forest.lookup("arm", "finger")) == 15);
+  CHECK(arms.partition.frame_count() == 7);
+}
+
+TEST_CASE("an add is refused with the frame and the reason") {
+  Arms arms;
+  arms.plant();
+  const Lines before = arms.structure();
+  CHECK(said(arms.ask("hand", AddRequest{"arm", {}})) ==
+        "already_exists: frame 'hand' exists already");
+  CHECK(said(arms.ask("base", AddRequest{"arm", {}})) ==
+        "already_exists: frame 'base' exists already");
+  CHECK(said(arms.ask("finger", AddRequest{"fist", {}})) ==
+        "unknown_parent: no frame 'fist' to be the parent of 'finger'");
+  CHECK(said(arms.ask("\x7f", AddRequest{"arm", {}})).rfind("invalid_input: id", 0) == 0);
+  CHECK(said(arms.ask("a", AddRequest{"\n", {}})).rfind("invalid_input: parent", 0) == 0);
+  CHECK(arms.structure() == before);
+  CHECK(arms.partition.take_pages().empty());
+}
+
+// ---- remove
+
+TEST_CASE("frames are removed with all that is owned below them") {
+  Arms arms;
+  arms.plant();
+  CHECK(said(arms.ask("hand", RemoveRequest{{"hand", "camera"}})) == "ok");
+  CHECK(arms.partition.frame_count() == 1);
+  CHECK_FALSE(arms.forest.exists("tool"));
+  const auto pages = arms.partition.take_pages();
+  REQUIRE(pages.size() == 1);
+  REQUIRE(pages[0].entries.size() == 1);
+  CHECK(pages[0].entries[0].id == "arm");
+}
+
+TEST_CASE("of frames to remove those owned here go, and the first that is not is named") {
+  Arms arms;
+  arms.plant();
+  const std::uint64_t epoch = arms.ask("arm", UpdateRequest{{{"arm", {}}}}).epoch;
+  const Reply reply = arms.ask("hand", RemoveRequest{{"base", "hand", "nobody", "camera"}});
+  CHECK(said(reply) == "not_owner: partition 'arms' does not own frame 'base' (any more)");
+  CHECK(reply.epoch == epoch + 1);
+  CHECK(arms.partition.frame_count() == 1);
+  CHECK(arms.forest.exists("base"));
+  const Reply again = arms.ask("nobody", RemoveRequest{{"nobody"}});
+  CHECK(said(again) == "not_owner: partition 'arms' does not own frame 'nobody' (any more)");
+  CHECK(again.epoch == epoch + 1);
+}
+
+TEST_CASE("another's claim to a removed frame shows") {
+  Arms arms;
+  arms.plant();
+  arms.directory.apply(Page{"legs", 0, 1, 1, {{"tool", "foot"}}});
+  CHECK(arms.forest.info("tool")->owner == kHeldHere);
+  CHECK(said(arms.ask("hand", RemoveRequest{{"hand"}})) == "ok");
+  CHECK(arms.directory.name(arms.forest.info("tool")->owner) == "legs");
+  CHECK(arms.forest.info("tool")->parent == "foot");
+}
+
+// ---- move
+
+TEST_CASE("a frame is moved with or without a new value") {
+  Arms arms;
+  arms.plant();
+  CHECK(said(arms.ask("hand", MoveRequest{"camera", {}})) == "ok");
+  CHECK(x_of(arms.forest.lookup("camera", "tool")) == 110);
+  CHECK(said(arms.ask("hand", MoveRequest{"world", along_x(7)})) == "ok");
+  CHECK(x_of(arms.forest.value("hand")) == 7);
+  CHECK(said(arms.ask("hand", MoveRequest{"", {}})) == "ok");
+  CHECK(arms.forest.roots() == Lines{"hand", "world"});
+}
+
+TEST_CASE("a move is refused with the frame and the reason") {
+  Arms arms;
+  arms.plant();
+  const Lines before = arms.structure();
+  const std::string foreign = "not_owner: partition 'arms' does not own frame ";
+  CHECK(said(arms.ask("base", MoveRequest{"", {}})) == foreign + "'base' (any more)");
+  CHECK(said(arms.ask("nobody", MoveRequest{"", {}})) == foreign + "'nobody' (any more)");
+  CHECK(said(arms.ask("hand", MoveRequest{"fist", {}})) ==
+        "unknown_parent: no frame 'fist' to be the parent of 'hand'");
+  CHECK(said(arms.ask("arm", MoveRequest{"tool", {}})) ==
+        "cycle: frame 'arm' cannot hang under 'tool', which lies below it");
+  CHECK(said(arms.ask("arm", MoveRequest{"\n", {}})).rfind("invalid_input: parent", 0) == 0);
+  CHECK(arms.structure() == before);
+  CHECK(arms.partition.take_pages().empty());
+}
+
+// ---- update
+
+TEST_CASE("many edges are updated, or none, and the first frame that is not owned is named") {
+  Arms arms;
+  arms.plant();
+  CHECK(said(arms.ask("arm", UpdateRequest{{{"arm", along_x(2)}, {"hand", along_x(3)}}})) == "ok");
+  CHECK(x_of(arms.forest.value("arm")) == 2);
+  CHECK(x_of(arms.forest.value("hand")) == 3);
+  const std::string foreign = GENERATE(as<std::string>{}, "base", "nobody");
+  CHECK(said(arms.ask("arm", UpdateRequest{{{"arm", {}}, {foreign, {}}, {"hand", {}}}})) ==
+        "not_owner: partition 'arms' does not own frame '" + foreign + "' (any more)");
+  CHECK(x_of(arms.forest.value("arm")) == 2);
+  CHECK(x_of(arms.forest.value("hand")) == 3);
+}
+
+TEST_CASE("of a stream those edges are applied that are owned here") {
+  Arms arms;
+  arms.plant();
+  CHECK(arms.partition.apply(Update{{{"arm", along_x(5)}, {"hand", along_x(6)}}}) == 2);
+  CHECK(arms.partition.apply(
+            Update{{{"base", along_x(9)}, {"arm", along_x(7)}, {"nobody", along_x(9)}}}) == 1);
+  CHECK(x_of(arms.forest.value("arm")) == 7);
+  CHECK(x_of(arms.forest.value("hand")) == 6);
+  CHECK(arms.partition.apply(Update{{{"base", along_x(9)}}}) == 0);
+  CHECK(arms.partition.apply(Update{}) == 0);
+}
+
+// ---- lookup
+
+TEST_CASE("a lookup is answered with a transform a segment") {
+  Arms arms;
+  arms.plant();
+  const Reply reply = arms.ask(
+      "tool",
+      LookupRequest{{{"tool", "arm"}, {"base", "hand"}, {"camera", "tool"}, {"arm", "arm"}}});
+  CHECK(reply.sequence == 1);
+  const auto* transforms = std::get_if<std::vector<Transform>>(&reply.body);
+  REQUIRE(transforms != nullptr);
+  REQUIRE(transforms->size() == 4);
+  CHECK((*transforms)[0].pose.translation().x() == -110);
+  CHECK((*transforms)[1].pose.translation().x() == 11);
+  CHECK((*transforms)[2].pose.translation().x() == -890);
+  CHECK((*transforms)[3].pose.translation().x() == 0);
+}
+
+TEST_CASE("a lookup over an edge that is not owned here is refused, naming the ends") {
+  Arms arms;
+  arms.plant();
+  const std::string start = "not_owner: partition 'arms' does not own the path from ";
+  CHECK(said(arms.ask("hand", LookupRequest{{{"arm", "hand"}, {"world", "hand"}}}))
+            .rfind(start + "'world' to 'hand'", 0) == 0);
+  CHECK(said(arms.ask("hand", LookupRequest{{{"nobody", "hand"}}}))
+            .rfind(start + "'nobody' to 'hand'", 0) == 0);
+  REQUIRE(said(arms.ask("island", AddRequest{"", {}})) == "ok");
+  CHECK(said(arms.ask("hand", LookupRequest{{{"island", "hand"}}}))
+            .rfind(start + "'island' to 'hand'", 0) == 0);
+}
+
+// ---- repetition and epochs
+
+TEST_CASE("a repeated request is answered again but not applied again") {
+  Arms arms;
+  arms.plant();
+  const PeerId peer{1};
+  const Request add{5, "finger", AddRequest{"hand", along_x(1)}};
+  const Reply first = arms.partition.answer(peer, add);
+  CHECK(said(first) == "ok");
+  CHECK(said(arms.ask("hand", RemoveRequest{{"finger"}})) == "ok");
+  const Reply second = arms.partition.answer(peer, add);
+  CHECK(said(second) == "ok");
+  CHECK(second.sequence == 5);
+  CHECK(second.epoch == first.epoch);
+  CHECK_FALSE(arms.forest.exists("finger"));
+  // Of another peer, or by another number, it is another request.
+  CHECK(said(arms.partition.answer(PeerId{2}, add)) == "ok");
+  CHECK(arms.forest.exists("finger"));
+  const Request anew{6, "finger", AddRequest{"hand", along_x(1)}};
+  const std::string refused = "already_exists: frame 'finger' exists already";
+  CHECK(said(arms.partition.answer(peer, anew)) == refused);
+  REQUIRE(said(arms.ask("finger", RemoveRequest{{"finger"}})) == "ok");
+  CHECK(said(arms.partition.answer(peer, anew)) == refused);
+}
+
+TEST_CASE("a repeated lookup is answered with what holds now") {
+  Arms arms;
+  arms.plant();
+  const PeerId peer{1};
+  const Request lookup{9, "hand", LookupRequest{{{"arm", "hand"}}}};
+  const auto x = [&] {
+    const Reply reply = arms.partition.answer(peer, lookup);
+    return std::get<std::vector<Transform>>(reply.body).at(0).pose.translation().x();
+  };
+  CHECK(x() == 10);
+  REQUIRE(said(arms.ask("hand", UpdateRequest{{{"hand", along_x(20)}}})) == "ok");
+  CHECK(x() == 20);
+}
+
+TEST_CASE("the epoch advances with the structure only, and pages carry it") {
+  Arms arms;
+  arms.plant();
+  CHECK(arms.ask("arm", UpdateRequest{{{"arm", {}}}}).epoch == 1);
+  CHECK(arms.ask("arm", LookupRequest{{{"arm", "hand"}}}).epoch == 0);  // reads tell no epoch
+  CHECK(arms.ask("hand", AddRequest{"arm", {}}).epoch == 1);            // refused
+  CHECK(arms.partition.take_pages().empty());
+  CHECK(arms.ask("finger", AddRequest{"hand", {}}).epoch == 2);
+  CHECK(arms.ask("finger", MoveRequest{"arm", {}}).epoch == 3);
+  CHECK(arms.ask("finger", RemoveRequest{{"finger", "camera"}}).epoch == 4);
+  const auto pages = arms.partition.take_pages();
+  REQUIRE(pages.size() == 1);
+  CHECK(pages[0].epoch == 4);
+  CHECK(pages[0].partition == "arms");
+}
+
+}  // namespace
+}  // namespace tfdude

@@ -1,0 +1,328 @@
+#include "transport/fastdds/cdr_check.hpp"
+
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/random.hpp"
+#include "support/samples.hpp"
+
+namespace tfdude::fastdds {
+namespace {
+
+using testing::Bytes;
+using testing::Random;
+using testing::wire_kinds;
+using testing::WireKind;
+
+bool passes(const WireKind& kind, const Bytes& bytes) {
+  const bool well_formed = kind.well_formed(bytes.data(), bytes.size());
+  // The type must say the same, and take without an exception what it accepts.
+  return kind.take(bytes) == well_formed ? well_formed : throw std::logic_error("they differ");
+}
+
+/// Builds plain CDR by hand, valid or not.
+class Cdr {
+ public:
+  explicit Cdr(bool big_endian = false) : big_endian_(big_endian) {
+    bytes_ = {0, static_cast<std::uint8_t>(big_endian ? 0 : 1), 0, 0};
+  }
+
+  Cdr& octet(unsigned value) { return number(value, 1); }
+  Cdr& ulong(std::uint64_t value) { return number(value, 4); }
+  Cdr& ulonglong(std::uint64_t value) { return number(value, 8); }
+  Cdr& string(const std::string& text) { return string(text, text.size() + 1); }
+  Cdr& string(const std::string& text, std::uint64_t length) {
+    ulong(length);
+    bytes_.insert(bytes_.end(), text.begin(), text.end());
+    bytes_.push_back(0);
+    return *this;
+  }
+  Cdr& transform() {
+    for (int i = 0; i < 28; ++i) ulonglong(0);
+    return *this;
+  }
+  Cdr& edge(const std::string& id) { return string(id).transform(); }
+
+  [[nodiscard]] const Bytes& bytes() const { return bytes_; }
+
+ private:
+  Cdr& number(std::uint64_t value, std::size_t size) {
+    while ((bytes_.size() - 4) % size != 0) bytes_.push_back(0);
+    for (std::size_t i = 0; i < size; ++i) {
+      const std::size_t shift = 8 * (big_endian_ ? size - 1 - i : i);
+      bytes_.push_back(static_cast<std::uint8_t>(value >> shift));
+    }
+    return *this;
+  }
+
+  bool big_endian_;
+  Bytes bytes_;
+};
+
+bool request(const Cdr& cdr) { return well_formed_request(cdr.bytes().data(), cdr.bytes().size()); }
+bool reply(const Cdr& cdr) { return well_formed_reply(cdr.bytes().data(), cdr.bytes().size()); }
+bool update(const Cdr& cdr) { return well_formed_update(cdr.bytes().data(), cdr.bytes().size()); }
+bool page(const Cdr& cdr) { return well_formed_page(cdr.bytes().data(), cdr.bytes().size()); }
+bool presence(const Cdr& cdr) {
+  return well_formed_presence(cdr.bytes().data(), cdr.bytes().size());
+}
+
+// ---- samples of all kinds
+
+TEST_CASE("every kind of sample passes") {
+  Random random(0xcd1);
+  INFO("seed " << random.seed());
+  for (const WireKind& kind : wire_kinds(random)) {
+    INFO(kind.name);
+    REQUIRE(kind.valid.size() > 4);
+    CHECK(passes(kind, kind.valid));
+  }
+}
+
+TEST_CASE("every sample that is cut short is refused") {
+  Random random(0xcd2);
+  INFO("seed " << random.seed());
+  for (const WireKind& kind : wire_kinds(random)) {
+    for (std::size_t size = 0; size < kind.valid.size(); ++size) {
+      INFO(kind.name << " cut to " << size << " of " << kind.valid.size());
+      const auto cut = kind.valid.begin() + static_cast<std::ptrdiff_t>(size);
+      REQUIRE_FALSE(passes(kind, Bytes(kind.valid.begin(), cut)));
+    }
+  }
+}
+
+TEST_CASE("of changed samples those that pass can be read") {
+  Random random(0xcd3);
+  INFO("seed " << random.seed());
+  const auto kinds = wire_kinds(random);
+  // Values that mean something as a length, a discriminator or a boolean.
+  const Bytes telling{0, 1, 2, 3, 4, 5, 6, 7, 8, 0x10, 0x7f, 0x80, 0xfe, 0xff};
+  std::size_t passed = 0;
+  std::size_t refused = 0;
+  for (int i = 0; i < 60000; ++i) {
+    const WireKind& kind = kinds[random.index(kinds.size())];
+    Bytes bytes = kind.valid;
+    // Most of a sample is numbers of which all are well formed: rather change its head.
+    const std::size_t reach =
+        random.index(2) == 0 ? bytes.size() : std::min<std::size_t>(bytes.size(), 48);
+    for (std::size_t changes = 1 + random.index(3); changes > 0; --changes) {
+      bytes[random.index(reach)] = random.index(2) == 0
+                                       ? telling[random.index(telling.size())]
+                                       : static_cast<std::uint8_t>(random.index(256));
+    }
+    INFO("change " << i << " of " << kind.name);
+    ++(passes(kind, bytes) ? passed : refused);
+  }
+  CHECK(passed > 1000);
+  CHECK(refused > 1000);
+}
+
+TEST_CASE("random bytes pass at no topic, or can be read") {
+  Random random(0xcd4);
+  INFO("seed " << random.seed());
+  const auto kinds = wire_kinds(random);
+  std::size_t passed = 0;
+  std::size_t refused = 0;
+  for (int i = 0; i < 40000; ++i) {
+    Bytes bytes(random.index(200));
+    for (std::uint8_t& byte : bytes) {
+      byte = static_cast<std::uint8_t>(random.index(random.index(2) == 0 ? 4 : 256));
+    }
+    // With a header that is right, so that there is a body to look at.
+    if (bytes.size() >= 2 && random.index(8) > 0) bytes[0] = 0;
+    if (bytes.size() >= 2 && random.index(8) > 0) bytes[1] = static_cast<std::uint8_t>(i % 2);
+    const WireKind& kind = kinds[random.index(kinds.size())];
+    INFO("try " << i << " as " << kind.name);
+    ++(passes(kind, bytes) ? passed : refused);
+  }
+  CHECK(passed > 10);
+  CHECK(refused > 1000);
+}
+
+// ---- the header
+
+TEST_CASE("only plain CDR passes, of either byte order") {
+  for (const bool big_endian : {false, true}) {
+    Cdr cdr(big_endian);
+    cdr.ulong(1).edge("hand");
+    CHECK(update(cdr));
+    wire::Update sample;
+    REQUIRE(testing::deserialized<UpdateType>(cdr.bytes(), sample));
+    REQUIRE(sample.edges().size() == 1);
+    CHECK(std::string(sample.edges()[0].id().c_str()) == "hand");
+  }
+  for (const unsigned kind : {2U, 3U, 6U, 7U, 255U}) {
+    Bytes bytes = Cdr().ulong(0).bytes();
+    bytes[1] = static_cast<std::uint8_t>(kind);
+    CHECK_FALSE(well_formed_update(bytes.data(), bytes.size()));
+    bytes[1] = 1;
+    bytes[0] = static_cast<std::uint8_t>(kind);
+    CHECK_FALSE(well_formed_update(bytes.data(), bytes.size()));
+  }
+  CHECK_FALSE(well_formed_update(nullptr, 0));
+  CHECK_FALSE(well_formed_update(nullptr, 100));
+}
+
+// ---- strings
+
+TEST_CASE("an id has at most 255 bytes, its closing zero, and no other") {
+  const auto move = [](const Cdr& id) {
+    Cdr cdr(id);
+    return request(cdr.octet(4).string("arm").ulong(0).ulong(0));
+  };
+  CHECK(move(Cdr().string("hand")));
+  CHECK(move(Cdr().string("")));
+  CHECK(move(Cdr().string(std::string(255, 'h'))));
+  CHECK_FALSE(move(Cdr().string(std::string(256, 'h'))));
+  CHECK_FALSE(move(Cdr().string(std::string("ha\0nd", 5))));
+  CHECK_FALSE(move(Cdr().ulong(4).octet('h').octet('a').octet('n').octet('d')));  // no zero
+  CHECK_FALSE(move(Cdr().string("hand", 0xffffffff)));
+  CHECK_FALSE(move(Cdr().string("hand", 0x80000000)));
+}
+
+TEST_CASE("the message of an error has at most 4096 bytes") {
+  const auto error = [](const std::string& message) {
+    return reply(Cdr().ulonglong(0).ulong(0).octet(1).octet(9).string(message));
+  };
+  CHECK(error(std::string(4096, 'm')));
+  CHECK_FALSE(error(std::string(4097, 'm')));
+}
+
+TEST_CASE("the name of a host has at most 255 bytes") {
+  const auto host = [](const std::string& name) {
+    return presence(Cdr().string("r").ulonglong(0).string(name).ulong(0).ulong(0).octet(1));
+  };
+  CHECK(host(std::string(255, 'h')));
+  CHECK_FALSE(host(std::string(256, 'h')));
+}
+
+// ---- sequences
+
+// A sample of each sequence with as many elements, of which it says that there are `length`.
+Cdr edges(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.edge("e");
+  return cdr;
+}
+Cdr tops(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.string("hand").octet(2).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.string("t");
+  return cdr.ulong(0).ulong(0);
+}
+Cdr more_edges(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.string("hand").octet(3).transform().ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.edge("e");
+  return cdr.ulong(0).ulong(0);
+}
+Cdr segments(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.string("hand").octet(6).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.string("a").string("b");
+  return cdr.ulong(0).ulong(0);
+}
+Cdr transforms(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.ulonglong(0).ulong(0).octet(2).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.transform();
+  return cdr;
+}
+Cdr entries(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.string("robot").ulong(0).ulonglong(0).ulonglong(0).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.string("a").string("b");
+  return cdr;
+}
+
+TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
+  struct Sequence {
+    const char* name;
+    Cdr (*sample)(std::size_t count, std::uint64_t length);
+    bool (*well_formed)(const Cdr& cdr);
+  };
+  const std::vector<Sequence> all{{"edges of an update", edges, update},
+                                  {"tops of a remove", tops, request},
+                                  {"further edges of an update", more_edges, request},
+                                  {"segments of a lookup", segments, request},
+                                  {"transforms of a reply", transforms, reply},
+                                  {"entries of a page", entries, page}};
+  for (const Sequence& sequence : all) {
+    INFO(sequence.name);
+    CHECK(sequence.well_formed(sequence.sample(0, 0)));
+    CHECK(sequence.well_formed(sequence.sample(3, 3)));
+    CHECK(sequence.well_formed(sequence.sample(4096, 4096)));
+    CHECK_FALSE(sequence.well_formed(sequence.sample(4097, 4097)));
+    for (const std::uint64_t length : {5U, 4096U, 0x10000U, 0x80000000U, 0xffffffffU}) {
+      CHECK_FALSE(sequence.well_formed(sequence.sample(3, length)));
+    }
+  }
+}
+
+// ---- kinds and booleans
+
+TEST_CASE("bodies of kinds that there are not are refused") {
+  for (unsigned kind = 0; kind < 256; ++kind) {
+    if (kind >= 1 && kind <= 6) continue;
+    CHECK_FALSE(request(Cdr().string("hand").octet(kind).string("arm").ulong(0).ulong(0)));
+  }
+  for (unsigned kind = 0; kind < 256; ++kind) {
+    if (kind >= 1 && kind <= 3) continue;
+    CHECK_FALSE(reply(Cdr().ulonglong(0).ulong(0).octet(kind).octet(0)));
+  }
+}
+
+TEST_CASE("a boolean is zero or one") {
+  const auto serving = [](unsigned value) {
+    return presence(Cdr().string("r").ulonglong(0).string("h").ulong(0).ulong(0).octet(value));
+  };
+  CHECK(serving(0));
+  CHECK(serving(1));
+  CHECK_FALSE(serving(2));
+  CHECK_FALSE(serving(255));
+}
+
+// ---- what filters need
+
+TEST_CASE("a filter reads the id and the addressee of a request of every kind") {
+  Random random(0xcd5);
+  INFO("seed " << random.seed());
+  for (const Request& one : testing::requests(random)) {
+    const Bytes bytes = testing::serialized<RequestType>(to_wire(one, "robot"));
+    RequestHead head;
+    REQUIRE(read_request_head(bytes.data(), bytes.size(), head));
+    CHECK(head.id == one.id);
+    CHECK(head.addressee == addressee_of("robot"));
+    CHECK_FALSE(read_request_head(bytes.data(), bytes.size() - 1, head));
+  }
+}
+
+TEST_CASE("partitions are addressed by their FNV-1a") {
+  CHECK(addressee_of("") == 0x811c9dc5U);
+  CHECK(addressee_of("a") == 0xe40c292cU);
+  CHECK(addressee_of("foobar") == 0xbf9cf968U);
+}
+
+TEST_CASE("a filter looks at the edges of an update until one is owned") {
+  const Bytes bytes = Cdr().ulong(3).edge("a").edge("b").edge("c").bytes();
+  std::string seen;
+  const auto owned = [&](const std::string& own) {
+    seen.clear();
+    return any_edge(bytes.data(), bytes.size(), [&](std::string_view id) {
+      seen += id;
+      return id == own;
+    });
+  };
+  CHECK(owned("a"));
+  CHECK(seen == "a");
+  CHECK(owned("c"));
+  CHECK(seen == "abc");
+  CHECK_FALSE(owned("d"));
+  CHECK(seen == "abc");
+  CHECK_FALSE(any_edge(bytes.data(), bytes.size() - 1, [](std::string_view) { return true; }));
+}
+
+}  // namespace
+}  // namespace tfdude::fastdds

@@ -1,0 +1,265 @@
+#include "transport/fastdds/codec.hpp"
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/pose_diff.hpp"
+#include "support/samples.hpp"
+
+namespace tfdude::fastdds {
+namespace {
+
+using testing::Random;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// ---- round trips
+
+template <class Type, class Sample>
+Sample travelled(const Sample& sample) {
+  Sample arrived;
+  REQUIRE(testing::deserialized<Type>(testing::serialized<Type>(sample), arrived));
+  return arrived;
+}
+
+// Unit quaternions are normalized again on arrival, all else is exact.
+void check_same(const Transform& actual, const Transform& expected) {
+  CHECK(testing::pose_diff(actual.pose, expected.pose, 1e-15) == "");
+  CHECK(actual.covariance.upper() == expected.covariance.upper());
+}
+
+void check_same(const std::vector<EdgeUpdate>& actual, const std::vector<EdgeUpdate>& expected) {
+  REQUIRE(actual.size() == expected.size());
+  for (std::size_t i = 0; i < actual.size(); ++i) {
+    CHECK(actual[i].id == expected[i].id);
+    check_same(actual[i].X_PC, expected[i].X_PC);
+  }
+}
+
+void check_same(const Request& actual, const Request& expected) {
+  CHECK(actual.sequence == expected.sequence);
+  CHECK(actual.id == expected.id);
+  REQUIRE(actual.body.index() == expected.body.index());
+  if (const auto* add = std::get_if<AddRequest>(&expected.body)) {
+    CHECK(std::get<AddRequest>(actual.body).parent == add->parent);
+    check_same(std::get<AddRequest>(actual.body).X_PC, add->X_PC);
+  } else if (const auto* remove = std::get_if<RemoveRequest>(&expected.body)) {
+    CHECK(std::get<RemoveRequest>(actual.body).tops == remove->tops);
+  } else if (const auto* update = std::get_if<UpdateRequest>(&expected.body)) {
+    check_same(std::get<UpdateRequest>(actual.body).edges, update->edges);
+  } else if (const auto* move = std::get_if<MoveRequest>(&expected.body)) {
+    CHECK(std::get<MoveRequest>(actual.body).parent == move->parent);
+    const auto& X_PC = std::get<MoveRequest>(actual.body).X_PC;
+    REQUIRE(X_PC.has_value() == move->X_PC.has_value());
+    if (X_PC) check_same(*X_PC, *move->X_PC);
+  } else {
+    const auto& segments = std::get<LookupRequest>(expected.body).segments;
+    const auto& arrived = std::get<LookupRequest>(actual.body).segments;
+    REQUIRE(arrived.size() == segments.size());
+    for (std::size_t i = 0; i < segments.size(); ++i) {
+      CHECK(arrived[i].from == segments[i].from);
+      CHECK(arrived[i].to == segments[i].to);
+    }
+  }
+}
+
+TEST_CASE("requests arrive as they were sent") {
+  Random random(0xc0de1);
+  INFO("seed " << random.seed());
+  for (const Request& one : testing::requests(random)) {
+    INFO("request " << one.sequence);
+    const auto arrived = from_wire(travelled<RequestType>(to_wire(one, "robot")));
+    REQUIRE(arrived);
+    check_same(*arrived, one);
+  }
+}
+
+TEST_CASE("replies arrive as they were sent") {
+  Random random(0xc0de2);
+  INFO("seed " << random.seed());
+  for (const Reply& one : testing::replies(random)) {
+    INFO("reply " << one.sequence);
+    const auto arrived = from_wire(travelled<ReplyType>(to_wire(one)));
+    REQUIRE(arrived);
+    CHECK(arrived->sequence == one.sequence);
+    CHECK(arrived->epoch == one.epoch);
+    REQUIRE(arrived->body.index() == one.body.index());
+    if (const auto* error = std::get_if<Error>(&one.body)) {
+      CHECK(std::get<Error>(arrived->body).code == error->code);
+      CHECK(std::get<Error>(arrived->body).message == error->message);
+    } else if (const auto* transforms = std::get_if<std::vector<Transform>>(&one.body)) {
+      const auto& came = std::get<std::vector<Transform>>(arrived->body);
+      REQUIRE(came.size() == transforms->size());
+      for (std::size_t i = 0; i < came.size(); ++i) check_same(came[i], (*transforms)[i]);
+    }
+  }
+}
+
+TEST_CASE("a message that is too long arrives cut") {
+  const Reply reply{1, 2, Error{Errc::kCycle, std::string(10000, 'm')}};
+  const auto arrived = from_wire(travelled<ReplyType>(to_wire(reply)));
+  REQUIRE(arrived);
+  CHECK(std::get<Error>(arrived->body).message == std::string(4096, 'm'));
+}
+
+TEST_CASE("updates arrive as they were sent, but for the edges that nobody wants") {
+  Random random(0xc0de3);
+  INFO("seed " << random.seed());
+  for (const Update& one : testing::updates(random)) {
+    const auto sample = travelled<UpdateType>(to_wire(one));
+    const auto all = from_wire(sample, [](std::string_view) { return true; });
+    REQUIRE(all);
+    check_same(all->edges, one.edges);
+    const auto some = from_wire(sample, [](std::string_view id) { return id == "ab"; });
+    REQUIRE(some);
+    CHECK(some->edges.size() == (one.edges.size() == 3 ? 1 : 0));
+  }
+}
+
+TEST_CASE("pages and presences arrive as they were sent") {
+  for (const Page& one : testing::pages()) {
+    const auto arrived = from_wire(travelled<PageType>(to_wire(one)));
+    REQUIRE(arrived);
+    CHECK(arrived->partition == one.partition);
+    CHECK(arrived->number == one.number);
+    CHECK(arrived->incarnation == one.incarnation);
+    CHECK(arrived->epoch == one.epoch);
+    REQUIRE(arrived->entries.size() == one.entries.size());
+    for (std::size_t i = 0; i < one.entries.size(); ++i) {
+      CHECK(arrived->entries[i].id == one.entries[i].id);
+      CHECK(arrived->entries[i].parent == one.entries[i].parent);
+    }
+  }
+  for (const Presence& one : testing::presences()) {
+    const auto arrived = from_wire(travelled<PresenceType>(to_wire(one)));
+    REQUIRE(arrived);
+    CHECK(arrived->partition == one.partition);
+    CHECK(arrived->incarnation == one.incarnation);
+    CHECK(arrived->host == one.host);
+    CHECK(arrived->pid == one.pid);
+    CHECK(arrived->pages == one.pages);
+    CHECK(arrived->serving == one.serving);
+  }
+}
+
+// ---- values that are refused
+
+struct BadValue {
+  std::size_t index;  // in wire::Transform
+  double value;
+  const char* field;
+};
+
+const std::vector<BadValue> kBadValues{
+    {0, kNan, "rotation.x"},
+    {3, kInfinity, "rotation.w"},
+    {3, 2.0, "rotation has the norm"},
+    {3, 0.0, "rotation has the norm"},
+    {4, kNan, "translation.x"},
+    {5, -kInfinity, "translation.y"},
+    {6, 1.1e9, "translation.z is beyond"},
+    {7, kNan, "covariance[0][0]"},
+    {8, kInfinity, "covariance[0][1]"},
+    {7, -1.0, "covariance[0][0] is a negative variance"},
+    {27, 1.1e18, "covariance[5][5] is beyond"},
+    {8, 1.0, "covariance[0][1] is larger than its variances allow"},
+};
+
+wire::Transform bad_transform(const BadValue& bad) {
+  wire::Transform x_pc{};
+  x_pc[3] = 1;
+  x_pc[bad.index] = bad.value;
+  return x_pc;
+}
+
+// A request whose frames are called hand, but for the one with the bad value, which is called culprit.
+std::vector<wire::Request> requests_with(const wire::Transform& bad) {
+  const std::vector<EdgeUpdate> edges{{"hand", {}}, {"culprit", {}}};
+  const auto of = [](const std::string& id, auto body) {
+    return to_wire(Request{1, id, std::move(body)}, "robot");
+  };
+  std::vector<wire::Request> all{
+      of("culprit", AddRequest{"hand", {}}), of("culprit", MoveRequest{"hand", Transform()}),
+      of("culprit", UpdateRequest{{{"culprit", {}}}}), of("hand", UpdateRequest{edges})};
+  all[0].body().add().x_pc(bad);
+  all[1].body().move_and_update().x_pc(bad);
+  all[2].body().update().x_pc(bad);
+  all[3].body().update().more()[0].x_pc(bad);
+  return all;
+}
+
+template <class T>
+void check_refused(const Result<T>& result, const std::string& place, const std::string& field) {
+  REQUIRE_FALSE(result);
+  CHECK(result.error().code == Errc::kInvalidInput);
+  CAPTURE(result.error().message);
+  CHECK(result.error().message.find(place) != std::string::npos);
+  CHECK(result.error().message.find(field) != std::string::npos);
+}
+
+TEST_CASE("values that no transform has are refused, with frame and field") {
+  for (const BadValue& bad : kBadValues) {
+    INFO("x_pc[" << bad.index << "] = " << bad.value);
+    const wire::Transform x_pc = bad_transform(bad);
+    for (const wire::Request& sample : requests_with(x_pc)) {
+      check_refused(from_wire(sample), "frame 'culprit'", bad.field);
+    }
+    wire::Update update = to_wire(Update{{{"hand", {}}, {"culprit", {}}}});
+    update.edges()[1].x_pc(x_pc);
+    check_refused(from_wire(update, [](std::string_view) { return true; }), "frame 'culprit'",
+                  bad.field);
+    CHECK(from_wire(update, [](std::string_view id) { return id == "hand"; }));
+    wire::Reply reply = to_wire(Reply{1, 2, std::vector<Transform>(2)});
+    reply.body().transforms()[1] = x_pc;
+    check_refused(from_wire(reply), "of a reply", bad.field);
+  }
+}
+
+TEST_CASE("a covariance that is not positive semi-definite as a whole is refused") {
+  // Each pair of the three axes is possible, all together are not.
+  wire::Transform x_pc{};
+  x_pc[3] = 1;
+  for (const std::size_t i : {0U, 1U, 2U}) x_pc[7 + upper_index(i, i)] = 1;
+  x_pc[7 + upper_index(0, 1)] = 0.9;
+  x_pc[7 + upper_index(1, 2)] = 0.9;
+  x_pc[7 + upper_index(0, 2)] = -0.9;
+  for (const wire::Request& sample : requests_with(x_pc)) {
+    check_refused(from_wire(sample), "frame 'culprit'", "not positive semi-definite");
+  }
+}
+
+// ---- names that are refused
+
+TEST_CASE("a request for a frame that no frame can be called is refused") {
+  for (const char* id : {"", "a\nb", "\xff"}) {
+    check_refused(from_wire(to_wire(Request{1, id, RemoveRequest{}}, "robot")), "id", "");
+  }
+  check_refused(from_wire(to_wire(Request{1, "a", UpdateRequest{{{"a", {}}, {"\x01", {}}}}}, "r")),
+                "id '\\x01'", "control character");
+}
+
+TEST_CASE("a page with a bad name is refused") {
+  const auto read = [](const std::string& partition, const PageEntry& entry) {
+    return from_wire(to_wire(Page{partition, 0, 1, 1, {{"world", ""}, entry}}));
+  };
+  CHECK(read("robot", {"base", "world"}));
+  check_refused(read("ro*bot", {"base", "world"}), "partition 'ro*bot'", "'*'");
+  check_refused(read("", {"base", "world"}), "partition", "empty");
+  check_refused(read("robot", {"", "world"}), "id", "empty");
+  check_refused(read("robot", {"b\ta", "world"}), "id 'b\\x09a'", "control character");
+  check_refused(read("robot", {"base", "\xc3"}), "parent '\\xc3'", "UTF-8");
+}
+
+TEST_CASE("a presence with a bad name is refused") {
+  check_refused(from_wire(to_wire(Presence{"a,b", 1, "tower", 1, 1, true})), "partition 'a,b'",
+                "','");
+  check_refused(from_wire(to_wire(Presence{"robot", 1, "", 1, 1, true})), "host", "empty");
+  check_refused(from_wire(to_wire(Presence{"robot", 1, "a\033[2J", 1, 1, true})), "host",
+                "control character");
+}
+
+}  // namespace
+}  // namespace tfdude::fastdds
