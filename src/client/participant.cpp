@@ -8,7 +8,7 @@ namespace tfdude {
 namespace {
 
 // A request without a reply is sent again after this long, then twice as long, up to the second.
-constexpr Milliseconds kFirstRepeat{5};
+constexpr Milliseconds kFirstRepeat{2};
 constexpr Milliseconds kLastRepeat{160};
 
 // How long the structure may take to reach us where a reply says that ours is old.

@@ -25,7 +25,11 @@
 #include <fastdds/dds/topic/IContentFilterFactory.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
+#include <fastdds/rtps/transport/ChainingTransport.h>
+#include <fastdds/rtps/transport/ChainingTransportDescriptor.h>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/attributes/LibrarySettingsAttributes.h>
+#include <fastrtps/utils/IPLocator.h>
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 #else
 #include <fastdds/LibrarySettings.hpp>
@@ -50,15 +54,22 @@
 #include <fastdds/dds/topic/IContentFilterFactory.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
+#include <fastdds/rtps/transport/ChainingTransport.hpp>
+#include <fastdds/rtps/transport/ChainingTransportDescriptor.hpp>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.hpp>
+#include <fastdds/utils/IPLocator.hpp>
 #include <tfdudePubSubTypes.hpp>
 #endif
 
+#include <chrono>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace tfdude::fastdds {
 
 namespace edds = eprosima::fastdds::dds;
+namespace etransport = eprosima::fastdds::rtps;
 
 #if TFDUDE_FASTDDS_MAJOR == 2
 
@@ -116,6 +127,27 @@ class CheckedType final : public Generated {
 
  private:
   static constexpr std::uint32_t kUsualSize = 512;
+};
+
+/// A transport that sends through another, where it may.
+class SendFilter : public etransport::ChainingTransport {
+ public:
+  using ChainingTransport::ChainingTransport;
+
+  bool send(ertps::SenderResource* through, const ertps::octet* bytes, std::uint32_t size,
+            ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
+            const std::chrono::steady_clock::time_point& deadline) override {
+    return !may_send() || through->send(bytes, size, begin, end, deadline);
+  }
+
+  void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
+               std::uint32_t size, const ertps::Locator_t& local,
+               const ertps::Locator_t& remote) override {
+    next->OnDataReceived(bytes, size, local, remote);
+  }
+
+ private:
+  [[nodiscard]] virtual bool may_send() const = 0;
 };
 
 #else
@@ -178,6 +210,26 @@ class CheckedType final : public Generated {
 
  private:
   static constexpr std::uint32_t kUsualSize = 512;
+};
+
+class SendFilter : public etransport::ChainingTransport {
+ public:
+  using ChainingTransport::ChainingTransport;
+
+  bool send(ertps::SenderResource* through, const std::vector<ertps::NetworkBuffer>& buffers,
+            std::uint32_t size, ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
+            const std::chrono::steady_clock::time_point& deadline) override {
+    return !may_send() || through->send(buffers, size, begin, end, deadline);
+  }
+
+  void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
+               std::uint32_t size, const ertps::Locator_t& local,
+               const ertps::Locator_t& remote) override {
+    next->OnDataReceived(bytes, size, local, remote);
+  }
+
+ private:
+  [[nodiscard]] virtual bool may_send() const = 0;
 };
 
 #endif

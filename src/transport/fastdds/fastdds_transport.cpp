@@ -5,6 +5,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "transport/fastdds/entrance.hpp"
 #include "transport/fastdds/topics.hpp"
 
 namespace tfdude::fastdds {
@@ -47,12 +48,15 @@ Result<void> FastDdsTransport::create_participant() {
   edds::DomainParticipantQos qos = participant_qos();
   qos.name(participant_name(options_.partition));
   qos.properties().properties().emplace_back("fastdds.ignore_local_endpoints", "true");
+  Entrance entrance;
+  entrance.prepare(qos, options_.domain, options_.partition.empty());
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
       options_.domain, qos, &participant_listener_, edds::StatusMask::none());
   if (participant_ == nullptr) {
     return fail(Errc::kTransport,
                 "Fast DDS could not join domain " + std::to_string(options_.domain));
   }
+  entrance.open();
   self_ = peer_of(participant_->guid().guidPrefix);
   topics_.presence = create_topic(kPresenceTopic, edds::TypeSupport(new PresenceType));
   topics_.directory = create_topic(kDirectoryTopic, edds::TypeSupport(new PageType));

@@ -1,0 +1,71 @@
+#include "transport/fastdds/entrance.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tfdude::fastdds {
+namespace {
+
+using Flag = std::shared_ptr<std::atomic<bool>>;
+
+struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
+  GatedDescriptor(std::shared_ptr<etransport::TransportDescriptorInterface> guarded, Flag flag)
+      : ChainingTransportDescriptor(std::move(guarded)), open(std::move(flag)) {}
+
+  [[nodiscard]] etransport::TransportInterface* create_transport() const override;
+
+  Flag open;
+};
+
+class GatedTransport final : public SendFilter {
+ public:
+  explicit GatedTransport(const GatedDescriptor& descriptor)
+      : SendFilter(descriptor), descriptor_(descriptor) {}
+
+  etransport::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
+
+ private:
+  [[nodiscard]] bool may_send() const override {
+    return descriptor_.open->load(std::memory_order_relaxed);
+  }
+
+  GatedDescriptor descriptor_;
+};
+
+etransport::TransportInterface* GatedDescriptor::create_transport() const {
+  return new GatedTransport(*this);
+}
+
+// As Fast DDS would by default, but for the multicast locator that this participant listens to.
+void hear_by_unicast_only(edds::DomainParticipantQos& qos, std::uint32_t domain) {
+  auto& builtin = qos.wire_protocol().builtin;
+  const bool arranged =
+      builtin.discovery_config.discoveryProtocol != ertps::DiscoveryProtocol_t::SIMPLE ||
+      !builtin.metatrafficUnicastLocatorList.empty() ||
+      !builtin.metatrafficMulticastLocatorList.empty() || !builtin.initialPeersList.empty();
+  if (arranged) return;
+  ertps::Locator_t everywhere;
+  ertps::IPLocator::setIPv4(everywhere, 0, 0, 0, 0);
+  builtin.metatrafficUnicastLocatorList.push_back(everywhere);
+  ertps::Locator_t group;  // of RTPS 2.2, section 9.6.1.4.1
+  ertps::IPLocator::setIPv4(group, 239, 255, 0, 1);
+  group.port = qos.wire_protocol().port.getMulticastPort(domain);
+  builtin.initialPeersList.push_back(group);
+}
+
+}  // namespace
+
+void Entrance::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) const {
+  const auto is_udp = [](const auto& transport) {
+    return std::dynamic_pointer_cast<etransport::UDPv4TransportDescriptor>(transport) != nullptr;
+  };
+  auto& transports = qos.transport().user_transports;
+  const bool udp_only = !qos.transport().use_builtin_transports &&
+                        std::all_of(transports.begin(), transports.end(), is_udp);
+  if (client && udp_only) hear_by_unicast_only(qos, domain);
+  for (auto& transport : transports) {
+    if (is_udp(transport)) transport = std::make_shared<GatedDescriptor>(transport, open_);
+  }
+}
+
+}  // namespace tfdude::fastdds
