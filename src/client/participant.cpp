@@ -48,6 +48,11 @@ bool Participant::may_appear(Errc code) {
   }
 }
 
+// What a plan has checked before anybody was asked.
+bool Participant::denies_plan(Errc code) {
+  return code == Errc::kAlreadyExists || code == Errc::kUnknownParent || code == Errc::kCycle;
+}
+
 bool Participant::settled() {
   if (settled_.load(std::memory_order_relaxed)) return true;
   bool known = Clock::now() >= settle_deadline_;
