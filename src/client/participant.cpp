@@ -165,6 +165,8 @@ Result<void> Participant::add(const std::string& id, const AddRequest& request,
 }
 
 Result<void> Participant::remove(const std::string& id) {
+  // All below it are told by name, so all must be known.
+  settle();
   bool asked = false;
   auto removed = healed([&] { return route_remove(forest_, directory_, id); },
                         [&](std::vector<Part>& parts) {
