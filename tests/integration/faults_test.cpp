@@ -56,7 +56,7 @@ TEST_CASE("faults: who needs a killed daemon is told at once, and others do not 
   ThesisDaemons d;
   auto client = *Client::open(d.domain.options(kPatience));
   REQUIRE(client.lookup("world", "hand_left"));
-  d.arms->signal(SIGKILL);
+  d.arms->kill();
   check_arms_missing(client);
   check_arms_missing(client);
   const auto partitions = client.partitions();
@@ -72,7 +72,7 @@ TEST_CASE("faults: an owner is told of a killed daemon, and goes on with its own
   auto robot =
       *Node::open("robot", {{"world", "", {}}, {"robot_1", "world", {}}}, domain.options());
   REQUIRE(eventually([&] { return robot.lookup("world", "hand_left").has_value(); }));
-  arms.signal(SIGKILL);
+  arms.kill();
   const auto lost = robot.lookup("world", "hand_left");
   REQUIRE_FALSE(lost);
   CHECK(lost.error().code == Errc::kUnreachable);
@@ -88,8 +88,7 @@ TEST_CASE("faults: a killed daemon that is started again is asked again") {
     const auto before = client.lookup("world", "hand_left");
     REQUIRE(before);
     REQUIRE(client.add("tool", "hand_left", {}));
-    d.arms->signal(SIGKILL);
-    REQUIRE(d.arms->wait(in_time()) == 128 + SIGKILL);
+    d.arms->kill();
     d.arms.emplace(d.domain.serve(kArmsFile));
     // What was added to the predecessor is gone with it.
     REQUIRE(eventually([&] { return client.exists("hand_left") && !client.exists("tool"); }));
@@ -106,7 +105,7 @@ TEST_CASE("faults: a hanging partition costs its caller the time-out, and recove
   // Shorter than it takes to notice that a partition is gone.
   auto client = *Client::open(d.domain.options(Milliseconds(50)));
   REQUIRE(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
-  d.arms->signal(SIGSTOP);
+  d.arms->freeze();
   const auto late = client.lookup("world", "hand_left");
   REQUIRE_FALSE(late);
   CHECK(late.error().code == Errc::kTimeout);
@@ -124,7 +123,7 @@ TEST_CASE("faults: a partition that DDS had given up is met again") {
   auto client = *Client::open(d.domain.options(kPatience));
   for (int round = 0; round < 3; ++round) {
     REQUIRE(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
-    d.arms->signal(SIGSTOP);
+    d.arms->freeze();
     CHECK(eventually([&] {
       const auto lost = client.lookup("world", "hand_left");
       return !lost && lost.error().code == Errc::kUnreachable;
