@@ -48,6 +48,11 @@ bool Participant::may_appear(Errc code) {
   }
 }
 
+// What a plan has checked before anybody was asked.
+bool Participant::denies_plan(Errc code) {
+  return code == Errc::kAlreadyExists || code == Errc::kUnknownParent || code == Errc::kCycle;
+}
+
 bool Participant::settled() {
   if (settled_.load(std::memory_order_relaxed)) return true;
   bool known = Clock::now() >= settle_deadline_;
@@ -160,6 +165,8 @@ Result<void> Participant::add(const std::string& id, const AddRequest& request,
 }
 
 Result<void> Participant::remove(const std::string& id) {
+  // All below it are told by name, so all must be known.
+  settle();
   bool asked = false;
   auto removed = healed([&] { return route_remove(forest_, directory_, id); },
                         [&](std::vector<Part>& parts) {

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -91,19 +92,31 @@ class Participant final : public TransportHandler {
     });
   }
 
-  /// Plans, asks, and plans again where the structure has changed meanwhile.
+  /// Plans, asks, and plans again where the structure has changed meanwhile: the owner asked knows something
+  /// newer than this process, or has not heard yet of a change that this process knows of.
   template <class Route, class Ask, class Plan = typename std::invoke_result_t<Route>::value_type>
   std::invoke_result_t<Ask, Plan&> healed(Route route, Ask ask) {
-    for (int attempt = 1;; ++attempt) {
+    const auto deadline = Clock::now() + options_.timeout;
+    int attempts = 0;
+    Milliseconds pause{5};
+    while (true) {
       const std::uint64_t version = forest_.structure_version();
       auto plan = routed(route);
       if (!plan) return tl::unexpected(std::move(plan.error()));
       auto result = ask(*plan);
-      if (result || result.error().code != Errc::kNotOwner || attempt == kAttempts) return result;
-      await_structure_change(version);
+      if (result) return result;
+      if (result.error().code == Errc::kNotOwner && ++attempts < kAttempts) {
+        await_structure_change(version);
+      } else if (denies_plan(result.error().code) && Clock::now() + pause < deadline) {
+        std::this_thread::sleep_for(pause);
+        pause *= 2;
+      } else {
+        return result;
+      }
     }
   }
   static constexpr int kAttempts = 3;
+  static bool denies_plan(Errc code);
 
   [[nodiscard]] Result<void> change(std::vector<Part>& parts);
   [[nodiscard]] std::vector<Reply> ask(std::vector<Part>& parts, Clock::time_point deadline);

@@ -1,6 +1,6 @@
 // The function tests of the thesis, once over each transport: two owners and a client without frames.
 
-#include <atomic>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -14,6 +14,7 @@
 #include "tfdude/transport/loopback.hpp"
 
 #include "support/catch.hpp"
+#include "support/domain_lease.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
 
@@ -29,9 +30,9 @@ Join join_loopback() {
 }
 
 Join join_fastdds() {
-  // Tests of one machine that run side by side must not meet.
-  static std::atomic<std::uint32_t> tests{0};
-  const std::uint32_t domain = 20 + (static_cast<std::uint32_t>(getpid()) * 7 + tests++) % 200;
+  // Kept until the process ends, as the participants may live longer than what is returned.
+  static std::deque<testing::DomainLease> leases;
+  const std::uint32_t domain = leases.emplace_back().number();
   return [domain](const std::string& partition) {
     return *make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, partition, nullptr});
   };

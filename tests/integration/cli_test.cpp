@@ -156,7 +156,7 @@ TEST_CASE("cli: watch looks up again and again, and survives what it watches") {
   };
   REQUIRE(eventually([&] { return lines() >= 3; }));
   CHECK(json::parse(*watch.wait_for_line("{", in_time())).at("to") == "hand_left");
-  d.arms->signal(SIGSTOP);
+  d.arms->freeze();
   const auto complaint = watch.wait_for_line("{\"error\"", in_time());
   REQUIRE(complaint);
   CHECK_THAT(*complaint, Contains("'arms'"));

@@ -2,12 +2,12 @@
 
 #include <memory>
 #include <string>
-#include <unistd.h>
 
 #include "tfdude/client/client.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
 #include "support/catch.hpp"
+#include "support/domain_lease.hpp"
 
 namespace tfdude {
 namespace {
@@ -25,7 +25,8 @@ struct Counted {
 }  // namespace
 
 TEST_CASE("who does not own the frame receives nothing") {
-  const std::uint32_t domain = 20 + static_cast<std::uint32_t>(getpid()) % 200;
+  const testing::DomainLease lease;
+  const std::uint32_t domain = lease.number();
   Counted owner(domain, "owner", "a");
   Counted other(domain, "other", "b");
   auto client =

@@ -237,6 +237,22 @@ TEST_CASE("processes: own, others' and connecting edges are updated") {
                 {"nowhere"});
 }
 
+TEST_CASE("processes: on what one owner confirmed the other can build at once") {
+  const int who = GENERATE(0, 1, 2);
+  Robot r(who);
+  for (int i = 0; i < 50; ++i) {
+    REQUIRE(r.caller().add("tool", "camera", kX));
+    REQUIRE(r.caller().add("tip", "tool", kX, "arms"));
+    REQUIRE(r.caller().move("arm_2", "tool"));
+    REQUIRE(r.caller().move("arm_2", "arm_1"));
+    REQUIRE(r.caller().move("tool", "arm_2"));
+    REQUIRE(r.caller().remove("tool"));
+    REQUIRE(r.caller().add("tool", "arm_2", kX));
+    REQUIRE(r.caller().remove("tool"));
+  }
+  r.check_agreement();
+}
+
 TEST_CASE("processes: published edges arrive at both owners") {
   const int who = GENERATE(0, 1, 2);
   Robot r(who);

@@ -73,8 +73,7 @@ Process::~Process() {
     if (stream.fd >= 0) close(stream.fd);
   }
   if (pid_ < 0 || status_) return;
-  kill(pid_, SIGKILL);
-  waitpid(pid_, nullptr, 0);
+  kill();
 }
 
 void Process::read_some(Deadline deadline) {
@@ -125,7 +124,20 @@ std::optional<int> Process::wait(Deadline deadline) {
 }
 
 void Process::signal(int number) const {
-  if (!status_) kill(pid_, number);
+  if (!status_) ::kill(pid_, number);
+}
+
+void Process::kill() {
+  signal(SIGKILL);
+  int status = 0;
+  if (!status_ && waitpid(pid_, &status, 0) == pid_) status_ = 128 + SIGKILL;
+}
+
+void Process::freeze() const {
+  signal(SIGSTOP);
+  siginfo_t info{};
+  // What ended instead is left for wait().
+  waitid(P_PID, static_cast<id_t>(pid_), &info, WSTOPPED | WEXITED | WNOWAIT);
 }
 
 TemporaryDirectory::TemporaryDirectory() {

@@ -42,6 +42,11 @@ class Process {
 
   void signal(int number) const;
 
+  /// Kills it, and waits until it is no more.
+  void kill();
+  /// Stops it as a debugger does, and waits until it stands still; SIGCONT lets it go on.
+  void freeze() const;
+
   /// What was written until the last wait.
   [[nodiscard]] const std::string& out() const { return streams_[0].text; }
   [[nodiscard]] const std::string& err() const { return streams_[1].text; }

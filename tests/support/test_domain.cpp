@@ -1,48 +1,13 @@
 #include "support/test_domain.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <stdexcept>
-#include <sys/socket.h>
-#include <sys/un.h>
-#include <unistd.h>
 
 namespace tfdude::testing {
-namespace {
-
-constexpr std::uint32_t kFirst = 20;
-constexpr std::uint32_t kCount = 200;
-
-// A name in the abstract namespace of the kernel: one process has it at a time, and loses it as it ends.
-int claim(std::uint32_t domain) {
-  const std::string name = "tfdude-test-domain-" + std::to_string(domain);
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  std::copy(name.begin(), name.end(), address.sun_path + 1);
-  const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
-  if (bind(fd, reinterpret_cast<const sockaddr*>(&address), size) == 0) return fd;
-  close(fd);
-  return -1;
-}
-
-}  // namespace
-
-TestDomain::TestDomain() {
-  static std::atomic<std::uint32_t> tests{0};
-  const std::uint32_t wish = static_cast<std::uint32_t>(getpid()) * 7 + tests++;
-  for (std::uint32_t i = 0; i < kCount && claim_ < 0; ++i) {
-    number_ = kFirst + (wish + i) % kCount;
-    claim_ = claim(number_);
-  }
-  if (claim_ < 0) throw std::runtime_error("all DDS domains for tests are taken");
-}
-
-TestDomain::~TestDomain() { close(claim_); }
 
 Options TestDomain::options(Milliseconds timeout) const {
   Options options;
-  options.domain = number_;
+  options.domain = number();
   options.profile = TFDUDE_LOOPBACK_PROFILE;
   options.timeout = timeout;
   return options;
@@ -54,7 +19,7 @@ std::vector<std::string> TestDomain::command(const char* program,
     return std::count(arguments.begin(), arguments.end(), option) > 0;
   };
   std::vector<std::string> command{program};
-  if (!given("--domain")) command.insert(command.end(), {"--domain", std::to_string(number_)});
+  if (!given("--domain")) command.insert(command.end(), {"--domain", std::to_string(number())});
   if (!given("--profile")) command.insert(command.end(), {"--profile", TFDUDE_LOOPBACK_PROFILE});
   command.insert(command.end(), arguments.begin(), arguments.end());
   return command;

@@ -6,6 +6,7 @@
 
 #include "tfdude/client/client.hpp"
 
+#include "support/domain_lease.hpp"
 #include "support/process.hpp"
 
 namespace tfdude::testing {
@@ -20,12 +21,7 @@ struct CliResult {
 /// A DDS domain that no other test uses now, on this computer only, and the service's programs in it.
 class TestDomain {
  public:
-  TestDomain();
-  ~TestDomain();
-  TestDomain(const TestDomain&) = delete;
-  TestDomain& operator=(const TestDomain&) = delete;
-
-  [[nodiscard]] std::uint32_t number() const { return number_; }
+  [[nodiscard]] std::uint32_t number() const { return lease_.number(); }
 
   /// For clients in the test's process. The time-out is long, so that a busy machine is not an error.
   [[nodiscard]] Options options(Milliseconds timeout = Milliseconds(20000)) const;
@@ -43,8 +39,7 @@ class TestDomain {
   [[nodiscard]] std::vector<std::string> command(const char* program,
                                                  const std::vector<std::string>& arguments) const;
 
-  std::uint32_t number_ = 0;
-  int claim_ = -1;
+  DomainLease lease_;
 };
 
 /// @return the line by which a daemon says that it serves

@@ -88,7 +88,7 @@ struct Page {
   std::vector<PageEntry> entries;
 };
 
-/// That a partition is served, and by whom. Its writer's liveliness is the partition's.
+/// That a partition is served, and by whom. It holds as long as its participant lives.
 struct Presence {
   std::string partition;
   /// When its process took the name [ns since the UNIX epoch]; the later is the newer.

@@ -33,9 +33,6 @@ class Outlet final : public edds::DataWriterListener {
   /// A sample of the topic's type. Thread-safe.
   bool write(void* sample) { return fastdds::write(*writer_, sample); }
 
-  /// Says that the writer lives, where its liveliness is a manual one.
-  void assert_liveliness() { (void)writer_->assert_liveliness(); }
-
   void on_publication_matched(edds::DataWriter*,
                               const edds::PublicationMatchedStatus& status) override;
 
@@ -53,11 +50,10 @@ class Outlet final : public edds::DataWriterListener {
 template <class Sample>
 class Inlet : public edds::DataReaderListener {
  public:
-  /// What to call. A writer is named by its participant; +1: matched, or alive again; -1: no more.
+  /// What to call. A writer is named by its participant; +1: matched; -1: no more.
   struct Calls {
     std::function<void(const Sample&, const ertps::GuidPrefix_t& from)> on_sample;
     std::function<void(const ertps::GuidPrefix_t& writer, int change)> on_matched;
-    std::function<void(const ertps::GuidPrefix_t& writer, int change)> on_alive;
   };
 
   Inlet(edds::DomainParticipant& participant, edds::TopicDescription& topic,
@@ -96,13 +92,6 @@ class Inlet : public edds::DataReaderListener {
     if (!calls_.on_matched || status.current_count_change == 0) return;
     calls_.on_matched(ertps::iHandle2GUID(status.last_publication_handle).guidPrefix,
                       status.current_count_change);
-  }
-
-  void on_liveliness_changed(edds::DataReader*,
-                             const edds::LivelinessChangedStatus& status) override {
-    if (!calls_.on_alive || status.alive_count_change == 0) return;
-    calls_.on_alive(ertps::iHandle2GUID(status.last_publication_handle).guidPrefix,
-                    status.alive_count_change);
   }
 
  private:

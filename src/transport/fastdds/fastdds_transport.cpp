@@ -13,9 +13,6 @@ namespace {
 
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
 
-// A fifth of the lease of the presence's liveliness.
-constexpr Milliseconds kAliveEvery{100};
-
 tl::unexpected<Error> not_created(const char* what) {
   return fail(Errc::kTransport, std::string("Fast DDS could not create ") + what);
 }
@@ -80,18 +77,15 @@ Result<void> FastDdsTransport::create_endpoints() {
       *participant_, *topics_.presence, std::string(), "presence_reader",
       Inlet<wire::Presence>::Calls{
           [this](const wire::Presence& sample, const Prefix& from) { take_presence(sample, from); },
-          [this](const Prefix& from, int change) { presence_alive(from, change); },
-          [this](const Prefix& from, int change) { presence_alive(from, change); }});
+          [this](const Prefix& from, int change) { presence_matched(from, change); }});
   pages_ = std::make_unique<Inlet<wire::Page>>(
       *participant_, *topics_.directory, std::string(), "directory_reader",
       Inlet<wire::Page>::Calls{
-          [this](const wire::Page& sample, const Prefix&) { take_page(sample); }, nullptr,
-          nullptr});
+          [this](const wire::Page& sample, const Prefix&) { take_page(sample); }, nullptr});
   replies_ = std::make_unique<Inlet<wire::Reply>>(
       *participant_, *topics_.reply, reply_partition(self_), "call_reader",
       Inlet<wire::Reply>::Calls{
-          [this](const wire::Reply& sample, const Prefix&) { take_reply(sample); }, nullptr,
-          nullptr});
+          [this](const wire::Reply& sample, const Prefix&) { take_reply(sample); }, nullptr});
   if (!presence_->good() || !pages_->good() || !replies_->good()) return not_created("the readers");
   if (options_.partition.empty()) return {};
   presence_outlet_ =
@@ -99,7 +93,6 @@ Result<void> FastDdsTransport::create_endpoints() {
   directory_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.directory, std::string(),
                                                "directory_writer");
   if (!presence_outlet_->good() || !directory_outlet_->good()) return not_created("the writers");
-  worker_->repeat(kAliveEvery, [this] { presence_outlet_->assert_liveliness(); });
   return {};
 }
 
@@ -127,12 +120,11 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
       *participant_, *requests, partition, "call_reader",
       Inlet<wire::Request>::Calls{
           [this](const wire::Request& sample, const Prefix& from) { take_request(sample, from); },
-          asker_matched, nullptr});
+          asker_matched});
   updates_ = std::make_unique<Inlet<wire::Update>>(
       *participant_, *updates, partition, "update_reader",
       Inlet<wire::Update>::Calls{
-          [this](const wire::Update& sample, const Prefix&) { take_update(sample); }, nullptr,
-          nullptr});
+          [this](const wire::Update& sample, const Prefix&) { take_update(sample); }, nullptr});
   if (!requests_->good() || !updates_->good()) return not_created("the readers");
   return {};
 }
@@ -324,7 +316,7 @@ void FastDdsTransport::forget_predecessors(const Presence& presence) {
 
 // Whoever was silent for so long that it was taken for gone is met again, but what it said before is not
 // delivered a second time: hence nothing is forgotten as it goes.
-void FastDdsTransport::presence_alive(const ertps::GuidPrefix_t& from, int change) {
+void FastDdsTransport::presence_matched(const ertps::GuidPrefix_t& from, int change) {
   Presence presence;
   {
     const std::lock_guard lock(presences_mutex_);

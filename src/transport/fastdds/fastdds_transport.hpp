@@ -72,7 +72,7 @@ class FastDdsTransport final : public Transport {
   void take_page(const wire::Page& sample);
   void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from);
   void forget_predecessors(const Presence& presence);
-  void presence_alive(const ertps::GuidPrefix_t& from, int change);
+  void presence_matched(const ertps::GuidPrefix_t& from, int change);
 
   const FastDdsOptions options_;
   const std::shared_ptr<FastDdsCounters> counters_;

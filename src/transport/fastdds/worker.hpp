@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -9,8 +8,7 @@
 
 namespace tfdude::fastdds {
 
-/// A thread that does what must not be done in a DDS callback, creating and deleting entities, and what
-/// is to be done again and again.
+/// A thread that does what must not be done in a DDS callback: creating and deleting entities.
 class Worker {
  public:
   Worker() : thread_([this] { run(); }) {}
@@ -26,15 +24,6 @@ class Worker {
     changed_.notify_one();
   }
 
-  /// Does a job now and from now on once a period, between the others. One such job at a time.
-  void repeat(std::chrono::milliseconds period, std::function<void()> job) {
-    post([this, period, job = std::move(job)]() mutable {
-      period_ = period;
-      repeated_ = std::move(job);
-      due_ = Clock::now();
-    });
-  }
-
   /// Finishes the job at hand and drops the rest.
   void stop() {
     {
@@ -46,25 +35,15 @@ class Worker {
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   void run() {
     std::unique_lock lock(mutex_);
     while (true) {
-      const auto until = due_;
-      changed_.wait_until(lock, until, [this] { return stopping_ || !jobs_.empty(); });
+      changed_.wait(lock, [this] { return stopping_ || !jobs_.empty(); });
       if (stopping_) return;
-      std::function<void()> job;
-      if (!jobs_.empty()) {
-        job = std::move(jobs_.front());
-        jobs_.pop_front();
-      }
+      const auto job = std::move(jobs_.front());
+      jobs_.pop_front();
       lock.unlock();
-      if (job) job();
-      if (Clock::now() >= due_) {
-        due_ = Clock::now() + period_;
-        if (repeated_) repeated_();
-      }
+      job();
       lock.lock();
     }
   }
@@ -73,10 +52,6 @@ class Worker {
   std::condition_variable changed_;
   std::deque<std::function<void()>> jobs_;
   bool stopping_ = false;
-  // Of the thread alone.
-  std::chrono::milliseconds period_ = std::chrono::hours(1);
-  std::function<void()> repeated_;
-  Clock::time_point due_ = Clock::now() + period_;
   std::thread thread_;
 };
 
