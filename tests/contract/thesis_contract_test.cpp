@@ -1,42 +1,25 @@
 // The function tests of the thesis, once over each transport: two owners and a client without frames.
 
-#include <deque>
-#include <functional>
-#include <memory>
+#include <chrono>
 #include <optional>
 #include <string>
+#include <thread>
 #include <unistd.h>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/config.hpp"
-#include "tfdude/transport/fastdds.hpp"
-#include "tfdude/transport/loopback.hpp"
 
 #include "support/catch.hpp"
-#include "support/domain_lease.hpp"
+#include "support/networks.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
 
 namespace tfdude {
 namespace {
 
-/// Gives each participant of one test a transport of the same network.
-using Join = std::function<std::unique_ptr<Transport>(const std::string& partition)>;
-
-Join join_loopback() {
-  auto network = std::make_shared<LoopbackNetwork>();
-  return [network](const std::string&) { return network->join(); };
-}
-
-Join join_fastdds() {
-  // Kept until the process ends, as the participants may live longer than what is returned.
-  static std::deque<testing::DomainLease> leases;
-  const std::uint32_t domain = leases.emplace_back().number();
-  return [domain](const std::string& partition) {
-    return *make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, partition, nullptr});
-  };
-}
+using testing::Join;
+using testing::joined_by;
 
 struct Robot {
   explicit Robot(const Join& join) {
@@ -48,6 +31,15 @@ struct Robot {
   }
   std::vector<Client*> all() { return {&*robot, &*arms, &*client}; }
 
+  // What one has removed the others miss a moment later.
+  void await_removal(const std::string& id) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    for (Client* each : all()) {
+      while (each->exists(id) && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+      REQUIRE_FALSE(each->exists(id));
+    }
+  }
+
   std::optional<Node> robot;
   std::optional<Node> arms;
   std::optional<Client> client;
@@ -55,8 +47,6 @@ struct Robot {
 
 const Transform kX{exp((Twist() << 0.1, -0.2, 0.3, 0.4, 0.5, -0.6).finished()),
                    *Covariance::from_stddev({1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3})};
-
-Join joined_by(int transport) { return transport == 0 ? join_loopback() : join_fastdds(); }
 
 }  // namespace
 
@@ -103,6 +93,8 @@ TEST_CASE("frames are added, updated and moved from anywhere") {
     CHECK(caller->move("robot_1", "hand_left").error().code == Errc::kCycle);
     REQUIRE(caller->remove("tool"));
     REQUIRE(caller->remove("hand"));
+    r.await_removal("tool");
+    r.await_removal("hand");
   }
 }
 

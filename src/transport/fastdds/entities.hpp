@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -46,7 +48,7 @@ class Outlet final : public edds::DataWriterListener {
 };
 
 /// A reader with a subscriber of its own, hence in a DDS partition of its own. Samples are handed on one at a
-/// time, in the order of their arrival.
+/// time, those of one writer in the order in which they were written.
 template <class Sample>
 class Inlet : public edds::DataReaderListener {
  public:
@@ -81,9 +83,20 @@ class Inlet : public edds::DataReaderListener {
 
   void on_data_available(edds::DataReader* reader) override {
     const std::lock_guard lock(mutex_);
-    edds::SampleInfo info;
-    while (ok(reader->take_next_sample(&sample_, &info))) {
-      if (info.valid_data) calls_.on_sample(sample_, info.sample_identity.writer_guid().guidPrefix);
+    std::size_t taken = 0;
+    while (true) {
+      if (taken == batch_.size()) batch_.emplace_back();
+      Taken& next = batch_[taken];
+      if (!ok(reader->take_next_sample(&next.sample, &next.info))) break;
+      if (next.info.valid_data) ++taken;
+    }
+    // The library hands out one instance after the other, not in the order in which they were sent.
+    const auto end = batch_.begin() + static_cast<std::ptrdiff_t>(taken);
+    std::sort(batch_.begin(), end, [](const Taken& a, const Taken& b) {
+      return a.info.sample_identity.sequence_number() < b.info.sample_identity.sequence_number();
+    });
+    for (auto one = batch_.begin(); one != end; ++one) {
+      calls_.on_sample(one->sample, one->info.sample_identity.writer_guid().guidPrefix);
     }
   }
 
@@ -95,10 +108,15 @@ class Inlet : public edds::DataReaderListener {
   }
 
  private:
+  struct Taken {
+    Sample sample;
+    edds::SampleInfo info;
+  };
+
   edds::DomainParticipant& participant_;
   const Calls calls_;
-  std::mutex mutex_;  // of sample_; the library may call from several threads
-  Sample sample_;
+  std::mutex mutex_;         // of batch_; the library may call from several threads
+  std::deque<Taken> batch_;  // kept, for their memory
   edds::Subscriber* subscriber_ = nullptr;
   edds::DataReader* reader_ = nullptr;
 };

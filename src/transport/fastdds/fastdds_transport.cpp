@@ -81,7 +81,7 @@ Result<void> FastDdsTransport::create_endpoints() {
   pages_ = std::make_unique<Inlet<wire::Page>>(
       *participant_, *topics_.directory, std::string(), "directory_reader",
       Inlet<wire::Page>::Calls{
-          [this](const wire::Page& sample, const Prefix&) { take_page(sample); }, nullptr});
+          [this](const wire::Page& sample, const Prefix& from) { take_page(sample, from); }, nullptr});
   replies_ = std::make_unique<Inlet<wire::Reply>>(
       *participant_, *topics_.reply, reply_partition(self_), "call_reader",
       Inlet<wire::Reply>::Calls{
@@ -280,7 +280,9 @@ void FastDdsTransport::take_reply(const wire::Reply& sample) {
   }
 }
 
-void FastDdsTransport::take_page(const wire::Page& sample) {
+// Before Fast DDS 2.10 nothing but this keeps a participant from hearing itself.
+void FastDdsTransport::take_page(const wire::Page& sample, const ertps::GuidPrefix_t& from) {
+  if (peer_of(from) == self_) return;
   const auto page = from_wire(sample);
   if (page) {
     handler_->on_page(*page);
@@ -291,6 +293,7 @@ void FastDdsTransport::take_page(const wire::Page& sample) {
 
 void FastDdsTransport::take_presence(const wire::Presence& sample,
                                      const ertps::GuidPrefix_t& from) {
+  if (peer_of(from) == self_) return;
   const auto presence = from_wire(sample);
   if (!presence) {
     log_refused(kPresenceTopic, presence.error());

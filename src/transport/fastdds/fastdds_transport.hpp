@@ -69,7 +69,7 @@ class FastDdsTransport final : public Transport {
   void take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from);
   void take_update(const wire::Update& sample);
   void take_reply(const wire::Reply& sample);
-  void take_page(const wire::Page& sample);
+  void take_page(const wire::Page& sample, const ertps::GuidPrefix_t& from);
   void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from);
   void forget_predecessors(const Presence& presence);
   void presence_matched(const ertps::GuidPrefix_t& from, int change);

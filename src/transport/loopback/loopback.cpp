@@ -1,6 +1,7 @@
 #include "tfdude/transport/loopback.hpp"
 
 #include <algorithm>
+#include <condition_variable>
 #include <map>
 #include <mutex>
 #include <shared_mutex>
@@ -48,6 +49,24 @@ class LoopbackNetwork::Hub {
     return reached;
   }
 
+  /// Waits until there is such a member; false at the deadline.
+  template <class Choose>
+  bool wait_for(Choose choose, Transport::Deadline deadline) {
+    std::unique_lock lock(members_mutex_);
+    return serving_.wait_until(lock, deadline, [&] {
+      return std::any_of(members_.begin(), members_.end(),
+                         [&](const auto& member) { return choose(*member); });
+    });
+  }
+
+  void serve(Member& member, const std::string& partition) {
+    {
+      const std::lock_guard lock(members_mutex_);
+      member.serves = partition;
+    }
+    serving_.notify_all();
+  }
+
   std::shared_ptr<Member> join(TransportHandler& handler) {
     auto member = std::make_shared<Member>();
     member->handler = &handler;
@@ -71,6 +90,7 @@ class LoopbackNetwork::Hub {
       member->handler = nullptr;
     }
     if (!member->presence) return;
+    const std::lock_guard telling(telling_mutex_);
     deliver([](const Member&) { return true; },
             [&](TransportHandler& handler) {
               handler.on_lost(member->presence->partition, member->presence->incarnation);
@@ -89,6 +109,8 @@ class LoopbackNetwork::Hub {
     return all;
   }
 
+  // Held while presences and pages are told, so that who joins hears nothing older after something newer.
+  std::mutex telling_mutex_;
   std::mutex members_mutex_;  // of the list and of what the members say; never held during a call
 
  private:
@@ -101,6 +123,7 @@ class LoopbackNetwork::Hub {
 
   std::vector<std::shared_ptr<Member>> members_;
   std::uint64_t joined_ = 0;
+  std::condition_variable serving_;
   std::shared_mutex leaving_;
   // NOLINTNEXTLINE(*-avoid-non-const-global-variables): what is counted is a thread's, not an object's
   static thread_local int calling_;
@@ -117,6 +140,7 @@ class LoopbackTransport final : public Transport {
   LoopbackTransport& operator=(const LoopbackTransport&) = delete;
 
   Result<void> start(TransportHandler& handler) override {
+    const std::lock_guard telling(hub_->telling_mutex_);
     self_ = hub_->join(handler);
     const auto [presences, pages] = hub_->published(*self_);
     for (const Presence& presence : presences) handler.on_presence(presence);
@@ -131,12 +155,12 @@ class LoopbackTransport final : public Transport {
   }
 
   Result<void> serve(const std::string& partition) override {
-    const std::lock_guard lock(hub_->members_mutex_);
-    self_->serves = partition;
+    hub_->serve(*self_, partition);
     return {};
   }
 
   void announce(const Presence& presence) override {
+    const std::lock_guard telling(hub_->telling_mutex_);
     {
       const std::lock_guard lock(hub_->members_mutex_);
       self_->presence = presence;
@@ -145,6 +169,7 @@ class LoopbackTransport final : public Transport {
   }
 
   void publish(const Page& page) override {
+    const std::lock_guard telling(hub_->telling_mutex_);
     {
       const std::lock_guard lock(hub_->members_mutex_);
       self_->pages[page.number] = page;
@@ -154,13 +179,16 @@ class LoopbackTransport final : public Transport {
 
   void prepare(const std::string&) override {}
 
-  Result<void> send(const std::string& partition, const Request& request, Deadline) override {
-    return send_to(partition,
+  Result<void> send(const std::string& partition, const Request& request,
+                    Deadline deadline) override {
+    return send_to(partition, deadline,
                    [&](TransportHandler& handler) { handler.on_request(self_->id, request); });
   }
 
-  Result<void> send(const std::string& partition, const Update& update, Deadline) override {
-    return send_to(partition, [&](TransportHandler& handler) { handler.on_update(update); });
+  Result<void> send(const std::string& partition, const Update& update,
+                    Deadline deadline) override {
+    return send_to(partition, deadline,
+                   [&](TransportHandler& handler) { handler.on_update(update); });
   }
 
   void reply(const PeerId& to, const Reply& reply) override {
@@ -180,14 +208,14 @@ class LoopbackTransport final : public Transport {
   }
 
   template <class Call>
-  Result<void> send_to(const std::string& partition, Call call) {
-    const auto reached = hub_->deliver(
-        [&](const Member& member) { return !partition.empty() && member.serves == partition; },
-        call);
-    if (reached == 0) {
-      return fail(Errc::kTimeout, "partition " + quote(partition) + " is not there to be asked");
+  Result<void> send_to(const std::string& partition, Deadline deadline, Call call) {
+    const auto serves = [&](const Member& member) {
+      return !partition.empty() && member.serves == partition;
+    };
+    while (hub_->wait_for(serves, deadline)) {
+      if (hub_->deliver(serves, call) > 0) return {};
     }
-    return {};
+    return fail(Errc::kTimeout, "partition " + quote(partition) + " was not there in time");
   }
 
   std::shared_ptr<LoopbackNetwork::Hub> hub_;

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "tfdude/transport/fastdds.hpp"
+#include "tfdude/transport/loopback.hpp"
+
+#include "support/domain_lease.hpp"
+
+// The networks that contract tests run over. Needs TFDUDE_LOOPBACK_PROFILE.
+namespace tfdude::testing {
+
+/// Gives each participant of one test a transport of the same network.
+using Join = std::function<std::unique_ptr<Transport>(const std::string& partition)>;
+
+[[nodiscard]] inline Join join_loopback() {
+  auto network = std::make_shared<LoopbackNetwork>();
+  return [network](const std::string&) { return network->join(); };
+}
+
+[[nodiscard]] inline Join join_fastdds() {
+  // Kept until the process ends, as the participants may live longer than what is returned.
+  static std::deque<DomainLease> leases;
+  const std::uint32_t domain = leases.emplace_back().number();
+  return [domain](const std::string& partition) {
+    return *make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, partition, nullptr});
+  };
+}
+
+[[nodiscard]] inline Join joined_by(int transport) {
+  return transport == 0 ? join_loopback() : join_fastdds();
+}
+
+}  // namespace tfdude::testing
