@@ -81,7 +81,8 @@ Result<void> FastDdsTransport::create_endpoints() {
   pages_ = std::make_unique<Inlet<wire::Page>>(
       *participant_, *topics_.directory, std::string(), "directory_reader",
       Inlet<wire::Page>::Calls{
-          [this](const wire::Page& sample, const Prefix& from) { take_page(sample, from); }, nullptr});
+          [this](const wire::Page& sample, const Prefix& from) { take_page(sample, from); },
+          nullptr});
   replies_ = std::make_unique<Inlet<wire::Reply>>(
       *participant_, *topics_.reply, reply_partition(self_), "call_reader",
       Inlet<wire::Reply>::Calls{

@@ -1,0 +1,139 @@
+// DDS writers that are not ours: plain ones that stream updates, and ones that send what is not well formed.
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "tfdude/client/client.hpp"
+#include "tfdude/transport/fastdds.hpp"
+
+#include "support/catch.hpp"
+#include "support/domain_lease.hpp"
+#include "support/foreign_writer.hpp"
+#include "support/process.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::Bytes;
+using testing::eventually;
+using testing::ForeignWriter;
+using testing::RawType;
+
+struct Counted {
+  Counted(std::uint32_t domain, const std::string& partition, const std::string& frame)
+      : node(*Node::open(
+            *make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, partition, counters}),
+            partition, {{frame, "", {}}, {frame + "_tip", frame, {}}})) {}
+
+  std::shared_ptr<FastDdsCounters> counters = std::make_shared<FastDdsCounters>();
+  Node node;
+};
+
+// A stranger's update of one frame: one metre along x, a millimetre of deviation in each direction.
+wire::Update stranger_update(const std::string& id) {
+  wire::Edge edge;
+  edge.id(id);
+  edge.x_pc() = {};
+  edge.x_pc()[3] = 1.0;  // w of the quaternion
+  edge.x_pc()[4] = 1.0;  // x
+  for (const std::size_t diagonal : {7U, 13U, 18U}) edge.x_pc()[diagonal] = 1e-6;
+  wire::Update update;
+  update.edges({edge});
+  return update;
+}
+
+bool moved(Node& node, const std::string& frame) {
+  const auto X = node.lookup(frame, frame + "_tip");
+  return X && X->pose.translation().x() == 1.0;
+}
+
+}  // namespace
+
+TEST_CASE("a plain writer in partition * reaches the owner, and the others only to their filters") {
+  const testing::DomainLease domain;
+  Counted owner(domain.number(), "owner", "a");
+  Counted other(domain.number(), "other", "b");
+  ForeignWriter writer(domain.number(), "tfdude/update",
+                       fastdds::edds::TypeSupport(new wire::UpdatePubSubType), "*");
+  writer.await_readers(2);
+  wire::Update update = stranger_update("a_tip");
+  writer.write(&update);
+  CHECK(eventually([&] { return moved(owner.node, "a"); }));
+  CHECK(eventually([&] { return other.counters->updates_arrived == 1; }));
+  CHECK(other.counters->updates_passed == 0);
+  CHECK(owner.counters->updates_passed == 1);
+  CHECK_FALSE(moved(other.node, "b"));
+}
+
+namespace {
+
+struct Stranger {
+  const char* topic;
+  const char* type;
+  bool keyed;
+};
+
+constexpr Stranger kStrangers[] = {
+    {"tfdude/request", "tfdude::wire::Request", false},
+    {"tfdude/update", "tfdude::wire::Update", false},
+    {"tfdude/reply", "tfdude::wire::Reply", false},
+    {"tfdude/directory", "tfdude::wire::Page", true},
+    {"tfdude/presence", "tfdude::wire::Presence", true},
+};
+
+// What may come instead: cut short, with lengths that are not true, random bytes with and without a header.
+std::vector<Bytes> malformed(testing::Random& random) {
+  std::vector<Bytes> all;
+  const auto good = testing::bytes_of<wire::UpdatePubSubType>(stranger_update("a_tip"));
+  for (const std::size_t size : {1U, 4U, 7U, 8U, 40U, static_cast<unsigned>(good.size()) - 1U}) {
+    all.emplace_back(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size));
+  }
+  for (const std::size_t length_at : {4U, 8U}) {
+    for (const std::uint8_t byte : std::initializer_list<std::uint8_t>{0x7F, 0xFF}) {
+      all.push_back(good);
+      for (std::size_t i = 0; i < 4; ++i) all.back()[length_at + i] = byte;
+    }
+  }
+  for (int i = 0; i < 50; ++i) {
+    Bytes garbage(1 + random.index(600));
+    for (auto& byte : garbage) byte = static_cast<std::uint8_t>(random.index(256));
+    all.push_back(garbage);
+    if (garbage.size() < 4) continue;
+    for (const std::size_t zero : {0U, 2U, 3U}) garbage[zero] = 0;
+    garbage[1] = 1;  // plain CDR, little endian
+    all.push_back(garbage);
+  }
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("malformed samples are counted, and change nothing") {
+  testing::Random random(20261121);
+  INFO("seed " << random.seed());
+  const testing::DomainLease domain;
+  Counted owner(domain.number(), "owner", "a");
+  Counted other(domain.number(), "other", "b");
+  const auto samples = malformed(random);
+  for (const Stranger& stranger : kStrangers) {
+    INFO("topic " << stranger.topic);
+    const bool durable = stranger.keyed;
+    // Requests, updates and replies are read in DDS partitions of their own, the others in the default one.
+    ForeignWriter writer(domain.number(), stranger.topic,
+                         fastdds::edds::TypeSupport(new RawType(stranger.type, stranger.keyed)),
+                         stranger.keyed ? "" : "*", durable);
+    writer.await_readers(2);
+    for (Bytes sample : samples) writer.write(&sample);
+  }
+  // Of five readers of each participant all counted something, and each answers as before.
+  CHECK(eventually([&] { return owner.counters->malformed > 0 && other.counters->malformed > 0; }));
+  CHECK(other.node.lookup("a", "a_tip"));
+  REQUIRE(other.node.update("a_tip", {}));
+  CHECK_FALSE(moved(owner.node, "a"));
+  CHECK(other.node.frames().size() == 4);
+  CHECK(other.node.partitions().size() == 2);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,81 @@
+#include "support/foreign_writer.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+
+namespace tfdude::testing {
+namespace {
+
+namespace edds = fastdds::edds;
+
+edds::DomainParticipantFactory& factory() {
+  return *edds::DomainParticipantFactory::get_instance();
+}
+
+}  // namespace
+
+RawType::RawType(const std::string& name, bool keyed) {
+#if TFDUDE_FASTDDS_MAJOR == 2
+  setName(name.c_str());
+  m_typeSize = 1U << 16U;
+  m_isGetKeyDefined = keyed;
+#else
+  set_name(name);
+  max_serialized_type_size = 1U << 16U;
+  is_compute_key_provided = keyed;
+#endif
+}
+
+bool RawType::fill(const Bytes& bytes, fastdds::ertps::SerializedPayload_t& payload) {
+  if (bytes.size() > payload.max_size) return false;
+  std::copy(bytes.begin(), bytes.end(), payload.data);
+  payload.length = static_cast<std::uint32_t>(bytes.size());
+  return true;
+}
+
+ForeignWriter::ForeignWriter(std::uint32_t domain, const char* topic_name, edds::TypeSupport type,
+                             const std::string& partition, bool durable) {
+  edds::DomainParticipantQos participant_qos;
+  factory().load_XML_profiles_file(TFDUDE_LOOPBACK_PROFILE);  // once is enough, twice does no harm
+  factory().get_participant_qos_from_profile("tfdude_participant", participant_qos);
+  participant_ = factory().create_participant(domain, participant_qos);
+  if (participant_ == nullptr) throw std::runtime_error("no participant for a foreign writer");
+  type.register_type(participant_);
+  edds::Topic* topic =
+      participant_->create_topic(topic_name, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
+  edds::PublisherQos publisher_qos;
+  if (!partition.empty()) publisher_qos.partition().push_back(partition.c_str());
+  edds::Publisher* publisher = participant_->create_publisher(publisher_qos);
+  edds::DataWriterQos qos;
+  qos.data_sharing().off();
+  qos.endpoint().history_memory_policy = fastdds::ertps::DYNAMIC_REUSABLE_MEMORY_MODE;
+  qos.writer_resource_limits().reader_filters_allocation.maximum = 0;
+  if (durable) qos.durability().kind = edds::TRANSIENT_LOCAL_DURABILITY_QOS;
+  writer_ = publisher->create_datawriter(topic, qos);
+  if (writer_ == nullptr) throw std::runtime_error("no foreign writer");
+}
+
+ForeignWriter::~ForeignWriter() {
+  participant_->delete_contained_entities();
+  factory().delete_participant(participant_);
+}
+
+void ForeignWriter::await_readers(int count) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  edds::PublicationMatchedStatus status;
+  while (writer_->get_publication_matched_status(status), status.current_count < count) {
+    if (std::chrono::steady_clock::now() > deadline) {
+      throw std::runtime_error("the foreign writer met " + std::to_string(status.current_count) +
+                               " of " + std::to_string(count) + " readers");
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+void ForeignWriter::write(void* sample) {
+  if (!fastdds::write(*writer_, sample)) throw std::runtime_error("a foreign write failed");
+}
+
+}  // namespace tfdude::testing

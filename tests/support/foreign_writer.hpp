@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "transport/fastdds/compat.hpp"
+
+// DDS writers that know nothing of this project's library: whatever a stranger in the domain may send.
+namespace tfdude::testing {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// A type that says any name and sends any bytes: the sample is a Bytes, encapsulation header included.
+class RawType final : public fastdds::edds::TopicDataType {
+ public:
+  RawType(const std::string& name, bool keyed);
+
+#if TFDUDE_FASTDDS_MAJOR == 2
+  bool serialize(void* data, fastdds::ertps::SerializedPayload_t* payload) override {
+    return fill(*static_cast<const Bytes*>(data), *payload);
+  }
+  bool deserialize(fastdds::ertps::SerializedPayload_t*, void*) override { return false; }
+  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
+    return [data] { return static_cast<std::uint32_t>(static_cast<const Bytes*>(data)->size()); };
+  }
+  void* createData() override { return new Bytes; }
+  void deleteData(void* data) override { delete static_cast<Bytes*>(data); }
+  bool getKey(void*, fastdds::ertps::InstanceHandle_t* handle, bool) override {
+    handle->value[0] = 1;
+    return true;
+  }
+#else
+  bool serialize(const void* const data, fastdds::ertps::SerializedPayload_t& payload,
+                 fastdds::edds::DataRepresentationId_t) override {
+    return fill(*static_cast<const Bytes*>(data), payload);
+  }
+  bool deserialize(fastdds::ertps::SerializedPayload_t&, void*) override { return false; }
+  std::uint32_t calculate_serialized_size(const void* const data,
+                                          fastdds::edds::DataRepresentationId_t) override {
+    return static_cast<std::uint32_t>(static_cast<const Bytes*>(data)->size());
+  }
+  void* create_data() override { return new Bytes; }
+  void delete_data(void* data) override { delete static_cast<Bytes*>(data); }
+  bool compute_key(fastdds::ertps::SerializedPayload_t&, fastdds::ertps::InstanceHandle_t& handle,
+                   bool) override {
+    handle.value[0] = 1;
+    return true;
+  }
+  bool compute_key(const void* const, fastdds::ertps::InstanceHandle_t& handle, bool) override {
+    handle.value[0] = 1;
+    return true;
+  }
+#endif
+
+ private:
+  static bool fill(const Bytes& bytes, fastdds::ertps::SerializedPayload_t& payload);
+};
+
+/// A sample of a generated type as it stands on the wire.
+template <class GeneratedType, class Sample>
+Bytes bytes_of(Sample sample) {
+  GeneratedType type;
+  fastdds::ertps::SerializedPayload_t payload(1U << 16U);
+#if TFDUDE_FASTDDS_MAJOR == 2
+  const bool done = type.serialize(&sample, &payload);
+#else
+  const bool done = type.serialize(&sample, payload,
+                                   fastdds::edds::DataRepresentationId_t::XCDR_DATA_REPRESENTATION);
+#endif
+  return done ? Bytes(payload.data, payload.data + payload.length) : Bytes();
+}
+
+/// A participant with one writer on one topic, on this computer only.
+class ForeignWriter {
+ public:
+  /// @param partition  of DDS; empty: the default one
+  /// @throws std::runtime_error where it cannot be made.
+  ForeignWriter(std::uint32_t domain, const char* topic, fastdds::edds::TypeSupport type,
+                const std::string& partition, bool durable = false);
+  ~ForeignWriter();
+  ForeignWriter(const ForeignWriter&) = delete;
+  ForeignWriter& operator=(const ForeignWriter&) = delete;
+
+  /// Waits until so many readers were met. @throws std::runtime_error where they are not.
+  void await_readers(int count);
+
+  /// A sample of the writer's type. @throws std::runtime_error where it is not taken.
+  void write(void* sample);
+
+ private:
+  fastdds::edds::DomainParticipant* participant_ = nullptr;
+  fastdds::edds::DataWriter* writer_ = nullptr;
+};
+
+}  // namespace tfdude::testing
