@@ -97,6 +97,11 @@ struct Presence {
   std::uint32_t pid = 0;
   std::uint32_t pages = 0;  ///< how many pages its structure has
   bool serving = false;     ///< false: the name is only being claimed yet
+
+  friend bool operator==(const Presence& a, const Presence& b) {
+    return a.partition == b.partition && a.incarnation == b.incarnation && a.host == b.host &&
+           a.pid == b.pid && a.pages == b.pages && a.serving == b.serving;
+  }
 };
 
 }  // namespace tfdude

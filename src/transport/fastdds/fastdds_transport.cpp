@@ -37,6 +37,7 @@ Result<void> FastDdsTransport::start(TransportHandler& handler) {
   prepare_library();
   if (auto loaded = load_profiles(options_.profile); !loaded) return loaded;
   worker_.emplace();
+  worker_->repeat(Peers::kSpeakEvery / 2, [this] { keep_in_touch(); });
   if (auto created = create_participant(); !created) return created;
   return create_endpoints();
 }
@@ -77,7 +78,7 @@ Result<void> FastDdsTransport::create_endpoints() {
       *participant_, *topics_.presence, std::string(), "presence_reader",
       Inlet<wire::Presence>::Calls{
           [this](const wire::Presence& sample, const Prefix& from) { take_presence(sample, from); },
-          [this](const Prefix& from, int change) { presence_matched(from, change); }});
+          nullptr});
   pages_ = std::make_unique<Inlet<wire::Page>>(
       *participant_, *topics_.directory, std::string(), "directory_reader",
       Inlet<wire::Page>::Calls{
@@ -152,8 +153,17 @@ void FastDdsTransport::stop() {
 // --- sending ---
 
 void FastDdsTransport::announce(const Presence& presence) {
-  wire::Presence sample = to_wire(presence);
-  presence_outlet_->write(&sample);
+  const std::lock_guard lock(presence_mutex_);
+  said_ = to_wire(presence);
+  presence_outlet_->write(&*said_);
+}
+
+// Every second time it speaks, each time it looks who has fallen silent.
+void FastDdsTransport::keep_in_touch() {
+  peers_.look_for_silent(Peers::Clock::now());
+  const std::lock_guard lock(presence_mutex_);
+  to_speak_ = !to_speak_;
+  if (said_ && to_speak_) presence_outlet_->write(&*said_);
 }
 
 void FastDdsTransport::publish(const Page& page) {
@@ -300,40 +310,7 @@ void FastDdsTransport::take_presence(const wire::Presence& sample,
     log_refused(kPresenceTopic, presence.error());
     return;
   }
-  {
-    const std::lock_guard lock(presences_mutex_);
-    if (presence->serving) forget_predecessors(*presence);
-    presences_[peer_of(from)] = *presence;
-  }
-  handler_->on_presence(*presence);
-  peers_.present(from);
-}
-
-// Who serves a partition has outlived those who did before.
-void FastDdsTransport::forget_predecessors(const Presence& presence) {
-  for (auto known = presences_.begin(); known != presences_.end();) {
-    const bool gone = known->second.partition == presence.partition &&
-                      known->second.incarnation < presence.incarnation;
-    known = gone ? presences_.erase(known) : std::next(known);
-  }
-}
-
-// Whoever was silent for so long that it was taken for gone is met again, but what it said before is not
-// delivered a second time: hence nothing is forgotten as it goes.
-void FastDdsTransport::presence_matched(const ertps::GuidPrefix_t& from, int change) {
-  Presence presence;
-  {
-    const std::lock_guard lock(presences_mutex_);
-    const auto known = presences_.find(peer_of(from));
-    if (known == presences_.end()) return;
-    presence = known->second;
-  }
-  if (change > 0) {
-    handler_->on_presence(presence);
-    peers_.present(from);
-  } else {
-    handler_->on_lost(presence.partition, presence.incarnation);
-  }
+  peers_.present(from, *presence);
 }
 
 }  // namespace tfdude::fastdds

@@ -59,6 +59,7 @@ class FastDdsTransport final : public Transport {
   edds::Topic* create_topic(const char* name, const edds::TypeSupport& type);
   edds::ContentFilteredTopic* create_filtered(edds::Topic* topic, const std::string& partition);
 
+  void keep_in_touch();
   std::shared_ptr<Outlet> outlet(Outlets& outlets, edds::Topic* topic, const std::string& partition,
                                  const char* profile);
   std::shared_ptr<Outlet> reply_outlet(const PeerId& peer);
@@ -71,21 +72,23 @@ class FastDdsTransport final : public Transport {
   void take_reply(const wire::Reply& sample);
   void take_page(const wire::Page& sample, const ertps::GuidPrefix_t& from);
   void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from);
-  void forget_predecessors(const Presence& presence);
-  void presence_matched(const ertps::GuidPrefix_t& from, int change);
 
   const FastDdsOptions options_;
   const std::shared_ptr<FastDdsCounters> counters_;
   TransportHandler* handler_ = nullptr;
-  Peers peers_;
+  Peers peers_{[this](const Presence& presence) { handler_->on_presence(presence); },
+               [this](const Presence& presence) {
+                 handler_->on_lost(presence.partition, presence.incarnation);
+               }};
 
   ParticipantListener<FastDdsTransport> participant_listener_{*this};
   edds::DomainParticipant* participant_ = nullptr;
   PeerId self_{};
   Topics topics_;
 
-  std::mutex presences_mutex_;
-  std::map<PeerId, Presence> presences_;  // as last heard of each participant
+  std::mutex presence_mutex_;
+  bool to_speak_ = false;
+  std::optional<wire::Presence> said_;  // what this participant serves, as last announced
 
   std::mutex outlets_mutex_;
   Outlets request_outlets_;

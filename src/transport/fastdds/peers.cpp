@@ -33,24 +33,40 @@ std::string participant_name(const std::string& partition) {
 void Peers::met(const ertps::GuidPrefix_t& prefix, const std::string& name) {
   const std::lock_guard lock(mutex_);
   last_met_ = Clock::now();
-  if (name.rfind(kServer, 0) == 0) servers_.emplace(peer_of(prefix), false);
+  if (name.rfind(kServer, 0) == 0) servers_.try_emplace(peer_of(prefix));
 }
 
 void Peers::left(const ertps::GuidPrefix_t& prefix) {
   const std::lock_guard lock(mutex_);
-  servers_.erase(peer_of(prefix));
+  const auto known = servers_.find(peer_of(prefix));
+  if (known == servers_.end()) return;
+  if (known->second.presence && !known->second.silent) gone_(*known->second.presence);
+  servers_.erase(known);
 }
 
-void Peers::present(const ertps::GuidPrefix_t& prefix) {
+void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence) {
   const std::lock_guard lock(mutex_);
-  servers_[peer_of(prefix)] = true;
+  Server& server = servers_[peer_of(prefix)];
+  server.last_heard = Clock::now();
+  if (!std::exchange(server.silent, false) && server.presence == presence) return;
+  server.presence = presence;
+  there_(presence);
+}
+
+void Peers::look_for_silent(Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  for (auto& [id, server] : servers_) {
+    if (!server.presence || server.silent || now - server.last_heard < kSilence) continue;
+    server.silent = true;
+    gone_(*server.presence);
+  }
 }
 
 bool Peers::settled() const {
   const std::lock_guard lock(mutex_);
   return !servers_.empty() && Clock::now() - last_met_ >= kQuiet &&
          std::all_of(servers_.begin(), servers_.end(),
-                     [](const auto& server) { return server.second; });
+                     [](const auto& server) { return server.second.presence.has_value(); });
 }
 
 }  // namespace tfdude::fastdds

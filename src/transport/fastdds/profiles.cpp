@@ -93,6 +93,10 @@ edds::DataReaderQos reader_qos(edds::Subscriber& subscriber, const std::string& 
     return subscriber.get_datareader_qos_from_profile(profile, qos);
   });
   qos.endpoint().history_memory_policy = kMemoryPolicy;
+  // A socket of its own, that other traffic does not fill: else the living would seem dead.
+  if (name == "presence_reader") {
+    qos.properties().properties().emplace_back("fastdds.unique_network_flows", "");
+  }
   return qos;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -8,7 +9,8 @@
 
 namespace tfdude::fastdds {
 
-/// A thread that does what must not be done in a DDS callback: creating and deleting entities.
+/// A thread that does what must not be done in a DDS callback, creating and deleting entities, and what
+/// is to be done again and again.
 class Worker {
  public:
   Worker() : thread_([this] { run(); }) {}
@@ -24,6 +26,15 @@ class Worker {
     changed_.notify_one();
   }
 
+  /// Does a job once a period from now on, between the others. One such job at a time.
+  void repeat(std::chrono::milliseconds period, std::function<void()> job) {
+    post([this, period, job = std::move(job)]() mutable {
+      period_ = period;
+      repeated_ = std::move(job);
+      due_ = Clock::now() + period_;
+    });
+  }
+
   /// Finishes the job at hand and drops the rest.
   void stop() {
     {
@@ -35,15 +46,26 @@ class Worker {
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   void run() {
     std::unique_lock lock(mutex_);
     while (true) {
-      changed_.wait(lock, [this] { return stopping_ || !jobs_.empty(); });
+      // By a copy, which the jobs may not change while it is waited for.
+      const Clock::time_point due = due_;
+      changed_.wait_until(lock, due, [this] { return stopping_ || !jobs_.empty(); });
       if (stopping_) return;
-      const auto job = std::move(jobs_.front());
-      jobs_.pop_front();
+      std::function<void()> job;
+      if (!jobs_.empty()) {
+        job = std::move(jobs_.front());
+        jobs_.pop_front();
+      }
       lock.unlock();
-      job();
+      if (job) job();
+      if (repeated_ && Clock::now() >= due_) {
+        due_ = Clock::now() + period_;
+        repeated_();
+      }
       lock.lock();
     }
   }
@@ -52,6 +74,10 @@ class Worker {
   std::condition_variable changed_;
   std::deque<std::function<void()>> jobs_;
   bool stopping_ = false;
+  // Of the thread alone.
+  std::chrono::milliseconds period_{};
+  std::function<void()> repeated_;
+  Clock::time_point due_ = Clock::now() + std::chrono::hours(1);
   std::thread thread_;
 };
 
