@@ -1,6 +1,6 @@
 // A participant that calls all others from several threads at once, for busy_test.cpp:
 //
-//   busy_node DOMAIN PROFILE SECONDS NAME [CONFIG]
+//   busy_node DOMAIN SECONDS NAME [CONFIG]
 //
 // With a configuration it owns its frames, else none. It prints "ready" once it sees all partitions, works,
 // prints "done calls=N" and serves on until SIGTERM, as others may still be calling it. Its exit status is
@@ -113,19 +113,19 @@ void work_on(Work& work) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 5) return 2;
+  if (argc < 4) return 2;
   sigset_t stop;
   sigemptyset(&stop);
   sigaddset(&stop, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &stop, nullptr);
   Options options;
   options.domain = static_cast<std::uint32_t>(std::strtoul(argv[1], nullptr, 10));
-  options.profile = argv[2];
+  options.profile = TFDUDE_LOOPBACK_PROFILE;
   options.timeout = Milliseconds(10000);  // beyond it is a deadlock rather than a busy machine
   std::optional<Client> client;
   std::string partition;
-  if (argc > 5) {
-    const auto config = load_config(argv[5]);
+  if (argc > 4) {
+    const auto config = load_config(argv[4]);
     partition = config->partition;
     client.emplace(*Node::open(partition, config->frames, options));
   } else {
@@ -134,8 +134,8 @@ int main(int argc, char** argv) {
   if (!testing::eventually([&] { return sees_all(*client); })) return 3;
   std::puts("ready");
   std::fflush(stdout);
-  const auto seconds = std::chrono::seconds(std::strtol(argv[3], nullptr, 10));
-  Work work{*client, argv[4], partition, {}, Clock::now() + seconds};
+  const auto seconds = std::chrono::seconds(std::strtol(argv[2], nullptr, 10));
+  Work work{*client, argv[3], partition, {}, Clock::now() + seconds};
   work_on(work);
   std::printf("done calls=%u errors=%u\n", work.calls.load(), work.errors.load());
   std::fflush(stdout);

@@ -28,12 +28,12 @@ TEST_CASE("busy: five owners and three clients call each other without error or 
   std::vector<Process> processes;
   for (const auto& partition : testing::five_partitions(random, false)) {
     const auto config = directory.write(partition.name + ".yaml", partition.yaml());
-    processes.emplace_back(std::vector<std::string>{TFDUDE_BUSY_NODE, number, domain.profile(),
-                                                    kSeconds, "owner_" + partition.name, config});
+    processes.emplace_back(std::vector<std::string>{TFDUDE_BUSY_NODE, number, kSeconds,
+                                                    "owner_" + partition.name, config});
   }
   for (int i = 0; i < kClients; ++i) {
-    processes.emplace_back(std::vector<std::string>{TFDUDE_BUSY_NODE, number, domain.profile(),
-                                                    kSeconds, "client_" + std::to_string(i)});
+    processes.emplace_back(std::vector<std::string>{TFDUDE_BUSY_NODE, number, kSeconds,
+                                                    "client_" + std::to_string(i)});
   }
   for (Process& process : processes) {
     const auto done = process.wait_for_line("done ", in_time());

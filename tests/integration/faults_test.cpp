@@ -53,7 +53,7 @@ std::string host() {
 }  // namespace
 
 TEST_CASE("faults: who needs a killed daemon is told at once, and others do not notice") {
-  ThesisDaemons d(TFDUDE_LOOPBACK_PROFILE);
+  ThesisDaemons d;
   auto client = *Client::open(d.domain.options(kPatience));
   REQUIRE(client.lookup("world", "hand_left"));
   d.arms->kill();
@@ -67,7 +67,7 @@ TEST_CASE("faults: who needs a killed daemon is told at once, and others do not 
 }
 
 TEST_CASE("faults: an owner is told of a killed daemon, and goes on with its own frames") {
-  testing::TestDomain domain(TFDUDE_LOOPBACK_PROFILE);
+  testing::TestDomain domain;
   Process arms = domain.serve(kArmsFile);
   auto robot =
       *Node::open("robot", {{"world", "", {}}, {"robot_1", "world", {}}}, domain.options());
@@ -82,7 +82,7 @@ TEST_CASE("faults: an owner is told of a killed daemon, and goes on with its own
 }
 
 TEST_CASE("faults: a killed daemon that is started again is asked again") {
-  ThesisDaemons d(TFDUDE_LOOPBACK_PROFILE);
+  ThesisDaemons d;
   auto client = *Client::open(d.domain.options());
   for (int round = 0; round < 3; ++round) {
     const auto before = client.lookup("world", "hand_left");
@@ -101,7 +101,7 @@ TEST_CASE("faults: a killed daemon that is started again is asked again") {
 }
 
 TEST_CASE("faults: a hanging partition costs its caller the time-out, and recovers") {
-  ThesisDaemons d(TFDUDE_LOOPBACK_PROFILE);
+  ThesisDaemons d;
   // Shorter than it takes to notice that a partition is gone.
   auto client = *Client::open(d.domain.options(Milliseconds(50)));
   REQUIRE(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
@@ -119,7 +119,7 @@ TEST_CASE("faults: a hanging partition costs its caller the time-out, and recove
 }
 
 TEST_CASE("faults: a partition that DDS had given up is met again") {
-  ThesisDaemons d(TFDUDE_LOOPBACK_PROFILE);
+  ThesisDaemons d;
   auto client = *Client::open(d.domain.options(kPatience));
   for (int round = 0; round < 3; ++round) {
     REQUIRE(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
@@ -136,7 +136,7 @@ TEST_CASE("faults: a partition that DDS had given up is met again") {
 }
 
 TEST_CASE("faults: a second daemon of the same name is refused") {
-  ThesisDaemons d(TFDUDE_LOOPBACK_PROFILE);
+  ThesisDaemons d;
   Process second = d.domain.start_daemon({"--config", kArmsFile});
   const auto result = finish(second);
   CHECK(result.status != 0);
@@ -150,7 +150,7 @@ TEST_CASE("faults: a second daemon of the same name is refused") {
 
 TEST_CASE("faults: of two daemons of one name at the same instant exactly one serves") {
   for (int round = 0; round < 4; ++round) {
-    testing::TestDomain domain(TFDUDE_LOOPBACK_PROFILE);
+    testing::TestDomain domain;
     std::vector<Process> daemons;
     for (int i = 0; i < 2; ++i) daemons.push_back(domain.start_daemon({"--config", kArmsFile}));
     REQUIRE(eventually([&] { return !daemons[0].runs() || !daemons[1].runs(); }));
@@ -171,7 +171,7 @@ TEST_CASE("faults: of two daemons of one name at the same instant exactly one se
 
 TEST_CASE("faults: a daemon that is told to stop says goodbye and exits well") {
   const int signal = GENERATE(2, 15);  // SIGINT, SIGTERM
-  ThesisDaemons d(TFDUDE_LOOPBACK_PROFILE);
+  ThesisDaemons d;
   auto client = *Client::open(d.domain.options(kPatience));
   REQUIRE(client.lookup("world", "hand_left"));
   d.arms->signal(signal);

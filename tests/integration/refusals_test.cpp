@@ -25,7 +25,8 @@ using Arguments = std::vector<std::string>;
 class MutePartition final : public TransportHandler {
  public:
   MutePartition(const TestDomain& domain, const std::string& name, const std::string& frame)
-      : transport_(*make_fastdds_transport({domain.number(), domain.profile(), name, nullptr})) {
+      : transport_(
+            *make_fastdds_transport({domain.number(), TFDUDE_LOOPBACK_PROFILE, name, nullptr})) {
     REQUIRE(transport_->start(*this));
     REQUIRE(transport_->serve(name));
     transport_->publish({name, 0, 1, 1, {{frame, ""}}});

@@ -8,7 +8,7 @@ namespace tfdude::testing {
 Options TestDomain::options(Milliseconds timeout) const {
   Options options;
   options.domain = number();
-  options.profile = profile_;
+  options.profile = TFDUDE_LOOPBACK_PROFILE;
   options.timeout = timeout;
   return options;
 }
@@ -20,7 +20,7 @@ std::vector<std::string> TestDomain::command(const char* program,
   };
   std::vector<std::string> command{program};
   if (!given("--domain")) command.insert(command.end(), {"--domain", std::to_string(number())});
-  if (!given("--profile")) command.insert(command.end(), {"--profile", profile_});
+  if (!given("--profile")) command.insert(command.end(), {"--profile", TFDUDE_LOOPBACK_PROFILE});
   command.insert(command.end(), arguments.begin(), arguments.end());
   return command;
 }

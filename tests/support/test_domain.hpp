@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
@@ -22,11 +21,7 @@ struct CliResult {
 /// A DDS domain that no other test uses now, on this computer only, and the service's programs in it.
 class TestDomain {
  public:
-  explicit TestDomain(std::string profile = TFDUDE_PATIENT_PROFILE)
-      : profile_(std::move(profile)) {}
-
   [[nodiscard]] std::uint32_t number() const { return lease_.number(); }
-  [[nodiscard]] const std::string& profile() const { return profile_; }
 
   /// For clients in the test's process. The time-out is long, so that a busy machine is not an error.
   [[nodiscard]] Options options(Milliseconds timeout = Milliseconds(20000)) const;
@@ -44,7 +39,6 @@ class TestDomain {
   [[nodiscard]] std::vector<std::string> command(const char* program,
                                                  const std::vector<std::string>& arguments) const;
 
-  std::string profile_;
   DomainLease lease_;
 };
 

@@ -13,8 +13,6 @@ inline const std::string kArmsFile = TFDUDE_EXAMPLES "/thesis/arms.yaml";
 
 /// Both served by daemons.
 struct ThesisDaemons {
-  explicit ThesisDaemons(const std::string& profile = TFDUDE_PATIENT_PROFILE) : domain(profile) {}
-
   TestDomain domain;
   Process robot = domain.serve(kRobotFile);
   std::optional<Process> arms = domain.serve(kArmsFile);
