@@ -11,6 +11,9 @@ namespace {
 // How long the participant of a killed predecessor may still seem alive.
 constexpr Milliseconds kPredecessorGone{1500};
 
+// How much longer than usual somebody who was met may take to say which partition it serves.
+constexpr Milliseconds kSlowPresence{3000};
+
 std::uint64_t nanoseconds_since_epoch() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   return static_cast<std::uint64_t>(
@@ -53,8 +56,12 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
 Result<void> Participant::claim_name() {
   transport_->announce(presence_);
   const auto met = Clock::now() + transport_->settle_time();
+  {
+    std::unique_lock lock(structure_mutex_);
+    structure_changed_.wait_until(lock, met, [this] { return rival_ && rival_->serving; });
+  }
+  while (transport_->awaits_presence() && Clock::now() < met + kSlowPresence) wait_for_news();
   std::unique_lock lock(structure_mutex_);
-  structure_changed_.wait_until(lock, met, [this] { return rival_ && rival_->serving; });
   structure_changed_.wait_until(lock, Clock::now() + kPredecessorGone,
                                 [this] { return !rival_ || !rival_->serving; });
   if (!rival_ || (!rival_->serving && rival_->incarnation > presence_.incarnation)) return {};

@@ -70,6 +70,9 @@ class Transport {
   /// Whether the presence of all who were there when this participant started should have come by now.
   [[nodiscard]] virtual bool settled() const = 0;
 
+  /// Whether somebody was met who has not said yet which partition it serves.
+  [[nodiscard]] virtual bool awaits_presence() const = 0;
+
   /// How long a new participant needs to meet all others, by experience.
   [[nodiscard]] virtual Milliseconds settle_time() const = 0;
 };

@@ -64,8 +64,16 @@ void Peers::look_for_silent(Clock::time_point now) {
 
 bool Peers::settled() const {
   const std::lock_guard lock(mutex_);
-  return !servers_.empty() && Clock::now() - last_met_ >= kQuiet &&
-         std::all_of(servers_.begin(), servers_.end(),
+  return !servers_.empty() && Clock::now() - last_met_ >= kQuiet && all_present();
+}
+
+bool Peers::await_presence() const {
+  const std::lock_guard lock(mutex_);
+  return !all_present();
+}
+
+bool Peers::all_present() const {
+  return std::all_of(servers_.begin(), servers_.end(),
                      [](const auto& server) { return server.second.presence.has_value(); });
 }
 

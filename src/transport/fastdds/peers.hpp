@@ -24,7 +24,8 @@ namespace tfdude::fastdds {
 [[nodiscard]] std::string participant_name(const std::string& partition);
 
 /// Who was met, what each said that it serves, and who has fallen silent. Thread-safe; what is told is told
-/// under a lock, so that of one peer all is told in order.
+/// under a lock, so that of one peer all is told in order: whoever is told must not hold a lock of its own
+/// when it asks here.
 ///
 /// Each server says what it serves ten times a second, to readers with sockets of their own, which no other
 /// traffic fills. Leases of Fast DDS 2.9 are not used for this: a short one of a participant ends the
@@ -56,7 +57,12 @@ class Peers {
   /// Whether some server was met, nobody new for a while, and all servers have said what they serve.
   [[nodiscard]] bool settled() const;
 
+  /// Whether some server was met that has not said yet what it serves.
+  [[nodiscard]] bool await_presence() const;
+
  private:
+  [[nodiscard]] bool all_present() const;
+
   struct Server {
     std::optional<Presence> presence;
     Clock::time_point last_heard;

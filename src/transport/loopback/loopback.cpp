@@ -197,6 +197,7 @@ class LoopbackTransport final : public Transport {
   }
 
   [[nodiscard]] bool settled() const override { return true; }
+  [[nodiscard]] bool awaits_presence() const override { return false; }
   [[nodiscard]] Milliseconds settle_time() const override { return Milliseconds(0); }
 
  private:
