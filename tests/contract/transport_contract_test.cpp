@@ -276,16 +276,16 @@ TEST_CASE("messages of the largest size arrive whole") {
   CHECK(std::get<UpdateRequest>(by_arms.requests.at(0).body).edges.size() == 4096);
 }
 
-// ---- page order: see also transport_threads_contract_test.cpp
-
 TEST_CASE("pages of one sender arrive in order, and the last of each arrives") {
   const Join join = joined_by(GENERATE(0, 1));
   const Listener client(join);
   Server arms(join, "arms");
   REQUIRE(client.hears([](const Heard& h) { return h.presence("arms", 1); }));
+  // Large enough that some are lost on the way, and come later or not at all.
+  const std::vector<PageEntry> entries(60, PageEntry{std::string(255, 'i'), std::string(255, 'p')});
   constexpr std::uint64_t kLast = 600;
   for (std::uint64_t epoch = 1; epoch <= kLast; ++epoch) {
-    arms.publish(static_cast<std::uint32_t>(epoch % 3), epoch);
+    arms.publish(static_cast<std::uint32_t>(epoch % 3), epoch, entries);
   }
   for (std::uint64_t epoch = kLast - 2; epoch <= kLast; ++epoch) {
     CHECK(client.hears([epoch](const Heard& h) {

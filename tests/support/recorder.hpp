@@ -64,6 +64,8 @@ class Recorder final : public TransportHandler {
 
   /// Set before the transport starts: what to do with a request besides recording it.
   std::function<void(const PeerId&, const Request&)> answer;
+  /// Set before the transport starts: what to do with a presence besides recording it.
+  std::function<void()> greet;
   /// Set before the transport starts: the frames held here.
   std::set<std::string, std::less<>> frames;
 
@@ -100,6 +102,7 @@ class Recorder final : public TransportHandler {
   }
   void on_presence(const Presence& presence) override {
     record([&] { heard_.presences.push_back(presence); });
+    if (greet) greet();
   }
   void on_lost(const std::string& partition, std::uint64_t incarnation) override {
     record([&] { heard_.lost.emplace_back(partition, incarnation); });

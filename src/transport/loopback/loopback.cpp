@@ -4,7 +4,6 @@
 #include <condition_variable>
 #include <map>
 #include <mutex>
-#include <shared_mutex>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -13,19 +12,22 @@
 
 namespace tfdude {
 
-/// Who is there, and what late joiners must be told. Handlers are called under a shared lock (so that
-/// stop() can wait for them); they may send, hence the lock is taken once a thread.
+/// Who is there, and what late joiners must be told.
 class LoopbackNetwork::Hub {
  public:
   struct Member {
     PeerId id{};
-    TransportHandler* handler = nullptr;
     std::string serves;
     std::optional<Presence> presence;
     std::map<std::uint32_t, Page> pages;
+
+    std::mutex mutex;  // of the rest; not held during a call, since handlers may send
+    std::condition_variable idle;
+    TransportHandler* handler = nullptr;  // null: has left
+    int calls = 0;                        // of the handler, under way
   };
 
-  /// Calls the handler of each member chosen while none can leave.
+  /// Calls the handler of each member chosen that has not left. @return how many
   template <class Choose, class Call>
   std::size_t deliver(Choose choose, Call call) {
     std::vector<std::shared_ptr<Member>> chosen;
@@ -36,16 +38,7 @@ class LoopbackNetwork::Hub {
       }
     }
     std::size_t reached = 0;
-    for (const auto& member : chosen) {
-      if (calling_ > 0) {
-        reached += call_if_there(*member, call);
-      } else {
-        const std::shared_lock lock(leaving_);
-        ++calling_;
-        reached += call_if_there(*member, call);
-        --calling_;
-      }
-    }
+    for (const auto& member : chosen) reached += call_if_there(*member, call);
     return reached;
   }
 
@@ -85,9 +78,9 @@ class LoopbackNetwork::Hub {
       members_.erase(std::remove(members_.begin(), members_.end(), member), members_.end());
     }
     {
-      // Waits until no call into a handler is under way.
-      const std::unique_lock lock(leaving_);
+      std::unique_lock lock(member->mutex);
       member->handler = nullptr;
+      member->idle.wait(lock, [&] { return member->calls == 0; });
     }
     if (!member->presence) return;
     const std::lock_guard telling(telling_mutex_);
@@ -115,22 +108,24 @@ class LoopbackNetwork::Hub {
 
  private:
   template <class Call>
-  static std::size_t call_if_there(const Member& member, Call& call) {
-    if (member.handler == nullptr) return 0;
-    call(*member.handler);
+  static std::size_t call_if_there(Member& member, Call& call) {
+    TransportHandler* handler = nullptr;
+    {
+      const std::lock_guard lock(member.mutex);
+      handler = member.handler;
+      if (handler == nullptr) return 0;
+      ++member.calls;
+    }
+    call(*handler);
+    const std::lock_guard lock(member.mutex);
+    if (--member.calls == 0) member.idle.notify_all();
     return 1;
   }
 
   std::vector<std::shared_ptr<Member>> members_;
   std::uint64_t joined_ = 0;
   std::condition_variable serving_;
-  std::shared_mutex leaving_;
-  // NOLINTNEXTLINE(*-avoid-non-const-global-variables): what is counted is a thread's, not an object's
-  static thread_local int calling_;
 };
-
-// NOLINTNEXTLINE(*-avoid-non-const-global-variables): as declared
-thread_local int LoopbackNetwork::Hub::calling_ = 0;
 
 class LoopbackTransport final : public Transport {
  public:

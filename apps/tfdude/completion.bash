@@ -1,0 +1,56 @@
+# Completion of tfdude's commands, options and frames for bash; installed where bash-completion looks for it.
+# The frames are asked for with the domain and profile already on the line, for half a second at most.
+
+_tfdude_common() {
+  local i
+  for ((i = 1; i < COMP_CWORD; ++i)); do
+    case ${COMP_WORDS[i]} in
+      --domain | --profile) printf '%s\n%s\n' "${COMP_WORDS[i]}" "${COMP_WORDS[i + 1]}" ;;
+    esac
+  done
+}
+
+_tfdude_command() {
+  local i
+  for ((i = 1; i < COMP_CWORD; ++i)); do
+    case ${COMP_WORDS[i]} in
+      --domain | --profile | --timeout) ((++i)) ;;
+      -*) ;;
+      *) echo "${COMP_WORDS[i]}"; return ;;
+    esac
+  done
+}
+
+_tfdude() {
+  local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command words common
+  local commands="tree frames partitions roots parent children exists lookup watch add update remove move"
+  local pose="--xyz --rpy --quat --stddev --cov"
+  COMPREPLY=()
+  command=$(_tfdude_command)
+  mapfile -t common < <(_tfdude_common)
+  case $previous in
+    --profile) mapfile -t COMPREPLY < <(compgen -f -- "$word"); return ;;
+    --domain | --timeout | --rate | --xyz | --rpy | --quat | --stddev) return ;;
+    --partition) words=$(timeout 0.5 tfdude "${common[@]}" partitions 2>/dev/null | cut -d' ' -f1) ;;
+    --parent) words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null) ;;
+    *)
+      if [[ $word == -* ]]; then
+        words="--help --domain --profile --timeout --json"
+        case $command in
+          add) words+=" --parent --partition $pose" ;;
+          update) words+=" $pose" ;;
+          move) words+=" --parent $pose" ;;
+          lookup) words+=" --cov" ;;
+          watch) words+=" --rate" ;;
+        esac
+      elif [[ -z $command ]]; then
+        words=$commands
+      elif [[ $command =~ ^(parent|children|exists|lookup|watch|update|remove|move)$ ]]; then
+        words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null)
+      fi
+      ;;
+  esac
+  mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
+}
+
+complete -F _tfdude tfdude
