@@ -86,8 +86,11 @@ Result<void> FastDdsTransport::create_endpoints() {
           nullptr});
   replies_ = std::make_unique<Inlet<wire::Reply>>(
       *participant_, *topics_.reply, reply_partition(self_), "call_reader",
-      Inlet<wire::Reply>::Calls{
-          [this](const wire::Reply& sample, const Prefix&) { take_reply(sample); }, nullptr});
+      Inlet<wire::Reply>::Calls{[this](const wire::Reply& sample, const Prefix& from) {
+                                  peers_.heard(from);
+                                  take_reply(sample);
+                                },
+                                nullptr});
   if (!presence_->good() || !pages_->good() || !replies_->good()) return not_created("the readers");
   if (options_.partition.empty()) return {};
   presence_outlet_ =

@@ -53,6 +53,15 @@ void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence)
   there_(presence);
 }
 
+void Peers::heard(const ertps::GuidPrefix_t& prefix) {
+  const std::lock_guard lock(mutex_);
+  const auto known = servers_.find(peer_of(prefix));
+  if (known == servers_.end()) return;
+  Server& server = known->second;
+  server.last_heard = Clock::now();
+  if (std::exchange(server.silent, false)) there_(*server.presence);
+}
+
 void Peers::look_for_silent(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   for (auto& [id, server] : servers_) {

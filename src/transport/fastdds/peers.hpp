@@ -50,6 +50,8 @@ class Peers {
   void met(const ertps::GuidPrefix_t& prefix, const std::string& name);
   void left(const ertps::GuidPrefix_t& prefix);
   void present(const ertps::GuidPrefix_t& prefix, const Presence& presence);
+  /// A server sent something else: a sign of life, should what it says of itself be late.
+  void heard(const ertps::GuidPrefix_t& prefix);
 
   /// Tells who has fallen silent since the last time.
   void look_for_silent(Clock::time_point now);
