@@ -120,7 +120,7 @@ int main(int argc, char** argv) {
   pthread_sigmask(SIG_BLOCK, &stop, nullptr);
   Options options;
   options.domain = static_cast<std::uint32_t>(std::strtoul(argv[1], nullptr, 10));
-  options.profile = TFDUDE_LOOPBACK_PROFILE;
+  options.profile = TFDUDE_PATIENT_PROFILE;
   options.timeout = Milliseconds(10000);  // beyond it is a deadlock rather than a busy machine
   std::optional<Client> client;
   std::string partition;

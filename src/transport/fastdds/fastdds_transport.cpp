@@ -11,6 +11,8 @@
 namespace tfdude::fastdds {
 namespace {
 
+constexpr std::chrono::seconds kLongLease{10};
+
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
 
 tl::unexpected<Error> not_created(const char* what) {
@@ -46,6 +48,7 @@ Result<void> FastDdsTransport::create_participant() {
   edds::DomainParticipantQos qos = participant_qos();
   qos.name(participant_name(options_.partition));
   qos.properties().properties().emplace_back("fastdds.ignore_local_endpoints", "true");
+  take_lease(qos);
   Entrance entrance;
   entrance.prepare(qos, options_.domain, options_.partition.empty());
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
@@ -65,6 +68,15 @@ Result<void> FastDdsTransport::create_participant() {
                    topics_.reply != nullptr && topics_.request != nullptr &&
                    topics_.update != nullptr;
   return all ? Result<void>() : not_created("the topics");
+}
+
+// The profile's lease is for what is noticed here; DDS itself keeps a match for longer (see Peers).
+void FastDdsTransport::take_lease(edds::DomainParticipantQos& qos) {
+  auto& lease = qos.wire_protocol().builtin.discovery_config.leaseDuration;
+  const auto silence =
+      std::chrono::seconds(lease.seconds) + std::chrono::nanoseconds(lease.nanosec);
+  peers_.set_silence(silence);
+  if (silence < kLongLease) lease = {static_cast<std::int32_t>(kLongLease.count()), 0};
 }
 
 edds::Topic* FastDdsTransport::create_topic(const char* name, const edds::TypeSupport& type) {

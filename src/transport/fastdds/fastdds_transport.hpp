@@ -57,6 +57,7 @@ class FastDdsTransport final : public Transport {
 
   Result<void> create_participant();
   Result<void> create_endpoints();
+  void take_lease(edds::DomainParticipantQos& qos);
   edds::Topic* create_topic(const char* name, const edds::TypeSupport& type);
   edds::ContentFilteredTopic* create_filtered(edds::Topic* topic, const std::string& partition);
 

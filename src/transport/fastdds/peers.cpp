@@ -64,8 +64,10 @@ void Peers::heard(const ertps::GuidPrefix_t& prefix) {
 
 void Peers::look_for_silent(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
+  const auto late = now - std::exchange(last_look_, now) - kSpeakEvery;
   for (auto& [id, server] : servers_) {
-    if (!server.presence || server.silent || now - server.last_heard < kSilence) continue;
+    if (late > late.zero()) server.last_heard += late;
+    if (!server.presence || server.silent || now - server.last_heard < silence_) continue;
     server.silent = true;
     gone_(*server.presence);
   }

@@ -39,13 +39,15 @@ class Peers {
   /// Whatever answers a newcomer has answered, as a rule, once nobody new was met for this long.
   static constexpr std::chrono::milliseconds kQuiet{200};
 
-  /// How often a server says that it is there, and after which silence it counts as gone.
+  /// How often a server says that it is there.
   static constexpr std::chrono::milliseconds kSpeakEvery{100};
-  static constexpr std::chrono::milliseconds kSilence{450};
 
   /// @param there  a peer said what it serves, or is heard again
   /// @param gone   a peer that had said so has left or fallen silent
   Peers(Tell there, Tell gone) : there_(std::move(there)), gone_(std::move(gone)) {}
+
+  /// Whoever has not been heard for this long counts as gone. To be set before anybody is met.
+  void set_silence(std::chrono::nanoseconds silence) { silence_ = silence; }
 
   void met(const ertps::GuidPrefix_t& prefix, const std::string& name);
   void left(const ertps::GuidPrefix_t& prefix);
@@ -53,7 +55,8 @@ class Peers {
   /// A server sent something else: a sign of life, should what it says of itself be late.
   void heard(const ertps::GuidPrefix_t& prefix);
 
-  /// Tells who has fallen silent since the last time.
+  /// Tells who has fallen silent since the last time. Whoever looks late was kept from hearing, too, and
+  /// does not hold that against the others.
   void look_for_silent(Clock::time_point now);
 
   /// Whether some server was met, nobody new for a while, and all servers have said what they serve.
@@ -76,6 +79,8 @@ class Peers {
   mutable std::mutex mutex_;
   std::map<PeerId, Server> servers_;
   Clock::time_point last_met_{};
+  Clock::time_point last_look_ = Clock::now();
+  std::chrono::nanoseconds silence_{};
 };
 
 }  // namespace tfdude::fastdds
