@@ -77,7 +77,7 @@ class Directory {
     std::unordered_map<std::string, std::size_t> listed;
   };
   struct Claim {
-    Owner owner;
+    Owner owner = kHeldHere;
     std::string parent;
   };
 
