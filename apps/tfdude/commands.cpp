@@ -19,12 +19,6 @@ int answer(const Arguments& arguments, const nlohmann::json& json, const std::st
   return kDone;
 }
 
-int done(const Result<void>& result, const Arguments& arguments, const std::string& what) {
-  if (!result) return report(result.error(), arguments);
-  return answer(arguments, {{"done", what}, {"id", arguments.id}},
-                what + " " + arguments.id + "\n");
-}
-
 // A list of ids, a line each.
 int list(const Arguments& arguments, const char* key, const std::vector<std::string>& ids) {
   std::string text;
@@ -53,6 +47,13 @@ int refuse(Client& client, const Error& error, const Arguments& arguments) {
       break;
   }
   return report(error, arguments);
+}
+
+int finish(Client& client, const Result<void>& changed, const Arguments& arguments,
+           const std::string& what) {
+  if (!changed) return refuse(client, changed.error(), arguments);
+  return answer(arguments, {{"done", what}, {"id", arguments.id}},
+                what + " " + arguments.id + "\n");
 }
 
 int refuse_pose(const Error& error, const Arguments& arguments) {
@@ -138,19 +139,19 @@ int run_add(Client& client, const Arguments& arguments) {
   const auto X_PC = arguments.spec.build();
   if (!X_PC) return refuse_pose(X_PC.error(), arguments);
   const auto added = client.add(arguments.id, arguments.parent, *X_PC, arguments.partition);
-  return added ? done(added, arguments, "added") : refuse(client, added.error(), arguments);
+  return finish(client, added, arguments, "added");
 }
 
 int run_update(Client& client, const Arguments& arguments) {
   const auto X_PC = arguments.spec.build();
   if (!X_PC) return refuse_pose(X_PC.error(), arguments);
   const auto updated = client.update(arguments.id, *X_PC);
-  return updated ? done(updated, arguments, "updated") : refuse(client, updated.error(), arguments);
+  return finish(client, updated, arguments, "updated");
 }
 
 int run_remove(Client& client, const Arguments& arguments) {
   const auto removed = client.remove(arguments.id);
-  return removed ? done(removed, arguments, "removed") : refuse(client, removed.error(), arguments);
+  return finish(client, removed, arguments, "removed");
 }
 
 int run_move(Client& client, const Arguments& arguments) {
@@ -161,7 +162,7 @@ int run_move(Client& client, const Arguments& arguments) {
     X_PC = *built;
   }
   const auto moved = client.move(arguments.id, arguments.parent, X_PC);
-  return moved ? done(moved, arguments, "moved") : refuse(client, moved.error(), arguments);
+  return finish(client, moved, arguments, "moved");
 }
 
 int run_lookup(Client& client, const Arguments& arguments) {

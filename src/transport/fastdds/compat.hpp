@@ -129,27 +129,6 @@ class CheckedType final : public Generated {
   static constexpr std::uint32_t kUsualSize = 512;
 };
 
-/// A transport that sends through another, where it may.
-class SendFilter : public etransport::ChainingTransport {
- public:
-  using ChainingTransport::ChainingTransport;
-
-  bool send(ertps::SenderResource* through, const ertps::octet* bytes, std::uint32_t size,
-            ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
-            const std::chrono::steady_clock::time_point& deadline) override {
-    return !may_send() || through->send(bytes, size, begin, end, deadline);
-  }
-
-  void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
-               std::uint32_t size, const ertps::Locator_t& local,
-               const ertps::Locator_t& remote) override {
-    next->OnDataReceived(bytes, size, local, remote);
-  }
-
- private:
-  [[nodiscard]] virtual bool may_send() const = 0;
-};
-
 #else
 
 namespace ertps = eprosima::fastdds::rtps;
@@ -212,15 +191,26 @@ class CheckedType final : public Generated {
   static constexpr std::uint32_t kUsualSize = 512;
 };
 
+#endif
+
+/// A transport that sends through another, where it may.
 class SendFilter : public etransport::ChainingTransport {
  public:
   using ChainingTransport::ChainingTransport;
 
+#if TFDUDE_FASTDDS_MAJOR == 2
+  bool send(ertps::SenderResource* through, const ertps::octet* bytes, std::uint32_t size,
+            ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
+            const std::chrono::steady_clock::time_point& deadline) override {
+    return !may_send() || through->send(bytes, size, begin, end, deadline);
+  }
+#else
   bool send(ertps::SenderResource* through, const std::vector<ertps::NetworkBuffer>& buffers,
             std::uint32_t size, ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& deadline) override {
     return !may_send() || through->send(buffers, size, begin, end, deadline);
   }
+#endif
 
   void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
                std::uint32_t size, const ertps::Locator_t& local,
@@ -231,7 +221,5 @@ class SendFilter : public etransport::ChainingTransport {
  private:
   [[nodiscard]] virtual bool may_send() const = 0;
 };
-
-#endif
 
 }  // namespace tfdude::fastdds

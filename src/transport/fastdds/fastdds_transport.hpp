@@ -38,7 +38,7 @@ class FastDdsTransport final : public Transport {
   Result<void> send(const std::string& partition, const Update& update, Deadline deadline) override;
   void reply(const PeerId& to, const Reply& reply) override;
   bool settled() const override { return peers_.settled(); }
-  bool awaits_presence() const override { return peers_.await_presence(); }
+  bool awaits_presence() const override { return peers_.awaits_presence(); }
   Milliseconds settle_time() const override { return Milliseconds(400); }
 
   // Of ParticipantListener, from a thread of the library.

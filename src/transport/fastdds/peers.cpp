@@ -78,7 +78,7 @@ bool Peers::settled() const {
   return !servers_.empty() && Clock::now() - last_met_ >= kQuiet && all_present();
 }
 
-bool Peers::await_presence() const {
+bool Peers::awaits_presence() const {
   const std::lock_guard lock(mutex_);
   return !all_present();
 }

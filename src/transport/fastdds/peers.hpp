@@ -63,7 +63,7 @@ class Peers {
   [[nodiscard]] bool settled() const;
 
   /// Whether some server was met that has not said yet what it serves.
-  [[nodiscard]] bool await_presence() const;
+  [[nodiscard]] bool awaits_presence() const;
 
  private:
   [[nodiscard]] bool all_present() const;
