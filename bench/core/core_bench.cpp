@@ -1,0 +1,147 @@
+// What a process does with frames of its own, beside tf2's BufferCore on the same tree: set an edge, look up,
+// add and remove. tf2 keeps no covariance; ours is propagated wherever "pose" is not in the name.
+//
+// Keys: core/OPERATION/WHO/DEPTH/FRAMES.
+
+#include <cstdlib>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include <benchmark/benchmark.h>
+
+#include "tfdude/transport/loopback.hpp"
+
+#include "core/trees.hpp"
+
+namespace {
+
+using namespace tfdude;
+
+using Shape = std::pair<std::size_t, std::size_t>;  // depth, frames
+constexpr Shape kShapes[] = {{2, 10}, {8, 100}, {30, 100}, {30, 1000}, {100, 1000}, {1000, 10000}};
+
+/// One of each kind a shape, made when first needed.
+const bench::Tree& tree_of(const Shape& shape) {
+  static std::map<Shape, bench::Tree> trees;
+  auto [entry, fresh] = trees.try_emplace(shape);
+  if (fresh) entry->second = bench::up_down_tree(shape.first, shape.second);
+  return entry->second;
+}
+
+Node& node_of(const Shape& shape) {
+  static std::map<Shape, Node> nodes;
+  const auto known = nodes.find(shape);
+  if (known != nodes.end()) return known->second;
+  LoopbackNetwork network;
+  Options options;
+  auto node = Node::open(network.join(), "bench", tree_of(shape).frames, options);
+  if (!node) std::abort();
+  return nodes.emplace(shape, *std::move(node)).first->second;
+}
+
+tf2::BufferCore& buffer_of(const Shape& shape) {
+  static std::map<Shape, tf2::BufferCore> buffers;
+  auto [entry, fresh] = buffers.try_emplace(shape);
+  if (fresh) bench::fill(entry->second, tree_of(shape));
+  return entry->second;
+}
+
+void look_up_by_handle(benchmark::State& state, Shape shape) {
+  Node& node = node_of(shape);
+  const Handle a = *node.find(tree_of(shape).from);
+  const Handle b = *node.find(tree_of(shape).to);
+  for (auto _ : state) benchmark::DoNotOptimize(node.lookup(a, b));
+}
+
+void look_up_by_name(benchmark::State& state, Shape shape) {
+  Node& node = node_of(shape);
+  const bench::Tree& tree = tree_of(shape);
+  for (auto _ : state) benchmark::DoNotOptimize(node.lookup(tree.from, tree.to));
+}
+
+void look_up_tf2(benchmark::State& state, Shape shape) {
+  const tf2::BufferCore& buffer = buffer_of(shape);
+  const bench::Tree& tree = tree_of(shape);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(buffer.lookupTransform(tree.from, tree.to, ros::Time(0)));
+  }
+}
+
+void set_by_handle(benchmark::State& state, Shape shape) {
+  Node& node = node_of(shape);
+  const Handle edge = *node.find(tree_of(shape).from);
+  const Transform X = tree_of(shape).frames[1].X_PC;
+  for (auto _ : state) benchmark::DoNotOptimize(node.update(edge, X));
+}
+
+void set_by_name(benchmark::State& state, Shape shape) {
+  Node& node = node_of(shape);
+  const std::string& edge = tree_of(shape).from;
+  const Transform X = tree_of(shape).frames[1].X_PC;
+  for (auto _ : state) benchmark::DoNotOptimize(node.update(edge, X));
+}
+
+void set_tf2(benchmark::State& state, Shape shape) {
+  // Of its own, as the moving stamp makes a history.
+  tf2::BufferCore buffer;
+  bench::fill(buffer, tree_of(shape));
+  auto message = bench::stamped(tree_of(shape).frames[1], ros::Time(2));
+  for (auto _ : state) {
+    message.header.stamp += ros::Duration(0, 1000000);
+    benchmark::DoNotOptimize(buffer.setTransform(message, "bench", false));
+  }
+}
+
+void add_and_remove(benchmark::State& state, Shape shape) {
+  Node& node = node_of(shape);
+  const std::string& parent = tree_of(shape).frames[shape.second / 2].id;
+  const Transform X = tree_of(shape).frames[1].X_PC;
+  const std::string leaf = "leaf";
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(node.add(leaf, parent, X));
+    benchmark::DoNotOptimize(node.remove(leaf));
+  }
+}
+
+void add_and_remove_in_forest(benchmark::State& state, Shape shape) {
+  Forest forest;
+  for (const FrameSpec& frame : tree_of(shape).frames) {
+    if (!forest.add(frame.id, frame.parent, frame.X_PC)) std::abort();
+  }
+  const std::string& parent = tree_of(shape).frames[shape.second / 2].id;
+  const Transform X = tree_of(shape).frames[1].X_PC;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(forest.add("leaf", parent, X));
+    benchmark::DoNotOptimize(forest.remove("leaf"));
+  }
+}
+
+template <class Function>
+void enter(const char* name, const Shape& shape, Function function) {
+  const std::string key = std::string("core/") + name + "/" + std::to_string(shape.first) + "/" +
+                          std::to_string(shape.second);
+  benchmark::RegisterBenchmark(key.c_str(), function, shape);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  for (const Shape& shape : kShapes) {
+    enter("lookup/ours_by_handle", shape, look_up_by_handle);
+    enter("lookup/ours_by_name", shape, look_up_by_name);
+    enter("lookup/tf2", shape, look_up_tf2);
+  }
+  for (const Shape& shape : {Shape{2, 10}, {30, 100}, {30, 1000}, {1000, 10000}}) {
+    enter("set/ours_by_handle", shape, set_by_handle);
+    enter("set/ours_by_name", shape, set_by_name);
+    enter("set/tf2", shape, set_tf2);
+  }
+  for (const Shape& shape : {Shape{2, 10}, {30, 1000}, {1000, 10000}, {1000, 100000}}) {
+    enter("add_remove/ours", shape, add_and_remove);
+    enter("add_remove/ours_forest", shape, add_and_remove_in_forest);
+  }
+  benchmark::Initialize(&argc, argv);
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}
