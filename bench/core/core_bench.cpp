@@ -54,6 +54,13 @@ void look_up_by_handle(benchmark::State& state, Shape shape) {
   for (auto _ : state) benchmark::DoNotOptimize(node.lookup(a, b));
 }
 
+void look_up_pose(benchmark::State& state, Shape shape) {
+  Node& node = node_of(shape);
+  const Handle a = *node.find(tree_of(shape).from);
+  const Handle b = *node.find(tree_of(shape).to);
+  for (auto _ : state) benchmark::DoNotOptimize(node.lookup_pose(a, b));
+}
+
 void look_up_by_name(benchmark::State& state, Shape shape) {
   Node& node = node_of(shape);
   const bench::Tree& tree = tree_of(shape);
@@ -129,6 +136,7 @@ void enter(const char* name, const Shape& shape, Function function) {
 int main(int argc, char** argv) {
   for (const Shape& shape : kShapes) {
     enter("lookup/ours_by_handle", shape, look_up_by_handle);
+    enter("lookup/ours_pose", shape, look_up_pose);
     enter("lookup/ours_by_name", shape, look_up_by_name);
     enter("lookup/tf2", shape, look_up_tf2);
   }

@@ -28,17 +28,16 @@ void Series::end_repetition() {
 }
 
 void Series::print() const {
-  nlohmann::json line{
-      {"key", key_}, {"unit", unit_}, {"n", values_.size()}, {"medians", medians_}};
+  nlohmann::json line{{"key", key_}, {"unit", unit_}, {"n", values_.size()}, {"medians", medians_}};
   if (!values_.empty()) {
     std::vector<double> sorted = values_;
     std::sort(sorted.begin(), sorted.end());
     constexpr std::pair<const char*, double> kQuantiles[] = {
-        {"min", 0.0},   {"p5", 0.05},  {"p25", 0.25},  {"median", 0.5},  {"p75", 0.75},
-        {"p90", 0.9},   {"p95", 0.95}, {"p99", 0.99},  {"p99.9", 0.999}, {"max", 1.0}};
+        {"min", 0.0}, {"p5", 0.05},  {"p25", 0.25}, {"median", 0.5},  {"p75", 0.75},
+        {"p90", 0.9}, {"p95", 0.95}, {"p99", 0.99}, {"p99.9", 0.999}, {"max", 1.0}};
     for (const auto& [name, share] : kQuantiles) line[name] = quantile(sorted, share);
-    line["mean"] = std::accumulate(sorted.begin(), sorted.end(), 0.0) /
-                   static_cast<double>(sorted.size());
+    line["mean"] =
+        std::accumulate(sorted.begin(), sorted.end(), 0.0) / static_cast<double>(sorted.size());
   }
   std::puts(line.dump().c_str());
   std::fflush(stdout);

@@ -48,6 +48,17 @@ Result<void> Client::update(const std::vector<EdgeUpdate>& edges) {
   return participant_->update(edges);
 }
 
+Result<void> Client::update(const std::vector<HandleUpdate>& edges) {
+  if (participant_->forest().update(edges)) return {};
+  std::vector<EdgeUpdate> named;
+  for (const HandleUpdate& edge : edges) {
+    const auto info = participant_->forest().info(edge.frame);
+    if (!info) return fail(Errc::kUnknownFrame, "the frame of a handle was removed");
+    named.push_back({info->id, edge.X_PC});
+  }
+  return participant_->update(named);
+}
+
 Result<void> Client::publish(const std::vector<EdgeUpdate>& edges) {
   return participant_->publish(edges);
 }
@@ -62,6 +73,12 @@ Result<Transform> Client::lookup(std::string_view a, std::string_view b) {
 }
 
 Result<Transform> Client::lookup(Handle a, Handle b) { return participant_->lookup(a, b); }
+
+Result<Pose> Client::lookup_pose(std::string_view a, std::string_view b) {
+  return participant_->lookup_pose(a, b);
+}
+
+Result<Pose> Client::lookup_pose(Handle a, Handle b) { return participant_->lookup_pose(a, b); }
 
 Result<Handle> Client::find(std::string_view id) {
   return participant_->when_known([&]() -> Result<Handle> {

@@ -45,6 +45,11 @@ class Participant final : public TransportHandler {
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges);
   [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b);
   [[nodiscard]] Result<Transform> lookup(Handle a, Handle b);
+  template <class Name>
+  [[nodiscard]] Result<Pose> lookup_pose(Name a, Name b) {
+    if (auto local = forest_.lookup_pose(a, b)) return local;
+    return lookup(a, b).map([](const Transform& X_AB) { return X_AB.pose; });
+  }
   [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b);
   [[nodiscard]] Result<FrameInfo> info(const std::string& id);
   [[nodiscard]] std::vector<Frame> frames();

@@ -6,6 +6,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "math/columns.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -188,26 +190,9 @@ std::array<double, 6> Covariance::stddev() const {
 }
 
 Covariance Covariance::transported(const Pose& X) const {
-  // Σ = [P, C; Cᵀ, Q] turned by R, then sheared by T = [t]×: C += T Q, P += T Cᵀ_old + C_new Tᵀ.
-  using Eigen::Matrix3d;
-  const auto& u = upper_;
-  Matrix3d P;
-  Matrix3d C;
-  Matrix3d Q;
-  P << u[0], u[1], u[2], u[1], u[6], u[7], u[2], u[7], u[11];
-  C << u[3], u[4], u[5], u[8], u[9], u[10], u[12], u[13], u[14];
-  Q << u[15], u[16], u[17], u[16], u[18], u[19], u[17], u[19], u[20];
-  const Matrix3d R = X.rotation().toRotationMatrix();
-  const Matrix3d T = skew(X.translation());
-  P = R * P * R.transpose();
-  C = R * C * R.transpose();
-  Q = R * Q * R.transpose();
-  const Matrix3d C_new = C + T * Q;
-  const Matrix3d P_new = P + T * C.transpose() + C_new * T.transpose();
-  return trusted(Upper{P_new(0, 0), P_new(0, 1), P_new(0, 2), C_new(0, 0), C_new(0, 1), C_new(0, 2),
-                       P_new(1, 1), P_new(1, 2), C_new(1, 0), C_new(1, 1), C_new(1, 2), P_new(2, 2),
-                       C_new(2, 0), C_new(2, 1), C_new(2, 2), Q(0, 0),     Q(0, 1),     Q(0, 2),
-                       Q(1, 1),     Q(1, 2),     Q(2, 2)});
+  kernel::Blocks sum;
+  kernel::functions().add_transported(kernel::columns_of(X), upper_.data(), sum);
+  return trusted(kernel::upper_of(sum));
 }
 
 Covariance& Covariance::operator+=(const Covariance& other) {

@@ -7,9 +7,11 @@
 // unlinked only when all readers that could have seen it are gone. Fraser, "Practical lock-freedom",
 // 2004, section 5.2.3, with the oldest announced epoch in place of his three generations.
 //
-// Why it is safe: a reader announces the epoch (seq_cst) before it reads any link. A writer unlinks
-// (seq_cst), then takes the tag with retire_tag(), then scans. A reader that still saw the old link made
-// its announcement before the unlinking, so the scan sees it, and it announced an epoch <= the tag.
+// Why it is safe: a reader announces the epoch (seq_cst), then loads what the writer has committed (seq_cst),
+// and only then follows links. A writer unlinks, stores what it has committed (seq_cst), takes the tag with
+// retire_tag(), then scans. A reader that the scan misses loads the commit after all these in the one order of
+// seq_cst operations, so it sees the unlinking; one that still saw the old link is seen by the scan, and
+// announced an epoch <= the tag. Many commits may share one tag, taken after the last of them.
 namespace tfdude::epoch {
 
 /// One per thread that reads, reused by later threads; never freed.
@@ -46,7 +48,7 @@ class Guard {
   Reader& reader_;
 };
 
-/// The tag for what was unlinked just now.
+/// The tag for all that was unlinked before the last seq_cst store of a commit.
 inline std::uint64_t retire_tag() { return current.fetch_add(1, std::memory_order_seq_cst); }
 
 /// What carries a tag below this may be reused.

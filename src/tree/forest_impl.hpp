@@ -26,10 +26,13 @@ class Forest::Impl {
   }
 
   /// What the slot held at that commit.
-  [[nodiscard]] const Version* at(std::uint32_t slot, std::uint64_t commit) const {
-    const Version* version = slots_[slot].load(std::memory_order_acquire);
+  [[nodiscard]] static const Version* at(const Head& head, std::uint64_t commit) {
+    const Version* version = head.load(std::memory_order_acquire);
     while (version->commit > commit) version = version->older;
     return version;
+  }
+  [[nodiscard]] const Version* at(std::uint32_t slot, std::uint64_t commit) const {
+    return at(slots_[slot], commit);
   }
 
   /// The version of the id's slot at that commit; null if no slot stood for the id then.
@@ -46,8 +49,15 @@ class Forest::Impl {
 
   /// Both ends climb to where they meet. Frames that are not there end the climb, or may be passed.
   enum class Absent { kEnds, kMayPass };
-  [[nodiscard]] Result<Transform> walk(const Version* a, const Version* b, std::uint64_t commit,
-                                       Absent absent) const;
+  template <class Value>
+  [[nodiscard]] Result<Value> walk(const Version* a, const Version* b, std::uint64_t commit,
+                                   Absent absent) const;
+
+  /// From handle to handle; Value is Transform, or Pose where the covariance is not asked for.
+  template <class Value>
+  [[nodiscard]] Result<Value> look_up(Handle a, Handle b) const;
+  template <class Value>
+  [[nodiscard]] Result<Value> look_up(std::string_view a, std::string_view b) const;
 
   [[nodiscard]] FrameInfo info_of(const Version& version, std::uint64_t commit) const;
 
@@ -63,12 +73,29 @@ class Forest::Impl {
 
   /// Checks that the frame is there and held here. @return kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<std::uint32_t> held_slot(std::string_view id) const;
+  [[nodiscard]] Result<std::uint32_t> held_slot(Handle frame) const;
 
-  /// Checks that `id` may hang under `parent` (empty: under nothing). @return kCycle.
-  [[nodiscard]] Result<void> check_no_cycle(std::string_view id, std::string_view parent) const;
+  /// All of them as one commit, or none; `frame` gives the id or the handle of an update.
+  template <class Update, class Frame>
+  [[nodiscard]] Result<void> update_all(const std::vector<Update>& edges, Frame frame);
 
-  /// The id's slot, a new absent one if the id is not interned; kNoSlot for an empty id.
-  std::uint32_t intern(std::string_view id);
+  /// The newest versions of an id and of the parent that it is to have; null where not interned.
+  struct Pair {
+    std::string_view id;
+    std::string_view parent;
+    const Version* frame;
+    const Version* above;
+  };
+  [[nodiscard]] Pair newest_pair(std::string_view id, std::string_view parent) const;
+
+  /// Checks that the frame may hang under the parent (empty: under nothing). @return kCycle.
+  [[nodiscard]] Result<void> check_no_cycle(const Pair& pair) const;
+
+  /// The parent's slot, a new absent one if the id is not interned; kNoSlot for an empty id.
+  std::uint32_t parent_slot(const Pair& pair);
+
+  /// A name for an id that is not interned, on a slot whose next version is to have it.
+  const Name* intern(std::string_view id);
 
   /// Pushes copies of the newest version, to be changed before commit().
   HeldVersion& push_held(std::uint32_t slot, const Transform& X_PC);
@@ -90,13 +117,15 @@ class Forest::Impl {
   Graph graph_;
 
  private:
-  // How many superseded versions may wait before the readers are asked: rare enough to cost nothing,
-  // few enough that the pool stays in the first-level cache.
+  // How many superseded versions may wait before the readers are asked: rare enough to cost little (locked
+  // instructions, and the readers' cache lines), few enough that the pool stays in the first-level cache.
   static constexpr std::size_t kCollectAt = 64;
 
   template <class T>
   T& push(VersionPool<T>& pool, std::uint32_t slot);
+  void hang(Version& fresh, std::uint32_t parent) const;
   void renew_depths(std::uint32_t top);
+  void release(Version& fresh);
   void release_if_unused(std::uint32_t slot);
   void collect();
 
@@ -104,9 +133,10 @@ class Forest::Impl {
   std::atomic<std::uint64_t> committed_{0};
   VersionPool<HeldVersion> held_pool_;
   VersionPool<Version> remote_pool_;
-  std::vector<Version*> superseded_;         // by the commit being made
+  std::vector<Version*> superseded_;         // by commits since the readers were last asked
   std::vector<const Name*> released_names_;  // by the commit being made
   std::vector<std::uint32_t> free_slots_;
+  std::vector<std::uint32_t> to_update_;  // of the update being made; kept for its memory
   std::uint32_t next_generation_ = 1;
 };
 

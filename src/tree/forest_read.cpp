@@ -1,7 +1,10 @@
 #include <algorithm>
+#include <type_traits>
+#include <utility>
 
 #include "tfdude/base/id.hpp"
 
+#include "math/climb.hpp"
 #include "tree/forest_impl.hpp"
 
 namespace tfdude {
@@ -20,6 +23,17 @@ tl::unexpected<Error> not_connected(const Version& a, const Version& b) {
                                        " have no common root");
 }
 
+// Of a held version.
+template <class Value>
+const Value& value_of(const Version& version) {
+  const Transform& X_PC = static_cast<const HeldVersion&>(version).X_PC;
+  if constexpr (std::is_same_v<Value, Pose>) {
+    return X_PC.pose;
+  } else {
+    return X_PC;
+  }
+}
+
 }  // namespace
 
 const Version* Forest::Impl::named(std::string_view id, std::uint64_t commit) const {
@@ -35,30 +49,31 @@ const Version* Forest::Impl::of(Handle frame, std::uint64_t commit) const {
   return version->present() && version->generation == frame.generation ? version : nullptr;
 }
 
-Result<Transform> Forest::Impl::walk(const Version* a, const Version* b, std::uint64_t commit,
-                                     Absent absent) const {
+template <class Value>
+Result<Value> Forest::Impl::walk(const Version* a, const Version* b, std::uint64_t commit,
+                                 Absent absent) const {
   const Version* const start = a;
   const Version* const end = b;
-  Climb climb_a;
-  Climb climb_b;
+  Climb<Value> climb_a;
+  Climb<Value> climb_b;
   // An edge held by another; from there on only the errors matter, and kNotConnected goes first.
   const Version* elsewhere = nullptr;
   while (a != b) {
     const bool from_a = a->depth >= b->depth;
     const Version*& here = from_a ? a : b;
-    const bool top = absent == Absent::kEnds ? here->depth == 0 : here->parent == kNoSlot;
+    const bool top = absent == Absent::kEnds ? here->depth == 0 : here->above == nullptr;
     if (top) return not_connected(*start, *end);
     if (!here->held()) elsewhere = here;
     if (elsewhere == nullptr) {
-      (from_a ? climb_a : climb_b).up(static_cast<const HeldVersion*>(here)->X_PC);
+      (from_a ? climb_a : climb_b).up(value_of<Value>(*here));
     }
-    here = at(here->parent, commit);
+    here = at(*here->above, commit);
   }
   if (elsewhere != nullptr) {
     return fail(Errc::kNotOwner,
                 "the edge of " + quote(elsewhere->name->text) + " is held by another partition");
   }
-  return join(climb_a, climb_b);
+  return join(std::move(climb_a), std::move(climb_b));
 }
 
 FrameInfo Forest::Impl::info_of(const Version& version, std::uint64_t commit) const {
@@ -76,25 +91,41 @@ FrameInfo Forest::Impl::info_of(const Version& version, std::uint64_t commit) co
 Forest::Forest() : impl_(std::make_unique<Impl>()) {}
 Forest::~Forest() = default;
 
-Result<Transform> Forest::lookup(std::string_view a, std::string_view b) const {
+template <class Value>
+Result<Value> Forest::Impl::look_up(std::string_view a, std::string_view b) const {
   const epoch::Guard guard;
-  const std::uint64_t commit = impl_->snapshot();
-  const Version* start = impl_->present(a, commit);
+  const std::uint64_t commit = snapshot();
+  const Version* start = present(a, commit);
   if (start == nullptr) return unknown_start(a);
-  const Version* end = impl_->present(b, commit);
+  const Version* end = present(b, commit);
   if (end == nullptr) return unknown_end(b);
-  return impl_->walk(start, end, commit, Impl::Absent::kEnds);
+  return walk<Value>(start, end, commit, Absent::kEnds);
+}
+
+template <class Value>
+Result<Value> Forest::Impl::look_up(Handle a, Handle b) const {
+  const epoch::Guard guard;
+  const std::uint64_t commit = snapshot();
+  const Version* start = of(a, commit);
+  if (start == nullptr) return fail(Errc::kUnknownStart, "the first frame was removed");
+  const Version* end = of(b, commit);
+  if (end == nullptr) return fail(Errc::kUnknownEnd, "the second frame was removed");
+  return walk<Value>(start, end, commit, Absent::kEnds);
+}
+
+Result<Transform> Forest::lookup(std::string_view a, std::string_view b) const {
+  return impl_->look_up<Transform>(a, b);
 }
 
 Result<Transform> Forest::lookup(Handle a, Handle b) const {
-  const epoch::Guard guard;
-  const std::uint64_t commit = impl_->snapshot();
-  const Version* start = impl_->of(a, commit);
-  if (start == nullptr) return fail(Errc::kUnknownStart, "the first frame was removed");
-  const Version* end = impl_->of(b, commit);
-  if (end == nullptr) return fail(Errc::kUnknownEnd, "the second frame was removed");
-  return impl_->walk(start, end, commit, Impl::Absent::kEnds);
+  return impl_->look_up<Transform>(a, b);
 }
+
+Result<Pose> Forest::lookup_pose(std::string_view a, std::string_view b) const {
+  return impl_->look_up<Pose>(a, b);
+}
+
+Result<Pose> Forest::lookup_pose(Handle a, Handle b) const { return impl_->look_up<Pose>(a, b); }
 
 Result<Transform> Forest::lookup_segment(std::string_view from, std::string_view to) const {
   const epoch::Guard guard;
@@ -103,7 +134,7 @@ Result<Transform> Forest::lookup_segment(std::string_view from, std::string_view
   if (start == nullptr) return unknown_start(from);
   const Version* end = impl_->named(to, commit);
   if (end == nullptr) return unknown_end(to);
-  return impl_->walk(start, end, commit, Impl::Absent::kMayPass);
+  return impl_->walk<Transform>(start, end, commit, Impl::Absent::kMayPass);
 }
 
 Result<std::vector<Segment>> Forest::segments(std::string_view a, std::string_view b) const {
@@ -127,7 +158,7 @@ Result<std::vector<Segment>> Forest::segments(std::string_view a, std::string_vi
     const bool from_a = up->depth >= down->depth;
     const Version*& here = from_a ? up : down;
     if (here->depth == 0) return not_connected(*start, *end);
-    const Version* parent = impl_->at(here->parent, commit);
+    const Version* parent = Impl::at(*here->above, commit);
     if (from_a) {
       append(*here, *here, *parent);
     } else {

@@ -27,34 +27,51 @@ Result<std::uint32_t> Forest::Impl::held_slot(std::string_view id) const {
   return version->slot;
 }
 
-Result<void> Forest::Impl::check_no_cycle(std::string_view id, std::string_view parent) const {
-  const Version* top = newest_named(id);
-  const Version* above = parent.empty() ? nullptr : newest_named(parent);
-  while (top != nullptr && above != nullptr && above != top) {
+Result<std::uint32_t> Forest::Impl::held_slot(Handle frame) const {
+  const Version* version = frame.slot < slots_.size() ? &newest(frame.slot) : nullptr;
+  if (version == nullptr || !version->present() || version->generation != frame.generation) {
+    return fail(Errc::kUnknownFrame, "the frame of this handle was removed");
+  }
+  if (!version->held()) {
+    return fail(Errc::kNotOwner,
+                "frame " + quote(version->name->text) + " is held by another partition");
+  }
+  return frame.slot;
+}
+
+Forest::Impl::Pair Forest::Impl::newest_pair(std::string_view id, std::string_view parent) const {
+  return {id, parent, newest_named(id), parent.empty() ? nullptr : newest_named(parent)};
+}
+
+Result<void> Forest::Impl::check_no_cycle(const Pair& pair) const {
+  const Version* above = pair.above;
+  while (pair.frame != nullptr && above != nullptr && above != pair.frame) {
     above = above->parent == kNoSlot ? nullptr : &newest(above->parent);
   }
-  if (id == parent || (top != nullptr && above == top)) {
-    return fail(Errc::kCycle, "frame " + quote(id) + " cannot hang under " + quote(parent) +
-                                  ", which lies below it");
+  if (pair.id == pair.parent || (pair.frame != nullptr && above == pair.frame)) {
+    return fail(Errc::kCycle, "frame " + quote(pair.id) + " cannot hang under " +
+                                  quote(pair.parent) + ", which lies below it");
   }
   return {};
 }
 
-std::uint32_t Forest::Impl::intern(std::string_view id) {
-  if (id.empty()) return kNoSlot;
-  if (const Name* known = ids_.find(id)) return known->slot;
-  std::uint32_t slot = 0;
+const Name* Forest::Impl::intern(std::string_view id) {
   if (free_slots_.empty()) {
     Version* nobody = remote_pool_.take();
     *nobody = Version{};
-    slot = slots_.append(nobody);
-  } else {
-    slot = free_slots_.back();
-    free_slots_.pop_back();
+    free_slots_.push_back(slots_.append(nobody));
   }
-  const Name* name = ids_.insert(id, slot);
-  push_remote(slot).name = name;
-  return slot;
+  const std::uint32_t slot = free_slots_.back();
+  free_slots_.pop_back();
+  return ids_.insert(id, slot);
+}
+
+std::uint32_t Forest::Impl::parent_slot(const Pair& pair) {
+  if (pair.above != nullptr) return pair.above->slot;
+  if (pair.parent.empty()) return kNoSlot;
+  const Name* name = intern(pair.parent);
+  push_remote(name->slot).name = name;
+  return name->slot;
 }
 
 template <class T>
@@ -65,6 +82,7 @@ T& Forest::Impl::push(VersionPool<T>& pool, std::uint32_t slot) {
   fresh->commit = committed_.load(std::memory_order_relaxed) + 1;
   fresh->older = old;
   fresh->name = old->name;
+  fresh->above = old->above;
   fresh->parent = old->parent;
   fresh->depth = old->depth;
   fresh->owner = old->owner;
@@ -85,16 +103,22 @@ HeldVersion& Forest::Impl::push_held(std::uint32_t slot, const Transform& X_PC) 
 
 Version& Forest::Impl::push_remote(std::uint32_t slot) { return push(remote_pool_, slot); }
 
+void Forest::Impl::hang(Version& fresh, std::uint32_t parent) const {
+  fresh.parent = parent;
+  fresh.above = parent == kNoSlot ? nullptr : &slots_[parent];
+  fresh.depth = parent == kNoSlot ? 0 : newest(parent).depth + 1;
+}
+
 void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
   const std::uint32_t old_parent = fresh.parent;
   if (!fresh.present()) fresh.generation = next_generation_++;
   if (old_parent != kNoSlot) graph_.unlink(old_parent, fresh.slot);
+  graph_.ensure(fresh.slot);
   if (parent != kNoSlot) {
-    graph_.ensure(std::max(parent, fresh.slot));
+    graph_.ensure(parent);
     graph_.link(parent, fresh.slot);
   }
-  fresh.parent = parent;
-  fresh.depth = parent == kNoSlot ? 0 : newest(parent).depth + 1;
+  hang(fresh, parent);
   renew_depths(fresh.slot);
   if (old_parent != kNoSlot) release_if_unused(old_parent);
 }
@@ -103,15 +127,15 @@ void Forest::Impl::make_absent(std::uint32_t slot) {
   Version& fresh = push_remote(slot);
   const std::uint32_t parent = fresh.parent;
   if (parent != kNoSlot) graph_.unlink(parent, slot);
-  fresh.parent = kNoSlot;
+  hang(fresh, kNoSlot);
   fresh.depth = Version::kAbsent;
   renew_depths(slot);
   if (parent != kNoSlot) release_if_unused(parent);
-  release_if_unused(slot);
+  if (graph_.is_leaf(slot)) release(fresh);
 }
 
 void Forest::Impl::renew_depths(std::uint32_t top) {
-  graph_.ensure(top);
+  if (graph_.is_leaf(top)) return;
   const auto stale = [this](std::uint32_t child) {
     const Version& version = newest(child);
     if (version.depth == newest(version.parent).depth + 1) return false;
@@ -124,16 +148,38 @@ void Forest::Impl::renew_depths(std::uint32_t top) {
   (void)graph_.subtree(top, stale);
 }
 
+// A name that nobody uses: no frame, and none below it.
+void Forest::Impl::release(Version& fresh) {
+  released_names_.push_back(fresh.name);
+  fresh.name = nullptr;
+}
+
 void Forest::Impl::release_if_unused(std::uint32_t slot) {
-  graph_.ensure(slot);
   const Version& version = newest(slot);
-  if (version.present() || version.name == nullptr || !graph_.is_leaf(slot)) return;
-  released_names_.push_back(version.name);
-  push_remote(slot).name = nullptr;
+  if (!version.present() && version.name != nullptr && graph_.is_leaf(slot)) {
+    release(push_remote(slot));
+  }
 }
 
 void Forest::Impl::commit() {
-  committed_.store(committed_.load(std::memory_order_relaxed) + 1, std::memory_order_seq_cst);
+  committed_.store(committed_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  // Only now: a reader of the commit before may still reach a name through the version it sees.
+  for (const Name* name : released_names_) {
+    free_slots_.push_back(name->slot);
+    ids_.erase(name);
+  }
+  released_names_.clear();
+  if (superseded_.size() > kCollectAt) collect();
+}
+
+void Forest::Impl::commit_structure() {
+  commit();
+  structure_version_.fetch_add(1, std::memory_order_release);
+}
+
+void Forest::Impl::collect() {
+  // The store of the last commit once more, now in the order of the readers' announcements (epoch.hpp).
+  committed_.fetch_add(0, std::memory_order_seq_cst);
   const std::uint64_t tag = epoch::retire_tag();
   for (Version* version : superseded_) {
     if (version->held()) {
@@ -143,25 +189,10 @@ void Forest::Impl::commit() {
     }
   }
   superseded_.clear();
-  // Only now: a reader of the commit before may still reach a name through the version it sees.
-  for (const Name* name : released_names_) {
-    free_slots_.push_back(name->slot);
-    ids_.erase(name);
-  }
-  released_names_.clear();
-  if (held_pool_.waiting() + remote_pool_.waiting() > kCollectAt) collect();
-}
-
-void Forest::Impl::commit_structure() {
-  commit();
-  structure_version_.fetch_add(1, std::memory_order_release);
-}
-
-void Forest::Impl::collect() {
   const std::uint64_t below = epoch::safe_below();
   held_pool_.collect(below);
   remote_pool_.collect(below);
-  ids_.collect(below);
+  ids_.collect(tag, below);
 }
 
 Result<void> Forest::add(std::string_view id, std::string_view parent, const Transform& X_PC,
@@ -169,21 +200,21 @@ Result<void> Forest::add(std::string_view id, std::string_view parent, const Tra
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   const std::lock_guard lock(impl_->mutex_);
-  const Version* there = impl_->newest_named(id);
-  if (there != nullptr && there->present()) {
+  const Impl::Pair pair = impl_->newest_pair(id, parent);
+  if (pair.frame != nullptr && pair.frame->present()) {
     return fail(Errc::kAlreadyExists, "frame " + quote(id) + " exists already");
   }
-  if (!parent.empty() && rule == MissingParent::kRefuse) {
-    const Version* above = impl_->newest_named(parent);
-    if (above == nullptr || !above->present()) {
-      return fail(Errc::kUnknownParent,
-                  "no frame " + quote(parent) + " to be the parent of " + quote(id));
-    }
+  const bool parent_there = parent.empty() || (pair.above != nullptr && pair.above->present());
+  if (!parent_there && rule == MissingParent::kRefuse) {
+    return fail(Errc::kUnknownParent,
+                "no frame " + quote(parent) + " to be the parent of " + quote(id));
   }
-  if (auto ok = impl_->check_no_cycle(id, parent); !ok) return ok;
-  const std::uint32_t slot = impl_->intern(id);
-  const std::uint32_t parent_slot = impl_->intern(parent);
-  impl_->relink(impl_->push_held(slot, X_PC), parent_slot);
+  if (auto ok = impl_->check_no_cycle(pair); !ok) return ok;
+  const Name* name = pair.frame != nullptr ? pair.frame->name : impl_->intern(id);
+  const std::uint32_t parent_slot = impl_->parent_slot(pair);
+  HeldVersion& fresh = impl_->push_held(name->slot, X_PC);
+  fresh.name = name;
+  impl_->relink(fresh, parent_slot);
   impl_->commit_structure();
   return {};
 }
@@ -192,7 +223,6 @@ Result<std::vector<std::string>> Forest::remove(std::string_view id) {
   const std::lock_guard lock(impl_->mutex_);
   const auto top = impl_->held_slot(id);
   if (!top) return tl::unexpected(top.error());
-  impl_->graph_.ensure(*top);
   const auto slots =
       impl_->graph_.subtree(*top, [&](std::uint32_t child) { return impl_->newest(child).held(); });
   std::vector<std::string> removed;
@@ -214,27 +244,33 @@ Result<void> Forest::update(std::string_view id, const Transform& X_PC) {
 
 Result<void> Forest::update(Handle frame, const Transform& X_PC) {
   const std::lock_guard lock(impl_->mutex_);
-  const Version* version = frame.slot < impl_->slots_.size() ? &impl_->newest(frame.slot) : nullptr;
-  if (version == nullptr || !version->present() || version->generation != frame.generation) {
-    return fail(Errc::kUnknownFrame, "the frame of this handle was removed");
-  }
-  if (!version->held()) {
-    return fail(Errc::kNotOwner,
-                "frame " + quote(version->name->text) + " is held by another partition");
-  }
-  impl_->push_held(frame.slot, X_PC);
+  const auto slot = impl_->held_slot(frame);
+  if (!slot) return tl::unexpected(slot.error());
+  impl_->push_held(*slot, X_PC);
   impl_->commit();
   return {};
 }
 
-Result<void> Forest::update(const std::vector<EdgeUpdate>& edges) {
-  const std::lock_guard lock(impl_->mutex_);
-  for (const EdgeUpdate& edge : edges) {
-    if (const auto slot = impl_->held_slot(edge.id); !slot) return tl::unexpected(slot.error());
+template <class Update, class Frame>
+Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame frame) {
+  const std::lock_guard lock(mutex_);
+  to_update_.clear();
+  for (const Update& edge : edges) {
+    const auto slot = held_slot(edge.*frame);
+    if (!slot) return tl::unexpected(slot.error());
+    to_update_.push_back(*slot);
   }
-  for (const EdgeUpdate& edge : edges) impl_->push_held(*impl_->held_slot(edge.id), edge.X_PC);
-  impl_->commit();
+  for (std::size_t i = 0; i < edges.size(); ++i) push_held(to_update_[i], edges[i].X_PC);
+  commit();
   return {};
+}
+
+Result<void> Forest::update(const std::vector<EdgeUpdate>& edges) {
+  return impl_->update_all(edges, &EdgeUpdate::id);
+}
+
+Result<void> Forest::update(const std::vector<HandleUpdate>& edges) {
+  return impl_->update_all(edges, &HandleUpdate::frame);
 }
 
 Result<void> Forest::move(std::string_view id, std::string_view parent,
@@ -243,16 +279,14 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
-  if (!parent.empty()) {
-    const Version* above = impl_->newest_named(parent);
-    if (above == nullptr || !above->present()) {
-      return fail(Errc::kUnknownParent,
-                  "no frame " + quote(parent) + " to be the parent of " + quote(id));
-    }
+  const Impl::Pair pair = impl_->newest_pair(id, parent);
+  if (!parent.empty() && (pair.above == nullptr || !pair.above->present())) {
+    return fail(Errc::kUnknownParent,
+                "no frame " + quote(parent) + " to be the parent of " + quote(id));
   }
-  if (auto ok = impl_->check_no_cycle(id, parent); !ok) return ok;
-  const std::uint32_t parent_slot = impl_->intern(parent);
-  const auto& old = static_cast<const HeldVersion&>(impl_->newest(*slot));
+  if (auto ok = impl_->check_no_cycle(pair); !ok) return ok;
+  const auto& old = static_cast<const HeldVersion&>(*pair.frame);
+  const std::uint32_t parent_slot = impl_->parent_slot(pair);
   impl_->relink(impl_->push_held(*slot, X_PC.value_or(old.X_PC)), parent_slot);
   impl_->commit_structure();
   return {};
@@ -264,16 +298,17 @@ Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Ow
   // A version that counts as held carries a value, which there is none of.
   if (owner == kHeldHere) return fail(Errc::kInvalidInput, "owner is this very forest");
   const std::lock_guard lock(impl_->mutex_);
-  const Version* there = impl_->newest_named(id);
-  if (there != nullptr && there->held()) {
+  const Impl::Pair pair = impl_->newest_pair(id, parent);
+  if (pair.frame != nullptr && pair.frame->held()) {
     return fail(Errc::kAlreadyExists, "frame " + quote(id) + " is held here");
   }
-  auto acyclic = impl_->check_no_cycle(id, parent);
-  const std::uint32_t slot = impl_->intern(id);
-  const std::uint32_t parent_slot = acyclic ? impl_->intern(parent) : kNoSlot;
-  const Version& old = impl_->newest(slot);
+  auto acyclic = impl_->check_no_cycle(pair);
+  const Name* name = pair.frame != nullptr ? pair.frame->name : impl_->intern(id);
+  const std::uint32_t parent_slot = acyclic ? impl_->parent_slot(pair) : kNoSlot;
+  const Version& old = impl_->newest(name->slot);
   if (!old.present() || old.owner != owner || old.parent != parent_slot) {
-    Version& fresh = impl_->push_remote(slot);
+    Version& fresh = impl_->push_remote(name->slot);
+    fresh.name = name;
     fresh.owner = owner;
     impl_->relink(fresh, parent_slot);
     impl_->commit_structure();

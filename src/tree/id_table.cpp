@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <functional>
 
-#include "tree/epoch.hpp"
-
 namespace tfdude {
 namespace {
 
@@ -28,9 +26,9 @@ IdTable::~IdTable() {
 
 const Name* IdTable::find(std::string_view id) const {
   const std::size_t hash = hash_of(id);
-  const Table& table = *table_.load(std::memory_order_seq_cst);
+  const Table& table = *table_.load(std::memory_order_acquire);
   for (std::size_t i = hash & table.mask;; i = (i + 1) & table.mask) {
-    const Name* name = table.cells[i].load(std::memory_order_seq_cst);
+    const Name* name = table.cells[i].load(std::memory_order_acquire);
     if (name == nullptr) return nullptr;
     if (name != &kTombstone && name->hash == hash && name->text == id) return name;
   }
@@ -43,26 +41,33 @@ const Name* IdTable::insert(std::string_view id, std::uint32_t slot) {
     table = table_.load(std::memory_order_relaxed);
   }
   const auto* name = new Name{std::string(id), hash_of(id), slot};
-  place(*table, name);
+  if (place(*table, name)) ++used_;
   ++names_;
-  ++used_;
   return name;
 }
 
 void IdTable::erase(const Name* name) {
   Table& table = *table_.load(std::memory_order_relaxed);
-  for (std::size_t i = name->hash & table.mask;; i = (i + 1) & table.mask) {
-    if (table.cells[i].load(std::memory_order_relaxed) != name) continue;
-    table.cells[i].store(&kTombstone, std::memory_order_seq_cst);
-    break;
+  std::size_t i = name->hash & table.mask;
+  while (table.cells[i].load(std::memory_order_relaxed) != name) i = (i + 1) & table.mask;
+  table.cells[i].store(&kTombstone, std::memory_order_release);
+  // Tombstones before an empty cell lead nowhere: emptied, so that coming and going does not fill the table.
+  if (table.cells[(i + 1) & table.mask].load(std::memory_order_relaxed) == nullptr) {
+    while (table.cells[i].load(std::memory_order_relaxed) == &kTombstone) {
+      table.cells[i].store(nullptr, std::memory_order_release);
+      --used_;
+      i = (i - 1) & table.mask;
+    }
   }
   --names_;
-  limbo_.push_back({epoch::retire_tag(), std::unique_ptr<const Name>(name), nullptr});
+  limbo_.push_back({0, std::unique_ptr<const Name>(name), nullptr});
 }
 
-void IdTable::collect(std::uint64_t safe_below) {
+void IdTable::collect(std::uint64_t tag, std::uint64_t safe_below) {
+  for (; tagged_ < limbo_.size(); ++tagged_) limbo_[tagged_].tag = tag;
   const auto first_kept = std::find_if(limbo_.begin(), limbo_.end(),
                                        [&](const Limbo& l) { return l.tag >= safe_below; });
+  tagged_ -= static_cast<std::size_t>(first_kept - limbo_.begin());
   limbo_.erase(limbo_.begin(), first_kept);
 }
 
@@ -74,17 +79,23 @@ void IdTable::grow() {
   Table* old = table_.load(std::memory_order_relaxed);
   for (auto& cell : old->cells) {
     const Name* name = cell.load(std::memory_order_relaxed);
-    if (name != nullptr && name != &kTombstone) place(*fresh, name);
+    if (name != nullptr && name != &kTombstone) (void)place(*fresh, name);
   }
   used_ = names_;
-  table_.store(fresh.release(), std::memory_order_seq_cst);
-  limbo_.push_back({epoch::retire_tag(), nullptr, std::unique_ptr<Table>(old)});
+  table_.store(fresh.release(), std::memory_order_release);
+  limbo_.push_back({0, nullptr, std::unique_ptr<Table>(old)});
 }
 
-void IdTable::place(Table& table, const Name* name) {
+bool IdTable::place(Table& table, const Name* name) {
   std::size_t i = name->hash & table.mask;
-  while (table.cells[i].load(std::memory_order_relaxed) != nullptr) i = (i + 1) & table.mask;
-  table.cells[i].store(name, std::memory_order_release);
+  while (true) {
+    const Name* there = table.cells[i].load(std::memory_order_relaxed);
+    if (there == nullptr || there == &kTombstone) {
+      table.cells[i].store(name, std::memory_order_release);
+      return there == nullptr;
+    }
+    i = (i + 1) & table.mask;
+  }
 }
 
 }  // namespace tfdude

@@ -33,8 +33,9 @@ class IdTable {
   /// The name must be in the table.
   void erase(const Name* name);
 
-  /// Frees what no reader can see any more.
-  void collect(std::uint64_t safe_below);
+  /// Whatever was erased since the last call gets the tag (epoch::retire_tag); what carries one below
+  /// safe_below is freed.
+  void collect(std::uint64_t tag, std::uint64_t safe_below);
 
  private:
   struct Table {
@@ -49,12 +50,14 @@ class IdTable {
   };
 
   void grow();
-  static void place(Table& table, const Name* name);
+  /// @return whether it took a cell that had never been used
+  static bool place(Table& table, const Name* name);
 
   std::atomic<Table*> table_;
   std::size_t names_ = 0;
   std::size_t used_ = 0;  // names and tombstones
   std::vector<Limbo> limbo_;
+  std::size_t tagged_ = 0;  // of limbo_, from the front
 };
 
 }  // namespace tfdude

@@ -16,11 +16,17 @@ namespace tfdude {
 
 inline constexpr std::uint32_t kNoSlot = 0xFFFFFFFF;
 
+struct Version;
+
+/// Where a slot's newest version is found; stays where it is.
+using Head = std::atomic<Version*>;
+
 /// What one commit says of the frame in one slot. Immutable once its commit is visible.
 struct Version {
   std::uint64_t commit = 0;
   Version* older = nullptr;
-  const Name* name = nullptr;  // null: the slot stands for no id
+  const Name* name = nullptr;   // null: the slot stands for no id
+  const Head* above = nullptr;  // of the slot `parent`, which a climb need not look up then
   std::uint32_t parent = kNoSlot;
   std::int32_t depth = kAbsent;  // parent's + 1, so 0 where there is none or it is absent
   Owner owner = kHeldHere;
@@ -105,8 +111,6 @@ class SlotArray {
   }
   SlotArray(const SlotArray&) = delete;
   SlotArray& operator=(const SlotArray&) = delete;
-
-  using Head = std::atomic<Version*>;
 
   [[nodiscard]] Head& operator[](std::uint32_t slot) const {
     const std::uint32_t biased = slot + kFirst;

@@ -89,6 +89,7 @@ class Client {
   /// Many edges: each owner applies its share as one, so that nobody sees half of it. Another process takes
   /// at most kMaxItems edges at once.
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
+  [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges);
 
   /// Streams new edge values to their owners, unacknowledged: the path for joints at 1 kHz and more. A
   /// share that an owner cannot take in time may be lost, never torn.
@@ -107,6 +108,10 @@ class Client {
   /// @return kUnknownStart, kUnknownEnd, kNotConnected.
   [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b);
   [[nodiscard]] Result<Transform> lookup(Handle a, Handle b);
+
+  /// The same without its covariance. On a path of own edges this takes a fraction of the time.
+  [[nodiscard]] Result<Pose> lookup_pose(std::string_view a, std::string_view b);
+  [[nodiscard]] Result<Pose> lookup_pose(Handle a, Handle b);
 
   /// Finds a frame once, for calls that then need no hashing. @return kUnknownFrame.
   [[nodiscard]] Result<Handle> find(std::string_view id);

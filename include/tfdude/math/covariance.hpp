@@ -49,8 +49,8 @@ class Covariance {
   /// Square roots of the diagonal: three [m], three [rad].
   [[nodiscard]] std::array<double, 6> stddev() const;
 
-  /// Ad(X) Σ Ad(X)ᵀ: the same error seen from the other side of X. Block form of the adjoint,
-  /// about 200 multiplications instead of 864 of two dense products.
+  /// Ad(X) Σ Ad(X)ᵀ: the same error seen from the other side of X. Block form of the adjoint, 243
+  /// multiplications instead of 864 of two dense products.
   [[nodiscard]] Covariance transported(const Pose& X) const;
 
   Covariance& operator+=(const Covariance& other);

@@ -24,25 +24,4 @@ struct Transform {
 /// X_AB of X_WA and X_WB with independent errors: compose(inverse(X_WA), X_WB).
 [[nodiscard]] Transform between(const Transform& X_WA, const Transform& X_WB);
 
-/// The way from a frame S up towards its root, added up in S itself: the sum Σ Ad(X_SC) Σ_C
-/// Ad(X_SC)ᵀ over the edges climbed (C the child of each) needs one adjoint an edge, whatever
-/// follows, and no buffer.
-class Climb {
- public:
-  /// Goes up one edge: X_PC is its value, C the frame reached so far, P the frame reached then.
-  void up(const Transform& X_PC);
-
-  /// X_SH, the pose of the frame reached (here, H) in the start S.
-  [[nodiscard]] const Pose& pose() const { return X_SH_; }
-
-  /// X_AB where A and B climbed to the same frame. Independent edges, first order.
-  friend Transform join(const Climb& from_a, const Climb& from_b);
-
- private:
-  Pose X_SH_;
-  Covariance left_;  // of the left perturbation of X_SH, expressed in S
-};
-
-[[nodiscard]] Transform join(const Climb& from_a, const Climb& from_b);
-
 }  // namespace tfdude

@@ -32,6 +32,12 @@ struct EdgeUpdate {
   Transform X_PC;
 };
 
+/// The same by number.
+struct HandleUpdate {
+  Handle frame;
+  Transform X_PC;
+};
+
 /// A run of edges on a path that one owner holds: X from `from` to `to`.
 struct Segment {
   Owner owner = kHeldHere;
@@ -86,6 +92,7 @@ class Forest {
 
   /// Gives many edges new values as one commit: all or, on an error, none; no reader sees a part.
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
+  [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges);
 
   /// Hangs a held frame, with all below it, under a new parent; empty makes it a root. Keeps the edge's
   /// value where X_PC is not given. O(subtree).
@@ -109,6 +116,10 @@ class Forest {
   ///   elsewhere: see segments()).
   [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b) const;
   [[nodiscard]] Result<Transform> lookup(Handle a, Handle b) const;
+
+  /// The same without its covariance, at a fraction of the time.
+  [[nodiscard]] Result<Pose> lookup_pose(std::string_view a, std::string_view b) const;
+  [[nodiscard]] Result<Pose> lookup_pose(Handle a, Handle b) const;
 
   /// As lookup, for a segment that somebody else's path needs: its ends may be frames that are not there,
   /// as long as held edges name them as their parent.

@@ -77,6 +77,7 @@ TEST_CASE("lookups and queries of one frame do not allocate") {
   CHECK(allocations_of([&] { return forest.lookup(top, bottom).has_value(); }) == 0);
   CHECK(allocations_of([&] { return forest.lookup(bottom, top).has_value(); }) == 0);
   CHECK(allocations_of([&] { return forest.lookup(a, b).has_value(); }) == 0);
+  CHECK(allocations_of([&] { return forest.lookup_pose(a, b).has_value(); }) == 0);
   CHECK(allocations_of([&] { return forest.lookup_segment(top, bottom).has_value(); }) == 0);
   CHECK(allocations_of([&] { return forest.holds(bottom) && !forest.holds(absent); }) == 0);
   CHECK(allocations_of([&] { return forest.find(bottom) && !forest.find(absent); }) == 0);
@@ -93,10 +94,15 @@ TEST_CASE("updates do not allocate") {
   const std::string id = deep_id(kDepth / 2);
   const Handle handle = forest.find(id).value();
   std::vector<EdgeUpdate> batch;
-  for (int i = 0; i < 100; ++i) batch.push_back({deep_id(i), X_PC});
+  std::vector<HandleUpdate> batch_by_handle;
+  for (int i = 0; i < 100; ++i) {
+    batch.push_back({deep_id(i), X_PC});
+    batch_by_handle.push_back({forest.find(deep_id(i)).value(), X_PC});
+  }
   CHECK(allocations_of([&] { return forest.update(id, X_PC).has_value(); }) == 0);
   CHECK(allocations_of([&] { return forest.update(handle, X_PC).has_value(); }) == 0);
   CHECK(allocations_of([&] { return forest.update(batch).has_value(); }) == 0);
+  CHECK(allocations_of([&] { return forest.update(batch_by_handle).has_value(); }) == 0);
 }
 
 // ---- memory does not grow with the past

@@ -16,6 +16,7 @@ using testing::along_x;
 using testing::describe;
 using testing::ids_of;
 using testing::outcome;
+using testing::pose_diff;
 using testing::Random;
 using testing::sorted;
 using testing::transform_diff;
@@ -59,6 +60,22 @@ TEST_CASE("a lookup goes up, down, across and to itself") {
   const auto handle = [&](const char* id) { return forest.find(id).value(); };
   CHECK(transform_diff(*forest.lookup(handle("c"), handle("b")), *forest.lookup("c", "b"), 0.0) ==
         "");
+}
+
+TEST_CASE("a lookup of the pose alone gives the pose of the lookup") {
+  Random random(102);
+  INFO("seed " << random.seed());
+  Forest forest;
+  REQUIRE(forest.add("w", "", Transform()));
+  REQUIRE(forest.add("a", "w", random.transform()));
+  REQUIRE(forest.add("b", "w", random.transform()));
+  REQUIRE(forest.put_remote("r", "w", 1));
+  const Pose X_AB = forest.lookup("a", "b")->pose;
+  CHECK(pose_diff(*forest.lookup_pose("a", "b"), X_AB, 0.0) == "");
+  CHECK(pose_diff(*forest.lookup_pose(*forest.find("a"), *forest.find("b")), X_AB, 0.0) == "");
+  CHECK(outcome(forest.lookup_pose("x", "b")) == "unknown_start");
+  CHECK(outcome(forest.lookup_pose("a", "x")) == "unknown_end");
+  CHECK(outcome(forest.lookup_pose("a", "r")) == "not_owner");
 }
 
 TEST_CASE("unknown start, unknown end and no common root are three errors") {

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "tfdude/math/transform.hpp"
+
+#include "math/kernel.hpp"
+
+namespace tfdude {
+
+/// The way from a frame S up towards its root, added up in S itself: the sum Σ Ad(X_SC) Σ_C Ad(X_SC)ᵀ over the
+/// edges climbed (C the child of each) needs one adjoint an edge, whatever follows. Edges are computed some at
+/// a time, as the arithmetic then stays in registers: a value given to up() must stay where it is until the
+/// climb is joined.
+///
+/// @tparam Value  Transform, or Pose where the covariance is not asked for
+template <class Value>
+class Climb {
+ public:
+  /// Goes up one edge: X_PC is its value, C the frame reached so far, P the frame reached then.
+  void up(const Value& X_PC) {
+    pending_[count_++] = reinterpret_cast<kernel::Edge>(&X_PC);
+    if (count_ == pending_.size()) compute();
+  }
+
+  /// X_AB where A and B climbed to the same frame. Independent edges, first order.
+  template <class V>
+  friend V join(Climb<V>&& from_a, Climb<V>&& from_b);
+
+ private:
+  void compute();
+
+  kernel::Columns X_SH_;  // the pose of the frame reached (here, H) in the start S
+  kernel::Blocks left_;   // of the left perturbation of X_SH, expressed in S
+  std::array<kernel::Edge, 16> pending_;
+  std::size_t count_ = 0;
+};
+
+template <class Value>
+[[nodiscard]] Value join(Climb<Value>&& from_a, Climb<Value>&& from_b);
+
+}  // namespace tfdude

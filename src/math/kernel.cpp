@@ -1,0 +1,39 @@
+#include "math/kernel.hpp"
+
+// Vectors are passed between functions of this file only, whose calls are inlined.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+namespace tfdude::kernel {
+namespace {
+
+using V4 = double __attribute__((vector_size(32)));
+using Lanes = long long __attribute__((vector_size(32)));
+
+namespace any {
+#include "math/kernel_body.inc"
+}
+
+#if defined(__x86_64__)
+#pragma GCC push_options
+#pragma GCC target("avx2,fma")
+namespace avx2 {
+#include "math/kernel_body.inc"
+}  // namespace avx2
+#pragma GCC pop_options
+
+const Functions kForAvx2{avx2::climb_pose, avx2::climb_both, avx2::quotient, avx2::transport};
+const bool kAvx2 = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+#endif
+
+}  // namespace
+
+const Functions kPortable{any::climb_pose, any::climb_both, any::quotient, any::transport};
+
+const Functions& functions() {
+#if defined(__x86_64__)
+  if (kAvx2) return kForAvx2;
+#endif
+  return kPortable;
+}
+
+}  // namespace tfdude::kernel

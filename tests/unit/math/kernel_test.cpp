@@ -1,0 +1,51 @@
+#include "math/kernel.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include "math/columns.hpp"
+#include "support/catch.hpp"
+#include "support/pose_diff.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::covariance_diff;
+using testing::pose_diff;
+using testing::Random;
+
+TEST_CASE("the portable kernel and that of this processor agree") {
+  Random random(250);
+  INFO("seed " << random.seed());
+  std::vector<Transform> path;
+  std::vector<kernel::Edge> edges;
+  path.reserve(50);
+  for (int i = 0; i < 50; ++i) {
+    edges.push_back(reinterpret_cast<kernel::Edge>(&path.emplace_back(random.transform())));
+  }
+  const auto climbed = [&](const kernel::Functions& functions) {
+    kernel::Columns X_SH;
+    kernel::Blocks sum;
+    functions.climb_with_covariance(X_SH, sum, edges.data(), edges.size());
+    functions.add_transported(functions.quotient(X_SH, kernel::Columns()),
+                              path[0].covariance.upper().data(), sum);
+    return Transform{kernel::pose_of(X_SH), Covariance::trusted(kernel::upper_of(sum))};
+  };
+  const Transform here = climbed(kernel::functions());
+  const Transform portable = climbed(kernel::kPortable);
+  CHECK(pose_diff(here.pose, portable.pose, 1e-12) == "");
+  CHECK(covariance_diff(here.covariance, portable.covariance, 1e-12) == "");
+}
+
+TEST_CASE("columns keep the pose") {
+  Random random(251);
+  INFO("seed " << random.seed());
+  for (int i = 0; i < 100; ++i) {
+    const Pose X = random.pose();
+    CHECK(pose_diff(kernel::pose_of(kernel::columns_of(X)), X, 1e-14) == "");
+  }
+}
+
+}  // namespace
+}  // namespace tfdude
