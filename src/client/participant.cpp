@@ -97,6 +97,7 @@ void Participant::send(Calls::Call& call, std::size_t entry, const Request& requ
 void Participant::wait_for_replies(Calls::Call& call, const std::vector<const Request*>& requests,
                                    Clock::time_point deadline) {
   Milliseconds pause = kFirstRepeat;
+  int asked = 1;
   while (!call.wait_until(std::min(deadline, Clock::now() + pause))) {
     const bool over = Clock::now() >= deadline;
     for (std::size_t i = 0; i < requests.size(); ++i) {
@@ -107,8 +108,11 @@ void Participant::wait_for_replies(Calls::Call& call, const std::vector<const Re
       }
       call.give_up(i, Error{Errc::kTimeout, "partition " + quote(call.entries()[i].partition) +
                                                 " did not answer within " +
-                                                std::to_string(options_.timeout.count()) + " ms"});
+                                                std::to_string(options_.timeout.count()) +
+                                                " ms (asked " + std::to_string(asked) +
+                                                " times)"});
     }
+    ++asked;
     pause = std::min(2 * pause, kLastRepeat);
   }
 }

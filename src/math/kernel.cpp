@@ -10,14 +10,14 @@ using V4 = double __attribute__((vector_size(32)));
 using Lanes = long long __attribute__((vector_size(32)));
 
 namespace any {
-#include "math/kernel_body.inc"
+#include "math/kernel_body.ipp"
 }
 
 #if defined(__x86_64__)
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 namespace avx2 {
-#include "math/kernel_body.inc"
+#include "math/kernel_body.ipp"
 }  // namespace avx2
 #pragma GCC pop_options
 

@@ -80,6 +80,9 @@ TEST_CASE("frames are added, updated and moved from anywhere") {
     REQUIRE(caller->update({{tool, inverse(kX)}, {hand, inverse(kX)}, {"arm_1", kX}}));
     CHECK(testing::transform_diff(*caller->lookup("robot_1", "arm_1"), kX, 1e-12) == "");
     CHECK(testing::transform_diff(*caller->lookup("arm_2", hand), inverse(kX), 1e-12) == "");
+    REQUIRE(caller->update({{*caller->find(tool), kX}, {*caller->find(hand), kX}}));
+    CHECK(testing::transform_diff(*caller->lookup("camera", tool), kX, 1e-12) == "");
+    CHECK(testing::pose_diff(*caller->lookup_pose("arm_2", hand), kX.pose, 1e-12) == "");
     REQUIRE(caller->move(hand, "camera"));
     CHECK(*caller->parent(hand) == "camera");
     CHECK(caller->move("robot_1", "hand_left").error().code == Errc::kCycle);
