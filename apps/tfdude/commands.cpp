@@ -3,6 +3,9 @@
 #include <csignal>
 #include <cstdio>
 #include <ctime>
+#include <string_view>
+
+#include "tfdude/base/id.hpp"
 
 #include "render.hpp"
 
@@ -12,6 +15,10 @@ namespace {
 void print(const std::string& text) {
   std::fputs(text.c_str(), stdout);
   std::fflush(stdout);
+}
+
+void print_error(std::string_view code, std::string_view message) {
+  print(dump({{"error", {{"code", code}, {"message", message}}}}) + "\n");
 }
 
 int answer(const Arguments& arguments, const nlohmann::json& json, const std::string& text) {
@@ -57,7 +64,7 @@ int finish(Client& client, const Result<void>& changed, const Arguments& argumen
 }
 
 int refuse_pose(const Error& error, const Arguments& arguments) {
-  return report({error.code, "frame '" + arguments.id + "': " + error.message}, arguments);
+  return report({error.code, "frame " + quote(arguments.id) + ": " + error.message}, arguments);
 }
 
 int print_lookup(Client& client, const Arguments& arguments) {
@@ -76,9 +83,14 @@ int print_lookup(Client& client, const Arguments& arguments) {
 
 }  // namespace
 
+int report_usage(const std::string& message) {
+  print_error("usage", message);
+  return kWrongUsage;
+}
+
 int report(const Error& error, const Arguments& arguments) {
   if (arguments.json) {
-    print(dump({{"error", {{"code", to_string(error.code)}, {"message", error.message}}}}) + "\n");
+    print_error(to_string(error.code), error.message);
   } else {
     std::fprintf(stderr, "tfdude: %s\n", error.message.c_str());
   }

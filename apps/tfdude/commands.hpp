@@ -41,6 +41,9 @@ int run_roots(Client& client, const Arguments& arguments);
 int run_exists(Client& client, const Arguments& arguments);
 int run_watch(Client& client, const Arguments& arguments);
 
+/// Prints what is wrong with the command line itself, as JSON, and returns the exit status.
+int report_usage(const std::string& message);
+
 /// Prints an error and returns the exit status that it means.
 int report(const Error& error, const Arguments& arguments);
 

@@ -1,12 +1,16 @@
 // The command line: one question or change at a time.
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <string>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+
+#include "tfdude/base/id.hpp"
 
 #include "commands.hpp"
 
@@ -26,8 +30,10 @@ void add_pose_options(CLI::App& command, Arguments& arguments) {
       ->type_name("X Y Z W")
       ->excludes(rpy);
   auto* stddev =
-      command.add_option("--stddev", spec.stddev, "standard deviations [m m m rad rad rad]");
+      command.add_option("--stddev", spec.stddev, "standard deviations [m m m rad rad rad]")
+          ->type_name("6 NUMBERS");
   command.add_option("--cov", spec.cov, "upper triangle of the covariance row by row")
+      ->type_name("21 NUMBERS")
       ->excludes(stddev);
 }
 
@@ -70,7 +76,11 @@ void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
                             "watch world hand_left --rate 5", cli::run_watch, chosen);
   add_ends(watch, arguments);
   watch->add_option("--rate", arguments.rate, "times a second [Hz]")
-      ->check(CLI::Range(0.001, 1000.0));
+      ->check([](const std::string& text) {
+        // Not CLI::Range, which takes NaN.
+        const double rate = std::strtod(text.c_str(), nullptr);
+        return rate >= 0.001 && rate <= 1000.0 ? "" : text + " is not within 0.001 to 1000";
+      });
 }
 
 void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
@@ -114,7 +124,8 @@ int main(int argc, char** argv) {
   app.footer("Exit status: 0 done, 1 the service said no, 2 wrong usage, 3 no answer.");
   app.require_subcommand(1);
   app.fallthrough();
-  app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232");
+  app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232")
+      ->check(CLI::Range(0, 232));
   app.add_option("--profile", arguments.options.profile, "XML file of DDS profiles");
   app.add_option("--timeout", timeout_ms, "how long to wait for an answer [ms]")
       ->check(CLI::Range(1, 3600000));
@@ -124,13 +135,17 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
     const auto unknown = app.remaining();
-    if (app.get_subcommands().empty() && !unknown.empty()) {
-      std::fprintf(stderr, "tfdude: no command '%s'\n", unknown.front().c_str());
-    }
-    return app.exit(error) == 0 ? cli::kDone : cli::kWrongUsage;
+    const bool no_command = app.get_subcommands().empty() && !unknown.empty();
+    const std::string what = no_command ? "no command " + quote(unknown.front()) : error.what();
+    if (arguments.json) return cli::report_usage(what);
+    if (no_command) std::fprintf(stderr, "tfdude: %s\n", what.c_str());
+    (void)app.exit(error);
+    return cli::kWrongUsage;
   }
   arguments.options.timeout = Milliseconds(timeout_ms);
+  arguments.options.discovery = std::min(arguments.options.discovery, arguments.options.timeout);
   // Before any thread starts, so that watch can wait for them.
   sigset_t stop_signals;
   sigemptyset(&stop_signals);
@@ -138,7 +153,8 @@ int main(int argc, char** argv) {
   sigaddset(&stop_signals, SIGTERM);
   if (app.got_subcommand("watch")) pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
   const int status = run(arguments, command);
-  std::fflush(stdout);
+  const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if (!written) std::perror("tfdude: standard output");
   // Fast DDS's static destructors would sleep 100 ms.
-  _exit(status);
+  _exit(status == cli::kDone && !written ? cli::kRefused : status);
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <map>
 
@@ -70,7 +71,9 @@ std::string draw_tree(const std::vector<Frame>& frames,
 std::string describe(const Transform& X_AB, bool with_covariance) {
   const Eigen::Vector3d t = X_AB.pose.translation();
   const Eigen::Quaterniond q = X_AB.pose.rotation();
-  const Eigen::Vector3d rpy = to_rpy(q) * kDegrees;
+  const Eigen::Vector3d rpy = (to_rpy(q) * kDegrees).unaryExpr([](double angle) {
+    return std::abs(angle) < 0.5e-4 ? 0.0 : angle;  // not "-0.0000"
+  });
   const auto s = X_AB.covariance.stddev();
   std::string text = format("translation  %.6f  %.6f  %.6f  m\n", t.x(), t.y(), t.z());
   text += format("quaternion   %.6f  %.6f  %.6f  %.6f  (x y z w)\n", q.x(), q.y(), q.z(), q.w());

@@ -8,6 +8,7 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/config.hpp"
 
@@ -50,12 +51,13 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
   }
   auto node = tfdude::Node::open(config->partition, config->frames, arguments.options);
   if (!node) {
-    spdlog::error("partition '{}': {}", config->partition, node.error().message);
-    return kRefused;
+    spdlog::error("partition {}: {}", tfdude::quote(config->partition), node.error().message);
+    return node.error().code == tfdude::Errc::kConfig ? kWrongUsage : kRefused;
   }
   std::printf("ready partition=%s frames=%zu\n", config->partition.c_str(), config->frames.size());
   std::fflush(stdout);
-  spdlog::info("serving partition '{}' in domain {}", config->partition, arguments.options.domain);
+  spdlog::info("serving partition {} in domain {}", tfdude::quote(config->partition),
+               arguments.options.domain);
   int signal = 0;
   sigwait(&stop_signals, &signal);
   spdlog::info("stopping on signal {}", signal);
@@ -71,7 +73,8 @@ int main(int argc, char** argv) {
   app.footer("Example: tfduded --partition arms --config examples/thesis/arms.yaml --domain 7");
   app.add_option("--partition", arguments.partition, "the partition's name");
   app.add_option("--config", arguments.config, "YAML file of frames");
-  app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232");
+  app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232")
+      ->check(CLI::Range(0, 232));
   app.add_option("--profile", arguments.options.profile, "XML file of DDS profiles");
   try {
     app.parse(argc, argv);
@@ -79,7 +82,8 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : kWrongUsage;
   }
   // Standard output is for the line "ready" alone.
-  spdlog::set_default_logger(spdlog::stderr_color_mt("tfduded"));
+  // The library takes the logger of this name for its own.
+  spdlog::set_default_logger(spdlog::stderr_color_mt("tfdude"));
   // Before any thread starts, so that all inherit it and sigwait() gets the signals.
   sigset_t stop_signals;
   sigemptyset(&stop_signals);

@@ -8,7 +8,10 @@ namespace tfdude {
 spdlog::logger& log() {
   static const std::shared_ptr<spdlog::logger> kLogger = [] {
     auto registered = spdlog::get("tfdude");
-    return registered ? registered : spdlog::stderr_color_mt("tfdude");
+    if (registered) return registered;
+    auto own = spdlog::stderr_color_mt("tfdude");
+    own->set_level(spdlog::level::warn);
+    return own;
   }();
   return *kLogger;
 }

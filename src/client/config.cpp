@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string_view>
@@ -84,6 +85,8 @@ class Reader {
                                      const std::string& place,
                                      std::optional<std::array<double, N>>& out) const;
   [[nodiscard]] Result<FrameSpec> frame(const YAML::Node& node, std::size_t index) const;
+  [[nodiscard]] Result<void> check_no_cycle(const YAML::Node& list,
+                                            const std::vector<FrameSpec>& frames) const;
   [[nodiscard]] Result<std::string> id(const Fields& fields, std::string_view key,
                                        const std::string& place) const;
   [[nodiscard]] Result<Transform> transform(const YAML::Node& node, const Fields& fields,
@@ -254,6 +257,31 @@ Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index) const
   return spec;
 }
 
+// Each frame climbs until where another has been that found its root.
+Result<void> Reader::check_no_cycle(const YAML::Node& list,
+                                    const std::vector<FrameSpec>& frames) const {
+  std::unordered_map<std::string_view, std::size_t> index;
+  for (std::size_t i = 0; i < frames.size(); ++i) index.emplace(frames[i].id, i);
+  constexpr std::size_t kNobody = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> visitor(frames.size(), kNobody);
+  for (std::size_t start = 0; start < frames.size(); ++start) {
+    std::size_t here = start;
+    while (visitor[here] == kNobody) {
+      visitor[here] = start;
+      const auto parent = index.find(frames[here].parent);
+      if (parent == index.end()) break;
+      if (visitor[parent->second] == start) {
+        return error(Errc::kInvalidInput, list[here].Mark(),
+                     "frame " + tfdude::quote(frames[here].id) + ": parent " +
+                         tfdude::quote(frames[here].parent) +
+                         " is the frame itself or lies below it");
+      }
+      here = parent->second;
+    }
+  }
+  return {};
+}
+
 Result<Config> Reader::config(const YAML::Node& root) const {
   const auto entries = fields(root, kFileKeys, "the file");
   if (!entries) return tl::unexpected(entries.error());
@@ -282,6 +310,7 @@ Result<Config> Reader::config(const YAML::Node& root) const {
     }
     config.frames.push_back(*std::move(spec));
   }
+  if (auto ok = check_no_cycle(list, config.frames); !ok) return tl::unexpected(ok.error());
   return config;
 }
 

@@ -4,6 +4,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/log.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -109,8 +111,7 @@ void Participant::wait_for_replies(Calls::Call& call, const std::vector<const Re
       call.give_up(i, Error{Errc::kTimeout, "partition " + quote(call.entries()[i].partition) +
                                                 " did not answer within " +
                                                 std::to_string(options_.timeout.count()) +
-                                                " ms (asked " + std::to_string(asked) +
-                                                " times)"});
+                                                " ms (asked " + std::to_string(asked) + " times)"});
     }
     ++asked;
     pause = std::min(2 * pause, kLastRepeat);
@@ -296,15 +297,25 @@ void Participant::on_page(const Page& page) {
 }
 
 void Participant::on_presence(const Presence& presence) {
+  bool rivals = false;
+  bool appeared = false;
   {
     const std::lock_guard lock(structure_mutex_);
     if (presence.partition == directory_.name(kHeldHere)) {
-      if (presence.incarnation != presence_.incarnation) rival_ = presence;
+      if (presence.incarnation == presence_.incarnation) return;
+      rivals = presence_.serving && presence.serving;
+      rival_ = presence;
     } else {
+      const auto before = directory_.serving(presence.partition);
       directory_.apply(presence, wall_clock());
+      appeared = directory_.serving(presence.partition) && !before;
     }
   }
   structure_changed_.notify_all();
+  const std::string who = quote(presence.partition) + " (host " + quote(presence.host) + ", pid " +
+                          std::to_string(presence.pid) + ")";
+  if (appeared) log().info("partition {} is there", who);
+  if (rivals) log().error("partition {} is served by another process, too", who);
 }
 
 void Participant::on_lost(const std::string& partition, std::uint64_t incarnation) {
@@ -316,7 +327,9 @@ void Participant::on_lost(const std::string& partition, std::uint64_t incarnatio
     news = directory_.lost(partition, incarnation, wall_clock());
   }
   structure_changed_.notify_all();
-  if (news) calls_.on_lost(partition);
+  if (!news) return;
+  log().info("partition {} has gone or fallen silent", quote(partition));
+  calls_.on_lost(partition);
 }
 
 }  // namespace tfdude

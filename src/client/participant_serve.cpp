@@ -3,6 +3,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/log.hpp"
 #include "client/participant.hpp"
 
 namespace tfdude {
@@ -24,6 +25,23 @@ std::string host_name() {
   std::array<char, 256> name{};
   if (gethostname(name.data(), name.size() - 1) != 0) return "unknown";
   return name.data();
+}
+
+// One line a change of the structure; values change too often for it.
+void log_change(const Request& request, const Reply& reply) {
+  std::string what;
+  if (const auto* add = std::get_if<AddRequest>(&request.body)) {
+    what = "add frame " + quote(request.id) + " under " + quote(add->parent);
+  } else if (const auto* remove = std::get_if<RemoveRequest>(&request.body)) {
+    what = "remove, with all below,";
+    for (const std::string& top : remove->tops) what += " " + quote(top);
+  } else if (const auto* move = std::get_if<MoveRequest>(&request.body)) {
+    what = "move frame " + quote(request.id) + " under " + quote(move->parent);
+  } else {
+    return;
+  }
+  const auto* error = std::get_if<Error>(&reply.body);
+  log().info("{}: {}", what, error != nullptr ? "refused: " + error->message : "done");
 }
 
 }  // namespace
@@ -109,6 +127,7 @@ void Participant::on_request(const PeerId& from, const Request& request) {
     const std::lock_guard lock(structure_mutex_);
     reply = partition_->answer(from, request);
   }
+  log_change(request, reply);
   // Before the reply, so that whoever gets that finds the structure changed.
   if (!std::holds_alternative<UpdateRequest>(request.body)) publish_structure();
   transport_->reply(from, reply);

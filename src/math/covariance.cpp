@@ -1,7 +1,9 @@
 #include "tfdude/math/covariance.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <string>
 
 #include <Eigen/Eigenvalues>
@@ -16,11 +18,17 @@ constexpr double kSymmetryTolerance = 1e-9;
 // of very different size are judged alike.
 constexpr double kPsdTolerance = 1e-9;
 // An axis is scaled as if it had at least this share of the largest variance in metres (in radians).
-// The library's own results are semi-definite to rounding of that largest variance, 1e-12 at worst: an
-// axis that is known exactly but for rounding must not be judged by its rounding error.
+// The library's own results are semi-definite to rounding of that largest variance, as a rule: an axis that is
+// known exactly but for rounding must not be judged by its rounding error.
 constexpr double kAxisShare = 1e-3;
 // Pivots above this leave no doubt about the sign of the smallest eigenvalue.
 constexpr double kClearPivot = 1e-7;
+
+std::string number(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%g", value);
+  return text.data();
+}
 
 std::string element(std::size_t row, std::size_t column) {
   return "covariance[" + std::to_string(row) + "][" + std::to_string(column) + "]";
@@ -83,7 +91,7 @@ Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
     return fail(Errc::kInvalidInput,
                 "covariance is not positive semi-definite: the smallest eigenvalue "
                 "of its correlation matrix is " +
-                    std::to_string(smallest));
+                    number(smallest));
   }
   if (smallest >= 0) return upper;
   const Twist lifted = solver.eigenvalues().cwiseMax(0.0);

@@ -1,7 +1,9 @@
 #include "tfdude/math/pose.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <string>
 
 namespace tfdude {
@@ -35,7 +37,9 @@ Result<Pose> Pose::create(const Eigen::Quaterniond& rotation, const Eigen::Vecto
   }
   const double norm = rotation.norm();
   if (!(std::abs(norm - 1.0) <= kQuaternionTolerance)) {
-    return fail(Errc::kInvalidInput, "rotation has the norm " + std::to_string(norm) +
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%g", norm);
+    return fail(Errc::kInvalidInput, std::string("rotation has the norm ") + text.data() +
                                          ", not that of a unit quaternion");
   }
   return trusted(Eigen::Quaterniond(rotation.coeffs() / norm), translation);

@@ -37,6 +37,13 @@ Result<void> check_size(const Part& part, std::size_t items, const char* what) {
                                        " at once, of at most " + std::to_string(kMaxItems));
 }
 
+Result<void> check_value(const std::string& id, const Transform& X_PC) {
+  if (auto finite = check_finite(X_PC); !finite) {
+    return fail_at("frame " + quote(id), finite.error());
+  }
+  return {};
+}
+
 Result<void> check_all_reachable(const Directory& directory, const std::vector<Part>& parts) {
   for (const Part& part : parts) {
     if (auto ok = check_reachable(directory, part.owner); !ok) return ok;
@@ -49,6 +56,7 @@ Result<void> check_all_reachable(const Directory& directory, const std::vector<P
 Result<Part> route_add(const Forest& forest, const Directory& directory, const std::string& id,
                        const AddRequest& request, const std::string& partition) {
   if (auto ok = check_id(id, "id"); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_value(id, request.X_PC); !ok) return tl::unexpected(ok.error());
   if (forest.exists(id))
     return fail(Errc::kAlreadyExists, "frame " + quote(id) + " exists already");
   const auto parent = forest.info(request.parent);
@@ -94,6 +102,7 @@ Result<std::vector<Part>> route_update(const Forest& forest, const Directory& di
   for (const EdgeUpdate& edge : edges) {
     const auto frame = forest.info(edge.id);
     if (!frame) return unknown_frame(edge.id);
+    if (auto ok = check_value(edge.id, edge.X_PC); !ok) return tl::unexpected(ok.error());
     body_for<UpdateRequest>(parts, directory, frame->owner, edge.id).edges.push_back(edge);
   }
   if (auto ok = check_all_reachable(directory, parts); !ok) return tl::unexpected(ok.error());
@@ -108,6 +117,12 @@ Result<Part> route_move(const Forest& forest, const Directory& directory, const 
                         const MoveRequest& request) {
   const auto frame = forest.info(id);
   if (!frame) return unknown_frame(id);
+  if (request.X_PC) {
+    if (auto ok = check_value(id, *request.X_PC); !ok) return tl::unexpected(ok.error());
+  }
+  if (id == request.parent) {
+    return fail(Errc::kCycle, "frame " + quote(id) + " cannot hang under itself");
+  }
   if (!request.parent.empty() && !forest.exists(request.parent)) {
     return fail(Errc::kUnknownParent,
                 "no frame " + quote(request.parent) + " to be the parent of " + quote(id));

@@ -18,6 +18,13 @@ const Version* Forest::Impl::newest_named(std::string_view id) const {
   return name != nullptr ? &newest(name->slot) : nullptr;
 }
 
+Result<void> Forest::Impl::check_value(std::string_view id, const Transform& X_PC) {
+  if (auto finite = check_finite(X_PC); !finite) {
+    return fail_at("frame " + quote(id), finite.error());
+  }
+  return {};
+}
+
 Result<std::uint32_t> Forest::Impl::held_slot(std::string_view id) const {
   const Version* version = newest_named(id);
   if (version == nullptr || !version->present()) return unknown_frame(id);
@@ -48,7 +55,10 @@ Result<void> Forest::Impl::check_no_cycle(const Pair& pair) const {
   while (pair.frame != nullptr && above != nullptr && above != pair.frame) {
     above = above->parent == kNoSlot ? nullptr : &newest(above->parent);
   }
-  if (pair.id == pair.parent || (pair.frame != nullptr && above == pair.frame)) {
+  if (pair.id == pair.parent) {
+    return fail(Errc::kCycle, "frame " + quote(pair.id) + " cannot hang under itself");
+  }
+  if (pair.frame != nullptr && above == pair.frame) {
     return fail(Errc::kCycle, "frame " + quote(pair.id) + " cannot hang under " +
                                   quote(pair.parent) + ", which lies below it");
   }
@@ -199,6 +209,7 @@ Result<void> Forest::add(std::string_view id, std::string_view parent, const Tra
                          MissingParent rule) {
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
+  if (auto ok = Impl::check_value(id, X_PC); !ok) return ok;
   const std::lock_guard lock(impl_->mutex_);
   const Impl::Pair pair = impl_->newest_pair(id, parent);
   if (pair.frame != nullptr && pair.frame->present()) {
@@ -234,6 +245,7 @@ Result<std::vector<std::string>> Forest::remove(std::string_view id) {
 }
 
 Result<void> Forest::update(std::string_view id, const Transform& X_PC) {
+  if (auto ok = Impl::check_value(id, X_PC); !ok) return ok;
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
@@ -246,6 +258,7 @@ Result<void> Forest::update(Handle frame, const Transform& X_PC) {
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->held_slot(frame);
   if (!slot) return tl::unexpected(slot.error());
+  if (auto ok = Impl::check_value(impl_->newest(*slot).name->text, X_PC); !ok) return ok;
   impl_->push_held(*slot, X_PC);
   impl_->commit();
   return {};
@@ -258,6 +271,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   for (const Update& edge : edges) {
     const auto slot = held_slot(edge.*frame);
     if (!slot) return tl::unexpected(slot.error());
+    if (auto ok = check_value(newest(*slot).name->text, edge.X_PC); !ok) return ok;
     to_update_.push_back(*slot);
   }
   for (std::size_t i = 0; i < edges.size(); ++i) push_held(to_update_[i], edges[i].X_PC);
@@ -277,6 +291,9 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
                           const std::optional<Transform>& X_PC) {
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   const std::lock_guard lock(impl_->mutex_);
+  if (X_PC) {
+    if (auto ok = Impl::check_value(id, *X_PC); !ok) return ok;
+  }
   const auto slot = impl_->held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   const Impl::Pair pair = impl_->newest_pair(id, parent);

@@ -1,5 +1,7 @@
 // The function tests of the thesis, once over each transport: two owners and a client without frames.
 
+#include <array>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <unistd.h>
@@ -88,6 +90,54 @@ TEST_CASE("frames are added, updated and moved from anywhere") {
     CHECK(caller->move("robot_1", "hand_left").error().code == Errc::kCycle);
     REQUIRE(caller->remove(tool));
     REQUIRE(caller->remove(hand));
+  }
+}
+
+TEST_CASE("what is not finite is refused before it is sent") {
+  const int transport = GENERATE(0, 1);
+  Robot r(joined_by(transport));
+  const Transform bad{Pose::trusted(Eigen::Quaterniond::Identity(), {NAN, 0, 0}), {}};
+  for (Client* caller : r.all()) {
+    for (const Result<void>& refused :
+         {caller->add("x", "camera", bad), caller->update("arm_1", bad),
+          caller->publish({{"camera", kX}, {"arm_1", bad}}),
+          caller->move("arm_2", "camera", bad)}) {
+      REQUIRE_FALSE(refused);
+      CHECK(refused.error().code == Errc::kInvalidInput);
+      CHECK(refused.error().message.find("translation.x is not a finite number") !=
+            std::string::npos);
+    }
+    CHECK_FALSE(caller->exists("x"));
+    CHECK(caller->lookup("world", "hand_left"));
+  }
+}
+
+TEST_CASE("an answer that is semi-definite but for rounding arrives") {
+  // An edge without translation seen from its child's side: the variances of the translation are zero but for
+  // the rounding of those of the rotation over a lever.
+  const int transport = GENERATE(0, 1);
+  Robot r(joined_by(transport));
+  const auto edge = [](const Eigen::Vector3d& p, const Eigen::Vector3d& rpy,
+                       const std::array<double, 6>& stddev) {
+    return Transform{*Pose::create(from_rpy(rpy[0], rpy[1], rpy[2]), p),
+                     *Covariance::from_stddev(stddev)};
+  };
+  REQUIRE(r.client->add("e", "arm_2",
+                        edge({0, 0, 0}, {0.36, -0.63, 1.1}, {0, 0, 0, 5e-5, 2.4e-4, 9.7e-3})));
+  REQUIRE(r.client->add("f", "e", edge({0, -0.78, 0}, {-2.4, 0.4, -2}, {})));
+  REQUIRE(r.client->add("a", "arm_2",
+                        edge({0, 0, 0}, {1.1, -0.072, -0.28}, {0, 0, 0, 2.1e-3, 0, 5.3e-3})));
+  REQUIRE(r.client->add("b", "a", edge({0, 0, 0.3}, {0, 0, 0}, {0, 0, 0, 0, 1.3e-5, 0})));
+  // Farther than a user may say that anything is, since two such edges add up.
+  const auto far = edge({9e8, 0, 0}, {0, 0, 0}, {9e8, 9e8, 9e8, 1, 1, 1});
+  REQUIRE(r.client->add("far1", "arm_2", far));
+  REQUIRE(r.client->add("far2", "far1", far));
+  for (const char* end : {"f", "b", "far2"}) {
+    CAPTURE(end);
+    const auto asked = r.client->lookup(end, "arm_2");
+    INFO((asked ? "" : asked.error().message));
+    REQUIRE(asked);
+    CHECK(testing::transform_diff(*asked, *r.arms->lookup(end, "arm_2"), 1e-12) == "");
   }
 }
 

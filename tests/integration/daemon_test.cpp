@@ -49,7 +49,7 @@ TEST_CASE("daemon: what it cannot serve it refuses by name, without being ready"
       {{"--config", config("twice.yaml", "  - id: knee\n  - id: knee\n")},
        {"twice.yaml:4", "'knee'"}},
       {{"--config", config("cycle.yaml", "  - {id: a, parent: b}\n  - {id: b, parent: a}\n")},
-       {"'legs'", "'b'"}},
+       {"cycle.yaml:4", "'a'", "'b'", "parent"}},
       {{"--config", directory.write("text.yaml", "frames: [\n")}, {"text.yaml", "YAML"}},
   };
   for (const Refusal& refusal : refusals) {

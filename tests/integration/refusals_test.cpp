@@ -144,6 +144,8 @@ TEST_CASE("cli: wrong usage is 2") {
       {{"add", "tool", "--parent", "camera", "--xyz", "1", "2"}, "", {"--xyz"}},
       {{"update", "camera", "--quat", "0", "0", "0", "1", "--rpy", "0", "0", "0"}, "", {"--quat"}},
       {{"watch", "world", "camera", "--rate", "0"}, "", {"--rate"}},
+      {{"watch", "world", "camera", "--rate", "nan"}, "", {"--rate", "nan"}},
+      {{"watch", "world", "camera", "--rate", "2x"}, "", {"--rate", "2x"}},
       {{"tree", "--timeout", "soon"}, "", {"--timeout", "soon"}},
       {{"tree", "--profile", "/nowhere/profile.xml"}, "", {"/nowhere/profile.xml"}},
       {{"tree", "--profile", directory.write("broken.xml", "<profiles><")}, "", {"broken.xml"}},
@@ -156,6 +158,14 @@ TEST_CASE("cli: wrong usage is 2") {
     CHECK(result.status == 2);
     CHECK(result.out.empty());
     for (const std::string& name : usage.names) CHECK_THAT(result.err, Contains(name));
+    Arguments arguments = usage.arguments;
+    arguments.insert(arguments.begin(), "--json");
+    const CliResult program = d.domain.cli(arguments);
+    CHECK(program.status == 2);
+    const json error = json::parse(program.out).at("error");
+    for (const std::string& name : usage.names) {
+      CHECK_THAT(error.at("message").get<std::string>(), Contains(name));
+    }
   }
 }
 

@@ -33,7 +33,8 @@ class Covariance {
   /// @return as from_matrix. Negative eigenvalues within 1e-9 of the scaled matrix, as decimal
   ///   rounding makes them, are lifted to zero. Scaled is each axis by its own variance, but by no less
   ///   than 1e-3 of the largest in its unit (m² or rad²): below 1e-12 of that one everything is taken
-  ///   for rounding, so that results of the library are always accepted again.
+  ///   for rounding, so that results of the library are accepted again, as a rule: where all of one unit is
+  ///   rounding of the other's, over a lever, nothing here can tell.
   [[nodiscard]] static Result<Covariance> from_upper(const Upper& upper);
 
   /// Independent errors along the six axes: three standard deviations [m], then three [rad].

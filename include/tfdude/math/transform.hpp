@@ -13,6 +13,11 @@ struct Transform {
   Covariance covariance;
 };
 
+/// For what did not come through the checked constructors of its parts, as the result of a computation may not
+/// be a number. Some nanoseconds.
+/// @return kInvalidInput naming the field: NaN, infinity.
+[[nodiscard]] Result<void> check_finite(const Transform& X);
+
 /// X_AC of X_AB and X_BC with independent errors, first order: Σ_AC = Ad(X_BC⁻¹) Σ_AB Ad(X_BC⁻¹)ᵀ +
 /// Σ_BC. Barfoot & Furgale 2014, Eq. 40 to second order, written for the right perturbation.
 [[nodiscard]] Transform compose(const Transform& X_AB, const Transform& X_BC);

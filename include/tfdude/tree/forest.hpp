@@ -76,7 +76,7 @@ class Forest {
   // --- frames held here ---
 
   /// Adds a frame; an empty parent makes a root. O(1) for a leaf, O(n) where n frames wait for it.
-  /// @return kAlreadyExists, kUnknownParent, kCycle, kInvalidInput (id).
+  /// @return kAlreadyExists, kUnknownParent, kCycle, kInvalidInput (id, or a value that is not finite).
   [[nodiscard]] Result<void> add(std::string_view id, std::string_view parent,
                                  const Transform& X_PC,
                                  MissingParent rule = MissingParent::kRefuse);
@@ -86,7 +86,7 @@ class Forest {
   [[nodiscard]] Result<std::vector<std::string>> remove(std::string_view id);
 
   /// Gives an edge a new value. Allocation-free.
-  /// @return kUnknownFrame, kNotOwner.
+  /// @return kUnknownFrame, kNotOwner, kInvalidInput (not finite).
   [[nodiscard]] Result<void> update(std::string_view id, const Transform& X_PC);
   [[nodiscard]] Result<void> update(Handle frame, const Transform& X_PC);
 
@@ -96,7 +96,7 @@ class Forest {
 
   /// Hangs a held frame, with all below it, under a new parent; empty makes it a root. Keeps the edge's
   /// value where X_PC is not given. O(subtree).
-  /// @return kUnknownFrame, kNotOwner, kUnknownParent, kCycle.
+  /// @return kUnknownFrame, kNotOwner, kUnknownParent, kCycle, kInvalidInput (not finite).
   [[nodiscard]] Result<void> move(std::string_view id, std::string_view parent,
                                   const std::optional<Transform>& X_PC = std::nullopt);
 

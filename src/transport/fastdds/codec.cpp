@@ -46,6 +46,21 @@ Result<Transform> from_wire(const wire::Transform& in, std::string_view frame) {
   return Transform{*pose, *covariance};
 }
 
+// The result of another's computation: of any size, and semi-definite to its rounding, so that it is not for
+// the rules of what users give.
+Result<Transform> computed_from_wire(const wire::Transform& in) {
+  const Eigen::Quaterniond rotation(in[3], in[0], in[1], in[2]);
+  Transform X{Pose::trusted(rotation, {in[4], in[5], in[6]}), {}};
+  Covariance::Upper upper{};
+  std::copy_n(in.begin() + 7, Covariance::kSize, upper.begin());
+  X.covariance = Covariance::trusted(upper);
+  if (auto finite = check_finite(X); !finite) return fail_at("a reply", finite.error());
+  const auto unit = Pose::create(rotation, Eigen::Vector3d::Zero());
+  if (!unit) return fail_at("a reply", unit.error());
+  X.pose = Pose::trusted(unit->rotation(), X.pose.translation());
+  return X;
+}
+
 wire::Edge to_wire(const EdgeUpdate& edge) {
   wire::Edge out;
   out.id(edge.id);
@@ -248,7 +263,7 @@ Result<Reply> from_wire(const wire::Reply& sample) {
     std::vector<Transform> transforms;
     transforms.reserve(body.transforms().size());
     for (const wire::Transform& in : body.transforms()) {
-      auto X = from_wire(in, "of a reply");
+      auto X = computed_from_wire(in);
       if (!X) return tl::unexpected(std::move(X.error()));
       transforms.push_back(*X);
     }

@@ -199,7 +199,7 @@ TEST_CASE("a value that breaks its rule is refused by field") {
                  "robot.yaml:4: frame 'camera': xyz: translation.z is beyond 1e9 m"});
   check_refused(
       {camera("    parent: world\n    quat: [0, 0, 0, 2]"), Errc::kInvalidInput,
-       "robot.yaml:5: frame 'camera': quat: rotation has the norm 2.000000, not that of a unit "
+       "robot.yaml:5: frame 'camera': quat: rotation has the norm 2, not that of a unit "
        "quaternion"});
   check_refused(
       {camera("    cov: [1, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 0, 1]"),

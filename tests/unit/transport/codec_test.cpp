@@ -1,5 +1,6 @@
 #include "transport/fastdds/codec.hpp"
 
+#include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
@@ -214,7 +215,13 @@ TEST_CASE("values that no transform has are refused, with frame and field") {
     CHECK(from_wire(update, [](std::string_view id) { return id == "hand"; }));
     wire::Reply reply = to_wire(Reply{1, 2, std::vector<Transform>(2)});
     reply.body().transforms()[1] = x_pc;
-    check_refused(from_wire(reply), "of a reply", bad.field);
+    // What another has computed may be of any size, and semi-definite to its rounding only.
+    const bool only_for_users = std::isfinite(bad.value) && bad.index > 3;
+    if (only_for_users) {
+      CHECK(from_wire(reply));
+    } else {
+      check_refused(from_wire(reply), "a reply", bad.field);
+    }
   }
 }
 

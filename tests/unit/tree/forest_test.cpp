@@ -1,10 +1,12 @@
 #include "tfdude/tree/forest.hpp"
 
+#include <limits>
 #include <string>
 #include <type_traits>
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "support/pose_diff.hpp"
 
 namespace tfdude {
 namespace {
@@ -200,6 +202,34 @@ TEST_CASE("a batch is applied as a whole or not at all") {
   // The last of several values for one edge holds.
   CHECK(outcome(forest.update({{"arm", along_x(1)}, {"arm", along_x(2)}})) == "ok");
   CHECK(x_of(forest.value("arm")) == 2);
+}
+
+TEST_CASE("a value that is not finite is refused by frame and field") {
+  Forest forest;
+  plant(forest);
+  const Transform before = *forest.value("arm");
+  const double bad =
+      GENERATE(std::numeric_limits<double>::quiet_NaN(), -std::numeric_limits<double>::infinity());
+  const Transform no_place{
+      Pose::trusted(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, bad, 0)), {}};
+  Covariance::Upper upper{};
+  upper[20] = bad;
+  const Transform no_number{Pose(), Covariance::trusted(upper)};
+  const Handle arm = *forest.find("arm");
+  for (const Result<void>& refused :
+       {forest.update("arm", no_place), forest.update(arm, no_place),
+        forest.update({{"hand", along_x(1)}, {"arm", no_place}}),
+        forest.update({{*forest.find("hand"), along_x(1)}, {arm, no_place}}),
+        forest.move("arm", "dock", no_place)}) {
+    REQUIRE(outcome(refused) == "invalid_input");
+    CHECK(refused.error().message == "frame 'arm': translation.y is not a finite number");
+  }
+  const auto added = forest.add("new", "arm", no_number);
+  REQUIRE(outcome(added) == "invalid_input");
+  CHECK(added.error().message == "frame 'new': covariance[5][5] is not a finite number");
+  CHECK_FALSE(forest.exists("new"));
+  CHECK(forest.info("arm")->parent != "dock");
+  CHECK(testing::transform_diff(*forest.value("arm"), before, 0.0) == "");
 }
 
 TEST_CASE("a batch by handles is applied as a whole or not at all") {
