@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -139,7 +140,10 @@ int main(int argc, char** argv) {
     const auto unknown = app.remaining();
     const bool no_command = app.get_subcommands().empty() && !unknown.empty();
     const std::string what = no_command ? "no command " + quote(unknown.front()) : error.what();
-    if (arguments.json) return cli::report_usage(what);
+    // Not in arguments, which a command line that is wrong has not filled.
+    if (std::find(argv, argv + argc, std::string_view("--json")) != argv + argc) {
+      return cli::report_usage(what);
+    }
     if (no_command) std::fprintf(stderr, "tfdude: %s\n", what.c_str());
     (void)app.exit(error);
     return cli::kWrongUsage;
