@@ -8,6 +8,12 @@ namespace tfdude {
 
 Calls::Call::Call(Calls& calls, const std::vector<std::string>& partitions) : calls_(calls) {
   const std::lock_guard lock(calls_.mutex_);
+  if (calls_.idle_signals_.empty()) {
+    calls_.signals_.push_back(std::make_unique<Signal>());
+    calls_.idle_signals_.push_back(calls_.signals_.back().get());
+  }
+  arrived_ = calls_.idle_signals_.back();
+  calls_.idle_signals_.pop_back();
   entries_.reserve(partitions.size());
   for (const std::string& partition : partitions) {
     const std::uint32_t sequence = ++calls_.last_sequence_;
@@ -19,6 +25,7 @@ Calls::Call::Call(Calls& calls, const std::vector<std::string>& partitions) : ca
 Calls::Call::~Call() {
   const std::lock_guard lock(calls_.mutex_);
   for (const Entry& entry : entries_) calls_.waiting_.erase(entry.sequence);
+  calls_.idle_signals_.push_back(arrived_);
 }
 
 bool Calls::Call::complete() const {
@@ -28,7 +35,7 @@ bool Calls::Call::complete() const {
 
 bool Calls::Call::wait_until(Clock::time_point deadline) {
   std::unique_lock lock(calls_.mutex_);
-  return arrived_.wait_until(lock, deadline, [this] { return complete(); });
+  return arrived_->wait_until(lock, deadline, [this] { return complete(); });
 }
 
 bool Calls::Call::waits(std::size_t entry) const {
@@ -43,14 +50,18 @@ void Calls::Call::give_up(std::size_t entry, Error error) {
 }
 
 void Calls::on_reply(const Reply& reply) {
-  const std::lock_guard lock(mutex_);
-  const auto waiting = waiting_.find(reply.sequence);
-  if (waiting == waiting_.end()) return;
-  Call& call = *waiting->second.call;
-  auto& entry = call.entries_[waiting->second.entry];
-  if (entry.reply) return;
-  entry.reply = reply;
-  if (call.complete()) call.arrived_.notify_one();
+  Signal* arrived = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto waiting = waiting_.find(reply.sequence);
+    if (waiting == waiting_.end()) return;
+    const Call& call = *waiting->second.call;
+    auto& entry = waiting->second.call->entries_[waiting->second.entry];
+    if (entry.reply) return;
+    entry.reply = reply;
+    if (call.complete()) arrived = call.arrived_;
+  }
+  if (arrived != nullptr) arrived->notify_one();
 }
 
 void Calls::on_lost(const std::string& partition) {
@@ -61,7 +72,7 @@ void Calls::on_lost(const std::string& partition) {
     entry.reply = Reply{sequence, 0,
                         Error{Errc::kUnreachable,
                               "partition " + quote(partition) + " went away while it was asked"}};
-    if (waiting.call->complete()) waiting.call->arrived_.notify_one();
+    if (waiting.call->complete()) waiting.call->arrived_->notify_one();
   }
 }
 

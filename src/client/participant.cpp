@@ -32,7 +32,10 @@ Participant::Participant(std::unique_ptr<Transport> transport, std::string parti
       settle_deadline_(Clock::now() + options.discovery),
       transport_(std::move(transport)) {}
 
-Participant::~Participant() { transport_->stop(); }
+Participant::~Participant() {
+  publisher_.reset();
+  transport_->stop();
+}
 
 Result<void> Participant::start() { return transport_->start(*this); }
 
@@ -147,6 +150,7 @@ std::vector<Reply> Participant::ask(std::vector<Part>& parts, Clock::time_point 
 }
 
 Result<void> Participant::change(std::vector<Part>& parts) {
+  if (parts.size() == 1 && parts[0].owner == kHeldHere) return change_here(parts[0].request);
   const auto deadline = Clock::now() + options_.timeout;
   const std::vector<Reply> replies = ask(parts, deadline);
   Result<void> outcome;

@@ -16,6 +16,7 @@
 #include "tfdude/transport/transport.hpp"
 
 #include "client/calls.hpp"
+#include "client/deferred.hpp"
 
 namespace tfdude {
 
@@ -133,6 +134,7 @@ class Participant final : public TransportHandler {
   void await_structure_change(std::uint64_t version);
   void await_epoch(const Part& part, std::uint64_t epoch, Clock::time_point deadline);
   void publish_structure();
+  [[nodiscard]] Result<void> change_here(const Request& request);
   [[nodiscard]] Result<void> claim_name();
 
   const Options options_;
@@ -147,7 +149,8 @@ class Participant final : public TransportHandler {
   Calls calls_;
   std::atomic<bool> settled_{false};
   Clock::time_point settle_deadline_;
-  std::unique_ptr<Transport> transport_;  // last: stops before the rest goes
+  std::unique_ptr<Transport> transport_;  // stops before the rest goes
+  std::optional<Deferred> publisher_;  // publishes own changes of the structure; stops before that
 };
 
 }  // namespace tfdude

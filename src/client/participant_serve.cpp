@@ -15,6 +15,9 @@ constexpr Milliseconds kPredecessorGone{1500};
 // How much longer than usual somebody who was met may take to say which partition it serves.
 constexpr Milliseconds kSlowPresence{3000};
 
+// How often own changes of the structure are published at most.
+constexpr Milliseconds kPublishEvery{1};
+
 std::uint64_t nanoseconds_since_epoch() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   return static_cast<std::uint64_t>(
@@ -63,6 +66,7 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
     presence_.pages = partition_->page_count();
     presence_.serving = true;
   }
+  publisher_.emplace(kPublishEvery, [this] { publish_structure(); });
   if (auto serving = transport_->serve(name); !serving) return serving;
   publish_structure();
   transport_->announce(presence_);
@@ -112,8 +116,15 @@ Reply Participant::answer_here(const Request& request) {
     const std::lock_guard lock(structure_mutex_);
     reply = partition_->answer(request);
   }
-  publish_structure();
+  // This process sees the change already; the others are told without making it wait.
+  if (!std::holds_alternative<UpdateRequest>(request.body)) publisher_->ask();
   return reply;
+}
+
+Result<void> Participant::change_here(const Request& request) {
+  Reply reply = answer_here(request);
+  if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
+  return {};
 }
 
 void Participant::on_request(const PeerId& from, const Request& request) {

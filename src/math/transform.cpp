@@ -1,24 +1,10 @@
 #include "tfdude/math/transform.hpp"
 
-#include <string>
+#include "math/finite.hpp"
 
 namespace tfdude {
-namespace {
-
-// Zero times each number, added up: zero for finite ones, else NaN.
-bool all_finite(const double* numbers, std::size_t count) {
-  double lanes[4] = {};
-  for (std::size_t i = 0; i < count; i += 4) {
-    for (std::size_t k = 0; k < 4; ++k) lanes[k] += 0.0 * numbers[i + k];
-  }
-  return lanes[0] + lanes[1] + lanes[2] + lanes[3] == 0.0;
-}
-
-}  // namespace
-
 Result<void> check_finite(const Transform& X) {
-  static_assert(sizeof(Transform) == 28 * sizeof(double));
-  if (all_finite(reinterpret_cast<const double*>(&X), 28)) return {};
+  if (is_finite(X)) return {};
   const auto pose = Pose::create(X.pose.rotation(), X.pose.translation());
   if (!pose) return tl::unexpected(pose.error());
   const auto covariance = Covariance::from_upper(X.covariance.upper());

@@ -8,6 +8,7 @@
 #include "tree/graph.hpp"
 #include "tree/id_table.hpp"
 #include "tree/versions.hpp"
+#include "tree/write_lock.hpp"
 
 namespace tfdude {
 
@@ -71,7 +72,7 @@ class Forest::Impl {
   /// The id's newest version, there or not; null if the id is not interned.
   [[nodiscard]] const Version* newest_named(std::string_view id) const;
 
-  /// @return kInvalidInput naming the frame and the field.
+  /// What is wrong with a value that is not finite. @return kInvalidInput naming the frame and the field.
   [[nodiscard]] static Result<void> check_value(std::string_view id, const Transform& X_PC);
 
   /// Checks that the frame is there and held here. @return kUnknownFrame, kNotOwner.
@@ -116,7 +117,7 @@ class Forest::Impl {
 
   SlotArray slots_;
   std::atomic<std::uint64_t> structure_version_{0};
-  mutable std::mutex mutex_;
+  mutable WriteLock mutex_;
   Graph graph_;
 
  private:

@@ -2,6 +2,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
 
 namespace tfdude {
@@ -209,7 +210,7 @@ Result<void> Forest::add(std::string_view id, std::string_view parent, const Tra
                          MissingParent rule) {
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
-  if (auto ok = Impl::check_value(id, X_PC); !ok) return ok;
+  if (!is_finite(X_PC)) return Impl::check_value(id, X_PC);
   const std::lock_guard lock(impl_->mutex_);
   const Impl::Pair pair = impl_->newest_pair(id, parent);
   if (pair.frame != nullptr && pair.frame->present()) {
@@ -245,7 +246,7 @@ Result<std::vector<std::string>> Forest::remove(std::string_view id) {
 }
 
 Result<void> Forest::update(std::string_view id, const Transform& X_PC) {
-  if (auto ok = Impl::check_value(id, X_PC); !ok) return ok;
+  if (!is_finite(X_PC)) return Impl::check_value(id, X_PC);
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
@@ -258,7 +259,7 @@ Result<void> Forest::update(Handle frame, const Transform& X_PC) {
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->held_slot(frame);
   if (!slot) return tl::unexpected(slot.error());
-  if (auto ok = Impl::check_value(impl_->newest(*slot).name->text, X_PC); !ok) return ok;
+  if (!is_finite(X_PC)) return Impl::check_value(impl_->newest(*slot).name->text, X_PC);
   impl_->push_held(*slot, X_PC);
   impl_->commit();
   return {};
@@ -271,7 +272,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   for (const Update& edge : edges) {
     const auto slot = held_slot(edge.*frame);
     if (!slot) return tl::unexpected(slot.error());
-    if (auto ok = check_value(newest(*slot).name->text, edge.X_PC); !ok) return ok;
+    if (!is_finite(edge.X_PC)) return check_value(newest(*slot).name->text, edge.X_PC);
     to_update_.push_back(*slot);
   }
   for (std::size_t i = 0; i < edges.size(); ++i) push_held(to_update_[i], edges[i].X_PC);
@@ -291,9 +292,7 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
                           const std::optional<Transform>& X_PC) {
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   const std::lock_guard lock(impl_->mutex_);
-  if (X_PC) {
-    if (auto ok = Impl::check_value(id, *X_PC); !ok) return ok;
-  }
+  if (X_PC && !is_finite(*X_PC)) return Impl::check_value(id, *X_PC);
   const auto slot = impl_->held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   const Impl::Pair pair = impl_->newest_pair(id, parent);

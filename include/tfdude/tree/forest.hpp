@@ -62,7 +62,7 @@ struct FrameInfo {
 /// @par Thread safety  All functions may be called from any thread. Lookups, find, exists, info and frames
 ///   take no lock and never wait: every commit (of one edge or of many) pushes new versions of its edges
 ///   and becomes visible by one store, and a reader sees the forest as it was at one commit. Writers take
-///   turns on a mutex that no reader touches; children() and roots() take it too.
+///   turns on a lock that no reader touches; children() and roots() take it too.
 /// @par Memory  Superseded versions are reused as soon as no reader can see them (epochs, see epoch.hpp).
 class Forest {
  public:

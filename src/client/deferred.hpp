@@ -1,0 +1,61 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+namespace tfdude {
+
+/// Does one job on a thread of its own soon after it is asked to, once for all that ask meanwhile, and at most
+/// once a period: whoever asks a million times a second pays nanoseconds, and the job is done a thousand times.
+class Deferred {
+ public:
+  Deferred(std::chrono::milliseconds period, std::function<void()> job)
+      : period_(period), job_(std::move(job)), thread_([this] { run(); }) {}
+  ~Deferred() {
+    {
+      const std::lock_guard lock(mutex_);
+      stopping_ = true;
+    }
+    changed_.notify_one();
+    thread_.join();
+  }
+  Deferred(const Deferred&) = delete;
+  Deferred& operator=(const Deferred&) = delete;
+
+  void ask() {
+    if (asked_.exchange(true)) return;
+    // The lock keeps the notice from falling between the thread's look and its sleep.
+    { const std::lock_guard lock(mutex_); }
+    changed_.notify_one();
+  }
+
+ private:
+  void run() {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      changed_.wait(lock, [this] { return stopping_ || asked_.load(); });
+      if (stopping_) return;
+      lock.unlock();
+      // Before the job, so that what changes while it runs is not missed.
+      asked_.store(false);
+      job_();
+      lock.lock();
+      changed_.wait_for(lock, period_, [this] { return stopping_; });
+    }
+  }
+
+  const std::chrono::milliseconds period_;
+  const std::function<void()> job_;
+  std::atomic<bool> asked_{false};
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool stopping_ = false;
+  std::thread thread_;  // last: it uses the rest
+};
+
+}  // namespace tfdude
