@@ -8,6 +8,7 @@ import dataclasses
 import struct
 
 ACKNACK, HEARTBEAT, GAP, INFO_DST, DATA, DATA_FRAG = 0x06, 0x07, 0x08, 0x0E, 0x15, 0x16
+VENDORS_OWN = 0x80  # and above
 SEDP_WRITERS = (0x000003C2, 0x000004C2)  # tell of the endpoints that publish, and that subscribe
 PID_TOPIC_NAME, PID_ENDPOINT_GUID, PID_SENTINEL = 0x0005, 0x005A, 0x0001
 INLINE_QOS = 0x02  # a flag of DATA
@@ -29,6 +30,7 @@ class Packet:
     sender: bytes       # participant
     kinds: list         # of its submessages, in order
     payload_bytes: int  # of its DATA submessages: CDR with its header of four bytes
+    vendor_bytes: int   # of the submessages that are Fast DDS's own: statistics, where it was built with them
     writers: list       # (participant, entity) that its submessages are about
 
 
@@ -101,10 +103,12 @@ class Capture:
 
     def _read(self, time_ns, port, message):
         sender = receiver = message[8:RTPS_HEADER]
-        packet = Packet(time_ns, port, len(message) + UDP_HEADERS, len(message), sender, [], 0, [])
+        packet = Packet(time_ns, port, len(message) + UDP_HEADERS, len(message), sender, [], 0, 0, [])
         for kind, flags, order, body in _submessages(message):
             packet.kinds.append(kind)
-            if kind == INFO_DST:
+            if kind >= VENDORS_OWN:
+                packet.vendor_bytes += 4 + len(body)
+            elif kind == INFO_DST:
                 receiver = body[:12]
             elif kind in (DATA, DATA_FRAG):
                 entity = struct.unpack(">I", body[8:12])[0]

@@ -1,6 +1,7 @@
 """What an operation puts on the wire, counted in a capture of the loopback: the thesis's table 5.1 measured.
 
-Keys: wire/OPERATION/PART_LAYER [bytes] and wire/OPERATION/packets. PART is request, reply, or other: the news
+Keys: wire/OPERATION/PART_LAYER [bytes], wire/OPERATION/packets, and wire/OPERATION/vendor_rtps, what Fast DDS adds
+to the messages for its statistics where it was built with them (Debian's is). PART is request, reply, or other: the news
 of the structure that an added or removed frame makes, and what DDS sends to acknowledge; LAYER is payload (CDR
 with its header of four bytes), rtps (the message) or udp (with IP and UDP headers).
 wire/lookup_over_N_partitions/total_udp is a lookup's whole traffic while six partitions are there;
@@ -112,7 +113,7 @@ def count(capture, begin_ns):
     """What one operation put on the wire: {name: number}."""
     counts = {f"{part}_{layer}": 0 for part in ("request", "reply", "other")
               for layer in ("payload", "rtps", "udp")}
-    counts.update(packets=0, total_udp=0)
+    counts.update(packets=0, total_udp=0, vendor_rtps=0)
     for packet in capture.between(begin_ns, begin_ns + int(PAUSE_S * 1e9)):
         part = part_of(capture, packet)
         if part is None:
@@ -121,6 +122,7 @@ def count(capture, begin_ns):
         counts[f"{part}_rtps"] += packet.rtps_bytes
         counts[f"{part}_udp"] += packet.udp_bytes
         counts["total_udp"] += packet.udp_bytes
+        counts["vendor_rtps"] += packet.vendor_bytes
         counts["packets"] += 1
     return counts
 
