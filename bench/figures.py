@@ -62,7 +62,9 @@ def growth(points):
     mean_x = statistics.fmean(x for x, _ in logs)
     mean_y = statistics.fmean(y for _, y in logs)
     spread = sum((x - mean_x) ** 2 for x, _ in logs)
-    return sum((x - mean_x) * (y - mean_y) for x, y in logs) / spread if spread > 0 else None
+    if spread == 0:
+        return None
+    return round(sum((x - mean_x) * (y - mean_y) for x, y in logs) / spread, 2) + 0.0  # not -0.0
 
 
 def growth_in_words(exponent):
@@ -82,9 +84,28 @@ def growth_in_words(exponent):
     return f"{kind} (fitted exponent {exponent:.2f})"
 
 
-TO_MICROSECONDS = {"ns": 1e-3, "us": 1.0, "ms": 1e3, "s": 1e6}
+NANOSECONDS = {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9}
+
+
+def nanoseconds(figure, which="median"):
+    """A time of a figure."""
+    return figure[which] * NANOSECONDS[figure["unit"]]
 
 
 def microseconds(figure, which="median"):
-    """A figure's value in microseconds."""
-    return figure[which] * TO_MICROSECONDS[figure["unit"]]
+    """A time of a figure."""
+    return nanoseconds(figure, which) / 1e3
+
+
+def as_measured(figure, which="median"):
+    """A value of a figure, in the figure's unit."""
+    return figure[which]
+
+
+def number(value):
+    """A value for a reader: three digits that count, and whole numbers whole."""
+    if value is None:
+        return "missing"
+    if isinstance(value, int) or value == 0 or abs(value) >= 100:
+        return f"{value:,.0f}"
+    return f"{value:.{min(2 - math.floor(math.log10(abs(value))), 6)}f}"

@@ -8,10 +8,10 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as pyplot  # noqa: E402  (after the choice of what draws)
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator  # noqa: E402
 
 import thesis  # noqa: E402
-from figures import growth, microseconds, numbered, ratio  # noqa: E402
+from figures import as_measured, growth, microseconds, nanoseconds, number, numbered, ratio  # noqa: E402
 
 BOXES = "Boxes: quartiles and median; whiskers: 5th to 95th percentile; cross: 99th."
 COLOURS = {"centralized": "#b07040", "decentralized": "#2f6f9f", "ours": "#2f6f9f", "dds": "#7f7f7f",
@@ -44,27 +44,26 @@ def boxes(axes, labelled, colours):
         patch.set(facecolor=colour, alpha=0.75, linewidth=0.6)
     log_where_needed(axes, [one["med"] for one in stats])
     for position, one in enumerate(stats, 1):
-        axes.annotate(three_digits(one["med"]), (position, one["med"]), xytext=(16, 0),
-                      textcoords="offset points", fontsize=7, va="center")
-    axes.set_xlim(0.5, len(stats) + 0.75)
+        axes.text(position + 0.3, one["med"], number(one["med"]), fontsize=7, va="center")
+    axes.set_xlim(0.5, len(stats) + 0.8)
 
 
-def three_digits(value):
-    """A median beside its box."""
-    return f"{value:.3g}" if value < 1000 else f"{value:,.0f}"
-
-
-def log_where_needed(axes, values, least=LOG_FROM):
+def log_where_needed(axes, values):
     """Makes the upright axis logarithmic where the values span more than ten times; else it begins at zero."""
     values = [value for value in values if value > 0]
-    if values and max(values) > least * min(values):
-        axes.set_yscale("log")
-        span = max(values) / min(values)
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0,) if span > 100 else (1.0, 2.0, 5.0)))
-        axes.yaxis.set_major_formatter(FuncFormatter(plain))
-        axes.yaxis.set_minor_formatter(NullFormatter())
+    if values and max(values) > LOG_FROM * min(values):
+        upright_log(axes)
     else:
         axes.set_ylim(bottom=0)
+
+
+def upright_log(axes):
+    """Makes the upright axis logarithmic, with enough ticks to read it."""
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0,) if high > 100 * low else (1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(FuncFormatter(plain))
+    axes.yaxis.set_minor_locator(NullLocator())
 
 
 def grid(count, columns, width, height):
@@ -91,11 +90,13 @@ def draw_thesis(figures):
         boxes(axes, [(side, figures[key]) for side, key in zip(sides, keys)],
               [COLOURS[side] for side in sides])
         ours = ratio(figures, *keys)
-        theirs = f"{case.ratio:.2g}" if case.ratio else case.words or "no such figure"
-        axes.set_title(f"{case.figure} {case.title}".strip() +
-                       f"\ncentr./decentr.: ours {three_digits(ours)}; thesis: {theirs}")
-        axes.set_ylabel("us")
-    page.suptitle("The thesis's cases, centralized and decentralized. " + BOXES)
+        theirs = f"{case.ratio:.2g}" if case.ratio else ""
+        if case.medians:
+            theirs += " ({:.3g}, {:.3g} µs)".format(*case.medians)
+        axes.set_title(f"{case.figure} {case.title}".strip() + f"\nratio: ours {number(ours)}" +
+                       (f", thesis {theirs}" if theirs else ""))
+        axes.set_ylabel("µs")
+    page.suptitle("The thesis's cases; the ratio is centralized / decentralized.\n" + BOXES)
     return page
 
 
@@ -113,20 +114,20 @@ def draw_floor(figures):
     page, every = grid(len(panels), 2, 3.6, 2.6)
     for (title, found), axes in zip(panels, every):
         boxes(axes, found, [COLOURS[who] for who, _ in found])
-        axes.set(title=title, ylabel="round trip [us]")
+        axes.set(title=title, ylabel="round trip [µs]")
     page.suptitle("The floor: a remote call beside a bare round trip.\n" + BOXES)
     return page
 
 
-def curve(axes, points, label, colour=None, style="-"):
+def curve(axes, points, label, colour=None, style="-", convert=microseconds):
     """Draws medians with a band from the 5th to the 95th percentile: points are [(x, figure)] by x."""
     if not points:
         return
     xs = [x for x, _ in points]
-    line, = axes.plot(xs, [microseconds(figure) for _, figure in points], style, marker="o",
+    line, = axes.plot(xs, [convert(figure) for _, figure in points], style, marker="o",
                       markersize=3, linewidth=1.2, color=colour, label=label)
-    axes.fill_between(xs, [microseconds(figure, "p5") for _, figure in points],
-                      [microseconds(figure, "p95") for _, figure in points],
+    axes.fill_between(xs, [convert(figure, "p5") for _, figure in points],
+                      [convert(figure, "p95") for _, figure in points],
                       color=line.get_color(), alpha=0.15, linewidth=0)
 
 
@@ -140,53 +141,60 @@ def by_shape(figures, prefix):
     return sorted(found, key=lambda entry: entry[:2])
 
 
-def deepest(figures, prefix):
-    """[(depth, figure)], of the largest tree of each depth."""
-    return sorted({depth: figure for depth, _, figure in by_shape(figures, prefix)}.items())
-
-
-def logarithmic(axes, xs, x_label, y_label="us"):
-    """Both axes logarithmic, with a tick at each x that was measured."""
-    axes.set(xscale="log", yscale="log", xlabel=x_label, ylabel=y_label)
-    axes.set_xticks(sorted(set(xs)), [f"{x:,}" for x in sorted(set(xs))])
-    axes.minorticks_off()
-    axes.yaxis.set_major_formatter(FuncFormatter(plain))
+def finish_curves(axes, x_label, y_label):
+    """The lower axis logarithmic, with a tick at each x that was measured; the other where needed."""
+    xs = sorted({x for line in axes.lines for x in line.get_xdata()})
+    if not xs:
+        return
+    axes.set(xscale="log", xlabel=x_label, ylabel=y_label)
+    axes.set_xticks(xs, [f"{x:,}" for x in xs])
+    log_where_needed(axes, [y for line in axes.lines for y in line.get_ydata()])
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.legend(frameon=False, fontsize=7)
 
 
-CORE_CURVES = (("ours_by_handle", "ours, with covariance, by handle", "#2f6f9f", "-"),
-               ("ours_by_name", "ours, with covariance, by name", "#2f6f9f", ":"),
-               ("ours_pose", "ours, pose only, by handle", "#3f9f6f", "-"),
-               ("tf2", "tf2, no covariance", "#b07040", "-"))
+CORE_STYLES = (("ours_by_handle", "ours, covariance, by handle", "#2f6f9f", "-"),
+               ("ours_by_name", "ours, covariance, by name", "#2f6f9f", ":"),
+               ("ours_pose", "ours, pose only", "#3f9f6f", "-"),
+               ("tf2", "tf2, no covariance", "#b07040", "-"),
+               ("ours", "ours, through a node", "#2f6f9f", "-"),
+               ("ours_forest", "ours, in the forest", "#3f9f6f", "-"))
+CORE_DEPTH = 30  # at which the number of frames is varied
+CORE_PANELS = ("look up by depth", "look up by frames", "set by frames", "add and remove by frames")
+
+
+def core_points(figures, panel, who):
+    """[(x, figure)] of one curve, sorted."""
+    operation = {"lo": "lookup", "se": "set", "ad": "add_remove"}[panel[:2]]
+    shapes = by_shape(figures, f"core/{operation}/{who}")
+    if panel == "look up by depth":  # of the largest tree of each
+        return sorted({depth: figure for depth, _, figure in shapes}.items())
+    if panel == "look up by frames":
+        shapes = [shape for shape in shapes if shape[0] == CORE_DEPTH]
+    return sorted({frames: figure for _, frames, figure in shapes}.items())
+
+
+def core_curves(figures):
+    """All of them: (name, points)."""
+    for panel in CORE_PANELS:
+        for who, label, _, _ in CORE_STYLES:
+            if points := core_points(figures, panel, who):
+                yield f"own frames, {panel}, {label}", points
 
 
 def draw_core(figures):
-    """A process's own frames beside tf2: lookup by depth; set, add and remove by the number of frames."""
-    if not deepest(figures, "core/lookup/ours_by_handle"):
+    """A process's own frames beside tf2."""
+    if not any(key.startswith("core/") for key in figures):
         return None
-    page, (lookup, edge, leaf) = grid(3, 3, 3.6, 3.0)
-    for who, label, colour, style in CORE_CURVES:
-        curve(lookup, deepest(figures, f"core/lookup/{who}"), label, colour, style)
-    depths = [depth for depth, _ in deepest(figures, "core/lookup/ours_by_handle")]
-    lookup.set_title("look up")
-    logarithmic(lookup, depths, "edges of the path")
-    frames = []
-    for who, label, colour, style in CORE_CURVES:
-        points = [(count, figure) for _, count, figure in by_shape(figures, f"core/set/{who}")]
-        points = sorted(dict(points).items())
-        curve(edge, points, label.replace("with covariance, ", ""), colour, style)
-        frames += [count for count, _ in points]
-    edge.set_title("set an edge")
-    logarithmic(edge, frames, "frames")
-    frames = []
-    for who, label, colour in (("ours", "through a node", "#2f6f9f"),
-                               ("ours_forest", "in the forest", "#3f9f6f")):
-        points = [(count, figure) for _, count, figure in by_shape(figures, f"core/add_remove/{who}")]
-        curve(leaf, points, label, colour)
-        frames += [count for count, _ in points]
-    leaf.set_title("add and remove a leaf (tf2 cannot)")
-    logarithmic(leaf, frames, "frames")
-    page.suptitle("Own frames, beside tf2's BufferCore. Medians; bands: 5th to 95th percentile of the repetitions.")
+    page, panels = grid(len(CORE_PANELS), 2, 4.2, 3.0)
+    for panel, axes in zip(CORE_PANELS, panels):
+        for who, label, colour, style in CORE_STYLES:
+            curve(axes, core_points(figures, panel, who), label, colour, style, nanoseconds)
+        by_depth = panel.endswith("depth")
+        axes.set_title(panel + (f", {CORE_DEPTH} edges deep" if panel == "look up by frames" else ""))
+        finish_curves(axes, "edges of the path" if by_depth else "frames", "ns")
+    page.suptitle("Own frames, beside tf2's BufferCore. Medians; bands: 5th to 95th percentile of the repetitions.",
+                  fontsize=8)
     return page
 
 
@@ -204,24 +212,26 @@ def draw_contention(figures):
         return None
     page, (axes,) = grid(1, 1, 1.2 + 1.1 * len(labelled), 3.0)
     boxes(axes, labelled, colours)
-    axes.set_ylabel("lookup [us]")
+    axes.set_ylabel("lookup [µs]")
     page.suptitle("A reader, alone and beside a writer of 100 joints at 1 kHz.\n" + BOXES, fontsize=7)
     return page
 
 
+# What was varied, the axes' words, the curves' keys and words, and what converts the figures.
 SCALES = (
-    ("partitions", "partitions on the path", (
+    ("partitions", "partitions on the path", "lookup [µs]", microseconds, (
         ("decentralized", "decentralized"), ("centralized", "centralized"), ("udp_floor", "bare UDP"))),
-    ("clients", "clients at once", (("latency", "lookup"),)),
-    ("frames", "frames", (("lookup", "lookup"), ("update", "update"))),
+    ("clients", "clients at once", "lookup [µs]", microseconds, (("latency", "latency"),)),
+    ("clients", "clients at once", "calls a second, of all", as_measured, (("rate", "rate"),)),
+    ("frames", "frames", "call [µs]", microseconds, (("lookup", "lookup"), ("update", "update"))),
 )
 
 
 def growths(figures):
     """{(what, who): exponent} of all that was measured over a range."""
     found = {}
-    for what, _, curves in SCALES:
-        for who, _ in curves + ((("rate", ""),) if what == "clients" else ()):
+    for what, _, _, _, curves in SCALES:
+        for who, _ in curves:
             points = numbered(figures, f"scale/{what}/*/{who}")
             if points:
                 found[what, who] = growth([(x, figure["median"]) for x, figure in points])
@@ -231,20 +241,16 @@ def growths(figures):
 def draw_scale(figures):
     """Network calls by partitions, clients and frames, with the fitted growth."""
     exponents = growths(figures)
-    shown = [scale for scale in SCALES if any(what == scale[0] for what, _ in exponents)]
+    shown = [scale for scale in SCALES if any((scale[0], who) in exponents for who, _ in scale[4])]
     if not shown:
         return None
-    page, panels = grid(len(shown), 3, 3.6, 3.0)
-    for (what, x_label, curves), axes in zip(shown, panels):
-        xs = []
+    page, panels = grid(len(shown), 2, 4.2, 3.0)
+    for (what, x_label, y_label, convert, curves), axes in zip(shown, panels):
         for who, label in curves:
-            points = numbered(figures, f"scale/{what}/*/{who}")
             exponent = exponents.get((what, who))
             fitted = "" if exponent is None else f", ~n^{exponent:.2f}"
-            curve(axes, points, label + fitted)
-            xs += [x for x, _ in points]
-        if xs:
-            logarithmic(axes, xs, x_label)
+            curve(axes, numbered(figures, f"scale/{what}/*/{who}"), label + fitted, convert=convert)
+        finish_curves(axes, x_label, y_label)
     page.suptitle("Cost as work grows. Medians; bands: 5th to 95th percentile.")
     return page
 

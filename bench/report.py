@@ -5,8 +5,8 @@ import os
 import plots
 import targets
 import thesis
-from figures import TO_MICROSECONDS, growth, growth_in_words, microseconds, ratio
-from targets import number
+from figures import (NANOSECONDS, as_measured, growth, growth_in_words, microseconds, nanoseconds, number,
+                     ratio)
 
 MISSING = "missing"
 
@@ -23,14 +23,14 @@ def value(figures, key, which="median", convert=microseconds):
     return number(convert(figures[key], which)) if key in figures else MISSING
 
 
-def as_it_is(figure, which):
-    """For what is not a time."""
-    return figure[which]
-
-
 def has(figures, prefix):
     """Whether there is any figure whose key begins so."""
     return any(key.startswith(prefix) for key in figures)
+
+
+def duration(seconds):
+    """As a reader wants it."""
+    return f"{seconds} seconds" if seconds < 120 else f"{seconds / 60:.0f} minutes"
 
 
 def introduction(results):
@@ -44,8 +44,8 @@ def introduction(results):
     lines = [
         "# Benchmarks\n",
         f"Written by `scripts/bench` on {machine.get('date')}, commit {machine.get('commit')}: "
-        f"{'a quick run' if settings.get('quick') else 'the full run'}, {settings.get('seconds', 0) / 60:.0f} "
-        "minutes. All text here is made from `results/latest.json`.\n",
+        f"{'a quick run' if settings.get('quick') else 'the full run'}, {duration(settings.get('seconds', 0))}. "
+        "All text here is made from `results/latest.json`.\n",
         "**Machine.** " + "; ".join(str(item) for item in about) + ".\n"]
     if load[0] > 0.5:
         lines.append(f"**The machine was not idle**: its load was {load[0]:g} before the run. Read times with that "
@@ -116,12 +116,12 @@ def wire_section(figures):
              "lookup_across": "look up, two owners", "update": "update", "publish": "publish (no reply)"}
     rows = []
     for operation, name in names.items():
-        sizes = [" / ".join(value(figures, f"wire/{operation}/{part}_{layer}", convert=as_it_is)
+        sizes = [" / ".join(value(figures, f"wire/{operation}/{part}_{layer}", convert=as_measured)
                             for part in ("request", "reply")) for layer in ("payload", "rtps", "udp")]
         theirs = thesis.SIZES.get(operation)
         rows.append((name, f"{theirs[0]} / {theirs[1]}" if theirs else "-", *sizes,
-                     value(figures, f"wire/{operation}/other_udp", convert=as_it_is),
-                     value(figures, f"wire/{operation}/packets", convert=as_it_is)))
+                     value(figures, f"wire/{operation}/other_udp", convert=as_measured),
+                     value(figures, f"wire/{operation}/packets", convert=as_measured)))
     lines.append("Bytes of request / reply, captured on the loopback interface; the caller owns nothing, ids have "
                  "ten characters. Payloads are CDR with its header of four bytes. \"Other\" is the news of the "
                  "structure, to everybody, and acknowledgements, as UDP packets.\n")
@@ -139,7 +139,7 @@ def wire_section(figures):
                      "processes.\n")
     if "wire/idle/udp_per_second" in figures:
         lines.append("Discovery and presence of two daemons and a client that do nothing: "
-                     f"{value(figures, 'wire/idle/udp_per_second', convert=as_it_is)} bytes a second.\n")
+                     f"{value(figures, 'wire/idle/udp_per_second', convert=as_measured)} bytes a second.\n")
     return "\n".join(lines)
 
 
@@ -179,32 +179,32 @@ def stream_section(figures):
     return "\n".join(lines)
 
 
+def core_rows(figures):
+    """Each operation of ours with tf2's of the same, where tf2 has one."""
+    looked_up = (("ours_by_handle", "by handle"), ("ours_by_name", "by name"),
+                 ("ours_pose", "pose only, by handle"))
+    operations = (("lookup", looked_up, "look up {who}, depth {depth} of {frames:,}"),
+                  ("set", looked_up[:2], "set an edge {who}, {frames:,} frames"),
+                  ("add_remove", (("ours", "node"), ("ours_forest", "forest")),
+                   "add and remove a leaf, {who}, {frames:,} frames"))
+    for operation, all_of_ours, name in operations:
+        for ours, who in all_of_ours:
+            for depth, frames, figure in plots.by_shape(figures, f"core/{operation}/{ours}"):
+                shape = f"{depth}/{frames}"
+                tf2 = f"core/{operation}/tf2/{shape}"
+                quotient = ratio(figures, f"core/{operation}/{ours}/{shape}", tf2)
+                yield (name.format(who=who, depth=depth, frames=frames), number(nanoseconds(figure)),
+                       "cannot" if operation == "add_remove" else value(figures, tf2, convert=nanoseconds),
+                       "-" if quotient is None else number(quotient))
+
+
 def core_section(figures, drawn, home):
     """Beside tf2."""
     lines = ["## Own frames, beside tf2\n"]
-    shapes = [(depth, count) for depth, count, _ in plots.by_shape(figures, "core/lookup/ours_by_handle")]
-    if not shapes:
+    rows = list(core_rows(figures))
+    if not rows:
         return "\n".join(lines + ["No figures in this run.\n"])
-    rows = []
-    for depth, count in shapes:
-        tf2 = f"core/lookup/tf2/{depth}/{count}"
-        for who, name in (("ours_by_handle", "by handle"), ("ours_by_name", "by name"),
-                          ("ours_pose", "pose only, by handle")):
-            key = f"core/lookup/{who}/{depth}/{count}"
-            if key in figures:
-                rows.append((f"look up {name}, depth {depth} of {count:,}", value(figures, key),
-                             value(figures, tf2), number(ratio(figures, key, tf2))))
-    for depth, count, _ in plots.by_shape(figures, "core/set/ours_by_handle"):
-        tf2 = f"core/set/tf2/{depth}/{count}"
-        for who, name in (("ours_by_handle", "by handle"), ("ours_by_name", "by name")):
-            key = f"core/set/{who}/{depth}/{count}"
-            rows.append((f"set an edge {name}, {count:,} frames", value(figures, key), value(figures, tf2),
-                         number(ratio(figures, key, tf2))))
-    for who, name in (("ours", "node"), ("ours_forest", "forest")):
-        for _, count, figure in plots.by_shape(figures, f"core/add_remove/{who}"):
-            rows.append((f"add and remove a leaf, {name}, {count:,} frames",
-                         number(microseconds(figure)), "cannot", "-"))
-    lines.append("Microseconds. Ours carries a covariance unless it says pose only; tf2 has none.\n")
+    lines.append("Nanoseconds. Ours carries a covariance unless it says pose only; tf2 has none.\n")
     lines.append(table(("operation", "ours", "tf2", "ours / tf2"), rows))
     lines.append(picture(drawn, "core", home))
     return "\n".join(lines)
@@ -219,11 +219,11 @@ def contention_section(figures, drawn, home):
     rows = []
     for key in keys:
         figure = figures[key]
-        timed = figure["unit"] in TO_MICROSECONDS
+        timed = figure["unit"] in NANOSECONDS
         cells = [number(microseconds(figure, which) if timed else figure[which])
                  for which in ("median", "p99", "p99.9", "max")]
         name = key.removeprefix("contention/").replace("/", ", ").replace("_", " ")
-        rows.append((f"{name} [{'us' if timed else figure['unit']}]", *cells))
+        rows.append((f"{name} [{'µs' if timed else figure['unit']}]", *cells))
     lines.append("A writer of 100 joints at 1 kHz, and a reader that looks up again and again.\n")
     lines.append(table(("figure", "median", "p99", "p99.9", "max"), rows))
     lines.append(picture(drawn, "contention", home))
@@ -235,31 +235,33 @@ def scale_section(figures, drawn, home):
     lines = ["## Cost as work grows\n"]
     said = [f"- {what}, {who.replace('_', ' ')}: {growth_in_words(exponent)}"
             for (what, who), exponent in plots.growths(figures).items()]
-    for who, label, _, _ in plots.CORE_CURVES:
-        points = plots.deepest(figures, f"core/lookup/{who}")
-        if points:
-            exponent = growth([(x, figure["median"]) for x, figure in points])
-            said.append(f"- depth of a path of own frames, {label}: {growth_in_words(exponent)}")
+    said += [f"- {name}: {growth_in_words(growth([(x, figure['median']) for x, figure in points]))}"
+             for name, points in plots.core_curves(figures)]
     if not said:
         return "\n".join(lines + ["No figures in this run.\n"])
     lines.append("How the median grows with the number of each; the exponent is that of a power law, fitted over all "
                  "that was measured, so a fixed cost at the small end lowers it.\n")
     lines.append("\n".join(said) + "\n")
-    lines.append(scale_table(figures))
+    lines.append("Medians / p99:\n")
+    lines += [scale_table(figures, what) for what in dict.fromkeys(scale[0] for scale in plots.SCALES)]
     lines.append(picture(drawn, "scale", home))
     return "\n".join(lines)
 
 
-def scale_table(figures):
-    """All figures of the scale, as measured."""
+def scale_table(figures, what):
+    """All that was measured over the numbers of one thing."""
+    keys = [key.split("/") for key in figures if key.startswith(f"scale/{what}/")]
+    if not keys:
+        return ""
+    curves = sorted({words[3] for words in keys})
+    units = {who: figures[f"scale/{what}/{count}/{who}"]["unit"] for _, _, count, who in keys}
     rows = []
-    for what, _, _ in plots.SCALES:
-        keys = [key for key in figures if key.startswith(f"scale/{what}/")]
-        for key in sorted(keys, key=lambda key: (key.split("/")[3:], int(key.split("/")[2]))):
-            figure, words = figures[key], key.split("/")
-            rows.append((f"{int(words[2]):,} {what}, {' '.join(words[3:]).replace('_', ' ')} [{figure['unit']}]",
-                         number(figure["median"]), number(figure["p99"])))
-    return table(("case", "median", "p99"), rows) if rows else ""
+    for count in sorted({int(words[2]) for words in keys}):
+        row = [figures.get(f"scale/{what}/{count}/{who}") for who in curves]
+        rows.append((f"{count:,}", *(f"{number(one['median'])} / {number(one['p99'])}" if one else MISSING
+                                     for one in row)))
+    head = [f"{who.replace('_', ' ')} [{units[who]}]" for who in curves]
+    return table((what, *head), rows)
 
 
 def text(results, drawn, home):

@@ -8,7 +8,7 @@ import dataclasses
 import typing
 
 import thesis
-from figures import microseconds, numbered, ratio
+from figures import as_measured, microseconds, number, numbered, ratio
 
 MOST, LEAST = "at most", "at least"
 
@@ -37,7 +37,7 @@ def ratio_of(over, under, which="median"):
     return lambda figures: ratio(figures, over, under, which)
 
 
-def value_of(key, which="median", convert=lambda figure, which: figure[which]):
+def value_of(key, which="median", convert=as_measured):
     """Computes a value of one figure."""
     return lambda figures: convert(figures[key], which) if key in figures else None
 
@@ -130,21 +130,14 @@ def _contention():
                  value_of("contention/ours/batch", "median", microseconds), 5, unit="us")
 
 
-TARGETS = (
+ALL = (
     *_thesis(),
     Target("Across partitions", "lookup over 2 to 16 partitions, the worst: decentralized / centralized",
            _worst_over_partitions, 1.3),
     *_wire(), *_floor(), *_stream(), *_core(), *_contention(),
 )
-
-
-def number(value):
-    """A value as a reader wants it: three digits that count."""
-    if value is None:
-        return "missing"
-    if value == 0 or abs(value) >= 1000:
-        return f"{value:,.0f}"
-    return f"{value:.{max(0, 2 - len(str(int(abs(value)))) + 1)}f}"
+GROUPS = tuple(dict.fromkeys(target.group for target in ALL))
+TARGETS = tuple(sorted(ALL, key=lambda target: GROUPS.index(target.group)))
 
 
 def rows(figures):

@@ -18,6 +18,7 @@ class Case:
     kind: str             # whose frames: own, other, or across
     ratio: typing.Optional[float] = None  # the thesis's, centralized over decentralized
     words: str = ""       # what it says of it
+    medians: tuple = ()   # [us] centralized, decentralized
 
 
 CASES = (
@@ -27,12 +28,12 @@ CASES = (
     Case("5.3", "remove_own/robot", "remove, own process", "own", None, "like add"),
     Case("5.4", "remove_other/robot", "remove, other process", "other", None, "like add"),
     Case("5.5", "path_across/robot", "path across both", "across", 0.5, "about double the time"),
-    Case("5.6", "path_other/arms", "path in other, from arms", "other", None, "15 us faster"),
-    Case("5.7", "path_own/robot", "path in own process", "own", None, "nearly 80 us faster"),
-    Case("5.8", "update_other/robot", "update, other process", "other", 0.83, "12 us slower"),
+    Case("5.6", "path_other/arms", "path in other, from arms", "other", None, "15 µs faster"),
+    Case("5.7", "path_own/robot", "path in own process", "own", None, "nearly 80 µs faster"),
+    Case("5.8", "update_other/robot", "update, other process", "other", 0.83, "12 µs slower"),
     Case("5.9", "update_own/arms", "update, own, in arms", "own", None, "like 5.10"),
     Case("5.10", "update_own/robot", "update, own, in robot", "own", 57.597 / 14.022,
-         "medians 57.597 and 14.022 us"),
+         "medians 57.597 and 14.022 µs", (57.597, 14.022)),
     Case("5.11", "update_connector/arms", "update the connector, owner", "own", None,
          "better than 5.10"),
     Case("", "update_connector/robot", "update the connector, not owner", "other"),
