@@ -55,6 +55,7 @@ def log_where_needed(axes, values):
         upright_log(axes)
     else:
         axes.set_ylim(bottom=0)
+        axes.yaxis.set_major_formatter(FuncFormatter(plain))
 
 
 def upright_log(axes):
@@ -81,7 +82,7 @@ def draw_thesis(figures):
     """The thesis's figures 5.1 to 5.11: centralized beside decentralized."""
     sides = ("centralized", "decentralized")
     cases = [case for case in thesis.CASES
-             if all(f"thesis/{case.key}/{side}" in figures for side in sides)]
+             if case.figure and all(f"thesis/{case.key}/{side}" in figures for side in sides)]
     if not cases:
         return None
     page, panels = grid(len(cases), 4, 2.7, 2.5)
@@ -93,7 +94,7 @@ def draw_thesis(figures):
         theirs = f"{case.ratio:.2g}" if case.ratio else ""
         if case.medians:
             theirs += " ({:.3g}, {:.3g} µs)".format(*case.medians)
-        axes.set_title(f"{case.figure} {case.title}".strip() + f"\nratio: ours {number(ours)}" +
+        axes.set_title(f"{case.figure} {case.title}\nratio: ours {number(ours)}" +
                        (f", thesis {theirs}" if theirs else ""))
         axes.set_ylabel("µs")
     page.suptitle("The thesis's cases; the ratio is centralized / decentralized.\n" + BOXES)
@@ -126,9 +127,11 @@ def curve(axes, points, label, colour=None, style="-", convert=microseconds):
     xs = [x for x, _ in points]
     line, = axes.plot(xs, [convert(figure) for _, figure in points], style, marker="o",
                       markersize=3, linewidth=1.2, color=colour, label=label)
-    axes.fill_between(xs, [convert(figure, "p5") for _, figure in points],
-                      [convert(figure, "p95") for _, figure in points],
-                      color=line.get_color(), alpha=0.15, linewidth=0)
+    low, high = ([convert(figure, which) for _, figure in points] for which in ("p5", "p95"))
+    axes.fill_between(xs, low, high, color=line.get_color(), alpha=0.15, linewidth=0)
+    # What finds a free place for the legend sees lines, not bands.
+    for edge in (low, high):
+        axes.plot(xs, edge, alpha=0)
 
 
 def by_shape(figures, prefix):
@@ -249,7 +252,8 @@ def draw_scale(figures):
         for who, label in curves:
             exponent = exponents.get((what, who))
             fitted = "" if exponent is None else f", ~n^{exponent:.2f}"
-            curve(axes, numbered(figures, f"scale/{what}/*/{who}"), label + fitted, convert=convert)
+            curve(axes, numbered(figures, f"scale/{what}/*/{who}"), label + fitted,
+                  COLOURS.get(who.removesuffix("_floor")), convert=convert)
         finish_curves(axes, x_label, y_label)
     page.suptitle("Cost as work grows. Medians; bands: 5th to 95th percentile.")
     return page

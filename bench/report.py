@@ -53,8 +53,9 @@ def introduction(results):
     lines.append(
         "**Method.** The shipped library and daemons, one run, everything over the loopback interface. What is "
         "compared is measured in turns; a ratio of medians is the median of the ratios of each repetition. "
-        "Warm-up is discarded. Of the core a value is a repetition's mean processor time; elsewhere it is one "
-        "call. Where a table says p99, it is of all values of all repetitions.\n")
+        "Warm-up is discarded. Of the core a value is a repetition's mean processor time. Elsewhere a value is one "
+        "call; calls on own frames take hardly longer than reading the clock, so theirs is the mean of several. "
+        "Where a table says p99, it is of all values of all repetitions.\n")
     skipped = [f"- {name}: {how}" for name, how in settings.get("stages", {}).items() if how != "done"]
     if skipped:
         lines.append("**Not measured in this run:**\n\n" + "\n".join(skipped) + "\n")

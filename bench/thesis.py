@@ -10,7 +10,7 @@ import typing
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A figure of the thesis, or a case that belongs beside them."""
+    """A figure of the thesis, or a case beside them. The connector was the main process's; ours is the arms'."""
 
     figure: str           # of the thesis; empty: it has none
     key: str              # thesis/KEY/centralized and thesis/KEY/decentralized
@@ -34,10 +34,19 @@ CASES = (
     Case("5.9", "update_own/arms", "update, own, in arms", "own", None, "like 5.10"),
     Case("5.10", "update_own/robot", "update, own, in robot", "own", 57.597 / 14.022,
          "medians 57.597 and 14.022 µs", (57.597, 14.022)),
-    Case("5.11", "update_connector/arms", "update the connector, owner", "own", None,
+    Case("5.11", "update_connector/arms", "update connector, by owner", "own", None,
          "better than 5.10"),
-    Case("", "update_connector/robot", "update the connector, not owner", "other"),
+    Case("5.11", "update_connector/robot", "update connector, by other", "other", None,
+         "better than 5.10"),
     Case("", "path_other/robot", "path in other, from robot", "other"),
+    # What the thesis measured in one of the processes, in the other one.
+    Case("", "add_own/arms", "add, own, in arms", "own"),
+    Case("", "add_other/arms", "add, other, in arms", "other"),
+    Case("", "remove_own/arms", "remove, own, in arms", "own"),
+    Case("", "remove_other/arms", "remove, other, in arms", "other"),
+    Case("", "path_across/arms", "path across both, in arms", "across"),
+    Case("", "path_own/arms", "path in own, in arms", "own"),
+    Case("", "update_other/arms", "update, other, in arms", "other"),
 )
 
 # Table 5.1: bytes of request and reply by our operation's key.
