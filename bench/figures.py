@@ -1,8 +1,8 @@
 """The form of a measured figure, and what is computed from figures.
 
-A figure is a dict as the C++ programs print it (bench/support/series.cpp): unit, n, min, p5, p25, median,
-p75, p90, p95, p99, p99.9, max, mean, and medians, the median of each repetition. The results hold them by
-their key, words separated by slashes.
+A figure is a dict as the C++ programs print it (bench/support/series.cpp): unit, n, min, p5, p25,
+median, p75, p90, p95, p99, p99.9, max, mean, and medians, the median of each repetition. The
+results hold them by their key, words separated by slashes.
 """
 
 import math
@@ -44,7 +44,7 @@ def ratio(figures, over, under, which="median"):
 
 
 def numbered(figures, pattern):
-    """The figures whose keys fit `pattern`, with a star for a whole number: [(number, figure)], sorted."""
+    """[(number, figure)] of the keys that fit `pattern`, a star being the number; sorted."""
     before, after = pattern.split("*")
     found = []
     for key, figure in figures.items():
@@ -69,8 +69,6 @@ def growth(points):
 
 def growth_in_words(exponent):
     """What an exponent means, for a reader."""
-    if exponent is None:
-        return "too few points for a fit"
     if exponent < -0.1:
         kind = "falls"
     elif exponent < 0.1:

@@ -1,7 +1,7 @@
 """Draws the figures: box plots of what was timed, curves of what grows. Each as SVG and PNG.
 
-Boxes are from the 25th to the 75th percentile with the median as a line, whiskers from the 5th to the 95th, and
-a cross is the 99th.
+Boxes are from the 25th to the 75th percentile with the median as a line, whiskers from the 5th to
+the 95th, and a cross is the 99th.
 """
 
 import matplotlib
@@ -11,17 +11,19 @@ import matplotlib.pyplot as pyplot  # noqa: E402  (after the choice of what draw
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator  # noqa: E402
 
 import thesis  # noqa: E402
-from figures import as_measured, growth, microseconds, nanoseconds, number, numbered, ratio  # noqa: E402
+from figures import (as_measured, growth, microseconds, nanoseconds, number,  # noqa: E402
+                     numbered, ratio)
 
 BOXES = "Boxes: quartiles and median; whiskers: 5th to 95th percentile; cross: 99th."
-COLOURS = {"centralized": "#b07040", "decentralized": "#2f6f9f", "ours": "#2f6f9f", "dds": "#7f7f7f",
-           "udp": "#b9b9b9", "tf2": "#b07040", "alone": "#7f7f7f", "beside": "#2f6f9f"}
+BLUE, GREEN, BROWN, GREY = "#2f6f9f", "#3f9f6f", "#b07040", "#7f7f7f"
+COLOURS = {"centralized": BROWN, "decentralized": BLUE, "ours": BLUE, "dds": GREY,
+           "udp": "#b9b9b9", "tf2": BROWN, "alone": GREY, "beside": BLUE}
 LOG_FROM = 10.0  # an axis is logarithmic where the largest median is more than this times the least
 
 matplotlib.rcParams.update({
-    "font.size": 8, "axes.titlesize": 8, "axes.grid": True, "grid.color": "#e4e4e4", "grid.linewidth": 0.6,
-    "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False,
-    # The same figures make the same file.
+    "font.size": 8, "axes.titlesize": 8, "figure.titlesize": 9, "axes.grid": True,
+    "grid.color": "#e4e4e4", "grid.linewidth": 0.6, "axes.axisbelow": True,
+    "axes.spines.top": False, "axes.spines.right": False,
     "svg.hashsalt": "tf-dude", "svg.fonttype": "none",
 })
 
@@ -35,7 +37,8 @@ def boxes(axes, labelled, colours):
     """Draws a box for each (label, figure), in microseconds."""
     stats = []
     for label, figure in labelled:
-        at = {name: microseconds(figure, name) for name in ("p5", "p25", "median", "p75", "p95", "p99")}
+        at = {which: microseconds(figure, which)
+              for which in ("p5", "p25", "median", "p75", "p95", "p99")}
         stats.append({"label": label, "med": at["median"], "q1": at["p25"], "q3": at["p75"],
                       "whislo": at["p5"], "whishi": at["p95"], "fliers": [at["p99"]]})
     drawn = axes.bxp(stats, patch_artist=True, widths=0.55, medianprops={"color": "black"},
@@ -49,7 +52,7 @@ def boxes(axes, labelled, colours):
 
 
 def log_where_needed(axes, values):
-    """Makes the upright axis logarithmic where the values span more than ten times; else it begins at zero."""
+    """The upright axis logarithmic where the values span more than ten times; else from zero."""
     values = [value for value in values if value > 0]
     if values and max(values) > LOG_FROM * min(values):
         upright_log(axes)
@@ -85,31 +88,33 @@ def draw_thesis(figures):
              if case.figure and all(f"thesis/{case.key}/{side}" in figures for side in sides)]
     if not cases:
         return None
-    page, panels = grid(len(cases), 4, 2.7, 2.5)
+    page, panels = grid(len(cases), 4, 2.8, 2.5)
     for case, axes in zip(cases, panels):
         keys = [f"thesis/{case.key}/{side}" for side in sides]
         boxes(axes, [(side, figures[key]) for side, key in zip(sides, keys)],
               [COLOURS[side] for side in sides])
         ours = ratio(figures, *keys)
-        theirs = f"{case.ratio:.2g}" if case.ratio else ""
+        theirs = f"{case.ratio:.2g}" if case.ratio else case.words
         if case.medians:
             theirs += " ({:.3g}, {:.3g} µs)".format(*case.medians)
-        axes.set_title(f"{case.figure} {case.title}\nratio: ours {number(ours)}" +
-                       (f", thesis {theirs}" if theirs else ""))
+        axes.set_title(f"{case.figure} {case.title}\nratio {number(ours)}; thesis: {theirs}")
         axes.set_ylabel("µs")
     page.suptitle("The thesis's cases; the ratio is centralized / decentralized.\n" + BOXES)
     return page
 
 
+FLOOR_PANELS = tuple((operation, placement) for operation in ("update", "lookup")
+                     for placement in ("one_core", "two_cores"))
+
+
 def draw_floor(figures):
     """Ours, bare DDS and bare UDP, a panel for each operation and placement."""
     panels = []
-    for operation in ("update", "lookup"):
-        for placement in ("one_core", "two_cores"):
-            found = [(who, figures[key]) for who in ("ours", "dds", "udp")
-                     if (key := f"floor/{operation}/{who}/{placement}") in figures]
-            if found:
-                panels.append((f"{operation}, {placement.replace('_', ' ')}", found))
+    for operation, placement in FLOOR_PANELS:
+        found = [(who, figures[key]) for who in ("ours", "dds", "udp")
+                 if (key := f"floor/{operation}/{who}/{placement}") in figures]
+        if found:
+            panels.append((f"{operation}, {placement.replace('_', ' ')}", found))
     if not panels:
         return None
     page, every = grid(len(panels), 2, 3.6, 2.6)
@@ -121,7 +126,7 @@ def draw_floor(figures):
 
 
 def curve(axes, points, label, colour=None, style="-", convert=microseconds):
-    """Draws medians with a band from the 5th to the 95th percentile: points are [(x, figure)] by x."""
+    """Draws the medians of [(x, figure)] with a band from the 5th to the 95th percentile."""
     if not points:
         return
     xs = [x for x, _ in points]
@@ -145,7 +150,7 @@ def by_shape(figures, prefix):
 
 
 def finish_curves(axes, x_label, y_label):
-    """The lower axis logarithmic, with a tick at each x that was measured; the other where needed."""
+    """The lower axis logarithmic, a tick at each x that was measured; the other where needed."""
     xs = sorted({x for line in axes.lines for x in line.get_xdata()})
     if not xs:
         return
@@ -156,12 +161,12 @@ def finish_curves(axes, x_label, y_label):
     axes.legend(frameon=False, fontsize=7)
 
 
-CORE_STYLES = (("ours_by_handle", "ours, covariance, by handle", "#2f6f9f", "-"),
-               ("ours_by_name", "ours, covariance, by name", "#2f6f9f", ":"),
-               ("ours_pose", "ours, pose only", "#3f9f6f", "-"),
-               ("tf2", "tf2, no covariance", "#b07040", "-"),
-               ("ours", "ours, through a node", "#2f6f9f", "-"),
-               ("ours_forest", "ours, in the forest", "#3f9f6f", "-"))
+CORE_STYLES = (("ours_by_handle", "ours, covariance, by handle", BLUE, "-"),
+               ("ours_by_name", "ours, covariance, by name", BLUE, ":"),
+               ("ours_pose", "ours, pose only", GREEN, "-"),
+               ("tf2", "tf2, no covariance", BROWN, "-"),
+               ("ours", "ours, through a node", BLUE, "-"),
+               ("ours_forest", "ours, in the forest", GREEN, "-"))
 CORE_DEPTH = 30  # at which the number of frames is varied
 CORE_PANELS = ("look up by depth", "look up by frames", "set by frames", "add and remove by frames")
 
@@ -194,10 +199,11 @@ def draw_core(figures):
         for who, label, colour, style in CORE_STYLES:
             curve(axes, core_points(figures, panel, who), label, colour, style, nanoseconds)
         by_depth = panel.endswith("depth")
-        axes.set_title(panel + (f", {CORE_DEPTH} edges deep" if panel == "look up by frames" else ""))
+        deep = f", {CORE_DEPTH} edges deep" if panel == "look up by frames" else ""
+        axes.set_title(panel + deep)
         finish_curves(axes, "edges of the path" if by_depth else "frames", "ns")
-    page.suptitle("Own frames, beside tf2's BufferCore. Medians; bands: 5th to 95th percentile of the repetitions.",
-                  fontsize=8)
+    page.suptitle("Own frames, beside tf2's BufferCore. Medians of the repetitions; "
+                  "bands: 5th to 95th percentile.")
     return page
 
 
@@ -216,14 +222,15 @@ def draw_contention(figures):
     page, (axes,) = grid(1, 1, 1.2 + 1.1 * len(labelled), 3.0)
     boxes(axes, labelled, colours)
     axes.set_ylabel("lookup [µs]")
-    page.suptitle("A reader, alone and beside a writer of 100 joints at 1 kHz.\n" + BOXES, fontsize=7)
+    page.suptitle("A reader, alone and beside a writer of 100 joints at 1 kHz.\n" + BOXES)
     return page
 
 
 # What was varied, the axes' words, the curves' keys and words, and what converts the figures.
 SCALES = (
     ("partitions", "partitions on the path", "lookup [µs]", microseconds, (
-        ("decentralized", "decentralized"), ("centralized", "centralized"), ("udp_floor", "bare UDP"))),
+        ("decentralized", "decentralized"), ("centralized", "centralized"),
+        ("udp_floor", "bare UDP"))),
     ("clients", "clients at once", "lookup [µs]", microseconds, (("latency", "latency"),)),
     ("clients", "clients at once", "calls a second, of all", as_measured, (("rate", "rate"),)),
     ("frames", "frames", "call [µs]", microseconds, (("lookup", "lookup"), ("update", "update"))),
@@ -264,7 +271,7 @@ PLOTS = {"thesis": draw_thesis, "floor": draw_floor, "core": draw_core,
 
 
 def draw(figures, folder):
-    """Draws what there are figures for; returns {name: PNG file}. An earlier run's plots do not stay."""
+    """Draws what there are figures for; returns {name: PNG file}. Other plots do not stay."""
     drawn = {}
     for name, function in PLOTS.items():
         files = [folder / f"{name}.{ending}" for ending in ("svg", "png")]
@@ -273,7 +280,9 @@ def draw(figures, folder):
             if page is None:
                 file.unlink(missing_ok=True)
             else:
-                page.savefig(file, dpi=130, metadata={"Date": None} if file.suffix == ".svg" else None)
+                # The same figures make the same file.
+                dateless = {"Date": None} if file.suffix == ".svg" else None
+                page.savefig(file, dpi=130, metadata=dateless)
         if page is not None:
             drawn[name] = files[1]
             pyplot.close(page)

@@ -27,7 +27,7 @@ def core(quick, bin_dir, _work):
     measured = {}
     for run in json.loads(printed)["benchmarks"]:
         if run["run_type"] == "iteration":
-            # Time of the processor: nothing in these waits, and what else the machine does is not ours.
+            # Of the processor: nothing in these waits, and what else runs is not theirs.
             entry = (run["repetition_index"], run["cpu_time"], run["time_unit"])
             measured.setdefault(run["run_name"], []).append(entry)
     for key, entries in measured.items():

@@ -1,7 +1,7 @@
 """Reads a capture of UDP over Ethernet or Linux's loopback (pcap), and the RTPS messages in it.
 
-Only what telling topics apart needs: RTPS 2.2, sections 8.3.7 and 9.4.5. Which topic an endpoint is of is
-learned from the capture itself, from the discovery of endpoints, so it must begin before the participants.
+Only what telling topics apart needs: RTPS 2.2, sections 8.3.7 and 9.4.5. Which topic an endpoint
+is of is learned from the capture itself, from the discovery of endpoints: it must begin before.
 """
 
 import dataclasses
@@ -24,14 +24,17 @@ class Packet:
     """A UDP packet with an RTPS message."""
 
     time_ns: int
-    port: int           # it went to
-    udp_bytes: int      # with IP and UDP headers
+    sender: bytes           # participant
     rtps_bytes: int
-    sender: bytes       # participant
-    kinds: list         # of its submessages, in order
-    payload_bytes: int  # of its DATA submessages: CDR with its header of four bytes
-    vendor_bytes: int   # of the submessages that are Fast DDS's own: statistics, where it was built with them
-    writers: list       # (participant, entity) that its submessages are about
+    payload_bytes: int = 0  # of its DATA submessages: CDR with its header of four bytes
+    vendor_bytes: int = 0   # of submessages that are Fast DDS's own, for statistics
+    kinds: list = dataclasses.field(default_factory=list)    # of its submessages, in order
+    writers: list = dataclasses.field(default_factory=list)  # (participant, entity) they are about
+
+    @property
+    def udp_bytes(self):
+        """With IP and UDP headers."""
+        return self.rtps_bytes + UDP_HEADERS
 
 
 def _datagrams(path):
@@ -98,12 +101,11 @@ class Capture:
             message = packet[at + 8:]
             if packet[9] != 17 or message[:4] != b"RTPS":
                 continue
-            port = struct.unpack(">H", packet[at + 2:at + 4])[0]
-            self.packets.append(self._read(time_ns, port, message))
+            self.packets.append(self._read(time_ns, message))
 
-    def _read(self, time_ns, port, message):
+    def _read(self, time_ns, message):
         sender = receiver = message[8:RTPS_HEADER]
-        packet = Packet(time_ns, port, len(message) + UDP_HEADERS, len(message), sender, [], 0, 0, [])
+        packet = Packet(time_ns, sender, len(message))
         for kind, flags, order, body in _submessages(message):
             packet.kinds.append(kind)
             if kind >= VENDORS_OWN:

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Runs the benchmarks and writes results, plots and report: run.py --help. scripts/bench builds before."""
+"""Runs the benchmarks; writes results, plots and report. scripts/bench builds before."""
 
 import argparse
 import json
 import pathlib
+import signal
 import sys
 import tempfile
 import time
@@ -23,7 +24,7 @@ STAGES = ("core", "contention", "net", "wire")
 
 
 def stage(name):
-    """What measures: a function of quick, the binaries' folder and a folder to work in, which yields figures."""
+    """What yields the figures, given quick, the binaries' folder and a folder to work in."""
     if name == "wire":
         return wire.run
     if name == "net":
@@ -37,23 +38,34 @@ def stage(name):
     return getattr(programs, name)
 
 
+def run_stage(name, quick, bin_dir, figures):
+    """Puts a stage's figures to the others, by their keys; returns how it went."""
+    with tempfile.TemporaryDirectory(prefix=f"tfdude-{name}-") as work:
+        try:
+            for figure in stage(name)(quick, bin_dir, pathlib.Path(work)):
+                figure = dict(figure)
+                key = figure.pop("key")
+                if figure["n"] > 0:
+                    figures[key] = figure
+                else:
+                    print(f"   {key} has no values")
+            return "done"
+        except processes.Skipped as reason:
+            return f"skipped: {reason}"
+        except Exception as error:  # whatever it is, the other stages can still be run
+            for log in sorted(pathlib.Path(work).glob("*.log")):
+                print(f"--- {log.name}\n{log.read_text(errors='replace')[-2000:]}")
+            traceback.print_exc()
+            return f"failed: {error}"
+
+
 def measure(names, quick, bin_dir):
-    """Runs the stages; returns the figures by key, and the stages by name with how each went."""
+    """Runs the stages; returns the figures by key, and how each stage went by its name."""
     figures, went = {}, {}
     for name in names:
         begin = time.monotonic()
         print(f"== {name}", flush=True)
-        try:
-            with tempfile.TemporaryDirectory(prefix=f"tfdude-{name}-") as work:
-                for figure in stage(name)(quick, bin_dir, pathlib.Path(work)):
-                    figure = dict(figure)
-                    figures[figure.pop("key")] = figure
-            went[name] = "done"
-        except processes.Skipped as reason:
-            went[name] = f"skipped: {reason}"
-        except Exception as error:  # whatever it is, the other stages can still be run
-            traceback.print_exc()
-            went[name] = f"failed: {error}"
+        went[name] = run_stage(name, quick, bin_dir, figures)
         print(f"   {went[name]} ({time.monotonic() - begin:.0f} s)", flush=True)
     return figures, went
 
@@ -89,6 +101,8 @@ def arguments():
 
 
 def main():
+    # So that what was started is stopped then, too.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("terminated"))
     chosen = arguments()
     if chosen.saved:
         results = json.loads(chosen.saved.read_text(encoding="utf-8"))

@@ -15,7 +15,7 @@ MOST, LEAST = "at most", "at least"
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """A bound for something computed from the figures; `compute` returns None where they are missing."""
+    """A bound for what `compute` makes of the figures; None where they are missing."""
 
     group: str
     name: str
@@ -48,17 +48,16 @@ def _thesis():
               "across": ("Across partitions", 1.3, MOST, "decentralized / centralized")}
     for case in thesis.CASES:
         group, bound, direction, what = bounds[case.kind]
-        central, decentral = (f"thesis/{case.key}/{how}" for how in ("centralized", "decentralized"))
-        sides = (decentral, central) if case.kind == "across" else (central, decentral)
+        sides = [f"thesis/{case.key}/{how}" for how in what.split(" / ")]
         name = f"{case.title} ({case.figure})" if case.figure else case.title
         yield Target(group, f"{name}: {what}", ratio_of(*sides), bound, direction)
 
 
 def _worst_over_partitions(figures):
     worst = []
-    for number, _ in numbered(figures, "scale/partitions/*/decentralized"):
-        if 2 <= number <= 16:
-            key = f"scale/partitions/{number}"
+    for count, _ in numbered(figures, "scale/partitions/*/decentralized"):
+        if 2 <= count <= 16:
+            key = f"scale/partitions/{count}"
             worst.append(ratio(figures, f"{key}/decentralized", f"{key}/centralized"))
     worst = [value for value in worst if value is not None]
     return max(worst) if worst else None
@@ -92,15 +91,10 @@ def _floor():
 
 
 def _stream():
-    yield Target("Stream", "100 edges at 1 kHz: samples lost", value_of("stream/1khz/lost", "max"), 0,
-                 unit="samples")
+    yield Target("Stream", "100 edges at 1 kHz: samples lost",
+                 value_of("stream/1khz/lost", "max"), 0, unit="samples")
     yield Target("Stream", "100 edges at 1 kHz: owner's share of a core",
-                 value_of("stream/1khz/owner_cpu", "median", percent), 10, unit="%")
-
-
-def percent(figure, which):
-    """A share in percent, whichever of both it is given in."""
-    return figure[which] * (100 if figure["unit"] in ("share", "ratio", "cores") else 1)
+                 value_of("stream/1khz/owner_cpu"), 10, unit="%")
 
 
 def _core():
@@ -119,20 +113,22 @@ def _core():
     for who, what in (("ours_forest", "in the forest"), ("ours", "through a node")):
         yield Target("Core", f"add and remove a leaf in 100,000 frames, {what}",
                      value_of(f"core/add_remove/{who}/1000/100000", "median", microseconds), 0.2,
-                     unit="us")
+                     unit="µs")
 
 
 def _contention():
     yield Target("Contention", "reader's p99 beside the writer / alone",
                  ratio_of("contention/ours/beside_writer", "contention/ours/alone", "p99"), 1.5)
-    yield Target("Contention", "torn reads", value_of("contention/ours/torn", "max"), 0, unit="reads")
+    yield Target("Contention", "torn reads", value_of("contention/ours/torn", "max"), 0,
+                 unit="reads")
     yield Target("Contention", "writer's batch of 100 edges",
-                 value_of("contention/ours/batch", "median", microseconds), 5, unit="us")
+                 value_of("contention/ours/batch", "median", microseconds), 5, unit="µs")
 
 
 ALL = (
     *_thesis(),
-    Target("Across partitions", "lookup over 2 to 16 partitions, the worst: decentralized / centralized",
+    Target("Across partitions",
+           "lookup over 2 to 16 partitions, the worst: decentralized / centralized",
            _worst_over_partitions, 1.3),
     *_wire(), *_floor(), *_stream(), *_core(), *_contention(),
 )

@@ -1,7 +1,7 @@
 """The thesis's chapter 5 as data: its figures' cases, and what it says of each.
 
-It prints medians beside one plot only (5.10); of the others its text says a ratio or a difference, or that one
-is like another.
+It prints medians beside one plot only (5.10); of the others its text says a ratio or a difference,
+or that one is like another.
 """
 
 import dataclasses
@@ -10,7 +10,7 @@ import typing
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A figure of the thesis, or a case beside them. The connector was the main process's; ours is the arms'."""
+    """A figure of the thesis, or a case beside them. Its connector was main's, ours is arms'."""
 
     figure: str           # of the thesis; empty: it has none
     key: str              # thesis/KEY/centralized and thesis/KEY/decentralized

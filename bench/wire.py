@@ -1,9 +1,10 @@
-"""What an operation puts on the wire, counted in a capture of the loopback: the thesis's table 5.1 measured.
+"""What an operation puts on the wire, counted in a capture: the thesis's table 5.1, measured.
 
-Keys: wire/OPERATION/PART_LAYER [bytes], wire/OPERATION/packets, and wire/OPERATION/vendor_rtps, what Fast DDS adds
-to the messages for its statistics where it was built with them (Debian's is). PART is request, reply, or other: the news
-of the structure that an added or removed frame makes, and what DDS sends to acknowledge; LAYER is payload (CDR
-with its header of four bytes), rtps (the message) or udp (with IP and UDP headers).
+Keys: wire/OPERATION/PART_LAYER [bytes], wire/OPERATION/packets, and wire/OPERATION/vendor_rtps:
+what Fast DDS adds to messages for its statistics where it was built with them (Debian's is). PART
+is request, reply, or other: the news of the structure that an added or removed frame makes, and
+what DDS sends to acknowledge; LAYER is payload (CDR with its header of four bytes), rtps (the
+message) or udp (with IP and UDP headers).
 wire/lookup_over_N_partitions/total_udp is a lookup's whole traffic while six partitions are there;
 wire/idle/udp_per_second is discovery's and presence's while two daemons and a client do nothing.
 """
@@ -165,7 +166,7 @@ def chain_configs(work):
         parent = f"    parent: link_{number - 1}_b\n" if number > 1 else ""
         config = work / f"chain_{number}.yaml"
         config.write_text(f"partition: chain_{number}\nframes:\n  - id: link_{number}_a\n{parent}"
-                          f"  - id: link_{number}_b\n    parent: link_{number}_a\n    xyz: [1, 0, 0]\n",
+                          f"  - id: link_{number}_b\n    parent: link_{number}_a\n",
                           encoding="utf-8")
         yield config
 
@@ -174,7 +175,8 @@ def measure_chain(bin_dir, work, rounds):
     """A lookup over some of six partitions: who is not on the path should cost nothing."""
     file, domain = work / "chain.pcap", DOMAIN + 1
     begins = {over: [] for over in PATHS}
-    with capturing(file, domain), processes.daemons(bin_dir, list(chain_configs(work)), domain, work):
+    configs = list(chain_configs(work))
+    with capturing(file, domain), processes.daemons(bin_dir, configs, domain, work):
         with client_of(bin_dir, domain, work) as client:
             for turn in range(rounds + 1):
                 for over, when in begins.items():

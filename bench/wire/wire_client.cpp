@@ -1,12 +1,12 @@
-// One long-lived client for bench/wire.py, which counts what an operation puts on the wire: discovery is over
-// before the first one.
+// One long-lived client for bench/wire.py, which counts what an operation puts on the wire:
+// discovery is over before the first one.
 //
 //   wire_client DOMAIN PROFILE
 //
 // Reads operations from standard input, one a line:
 //   add ID PARENT | remove ID | update ID | publish ID | lookup A B
-// and answers each with a line of "BEGIN END done", BEGIN and END being the system's clock [ns], which is also
-// what a capture has; or with "failed" and why.
+// and answers each with "BEGIN done", BEGIN being when it began by the system's clock [ns], which a
+// capture has, too; or with "failed" and why.
 
 #include <chrono>
 #include <cstdlib>
@@ -61,9 +61,8 @@ int main(int argc, char** argv) {
   for (std::string line; std::getline(std::cin, line);) {
     const long long begin = now_ns();
     const auto done = perform(*client, line);
-    const long long end = now_ns();
     if (done) {
-      std::cout << begin << ' ' << end << " done" << std::endl;
+      std::cout << begin << " done" << std::endl;
     } else {
       std::cout << "failed " << done.error().message << std::endl;
     }
