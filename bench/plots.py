@@ -209,17 +209,18 @@ def draw_core(figures):
 
 def draw_contention(figures):
     """Readers alone and beside a writer."""
-    alone = [key.split("/")[1] for key in sorted(figures)
-             if key.startswith("contention/") and key.endswith("/alone")]
+    readers = [key.removesuffix("/alone") for key in sorted(figures)
+               if key.startswith("contention/") and key.endswith("/alone")]
     labelled, colours = [], []
-    for who in alone:
+    for reader in readers:
         for how in ("alone", "beside_writer"):
-            if figure := figures.get(f"contention/{who}/{how}"):
+            if figure := figures.get(f"{reader}/{how}"):
+                who = reader.removeprefix("contention/").replace("/", ", ")
                 labelled.append((f"{who}\n{how.replace('_', ' ')}", figure))
                 colours.append(COLOURS[how.split("_")[0]])
     if not labelled:
         return None
-    page, (axes,) = grid(1, 1, 1.2 + 1.1 * len(labelled), 3.0)
+    page, (axes,) = grid(1, 1, 1.0 + 1.1 * len(labelled), 3.0)
     boxes(axes, labelled, colours)
     axes.set_ylabel("lookup [µs]")
     page.suptitle("A reader, alone and beside a writer of 100 joints at 1 kHz.\n" + BOXES)

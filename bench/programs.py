@@ -39,7 +39,8 @@ def contention(quick, bin_dir, _work):
     program = bin_dir / "contention_bench"
     if not program.exists():
         raise processes.Skipped("contention_bench is not built")
-    printed = processes.output_of([program] + (["--quick"] if quick else []), SECONDS_FOR_A_STAGE)
+    seconds, repetitions = ("0.3", "5") if quick else ("3", "7")
+    printed = processes.output_of([program, seconds, repetitions], SECONDS_FOR_A_STAGE)
     for line in printed.splitlines():
         if line.startswith("{"):
             yield json.loads(line)

@@ -41,7 +41,7 @@ CORE = """\
 Nanoseconds. Ours carries a covariance unless it says pose only; tf2 has none.
 """
 CONTENTION = """\
-A writer of 100 joints at 1 kHz, and a reader that looks up again and again.
+A writer of 100 joints at 1 kHz, and a reader that looks up a path of 30 of them again and again.
 """
 SCALE = """\
 How the median grows with the number of each. The exponent is that of a power law fitted over all
@@ -90,8 +90,8 @@ def introduction(results):
     about.append(f"Linux {machine.get('kernel')}")
     extent = "a quick run" if settings.get("quick") else "the full run"
     lines = ["# Benchmarks\n",
-             f"Written by `scripts/bench` on {machine.get('date')}, commit {machine.get('commit')}: "
-             f"{extent}, {duration(settings.get('seconds', 0))}.\nAll figures here are from "
+             f"Written by `scripts/bench` on {machine.get('date')}; commit "
+             f"{machine.get('commit')}; {extent}, {duration(settings.get('seconds', 0))}.\nAll figures here are from "
              "`results/latest.json`.\n",
              "**Machine.** " + "; ".join(about) + ".\n"]
     load = (machine.get("load before") or [0])[0]
@@ -113,7 +113,8 @@ def targets_section(figures):
         verdicts = [row[3] for row in rows if group in (row[0].group, "All")]
         groups.append((group, *(str(verdicts.count(one)) for one in ("yes", "NO", MISSING))))
     lines = ["## Targets\n", table(("group", "reached", "not reached", "no figures"), groups)]
-    lost = [f"- {target.group}: {target.name} is **{found}** ({bound})"
+    lost = [f"- {target.group}: {target.name} is **{found}** ({bound}). "
+            f"{targets.why(target)}".rstrip()
             for target, found, bound, verdict in rows if verdict == "NO"]
     if lost:
         lines.append("**Not reached:**\n\n" + "\n".join(lost) + "\n")
