@@ -18,7 +18,7 @@ BOXES = "Boxes: quartiles and median; whiskers: 5th to 95th percentile; cross: 9
 BLUE, GREEN, BROWN, GREY = "#2f6f9f", "#3f9f6f", "#b07040", "#7f7f7f"
 COLOURS = {"centralized": BROWN, "decentralized": BLUE, "ours": BLUE, "dds": GREY,
            "udp": "#b9b9b9", "tf2": BROWN, "alone": GREY, "beside": BLUE}
-LOG_FROM = 10.0  # an axis is logarithmic where the largest median is more than this times the least
+LOG_FROM = 10.0  # an axis is logarithmic where its values span more than this
 
 matplotlib.rcParams.update({
     "font.size": 8, "axes.titlesize": 8, "figure.titlesize": 9, "axes.grid": True,
@@ -45,7 +45,8 @@ def boxes(axes, labelled, colours):
                      flierprops={"marker": "x", "markersize": 4})
     for patch, colour in zip(drawn["boxes"], colours):
         patch.set(facecolor=colour, alpha=0.75, linewidth=0.6)
-    log_where_needed(axes, [one["med"] for one in stats])
+    log_where_needed(axes, [one[end] for one in stats for end in ("whislo", "med")] +
+                     [value for one in stats for value in one["fliers"]])
     for position, one in enumerate(stats, 1):
         axes.text(position + 0.3, one["med"], number(one["med"]), fontsize=7, va="center")
     axes.set_xlim(0.5, len(stats) + 0.8)
@@ -157,6 +158,8 @@ def finish_curves(axes, x_label, y_label):
     axes.set(xscale="log", xlabel=x_label, ylabel=y_label)
     axes.set_xticks(xs, [f"{x:,}" for x in xs])
     log_where_needed(axes, [y for line in axes.lines for y in line.get_ydata()])
+    if axes.get_yscale() == "linear":
+        axes.set_ylim(top=1.4 * axes.get_ylim()[1])  # room for the legend
     axes.xaxis.set_minor_locator(NullLocator())
     axes.legend(frameon=False, fontsize=7)
 
