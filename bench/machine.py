@@ -6,6 +6,7 @@ import pathlib
 import platform
 import re
 import subprocess
+import time
 
 import processes
 
@@ -45,6 +46,23 @@ def _read(path):
         return ""
 
 
+def _processor_times():
+    """(all, idle) in ticks since the start; waiting for a disk counts as idle."""
+    fields = [int(word) for word in _read("/proc/stat").split("\n")[0].split()[1:9]]
+    return sum(fields), fields[3] + fields[4]
+
+
+def busy(seconds=3):
+    """How busy the processors are with what is not ours [%]. The load average would show our build."""
+    try:
+        begin, idle_begin = _processor_times()
+        time.sleep(seconds)
+        end, idle_end = _processor_times()
+        return round(100 * (1 - (idle_end - idle_begin) / (end - begin)), 1)
+    except (IndexError, ValueError, ZeroDivisionError):
+        return None
+
+
 def description(build_dir):
     """What there is to know of the machine, by name."""
     cache = _read(pathlib.Path(build_dir) / "CMakeCache.txt")
@@ -64,4 +82,5 @@ def description(build_dir):
         "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
         "commit": _commit(),
         "load before": [round(load, 2) for load in os.getloadavg()],
+        "busy before [%]": busy(),
     }

@@ -10,6 +10,7 @@ from figures import (NANOSECONDS, as_measured, growth, growth_in_words, microsec
 
 MISSING = "missing"
 NOTHING = "No figures in this run.\n"
+IDLE_UP_TO = 5  # percent of the processors' time
 
 METHOD = """\
 **Method.** The shipped library and daemons, one run, everything over the loopback interface. What
@@ -19,8 +20,8 @@ time. Elsewhere a value is one call; calls on own frames take hardly longer than
 so theirs is the mean of several. The 99th percentile (p99) is of all values of all repetitions.
 """
 NOT_IDLE = """\
-**The machine was not idle**: its load was {load:g} before the run. Read times with that in mind;
-what waits for another process suffers most.
+**The machine was not idle**: others kept its processors busy by {busy:g} % before the run. Read
+times with that in mind; what waits for another process suffers most.
 """
 THESIS = """\
 Microseconds. Centralized: one daemon owns all frames, and the caller is a plain client.
@@ -94,9 +95,9 @@ def introduction(results):
              f"{machine.get('commit')}; {extent}, {duration(settings.get('seconds', 0))}.\nAll figures here are from "
              "`results/latest.json`.\n",
              "**Machine.** " + "; ".join(about) + ".\n"]
-    load = (machine.get("load before") or [0])[0]
-    if load > 0.5:
-        lines.append(NOT_IDLE.format(load=load))
+    busy = machine.get("busy before [%]") or 0
+    if busy > IDLE_UP_TO:
+        lines.append(NOT_IDLE.format(busy=busy))
     lines.append(METHOD)
     left_out = [f"- {name}: {how}" for name, how in settings.get("stages", {}).items()
                 if how != "done"]

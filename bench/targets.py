@@ -153,8 +153,12 @@ def rows(figures):
         value, reached = target.verdict(figures)
         unit = f" {target.unit}" if target.unit else ""
         verdict = {True: "yes", False: "NO", None: "missing"}[reached]
-        yield (target, number(value) + (unit if value is not None else ""),
-               f"{target.direction} {target.bound:g}{unit}", verdict)
+        found = number(value)
+        if value is not None:
+            if found == number(target.bound):  # show on which side it is
+                found = f"{value:.5g}"
+            found += unit
+        yield target, found, f"{target.direction} {target.bound:g}{unit}", verdict
 
 
 def table(figures):
