@@ -53,7 +53,7 @@ def _processor_times():
 
 
 def busy(seconds=3):
-    """How busy the processors are with what is not ours [%]. The load average would show our build."""
+    """How busy others keep the processors [%]; the load average would show our own build."""
     try:
         begin, idle_begin = _processor_times()
         time.sleep(seconds)

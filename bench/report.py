@@ -92,8 +92,8 @@ def introduction(results):
     extent = "a quick run" if settings.get("quick") else "the full run"
     lines = ["# Benchmarks\n",
              f"Written by `scripts/bench` on {machine.get('date')}; commit "
-             f"{machine.get('commit')}; {extent}, {duration(settings.get('seconds', 0))}.\nAll figures here are from "
-             "`results/latest.json`.\n",
+             f"{machine.get('commit')}; {extent}, {duration(settings.get('seconds', 0))}.\n"
+             "All figures here are from `results/latest.json`.\n",
              "**Machine.** " + "; ".join(about) + ".\n"]
     busy = machine.get("busy before [%]") or 0
     if busy > IDLE_UP_TO:
