@@ -1,0 +1,71 @@
+"""Programs that a stage starts, waits for, and ends again."""
+
+import contextlib
+import pathlib
+import select
+import signal
+import subprocess
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PROFILE = ROOT / "profiles" / "loopback.xml"
+PATIENCE_S = 20  # for a program to start or to answer
+
+
+class Skipped(Exception):
+    """A stage cannot be run here, and why."""
+
+
+def end(process, how=signal.SIGTERM):
+    """Ends a program that we started."""
+    if process.poll() is None:
+        process.send_signal(how)
+        try:
+            process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def await_line(stream, what):
+    """The next line of an unbuffered pipe, or an error when it does not come in time."""
+    deadline = time.monotonic() + PATIENCE_S
+    line = b""
+    while not line.endswith(b"\n"):
+        if not select.select([stream], [], [], max(deadline - time.monotonic(), 0))[0]:
+            raise RuntimeError(f"{what}: no answer within {PATIENCE_S} s")
+        read = stream.read(1)
+        if not read:
+            raise RuntimeError(f"{what} has ended")
+        line += read
+    return line.decode().rstrip()
+
+
+@contextlib.contextmanager
+def daemons(bin_dir, configs, domain, logs):
+    """Runs a tfduded for each configuration file until the block is left."""
+    running = []
+    try:
+        for config in configs:
+            with open(pathlib.Path(logs) / f"{pathlib.Path(config).stem}.log", "wb") as log:
+                running.append(subprocess.Popen(
+                    [bin_dir / "tfduded", "--config", config, "--domain", str(domain),
+                     "--profile", PROFILE], stdout=subprocess.PIPE, stderr=log, bufsize=0))
+        for process, config in zip(running, configs):
+            line = await_line(process.stdout, f"tfduded --config {config}")
+            if not line.startswith("ready"):
+                raise RuntimeError(f"tfduded --config {config} said: {line}")
+        yield running
+    finally:
+        for process in running:
+            end(process)
+
+
+def output_of(command, timeout, **more):
+    """What a program prints; it is ended with an error where it takes longer."""
+    run = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                         timeout=timeout, check=False, **more)
+    if run.returncode != 0:
+        raise RuntimeError(f"{pathlib.Path(command[0]).name} ended with {run.returncode}: "
+                           + run.stderr[-2000:])
+    return run.stdout

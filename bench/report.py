@@ -1,0 +1,283 @@
+"""Writes the report from the results only: what was not measured is said to be missing."""
+
+import os
+
+import plots
+import targets
+import thesis
+from figures import (NANOSECONDS, as_measured, growth, growth_in_words, microseconds, nanoseconds,
+                     number, ratio)
+
+MISSING = "missing"
+NOTHING = "No figures in this run.\n"
+IDLE_UP_TO = 5  # percent of the processors' time
+
+METHOD = """\
+**Method.** The shipped library and daemons, one run, everything over the loopback interface. What
+is compared is measured in turns; a ratio of medians is the median of the ratios of each
+repetition. Warm-up is discarded. Of own frames beside tf2 a value is a repetition's mean processor
+time. Elsewhere a value is one call; calls on own frames take hardly longer than reading the clock,
+so theirs is the mean of several. The 99th percentile (p99) is of all values of all repetitions.
+"""
+NOT_IDLE = """\
+**The machine was not idle**: others kept its processors busy by {busy:g} % before the run. Read
+times with that in mind; what waits for another process suffers most.
+"""
+THESIS = """\
+Microseconds. Centralized: one daemon owns all frames, and the caller is a plain client.
+Decentralized: the caller is the process `robot` (the thesis's main process) unless it says `arms`,
+and owns its frames. The ratio is centralized / decentralized: above one the decentralized tree is
+faster. The thesis's ratio is what its text says, in words where it has no number.
+"""
+WIRE = """\
+Bytes of request / reply, captured on the loopback interface; the caller owns nothing, and ids have
+ten characters. Payloads are CDR with its header of four bytes. "Other" is the news of the
+structure, which goes to everybody, and acknowledgements, as UDP packets.
+"""
+FLOOR = """\
+Round trips in microseconds, median / p99, beside a bare Fast DDS ping-pong and bare UDP of equal
+payload.
+"""
+CORE = """\
+Nanoseconds. Ours carries a covariance unless it says pose only; tf2 has none.
+"""
+CONTENTION = """\
+A writer of 100 joints at 1 kHz, and a reader that looks up a path of 30 of them again and again.
+"""
+SCALE = """\
+How the median grows with the number of each. The exponent is that of a power law fitted over all
+that was measured, so a fixed cost at the small end lowers it.
+"""
+
+
+def table(head, rows):
+    """A table; the first column is text, the others are numbers."""
+    lines = ["| " + " | ".join(head) + " |", "| --- |" + " ---: |" * (len(head) - 1)]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def value(figures, key, which="median", convert=microseconds):
+    """A figure's value as text."""
+    return number(convert(figures[key], which)) if key in figures else MISSING
+
+
+def both(figures, key, convert=microseconds):
+    """Median and 99th percentile as text."""
+    return f"{value(figures, key, 'median', convert)} / {value(figures, key, 'p99', convert)}"
+
+
+def unit_of(figure):
+    """A figure's unit as text."""
+    return {"us": "µs"}.get(figure["unit"], figure["unit"])
+
+
+def picture(drawn, name, home):
+    """A plot, by a path relative to the report."""
+    return f"![{name}]({os.path.relpath(drawn[name], home)})\n" if name in drawn else ""
+
+
+def duration(seconds):
+    """As a reader wants it."""
+    return f"{seconds} seconds" if seconds < 120 else f"{seconds / 60:.0f} minutes"
+
+
+def introduction(results):
+    """Machine, method, and what was left out."""
+    machine, settings = results["machine"], results["settings"]
+    about = [machine.get(name, "unknown") for name in (
+        "cpu", "vector instructions", "distribution", "compiler", "build type", "fastdds", "tf2")]
+    about[1:1] = [f"{machine.get('cores')} cores"]
+    about.append(f"Linux {machine.get('kernel')}")
+    extent = "a quick run" if settings.get("quick") else "the full run"
+    lines = ["# Benchmarks\n",
+             f"Written by `scripts/bench` on {machine.get('date')}; commit "
+             f"{machine.get('commit')}; {extent}, {duration(settings.get('seconds', 0))}.\n"
+             "All figures here are from `results/latest.json`.\n",
+             "**Machine.** " + "; ".join(about) + ".\n"]
+    busy = machine.get("busy before [%]") or 0
+    if busy > IDLE_UP_TO:
+        lines.append(NOT_IDLE.format(busy=busy))
+    lines.append(METHOD)
+    left_out = [f"- {name}: {how}" for name, how in settings.get("stages", {}).items()
+                if how != "done"]
+    if left_out:
+        lines.append("**Not measured in this run:**\n\n" + "\n".join(left_out) + "\n")
+    return "\n".join(lines)
+
+
+def targets_section(figures):
+    """All targets; what is not reached stands first."""
+    rows = list(targets.rows(figures))
+    groups = []
+    for group in (*targets.GROUPS, "All"):
+        verdicts = [row[3] for row in rows if group in (row[0].group, "All")]
+        groups.append((group, *(str(verdicts.count(one)) for one in ("yes", "NO", MISSING))))
+    lines = ["## Targets\n", table(("group", "reached", "not reached", "no figures"), groups)]
+    lost = [f"- {target.group}: {target.name} is **{found}** ({bound}). "
+            f"{targets.why(target)}".rstrip()
+            for target, found, bound, verdict in rows if verdict == "NO"]
+    if lost:
+        lines.append("**Not reached:**\n\n" + "\n".join(lost) + "\n")
+    lines.append(table(("target", "measured", "bound", "reached"),
+                       [(f"{target.group}: {target.name}", found, bound,
+                         f"**{verdict}**" if verdict == "NO" else verdict)
+                        for target, found, bound, verdict in rows]))
+    return "\n".join(lines)
+
+
+def thesis_section(figures, drawn, home):
+    """Figures 5.1 to 5.11."""
+    rows = []
+    for case in thesis.CASES:
+        keys = [f"thesis/{case.key}/{side}" for side in ("centralized", "decentralized")]
+        ours = ratio(figures, *keys)
+        theirs = [f"{case.ratio:.2g}" if case.ratio else "", case.words]
+        rows.append((f"{case.figure} {case.title}".strip(), *(both(figures, key) for key in keys),
+                     number(ours), ": ".join(word for word in theirs if word) or "-"))
+    head = ("case", "centralized, median / p99", "decentralized, median / p99", "ratio",
+            "the thesis's")
+    return [THESIS, table(head, rows), picture(drawn, "thesis", home)]
+
+
+WIRE_NAMES = {"add": "add", "remove": "remove", "lookup_other": "look up, one other owner",
+              "lookup_across": "look up, two owners", "update": "update",
+              "publish": "publish (has no reply)"}
+
+
+def wire_section(figures, _drawn, _home):
+    """Table 5.1."""
+    def size(name):
+        return value(figures, f"wire/{name}", convert=as_measured)
+
+    rows = []
+    for operation, name in WIRE_NAMES.items():
+        sizes = [f"{size(f'{operation}/request_{layer}')} / {size(f'{operation}/reply_{layer}')}"
+                 for layer in ("payload", "rtps", "udp")]
+        theirs = "{} / {}".format(*thesis.SIZES.get(operation, ("-", "-")))
+        rows.append((name, theirs, *sizes, size(f"{operation}/other_udp"),
+                     size(f"{operation}/packets")))
+    head = ("operation", "thesis", "payload", "RTPS", "UDP", "other", "packets")
+    paths = ", ".join(f"{size(f'lookup_over_{count}_partitions/total_udp')} over {count}"
+                      for count in (1, 2, 4))
+    return [WIRE, table(head, rows),
+            f"- Of an update's RTPS bytes, both ways, {size('update/vendor_rtps')} are what this "
+            "build of Fast DDS adds for its statistics.\n"
+            f"- With six partitions there, a lookup's UDP bytes by those on its path: {paths}. The "
+            f"thesis's worst case is {thesis.WORST_CASE_PER_PROCESS} payload bytes for each "
+            "process that there is.\n"
+            "- Discovery and presence of two daemons and a client that do nothing: "
+            f"{size('idle/udp_per_second')} UDP bytes a second.\n"]
+
+
+def floor_section(figures, drawn, home):
+    """Ours beside bare DDS and bare UDP."""
+    rows = []
+    for operation, placement in plots.FLOOR_PANELS:
+        ours, dds, udp = (f"floor/{operation}/{who}/{placement}" for who in ("ours", "dds", "udp"))
+        rows.append((f"{operation}, {placement.replace('_', ' ')}",
+                     *(both(figures, key) for key in (ours, dds, udp)),
+                     number(ratio(figures, ours, dds)), number(ratio(figures, ours, udp))))
+    head = ("call", "ours", "bare DDS", "bare UDP", "ours / DDS", "ours / UDP")
+    return [FLOOR, table(head, rows), picture(drawn, "floor", home)]
+
+
+def stream_section(figures, _drawn, _home):
+    """One publisher, one owner."""
+    rows = []
+    for key in sorted(key for key in figures if key.startswith("stream/")):
+        name = f"{key.removeprefix('stream/').replace('_', ' ')} [{unit_of(figures[key])}]"
+        rows.append((name, *(value(figures, key, which, as_measured)
+                             for which in ("median", "p90", "p99", "max"))))
+    return ["One publisher to one owner, 100 edges a sample.\n",
+            table(("figure", "median", "p90", "p99", "max"), rows)]
+
+
+def core_rows(figures):
+    """Each operation of ours with tf2's of the same, where tf2 has one."""
+    found = (("ours_by_handle", "by handle"), ("ours_by_name", "by name"),
+             ("ours_pose", "pose only, by handle"))
+    operations = (("lookup", found, "look up {who}, depth {depth:,} of {frames:,}"),
+                  ("set", found[:2], "set an edge {who}, {frames:,} frames"),
+                  ("add_remove", (("ours", "node"), ("ours_forest", "forest")),
+                   "add and remove a leaf, {who}, {frames:,} frames"))
+    for operation, all_of_ours, name in operations:
+        for ours, who in all_of_ours:
+            for depth, frames, figure in plots.by_shape(figures, f"core/{operation}/{ours}"):
+                shape = f"{depth}/{frames}"
+                tf2 = f"core/{operation}/tf2/{shape}"
+                cells = ("cannot", "-")
+                if operation != "add_remove":
+                    cells = (value(figures, tf2, convert=nanoseconds),
+                             number(ratio(figures, f"core/{operation}/{ours}/{shape}", tf2)))
+                yield (name.format(who=who, depth=depth, frames=frames),
+                       number(nanoseconds(figure)), *cells)
+
+
+def core_section(figures, drawn, home):
+    """Beside tf2."""
+    return [CORE, table(("operation", "ours", "tf2", "ours / tf2"), core_rows(figures)),
+            picture(drawn, "core", home)]
+
+
+def contention_section(figures, drawn, home):
+    """Readers beside a writer."""
+    rows = []
+    for key in sorted(key for key in figures if key.startswith("contention/")):
+        timed = figures[key]["unit"] in NANOSECONDS
+        convert, unit = (microseconds, "µs") if timed else (as_measured, unit_of(figures[key]))
+        name = key.removeprefix("contention/").replace("/", ", ").replace("_", " ")
+        rows.append((f"{name} [{unit}]", *(value(figures, key, which, convert)
+                                           for which in ("median", "p99", "p99.9", "max"))))
+    return [CONTENTION, table(("figure", "median", "p99", "p99.9", "max"), rows),
+            picture(drawn, "contention", home)]
+
+
+def scale_table(figures, what):
+    """All that was measured over the numbers of one thing."""
+    keys = [key.split("/") for key in figures if key.startswith(f"scale/{what}/")]
+    curves = sorted({who for _, _, _, who in keys})
+    units = {who: unit_of(figures[f"scale/{what}/{count}/{who}"]) for _, _, count, who in keys}
+    head = [f"{who.replace('_', ' ')} [{units[who]}]" for who in curves]
+    rows = [(f"{count:,}", *(both(figures, f"scale/{what}/{count}/{who}", as_measured)
+                             for who in curves))
+            for count in sorted({int(count) for _, _, count, _ in keys})]
+    return table((f"{what}; median / p99", *head), rows) if rows else ""
+
+
+def scale_section(figures, drawn, home):
+    """What grows with what."""
+    fitted = {f"{what}, {who.replace('_', ' ')}": exponent
+              for (what, who), exponent in plots.growths(figures).items()}
+    for name, points in plots.core_curves(figures):
+        fitted[name] = growth([(x, figure["median"]) for x, figure in points])
+    said = [f"- {name}: {growth_in_words(exponent)}" for name, exponent in fitted.items()
+            if exponent is not None]
+    if few := [name for name, exponent in fitted.items() if exponent is None]:
+        said.append("- too few points for a fit: " + "; ".join(few))
+    of = dict.fromkeys(scale[0] for scale in plots.SCALES)
+    return [SCALE, "\n".join(said) + "\n", *(scale_table(figures, what) for what in of),
+            picture(drawn, "scale", home)]
+
+
+# Heading, what the keys begin with of which there must be some, and what writes it.
+SECTIONS = (
+    ("The thesis's cases", ("thesis/",), thesis_section),
+    ("On the wire: the thesis's table 5.1", ("wire/",), wire_section),
+    ("The floor", ("floor/",), floor_section),
+    ("Streamed updates", ("stream/",), stream_section),
+    ("Own frames, beside tf2", ("core/",), core_section),
+    ("A reader beside a writer", ("contention/",), contention_section),
+    ("Cost as work grows", ("scale/", "core/"), scale_section),
+)
+
+
+def text(results, drawn, home):
+    """The whole report, to be put into the folder `home`."""
+    figures = results["figures"]
+    parts = [introduction(results), targets_section(figures)]
+    for heading, prefixes, section in SECTIONS:
+        parts.append(f"## {heading}\n")
+        there = any(key.startswith(prefixes) for key in figures)
+        parts += section(figures, drawn, home) if there else [NOTHING]
+    return "\n".join(part for part in parts if part).rstrip() + "\n"

@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+"""Runs the benchmarks; writes results, plots and report. scripts/bench builds before."""
+
+import argparse
+import json
+import pathlib
+import signal
+import sys
+import tempfile
+import time
+import traceback
+
+import machine
+import plots
+import processes
+import programs
+import report
+import targets
+import wire
+
+BENCH = pathlib.Path(__file__).resolve().parent
+RESULTS = BENCH / "results"
+STAGES = ("core", "contention", "net", "wire")
+
+
+def stage(name):
+    """What yields the figures, given quick, the binaries' folder and a folder to work in."""
+    if name == "wire":
+        return wire.run
+    if name == "net":
+        try:
+            import net_stage
+        except ModuleNotFoundError as error:
+            if error.name != "net_stage":
+                raise
+            raise processes.Skipped("bench/net_stage.py is not there") from error
+        return net_stage.run
+    return getattr(programs, name)
+
+
+def run_stage(name, quick, bin_dir, figures):
+    """Puts a stage's figures to the others, by their keys; returns how it went."""
+    with tempfile.TemporaryDirectory(prefix=f"tfdude-{name}-") as work:
+        try:
+            for figure in stage(name)(quick, bin_dir, pathlib.Path(work)):
+                figure = dict(figure)
+                key = figure.pop("key")
+                if figure["n"] > 0:
+                    figures[key] = figure
+                else:
+                    print(f"   {key} has no values")
+            return "done"
+        except processes.Skipped as reason:
+            return f"skipped: {reason}"
+        except Exception as error:  # whatever it is, the other stages can still be run
+            for log in sorted(pathlib.Path(work).glob("*.log")):
+                print(f"--- {log.name}\n{log.read_text(errors='replace')[-2000:]}")
+            traceback.print_exc()
+            return f"failed: {error}"
+
+
+def measure(names, quick, bin_dir):
+    """Runs the stages; returns the figures by key, and how each stage went by its name."""
+    figures, went = {}, {}
+    for name in names:
+        begin = time.monotonic()
+        print(f"== {name}", flush=True)
+        went[name] = run_stage(name, quick, bin_dir, figures)
+        print(f"   {went[name]} ({time.monotonic() - begin:.0f} s)", flush=True)
+    return figures, went
+
+
+def write(results, folder, report_file):
+    """Writes the results' file, the plots and the report."""
+    folder.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(results, indent=1, sort_keys=True)
+    (folder / "latest.json").write_text(text + "\n", encoding="utf-8")
+    drawn = plots.draw(results["figures"], folder)
+    report_file.write_text(report.text(results, drawn, report_file.parent), encoding="utf-8")
+    print(f"Results are in {folder}, the report is {report_file}")
+
+
+def arguments():
+    """What the command line says."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="fewer values: under 5 minutes")
+    parser.add_argument("--check", action="store_true",
+                        help="a quick run beside the targets; leaves the committed results alone")
+    parser.add_argument("--from", dest="saved", type=pathlib.Path, metavar="FILE",
+                        help="make plots and report of a saved latest.json, without measuring")
+    parser.add_argument("--build", type=pathlib.Path, default=processes.ROOT / "build" / "release",
+                        help="where the programs were built (%(default)s)")
+    parser.add_argument("--stages", default=",".join(STAGES), help="only these (%(default)s)")
+    parser.add_argument("--results", type=pathlib.Path, default=RESULTS,
+                        help="the folder to write to (%(default)s)")
+    chosen = parser.parse_args()
+    chosen.stages = [name for name in chosen.stages.split(",") if name]
+    if unknown := set(chosen.stages) - set(STAGES):
+        parser.error("no such stage: " + ", ".join(sorted(unknown)))
+    return chosen
+
+
+def main():
+    # So that what was started is stopped then, too.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("terminated"))
+    chosen = arguments()
+    if chosen.saved:
+        results = json.loads(chosen.saved.read_text(encoding="utf-8"))
+    else:
+        quick = chosen.quick or chosen.check
+        about = machine.description(chosen.build)
+        begin = time.monotonic()
+        figures, went = measure(chosen.stages, quick, chosen.build / "bin")
+        settings = {"quick": quick, "stages": went, "seconds": round(time.monotonic() - begin)}
+        results = {"machine": about, "settings": settings, "figures": figures}
+    if chosen.check:
+        print(targets.table(results["figures"]))
+    else:
+        # A report of other results stays with them.
+        home = BENCH if chosen.results.resolve() == RESULTS else chosen.results
+        write(results, chosen.results, home / "REPORT.md")
+    failed = [name for name, how in results["settings"]["stages"].items()
+              if how.startswith("failed")]
+    if failed and not chosen.saved:
+        sys.exit("FAILED: " + ", ".join(failed))
+
+
+if __name__ == "__main__":
+    main()

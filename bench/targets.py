@@ -1,0 +1,175 @@
+"""What is to be reached, as data: how each is computed from the figures, and its bound.
+
+A ratio of medians is the median of the ratios of each repetition, where both sides have as many
+(figures.ratio).
+"""
+
+import dataclasses
+import typing
+
+import thesis
+from figures import as_measured, microseconds, number, numbered, ratio
+
+MOST, LEAST = "at most", "at least"
+
+
+@dataclasses.dataclass(frozen=True)
+class Target:
+    """A bound for what `compute` makes of the figures; None where they are missing."""
+
+    group: str
+    name: str
+    compute: typing.Callable
+    bound: float
+    direction: str = MOST
+    unit: str = ""  # empty: a ratio
+
+    def verdict(self, figures):
+        """(value, reached), or (None, None) where the figures are missing."""
+        value = self.compute(figures)
+        if value is None:
+            return None, None
+        return value, value <= self.bound if self.direction == MOST else value >= self.bound
+
+
+def ratio_of(over, under, which="median"):
+    """Computes what one figure is times another."""
+    return lambda figures: ratio(figures, over, under, which)
+
+
+def value_of(key, which="median", convert=as_measured):
+    """Computes a value of one figure."""
+    return lambda figures: convert(figures[key], which) if key in figures else None
+
+
+def _thesis():
+    bounds = {"own": ("Own process", 100.0, LEAST, "centralized / decentralized"),
+              "other": ("Other process", 0.95, LEAST, "centralized / decentralized"),
+              "across": ("Across partitions", 1.3, MOST, "decentralized / centralized")}
+    for case in thesis.CASES:
+        group, bound, direction, what = bounds[case.kind]
+        sides = [f"thesis/{case.key}/{how}" for how in what.split(" / ")]
+        name = f"{case.title} ({case.figure})" if case.figure else case.title
+        yield Target(group, f"{name}: {what}", ratio_of(*sides), bound, direction)
+
+
+def _worst_over_partitions(figures):
+    worst = []
+    for count, _ in numbered(figures, "scale/partitions/*/decentralized"):
+        if 2 <= count <= 16:
+            key = f"scale/partitions/{count}"
+            worst.append(ratio(figures, f"{key}/decentralized", f"{key}/centralized"))
+    worst = [value for value in worst if value is not None]
+    return max(worst) if worst else None
+
+
+def _growth_on_path(figures):
+    one, four = (figures.get(f"wire/lookup_over_{n}_partitions/total_udp") for n in (1, 4))
+    return four["median"] / (4 * one["median"]) if one and four and one["median"] else None
+
+
+def _wire():
+    for operation, part, index in (("add", "request", 0), ("update", "request", 0),
+                                   ("lookup_other", "reply", 1)):
+        size = thesis.SIZES[operation][index]
+        key = f"wire/{operation}/{part}_payload"
+        yield Target("On the wire", f"{operation}, {part}: CDR bytes / the thesis's {size}",
+                     lambda figures, key=key, size=size:
+                     figures[key]["median"] / size if key in figures else None, 0.75)
+    yield Target("On the wire", "lookup over 4 of 6 partitions: bytes / 4 x those over 1",
+                 _growth_on_path, 1.05)
+
+
+def _floor():
+    for operation in ("update", "lookup"):
+        for placement in ("one_core", "two_cores"):
+            ours, dds = (f"floor/{operation}/{who}/{placement}" for who in ("ours", "dds"))
+            where = placement.replace("_", " ")
+            for which, bound in (("median", 1.15), ("p99", 1.5)):
+                yield Target("Floor", f"{operation}, {where}, {which}: ours / bare DDS",
+                             ratio_of(ours, dds, which), bound)
+
+
+def _stream():
+    yield Target("Stream", "100 edges at 1 kHz: samples lost",
+                 value_of("stream/1khz/lost", "max"), 0, unit="samples")
+    yield Target("Stream", "100 edges at 1 kHz: owner's share of a core",
+                 value_of("stream/1khz/owner_cpu"), 10, unit="%")
+
+
+def _core():
+    for shape in ("30/100", "30/1000"):
+        depth, frames = shape.split("/")
+        tree = f"depth {depth} of {frames} frames"
+        tf2 = f"core/lookup/tf2/{shape}"
+        yield Target("Core", f"lookup with covariance, {tree}: by handle / tf2",
+                     ratio_of(f"core/lookup/ours_by_handle/{shape}", tf2), 0.6)
+        yield Target("Core", f"lookup of the pose only, {tree}: by handle / tf2",
+                     ratio_of(f"core/lookup/ours_pose/{shape}", tf2), 0.2)
+    for shape in ("2/10", "30/100", "30/1000", "1000/10000"):
+        frames = shape.split("/")[1]
+        yield Target("Core", f"set an edge of {frames} frames: by handle / tf2",
+                     ratio_of(f"core/set/ours_by_handle/{shape}", f"core/set/tf2/{shape}"), 0.1)
+    for who, what in (("ours_forest", "in the forest"), ("ours", "through a node")):
+        yield Target("Core", f"add and remove a leaf in 100,000 frames, {what}",
+                     value_of(f"core/add_remove/{who}/1000/100000", "median", microseconds), 0.2,
+                     unit="µs")
+
+
+def _contention():
+    for reader, what in (("covariance", "with covariance"), ("pose", "of the pose only")):
+        key = f"contention/ours/{reader}"
+        yield Target("Contention", f"p99 of a lookup {what}: beside the writer / alone",
+                     ratio_of(f"{key}/beside_writer", f"{key}/alone", "p99"), 1.5)
+    yield Target("Contention", "torn reads", value_of("contention/ours/torn", "max"), 0,
+                 unit="reads")
+    yield Target("Contention", "writer's batch of 100 edges",
+                 value_of("contention/ours/batch", "median", microseconds), 5, unit="µs")
+
+
+ALL = (
+    *_thesis(),
+    Target("Across partitions",
+           "lookup over 2 to 16 partitions, the worst: decentralized / centralized",
+           _worst_over_partitions, 1.3),
+    *_wire(), *_floor(), *_stream(), *_core(), *_contention(),
+)
+# Why a target is not reached, by the start of "GROUP: NAME"; said only where it is not.
+WHY = {}
+
+GROUPS = tuple(dict.fromkeys(target.group for target in ALL))
+TARGETS = tuple(sorted(ALL, key=lambda target: GROUPS.index(target.group)))
+
+
+def why(target):
+    """The reason known for missing a target, or nothing."""
+    full = f"{target.group}: {target.name}"
+    return next((reason for start, reason in WHY.items() if full.startswith(start)), "")
+
+
+def rows(figures):
+    """(target, value or "missing", bound, verdict) of each, as text."""
+    for target in TARGETS:
+        value, reached = target.verdict(figures)
+        unit = f" {target.unit}" if target.unit else ""
+        verdict = {True: "yes", False: "NO", None: "missing"}[reached]
+        found = number(value)
+        if value is not None:
+            if found == number(target.bound):  # show on which side it is
+                found = f"{value:.5g}"
+            found += unit
+        yield target, found, f"{target.direction} {target.bound:g}{unit}", verdict
+
+
+def table(figures):
+    """All targets as plain text, for --check."""
+    lines, group = [], None
+    for target, value, bound, verdict in rows(figures):
+        if target.group != group:
+            group = target.group
+            lines.append(f"\n{group}")
+        lines.append(f"  {verdict:8}{value:>14}   {bound:18}{target.name}")
+    counted = [line.split()[0] for line in lines if line.startswith("  ")]
+    lines.append(f"\n{counted.count('yes')} hold, {counted.count('NO')} do not, "
+                 f"{counted.count('missing')} have no figures")
+    return "\n".join(lines)

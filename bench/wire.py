@@ -1,0 +1,212 @@
+"""What an operation puts on the wire, counted in a capture: the thesis's table 5.1, measured.
+
+Keys: wire/OPERATION/PART_LAYER [bytes], wire/OPERATION/packets, and wire/OPERATION/vendor_rtps:
+what Fast DDS adds to messages for its statistics where it was built with them (Debian's is). PART
+is request, reply, or other: the news of the structure that an added or removed frame makes, and
+what DDS sends to acknowledge; LAYER is payload (CDR with its header of four bytes), rtps (the
+message) or udp (with IP and UDP headers).
+wire/lookup_over_N_partitions/total_udp is a lookup's whole traffic while six partitions are there;
+wire/idle/udp_per_second is discovery's and presence's while two daemons and a client do nothing.
+"""
+
+import contextlib
+import pathlib
+import signal
+import subprocess
+import time
+
+import figures
+import processes
+import rtps
+
+PAUSE_S = 0.2  # after an operation: several of DDS's heartbeats and acknowledgements
+IDLE_S = 2.0
+PARTITIONS = 6
+PATHS = (1, 2, 4)  # partitions on the path
+DOMAIN = 170
+THESIS_CONFIGS = ("robot", "arms")
+
+# The ids have ten characters, as the thesis assumed.
+SETUP = "add grip_plate hand_left"
+OPERATIONS = {
+    "add": "add tool_mount grip_plate",
+    "update": "update tool_mount",
+    "publish": "publish tool_mount",
+    "lookup_other": "lookup grip_plate tool_mount",
+    "lookup_across": "lookup world tool_mount",
+    "remove": "remove tool_mount",
+}
+
+
+class WireClient:
+    """The client that performs operations one at a time (wire/wire_client.cpp)."""
+
+    def __init__(self, bin_dir, domain, log):
+        self._process = subprocess.Popen(
+            [bin_dir / "wire_client", str(domain), processes.PROFILE], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, stderr=log, bufsize=0)
+
+    def perform(self, operation):
+        """Returns when it began, in nanoseconds of the system's clock."""
+        self._process.stdin.write(f"{operation}\n".encode())
+        answer = processes.await_line(self._process.stdout, "wire_client")
+        time.sleep(PAUSE_S)
+        if not answer.endswith("done"):
+            raise RuntimeError(f"{operation}: {answer}")
+        return int(answer.split()[0])
+
+    def settle(self, lookup):
+        """Waits until it has met everybody, which takes longer where the machine is busy."""
+        deadline = time.monotonic() + processes.PATIENCE_S
+        while True:
+            try:
+                self.perform(lookup)
+                return
+            except RuntimeError:
+                if time.monotonic() > deadline:
+                    raise
+
+    def close(self):
+        """Lets it leave the domain."""
+        self._process.stdin.close()
+        processes.end(self._process)
+
+
+@contextlib.contextmanager
+def client_of(bin_dir, domain, work):
+    """A client until the block is left."""
+    with open(work / "wire_client.log", "wb") as log:
+        client = WireClient(bin_dir, domain, log)
+    try:
+        yield client
+    finally:
+        client.close()
+
+
+@contextlib.contextmanager
+def capturing(file, domain):
+    """Captures a domain's packets until the block is left."""
+    first = 7400 + 250 * domain  # RTPS 2.2, section 9.6.1.1
+    # Presence has sockets of its own, with ports from the range for such.
+    ports = f"udp and (dst portrange {first}-{first + 249} or dst portrange 49152-65535)"
+    try:
+        process = subprocess.Popen(
+            ["tcpdump", "-i", "lo", "-w", file, "-U", "-Z", "root", "-B", "16384", ports],
+            stderr=subprocess.PIPE, bufsize=0)
+    except FileNotFoundError as error:
+        raise processes.Skipped("tcpdump is not installed") from error
+    try:
+        said = []
+        while not said or "listening on" not in said[-1]:
+            try:
+                said.append(processes.await_line(process.stderr, "tcpdump"))
+            except RuntimeError as error:
+                raise processes.Skipped("capturing is not permitted: " + " ".join(said)) from error
+        yield
+        time.sleep(PAUSE_S)
+    finally:
+        processes.end(process, signal.SIGINT)
+
+
+def part_of(capture, packet):
+    """request, reply or other; None for what is there without an operation, too."""
+    topic = capture.topic(packet)
+    if topic is None or not topic.startswith("tfdude/") or topic == "tfdude/presence":
+        return None
+    if rtps.DATA in packet.kinds or rtps.DATA_FRAG in packet.kinds:
+        if topic in ("tfdude/request", "tfdude/update"):
+            return "request"
+        if topic == "tfdude/reply":
+            return "reply"
+    return "other"
+
+
+def count(capture, begin_ns):
+    """What one operation put on the wire: {name: number}."""
+    counts = {f"{part}_{layer}": 0 for part in ("request", "reply", "other")
+              for layer in ("payload", "rtps", "udp")}
+    counts.update(packets=0, total_udp=0, vendor_rtps=0)
+    for packet in capture.between(begin_ns, begin_ns + int(PAUSE_S * 1e9)):
+        part = part_of(capture, packet)
+        if part is None:
+            continue
+        counts[f"{part}_payload"] += packet.payload_bytes
+        counts[f"{part}_rtps"] += packet.rtps_bytes
+        counts[f"{part}_udp"] += packet.udp_bytes
+        counts["total_udp"] += packet.udp_bytes
+        counts["vendor_rtps"] += packet.vendor_bytes
+        counts["packets"] += 1
+    return counts
+
+
+def figures_of(capture, operation, begins, names=None):
+    """The figures of an operation that was performed at `begins`."""
+    counted = [count(capture, begin) for begin in begins]
+    for name in names or counted[0]:
+        unit = "packets" if name == "packets" else "bytes"
+        yield figures.summary(f"wire/{operation}/{name}", unit, [one[name] for one in counted])
+
+
+def measure_operations(bin_dir, work, rounds):
+    """Table 5.1 on the thesis's tree, asked by a client that owns nothing."""
+    file = work / "operations.pcap"
+    configs = [processes.ROOT / "examples" / "thesis" / f"{name}.yaml" for name in THESIS_CONFIGS]
+    begins = {name: [] for name in OPERATIONS}
+    with capturing(file, DOMAIN), processes.daemons(bin_dir, configs, DOMAIN, work):
+        with client_of(bin_dir, DOMAIN, work) as client:
+            client.settle("lookup world hand_left")
+            client.perform(SETUP)
+            for turn in range(rounds + 1):
+                for name, operation in OPERATIONS.items():
+                    begin = client.perform(operation)
+                    if turn > 0:  # the first time writers are made
+                        begins[name].append(begin)
+            idle_begin = time.time_ns()
+            time.sleep(IDLE_S)
+    capture = rtps.Capture(file)
+    for name, when in begins.items():
+        yield from figures_of(capture, name, when)
+    idle = [packet for packet in capture.between(idle_begin, idle_begin + int(IDLE_S * 1e9))
+            if capture.is_of_participant(packet)]
+    total = sum(packet.udp_bytes for packet in idle)
+    yield figures.summary("wire/idle/udp_per_second", "bytes", [total / IDLE_S])
+
+
+def chain_configs(work):
+    """A daemon's configuration for each of six partitions, each hanging on the one before."""
+    for number in range(1, PARTITIONS + 1):
+        parent = f"    parent: link_{number - 1}_b\n" if number > 1 else ""
+        config = work / f"chain_{number}.yaml"
+        config.write_text(f"partition: chain_{number}\nframes:\n  - id: link_{number}_a\n{parent}"
+                          f"  - id: link_{number}_b\n    parent: link_{number}_a\n",
+                          encoding="utf-8")
+        yield config
+
+
+def measure_chain(bin_dir, work, rounds):
+    """A lookup over some of six partitions: who is not on the path should cost nothing."""
+    file, domain = work / "chain.pcap", DOMAIN + 1
+    begins = {over: [] for over in PATHS}
+    configs = list(chain_configs(work))
+    with capturing(file, domain), processes.daemons(bin_dir, configs, domain, work):
+        with client_of(bin_dir, domain, work) as client:
+            client.settle(f"lookup link_1_a link_{PARTITIONS}_b")
+            for turn in range(rounds + 1):
+                for over, when in begins.items():
+                    begin = client.perform(f"lookup link_1_a link_{over}_b")
+                    if turn > 0:
+                        when.append(begin)
+    capture = rtps.Capture(file)
+    for over, when in begins.items():
+        yield from figures_of(capture, f"lookup_over_{over}_partitions", when,
+                              ("total_udp", "packets"))
+
+
+def run(quick, bin_dir, work):
+    """Yields the figures."""
+    bin_dir, work = pathlib.Path(bin_dir), pathlib.Path(work)
+    if not (bin_dir / "wire_client").exists():
+        raise processes.Skipped("wire_client is not built")
+    rounds = 5 if quick else 20
+    yield from measure_operations(bin_dir, work, rounds)
+    yield from measure_chain(bin_dir, work, rounds)

@@ -1,0 +1,71 @@
+// One long-lived client for bench/wire.py, which counts what an operation puts on the wire:
+// discovery is over before the first one.
+//
+//   wire_client DOMAIN PROFILE
+//
+// Reads operations from standard input, one a line:
+//   add ID PARENT | remove ID | update ID | publish ID | lookup A B
+// and answers each with "BEGIN done", BEGIN being when it began by the system's clock [ns], which a
+// capture has, too; or with "failed" and why.
+
+#include <chrono>
+#include <cstdlib>
+#include <iostream>
+#include <sstream>
+#include <string>
+
+#include "tfdude/client/client.hpp"
+
+namespace {
+
+using namespace tfdude;
+
+long long now_ns() {
+  const auto since = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(since).count();
+}
+
+Result<void> perform(Client& client, const std::string& line) {
+  std::istringstream words(line);
+  std::string operation;
+  std::string first;
+  std::string second;
+  words >> operation >> first >> second;
+  const Transform X;
+  if (operation == "add") return client.add(first, second, X);
+  if (operation == "remove") return client.remove(first);
+  if (operation == "update") return client.update(first, X);
+  if (operation == "publish") return client.publish({{first, X}});
+  if (operation == "lookup") {
+    if (auto found = client.lookup(first, second); !found) return tl::unexpected(found.error());
+    return {};
+  }
+  return fail(Errc::kInvalidInput, "unknown operation: " + line);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::cerr << "usage: wire_client DOMAIN PROFILE\n";
+    return 2;
+  }
+  Options options;
+  options.domain = static_cast<std::uint32_t>(std::strtoul(argv[1], nullptr, 10));
+  options.profile = argv[2];
+  auto client = Client::open(options);
+  if (!client) {
+    std::cerr << client.error().message << '\n';
+    return 1;
+  }
+  for (std::string line; std::getline(std::cin, line);) {
+    const long long begin = now_ns();
+    const auto done = perform(*client, line);
+    if (done) {
+      std::cout << begin << " done" << std::endl;
+    } else {
+      std::cout << "failed " << done.error().message << std::endl;
+    }
+  }
+  return 0;
+}
