@@ -1,8 +1,8 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
-#include <thread>
+#include <ctime>
+#include <sched.h>
 
 namespace tfdude {
 
@@ -14,9 +14,10 @@ class WriteLock {
   void lock() {
     for (int tries = 0; taken_.exchange(true, std::memory_order_acquire); ++tries) {
       if (tries < kYields) {
-        std::this_thread::yield();
+        (void)sched_yield();
       } else {
-        std::this_thread::sleep_for(std::chrono::microseconds(50));
+        const std::timespec pause{0, 50'000};
+        (void)nanosleep(&pause, nullptr);
       }
     }
   }
