@@ -1,8 +1,5 @@
 #include "math/kernel.hpp"
 
-// Vectors are passed between functions of this file only, whose calls are inlined.
-#pragma GCC diagnostic ignored "-Wpsabi"
-
 namespace tfdude::kernel {
 namespace {
 

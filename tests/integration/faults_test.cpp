@@ -96,7 +96,10 @@ TEST_CASE("faults: a killed daemon that is started again is asked again") {
     INFO((after ? "" : after.error().message));
     REQUIRE(after);
     CHECK(after->pose.matrix() == before->pose.matrix());
-    CHECK(client.partitions()[0].pid == static_cast<std::uint32_t>(d.arms->pid()));
+    // Host and process come with the presence, which may be behind the pages.
+    CHECK(eventually([&] {
+      return client.partitions()[0].pid == static_cast<std::uint32_t>(d.arms->pid());
+    }));
   }
 }
 

@@ -159,6 +159,7 @@ bool well_formed_presence(const std::uint8_t* data, std::size_t size) {
   walk.string(255);
   walk.ulong();
   walk.ulong();
+  walk.ulong();
   walk.boolean();
   return walk.good();
 }

@@ -75,7 +75,7 @@ void FastDdsTransport::take_lease(edds::DomainParticipantQos& qos) {
   auto& lease = qos.wire_protocol().builtin.discovery_config.leaseDuration;
   const auto silence =
       std::chrono::seconds(lease.seconds) + std::chrono::nanoseconds(lease.nanosec);
-  peers_.set_silence(silence);
+  peers_.configure(silence, !options_.partition.empty());
   if (silence < kLongLease) lease = {static_cast<std::int32_t>(kLongLease.count()), 0};
 }
 
@@ -170,6 +170,12 @@ void FastDdsTransport::stop() {
 void FastDdsTransport::announce(const Presence& presence) {
   const std::lock_guard lock(presence_mutex_);
   said_ = to_wire(presence);
+  say_presence();
+}
+
+// Under presence_mutex_.
+void FastDdsTransport::say_presence() {
+  said_->peers(peers_.heard_count());
   presence_outlet_->write(&*said_);
 }
 
@@ -178,7 +184,7 @@ void FastDdsTransport::keep_in_touch() {
   peers_.look_for_silent(Peers::Clock::now());
   const std::lock_guard lock(presence_mutex_);
   to_speak_ = !to_speak_;
-  if (said_ && to_speak_) presence_outlet_->write(&*said_);
+  if (said_ && to_speak_) say_presence();
 }
 
 void FastDdsTransport::publish(const Page& page) {
@@ -325,7 +331,7 @@ void FastDdsTransport::take_presence(const wire::Presence& sample,
     log_refused(kPresenceTopic, presence.error());
     return;
   }
-  peers_.present(from, *presence);
+  peers_.present(from, *presence, sample.peers());
 }
 
 }  // namespace tfdude::fastdds

@@ -62,6 +62,7 @@ class FastDdsTransport final : public Transport {
   edds::ContentFilteredTopic* create_filtered(edds::Topic* topic, const std::string& partition);
 
   void keep_in_touch();
+  void say_presence();
   std::shared_ptr<Outlet> outlet(Outlets& outlets, edds::Topic* topic, const std::string& partition,
                                  const char* profile);
   std::shared_ptr<Outlet> reply_outlet(const PeerId& peer);

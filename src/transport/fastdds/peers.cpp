@@ -44,9 +44,11 @@ void Peers::left(const ertps::GuidPrefix_t& prefix) {
   servers_.erase(known);
 }
 
-void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence) {
+void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence,
+                    std::size_t peers) {
   const std::lock_guard lock(mutex_);
   Server& server = servers_[peer_of(prefix)];
+  server.peers = peers;
   server.last_heard = Clock::now();
   if (!std::exchange(server.silent, false) && server.presence == presence) return;
   server.presence = presence;
@@ -75,12 +77,27 @@ void Peers::look_for_silent(Clock::time_point now) {
 
 bool Peers::settled() const {
   const std::lock_guard lock(mutex_);
-  return !servers_.empty() && Clock::now() - last_met_ >= kQuiet && all_present();
+  return !servers_.empty() && Clock::now() - last_met_ >= kQuiet && all_present() &&
+         nobody_hears_more();
+}
+
+std::uint32_t Peers::heard_count() const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<std::uint32_t>(std::count_if(
+      servers_.begin(), servers_.end(),
+      [](const auto& server) { return server.second.presence && !server.second.silent; }));
 }
 
 bool Peers::awaits_presence() const {
   const std::lock_guard lock(mutex_);
   return !all_present();
+}
+
+bool Peers::nobody_hears_more() const {
+  const std::size_t others = servers_.size() - 1 + (is_server_ ? 1 : 0);
+  return std::all_of(servers_.begin(), servers_.end(), [others](const auto& server) {
+    return server.second.silent || server.second.peers <= others;
+  });
 }
 
 bool Peers::all_present() const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -46,12 +47,18 @@ class Peers {
   /// @param gone   a peer that had said so has left or fallen silent
   Peers(Tell there, Tell gone) : there_(std::move(there)), gone_(std::move(gone)) {}
 
-  /// Whoever has not been heard for this long counts as gone. To be set before anybody is met.
-  void set_silence(std::chrono::nanoseconds silence) { silence_ = silence; }
+  /// To be called before anybody is met.
+  /// @param silence    whoever has not been heard for this long counts as gone
+  /// @param is_server  the others count this participant, too
+  void configure(std::chrono::nanoseconds silence, bool is_server) {
+    silence_ = silence;
+    is_server_ = is_server;
+  }
 
   void met(const ertps::GuidPrefix_t& prefix, const std::string& name);
   void left(const ertps::GuidPrefix_t& prefix);
-  void present(const ertps::GuidPrefix_t& prefix, const Presence& presence);
+  /// @param peers  how many other servers that one hears
+  void present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers);
   /// A server sent something else: a sign of life, should what it says of itself be late.
   void heard(const ertps::GuidPrefix_t& prefix);
 
@@ -59,7 +66,11 @@ class Peers {
   /// does not hold that against the others.
   void look_for_silent(Clock::time_point now);
 
-  /// Whether some server was met, nobody new for a while, and all servers have said what they serve.
+  /// How many servers are heard.
+  [[nodiscard]] std::uint32_t heard_count() const;
+
+  /// Whether some server was met, nobody new for a while, all servers have said what they serve, and none hears
+  /// more others than this participant knows.
   [[nodiscard]] bool settled() const;
 
   /// Whether some server was met that has not said yet what it serves.
@@ -67,9 +78,11 @@ class Peers {
 
  private:
   [[nodiscard]] bool all_present() const;
+  [[nodiscard]] bool nobody_hears_more() const;
 
   struct Server {
     std::optional<Presence> presence;
+    std::size_t peers = 0;
     Clock::time_point last_heard;
     bool silent = false;
   };
@@ -81,6 +94,7 @@ class Peers {
   Clock::time_point last_met_{};
   Clock::time_point last_look_ = Clock::now();
   std::chrono::nanoseconds silence_{};
+  bool is_server_ = false;
 };
 
 }  // namespace tfdude::fastdds

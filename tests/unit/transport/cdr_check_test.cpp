@@ -191,7 +191,8 @@ TEST_CASE("the message of an error has at most 4096 bytes") {
 
 TEST_CASE("the name of a host has at most 255 bytes") {
   const auto host = [](const std::string& name) {
-    return presence(Cdr().string("r").ulonglong(0).string(name).ulong(0).ulong(0).octet(1));
+    return presence(
+        Cdr().string("r").ulonglong(0).string(name).ulong(0).ulong(0).ulong(0).octet(1));
   };
   CHECK(host(std::string(255, 'h')));
   CHECK_FALSE(host(std::string(256, 'h')));
@@ -276,7 +277,8 @@ TEST_CASE("bodies of kinds that there are not are refused") {
 
 TEST_CASE("a boolean is zero or one") {
   const auto serving = [](unsigned value) {
-    return presence(Cdr().string("r").ulonglong(0).string("h").ulong(0).ulong(0).octet(value));
+    return presence(
+        Cdr().string("r").ulonglong(0).string("h").ulong(0).ulong(0).ulong(0).octet(value));
   };
   CHECK(serving(0));
   CHECK(serving(1));
