@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""The network benchmarks: starts the daemons as shipped, pins, runs the programs of bench/net, and yields what
+they print, one dictionary a figure.
+
+    python3 bench/net_stage.py [--quick] [--bin DIR]    prints the lines
+"""
+
+import argparse
+import contextlib
+import json
+import pathlib
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Iterator
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PROFILE = ROOT / "profiles" / "loopback.xml"
+EXAMPLES = ROOT / "examples" / "thesis"
+
+# The DDS domains used; nobody else's.
+CENTRAL, DECENTRAL, FLOOR, STREAM = 140, 141, 142, 143
+
+START_DEADLINE = 40.0  # for a daemon to be ready [s]
+STOP_DEADLINE = 5.0  # after SIGTERM [s]
+
+
+class Stage:
+    """Runs processes and never leaves one behind."""
+
+    def __init__(self, bin_dir: pathlib.Path, work: pathlib.Path):
+        self.bin_dir = bin_dir
+        self.work = work
+
+    def command(self, cpus: str, program: str, arguments: list) -> list[str]:
+        return ["taskset", "-c", cpus, str(self.bin_dir / program), *map(str, arguments)]
+
+    @contextlib.contextmanager
+    def servers(self, commands: list[list[str]]) -> Iterator[list[str]]:
+        """Starts all at once, and gives the line "ready ..." of each."""
+        with open(self.work / "servers.log", "ab") as log, contextlib.ExitStack() as started:
+            running = []
+            for command in commands:
+                server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+                running.append(server)
+                started.callback(stop, server)
+            # Told all at once, before any is waited for.
+            started.callback(lambda: [server.terminate() for server in running])
+            deadline = time.monotonic() + START_DEADLINE
+            yield [ready_line(server, deadline) for server in running]
+
+    def daemon(self, cpus: str, domain: int, config: pathlib.Path) -> list[str]:
+        return self.command(
+            cpus, "tfduded", ["--config", config, "--domain", domain, "--profile", PROFILE]
+        )
+
+    def figures(self, command: list[str], deadline: float) -> Iterator[dict]:
+        """Runs a benchmark for at most `deadline` seconds."""
+        with open(self.work / "benchmarks.log", "ab") as log:
+            benchmark = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+            try:
+                lines, _ = benchmark.communicate(timeout=deadline)
+            finally:
+                stop(benchmark)
+        if benchmark.returncode != 0:
+            raise RuntimeError(f"{' '.join(command)} failed; see {self.work}/benchmarks.log")
+        for line in lines.splitlines():
+            yield json.loads(line)
+
+
+def stop(process: subprocess.Popen) -> None:
+    if process.poll() is None:
+        process.send_signal(signal.SIGTERM)
+        try:
+            process.wait(STOP_DEADLINE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+    if process.stdout:
+        process.stdout.close()
+
+
+def ready_line(server: subprocess.Popen, deadline: float) -> str:
+    readable, _, _ = select.select([server.stdout], [], [], max(0.0, deadline - time.monotonic()))
+    line = server.stdout.readline() if readable else ""
+    if not line.startswith("ready"):
+        raise RuntimeError(f"{' '.join(server.args)} did not become ready")
+    return line
+
+
+def merged(work: pathlib.Path, configs: list[pathlib.Path]) -> pathlib.Path:
+    """A configuration of one partition, "central", that has the frames of all."""
+    lines = ["partition: central", "frames:"]
+    for config in configs:
+        _, frames = config.read_text().split("\nframes:\n")
+        lines.append(frames)
+    path = work / "central.yaml"
+    path.write_text("\n".join(lines))
+    return path
+
+
+def thesis(stage: Stage, quick: bool) -> Iterator[dict]:
+    """Who asks has a core of its own, those who are asked the other."""
+    calls, repetitions = (1000, 5) if quick else (60000, 5)  # full: the thesis's 300,000 a case
+    configs = {name: EXAMPLES / f"{name}.yaml" for name in ("robot", "arms")}
+    central = stage.daemon("1", CENTRAL, merged(stage.work, list(configs.values())))
+    for asking, other in (("robot", "arms"), ("arms", "robot")):
+        with stage.servers([central, stage.daemon("1", DECENTRAL, configs[other])]):
+            yield from stage.figures(
+                stage.command("0", "thesis_bench",
+                              ["--as", asking, "--config", configs[asking], "--central", CENTRAL,
+                               "--domain", DECENTRAL, "--profile", PROFILE, "--calls", calls,
+                               "--repetitions", repetitions]),
+                60 if quick else 1200)
+
+
+PARTS = {"thesis": thesis}
+
+
+def run(quick: bool, bin_dir: pathlib.Path, work: pathlib.Path) -> Iterator[dict]:
+    stage = Stage(bin_dir, work)
+    for part in PARTS.values():
+        yield from part(stage, quick)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "release" / "bin")
+    parser.add_argument("parts", nargs="*", metavar="part", help=f"of {', '.join(PARTS)}")
+    arguments = parser.parse_args()
+    # So that what was started is stopped then, too.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    with tempfile.TemporaryDirectory(prefix="tfdude-bench-") as work:
+        stage = Stage(arguments.bin, pathlib.Path(work))
+        try:
+            for name in arguments.parts or PARTS:
+                for line in PARTS[name](stage, arguments.quick):
+                    print(json.dumps(line), flush=True)
+        except BaseException:
+            for log in pathlib.Path(work).glob("*.log"):
+                sys.stderr.write(log.read_text())
+            raise
+
+
+if __name__ == "__main__":
+    main()
