@@ -91,6 +91,10 @@ def ready_line(server: subprocess.Popen, deadline: float) -> str:
     return line
 
 
+def udp_port(ready: str) -> str:
+    return ready.split("udp_port=")[1].strip()
+
+
 def merged(work: pathlib.Path, configs: list[pathlib.Path]) -> pathlib.Path:
     """A configuration of one partition, "central", that has the frames of all."""
     lines = ["partition: central", "frames:"]
@@ -117,7 +121,22 @@ def thesis(stage: Stage, quick: bool) -> Iterator[dict]:
                 60 if quick else 1200)
 
 
-PARTS = {"thesis": thesis}
+def floor(stage: Stage, quick: bool) -> Iterator[dict]:
+    """On one core, where a wake-up is cheap, the programs' own work shows; two cores are what one has."""
+    calls, repetitions = (1000, 5) if quick else (20000, 5)
+    config = merged(stage.work, [EXAMPLES / "robot.yaml", EXAMPLES / "arms.yaml"])
+    for placement, cpu in (("one_core", "0"), ("two_cores", "1")):
+        echo = stage.command(cpu, "floor_echo", ["--domain", FLOOR, "--profile", PROFILE])
+        with stage.servers([stage.daemon(cpu, CENTRAL, config), echo]) as (_, ready):
+            yield from stage.figures(
+                stage.command("0", "floor_bench",
+                              ["--placement", placement, "--central", CENTRAL, "--domain", FLOOR,
+                               "--udp-port", udp_port(ready), "--profile", PROFILE,
+                               "--calls", calls, "--repetitions", repetitions]),
+                60 if quick else 300)
+
+
+PARTS = {"thesis": thesis, "floor": floor}
 
 
 def run(quick: bool, bin_dir: pathlib.Path, work: pathlib.Path) -> Iterator[dict]:
