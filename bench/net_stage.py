@@ -136,7 +136,19 @@ def floor(stage: Stage, quick: bool) -> Iterator[dict]:
                 60 if quick else 300)
 
 
-PARTS = {"thesis": thesis, "floor": floor}
+def stream(stage: Stage, quick: bool) -> Iterator[dict]:
+    """The publisher has one core, the owner the other."""
+    seconds, repetitions = (1, 5) if quick else (8, 5)
+    common = ["--shared", stage.work / "stream", "--domain", STREAM, "--profile", PROFILE]
+    with stage.servers([stage.command("1", "stream_bench", ["--mode", "own", *common])]):
+        yield from stage.figures(
+            stage.command("0", "stream_bench",
+                          ["--mode", "publish", *common, "--seconds", seconds,
+                           "--repetitions", repetitions]),
+            60 if quick else 400)
+
+
+PARTS = {"thesis": thesis, "floor": floor, "stream": stream}
 
 
 def run(quick: bool, bin_dir: pathlib.Path, work: pathlib.Path) -> Iterator[dict]:

@@ -82,8 +82,10 @@ class DdsPing final : public edds::DataReaderListener {
 
   void on_data_available(edds::DataReader* reader) override {
     if (!tfdude::fastdds::ok(reader->take_next_sample(&pong_, &info_)) || !info_.valid_data) return;
-    const std::lock_guard lock(mutex_);
-    answered_ = pong_.sequence_number();
+    {
+      const std::lock_guard lock(mutex_);
+      answered_ = pong_.sequence_number();
+    }
     arrived_.notify_one();
   }
 
