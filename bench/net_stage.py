@@ -148,7 +148,73 @@ def stream(stage: Stage, quick: bool) -> Iterator[dict]:
             60 if quick else 400)
 
 
-PARTS = {"thesis": thesis, "floor": floor, "stream": stream}
+def chain_config(work: pathlib.Path, partition: str, first: int, count: int,
+                 others: int = 0) -> pathlib.Path:
+    """`count` frames of the chain chain_0, chain_1... from the `first` on, and others below its start."""
+    value = "xyz: [0.1, 0.2, 0.3], rpy: [0.1, 0.2, 0.3], stddev: [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]"
+    lines = [f"partition: {partition}", "frames:"]
+    for number in range(first, first + count):
+        parent = f", parent: chain_{number - 1}, {value}" if number else ""
+        lines.append(f"  - {{id: chain_{number}{parent}}}")
+    lines += [f"  - {{id: other_{k}, parent: chain_0, {value}}}" for k in range(others)]
+    path = work / f"{partition}.yaml"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
+    """The daemons have one core, the asking process the other."""
+    calls, repetitions = (100, 5) if quick else (2000, 5)
+    for count in (2, 8, 16) if quick else (2, 4, 8, 16, 32):
+        configs = [chain_config(stage.work, f"p{k}", 2 * k, 2) for k in range(count)]
+        central = chain_config(stage.work, "central", 0, 2 * count)
+        daemons = [stage.daemon("1", DECENTRAL, config) for config in configs]
+        daemons.append(stage.daemon("1", CENTRAL, central))
+        echoes = [stage.command("1", "floor_echo", [])] * count
+        with stage.servers(daemons + echoes) as ready:
+            ports = ",".join(udp_port(line) for line in ready[-count:])
+            yield from stage.figures(
+                stage.command("0", "scale_bench",
+                              ["--mode", "partitions", "--partitions", count,
+                               "--central", CENTRAL, "--domain", DECENTRAL, "--udp-ports", ports,
+                               "--profile", PROFILE, "--calls", calls,
+                               "--repetitions", repetitions]),
+                60 if quick else 200)
+
+
+def scale_clients(stage: Stage, quick: bool) -> Iterator[dict]:
+    calls, repetitions = (500, 5) if quick else (20000, 5)
+    with stage.servers([stage.daemon("1", CENTRAL, chain_config(stage.work, "central", 0, 10))]):
+        yield from stage.figures(
+            stage.command("0", "scale_bench",
+                          ["--mode", "clients", "--domain", CENTRAL, "--profile", PROFILE,
+                           "--calls", calls, "--repetitions", repetitions]),
+            60 if quick else 200)
+
+
+def scale_frames(stage: Stage, quick: bool) -> Iterator[dict]:
+    calls, repetitions = (200, 5) if quick else (5000, 5)
+    frames = (10, 100, 1000, 10000)
+    domains = [CENTRAL + 10 + k for k in range(len(frames))]
+    daemons = [stage.daemon("1", domain, chain_config(stage.work, f"n{count}", 0, 4, count - 4))
+               for domain, count in zip(domains, frames)]
+    with stage.servers(daemons):
+        yield from stage.figures(
+            stage.command("0", "scale_bench",
+                          ["--mode", "frames", "--domains", ",".join(map(str, domains)),
+                           "--frames", ",".join(map(str, frames)), "--profile", PROFILE,
+                           "--calls", calls, "--repetitions", repetitions]),
+            60 if quick else 200)
+
+
+PARTS = {
+    "thesis": thesis,
+    "floor": floor,
+    "stream": stream,
+    "scale_partitions": scale_partitions,
+    "scale_clients": scale_clients,
+    "scale_frames": scale_frames,
+}
 
 
 def run(quick: bool, bin_dir: pathlib.Path, work: pathlib.Path) -> Iterator[dict]:
