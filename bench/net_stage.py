@@ -8,9 +8,12 @@ they print, one dictionary a figure.
 import argparse
 import contextlib
 import json
+import math
+import os
 import pathlib
 import select
 import signal
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -24,7 +27,10 @@ EXAMPLES = ROOT / "examples" / "thesis"
 # The DDS domains used; nobody else's.
 CENTRAL, DECENTRAL, FLOOR, STREAM = 140, 141, 142, 143
 
+ALL_CPUS = ",".join(map(str, sorted(os.sched_getaffinity(0))))
+
 START_DEADLINE = 40.0  # for a daemon to be ready [s]
+SETTLE = 1.0  # for many daemons to have met [s]
 STOP_DEADLINE = 5.0  # after SIGTERM [s]
 
 
@@ -39,8 +45,8 @@ class Stage:
         return ["taskset", "-c", cpus, str(self.bin_dir / program), *map(str, arguments)]
 
     @contextlib.contextmanager
-    def servers(self, commands: list[list[str]]) -> Iterator[list[str]]:
-        """Starts all at once, and gives the line "ready ..." of each."""
+    def servers(self, commands: list[list[str]]) -> Iterator[list["Server"]]:
+        """Starts all at once, and stops them in the end."""
         with open(self.work / "servers.log", "ab") as log, contextlib.ExitStack() as started:
             running = []
             for command in commands:
@@ -50,7 +56,7 @@ class Stage:
             # Told all at once, before any is waited for.
             started.callback(lambda: [server.terminate() for server in running])
             deadline = time.monotonic() + START_DEADLINE
-            yield [ready_line(server, deadline) for server in running]
+            yield [Server(server, ready_line(server, deadline)) for server in running]
 
     def daemon(self, cpus: str, domain: int, config: pathlib.Path) -> list[str]:
         return self.command(
@@ -71,6 +77,37 @@ class Stage:
             yield json.loads(line)
 
 
+class Server:
+    def __init__(self, process: subprocess.Popen, ready: str):
+        self.ready = ready  # what it said
+        self.stat = pathlib.Path(f"/proc/{process.pid}/stat")
+
+    def udp_port(self) -> str:
+        return self.ready.split("udp_port=")[1].strip()
+
+    def cpu(self) -> float:
+        """Processor time used so far [s]."""
+        user, system = self.stat.read_text().rsplit(")", 1)[1].split()[11:13]
+        return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+
+def idle_cpu(key: str, servers: list[Server], seconds: float, repetitions: int) -> dict:
+    """What the servers together use while nobody asks them [% of a core]."""
+    shares = []
+    for _ in range(repetitions):
+        before, start = sum(server.cpu() for server in servers), time.monotonic()
+        time.sleep(seconds)
+        used = sum(server.cpu() for server in servers) - before
+        shares.append(100 * used / (time.monotonic() - start))
+    quantiles = {"min": 0, "p5": 0.05, "p25": 0.25, "median": 0.5, "p75": 0.75, "p90": 0.9,
+                 "p95": 0.95, "p99": 0.99, "p99.9": 0.999, "max": 1}
+    # The nearest rank, as bench/support/series.cpp has it.
+    ranked = {name: sorted(shares)[max(math.ceil(share * repetitions), 1) - 1]
+              for name, share in quantiles.items()}
+    return {"key": key, "unit": "%", "n": repetitions, "medians": shares,
+            "mean": statistics.mean(shares), **ranked}
+
+
 def stop(process: subprocess.Popen) -> None:
     if process.poll() is None:
         process.send_signal(signal.SIGTERM)
@@ -89,10 +126,6 @@ def ready_line(server: subprocess.Popen, deadline: float) -> str:
     if not line.startswith("ready"):
         raise RuntimeError(f"{' '.join(server.args)} did not become ready")
     return line
-
-
-def udp_port(ready: str) -> str:
-    return ready.split("udp_port=")[1].strip()
 
 
 def merged(work: pathlib.Path, configs: list[pathlib.Path]) -> pathlib.Path:
@@ -126,12 +159,12 @@ def floor(stage: Stage, quick: bool) -> Iterator[dict]:
     calls, repetitions = (1000, 5) if quick else (20000, 5)
     config = merged(stage.work, [EXAMPLES / "robot.yaml", EXAMPLES / "arms.yaml"])
     for placement, cpu in (("one_core", "0"), ("two_cores", "1")):
-        echo = stage.command(cpu, "floor_echo", ["--domain", FLOOR, "--profile", PROFILE])
-        with stage.servers([stage.daemon(cpu, CENTRAL, config), echo]) as (_, ready):
+        floor_echo = stage.command(cpu, "floor_echo", ["--domain", FLOOR, "--profile", PROFILE])
+        with stage.servers([stage.daemon(cpu, CENTRAL, config), floor_echo]) as (_, echo):
             yield from stage.figures(
                 stage.command("0", "floor_bench",
                               ["--placement", placement, "--central", CENTRAL, "--domain", FLOOR,
-                               "--udp-port", udp_port(ready), "--profile", PROFILE,
+                               "--udp-port", echo.udp_port(), "--profile", PROFILE,
                                "--calls", calls, "--repetitions", repetitions]),
                 60 if quick else 300)
 
@@ -163,21 +196,27 @@ def chain_config(work: pathlib.Path, partition: str, first: int, count: int,
 
 
 def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
-    """The daemons have one core, the asking process the other."""
-    calls, repetitions = (100, 5) if quick else (2000, 5)
+    """The asking process and the daemon of all frames have a core each, the partitions' daemons and the echoes
+    both: two cores are few for so many computers. Daemons of 32 partitions keep them busy by telling each
+    other that they are there (idle_cpu), so that there this measures the machine."""
+    repetitions = 5
     for count in (2, 8, 16) if quick else (2, 4, 8, 16, 32):
         configs = [chain_config(stage.work, f"p{k}", 2 * k, 2) for k in range(count)]
         central = chain_config(stage.work, "central", 0, 2 * count)
-        daemons = [stage.daemon("1", DECENTRAL, config) for config in configs]
+        daemons = [stage.daemon(ALL_CPUS, DECENTRAL, config) for config in configs]
         daemons.append(stage.daemon("1", CENTRAL, central))
-        echoes = [stage.command("1", "floor_echo", [])] * count
-        with stage.servers(daemons + echoes) as ready:
-            ports = ",".join(udp_port(line) for line in ready[-count:])
+        echoes = [stage.command(ALL_CPUS, "floor_echo", [])] * count
+        with stage.servers(daemons + echoes) as servers:
+            time.sleep(SETTLE)
+            yield idle_cpu(f"scale/partitions/{count}/idle_cpu", servers[:count],
+                           1 if quick else 2, repetitions)
+            ports = ",".join(echo.udp_port() for echo in servers[-count:])
             yield from stage.figures(
                 stage.command("0", "scale_bench",
                               ["--mode", "partitions", "--partitions", count,
                                "--central", CENTRAL, "--domain", DECENTRAL, "--udp-ports", ports,
-                               "--profile", PROFILE, "--calls", calls,
+                               "--profile", PROFILE,
+                               "--calls", (800 if quick else 8000) // count,
                                "--repetitions", repetitions]),
                 60 if quick else 200)
 

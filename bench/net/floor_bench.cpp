@@ -119,7 +119,7 @@ class UdpPing {
 int main(int argc, char** argv) {
   const bench::Arguments arguments(argc, argv);
   auto client = must(Client::open(arguments.options("central")), "a client");
-  const Transform X = must(client.lookup(kFrom, kFrame), "the example tree");
+  const Transform X = bench::await_lookup(client, kFrom, kFrame);
   // After our client, which has loaded the profiles.
   DdsPing dds(static_cast<std::uint32_t>(arguments.number("domain")));
   UdpPing udp(arguments.number("udp-port"));

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <thread>
+#include <utility>
 
 namespace bench {
 namespace {
@@ -50,6 +52,15 @@ void give_up(const std::string& message) {
   std::fprintf(stderr, "benchmark given up: %s\n", message.c_str());
   std::fflush(nullptr);
   std::_Exit(1);  // the library's threads may be at work
+}
+
+tfdude::Transform await_lookup(tfdude::Client& client, const std::string& a, const std::string& b) {
+  const auto deadline = Clock::now() + std::chrono::seconds(30);
+  while (true) {
+    auto X = client.lookup(a, b);
+    if (X || Clock::now() > deadline) return must(std::move(X), "waiting for the frames");
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
 }
 
 void measure(std::vector<Turn> turns, const Extent& extent) {

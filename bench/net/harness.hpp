@@ -43,6 +43,10 @@ Value must(tfdude::Result<Value> outcome, const char* what) {
   return *std::move(outcome);
 }
 
+/// Waits until two frames are connected: many daemons that start at once on one core need longer to meet than a
+/// client looks round for.
+tfdude::Transform await_lookup(tfdude::Client& client, const std::string& a, const std::string& b);
+
 /// One side of a comparison: once() makes the calls and writes one value for each of the figures.
 struct Turn {
   std::vector<Series> figures;

@@ -83,6 +83,8 @@ void compare_partitions(const Arguments& arguments) {
   FanOut fan_out(numbers(arguments.text("udp-ports")));
   // Each partition owns two frames; the first one's first is the root.
   const std::string last = chain(2 * partitions - 1);
+  (void)bench::await_lookup(central, chain(0), last);
+  (void)bench::await_lookup(decentral, chain(0), last);
   bench::measure({bench::turn(key("decentralized"), lookup(decentral, chain(0), last)),
                   bench::turn(key("centralized"), lookup(central, chain(0), last)),
                   bench::turn(key("udp_floor"), [&] { fan_out.call(); })},
@@ -162,7 +164,7 @@ void compare_frames(const Arguments& arguments) {
     options.profile = arguments.text("profile");
     clients.push_back(std::make_unique<Client>(must(Client::open(options), "a client")));
     Client& client = *clients.back();
-    const auto X = must(client.lookup(chain(0), chain(1)), "the chain");
+    const auto X = bench::await_lookup(client, chain(0), chain(1));
     const std::string key = "scale/frames/" + std::to_string(frames[i]);
     turns.push_back(bench::turn(key + "/lookup", lookup(client, chain(1), chain(3))));
     turns.push_back(bench::turn(key + "/update", [&client, X, frame = chain(1)] {

@@ -22,8 +22,10 @@
 //   5.11    update the connection (arm_1, below robot_1)         update_connector/robot and /arms
 //
 // "main" is the thesis's process of world and robot, ours the partition robot. The other pairs, such as
-// add_own/arms, it has not; they show that it does not matter who asks.
+// add_own/arms, it has not; they show that it does not matter who asks, and are measured with fewer calls.
 
+#include <algorithm>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -55,6 +57,13 @@ constexpr Role kRobot{"camera",  "arm_2", {"world", "robot_1"}, {"arm_1", "hand_
 constexpr Role kArms{"arm_2", "camera", {"arm_1", "hand_left"}, {"world", "robot_1"},
                      "arm_2", "robot_1"};
 
+// What the thesis has, as in the table.
+const std::set<std::string> kFigures{
+    "add_own/robot",          "add_other/robot",      "path_across/robot", "path_other/arms",
+    "path_own/robot",         "update_other/robot",   "update_own/arms",   "update_own/robot",
+    "update_connector/robot", "update_connector/arms"};
+constexpr int kFewer = 6;
+
 class ThesisBench {
  public:
   ThesisBench(Client& central, Client& decentral, std::string as, bench::Extent extent)
@@ -77,6 +86,12 @@ class ThesisBench {
  private:
   [[nodiscard]] std::string key(const std::string& what, const char* deployment) const {
     return "thesis/" + what + "/" + as_ + "/" + deployment;
+  }
+
+  [[nodiscard]] bench::Extent extent(const std::string& what) const {
+    bench::Extent extent = extent_;
+    if (kFigures.count(what + "/" + as_) == 0) extent.calls = std::max(extent.calls / kFewer, 1);
+    return extent;
   }
 
   /// @param batch  of the decentralized calls
@@ -115,7 +130,8 @@ class ThesisBench {
                 values[1] = bench::microseconds_since(added);
               }};
     };
-    bench::measure({turn(central_, "centralized"), turn(decentral_, "decentralized")}, extent_);
+    bench::measure({turn(central_, "centralized"), turn(decentral_, "decentralized")},
+                   extent("add_" + whose));
   }
 
   Client& central_;
@@ -135,7 +151,7 @@ int main(int argc, char** argv) {
                    "the decentralized deployment");
   // All are there before anything is timed.
   for (Client* client : {&central, static_cast<Client*>(&node)}) {
-    check(client->lookup("world", "hand_left"), "the example tree");
+    (void)bench::await_lookup(*client, "world", "hand_left");
   }
   ThesisBench(central, node, arguments.text("as"),
               {arguments.number("calls"), arguments.number("repetitions")})
