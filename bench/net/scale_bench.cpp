@@ -7,7 +7,7 @@
 //   scale_bench --mode clients --domain DOMAIN
 //     1 to 16 clients at once, a thread each, that ask one owner.
 //     scale/clients/N/latency, /rate
-//   scale_bench --mode frames --domains D,D,... --frames N,N,...
+//   scale_bench --mode frames --frames N,N,... --domain-0 DOMAIN --domain-1 DOMAIN...
 //     The same lookup and update of owners of N frames each, in domains of their own.
 //     scale/frames/N/lookup, /update
 //
@@ -31,9 +31,10 @@ using bench::must;
 using bench::Series;
 using tfdude::Client;
 
-// CDR payloads of a lookup of one segment and of its reply, rounded; floor_bench computes them.
-constexpr std::size_t kRequestBytes = 48;
-constexpr std::size_t kReplyBytes = 248;
+// CDR payloads of a lookup of one segment between two of these frames, and of its reply, as idl/tfdude.idl lays
+// them out; floor_bench computes such sizes.
+constexpr std::size_t kRequestBytes = 56;
+constexpr std::size_t kReplyBytes = 252;
 
 std::vector<int> numbers(const std::string& list) {
   std::vector<int> all;
@@ -154,14 +155,11 @@ void compare_clients(const Arguments& arguments) {
 // --- frames ---
 
 void compare_frames(const Arguments& arguments) {
-  const std::vector<int> domains = numbers(arguments.text("domains"));
   const std::vector<int> frames = numbers(arguments.text("frames"));
   std::vector<std::unique_ptr<Client>> clients;
   std::vector<bench::Turn> turns;
-  for (std::size_t i = 0; i < domains.size(); ++i) {
-    tfdude::Options options;
-    options.domain = static_cast<std::uint32_t>(domains[i]);
-    options.profile = arguments.text("profile");
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const auto options = arguments.options("domain-" + std::to_string(i));
     clients.push_back(std::make_unique<Client>(must(Client::open(options), "a client")));
     Client& client = *clients.back();
     const auto X = bench::await_lookup(client, chain(0), chain(1));

@@ -30,9 +30,7 @@ sockaddr_in loopback(std::uint16_t port) {
   return address;
 }
 
-// NOLINTBEGIN(cppcoreguidelines-pro-type-reinterpret-cast): as the socket functions want it
 sockaddr* generic(sockaddr_in& address) { return reinterpret_cast<sockaddr*>(&address); }
-// NOLINTEND(cppcoreguidelines-pro-type-reinterpret-cast)
 
 }  // namespace
 
