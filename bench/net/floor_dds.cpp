@@ -1,0 +1,36 @@
+#include "net/floor_dds.hpp"
+
+namespace bench {
+
+namespace edds = fastdds::edds;
+
+FloorEndpoints::FloorEndpoints(std::uint32_t domain, const char* to, const char* from,
+                               edds::DataReaderListener& listener) {
+  const edds::TypeSupport type(new PingType);
+  participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
+      domain, fastdds::participant_qos());
+  type.register_type(participant_);
+  auto* to_topic = participant_->create_topic(to, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
+  auto* from_topic =
+      participant_->create_topic(from, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
+  auto* publisher = participant_->create_publisher(edds::PUBLISHER_QOS_DEFAULT);
+  auto* subscriber = participant_->create_subscriber(edds::SUBSCRIBER_QOS_DEFAULT);
+  writer_ = publisher->create_datawriter(to_topic, fastdds::writer_qos(*publisher, "call_writer"));
+  reader_ = subscriber->create_datareader(
+      from_topic, fastdds::reader_qos(*subscriber, "call_reader"), &listener);
+}
+
+FloorEndpoints::~FloorEndpoints() {
+  participant_->delete_contained_entities();
+  edds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+}
+
+bool FloorEndpoints::matched() const {
+  edds::PublicationMatchedStatus readers;
+  edds::SubscriptionMatchedStatus writers;
+  writer_->get_publication_matched_status(readers);
+  reader_->get_subscription_matched_status(writers);
+  return readers.current_count > 0 && writers.current_count > 0;
+}
+
+}  // namespace bench

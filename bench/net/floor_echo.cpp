@@ -1,0 +1,50 @@
+// The other end of floor_bench and of scale_bench's fan-out: bare echoes over UDP and, where a domain is given,
+// over Fast DDS. Says "ready udp_port=PORT" and answers until it is stopped.
+//
+//   floor_echo --domain DOMAIN --profile FILE
+//   floor_echo
+
+#include <cstdio>
+#include <optional>
+
+#include "net/floor_dds.hpp"
+#include "net/harness.hpp"
+#include "net/udp.hpp"
+
+namespace {
+
+namespace edds = tfdude::fastdds::edds;
+
+/// Answers in the callback, through a writer that is there already.
+class DdsEcho final : public edds::DataReaderListener {
+ public:
+  explicit DdsEcho(std::uint32_t domain)
+      : endpoints_(domain, bench::kPongTopic, bench::kPingTopic, *this) {}
+
+  void on_data_available(edds::DataReader* reader) override {
+    if (!tfdude::fastdds::ok(reader->take_next_sample(&sample_, &info_)) || !info_.valid_data)
+      return;
+    sample_.filler().resize(sample_.reply_bytes() - bench::kPingOverhead);
+    endpoints_.write(sample_);
+  }
+
+ private:
+  bench::wire::Ping sample_;
+  edds::SampleInfo info_;
+  bench::FloorEndpoints endpoints_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::optional<DdsEcho> dds;
+  if (argc > 1) {
+    const bench::Arguments arguments(argc, argv);
+    bench::check(tfdude::fastdds::load_profiles(arguments.text("profile")), "the profile");
+    dds.emplace(static_cast<std::uint32_t>(arguments.number("domain")));
+  }
+  bench::UdpSocket udp;
+  std::printf("ready udp_port=%d\n", udp.port());
+  std::fflush(stdout);
+  udp.echo();
+}

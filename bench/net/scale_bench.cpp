@@ -1,0 +1,190 @@
+// Network calls as the work grows; the daemons and echoes are started by the python module.
+//
+//   scale_bench --mode partitions --partitions N --central DOMAIN --domain DOMAIN --udp-ports P,P,...
+//     One lookup along a chain across N partitions, beside the same lookup of one daemon that owns all, and
+//     beside a bare UDP datagram to each of N processes and back: the floor of asking N.
+//     scale/partitions/N/decentralized, /centralized, /udp_floor
+//   scale_bench --mode clients --domain DOMAIN
+//     1 to 16 clients at once, a thread each, that ask one owner.
+//     scale/clients/N/latency, /rate
+//   scale_bench --mode frames --frames N,N,... --domain-0 DOMAIN --domain-1 DOMAIN...
+//     The same lookup and update of owners of N frames each, in domains of their own.
+//     scale/frames/N/lookup, /update
+//
+// All take --profile FILE --calls N --repetitions R. The frames chain_0, chain_1... hang each on the last.
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "net/harness.hpp"
+#include "net/udp.hpp"
+
+namespace {
+
+using bench::Arguments;
+using bench::must;
+using bench::Series;
+using tfdude::Client;
+
+// CDR payloads of a lookup of one segment between two of these frames, and of its reply, as idl/tfdude.idl lays
+// them out; floor_bench computes such sizes.
+constexpr std::size_t kRequestBytes = 56;
+constexpr std::size_t kReplyBytes = 252;
+
+std::vector<int> numbers(const std::string& list) {
+  std::vector<int> all;
+  std::istringstream in(list);
+  for (std::string one; std::getline(in, one, ',');) all.push_back(std::stoi(one));
+  return all;
+}
+
+bench::Extent extent_of(const Arguments& arguments) {
+  return {arguments.number("calls"), arguments.number("repetitions"), 100};
+}
+
+std::string chain(int number) { return "chain_" + std::to_string(number); }
+
+/// A lookup that must succeed, for what it takes.
+auto lookup(Client& client, const std::string& a, const std::string& b) {
+  return [&client, a, b] { bench::check(client.lookup(a, b), "lookup"); };
+}
+
+// --- partitions ---
+
+class FanOut {
+ public:
+  explicit FanOut(std::vector<int> ports) : ports_(std::move(ports)) {}
+
+  void call() {
+    ++number_;
+    for (const int port : ports_) {
+      socket_.ask(static_cast<std::uint16_t>(port), number_, kRequestBytes, kReplyBytes);
+    }
+    for (std::size_t missing = ports_.size(); missing > 0; --missing) socket_.await_reply();
+  }
+
+ private:
+  std::vector<int> ports_;
+  std::uint32_t number_ = 0;
+  bench::UdpSocket socket_;
+};
+
+void compare_partitions(const Arguments& arguments) {
+  const int partitions = arguments.number("partitions");
+  const auto key = [&](const char* what) {
+    return "scale/partitions/" + std::to_string(partitions) + "/" + what;
+  };
+  auto central = must(Client::open(arguments.options("central")), "the centralized deployment");
+  auto decentral = must(Client::open(arguments.options("domain")), "the decentralized deployment");
+  FanOut fan_out(numbers(arguments.text("udp-ports")));
+  // Each partition owns two frames; the first one's first is the root.
+  const std::string last = chain(2 * partitions - 1);
+  (void)bench::await_lookup(central, chain(0), last);
+  (void)bench::await_lookup(decentral, chain(0), last);
+  bench::measure({bench::turn(key("decentralized"), lookup(decentral, chain(0), last)),
+                  bench::turn(key("centralized"), lookup(central, chain(0), last)),
+                  bench::turn(key("udp_floor"), [&] { fan_out.call(); })},
+                 extent_of(arguments));
+}
+
+// --- clients ---
+
+/// What some clients at once measured.
+struct Crowd {
+  explicit Crowd(int count)
+      : size(count),
+        latency("scale/clients/" + std::to_string(count) + "/latency", "us"),
+        rate("scale/clients/" + std::to_string(count) + "/rate", "1/s") {}
+
+  int size;
+  Series latency;
+  Series rate;
+};
+
+void ask_at_once(std::vector<std::unique_ptr<Client>>& clients, Crowd& crowd, int calls) {
+  const int each = std::max(calls / crowd.size, 1);
+  std::vector<std::vector<double>> times(static_cast<std::size_t>(crowd.size));
+  std::vector<std::thread> threads;
+  std::atomic<bool> go{false};
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    threads.emplace_back([&, i] {
+      const auto call = lookup(*clients[i], chain(1), chain(3));
+      times[i].reserve(static_cast<std::size_t>(each));
+      while (!go) std::this_thread::yield();
+      for (int k = 0; k < each; ++k) {
+        const auto start = bench::Clock::now();
+        call();
+        times[i].push_back(bench::microseconds_since(start));
+      }
+    });
+  }
+  const auto start = bench::Clock::now();
+  go = true;
+  for (std::thread& thread : threads) thread.join();
+  crowd.rate.add(1e6 * each * crowd.size / bench::microseconds_since(start));
+  for (const auto& some : times) {
+    for (const double time : some) crowd.latency.add(time);
+  }
+  crowd.rate.end_repetition();
+  crowd.latency.end_repetition();
+}
+
+void compare_clients(const Arguments& arguments) {
+  std::vector<Crowd> crowds;
+  for (const int count : {1, 2, 4, 8, 16}) crowds.emplace_back(count);
+  std::vector<std::unique_ptr<Client>> clients;
+  for (int i = 0; i < crowds.back().size; ++i) {
+    clients.push_back(
+        std::make_unique<Client>(must(Client::open(arguments.options("domain")), "a client")));
+    for (int k = 0; k < 100; ++k) lookup(*clients.back(), chain(1), chain(3))();  // warm-up
+  }
+  for (int i = 0; i < arguments.number("repetitions"); ++i) {
+    for (Crowd& crowd : crowds) ask_at_once(clients, crowd, arguments.number("calls"));
+  }
+  for (const Crowd& crowd : crowds) {
+    crowd.latency.print();
+    crowd.rate.print();
+  }
+}
+
+// --- frames ---
+
+void compare_frames(const Arguments& arguments) {
+  const std::vector<int> frames = numbers(arguments.text("frames"));
+  std::vector<std::unique_ptr<Client>> clients;
+  std::vector<bench::Turn> turns;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const auto options = arguments.options("domain-" + std::to_string(i));
+    clients.push_back(std::make_unique<Client>(must(Client::open(options), "a client")));
+    Client& client = *clients.back();
+    const auto X = bench::await_lookup(client, chain(0), chain(1));
+    const std::string key = "scale/frames/" + std::to_string(frames[i]);
+    turns.push_back(bench::turn(key + "/lookup", lookup(client, chain(1), chain(3))));
+    turns.push_back(bench::turn(key + "/update", [&client, X, frame = chain(1)] {
+      bench::check(client.update(frame, X), "update");
+    }));
+  }
+  bench::measure(std::move(turns), extent_of(arguments));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Arguments arguments(argc, argv);
+  const std::string& mode = arguments.text("mode");
+  if (mode == "partitions") {
+    compare_partitions(arguments);
+  } else if (mode == "clients") {
+    compare_clients(arguments);
+  } else if (mode == "frames") {
+    compare_frames(arguments);
+  } else {
+    bench::give_up("no mode " + mode);
+  }
+  return 0;
+}

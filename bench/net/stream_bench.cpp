@@ -1,0 +1,224 @@
+// Streamed updates: one publisher in one process sends all 100 edges of an owner in another at a fixed rate.
+//
+//   stream_bench --mode own     --shared FILE --domain DOMAIN --profile FILE
+//   stream_bench --mode publish --shared FILE --domain DOMAIN --profile FILE --seconds S --repetitions R
+//
+// The owner says "ready"; the publisher measures, and prints:
+//   stream/1khz/latency       from before publish() until a lookup in the owner sees the value [us]
+//   stream/1khz/owner_cpu     processor time of the owner [% of one core], one value a repetition
+//   stream/1khz/lost          samples, one value a repetition
+//   stream/highest_rate       of 1, 2, 4... kHz and as fast as publish() returns: the highest with nothing lost [Hz]
+//   stream/unthrottled/rate   as fast as publish() returns [Hz], and stream/unthrottled/lost, in percent
+//
+// The first edge's translation carries the moment of publishing, by a clock that both share.
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <string>
+#include <thread>
+#include <unistd.h>
+#include <utility>
+#include <vector>
+
+#include "tfdude/transport/fastdds.hpp"
+
+#include "net/harness.hpp"
+#include "net/stream_owner.hpp"
+
+namespace {
+
+using namespace tfdude;
+using bench::must;
+using bench::Series;
+using bench::shared_clock;
+using bench::StreamState;
+
+constexpr int kEdges = 100;
+constexpr const char* kPartition = "joints";
+constexpr const char* kRoot = "base";
+
+std::string joint(int number) { return "joint_" + std::to_string(number); }
+
+// --- the owner ---
+
+/// Looks, as a reader does, whether what came is visible.
+class Latency final : public bench::AppliedListener {
+ public:
+  explicit Latency(StreamState& state) : state_(state) {}
+
+  void watch(Node& node) {
+    root_ = must(node.find(kRoot), "the root");
+    joint_ = must(node.find(joint(0)), "the first joint");
+    node_ = &node;
+  }
+
+  void on_applied() override {
+    Node* node = node_;
+    if (node == nullptr) return;
+    const Transform seen = must(node->lookup(root_, joint_), "a lookup");
+    const double latency = 1e6 * (shared_clock() - seen.pose.translation().x());
+    const std::uint64_t count = state_.latency_count.load();
+    if (count < bench::kMostLatencies) state_.latencies[count] = latency;
+    state_.latency_count.store(count + 1);
+    ++state_.applied;
+  }
+
+ private:
+  StreamState& state_;
+  std::atomic<Node*> node_{nullptr};
+  Handle root_;
+  Handle joint_;
+};
+
+[[noreturn]] void own(const bench::Arguments& arguments) {
+  StreamState& state = bench::map_stream_state(arguments.text("shared"));
+  const Options options = arguments.options("domain");
+  std::vector<FrameSpec> frames{{kRoot, "", {}}};
+  for (int i = 0; i < kEdges; ++i) frames.push_back({joint(i), kRoot, {}});
+  Latency latency(state);
+  auto transport = must(make_fastdds_transport({options.domain, options.profile, kPartition, {}}),
+                        "a transport");
+  auto node =
+      must(Node::open(bench::watch(std::move(transport), latency), kPartition, frames, options),
+           "a node");
+  latency.watch(node);
+  state.owner_pid = getpid();
+  std::puts("ready");
+  std::fflush(stdout);
+  while (true) ::pause();
+}
+
+// --- the publisher ---
+
+struct Run {
+  double rate = 0;  // reached [Hz]
+  double owner_cpu = 0;
+  double published = 0;
+  double lost = 0;
+};
+
+class Publisher {
+ public:
+  Publisher(Client& client, StreamState& state) : client_(client), state_(state) {
+    for (int i = 0; i < kEdges; ++i) edges_.push_back({joint(i), {}});
+    if (::clock_getcpuclockid(state_.owner_pid, &owner_clock_) != 0) bench::give_up("no owner");
+  }
+
+  /// @param rate  [Hz]; 0: as fast as it goes
+  Run run(double rate, double seconds) {
+    const std::uint64_t before = state_.applied;
+    state_.latency_count = 0;
+    const double cpu_before = owner_cpu();
+    const double start = shared_clock();
+    std::uint64_t published = 0;
+    while (shared_clock() < start + seconds) {
+      if (rate > 0) sleep_until(start + static_cast<double>(published) / rate);
+      publish();
+      ++published;
+    }
+    const double took = shared_clock() - start;
+    await_rest(before + published);
+    const double count = static_cast<double>(published);
+    return {count / took, 100 * (owner_cpu() - cpu_before) / (shared_clock() - start), count,
+            static_cast<double>(before + published - state_.applied)};
+  }
+
+ private:
+  void publish() {
+    edges_[0].X_PC.pose = Pose::trusted(Eigen::Quaterniond::Identity(), {shared_clock(), 0, 0});
+    bench::check(client_.publish(edges_), "publish");
+  }
+
+  // A sleep comes some 60 us too late; the rest is waited for awake.
+  static void sleep_until(double moment) {
+    constexpr double kOversleep = 100e-6;
+    while (true) {
+      const double left = moment - shared_clock();
+      if (left <= 0) return;
+      if (left > kOversleep) {
+        std::this_thread::sleep_for(std::chrono::duration<double>(left - kOversleep));
+      }
+    }
+  }
+
+  // Until all is applied, or nothing more comes.
+  void await_rest(std::uint64_t expected) const {
+    std::uint64_t seen = 0;
+    do {
+      seen = state_.applied;
+      for (int i = 0; i < 20 && state_.applied < expected; ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      }
+    } while (state_.applied < expected && state_.applied != seen);
+  }
+
+  [[nodiscard]] double owner_cpu() const {
+    timespec time{};
+    ::clock_gettime(owner_clock_, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
+
+  Client& client_;
+  StreamState& state_;
+  clockid_t owner_clock_{};
+  std::vector<EdgeUpdate> edges_;
+};
+
+void measure_1khz(Publisher& publisher, const StreamState& state, double seconds, int repetitions) {
+  Series latency("stream/1khz/latency", "us");
+  Series cpu("stream/1khz/owner_cpu", "%");
+  Series lost("stream/1khz/lost", "samples");
+  for (int i = 0; i < repetitions; ++i) {
+    const Run run = publisher.run(1000, seconds);
+    const std::size_t count = std::min<std::size_t>(state.latency_count, bench::kMostLatencies);
+    for (std::size_t k = 0; k < count; ++k) latency.add(state.latencies[k]);
+    cpu.add(run.owner_cpu);
+    lost.add(run.lost);
+    for (Series* series : {&latency, &cpu, &lost}) series->end_repetition();
+  }
+  for (const Series* series : {&latency, &cpu, &lost}) series->print();
+}
+
+void measure_highest(Publisher& publisher, double seconds, int repetitions) {
+  Series highest("stream/highest_rate", "Hz");
+  Series unthrottled("stream/unthrottled/rate", "Hz");
+  Series lost("stream/unthrottled/lost", "%");
+  for (int i = 0; i < repetitions; ++i) {
+    double best = 0;
+    for (double rate = 1000;; rate *= 2) {
+      const Run run = publisher.run(rate, seconds);
+      if (run.lost == 0) best = std::max(best, run.rate);
+      if (run.lost > 0 || run.rate < 0.95 * rate) break;
+    }
+    const Run run = publisher.run(0, seconds);
+    if (run.lost == 0) best = std::max(best, run.rate);
+    highest.add(best);
+    unthrottled.add(run.rate);
+    lost.add(100 * run.lost / run.published);
+    for (Series* series : {&highest, &unthrottled, &lost}) series->end_repetition();
+  }
+  for (const Series* series : {&highest, &unthrottled, &lost}) series->print();
+}
+
+void publish(const bench::Arguments& arguments) {
+  StreamState& state = bench::map_stream_state(arguments.text("shared"));
+  auto client = must(Client::open(arguments.options("domain")), "a client");
+  (void)must(client.find(joint(kEdges - 1)), "the owner's frames");
+  Publisher publisher(client, state);
+  (void)publisher.run(1000, 0.5);  // warm-up
+  const int seconds = arguments.number("seconds");
+  const int repetitions = arguments.number("repetitions");
+  measure_1khz(publisher, state, seconds, repetitions);
+  measure_highest(publisher, 0.25 * seconds, repetitions);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const bench::Arguments arguments(argc, argv);
+  if (arguments.text("mode") == "own") own(arguments);
+  publish(arguments);
+  return 0;
+}

@@ -1,0 +1,300 @@
+#!/usr/bin/env python3
+"""The network benchmarks: starts the daemons as shipped, pins, runs the programs of bench/net, and yields what
+they print, one dictionary a figure.
+
+    python3 bench/net_stage.py [--quick] [--bin DIR]    prints the lines
+"""
+
+import argparse
+import contextlib
+import json
+import math
+import os
+import pathlib
+import select
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Iterator
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+LOOPBACK = ROOT / "profiles" / "loopback.xml"
+EXAMPLES = ROOT / "examples" / "thesis"
+
+# The DDS domains used; nobody else's.
+CENTRAL, DECENTRAL, FLOOR, STREAM = 140, 141, 142, 143
+
+ALL_CPUS = ",".join(map(str, sorted(os.sched_getaffinity(0))))
+
+START_DEADLINE = 40.0  # for a daemon to be ready [s]
+SETTLE = 1.0  # for many daemons to have met [s]
+STOP_DEADLINE = 5.0  # after SIGTERM [s]
+
+
+def patient_profile(work: pathlib.Path) -> pathlib.Path:
+    """The loopback profile, but whoever is silent counts as gone after 9 s only: a call that fails ends a
+    benchmark, and a virtual machine may stop for half a second within a quarter of an hour. Nothing that
+    is measured depends on it."""
+    shipped = LOOPBACK.read_text()
+    patient = shipped.replace("<leaseDuration><nanosec>450000000</nanosec>",
+                              "<leaseDuration><sec>9</sec>")
+    assert patient != shipped
+    path = work / "patient.xml"
+    path.write_text(patient)
+    return path
+
+
+class Stage:
+    """Runs processes and never leaves one behind."""
+
+    def __init__(self, bin_dir: pathlib.Path, work: pathlib.Path):
+        self.bin_dir = bin_dir
+        self.work = work
+        self.profile = patient_profile(work)
+
+    def command(self, cpus: str, program: str, arguments: list) -> list[str]:
+        return ["taskset", "-c", cpus, str(self.bin_dir / program), *map(str, arguments)]
+
+    @contextlib.contextmanager
+    def servers(self, commands: list[list[str]]) -> Iterator[list["Server"]]:
+        """Starts all at once, and stops them in the end."""
+        with open(self.work / "servers.log", "ab") as log, contextlib.ExitStack() as started:
+            running = []
+            for command in commands:
+                server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+                running.append(server)
+                started.callback(stop, server)
+            # Told all at once, before any is waited for.
+            started.callback(lambda: [server.terminate() for server in running])
+            deadline = time.monotonic() + START_DEADLINE
+            yield [Server(server, ready_line(server, deadline)) for server in running]
+
+    def daemon(self, cpus: str, domain: int, config: pathlib.Path) -> list[str]:
+        return self.command(
+            cpus, "tfduded", ["--config", config, "--domain", domain, "--profile", self.profile]
+        )
+
+    def figures(self, command: list[str], deadline: float) -> Iterator[dict]:
+        """Runs a benchmark for at most `deadline` seconds."""
+        path = self.work / "benchmarks.log"
+        with open(path, "ab") as log:
+            benchmark = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+            try:
+                lines, _ = benchmark.communicate(timeout=deadline)
+            finally:
+                stop(benchmark)
+        if benchmark.returncode != 0:
+            reasons = path.read_text().splitlines()[-3:]
+            raise RuntimeError("\n".join([f"{' '.join(command)} failed:", *reasons]))
+        for line in lines.splitlines():
+            yield json.loads(line)
+
+
+class Server:
+    def __init__(self, process: subprocess.Popen, ready: str):
+        self.ready = ready  # what it said
+        self.stat = pathlib.Path(f"/proc/{process.pid}/stat")
+
+    def udp_port(self) -> str:
+        return self.ready.split("udp_port=")[1].strip()
+
+    def cpu(self) -> float:
+        """Processor time used so far [s]."""
+        user, system = self.stat.read_text().rsplit(")", 1)[1].split()[11:13]
+        return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+
+def idle_cpu(key: str, servers: list[Server], seconds: float, repetitions: int) -> dict:
+    """What the servers together use while nobody asks them [% of a core]."""
+    shares = []
+    for _ in range(repetitions):
+        before, start = sum(server.cpu() for server in servers), time.monotonic()
+        time.sleep(seconds)
+        used = sum(server.cpu() for server in servers) - before
+        shares.append(100 * used / (time.monotonic() - start))
+    quantiles = {"min": 0, "p5": 0.05, "p25": 0.25, "median": 0.5, "p75": 0.75, "p90": 0.9,
+                 "p95": 0.95, "p99": 0.99, "p99.9": 0.999, "max": 1}
+    # The nearest rank, as bench/support/series.cpp has it.
+    ranked = {name: sorted(shares)[max(math.ceil(share * repetitions), 1) - 1]
+              for name, share in quantiles.items()}
+    return {"key": key, "unit": "%", "n": repetitions, "medians": shares,
+            "mean": statistics.mean(shares), **ranked}
+
+
+def stop(process: subprocess.Popen) -> None:
+    if process.poll() is None:
+        process.send_signal(signal.SIGTERM)
+        try:
+            process.wait(STOP_DEADLINE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+    if process.stdout:
+        process.stdout.close()
+
+
+def ready_line(server: subprocess.Popen, deadline: float) -> str:
+    readable, _, _ = select.select([server.stdout], [], [], max(0.0, deadline - time.monotonic()))
+    line = server.stdout.readline() if readable else ""
+    if not line.startswith("ready"):
+        raise RuntimeError(f"{' '.join(server.args)} did not become ready")
+    return line
+
+
+def merged(work: pathlib.Path, configs: list[pathlib.Path]) -> pathlib.Path:
+    """A configuration of one partition, "central", that has the frames of all."""
+    lines = ["partition: central", "frames:"]
+    for config in configs:
+        _, frames = config.read_text().split("\nframes:\n")
+        lines.append(frames)
+    path = work / "central.yaml"
+    path.write_text("\n".join(lines))
+    return path
+
+
+def thesis(stage: Stage, quick: bool) -> Iterator[dict]:
+    """Who asks has a core of its own, those who are asked the other."""
+    calls, repetitions = (1000, 5) if quick else (60000, 5)  # full: the thesis's 300,000 a case
+    configs = {name: EXAMPLES / f"{name}.yaml" for name in ("robot", "arms")}
+    central = stage.daemon("1", CENTRAL, merged(stage.work, list(configs.values())))
+    for asking, other in (("robot", "arms"), ("arms", "robot")):
+        with stage.servers([central, stage.daemon("1", DECENTRAL, configs[other])]):
+            yield from stage.figures(
+                stage.command("0", "thesis_bench",
+                              ["--as", asking, "--config", configs[asking], "--central", CENTRAL,
+                               "--domain", DECENTRAL, "--profile", stage.profile, "--calls", calls,
+                               "--repetitions", repetitions]),
+                60 if quick else 1200)
+
+
+def floor(stage: Stage, quick: bool) -> Iterator[dict]:
+    """On one core, where a wake-up is cheap, the programs' own work shows; two cores are what one has."""
+    calls, repetitions = (1000, 5) if quick else (20000, 5)
+    config = merged(stage.work, [EXAMPLES / "robot.yaml", EXAMPLES / "arms.yaml"])
+    for placement, cpu in (("one_core", "0"), ("two_cores", "1")):
+        floor_echo = stage.command(cpu, "floor_echo", ["--domain", FLOOR, "--profile", stage.profile])
+        with stage.servers([stage.daemon(cpu, CENTRAL, config), floor_echo]) as (_, echo):
+            yield from stage.figures(
+                stage.command("0", "floor_bench",
+                              ["--placement", placement, "--central", CENTRAL, "--domain", FLOOR,
+                               "--udp-port", echo.udp_port(), "--profile", stage.profile,
+                               "--calls", calls, "--repetitions", repetitions]),
+                60 if quick else 300)
+
+
+def stream(stage: Stage, quick: bool) -> Iterator[dict]:
+    """The publisher has one core, the owner the other."""
+    seconds, repetitions = (1, 5) if quick else (8, 5)
+    common = ["--shared", stage.work / "stream", "--domain", STREAM, "--profile", stage.profile]
+    with stage.servers([stage.command("1", "stream_bench", ["--mode", "own", *common])]):
+        yield from stage.figures(
+            stage.command("0", "stream_bench",
+                          ["--mode", "publish", *common, "--seconds", seconds,
+                           "--repetitions", repetitions]),
+            60 if quick else 400)
+
+
+def chain_config(work: pathlib.Path, partition: str, first: int, count: int,
+                 others: int = 0) -> pathlib.Path:
+    """`count` frames of the chain chain_0, chain_1... from the `first` on, and others below its start."""
+    value = "xyz: [0.1, 0.2, 0.3], rpy: [0.1, 0.2, 0.3], stddev: [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]"
+    lines = [f"partition: {partition}", "frames:"]
+    for number in range(first, first + count):
+        parent = f", parent: chain_{number - 1}, {value}" if number else ""
+        lines.append(f"  - {{id: chain_{number}{parent}}}")
+    lines += [f"  - {{id: other_{k}, parent: chain_0, {value}}}" for k in range(others)]
+    path = work / f"{partition}.yaml"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
+    """The asking process and the daemon of all frames have a core each, the partitions' daemons and the echoes
+    both: two cores are few for so many computers. Daemons of 32 partitions keep them busy by telling each
+    other that they are there (idle_cpu), so that there this measures the machine."""
+    repetitions = 5
+    for count in (2, 8, 16) if quick else (2, 4, 8, 16, 32):
+        configs = [chain_config(stage.work, f"p{k}", 2 * k, 2) for k in range(count)]
+        central = chain_config(stage.work, "central", 0, 2 * count)
+        daemons = [stage.daemon(ALL_CPUS, DECENTRAL, config) for config in configs]
+        daemons.append(stage.daemon("1", CENTRAL, central))
+        echoes = [stage.command(ALL_CPUS, "floor_echo", [])] * count
+        with stage.servers(daemons + echoes) as servers:
+            time.sleep(SETTLE)
+            yield idle_cpu(f"scale/partitions/{count}/idle_cpu", servers[:count],
+                           1 if quick else 2, repetitions)
+            ports = ",".join(echo.udp_port() for echo in servers[-count:])
+            yield from stage.figures(
+                stage.command("0", "scale_bench",
+                              ["--mode", "partitions", "--partitions", count,
+                               "--central", CENTRAL, "--domain", DECENTRAL, "--udp-ports", ports,
+                               "--profile", stage.profile,
+                               "--calls", (800 if quick else 8000) // count,
+                               "--repetitions", repetitions]),
+                60 if quick else 200)
+
+
+def scale_clients(stage: Stage, quick: bool) -> Iterator[dict]:
+    calls, repetitions = (500, 5) if quick else (20000, 5)
+    with stage.servers([stage.daemon("1", CENTRAL, chain_config(stage.work, "central", 0, 10))]):
+        yield from stage.figures(
+            stage.command("0", "scale_bench",
+                          ["--mode", "clients", "--domain", CENTRAL, "--profile", stage.profile,
+                           "--calls", calls, "--repetitions", repetitions]),
+            60 if quick else 200)
+
+
+def scale_frames(stage: Stage, quick: bool) -> Iterator[dict]:
+    calls, repetitions = (200, 5) if quick else (5000, 5)
+    frames = (10, 100, 1000, 10000)
+    domains = [CENTRAL + 10 + k for k in range(len(frames))]
+    daemons = [stage.daemon("1", domain, chain_config(stage.work, f"n{count}", 0, 4, count - 4))
+               for domain, count in zip(domains, frames)]
+    named = [word for k, domain in enumerate(domains) for word in (f"--domain-{k}", domain)]
+    with stage.servers(daemons):
+        yield from stage.figures(
+            stage.command("0", "scale_bench",
+                          ["--mode", "frames", "--frames", ",".join(map(str, frames)), *named, "--profile", stage.profile,
+                           "--calls", calls, "--repetitions", repetitions]),
+            60 if quick else 200)
+
+
+PARTS = {
+    "thesis": thesis,
+    "floor": floor,
+    "stream": stream,
+    "scale_partitions": scale_partitions,
+    "scale_clients": scale_clients,
+    "scale_frames": scale_frames,
+}
+
+
+def run(quick: bool, bin_dir: pathlib.Path, work: pathlib.Path) -> Iterator[dict]:
+    stage = Stage(bin_dir, work)
+    for part in PARTS.values():
+        yield from part(stage, quick)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "release" / "bin")
+    parser.add_argument("parts", nargs="*", metavar="part", help=f"of {', '.join(PARTS)}")
+    arguments = parser.parse_args()
+    # So that what was started is stopped then, too.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    with tempfile.TemporaryDirectory(prefix="tfdude-bench-") as work:
+        stage = Stage(arguments.bin, pathlib.Path(work))
+        try:
+            for name in arguments.parts or PARTS:
+                for line in PARTS[name](stage, arguments.quick):
+                    print(json.dumps(line), flush=True)
+        except RuntimeError as error:
+            sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()
