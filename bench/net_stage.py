@@ -8,37 +8,33 @@ they print, one dictionary a figure.
 import argparse
 import contextlib
 import json
-import math
 import os
 import pathlib
-import select
 import signal
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from typing import Iterator
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-LOOPBACK = ROOT / "profiles" / "loopback.xml"
-EXAMPLES = ROOT / "examples" / "thesis"
+import figures
+import processes
+
+EXAMPLES = processes.ROOT / "examples" / "thesis"
 
 # The DDS domains used; nobody else's.
 CENTRAL, DECENTRAL, FLOOR, STREAM = 140, 141, 142, 143
 
 ALL_CPUS = ",".join(map(str, sorted(os.sched_getaffinity(0))))
 
-START_DEADLINE = 40.0  # for a daemon to be ready [s]
 SETTLE = 1.0  # for many daemons to have met [s]
-STOP_DEADLINE = 5.0  # after SIGTERM [s]
 
 
 def patient_profile(work: pathlib.Path) -> pathlib.Path:
     """The loopback profile, but whoever is silent counts as gone after 9 s only: a call that fails ends a
     benchmark, and a virtual machine may stop for half a second within a quarter of an hour. Nothing that
     is measured depends on it."""
-    shipped = LOOPBACK.read_text()
+    shipped = processes.PROFILE.read_text()
     patient = shipped.replace("<leaseDuration><nanosec>450000000</nanosec>",
                               "<leaseDuration><sec>9</sec>")
     assert patient != shipped
@@ -64,20 +60,19 @@ class Stage:
         with open(self.work / "servers.log", "ab") as log, contextlib.ExitStack() as started:
             running = []
             for command in commands:
-                server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+                server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, bufsize=0)
                 running.append(server)
-                started.callback(stop, server)
+                started.callback(processes.end, server)
             # Told all at once, before any is waited for.
             started.callback(lambda: [server.terminate() for server in running])
-            deadline = time.monotonic() + START_DEADLINE
-            yield [Server(server, ready_line(server, deadline)) for server in running]
+            yield [Server(server, ready_line(server)) for server in running]
 
     def daemon(self, cpus: str, domain: int, config: pathlib.Path) -> list[str]:
         return self.command(
             cpus, "tfduded", ["--config", config, "--domain", domain, "--profile", self.profile]
         )
 
-    def figures(self, command: list[str], deadline: float) -> Iterator[dict]:
+    def measured(self, command: list[str], deadline: float) -> Iterator[dict]:
         """Runs a benchmark for at most `deadline` seconds."""
         path = self.work / "benchmarks.log"
         with open(path, "ab") as log:
@@ -85,7 +80,7 @@ class Stage:
             try:
                 lines, _ = benchmark.communicate(timeout=deadline)
             finally:
-                stop(benchmark)
+                processes.end(benchmark)
         if benchmark.returncode != 0:
             reasons = path.read_text().splitlines()[-3:]
             raise RuntimeError("\n".join([f"{' '.join(command)} failed:", *reasons]))
@@ -107,6 +102,14 @@ class Server:
         return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
+def ready_line(server: subprocess.Popen) -> str:
+    what = " ".join(server.args)
+    line = processes.await_line(server.stdout, what)
+    if not line.startswith("ready"):
+        raise RuntimeError(f"{what} said: {line}")
+    return line
+
+
 def idle_cpu(key: str, servers: list[Server], seconds: float, repetitions: int) -> dict:
     """What the servers together use while nobody asks them [% of a core]."""
     shares = []
@@ -115,33 +118,7 @@ def idle_cpu(key: str, servers: list[Server], seconds: float, repetitions: int) 
         time.sleep(seconds)
         used = sum(server.cpu() for server in servers) - before
         shares.append(100 * used / (time.monotonic() - start))
-    quantiles = {"min": 0, "p5": 0.05, "p25": 0.25, "median": 0.5, "p75": 0.75, "p90": 0.9,
-                 "p95": 0.95, "p99": 0.99, "p99.9": 0.999, "max": 1}
-    # The nearest rank, as bench/support/series.cpp has it.
-    ranked = {name: sorted(shares)[max(math.ceil(share * repetitions), 1) - 1]
-              for name, share in quantiles.items()}
-    return {"key": key, "unit": "%", "n": repetitions, "medians": shares,
-            "mean": statistics.mean(shares), **ranked}
-
-
-def stop(process: subprocess.Popen) -> None:
-    if process.poll() is None:
-        process.send_signal(signal.SIGTERM)
-        try:
-            process.wait(STOP_DEADLINE)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-    if process.stdout:
-        process.stdout.close()
-
-
-def ready_line(server: subprocess.Popen, deadline: float) -> str:
-    readable, _, _ = select.select([server.stdout], [], [], max(0.0, deadline - time.monotonic()))
-    line = server.stdout.readline() if readable else ""
-    if not line.startswith("ready"):
-        raise RuntimeError(f"{' '.join(server.args)} did not become ready")
-    return line
+    return figures.summary(key, "%", shares)
 
 
 def merged(work: pathlib.Path, configs: list[pathlib.Path]) -> pathlib.Path:
@@ -162,7 +139,7 @@ def thesis(stage: Stage, quick: bool) -> Iterator[dict]:
     central = stage.daemon("1", CENTRAL, merged(stage.work, list(configs.values())))
     for asking, other in (("robot", "arms"), ("arms", "robot")):
         with stage.servers([central, stage.daemon("1", DECENTRAL, configs[other])]):
-            yield from stage.figures(
+            yield from stage.measured(
                 stage.command("0", "thesis_bench",
                               ["--as", asking, "--config", configs[asking], "--central", CENTRAL,
                                "--domain", DECENTRAL, "--profile", stage.profile, "--calls", calls,
@@ -177,7 +154,7 @@ def floor(stage: Stage, quick: bool) -> Iterator[dict]:
     for placement, cpu in (("one_core", "0"), ("two_cores", "1")):
         floor_echo = stage.command(cpu, "floor_echo", ["--domain", FLOOR, "--profile", stage.profile])
         with stage.servers([stage.daemon(cpu, CENTRAL, config), floor_echo]) as (_, echo):
-            yield from stage.figures(
+            yield from stage.measured(
                 stage.command("0", "floor_bench",
                               ["--placement", placement, "--central", CENTRAL, "--domain", FLOOR,
                                "--udp-port", echo.udp_port(), "--profile", stage.profile,
@@ -190,7 +167,7 @@ def stream(stage: Stage, quick: bool) -> Iterator[dict]:
     seconds, repetitions = (1, 5) if quick else (8, 5)
     common = ["--shared", stage.work / "stream", "--domain", STREAM, "--profile", stage.profile]
     with stage.servers([stage.command("1", "stream_bench", ["--mode", "own", *common])]):
-        yield from stage.figures(
+        yield from stage.measured(
             stage.command("0", "stream_bench",
                           ["--mode", "publish", *common, "--seconds", seconds,
                            "--repetitions", repetitions]),
@@ -227,7 +204,7 @@ def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
             yield idle_cpu(f"scale/partitions/{count}/idle_cpu", servers[:count],
                            1 if quick else 2, repetitions)
             ports = ",".join(echo.udp_port() for echo in servers[-count:])
-            yield from stage.figures(
+            yield from stage.measured(
                 stage.command("0", "scale_bench",
                               ["--mode", "partitions", "--partitions", count,
                                "--central", CENTRAL, "--domain", DECENTRAL, "--udp-ports", ports,
@@ -240,7 +217,7 @@ def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
 def scale_clients(stage: Stage, quick: bool) -> Iterator[dict]:
     calls, repetitions = (500, 5) if quick else (20000, 5)
     with stage.servers([stage.daemon("1", CENTRAL, chain_config(stage.work, "central", 0, 10))]):
-        yield from stage.figures(
+        yield from stage.measured(
             stage.command("0", "scale_bench",
                           ["--mode", "clients", "--domain", CENTRAL, "--profile", stage.profile,
                            "--calls", calls, "--repetitions", repetitions]),
@@ -255,9 +232,10 @@ def scale_frames(stage: Stage, quick: bool) -> Iterator[dict]:
                for domain, count in zip(domains, frames)]
     named = [word for k, domain in enumerate(domains) for word in (f"--domain-{k}", domain)]
     with stage.servers(daemons):
-        yield from stage.figures(
+        yield from stage.measured(
             stage.command("0", "scale_bench",
-                          ["--mode", "frames", "--frames", ",".join(map(str, frames)), *named, "--profile", stage.profile,
+                          ["--mode", "frames", "--frames", ",".join(map(str, frames)), *named,
+                           "--profile", stage.profile,
                            "--calls", calls, "--repetitions", repetitions]),
             60 if quick else 200)
 
@@ -281,7 +259,7 @@ def run(quick: bool, bin_dir: pathlib.Path, work: pathlib.Path) -> Iterator[dict
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "release" / "bin")
+    parser.add_argument("--bin", type=pathlib.Path, default=processes.ROOT / "build" / "release" / "bin")
     parser.add_argument("parts", nargs="*", metavar="part", help=f"of {', '.join(PARTS)}")
     arguments = parser.parse_args()
     # So that what was started is stopped then, too.

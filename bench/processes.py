@@ -9,7 +9,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROFILE = ROOT / "profiles" / "loopback.xml"
-PATIENCE_S = 20  # for a program to start or to answer
+PATIENCE_S = 40  # for a program to start or to answer
 
 
 class Skipped(Exception):
