@@ -1,5 +1,6 @@
 #include "tfdude/base/id.hpp"
 
+#include <algorithm>
 #include <cstdint>
 
 namespace tfdude {
@@ -33,6 +34,10 @@ bool is_control(std::uint32_t value) { return value < 0x20 || (value >= 0x7F && 
 }  // namespace
 
 Result<void> check_id(std::string_view id, std::string_view what) {
+  // As most are; apart, as it is done for each edge of a stream.
+  const auto plain = [](char c) { return c >= ' ' && c <= '~'; };
+  if (!id.empty() && id.size() <= kMaxIdBytes && std::all_of(id.begin(), id.end(), plain))
+    return {};
   const std::string field(what);
   if (id.empty()) return fail(Errc::kInvalidInput, field + " is empty");
   if (id.size() > kMaxIdBytes) {

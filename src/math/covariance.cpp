@@ -64,15 +64,26 @@ Result<void> scale_to_unit_diagonal(Matrix6d& m, Twist& scale) {
   return {};
 }
 
-// True where a Cholesky factorization goes through with clear pivots: the fast answer for most.
-bool clearly_psd(const Matrix6d& unit) {
-  Matrix6d L = unit;
-  for (int k = 0; k < 6; ++k) {
-    if (unit.col(k).isZero(0)) continue;
-    if (L(k, k) < kClearPivot) return false;
-    for (int i = k + 1; i < 6; ++i) {
-      const double factor = L(i, k) / L(k, k);
-      for (int j = i; j < 6; ++j) L(j, i) -= factor * L(j, k);
+// True where an LDLᵀ factorization goes through with clear pivots, each judged by its own variance, which is as if
+// the diagonal were scaled to one; rows of zeros are left out. The fast answer for most, false for what is
+// not a number.
+bool clearly_psd(const Covariance::Upper& upper) {
+  double a[6][6];
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = i; j < 6; ++j) a[i][j] = upper[upper_index(i, j)];
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    const double variance = upper[upper_index(k, k)];
+    if (variance == 0) {
+      for (std::size_t i = 0; i < 6; ++i) {
+        if (upper[upper_index(std::min(i, k), std::max(i, k))] != 0) return false;
+      }
+      continue;
+    }
+    if (!(a[k][k] > kClearPivot * variance && variance <= kMaxVariance)) return false;
+    for (std::size_t i = k + 1; i < 6; ++i) {
+      const double factor = a[k][i] / a[k][k];
+      for (std::size_t j = i; j < 6; ++j) a[i][j] -= factor * a[k][j];
     }
   }
   return true;
@@ -84,7 +95,6 @@ Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
   Matrix6d unit = sigma;
   Twist scale;
   if (auto ok = scale_to_unit_diagonal(unit, scale); !ok) return tl::unexpected(ok.error());
-  if (clearly_psd(unit)) return upper;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(unit);
   const double smallest = solver.eigenvalues()[0];
   if (!(smallest >= -kPsdTolerance)) {
@@ -121,12 +131,12 @@ Result<Covariance> Covariance::from_matrix(const Matrix6d& matrix) {
 }
 
 Result<Covariance> Covariance::from_upper(const Upper& upper) {
+  if (clearly_psd(upper)) return trusted(upper);
   Twist variances;
   for (std::size_t i = 0; i < 6; ++i) {
     variances[static_cast<Eigen::Index>(i)] = upper[upper_index(i, i)];
   }
   const Twist least = -kPsdTolerance * judged_variances(variances);
-  bool diagonal = true;
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = i; j < 6; ++j) {
       const double value = upper[upper_index(i, j)];
@@ -139,10 +149,8 @@ Result<Covariance> Covariance::from_upper(const Upper& upper) {
       if (std::abs(value) > kMaxVariance) {
         return fail(Errc::kInvalidInput, element(i, j) + " is beyond 1e18");
       }
-      diagonal = diagonal && (i == j ? value >= 0 : value == 0);
     }
   }
-  if (diagonal) return trusted(upper);
   const auto psd = checked_psd(upper);
   if (!psd) return tl::unexpected(psd.error());
   return trusted(*psd);

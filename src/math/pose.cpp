@@ -15,13 +15,12 @@ constexpr double kSmallAngleSquared = 1e-6;
 
 constexpr double kQuaternionTolerance = 1e-3;
 
-}  // namespace
-
-Result<Pose> Pose::create(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
+// Of a pose that is not good: apart, so that the good ones pay for no text.
+tl::unexpected<Error> what_is_wrong(const Eigen::Quaterniond& rotation,
+                                    const Eigen::Vector3d& translation) {
   constexpr const char* kAxes[] = {"x", "y", "z", "w"};
   for (int i = 0; i < 4; ++i) {
-    const double value = rotation.coeffs()[i];
-    if (!std::isfinite(value)) {
+    if (!std::isfinite(rotation.coeffs()[i])) {
       return fail(Errc::kInvalidInput,
                   std::string("rotation.") + kAxes[i] + " is not a finite number");
     }
@@ -35,13 +34,20 @@ Result<Pose> Pose::create(const Eigen::Quaterniond& rotation, const Eigen::Vecto
       return fail(Errc::kInvalidInput, field + " is beyond 1e9 m");
     }
   }
+  std::array<char, 32> norm{};
+  std::snprintf(norm.data(), norm.size(), "%g", rotation.norm());
+  return fail(Errc::kInvalidInput, std::string("rotation has the norm ") + norm.data() +
+                                       ", not that of a unit quaternion");
+}
+
+}  // namespace
+
+Result<Pose> Pose::create(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
   const double norm = rotation.norm();
-  if (!(std::abs(norm - 1.0) <= kQuaternionTolerance)) {
-    std::array<char, 32> text{};
-    std::snprintf(text.data(), text.size(), "%g", norm);
-    return fail(Errc::kInvalidInput, std::string("rotation has the norm ") + text.data() +
-                                         ", not that of a unit quaternion");
-  }
+  // False for what is not a number, too.
+  const bool good = std::abs(norm - 1.0) <= kQuaternionTolerance &&
+                    translation.cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= kMaxTranslation;
+  if (!good) return what_is_wrong(rotation, translation);
   return trusted(Eigen::Quaterniond(rotation.coeffs() / norm), translation);
 }
 
