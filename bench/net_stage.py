@@ -11,6 +11,7 @@ import json
 import os
 import pathlib
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -22,8 +23,7 @@ import processes
 
 EXAMPLES = processes.ROOT / "examples" / "thesis"
 
-# The DDS domains used; nobody else's.
-CENTRAL, DECENTRAL, FLOOR, STREAM = 140, 141, 142, 143
+DOMAINS = range(140, 170)
 
 ALL_CPUS = ",".join(map(str, sorted(os.sched_getaffinity(0))))
 
@@ -43,6 +43,19 @@ def patient_profile(work: pathlib.Path) -> pathlib.Path:
     return path
 
 
+def lease_domain() -> tuple[int, socket.socket]:
+    """A DDS domain that no other benchmark and no test has, and what keeps it: a name of the kernel's, as in
+    tests/support/domain_lease.cpp."""
+    for domain in DOMAINS:
+        lease = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            lease.bind(f"\0tfdude-test-domain-{domain}")
+            return domain, lease
+        except OSError:
+            lease.close()
+    raise RuntimeError("all DDS domains for benchmarks are taken")
+
+
 class Stage:
     """Runs processes and never leaves one behind."""
 
@@ -50,6 +63,13 @@ class Stage:
         self.bin_dir = bin_dir
         self.work = work
         self.profile = patient_profile(work)
+        self.leases = {}
+
+    def domain(self, name: str) -> int:
+        """The DDS domain that stands for a name in this stage."""
+        if name not in self.leases:
+            self.leases[name] = lease_domain()
+        return self.leases[name][0]
 
     def command(self, cpus: str, program: str, arguments: list) -> list[str]:
         return ["taskset", "-c", cpus, str(self.bin_dir / program), *map(str, arguments)]
@@ -134,38 +154,44 @@ def merged(work: pathlib.Path, configs: list[pathlib.Path]) -> pathlib.Path:
 
 def thesis(stage: Stage, quick: bool) -> Iterator[dict]:
     """Who asks has a core of its own, those who are asked the other."""
+    central_domain = stage.domain("central")
+    decentral_domain = stage.domain("decentral")
     calls, repetitions = (1000, 5) if quick else (60000, 5)  # full: the thesis's 300,000 a case
     configs = {name: EXAMPLES / f"{name}.yaml" for name in ("robot", "arms")}
-    central = stage.daemon("1", CENTRAL, merged(stage.work, list(configs.values())))
+    central = stage.daemon("1", central_domain, merged(stage.work, list(configs.values())))
     for asking, other in (("robot", "arms"), ("arms", "robot")):
-        with stage.servers([central, stage.daemon("1", DECENTRAL, configs[other])]):
+        with stage.servers([central, stage.daemon("1", decentral_domain, configs[other])]):
             yield from stage.measured(
                 stage.command("0", "thesis_bench",
-                              ["--as", asking, "--config", configs[asking], "--central", CENTRAL,
-                               "--domain", DECENTRAL, "--profile", stage.profile, "--calls", calls,
-                               "--repetitions", repetitions]),
+                              ["--as", asking, "--config", configs[asking],
+                               "--central", central_domain, "--domain", decentral_domain,
+                               "--profile", stage.profile,
+                               "--calls", calls, "--repetitions", repetitions]),
                 60 if quick else 1200)
 
 
 def floor(stage: Stage, quick: bool) -> Iterator[dict]:
     """On one core, where a wake-up is cheap, the programs' own work shows; two cores are what one has."""
+    central_domain = stage.domain("central")
+    floor_domain = stage.domain("floor")
     calls, repetitions = (1000, 5) if quick else (20000, 5)
     config = merged(stage.work, [EXAMPLES / "robot.yaml", EXAMPLES / "arms.yaml"])
     for placement, cpu in (("one_core", "0"), ("two_cores", "1")):
-        floor_echo = stage.command(cpu, "floor_echo", ["--domain", FLOOR, "--profile", stage.profile])
-        with stage.servers([stage.daemon(cpu, CENTRAL, config), floor_echo]) as (_, echo):
+        floor_echo = stage.command(cpu, "floor_echo", ["--domain", floor_domain, "--profile", stage.profile])
+        with stage.servers([stage.daemon(cpu, central_domain, config), floor_echo]) as (_, echo):
             yield from stage.measured(
                 stage.command("0", "floor_bench",
-                              ["--placement", placement, "--central", CENTRAL, "--domain", FLOOR,
-                               "--udp-port", echo.udp_port(), "--profile", stage.profile,
+                              ["--placement", placement, "--central", central_domain,
+                               "--domain", floor_domain, "--udp-port", echo.udp_port(), "--profile", stage.profile,
                                "--calls", calls, "--repetitions", repetitions]),
                 60 if quick else 300)
 
 
 def stream(stage: Stage, quick: bool) -> Iterator[dict]:
     """The publisher has one core, the owner the other."""
+    stream_domain = stage.domain("stream")
     seconds, repetitions = (1, 5) if quick else (8, 5)
-    common = ["--shared", stage.work / "stream", "--domain", STREAM, "--profile", stage.profile]
+    common = ["--shared", stage.work / "stream", "--domain", stream_domain, "--profile", stage.profile]
     with stage.servers([stage.command("1", "stream_bench", ["--mode", "own", *common])]):
         yield from stage.measured(
             stage.command("0", "stream_bench",
@@ -192,12 +218,14 @@ def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
     """The asking process and the daemon of all frames have a core each, the partitions' daemons and the echoes
     both: two cores are few for so many computers. Daemons of 32 partitions keep them busy by telling each
     other that they are there (idle_cpu), so that there this measures the machine."""
+    central_domain = stage.domain("central")
+    decentral_domain = stage.domain("decentral")
     repetitions = 5
     for count in (2, 8, 16) if quick else (2, 4, 8, 16, 32):
         configs = [chain_config(stage.work, f"p{k}", 2 * k, 2) for k in range(count)]
         central = chain_config(stage.work, "central", 0, 2 * count)
-        daemons = [stage.daemon(ALL_CPUS, DECENTRAL, config) for config in configs]
-        daemons.append(stage.daemon("1", CENTRAL, central))
+        daemons = [stage.daemon(ALL_CPUS, decentral_domain, config) for config in configs]
+        daemons.append(stage.daemon("1", central_domain, central))
         echoes = [stage.command(ALL_CPUS, "floor_echo", [])] * count
         with stage.servers(daemons + echoes) as servers:
             time.sleep(SETTLE)
@@ -207,7 +235,8 @@ def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
             yield from stage.measured(
                 stage.command("0", "scale_bench",
                               ["--mode", "partitions", "--partitions", count,
-                               "--central", CENTRAL, "--domain", DECENTRAL, "--udp-ports", ports,
+                               "--central", central_domain, "--domain", decentral_domain,
+                               "--udp-ports", ports,
                                "--profile", stage.profile,
                                "--calls", (800 if quick else 8000) // count,
                                "--repetitions", repetitions]),
@@ -215,11 +244,12 @@ def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
 
 
 def scale_clients(stage: Stage, quick: bool) -> Iterator[dict]:
+    central_domain = stage.domain("central")
     calls, repetitions = (500, 5) if quick else (20000, 5)
-    with stage.servers([stage.daemon("1", CENTRAL, chain_config(stage.work, "central", 0, 10))]):
+    with stage.servers([stage.daemon("1", central_domain, chain_config(stage.work, "central", 0, 10))]):
         yield from stage.measured(
             stage.command("0", "scale_bench",
-                          ["--mode", "clients", "--domain", CENTRAL, "--profile", stage.profile,
+                          ["--mode", "clients", "--domain", central_domain, "--profile", stage.profile,
                            "--calls", calls, "--repetitions", repetitions]),
             60 if quick else 200)
 
@@ -227,7 +257,7 @@ def scale_clients(stage: Stage, quick: bool) -> Iterator[dict]:
 def scale_frames(stage: Stage, quick: bool) -> Iterator[dict]:
     calls, repetitions = (200, 5) if quick else (5000, 5)
     frames = (10, 100, 1000, 10000)
-    domains = [CENTRAL + 10 + k for k in range(len(frames))]
+    domains = [stage.domain(f"{count} frames") for count in frames]
     daemons = [stage.daemon("1", domain, chain_config(stage.work, f"n{count}", 0, 4, count - 4))
                for domain, count in zip(domains, frames)]
     named = [word for k, domain in enumerate(domains) for word in (f"--domain-{k}", domain)]
