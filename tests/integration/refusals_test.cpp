@@ -13,9 +13,9 @@
 namespace tfdude {
 namespace {
 
-using Catch::Matchers::Contains;
 using nlohmann::json;
 using testing::CliResult;
+using testing::ContainsSubstring;
 using testing::TemporaryDirectory;
 using testing::TestDomain;
 using testing::ThesisDaemons;
@@ -121,7 +121,7 @@ TEST_CASE("cli: what breaks a rule is refused by name and changes nothing") {
     INFO("tfdude " << arguments[0] << " " << arguments[1] << ": " << plain.err);
     CHECK(plain.status == 1);
     CHECK(plain.out.empty());
-    for (const std::string& name : refusal.names) CHECK_THAT(plain.err, Contains(name));
+    for (const std::string& name : refusal.names) CHECK_THAT(plain.err, ContainsSubstring(name));
     arguments.insert(arguments.begin(), "--json");
     const CliResult program = d.domain.cli(arguments);
     CHECK(program.status == 1);
@@ -157,14 +157,14 @@ TEST_CASE("cli: wrong usage is 2") {
     INFO(result.err);
     CHECK(result.status == 2);
     CHECK(result.out.empty());
-    for (const std::string& name : usage.names) CHECK_THAT(result.err, Contains(name));
+    for (const std::string& name : usage.names) CHECK_THAT(result.err, ContainsSubstring(name));
     Arguments arguments = usage.arguments;
     arguments.insert(arguments.begin(), "--json");
     const CliResult program = d.domain.cli(arguments);
     CHECK(program.status == 2);
     const json error = json::parse(program.out).at("error");
     for (const std::string& name : usage.names) {
-      CHECK_THAT(error.at("message").get<std::string>(), Contains(name));
+      CHECK_THAT(error.at("message").get<std::string>(), ContainsSubstring(name));
     }
   }
 }
@@ -180,7 +180,7 @@ TEST_CASE("cli: no answer is 3") {
     const CliResult result = domain.cli(command);
     INFO(command[0]);
     CHECK(result.status == 3);
-    CHECK_THAT(result.err, Contains("domain " + std::to_string(domain.number())));
+    CHECK_THAT(result.err, ContainsSubstring("domain " + std::to_string(domain.number())));
   }
   const CliResult program = domain.cli({"--json", "tree"});
   CHECK(program.status == 3);
@@ -198,13 +198,14 @@ TEST_CASE("cli: a partition that does not answer is 3 and named") {
     const CliResult result = domain.cli(command);
     INFO(command[0]);
     CHECK(result.status == 3);
-    CHECK_THAT(result.err, Contains("'mute'"));
+    CHECK_THAT(result.err, ContainsSubstring("'mute'"));
     command.insert(command.begin(), {"--json", "--timeout", "300"});
     const CliResult program = domain.cli(command);
     CHECK(program.status == 3);
     const json error = json::parse(program.out).at("error");
     CHECK(error.at("code") == "timeout");
-    CHECK_THAT(error.at("message").get<std::string>(), Contains("'mute'") && Contains("300 ms"));
+    CHECK_THAT(error.at("message").get<std::string>(),
+               ContainsSubstring("'mute'") && ContainsSubstring("300 ms"));
   }
 }
 

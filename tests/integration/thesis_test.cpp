@@ -81,7 +81,7 @@ void check_refused(Robot& r, const Result<void>& result, Errc code,
   REQUIRE_FALSE(result);
   CHECK(result.error().code == code);
   for (const std::string& name : names) {
-    CHECK_THAT(result.error().message, Catch::Matchers::Contains("'" + name + "'"));
+    CHECK_THAT(result.error().message, testing::ContainsSubstring("'" + name + "'"));
   }
   r.check_agreement();
 }
@@ -94,13 +94,13 @@ TEST_CASE("the oracle knows what a lever does to an uncertain heading") {
   oracle.add("turret", "world", {Pose(), *Covariance::from_stddev({0, 0, 0, 0, 0, 0.1})});
   oracle.add("muzzle", "turret", {Pose::trusted({1, 0, 0, 0}, {2, 0, 0}), {}});
   const Matrix6d sigma = oracle.between("world", "muzzle").covariance.matrix();
-  CHECK(sigma(1, 1) == Approx(0.04));  // 2 m times 0.1 rad, sideways
-  CHECK(sigma(1, 5) == Approx(0.02));
-  CHECK(sigma(5, 5) == Approx(0.01));
-  CHECK(sigma(0, 0) == Approx(0.0));
+  CHECK(sigma(1, 1) == testing::Approx(0.04));  // 2 m times 0.1 rad, sideways
+  CHECK(sigma(1, 5) == testing::Approx(0.02));
+  CHECK(sigma(5, 5) == testing::Approx(0.01));
+  CHECK(sigma(0, 0) == testing::Approx(0.0));
   // Seen from the muzzle, the turret's own place is sure but for the heading.
-  CHECK(oracle.between("muzzle", "world").covariance.matrix()(5, 5) == Approx(0.01));
-  CHECK(oracle.between("muzzle", "world").pose.translation().x() == Approx(-2.0));
+  CHECK(oracle.between("muzzle", "world").covariance.matrix()(5, 5) == testing::Approx(0.01));
+  CHECK(oracle.between("muzzle", "world").pose.translation().x() == testing::Approx(-2.0));
 }
 
 TEST_CASE("processes: every ordered pair of frames is looked up from each process") {
@@ -156,7 +156,7 @@ TEST_CASE("processes: a frame cannot be added below what is not there") {
   check_refused(r, r.caller().add("camera", "arm_2", kX), Errc::kAlreadyExists, {"camera"});
   const auto result = r.domain.cli({"add", "tool", "--parent", "missing"});
   CHECK(result.status == 1);
-  CHECK_THAT(result.err, Catch::Matchers::Contains("'missing'"));
+  CHECK_THAT(result.err, testing::ContainsSubstring("'missing'"));
   r.check_agreement();
 }
 
@@ -204,14 +204,14 @@ TEST_CASE("processes: unknown start, unknown end and no connection are three err
   REQUIRE_FALSE(end);
   CHECK(start.error().code == Errc::kUnknownStart);
   CHECK(end.error().code == Errc::kUnknownEnd);
-  CHECK_THAT(start.error().message, Catch::Matchers::Contains("'nowhere'"));
-  CHECK_THAT(end.error().message, Catch::Matchers::Contains("'nowhere'"));
+  CHECK_THAT(start.error().message, testing::ContainsSubstring("'nowhere'"));
+  CHECK_THAT(end.error().message, testing::ContainsSubstring("'nowhere'"));
   REQUIRE(r.caller().add("island", "", kX, "arms"));
   for (const char* other : {"world", "hand_left"}) {
     const auto apart = r.caller().lookup(other, "island");
     REQUIRE_FALSE(apart);
     CHECK(apart.error().code == Errc::kNotConnected);
-    CHECK_THAT(apart.error().message, Catch::Matchers::Contains("'island'"));
+    CHECK_THAT(apart.error().message, testing::ContainsSubstring("'island'"));
   }
 }
 

@@ -61,9 +61,11 @@
 #include <tfdudePubSubTypes.hpp>
 #endif
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace tfdude::fastdds {
@@ -76,12 +78,18 @@ namespace etransport = eprosima::fastdds::rtps;
 namespace ertps = eprosima::fastrtps::rtps;
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 using ParticipantInfo = ertps::ParticipantDiscoveryInfo;
+using DiscoveryProtocol = ertps::DiscoveryProtocol_t;
 
 inline bool ok(const ReturnCode& code) { return code == ReturnCode::RETCODE_OK; }
 inline ReturnCode bad_parameter() { return ReturnCode::RETCODE_BAD_PARAMETER; }
 inline ReturnCode done() { return ReturnCode::RETCODE_OK; }
 
 inline bool write(edds::DataWriter& writer, void* data) { return writer.write(data); }
+
+inline std::string name_of(const edds::TopicDataType& type) { return type.getName(); }
+
+/// Elements of XML profiles that have another name in this version than in profiles/tfdude.xml.
+inline constexpr std::array<std::pair<const char*, const char*>, 0> kRenamedElements{};
 
 inline void switch_intraprocess_off() {
   eprosima::fastrtps::LibrarySettingsAttributes settings;
@@ -133,12 +141,24 @@ class CheckedType final : public Generated {
 
 namespace ertps = eprosima::fastdds::rtps;
 using ReturnCode = edds::ReturnCode_t;
+using DiscoveryProtocol = ertps::DiscoveryProtocol;
 
 inline bool ok(ReturnCode code) { return code == edds::RETCODE_OK; }
 inline ReturnCode bad_parameter() { return edds::RETCODE_BAD_PARAMETER; }
 inline ReturnCode done() { return edds::RETCODE_OK; }
 
 inline bool write(edds::DataWriter& writer, void* data) { return ok(writer.write(data)); }
+
+inline std::string name_of(const edds::TopicDataType& type) { return type.get_name(); }
+
+inline constexpr std::array<std::pair<const char*, const char*>, 6> kRenamedElements{{
+    {"initialHeartbeatDelay", "initial_heartbeat_delay"},
+    {"heartbeatPeriod", "heartbeat_period"},
+    {"nackResponseDelay", "nack_response_delay"},
+    {"nackSupressionDuration", "nack_supression_duration"},
+    {"initialAcknackDelay", "initial_acknack_delay"},
+    {"heartbeatResponseDelay", "heartbeat_response_delay"},
+}};
 
 inline void switch_intraprocess_off() {
   eprosima::fastdds::LibrarySettings settings;

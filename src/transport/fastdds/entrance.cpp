@@ -39,10 +39,10 @@ etransport::TransportInterface* GatedDescriptor::create_transport() const {
 // As Fast DDS would by default, but for the multicast locator that this participant listens to.
 void hear_by_unicast_only(edds::DomainParticipantQos& qos, std::uint32_t domain) {
   auto& builtin = qos.wire_protocol().builtin;
-  const bool arranged =
-      builtin.discovery_config.discoveryProtocol != ertps::DiscoveryProtocol_t::SIMPLE ||
-      !builtin.metatrafficUnicastLocatorList.empty() ||
-      !builtin.metatrafficMulticastLocatorList.empty() || !builtin.initialPeersList.empty();
+  const bool arranged = builtin.discovery_config.discoveryProtocol != DiscoveryProtocol::SIMPLE ||
+                        !builtin.metatrafficUnicastLocatorList.empty() ||
+                        !builtin.metatrafficMulticastLocatorList.empty() ||
+                        !builtin.initialPeersList.empty();
   if (arranged) return;
   ertps::Locator_t everywhere;
   ertps::IPLocator::setIPv4(everywhere, 0, 0, 0, 0);

@@ -41,7 +41,7 @@ ReturnCode OwnedFilters::create_content_filter(const char* filter_class_name, co
                                                const edds::TopicDataType*, const char*,
                                                const ParameterSeq&, edds::IContentFilter*& filter) {
   if (std::string_view(filter_class_name) != kClassName) return bad_parameter();
-  const bool of_requests = std::string_view(type_name) == RequestType().getName();
+  const bool of_requests = type_name == name_of(RequestType());
   filter = of_requests ? static_cast<edds::IContentFilter*>(&requests_) : &updates_;
   return done();
 }

@@ -4,6 +4,7 @@
 #include <functional>
 #include <mutex>
 #include <set>
+#include <string_view>
 
 #include "tfdude/base/id.hpp"
 
@@ -19,15 +20,18 @@ edds::DomainParticipantFactory& factory() {
   return *edds::DomainParticipantFactory::get_instance();
 }
 
+void replace_all(std::string& text, std::string_view from, std::string_view to) {
+  for (auto at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
+    text.replace(at, from.size(), to);
+  }
+}
+
 // Fast DDS keeps profiles by name for the whole process and refuses a name twice, so the built-in ones
 // get names of their own, and each file is loaded once.
 std::string renamed_builtin() {
   std::string xml = kBuiltinProfiles;
-  const std::string from = kPrefix;
-  const std::string to = kBuiltinPrefix;
-  for (auto at = xml.find(from); at != std::string::npos; at = xml.find(from, at + to.size())) {
-    xml.replace(at, from.size(), to);
-  }
+  replace_all(xml, kPrefix, kBuiltinPrefix);
+  for (const auto& [from, to] : kRenamedElements) replace_all(xml, from, to);
   return xml;
 }
 

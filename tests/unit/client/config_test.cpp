@@ -89,8 +89,8 @@ TEST_CASE("a configuration is read") {
   CHECK(camera.parent == "world");
   CHECK(camera.X_PC.pose.translation() == Eigen::Vector3d(1, -2.5, 0.3));
   CHECK(camera.X_PC.pose.rotation().angularDistance(tfdude::from_rpy(0.1, 0.2, 0.3)) < 1e-15);
-  CHECK(camera.X_PC.covariance.stddev()[2] == Catch::Detail::Approx(0.01));
-  CHECK(camera.X_PC.covariance.stddev()[5] == Catch::Detail::Approx(0.001));
+  CHECK(camera.X_PC.covariance.stddev()[2] == tfdude::testing::Approx(0.01));
+  CHECK(camera.X_PC.covariance.stddev()[5] == tfdude::testing::Approx(0.001));
 
   CHECK(config->frames[2].X_PC.covariance.matrix()(1, 0) == 0.5);
 }
@@ -197,10 +197,9 @@ TEST_CASE("a value that breaks its rule is refused by field") {
                  "robot.yaml:4: frame 'camera': xyz[0] is 1e999, which no double can hold"});
   check_refused({camera("    xyz: [0, 0, 2e9]"), Errc::kInvalidInput,
                  "robot.yaml:4: frame 'camera': xyz: translation.z is beyond 1e9 m"});
-  check_refused(
-      {camera("    parent: world\n    quat: [0, 0, 0, 2]"), Errc::kInvalidInput,
-       "robot.yaml:5: frame 'camera': quat: rotation has the norm 2, not that of a unit "
-       "quaternion"});
+  check_refused({camera("    parent: world\n    quat: [0, 0, 0, 2]"), Errc::kInvalidInput,
+                 "robot.yaml:5: frame 'camera': quat: rotation has the norm 2, not that of a unit "
+                 "quaternion"});
   check_refused(
       {camera("    cov: [1, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 0, 1]"),
        Errc::kInvalidInput,
@@ -228,7 +227,8 @@ TEST_CASE("a value that breaks its rule is refused by field") {
   CHECK(longest.has_value());
   const auto longer = tfdude::parse_config("frames: [{id: " + std::string(256, 'x') + "}]", "f");
   REQUIRE_FALSE(longer.has_value());
-  CHECK_THAT(longer.error().message, Catch::Matchers::Contains("has 256 bytes, at most 255"));
+  CHECK_THAT(longer.error().message,
+             tfdude::testing::ContainsSubstring("has 256 bytes, at most 255"));
 }
 
 TEST_CASE("huge nesting is refused, not followed") {
