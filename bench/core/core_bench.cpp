@@ -19,7 +19,8 @@ namespace {
 using namespace tfdude;
 
 using Shape = std::pair<std::size_t, std::size_t>;  // depth, frames
-constexpr Shape kShapes[] = {{2, 10}, {8, 100}, {30, 100}, {30, 1000}, {100, 1000}, {1000, 10000}};
+constexpr Shape kShapes[] = {{2, 10},     {8, 100},    {30, 100},    {30, 1000},
+                             {30, 10000}, {100, 1000}, {1000, 10000}};
 
 /// One of each kind a shape, made when first needed.
 const bench::Tree& tree_of(const Shape& shape) {
