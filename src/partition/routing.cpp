@@ -177,7 +177,8 @@ Result<Transform> assemble(const LookupPlan& plan,
     const auto part = std::find_if(plan.parts.begin(), plan.parts.end(),
                                    [&](const Part& asked) { return asked.owner == segment.owner; });
     const auto i = static_cast<std::size_t>(part - plan.parts.begin());
-    X_AB = compose(X_AB, answers[i][taken[i]++]);
+    const Transform& X = answers[i][taken[i]++];
+    X_AB = &segment == &plan.segments.front() ? X : compose(X_AB, X);
   }
   return X_AB;
 }

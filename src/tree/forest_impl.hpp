@@ -78,6 +78,12 @@ class Forest::Impl {
   /// Checks that the frame is there and held here. @return kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<std::uint32_t> held_slot(std::string_view id) const;
   [[nodiscard]] Result<std::uint32_t> held_slot(Handle frame) const;
+  /// The newest version of the frame if it is held here, else null.
+  [[nodiscard]] const Version* newest_held(Handle frame) const {
+    if (frame.slot >= slots_.size()) return nullptr;
+    const Version& version = newest(frame.slot);
+    return version.held() && version.generation == frame.generation ? &version : nullptr;
+  }
 
   /// All of them as one commit, or none; `frame` gives the id or the handle of an update.
   template <class Update, class Frame>

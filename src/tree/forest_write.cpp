@@ -257,10 +257,10 @@ Result<void> Forest::update(std::string_view id, const Transform& X_PC) {
 
 Result<void> Forest::update(Handle frame, const Transform& X_PC) {
   const std::lock_guard lock(impl_->mutex_);
-  const auto slot = impl_->held_slot(frame);
-  if (!slot) return tl::unexpected(slot.error());
-  if (!is_finite(X_PC)) return Impl::check_value(impl_->newest(*slot).name->text, X_PC);
-  impl_->push_held(*slot, X_PC);
+  const Version* version = impl_->newest_held(frame);
+  if (version == nullptr) return tl::unexpected(impl_->held_slot(frame).error());
+  if (!is_finite(X_PC)) return Impl::check_value(version->name->text, X_PC);
+  impl_->push_held(frame.slot, X_PC);
   impl_->commit();
   return {};
 }

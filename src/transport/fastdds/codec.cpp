@@ -182,12 +182,16 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
 
 }  // namespace
 
-wire::Request to_wire(const Request& request, std::string_view partition) {
-  wire::Request sample;
+void write_wire(const Request& request, std::string_view partition, wire::Request& sample) {
   sample.id(request.id);
   std::visit(BodyWriter{sample.body()}, request.body);
   sample.addressee(addressee_of(partition));
   sample.sequence_number(request.sequence);
+}
+
+wire::Request to_wire(const Request& request, std::string_view partition) {
+  wire::Request sample;
+  write_wire(request, partition, sample);
   return sample;
 }
 

@@ -12,6 +12,9 @@
 // error says which frame and field.
 namespace tfdude::fastdds {
 
+/// Into a sample that may have been used before: the generated union has a place for every kind of request, some
+/// 1.5 KB, which take longer to make than to fill.
+void write_wire(const Request& request, std::string_view partition, wire::Request& sample);
 [[nodiscard]] wire::Request to_wire(const Request& request, std::string_view partition);
 [[nodiscard]] wire::Reply to_wire(const Reply& reply);
 [[nodiscard]] wire::Update to_wire(const Update& update);

@@ -210,7 +210,8 @@ void FastDdsTransport::prepare(const std::string& partition) {
 Result<void> FastDdsTransport::send(const std::string& partition, const Request& request,
                                     Deadline deadline) {
   const auto to = outlet(request_outlets_, topics_.request, partition, "call_writer");
-  wire::Request sample = to_wire(request, partition);
+  thread_local wire::Request sample;
+  write_wire(request, partition, sample);
   return send(*to, partition, &sample, deadline);
 }
 
