@@ -53,12 +53,21 @@ void hear_by_unicast_only(edds::DomainParticipantQos& qos, std::uint32_t domain)
   builtin.initialPeersList.push_back(group);
 }
 
+// Whoever enters to ask does not wait for its next announcement; there are few of them at a time, and not for
+// long, where each server's announcement is heard by all.
+void announce_eagerly(edds::DomainParticipantQos& qos) {
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  discovery.initial_announcements.period = {0, 2'000'000};
+  discovery.leaseDuration_announcementperiod = {0, 100'000'000};
+}
+
 }  // namespace
 
 void Entrance::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) const {
   const auto is_udp = [](const auto& transport) {
     return std::dynamic_pointer_cast<etransport::UDPv4TransportDescriptor>(transport) != nullptr;
   };
+  if (client) announce_eagerly(qos);
   auto& transports = qos.transport().user_transports;
   const bool udp_only = !qos.transport().use_builtin_transports &&
                         std::all_of(transports.begin(), transports.end(), is_udp);

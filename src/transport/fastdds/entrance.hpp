@@ -18,6 +18,7 @@ namespace tfdude::fastdds {
 /// - An answer comes to the multicast socket and what follows on it to the unicast one, where another thread
 ///   may be faster. So a client does not listen to multicast: all comes to one socket, in order. It
 ///   then meets later participants by its own announcements, and other clients not at all.
+/// - A client announces itself every 2 ms at first, later every 100 ms; servers as the profile says.
 class Entrance {
  public:
   /// Prepares a participant that is going to be created. Of transports other than UDP, and of discovery that
