@@ -138,8 +138,8 @@ ALL = (
 WHY = {
     "Across partitions: lookup over 2 to 16":
         "All are asked at once, but two processors have to run all of them: each asked process costs "
-        "a wake-up, a receive and a send. A bare UDP fan-out to as many processes "
-        "(`udp_floor` below) exceeds the bound, too, from about four on.",
+        "a wake-up, a receive and a send. A bare UDP fan-out to as many processes (`udp floor` "
+        "below) grows alike.",
     "Floor: lookup, one core":
         "What is ours in a round trip, planning and the codec at both ends, takes two to four "
         "microseconds; on one core nothing hides them.",
