@@ -16,10 +16,12 @@ namespace tfdude {
 ///
 /// @tparam Value  Transform, or Pose where the covariance is not asked for
 template <class Value>
-class Climb {
+class
+    Climb {  // NOLINT(cppcoreguidelines-pro-type-member-init): pending_ is written before it is read
  public:
   /// Goes up one edge: X_PC is its value, C the frame reached so far, P the frame reached then.
   void up(const Value& X_PC) {
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only, see climb.cpp
     pending_[count_++] = reinterpret_cast<kernel::Edge>(&X_PC);
     if (count_ == pending_.size()) compute();
   }

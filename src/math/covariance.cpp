@@ -64,6 +64,13 @@ Result<void> scale_to_unit_diagonal(Matrix6d& m, Twist& scale) {
   return {};
 }
 
+bool is_zero_axis(const Covariance::Upper& upper, std::size_t k) {
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (upper[upper_index(std::min(i, k), std::max(i, k))] != 0) return false;
+  }
+  return true;
+}
+
 // True where an LDLᵀ factorization goes through with clear pivots, each judged by its own variance, which is as if
 // the diagonal were scaled to one; rows of zeros are left out. The fast answer for most, false for what is
 // not a number.
@@ -75,9 +82,7 @@ bool clearly_psd(const Covariance::Upper& upper) {
   for (std::size_t k = 0; k < 6; ++k) {
     const double variance = upper[upper_index(k, k)];
     if (variance == 0) {
-      for (std::size_t i = 0; i < 6; ++i) {
-        if (upper[upper_index(std::min(i, k), std::max(i, k))] != 0) return false;
-      }
+      if (!is_zero_axis(upper, k)) return false;
       continue;
     }
     if (!(a[k][k] > kClearPivot * variance && variance <= kMaxVariance)) return false;

@@ -10,6 +10,7 @@ namespace tfdude {
 inline bool is_finite(const Transform& X) {
   static_assert(sizeof(Transform) == 28 * sizeof(double));
   using Pair = double __attribute__((vector_size(16), aligned(8), may_alias));
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
   const auto* pairs = reinterpret_cast<const Pair*>(&X);
   Pair sums[4] = {pairs[0], pairs[1], pairs[2], pairs[3]};
   for (int i = 4; i < 14; ++i) sums[i % 4] += pairs[i];

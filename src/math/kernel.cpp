@@ -4,17 +4,18 @@ namespace tfdude::kernel {
 namespace {
 
 using V4 = double __attribute__((vector_size(32)));
-using Lanes = long long __attribute__((vector_size(32)));
 
 namespace any {
 #include "math/kernel_body.ipp"
 }
 
-#if defined(__x86_64__)
+// clang, which only checks this, has another pragma for it.
+#if defined(__x86_64__) && !defined(__clang__)
+#define TFDUDE_HAS_AVX2
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 namespace avx2 {
-#include "math/kernel_body.ipp"
+#include "math/kernel_body.ipp"  // NOLINT(readability-duplicate-include): the same for another processor
 }  // namespace avx2
 #pragma GCC pop_options
 
@@ -27,7 +28,7 @@ const bool kAvx2 = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports
 const Functions kPortable{any::climb_pose, any::climb_both, any::quotient, any::transport};
 
 const Functions& functions() {
-#if defined(__x86_64__)
+#if defined(TFDUDE_HAS_AVX2)
   if (kAvx2) return kForAvx2;
 #endif
   return kPortable;

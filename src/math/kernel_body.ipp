@@ -6,7 +6,7 @@ inline V4 combine(const V4* m, double x0, double x1, double x2) {
   return m[0] * x0 + m[1] * x1 + m[2] * x2;
 }
 
-inline V4 turn_lanes(V4 a) { return __builtin_shuffle(a, Lanes{1, 2, 0, 3}); }
+inline V4 turn_lanes(V4 a) { return __builtin_shufflevector(a, a, 1, 2, 0, 3); }
 
 inline V4 cross(V4 a, V4 b) { return turn_lanes(a * turn_lanes(b) - turn_lanes(a) * b); }
 

@@ -68,7 +68,7 @@ void Peers::look_for_silent(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   const auto late = now - std::exchange(last_look_, now) - kSpeakEvery;
   for (auto& [id, server] : servers_) {
-    if (late > late.zero()) server.last_heard += late;
+    if (late > Clock::duration::zero()) server.last_heard += late;
     if (!server.presence || server.silent || now - server.last_heard < silence_) continue;
     server.silent = true;
     gone_(*server.presence);
