@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string_view>
+
+#include "tfdude/base/id.hpp"
 #include "tfdude/math/transform.hpp"
 
 namespace tfdude {
@@ -17,6 +20,14 @@ inline bool is_finite(const Transform& X) {
   const Pair sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
   const double total = sum[0] + sum[1];
   return total - total == 0.0;
+}
+
+/// As check_finite, for the value of a frame's edge, whose id the error names.
+inline Result<void> check_value(std::string_view id, const Transform& X_PC) {
+  if (auto finite = check_finite(X_PC); !finite) {
+    return fail_at("frame " + quote(id), finite.error());
+  }
+  return {};
 }
 
 }  // namespace tfdude

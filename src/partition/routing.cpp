@@ -4,6 +4,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "math/finite.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -35,13 +37,6 @@ Result<void> check_size(const Part& part, std::size_t items, const char* what) {
   return fail(Errc::kInvalidInput, "partition " + quote(part.partition) + " is asked for " +
                                        std::to_string(items) + " " + what +
                                        " at once, of at most " + std::to_string(kMaxItems));
-}
-
-Result<void> check_value(const std::string& id, const Transform& X_PC) {
-  if (auto finite = check_finite(X_PC); !finite) {
-    return fail_at("frame " + quote(id), finite.error());
-  }
-  return {};
 }
 
 Result<void> check_all_reachable(const Directory& directory, const std::vector<Part>& parts) {

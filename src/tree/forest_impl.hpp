@@ -72,9 +72,6 @@ class Forest::Impl {
   /// The id's newest version, there or not; null if the id is not interned.
   [[nodiscard]] const Version* newest_named(std::string_view id) const;
 
-  /// What is wrong with a value that is not finite. @return kInvalidInput naming the frame and the field.
-  [[nodiscard]] static Result<void> check_value(std::string_view id, const Transform& X_PC);
-
   /// Checks that the frame is there and held here. @return kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<std::uint32_t> held_slot(std::string_view id) const;
   [[nodiscard]] Result<std::uint32_t> held_slot(Handle frame) const;

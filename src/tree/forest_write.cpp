@@ -19,13 +19,6 @@ const Version* Forest::Impl::newest_named(std::string_view id) const {
   return name != nullptr ? &newest(name->slot) : nullptr;
 }
 
-Result<void> Forest::Impl::check_value(std::string_view id, const Transform& X_PC) {
-  if (auto finite = check_finite(X_PC); !finite) {
-    return fail_at("frame " + quote(id), finite.error());
-  }
-  return {};
-}
-
 Result<std::uint32_t> Forest::Impl::held_slot(std::string_view id) const {
   const Version* version = newest_named(id);
   if (version == nullptr || !version->present()) return unknown_frame(id);
@@ -52,12 +45,12 @@ Forest::Impl::Pair Forest::Impl::newest_pair(std::string_view id, std::string_vi
 }
 
 Result<void> Forest::Impl::check_no_cycle(const Pair& pair) const {
+  if (pair.id == pair.parent) {
+    return fail(Errc::kCycle, "frame " + quote(pair.id) + " cannot hang under itself");
+  }
   const Version* above = pair.above;
   while (pair.frame != nullptr && above != nullptr && above != pair.frame) {
     above = above->parent == kNoSlot ? nullptr : &newest(above->parent);
-  }
-  if (pair.id == pair.parent) {
-    return fail(Errc::kCycle, "frame " + quote(pair.id) + " cannot hang under itself");
   }
   if (pair.frame != nullptr && above == pair.frame) {
     return fail(Errc::kCycle, "frame " + quote(pair.id) + " cannot hang under " +
@@ -210,7 +203,7 @@ Result<void> Forest::add(std::string_view id, std::string_view parent, const Tra
                          MissingParent rule) {
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
-  if (!is_finite(X_PC)) return Impl::check_value(id, X_PC);
+  if (!is_finite(X_PC)) return check_value(id, X_PC);
   const std::lock_guard lock(impl_->mutex_);
   const Impl::Pair pair = impl_->newest_pair(id, parent);
   if (pair.frame != nullptr && pair.frame->present()) {
@@ -246,7 +239,7 @@ Result<std::vector<std::string>> Forest::remove(std::string_view id) {
 }
 
 Result<void> Forest::update(std::string_view id, const Transform& X_PC) {
-  if (!is_finite(X_PC)) return Impl::check_value(id, X_PC);
+  if (!is_finite(X_PC)) return check_value(id, X_PC);
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
@@ -259,7 +252,7 @@ Result<void> Forest::update(Handle frame, const Transform& X_PC) {
   const std::lock_guard lock(impl_->mutex_);
   const Version* version = impl_->newest_held(frame);
   if (version == nullptr) return tl::unexpected(impl_->held_slot(frame).error());
-  if (!is_finite(X_PC)) return Impl::check_value(version->name->text, X_PC);
+  if (!is_finite(X_PC)) return check_value(version->name->text, X_PC);
   impl_->push_held(frame.slot, X_PC);
   impl_->commit();
   return {};
@@ -292,7 +285,7 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
                           const std::optional<Transform>& X_PC) {
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   const std::lock_guard lock(impl_->mutex_);
-  if (X_PC && !is_finite(*X_PC)) return Impl::check_value(id, *X_PC);
+  if (X_PC && !is_finite(*X_PC)) return check_value(id, *X_PC);
   const auto slot = impl_->held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   const Impl::Pair pair = impl_->newest_pair(id, parent);

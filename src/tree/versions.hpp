@@ -67,7 +67,6 @@ class VersionPool {
     version->next = nullptr;
     (last_ != nullptr ? last_->next : first_) = version;
     last_ = version;
-    ++waiting_;
   }
 
   void collect(std::uint64_t safe_below) {
@@ -77,11 +76,8 @@ class VersionPool {
       if (first_ == nullptr) last_ = nullptr;
       version->next = free_;
       free_ = version;
-      --waiting_;
     }
   }
-
-  [[nodiscard]] std::size_t waiting() const { return waiting_; }
 
  private:
   static constexpr std::size_t kBlock = 64;
@@ -98,7 +94,6 @@ class VersionPool {
   Version* free_ = nullptr;
   Version* first_ = nullptr;
   Version* last_ = nullptr;
-  std::size_t waiting_ = 0;
 };
 
 /// The newest version of each slot. Grows without moving what readers look at: segment k holds
