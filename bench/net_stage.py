@@ -11,7 +11,6 @@ import json
 import os
 import pathlib
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -22,8 +21,6 @@ import figures
 import processes
 
 EXAMPLES = processes.ROOT / "examples" / "thesis"
-
-DOMAINS = range(140, 170)
 
 ALL_CPUS = ",".join(map(str, sorted(os.sched_getaffinity(0))))
 
@@ -43,19 +40,6 @@ def patient_profile(work: pathlib.Path) -> pathlib.Path:
     return path
 
 
-def lease_domain() -> tuple[int, socket.socket]:
-    """A DDS domain that no other benchmark and no test has, and what keeps it: a name of the kernel's, as in
-    tests/support/domain_lease.cpp."""
-    for domain in DOMAINS:
-        lease = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            lease.bind(f"\0tfdude-test-domain-{domain}")
-            return domain, lease
-        except OSError:
-            lease.close()
-    raise RuntimeError("all DDS domains for benchmarks are taken")
-
-
 class Stage:
     """Runs processes and never leaves one behind."""
 
@@ -68,7 +52,7 @@ class Stage:
     def domain(self, name: str) -> int:
         """The DDS domain that stands for a name in this stage."""
         if name not in self.leases:
-            self.leases[name] = lease_domain()
+            self.leases[name] = processes.lease_domain()
         return self.leases[name][0]
 
     def command(self, cpus: str, program: str, arguments: list) -> list[str]:

@@ -4,16 +4,31 @@ import contextlib
 import pathlib
 import select
 import signal
+import socket
 import subprocess
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROFILE = ROOT / "profiles" / "loopback.xml"
+DOMAINS = range(140, 172)
 PATIENCE_S = 40  # for a program to start or to answer
 
 
 class Skipped(Exception):
     """A stage cannot be run here, and why."""
+
+
+def lease_domain():
+    """A DDS domain that no other benchmark and no test has, and what keeps it: a name of the kernel's, as in
+    tests/support/domain_lease.cpp."""
+    for domain in DOMAINS:
+        lease = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            lease.bind(f"\0tfdude-test-domain-{domain}")
+            return domain, lease
+        except OSError:
+            lease.close()
+    raise RuntimeError("all DDS domains for benchmarks are taken")
 
 
 def end(process, how=signal.SIGTERM):

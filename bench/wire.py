@@ -23,7 +23,6 @@ PAUSE_S = 0.2  # after an operation: several of DDS's heartbeats and acknowledge
 IDLE_S = 2.0
 PARTITIONS = 6
 PATHS = (1, 2, 4)  # partitions on the path
-DOMAIN = 170
 THESIS_CONFIGS = ("robot", "arms")
 
 # The ids have ten characters, as the thesis assumed.
@@ -150,10 +149,11 @@ def figures_of(capture, operation, begins, names=None):
 def measure_operations(bin_dir, work, rounds):
     """Table 5.1 on the thesis's tree, asked by a client that owns nothing."""
     file = work / "operations.pcap"
+    domain, _lease = processes.lease_domain()
     configs = [processes.ROOT / "examples" / "thesis" / f"{name}.yaml" for name in THESIS_CONFIGS]
     begins = {name: [] for name in OPERATIONS}
-    with capturing(file, DOMAIN), processes.daemons(bin_dir, configs, DOMAIN, work):
-        with client_of(bin_dir, DOMAIN, work) as client:
+    with capturing(file, domain), processes.daemons(bin_dir, configs, domain, work):
+        with client_of(bin_dir, domain, work) as client:
             client.settle("lookup world hand_left")
             client.perform(SETUP)
             for turn in range(rounds + 1):
@@ -185,7 +185,8 @@ def chain_configs(work):
 
 def measure_chain(bin_dir, work, rounds):
     """A lookup over some of six partitions: who is not on the path should cost nothing."""
-    file, domain = work / "chain.pcap", DOMAIN + 1
+    file = work / "chain.pcap"
+    domain, _lease = processes.lease_domain()
     begins = {over: [] for over in PATHS}
     configs = list(chain_configs(work))
     with capturing(file, domain), processes.daemons(bin_dir, configs, domain, work):
