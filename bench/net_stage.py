@@ -73,7 +73,7 @@ class Stage:
 
     def daemon(self, cpus: str, domain: int, config: pathlib.Path) -> list[str]:
         return self.command(
-            cpus, "tfduded", ["--config", config, "--domain", domain, "--profile", self.profile]
+            cpus, "tfduded", ["--no-state", "--config", config, "--domain", domain, "--profile", self.profile]
         )
 
     def measured(self, command: list[str], deadline: float) -> Iterator[dict]:

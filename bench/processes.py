@@ -64,7 +64,7 @@ def daemons(bin_dir, configs, domain, logs):
         for config in configs:
             with open(pathlib.Path(logs) / f"{pathlib.Path(config).stem}.log", "wb") as log:
                 running.append(subprocess.Popen(
-                    [bin_dir / "tfduded", "--config", config, "--domain", str(domain),
+                    [bin_dir / "tfduded", "--no-state", "--config", config, "--domain", str(domain),
                      "--profile", PROFILE], stdout=subprocess.PIPE, stderr=log, bufsize=0))
         for process, config in zip(running, configs):
             line = await_line(process.stdout, f"tfduded --config {config}")

@@ -12,7 +12,7 @@ import sys
 import tempfile
 import unittest
 
-LAYERS = ["base", "math", "tree", "partition", "transport", "client", "apps"]
+LAYERS = ["base", "math", "tree", "partition", "store", "transport", "client", "apps"]
 SUFFIXES = {".hpp", ".cpp", ".h", ".cc", ".ipp"}
 DDS_FOLDER = "src/transport/fastdds/"
 
@@ -21,6 +21,7 @@ CONFINED = [
     ("Boost", r"boost/", ["src/tree/graph.hpp"]),
     ("DDS", r"(fastdds|fastrtps|fastcdr)/", [DDS_FOLDER]),
     ("yaml-cpp", r"yaml-cpp/", ["src/client/"]),
+    ("SQLite", r"sqlite3\.h$", ["src/store/"]),
     ("CLI11", r"CLI/", ["apps/"]),
     ("nlohmann", r"nlohmann/", ["apps/"]),
 ]
@@ -175,6 +176,8 @@ class SelfTest(unittest.TestCase):
         ("confined", "apps/tfdude/a.cpp", '#include "transport/fastdds/entity.hpp"\n'),
         ("confined", "apps/tfdude/a.cpp", "#include <yaml-cpp/yaml.h>\n"),
         ("confined", "src/client/a.cpp", "#include <CLI/CLI.hpp>\n"),
+        ("confined", "src/client/a.cpp", "#include <sqlite3.h>\n"),
+        ("arrow", "src/store/a.cpp", '#include "tfdude/transport/port.hpp"\n'),
         ("confined", "src/client/a.cpp", "#include <nlohmann/json.hpp>\n"),
         ("math", "src/math/a.cpp", "#include <tl/expected.hpp>\n"),
         ("math", "src/math/a.cpp", "#include <unistd.h>\n"),

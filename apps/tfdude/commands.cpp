@@ -26,6 +26,15 @@ int answer(const Arguments& arguments, const nlohmann::json& json, const std::st
   return kDone;
 }
 
+// Those that end what goes on and on; main() has blocked them.
+sigset_t signals_to_stop() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  return signals;
+}
+
 // A list of ids, a line each.
 int list(const Arguments& arguments, const char* key, const std::vector<std::string>& ids) {
   std::string text;
@@ -210,10 +219,7 @@ int run_exists(Client& client, const Arguments& arguments) {
 }
 
 int run_watch(Client& client, const Arguments& arguments) {
-  sigset_t stop_signals;
-  sigemptyset(&stop_signals);
-  sigaddset(&stop_signals, SIGINT);
-  sigaddset(&stop_signals, SIGTERM);
+  const sigset_t stop_signals = signals_to_stop();
   const double period = 1.0 / arguments.rate;
   const timespec pause{
       static_cast<std::time_t>(period),
@@ -221,6 +227,19 @@ int run_watch(Client& client, const Arguments& arguments) {
   do {
     (void)print_lookup(client, arguments);
   } while (sigtimedwait(&stop_signals, nullptr, &pause) < 0);
+  return kDone;
+}
+
+int run_events(Client& client, const Arguments& arguments) {
+  // What is there already is no event.
+  (void)client.partitions();
+  const auto subscription = client.on_change([&](const Change& change) {
+    print(arguments.json ? dump(change_json(change)) + "\n"
+                         : to_string(change.time) + "  " + change.message + "\n");
+  });
+  const sigset_t stop_signals = signals_to_stop();
+  int signal = 0;
+  sigwait(&stop_signals, &signal);
   return kDone;
 }
 

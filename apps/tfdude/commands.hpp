@@ -40,6 +40,7 @@ int run_children(Client& client, const Arguments& arguments);
 int run_roots(Client& client, const Arguments& arguments);
 int run_exists(Client& client, const Arguments& arguments);
 int run_watch(Client& client, const Arguments& arguments);
+int run_events(Client& client, const Arguments& arguments);
 
 /// Prints what is wrong with the command line itself, as JSON, and returns the exit status.
 int report_usage(const std::string& message);

@@ -23,7 +23,7 @@ _tfdude_command() {
 
 _tfdude() {
   local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command words common
-  local commands="tree frames partitions roots parent children exists lookup watch add update remove move"
+  local commands="tree frames partitions roots parent children exists lookup watch events add update remove move"
   local pose="--xyz --rpy --quat --stddev --cov"
   COMPREPLY=()
   command=$(_tfdude_command)

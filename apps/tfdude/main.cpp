@@ -84,6 +84,11 @@ void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
       });
 }
 
+void add_events_command(CLI::App& app, Command& chosen) {
+  add_command(app, "events", "tell what changes: partitions that come and go, frames, conflicts",
+              "--json events", cli::run_events, chosen);
+}
+
 void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   auto* add = add_command(app, "add", "add a frame", "add tool --parent camera --xyz 0.1 0 -0.2",
                           cli::run_add, chosen);
@@ -132,6 +137,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 3600000));
   app.add_flag("--json", arguments.json, "one JSON object an answer");
   add_reading_commands(app, arguments, command);
+  add_events_command(app, command);
   add_changing_commands(app, arguments, command);
   try {
     app.parse(argc, argv);
@@ -150,12 +156,13 @@ int main(int argc, char** argv) {
   }
   arguments.options.timeout = Milliseconds(timeout_ms);
   arguments.options.discovery = std::min(arguments.options.discovery, arguments.options.timeout);
-  // Before any thread starts, so that watch can wait for them.
+  // Before any thread starts, so that watch and events can wait for them.
   sigset_t stop_signals;
   sigemptyset(&stop_signals);
   sigaddset(&stop_signals, SIGINT);
   sigaddset(&stop_signals, SIGTERM);
-  if (app.got_subcommand("watch")) pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
+  if (app.got_subcommand("watch") || app.got_subcommand("events"))
+    pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
   const int status = run(arguments, command);
   const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
   if (!written) std::perror("tfdude: standard output");

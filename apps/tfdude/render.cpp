@@ -124,6 +124,20 @@ nlohmann::json partition_json(const PartitionInfo& partition) {
           {"reachable", partition.reachable}};
 }
 
+nlohmann::json change_json(const Change& change) {
+  nlohmann::json json{{"event", to_string(change.kind)},
+                      {"time", static_cast<double>(change.time.time_since_epoch().count()) * 1e-9},
+                      {"message", change.message}};
+  const std::pair<const char*, const std::string&> names[] = {{"partition", change.partition},
+                                                              {"frame", change.frame},
+                                                              {"parent", change.parent},
+                                                              {"rival", change.rival}};
+  for (const auto& [key, name] : names) {
+    if (!name.empty()) json[key] = name;
+  }
+  return json;
+}
+
 std::string dump(const nlohmann::json& json) {
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }

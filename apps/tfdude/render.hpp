@@ -21,6 +21,7 @@ namespace tfdude::cli {
                                          const std::vector<std::string>& partitions);
 [[nodiscard]] nlohmann::json frame_json(const Frame& frame);
 [[nodiscard]] nlohmann::json partition_json(const PartitionInfo& partition);
+[[nodiscard]] nlohmann::json change_json(const Change& change);
 
 /// One line of JSON; what is not valid UTF-8 is replaced.
 [[nodiscard]] std::string dump(const nlohmann::json& json);

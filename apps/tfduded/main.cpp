@@ -1,8 +1,11 @@
 // The daemon of one subsystem: loads its frames, owns them, serves them until it is told to stop.
 
+#include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <string>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -20,8 +23,18 @@ constexpr int kWrongUsage = 2;
 struct Arguments {
   std::string partition;
   std::string config;
+  bool no_state = false;
+  int save_every_ms = 1000;
   tfdude::Options options;
 };
+
+// Of the XDG base directory specification. @return empty where there is no home
+std::string default_state() {
+  const char* state = std::getenv("XDG_STATE_HOME");
+  if (state != nullptr && *state == '/') return std::string(state) + "/tfdude";
+  const char* home = std::getenv("HOME");
+  return home != nullptr && *home != 0 ? std::string(home) + "/.local/state/tfdude" : std::string();
+}
 
 tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
   tfdude::Config config;
@@ -43,6 +56,22 @@ tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
   return config;
 }
 
+// Waits for a signal to stop, or until another process has the partition. @return the exit status
+int run(tfdude::Node& node, const sigset_t& stop_signals) {
+  std::atomic<bool> given_up{false};
+  const auto subscription = node.on_change([&](const tfdude::Change& change) {
+    const bool own = change.partition == node.partition() && change.frame.empty();
+    if (change.kind != tfdude::ChangeKind::kConflict || !own) return;
+    given_up = true;
+    kill(getpid(), SIGTERM);
+  });
+  int signal = 0;
+  sigwait(&stop_signals, &signal);
+  if (given_up) return kRefused;
+  spdlog::info("stopping on signal {}", signal);
+  return 0;
+}
+
 int serve(const Arguments& arguments, const sigset_t& stop_signals) {
   const auto config = configure(arguments);
   if (!config) {
@@ -52,16 +81,14 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
   auto node = tfdude::Node::open(config->partition, config->frames, arguments.options);
   if (!node) {
     spdlog::error("partition {}: {}", tfdude::quote(config->partition), node.error().message);
-    return node.error().code == tfdude::Errc::kConfig ? kWrongUsage : kRefused;
+    const auto code = node.error().code;
+    return code == tfdude::Errc::kConfig || code == tfdude::Errc::kState ? kWrongUsage : kRefused;
   }
-  std::printf("ready partition=%s frames=%zu\n", config->partition.c_str(), config->frames.size());
+  std::printf("ready partition=%s frames=%zu\n", config->partition.c_str(), node->own_frames());
   std::fflush(stdout);
   spdlog::info("serving partition {} in domain {}", tfdude::quote(config->partition),
                arguments.options.domain);
-  int signal = 0;
-  sigwait(&stop_signals, &signal);
-  spdlog::info("stopping on signal {}", signal);
-  return 0;
+  return run(*node, stop_signals);
 }
 
 }  // namespace
@@ -76,10 +103,26 @@ int main(int argc, char** argv) {
   app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232")
       ->check(CLI::Range(0, 232));
   app.add_option("--profile", arguments.options.profile, "XML file of DDS profiles");
+  auto* state = app.add_option("--state", arguments.options.state,
+                               "directory in which to keep the frames "
+                               "(default: $XDG_STATE_HOME/tfdude or ~/.local/state/tfdude)");
+  app.add_flag("--no-state", arguments.no_state, "keep nothing: begin with --config each time")
+      ->excludes(state);
+  app.add_option("--save-every", arguments.save_every_ms,
+                 "how often at most streamed values are stored [ms]")
+      ->check(CLI::Range(1, 86'400'000));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kWrongUsage;
+  }
+  arguments.options.save_every = tfdude::Milliseconds(arguments.save_every_ms);
+  if (arguments.options.state.empty() && !arguments.no_state) {
+    arguments.options.state = default_state();
+    if (arguments.options.state.empty()) {
+      std::fputs("tfduded: no home for the state: give --state DIR or --no-state\n", stderr);
+      return kWrongUsage;
+    }
   }
   // Standard output is for the line "ready" alone.
   // The library takes the logger of this name for its own.

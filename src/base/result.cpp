@@ -34,6 +34,8 @@ std::string_view to_string(Errc code) {
       return "config";
     case Errc::kTransport:
       return "transport";
+    case Errc::kState:
+      return "state";
   }
   return "unknown";
 }

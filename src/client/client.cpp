@@ -112,6 +112,10 @@ std::vector<Frame> Client::frames() { return participant_->frames(); }
 
 std::vector<PartitionInfo> Client::partitions() { return participant_->partitions(); }
 
+Subscription Client::on_change(std::function<void(const Change&)> listener) {
+  return Subscription(participant_->on_change(std::move(listener)));
+}
+
 Result<Node> Node::open(const std::string& partition, const std::vector<FrameSpec>& frames,
                         const Options& options) {
   if (auto ok = check_partition_name(partition); !ok) return tl::unexpected(std::move(ok.error()));
@@ -131,6 +135,8 @@ Result<Node> Node::open(std::unique_ptr<Transport> transport, const std::string&
   }
   return Node(std::move(participant));
 }
+
+std::size_t Node::own_frames() const { return participant_->own_frames(); }
 
 const std::string& Node::partition() const { return participant_->partition_name(); }
 

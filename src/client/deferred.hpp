@@ -16,16 +16,19 @@ class Deferred {
  public:
   Deferred(std::chrono::milliseconds period, std::function<void()> job)
       : period_(period), job_(std::move(job)), thread_([this] { run(); }) {}
-  ~Deferred() {
+  ~Deferred() { stop(); }
+  Deferred(const Deferred&) = delete;
+  Deferred& operator=(const Deferred&) = delete;
+
+  /// Finishes the job at hand; what is asked for from now on is not done.
+  void stop() {
     {
       const std::lock_guard lock(mutex_);
       stopping_ = true;
     }
     changed_.notify_one();
-    thread_.join();
+    if (thread_.joinable()) thread_.join();
   }
-  Deferred(const Deferred&) = delete;
-  Deferred& operator=(const Deferred&) = delete;
 
   void ask() {
     if (asked_.exchange(true)) return;

@@ -19,10 +19,6 @@ constexpr Milliseconds kStructureDelay{100};
 // How often a new participant asks itself whether it has met everybody.
 constexpr Milliseconds kLookAround{2};
 
-Time wall_clock() {
-  return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
-}
-
 }  // namespace
 
 Participant::Participant(std::unique_ptr<Transport> transport, std::string partition,
@@ -33,8 +29,21 @@ Participant::Participant(std::unique_ptr<Transport> transport, std::string parti
       transport_(std::move(transport)) {}
 
 Participant::~Participant() {
-  publisher_.reset();
+  saver_.reset();
+  if (publisher_) publisher_->stop();
+  (void)commit();
+  save_values();
   transport_->stop();
+}
+
+Time Participant::wall_clock() {
+  return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
+}
+
+Result<void> Participant::still_in() {
+  if (!out_.load(std::memory_order_relaxed)) return {};
+  const std::lock_guard lock(structure_mutex_);
+  return fail(Errc::kPartitionTaken, given_up_);
 }
 
 Result<void> Participant::start() { return transport_->start(*this); }
@@ -278,6 +287,11 @@ std::vector<Frame> Participant::frames() {
   return frames;
 }
 
+std::size_t Participant::own_frames() {
+  const std::lock_guard lock(structure_mutex_);
+  return partition_ != nullptr ? partition_->frame_count() : 0;
+}
+
 std::vector<PartitionInfo> Participant::partitions() {
   settle();
   const std::lock_guard lock(structure_mutex_);
@@ -292,28 +306,57 @@ std::vector<PartitionInfo> Participant::partitions() {
   return all;
 }
 
+std::shared_ptr<void> Participant::on_change(Events::Callback listener) {
+  {
+    const std::lock_guard lock(structure_mutex_);
+    directory_.changes().watch();
+  }
+  const std::uint64_t subscriber = events_->subscribe(std::move(listener));
+  return {nullptr, [events = events_, subscriber](void*) { events->unsubscribe(subscriber); }};
+}
+
+// Under structure_mutex_, so that they are told in the order in which they happened.
+void Participant::tell_changes() {
+  auto changes = directory_.changes().take();
+  if (changes.empty()) return;
+  for (Change& change : changes) {
+    change.time = wall_clock();
+    const bool loser = change.partition == directory_.name(kHeldHere);
+    if (change.kind == ChangeKind::kConflict && loser) log().error("{}", change.message);
+  }
+  events_->post(std::move(changes));
+}
+
 void Participant::on_page(const Page& page) {
+  bool conceded = false;
   {
     const std::lock_guard lock(structure_mutex_);
     directory_.apply(page);
+    if (partition_ != nullptr) conceded = partition_->concede(wall_clock());
+    tell_changes();
   }
   structure_changed_.notify_all();
+  if (conceded) publisher_->ask();
 }
 
 void Participant::on_presence(const Presence& presence) {
-  bool rivals = false;
   bool appeared = false;
+  bool rivals = false;
   {
     const std::lock_guard lock(structure_mutex_);
     if (presence.partition == directory_.name(kHeldHere)) {
       if (presence.incarnation == presence_.incarnation) return;
-      rivals = presence_.serving && presence.serving;
+      // Who has given up, or only asks, does not hide who serves.
+      if (rival_ && rival_->serving && !presence.serving) return;
       rival_ = presence;
+      rivals = presence_.serving && presence.serving;
+      if (rivals && presence.incarnation > presence_.incarnation) give_up_partition();
     } else {
       const auto before = directory_.serving(presence.partition);
       directory_.apply(presence, wall_clock());
       appeared = directory_.serving(presence.partition) && !before;
     }
+    tell_changes();
   }
   structure_changed_.notify_all();
   const std::string who = quote(presence.partition) + " (host " + quote(presence.host) + ", pid " +
@@ -329,6 +372,7 @@ void Participant::on_lost(const std::string& partition, std::uint64_t incarnatio
     if (rival_ && partition == rival_->partition && rival_->incarnation == incarnation)
       rival_.reset();
     news = directory_.lost(partition, incarnation, wall_clock());
+    tell_changes();
   }
   structure_changed_.notify_all();
   if (!news) return;

@@ -17,6 +17,8 @@
 
 #include "client/calls.hpp"
 #include "client/deferred.hpp"
+#include "client/events.hpp"
+#include "client/periodic.hpp"
 
 namespace tfdude {
 
@@ -55,6 +57,9 @@ class Participant final : public TransportHandler {
   [[nodiscard]] Result<FrameInfo> info(const std::string& id);
   [[nodiscard]] std::vector<Frame> frames();
   [[nodiscard]] std::vector<PartitionInfo> partitions();
+  [[nodiscard]] std::size_t own_frames();
+  /// @return what ends it when its last copy goes
+  [[nodiscard]] std::shared_ptr<void> on_change(Events::Callback listener);
 
   /// Waits until all that was there at the start is known, or the time for it is over.
   void settle();
@@ -63,6 +68,7 @@ class Participant final : public TransportHandler {
   template <class Operation>
   auto when_known(Operation operation) -> decltype(operation()) {
     while (true) {
+      if (auto ok = still_in(); !ok) return tl::unexpected(std::move(ok.error()));
       const bool certain = settled();
       auto result = operation();
       if (result || certain || !may_appear(result.error().code)) return result;
@@ -85,7 +91,10 @@ class Participant final : public TransportHandler {
  private:
   using Clock = std::chrono::steady_clock;
 
+  static Time wall_clock();
   static bool may_appear(Errc code);
+  /// @return kPartitionTaken once this participant has given its partition up.
+  [[nodiscard]] Result<void> still_in();
   [[nodiscard]] bool settled();
   void wait_for_news();
 
@@ -133,24 +142,37 @@ class Participant final : public TransportHandler {
                         Clock::time_point deadline);
   void await_structure_change(std::uint64_t version);
   void await_epoch(const Part& part, std::uint64_t epoch, Clock::time_point deadline);
-  void publish_structure();
+  /// Stores what was changed by request and publishes what changed of the structure. @return kState.
+  Result<void> commit();
+  void save_values();
   [[nodiscard]] Result<void> change_here(const Request& request);
   [[nodiscard]] Result<void> claim_name();
+  [[nodiscard]] Result<StoredState> open_store();
+  [[nodiscard]] Result<void> take_frames(const std::vector<FrameSpec>& frames);
+  void give_up_partition();
+  void tell_changes();
 
   const Options options_;
   Forest forest_;
-  std::mutex structure_mutex_;  // directory_, partition_, rival_
+  std::mutex structure_mutex_;  // directory_, partition_, rival_, given_up_
   std::condition_variable structure_changed_;
   Directory directory_;
   std::unique_ptr<Partition> partition_;  // set once, before the transport serves
   Presence presence_;
   std::optional<Presence> rival_;
-  std::mutex publish_mutex_;
+  std::atomic<bool> out_{false};  // another process has the partition now,
+  std::string given_up_;          // and this is why
+  const std::shared_ptr<Events> events_ = std::make_shared<Events>();
+  std::mutex publish_mutex_;           // store_, saved_commit_
+  std::unique_ptr<StateStore> store_;  // null: nothing is kept
+  std::uint64_t saved_commit_ = 0;
   Calls calls_;
   std::atomic<bool> settled_{false};
   Clock::time_point settle_deadline_;
   std::unique_ptr<Transport> transport_;  // stops before the rest goes
-  std::optional<Deferred> publisher_;  // publishes own changes of the structure; stops before that
+  // Publish own changes of the structure, and store values; stop before the transport.
+  std::optional<Deferred> publisher_;
+  std::optional<Periodic> saver_;
 };
 
 }  // namespace tfdude

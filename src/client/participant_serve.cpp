@@ -1,10 +1,12 @@
 #include <array>
+#include <limits>
 #include <unistd.h>
 
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
 #include "client/participant.hpp"
+#include "store/sqlite_store.hpp"
 
 namespace tfdude {
 namespace {
@@ -58,18 +60,50 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
                  0,           false};
   }
   if (auto claimed = claim_name(); !claimed) return claimed;
-  {
-    const std::lock_guard lock(structure_mutex_);
-    auto partition = std::make_unique<Partition>(name, presence_.incarnation, forest_, directory_);
-    if (auto loaded = partition->load(frames); !loaded) return loaded;
-    partition_ = std::move(partition);
-    presence_.pages = partition_->page_count();
-    presence_.serving = true;
-  }
-  publisher_.emplace(kPublishEvery, [this] { publish_structure(); });
+  publisher_.emplace(kPublishEvery, [this] { (void)commit(); });
+  if (auto taken = take_frames(frames); !taken) return taken;
   if (auto serving = transport_->serve(name); !serving) return serving;
-  publish_structure();
+  if (auto stored = commit(); !stored) return stored;
+  if (store_ != nullptr) {
+    if (auto stored = store_->save_configured(frames); !stored) return stored;
+    saver_.emplace(options_.save_every, [this] { save_values(); });
+  }
   transport_->announce(presence_);
+  return {};
+}
+
+Result<StoredState> Participant::open_store() {
+  auto opened = open_sqlite_store(state_file(options_.state, options_.domain, partition_name()),
+                                  partition_name());
+  if (!opened) return tl::unexpected(std::move(opened.error()));
+  store_ = *std::move(opened);
+  return store_->load();
+}
+
+Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
+  StoredState state;
+  if (!options_.state.empty()) {
+    auto stored = open_store();
+    if (!stored) return tl::unexpected(std::move(stored.error()));
+    state = *std::move(stored);
+  }
+  // What is left is judged by what the others own now.
+  const auto incomplete = [this] {
+    if (transport_->awaits_presence()) return true;
+    const std::lock_guard lock(structure_mutex_);
+    return !directory_.complete();
+  };
+  while (!state.frames.empty() && Clock::now() < settle_deadline_ && incomplete()) wait_for_news();
+  const std::lock_guard lock(structure_mutex_);
+  auto partition =
+      std::make_unique<Partition>(partition_name(), presence_.incarnation, forest_, directory_);
+  auto taken = store_ != nullptr ? partition->restore(state, frames, wall_clock())
+                                 : partition->load(frames, wall_clock());
+  if (!taken) return taken;
+  partition_ = std::move(partition);
+  presence_.pages = partition_->page_count();
+  presence_.serving = true;
+  tell_changes();
   return {};
 }
 
@@ -92,19 +126,66 @@ Result<void> Participant::claim_name() {
                                          " by process " + std::to_string(rival_->pid));
 }
 
-void Participant::publish_structure() {
+Result<void> Participant::commit() {
   const std::lock_guard publishing(publish_mutex_);
   std::vector<Page> pages;
-  bool more_pages = false;
+  StateChange unsaved;
+  std::optional<Presence> news;
   {
     const std::lock_guard lock(structure_mutex_);
-    pages = partition_->take_pages();
-    more_pages = partition_->page_count() != presence_.pages;
-    presence_.pages = partition_->page_count();
+    if (partition_ == nullptr) return {};
+    if (out_) {
+      news = presence_;
+    } else {
+      pages = partition_->take_pages();
+      if (store_ != nullptr) unsaved = partition_->take_unsaved();
+      if (partition_->page_count() != presence_.pages) {
+        presence_.pages = partition_->page_count();
+        news = presence_;
+      }
+    }
+  }
+  Result<void> saved;
+  if (!unsaved.empty()) saved = store_->save(unsaved);
+  if (!saved) {
+    log().error("{}", saved.error().message);
+    const std::lock_guard lock(structure_mutex_);
+    partition_->still_unsaved(unsaved);
   }
   for (const Page& page : pages) transport_->publish(page);
-  if (more_pages) transport_->announce(presence_);
+  if (news) transport_->announce(*news);
   structure_changed_.notify_all();
+  return saved;
+}
+
+void Participant::save_values() {
+  const std::lock_guard publishing(publish_mutex_);
+  if (store_ == nullptr || out_) return;
+  const auto [edges, commit] = forest_.changed_since(saved_commit_);
+  if (edges.empty()) return;
+  if (auto saved = store_->save_values(edges); !saved) {
+    log().error("{}", saved.error().message);
+    return;
+  }
+  saved_commit_ = commit;
+}
+
+// Under structure_mutex_. Lookups find no value of this process's any more: none is better than an old one.
+void Participant::give_up_partition() {
+  given_up_ = "partition " + quote(rival_->partition) + " was taken over by process " +
+              std::to_string(rival_->pid) + " on host " + rival_->host + " while process " +
+              std::to_string(presence_.pid) + " on host " + presence_.host +
+              " was not heard, which has given it up";
+  presence_.serving = false;
+  // A claim that everybody may ignore.
+  presence_.incarnation = std::numeric_limits<std::uint64_t>::max();
+  out_ = true;
+  for (const FrameInfo& frame : forest_.frames()) {
+    if (frame.owner == kHeldHere) (void)forest_.release(frame.id);
+  }
+  Change change{ChangeKind::kConflict, rival_->partition, {}, {}, rival_->partition, given_up_, {}};
+  directory_.changes().add(std::move(change));
+  publisher_->ask();
 }
 
 Reply Participant::answer_here(const Request& request) {
@@ -114,7 +195,8 @@ Reply Participant::answer_here(const Request& request) {
   Reply reply;
   {
     const std::lock_guard lock(structure_mutex_);
-    reply = partition_->answer(request);
+    reply = partition_->answer(request, wall_clock());
+    tell_changes();
   }
   // This process sees the change already; the others are told without making it wait.
   if (!std::holds_alternative<UpdateRequest>(request.body)) publisher_->ask();
@@ -136,11 +218,20 @@ void Participant::on_request(const PeerId& from, const Request& request) {
   Reply reply;
   {
     const std::lock_guard lock(structure_mutex_);
-    reply = partition_->answer(from, request);
+    if (out_) {
+      reply = {request.sequence, 0, Error{Errc::kNotOwner, given_up_}};
+    } else {
+      reply = partition_->answer(from, request, wall_clock());
+    }
+    tell_changes();
   }
   log_change(request, reply);
-  // Before the reply, so that whoever gets that finds the structure changed.
-  if (!std::holds_alternative<UpdateRequest>(request.body)) publish_structure();
+  // Before the reply, so that whoever gets that finds the structure changed, and the change stored.
+  if (!std::holds_alternative<UpdateRequest>(request.body) || store_ != nullptr) {
+    if (auto stored = commit(); !stored && std::holds_alternative<Done>(reply.body)) {
+      reply.body = Error{Errc::kState, "done, but not stored: " + stored.error().message};
+    }
+  }
   transport_->reply(from, reply);
 }
 

@@ -5,9 +5,17 @@
 #include <utility>
 
 namespace tfdude {
+namespace {
 
-Directory::Directory(Forest& forest, std::string own) : forest_(forest), partitions_(1) {
+// No clock comes so far, and one more can always be added.
+constexpr std::uint64_t kLastStamp = 1ULL << 63U;
+
+}  // namespace
+
+Directory::Directory(Forest& forest, std::string own)
+    : forest_(forest), claims_(forest, changes_), partitions_(1) {
   if (!own.empty()) owners_.emplace(own, kHeldHere);
+  (void)claims_.add_owner(own);
   partitions_.front().info.name = std::move(own);
   partitions_.front().info.reachable = true;
 }
@@ -16,39 +24,44 @@ Directory::Known& Directory::known(const std::string& partition, Owner& owner) {
   const auto [entry, added] = owners_.emplace(partition, static_cast<Owner>(partitions_.size()));
   owner = entry->second;
   if (added) {
+    (void)claims_.add_owner(partition);
     partitions_.emplace_back();
     partitions_.back().info.name = partition;
   }
   return partitions_[owner];
 }
 
-// Makes the incarnation the one in force; false if a later one is already.
-bool Directory::advance(Known& partition, Owner owner, std::uint64_t incarnation) {
-  if (incarnation < partition.incarnation) return false;
-  if (incarnation > partition.incarnation) {
-    for (const auto& [id, count] : partition.listed) unclaim(id, owner);
-    partition.listed.clear();
-    partition.pages.clear();
+// The incarnation's pages that are gathered beside those in force; null where they need not be.
+Directory::Successor* Directory::succeed(Known& partition, std::uint64_t incarnation) {
+  if (incarnation == partition.incarnation) return nullptr;
+  if (partition.pages.empty()) {
+    partition.incarnation = incarnation;
     partition.epoch = 0;
     partition.page_count = 0;
-    partition.info.frames = 0;
-    partition.incarnation = incarnation;
-    // Whoever tells something new of an incarnation lives, even where the presence, which is handed
-    // the time, comes after a page.
-    if (!partition.info.reachable) partition.info.since = Time{};
-    partition.info.reachable = true;
+    return nullptr;
   }
-  return true;
+  if (!partition.successor || partition.successor->incarnation < incarnation) {
+    partition.successor = Successor{incarnation, {}, {}};
+  }
+  return &*partition.successor;
 }
 
 void Directory::apply(const Presence& presence, Time now) {
   if (!presence.serving) return;
   Owner owner = kHeldHere;
   Known& partition = known(presence.partition, owner);
-  if (owner == kHeldHere || !advance(partition, owner, presence.incarnation)) return;
-  mend();
-  partition.page_count = presence.pages;
+  if (owner == kHeldHere || presence.incarnation < partition.live) return;
+  partition.live = presence.incarnation;
+  if (Successor* successor = succeed(partition, presence.incarnation)) {
+    successor->page_count = presence.pages;
+    replace_if_complete(partition, owner);
+  } else {
+    partition.page_count = presence.pages;
+  }
   PartitionInfo& info = partition.info;
+  const bool known_to_be_up = info.reachable && partition.announced == presence.incarnation;
+  if (!known_to_be_up) changes_.partition_up(info.name, presence.host, presence.pid);
+  partition.announced = presence.incarnation;
   info.host = presence.host;
   info.pid = presence.pid;
   if (!info.reachable || info.since == Time{}) info.since = now;
@@ -58,20 +71,62 @@ void Directory::apply(const Presence& presence, Time now) {
 void Directory::apply(const Page& page) {
   Owner owner = kHeldHere;
   Known& partition = known(page.partition, owner);
-  if (owner == kHeldHere || !advance(partition, owner, page.incarnation)) return;
+  if (owner == kHeldHere || page.incarnation < partition.incarnation) return;
+  if (page.incarnation > partition.live) {
+    // Whoever tells something new of an incarnation lives, even where the presence, which is handed
+    // the time, comes after a page.
+    partition.live = page.incarnation;
+    if (!partition.info.reachable) partition.info.since = Time{};
+    partition.info.reachable = true;
+  }
+  if (Successor* successor = succeed(partition, page.incarnation)) {
+    if (page.incarnation < successor->incarnation) return;
+    successor->pages.insert_or_assign(page.number, page);
+    replace_if_complete(partition, owner);
+    return;
+  }
+  report_conflicts(partition, page);
+  put_page(partition, owner, page);
+  claims_.mend();
+  find_orphans(page, owner);
+}
+
+void Directory::replace_if_complete(Known& partition, Owner owner) {
+  Successor& successor = *partition.successor;
+  if (!successor.page_count || successor.pages.size() < *successor.page_count) return;
+  PageMap pages = std::move(successor.pages);
+  partition.incarnation = successor.incarnation;
+  partition.page_count = *successor.page_count;
+  partition.epoch = 0;
+  partition.successor.reset();
+  std::unordered_set<std::string_view> stays;
+  for (const auto& [number, page] : pages) {
+    for (const PageEntry& entry : page.entries) stays.insert(entry.id);
+  }
+  for (const auto& [id, count] : std::exchange(partition.listed, {})) {
+    if (stays.count(id) == 0) claims_.unclaim(id, owner);
+  }
+  partition.pages.clear();
+  partition.info.frames = 0;
+  for (const auto& [number, page] : pages) put_page(partition, owner, page);
+  claims_.mend();
+  for (const auto& [number, page] : pages) find_orphans(page, owner);
+}
+
+void Directory::put_page(Known& partition, Owner owner, const Page& page) {
+  Page& there = partition.pages[page.number];
   std::unordered_set<std::string_view> stays;
   for (const PageEntry& entry : page.entries) stays.insert(entry.id);
-  for (const PageEntry& entry : std::exchange(partition.pages[page.number], {})) {
+  for (const PageEntry& entry : std::exchange(there.entries, {})) {
     leave_page(partition, owner, entry.id, stays.count(entry.id) != 0);
   }
   for (const PageEntry& entry : page.entries) {
     ++partition.listed[entry.id];
     claim(entry, owner);
   }
-  partition.pages[page.number] = page.entries;
+  there = page;
   partition.info.frames = partition.listed.size();
   partition.epoch = std::max(partition.epoch, page.epoch);
-  mend();
 }
 
 // An id is no longer where it was; unless the same page lists it again, another page or nobody has it.
@@ -81,96 +136,67 @@ void Directory::leave_page(Known& partition, Owner owner, const std::string& id,
   if (!elsewhere) partition.listed.erase(listed);
   if (stays) return;
   if (!elsewhere) {
-    unclaim(id, owner);
+    claims_.unclaim(id, owner);
     return;
   }
-  for (const auto& [number, entries] : partition.pages) {
-    for (const PageEntry& entry : entries) {
+  for (const auto& [number, page] : partition.pages) {
+    for (const PageEntry& entry : page.entries) {
       if (entry.id == id) claim(entry, owner);
     }
   }
+}
+
+void Directory::claim(const PageEntry& entry, Owner owner) {
+  latest_stamp_ = std::max(latest_stamp_, std::min(entry.since, kLastStamp));
+  claims_.claim(entry.id, {owner, entry.parent, entry.since});
+}
+
+// Of what is new in a page; a newcomer does not hear of what was before it came.
+void Directory::report_conflicts(const Known& partition, const Page& page) {
+  if (!changes_.watched() || partition.page_count == 0 || !partition.complete()) return;
+  const auto there = partition.pages.find(page.number);
+  for (const Note& note : page.notes) {
+    if (note.kind == Note::Kind::kRemoved) continue;
+    const bool known = there != partition.pages.end() &&
+                       std::find(there->second.notes.begin(), there->second.notes.end(), note) !=
+                           there->second.notes.end();
+    if (!known) changes_.add(conflict_of(note, partition.info.name));
+  }
+}
+
+void Directory::find_orphans(const Page& page, Owner owner) {
+  for (const Note& note : page.notes) {
+    latest_stamp_ = std::max(latest_stamp_, std::min(note.since, kLastStamp));
+    if (note.kind != Note::Kind::kRemoved) continue;
+    for (const FrameInfo& frame : forest_.waiting_for(note.id)) {
+      if (frame.owner != kHeldHere || frame.since >= note.since) continue;
+      claims_.concede({Concession::Kind::kRemove, frame.id, owner});
+    }
+  }
+}
+
+void Directory::find_orphans() {
+  for (Owner owner = 1; owner < partitions_.size(); ++owner) {
+    for (const auto& [number, page] : partitions_[owner].pages) find_orphans(page, owner);
+  }
+}
+
+std::uint64_t Directory::next_stamp(Time now) {
+  const auto nanoseconds = now.time_since_epoch().count();
+  const auto clock = nanoseconds > 0 ? static_cast<std::uint64_t>(nanoseconds) : 0;
+  latest_stamp_ = std::max(clock, latest_stamp_ + 1);
+  return latest_stamp_;
 }
 
 bool Directory::lost(std::string_view partition, std::uint64_t incarnation, Time now) {
   const auto number = owner(partition);
   if (!number || *number == kHeldHere) return false;
   Known& gone = partitions_[*number];
-  if (gone.incarnation != incarnation || !gone.info.reachable) return false;
+  if (gone.live != incarnation || !gone.info.reachable) return false;
   gone.info.reachable = false;
   gone.info.since = now;
+  changes_.partition_down(gone.info.name);
   return true;
-}
-
-void Directory::claim(const PageEntry& entry, Owner owner) {
-  const auto there = forest_.info(entry.id);
-  if (there && there->owner != owner) {
-    const bool wins = there->owner != kHeldHere && name(owner) < name(there->owner);
-    if (!wins) {
-      shadow(entry.id, {owner, entry.parent});
-      return;
-    }
-    const auto cut = cut_.find(entry.id);
-    shadow(entry.id, cut != cut_.end() ? cut->second : Claim{there->owner, there->parent});
-  }
-  put(entry.id, {owner, entry.parent});
-}
-
-void Directory::unclaim(const std::string& id, Owner owner) {
-  if (const auto claims = shadowed_.find(id); claims != shadowed_.end()) {
-    auto& others = claims->second;
-    const auto mine = std::find_if(others.begin(), others.end(),
-                                   [owner](const Claim& claim) { return claim.owner == owner; });
-    if (mine != others.end()) {
-      others.erase(mine);
-      if (others.empty()) shadowed_.erase(claims);
-      return;
-    }
-  }
-  forest_.drop_remote(id, owner);
-  cut_.erase(id);
-  promote(id);
-}
-
-void Directory::released(const std::string& id) {
-  promote(id);
-  mend();
-}
-
-void Directory::promote(const std::string& id) {
-  const auto claims = shadowed_.find(id);
-  if (claims == shadowed_.end()) return;
-  auto& others = claims->second;
-  const auto least = std::min_element(
-      others.begin(), others.end(),
-      [this](const Claim& a, const Claim& b) { return name(a.owner) < name(b.owner); });
-  put(id, *least);
-  others.erase(least);
-  if (others.empty()) shadowed_.erase(claims);
-}
-
-void Directory::shadow(const std::string& id, Claim claim) {
-  auto& claims = shadowed_[id];
-  const auto mine = std::find_if(claims.begin(), claims.end(),
-                                 [&](const Claim& c) { return c.owner == claim.owner; });
-  if (mine != claims.end()) {
-    *mine = std::move(claim);
-  } else {
-    claims.push_back(std::move(claim));
-  }
-}
-
-void Directory::put(const std::string& id, const Claim& claim) {
-  const auto done = forest_.put_remote(id, claim.parent, claim.owner);
-  if (!done && done.error().code == Errc::kCycle) {
-    cut_[id] = claim;
-  } else {
-    cut_.erase(id);
-  }
-}
-
-// Hangs frames where they belong that could not hang there before. None, but for conflicts.
-void Directory::mend() {
-  for (const auto& [id, claim] : std::exchange(cut_, {})) put(id, claim);
 }
 
 std::optional<Owner> Directory::owner(std::string_view partition) const {
@@ -181,7 +207,7 @@ std::optional<Owner> Directory::owner(std::string_view partition) const {
 
 bool Directory::complete() const {
   return std::all_of(partitions_.begin(), partitions_.end(), [](const Known& partition) {
-    return !partition.info.reachable || partition.pages.size() >= partition.page_count;
+    return !partition.info.reachable || partition.complete();
   });
 }
 
@@ -199,8 +225,8 @@ std::optional<Presence> Directory::serving(std::string_view partition) const {
   const auto number = owner(partition);
   if (!number || *number == kHeldHere || !reachable(*number)) return std::nullopt;
   const Known& there = partitions_[*number];
-  return Presence{there.info.name, there.incarnation, there.info.host,
-                  there.info.pid,  there.page_count,  true};
+  return Presence{there.info.name, there.live,       there.info.host,
+                  there.info.pid,  there.page_count, true};
 }
 
 }  // namespace tfdude

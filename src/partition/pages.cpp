@@ -2,42 +2,88 @@
 
 namespace tfdude {
 
-void Pages::put(const std::string& id, const std::string& parent) {
-  const auto known = page_of_.find(id);
-  std::uint32_t number = 0;
-  if (known != page_of_.end()) {
-    number = known->second;
-  } else {
-    if (with_room_.empty()) {
-      with_room_.insert(count());
-      pages_.emplace_back();
-    }
-    number = *with_room_.begin();
-    page_of_.emplace(id, number);
+std::uint32_t Pages::page_with_room() {
+  if (with_room_.empty()) {
+    with_room_.insert(count());
+    pages_.emplace_back();
   }
-  Frames& page = pages_[number];
-  page[id] = parent;
-  if (page.size() >= kPageSize) with_room_.erase(number);
+  return *with_room_.begin();
+}
+
+void Pages::changed(std::uint32_t number, const std::string& id) {
+  if (pages_[number].size() >= kPageSize) {
+    with_room_.erase(number);
+  } else {
+    with_room_.insert(number);
+  }
   changed_.insert(number);
+  if (watching_) touched_.insert(id);
+}
+
+void Pages::put(const std::string& id, const std::string& parent, std::uint64_t since) {
+  forget_note(id);
+  const auto known = page_of_.find(id);
+  const std::uint32_t number = known != page_of_.end() ? known->second : page_with_room();
+  if (known == page_of_.end()) page_of_.emplace(id, number);
+  pages_[number].frames[id] = {parent, since};
+  changed(number, id);
 }
 
 void Pages::erase(const std::string& id) {
   const auto known = page_of_.find(id);
   if (known == page_of_.end()) return;
   const std::uint32_t number = known->second;
-  pages_[number].erase(id);
   page_of_.erase(known);
-  with_room_.insert(number);
-  changed_.insert(number);
+  pages_[number].frames.erase(id);
+  changed(number, id);
+}
+
+void Pages::leave(const Note& note) {
+  forget_note(note.id);
+  const std::uint32_t number = page_with_room();
+  page_of_note_.emplace(note.id, number);
+  pages_[number].notes[note.id] = note;
+  changed(number, note.id);
+  oldest_notes_.emplace_back(note.id, note.since);
+  while (page_of_note_.size() > kMaxNotes || oldest_notes_.size() > 2 * kMaxNotes) {
+    const auto [id, since] = std::move(oldest_notes_.front());
+    oldest_notes_.pop_front();
+    const auto there = this->note(id);
+    if (there && there->since == since) forget_note(id);
+  }
+}
+
+void Pages::forget_note(const std::string& id) {
+  const auto known = page_of_note_.find(id);
+  if (known == page_of_note_.end()) return;
+  const std::uint32_t number = known->second;
+  page_of_note_.erase(known);
+  pages_[number].notes.erase(id);
+  changed(number, id);
+}
+
+std::optional<Pages::Place> Pages::place(const std::string& id) const {
+  const auto known = page_of_.find(id);
+  if (known == page_of_.end()) return std::nullopt;
+  return pages_[known->second].frames.at(id);
+}
+
+std::optional<Note> Pages::note(const std::string& id) const {
+  const auto known = page_of_note_.find(id);
+  if (known == page_of_note_.end()) return std::nullopt;
+  return pages_[known->second].notes.at(id);
 }
 
 std::vector<Page> Pages::take_changed() {
   std::vector<Page> changed;
   changed.reserve(changed_.size());
   for (const std::uint32_t number : changed_) {
-    Page page{partition_, number, incarnation_, published_epoch_, {}};
-    page.entries.reserve(pages_[number].size());
-    for (const auto& [id, parent] : pages_[number]) page.entries.push_back({id, parent});
+    Page page{partition_, number, incarnation_, published_epoch_, {}, {}};
+    const Sheet& sheet = pages_[number];
+    page.entries.reserve(sheet.frames.size());
+    for (const auto& [id, place] : sheet.frames)
+      page.entries.push_back({id, place.parent, place.since});
+    for (const auto& [id, note] : sheet.notes) page.notes.push_back(note);
     changed.push_back(std::move(page));
   }
   // Only the last page completes the epoch.

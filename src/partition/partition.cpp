@@ -20,36 +20,38 @@ Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest
                      Directory& directory)
     : name_(std::move(name)), forest_(forest), directory_(directory), pages_(name_, incarnation) {}
 
-Result<void> Partition::load(const std::vector<FrameSpec>& frames) {
+Result<void> Partition::load(const std::vector<FrameSpec>& frames, Time now) {
+  const std::uint64_t since = directory_.next_stamp(now);
   std::vector<std::string> loaded;
   for (const FrameSpec& frame : frames) {
-    auto added = forest_.add(frame.id, frame.parent, frame.X_PC, Forest::MissingParent::kAllow);
+    auto added =
+        forest_.add(frame.id, frame.parent, frame.X_PC, Forest::MissingParent::kAllow, since);
     if (!added) {
       for (const std::string& id : loaded) (void)forest_.remove(id);
       return added;
     }
     loaded.push_back(frame.id);
   }
-  for (const FrameSpec& frame : frames) pages_.put(frame.id, frame.parent);
+  for (const FrameSpec& frame : frames) put(frame.id, frame.parent, since);
   pages_.close_epoch();
   return {};
 }
 
-Reply Partition::answer(const PeerId& peer, const Request& request) {
-  if (std::holds_alternative<LookupRequest>(request.body)) return answer(request);
+Reply Partition::answer(const PeerId& peer, const Request& request, Time now) {
+  if (std::holds_alternative<LookupRequest>(request.body)) return answer(request, now);
   if (auto before = replies_.find(peer, request.sequence)) return *std::move(before);
-  Reply reply = answer(request);
+  Reply reply = answer(request, now);
   replies_.put(peer, reply);
   return reply;
 }
 
-Reply Partition::answer(const Request& request) {
+Reply Partition::answer(const Request& request, Time now) {
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
     return answer_lookup(request.sequence, *lookup);
   }
   Reply reply;
   reply.sequence = request.sequence;
-  if (auto done = apply(request); !done) reply.body = std::move(done.error());
+  if (auto done = apply(request, now); !done) reply.body = std::move(done.error());
   reply.epoch = pages_.epoch();
   return reply;
 }
@@ -75,25 +77,25 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
   return reply;
 }
 
-Result<void> Partition::apply(const Request& request) {
-  return std::visit(
-      Overloaded{[&](const AddRequest& add_request) { return add(request.id, add_request); },
-                 [&](const RemoveRequest& remove_request) { return remove(remove_request); },
-                 [&](const UpdateRequest& update_request) { return update(update_request.edges); },
-                 [&](const MoveRequest& move_request) { return move(request.id, move_request); },
-                 [](const LookupRequest&) -> Result<void> { return {}; }},
-      request.body);
+Result<void> Partition::apply(const Request& request, Time now) {
+  return std::visit(Overloaded{[&](const AddRequest& one) { return add(request.id, one, now); },
+                               [&](const RemoveRequest& one) { return remove(one, now); },
+                               [&](const UpdateRequest& one) { return update(one.edges); },
+                               [&](const MoveRequest& one) { return move(request.id, one, now); },
+                               [](const LookupRequest&) -> Result<void> { return {}; }},
+                    request.body);
 }
 
-Result<void> Partition::add(const std::string& id, const AddRequest& request) {
-  auto added = forest_.add(id, request.parent, request.X_PC);
+Result<void> Partition::add(const std::string& id, const AddRequest& request, Time now) {
+  const std::uint64_t since = directory_.next_stamp(now);
+  auto added = forest_.add(id, request.parent, request.X_PC, Forest::MissingParent::kRefuse, since);
   if (!added) return added;
-  pages_.put(id, request.parent);
+  put(id, request.parent, since);
   pages_.close_epoch();
   return {};
 }
 
-Result<void> Partition::remove(const RemoveRequest& request) {
+Result<void> Partition::remove(const RemoveRequest& request, Time now) {
   std::vector<std::string> removed;
   Result<void> outcome;
   for (const std::string& top : request.tops) {
@@ -104,27 +106,48 @@ Result<void> Partition::remove(const RemoveRequest& request) {
       outcome = tl::unexpected(at_home(std::move(gone.error()), top));
     }
   }
-  for (const std::string& id : removed) {
-    pages_.erase(id);
-    directory_.released(id);
-  }
-  if (!removed.empty()) pages_.close_epoch();
+  forget(removed, now);
   return outcome;
 }
 
-Result<void> Partition::move(const std::string& id, const MoveRequest& request) {
-  if (auto moved = forest_.move(id, request.parent, request.X_PC); !moved) {
+Result<void> Partition::move(const std::string& id, const MoveRequest& request, Time now) {
+  const std::uint64_t since = directory_.next_stamp(now);
+  if (auto moved = forest_.move(id, request.parent, request.X_PC, since); !moved) {
     return tl::unexpected(at_home(std::move(moved.error()), id));
   }
-  pages_.put(id, request.parent);
+  pages_.put(id, request.parent, since);
   pages_.close_epoch();
+  directory_.changes().frame_moved(id, request.parent, name_);
   directory_.moved();
   return {};
 }
 
+void Partition::put(const std::string& id, const std::string& parent, std::uint64_t since) {
+  pages_.put(id, parent, since);
+  directory_.changes().frame_added(id, parent, name_);
+}
+
+// From the leaves up, so that of the notes, which are not kept for ever, those about the tops last longest.
+void Partition::forget(const std::vector<std::string>& removed, Time now) {
+  if (removed.empty()) return;
+  const std::uint64_t since = directory_.next_stamp(now);
+  for (auto id = removed.rbegin(); id != removed.rend(); ++id) {
+    pages_.erase(*id);
+    pages_.leave({*id, since, Note::Kind::kRemoved, {}});
+    directory_.changes().frame_removed(*id, name_);
+    directory_.released(*id);
+  }
+  pages_.close_epoch();
+}
+
 Result<void> Partition::update(const std::vector<EdgeUpdate>& edges) {
   auto updated = forest_.update(edges);
-  if (updated) return {};
+  if (updated) {
+    if (saved_) {
+      for (const EdgeUpdate& edge : edges) updated_.insert(edge.id);
+    }
+    return {};
+  }
   // It fails for nothing but a frame that is not held.
   const auto foreign = std::find_if(edges.begin(), edges.end(), [this](const EdgeUpdate& edge) {
     return !forest_.holds(edge.id);

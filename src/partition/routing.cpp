@@ -83,7 +83,14 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
     if (!top) continue;
     body_for<RemoveRequest>(parts, directory, frame.owner, frame.id).tops.push_back(frame.id);
   }
-  if (auto ok = check_all_reachable(directory, parts); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_reachable(directory, parts.front().owner); !ok)
+    return tl::unexpected(ok.error());
+  // Those that cannot be told now find out when they return, by a note of the first part's owner.
+  parts.erase(std::remove_if(parts.begin(), parts.end(),
+                             [&](const Part& part) {
+                               return part.owner != kHeldHere && !directory.reachable(part.owner);
+                             }),
+              parts.end());
   for (const Part& part : parts) {
     const auto& tops = std::get<RemoveRequest>(part.request.body).tops;
     if (auto ok = check_size(part, tops.size(), "subtrees"); !ok) return tl::unexpected(ok.error());

@@ -80,6 +80,7 @@ FrameInfo Forest::Impl::info_of(const Version& version, std::uint64_t commit) co
   FrameInfo info;
   info.id = version.name->text;
   info.owner = version.owner;
+  info.since = version.name->since.load(std::memory_order_relaxed);
   if (version.parent != kNoSlot) {
     const Version* parent = at(version.parent, commit);
     info.parent = parent->name->text;
@@ -256,6 +257,31 @@ std::vector<std::string> Forest::roots() const {
   }
   std::sort(ids.begin(), ids.end());
   return ids;
+}
+
+std::vector<FrameInfo> Forest::waiting_for(std::string_view id) const {
+  const std::lock_guard lock(impl_->mutex_);
+  const epoch::Guard guard;
+  std::vector<FrameInfo> all;
+  const Version* absent = impl_->newest_named(id);
+  if (absent == nullptr || absent->present()) return all;
+  impl_->graph_.for_each_child(absent->slot, [&](std::uint32_t child) {
+    all.push_back(impl_->info_of(impl_->newest(child), impl_->snapshot()));
+  });
+  return all;
+}
+
+std::pair<std::vector<ChangedEdge>, std::uint64_t> Forest::changed_since(
+    std::uint64_t commit) const {
+  const epoch::Guard guard;
+  const std::uint64_t now = impl_->snapshot();
+  std::vector<ChangedEdge> changed;
+  for (std::uint32_t slot = 0; slot < impl_->slots_.size(); ++slot) {
+    const Version* version = impl_->at(slot, now);
+    if (!version->held() || version->commit <= commit) continue;
+    changed.push_back({version->name->text, static_cast<const HeldVersion*>(version)->X_PC});
+  }
+  return {std::move(changed), now};
 }
 
 std::uint64_t Forest::structure_version() const {

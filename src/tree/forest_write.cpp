@@ -200,7 +200,7 @@ void Forest::Impl::collect() {
 }
 
 Result<void> Forest::add(std::string_view id, std::string_view parent, const Transform& X_PC,
-                         MissingParent rule) {
+                         MissingParent rule, std::uint64_t since) {
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   if (!is_finite(X_PC)) return check_value(id, X_PC);
@@ -219,6 +219,7 @@ Result<void> Forest::add(std::string_view id, std::string_view parent, const Tra
   const std::uint32_t parent_slot = impl_->parent_slot(pair);
   HeldVersion& fresh = impl_->push_held(name->slot, X_PC);
   fresh.name = name;
+  name->hung(since);
   impl_->relink(fresh, parent_slot);
   impl_->commit_structure();
   return {};
@@ -236,6 +237,15 @@ Result<std::vector<std::string>> Forest::remove(std::string_view id) {
   for (auto slot = slots.rbegin(); slot != slots.rend(); ++slot) impl_->make_absent(*slot);
   impl_->commit_structure();
   return removed;
+}
+
+Result<void> Forest::release(std::string_view id) {
+  const std::lock_guard lock(impl_->mutex_);
+  const auto slot = impl_->held_slot(id);
+  if (!slot) return tl::unexpected(slot.error());
+  impl_->make_absent(*slot);
+  impl_->commit_structure();
+  return {};
 }
 
 Result<void> Forest::update(std::string_view id, const Transform& X_PC) {
@@ -282,7 +292,7 @@ Result<void> Forest::update(const std::vector<HandleUpdate>& edges) {
 }
 
 Result<void> Forest::move(std::string_view id, std::string_view parent,
-                          const std::optional<Transform>& X_PC) {
+                          const std::optional<Transform>& X_PC, std::uint64_t since) {
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   const std::lock_guard lock(impl_->mutex_);
   if (X_PC && !is_finite(*X_PC)) return check_value(id, *X_PC);
@@ -296,12 +306,14 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   if (auto ok = impl_->check_no_cycle(pair); !ok) return ok;
   const auto& old = static_cast<const HeldVersion&>(*pair.frame);
   const std::uint32_t parent_slot = impl_->parent_slot(pair);
+  old.name->hung(since);
   impl_->relink(impl_->push_held(*slot, X_PC.value_or(old.X_PC)), parent_slot);
   impl_->commit_structure();
   return {};
 }
 
-Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Owner owner) {
+Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Owner owner,
+                                std::uint64_t since) {
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   // A version that counts as held carries a value, which there is none of.
@@ -314,6 +326,7 @@ Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Ow
   auto acyclic = impl_->check_no_cycle(pair);
   const Name* name = pair.frame != nullptr ? pair.frame->name : impl_->intern(id);
   const std::uint32_t parent_slot = acyclic ? impl_->parent_slot(pair) : kNoSlot;
+  name->hung(since);
   const Version& old = impl_->newest(name->slot);
   if (!old.present() || old.owner != owner || old.parent != parent_slot) {
     Version& fresh = impl_->push_remote(name->slot);

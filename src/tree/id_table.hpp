@@ -9,11 +9,15 @@
 
 namespace tfdude {
 
-/// An interned id and the slot it stands for. Immutable once it is in the table.
+/// An interned id and the slot it stands for. Immutable once it is in the table, but for `since`.
 struct Name {
   std::string text;
   std::size_t hash = 0;
   std::uint32_t slot = 0;
+  /// When its frame was hung where it hangs. Of the newest commit, whichever a reader sees.
+  mutable std::atomic<std::uint64_t> since{0};
+
+  void hung(std::uint64_t when) const { since.store(when, std::memory_order_relaxed); }
 };
 
 /// Id to Name: open addressing, found without a lock under an epoch::Guard, changed by one writer at a

@@ -33,7 +33,7 @@ void check_arms_missing(Client& client) {
   const auto lookup = client.lookup("world", "hand_left");
   const auto update = client.update("arm_1", {});
   const auto add = client.add("tool", "arm_2", {});
-  const auto remove = client.remove("robot_1");
+  const auto remove = client.remove("arm_1");
   for (const auto& result : {lookup.map([](const Transform&) {}), update, add, remove}) {
     REQUIRE_FALSE(result);
     CHECK(result.error().code == Errc::kUnreachable);

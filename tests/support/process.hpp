@@ -78,6 +78,8 @@ class TemporaryDirectory {
   /// Writes a file. @return its path
   [[nodiscard]] std::string write(const std::string& name, const std::string& text) const;
 
+  [[nodiscard]] const std::string& path() const { return path_; }
+
  private:
   std::string path_;
 };

@@ -26,7 +26,10 @@ std::vector<std::string> TestDomain::command(const char* program,
 }
 
 Process TestDomain::start_daemon(const std::vector<std::string>& arguments) const {
-  return Process(command(TFDUDE_DAEMON, arguments));
+  const bool keeps = std::count(arguments.begin(), arguments.end(), "--state") > 0;
+  auto daemon = command(TFDUDE_DAEMON, arguments);
+  if (!keeps) daemon.emplace_back("--no-state");
+  return Process(daemon);
 }
 
 Process TestDomain::serve(const std::string& config) const {

@@ -27,6 +27,7 @@ enum class Errc : std::uint8_t {
   kTimeout = 13,          ///< the owner did not answer in time
   kConfig = 14,           ///< a file (configuration, profile) is missing or broken
   kTransport = 15,        ///< the transport could not be set up
+  kState = 16,            ///< what is kept of a partition could not be read or written
 };
 
 /// The stable snake_case name of a code, as the command line prints it in JSON.

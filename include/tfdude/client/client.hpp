@@ -1,14 +1,17 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
+#include "tfdude/partition/change.hpp"
 #include "tfdude/partition/directory.hpp"
 #include "tfdude/partition/partition.hpp"
 #include "tfdude/transport/transport.hpp"
@@ -25,6 +28,11 @@ struct Options {
   /// How long a new participant looks round at most before it says that a frame is not there. It waits
   /// this long only where it meets nobody or somebody is slow to tell what it owns.
   Milliseconds discovery{1000};
+  /// Directory in which a Node keeps its partition's frames, so that its next process has them back; empty:
+  /// it keeps nothing. What others change by request is stored before they are answered.
+  std::string state;
+  /// How often at most values that were streamed, or set by the Node's own process, are stored.
+  Milliseconds save_every{1000};
 };
 
 /// A frame and where it stands.
@@ -43,6 +51,16 @@ struct PathSegment {
 };
 
 class Participant;
+
+/// Keeps a listener listening; ends that when destroyed. May outlive the Client.
+class Subscription {
+ public:
+  Subscription() = default;
+  explicit Subscription(std::shared_ptr<void> token) : token_(std::move(token)) {}
+
+ private:
+  std::shared_ptr<void> token_;
+};
 
 /// A process's access to all frames of a domain. See Node for a process that owns frames.
 ///
@@ -132,6 +150,11 @@ class Client {
   /// All partitions, also those that are not reachable now; sorted by name.
   [[nodiscard]] std::vector<PartitionInfo> partitions();
 
+  /// Calls a function with each change of the structure from now on: partitions that come and go, frames added,
+  /// removed and moved, conflicts. What this participant knows already is not told. One call at a time, in
+  /// order, from a thread of the library's that holds no lock: it may use the client, and must not throw.
+  [[nodiscard]] Subscription on_change(std::function<void(const Change&)> listener);
+
  protected:
   explicit Client(std::unique_ptr<Participant> participant);
   std::unique_ptr<Participant> participant_;
@@ -142,8 +165,14 @@ class Client {
 class Node : public Client {
  public:
   /// Joins a domain over DDS, makes sure that nobody serves the partition, takes the frames (in any order;
-  /// parents may be missing yet or belong to others) and serves them.
-  /// @return kPartitionTaken (naming host and process), the first bad frame's error, as Client::open.
+  /// parents may be missing yet or belong to others) and serves them. With Options::state, what an
+  /// earlier process left of the partition is taken first; of the given frames those count that were not given,
+  /// or given differently, to that process.
+  ///
+  /// A Node learns, after a hang or a broken link, that another process has taken its partition since: it then
+  /// gives way, reports a conflict without a frame, and answers every call with kPartitionTaken.
+  /// @return kPartitionTaken (naming host and process), kState (naming the file), the first bad frame's error,
+  ///   as Client::open.
   [[nodiscard]] static Result<Node> open(const std::string& partition,
                                          const std::vector<FrameSpec>& frames = {},
                                          const Options& options = {});
@@ -155,6 +184,8 @@ class Node : public Client {
                                          const Options& options = {});
 
   [[nodiscard]] const std::string& partition() const;
+  /// How many frames the partition has.
+  [[nodiscard]] std::size_t own_frames() const;
 
  private:
   using Client::Client;

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "tfdude/base/time.hpp"
+#include "tfdude/partition/change.hpp"
+#include "tfdude/partition/claims.hpp"
 #include "tfdude/partition/messages.hpp"
 #include "tfdude/tree/forest.hpp"
 
@@ -31,11 +33,14 @@ class Directory {
  public:
   /// @param own  the name of the partition that this process serves; empty: none
   Directory(Forest& forest, std::string own);
+  Directory(const Directory&) = delete;
+  Directory& operator=(const Directory&) = delete;
 
   /// A partition is served. A later incarnation replaces an earlier one.
   void apply(const Presence& presence, Time now);
 
-  /// A piece of a partition's structure.
+  /// A piece of a partition's structure. That of an incarnation which is new, where an earlier one is known,
+  /// takes its place once all of it has come, so that what a restart does not change stays there all the time.
   void apply(const Page& page);
 
   /// The partition's participant has gone; its structure is kept.
@@ -43,10 +48,28 @@ class Directory {
   bool lost(std::string_view partition, std::uint64_t incarnation, Time now);
 
   /// This process released a frame that it held: another's claim to it may show now.
-  void released(const std::string& id);
+  void released(const std::string& id) { claims_.released(id); }
 
   /// This process moved a frame that it holds: another's frame may hang below it now.
-  void moved() { mend(); }
+  void moved() { claims_.mend(); }
+
+  /// As Claims::take().
+  [[nodiscard]] bool take(const std::string& id, std::uint64_t since) {
+    return claims_.take(id, since);
+  }
+
+  /// Looks among all that others removed for what held frames hang below, besides what comes with a page.
+  void find_orphans();
+
+  /// What this process's partition has to give up now because of what was applied.
+  [[nodiscard]] std::vector<Concession> take_concessions() { return claims_.take_concessions(); }
+
+  /// A stamp for a change of the structure: the time [ns since the UNIX epoch], but later than all stamps given
+  /// or seen before (Lamport 1978, rule IR1 and IR2), so that whoever knew of a change has the greater one.
+  [[nodiscard]] std::uint64_t next_stamp(Time now);
+
+  /// What happened to the frames of others, and of this process as far as it is reported.
+  [[nodiscard]] ChangeLog& changes() { return changes_; }
 
   /// The number under which the forest knows a partition; kHeldHere for the own one.
   [[nodiscard]] std::optional<Owner> owner(std::string_view partition) const;
@@ -67,38 +90,44 @@ class Directory {
   [[nodiscard]] std::optional<Presence> serving(std::string_view partition) const;
 
  private:
+  using PageMap = std::map<std::uint32_t, Page>;
+
+  /// An incarnation that follows one whose structure is here, until all of its own has come.
+  struct Successor {
+    std::uint64_t incarnation = 0;
+    std::optional<std::uint32_t> page_count;  // said by its presence
+    PageMap pages;
+  };
   struct Known {
     PartitionInfo info;
-    std::uint64_t incarnation = 0;
+    std::uint64_t live = 0;         // the latest incarnation heard of
+    std::uint64_t announced = 0;    // the latest whose presence has come
+    std::uint64_t incarnation = 0;  // that of the pages
     std::uint64_t epoch = 0;
     std::uint32_t page_count = 0;
-    std::map<std::uint32_t, std::vector<PageEntry>> pages;
+    PageMap pages;
     // How many pages list an id: a frame that changes its page may come before it goes.
     std::unordered_map<std::string, std::size_t> listed;
-  };
-  struct Claim {
-    Owner owner = kHeldHere;
-    std::string parent;
+    std::optional<Successor> successor;
+
+    [[nodiscard]] bool complete() const { return !successor && pages.size() >= page_count; }
   };
 
   Known& known(const std::string& partition, Owner& owner);
-  bool advance(Known& partition, Owner owner, std::uint64_t incarnation);
+  Successor* succeed(Known& partition, std::uint64_t incarnation);
+  void replace_if_complete(Known& partition, Owner owner);
+  void put_page(Known& partition, Owner owner, const Page& page);
   void leave_page(Known& partition, Owner owner, const std::string& id, bool stays);
   void claim(const PageEntry& entry, Owner owner);
-  void unclaim(const std::string& id, Owner owner);
-  void promote(const std::string& id);
-  void shadow(const std::string& id, Claim claim);
-  void put(const std::string& id, const Claim& claim);
-  void mend();
+  void report_conflicts(const Known& partition, const Page& page);
+  void find_orphans(const Page& page, Owner owner);
 
   Forest& forest_;
+  ChangeLog changes_;
+  Claims claims_;
   std::vector<Known> partitions_;  // by Owner; the first is the own
   std::unordered_map<std::string, Owner> owners_;
-  // Frames that several partitions claim: all claims but the one in force, that of the least name.
-  std::unordered_map<std::string, std::vector<Claim>> shadowed_;
-  // Claims in force whose parent lies below the frame, which is kept as a root: a conflict of two owners,
-  // as a rule only until another page comes.
-  std::map<std::string, Claim> cut_;
+  std::uint64_t latest_stamp_ = 0;
 };
 
 }  // namespace tfdude

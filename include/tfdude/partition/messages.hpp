@@ -75,6 +75,27 @@ struct Update {
 struct PageEntry {
   std::string id;
   std::string parent;  ///< empty: a root
+  /// When the frame was hung there, by its owner's count (Directory::next_stamp): of two claims that
+  /// cannot both hold, the older does.
+  std::uint64_t since = 0;
+};
+
+/// What became of a frame that is not where it was: for those who were away meanwhile, and for those who
+/// want to know of conflicts.
+struct Note {
+  enum class Kind : std::uint8_t {
+    kRemoved = 1,  ///< by request; whatever hung below it since before goes, too
+    kGaveWay = 2,  ///< `rival` has claimed the same id earlier
+    kUnhung = 3,   ///< its move and an earlier one, of `rival`, make a cycle: it was made a root
+  };
+  std::string id;
+  std::uint64_t since = 0;
+  Kind kind = Kind::kRemoved;
+  std::string rival;  ///< a partition; empty where removed
+
+  friend bool operator==(const Note& a, const Note& b) {
+    return a.id == b.id && a.since == b.since && a.kind == b.kind && a.rival == b.rival;
+  }
 };
 
 /// A piece of a partition's structure. Each page is replaced as a whole, so that a frame costs its page
@@ -86,6 +107,7 @@ struct Page {
   /// Once this page has come, all of the partition's structure up to this epoch has.
   std::uint64_t epoch = 0;
   std::vector<PageEntry> entries;
+  std::vector<Note> notes{};
 };
 
 /// That a partition is served, and by whom. It holds as long as its participant lives.

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "tfdude/partition/messages.hpp"
@@ -15,37 +18,74 @@ namespace tfdude {
 /// An owner's structure, split into the pages that it publishes. Not thread-safe.
 class Pages {
  public:
-  /// Frames a page: a page of long ids stays below 64 KiB, and of usual ones is about 2 KiB.
+  /// Frames and notes a page: a page of long ids stays below 64 KiB, and of usual ones is about 2 KiB.
   static constexpr std::size_t kPageSize = 60;
 
-  Pages(std::string partition, std::uint64_t incarnation)
-      : partition_(std::move(partition)), incarnation_(incarnation) {}
+  /// Notes kept; the oldest go first.
+  static constexpr std::size_t kMaxNotes = 1024;
 
-  /// Notes a frame's parent. O(log frames).
-  void put(const std::string& id, const std::string& parent);
+  struct Place {
+    std::string parent;
+    std::uint64_t since = 0;
+  };
+
+  Pages(std::string partition, std::uint64_t incarnation)
+      : partition_(std::move(partition)), incarnation_(incarnation), epoch_(incarnation) {}
+
+  /// Notes where a frame hangs, in place of what a note says of it. O(log frames).
+  void put(const std::string& id, const std::string& parent, std::uint64_t since);
+
   void erase(const std::string& id);
 
-  /// Closes a change of structure, of as many frames as it has; the epoch that shows it.
+  /// Leaves word of a frame, in place of an earlier one.
+  void leave(const Note& note);
+
+  [[nodiscard]] std::optional<Place> place(const std::string& id) const;
+  [[nodiscard]] std::optional<Note> note(const std::string& id) const;
+
+  /// Goes on counting from here, if that is ahead.
+  void resume(std::uint64_t epoch) { epoch_ = epoch > epoch_ ? epoch : epoch_; }
+
+  /// Closes a change of structure, of as many frames as it has; the epoch that shows it. It begins with the
+  /// incarnation, so that it grows over all of a partition's lives.
   std::uint64_t close_epoch() { return ++epoch_; }
   [[nodiscard]] std::uint64_t epoch() const { return epoch_; }
 
   /// The pages to publish since the last call, in the order in which to publish them.
   [[nodiscard]] std::vector<Page> take_changed();
 
+  /// The ids whose place or note has changed since the last call; none before watch_ids().
+  [[nodiscard]] std::set<std::string> take_touched() { return std::exchange(touched_, {}); }
+  void watch_ids() { watching_ = true; }
+
   [[nodiscard]] std::size_t frame_count() const { return page_of_.size(); }
   [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(pages_.size()); }
 
  private:
-  using Frames = std::map<std::string, std::string>;  // id to parent
+  struct Sheet {
+    std::map<std::string, Place> frames;
+    std::map<std::string, Note> notes;
+    [[nodiscard]] std::size_t size() const { return frames.size() + notes.size(); }
+  };
+  using PageOf = std::unordered_map<std::string, std::uint32_t>;
+
+  std::uint32_t page_with_room();
+  void changed(std::uint32_t number, const std::string& id);
+  void forget_note(const std::string& id);
 
   std::string partition_;
   std::uint64_t incarnation_;
-  std::uint64_t epoch_ = 0;
+  std::uint64_t epoch_;
   std::uint64_t published_epoch_ = 0;
-  std::vector<Frames> pages_;
-  std::unordered_map<std::string, std::uint32_t> page_of_;
+  std::vector<Sheet> pages_;
+  PageOf page_of_;
+  PageOf page_of_note_;
+  // In the order in which they were left; what stands here no longer was replaced since.
+  std::deque<std::pair<std::string, std::uint64_t>> oldest_notes_;
   std::set<std::uint32_t> with_room_;
   std::set<std::uint32_t> changed_;
+  bool watching_ = false;
+  std::set<std::string> touched_;
 };
 
 }  // namespace tfdude

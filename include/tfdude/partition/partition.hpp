@@ -1,24 +1,20 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "tfdude/base/time.hpp"
 #include "tfdude/partition/directory.hpp"
 #include "tfdude/partition/messages.hpp"
 #include "tfdude/partition/pages.hpp"
 #include "tfdude/partition/reply_cache.hpp"
+#include "tfdude/partition/state_store.hpp"
 #include "tfdude/tree/forest.hpp"
 
 namespace tfdude {
-
-/// A frame as a configuration gives it; an empty parent makes a root.
-struct FrameSpec {
-  std::string id;
-  std::string parent;
-  Transform X_PC;
-};
 
 /// The rules of an owner: what it answers to each request, and what it publishes of its structure.
 ///
@@ -32,13 +28,21 @@ class Partition {
 
   /// Takes the frames of a configuration, in any order; parents may be missing. All or none.
   /// @return the first frame's error: a bad or repeated id, a cycle.
-  [[nodiscard]] Result<void> load(const std::vector<FrameSpec>& frames);
+  [[nodiscard]] Result<void> load(const std::vector<FrameSpec>& frames, Time now);
+
+  /// Takes what an earlier process of this partition left, with what the configuration changes of that:
+  /// frames whose configuration is not what it was are as it says now, those that it no longer has go, all
+  /// others are as they were left. Gives way where others have claimed a frame since. From now on what
+  /// changes is kept for take_unsaved().
+  /// @return the error of the first new frame of the configuration: a bad or repeated id, a cycle.
+  [[nodiscard]] Result<void> restore(const StoredState& state,
+                                     const std::vector<FrameSpec>& configured, Time now);
 
   /// Answers any request of a peer; a repeated one as before.
-  [[nodiscard]] Reply answer(const PeerId& peer, const Request& request);
+  [[nodiscard]] Reply answer(const PeerId& peer, const Request& request, Time now);
 
   /// Answers a request of the owner's own process.
-  [[nodiscard]] Reply answer(const Request& request);
+  [[nodiscard]] Reply answer(const Request& request, Time now);
 
   /// Answers a request that reads.
   [[nodiscard]] Reply answer_lookup(std::uint32_t sequence, const LookupRequest& lookup) const;
@@ -47,17 +51,35 @@ class Partition {
   /// @return how many
   std::size_t apply(const Update& update);
 
+  /// Gives up what the directory says must be given up. @return whether the structure changed
+  bool concede(Time now);
+
   /// The pages to publish since the last call.
   [[nodiscard]] std::vector<Page> take_pages() { return pages_.take_changed(); }
   [[nodiscard]] std::uint32_t page_count() const { return pages_.count(); }
   [[nodiscard]] std::size_t frame_count() const { return pages_.frame_count(); }
 
+  /// What must be saved of what was changed by requests since the last call.
+  [[nodiscard]] StateChange take_unsaved();
+
+  /// It could not be saved: it will be taken again.
+  void still_unsaved(const StateChange& change) {
+    updated_.insert(change.erased.begin(), change.erased.end());
+  }
+
  private:
-  [[nodiscard]] Result<void> apply(const Request& request);
-  [[nodiscard]] Result<void> add(const std::string& id, const AddRequest& request);
-  [[nodiscard]] Result<void> remove(const RemoveRequest& request);
-  [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request);
+  [[nodiscard]] Result<void> apply(const Request& request, Time now);
+  [[nodiscard]] Result<void> add(const std::string& id, const AddRequest& request, Time now);
+  [[nodiscard]] Result<void> remove(const RemoveRequest& request, Time now);
+  [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request, Time now);
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
+  void restore_contested(const StoredFrame& frame, Time now);
+  [[nodiscard]] Result<void> reconfigure(const std::vector<FrameSpec>& before,
+                                         const std::vector<FrameSpec>& configured, Time now);
+  void put(const std::string& id, const std::string& parent, std::uint64_t since);
+  void forget(const std::vector<std::string>& removed, Time now);
+  void give_way(const std::string& id, Owner rival, Time now);
+  void unhang(const std::string& id, Owner rival, Time now);
   [[nodiscard]] Error at_home(Error error, std::string_view id) const;
 
   std::string name_;
@@ -65,6 +87,8 @@ class Partition {
   Directory& directory_;
   Pages pages_;
   ReplyCache replies_;
+  bool saved_ = false;
+  std::set<std::string> updated_;  // by requests, since the last take_unsaved()
 };
 
 }  // namespace tfdude

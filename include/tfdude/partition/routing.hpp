@@ -34,8 +34,8 @@ struct LookupPlan {
                                      const std::string& id, const AddRequest& request,
                                      const std::string& partition);
 
-/// The frame and all below it, each partition told of those subtrees that it owns. The first part is
-/// that of the frame itself.
+/// The frame and all below it, each reachable partition told of those subtrees that it owns. The first part
+/// is that of the frame itself, whose owner must be reachable.
 /// @return kUnknownFrame, kUnreachable, kInvalidInput.
 [[nodiscard]] Result<std::vector<Part>> route_remove(const Forest& forest,
                                                      const Directory& directory,

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tfdude/base/result.hpp"
@@ -50,7 +51,14 @@ struct FrameInfo {
   std::string id;
   std::string parent;  ///< empty: a root
   Owner owner = kHeldHere;
-  bool attached = false;  ///< its parent is there
+  bool attached = false;    ///< its parent is there
+  std::uint64_t since = 0;  ///< when it was hung where it hangs, as whoever did it counts
+};
+
+/// A held edge that was written at some commit or later.
+struct ChangedEdge {
+  std::string id;
+  Transform X_PC;
 };
 
 /// The coordinate frames that one process knows: a forest whose edges carry either a value (held here) or
@@ -78,12 +86,16 @@ class Forest {
   /// Adds a frame; an empty parent makes a root. O(1) for a leaf, O(n) where n frames wait for it.
   /// @return kAlreadyExists, kUnknownParent, kCycle, kInvalidInput (id, or a value that is not finite).
   [[nodiscard]] Result<void> add(std::string_view id, std::string_view parent,
-                                 const Transform& X_PC,
-                                 MissingParent rule = MissingParent::kRefuse);
+                                 const Transform& X_PC, MissingParent rule = MissingParent::kRefuse,
+                                 std::uint64_t since = 0);
 
   /// Removes a held frame and all held frames below it that are reached through held ones. O(removed).
   /// @return the removed ids; kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<std::vector<std::string>> remove(std::string_view id);
+
+  /// Removes one held frame and nothing below it, what hangs there waits for another of that id.
+  /// O(subtree). @return kUnknownFrame, kNotOwner.
+  [[nodiscard]] Result<void> release(std::string_view id);
 
   /// Gives an edge a new value. Allocation-free.
   /// @return kUnknownFrame, kNotOwner, kInvalidInput (not finite).
@@ -98,13 +110,15 @@ class Forest {
   /// value where X_PC is not given. O(subtree).
   /// @return kUnknownFrame, kNotOwner, kUnknownParent, kCycle, kInvalidInput (not finite).
   [[nodiscard]] Result<void> move(std::string_view id, std::string_view parent,
-                                  const std::optional<Transform>& X_PC = std::nullopt);
+                                  const std::optional<Transform>& X_PC = std::nullopt,
+                                  std::uint64_t since = 0);
 
   // --- frames held elsewhere: structure only ---
 
   /// Notes that `owner` holds a frame, new or known. A held frame is not touched.
   /// @return kAlreadyExists (it is held here), kCycle (kept as a root), kInvalidInput (id, owner).
-  [[nodiscard]] Result<void> put_remote(std::string_view id, std::string_view parent, Owner owner);
+  [[nodiscard]] Result<void> put_remote(std::string_view id, std::string_view parent, Owner owner,
+                                        std::uint64_t since = 0);
 
   /// Forgets a frame if `owner` holds it.
   void drop_remote(std::string_view id, Owner owner);
@@ -146,6 +160,13 @@ class Forest {
   [[nodiscard]] Result<std::vector<std::string>> children(std::string_view id) const;
   /// Frames without a parent that is there, sorted.
   [[nodiscard]] std::vector<std::string> roots() const;
+  /// Frames that name this one as their parent while it is not there. O(result).
+  [[nodiscard]] std::vector<FrameInfo> waiting_for(std::string_view id) const;
+
+  /// All held edges that were written since that commit, and the commit up to which this was looked for:
+  /// what to ask for next. Takes no lock. O(slots).
+  [[nodiscard]] std::pair<std::vector<ChangedEdge>, std::uint64_t> changed_since(
+      std::uint64_t commit) const;
 
   /// Grows with every change of the structure (not of values).
   [[nodiscard]] std::uint64_t structure_version() const;

@@ -146,6 +146,13 @@ bool well_formed_page(const std::uint8_t* data, std::size_t size) {
   walk.skip(8, 8);
   walk.skip(8, 8);
   walk.sequence([&] {
+    walk.skip(8, 8);
+    walk.id();
+    walk.id();
+  });
+  walk.sequence([&] {
+    walk.skip(8, 8);
+    walk.octet();
     walk.id();
     walk.id();
   });

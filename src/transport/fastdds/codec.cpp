@@ -5,6 +5,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "math/flat.hpp"
 #include "transport/fastdds/cdr_check.hpp"
 
 namespace tfdude::fastdds {
@@ -25,15 +26,7 @@ constexpr std::size_t kMaxMessage = 4096;
 
 std::string_view text(const wire::Id& id) { return {id.c_str(), id.size()}; }
 
-wire::Transform to_wire(const Transform& X) {
-  wire::Transform out{};
-  const Eigen::Quaterniond q = X.pose.rotation();
-  const Eigen::Vector3d p = X.pose.translation();
-  std::copy_n(q.coeffs().data(), 4, out.begin());
-  std::copy_n(p.data(), 3, out.begin() + 4);
-  std::copy_n(X.covariance.upper().begin(), Covariance::kSize, out.begin() + 7);
-  return out;
-}
+wire::Transform to_wire(const Transform& X) { return to_flat(X); }
 
 Result<Transform> from_wire(const wire::Transform& in, std::string_view frame) {
   const auto pose =
@@ -44,21 +37,6 @@ Result<Transform> from_wire(const wire::Transform& in, std::string_view frame) {
   const auto covariance = Covariance::from_upper(upper);
   if (!covariance) return fail_at("frame " + quote(frame), covariance.error());
   return Transform{*pose, *covariance};
-}
-
-// The result of another's computation: of any size, and semi-definite to its rounding, so that it is not for
-// the rules of what users give.
-Result<Transform> computed_from_wire(const wire::Transform& in) {
-  const Eigen::Quaterniond rotation(in[3], in[0], in[1], in[2]);
-  Transform X{Pose::trusted(rotation, {in[4], in[5], in[6]}), {}};
-  Covariance::Upper upper{};
-  std::copy_n(in.begin() + 7, Covariance::kSize, upper.begin());
-  X.covariance = Covariance::trusted(upper);
-  if (auto finite = check_finite(X); !finite) return fail_at("a reply", finite.error());
-  const auto unit = Pose::create(rotation, Eigen::Vector3d::Zero());
-  if (!unit) return fail_at("a reply", unit.error());
-  X.pose = Pose::trusted(unit->rotation(), X.pose.translation());
-  return X;
 }
 
 wire::Edge to_wire(const EdgeUpdate& edge) {
@@ -232,6 +210,14 @@ wire::Page to_wire(const Page& page) {
   for (std::size_t i = 0; i < page.entries.size(); ++i) {
     sample.entries()[i].id(page.entries[i].id);
     sample.entries()[i].parent(page.entries[i].parent);
+    sample.entries()[i].since(page.entries[i].since);
+  }
+  sample.notes().resize(page.notes.size());
+  for (std::size_t i = 0; i < page.notes.size(); ++i) {
+    sample.notes()[i].id(page.notes[i].id);
+    sample.notes()[i].since(page.notes[i].since);
+    sample.notes()[i].kind(static_cast<std::uint8_t>(page.notes[i].kind));
+    sample.notes()[i].rival(page.notes[i].rival);
   }
   return sample;
 }
@@ -267,8 +253,8 @@ Result<Reply> from_wire(const wire::Reply& sample) {
     std::vector<Transform> transforms;
     transforms.reserve(body.transforms().size());
     for (const wire::Transform& in : body.transforms()) {
-      auto X = computed_from_wire(in);
-      if (!X) return tl::unexpected(std::move(X.error()));
+      auto X = computed_from(in);
+      if (!X) return fail_at("a reply", X.error());
       transforms.push_back(*X);
     }
     reply.body = std::move(transforms);
@@ -291,21 +277,45 @@ Result<Update> from_wire(const wire::Update& sample,
   return update;
 }
 
+namespace {
+
+Result<Note> read_note(const wire::Note& sample) {
+  constexpr auto kLast = static_cast<std::uint8_t>(Note::Kind::kUnhung);
+  if (sample.kind() < 1 || sample.kind() > kLast) {
+    return fail(Errc::kInvalidInput, "kind " + std::to_string(sample.kind()) + " of a note");
+  }
+  Note note{string_of(sample.id()), sample.since(), static_cast<Note::Kind>(sample.kind()),
+            string_of(sample.rival())};
+  if (auto ok = check_id(note.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
+  if (!note.rival.empty()) {
+    if (auto ok = check_partition_name(note.rival); !ok) return tl::unexpected(ok.error());
+  }
+  return note;
+}
+
+}  // namespace
+
 Result<Page> from_wire(const wire::Page& sample) {
   Page page{
-      string_of(sample.partition()), sample.number(), sample.incarnation(), sample.epoch(), {}};
+      string_of(sample.partition()), sample.number(), sample.incarnation(), sample.epoch(), {}, {}};
   if (auto ok = check_partition_name(page.partition); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
   page.entries.reserve(sample.entries().size());
   for (const wire::PageEntry& entry : sample.entries()) {
-    PageEntry read{string_of(entry.id()), string_of(entry.parent())};
+    PageEntry read{string_of(entry.id()), string_of(entry.parent()), entry.since()};
     if (auto ok = check_id(read.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
     if (!read.parent.empty()) {
       if (auto ok = check_id(read.parent, "parent"); !ok)
         return tl::unexpected(std::move(ok.error()));
     }
     page.entries.push_back(std::move(read));
+  }
+  page.notes.reserve(sample.notes().size());
+  for (const wire::Note& note : sample.notes()) {
+    auto read = read_note(note);
+    if (!read) return tl::unexpected(std::move(read.error()));
+    page.notes.push_back(*std::move(read));
   }
   return page;
 }

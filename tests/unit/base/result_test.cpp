@@ -31,6 +31,7 @@ constexpr Named kCodes[] = {
     {Errc::kTimeout, 13, "timeout"},
     {Errc::kConfig, 14, "config"},
     {Errc::kTransport, 15, "transport"},
+    {Errc::kState, 16, "state"},
 };
 
 TEST_CASE("codes keep their numbers and names") {

@@ -201,7 +201,7 @@ class World {
     }
     const bool removal = std::holds_alternative<RemoveRequest>(request.body);
     if (!removal && below(parent, id)) return;
-    const Reply reply = owners_[who]->partition.answer(request);
+    const Reply reply = owners_[who]->partition.answer(request, kNow);
     if (!std::holds_alternative<Done>(reply.body)) return;  // its picture is behind the truth
     if (removal) {
       forget(who, id);

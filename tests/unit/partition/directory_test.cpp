@@ -115,8 +115,6 @@ TEST_CASE("an epoch is known once its last page has come, and never goes back") 
   CHECK(replica.directory.epoch(arms) == 4);
   replica.directory.apply(Page{"arms", 1, 1, 3, {}});
   CHECK(replica.directory.epoch(arms) == 4);
-  replica.directory.apply(Page{"arms", 0, 2, 1, {}});
-  CHECK(replica.directory.epoch(arms) == 1);
 }
 
 TEST_CASE("a partition that went away keeps its structure and is marked") {
@@ -146,28 +144,51 @@ TEST_CASE("the loss of somebody unknown, or of an earlier life, is no news") {
   CHECK(replica.directory.reachable(*replica.directory.owner("arms")));
 }
 
-TEST_CASE("a new incarnation replaces the old one, whose late pages change nothing") {
+TEST_CASE("a new incarnation replaces the old one once all of it has come, whatever comes late") {
+  const Lines old{"hand <  @ arms", "tool < hand @ arms, attached"};
   Replica replica;
   replica.directory.apply(presence_of("arms", 1, 1), kNow);
   replica.directory.apply(page_of("arms", {{"hand", ""}, {"tool", "hand"}}));
   replica.directory.lost("arms", 1, kNow);
   const Owner arms = *replica.directory.owner("arms");
-  SECTION("the presence first") { replica.directory.apply(presence_of("arms", 2, 1), kLater); }
-  SECTION("a page first") {
-    replica.directory.apply(page_of("arms", {}, 2));
-    CHECK(replica.directory.reachable(arms));
-    replica.directory.apply(presence_of("arms", 2, 1), kLater);
+  const Page first{"arms", 0, 2, 0, {{"hand", ""}}};
+  const Page last{"arms", 1, 2, 5, {{"fist", "hand"}}};
+  SECTION("the presence first") {
+    replica.directory.apply(presence_of("arms", 2, 2), kLater);
+    replica.directory.apply(first);
+    CHECK_FALSE(replica.directory.complete());
+    CHECK(replica.structure() == old);
+    replica.directory.apply(last);
   }
-  CHECK(replica.structure().empty());
+  SECTION("the pages first") {
+    replica.directory.apply(last);
+    CHECK(replica.directory.reachable(arms));
+    replica.directory.apply(first);
+    CHECK(replica.structure() == old);
+    replica.directory.apply(presence_of("arms", 2, 2), kLater);
+  }
+  const Lines fresh{"fist < hand @ arms, attached", "hand <  @ arms"};
+  CHECK(replica.structure() == fresh);
+  CHECK(replica.directory.complete());
   CHECK(replica.directory.reachable(arms));
   CHECK(replica.directory.info(arms).since == kLater);
-  CHECK(replica.directory.info(arms).frames == 0);
+  CHECK(replica.directory.info(arms).frames == 2);
+  CHECK(replica.directory.epoch(arms) == 5);
   replica.directory.apply(page_of("arms", {{"ghost", ""}}, 1));
   replica.directory.apply(presence_of("arms", 1, 9), kLater);
-  CHECK(replica.structure().empty());
+  CHECK(replica.structure() == fresh);
   CHECK(replica.directory.serving("arms")->incarnation == 2);
-  replica.directory.apply(page_of("arms", {{"fist", ""}}, 2));
-  CHECK(replica.structure() == Lines{"fist <  @ arms"});
+}
+
+TEST_CASE("what a restart does not change is there all the time") {
+  Replica replica;
+  replica.directory.apply(presence_of("arms", 1, 1), kNow);
+  replica.directory.apply(page_of("arms", {{"hand", ""}, {"tool", "hand"}}));
+  const Handle hand = *replica.forest.find("hand");
+  replica.directory.apply(presence_of("arms", 2, 1), kLater);
+  replica.directory.apply(page_of("arms", {{"hand", ""}}, 2));
+  REQUIRE(replica.forest.info(hand));
+  CHECK(replica.structure() == Lines{"hand <  @ arms"});
 }
 
 TEST_CASE("a directory is complete when all pages of all reachable partitions have come") {
@@ -185,7 +206,7 @@ TEST_CASE("a directory is complete when all pages of all reachable partitions ha
   CHECK(replica.directory.complete());
 }
 
-TEST_CASE("of two claims to a frame the lesser name has it, the other gets it when that goes") {
+TEST_CASE("of two claims as old the lesser name has it, the other gets it when that goes") {
   const Page of_arms = page_of("arms", {{"hand", "arm"}});
   const Page of_legs = page_of("legs", {{"hand", "foot"}});
   const Page of_wings = page_of("wings", {{"hand", "tip"}});
@@ -208,7 +229,7 @@ TEST_CASE("of two claims to a frame the lesser name has it, the other gets it wh
   }
   SECTION("the shadowed claims go first") {
     replica.directory.apply(page_of("legs", {}));
-    replica.directory.apply(page_of("wings", {}, 2));
+    replica.directory.apply(page_of("wings", {}));
     CHECK(replica.structure() == Lines{"hand < arm @ arms"});
     replica.directory.apply(page_of("arms", {}));
     CHECK(replica.structure().empty());
@@ -227,17 +248,20 @@ TEST_CASE("a frame held here is its holder's until it is released") {
 
 TEST_CASE("frames that hung below each other meanwhile end up where they belong") {
   // hand was moved away from below foot, then foot below hand; the second is heard of first.
-  const Page foot_moved = page_of("legs", {{"foot", "hand"}});
+  const Page foot_moved = page_of("legs", {{"foot", "hand", 2}});
   const Page hand_moved = page_of("arms", {{"hand", ""}});
   const Lines both{"foot < hand @ legs, attached", "hand <  @ arms"};
   Replica replica;
   replica.directory.apply(page_of("legs", {{"foot", ""}}));
-  replica.directory.apply(page_of("arms", {{"hand", "foot"}}));
+  replica.directory.apply(page_of("arms", {{"hand", "foot", 1}}));
   SECTION("of two others") {
     replica.directory.apply(foot_moved);
     CHECK(replica.structure() == Lines{"foot <  @ legs", "hand < foot @ arms, attached"});
     SECTION("by a page") { replica.directory.apply(hand_moved); }
-    SECTION("by a new incarnation") { replica.directory.apply(page_of("arms", {{"hand", ""}}, 2)); }
+    SECTION("by a new incarnation") {
+      replica.directory.apply(presence_of("arms", 2, 1), kLater);
+      replica.directory.apply(page_of("arms", {{"hand", ""}}, 2));
+    }
     CHECK(replica.structure() == both);
   }
   SECTION("while a lesser name claims it") {

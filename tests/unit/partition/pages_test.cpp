@@ -17,6 +17,8 @@ using testing::Replica;
 using Structure = std::map<std::string, std::string>;  // id to parent
 using Numbers = std::vector<std::uint32_t>;
 
+constexpr std::uint64_t kLife = 7;  // the incarnation, from which epochs count
+
 Numbers numbers_of(const std::vector<Page>& pages) {
   Numbers numbers;
   for (const Page& page : pages) numbers.push_back(page.number);
@@ -32,33 +34,33 @@ Structure structure_of(const std::vector<Page>& pages) {
 }
 
 void put_numbered(Pages& pages, std::size_t first, std::size_t count) {
-  for (std::size_t i = first; i < first + count; ++i) pages.put("f" + std::to_string(i), "");
+  for (std::size_t i = first; i < first + count; ++i) pages.put("f" + std::to_string(i), "", 0);
 }
 
 TEST_CASE("a new structure has no pages and nothing to publish") {
-  Pages pages("robot", 7);
+  Pages pages("robot", kLife);
   CHECK(pages.count() == 0);
   CHECK(pages.frame_count() == 0);
-  CHECK(pages.epoch() == 0);
+  CHECK(pages.epoch() == kLife);
   CHECK(pages.take_changed().empty());
 }
 
 TEST_CASE("a page says whose it is, of which life, and what is on it") {
-  Pages pages("robot", 7);
-  pages.put("world", "");
-  pages.put("base", "world");
-  CHECK(pages.close_epoch() == 1);
+  Pages pages("robot", kLife);
+  pages.put("world", "", 0);
+  pages.put("base", "world", 0);
+  CHECK(pages.close_epoch() == kLife + 1);
   const auto changed = pages.take_changed();
   REQUIRE(changed.size() == 1);
   CHECK(changed[0].partition == "robot");
-  CHECK(changed[0].incarnation == 7);
+  CHECK(changed[0].incarnation == kLife);
   CHECK(changed[0].number == 0);
-  CHECK(changed[0].epoch == 1);
+  CHECK(changed[0].epoch == kLife + 1);
   CHECK(structure_of(changed) == Structure{{"base", "world"}, {"world", ""}});
 }
 
 TEST_CASE("a page is full at 60 frames, and the next frame opens another") {
-  Pages pages("robot", 1);
+  Pages pages("robot", kLife);
   put_numbered(pages, 0, Pages::kPageSize);
   CHECK(pages.count() == 1);
   put_numbered(pages, Pages::kPageSize, 1);
@@ -70,11 +72,11 @@ TEST_CASE("a page is full at 60 frames, and the next frame opens another") {
 }
 
 TEST_CASE("only pages that changed since the last time are published") {
-  Pages pages("robot", 1);
+  Pages pages("robot", kLife);
   put_numbered(pages, 0, 3 * Pages::kPageSize);
   CHECK(numbers_of(pages.take_changed()) == Numbers{0, 1, 2});
   CHECK(pages.take_changed().empty());
-  pages.put("f70", "f0");
+  pages.put("f70", "f0", 0);
   CHECK(numbers_of(pages.take_changed()) == Numbers{1});
   pages.erase("f0");
   pages.erase("f179");
@@ -84,7 +86,7 @@ TEST_CASE("only pages that changed since the last time are published") {
 }
 
 TEST_CASE("room on a page is used again, also after the page was empty") {
-  Pages pages("robot", 1);
+  Pages pages("robot", kLife);
   put_numbered(pages, 0, 2 * Pages::kPageSize);
   for (std::size_t i = 0; i < Pages::kPageSize; ++i) pages.erase("f" + std::to_string(i));
   CHECK(pages.frame_count() == Pages::kPageSize);
@@ -94,32 +96,32 @@ TEST_CASE("room on a page is used again, also after the page was empty") {
   put_numbered(pages, 1000, Pages::kPageSize);
   CHECK(pages.count() == 2);
   CHECK(numbers_of(pages.take_changed()) == Numbers{0});
-  pages.put("one more", "");
+  pages.put("one more", "", 0);
   CHECK(pages.count() == 3);
 }
 
 TEST_CASE("only the last page completes the epoch") {
-  Pages pages("robot", 1);
+  Pages pages("robot", kLife);
   put_numbered(pages, 0, 2 * Pages::kPageSize);
-  CHECK(pages.close_epoch() == 1);
+  CHECK(pages.close_epoch() == kLife + 1);
   auto changed = pages.take_changed();
   REQUIRE(changed.size() == 2);
   CHECK(changed[0].epoch == 0);
-  CHECK(changed[1].epoch == 1);
-  pages.put("f0", "f1");
-  CHECK(pages.close_epoch() == 2);
-  pages.put("f100", "f1");
-  CHECK(pages.close_epoch() == 3);
+  CHECK(changed[1].epoch == kLife + 1);
+  pages.put("f0", "f1", 0);
+  CHECK(pages.close_epoch() == kLife + 2);
+  pages.put("f100", "f1", 0);
+  CHECK(pages.close_epoch() == kLife + 3);
   changed = pages.take_changed();
   REQUIRE(changed.size() == 2);
-  CHECK(changed[0].epoch == 1);
-  CHECK(changed[1].epoch == 3);
+  CHECK(changed[0].epoch == kLife + 1);
+  CHECK(changed[1].epoch == kLife + 3);
 }
 
 TEST_CASE("a replica fed with the pages in order has the owner's structure") {
   Random random(0x9a6e5);
   INFO("seed " << random.seed());
-  Pages pages("robot", 1);
+  Pages pages("robot", kLife);
   Structure owned;
   Replica replica;
   constexpr int kSteps = 3000;
@@ -130,7 +132,7 @@ TEST_CASE("a replica fed with the pages in order has the owner's structure") {
       if (random.index(3) > 0) id = "f" + std::to_string(random.index(300));
       if (random.index(5) < 3) {
         const std::string parent = "p" + std::to_string(random.index(10));
-        pages.put(id, parent);
+        pages.put(id, parent, 0);
         owned[id] = parent;
       } else {
         pages.erase(id);

@@ -16,9 +16,12 @@ using testing::Replica;
 using testing::x_of;
 using Lines = std::vector<std::string>;
 
+constexpr Time kNow{std::chrono::seconds(100)};
+constexpr std::uint64_t kLife = 7;  // the incarnation, from which epochs count
+
 // The partition "arms" of a process that also knows world and base of "robot".
 struct Arms : Replica {
-  Arms() : Replica("arms"), partition("arms", 1, forest, directory) {
+  Arms() : Replica("arms"), partition("arms", kLife, forest, directory) {
     directory.apply(Page{"robot", 0, 1, 1, {{"world", ""}, {"base", "world"}}});
   }
 
@@ -28,13 +31,14 @@ struct Arms : Replica {
     REQUIRE(partition.load({{"arm", "base", along_x(1)},
                             {"hand", "arm", along_x(10)},
                             {"tool", "hand", along_x(100)},
-                            {"camera", "arm", along_x(1000)}}));
+                            {"camera", "arm", along_x(1000)}},
+                           kNow));
     (void)partition.take_pages();
   }
 
   template <class Body>
   Reply ask(const std::string& id, Body body) {
-    return partition.answer(Request{++sequence, id, std::move(body)});
+    return partition.answer(Request{++sequence, id, std::move(body)}, kNow);
   }
 
   Partition partition;
@@ -52,8 +56,9 @@ std::string said(const Reply& reply) {
 TEST_CASE("a configuration's frames are taken in any order, with parents of others or of nobody") {
   Arms arms;
   REQUIRE(arms.partition.load(
-      {{"tool", "hand", along_x(3)}, {"arm", "base", along_x(1)}, {"hand", "arm", along_x(2)}}));
-  REQUIRE(arms.partition.load({{"lamp", "ceiling", along_x(1)}, {"island", "", along_x(1)}}));
+      {{"tool", "hand", along_x(3)}, {"arm", "base", along_x(1)}, {"hand", "arm", along_x(2)}},
+      kNow));
+  REQUIRE(arms.partition.load({{"lamp", "ceiling", along_x(1)}, {"island", "", along_x(1)}}, kNow));
   CHECK(arms.structure() == Lines{"arm < base @ arms, attached", "base < world @ robot, attached",
                                   "hand < arm @ arms, attached", "island <  @ arms",
                                   "lamp < ceiling @ arms", "tool < hand @ arms, attached",
@@ -81,7 +86,7 @@ TEST_CASE("of a configuration with a bad frame nothing is taken, and the frame i
   for (const Bad& bad : all) {
     Arms arms;
     const Lines before = arms.structure();
-    const auto loaded = arms.partition.load(bad.frames);
+    const auto loaded = arms.partition.load(bad.frames, kNow);
     CHECK(outcome(loaded) == bad.error);
     CAPTURE(loaded.error().message);
     CHECK(loaded.error().message.find(bad.named) != std::string::npos);
@@ -89,7 +94,7 @@ TEST_CASE("of a configuration with a bad frame nothing is taken, and the frame i
     CHECK(arms.partition.frame_count() == 0);
     CHECK(arms.partition.take_pages().empty());
     // What was taken back can be taken again.
-    CHECK(outcome(arms.partition.load({{"a", "", {}}, {"b", "a", {}}})) == "ok");
+    CHECK(outcome(arms.partition.load({{"a", "", {}}, {"b", "a", {}}}, kNow)) == "ok");
   }
 }
 
@@ -97,11 +102,11 @@ TEST_CASE("what is loaded is published once, as one epoch") {
   Arms arms;
   std::vector<FrameSpec> frames;
   for (int i = 0; i < 100; ++i) frames.push_back({"f" + std::to_string(i), "arm", {}});
-  REQUIRE(arms.partition.load(frames));
+  REQUIRE(arms.partition.load(frames, kNow));
   const auto pages = arms.partition.take_pages();
   REQUIRE(pages.size() == 2);
   CHECK(pages[0].epoch == 0);
-  CHECK(pages[1].epoch == 1);
+  CHECK(pages[1].epoch == kLife + 1);
   CHECK(arms.partition.take_pages().empty());
   Replica other;
   other.apply(pages);
@@ -268,22 +273,22 @@ TEST_CASE("a repeated request is answered again but not applied again") {
   arms.plant();
   const PeerId peer{1};
   const Request add{5, "finger", AddRequest{"hand", along_x(1)}};
-  const Reply first = arms.partition.answer(peer, add);
+  const Reply first = arms.partition.answer(peer, add, kNow);
   CHECK(said(first) == "ok");
   CHECK(said(arms.ask("hand", RemoveRequest{{"finger"}})) == "ok");
-  const Reply second = arms.partition.answer(peer, add);
+  const Reply second = arms.partition.answer(peer, add, kNow);
   CHECK(said(second) == "ok");
   CHECK(second.sequence == 5);
   CHECK(second.epoch == first.epoch);
   CHECK_FALSE(arms.forest.exists("finger"));
   // Of another peer, or by another number, it is another request.
-  CHECK(said(arms.partition.answer(PeerId{2}, add)) == "ok");
+  CHECK(said(arms.partition.answer(PeerId{2}, add, kNow)) == "ok");
   CHECK(arms.forest.exists("finger"));
   const Request anew{6, "finger", AddRequest{"hand", along_x(1)}};
   const std::string refused = "already_exists: frame 'finger' exists already";
-  CHECK(said(arms.partition.answer(peer, anew)) == refused);
+  CHECK(said(arms.partition.answer(peer, anew, kNow)) == refused);
   REQUIRE(said(arms.ask("finger", RemoveRequest{{"finger"}})) == "ok");
-  CHECK(said(arms.partition.answer(peer, anew)) == refused);
+  CHECK(said(arms.partition.answer(peer, anew, kNow)) == refused);
 }
 
 TEST_CASE("a repeated lookup is answered with what holds now") {
@@ -292,7 +297,7 @@ TEST_CASE("a repeated lookup is answered with what holds now") {
   const PeerId peer{1};
   const Request lookup{9, "hand", LookupRequest{{{"arm", "hand"}}}};
   const auto x = [&] {
-    const Reply reply = arms.partition.answer(peer, lookup);
+    const Reply reply = arms.partition.answer(peer, lookup, kNow);
     return std::get<std::vector<Transform>>(reply.body).at(0).pose.translation().x();
   };
   CHECK(x() == 10);
@@ -303,16 +308,16 @@ TEST_CASE("a repeated lookup is answered with what holds now") {
 TEST_CASE("the epoch advances with the structure only, and pages carry it") {
   Arms arms;
   arms.plant();
-  CHECK(arms.ask("arm", UpdateRequest{{{"arm", {}}}}).epoch == 1);
+  CHECK(arms.ask("arm", UpdateRequest{{{"arm", {}}}}).epoch == kLife + 1);
   CHECK(arms.ask("arm", LookupRequest{{{"arm", "hand"}}}).epoch == 0);  // reads tell no epoch
-  CHECK(arms.ask("hand", AddRequest{"arm", {}}).epoch == 1);            // refused
+  CHECK(arms.ask("hand", AddRequest{"arm", {}}).epoch == kLife + 1);    // refused
   CHECK(arms.partition.take_pages().empty());
-  CHECK(arms.ask("finger", AddRequest{"hand", {}}).epoch == 2);
-  CHECK(arms.ask("finger", MoveRequest{"arm", {}}).epoch == 3);
-  CHECK(arms.ask("finger", RemoveRequest{{"finger", "camera"}}).epoch == 4);
+  CHECK(arms.ask("finger", AddRequest{"hand", {}}).epoch == kLife + 2);
+  CHECK(arms.ask("finger", MoveRequest{"arm", {}}).epoch == kLife + 3);
+  CHECK(arms.ask("finger", RemoveRequest{{"finger", "camera"}}).epoch == kLife + 4);
   const auto pages = arms.partition.take_pages();
   REQUIRE(pages.size() == 1);
-  CHECK(pages[0].epoch == 4);
+  CHECK(pages[0].epoch == kLife + 4);
   CHECK(pages[0].partition == "arms");
 }
 

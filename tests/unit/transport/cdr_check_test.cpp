@@ -234,7 +234,13 @@ Cdr transforms(std::size_t count, std::uint64_t length) {
 Cdr entries(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("robot").ulong(0).ulonglong(0).ulonglong(0).ulong(length);
-  for (std::size_t i = 0; i < count; ++i) cdr.string("a").string("b");
+  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(7).string("a").string("b");
+  return cdr.ulong(0);
+}
+Cdr notes(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.string("robot").ulong(0).ulonglong(0).ulonglong(0).ulong(0).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(7).octet(1).string("a").string("b");
   return cdr;
 }
 
@@ -249,7 +255,8 @@ TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
                                   {"further edges of an update", more_edges, request},
                                   {"segments of a lookup", segments, request},
                                   {"transforms of a reply", transforms, reply},
-                                  {"entries of a page", entries, page}};
+                                  {"entries of a page", entries, page},
+                                  {"notes of a page", notes, page}};
   for (const Sequence& sequence : all) {
     INFO(sequence.name);
     CHECK(sequence.well_formed(sequence.sample(0, 0)));

@@ -120,6 +120,18 @@ TEST_CASE("updates arrive as they were sent, but for the edges that nobody wants
   }
 }
 
+TEST_CASE("a page with a note that means nothing is refused") {
+  const auto read = [](const Note& note) {
+    const auto page = from_wire(to_wire(Page{"robot", 0, 1, 1, {}, {note}}));
+    return page ? "ok" : page.error().message;
+  };
+  CHECK(read({"hand", 1, Note::Kind::kGaveWay, "arms"}) == "ok");
+  CHECK(read({"hand", 1, static_cast<Note::Kind>(0), ""}) == "kind 0 of a note");
+  CHECK(read({"hand", 1, static_cast<Note::Kind>(4), ""}) == "kind 4 of a note");
+  CHECK(read({"", 1, Note::Kind::kRemoved, ""}) != "ok");
+  CHECK(read({"hand", 1, Note::Kind::kGaveWay, "arms,head"}) != "ok");
+}
+
 TEST_CASE("pages and presences arrive as they were sent") {
   for (const Page& one : testing::pages()) {
     const auto arrived = from_wire(travelled<PageType>(to_wire(one)));
@@ -132,7 +144,9 @@ TEST_CASE("pages and presences arrive as they were sent") {
     for (std::size_t i = 0; i < one.entries.size(); ++i) {
       CHECK(arrived->entries[i].id == one.entries[i].id);
       CHECK(arrived->entries[i].parent == one.entries[i].parent);
+      CHECK(arrived->entries[i].since == one.entries[i].since);
     }
+    CHECK(arrived->notes == one.notes);
   }
   for (const Presence& one : testing::presences()) {
     const auto arrived = from_wire(travelled<PresenceType>(to_wire(one)));

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "tfdude/partition/change.hpp"
+#include "tfdude/tree/forest.hpp"
+
+namespace tfdude {
+
+/// That a partition has a frame, and where it hangs it.
+struct Claim {
+  Owner owner = kHeldHere;
+  std::string parent;
+  std::uint64_t since = 0;
+};
+
+/// What the partition of this process has to give up because of what others claim.
+struct Concession {
+  enum class Kind : std::uint8_t {
+    kGiveWay,  ///< the id was claimed earlier by `rival`: release the frame
+    kUnhang,   ///< it closes a cycle with an earlier move of `rival`: make it a root
+    kRemove,   ///< the frame that it hung below was removed by `rival`: so is it
+  };
+  Kind kind = Kind::kGiveWay;
+  std::string frame;
+  Owner rival = kHeldHere;
+};
+
+/// Which of all claims are in force: writes those into the forest. Of two partitions that claim a frame the
+/// older claim holds, of claims of the same age that of the lesser name; in each cycle of claims the
+/// youngest does not, and its frame is a root (of the same age: that of the greater id). So what is in force is
+/// a function of the claims, not of the order in which they came. A held frame stays until its owner
+/// concedes; whoever does not own it sees the outcome at once. Not thread-safe.
+class Claims {
+ public:
+  Claims(Forest& forest, ChangeLog& changes) : forest_(forest), changes_(changes) {}
+
+  /// Numbers the partitions; the first is this process's own.
+  Owner add_owner(std::string name);
+  [[nodiscard]] const std::string& name(Owner owner) const { return names_[owner]; }
+
+  /// A partition claims a frame, perhaps once more. O(log) where nobody else does.
+  void claim(const std::string& id, Claim claim);
+  void unclaim(const std::string& id, Owner owner);
+
+  /// This process released a frame that it held: another's claim to it may be in force now.
+  void released(const std::string& id);
+
+  /// This process is going to hold a frame that may be another's now.
+  /// @return false where the other's claim is the older one
+  [[nodiscard]] bool take(const std::string& id, std::uint64_t since);
+
+  /// Hangs frames where they belong that could not hang there before. None, but for cycles.
+  void mend();
+
+  void concede(Concession concession) { concessions_.push_back(std::move(concession)); }
+  [[nodiscard]] std::vector<Concession> take_concessions() {
+    return std::exchange(concessions_, {});
+  }
+
+ private:
+  [[nodiscard]] bool older(const Claim& a, const Claim& b) const;
+  [[nodiscard]] Claim in_force(const FrameInfo& there) const;
+  void shadow(const std::string& id, Claim claim);
+  void promote(const std::string& id);
+  void put(const std::string& id, const Claim& claim);
+  void break_cycle(const std::string& id, const Claim& claim);
+
+  Forest& forest_;
+  ChangeLog& changes_;
+  std::vector<std::string> names_;
+  // Frames that several partitions claim: all claims but the one in force.
+  std::unordered_map<std::string, std::vector<Claim>> shadowed_;
+  // Claims of frames that are roots because they would close a cycle.
+  std::map<std::string, Claim> cut_;
+  std::vector<Concession> concessions_;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tfdude/partition/messages.hpp"
+#include "tfdude/tree/forest.hpp"
+
+namespace tfdude {
+
+/// A frame as a configuration gives it; an empty parent makes a root.
+struct FrameSpec {
+  std::string id;
+  std::string parent;
+  Transform X_PC;
+};
+
+/// A frame with what outlives its process.
+struct StoredFrame {
+  std::string id;
+  std::string parent;  ///< empty: a root
+  Transform X_PC;
+  std::uint64_t since = 0;
+};
+
+/// All that outlives a partition's process.
+struct StoredState {
+  std::uint64_t epoch = 0;
+  std::vector<StoredFrame> frames;
+  std::vector<Note> notes;
+  /// What the configuration said when it was last taken: what it says since differs where somebody
+  /// has changed it.
+  std::vector<FrameSpec> configured;
+};
+
+/// What to change in a stored state.
+struct StateChange {
+  std::uint64_t epoch = 0;
+  std::vector<std::string> erased;  ///< frames and notes; before the rest
+  std::vector<StoredFrame> frames;
+  std::vector<Note> notes;
+
+  [[nodiscard]] bool empty() const { return erased.empty(); }
+};
+
+/// Where a partition's state is kept. Not thread-safe.
+class StateStore {
+ public:
+  virtual ~StateStore() = default;
+
+  /// @return kState naming the file and what to do, where it cannot be read.
+  [[nodiscard]] virtual Result<StoredState> load() = 0;
+
+  /// All of it or nothing; what was saved survives the end of the process at any instant. @return kState.
+  [[nodiscard]] virtual Result<void> save(const StateChange& change) = 0;
+
+  /// New values of frames that are there; of the others it is not told.
+  [[nodiscard]] virtual Result<void> save_values(const std::vector<ChangedEdge>& edges) = 0;
+
+  [[nodiscard]] virtual Result<void> save_configured(const std::vector<FrameSpec>& frames) = 0;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,106 @@
+#include "tfdude/partition/change.hpp"
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+namespace {
+
+std::string under(std::string_view parent) {
+  return parent.empty() ? " as a root" : " under " + quote(parent);
+}
+
+}  // namespace
+
+std::string_view to_string(ChangeKind kind) {
+  switch (kind) {
+    case ChangeKind::kPartitionUp:
+      return "partition_up";
+    case ChangeKind::kPartitionDown:
+      return "partition_down";
+    case ChangeKind::kFrameAdded:
+      return "frame_added";
+    case ChangeKind::kFrameRemoved:
+      return "frame_removed";
+    case ChangeKind::kFrameMoved:
+      return "frame_moved";
+    case ChangeKind::kConflict:
+      return "conflict";
+    case ChangeKind::kMissed:
+      return "missed";
+  }
+  return "unknown";
+}
+
+Change conflict_of(const Note& note, const std::string& partition) {
+  Change change{ChangeKind::kConflict, partition, note.id, {}, note.rival, {}, {}};
+  change.message = "frame " + quote(note.id) + ": ";
+  if (note.kind == Note::Kind::kGaveWay) {
+    change.message += "claimed by partition " + quote(note.rival) + " and later by " +
+                      quote(partition) + ", which gives way";
+  } else {
+    change.message += "moved by partition " + quote(partition) + " so that with a move by " +
+                      quote(note.rival) + " it makes a cycle; it is made a root";
+  }
+  return change;
+}
+
+void ChangeLog::partition_up(const std::string& partition, const std::string& host,
+                             std::uint32_t pid) {
+  if (!watched_) return;
+  add({ChangeKind::kPartitionUp,
+       partition,
+       {},
+       {},
+       {},
+       "partition " + quote(partition) + " is there (host " + host + ", pid " +
+           std::to_string(pid) + ")",
+       {}});
+}
+
+void ChangeLog::partition_down(const std::string& partition) {
+  if (!watched_) return;
+  add({ChangeKind::kPartitionDown,
+       partition,
+       {},
+       {},
+       {},
+       "partition " + quote(partition) + " has gone or fallen silent",
+       {}});
+}
+
+void ChangeLog::frame_added(std::string_view id, std::string_view parent,
+                            const std::string& partition) {
+  if (!watched_) return;
+  add({ChangeKind::kFrameAdded,
+       partition,
+       std::string(id),
+       std::string(parent),
+       {},
+       "frame " + quote(id) + " of partition " + quote(partition) + " added" + under(parent),
+       {}});
+}
+
+void ChangeLog::frame_moved(std::string_view id, std::string_view parent,
+                            const std::string& partition) {
+  if (!watched_) return;
+  add({ChangeKind::kFrameMoved,
+       partition,
+       std::string(id),
+       std::string(parent),
+       {},
+       "frame " + quote(id) + " of partition " + quote(partition) + " moved" + under(parent),
+       {}});
+}
+
+void ChangeLog::frame_removed(std::string_view id, const std::string& partition) {
+  if (!watched_) return;
+  add({ChangeKind::kFrameRemoved,
+       partition,
+       std::string(id),
+       {},
+       {},
+       "frame " + quote(id) + " of partition " + quote(partition) + " removed",
+       {}});
+}
+
+}  // namespace tfdude

@@ -1,0 +1,161 @@
+#include "tfdude/partition/claims.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+namespace tfdude {
+
+Owner Claims::add_owner(std::string name) {
+  names_.push_back(std::move(name));
+  return static_cast<Owner>(names_.size() - 1);
+}
+
+bool Claims::older(const Claim& a, const Claim& b) const {
+  return std::tie(a.since, name(a.owner)) < std::tie(b.since, name(b.owner));
+}
+
+Claim Claims::in_force(const FrameInfo& there) const {
+  const auto cut = cut_.find(there.id);
+  if (cut != cut_.end()) return cut->second;
+  return {there.owner, there.parent, there.since};
+}
+
+void Claims::claim(const std::string& id, Claim claim) {
+  const auto there = forest_.info(id);
+  const bool contested =
+      (there && there->owner != claim.owner) || shadowed_.find(id) != shadowed_.end();
+  if (!contested) {
+    put(id, claim);
+    return;
+  }
+  if (there && there->owner != claim.owner && there->owner != kHeldHere) {
+    shadow(id, in_force(*there));
+  }
+  shadow(id, std::move(claim));
+  promote(id);
+}
+
+void Claims::unclaim(const std::string& id, Owner owner) {
+  if (const auto claims = shadowed_.find(id); claims != shadowed_.end()) {
+    auto& others = claims->second;
+    const auto mine = std::find_if(others.begin(), others.end(),
+                                   [owner](const Claim& claim) { return claim.owner == owner; });
+    if (mine != others.end()) {
+      others.erase(mine);
+      if (others.empty()) shadowed_.erase(claims);
+      return;
+    }
+  }
+  const bool last = shadowed_.find(id) == shadowed_.end();
+  if (last && changes_.watched()) {
+    const auto there = forest_.info(id);
+    if (there && there->owner == owner) changes_.frame_removed(id, name(owner));
+  }
+  if (last) forest_.drop_remote(id, owner);
+  cut_.erase(id);
+  promote(id);
+}
+
+void Claims::released(const std::string& id) {
+  promote(id);
+  mend();
+}
+
+bool Claims::take(const std::string& id, std::uint64_t since) {
+  const auto there = forest_.info(id);
+  if (!there || there->owner == kHeldHere) return true;
+  Claim theirs = in_force(*there);
+  if (!older({kHeldHere, {}, since}, theirs)) return false;
+  forest_.drop_remote(id, theirs.owner);
+  cut_.erase(id);
+  shadow(id, std::move(theirs));
+  return true;
+}
+
+// Puts the oldest claim in force, unless this process holds the frame: then it is for the owner to concede.
+void Claims::promote(const std::string& id) {
+  const auto claims = shadowed_.find(id);
+  if (claims == shadowed_.end()) return;
+  auto& others = claims->second;
+  const auto oldest = std::min_element(
+      others.begin(), others.end(), [this](const Claim& a, const Claim& b) { return older(a, b); });
+  const auto there = forest_.info(id);
+  if (there && there->owner == kHeldHere) {
+    if (older(*oldest, in_force(*there))) {
+      concede({Concession::Kind::kGiveWay, id, oldest->owner});
+    }
+    return;
+  }
+  const Claim winner = *oldest;
+  others.erase(oldest);
+  if (others.empty()) shadowed_.erase(claims);
+  put(id, winner);
+}
+
+void Claims::shadow(const std::string& id, Claim claim) {
+  auto& claims = shadowed_[id];
+  const auto mine = std::find_if(claims.begin(), claims.end(),
+                                 [&](const Claim& c) { return c.owner == claim.owner; });
+  if (mine != claims.end()) {
+    *mine = std::move(claim);
+  } else {
+    claims.push_back(std::move(claim));
+  }
+}
+
+void Claims::put(const std::string& id, const Claim& claim) {
+  std::optional<FrameInfo> before;
+  if (changes_.watched()) before = forest_.info(id);
+  const auto done = forest_.put_remote(id, claim.parent, claim.owner, claim.since);
+  if (!done && done.error().code == Errc::kCycle) {
+    break_cycle(id, claim);
+  } else {
+    cut_.erase(id);
+  }
+  if (!changes_.watched()) return;
+  const auto after = forest_.info(id);
+  if (!after) return;
+  if (!before) {
+    changes_.frame_added(id, after->parent, name(claim.owner));
+  } else if (before->parent != after->parent || before->owner != after->owner) {
+    changes_.frame_moved(id, after->parent, name(claim.owner));
+  }
+}
+
+// The frame's claimed parent lies below it, where the forest has made it a root. Of the cycle's edges that others
+// own the youngest is cut; if a held one is younger still, its owner has to concede, which mends that.
+void Claims::break_cycle(const std::string& id, const Claim& claim) {
+  const auto younger = [](const FrameInfo& a, const FrameInfo& b) {
+    return std::tie(a.since, a.id) > std::tie(b.since, b.id);
+  };
+  FrameInfo youngest{id, claim.parent, claim.owner, false, claim.since};
+  std::optional<FrameInfo> held;
+  for (auto edge = forest_.info(claim.parent); edge && edge->id != id;
+       edge = forest_.info(edge->parent)) {
+    if (edge->owner == kHeldHere) {
+      if (!held || younger(*edge, *held)) held = edge;
+    } else if (younger(*edge, youngest)) {
+      youngest = *edge;
+    }
+  }
+  if (held && younger(*held, youngest)) {
+    concede({Concession::Kind::kUnhang, held->id, youngest.owner});
+  }
+  if (youngest.id == id) {
+    cut_[id] = claim;
+    return;
+  }
+  cut_[youngest.id] = {youngest.owner, youngest.parent, youngest.since};
+  (void)forest_.put_remote(youngest.id, {}, youngest.owner, youngest.since);
+  changes_.frame_moved(youngest.id, {}, name(youngest.owner));
+  (void)forest_.put_remote(id, claim.parent, claim.owner, claim.since);
+  cut_.erase(id);
+}
+
+void Claims::mend() {
+  for (const auto& [id, claim] : std::exchange(cut_, {})) put(id, claim);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,151 @@
+#include <map>
+
+#include "tfdude/partition/partition.hpp"
+
+// How a partition outlives its process, and what it gives up where others have been faster.
+namespace tfdude {
+namespace {
+
+std::map<std::string, const FrameSpec*> by_id(const std::vector<FrameSpec>& frames) {
+  std::map<std::string, const FrameSpec*> all;
+  for (const FrameSpec& frame : frames) all.emplace(frame.id, &frame);
+  return all;
+}
+
+bool same(const FrameSpec& a, const FrameSpec& b) {
+  return a.parent == b.parent && a.X_PC.covariance.upper() == b.X_PC.covariance.upper() &&
+         a.X_PC.pose.translation() == b.X_PC.pose.translation() &&
+         a.X_PC.pose.rotation().coeffs() == b.X_PC.pose.rotation().coeffs();
+}
+
+}  // namespace
+
+Result<void> Partition::restore(const StoredState& state, const std::vector<FrameSpec>& configured,
+                                Time now) {
+  std::vector<const StoredFrame*> contested;
+  for (const StoredFrame& frame : state.frames) {
+    const bool mine =
+        directory_.take(frame.id, frame.since) &&
+        forest_.add(frame.id, frame.parent, frame.X_PC, Forest::MissingParent::kAllow, frame.since);
+    if (mine) {
+      put(frame.id, frame.parent, frame.since);
+    } else {
+      contested.push_back(&frame);
+    }
+  }
+  for (const Note& note : state.notes) pages_.leave(note);
+  pages_.resume(state.epoch);
+  // Only what changes from here on is not in the store.
+  saved_ = true;
+  pages_.watch_ids();
+  for (const StoredFrame* frame : contested) restore_contested(*frame, now);
+  directory_.find_orphans();
+  (void)concede(now);
+  auto taken = reconfigure(state.configured, configured, now);
+  pages_.close_epoch();
+  return taken;
+}
+
+void Partition::restore_contested(const StoredFrame& frame, Time now) {
+  if (const auto there = forest_.info(frame.id)) {
+    give_way(frame.id, there->owner, now);
+    return;
+  }
+  // Others have hung the parent below this frame meanwhile.
+  const auto parent = forest_.info(frame.parent);
+  const std::uint64_t since = directory_.next_stamp(now);
+  if (!forest_.add(frame.id, {}, frame.X_PC, Forest::MissingParent::kAllow, since)) return;
+  put(frame.id, {}, since);
+  const Note note{frame.id, since, Note::Kind::kUnhung,
+                  parent ? directory_.name(parent->owner) : std::string()};
+  pages_.leave(note);
+  directory_.changes().add(conflict_of(note, name_));
+}
+
+Result<void> Partition::reconfigure(const std::vector<FrameSpec>& before,
+                                    const std::vector<FrameSpec>& configured, Time now) {
+  const auto old = by_id(before);
+  const auto current = by_id(configured);
+  std::vector<FrameSpec> fresh;
+  for (const FrameSpec& frame : configured) {
+    const auto was = old.find(frame.id);
+    if (was != old.end() && same(*was->second, frame)) continue;
+    if (!forest_.holds(frame.id)) {
+      fresh.push_back(frame);
+      continue;
+    }
+    // Its parent may come later: as a missing one is allowed for what is loaded, so it is here.
+    (void)forest_.release(frame.id);
+    pages_.erase(frame.id);
+    directory_.released(frame.id);
+    fresh.push_back(frame);
+  }
+  if (auto loaded = load(fresh, now); !loaded) return loaded;
+  for (const FrameSpec& frame : before) {
+    if (current.count(frame.id) != 0) continue;
+    if (auto removed = forest_.remove(frame.id)) forget(*removed, now);
+  }
+  return {};
+}
+
+bool Partition::concede(Time now) {
+  bool changed = false;
+  for (const Concession& concession : directory_.take_concessions()) {
+    // What was conceded just now may have settled this, too, or be the same.
+    const auto frame = forest_.info(concession.frame);
+    if (!frame || frame->owner != kHeldHere) continue;
+    if (concession.kind == Concession::Kind::kUnhang && frame->parent.empty()) continue;
+    changed = true;
+    switch (concession.kind) {
+      case Concession::Kind::kGiveWay:
+        (void)forest_.release(concession.frame);
+        pages_.erase(concession.frame);
+        give_way(concession.frame, concession.rival, now);
+        directory_.released(concession.frame);
+        break;
+      case Concession::Kind::kUnhang:
+        unhang(concession.frame, concession.rival, now);
+        break;
+      case Concession::Kind::kRemove:
+        if (auto removed = forest_.remove(concession.frame)) forget(*removed, now);
+        break;
+    }
+  }
+  if (changed) pages_.close_epoch();
+  return changed;
+}
+
+void Partition::give_way(const std::string& id, Owner rival, Time now) {
+  const Note note{id, directory_.next_stamp(now), Note::Kind::kGaveWay, directory_.name(rival)};
+  pages_.leave(note);
+  directory_.changes().add(conflict_of(note, name_));
+}
+
+void Partition::unhang(const std::string& id, Owner rival, Time now) {
+  const std::uint64_t since = directory_.next_stamp(now);
+  if (!forest_.move(id, {}, std::nullopt, since)) return;
+  pages_.put(id, {}, since);
+  const Note note{id, since, Note::Kind::kUnhung, directory_.name(rival)};
+  pages_.leave(note);
+  directory_.changes().frame_moved(id, {}, name_);
+  directory_.changes().add(conflict_of(note, name_));
+  directory_.moved();
+}
+
+StateChange Partition::take_unsaved() {
+  StateChange change;
+  change.epoch = pages_.epoch();
+  std::set<std::string> ids = pages_.take_touched();
+  ids.merge(updated_);
+  updated_.clear();
+  for (const std::string& id : ids) {
+    change.erased.push_back(id);
+    if (auto note = pages_.note(id)) change.notes.push_back(*std::move(note));
+    const auto place = pages_.place(id);
+    const auto X_PC = forest_.value(id);
+    if (place && X_PC) change.frames.push_back({id, place->parent, *X_PC, place->since});
+  }
+  return change;
+}
+
+}  // namespace tfdude

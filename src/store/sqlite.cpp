@@ -1,0 +1,99 @@
+#include "store/sqlite.hpp"
+
+#include <cstring>
+
+namespace tfdude::sqlite {
+namespace {
+
+tl::unexpected<Error> failed(sqlite3* handle) { return fail(Errc::kState, sqlite3_errmsg(handle)); }
+
+}  // namespace
+
+Result<Database> Database::open(const std::string& file) {
+  Database database;
+  sqlite3* handle = nullptr;
+  const int status =
+      sqlite3_open_v2(file.c_str(), &handle,
+                      SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
+  database.handle_.reset(handle);
+  if (status != SQLITE_OK) {
+    return fail(Errc::kState, handle != nullptr ? sqlite3_errmsg(handle) : sqlite3_errstr(status));
+  }
+  return database;
+}
+
+Result<void> Database::run(const char* sql) {
+  if (sqlite3_exec(handle_.get(), sql, nullptr, nullptr, nullptr) != SQLITE_OK)
+    return failed(handle_.get());
+  return {};
+}
+
+Result<std::int64_t> Database::number(const char* sql) {
+  auto statement = Statement::prepare(*this, sql);
+  if (!statement) return tl::unexpected(std::move(statement.error()));
+  auto row = statement->start();
+  if (!row) return tl::unexpected(std::move(row.error()));
+  return *row ? static_cast<std::int64_t>(statement->number(0)) : 0;
+}
+
+Result<std::string> Database::text(const char* sql) {
+  auto statement = Statement::prepare(*this, sql);
+  if (!statement) return tl::unexpected(std::move(statement.error()));
+  auto row = statement->start();
+  if (!row) return tl::unexpected(std::move(row.error()));
+  return *row ? statement->text(0) : std::string();
+}
+
+Result<Statement> Statement::prepare(const Database& database, const char* sql) {
+  sqlite3_stmt* handle = nullptr;
+  if (sqlite3_prepare_v3(database.get(), sql, -1, SQLITE_PREPARE_PERSISTENT, &handle, nullptr) !=
+      SQLITE_OK) {
+    return failed(database.get());
+  }
+  Statement statement;
+  statement.handle_.reset(handle);
+  return statement;
+}
+
+Result<bool> Statement::next() {
+  const int status = sqlite3_step(handle_.get());
+  if (status == SQLITE_ROW) return true;
+  if (status == SQLITE_DONE) return false;
+  return failed(sqlite3_db_handle(handle_.get()));
+}
+
+std::string Statement::text(int column) const {
+  const auto* text = static_cast<const char*>(sqlite3_column_blob(handle_.get(), column));
+  const int size = sqlite3_column_bytes(handle_.get(), column);
+  return text != nullptr ? std::string(text, static_cast<std::size_t>(size)) : std::string();
+}
+
+std::uint64_t Statement::number(int column) const {
+  return static_cast<std::uint64_t>(sqlite3_column_int64(handle_.get(), column));
+}
+
+Result<Flat> Statement::flat(int column) const {
+  Flat flat{};
+  const void* blob = sqlite3_column_blob(handle_.get(), column);
+  const int size = sqlite3_column_bytes(handle_.get(), column);
+  if (blob == nullptr || static_cast<std::size_t>(size) != sizeof flat) {
+    return fail(Errc::kState, "a transform of " + std::to_string(size) + " bytes");
+  }
+  std::memcpy(flat.data(), blob, sizeof flat);
+  return flat;
+}
+
+void Statement::bind(int at, const std::string& text) {
+  sqlite3_bind_text(handle_.get(), at, text.data(), static_cast<int>(text.size()),
+                    SQLITE_TRANSIENT);
+}
+
+void Statement::bind(int at, std::uint64_t number) {
+  sqlite3_bind_int64(handle_.get(), at, static_cast<sqlite3_int64>(number));
+}
+
+void Statement::bind(int at, const Flat& flat) {
+  sqlite3_bind_blob(handle_.get(), at, flat.data(), sizeof flat, SQLITE_TRANSIENT);
+}
+
+}  // namespace tfdude::sqlite

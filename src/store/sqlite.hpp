@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <sqlite3.h>
+#include <string>
+#include <string_view>
+
+#include "tfdude/base/result.hpp"
+
+#include "math/flat.hpp"
+
+namespace tfdude::sqlite {
+
+/// An open database. Errors are kState and say what SQLite says. Not thread-safe.
+class Database {
+ public:
+  [[nodiscard]] static Result<Database> open(const std::string& file);
+
+  /// Runs statements that give no rows.
+  [[nodiscard]] Result<void> run(const char* sql);
+
+  /// The first column of the first row, as a number; 0 where there is no row.
+  [[nodiscard]] Result<std::int64_t> number(const char* sql);
+  /// The same as text; empty where there is no row.
+  [[nodiscard]] Result<std::string> text(const char* sql);
+
+  /// What SQLite says of the last failure.
+  [[nodiscard]] std::string reason() const { return sqlite3_errmsg(handle_.get()); }
+  [[nodiscard]] int code() const { return sqlite3_errcode(handle_.get()); }
+  [[nodiscard]] sqlite3* get() const { return handle_.get(); }
+
+ private:
+  struct Close {
+    void operator()(sqlite3* handle) const { sqlite3_close_v2(handle); }
+  };
+  std::unique_ptr<sqlite3, Close> handle_;
+};
+
+/// A prepared statement, used again and again.
+class Statement {
+ public:
+  Statement() = default;
+  [[nodiscard]] static Result<Statement> prepare(const Database& database, const char* sql);
+
+  /// Binds values to ?1, ?2 ... and takes the first step.
+  /// @return whether there is a row
+  template <class... Values>
+  [[nodiscard]] Result<bool> start(const Values&... values) {
+    sqlite3_reset(handle_.get());
+    int at = 0;
+    (bind(++at, values), ...);
+    return next();
+  }
+  /// Binds values and runs to the end.
+  template <class... Values>
+  [[nodiscard]] Result<void> run(const Values&... values) {
+    auto row = start(values...);
+    sqlite3_reset(handle_.get());
+    if (!row) return tl::unexpected(std::move(row.error()));
+    return {};
+  }
+  [[nodiscard]] Result<bool> next();
+
+  [[nodiscard]] std::string text(int column) const;
+  [[nodiscard]] std::uint64_t number(int column) const;
+  /// @return kState where the column is not as large as one.
+  [[nodiscard]] Result<Flat> flat(int column) const;
+
+ private:
+  void bind(int at, const std::string& text);
+  void bind(int at, std::uint64_t number);
+  void bind(int at, const Flat& flat);
+
+  struct Finalize {
+    void operator()(sqlite3_stmt* handle) const { sqlite3_finalize(handle); }
+  };
+  std::unique_ptr<sqlite3_stmt, Finalize> handle_;
+};
+
+}  // namespace tfdude::sqlite

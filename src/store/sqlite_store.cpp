@@ -1,0 +1,301 @@
+#include "store/sqlite_store.hpp"
+
+#include <filesystem>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "store/sqlite.hpp"
+
+namespace tfdude {
+namespace {
+
+using sqlite::Database;
+using sqlite::Statement;
+
+constexpr std::int64_t kApplication = 0x74666475;  // "tfdu"
+constexpr std::int64_t kFormat = 1;
+constexpr std::size_t kLongestFileName = 200;
+
+constexpr const char* kSchema = R"(
+  CREATE TABLE about(partition TEXT NOT NULL, epoch INTEGER NOT NULL);
+  CREATE TABLE frames(id TEXT PRIMARY KEY, parent TEXT NOT NULL, x_pc BLOB NOT NULL,
+                      since INTEGER NOT NULL) WITHOUT ROWID;
+  CREATE TABLE notes(id TEXT PRIMARY KEY, since INTEGER NOT NULL, kind INTEGER NOT NULL,
+                     rival TEXT NOT NULL) WITHOUT ROWID;
+  CREATE TABLE configured(id TEXT PRIMARY KEY, parent TEXT NOT NULL, x_pc BLOB NOT NULL)
+                     WITHOUT ROWID;
+)";
+
+class SqliteStore final : public StateStore {
+ public:
+  explicit SqliteStore(std::string file) : file_(std::move(file)) {}
+
+  Result<void> open(const std::string& partition);
+
+  Result<StoredState> load() override;
+  Result<void> save(const StateChange& change) override;
+  Result<void> save_values(const std::vector<ChangedEdge>& edges) override;
+  Result<void> save_configured(const std::vector<FrameSpec>& frames) override;
+
+ private:
+  [[nodiscard]] tl::unexpected<Error> unusable(const std::string& why) const;
+  [[nodiscard]] tl::unexpected<Error> damaged(const std::string& how) const;
+  Result<void> check(const std::string& partition);
+  Result<void> create(const std::string& partition);
+  Result<void> prepare();
+  Result<void> load_frames(StoredState& state);
+  Result<void> load_notes(StoredState& state);
+  Result<void> load_configured(StoredState& state);
+  template <class Write>
+  Result<void> transaction(Write write);
+
+  const std::string file_;
+  std::optional<Database> database_;
+  Statement set_epoch_;
+  Statement erase_frame_;
+  Statement erase_note_;
+  Statement put_frame_;
+  Statement put_note_;
+  Statement set_value_;
+  Statement put_configured_;
+};
+
+tl::unexpected<Error> SqliteStore::unusable(const std::string& why) const {
+  return fail(Errc::kState, "state file " + quote(file_) + " " + why);
+}
+
+tl::unexpected<Error> SqliteStore::damaged(const std::string& how) const {
+  return unusable("is damaged (" + how +
+                  "): move it away to start from the configuration, or put a copy of it back");
+}
+
+Result<void> SqliteStore::open(const std::string& partition) {
+  std::error_code error;
+  std::filesystem::create_directories(std::filesystem::path(file_).parent_path(), error);
+  auto opened = error ? fail(Errc::kState, error.message()) : Database::open(file_);
+  if (!opened) return unusable("cannot be opened: " + opened.error().message);
+  database_ = std::move(*opened);
+  if (auto checked = check(partition); !checked) return checked;
+  if (auto prepared = prepare(); !prepared) return damaged(prepared.error().message);
+  return {};
+}
+
+// Nothing is written before it is known that the file is this partition's, or new.
+Result<void> SqliteStore::check(const std::string& partition) {
+  // One process at a time, which then needs no shared memory for the log.
+  auto locked = database_->run("PRAGMA busy_timeout = 200; PRAGMA locking_mode = EXCLUSIVE;");
+  if (locked) locked = database_->run("BEGIN IMMEDIATE; ROLLBACK;");
+  if (!locked) {
+    const bool busy = database_->code() == SQLITE_BUSY;
+    return busy ? unusable("is in use by another process: is the partition served already?")
+                : damaged(locked.error().message);
+  }
+  const auto application = database_->number("PRAGMA application_id");
+  const auto format = database_->number("PRAGMA user_version");
+  const auto tables = database_->number("SELECT count(*) FROM sqlite_master");
+  const auto sound = database_->text("PRAGMA quick_check(1)");
+  if (!application || !format || !tables || !sound || *sound != "ok") {
+    return damaged(sound ? *sound : sound.error().message);
+  }
+  if (*tables == 0 && *application == 0 && *format == 0) return create(partition);
+  if (*application != kApplication) {
+    return unusable("belongs to another program: name another directory, or move it away");
+  }
+  if (*format != kFormat) {
+    return unusable("has format " + std::to_string(*format) + ", of which this version reads " +
+                    std::to_string(kFormat) +
+                    ": use the version that wrote it, or move it away to start from the "
+                    "configuration");
+  }
+  const auto of = database_->text("SELECT partition FROM about");
+  if (!of) return damaged(of.error().message);
+  if (*of == partition) return database_->run("PRAGMA synchronous = NORMAL");
+  return unusable("is of partition " + quote(*of) + ", not of " + quote(partition) +
+                  ": move it away, or put the right one back");
+}
+
+Result<void> SqliteStore::create(const std::string& partition) {
+  auto done = database_->run("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;");
+  if (done) done = database_->run("BEGIN IMMEDIATE");
+  if (done) done = database_->run(kSchema);
+  if (done) {
+    auto about = Statement::prepare(*database_, "INSERT INTO about VALUES(?1, 0)");
+    done = about ? about->run(partition) : tl::unexpected(about.error());
+  }
+  const std::string marks = "PRAGMA application_id = " + std::to_string(kApplication) +
+                            "; PRAGMA user_version = " + std::to_string(kFormat) + "; COMMIT;";
+  if (done) done = database_->run(marks.c_str());
+  if (!done) return unusable("cannot be written: " + done.error().message);
+  return {};
+}
+
+Result<void> SqliteStore::prepare() {
+  const std::pair<Statement*, const char*> all[] = {
+      {&set_epoch_, "UPDATE about SET epoch = ?1"},
+      {&erase_frame_, "DELETE FROM frames WHERE id = ?1"},
+      {&erase_note_, "DELETE FROM notes WHERE id = ?1"},
+      {&put_frame_, "INSERT OR REPLACE INTO frames VALUES(?1, ?2, ?3, ?4)"},
+      {&put_note_, "INSERT OR REPLACE INTO notes VALUES(?1, ?2, ?3, ?4)"},
+      {&set_value_, "UPDATE frames SET x_pc = ?2 WHERE id = ?1"},
+      {&put_configured_, "INSERT INTO configured VALUES(?1, ?2, ?3)"},
+  };
+  for (const auto& [statement, sql] : all) {
+    auto prepared = Statement::prepare(*database_, sql);
+    if (!prepared) return tl::unexpected(std::move(prepared.error()));
+    *statement = std::move(*prepared);
+  }
+  return {};
+}
+
+Result<StoredState> SqliteStore::load() {
+  StoredState state;
+  const auto epoch = database_->number("SELECT epoch FROM about");
+  if (!epoch) return damaged(epoch.error().message);
+  state.epoch = static_cast<std::uint64_t>(*epoch);
+  for (auto part :
+       {&SqliteStore::load_frames, &SqliteStore::load_notes, &SqliteStore::load_configured}) {
+    if (auto loaded = (this->*part)(state); !loaded) return damaged(loaded.error().message);
+  }
+  return state;
+}
+
+// What one row says of a frame, and whether that can be.
+Result<FrameSpec> read_frame(const Statement& row) {
+  FrameSpec frame{row.text(0), row.text(1), {}};
+  if (auto ok = check_id(frame.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
+  if (!frame.parent.empty()) {
+    if (auto ok = check_id(frame.parent, "parent"); !ok) return tl::unexpected(ok.error());
+  }
+  const auto flat = row.flat(2);
+  auto X_PC = flat ? computed_from(*flat) : tl::unexpected(flat.error());
+  if (!X_PC) return fail_at("frame " + quote(frame.id), X_PC.error());
+  frame.X_PC = *X_PC;
+  return frame;
+}
+
+template <class Take>
+Result<void> each_row(const Database& database, const char* sql, Take take) {
+  auto rows = Statement::prepare(database, sql);
+  if (!rows) return tl::unexpected(std::move(rows.error()));
+  for (auto row = rows->start();; row = rows->next()) {
+    if (!row) return tl::unexpected(std::move(row.error()));
+    if (!*row) return {};
+    if (auto taken = take(*rows); !taken) return taken;
+  }
+}
+
+Result<void> SqliteStore::load_frames(StoredState& state) {
+  const char* sql = "SELECT id, parent, x_pc, since FROM frames";
+  return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
+    auto frame = read_frame(row);
+    if (!frame) return tl::unexpected(std::move(frame.error()));
+    state.frames.push_back({frame->id, frame->parent, frame->X_PC, row.number(3)});
+    return {};
+  });
+}
+
+Result<void> SqliteStore::load_notes(StoredState& state) {
+  const char* sql = "SELECT id, since, kind, rival FROM notes ORDER BY since";
+  return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
+    const std::uint64_t kind = row.number(2);
+    Note note{row.text(0), row.number(1), static_cast<Note::Kind>(kind), row.text(3)};
+    if (auto ok = check_id(note.id, "id"); !ok) return ok;
+    if (kind < 1 || kind > static_cast<std::uint64_t>(Note::Kind::kUnhung)) {
+      return fail(Errc::kState, "a note of kind " + std::to_string(kind));
+    }
+    state.notes.push_back(std::move(note));
+    return {};
+  });
+}
+
+Result<void> SqliteStore::load_configured(StoredState& state) {
+  const char* sql = "SELECT id, parent, x_pc FROM configured";
+  return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
+    auto frame = read_frame(row);
+    if (!frame) return tl::unexpected(std::move(frame.error()));
+    state.configured.push_back(*std::move(frame));
+    return {};
+  });
+}
+
+template <class Write>
+Result<void> SqliteStore::transaction(Write write) {
+  auto done = database_->run("BEGIN IMMEDIATE");
+  if (done) done = write();
+  if (done) done = database_->run("COMMIT");
+  if (done) return {};
+  (void)database_->run("ROLLBACK");
+  return unusable("could not be written: " + done.error().message);
+}
+
+Result<void> SqliteStore::save(const StateChange& change) {
+  return transaction([&]() -> Result<void> {
+    Result<void> done = set_epoch_.run(change.epoch);
+    for (const std::string& id : change.erased) {
+      if (done) done = erase_frame_.run(id);
+      if (done) done = erase_note_.run(id);
+    }
+    for (const StoredFrame& frame : change.frames) {
+      if (done) done = put_frame_.run(frame.id, frame.parent, to_flat(frame.X_PC), frame.since);
+    }
+    for (const Note& note : change.notes) {
+      const auto kind = static_cast<std::uint64_t>(note.kind);
+      if (done) done = put_note_.run(note.id, note.since, kind, note.rival);
+    }
+    return done;
+  });
+}
+
+Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges) {
+  return transaction([&]() -> Result<void> {
+    Result<void> done;
+    for (const ChangedEdge& edge : edges) {
+      if (done) done = set_value_.run(edge.id, to_flat(edge.X_PC));
+    }
+    return done;
+  });
+}
+
+Result<void> SqliteStore::save_configured(const std::vector<FrameSpec>& frames) {
+  return transaction([&]() -> Result<void> {
+    Result<void> done = database_->run("DELETE FROM configured");
+    for (const FrameSpec& frame : frames) {
+      if (done) done = put_configured_.run(frame.id, frame.parent, to_flat(frame.X_PC));
+    }
+    return done;
+  });
+}
+
+}  // namespace
+
+std::string state_file(const std::string& directory, std::uint32_t domain,
+                       const std::string& partition) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string name;
+  std::uint32_t hash = 2166136261U;
+  for (const char c : partition) {
+    const auto byte = static_cast<unsigned char>(c);
+    hash = (hash ^ byte) * 16777619U;
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '-' || c == '_' || (c == '.' && !name.empty());
+    if (plain) {
+      name += c;
+    } else {
+      name += {'%', kDigits[byte >> 4U], kDigits[byte & 15U]};
+    }
+  }
+  if (name.size() > kLongestFileName) {
+    name = name.substr(0, kLongestFileName) + "-" + std::to_string(hash);
+  }
+  return directory + "/domain-" + std::to_string(domain) + "/" + name + ".sqlite";
+}
+
+Result<std::unique_ptr<StateStore>> open_sqlite_store(const std::string& file,
+                                                      const std::string& partition) {
+  auto store = std::make_unique<SqliteStore>(file);
+  if (auto opened = store->open(partition); !opened) return tl::unexpected(opened.error());
+  return store;
+}
+
+}  // namespace tfdude

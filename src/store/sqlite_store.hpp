@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "tfdude/partition/state_store.hpp"
+
+namespace tfdude {
+
+/// The file of a partition's state: DIRECTORY/domain-N/PARTITION.sqlite, where whatever is not a letter, digit,
+/// dash, dot or underscore is written as % and two digits. Names too long for a file end in their FNV-1a hash.
+[[nodiscard]] std::string state_file(const std::string& directory, std::uint32_t domain,
+                                     const std::string& partition);
+
+/// Opens a partition's state, or makes an empty one, and keeps others from opening it. An SQLite file in WAL mode,
+/// synced at checkpoints only: what was saved survives the end of the process at any instant, and the
+/// file stays whole also where the computer stops, which may cost the last changes.
+/// @return kState naming the file and what to do: in use, damaged, of another program, of a newer format, of
+///   another partition, not to be created. A file that cannot be read is not changed.
+[[nodiscard]] Result<std::unique_ptr<StateStore>> open_sqlite_store(const std::string& file,
+                                                                    const std::string& partition);
+
+}  // namespace tfdude

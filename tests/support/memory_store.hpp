@@ -1,0 +1,50 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tfdude/partition/state_store.hpp"
+
+namespace tfdude::testing {
+
+/// A partition's state in memory, which outlives the partition.
+class MemoryStore final : public StateStore {
+ public:
+  Result<StoredState> load() override {
+    StoredState state{epoch_, {}, {}, configured_};
+    for (const auto& [id, frame] : frames_) state.frames.push_back(frame);
+    for (const auto& [id, note] : notes_) state.notes.push_back(note);
+    return state;
+  }
+  Result<void> save(const StateChange& change) override {
+    epoch_ = change.epoch;
+    for (const std::string& id : change.erased) {
+      frames_.erase(id);
+      notes_.erase(id);
+    }
+    for (const StoredFrame& frame : change.frames) frames_[frame.id] = frame;
+    for (const Note& note : change.notes) notes_[note.id] = note;
+    return {};
+  }
+  Result<void> save_values(const std::vector<ChangedEdge>& edges) override {
+    for (const ChangedEdge& edge : edges) {
+      const auto there = frames_.find(edge.id);
+      if (there != frames_.end()) there->second.X_PC = edge.X_PC;
+    }
+    return {};
+  }
+  Result<void> save_configured(const std::vector<FrameSpec>& frames) override {
+    configured_ = frames;
+    return {};
+  }
+
+ private:
+  std::uint64_t epoch_ = 0;
+  std::map<std::string, StoredFrame> frames_;
+  std::map<std::string, Note> notes_;
+  std::vector<FrameSpec> configured_;
+};
+
+}  // namespace tfdude::testing

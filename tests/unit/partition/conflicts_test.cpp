@@ -1,0 +1,222 @@
+#include <string>
+#include <vector>
+
+#include "tfdude/partition/partition.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/memory_store.hpp"
+#include "support/replica.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::MemoryStore;
+using testing::outcome;
+using testing::presence_of;
+using testing::Replica;
+using testing::x_of;
+using Lines = std::vector<std::string>;
+
+constexpr Time kNow{std::chrono::nanoseconds(1000)};
+
+// A process that serves a partition, and what it stored.
+struct Owning : Replica {
+  explicit Owning(const std::string& name, MemoryStore* kept = nullptr)
+      : Replica(name), partition(name, 1, forest, directory), store(kept) {}
+
+  template <class Body>
+  std::string ask(const std::string& id, Body body, Time now = kNow) {
+    const Reply reply = partition.answer(Request{0, id, std::move(body)}, now);
+    if (store != nullptr) REQUIRE(store->save(partition.take_unsaved()));
+    const auto* error = std::get_if<Error>(&reply.body);
+    return error == nullptr ? "ok" : error->message;
+  }
+  void start(const std::vector<FrameSpec>& configured = {}) {
+    REQUIRE(partition.restore(*store->load(), configured, kNow));
+    REQUIRE(store->save(partition.take_unsaved()));
+    REQUIRE(store->save_configured(configured));
+  }
+  std::vector<std::string> conflicts() {
+    std::vector<std::string> messages;
+    for (const Change& one : directory.changes().take()) {
+      if (one.kind == ChangeKind::kConflict) messages.push_back(one.message);
+    }
+    return messages;
+  }
+
+  Partition partition;
+  MemoryStore* store;
+};
+
+Page page_of(const std::string& partition, std::vector<PageEntry> entries,
+             std::vector<Note> notes = {}) {
+  return {partition, 0, 1, 1, std::move(entries), std::move(notes)};
+}
+
+TEST_CASE("of two partitions that add one id the later gives way, and says so") {
+  Owning arms("arms");
+  REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
+  REQUIRE(arms.ask("lens", AddRequest{"camera", along_x(1)}) == "ok");
+  (void)arms.partition.take_pages();
+  SECTION("where the other was earlier") {
+    arms.directory.apply(page_of("head", {{"camera", "", 900}}));
+    CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ arms, attached"});
+    CHECK(arms.partition.concede(kNow));
+    CHECK(arms.structure() == Lines{"camera <  @ head", "lens < camera @ arms, attached"});
+    CHECK(
+        arms.conflicts() ==
+        Lines{"frame 'camera': claimed by partition 'head' and later by 'arms', which gives way"});
+    const auto pages = arms.partition.take_pages();
+    REQUIRE(pages.size() == 1);
+    REQUIRE(pages[0].notes.size() == 1);
+    CHECK(pages[0].notes[0].rival == "head");
+    CHECK(pages[0].entries.size() == 1);
+  }
+  SECTION("where the other was later") {
+    arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
+    CHECK_FALSE(arms.partition.concede(kNow));
+    CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ arms, attached"});
+    CHECK(arms.conflicts().empty());
+  }
+}
+
+TEST_CASE("who watches hears of a conflict from the note of who gave way, once") {
+  Replica watcher;
+  watcher.directory.changes().watch();
+  watcher.directory.apply(presence_of("arms", 1, 1), kNow);
+  const Note old{"lamp", 5, Note::Kind::kGaveWay, "head"};
+  const Note fresh{"camera", 7, Note::Kind::kUnhung, "head"};
+  watcher.directory.apply(page_of("arms", {}, {old}));
+  (void)watcher.directory.changes().take();
+  watcher.directory.apply(page_of("arms", {}, {old, fresh}));
+  watcher.directory.apply(page_of("arms", {}, {old, fresh}));
+  const auto changes = watcher.directory.changes().take();
+  REQUIRE(changes.size() == 1);
+  CHECK(changes[0].frame == "camera");
+  CHECK(changes[0].partition == "arms");
+  CHECK(changes[0].rival == "head");
+}
+
+TEST_CASE("of two moves that make a cycle the later is undone to a root") {
+  Owning arms("arms");
+  arms.directory.apply(page_of("head", {{"neck", "", 10}}));
+  REQUIRE(arms.ask("hand", AddRequest{"", along_x(1)}) == "ok");
+  REQUIRE(arms.ask("hand", MoveRequest{"neck", {}}, Time(std::chrono::nanoseconds(2000))) == "ok");
+  SECTION("the own one") {
+    arms.directory.apply(page_of("head", {{"neck", "hand", 1500}}));
+    CHECK(arms.partition.concede(kNow));
+    CHECK(arms.structure() == Lines{"hand <  @ arms", "neck < hand @ head, attached"});
+    CHECK(arms.conflicts().size() == 1);
+  }
+  SECTION("the other's, who is to say so") {
+    arms.directory.apply(page_of("head", {{"neck", "hand", 2500}}));
+    CHECK_FALSE(arms.partition.concede(kNow));
+    CHECK(arms.structure() == Lines{"hand < neck @ arms, attached", "neck <  @ head"});
+  }
+}
+
+TEST_CASE("a stamp is later than all that were seen, however wrong a clock is") {
+  Replica replica;
+  const std::uint64_t first = replica.directory.next_stamp(kNow);
+  CHECK(first == 1000);
+  CHECK(replica.directory.next_stamp(kNow) > first);
+  replica.directory.apply(page_of("head", {{"neck", "", 5000}}));
+  CHECK(replica.directory.next_stamp(kNow) > 5000);
+}
+
+TEST_CASE("a partition has back what it stored") {
+  MemoryStore store;
+  {
+    Owning arms("arms", &store);
+    arms.start({{"arm", "", along_x(1)}, {"hand", "arm", along_x(10)}});
+    REQUIRE(arms.ask("tool", AddRequest{"hand", along_x(100)}) == "ok");
+    REQUIRE(arms.ask("lamp", AddRequest{"arm", along_x(5)}) == "ok");
+    REQUIRE(arms.ask("hand", UpdateRequest{{{"hand", along_x(20)}}}) == "ok");
+    REQUIRE(arms.ask("lamp", RemoveRequest{{"lamp"}}) == "ok");
+  }
+  Owning arms("arms", &store);
+  SECTION("under the same configuration") {
+    arms.start({{"arm", "", along_x(1)}, {"hand", "arm", along_x(10)}});
+    CHECK(arms.structure() ==
+          Lines{"arm <  @ arms", "hand < arm @ arms, attached", "tool < hand @ arms, attached"});
+    CHECK(x_of(arms.forest.lookup("arm", "tool")) == 120);
+  }
+  SECTION("what the configuration says anew counts") {
+    arms.start({{"arm", "", along_x(1)}, {"hand", "", along_x(30)}, {"eye", "arm", along_x(2)}});
+    CHECK(arms.structure() == Lines{"arm <  @ arms", "eye < arm @ arms, attached", "hand <  @ arms",
+                                    "tool < hand @ arms, attached"});
+    CHECK(x_of(arms.forest.value("hand")) == 30);
+  }
+  SECTION("what it no longer has goes, with what hangs below") {
+    arms.start({{"arm", "", along_x(1)}});
+    CHECK(arms.structure() == Lines{"arm <  @ arms"});
+  }
+  SECTION("a bad frame in it stops all") {
+    const auto state = store.load();
+    CHECK(outcome(arms.partition.restore(*state, {{"a", "b", {}}, {"b", "a", {}}}, kNow)) ==
+          "cycle");
+  }
+}
+
+TEST_CASE("a frame whose parent was removed while its owner was away goes when it returns") {
+  MemoryStore store;
+  {
+    Owning tools("tools", &store);
+    tools.directory.apply(page_of("arms", {{"flange", "", 10}}));
+    tools.start();
+    REQUIRE(tools.ask("gripper", AddRequest{"flange", along_x(1)}) == "ok");
+    REQUIRE(tools.ask("finger", AddRequest{"gripper", along_x(1)}) == "ok");
+  }
+  const Page removed = page_of("arms", {}, {{"flange", 2000, Note::Kind::kRemoved, {}}});
+  Owning tools("tools", &store);
+  SECTION("heard before the return") {
+    tools.directory.apply(removed);
+    tools.start();
+    CHECK(tools.structure().empty());
+  }
+  SECTION("heard after it") {
+    tools.start();
+    CHECK(tools.structure().size() == 2);
+    tools.directory.apply(removed);
+    CHECK(tools.partition.concede(kNow));
+    CHECK(tools.structure().empty());
+  }
+  SECTION("not where the parent is there again") {
+    tools.directory.apply(page_of("arms", {{"flange", "", 3000}}));
+    tools.start();
+    CHECK(tools.structure().size() == 3);
+  }
+  SECTION("not where it was hung there later") {
+    tools.directory.apply(page_of("arms", {}, {{"flange", 900, Note::Kind::kRemoved, {}}}));
+    tools.start();
+    CHECK(tools.structure().size() == 2);
+  }
+}
+
+TEST_CASE(
+    "who returns gives way to who has claimed a frame earlier, and takes it from who did later") {
+  MemoryStore store;
+  {
+    Owning arms("arms", &store);
+    arms.start();
+    REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
+  }
+  Owning arms("arms", &store);
+  SECTION("earlier") {
+    arms.directory.apply(page_of("head", {{"camera", "", 900}}));
+    arms.start();
+    CHECK(arms.structure() == Lines{"camera <  @ head"});
+    CHECK(arms.conflicts().size() == 1);
+    CHECK(store.load()->frames.empty());
+  }
+  SECTION("later") {
+    arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
+    arms.start();
+    CHECK(arms.structure() == Lines{"camera <  @ arms"});
+  }
+}
+
+}  // namespace
+}  // namespace tfdude

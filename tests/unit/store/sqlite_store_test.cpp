@@ -1,0 +1,171 @@
+#include "store/sqlite_store.hpp"
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <vector>
+
+#include "math/flat.hpp"
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/process.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::ContainsSubstring;
+using testing::outcome;
+using testing::Random;
+using testing::TemporaryDirectory;
+
+std::unique_ptr<StateStore> opened(const std::string& file, const std::string& partition = "arms") {
+  auto store = open_sqlite_store(file, partition);
+  INFO((store ? "" : store.error().message));
+  REQUIRE(store);
+  return *std::move(store);
+}
+
+// "code: message" of what keeps a file from being opened.
+std::string refused(const std::string& file, const std::string& partition = "arms") {
+  const auto store = open_sqlite_store(file, partition);
+  if (!store) return std::string(to_string(store.error().code)) + ": " + store.error().message;
+  const auto state = (*store)->load();
+  return state ? "ok" : std::string(to_string(state.error().code)) + ": " + state.error().message;
+}
+
+void put(const std::string& file, std::streamoff at, const std::string& bytes) {
+  std::fstream out(file, std::ios::in | std::ios::out | std::ios::binary);
+  out.seekp(at);
+  out << bytes;
+}
+
+std::string content(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST_CASE("what was saved is there for the next process, to the last bit") {
+  Random random(0x57a7e);
+  INFO("seed " << random.seed());
+  const TemporaryDirectory directory;
+  const std::string file = state_file(directory.path(), 7, "arms");
+  const StoredFrame hand{"hand", "arm", random.transform(), 5};
+  const StoredFrame tool{"tool \xc3\xa4'\"", "", random.transform(), 1ULL << 62U};
+  const Note gone{"lamp", 6, Note::Kind::kRemoved, ""};
+  const Note lost{"eye", 4, Note::Kind::kGaveWay, "head"};
+  const Transform later = random.transform();
+  {
+    const auto store = opened(file);
+    CHECK(store->load()->frames.empty());
+    CHECK(outcome(store->save({3, {"hand", "lamp"}, {hand}, {gone}})) == "ok");
+    CHECK(outcome(store->save({4, {tool.id, "eye"}, {tool}, {lost}})) == "ok");
+    CHECK(outcome(store->save_values({{"hand", later}, {"nobody", later}})) == "ok");
+    CHECK(outcome(store->save_configured({{"hand", "arm", hand.X_PC}})) == "ok");
+  }
+  const auto state = opened(file)->load();
+  REQUIRE(state);
+  CHECK(state->epoch == 4);
+  REQUIRE(state->frames.size() == 2);
+  CHECK(state->frames[0].id == "hand");
+  CHECK(state->frames[0].parent == "arm");
+  CHECK(state->frames[0].since == 5);
+  CHECK(to_flat(state->frames[0].X_PC) == to_flat(later));
+  CHECK(state->frames[1].id == tool.id);
+  CHECK(state->frames[1].since == tool.since);
+  // The oldest first.
+  CHECK(state->notes == std::vector<Note>{lost, gone});
+  REQUIRE(state->configured.size() == 1);
+  CHECK(to_flat(state->configured[0].X_PC) == to_flat(hand.X_PC));
+}
+
+TEST_CASE("what was erased is not there") {
+  const TemporaryDirectory directory;
+  const std::string file = state_file(directory.path(), 7, "arms");
+  {
+    const auto store = opened(file);
+    REQUIRE(store->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
+    REQUIRE(store->save({2, {"hand"}, {}, {{"hand", 2, Note::Kind::kRemoved, ""}}}));
+    REQUIRE(store->save({3, {"hand"}, {}, {}}));
+  }
+  const auto state = opened(file)->load();
+  CHECK(state->frames.empty());
+  CHECK(state->notes.empty());
+}
+
+TEST_CASE("what was saved survives a process that is killed right after") {
+  const TemporaryDirectory directory;
+  const std::string file = state_file(directory.path(), 7, "arms");
+  const pid_t child = fork();
+  if (child == 0) {
+    const auto store = open_sqlite_store(file, "arms");
+    for (int i = 0; store && i < 200; ++i) {
+      const std::string id = "f" + std::to_string(i);
+      if (!(*store)->save({1, {id}, {{id, "", {}, 1}}, {}})) _exit(1);
+    }
+    kill(getpid(), SIGKILL);
+  }
+  int status = 0;
+  REQUIRE(waitpid(child, &status, 0) == child);
+  REQUIRE(WIFSIGNALED(status));
+  CHECK(opened(file)->load()->frames.size() == 200);
+}
+
+TEST_CASE("a state that is in use is refused") {
+  const TemporaryDirectory directory;
+  const std::string file = state_file(directory.path(), 7, "arms");
+  const auto store = opened(file);
+  CHECK_THAT(refused(file),
+             ContainsSubstring("state: state file '" + file + "' is in use by another process"));
+}
+
+TEST_CASE("a file that cannot be this partition's state is refused and stays as it is") {
+  const TemporaryDirectory directory;
+  const std::string file = state_file(directory.path(), 7, "arms");
+  REQUIRE(opened(file)->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
+  SECTION("no database") {
+    put(file, 0, "something else altogether");
+    CHECK_THAT(refused(file), ContainsSubstring("is damaged (file is not a database): move it"));
+  }
+  SECTION("cut short") {
+    std::filesystem::resize_file(file, 5000);
+    CHECK_THAT(refused(file), ContainsSubstring("is damaged"));
+  }
+  SECTION("garbled within") {
+    for (std::streamoff at = 4096; at < 4096 * 4; at += 64) put(file, at, "garbage");
+    CHECK_THAT(refused(file), ContainsSubstring("is damaged"));
+  }
+  SECTION("of a newer format") {
+    put(file, 60, std::string("\0\0\0\2", 4));
+    CHECK_THAT(refused(file), ContainsSubstring("has format 2, of which this version reads 1"));
+  }
+  SECTION("of another program") {
+    put(file, 68, std::string("\0\0\0\2", 4));
+    CHECK_THAT(refused(file), ContainsSubstring("belongs to another program"));
+  }
+  SECTION("of another partition") {
+    CHECK_THAT(refused(file, "legs"), ContainsSubstring("is of partition 'arms', not of 'legs'"));
+  }
+  const std::string before = content(file);
+  CHECK(refused(file, "legs") != "ok");
+  CHECK(content(file) == before);
+}
+
+TEST_CASE("a directory that cannot be made is named") {
+  CHECK_THAT(refused("/proc/nowhere/arms.sqlite"), ContainsSubstring("cannot be opened"));
+}
+
+TEST_CASE("each partition and domain has a file of its own, whatever the name") {
+  CHECK(state_file("/s", 7, "arms") == "/s/domain-7/arms.sqlite");
+  CHECK(state_file("/s", 8, "left/arm") == "/s/domain-8/left%2farm.sqlite");
+  CHECK(state_file("/s", 7, "..") == "/s/domain-7/%2e..sqlite");
+  const std::string longest = state_file("/s", 7, std::string(255, ' '));
+  CHECK(std::filesystem::path(longest).filename().string().size() < 255);
+  CHECK(longest != state_file("/s", 7, std::string(254, ' ')));
+}
+
+}  // namespace
+}  // namespace tfdude
