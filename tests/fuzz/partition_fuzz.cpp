@@ -11,9 +11,9 @@
 #include "tfdude/partition/partition.hpp"
 #include "tfdude/partition/routing.hpp"
 
-#include "fuzz/claims.hpp"
 #include "fuzz/demand.hpp"
 #include "fuzz/forest_checks.hpp"
+#include "fuzz/plain_claims.hpp"
 #include "support/replica.hpp"
 
 namespace tfdude::fuzz {
@@ -206,8 +206,8 @@ class World {
   testing::Replica own_{kOwn};
   Partition partition_{kOwn, 1, own_.forest, own_.directory};
   testing::Replica hearer_;
-  Claims others_claims_;
-  Claims all_claims_;
+  PlainClaims others_claims_;
+  PlainClaims all_claims_;
 };
 
 }  // namespace

@@ -15,7 +15,7 @@
 namespace tfdude::fuzz {
 
 /// What partitions have said that they own, in the plainest way: the pages of each one's last life.
-class Claims {
+class PlainClaims {
  public:
   void apply(const Page& page) {
     Life& life = lives_[page.partition];
