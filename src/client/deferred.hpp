@@ -10,12 +10,14 @@
 
 namespace tfdude {
 
-/// Does one job on a thread of its own soon after it is asked to, once for all that ask meanwhile, and at most
+/// Does one job on a thread of its own a while after it is asked to, once for all that ask meanwhile, and at most
 /// once a period: whoever asks a million times a second pays nanoseconds, and the job is done a thousand times.
 class Deferred {
  public:
-  Deferred(std::chrono::milliseconds period, std::function<void()> job)
-      : period_(period), job_(std::move(job)), thread_([this] { run(); }) {}
+  using Milliseconds = std::chrono::milliseconds;
+
+  Deferred(Milliseconds period, std::function<void()> job, Milliseconds delay = Milliseconds(0))
+      : period_(period), delay_(delay), job_(std::move(job)), thread_([this] { run(); }) {}
   ~Deferred() { stop(); }
   Deferred(const Deferred&) = delete;
   Deferred& operator=(const Deferred&) = delete;
@@ -30,6 +32,9 @@ class Deferred {
     if (thread_.joinable()) thread_.join();
   }
 
+  /// Whether what was asked for has not begun yet.
+  [[nodiscard]] bool pending() const { return asked_.load(); }
+
   void ask() {
     if (asked_.exchange(true)) return;
     // The lock keeps the notice from falling between the thread's look and its sleep.
@@ -42,6 +47,7 @@ class Deferred {
     std::unique_lock lock(mutex_);
     while (true) {
       changed_.wait(lock, [this] { return stopping_ || asked_.load(); });
+      if (delay_.count() > 0) changed_.wait_for(lock, delay_, [this] { return stopping_; });
       if (stopping_) return;
       lock.unlock();
       // Before the job, so that what changes while it runs is not missed.
@@ -52,7 +58,8 @@ class Deferred {
     }
   }
 
-  const std::chrono::milliseconds period_;
+  const Milliseconds period_;
+  const Milliseconds delay_;
   const std::function<void()> job_;
   std::atomic<bool> asked_{false};
   std::mutex mutex_;

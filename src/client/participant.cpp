@@ -30,6 +30,7 @@ Participant::Participant(std::unique_ptr<Transport> transport, std::string parti
 
 Participant::~Participant() {
   saver_.reset();
+  if (conceder_) conceder_->stop();
   if (publisher_) publisher_->stop();
   (void)commit();
   save_values();
@@ -132,6 +133,8 @@ void Participant::wait_for_replies(Calls::Call& call, const std::vector<const Re
 }
 
 std::vector<Reply> Participant::ask(std::vector<Part>& parts, Clock::time_point deadline) {
+  // What this process has changed itself comes before what it asks for: others build on that.
+  if (publisher_ && publisher_->pending()) (void)commit();
   std::vector<std::string> partitions;
   for (const Part& part : parts) {
     if (part.owner == kHeldHere) continue;
@@ -329,15 +332,15 @@ void Participant::tell_changes() {
 }
 
 void Participant::on_page(const Page& page) {
-  bool conceded = false;
+  bool contested = false;
   {
     const std::lock_guard lock(structure_mutex_);
     directory_.apply(page);
-    if (partition_ != nullptr) conceded = partition_->concede(wall_clock());
+    contested = partition_ != nullptr && directory_.contested();
     tell_changes();
   }
   structure_changed_.notify_all();
-  if (conceded) publisher_->ask();
+  if (contested) conceder_->ask();
 }
 
 void Participant::on_presence(const Presence& presence) {

@@ -150,6 +150,7 @@ class Participant final : public TransportHandler {
   [[nodiscard]] Result<StoredState> open_store();
   [[nodiscard]] Result<void> take_frames(const std::vector<FrameSpec>& frames);
   void give_up_partition();
+  void concede();
   void tell_changes();
 
   const Options options_;
@@ -172,6 +173,7 @@ class Participant final : public TransportHandler {
   std::unique_ptr<Transport> transport_;  // stops before the rest goes
   // Publish own changes of the structure, and store values; stop before the transport.
   std::optional<Deferred> publisher_;
+  std::optional<Deferred> conceder_;
   std::optional<Periodic> saver_;
 };
 

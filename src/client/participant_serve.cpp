@@ -17,6 +17,9 @@ constexpr Milliseconds kPredecessorGone{1500};
 // How much longer than usual somebody who was met may take to say which partition it serves.
 constexpr Milliseconds kSlowPresence{3000};
 
+// A claim that was taken back just before may still be on its way here, and what takes it back behind it.
+constexpr Milliseconds kConcedeAfter{100};
+
 // How often own changes of the structure are published at most.
 constexpr Milliseconds kPublishEvery{1};
 
@@ -61,6 +64,8 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   }
   if (auto claimed = claim_name(); !claimed) return claimed;
   publisher_.emplace(kPublishEvery, [this] { (void)commit(); });
+  conceder_.emplace(
+      Milliseconds(0), [this] { concede(); }, kConcedeAfter);
   if (auto taken = take_frames(frames); !taken) return taken;
   if (auto serving = transport_->serve(name); !serving) return serving;
   if (auto stored = commit(); !stored) return stored;
@@ -158,6 +163,16 @@ Result<void> Participant::commit() {
   if (news) transport_->announce(*news);
   structure_changed_.notify_all();
   return saved;
+}
+
+void Participant::concede() {
+  bool conceded = false;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (partition_ != nullptr && !out_) conceded = partition_->concede(wall_clock());
+    tell_changes();
+  }
+  if (conceded) (void)commit();
 }
 
 void Participant::save_values() {

@@ -7,6 +7,14 @@
 
 namespace tfdude {
 
+namespace {
+
+bool younger(const FrameInfo& a, const FrameInfo& b) {
+  return std::tie(a.since, a.id) > std::tie(b.since, b.id);
+}
+
+}  // namespace
+
 Owner Claims::add_owner(std::string name) {
   names_.push_back(std::move(name));
   return static_cast<Owner>(names_.size() - 1);
@@ -19,6 +27,12 @@ bool Claims::older(const Claim& a, const Claim& b) const {
 std::uint32_t Claims::page_of(std::string_view id) const {
   const auto frame = forest_.find(id);
   return frame && frame->slot < page_of_slot_.size() ? page_of_slot_[frame->slot] : 0;
+}
+
+template <class List>
+auto Claims::oldest_of(List& claims) const {
+  return std::min_element(claims.begin(), claims.end(),
+                          [this](const Claim& a, const Claim& b) { return older(a, b); });
 }
 
 Claim Claims::in_force(const FrameInfo& there) const {
@@ -95,21 +109,35 @@ bool Claims::take(const std::string& id, std::uint64_t since) {
 // Puts the oldest claim in force, unless this process holds the frame: then it is for the owner to concede.
 void Claims::promote(const std::string& id) {
   const auto claims = shadowed_.find(id);
-  if (claims == shadowed_.end()) return;
-  auto& others = claims->second;
-  const auto oldest = std::min_element(
-      others.begin(), others.end(), [this](const Claim& a, const Claim& b) { return older(a, b); });
-  const auto there = forest_.info(id);
-  if (there && there->owner == kHeldHere) {
-    if (older(*oldest, in_force(*there))) {
-      concede({Concession::Kind::kGiveWay, id, oldest->owner});
-    }
-    return;
-  }
+  if (claims == shadowed_.end() || forest_.holds(id)) return;
+  const auto oldest = oldest_of(claims->second);
   const Claim winner = *oldest;
-  others.erase(oldest);
-  if (others.empty()) shadowed_.erase(claims);
+  claims->second.erase(oldest);
+  if (claims->second.empty()) shadowed_.erase(claims);
   put(id, winner);
+}
+
+std::vector<Concession> Claims::concessions() const {
+  std::vector<Concession> all;
+  for (const auto& [id, claims] : shadowed_) {
+    const auto there = forest_.info(id);
+    if (!there || there->owner != kHeldHere) continue;
+    const Claim& oldest = *oldest_of(claims);
+    if (older(oldest, in_force(*there))) {
+      all.push_back({Concession::Kind::kGiveWay, id, oldest.owner});
+    }
+  }
+  for (const auto& [id, claim] : cut_) {
+    const Cycle cycle = cycle_of(id, claim);
+    if (cycle.held && younger(*cycle.held, cycle.youngest)) {
+      all.push_back({Concession::Kind::kUnhang, cycle.held->id, cycle.youngest.owner});
+    }
+  }
+  // In the same order everywhere.
+  std::sort(all.begin(), all.end(), [](const Concession& a, const Concession& b) {
+    return std::tie(a.kind, a.frame) < std::tie(b.kind, b.frame);
+  });
+  return all;
 }
 
 void Claims::shadow(const std::string& id, Claim claim) {
@@ -146,25 +174,23 @@ void Claims::put(const std::string& id, const Claim& claim) {
   }
 }
 
-// The frame's claimed parent lies below it, where the forest has made it a root. Of the cycle's edges that others
-// own the youngest is cut; if a held one is younger still, its owner has to concede, which mends that.
-void Claims::break_cycle(const std::string& id, const Claim& claim) {
-  const auto younger = [](const FrameInfo& a, const FrameInfo& b) {
-    return std::tie(a.since, a.id) > std::tie(b.since, b.id);
-  };
-  FrameInfo youngest{id, claim.parent, claim.owner, false, claim.since};
-  std::optional<FrameInfo> held;
+Claims::Cycle Claims::cycle_of(const std::string& id, const Claim& claim) const {
+  Cycle cycle{{id, claim.parent, claim.owner, false, claim.since}, std::nullopt};
   for (auto edge = forest_.info(claim.parent); edge && edge->id != id;
        edge = forest_.info(edge->parent)) {
     if (edge->owner == kHeldHere) {
-      if (!held || younger(*edge, *held)) held = edge;
-    } else if (younger(*edge, youngest)) {
-      youngest = *edge;
+      if (!cycle.held || younger(*edge, *cycle.held)) cycle.held = edge;
+    } else if (younger(*edge, cycle.youngest)) {
+      cycle.youngest = *edge;
     }
   }
-  if (held && younger(*held, youngest)) {
-    concede({Concession::Kind::kUnhang, held->id, youngest.owner});
-  }
+  return cycle;
+}
+
+// The frame's claimed parent lies below it, where the forest has made it a root. Of the cycle's edges that others
+// own the youngest is cut; if a held one is younger still, its owner has to concede, which mends that.
+void Claims::break_cycle(const std::string& id, const Claim& claim) {
+  const FrameInfo youngest = cycle_of(id, claim).youngest;
   if (youngest.id == id) {
     cut_[id] = claim;
     return;

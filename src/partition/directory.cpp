@@ -9,6 +9,10 @@ namespace {
 // No clock comes so far, and one more can always be added.
 constexpr std::uint64_t kLastStamp = 1ULL << 63U;
 
+bool is_orphan(const FrameInfo& frame, const Note& note) {
+  return note.kind == Note::Kind::kRemoved && frame.owner == kHeldHere && frame.since < note.since;
+}
+
 }  // namespace
 
 Directory::Directory(Forest& forest, std::string own)
@@ -87,7 +91,7 @@ void Directory::apply(const Page& page) {
   report_conflicts(partition, page);
   put_page(partition, owner, page);
   claims_.mend();
-  find_orphans(page.notes, owner);
+  take_notes(page.notes);
 }
 
 void Directory::replace_if_complete(Known& partition, Owner owner) {
@@ -108,7 +112,7 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
   partition.pages.clear();
   for (const auto& [number, page] : pages) put_page(partition, owner, page);
   claims_.mend();
-  for (const auto& [number, page] : pages) find_orphans(page.notes, owner);
+  for (const auto& [number, page] : pages) take_notes(page.notes);
 }
 
 void Directory::put_page(Known& partition, Owner owner, const Page& page) {
@@ -157,21 +161,29 @@ void Directory::report_conflicts(const Known& partition, const Page& page) {
   }
 }
 
-void Directory::find_orphans(const std::vector<Note>& notes, Owner owner) {
+void Directory::take_notes(const std::vector<Note>& notes) {
   for (const Note& note : notes) {
     latest_stamp_ = std::max(latest_stamp_, std::min(note.since, kLastStamp));
-    if (note.kind != Note::Kind::kRemoved) continue;
-    for (const FrameInfo& frame : forest_.waiting_for(note.id)) {
-      if (frame.owner != kHeldHere || frame.since >= note.since) continue;
-      claims_.concede({Concession::Kind::kRemove, frame.id, owner});
-    }
+    const auto waiting = forest_.waiting_for(note.id);
+    orphans_ = orphans_ || std::any_of(waiting.begin(), waiting.end(), [&](const FrameInfo& frame) {
+                 return is_orphan(frame, note);
+               });
   }
 }
 
-void Directory::find_orphans() {
+std::vector<Concession> Directory::concessions() {
+  std::vector<Concession> all = claims_.concessions();
+  if (!std::exchange(orphans_, false)) return all;
   for (Owner owner = 1; owner < partitions_.size(); ++owner) {
-    for (const auto& [number, page] : partitions_[owner].pages) find_orphans(page.notes, owner);
+    for (const auto& [number, page] : partitions_[owner].pages) {
+      for (const Note& note : page.notes) {
+        for (const FrameInfo& frame : forest_.waiting_for(note.id)) {
+          if (is_orphan(frame, note)) all.push_back({Concession::Kind::kRemove, frame.id, owner});
+        }
+      }
+    }
   }
+  return all;
 }
 
 std::uint64_t Directory::next_stamp(Time now) {

@@ -39,7 +39,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   saved_ = true;
   pages_.watch_ids();
   for (const StoredFrame* frame : contested) restore_contested(*frame, now);
-  directory_.find_orphans();
+  directory_.expect_orphans();
   (void)concede(now);
   auto taken = reconfigure(state.configured, configured, now);
   pages_.close_epoch();
@@ -90,29 +90,39 @@ Result<void> Partition::reconfigure(const std::vector<FrameSpec>& before,
 
 bool Partition::concede(Time now) {
   bool changed = false;
-  for (const Concession& concession : directory_.take_concessions()) {
-    // What was conceded just now may have settled this, too, or be the same.
-    const auto frame = forest_.info(concession.frame);
-    if (!frame || frame->owner != kHeldHere) continue;
-    if (concession.kind == Concession::Kind::kUnhang && frame->parent.empty()) continue;
-    changed = true;
-    switch (concession.kind) {
-      case Concession::Kind::kGiveWay:
-        (void)forest_.release(concession.frame);
-        pages_.erase(concession.frame);
-        give_way(concession.frame, concession.rival, now);
-        directory_.released(concession.frame);
-        break;
-      case Concession::Kind::kUnhang:
-        unhang(concession.frame, concession.rival, now);
-        break;
-      case Concession::Kind::kRemove:
-        if (auto removed = forest_.remove(concession.frame)) forget(*removed, now);
-        break;
+  // What is conceded may bring up more.
+  while (directory_.contested()) {
+    bool more = false;
+    for (const Concession& concession : directory_.concessions()) {
+      more = concede(concession, now) || more;
     }
+    if (!more) break;
+    changed = true;
   }
   if (changed) pages_.close_epoch();
   return changed;
+}
+
+bool Partition::concede(const Concession& concession, Time now) {
+  // What was conceded just now may have settled this, too, or be the same.
+  const auto frame = forest_.info(concession.frame);
+  if (!frame || frame->owner != kHeldHere) return false;
+  switch (concession.kind) {
+    case Concession::Kind::kGiveWay:
+      (void)forest_.release(concession.frame);
+      pages_.erase(concession.frame);
+      give_way(concession.frame, concession.rival, now);
+      directory_.released(concession.frame);
+      return true;
+    case Concession::Kind::kUnhang:
+      if (frame->parent.empty()) return false;
+      unhang(concession.frame, concession.rival, now);
+      return true;
+    case Concession::Kind::kRemove:
+      if (auto removed = forest_.remove(concession.frame)) forget(*removed, now);
+      return true;
+  }
+  return false;
 }
 
 void Partition::give_way(const std::string& id, Owner rival, Time now) {

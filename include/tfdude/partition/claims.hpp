@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -19,7 +20,8 @@ struct Claim {
   std::uint32_t page = 0;  ///< of its owner's, where it says so
 };
 
-/// What the partition of this process has to give up because of what others claim.
+/// What the partition of this process has to give up because of what others claim. What is on its way may settle
+/// a conflict, such as a claim that was taken back just now: so it is done a little later.
 struct Concession {
   enum class Kind : std::uint8_t {
     kGiveWay,  ///< the id was claimed earlier by `rival`: release the frame
@@ -62,13 +64,16 @@ class Claims {
   /// Hangs frames where they belong that could not hang there before. None, but for cycles.
   void mend();
 
-  void concede(Concession concession) { concessions_.push_back(std::move(concession)); }
-  [[nodiscard]] std::vector<Concession> take_concessions() {
-    return std::exchange(concessions_, {});
-  }
+  /// Whether any two claims cannot both hold.
+  [[nodiscard]] bool contested() const { return !shadowed_.empty() || !cut_.empty(); }
+
+  /// What this process would have to concede now. O(contested frames).
+  [[nodiscard]] std::vector<Concession> concessions() const;
 
  private:
   [[nodiscard]] bool older(const Claim& a, const Claim& b) const;
+  template <class List>
+  [[nodiscard]] auto oldest_of(List& claims) const;
   [[nodiscard]] Claim in_force(const FrameInfo& there) const;
   [[nodiscard]] Claim* shadowed(const std::string& id, Owner owner);
   [[nodiscard]] std::uint32_t page_of(std::string_view id) const;
@@ -76,6 +81,12 @@ class Claims {
   void promote(const std::string& id);
   void put(const std::string& id, const Claim& claim);
   void break_cycle(const std::string& id, const Claim& claim);
+  /// Of the cycle that a claim would close: the youngest edge that others own, and the youngest held one.
+  struct Cycle {
+    FrameInfo youngest;
+    std::optional<FrameInfo> held;
+  };
+  [[nodiscard]] Cycle cycle_of(const std::string& id, const Claim& claim) const;
 
   Forest& forest_;
   ChangeLog& changes_;
@@ -85,7 +96,6 @@ class Claims {
   std::vector<std::uint32_t> page_of_slot_;  // of the claims in force
   // Claims of frames that are roots because they would close a cycle.
   std::map<std::string, Claim> cut_;
-  std::vector<Concession> concessions_;
 };
 
 }  // namespace tfdude

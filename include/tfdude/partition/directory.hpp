@@ -59,11 +59,13 @@ class Directory {
     return claims_.take(id, since);
   }
 
-  /// Looks among all that others removed for what held frames hang below, besides what comes with a page.
-  void find_orphans();
-
-  /// What this process's partition has to give up now because of what was applied.
-  [[nodiscard]] std::vector<Concession> take_concessions() { return claims_.take_concessions(); }
+  /// What this process's partition would have to give up now because of what was applied.
+  /// O(contested frames and notes).
+  [[nodiscard]] std::vector<Concession> concessions();
+  /// This process has taken frames whose parents others may have removed before.
+  void expect_orphans() { orphans_ = true; }
+  /// Whether there may be any. O(1).
+  [[nodiscard]] bool contested() const { return orphans_ || claims_.contested(); }
 
   /// A stamp for a change of the structure: the time [ns since the UNIX epoch], but later than all stamps given
   /// or seen before (Lamport 1978, rule IR1 and IR2), so that whoever knew of a change has the greater one.
@@ -126,13 +128,14 @@ class Directory {
   void unclaim_all_but(const std::unordered_set<std::string_view>& stays, Known& partition,
                        Owner owner, std::uint32_t number);
   void report_conflicts(const Known& partition, const Page& page);
-  void find_orphans(const std::vector<Note>& notes, Owner owner);
+  void take_notes(const std::vector<Note>& notes);
 
   Forest& forest_;
   ChangeLog changes_;
   Claims claims_;
   std::vector<Known> partitions_;  // by Owner; the first is the own
   std::unordered_map<std::string, Owner> owners_;
+  bool orphans_ = false;  // some held frame hangs, it seems, below one that another removed
   std::uint64_t latest_stamp_ = 0;
 };
 

@@ -73,6 +73,7 @@ class Partition {
   [[nodiscard]] Result<void> remove(const RemoveRequest& request, Time now);
   [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request, Time now);
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
+  bool concede(const Concession& concession, Time now);
   void restore_contested(const StoredFrame& frame, Time now);
   [[nodiscard]] Result<void> reconfigure(const std::vector<FrameSpec>& before,
                                          const std::vector<FrameSpec>& configured, Time now);
