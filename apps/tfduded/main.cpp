@@ -11,6 +11,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/config.hpp"
+#include "tfdude/transport/fastdds.hpp"
 
 namespace {
 
@@ -76,6 +77,12 @@ int main(int argc, char** argv) {
   app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232")
       ->check(CLI::Range(0, 232));
   app.add_option("--profile", arguments.options.profile, "XML file of DDS profiles");
+  app.add_option("--discovery-server", arguments.options.discovery_server,
+                 "HOST:PORT of a Fast DDS discovery server")
+      ->check([](const std::string& text) {
+        const auto good = tfdude::check_discovery_server(text);
+        return good ? std::string() : good.error().message;
+      });
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -13,7 +13,8 @@ Client& Client::operator=(Client&&) noexcept = default;
 Client::~Client() = default;
 
 Result<Client> Client::open(const Options& options) {
-  auto transport = make_fastdds_transport({options.domain, options.profile, {}, nullptr});
+  auto transport = make_fastdds_transport(
+      {options.domain, options.profile, {}, nullptr, options.discovery_server});
   if (!transport) return tl::unexpected(std::move(transport.error()));
   return open(*std::move(transport), options);
 }
@@ -115,7 +116,8 @@ std::vector<PartitionInfo> Client::partitions() { return participant_->partition
 Result<Node> Node::open(const std::string& partition, const std::vector<FrameSpec>& frames,
                         const Options& options) {
   if (auto ok = check_partition_name(partition); !ok) return tl::unexpected(std::move(ok.error()));
-  auto transport = make_fastdds_transport({options.domain, options.profile, partition, nullptr});
+  auto transport = make_fastdds_transport(
+      {options.domain, options.profile, partition, nullptr, options.discovery_server});
   if (!transport) return tl::unexpected(std::move(transport.error()));
   return open(*std::move(transport), partition, frames, options);
 }

@@ -97,6 +97,16 @@ inline void switch_intraprocess_off() {
   eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
 }
 
+/// Makes a participant meet the others by a discovery server. A participant of this version knows a server by
+/// its id, too: 0, unless told otherwise, as the servers have it.
+inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps::Locator_t& at) {
+  etransport::RemoteServerAttributes server;
+  server.ReadguidPrefix("44.53.00.5f.45.50.52.4f.53.49.4d.41");
+  server.metatrafficUnicastLocatorList.push_back(at);
+  discovery.discoveryProtocol = DiscoveryProtocol::CLIENT;
+  discovery.m_DiscoveryServers = {server};
+}
+
 /// Tells of participants that come and go: met(guid prefix, name) and left(guid prefix).
 template <class Observer>
 class ParticipantListener final : public edds::DomainParticipantListener {
@@ -164,6 +174,12 @@ inline void switch_intraprocess_off() {
   eprosima::fastdds::LibrarySettings settings;
   settings.intraprocess_delivery = eprosima::fastdds::INTRAPROCESS_OFF;
   edds::DomainParticipantFactory::get_instance()->set_library_settings(settings);
+}
+
+inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps::Locator_t& at) {
+  discovery.discoveryProtocol = DiscoveryProtocol::CLIENT;
+  discovery.m_DiscoveryServers.clear();
+  discovery.m_DiscoveryServers.push_back(at);
 }
 
 template <class Observer>

@@ -5,6 +5,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "transport/fastdds/discovery_server.hpp"
 #include "transport/fastdds/entrance.hpp"
 #include "transport/fastdds/topics.hpp"
 
@@ -49,6 +50,9 @@ Result<void> FastDdsTransport::create_participant() {
   qos.name(participant_name(options_.partition));
   qos.properties().properties().emplace_back("fastdds.ignore_local_endpoints", "true");
   take_lease(qos);
+  if (!options_.discovery_server.empty()) {
+    if (auto used = use_discovery_server(qos, options_.discovery_server); !used) return used;
+  }
   Entrance entrance;
   entrance.prepare(qos, options_.domain, options_.partition.empty());
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
@@ -344,6 +348,11 @@ Result<std::unique_ptr<Transport>> make_fastdds_transport(const FastDdsOptions& 
     return fail(Errc::kInvalidInput, "domain " + std::to_string(options.domain) +
                                          " is not within 0 to " +
                                          std::to_string(fastdds::kMaxDomain));
+  }
+  if (!options.discovery_server.empty()) {
+    if (auto good = check_discovery_server(options.discovery_server); !good) {
+      return tl::unexpected(std::move(good.error()));
+    }
   }
   return std::make_unique<fastdds::FastDdsTransport>(options);
 }
