@@ -12,9 +12,12 @@
 namespace tfdude::fastdds {
 namespace {
 
-constexpr std::chrono::seconds kLongLease{10};
+constexpr std::chrono::seconds kLongLease{60};
 
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
+
+// The DDS partition of the beats: those of a topic who are in different ones do not match.
+constexpr const char* kBeatPartition = "tfdude-beat";
 
 tl::unexpected<Error> not_created(const char* what) {
   return fail(Errc::kTransport, std::string("Fast DDS could not create ") + what);
@@ -95,6 +98,11 @@ Result<void> FastDdsTransport::create_endpoints() {
       Inlet<wire::Presence>::Calls{
           [this](const wire::Presence& sample, const Prefix& from) { take_presence(sample, from); },
           nullptr});
+  beats_ = std::make_unique<Inlet<wire::Presence>>(
+      *participant_, *topics_.presence, kBeatPartition, "beat_reader",
+      Inlet<wire::Presence>::Calls{
+          [this](const wire::Presence& sample, const Prefix& from) { take_presence(sample, from); },
+          nullptr});
   pages_ = std::make_unique<Inlet<wire::Page>>(
       *participant_, *topics_.directory, std::string(), "directory_reader",
       Inlet<wire::Page>::Calls{
@@ -107,13 +115,19 @@ Result<void> FastDdsTransport::create_endpoints() {
                                   take_reply(sample);
                                 },
                                 nullptr});
-  if (!presence_->good() || !pages_->good() || !replies_->good()) return not_created("the readers");
+  if (!presence_->good() || !beats_->good() || !pages_->good() || !replies_->good()) {
+    return not_created("the readers");
+  }
   if (options_.partition.empty()) return {};
   presence_outlet_ =
       std::make_unique<Outlet>(*participant_, *topics_.presence, std::string(), "presence_writer");
+  beat_outlet_ =
+      std::make_unique<Outlet>(*participant_, *topics_.presence, kBeatPartition, "beat_writer");
   directory_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.directory, std::string(),
                                                "directory_writer");
-  if (!presence_outlet_->good() || !directory_outlet_->good()) return not_created("the writers");
+  if (!presence_outlet_->good() || !beat_outlet_->good() || !directory_outlet_->good()) {
+    return not_created("the writers");
+  }
   return {};
 }
 
@@ -157,12 +171,14 @@ void FastDdsTransport::stop() {
   updates_.reset();
   replies_.reset();
   pages_.reset();
+  beats_.reset();
   presence_.reset();
   worker_->stop();
   reply_outlets_.clear();
   request_outlets_.clear();
   update_outlets_.clear();
   directory_outlet_.reset();
+  beat_outlet_.reset();
   presence_outlet_.reset();
   participant_->delete_contained_entities();
   edds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
@@ -174,21 +190,22 @@ void FastDdsTransport::stop() {
 void FastDdsTransport::announce(const Presence& presence) {
   const std::lock_guard lock(presence_mutex_);
   said_ = to_wire(presence);
-  say_presence();
-}
-
-// Under presence_mutex_.
-void FastDdsTransport::say_presence() {
   said_->peers(peers_.heard_count());
   presence_outlet_->write(&*said_);
 }
 
-// Every second time it speaks, each time it looks who has fallen silent.
+// Every second time it speaks, each time it looks who has fallen silent. What has changed since it last spoke is
+// for all to know, also those who join later; the rest is a beat that may be lost, as the next one follows.
 void FastDdsTransport::keep_in_touch() {
   peers_.look_for_silent(Peers::Clock::now());
   const std::lock_guard lock(presence_mutex_);
   to_speak_ = !to_speak_;
-  if (said_ && to_speak_) say_presence();
+  if (!said_ || !to_speak_) return;
+  if (const auto peers = peers_.heard_count(); peers != said_->peers()) {
+    said_->peers(peers);
+    presence_outlet_->write(&*said_);
+  }
+  beat_outlet_->write(&*said_);
 }
 
 void FastDdsTransport::publish(const Page& page) {

@@ -62,7 +62,6 @@ class FastDdsTransport final : public Transport {
   edds::ContentFilteredTopic* create_filtered(edds::Topic* topic, const std::string& partition);
 
   void keep_in_touch();
-  void say_presence();
   std::shared_ptr<Outlet> outlet(Outlets& outlets, edds::Topic* topic, const std::string& partition,
                                  const char* profile);
   std::shared_ptr<Outlet> reply_outlet(const PeerId& peer);
@@ -101,12 +100,14 @@ class FastDdsTransport final : public Transport {
 
   std::unique_ptr<OwnedFilters> filters_;
   std::unique_ptr<Outlet> presence_outlet_;
+  std::unique_ptr<Outlet> beat_outlet_;
   std::unique_ptr<Outlet> directory_outlet_;
   std::unique_ptr<Inlet<wire::Request>> requests_;
   std::unique_ptr<Inlet<wire::Update>> updates_;
   std::unique_ptr<Inlet<wire::Reply>> replies_;
   std::unique_ptr<Inlet<wire::Page>> pages_;
   std::unique_ptr<Inlet<wire::Presence>> presence_;
+  std::unique_ptr<Inlet<wire::Presence>> beats_;
   std::optional<Worker> worker_;
 };
 

@@ -41,7 +41,7 @@ class Peers {
   static constexpr std::chrono::milliseconds kQuiet{200};
 
   /// How often a server says that it is there.
-  static constexpr std::chrono::milliseconds kSpeakEvery{100};
+  static constexpr std::chrono::milliseconds kSpeakEvery{60};
 
   /// @param there  a peer said what it serves, or is heard again
   /// @param gone   a peer that had said so has left or fallen silent

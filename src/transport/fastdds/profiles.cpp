@@ -85,8 +85,7 @@ edds::DataWriterQos writer_qos(edds::Publisher& publisher, const std::string& na
   });
   // A stream is acknowledged with each periodic heartbeat, not with each sample: that halved what 1 kHz of 100
   // edges takes of the owner's processor (11 to 7 % of a core).
-  if (name == "update_writer" || name == "presence_writer")
-    qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
+  if (name == "update_writer") qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
   // Writers evaluate no filters: in Fast DDS 2.9 and 3.1 the map of filters is changed without a lock
   // while a write goes through it, and crashes as readers come and go.
   qos.writer_resource_limits().reader_filters_allocation.initial = 0;
@@ -102,7 +101,7 @@ edds::DataReaderQos reader_qos(edds::Subscriber& subscriber, const std::string& 
   });
   qos.endpoint().history_memory_policy = kMemoryPolicy;
   // A socket of its own, that other traffic does not fill: else the living would seem dead.
-  if (name == "presence_reader") {
+  if (name == "beat_reader") {
     qos.properties().properties().emplace_back("fastdds.unique_network_flows", "");
   }
   return qos;
