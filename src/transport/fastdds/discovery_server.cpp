@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <netdb.h>
 #include <optional>
@@ -63,9 +64,10 @@ Result<std::string> resolve(const std::string& host) {
                 "host " + quote(host) + " has no IPv4 address: " + gai_strerror(status));
   }
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owned(found, &freeaddrinfo);
-  const auto* address = reinterpret_cast<const sockaddr_in*>(found->ai_addr);
+  sockaddr_in address{};
+  std::memcpy(&address, found->ai_addr, sizeof address);
   std::array<char, INET_ADDRSTRLEN> text{};
-  inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size());
+  inet_ntop(AF_INET, &address.sin_addr, text.data(), text.size());
   return std::string(text.data());
 }
 

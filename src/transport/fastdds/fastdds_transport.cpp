@@ -1,5 +1,6 @@
 #include "transport/fastdds/fastdds_transport.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -12,7 +13,7 @@
 namespace tfdude::fastdds {
 namespace {
 
-constexpr std::chrono::seconds kLongLease{60};
+constexpr std::chrono::seconds kLongLease{30};
 
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
 
@@ -95,14 +96,16 @@ Result<void> FastDdsTransport::create_endpoints() {
   using Prefix = ertps::GuidPrefix_t;
   presence_ = std::make_unique<Inlet<wire::Presence>>(
       *participant_, *topics_.presence, std::string(), "presence_reader",
-      Inlet<wire::Presence>::Calls{
-          [this](const wire::Presence& sample, const Prefix& from) { take_presence(sample, from); },
-          nullptr});
+      Inlet<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
+                                     take_presence(sample, from, false);
+                                   },
+                                   nullptr});
   beats_ = std::make_unique<Inlet<wire::Presence>>(
       *participant_, *topics_.presence, kBeatPartition, "beat_reader",
-      Inlet<wire::Presence>::Calls{
-          [this](const wire::Presence& sample, const Prefix& from) { take_presence(sample, from); },
-          nullptr});
+      Inlet<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
+                                     take_presence(sample, from, true);
+                                   },
+                                   nullptr});
   pages_ = std::make_unique<Inlet<wire::Page>>(
       *participant_, *topics_.directory, std::string(), "directory_reader",
       Inlet<wire::Page>::Calls{
@@ -162,6 +165,11 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
           [this](const wire::Update& sample, const Prefix&) { take_update(sample); }, nullptr});
   if (!requests_->good() || !updates_->good()) return not_created("the readers");
   return {};
+}
+
+// A server passes on what it hears several times a second, one step of the discovery at a time.
+Milliseconds FastDdsTransport::settle_time() const {
+  return Milliseconds(options_.discovery_server.empty() ? 400 : 1500);
 }
 
 void FastDdsTransport::stop() {
@@ -246,7 +254,12 @@ Result<void> FastDdsTransport::send(const std::string& partition, const Update& 
 Result<void> FastDdsTransport::send(Outlet& outlet, const std::string& partition, void* sample,
                                     Deadline deadline) const {
   if (!outlet.good()) return not_created("a writer");
-  if (!outlet.wait_until_matched(deadline)) {
+  while (!outlet.wait_until_matched(std::min(deadline, Peers::Clock::now() + Peers::kSpeakEvery))) {
+    if (peers_.silent(partition)) {
+      return fail(Errc::kUnreachable,
+                  "partition " + quote(partition) + " went away before it was met");
+    }
+    if (Peers::Clock::now() < deadline) continue;
     return fail(Errc::kTimeout, "partition " + quote(partition) +
                                     " was not met in time in domain " +
                                     std::to_string(options_.domain));
@@ -345,15 +358,15 @@ void FastDdsTransport::take_page(const wire::Page& sample, const ertps::GuidPref
   }
 }
 
-void FastDdsTransport::take_presence(const wire::Presence& sample,
-                                     const ertps::GuidPrefix_t& from) {
+void FastDdsTransport::take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from,
+                                     bool beat) {
   if (peer_of(from) == self_) return;
   const auto presence = from_wire(sample);
   if (!presence) {
     log_refused(kPresenceTopic, presence.error());
     return;
   }
-  peers_.present(from, *presence, sample.peers());
+  peers_.present(from, *presence, sample.peers(), beat);
 }
 
 }  // namespace tfdude::fastdds

@@ -39,7 +39,7 @@ class FastDdsTransport final : public Transport {
   void reply(const PeerId& to, const Reply& reply) override;
   bool settled() const override { return peers_.settled(); }
   bool awaits_presence() const override { return peers_.awaits_presence(); }
-  Milliseconds settle_time() const override { return Milliseconds(400); }
+  Milliseconds settle_time() const override;
 
   // Of ParticipantListener, from a thread of the library.
   void met(const ertps::GuidPrefix_t& prefix, const std::string& name) { peers_.met(prefix, name); }
@@ -73,7 +73,7 @@ class FastDdsTransport final : public Transport {
   void take_update(const wire::Update& sample);
   void take_reply(const wire::Reply& sample);
   void take_page(const wire::Page& sample, const ertps::GuidPrefix_t& from);
-  void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from);
+  void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from, bool beat);
 
   const FastDdsOptions options_;
   const std::shared_ptr<FastDdsCounters> counters_;
