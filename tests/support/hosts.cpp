@@ -93,7 +93,12 @@ Hosts::~Hosts() {
 std::string Hosts::address(std::size_t host) { return "10.77.0." + std::to_string(host + 1); }
 
 Process Hosts::start(std::size_t host, const std::vector<std::string>& argv) const {
-  return Process(argv, hosts_.at(host).fd());
+  // With a shared memory of its own: what hosts have in common is the network.
+  std::vector<std::string> command = shell(
+      "exec unshare --mount /bin/sh -c 'mount -t tmpfs none /dev/shm && exec \"$@\"' sh \"$@\"");
+  command.emplace_back("sh");
+  command.insert(command.end(), argv.begin(), argv.end());
+  return Process(command, hosts_.at(host).fd());
 }
 
 void Hosts::enter(std::size_t host) const {
@@ -125,8 +130,10 @@ void Hosts::cut(std::size_t host) const { run(switch_, "ip link set " + port(hos
 
 void Hosts::heal(std::size_t host) const { run(switch_, "ip link set " + port(host) + " up"); }
 
-Process start_discovery_server(const Hosts& hosts, std::size_t host) {
-  Process server = hosts.start(host, {"/usr/bin/fast-discovery-server", "-i", "0"});
+Process start_discovery_server(const Hosts& hosts, std::size_t host, const std::string& backup) {
+  const std::string command = "exec fast-discovery-server -i 0";
+  Process server = hosts.start(
+      host, shell(backup.empty() ? command : "cd '" + backup + "'; " + command + " -b"));
   if (!server.wait_for_line("### Server is running ###", in_time())) {
     throw std::runtime_error("the discovery server does not run: " + server.err());
   }

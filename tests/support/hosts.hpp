@@ -2,7 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "support/process.hpp"
@@ -31,6 +34,17 @@ class Hosts {
   /// Moves the calling thread to a host, with all threads and sockets that it makes from now on. The thread
   /// that has made this object returns as that goes.
   void enter(std::size_t host) const;
+
+  /// What a function gives that runs on a host, in a thread of its own.
+  template <class Function>
+  [[nodiscard]] auto on(std::size_t host, Function function) const {
+    std::optional<decltype(function())> result;
+    std::thread([&] {
+      enter(host);
+      result.emplace(function());
+    }).join();
+    return *std::move(result);
+  }
 
   /// From now on each host drops this share of all packets that come to it over the network, at random.
   void lose(int percent) const;
@@ -63,7 +77,9 @@ class Hosts {
 };
 
 /// Starts Fast DDS's discovery server on a host, with id 0, and waits until it runs.
-[[nodiscard]] Process start_discovery_server(const Hosts& hosts, std::size_t host);
+/// @param backup  a directory in which it keeps what it knows for its successor; empty: it does not
+[[nodiscard]] Process start_discovery_server(const Hosts& hosts, std::size_t host,
+                                             const std::string& backup = {});
 /// Where the others find it, for --discovery-server.
 [[nodiscard]] std::string discovery_address(std::size_t host);
 

@@ -77,6 +77,8 @@ class TemporaryDirectory {
   TemporaryDirectory(const TemporaryDirectory&) = delete;
   TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
 
+  [[nodiscard]] const std::string& path() const { return path_; }
+
   /// Writes a file. @return its path
   [[nodiscard]] std::string write(const std::string& name, const std::string& text) const;
 

@@ -27,6 +27,7 @@ std::string environment(const char* name) {
 TestDomain::TestDomain() {
   const std::string loss = environment("TFDUDE_TEST_LOSS");
   if (loss.empty()) return;
+  if (skip_without_hosts()) throw std::runtime_error("there can be no hosts here");
   hosts_.emplace(kCommandHost + 1);
   hosts_->lose(std::stoi(loss));
   hosts_->enter(kOwnHost);
