@@ -41,7 +41,7 @@ class GatedTransport final : public SendFilter {
   [[nodiscard]] bool may_send(const ertps::Locator_t& to) const override {
     if (!descriptor_.open->load(std::memory_order_relaxed)) return false;
     const std::uint32_t host = host_of(to);
-    return host == 0 || descriptor_.reach->may_send(host, Reach::Clock::now());
+    return host == 0 || descriptor_.reach->may_send(host, to.port, Reach::Clock::now());
   }
 
   void heard(const ertps::Locator_t& from) const override {

@@ -15,6 +15,10 @@ namespace {
 
 constexpr std::chrono::seconds kLongLease{30};
 
+// What is lost of the discovery is repeated after a second; by a server it takes more steps.
+constexpr std::chrono::milliseconds kFirstBeat{1500};
+constexpr std::chrono::milliseconds kFirstBeatByServer{8000};
+
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
 
 // The DDS partition of the beats: those of a topic who are in different ones do not match.
@@ -83,7 +87,9 @@ void FastDdsTransport::take_lease(edds::DomainParticipantQos& qos) {
   auto& lease = qos.wire_protocol().builtin.discovery_config.leaseDuration;
   const auto silence =
       std::chrono::seconds(lease.seconds) + std::chrono::nanoseconds(lease.nanosec);
-  peers_.configure(silence, !options_.partition.empty());
+  const bool by_server = !options_.discovery_server.empty();
+  peers_.configure(silence, by_server ? kFirstBeatByServer : kFirstBeat,
+                   !options_.partition.empty());
   if (silence < kLongLease) lease = {static_cast<std::int32_t>(kLongLease.count()), 0};
 }
 

@@ -45,18 +45,19 @@ class Peers {
   /// How often a server says that it is there. Seven beats must be lost before it counts as gone after the usual 450 ms.
   static constexpr std::chrono::milliseconds kSpeakEvery{60};
 
-  /// How long its first beat may take, whose way DDS may have to find still when the presence has come already.
-  static constexpr std::chrono::milliseconds kFirstBeat{1500};
-
   /// @param there  a peer said what it serves, or is heard again
   /// @param gone   a peer that had said so has left or fallen silent
   Peers(Tell there, Tell gone) : there_(std::move(there)), gone_(std::move(gone)) {}
 
   /// To be called before anybody is met.
-  /// @param silence    whoever has not been heard for this long counts as gone
-  /// @param is_server  the others count this participant, too
-  void configure(std::chrono::nanoseconds silence, bool is_server) {
+  /// @param silence     whoever has not been heard for this long counts as gone
+  /// @param first_beat  how long its first beat may take, whose way DDS may have to find still when the presence has
+  ///                    come already
+  /// @param is_server   the others count this participant, too
+  void configure(std::chrono::nanoseconds silence, std::chrono::nanoseconds first_beat,
+                 bool is_server) {
     silence_ = silence;
+    first_beat_ = std::max(silence, first_beat);
     is_server_ = is_server;
   }
 
@@ -100,7 +101,7 @@ class Peers {
 
   /// How long this one may be silent.
   [[nodiscard]] std::chrono::nanoseconds patience(const Server& server) const {
-    return server.beats ? silence_ : std::max<std::chrono::nanoseconds>(silence_, kFirstBeat);
+    return server.beats ? silence_ : first_beat_;
   }
 
   const Tell there_;
@@ -110,6 +111,7 @@ class Peers {
   Clock::time_point last_met_{};
   Clock::time_point last_look_ = Clock::now();
   std::chrono::nanoseconds silence_{};
+  std::chrono::nanoseconds first_beat_{};
   bool is_server_ = false;
 };
 

@@ -18,26 +18,27 @@ class Reach {
 
   /// Who was not heard for this long...
   static constexpr std::chrono::milliseconds kSilence{500};
-  /// ...is sent no more than one datagram in this time, by which they meet again.
+  /// ...is sent no more than one datagram in this time at each port, by which they meet again. Who only listens is
+  /// silent, too: beats come less often, and each listener has a port for them.
   static constexpr std::chrono::milliseconds kTryEvery{50};
 
   /// @param host  an IPv4 address
   void heard(std::uint32_t host, Clock::time_point now);
 
-  /// Whether a datagram may be sent; counts it if so. Of more hosts than there is room for, always.
-  [[nodiscard]] bool may_send(std::uint32_t host, Clock::time_point now);
+  /// Whether a datagram may be sent; counts it if so. Of more hosts and ports than there is room for, always.
+  [[nodiscard]] bool may_send(std::uint32_t host, std::uint32_t port, Clock::time_point now);
 
  private:
-  struct Host {
-    std::atomic<std::uint32_t> address{0};  // 0: none yet
-    std::atomic<std::int64_t> heard{0};     // of the clock
-    std::atomic<std::int64_t> tried{0};
+  struct Entry {
+    std::atomic<std::uint64_t> key{0};  // 0: none yet
+    std::atomic<std::int64_t> time{0};  // of the clock
   };
 
-  /// Null where there is no room.
-  Host* find(std::uint32_t address, std::int64_t now);
+  /// The time that is kept for a key, which is made with a first one. Null where there is no room.
+  std::atomic<std::int64_t>* find(std::uint64_t key, std::int64_t first);
 
-  std::array<Host, 256> hosts_;
+  std::array<Entry, 1024>
+      entries_;  // when hosts were heard, and when silent ones were tried at a port
 };
 
 }  // namespace tfdude::fastdds
