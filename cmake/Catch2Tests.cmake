@@ -3,10 +3,11 @@
 find_package(Catch2 REQUIRED)
 include(Catch)
 
-# tfdude_add_tests(target LABELS label... [TIMEOUT seconds] SOURCES file... [LIBRARIES target...]): one
-# Catch2 binary, each of its test cases a ctest test.
+# tfdude_add_tests(target LABELS label... [TIMEOUT seconds] [SKIPPED_BY regex] SOURCES file...
+# [LIBRARIES target...]): one Catch2 binary, each of its test cases a ctest test, which counts as skipped
+# where it prints what the regular expression says.
 function(tfdude_add_tests target)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "LABELS;SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;SKIPPED_BY" "LABELS;SOURCES;LIBRARIES" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 60)
   endif()
@@ -16,10 +17,14 @@ function(tfdude_add_tests target)
   target_link_libraries(${target} PRIVATE tfdude Catch2::Catch2WithMain tfdude_options ${ARG_LIBRARIES})
   catch_discover_tests(${target} TEST_PREFIX "${target}: "
     PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+  set(skipped_by "")
+  if(ARG_SKIPPED_BY)
+    set(skipped_by " SKIP_REGULAR_EXPRESSION \"${ARG_SKIPPED_BY}\"")
+  endif()
   # Not among the PROPERTIES, which fall apart at the semicolon between two labels.
   set(labels_file ${CMAKE_CURRENT_BINARY_DIR}/${target}_labels.cmake)
   file(WRITE ${labels_file} "foreach(test IN LISTS ${target}_TESTS)
-  set_tests_properties(\"\${test}\" PROPERTIES LABELS \"${ARG_LABELS}\")
+  set_tests_properties(\"\${test}\" PROPERTIES LABELS \"${ARG_LABELS}\"${skipped_by})
 endforeach()
 ")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${labels_file})

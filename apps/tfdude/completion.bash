@@ -5,7 +5,7 @@ _tfdude_common() {
   local i
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
-      --domain | --profile) printf '%s\n%s\n' "${COMP_WORDS[i]}" "${COMP_WORDS[i + 1]}" ;;
+      --domain | --profile | --discovery-server) printf '%s\n%s\n' "${COMP_WORDS[i]}" "${COMP_WORDS[i + 1]}" ;;
     esac
   done
 }
@@ -14,7 +14,7 @@ _tfdude_command() {
   local i
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
-      --domain | --profile | --timeout) ((++i)) ;;
+      --domain | --profile | --discovery-server | --timeout) ((++i)) ;;
       -*) ;;
       *) echo "${COMP_WORDS[i]}"; return ;;
     esac
@@ -30,12 +30,12 @@ _tfdude() {
   mapfile -t common < <(_tfdude_common)
   case $previous in
     --profile) mapfile -t COMPREPLY < <(compgen -f -- "$word"); return ;;
-    --domain | --timeout | --rate | --xyz | --rpy | --quat | --stddev) return ;;
+    --domain | --discovery-server | --timeout | --rate | --xyz | --rpy | --quat | --stddev) return ;;
     --partition) words=$(timeout 0.5 tfdude "${common[@]}" partitions 2>/dev/null | cut -d' ' -f1) ;;
     --parent) words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null) ;;
     *)
       if [[ $word == -* ]]; then
-        words="--help --domain --profile --timeout --json"
+        words="--help --domain --profile --discovery-server --timeout --json"
         case $command in
           add) words+=" --parent --partition $pose" ;;
           update) words+=" $pose" ;;

@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/transport/fastdds.hpp"
 
 #include "commands.hpp"
 
@@ -19,6 +20,8 @@ namespace {
 
 using namespace tfdude;
 using cli::Arguments;
+
+constexpr long kTimeoutByServer = 3000;  // [ms]
 
 using Command = std::function<int(Client&, const Arguments&)>;
 
@@ -36,6 +39,21 @@ void add_pose_options(CLI::App& command, Arguments& arguments) {
   command.add_option("--cov", spec.cov, "upper triangle of the covariance row by row")
       ->type_name("21 NUMBERS")
       ->excludes(stddev);
+}
+
+void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {
+  app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232")
+      ->check(CLI::Range(0, 232));
+  app.add_option("--profile", arguments.options.profile, "XML file of DDS profiles");
+  app.add_option("--discovery-server", arguments.options.discovery_server,
+                 "HOST:PORT of a Fast DDS discovery server")
+      ->check([](const std::string& text) {
+        const auto good = check_discovery_server(text);
+        return good ? std::string() : good.error().message;
+      });
+  app.add_option("--timeout", timeout_ms, "how long to wait for an answer [ms]")
+      ->check(CLI::Range(1, 3600000));
+  app.add_flag("--json", arguments.json, "one JSON object an answer");
 }
 
 CLI::App* add_command(CLI::App& app, const char* name, const char* help, const char* example,
@@ -130,12 +148,7 @@ int main(int argc, char** argv) {
   app.footer("Exit status: 0 done, 1 the service said no, 2 wrong usage, 3 no answer.");
   app.require_subcommand(1);
   app.fallthrough();
-  app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232")
-      ->check(CLI::Range(0, 232));
-  app.add_option("--profile", arguments.options.profile, "XML file of DDS profiles");
-  app.add_option("--timeout", timeout_ms, "how long to wait for an answer [ms]")
-      ->check(CLI::Range(1, 3600000));
-  app.add_flag("--json", arguments.json, "one JSON object an answer");
+  add_common_options(app, arguments, timeout_ms);
   add_reading_commands(app, arguments, command);
   add_events_command(app, command);
   add_changing_commands(app, arguments, command);
@@ -154,8 +167,11 @@ int main(int argc, char** argv) {
     (void)app.exit(error);
     return cli::kWrongUsage;
   }
+  // To meet by a server takes most of the usual second.
+  const bool by_server = !arguments.options.discovery_server.empty();
+  if (by_server && app.count("--timeout") == 0) timeout_ms = kTimeoutByServer;
   arguments.options.timeout = Milliseconds(timeout_ms);
-  arguments.options.discovery = std::min(arguments.options.discovery, arguments.options.timeout);
+  arguments.options.discovery = arguments.options.timeout;
   // Before any thread starts, so that watch and events can wait for them.
   sigset_t stop_signals;
   sigemptyset(&stop_signals);

@@ -15,6 +15,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/config.hpp"
+#include "tfdude/transport/fastdds.hpp"
 
 namespace {
 
@@ -112,6 +113,12 @@ int main(int argc, char** argv) {
   app.add_option("--save-every", arguments.save_every_ms,
                  "how often at most streamed values are stored [ms]")
       ->check(CLI::Range(1, 86'400'000));
+  app.add_option("--discovery-server", arguments.options.discovery_server,
+                 "HOST:PORT of a Fast DDS discovery server")
+      ->check([](const std::string& text) {
+        const auto good = tfdude::check_discovery_server(text);
+        return good ? std::string() : good.error().message;
+      });
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -13,7 +13,8 @@ Client& Client::operator=(Client&&) noexcept = default;
 Client::~Client() = default;
 
 Result<Client> Client::open(const Options& options) {
-  auto transport = make_fastdds_transport({options.domain, options.profile, {}, nullptr});
+  auto transport = make_fastdds_transport(
+      {options.domain, options.profile, {}, nullptr, options.discovery_server});
   if (!transport) return tl::unexpected(std::move(transport.error()));
   return open(*std::move(transport), options);
 }
@@ -119,7 +120,8 @@ Subscription Client::on_change(std::function<void(const Change&)> listener) {
 Result<Node> Node::open(const std::string& partition, const std::vector<FrameSpec>& frames,
                         const Options& options) {
   if (auto ok = check_partition_name(partition); !ok) return tl::unexpected(std::move(ok.error()));
-  auto transport = make_fastdds_transport({options.domain, options.profile, partition, nullptr});
+  auto transport = make_fastdds_transport(
+      {options.domain, options.profile, partition, nullptr, options.discovery_server});
   if (!transport) return tl::unexpected(std::move(transport.error()));
   return open(*std::move(transport), partition, frames, options);
 }

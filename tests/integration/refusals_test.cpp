@@ -146,6 +146,7 @@ TEST_CASE("cli: wrong usage is 2") {
       {{"watch", "world", "camera", "--rate", "0"}, "", {"--rate"}},
       {{"watch", "world", "camera", "--rate", "nan"}, "", {"--rate", "nan"}},
       {{"watch", "world", "camera", "--rate", "2x"}, "", {"--rate", "2x"}},
+      {{"tree", "--discovery-server", "nowhere"}, "", {"'nowhere'", "HOST:PORT"}},
       {{"tree", "--timeout", "soon"}, "", {"--timeout", "soon"}},
       {{"tree", "--profile", "/nowhere/profile.xml"}, "", {"/nowhere/profile.xml"}},
       {{"tree", "--profile", directory.write("broken.xml", "<profiles><")}, "", {"broken.xml"}},

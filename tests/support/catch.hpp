@@ -8,6 +8,16 @@
 #include <catch2/catch.hpp>
 #endif
 
+#include "tfdude/base/result.hpp"
+
+/// What a result is that should have been another: its error's message.
+template <class T>
+struct Catch::StringMaker<tl::expected<T, tfdude::Error>> {
+  static std::string convert(const tl::expected<T, tfdude::Error>& result) {
+    return result ? "done" : "error: " + result.error().message;
+  }
+};
+
 namespace tfdude::testing {
 
 #if __has_include(<catch2/catch_all.hpp>)

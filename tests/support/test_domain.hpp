@@ -1,12 +1,15 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
 
 #include "support/domain_lease.hpp"
+#include "support/hosts.hpp"
 #include "support/process.hpp"
 
 namespace tfdude::testing {
@@ -19,8 +22,19 @@ struct CliResult {
 };
 
 /// A DDS domain that no other test uses now, on this computer only, and the service's programs in it.
+///
+/// With TFDUDE_TEST_LOSS in the environment, a percentage, the same test runs over several hosts of which each
+/// loses this share of the packets that come to it: the test's process is on one of them, daemons on
+/// others in turn, the command line on another. With TFDUDE_TEST_DISCOVERY=server they meet by a discovery
+/// server, else by multicast.
 class TestDomain {
  public:
+  TestDomain();
+  /// Checks that packets were lost where some were to be.
+  ~TestDomain();
+  TestDomain(const TestDomain&) = delete;
+  TestDomain& operator=(const TestDomain&) = delete;
+
   [[nodiscard]] std::uint32_t number() const { return lease_.number(); }
 
   /// For clients in the test's process. The time-out is long, so that a busy machine is not an error.
@@ -38,8 +52,13 @@ class TestDomain {
  private:
   [[nodiscard]] std::vector<std::string> command(const char* program,
                                                  const std::vector<std::string>& arguments) const;
+  [[nodiscard]] Process start(std::size_t host, const std::vector<std::string>& command) const;
 
   DomainLease lease_;
+  std::optional<Hosts> hosts_;
+  std::optional<Process> server_;  // for discovery
+  std::string server_address_;
+  mutable std::size_t daemons_ = 0;
 };
 
 /// @return the line by which a daemon says that it serves

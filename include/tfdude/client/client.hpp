@@ -24,6 +24,8 @@ struct Options {
   std::uint32_t domain =
       0;                ///< DDS domain: participants of different domains do not meet; 0 to 232
   std::string profile;  ///< XML file of DDS profiles; empty: the built-in ones
+  /// HOST:PORT of a Fast DDS discovery server with id 0; empty: participants meet by multicast
+  std::string discovery_server;
   Milliseconds timeout{1000};  ///< how long a call waits for the partitions that it asks
   /// How long a new participant looks round at most before it says that a frame is not there. It waits
   /// this long only where it meets nobody; for partitions that it has met, and that are slow to tell what they own,

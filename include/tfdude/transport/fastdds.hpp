@@ -24,12 +24,19 @@ struct FastDdsOptions {
   std::string profile;       ///< XML file; profiles that it lacks are taken from the built-in ones
   std::string partition;     ///< the one that the participant is going to serve; empty: none
   std::shared_ptr<FastDdsCounters> counters;  ///< counted into, where given
+  /// HOST:PORT of a Fast DDS discovery server with id 0; empty: participants meet by multicast
+  std::string discovery_server = {};
 };
+
+/// Whether this is the address of a discovery server, HOST:PORT with a name or an IPv4 address. Looks nothing up.
+/// @return kInvalidInput naming it.
+[[nodiscard]] Result<void> check_discovery_server(const std::string& address);
 
 /// A participant's access to a DDS domain by Fast DDS. Switches Fast DDS's delivery inside a process off for
 /// the whole process, since it calls handlers under the library's locks, and sends its log to standard
 /// error.
-/// @return kInvalidInput (domain). start() may fail with kConfig (profile) and kTransport.
+/// @return kInvalidInput (domain, discovery server). start() may fail with kConfig (profile), kTransport, and
+///   kInvalidInput where the discovery server's host has no IPv4 address.
 [[nodiscard]] Result<std::unique_ptr<Transport>> make_fastdds_transport(
     const FastDdsOptions& options);
 

@@ -97,6 +97,16 @@ inline void switch_intraprocess_off() {
   eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
 }
 
+/// Makes a participant meet the others by a discovery server. A participant of this version knows a server by
+/// its id, too: 0, unless told otherwise, as the servers have it.
+inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps::Locator_t& at) {
+  etransport::RemoteServerAttributes server;
+  server.ReadguidPrefix("44.53.00.5f.45.50.52.4f.53.49.4d.41");
+  server.metatrafficUnicastLocatorList.push_back(at);
+  discovery.discoveryProtocol = DiscoveryProtocol::CLIENT;
+  discovery.m_DiscoveryServers = {server};
+}
+
 /// Tells of participants that come and go: met(guid prefix, name) and left(guid prefix).
 template <class Observer>
 class ParticipantListener final : public edds::DomainParticipantListener {
@@ -166,6 +176,12 @@ inline void switch_intraprocess_off() {
   edds::DomainParticipantFactory::get_instance()->set_library_settings(settings);
 }
 
+inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps::Locator_t& at) {
+  discovery.discoveryProtocol = DiscoveryProtocol::CLIENT;
+  discovery.m_DiscoveryServers.clear();
+  discovery.m_DiscoveryServers.push_back(at);
+}
+
 template <class Observer>
 class ParticipantListener final : public edds::DomainParticipantListener {
  public:
@@ -213,7 +229,7 @@ class CheckedType final : public Generated {
 
 #endif
 
-/// A transport that sends through another, where it may.
+/// A transport that sends through another, to whom it may, and sees from whom something comes.
 class SendFilter : public etransport::ChainingTransport {
  public:
   using ChainingTransport::ChainingTransport;
@@ -222,24 +238,44 @@ class SendFilter : public etransport::ChainingTransport {
   bool send(ertps::SenderResource* through, const ertps::octet* bytes, std::uint32_t size,
             ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& deadline) override {
-    return !may_send() || through->send(bytes, size, begin, end, deadline);
+    return send_to(begin, end, [&](ertps::LocatorsIterator* from, ertps::LocatorsIterator* to) {
+      return through->send(bytes, size, from, to, deadline);
+    });
   }
 #else
   bool send(ertps::SenderResource* through, const std::vector<ertps::NetworkBuffer>& buffers,
             std::uint32_t size, ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& deadline) override {
-    return !may_send() || through->send(buffers, size, begin, end, deadline);
+    return send_to(begin, end, [&](ertps::LocatorsIterator* from, ertps::LocatorsIterator* to) {
+      return through->send(buffers, size, from, to, deadline);
+    });
   }
 #endif
 
   void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
                std::uint32_t size, const ertps::Locator_t& local,
                const ertps::Locator_t& remote) override {
+    heard(remote);
     next->OnDataReceived(bytes, size, local, remote);
   }
 
  private:
-  [[nodiscard]] virtual bool may_send() const = 0;
+  [[nodiscard]] virtual bool may_send(const ertps::Locator_t& to) const = 0;
+  virtual void heard(const ertps::Locator_t& from) const = 0;
+
+  // What may not be sent counts as sent, as what is lost on the way does.
+  template <class Send>
+  bool send_to(ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end, Send send) const {
+    thread_local std::vector<ertps::Locator_t> destinations;  // kept for its memory
+    destinations.clear();
+    for (auto& at = *begin; at != *end; ++at) {
+      if (may_send(*at)) destinations.push_back(*at);
+    }
+    if (destinations.empty()) return true;
+    etransport::Locators from(destinations.cbegin());
+    etransport::Locators to(destinations.cend());
+    return send(&from, &to);
+  }
 };
 
 }  // namespace tfdude::fastdds

@@ -1,7 +1,10 @@
 #include "transport/fastdds/entrance.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <utility>
+
+#include "transport/fastdds/reach.hpp"
 
 namespace tfdude::fastdds {
 namespace {
@@ -15,7 +18,17 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   [[nodiscard]] etransport::TransportInterface* create_transport() const override;
 
   Flag open;
+  std::shared_ptr<Reach> reach = std::make_shared<Reach>();
 };
+
+// Of another computer; else 0: groups have no neighbours to wait for, and this computer is always there.
+std::uint32_t host_of(const ertps::Locator_t& locator) {
+  const ertps::octet* address = ertps::IPLocator::getIPv4(locator);
+  if (address[0] == 127 || address[0] >= 224) return 0;
+  return static_cast<std::uint32_t>(address[0]) << 24U |
+         static_cast<std::uint32_t>(address[1]) << 16U |
+         static_cast<std::uint32_t>(address[2]) << 8U | address[3];
+}
 
 class GatedTransport final : public SendFilter {
  public:
@@ -25,8 +38,15 @@ class GatedTransport final : public SendFilter {
   etransport::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
 
  private:
-  [[nodiscard]] bool may_send() const override {
-    return descriptor_.open->load(std::memory_order_relaxed);
+  [[nodiscard]] bool may_send(const ertps::Locator_t& to) const override {
+    if (!descriptor_.open->load(std::memory_order_relaxed)) return false;
+    const std::uint32_t host = host_of(to);
+    return host == 0 || descriptor_.reach->may_send(host, to.port, Reach::Clock::now());
+  }
+
+  void heard(const ertps::Locator_t& from) const override {
+    const std::uint32_t host = host_of(from);
+    if (host != 0) descriptor_.reach->heard(host, Reach::Clock::now());
   }
 
   GatedDescriptor descriptor_;

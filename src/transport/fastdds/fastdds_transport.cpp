@@ -1,19 +1,28 @@
 #include "transport/fastdds/fastdds_transport.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "transport/fastdds/discovery_server.hpp"
 #include "transport/fastdds/entrance.hpp"
 #include "transport/fastdds/topics.hpp"
 
 namespace tfdude::fastdds {
 namespace {
 
-constexpr std::chrono::seconds kLongLease{10};
+constexpr std::chrono::seconds kLongLease{30};
+
+// What is lost of the discovery is repeated after a second; by a server it takes more steps.
+constexpr std::chrono::milliseconds kFirstBeat{1500};
+constexpr std::chrono::milliseconds kFirstBeatByServer{8000};
 
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
+
+// The DDS partition of the beats: those of a topic who are in different ones do not match.
+constexpr const char* kBeatPartition = "tfdude-beat";
 
 tl::unexpected<Error> not_created(const char* what) {
   return fail(Errc::kTransport, std::string("Fast DDS could not create ") + what);
@@ -49,6 +58,9 @@ Result<void> FastDdsTransport::create_participant() {
   qos.name(participant_name(options_.partition));
   qos.properties().properties().emplace_back("fastdds.ignore_local_endpoints", "true");
   take_lease(qos);
+  if (!options_.discovery_server.empty()) {
+    if (auto used = use_discovery_server(qos, options_.discovery_server); !used) return used;
+  }
   Entrance entrance;
   entrance.prepare(qos, options_.domain, options_.partition.empty());
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
@@ -75,7 +87,9 @@ void FastDdsTransport::take_lease(edds::DomainParticipantQos& qos) {
   auto& lease = qos.wire_protocol().builtin.discovery_config.leaseDuration;
   const auto silence =
       std::chrono::seconds(lease.seconds) + std::chrono::nanoseconds(lease.nanosec);
-  peers_.configure(silence, !options_.partition.empty());
+  const bool by_server = !options_.discovery_server.empty();
+  peers_.configure(silence, by_server ? kFirstBeatByServer : kFirstBeat,
+                   !options_.partition.empty());
   if (silence < kLongLease) lease = {static_cast<std::int32_t>(kLongLease.count()), 0};
 }
 
@@ -88,9 +102,16 @@ Result<void> FastDdsTransport::create_endpoints() {
   using Prefix = ertps::GuidPrefix_t;
   presence_ = std::make_unique<Inlet<wire::Presence>>(
       *participant_, *topics_.presence, std::string(), "presence_reader",
-      Inlet<wire::Presence>::Calls{
-          [this](const wire::Presence& sample, const Prefix& from) { take_presence(sample, from); },
-          nullptr});
+      Inlet<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
+                                     take_presence(sample, from, false);
+                                   },
+                                   nullptr});
+  beats_ = std::make_unique<Inlet<wire::Presence>>(
+      *participant_, *topics_.presence, kBeatPartition, "beat_reader",
+      Inlet<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
+                                     take_presence(sample, from, true);
+                                   },
+                                   nullptr});
   pages_ = std::make_unique<Inlet<wire::Page>>(
       *participant_, *topics_.directory, std::string(), "directory_reader",
       Inlet<wire::Page>::Calls{
@@ -103,13 +124,19 @@ Result<void> FastDdsTransport::create_endpoints() {
                                   take_reply(sample);
                                 },
                                 nullptr});
-  if (!presence_->good() || !pages_->good() || !replies_->good()) return not_created("the readers");
+  if (!presence_->good() || !beats_->good() || !pages_->good() || !replies_->good()) {
+    return not_created("the readers");
+  }
   if (options_.partition.empty()) return {};
   presence_outlet_ =
       std::make_unique<Outlet>(*participant_, *topics_.presence, std::string(), "presence_writer");
+  beat_outlet_ =
+      std::make_unique<Outlet>(*participant_, *topics_.presence, kBeatPartition, "beat_writer");
   directory_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.directory, std::string(),
                                                "directory_writer");
-  if (!presence_outlet_->good() || !directory_outlet_->good()) return not_created("the writers");
+  if (!presence_outlet_->good() || !beat_outlet_->good() || !directory_outlet_->good()) {
+    return not_created("the writers");
+  }
   return {};
 }
 
@@ -146,6 +173,11 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
   return {};
 }
 
+// A server passes on what it hears several times a second, one step of the discovery at a time.
+Milliseconds FastDdsTransport::settle_time() const {
+  return Milliseconds(options_.discovery_server.empty() ? 400 : 1500);
+}
+
 void FastDdsTransport::stop() {
   if (participant_ == nullptr) return;
   participant_->set_listener(nullptr);
@@ -153,12 +185,14 @@ void FastDdsTransport::stop() {
   updates_.reset();
   replies_.reset();
   pages_.reset();
+  beats_.reset();
   presence_.reset();
   worker_->stop();
   reply_outlets_.clear();
   request_outlets_.clear();
   update_outlets_.clear();
   directory_outlet_.reset();
+  beat_outlet_.reset();
   presence_outlet_.reset();
   participant_->delete_contained_entities();
   edds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
@@ -170,21 +204,22 @@ void FastDdsTransport::stop() {
 void FastDdsTransport::announce(const Presence& presence) {
   const std::lock_guard lock(presence_mutex_);
   said_ = to_wire(presence);
-  say_presence();
-}
-
-// Under presence_mutex_.
-void FastDdsTransport::say_presence() {
   said_->peers(peers_.heard_count());
   presence_outlet_->write(&*said_);
 }
 
-// Every second time it speaks, each time it looks who has fallen silent.
+// Every second time it speaks, each time it looks who has fallen silent. What has changed since it last spoke is
+// for all to know, also those who join later; the rest is a beat that may be lost, as the next one follows.
 void FastDdsTransport::keep_in_touch() {
   peers_.look_for_silent(Peers::Clock::now());
   const std::lock_guard lock(presence_mutex_);
   to_speak_ = !to_speak_;
-  if (said_ && to_speak_) say_presence();
+  if (!said_ || !to_speak_) return;
+  if (const auto peers = peers_.heard_count(); peers != said_->peers()) {
+    said_->peers(peers);
+    presence_outlet_->write(&*said_);
+  }
+  beat_outlet_->write(&*said_);
 }
 
 void FastDdsTransport::publish(const Page& page) {
@@ -225,7 +260,12 @@ Result<void> FastDdsTransport::send(const std::string& partition, const Update& 
 Result<void> FastDdsTransport::send(Outlet& outlet, const std::string& partition, void* sample,
                                     Deadline deadline) const {
   if (!outlet.good()) return not_created("a writer");
-  if (!outlet.wait_until_matched(deadline)) {
+  while (!outlet.wait_until_matched(std::min(deadline, Peers::Clock::now() + Peers::kSpeakEvery))) {
+    if (peers_.silent(partition)) {
+      return fail(Errc::kUnreachable,
+                  "partition " + quote(partition) + " went away before it was met");
+    }
+    if (Peers::Clock::now() < deadline) continue;
     return fail(Errc::kTimeout, "partition " + quote(partition) +
                                     " was not met in time in domain " +
                                     std::to_string(options_.domain));
@@ -324,15 +364,15 @@ void FastDdsTransport::take_page(const wire::Page& sample, const ertps::GuidPref
   }
 }
 
-void FastDdsTransport::take_presence(const wire::Presence& sample,
-                                     const ertps::GuidPrefix_t& from) {
+void FastDdsTransport::take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from,
+                                     bool beat) {
   if (peer_of(from) == self_) return;
   const auto presence = from_wire(sample);
   if (!presence) {
     log_refused(kPresenceTopic, presence.error());
     return;
   }
-  peers_.present(from, *presence, sample.peers());
+  peers_.present(from, *presence, sample.peers(), beat);
 }
 
 }  // namespace tfdude::fastdds
@@ -344,6 +384,11 @@ Result<std::unique_ptr<Transport>> make_fastdds_transport(const FastDdsOptions& 
     return fail(Errc::kInvalidInput, "domain " + std::to_string(options.domain) +
                                          " is not within 0 to " +
                                          std::to_string(fastdds::kMaxDomain));
+  }
+  if (!options.discovery_server.empty()) {
+    if (auto good = check_discovery_server(options.discovery_server); !good) {
+      return tl::unexpected(std::move(good.error()));
+    }
   }
   return std::make_unique<fastdds::FastDdsTransport>(options);
 }

@@ -39,7 +39,7 @@ class FastDdsTransport final : public Transport {
   void reply(const PeerId& to, const Reply& reply) override;
   bool settled() const override { return peers_.settled(); }
   bool awaits_presence() const override { return peers_.awaits_presence(); }
-  Milliseconds settle_time() const override { return Milliseconds(400); }
+  Milliseconds settle_time() const override;
 
   // Of ParticipantListener, from a thread of the library.
   void met(const ertps::GuidPrefix_t& prefix, const std::string& name) { peers_.met(prefix, name); }
@@ -62,7 +62,6 @@ class FastDdsTransport final : public Transport {
   edds::ContentFilteredTopic* create_filtered(edds::Topic* topic, const std::string& partition);
 
   void keep_in_touch();
-  void say_presence();
   std::shared_ptr<Outlet> outlet(Outlets& outlets, edds::Topic* topic, const std::string& partition,
                                  const char* profile);
   std::shared_ptr<Outlet> reply_outlet(const PeerId& peer);
@@ -74,7 +73,7 @@ class FastDdsTransport final : public Transport {
   void take_update(const wire::Update& sample);
   void take_reply(const wire::Reply& sample);
   void take_page(const wire::Page& sample, const ertps::GuidPrefix_t& from);
-  void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from);
+  void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from, bool beat);
 
   const FastDdsOptions options_;
   const std::shared_ptr<FastDdsCounters> counters_;
@@ -101,12 +100,14 @@ class FastDdsTransport final : public Transport {
 
   std::unique_ptr<OwnedFilters> filters_;
   std::unique_ptr<Outlet> presence_outlet_;
+  std::unique_ptr<Outlet> beat_outlet_;
   std::unique_ptr<Outlet> directory_outlet_;
   std::unique_ptr<Inlet<wire::Request>> requests_;
   std::unique_ptr<Inlet<wire::Update>> updates_;
   std::unique_ptr<Inlet<wire::Reply>> replies_;
   std::unique_ptr<Inlet<wire::Page>> pages_;
   std::unique_ptr<Inlet<wire::Presence>> presence_;
+  std::unique_ptr<Inlet<wire::Presence>> beats_;
   std::optional<Worker> worker_;
 };
 

@@ -44,11 +44,12 @@ void Peers::left(const ertps::GuidPrefix_t& prefix) {
   servers_.erase(known);
 }
 
-void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence,
-                    std::size_t peers) {
+void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers,
+                    bool beat) {
   const std::lock_guard lock(mutex_);
   Server& server = servers_[peer_of(prefix)];
   server.peers = peers;
+  server.beats = server.beats || beat;
   server.last_heard = Clock::now();
   if (!std::exchange(server.silent, false) && server.presence == presence) return;
   server.presence = presence;
@@ -69,7 +70,7 @@ void Peers::look_for_silent(Clock::time_point now) {
   const auto late = now - std::exchange(last_look_, now) - kSpeakEvery;
   for (auto& [id, server] : servers_) {
     if (late > Clock::duration::zero()) server.last_heard += late;
-    if (!server.presence || server.silent || now - server.last_heard < silence_) continue;
+    if (!server.presence || server.silent || now - server.last_heard < patience(server)) continue;
     server.silent = true;
     gone_(*server.presence);
   }
@@ -86,6 +87,17 @@ std::uint32_t Peers::heard_count() const {
   return static_cast<std::uint32_t>(std::count_if(
       servers_.begin(), servers_.end(),
       [](const auto& server) { return server.second.presence && !server.second.silent; }));
+}
+
+bool Peers::silent(const std::string& partition) const {
+  const std::lock_guard lock(mutex_);
+  bool silent = false;
+  for (const auto& [id, server] : servers_) {
+    if (!server.presence || server.presence->partition != partition) continue;
+    if (!server.silent) return false;
+    silent = true;
+  }
+  return silent;
 }
 
 bool Peers::awaits_presence() const {

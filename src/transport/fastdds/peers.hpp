@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -28,8 +29,9 @@ namespace tfdude::fastdds {
 /// under a lock, so that of one peer all is told in order: whoever is told must not hold a lock of its own
 /// when it asks here.
 ///
-/// Each server says what it serves ten times a second, to readers with sockets of their own, which no other
-/// traffic fills. Leases of Fast DDS 2.9 are not used for this: a short one of a participant ends the
+/// Each server says what it serves when that changes, reliably, and again and again as a beat that may be lost, to
+/// readers with sockets of their own, which no other traffic fills: of a reliable stream, what follows a lost
+/// sample is late, too. Leases of Fast DDS 2.9 are not used for this: a short one of a participant ends the
 /// match on the side only that was starved, and the other's count of acknowledgements, an old one, keeps it
 /// from being renewed; and liveliness of a topic is renewed by any participant (issue 4373).
 class Peers {
@@ -40,25 +42,31 @@ class Peers {
   /// Whatever answers a newcomer has answered, as a rule, once nobody new was met for this long.
   static constexpr std::chrono::milliseconds kQuiet{200};
 
-  /// How often a server says that it is there.
-  static constexpr std::chrono::milliseconds kSpeakEvery{100};
+  /// How often a server says that it is there. Seven beats must be lost before it counts as gone after the usual 450 ms.
+  static constexpr std::chrono::milliseconds kSpeakEvery{60};
 
   /// @param there  a peer said what it serves, or is heard again
   /// @param gone   a peer that had said so has left or fallen silent
   Peers(Tell there, Tell gone) : there_(std::move(there)), gone_(std::move(gone)) {}
 
   /// To be called before anybody is met.
-  /// @param silence    whoever has not been heard for this long counts as gone
-  /// @param is_server  the others count this participant, too
-  void configure(std::chrono::nanoseconds silence, bool is_server) {
+  /// @param silence     whoever has not been heard for this long counts as gone
+  /// @param first_beat  how long its first beat may take, whose way DDS may have to find still when the presence has
+  ///                    come already
+  /// @param is_server   the others count this participant, too
+  void configure(std::chrono::nanoseconds silence, std::chrono::nanoseconds first_beat,
+                 bool is_server) {
     silence_ = silence;
+    first_beat_ = std::max(silence, first_beat);
     is_server_ = is_server;
   }
 
   void met(const ertps::GuidPrefix_t& prefix, const std::string& name);
   void left(const ertps::GuidPrefix_t& prefix);
   /// @param peers  how many other servers that one hears
-  void present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers);
+  /// @param beat   whether this is said again and again
+  void present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers,
+               bool beat);
   /// A server sent something else: a sign of life, should what it says of itself be late.
   void heard(const ertps::GuidPrefix_t& prefix);
 
@@ -68,6 +76,9 @@ class Peers {
 
   /// How many servers are heard.
   [[nodiscard]] std::uint32_t heard_count() const;
+
+  /// Whether whoever served this partition has fallen silent.
+  [[nodiscard]] bool silent(const std::string& partition) const;
 
   /// Whether some server was met, nobody new for a while, all servers have said what they serve, and none hears
   /// more others than this participant knows.
@@ -84,8 +95,14 @@ class Peers {
     std::optional<Presence> presence;
     std::size_t peers = 0;
     Clock::time_point last_heard;
+    bool beats = false;
     bool silent = false;
   };
+
+  /// How long this one may be silent.
+  [[nodiscard]] std::chrono::nanoseconds patience(const Server& server) const {
+    return server.beats ? silence_ : first_beat_;
+  }
 
   const Tell there_;
   const Tell gone_;
@@ -94,6 +111,7 @@ class Peers {
   Clock::time_point last_met_{};
   Clock::time_point last_look_ = Clock::now();
   std::chrono::nanoseconds silence_{};
+  std::chrono::nanoseconds first_beat_{};
   bool is_server_ = false;
 };
 

@@ -86,7 +86,7 @@ edds::DataWriterQos writer_qos(edds::Publisher& publisher, const std::string& na
   // What is written often, or to many, is acknowledged with each periodic heartbeat, not with each sample: that halved
   // what 1 kHz of 100 edges takes of the owner's processor (11 to 7 % of a core), and 32 daemons that start at
   // once send a quarter of the packets.
-  if (name == "update_writer" || name == "presence_writer" || name == "directory_writer")
+  if (name == "update_writer" || name == "directory_writer")
     qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
   // Writers evaluate no filters: in Fast DDS 2.9 and 3.1 the map of filters is changed without a lock
   // while a write goes through it, and crashes as readers come and go.
@@ -103,7 +103,7 @@ edds::DataReaderQos reader_qos(edds::Subscriber& subscriber, const std::string& 
   });
   qos.endpoint().history_memory_policy = kMemoryPolicy;
   // A socket of its own, that other traffic does not fill: else the living would seem dead.
-  if (name == "presence_reader") {
+  if (name == "beat_reader") {
     qos.properties().properties().emplace_back("fastdds.unique_network_flows", "");
   }
   return qos;

@@ -1,0 +1,95 @@
+#include "transport/fastdds/discovery_server.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <netdb.h>
+#include <optional>
+#include <sys/socket.h>
+
+#include <arpa/inet.h>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/transport/fastdds.hpp"
+
+namespace tfdude {
+namespace {
+
+struct Address {
+  std::string host;
+  std::uint16_t port = 0;
+};
+
+std::optional<Address> parse(const std::string& text) {
+  const auto colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) return std::nullopt;
+  Address address{text.substr(0, colon), 0};
+  const bool name = std::none_of(address.host.begin(), address.host.end(), [](unsigned char c) {
+    return c <= ' ' || c == ':' || c == '[' || c == ']' || c == 0x7F;
+  });
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data() + colon + 1, end, address.port);
+  if (!name || error != std::errc() || stop != end || address.port == 0) return std::nullopt;
+  return address;
+}
+
+tl::unexpected<Error> malformed(const std::string& text) {
+  return fail(Errc::kInvalidInput,
+              "discovery server " + quote(text) +
+                  " is not HOST:PORT with a name or an IPv4 address and a port from 1 to 65535");
+}
+
+}  // namespace
+
+Result<void> check_discovery_server(const std::string& address) {
+  if (!parse(address)) return malformed(address);
+  return {};
+}
+
+namespace fastdds {
+namespace {
+
+// Not by Fast DDS, whose versions differ in what they resolve.
+Result<std::string> resolve(const std::string& host) {
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = SOCK_DGRAM;
+  addrinfo* found = nullptr;
+  const int status = getaddrinfo(host.c_str(), nullptr, &hints, &found);
+  if (status != 0) {
+    return fail(Errc::kInvalidInput,
+                "host " + quote(host) + " has no IPv4 address: " + gai_strerror(status));
+  }
+  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owned(found, &freeaddrinfo);
+  sockaddr_in address{};
+  std::memcpy(&address, found->ai_addr, sizeof address);
+  std::array<char, INET_ADDRSTRLEN> text{};
+  inet_ntop(AF_INET, &address.sin_addr, text.data(), text.size());
+  return std::string(text.data());
+}
+
+}  // namespace
+
+Result<void> use_discovery_server(edds::DomainParticipantQos& qos, const std::string& address) {
+  const auto parsed = parse(address);
+  if (!parsed) return malformed(address);
+  const auto resolved = resolve(parsed->host);
+  if (!resolved) {
+    return fail(Errc::kInvalidInput,
+                "discovery server " + quote(address) + ": " + resolved.error().message);
+  }
+  ertps::Locator_t at;
+  ertps::IPLocator::setIPv4(at, *resolved);
+  at.port = parsed->port;
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  // How often a server is called that has not answered yet.
+  discovery.discoveryServer_client_syncperiod = {0, 100'000'000};
+  discover_by_server(discovery, at);
+  return {};
+}
+
+}  // namespace fastdds
+}  // namespace tfdude

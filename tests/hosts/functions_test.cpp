@@ -1,0 +1,86 @@
+// The service over several hosts: network namespaces, each with an address of its own.
+
+#include "hosts/robot_hosts.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::eventually;
+using testing::kX;
+using testing::kY;
+using testing::lookups_diff;
+using testing::Process;
+using testing::RobotHosts;
+using testing::structure_diff;
+
+void check_agreement(RobotHosts& r, Client& client) {
+  CHECK(eventually([&] { return structure_diff(client, r.oracle).empty(); }));
+  CHECK(lookups_diff(client, r.oracle) == "");
+}
+
+/// Whatever a process has mapped, line by line.
+std::string maps(const Process& process) {
+  std::ifstream file("/proc/" + std::to_string(process.pid()) + "/maps");
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
+
+TEST_CASE("hosts: a client on a fourth host uses what three others own") {
+  if (testing::skip_without_hosts()) return;
+  const bool by_server = GENERATE(false, true);
+  RobotHosts r(by_server);
+  if (by_server) r.start_server();
+  r.start_daemons();
+  auto client = *Client::open(r.options());
+  auto witness = r.open_client(RobotHosts::kArms);
+  check_agreement(r, client);
+  const auto path = client.path("world", "tool");
+  REQUIRE(path);
+  CHECK(path->size() == 3);
+  REQUIRE(client.add("marker", "tool", kX));
+  REQUIRE(client.add("lamp", "camera", kY, "arms"));
+  REQUIRE(client.update("arm_1", kY));
+  REQUIRE(client.move("tool", "arm_2"));
+  REQUIRE(client.remove("arm_right"));
+  r.oracle.add("marker", "tool", kX);
+  r.oracle.add("lamp", "camera", kY);
+  r.oracle.update("arm_1", kY);
+  r.oracle.move("tool", "arm_2");
+  r.oracle.remove("arm_right");
+  for (Client* each : {&client, &witness}) check_agreement(r, *each);
+  r.oracle.update("robot_1", kX);
+  r.oracle.update("tool", kY);
+  REQUIRE(eventually([&] {
+    return client.publish({{"robot_1", kX}, {"tool", kY}}) &&
+           lookups_diff(witness, r.oracle).empty();
+  }));
+  // Who joins late, a process or a client, learns all of it.
+  auto late = r.open_client(RobotHosts::kTools);
+  check_agreement(r, late);
+  const auto answer = r.cli(RobotHosts::kServer, {"lookup", "world", "marker"});
+  INFO(answer.err);
+  CHECK(answer.status == 0);
+  for (const Process* daemon : {&*r.robot, &*r.arms, &*r.tools}) {
+    CHECK_THAT(maps(*daemon), !testing::ContainsSubstring("/dev/shm"));
+  }
+}
+
+TEST_CASE("hosts: a discovery server may come late, be killed, and come again") {
+  if (testing::skip_without_hosts()) return;
+  RobotHosts r(true);
+  r.start_daemons();
+  auto early = *Client::open(r.options());
+  r.start_server_with_backup();
+  check_agreement(r, early);
+  r.server->kill();
+  // Those who have met go on without it.
+  REQUIRE(early.add("marker", "tool", kX));
+  r.oracle.add("marker", "tool", kX);
+  check_agreement(r, early);
+  r.start_server_with_backup();
+  auto late = r.open_client(RobotHosts::kArms);
+  check_agreement(r, late);
+}
+
+}  // namespace tfdude
