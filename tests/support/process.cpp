@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <poll.h>
+#include <sched.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <system_error>
@@ -36,7 +37,8 @@ std::array<int, 2> make_pipe() {
 }
 
 // Between fork and exec: only what is safe in a signal handler, as other threads' locks stay locked.
-[[noreturn]] void become(char* const* argv, pid_t parent, int out, int err) {
+[[noreturn]] void become(char* const* argv, pid_t parent, int network, int out, int err) {
+  if (network >= 0 && setns(network, CLONE_NEWNET) != 0) _exit(kExecFailed);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(kExecFailed);
   dup2(out, STDOUT_FILENO);
@@ -47,7 +49,7 @@ std::array<int, 2> make_pipe() {
 
 }  // namespace
 
-Process::Process(const std::vector<std::string>& argv) {
+Process::Process(const std::vector<std::string>& argv, int network) {
   std::vector<char*> arguments;
   for (const std::string& argument : argv) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);
@@ -55,7 +57,7 @@ Process::Process(const std::vector<std::string>& argv) {
   const auto err = make_pipe();
   const pid_t parent = getpid();
   pid_ = fork();
-  if (pid_ == 0) become(arguments.data(), parent, out[1], err[1]);
+  if (pid_ == 0) become(arguments.data(), parent, network, out[1], err[1]);
   close(out[1]);
   close(err[1]);
   streams_[0].fd = out[0];

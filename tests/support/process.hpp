@@ -21,8 +21,10 @@ using Deadline = Clock::time_point;
 /// outlive it.
 class Process {
  public:
-  /// Starts argv[0], a path. @throws std::system_error where there can be no new process.
-  explicit Process(const std::vector<std::string>& argv);
+  /// Starts argv[0], a path.
+  /// @param network  a namespace of the kernel to start it in, as an open file; -1: this thread's
+  /// @throws std::system_error where there can be no new process.
+  explicit Process(const std::vector<std::string>& argv, int network = -1);
   ~Process();
   Process(Process&& other) noexcept;
   Process& operator=(Process&&) = delete;
