@@ -67,7 +67,11 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   if (auto serving = transport_->serve(partition_name_); !serving) return serving;
   if (auto stored = commit(); !stored) return stored;
   if (store_ != nullptr) {
-    if (auto stored = store_->save_configured(frames); !stored) return stored;
+    // Requests may have come already, which store something, too.
+    {
+      const std::lock_guard publishing(publish_mutex_);
+      if (auto stored = store_->save_configured(frames); !stored) return stored;
+    }
     saver_.emplace(options_.save_every, [this] { save_values(); });
   }
   transport_->announce(presence_);
