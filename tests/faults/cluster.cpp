@@ -16,6 +16,24 @@ using testing::Process;
 
 constexpr std::size_t kLogShown = 3000;
 
+// Drops what comes from some hosts, or what passes some interfaces.
+constexpr const char* kFirewall = R"(nft -f - <<END
+table ip parted {
+  set others { type ipv4_addr; }
+  set links { type ifname; }
+  chain arriving {
+    type filter hook prerouting priority raw;
+    ip saddr @others drop
+    iifname @links drop
+  }
+  chain leaving {
+    type filter hook output priority raw;
+    oifname @links drop
+  }
+}
+END
+)";
+
 std::string config_of(std::size_t partition) {
   const Eigen::Vector3d t = base_edge(partition).pose.translation();
   std::ostringstream yaml;
@@ -37,13 +55,7 @@ Cluster::Cluster(std::size_t partitions, std::size_t clients,
     hosts_.emplace(1 + partitions + clients);
     hosts_->enter(kObservers);
     for (std::size_t host = 0; host < hosts_->count(); ++host) {
-      shell(
-          host,
-          "nft -f - <<END\n"
-          "table ip parted {\n"
-          "  set others { type ipv4_addr; }\n"
-          "  chain arriving { type filter hook prerouting priority raw; ip saddr @others drop; }\n"
-          "}\nEND\n");
+      shell(host, kFirewall);
     }
   } else {
     domain_.emplace();
@@ -149,6 +161,14 @@ void Cluster::shell(std::size_t host, const std::string& script) const {
   Process process =
       hosts_->start(host, {"/bin/sh", "-c", "PATH=/usr/sbin:/sbin:$PATH; set -e\n" + script});
   if (process.wait(in_time()) != 0) throw std::runtime_error("failed: " + process.err());
+}
+
+void Cluster::cut(std::size_t host) const {
+  shell(host, "nft add element ip parted links { eth0 }");
+}
+
+void Cluster::heal(std::size_t host) const {
+  shell(host, "nft delete element ip parted links { eth0 }");
 }
 
 void Cluster::part(std::size_t host, std::size_t other) const {

@@ -50,13 +50,16 @@ class Cluster {
   /// What a daemon and those before it have logged, the last lines.
   [[nodiscard]] std::string log_of(std::size_t partition) const;
 
-  // Cables between a host and the switch.
   [[nodiscard]] std::size_t daemon_host(std::size_t partition) const { return 1 + partition; }
   [[nodiscard]] std::size_t client_host(std::size_t client) const {
     return 1 + partitions() + client;
   }
-  void cut(std::size_t host) const { hosts_->cut(host); }
-  void heal(std::size_t host) const { hosts_->heal(host); }
+  // The host sees its network as before, but nothing passes.
+  void cut(std::size_t host) const;
+  void heal(std::size_t host) const;
+  // The host sees that its cable is not connected.
+  void unplug(std::size_t host) const { hosts_->cut(host); }
+  void plug(std::size_t host) const { hosts_->heal(host); }
   // What two hosts send to each other.
   void part(std::size_t host, std::size_t other) const;
   void join(std::size_t host, std::size_t other) const;

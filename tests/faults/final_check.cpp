@@ -106,7 +106,7 @@ void check_values(const std::string& when, std::vector<Client>& clients, const W
         const auto X_PC = client.lookup(parent, id);
         ++looked_up;
         const std::string wrong =
-            X_PC ? worker->model().judge(parent, id, *X_PC) : X_PC.error().message;
+            X_PC ? worker->model().judge(parent, id, *X_PC, true) : X_PC.error().message;
         if (!wrong.empty()) journal.violation(when + ": " + wrong, model.history);
       }
       for (const auto& [id, base] : worker->joints()) {
@@ -154,11 +154,11 @@ void check_all(const std::string& when, Cluster& cluster, Client& observer, cons
     differs.clear();
     frames = frames_of(fresh[0]);
     for (const PartitionInfo& partition : fresh[0].partitions()) {
-      if (!partition.reachable) differs = partition.name + " is not reachable";
+      if (!partition.reachable) differs += partition.name + " is not reachable\n";
     }
     for (auto& [name, client] : clients) {
       const std::string here = difference(frames, frames_of(*client));
-      if (!here.empty()) differs = name + " differs from a new one: " + here;
+      if (!here.empty()) differs += name + " differs from a new one: " + here + "\n";
     }
     return differs.empty() && all_misplaced(frames, workers).empty();
   });

@@ -8,6 +8,9 @@ namespace {
 
 constexpr std::size_t kFaultsKept = 40;
 
+// What is wrong first tells most.
+constexpr std::size_t kViolationsTold = 8;
+
 }  // namespace
 
 void Journal::count(const std::string& operation, const std::string& outcome) {
@@ -22,7 +25,7 @@ void Journal::fault(const std::string& what) {
 }
 
 void Journal::violation(const std::string& what, const std::deque<std::string>& history) {
-  ++violations_;
+  if (++violations_ > kViolationsTold) return;
   const std::lock_guard lock(mutex_);
   std::printf("VIOLATION at %s s: %s\n", seconds(now()).c_str(), what.c_str());
   for (const std::string& line : history) std::printf("    %s\n", line.c_str());

@@ -49,7 +49,9 @@ bool Model::Frame::may_be_gone() const {
 }
 
 void Model::fix(const std::string& id, const std::string& partition, const Place& place) {
-  frames_[id] = {partition, {place}, {}};
+  Frame& frame = frames_[id];
+  frame.partition = partition;
+  frame.possible.assign(1, place);
 }
 
 void Model::add(const std::string& id, const std::string& partition, const Place& place,
@@ -67,6 +69,7 @@ void Model::update(const std::string& id, const Transform& X_PC, bool done) {
   for (const auto& place : frame.possible) {
     if (place) insert(after, Place{place->parent, X_PC});
   }
+  if (frame.doomed) insert(after, std::nullopt);
   frame.possible = std::move(after);
 }
 
@@ -86,13 +89,16 @@ void Model::remove(const std::string& id, bool done) {
   std::vector<std::string> unsure;
   for (const auto& [below, frame] : frames_) {
     if (!may_be_below(below, id)) continue;
-    (done && (below == id || anchored(below)) ? sure : unsure).push_back(below);
+    (done && surely_below(below, id) ? sure : unsure).push_back(below);
   }
   for (const std::string& below : sure) {
     insert(frames_.at(below).possible, std::nullopt);
     gone(below);
   }
-  for (const std::string& below : unsure) insert(frames_.at(below).possible, std::nullopt);
+  for (const std::string& below : unsure) {
+    insert(frames_.at(below).possible, std::nullopt);
+    frames_.at(below).doomed = true;
+  }
 }
 
 void Model::gone(const std::string& id) {
@@ -142,6 +148,17 @@ bool Model::may_be_below(const std::string& id, const std::string& ancestor) con
   return false;
 }
 
+bool Model::surely_below(const std::string& id, const std::string& ancestor,
+                         std::size_t steps) const {
+  if (id == ancestor) return true;
+  const auto found = frames_.find(id);
+  if (found == frames_.end() || steps > frames_.size()) return false;
+  const auto& possible = found->second.possible;
+  return std::all_of(possible.begin(), possible.end(), [&](const auto& place) {
+    return !place || surely_below(place->parent, ancestor, steps + 1);
+  });
+}
+
 std::vector<std::string> Model::closure(const std::string& a, const std::string& b) const {
   std::vector<std::string> look{a, b};
   std::set<std::string> seen;
@@ -175,7 +192,7 @@ void Model::each_state(const std::vector<std::string>& ids,
 }
 
 std::string Model::judge(const std::string& a, const std::string& b,
-                         const std::optional<Transform>& X_AB) {
+                         const std::optional<Transform>& X_AB, bool quiet) {
   const auto ids = closure(a, b);
   std::size_t states = 1;
   for (const std::string& id : ids) states *= frames_.at(id).possible.size();
@@ -207,7 +224,12 @@ std::string Model::judge(const std::string& a, const std::string& b,
   if (!agrees) return "lookup of " + b + " in " + a + expected;
   // A denial may come from a replica that is behind; an answer comes from the owners.
   if (X_AB) {
-    for (auto& [id, places] : left) frames_.at(id).possible = std::move(places);
+    for (auto& [id, places] : left) {
+      Frame& frame = frames_.at(id);
+      frame.possible = std::move(places);
+      if (quiet) frame.doomed = false;
+      if (frame.doomed) insert(frame.possible, std::nullopt);
+    }
   }
   return "";
 }

@@ -27,6 +27,8 @@ class Model {
     std::string partition;
     /// What the frame may be now; an empty place: not there.
     std::vector<std::optional<Place>> possible;
+    /// What it hangs below was removed, perhaps: it may go as soon as its owner learns of that.
+    bool doomed = false;
     std::deque<std::string> history;
 
     [[nodiscard]] bool may_be_there() const;
@@ -64,11 +66,14 @@ class Model {
 
   /// Judges what a lookup of b in a gave; empty: an answer that one of the two is not there, or not connected.
   /// Drops the possibilities that an answer excludes.
+  /// @param quiet  nobody can have anything to learn any more
   /// @return empty where one of the possible states has that answer; else what was expected
   [[nodiscard]] std::string judge(const std::string& a, const std::string& b,
-                                  const std::optional<Transform>& X_AB);
+                                  const std::optional<Transform>& X_AB, bool quiet);
 
  private:
+  [[nodiscard]] bool surely_below(const std::string& id, const std::string& ancestor,
+                                  std::size_t steps = 0) const;
   using State = std::map<std::string, std::optional<Place>>;
 
   [[nodiscard]] std::vector<std::string> closure(const std::string& a, const std::string& b) const;

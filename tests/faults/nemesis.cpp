@@ -19,6 +19,8 @@ std::string name_of(FaultKind kind) {
       return "pause";
     case FaultKind::kCutDaemon:
       return "cut of a daemon";
+    case FaultKind::kUnplug:
+      return "unplugged cable of a daemon";
     case FaultKind::kCutClient:
       return "cut of a client";
     case FaultKind::kPart:
@@ -90,6 +92,11 @@ void Nemesis::begin(const Fault& fault) {
       cut_.insert(fault.target);
       observer_.disregard(fault.target);
       break;
+    case FaultKind::kUnplug:
+      cluster_.unplug(cluster_.daemon_host(fault.target));
+      cut_.insert(fault.target);
+      observer_.disregard(fault.target);
+      break;
     case FaultKind::kCutClient:
       cluster_.cut(cluster_.client_host(fault.target));
       break;
@@ -110,7 +117,11 @@ void Nemesis::end(const Fault& fault) {
       break;
     case FaultKind::kCutDaemon:
       cluster_.heal(cluster_.daemon_host(fault.target));
-      cut_.erase(fault.target);
+      cut_.erase(cut_.find(fault.target));
+      break;
+    case FaultKind::kUnplug:
+      cluster_.plug(cluster_.daemon_host(fault.target));
+      cut_.erase(cut_.find(fault.target));
       break;
     case FaultKind::kCutClient:
       cluster_.heal(cluster_.client_host(fault.target));

@@ -38,7 +38,7 @@ class Nemesis {
   Journal& journal_;
   std::multimap<double, Fault> endings_;
   std::set<std::size_t> starting_;
-  std::set<std::size_t> cut_;  // partitions
+  std::multiset<std::size_t> cut_;  // partitions, by either kind of cut
 };
 
 }  // namespace tfdude::faults

@@ -15,6 +15,8 @@ Claim claim_of(const Fault& fault) {
   switch (fault.kind) {
     case FaultKind::kKill:
     case FaultKind::kPause:
+    // Fast DDS never hears of a network that comes after the participant was made.
+    case FaultKind::kUnplug:
       return {0, {fault.target, 0}};
     case FaultKind::kCutDaemon:
       return {1, {fault.target, 0}};
@@ -36,8 +38,8 @@ double duration(testing::Random& random) {
 
 Fault draw(testing::Random& random, std::size_t partitions, std::size_t clients, bool links) {
   static constexpr std::array kKinds = {
-      FaultKind::kKill,      FaultKind::kKill,      FaultKind::kPause,     FaultKind::kPause,
-      FaultKind::kCutDaemon, FaultKind::kCutDaemon, FaultKind::kCutClient, FaultKind::kPart};
+      FaultKind::kKill,      FaultKind::kKill,   FaultKind::kPause,     FaultKind::kPause,
+      FaultKind::kCutDaemon, FaultKind::kUnplug, FaultKind::kCutClient, FaultKind::kPart};
   Fault fault;
   fault.kind = kKinds[random.index(links ? kKinds.size() : 4)];
   fault.target = random.index(fault.kind == FaultKind::kCutClient ? clients : partitions);
@@ -61,7 +63,7 @@ std::vector<Fault> schedule(testing::Random& random, double seconds, std::size_t
       double& free = free_at[claim_of(fault)];
       if (free > at) continue;
       // A daemon that starts may be hit again before it serves.
-      free = fault.end + random.uniform(0.0, 3.0);
+      free = fault.end + random.uniform(0.3, 3.0);
       faults.push_back(fault);
     }
   }

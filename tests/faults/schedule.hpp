@@ -10,8 +10,9 @@ namespace tfdude::faults {
 enum class FaultKind {
   kKill,       ///< a daemon, which is started again at the end
   kPause,      ///< a daemon
-  kCutDaemon,  ///< its host from all others
+  kCutDaemon,  ///< its host from all others, without a sign
   kCutClient,  ///< as that
+  kUnplug,     ///< a daemon's host from all others, as it can see
   kPart,       ///< two daemons' hosts from each other
 };
 

@@ -143,7 +143,11 @@ void Worker::record(const std::string& operation, const std::vector<std::string>
   }
   std::string line = seconds(journal_.now()) + " " + operation + " " + details + ": " + outcome;
   if (!result) line += " (" + result.error().message + ")";
-  for (const std::string& frame : frames) model_.note(frame, line);
+  for (const std::string& frame : frames) {
+    // That a frame is not there which may be gone tells nothing.
+    const bool expected = !result && denies(result.error().code) && !model_.frame(frame).certain();
+    if (!expected) model_.note(frame, line);
+  }
   // No disk is broken here.
   if (!result && result.error().code == Errc::kState) journal_.violation(prefix_ + " " + line);
 }
@@ -203,7 +207,7 @@ void Worker::update() {
   const bool all_there = std::all_of(
       edges.begin(), edges.end(), [&](const EdgeUpdate& edge) { return model_.anchored(edge.id); });
   for (const EdgeUpdate& edge : edges) {
-    const bool asked = updated || edges.size() > 1 || !never_asked(updated.error());
+    const bool asked = updated || edges.size() > 1 || !(denial || never_asked(updated.error()));
     if (asked) model_.update(edge.id, edge.X_PC, updated.has_value());
     record("update", {edge.id}, "to " + translation(edge.X_PC), updated);
   }
@@ -263,10 +267,10 @@ void Worker::look_up() {
   const auto X_AB = client_.lookup(a, b);
   record("lookup", {b}, "in " + a + (X_AB ? " " + translation(*X_AB) : ""), X_AB);
   if (X_AB) {
-    const std::string difference = model_.judge(a, b, *X_AB);
+    const std::string difference = model_.judge(a, b, *X_AB, calm_ > kGrace);
     if (!difference.empty()) contradiction(difference, b);
   } else if (denies(X_AB.error().code)) {
-    const std::string difference = model_.judge(a, b, std::nullopt);
+    const std::string difference = model_.judge(a, b, std::nullopt, calm_ > kGrace);
     if (!difference.empty()) denied(difference + "\n  answer: " + X_AB.error().message, b);
     if (X_AB.error().code == Errc::kUnknownEnd && calm_ > kGrace) model_.gone(b);
   }
