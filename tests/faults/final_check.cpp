@@ -101,7 +101,7 @@ void check_values(const std::string& when, std::vector<Client>& clients, const W
     for (const auto& worker : workers) {
       for (const auto& [id, model] : std::map(worker->model().frames())) {
         const auto found = frames.find(id);
-        if (found == frames.end() || found->second.parent.empty()) continue;
+        if (found == frames.end() || !found->second.attached) continue;
         const std::string& parent = found->second.parent;
         const auto X_PC = client.lookup(parent, id);
         ++looked_up;

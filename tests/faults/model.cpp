@@ -89,7 +89,7 @@ void Model::remove(const std::string& id, bool done) {
   std::vector<std::string> unsure;
   for (const auto& [below, frame] : frames_) {
     if (!may_be_below(below, id)) continue;
-    (done && surely_below(below, id) ? sure : unsure).push_back(below);
+    (done && goes_with(below, id) ? sure : unsure).push_back(below);
   }
   for (const std::string& below : sure) {
     insert(frames_.at(below).possible, std::nullopt);
@@ -148,15 +148,23 @@ bool Model::may_be_below(const std::string& id, const std::string& ancestor) con
   return false;
 }
 
-bool Model::surely_below(const std::string& id, const std::string& ancestor,
-                         std::size_t steps) const {
-  if (id == ancestor) return true;
-  const auto found = frames_.find(id);
-  if (found == frames_.end() || steps > frames_.size()) return false;
-  const auto& possible = found->second.possible;
-  return std::all_of(possible.begin(), possible.end(), [&](const auto& place) {
-    return !place || surely_below(place->parent, ancestor, steps + 1);
-  });
+// An add or move without an answer may be made after the removal of what it names: that frame stays, without its parent.
+bool Model::goes_with(const std::string& id, const std::string& ancestor) const {
+  std::string at = id;
+  for (std::size_t steps = 0; at != ancestor; ++steps) {
+    const auto found = frames_.find(at);
+    if (found == frames_.end() || found->second.may_be_gone() || steps > frames_.size()) {
+      return false;
+    }
+    const auto& possible = found->second.possible;
+    const std::string& parent = possible.front()->parent;
+    if (std::any_of(possible.begin(), possible.end(),
+                    [&](const auto& place) { return place->parent != parent; })) {
+      return false;
+    }
+    at = parent;
+  }
+  return true;
 }
 
 std::vector<std::string> Model::closure(const std::string& a, const std::string& b) const {

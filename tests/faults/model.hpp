@@ -72,8 +72,7 @@ class Model {
                                   const std::optional<Transform>& X_AB, bool quiet);
 
  private:
-  [[nodiscard]] bool surely_below(const std::string& id, const std::string& ancestor,
-                                  std::size_t steps = 0) const;
+  [[nodiscard]] bool goes_with(const std::string& id, const std::string& ancestor) const;
   using State = std::map<std::string, std::optional<Place>>;
 
   [[nodiscard]] std::vector<std::string> closure(const std::string& a, const std::string& b) const;
