@@ -57,7 +57,7 @@ def await_line(stream, what):
 
 
 @contextlib.contextmanager
-def daemons(bin_dir, configs, domain, logs):
+def daemons(bin_dir, configs, domain, logs, options=("--profile", PROFILE)):
     """Runs a tfduded for each configuration file until the block is left."""
     running = []
     try:
@@ -65,7 +65,7 @@ def daemons(bin_dir, configs, domain, logs):
             with open(pathlib.Path(logs) / f"{pathlib.Path(config).stem}.log", "wb") as log:
                 running.append(subprocess.Popen(
                     [bin_dir / "tfduded", "--no-state", "--config", config, "--domain", str(domain),
-                     "--profile", PROFILE], stdout=subprocess.PIPE, stderr=log, bufsize=0))
+                     *options], stdout=subprocess.PIPE, stderr=log, bufsize=0))
         for process, config in zip(running, configs):
             line = await_line(process.stdout, f"tfduded --config {config}")
             if not line.startswith("ready"):

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <spdlog/async.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -124,14 +125,17 @@ int main(int argc, char** argv) {
       return kWrongUsage;
     }
   }
-  // Standard output is for the line "ready" alone.
-  // The library takes the logger of this name for its own.
-  spdlog::set_default_logger(spdlog::stderr_color_mt("tfdude"));
   // Before any thread starts, so that all inherit it and sigwait() gets the signals.
   sigset_t stop_signals;
   sigemptyset(&stop_signals);
   sigaddset(&stop_signals, SIGINT);
   sigaddset(&stop_signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
-  return serve(arguments, stop_signals);
+  // Standard output is for the line "ready" alone. The library takes the logger of this name for its own. A reader
+  // of the log that does not read must not hold up who serves: rather lines are lost.
+  spdlog::set_default_logger(
+      spdlog::create_async_nb<spdlog::sinks::stderr_color_sink_mt>("tfdude"));
+  const int status = serve(arguments, stop_signals);
+  spdlog::shutdown();
+  return status;
 }

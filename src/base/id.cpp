@@ -67,9 +67,9 @@ Result<void> check_partition_name(std::string_view name) {
   return {};
 }
 
-std::string quote(std::string_view text) {
+std::string printable(std::string_view text) {
   constexpr std::string_view kHexDigits = "0123456789abcdef";
-  std::string out = "'";
+  std::string out;
   for (std::size_t i = 0; i < text.size();) {
     const CodePoint point = decode(text.substr(i));
     if (point.bytes == 0 || is_control(point.value)) {
@@ -83,7 +83,9 @@ std::string quote(std::string_view text) {
       i += point.bytes;
     }
   }
-  return out + "'";
+  return out;
 }
+
+std::string quote(std::string_view text) { return "'" + printable(text) + "'"; }
 
 }  // namespace tfdude

@@ -10,11 +10,13 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <sstream>
 #include <string_view>
 #include <system_error>
 #include <unordered_map>
 #include <utility>
 
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include "tfdude/base/id.hpp"
@@ -158,13 +160,13 @@ Result<double> Reader::number(const YAML::Node& node, const std::string& what) c
   const std::string written = plain_number(node.Scalar());
   double value = 0;
   const auto [end, code] = std::from_chars(written.data(), written.data() + written.size(), value);
+  if (code == std::errc::invalid_argument || end != written.data() + written.size()) {
+    return error(Errc::kConfig, node.Mark(),
+                 what + " is " + tfdude::quote(node.Scalar()) + ", which is not a number");
+  }
   if (code == std::errc::result_out_of_range) {
     return error(Errc::kInvalidInput, node.Mark(),
                  what + " is " + node.Scalar() + ", which no double can hold");
-  }
-  if (code != std::errc() || end != written.data() + written.size()) {
-    return error(Errc::kConfig, node.Mark(),
-                 what + " is " + tfdude::quote(node.Scalar()) + ", which is not a number");
   }
   if (!std::isfinite(value)) {
     return error(Errc::kInvalidInput, node.Mark(), what + " is not a finite number");
@@ -314,22 +316,51 @@ Result<Config> Reader::config(const YAML::Node& root) const {
   return config;
 }
 
+// Notes where a document begins, and what else it holds is of no interest.
+class DocumentStart final : public YAML::EventHandler {
+ public:
+  [[nodiscard]] const YAML::Mark& mark() const { return mark_; }
+
+  void OnDocumentStart(const YAML::Mark& mark) override { mark_ = mark; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+
+ private:
+  YAML::Mark mark_;
+};
+
+// Not by YAML::LoadAll(), which for "!!str ," finds one document after the other where it stands, and never ends.
+std::optional<YAML::Mark> second_document(const std::string& text) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  DocumentStart handler;
+  const bool two = parser.HandleNextDocument(handler) && parser.HandleNextDocument(handler);
+  return two ? std::optional(handler.mark()) : std::nullopt;
+}
+
 }  // namespace
 
 Result<Config> parse_config(const std::string& text, const std::string& name) {
   const Reader reader(name);
   if (auto ok = reader.check_bytes(text); !ok) return tl::unexpected(ok.error());
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.empty() || documents[0].IsNull()) {
-      return fail(Errc::kConfig, name + ": is empty");
+    const YAML::Node document = YAML::Load(text);
+    if (const auto second = second_document(text)) {
+      return reader.error(Errc::kConfig, *second, "holds more than one YAML document");
     }
-    if (documents.size() > 1) {
-      return reader.error(Errc::kConfig, documents[1].Mark(), "holds more than one YAML document");
-    }
-    return reader.config(documents[0]);
+    if (document.IsNull()) return fail(Errc::kConfig, name + ": is empty");
+    return reader.config(document);
   } catch (const YAML::Exception& e) {
-    return reader.error(Errc::kConfig, e.mark, "not YAML: " + e.msg);
+    return reader.error(Errc::kConfig, e.mark, "not YAML: " + printable(e.msg));
   } catch (const std::exception& e) {
     return fail(Errc::kConfig, name + ": " + e.what());
   }

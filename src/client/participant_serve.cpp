@@ -67,11 +67,9 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   if (auto serving = transport_->serve(partition_name_); !serving) return serving;
   if (auto stored = commit(); !stored) return stored;
   if (store_ != nullptr) {
-    // Requests may have come already, which store something, too.
-    {
-      const std::lock_guard publishing(publish_mutex_);
-      if (auto stored = store_->save_configured(frames); !stored) return stored;
-    }
+    // Others are served already, and what they change is stored.
+    const std::lock_guard publishing(publish_mutex_);
+    if (auto stored = store_->save_configured(frames); !stored) return stored;
     saver_.emplace(options_.save_every, [this] { save_values(); });
   }
   transport_->announce(presence_);

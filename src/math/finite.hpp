@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstring>
 #include <string_view>
 
 #include "tfdude/base/id.hpp"
@@ -12,11 +14,16 @@ namespace tfdude {
 /// looks at one number after the other.
 inline bool is_finite(const Transform& X) {
   static_assert(sizeof(Transform) == 28 * sizeof(double));
-  using Pair = double __attribute__((vector_size(16), aligned(8), may_alias));
-  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
-  const auto* pairs = reinterpret_cast<const Pair*>(&X);
-  Pair sums[4] = {pairs[0], pairs[1], pairs[2], pairs[3]};
-  for (int i = 4; i < 14; ++i) sums[i % 4] += pairs[i];
+  using Pair = double __attribute__((vector_size(16)));
+  // Copied, since a transform is not aligned as pairs are; the compiler loads them straight from where they are.
+  const auto pair = [&X](std::size_t i) {
+    Pair copy;
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
+    std::memcpy(&copy, reinterpret_cast<const double*>(&X) + 2 * i, sizeof(copy));
+    return copy;
+  };
+  Pair sums[4] = {pair(0), pair(1), pair(2), pair(3)};
+  for (std::size_t i = 4; i < 14; ++i) sums[i % 4] += pair(i);
   const Pair sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
   const double total = sum[0] + sum[1];
   return total - total == 0.0;

@@ -16,46 +16,64 @@ bool Claims::older(const Claim& a, const Claim& b) const {
   return std::tie(a.since, name(a.owner)) < std::tie(b.since, name(b.owner));
 }
 
+std::uint32_t Claims::page_of(std::string_view id) const {
+  const auto frame = forest_.find(id);
+  return frame && frame->slot < page_of_slot_.size() ? page_of_slot_[frame->slot] : 0;
+}
+
 Claim Claims::in_force(const FrameInfo& there) const {
   const auto cut = cut_.find(there.id);
   if (cut != cut_.end()) return cut->second;
-  return {there.owner, there.parent, there.since};
+  return {there.owner, there.parent, there.since, page_of(there.id)};
 }
 
-void Claims::claim(const std::string& id, Claim claim) {
+Claim* Claims::shadowed(const std::string& id, Owner owner) {
+  const auto claims = shadowed_.find(id);
+  if (claims == shadowed_.end()) return nullptr;
+  const auto mine = std::find_if(claims->second.begin(), claims->second.end(),
+                                 [owner](const Claim& claim) { return claim.owner == owner; });
+  return mine != claims->second.end() ? &*mine : nullptr;
+}
+
+bool Claims::claim(const std::string& id, Claim claim) {
   const auto there = forest_.info(id);
+  std::optional<Claim> before;
+  if (there && there->owner == claim.owner) before = in_force(*there);
+  if (const Claim* mine = shadowed(id, claim.owner)) before = *mine;
+  // A page that came late: the frame has left it since.
+  if (before && before->page != claim.page && before->since > claim.since) return false;
   const bool contested =
       (there && there->owner != claim.owner) || shadowed_.find(id) != shadowed_.end();
   if (!contested) {
     put(id, claim);
-    return;
+    return !before;
   }
   if (there && there->owner != claim.owner && there->owner != kHeldHere) {
     shadow(id, in_force(*there));
   }
   shadow(id, std::move(claim));
   promote(id);
+  return !before;
 }
 
-void Claims::unclaim(const std::string& id, Owner owner) {
-  if (const auto claims = shadowed_.find(id); claims != shadowed_.end()) {
-    auto& others = claims->second;
-    const auto mine = std::find_if(others.begin(), others.end(),
-                                   [owner](const Claim& claim) { return claim.owner == owner; });
-    if (mine != others.end()) {
-      others.erase(mine);
-      if (others.empty()) shadowed_.erase(claims);
-      return;
-    }
+bool Claims::unclaim(const std::string& id, Owner owner, std::uint32_t page) {
+  if (Claim* mine = shadowed(id, owner)) {
+    if (mine->page != page) return false;
+    auto& others = shadowed_[id];
+    others.erase(others.begin() + (mine - others.data()));
+    if (others.empty()) shadowed_.erase(id);
+    return true;
   }
+  const auto there = forest_.info(id);
+  if (!there || there->owner != owner || page_of(id) != page) return false;
   const bool last = shadowed_.find(id) == shadowed_.end();
-  if (last && changes_.watched()) {
-    const auto there = forest_.info(id);
-    if (there && there->owner == owner) changes_.frame_removed(id, name(owner));
+  if (last) {
+    changes_.frame_removed(id, name(owner));
+    forest_.drop_remote(id, owner);
   }
-  if (last) forest_.drop_remote(id, owner);
   cut_.erase(id);
   promote(id);
+  return true;
 }
 
 void Claims::released(const std::string& id) {
@@ -67,7 +85,7 @@ bool Claims::take(const std::string& id, std::uint64_t since) {
   const auto there = forest_.info(id);
   if (!there || there->owner == kHeldHere) return true;
   Claim theirs = in_force(*there);
-  if (!older({kHeldHere, {}, since}, theirs)) return false;
+  if (!older({kHeldHere, {}, since, 0}, theirs)) return false;
   forest_.drop_remote(id, theirs.owner);
   cut_.erase(id);
   shadow(id, std::move(theirs));
@@ -109,6 +127,10 @@ void Claims::put(const std::string& id, const Claim& claim) {
   std::optional<FrameInfo> before;
   if (changes_.watched()) before = forest_.info(id);
   const auto done = forest_.put_remote(id, claim.parent, claim.owner, claim.since);
+  if (const auto frame = forest_.find(id)) {
+    if (frame->slot >= page_of_slot_.size()) page_of_slot_.resize(frame->slot + 1);
+    page_of_slot_[frame->slot] = claim.page;
+  }
   if (!done && done.error().code == Errc::kCycle) {
     break_cycle(id, claim);
   } else {
@@ -147,7 +169,7 @@ void Claims::break_cycle(const std::string& id, const Claim& claim) {
     cut_[id] = claim;
     return;
   }
-  cut_[youngest.id] = {youngest.owner, youngest.parent, youngest.since};
+  cut_[youngest.id] = {youngest.owner, youngest.parent, youngest.since, page_of(youngest.id)};
   (void)forest_.put_remote(youngest.id, {}, youngest.owner, youngest.since);
   changes_.frame_moved(youngest.id, {}, name(youngest.owner));
   (void)forest_.put_remote(id, claim.parent, claim.owner, claim.since);

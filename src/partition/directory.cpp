@@ -1,7 +1,6 @@
 #include "tfdude/partition/directory.hpp"
 
 #include <algorithm>
-#include <unordered_set>
 #include <utility>
 
 namespace tfdude {
@@ -88,7 +87,7 @@ void Directory::apply(const Page& page) {
   report_conflicts(partition, page);
   put_page(partition, owner, page);
   claims_.mend();
-  find_orphans(page, owner);
+  find_orphans(page.notes, owner);
 }
 
 void Directory::replace_if_complete(Known& partition, Owner owner) {
@@ -103,52 +102,46 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
   for (const auto& [number, page] : pages) {
     for (const PageEntry& entry : page.entries) stays.insert(entry.id);
   }
-  for (const auto& [id, count] : std::exchange(partition.listed, {})) {
-    if (stays.count(id) == 0) claims_.unclaim(id, owner);
+  for (const auto& [number, page] : partition.pages) {
+    unclaim_all_but(stays, partition, owner, number);
   }
   partition.pages.clear();
-  partition.info.frames = 0;
   for (const auto& [number, page] : pages) put_page(partition, owner, page);
   claims_.mend();
-  for (const auto& [number, page] : pages) find_orphans(page, owner);
+  for (const auto& [number, page] : pages) find_orphans(page.notes, owner);
 }
 
 void Directory::put_page(Known& partition, Owner owner, const Page& page) {
-  Page& there = partition.pages[page.number];
   std::unordered_set<std::string_view> stays;
   for (const PageEntry& entry : page.entries) stays.insert(entry.id);
-  for (const PageEntry& entry : std::exchange(there.entries, {})) {
-    leave_page(partition, owner, entry.id, stays.count(entry.id) != 0);
-  }
+  unclaim_all_but(stays, partition, owner, page.number);
+  KeptPage& kept = partition.pages[page.number];
+  kept.ids.clear();
   for (const PageEntry& entry : page.entries) {
-    ++partition.listed[entry.id];
-    claim(entry, owner);
+    latest_stamp_ = std::max(latest_stamp_, std::min(entry.since, kLastStamp));
+    const bool fresh = claims_.claim(entry.id, {owner, entry.parent, entry.since, page.number});
+    partition.info.frames += fresh ? 1 : 0;
+    kept.ids += static_cast<char>(entry.id.size());
+    kept.ids += entry.id;
   }
-  there = page;
-  partition.info.frames = partition.listed.size();
+  kept.ids.shrink_to_fit();
+  kept.notes = page.notes;
   partition.epoch = std::max(partition.epoch, page.epoch);
 }
 
-// An id is no longer where it was; unless the same page lists it again, another page or nobody has it.
-void Directory::leave_page(Known& partition, Owner owner, const std::string& id, bool stays) {
-  const auto listed = partition.listed.find(id);
-  const bool elsewhere = --listed->second > 0;
-  if (!elsewhere) partition.listed.erase(listed);
-  if (stays) return;
-  if (!elsewhere) {
-    claims_.unclaim(id, owner);
-    return;
+// A frame that has changed its page is claimed by the other by now, as pages come in order.
+void Directory::unclaim_all_but(const std::unordered_set<std::string_view>& stays, Known& partition,
+                                Owner owner, std::uint32_t number) {
+  const auto there = partition.pages.find(number);
+  if (there == partition.pages.end()) return;
+  const std::string& ids = there->second.ids;
+  for (std::size_t at = 0; at < ids.size();) {
+    const std::size_t size = static_cast<unsigned char>(ids[at]);
+    const std::string_view id(ids.data() + at + 1, size);
+    at += 1 + size;
+    if (stays.count(id) != 0) continue;
+    if (claims_.unclaim(std::string(id), owner, number)) --partition.info.frames;
   }
-  for (const auto& [number, page] : partition.pages) {
-    for (const PageEntry& entry : page.entries) {
-      if (entry.id == id) claim(entry, owner);
-    }
-  }
-}
-
-void Directory::claim(const PageEntry& entry, Owner owner) {
-  latest_stamp_ = std::max(latest_stamp_, std::min(entry.since, kLastStamp));
-  claims_.claim(entry.id, {owner, entry.parent, entry.since});
 }
 
 // Of what is new in a page; a newcomer does not hear of what was before it came.
@@ -164,8 +157,8 @@ void Directory::report_conflicts(const Known& partition, const Page& page) {
   }
 }
 
-void Directory::find_orphans(const Page& page, Owner owner) {
-  for (const Note& note : page.notes) {
+void Directory::find_orphans(const std::vector<Note>& notes, Owner owner) {
+  for (const Note& note : notes) {
     latest_stamp_ = std::max(latest_stamp_, std::min(note.since, kLastStamp));
     if (note.kind != Note::Kind::kRemoved) continue;
     for (const FrameInfo& frame : forest_.waiting_for(note.id)) {
@@ -177,7 +170,7 @@ void Directory::find_orphans(const Page& page, Owner owner) {
 
 void Directory::find_orphans() {
   for (Owner owner = 1; owner < partitions_.size(); ++owner) {
-    for (const auto& [number, page] : partitions_[owner].pages) find_orphans(page, owner);
+    for (const auto& [number, page] : partitions_[owner].pages) find_orphans(page.notes, owner);
   }
 }
 

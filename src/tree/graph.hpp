@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <boost/graph/adjacency_list.hpp>
@@ -9,7 +11,8 @@ namespace tfdude {
 
 /// Who hangs below whom, by slot: the writer's side of the structure. The only place that includes
 /// Boost.Graph. Vertices are never erased (a slot is reused), so that descriptors stay what they are;
-/// out-edges are sets, so that a leaf among many siblings is unlinked in O(log siblings).
+/// out-edges are vectors, which take 60 bytes a frame less than sets; the youngest of many siblings is unlinked in
+/// O(1), the oldest in O(siblings).
 class Graph {
  public:
   using Slot = std::uint32_t;
@@ -18,7 +21,17 @@ class Graph {
     while (boost::num_vertices(graph_) <= slot) boost::add_vertex(graph_);
   }
   void link(Slot parent, Slot child) { boost::add_edge(parent, child, graph_); }
-  void unlink(Slot parent, Slot child) { boost::remove_edge(parent, child, graph_); }
+  void unlink(Slot parent, Slot child) {
+    // Not boost::remove_edge, which looks from the front and keeps the order.
+    auto& edges = graph_.out_edge_list(parent);
+    const auto last = std::find_if(edges.rbegin(), edges.rend(), [child](const auto& edge) {
+      return edge.get_target() == child;
+    });
+    if (last == edges.rend()) return;
+    std::swap(*last, edges.back());
+    edges.pop_back();
+    if (edges.empty()) edges.shrink_to_fit();
+  }
   [[nodiscard]] bool is_leaf(Slot slot) const { return boost::out_degree(slot, graph_) == 0; }
 
   /// Calls visit(child) for each child.
@@ -41,7 +54,7 @@ class Graph {
   }
 
  private:
-  boost::adjacency_list<boost::setS, boost::vecS, boost::directedS> graph_;
+  boost::adjacency_list<boost::vecS, boost::vecS, boost::directedS> graph_;
 };
 
 }  // namespace tfdude

@@ -157,7 +157,7 @@ void Worker::contradiction(const std::string& what, const std::string& frame) {
 }
 
 void Worker::denied(const std::string& what, const std::string& frame) {
-  if (calm_ > kGrace) return contradiction(what, frame);
+  if (quiet()) return contradiction(what, frame);
   journal_.count("denied amid faults", what.substr(0, what.find(' ')));
 }
 
@@ -168,6 +168,14 @@ std::vector<std::string> Worker::own(bool anchored) const {
     if (anchored ? model_.anchored(id) : frame.may_be_there()) ids.push_back(id);
   }
   return ids;
+}
+
+bool Worker::quiet() {
+  if (calm_ <= kGrace) return false;
+  const auto partitions = client_.partitions();
+  return partitions.size() == partitions_ &&
+         std::all_of(partitions.begin(), partitions.end(),
+                     [](const PartitionInfo& partition) { return partition.reachable; });
 }
 
 std::string Worker::any_anchor() {
@@ -267,12 +275,12 @@ void Worker::look_up() {
   const auto X_AB = client_.lookup(a, b);
   record("lookup", {b}, "in " + a + (X_AB ? " " + translation(*X_AB) : ""), X_AB);
   if (X_AB) {
-    const std::string difference = model_.judge(a, b, *X_AB, calm_ > kGrace);
+    const std::string difference = model_.judge(a, b, *X_AB, quiet());
     if (!difference.empty()) contradiction(difference, b);
   } else if (denies(X_AB.error().code)) {
-    const std::string difference = model_.judge(a, b, std::nullopt, calm_ > kGrace);
+    const std::string difference = model_.judge(a, b, std::nullopt, quiet());
     if (!difference.empty()) denied(difference + "\n  answer: " + X_AB.error().message, b);
-    if (X_AB.error().code == Errc::kUnknownEnd && calm_ > kGrace) model_.gone(b);
+    if (X_AB.error().code == Errc::kUnknownEnd && quiet()) model_.gone(b);
   }
 }
 

@@ -71,6 +71,8 @@ class Worker {
   void denied(const std::string& what, const std::string& frame);
   void contradiction(const std::string& what, const std::string& frame);
   [[nodiscard]] std::vector<std::string> own(bool anchored) const;
+  /// Whether all that was ever asked for has been done, or never will be, and this client knows it.
+  [[nodiscard]] bool quiet();
   [[nodiscard]] std::string any(const std::vector<std::string>& ids) {
     return ids[random_.index(ids.size())];
   }

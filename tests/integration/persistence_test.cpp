@@ -4,6 +4,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <iterator>
 #include <optional>
 #include <string>
@@ -89,7 +90,7 @@ TEST_CASE("persistence: what was acknowledged survives a kill at any instant") {
   std::vector<std::string> there;
   for (int round = 0; round < 5; ++round) {
     // The kill falls into a call of another thread's, whose outcome nobody knows.
-    std::thread other([domain = &arms.domain, round] {
+    auto other = std::async(std::launch::async, [domain = &arms.domain, round] {
       auto caller = *Client::open(domain->options(Milliseconds(300)));
       for (int i = 0; i < 1000; ++i) {
         if (!caller.add("other_" + std::to_string(round) + "_" + std::to_string(i), "arm", {}))
@@ -109,7 +110,7 @@ TEST_CASE("persistence: what was acknowledged survives a kill at any instant") {
       }
     }
     arms.restart();
-    other.join();
+    other.wait();
     for (const std::string& id : there) {
       INFO("round " << round << ", frame " << id);
       const int number = std::stoi(id.substr(1));

@@ -29,18 +29,25 @@ template <class Type, class Sample>
   return {payload.data, payload.data + payload.length};
 }
 
+/// A payload of bytes that remain somebody else's.
+struct BorrowedPayload : fastdds::ertps::SerializedPayload_t {
+  BorrowedPayload(std::uint8_t* bytes, std::size_t size) {
+    data = bytes;
+    length = static_cast<std::uint32_t>(size);
+    max_size = length;
+  }
+  BorrowedPayload(const BorrowedPayload&) = delete;
+  BorrowedPayload& operator=(const BorrowedPayload&) = delete;
+  ~BorrowedPayload() { data = nullptr; }  // not the payload's to free
+};
+
 /// What a reader of this type would make of the bytes; false where it refuses them. They are copied to a
 /// place of exactly their size, so that AddressSanitizer sees every step beyond.
 template <class Type, class Sample>
 [[nodiscard]] bool deserialized(const Bytes& bytes, Sample& sample) {
   const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());
   std::copy(bytes.begin(), bytes.end(), exact.get());
-  struct Borrowed : fastdds::ertps::SerializedPayload_t {
-    ~Borrowed() { data = nullptr; }  // not the payload's to free
-  } payload;
-  payload.data = exact.get();
-  payload.length = static_cast<std::uint32_t>(bytes.size());
-  payload.max_size = payload.length;
+  BorrowedPayload payload(exact.get(), bytes.size());
   Type type;
 #if TFDUDE_FASTDDS_MAJOR == 2
   return type.deserialize(&payload, &sample);

@@ -20,7 +20,11 @@ inline constexpr std::size_t kMaxIdBytes = 255;
 /// is also the name of a DDS partition, where those mean something else.
 [[nodiscard]] Result<void> check_partition_name(std::string_view name);
 
-/// The text in single quotes with everything unprintable escaped, fit for a message or a log line.
+/// The text with every control character, and every byte that is not valid UTF-8, written as "\x07": fit for a
+/// terminal, where it comes from somebody else.
+[[nodiscard]] std::string printable(std::string_view text);
+
+/// The same in single quotes, fit for a message or a log line.
 [[nodiscard]] std::string quote(std::string_view text);
 
 }  // namespace tfdude

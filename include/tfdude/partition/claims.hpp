@@ -16,6 +16,7 @@ struct Claim {
   Owner owner = kHeldHere;
   std::string parent;
   std::uint64_t since = 0;
+  std::uint32_t page = 0;  ///< of its owner's, where it says so
 };
 
 /// What the partition of this process has to give up because of what others claim.
@@ -43,9 +44,13 @@ class Claims {
   Owner add_owner(std::string name);
   [[nodiscard]] const std::string& name(Owner owner) const { return names_[owner]; }
 
-  /// A partition claims a frame, perhaps once more. O(log) where nobody else does.
-  void claim(const std::string& id, Claim claim);
-  void unclaim(const std::string& id, Owner owner);
+  /// A partition claims a frame, perhaps once more. O(1) where nobody else does.
+  /// @return whether it had not claimed it before
+  bool claim(const std::string& id, Claim claim);
+
+  /// A page of the partition's does not claim the frame any more. What another page has claimed since stays.
+  /// @return whether the claim is gone
+  bool unclaim(const std::string& id, Owner owner, std::uint32_t page);
 
   /// This process released a frame that it held: another's claim to it may be in force now.
   void released(const std::string& id);
@@ -65,6 +70,8 @@ class Claims {
  private:
   [[nodiscard]] bool older(const Claim& a, const Claim& b) const;
   [[nodiscard]] Claim in_force(const FrameInfo& there) const;
+  [[nodiscard]] Claim* shadowed(const std::string& id, Owner owner);
+  [[nodiscard]] std::uint32_t page_of(std::string_view id) const;
   void shadow(const std::string& id, Claim claim);
   void promote(const std::string& id);
   void put(const std::string& id, const Claim& claim);
@@ -75,6 +82,7 @@ class Claims {
   std::vector<std::string> names_;
   // Frames that several partitions claim: all claims but the one in force.
   std::unordered_map<std::string, std::vector<Claim>> shadowed_;
+  std::vector<std::uint32_t> page_of_slot_;  // of the claims in force
   // Claims of frames that are roots because they would close a cycle.
   std::map<std::string, Claim> cut_;
   std::vector<Concession> concessions_;

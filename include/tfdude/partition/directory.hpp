@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "tfdude/base/time.hpp"
@@ -92,6 +93,13 @@ class Directory {
  private:
   using PageMap = std::map<std::uint32_t, Page>;
 
+  /// What of a page is needed later: its ids, each after its length in one byte, since most of the memory of a
+  /// large structure would else go into strings; and its notes.
+  struct KeptPage {
+    std::string ids;
+    std::vector<Note> notes;
+  };
+
   /// An incarnation that follows one whose structure is here, until all of its own has come.
   struct Successor {
     std::uint64_t incarnation = 0;
@@ -105,9 +113,7 @@ class Directory {
     std::uint64_t incarnation = 0;  // that of the pages
     std::uint64_t epoch = 0;
     std::uint32_t page_count = 0;
-    PageMap pages;
-    // How many pages list an id: a frame that changes its page may come before it goes.
-    std::unordered_map<std::string, std::size_t> listed;
+    std::map<std::uint32_t, KeptPage> pages;
     std::optional<Successor> successor;
 
     [[nodiscard]] bool complete() const { return !successor && pages.size() >= page_count; }
@@ -117,10 +123,10 @@ class Directory {
   Successor* succeed(Known& partition, std::uint64_t incarnation);
   void replace_if_complete(Known& partition, Owner owner);
   void put_page(Known& partition, Owner owner, const Page& page);
-  void leave_page(Known& partition, Owner owner, const std::string& id, bool stays);
-  void claim(const PageEntry& entry, Owner owner);
+  void unclaim_all_but(const std::unordered_set<std::string_view>& stays, Known& partition,
+                       Owner owner, std::uint32_t number);
   void report_conflicts(const Known& partition, const Page& page);
-  void find_orphans(const Page& page, Owner owner);
+  void find_orphans(const std::vector<Note>& notes, Owner owner);
 
   Forest& forest_;
   ChangeLog changes_;

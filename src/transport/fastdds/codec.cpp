@@ -248,7 +248,8 @@ Result<Reply> from_wire(const wire::Reply& sample) {
   reply.epoch = sample.epoch();
   const wire::ReplyBody& body = sample.body();
   if (body._d() == kError) {
-    reply.body = Error{static_cast<Errc>(body.error().code()), body.error().message()};
+    // For people to read, though its sender may have put anything in it.
+    reply.body = Error{static_cast<Errc>(body.error().code()), printable(body.error().message())};
   } else if (body._d() == kTransforms) {
     std::vector<Transform> transforms;
     transforms.reserve(body.transforms().size());

@@ -113,6 +113,11 @@ TEST_CASE("a partition name holds nothing DDS would expand") {
   CHECK(check_id(std::string("robot") + meant + "1", "child"));
 }
 
+TEST_CASE("printable is quoted without the quotes") {
+  CHECK(printable("").empty());
+  CHECK(printable("'arm' \xE2\x82\xAC\n\xFF") == "'arm' \xE2\x82\xAC\\x0a\\xff");
+}
+
 TEST_CASE("quoted shows text as it is and escapes the rest") {
   CHECK(quote("") == "''");
   CHECK(quote("arm_1") == "'arm_1'");

@@ -136,7 +136,7 @@ TEST_CASE("a file of the wrong structure is refused") {
   check_refused({"frames:\n", Errc::kConfig, "robot.yaml:1: frames is not a list"});
   check_refused({"[a]: b\n", Errc::kConfig, "robot.yaml:1: the file: a key is not plain text"});
   check_refused({"partition: a\n---\npartition: b\n", Errc::kConfig,
-                 "robot.yaml:3: holds more than one YAML document"});
+                 "robot.yaml:2: holds more than one YAML document"});
   check_refused(
       {"frames:\n  - world\n", Errc::kConfig,
        "robot.yaml:2: frames[0] is not a mapping with the keys id, parent, xyz, rpy, quat, "
@@ -151,6 +151,9 @@ TEST_CASE("a file of the wrong structure is refused") {
   check_refused_at("frames: ['a\n", "robot.yaml:");
   check_refused_at("frames:\n  - id: a\n parent: b\n", "robot.yaml:3: not YAML: ");
   check_refused_at("\tpartition: a\n", "robot.yaml:1: not YAML: ");
+  check_refused_at("!!str , ", "robot.yaml:1: ");
+  check_refused_at("%YAML 1.2\xa5\n---\npartition: a\n",
+                   "robot.yaml:1: not YAML: bad YAML version: 1.2\\xa5");
 }
 
 TEST_CASE("a bad frame is refused by name and line") {
@@ -174,6 +177,8 @@ TEST_CASE("a bad frame is refused by name and line") {
                  "robot.yaml:4: frame 'camera': xyz[1] is not a number"});
   check_refused({camera("    xyz: [1, 2 3, 3]"), Errc::kConfig,
                  "robot.yaml:4: frame 'camera': xyz[1] is '2 3', which is not a number"});
+  check_refused({camera("    xyz: [0, 1e999\xff, 0]"), Errc::kConfig,
+                 "robot.yaml:4: frame 'camera': xyz[1] is '1e999\\xff', which is not a number"});
   check_refused({camera("    xyz: [1, , 3]"), Errc::kConfig,
                  "robot.yaml:4: frame 'camera': xyz[1] is not a number"});
   check_refused({camera("    parent: [world]"), Errc::kConfig,

@@ -88,8 +88,8 @@ TEST_CASE("a page replaces what it listed before") {
 }
 
 TEST_CASE("a frame that changes its page stays, whichever page comes first") {
-  const Page old_page{"arms", 1, 1, 1, {{"hand", "arm"}}};
-  const Page new_page{"arms", 0, 1, 1, {{"hand", "wrist"}}};
+  const Page old_page{"arms", 1, 1, 1, {{"hand", "arm", 1}}};
+  const Page new_page{"arms", 0, 1, 1, {{"hand", "wrist", 2}}};
   const Page emptied{"arms", 1, 1, 2, {}};
   const Lines moved{"hand < wrist @ arms"};
   Replica replica;

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/base/id.hpp"
+
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"
 #include "support/samples.hpp"
@@ -90,13 +92,20 @@ TEST_CASE("replies arrive as they were sent") {
     REQUIRE(arrived->body.index() == one.body.index());
     if (const auto* error = std::get_if<Error>(&one.body)) {
       CHECK(std::get<Error>(arrived->body).code == error->code);
-      CHECK(std::get<Error>(arrived->body).message == error->message);
+      CHECK(std::get<Error>(arrived->body).message == printable(error->message));
     } else if (const auto* transforms = std::get_if<std::vector<Transform>>(&one.body)) {
       const auto& came = std::get<std::vector<Transform>>(arrived->body);
       REQUIRE(came.size() == transforms->size());
       for (std::size_t i = 0; i < came.size(); ++i) check_same(came[i], (*transforms)[i]);
     }
   }
+}
+
+TEST_CASE("a message cannot do more to a terminal than be shown") {
+  const Reply reply{1, 2, Error{Errc::kCycle, "\x1b[2J \xc3\xa4\n\xff"}};
+  const auto arrived = from_wire(travelled<ReplyType>(to_wire(reply)));
+  REQUIRE(arrived);
+  CHECK(std::get<Error>(arrived->body).message == "\\x1b[2J \xc3\xa4\\x0a\\xff");
 }
 
 TEST_CASE("a message that is too long arrives cut") {

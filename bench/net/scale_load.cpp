@@ -1,0 +1,49 @@
+// Calls that concern one daemon of those that bench/scaling.py starts, the second: frames added below its first
+// one, or lookups of that. Whoever else is woken by them has no part in it.
+
+#include <cstdio>
+#include <string>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+
+#include "tfdude/client/client.hpp"
+
+namespace {
+
+int failed(const tfdude::Error& error) {
+  std::fprintf(stderr, "scale_load: %s\n", error.message.c_str());
+  return 1;
+}
+
+}  // namespace
+
+// NOLINTNEXTLINE(bugprone-exception-escape): it should end the program
+int main(int argc, char** argv) {
+  std::string mode;
+  int calls = 0;
+  int timeout_ms = 0;
+  tfdude::Options options;
+  CLI::App app{"calls for one daemon"};
+  app.add_option("mode", mode)->required()->check(CLI::IsMember({"add", "lookup"}));
+  app.add_option("--calls", calls)->required();
+  app.add_option("--domain", options.domain)->required();
+  app.add_option("--timeout", timeout_ms)->required();
+  app.add_option("--profile", options.profile)->required();
+  CLI11_PARSE(app, argc, argv);
+  options.timeout = tfdude::Milliseconds(timeout_ms);
+  auto client = tfdude::Client::open(options);
+  if (!client) return failed(client.error());
+  for (int i = 0; i < calls; ++i) {
+    if (mode == "add") {
+      // Other names in each run.
+      const std::string id = "added_" + std::to_string(getpid()) + "_" + std::to_string(i);
+      const auto added = client->add(id, "p1_0", {});
+      if (!added) return failed(added.error());
+    } else {
+      const auto X = client->lookup("p0_0", "p1_0");
+      if (!X) return failed(X.error());
+    }
+  }
+  return 0;
+}

@@ -1,0 +1,94 @@
+// What the filters between a partition's readers and the wire let pass of any bytes: what they read without
+// deserializing is what deserializing gives.
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+
+#include <fastdds/dds/core/LoanableSequence.hpp>
+#include <spdlog/spdlog.h>
+
+#include "base/log.hpp"
+#include "fuzz/demand.hpp"
+#include "support/samples.hpp"
+#include "transport/fastdds/owned_filter.hpp"
+
+namespace tfdude::fuzz {
+namespace {
+
+using testing::Bytes;
+
+// Not the one to which the seeds are addressed, so that it matters who owns the frame.
+constexpr const char* kPartition = "legs";
+
+class Owner final : public TransportHandler {
+ public:
+  void on_request(const PeerId&, const Request&) override {}
+  void on_reply(const Reply&) override {}
+  void on_update(const Update&) override {}
+  void on_page(const Page&) override {}
+  void on_presence(const Presence&) override {}
+  void on_lost(const std::string&, std::uint64_t) override {}
+  [[nodiscard]] bool owns(std::string_view id) const override { return id == "hand" || id == "x"; }
+};
+
+class Filters {
+ public:
+  Filters() {
+    log().set_level(spdlog::level::off);
+    requests_ = created(fastdds::RequestType());
+    updates_ = created(fastdds::UpdateType());
+  }
+
+  void run(Bytes& bytes) {
+    demand(passes(*requests_, bytes) == request_concerns(bytes),
+           "requests pass that concern the owner, and no others");
+    demand(passes(*updates_, bytes) == update_concerns(bytes),
+           "updates pass that concern the owner, and no others");
+  }
+
+ private:
+  fastdds::edds::IContentFilter* created(const fastdds::edds::TopicDataType& type) {
+    fastdds::edds::IContentFilter* filter = nullptr;
+    const auto code = filters_.create_content_filter(
+        fastdds::OwnedFilters::kClassName, fastdds::name_of(type).c_str(), &type, "",
+        fastdds::edds::LoanableSequence<const char*>(), filter);
+    demand(fastdds::ok(code) && filter != nullptr, "there is a filter");
+    return filter;
+  }
+
+  static bool passes(const fastdds::edds::IContentFilter& filter, Bytes& bytes) {
+    const testing::BorrowedPayload payload(bytes.data(), bytes.size());
+    return filter.evaluate(payload, {}, {});
+  }
+
+  [[nodiscard]] bool request_concerns(const Bytes& bytes) const {
+    wire::Request sample;
+    if (!testing::deserialized<fastdds::RequestType>(bytes, sample)) return false;
+    return sample.addressee() == fastdds::addressee_of(kPartition) ||
+           owner_.owns(sample.id().c_str());
+  }
+
+  [[nodiscard]] bool update_concerns(const Bytes& bytes) const {
+    wire::Update sample;
+    if (!testing::deserialized<fastdds::UpdateType>(bytes, sample)) return false;
+    return std::any_of(sample.edges().begin(), sample.edges().end(),
+                       [this](const wire::Edge& edge) { return owner_.owns(edge.id().c_str()); });
+  }
+
+  Owner owner_;
+  FastDdsCounters counters_;
+  fastdds::OwnedFilters filters_{kPartition, owner_, counters_};
+  fastdds::edds::IContentFilter* requests_ = nullptr;
+  fastdds::edds::IContentFilter* updates_ = nullptr;
+};
+
+}  // namespace
+}  // namespace tfdude::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static tfdude::fuzz::Filters filters;
+  tfdude::testing::Bytes bytes(data, data + size);
+  filters.run(bytes);
+  return 0;
+}

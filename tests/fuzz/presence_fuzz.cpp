@@ -1,0 +1,45 @@
+// What a participant makes of bytes on the topic of presence.
+
+#include <vector>
+
+#include "fuzz/key.hpp"
+#include "fuzz/wire.hpp"
+#include "support/replica.hpp"
+
+namespace tfdude::fuzz {
+namespace {
+
+void demand_known(const Presence& presence) {
+  testing::Replica replica;
+  replica.directory.apply(presence, Time{});
+  const auto there = replica.directory.serving(presence.partition);
+  demand(there.has_value() == presence.serving, "who serves is there");
+  demand(!there || *there == presence, "a partition is known as it said");
+  demand(
+      replica.directory.lost(presence.partition, presence.incarnation, Time{}) == presence.serving,
+      "who was there can be lost");
+  demand(!replica.directory.serving(presence.partition), "who was lost is not there");
+}
+
+void run(const Bytes& bytes) {
+  const bool well_formed = fastdds::well_formed_presence(bytes.data(), bytes.size());
+  auto sample = received<fastdds::PresenceType, wire::Presence>(bytes, well_formed);
+  if (!sample) return;
+  const Key key = key_of<fastdds::PresenceType>(*sample);
+  const auto presence = round_trip<fastdds::PresenceType>(
+      *sample, [](const Presence& message) { return fastdds::to_wire(message); },
+      [](const wire::Presence& wire) { return fastdds::from_wire(wire); },
+      [](wire::Presence& wire, const std::vector<wire::Transform>&) { wire.peers(0); });
+  if (!presence) return;
+  wire::Presence sent = fastdds::to_wire(*presence);
+  demand(key_of<fastdds::PresenceType>(sent) == key, "a presence keeps its key");
+  demand_known(*presence);
+}
+
+}  // namespace
+}  // namespace tfdude::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  tfdude::fuzz::run({data, data + size});
+  return 0;
+}
