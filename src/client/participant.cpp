@@ -24,7 +24,8 @@ constexpr Milliseconds kLookAround{2};
 Participant::Participant(std::unique_ptr<Transport> transport, std::string partition,
                          const Options& options)
     : options_(options),
-      directory_(forest_, std::move(partition)),
+      partition_name_(std::move(partition)),
+      directory_(forest_, partition_name_),
       settle_deadline_(Clock::now() + options.discovery),
       transport_(std::move(transport)) {}
 
@@ -325,7 +326,7 @@ void Participant::tell_changes() {
   if (changes.empty()) return;
   for (Change& change : changes) {
     change.time = wall_clock();
-    const bool loser = change.partition == directory_.name(kHeldHere);
+    const bool loser = change.partition == partition_name_;
     if (change.kind == ChangeKind::kConflict && loser) log().error("{}", change.message);
   }
   events_->post(std::move(changes));
@@ -348,7 +349,7 @@ void Participant::on_presence(const Presence& presence) {
   bool rivals = false;
   {
     const std::lock_guard lock(structure_mutex_);
-    if (presence.partition == directory_.name(kHeldHere)) {
+    if (presence.partition == partition_name_) {
       if (presence.incarnation == presence_.incarnation) return;
       // Who has given up, or only asks, does not hide who serves.
       if (rival_ && rival_->serving && !presence.serving) return;

@@ -77,7 +77,7 @@ class Participant final : public TransportHandler {
   }
 
   Forest& forest() { return forest_; }
-  [[nodiscard]] const std::string& partition_name() const { return directory_.name(kHeldHere); }
+  [[nodiscard]] const std::string& partition_name() const { return partition_name_; }
 
   // TransportHandler
   void on_request(const PeerId& from, const Request& request) override;
@@ -154,6 +154,8 @@ class Participant final : public TransportHandler {
   void tell_changes();
 
   const Options options_;
+  // The directory's copy moves as others appear.
+  const std::string partition_name_;
   Forest forest_;
   std::mutex structure_mutex_;  // directory_, partition_, rival_, given_up_
   std::condition_variable structure_changed_;

@@ -55,19 +55,21 @@ void log_change(const Request& request, const Reply& reply) {
 }  // namespace
 
 Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
-  const std::string name = partition_name();
   {
     const std::lock_guard lock(structure_mutex_);
-    presence_ = {name,        nanoseconds_since_epoch(),
-                 host_name(), static_cast<std::uint32_t>(getpid()),
-                 0,           false};
+    presence_ = {partition_name_,
+                 nanoseconds_since_epoch(),
+                 host_name(),
+                 static_cast<std::uint32_t>(getpid()),
+                 0,
+                 false};
   }
   if (auto claimed = claim_name(); !claimed) return claimed;
   publisher_.emplace(kPublishEvery, [this] { (void)commit(); });
   conceder_.emplace(
       Milliseconds(0), [this] { concede(); }, kConcedeAfter);
   if (auto taken = take_frames(frames); !taken) return taken;
-  if (auto serving = transport_->serve(name); !serving) return serving;
+  if (auto serving = transport_->serve(partition_name_); !serving) return serving;
   if (auto stored = commit(); !stored) return stored;
   if (store_ != nullptr) {
     // Others are served already, and what they change is stored.
@@ -80,8 +82,8 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
 }
 
 Result<StoredState> Participant::open_store() {
-  auto opened = open_sqlite_store(state_file(options_.state, options_.domain, partition_name()),
-                                  partition_name());
+  auto opened = open_sqlite_store(state_file(options_.state, options_.domain, partition_name_),
+                                  partition_name_);
   if (!opened) return tl::unexpected(std::move(opened.error()));
   store_ = *std::move(opened);
   return store_->load();
@@ -103,7 +105,7 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
   while (!state.frames.empty() && Clock::now() < settle_deadline_ && incomplete()) wait_for_news();
   const std::lock_guard lock(structure_mutex_);
   auto partition =
-      std::make_unique<Partition>(partition_name(), presence_.incarnation, forest_, directory_);
+      std::make_unique<Partition>(partition_name_, presence_.incarnation, forest_, directory_);
   auto taken = store_ != nullptr ? partition->restore(state, frames, wall_clock())
                                  : partition->load(frames, wall_clock());
   if (!taken) return taken;

@@ -1,0 +1,184 @@
+#include "faults/cluster.hpp"
+
+#include <csignal>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <stdexcept>
+
+#include "faults/worker.hpp"
+
+namespace tfdude::faults {
+namespace {
+
+using testing::in_time;
+using testing::Process;
+
+constexpr std::size_t kLogShown = 3000;
+
+// Drops what comes from some hosts, or what passes some interfaces.
+constexpr const char* kFirewall = R"(nft -f - <<END
+table ip parted {
+  set others { type ipv4_addr; }
+  set links { type ifname; }
+  chain arriving {
+    type filter hook prerouting priority raw;
+    ip saddr @others drop
+    iifname @links drop
+  }
+  chain leaving {
+    type filter hook output priority raw;
+    oifname @links drop
+  }
+}
+END
+)";
+
+std::string config_of(std::size_t partition) {
+  const Eigen::Vector3d t = base_edge(partition).pose.translation();
+  std::ostringstream yaml;
+  yaml << "partition: " << partition_name(partition) << "\nframes:\n";
+  if (partition == 0) yaml << "  - id: world\n";
+  yaml << "  - id: " << base_of(partition) << "\n    parent: world\n    xyz: [" << t.x() << ", "
+       << t.y() << ", " << t.z() << "]\n";
+  return yaml.str();
+}
+
+}  // namespace
+
+Cluster::Cluster(std::size_t partitions, std::size_t clients,
+                 std::vector<std::string> daemon_options)
+    : daemon_options_(std::move(daemon_options)),
+      no_links_(testing::Hosts::missing()),
+      daemons_(partitions) {
+  if (no_links_.empty()) {
+    hosts_.emplace(1 + partitions + clients);
+    hosts_->enter(kObservers);
+    for (std::size_t host = 0; host < hosts_->count(); ++host) {
+      shell(host, kFirewall);
+    }
+  } else {
+    domain_.emplace();
+  }
+  for (std::size_t i = 0; i < partitions; ++i) {
+    (void)directory_.write(partition_name(i) + ".yaml", config_of(i));
+  }
+}
+
+std::vector<std::string> Cluster::meeting() const {
+  if (!domain_) return {};
+  return {"--domain", std::to_string(domain_->number()), "--profile", TFDUDE_LOOPBACK_PROFILE};
+}
+
+Client Cluster::open_on(std::size_t host, Milliseconds timeout) const {
+  Options options;
+  options.timeout = timeout;
+  if (domain_) {
+    options.domain = domain_->number();
+    options.profile = TFDUDE_LOOPBACK_PROFILE;
+  }
+  const auto open = [&] { return *Client::open(options); };
+  return hosts_ ? hosts_->on(host, open) : open();
+}
+
+testing::CliResult Cluster::cli(const std::vector<std::string>& arguments) const {
+  std::vector<std::string> command{TFDUDE_CLI};
+  for (const auto& part : {meeting(), arguments}) {
+    command.insert(command.end(), part.begin(), part.end());
+  }
+  Process process = hosts_ ? hosts_->start(kObservers, command) : Process(command);
+  return testing::finish(process);
+}
+
+std::string Cluster::log_file(std::size_t partition) const {
+  return directory_.path() + "/" + partition_name(partition) + ".log";
+}
+
+void Cluster::start(std::size_t partition) {
+  // Its log goes into a file, as nobody may come to read a pipe in time.
+  std::vector<std::string> command{"/bin/sh",
+                                   "-c",
+                                   "exec 2>>" + log_file(partition) + "; exec \"$0\" \"$@\"",
+                                   TFDUDE_DAEMON,
+                                   "--config",
+                                   directory_.path() + "/" + partition_name(partition) + ".yaml",
+                                   "--state",
+                                   state_directory()};
+  for (const auto& part : {meeting(), daemon_options_}) {
+    command.insert(command.end(), part.begin(), part.end());
+  }
+  daemons_[partition].reset();
+  if (hosts_) {
+    daemons_[partition].emplace(hosts_->start(daemon_host(partition), command));
+  } else {
+    daemons_[partition].emplace(command);
+  }
+}
+
+void Cluster::kill(std::size_t partition) {
+  if (!daemons_[partition]) return;
+  daemons_[partition]->kill();
+  daemons_[partition].reset();
+}
+
+void Cluster::pause(std::size_t partition) {
+  if (daemons_[partition]) daemons_[partition]->freeze();
+}
+
+void Cluster::resume(std::size_t partition) {
+  if (daemons_[partition]) daemons_[partition]->signal(SIGCONT);
+}
+
+bool Cluster::ready(std::size_t partition) {
+  return daemons_[partition] && daemons_[partition]->wait_for_line("ready ", Clock::now());
+}
+
+void Cluster::await_ready(std::size_t partition) {
+  if (daemons_[partition]->wait_for_line("ready ", in_time())) return;
+  throw std::runtime_error(partition_name(partition) + " does not get ready:\n" +
+                           log_of(partition));
+}
+
+std::vector<std::string> Cluster::take_ended() {
+  std::vector<std::string> ended;
+  for (std::size_t i = 0; i < daemons_.size(); ++i) {
+    if (!daemons_[i] || daemons_[i]->runs()) continue;
+    const auto status = daemons_[i]->wait(Clock::now());
+    ended.push_back(partition_name(i) + " (status " + std::to_string(status.value_or(-1)) +
+                    "), its log ends with\n" + log_of(i));
+    daemons_[i].reset();
+  }
+  return ended;
+}
+
+std::string Cluster::log_of(std::size_t partition) const {
+  std::ifstream file(log_file(partition));
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  return text.size() <= kLogShown ? text : text.substr(text.size() - kLogShown);
+}
+
+void Cluster::shell(std::size_t host, const std::string& script) const {
+  Process process =
+      hosts_->start(host, {"/bin/sh", "-c", "PATH=/usr/sbin:/sbin:$PATH; set -e\n" + script});
+  if (process.wait(in_time()) != 0) throw std::runtime_error("failed: " + process.err());
+}
+
+void Cluster::cut(std::size_t host) const {
+  shell(host, "nft add element ip parted links { eth0 }");
+}
+
+void Cluster::heal(std::size_t host) const {
+  shell(host, "nft delete element ip parted links { eth0 }");
+}
+
+void Cluster::part(std::size_t host, std::size_t other) const {
+  shell(host, "nft add element ip parted others '{ " + testing::Hosts::address(other) + " }'");
+  shell(other, "nft add element ip parted others '{ " + testing::Hosts::address(host) + " }'");
+}
+
+void Cluster::join(std::size_t host, std::size_t other) const {
+  shell(host, "nft delete element ip parted others '{ " + testing::Hosts::address(other) + " }'");
+  shell(other, "nft delete element ip parted others '{ " + testing::Hosts::address(host) + " }'");
+}
+
+}  // namespace tfdude::faults

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/domain_lease.hpp"
+#include "support/hosts.hpp"
+#include "support/process.hpp"
+#include "support/test_domain.hpp"
+
+namespace tfdude::faults {
+
+/// Daemons that keep their state, and places for clients: each on a host of its own where there can be hosts, else
+/// all on this computer, where no link can be cut. Belongs to one thread.
+class Cluster {
+ public:
+  /// @param clients  how many hosts there are for clients, besides the observers' one
+  Cluster(std::size_t partitions, std::size_t clients, std::vector<std::string> daemon_options);
+
+  [[nodiscard]] std::size_t partitions() const { return daemons_.size(); }
+  /// Why no link can be cut; empty where they can.
+  [[nodiscard]] const std::string& no_links() const { return no_links_; }
+  [[nodiscard]] std::string state_directory() const { return directory_.path() + "/state"; }
+
+  [[nodiscard]] Client open_observer() const { return open_on(kObservers, Milliseconds(1000)); }
+  [[nodiscard]] Client open_observer(Milliseconds timeout) const {
+    return open_on(kObservers, timeout);
+  }
+  [[nodiscard]] Client open_client(std::size_t client) const {
+    return open_on(client_host(client), Milliseconds(1000));
+  }
+  [[nodiscard]] testing::CliResult cli(const std::vector<std::string>& arguments) const;
+
+  void start(std::size_t partition);
+  void kill(std::size_t partition);
+  void pause(std::size_t partition);
+  void resume(std::size_t partition);
+  [[nodiscard]] bool runs(std::size_t partition) const { return daemons_[partition].has_value(); }
+  [[nodiscard]] pid_t pid(std::size_t partition) const { return daemons_[partition]->pid(); }
+  /// Whether a daemon has said that it serves. Does not wait.
+  [[nodiscard]] bool ready(std::size_t partition);
+  /// @throws std::runtime_error where it does not get ready.
+  void await_ready(std::size_t partition);
+  /// Daemons that have ended without being killed, each as "p1 (status 1)". They are not started again.
+  [[nodiscard]] std::vector<std::string> take_ended();
+  /// What a daemon and those before it have logged, the last lines.
+  [[nodiscard]] std::string log_of(std::size_t partition) const;
+
+  [[nodiscard]] std::size_t daemon_host(std::size_t partition) const { return 1 + partition; }
+  [[nodiscard]] std::size_t client_host(std::size_t client) const {
+    return 1 + partitions() + client;
+  }
+  // The host sees its network as before, but nothing passes.
+  void cut(std::size_t host) const;
+  void heal(std::size_t host) const;
+  // The host sees that its cable is not connected.
+  void unplug(std::size_t host) const { hosts_->cut(host); }
+  void plug(std::size_t host) const { hosts_->heal(host); }
+  // What two hosts send to each other.
+  void part(std::size_t host, std::size_t other) const;
+  void join(std::size_t host, std::size_t other) const;
+
+ private:
+  static constexpr std::size_t kObservers = 0;
+
+  [[nodiscard]] Client open_on(std::size_t host, Milliseconds timeout) const;
+  [[nodiscard]] std::vector<std::string> meeting() const;
+  [[nodiscard]] std::string log_file(std::size_t partition) const;
+  void shell(std::size_t host, const std::string& script) const;
+
+  testing::TemporaryDirectory directory_;
+  const std::vector<std::string> daemon_options_;
+  std::string no_links_;
+  std::optional<testing::Hosts> hosts_;
+  std::optional<testing::DomainLease> domain_;  // without hosts
+  std::vector<std::optional<testing::Process>> daemons_;
+};
+
+}  // namespace tfdude::faults

@@ -1,0 +1,245 @@
+#include "faults/model.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include "support/oracle.hpp"
+#include "support/pose_diff.hpp"
+
+namespace tfdude::faults {
+namespace {
+
+constexpr double kTolerance = 1e-9;
+constexpr std::size_t kHistoryKept = 30;
+constexpr std::size_t kStatesJudged = 256;
+
+bool same(const std::optional<Place>& a, const std::optional<Place>& b) {
+  if (!a || !b) return !a && !b;
+  return a->parent == b->parent && a->X_PC.pose.matrix() == b->X_PC.pose.matrix();
+}
+
+void insert(std::vector<std::optional<Place>>& places, const std::optional<Place>& place) {
+  const auto known = std::any_of(places.begin(), places.end(),
+                                 [&](const auto& other) { return same(other, place); });
+  if (!known) places.push_back(place);
+}
+
+// The frame and all above it, the root first; empty where one of them is not there.
+template <class State>
+std::vector<std::string> way_down(const State& state, const std::string& id) {
+  std::vector<std::string> way;
+  for (std::string at = id; !at.empty();) {
+    const auto frame = state.find(at);
+    if (frame == state.end() || !frame->second || way.size() > state.size()) return {};
+    way.insert(way.begin(), at);
+    at = frame->second->parent;
+  }
+  return way;
+}
+
+}  // namespace
+
+bool Model::Frame::may_be_there() const {
+  return std::any_of(possible.begin(), possible.end(),
+                     [](const auto& place) { return place.has_value(); });
+}
+
+bool Model::Frame::may_be_gone() const {
+  return std::any_of(possible.begin(), possible.end(), [](const auto& place) { return !place; });
+}
+
+void Model::fix(const std::string& id, const std::string& partition, const Place& place) {
+  Frame& frame = frames_[id];
+  frame.partition = partition;
+  frame.possible.assign(1, place);
+}
+
+void Model::add(const std::string& id, const std::string& partition, const Place& place,
+                bool done) {
+  Frame& frame = frames_[id];
+  frame.partition = partition;
+  frame.possible.assign(1, place);
+  if (!done) frame.possible.emplace_back();
+}
+
+void Model::update(const std::string& id, const Transform& X_PC, bool done) {
+  Frame& frame = frames_.at(id);
+  std::vector<std::optional<Place>> after;
+  if (!done) after = frame.possible;
+  for (const auto& place : frame.possible) {
+    if (place) insert(after, Place{place->parent, X_PC});
+  }
+  if (frame.doomed) insert(after, std::nullopt);
+  frame.possible = std::move(after);
+}
+
+void Model::move(const std::string& id, const std::string& parent,
+                 const std::optional<Transform>& X_PC, bool done) {
+  Frame& frame = frames_.at(id);
+  std::vector<std::optional<Place>> after;
+  if (!done) after = frame.possible;
+  for (const auto& place : frame.possible) {
+    if (place) insert(after, Place{parent, X_PC ? *X_PC : place->X_PC});
+  }
+  frame.possible = std::move(after);
+}
+
+void Model::remove(const std::string& id, bool done) {
+  std::vector<std::string> sure;
+  std::vector<std::string> unsure;
+  for (const auto& [below, frame] : frames_) {
+    if (!may_be_below(below, id)) continue;
+    (done && goes_with(below, id) ? sure : unsure).push_back(below);
+  }
+  for (const std::string& below : sure) {
+    insert(frames_.at(below).possible, std::nullopt);
+    gone(below);
+  }
+  for (const std::string& below : unsure) {
+    insert(frames_.at(below).possible, std::nullopt);
+    frames_.at(below).doomed = true;
+  }
+}
+
+void Model::gone(const std::string& id) {
+  const auto found = frames_.find(id);
+  if (found == frames_.end() || !found->second.may_be_gone()) return;
+  found->second.possible.assign(1, std::nullopt);
+  removed_.insert(frames_.extract(found));
+}
+
+const Model::Frame& Model::frame(const std::string& id) const {
+  const auto found = frames_.find(id);
+  return found != frames_.end() ? found->second : removed_.at(id);
+}
+
+void Model::note(const std::string& id, const std::string& line) {
+  const auto found = frames_.find(id);
+  auto& history = (found != frames_.end() ? found->second : removed_.at(id)).history;
+  history.push_back(line);
+  if (history.size() > kHistoryKept) history.pop_front();
+}
+
+bool Model::anchored(const std::string& id) const {
+  std::size_t steps = 0;
+  for (std::string at = id; !at.empty(); ++steps) {
+    const auto found = frames_.find(at);
+    if (found == frames_.end() || !found->second.certain()) return false;
+    const auto& place = found->second.possible.front();
+    if (!place || steps > frames_.size()) return false;
+    at = place->parent;
+  }
+  return true;
+}
+
+bool Model::may_be_below(const std::string& id, const std::string& ancestor) const {
+  std::vector<std::string> look{id};
+  std::set<std::string> seen;
+  while (!look.empty()) {
+    const std::string at = look.back();
+    look.pop_back();
+    if (at == ancestor) return true;
+    const auto found = frames_.find(at);
+    if (found == frames_.end() || !seen.insert(at).second) continue;
+    for (const auto& place : found->second.possible) {
+      if (place) look.push_back(place->parent);
+    }
+  }
+  return false;
+}
+
+// An add or move without an answer may be made after the removal of what it names: that frame stays, without its parent.
+bool Model::goes_with(const std::string& id, const std::string& ancestor) const {
+  std::string at = id;
+  for (std::size_t steps = 0; at != ancestor; ++steps) {
+    const auto found = frames_.find(at);
+    if (found == frames_.end() || found->second.may_be_gone() || steps > frames_.size()) {
+      return false;
+    }
+    const auto& possible = found->second.possible;
+    const std::string& parent = possible.front()->parent;
+    if (std::any_of(possible.begin(), possible.end(),
+                    [&](const auto& place) { return place->parent != parent; })) {
+      return false;
+    }
+    at = parent;
+  }
+  return true;
+}
+
+std::vector<std::string> Model::closure(const std::string& a, const std::string& b) const {
+  std::vector<std::string> look{a, b};
+  std::set<std::string> seen;
+  while (!look.empty()) {
+    const std::string at = look.back();
+    look.pop_back();
+    const auto found = frames_.find(at);
+    if (found == frames_.end() || !seen.insert(at).second) continue;
+    for (const auto& place : found->second.possible) {
+      if (place) look.push_back(place->parent);
+    }
+  }
+  return {seen.begin(), seen.end()};
+}
+
+void Model::each_state(const std::vector<std::string>& ids,
+                       const std::function<void(const State&)>& see) const {
+  std::vector<std::size_t> chosen(ids.size(), 0);
+  while (true) {
+    State state;
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      state[ids[i]] = frames_.at(ids[i]).possible[chosen[i]];
+    }
+    see(state);
+    std::size_t digit = 0;
+    while (digit < ids.size() && ++chosen[digit] == frames_.at(ids[digit]).possible.size()) {
+      chosen[digit++] = 0;
+    }
+    if (digit == ids.size()) return;
+  }
+}
+
+std::string Model::judge(const std::string& a, const std::string& b,
+                         const std::optional<Transform>& X_AB, bool quiet) {
+  const auto ids = closure(a, b);
+  std::size_t states = 1;
+  for (const std::string& id : ids) states *= frames_.at(id).possible.size();
+  if (states > kStatesJudged) return "";
+  std::map<std::string, std::vector<std::optional<Place>>> left;
+  bool agrees = false;
+  std::string expected;
+  each_state(ids, [&](const State& state) {
+    const auto to_a = way_down(state, a);
+    const auto to_b = way_down(state, b);
+    const bool connected = !to_a.empty() && !to_b.empty() && to_a.front() == to_b.front();
+    std::string difference;
+    if (connected && X_AB) {
+      testing::Oracle oracle;
+      for (const auto* way : {&to_a, &to_b}) {
+        for (const std::string& id : *way) oracle.add(id, state.at(id)->parent, state.at(id)->X_PC);
+      }
+      difference = testing::transform_diff(*X_AB, oracle.between(a, b), kTolerance);
+    } else if (connected != X_AB.has_value()) {
+      difference = connected ? "both are there and connected" : "not both are there and connected";
+    }
+    if (!difference.empty()) {
+      expected += "\n  possible: " + difference;
+      return;
+    }
+    agrees = true;
+    for (const std::string& id : ids) insert(left[id], state.at(id));
+  });
+  if (!agrees) return "lookup of " + b + " in " + a + expected;
+  // A denial may come from a replica that is behind; an answer comes from the owners.
+  if (X_AB) {
+    for (auto& [id, places] : left) {
+      Frame& frame = frames_.at(id);
+      frame.possible = std::move(places);
+      if (quiet) frame.doomed = false;
+      if (frame.doomed) insert(frame.possible, std::nullopt);
+    }
+  }
+  return "";
+}
+
+}  // namespace tfdude::faults

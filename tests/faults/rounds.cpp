@@ -1,0 +1,84 @@
+#include "faults/rounds.hpp"
+
+#include <cstdio>
+#include <filesystem>
+#include <set>
+
+#include "faults/cluster.hpp"
+#include "faults/journal.hpp"
+#include "faults/worker.hpp"
+
+namespace tfdude::faults {
+namespace {
+
+using testing::eventually;
+
+std::set<std::string> files_in(const std::string& directory) {
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(directory)) {
+    if (!entry.is_directory()) names.insert(entry.path().filename().string());
+  }
+  return names;
+}
+
+std::string list(const std::set<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += " " + name;
+  return text;
+}
+
+double milliseconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+// The database, and what SQLite keeps beside it while it is open.
+bool one_database(const std::set<std::string>& names) {
+  std::set<std::string> databases;
+  for (const std::string& name : names) {
+    databases.insert(name.substr(0, name.find("-wal")).substr(0, name.find("-shm")));
+  }
+  return databases.size() == 1;
+}
+
+}  // namespace
+
+int run_rounds(std::size_t rounds) {
+  Cluster cluster(1, 0, {});
+  Journal journal;
+  cluster.start(0);
+  cluster.await_ready(0);
+  Client client = cluster.open_observer(Milliseconds(500));
+  std::vector<double> until_answer;
+  const auto shared_before = files_in("/dev/shm");
+  for (std::size_t round = 0; round < rounds; ++round) {
+    const std::string id = "frame_" + std::to_string(round);
+    if (!eventually([&] { return client.add(id, base_of(0), base_edge(0)).has_value(); })) {
+      journal.violation(id + " cannot be added");
+    }
+    cluster.kill(0);
+    const auto begin = Clock::now();
+    cluster.start(0);
+    if (!eventually([&] { return client.lookup("world", id).has_value(); })) {
+      journal.violation("round " + std::to_string(round) + ": no answer:\n" + cluster.log_of(0));
+      break;
+    }
+    until_answer.push_back(milliseconds_since(begin));
+    const auto state = files_in(cluster.state_directory());
+    if (!one_database(state)) journal.violation("more files are kept:" + list(state));
+  }
+  cluster.await_ready(0);
+  for (std::size_t round = 0; round < until_answer.size(); ++round) {
+    const std::string id = "frame_" + std::to_string(round);
+    if (!client.lookup("world", id)) journal.violation(id + " is missing");
+  }
+  const auto shared = files_in("/dev/shm");
+  std::printf("%zu rounds: from a daemon's start until it answers %s\n", rounds,
+              distribution(until_answer).c_str());
+  std::printf("files in /dev/shm: %zu before, %zu after; state:%s\n", shared_before.size(),
+              shared.size(), list(files_in(cluster.state_directory())).c_str());
+  if (shared.size() > shared_before.size())
+    journal.violation("shared memory is left:" + list(shared));
+  return journal.violations() == 0 ? 0 : 1;
+}
+
+}  // namespace tfdude::faults

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "faults/journal.hpp"
+#include "faults/model.hpp"
+#include "support/random.hpp"
+
+namespace tfdude::faults {
+
+/// The frame that each partition is configured with, below the world of the first.
+[[nodiscard]] std::string base_of(std::size_t partition);
+[[nodiscard]] std::string partition_name(std::size_t partition);
+/// Of the edge from the world to a base.
+[[nodiscard]] Transform base_edge(std::size_t partition);
+/// Frames that all clients change, so that nobody knows what becomes of them.
+[[nodiscard]] std::string contested_frame(std::size_t number);
+inline constexpr std::size_t kContested = 12;
+
+/// A client in a thread of its own that changes frames and asks for them, and holds each answer against its model.
+class Worker {
+ public:
+  Worker(Client client, std::size_t number, std::size_t partitions, std::uint64_t seed,
+         Journal& journal);
+  ~Worker() { stop(); }
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  void start();
+  void stop();
+
+  // After stop().
+  [[nodiscard]] Client& client() { return client_; }
+  [[nodiscard]] Model& model() { return model_; }
+
+  /// Empty where a joint has a value that was streamed.
+  [[nodiscard]] std::string judge_joint(const std::string& id, const Transform& X_PC) const;
+  /// The frames that were streamed, and the bases that they hang below.
+  [[nodiscard]] const std::map<std::string, std::string>& joints() const { return joints_; }
+
+ private:
+  void run();
+  void add_joints();
+  void step();
+
+  void add();
+  void update();
+  void move();
+  void remove();
+  void look_up();
+  void look_up_removed();
+  void ask_parent();
+  void publish();
+  void look_up_joint();
+  void contest();
+
+  /// Counts it, and writes it down beside the frames that it is about.
+  template <class Value>
+  void record(const std::string& operation, const std::vector<std::string>& frames,
+              const std::string& details, const Result<Value>& result);
+  /// The service denies something that is so. While there are faults a replica may be behind; else it may not.
+  void denied(const std::string& what, const std::string& frame);
+  void contradiction(const std::string& what, const std::string& frame);
+  [[nodiscard]] std::vector<std::string> own(bool anchored) const;
+  /// Whether all that was ever asked for has been done, or never will be, and this client knows it.
+  [[nodiscard]] bool quiet();
+  [[nodiscard]] std::string any(const std::vector<std::string>& ids) {
+    return ids[random_.index(ids.size())];
+  }
+  [[nodiscard]] std::string any_base() { return base_of(random_.index(partitions_)); }
+  [[nodiscard]] std::string any_anchor();
+
+  Client client_;
+  const std::string prefix_;
+  const std::size_t number_;
+  const std::size_t partitions_;
+  testing::Random random_;
+  Journal& journal_;
+  Model model_;
+  std::size_t added_ = 0;
+  std::deque<std::string> removed_;  // the latest
+  std::map<std::string, std::string> joints_;
+  std::uint32_t streamed_ = 0;
+  double calm_ = 0;  // when the operation began
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+}  // namespace tfdude::faults
