@@ -10,14 +10,14 @@
 
 namespace tfdude {
 
-/// Does one job on a thread of its own a while after it is asked to, once for all that ask meanwhile, and at most
+/// Does one job on a thread of its own soon after it is asked to, once for all that ask meanwhile, and at most
 /// once a period: whoever asks a million times a second pays nanoseconds, and the job is done a thousand times.
 class Deferred {
  public:
   using Milliseconds = std::chrono::milliseconds;
 
-  Deferred(Milliseconds period, std::function<void()> job, Milliseconds delay = Milliseconds(0))
-      : period_(period), delay_(delay), job_(std::move(job)), thread_([this] { run(); }) {}
+  Deferred(Milliseconds period, std::function<void()> job)
+      : period_(period), job_(std::move(job)), thread_([this] { run(); }) {}
   ~Deferred() { stop(); }
   Deferred(const Deferred&) = delete;
   Deferred& operator=(const Deferred&) = delete;
@@ -47,7 +47,6 @@ class Deferred {
     std::unique_lock lock(mutex_);
     while (true) {
       changed_.wait(lock, [this] { return stopping_ || asked_.load(); });
-      if (delay_.count() > 0) changed_.wait_for(lock, delay_, [this] { return stopping_; });
       if (stopping_) return;
       lock.unlock();
       // Before the job, so that what changes while it runs is not missed.
@@ -59,7 +58,6 @@ class Deferred {
   }
 
   const Milliseconds period_;
-  const Milliseconds delay_;
   const std::function<void()> job_;
   std::atomic<bool> asked_{false};
   std::mutex mutex_;

@@ -18,7 +18,8 @@ constexpr Milliseconds kPredecessorGone{1500};
 constexpr Milliseconds kSlowPresence{3000};
 
 // A claim that was taken back just before may still be on its way here, and what takes it back behind it.
-constexpr Milliseconds kConcedeAfter{100};
+// A page that was lost comes a heartbeat of 100 ms later, or several.
+constexpr Milliseconds kConcedeAfter{1000};
 
 // How often own changes of the structure are published at most.
 constexpr Milliseconds kPublishEvery{1};
@@ -66,8 +67,7 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   }
   if (auto claimed = claim_name(); !claimed) return claimed;
   publisher_.emplace(kPublishEvery, [this] { (void)commit(); });
-  conceder_.emplace(
-      Milliseconds(0), [this] { concede(); }, kConcedeAfter);
+  conceder_.emplace(kConcedeAfter / 4, [this] { concede(); });
   if (auto taken = take_frames(frames); !taken) return taken;
   if (auto serving = transport_->serve(partition_name_); !serving) return serving;
   if (auto stored = commit(); !stored) return stored;
@@ -168,13 +168,16 @@ Result<void> Participant::commit() {
 }
 
 void Participant::concede() {
-  bool conceded = false;
+  Partition::Conceded conceded;
   {
     const std::lock_guard lock(structure_mutex_);
-    if (partition_ != nullptr && !out_) conceded = partition_->concede(wall_clock());
+    if (partition_ != nullptr && !out_) {
+      conceded = partition_->concede(wall_clock(), kConcedeAfter);
+    }
     tell_changes();
   }
-  if (conceded) (void)commit();
+  if (conceded.pending) conceder_->ask();
+  if (conceded.changed) (void)commit();
 }
 
 void Participant::save_values() {

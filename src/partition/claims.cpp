@@ -133,10 +133,6 @@ std::vector<Concession> Claims::concessions() const {
       all.push_back({Concession::Kind::kUnhang, cycle.held->id, cycle.youngest.owner});
     }
   }
-  // In the same order everywhere.
-  std::sort(all.begin(), all.end(), [](const Concession& a, const Concession& b) {
-    return std::tie(a.kind, a.frame) < std::tie(b.kind, b.frame);
-  });
   return all;
 }
 

@@ -178,7 +178,9 @@ std::vector<Concession> Directory::concessions() {
     for (const auto& [number, page] : partitions_[owner].pages) {
       for (const Note& note : page.notes) {
         for (const FrameInfo& frame : forest_.waiting_for(note.id)) {
-          if (is_orphan(frame, note)) all.push_back({Concession::Kind::kRemove, frame.id, owner});
+          if (!is_orphan(frame, note)) continue;
+          all.push_back({Concession::Kind::kRemove, frame.id, owner});
+          orphans_ = true;  // until it is removed, or its parent is there again
         }
       }
     }

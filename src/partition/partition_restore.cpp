@@ -40,7 +40,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   pages_.watch_ids();
   for (const StoredFrame* frame : contested) restore_contested(*frame, now);
   directory_.expect_orphans();
-  (void)concede(now);
+  (void)concede(now, {});
   auto taken = reconfigure(state.configured, configured, now);
   pages_.close_epoch();
   return taken;
@@ -88,19 +88,33 @@ Result<void> Partition::reconfigure(const std::vector<FrameSpec>& before,
   return {};
 }
 
-bool Partition::concede(Time now) {
-  bool changed = false;
-  // What is conceded may bring up more.
-  while (directory_.contested()) {
-    bool more = false;
+Partition::Conceded Partition::concede(Time now, Time::duration patience) {
+  Conceded done;
+  bool more = true;
+  // What is conceded may bring up more, or settle something else.
+  while (more) {
+    more = false;
+    std::map<Concession, Suspicion> standing;
     for (const Concession& concession : directory_.concessions()) {
-      more = concede(concession, now) || more;
+      const auto frame = forest_.info(concession.frame);
+      if (!frame) continue;
+      Suspicion suspicion{now, frame->since};
+      const auto before = suspicions_.find(concession);
+      if (before != suspicions_.end() && before->second.frame_since == frame->since) {
+        suspicion = before->second;
+      }
+      if (now - suspicion.first < patience) {
+        standing.emplace(concession, suspicion);
+      } else {
+        more = concede(concession, now) || more;
+      }
     }
-    if (!more) break;
-    changed = true;
+    suspicions_ = std::move(standing);
+    done.changed = done.changed || more;
   }
-  if (changed) pages_.close_epoch();
-  return changed;
+  done.pending = !suspicions_.empty();
+  if (done.changed) pages_.close_epoch();
+  return done;
 }
 
 bool Partition::concede(const Concession& concession, Time now) {

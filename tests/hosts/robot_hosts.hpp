@@ -59,7 +59,7 @@ class RobotHosts {
   }
 
   [[nodiscard]] Process start_daemon(std::size_t host, const std::string& config) const {
-    return start(host, TFDUDE_DAEMON, {"--config", config});
+    return start(host, TFDUDE_DAEMON, {"--no-state", "--config", config});
   }
 
   /// A run of the command line on a host.

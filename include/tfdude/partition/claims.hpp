@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <unordered_map>
 #include <vector>
 
@@ -31,6 +32,10 @@ struct Concession {
   Kind kind = Kind::kGiveWay;
   std::string frame;
   Owner rival = kHeldHere;
+
+  friend bool operator<(const Concession& a, const Concession& b) {
+    return std::tie(a.kind, a.frame, a.rival) < std::tie(b.kind, b.frame, b.rival);
+  }
 };
 
 /// Which of all claims are in force: writes those into the forest. Of two partitions that claim a frame the

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -51,8 +52,14 @@ class Partition {
   /// @return how many
   std::size_t apply(const Update& update);
 
-  /// Gives up what the directory says must be given up. @return whether the structure changed
-  bool concede(Time now);
+  struct Conceded {
+    bool changed = false;  ///< the structure
+    bool pending = false;  ///< something stands that has not stood for long enough
+  };
+
+  /// Gives up what has had to be given up for at least `patience`, as seen by calls of this function: a claim that
+  /// was taken back may be on its way still.
+  Conceded concede(Time now, Time::duration patience);
 
   /// The pages to publish since the last call.
   [[nodiscard]] std::vector<Page> take_pages() { return pages_.take_changed(); }
@@ -88,6 +95,13 @@ class Partition {
   Directory& directory_;
   Pages pages_;
   ReplyCache replies_;
+  // What would have to be conceded, since when, and since when the frame concerned hangs where it hangs: another of
+  // its name, or a move, begins anew.
+  struct Suspicion {
+    Time first{};
+    std::uint64_t frame_since = 0;
+  };
+  std::map<Concession, Suspicion> suspicions_;
   bool saved_ = false;
   std::set<std::string> updated_;  // by requests, since the last take_unsaved()
 };

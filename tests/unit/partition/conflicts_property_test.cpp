@@ -168,7 +168,7 @@ class World {
     }
     if (hearer == kSpectator) return;
     const std::size_t before = owners_[hearer]->partition.frame_count();
-    if (!owners_[hearer]->partition.concede(now(hearer))) return;
+    if (!owners_[hearer]->partition.concede(now(hearer), {}).changed) return;
     if (owners_[hearer]->partition.frame_count() < before) ++orphans_;
     publish(hearer);
   }

@@ -63,7 +63,7 @@ TEST_CASE("of two partitions that add one id the later gives way, and says so") 
   SECTION("where the other was earlier") {
     arms.directory.apply(page_of("head", {{"camera", "", 900}}));
     CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ arms, attached"});
-    CHECK(arms.partition.concede(kNow));
+    CHECK(arms.partition.concede(kNow, {}).changed);
     CHECK(arms.structure() == Lines{"camera <  @ head", "lens < camera @ arms, attached"});
     CHECK(
         arms.conflicts() ==
@@ -76,9 +76,34 @@ TEST_CASE("of two partitions that add one id the later gives way, and says so") 
   }
   SECTION("where the other was later") {
     arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
-    CHECK_FALSE(arms.partition.concede(kNow));
+    CHECK_FALSE(arms.partition.concede(kNow, {}).changed);
     CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ arms, attached"});
     CHECK(arms.conflicts().empty());
+  }
+}
+
+TEST_CASE("a claim that is taken back soon costs nobody a frame") {
+  Owning arms("arms");
+  const auto later = [](int milliseconds) {
+    return kNow + std::chrono::milliseconds(milliseconds);
+  };
+  const auto patience = std::chrono::milliseconds(100);
+  REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
+  arms.directory.apply(page_of("head", {{"camera", "", 900}}));
+  CHECK(arms.partition.concede(later(0), patience).pending);
+  SECTION("once") {
+    arms.directory.apply(page_of("head", {}));
+    CHECK_FALSE(arms.partition.concede(later(200), patience).pending);
+    CHECK(arms.forest.holds("camera"));
+  }
+  SECTION("and made again for another frame of that name") {
+    REQUIRE(arms.ask("camera", RemoveRequest{{"camera"}}) == "ok");
+    arms.directory.apply(page_of("head", {}));
+    REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}, later(150)) == "ok");
+    arms.directory.apply(page_of("head", {{"camera", "", 950}}));
+    CHECK(arms.partition.concede(later(200), patience).pending);
+    CHECK(arms.forest.holds("camera"));
+    CHECK(arms.partition.concede(later(300), patience).changed);
   }
 }
 
@@ -106,13 +131,13 @@ TEST_CASE("of two moves that make a cycle the later is undone to a root") {
   REQUIRE(arms.ask("hand", MoveRequest{"neck", {}}, Time(std::chrono::nanoseconds(2000))) == "ok");
   SECTION("the own one") {
     arms.directory.apply(page_of("head", {{"neck", "hand", 1500}}));
-    CHECK(arms.partition.concede(kNow));
+    CHECK(arms.partition.concede(kNow, {}).changed);
     CHECK(arms.structure() == Lines{"hand <  @ arms", "neck < hand @ head, attached"});
     CHECK(arms.conflicts().size() == 1);
   }
   SECTION("the other's, who is to say so") {
     arms.directory.apply(page_of("head", {{"neck", "hand", 2500}}));
-    CHECK_FALSE(arms.partition.concede(kNow));
+    CHECK_FALSE(arms.partition.concede(kNow, {}).changed);
     CHECK(arms.structure() == Lines{"hand < neck @ arms, attached", "neck <  @ head"});
   }
 }
@@ -180,7 +205,7 @@ TEST_CASE("a frame whose parent was removed while its owner was away goes when i
     tools.start();
     CHECK(tools.structure().size() == 2);
     tools.directory.apply(removed);
-    CHECK(tools.partition.concede(kNow));
+    CHECK(tools.partition.concede(kNow, {}).changed);
     CHECK(tools.structure().empty());
   }
   SECTION("not where the parent is there again") {
