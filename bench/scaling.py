@@ -98,10 +98,24 @@ class Run:
     def tfdude(self, *arguments):
         return processes.output_of([self.bin_dir / "tfdude", *self.common, *arguments], 60)
 
+    def listed(self):
+        """How many frames a new process lists; none where it meets nobody in its time."""
+        try:
+            return len(self.tfdude("frames").splitlines())
+        except RuntimeError:
+            return 0
+
+    def await_known(self, frames):
+        """Waits until daemons that started all at once have told each other and newcomers what they own."""
+        deadline = time.monotonic() + processes.PATIENCE_S
+        while self.listed() != frames:
+            if time.monotonic() > deadline:
+                raise RuntimeError(f"newcomers do not come to list {frames} frames")
+
     def newcomer(self, frames):
         """Seconds until a new process has listed all frames."""
         begin = time.monotonic()
-        listed = len(self.tfdude("frames").splitlines())
+        listed = self.listed()
         if listed != frames:
             raise RuntimeError(f"a newcomer lists {listed} frames of {frames}")
         return time.monotonic() - begin
@@ -132,8 +146,9 @@ def measure(bin_dir, count, frames, server):
         with processes.daemons(bin_dir, files, domain, work, options) as running:
             started = time.monotonic() - begin
             run = Run(bin_dir, running, domain, options)
-            run.newcomer(frames)
+            run.await_known(frames)
             row = {"daemons": count, "frames": frames, "started_s": started,
+                   "known_s": time.monotonic() - begin,
                    "newcomer_s": statistics.median(run.newcomer(frames) for _ in range(5)),
                    "rss_kib": statistics.median(status_of(one.pid, "VmRSS") for one in running)}
             idle = run.over(lambda: time.sleep(IDLE_S))

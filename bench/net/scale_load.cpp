@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
   app.add_option("--domain", options.domain)->required();
   app.add_option("--timeout", timeout_ms)->required();
   app.add_option("--profile", options.profile)->required();
+  app.add_option("--discovery-server", options.discovery_server);
   CLI11_PARSE(app, argc, argv);
   options.timeout = tfdude::Milliseconds(timeout_ms);
   auto client = tfdude::Client::open(options);
