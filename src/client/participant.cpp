@@ -72,7 +72,7 @@ bool Participant::denies_plan(Errc code) {
 bool Participant::settled() {
   if (settled_.load(std::memory_order_relaxed)) return true;
   const auto now = Clock::now();
-  bool known = now >= settle_deadline_ + options_.timeout;
+  bool known = now >= settle_deadline_ + 3 * options_.timeout;
   if (!known && (now >= settle_deadline_ || transport_->settled())) {
     const std::lock_guard lock(structure_mutex_);
     known = directory_.complete();

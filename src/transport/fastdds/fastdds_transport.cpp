@@ -22,6 +22,8 @@ constexpr std::chrono::milliseconds kFirstBeatByServer{8000};
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
 
 // The DDS partition of the beats: those of a topic who are in different ones do not match.
+constexpr std::uint32_t kMany = 12;  // servers
+
 constexpr const char* kBeatPartition = "tfdude-beat";
 
 tl::unexpected<Error> not_created(const char* what) {
@@ -208,17 +210,17 @@ void FastDdsTransport::announce(const Presence& presence) {
   presence_outlet_->write(&*said_);
 }
 
-// Every second time it speaks, each time it looks who has fallen silent. What has changed since it last spoke is
-// for all to know, also those who join later; the rest is a beat that may be lost, as the next one follows.
+// Each time it looks who has fallen silent; every second time it speaks, among many every third, since what all hear of
+// all grows with the square. That is a beat that may be lost, as the next one follows; how many it hears is in that
+// alone, as it changes often just when there is most to do.
 void FastDdsTransport::keep_in_touch() {
   peers_.look_for_silent(Peers::Clock::now());
+  const auto heard = peers_.heard_count();
   const std::lock_guard lock(presence_mutex_);
-  to_speak_ = !to_speak_;
-  if (!said_ || !to_speak_) return;
-  if (const auto peers = peers_.heard_count(); peers != said_->peers()) {
-    said_->peers(peers);
-    presence_outlet_->write(&*said_);
-  }
+  if (++looks_ < (heard > kMany ? 3 : 2)) return;
+  looks_ = 0;
+  if (!said_) return;
+  said_->peers(heard);
   beat_outlet_->write(&*said_);
 }
 
