@@ -73,9 +73,11 @@ bool Participant::settled() {
   if (settled_.load(std::memory_order_relaxed)) return true;
   const auto now = Clock::now();
   bool known = now >= settle_deadline_ + 3 * options_.timeout;
-  if (!known && (now >= settle_deadline_ || transport_->settled())) {
+  if (!known) {
+    const bool met_all = transport_->settled();
+    const bool met_none = now >= settle_deadline_ && !transport_->awaits_presence();
     const std::lock_guard lock(structure_mutex_);
-    known = directory_.complete();
+    known = met_all ? directory_.complete() : met_none && directory_.knows_nobody();
   }
   if (known) settled_.store(true, std::memory_order_relaxed);
   return known;

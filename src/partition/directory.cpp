@@ -212,6 +212,11 @@ std::optional<Owner> Directory::owner(std::string_view partition) const {
   return entry->second;
 }
 
+bool Directory::knows_nobody() const {
+  return std::none_of(partitions_.begin() + 1, partitions_.end(),
+                      [](const Known& partition) { return partition.info.reachable; });
+}
+
 bool Directory::complete() const {
   return std::all_of(partitions_.begin(), partitions_.end(), [](const Known& partition) {
     return !partition.info.reachable || partition.complete();

@@ -28,7 +28,7 @@ struct Options {
   std::string discovery_server;
   Milliseconds timeout{1000};  ///< how long a call waits for the partitions that it asks
   /// How long a new participant looks round at most before it says that a frame is not there. It waits
-  /// this long only where it meets nobody; for partitions that it has met, and that are slow to tell what they own,
+  /// this long only where it meets nobody; for others that it has met or heard of, and that are slow to tell what they own,
   /// it waits three time-outs longer.
   Milliseconds discovery{1000};
   /// Directory in which a Node keeps its partition's frames, so that its next process has them back; empty:

@@ -83,6 +83,9 @@ class Directory {
   /// Up to which epoch this partition's structure is here.
   [[nodiscard]] std::uint64_t epoch(Owner owner) const { return partitions_[owner].epoch; }
 
+  /// Whether no other partition is reachable.
+  [[nodiscard]] bool knows_nobody() const;
+
   /// Whether all pages of all reachable partitions have come.
   [[nodiscard]] bool complete() const;
 
