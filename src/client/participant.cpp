@@ -362,6 +362,8 @@ void Participant::on_presence(const Presence& presence) {
       const auto before = directory_.serving(presence.partition);
       directory_.apply(presence, wall_clock());
       appeared = directory_.serving(presence.partition) && !before;
+      // It may be the last that was missing of the structure of one who has returned.
+      if (partition_ != nullptr && directory_.contested()) conceder_->ask();
     }
     tell_changes();
   }

@@ -218,6 +218,7 @@ Reply Participant::answer_here(const Request& request) {
   {
     const std::lock_guard lock(structure_mutex_);
     reply = partition_->answer(request, wall_clock());
+    if (directory_.contested()) conceder_->ask();
     tell_changes();
   }
   // This process sees the change already; the others are told without making it wait.
@@ -244,6 +245,8 @@ void Participant::on_request(const PeerId& from, const Request& request) {
       reply = {request.sequence, 0, Error{Errc::kNotOwner, given_up_}};
     } else {
       reply = partition_->answer(from, request, wall_clock());
+      // A frame that was moved has the younger claim now.
+      if (directory_.contested()) conceder_->ask();
     }
     tell_changes();
   }

@@ -49,13 +49,14 @@ Claim* Claims::shadowed(const std::string& id, Owner owner) {
   return mine != claims->second.end() ? &*mine : nullptr;
 }
 
-bool Claims::claim(const std::string& id, Claim claim) {
+bool Claims::claim(const std::string& id, Claim claim, Counts counts) {
   const auto there = forest_.info(id);
   std::optional<Claim> before;
   if (there && there->owner == claim.owner) before = in_force(*there);
   if (const Claim* mine = shadowed(id, claim.owner)) before = *mine;
   // A page that came late: the frame has left it since.
-  if (before && before->page != claim.page && before->since > claim.since) return false;
+  const bool late = before && before->page != claim.page && before->since > claim.since;
+  if (late && counts == Counts::kTheYounger) return false;
   const bool contested =
       (there && there->owner != claim.owner) || shadowed_.find(id) != shadowed_.end();
   if (!contested) {

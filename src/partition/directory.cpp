@@ -89,7 +89,8 @@ void Directory::apply(const Page& page) {
     return;
   }
   report_conflicts(partition, page);
-  put_page(partition, owner, page);
+  Ids outdated;
+  put_page(partition, owner, page, outdated);
   claims_.mend();
   take_notes(page.notes);
 }
@@ -102,7 +103,7 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
   partition.page_count = *successor.page_count;
   partition.epoch = 0;
   partition.successor.reset();
-  std::unordered_set<std::string_view> stays;
+  Ids stays;
   for (const auto& [number, page] : pages) {
     for (const PageEntry& entry : page.entries) stays.insert(entry.id);
   }
@@ -110,20 +111,25 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
     unclaim_all_but(stays, partition, owner, number);
   }
   partition.pages.clear();
-  for (const auto& [number, page] : pages) put_page(partition, owner, page);
+  // Of each frame the first claim that comes now replaces that of the life before, whichever is the younger.
+  for (const auto& [number, page] : pages) put_page(partition, owner, page, stays);
   claims_.mend();
   for (const auto& [number, page] : pages) take_notes(page.notes);
 }
 
-void Directory::put_page(Known& partition, Owner owner, const Page& page) {
-  std::unordered_set<std::string_view> stays;
+// @param outdated  frames whose claims here are of an earlier incarnation; those that the page has are taken out
+void Directory::put_page(Known& partition, Owner owner, const Page& page, Ids& outdated) {
+  Ids stays;
   for (const PageEntry& entry : page.entries) stays.insert(entry.id);
   unclaim_all_but(stays, partition, owner, page.number);
   KeptPage& kept = partition.pages[page.number];
   kept.ids.clear();
   for (const PageEntry& entry : page.entries) {
-    latest_stamp_ = std::max(latest_stamp_, std::min(entry.since, kLastStamp));
-    const bool fresh = claims_.claim(entry.id, {owner, entry.parent, entry.since, page.number});
+    saw_stamp(entry.since);
+    const auto counts =
+        outdated.erase(entry.id) != 0 ? Claims::Counts::kThis : Claims::Counts::kTheYounger;
+    const bool fresh =
+        claims_.claim(entry.id, {owner, entry.parent, entry.since, page.number}, counts);
     partition.info.frames += fresh ? 1 : 0;
     kept.ids += static_cast<char>(entry.id.size());
     kept.ids += entry.id;
@@ -134,8 +140,8 @@ void Directory::put_page(Known& partition, Owner owner, const Page& page) {
 }
 
 // A frame that has changed its page is claimed by the other by now, as pages come in order.
-void Directory::unclaim_all_but(const std::unordered_set<std::string_view>& stays, Known& partition,
-                                Owner owner, std::uint32_t number) {
+void Directory::unclaim_all_but(const Ids& stays, Known& partition, Owner owner,
+                                std::uint32_t number) {
   const auto there = partition.pages.find(number);
   if (there == partition.pages.end()) return;
   const std::string& ids = there->second.ids;
@@ -163,7 +169,7 @@ void Directory::report_conflicts(const Known& partition, const Page& page) {
 
 void Directory::take_notes(const std::vector<Note>& notes) {
   for (const Note& note : notes) {
-    latest_stamp_ = std::max(latest_stamp_, std::min(note.since, kLastStamp));
+    saw_stamp(note.since);
     const auto waiting = forest_.waiting_for(note.id);
     orphans_ = orphans_ || std::any_of(waiting.begin(), waiting.end(), [&](const FrameInfo& frame) {
                  return is_orphan(frame, note);
@@ -186,6 +192,10 @@ std::vector<Concession> Directory::concessions() {
     }
   }
   return all;
+}
+
+void Directory::saw_stamp(std::uint64_t stamp) {
+  latest_stamp_ = std::max(latest_stamp_, std::min(stamp, kLastStamp));
 }
 
 std::uint64_t Directory::next_stamp(Time now) {

@@ -24,6 +24,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
                                 Time now) {
   std::vector<const StoredFrame*> contested;
   for (const StoredFrame& frame : state.frames) {
+    directory_.saw_stamp(frame.since);
     const bool mine =
         directory_.take(frame.id, frame.since) &&
         forest_.add(frame.id, frame.parent, frame.X_PC, Forest::MissingParent::kAllow, frame.since);
@@ -33,7 +34,10 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
       contested.push_back(&frame);
     }
   }
-  for (const Note& note : state.notes) pages_.leave(note);
+  for (const Note& note : state.notes) {
+    directory_.saw_stamp(note.since);
+    pages_.leave(note);
+  }
   pages_.resume(state.epoch);
   // Only what changes from here on is not in the store.
   saved_ = true;

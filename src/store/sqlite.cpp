@@ -1,11 +1,30 @@
 #include "store/sqlite.hpp"
 
+#include <array>
 #include <cstring>
+#include <utility>
 
 namespace tfdude::sqlite {
 namespace {
 
+// Longer than any row that is ever written.
+constexpr int kLongestRow = 64 * 1024;
+
 tl::unexpected<Error> failed(sqlite3* handle) { return fail(Errc::kState, sqlite3_errmsg(handle)); }
+
+// A file may come from anywhere: what its schema says is not to be run, and the file not to be touched by looking.
+void distrust(sqlite3* handle) {
+  constexpr std::array<std::pair<int, int>, 6> kSettings{{{SQLITE_DBCONFIG_DEFENSIVE, 1},
+                                                          {SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0},
+                                                          {SQLITE_DBCONFIG_ENABLE_TRIGGER, 0},
+                                                          {SQLITE_DBCONFIG_ENABLE_VIEW, 0},
+                                                          {SQLITE_DBCONFIG_DQS_DDL, 0},
+                                                          {SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1}}};
+  for (const auto& [setting, value] : kSettings) {
+    sqlite3_db_config(handle, setting, value, nullptr);
+  }
+  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kLongestRow);
+}
 
 }  // namespace
 
@@ -19,7 +38,12 @@ Result<Database> Database::open(const std::string& file) {
   if (status != SQLITE_OK) {
     return fail(Errc::kState, handle != nullptr ? sqlite3_errmsg(handle) : sqlite3_errstr(status));
   }
+  distrust(handle);
   return database;
+}
+
+void Database::tidy_up_at_close() {
+  sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
 }
 
 Result<void> Database::run(const char* sql) {
@@ -60,6 +84,18 @@ Result<bool> Statement::next() {
   if (status == SQLITE_ROW) return true;
   if (status == SQLITE_DONE) return false;
   return failed(sqlite3_db_handle(handle_.get()));
+}
+
+Result<void> Statement::check_types(std::initializer_list<int> types) const {
+  int column = 0;
+  for (const int type : types) {
+    if (sqlite3_column_type(handle_.get(), column) != type) {
+      return fail(Errc::kState, std::string("a value of another type in column ") +
+                                    sqlite3_column_name(handle_.get(), column));
+    }
+    ++column;
+  }
+  return {};
 }
 
 std::string Statement::text(int column) const {

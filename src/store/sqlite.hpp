@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <memory>
 #include <sqlite3.h>
 #include <string>
@@ -16,6 +17,9 @@ namespace tfdude::sqlite {
 class Database {
  public:
   [[nodiscard]] static Result<Database> open(const std::string& file);
+
+  /// Closes the log of a file that was changed, into the file; before, a file is left as it was found.
+  void tidy_up_at_close();
 
   /// Runs statements that give no rows.
   [[nodiscard]] Result<void> run(const char* sql);
@@ -62,6 +66,8 @@ class Statement {
   }
   [[nodiscard]] Result<bool> next();
 
+  /// That the row is of these types, each SQLITE_INTEGER or the like: a column may hold any. @return kState.
+  [[nodiscard]] Result<void> check_types(std::initializer_list<int> types) const;
   [[nodiscard]] std::string text(int column) const;
   [[nodiscard]] std::uint64_t number(int column) const;
   /// @return kState where the column is not as large as one.

@@ -1,6 +1,8 @@
 #include "store/sqlite_store.hpp"
 
+#include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -16,7 +18,9 @@ using sqlite::Statement;
 constexpr std::int64_t kApplication = 0x74666475;  // "tfdu"
 constexpr std::int64_t kFormat = 1;
 constexpr std::size_t kLongestFileName = 200;
+constexpr std::uint64_t kLastCount = 1ULL << 63U;
 
+// A file with other words than these is refused: a change of them needs another format.
 constexpr const char* kSchema = R"(
   CREATE TABLE about(partition TEXT NOT NULL, epoch INTEGER NOT NULL);
   CREATE TABLE frames(id TEXT PRIMARY KEY, parent TEXT NOT NULL, x_pc BLOB NOT NULL,
@@ -26,6 +30,24 @@ constexpr const char* kSchema = R"(
   CREATE TABLE configured(id TEXT PRIMARY KEY, parent TEXT NOT NULL, x_pc BLOB NOT NULL)
                      WITHOUT ROWID;
 )";
+
+std::string without_spaces(std::string_view text) {
+  std::string plain;
+  std::copy_if(text.begin(), text.end(), std::back_inserter(plain),
+               [](char c) { return c != ' ' && c != '\n' && c != ';'; });
+  return plain;
+}
+
+template <class Take>
+Result<void> each_row(const Database& database, const char* sql, Take take) {
+  auto rows = Statement::prepare(database, sql);
+  if (!rows) return tl::unexpected(std::move(rows.error()));
+  for (auto row = rows->start();; row = rows->next()) {
+    if (!row) return tl::unexpected(std::move(row.error()));
+    if (!*row) return {};
+    if (auto taken = take(*rows); !taken) return taken;
+  }
+}
 
 class SqliteStore final : public StateStore {
  public:
@@ -41,17 +63,22 @@ class SqliteStore final : public StateStore {
  private:
   [[nodiscard]] tl::unexpected<Error> unusable(const std::string& why) const;
   [[nodiscard]] tl::unexpected<Error> damaged(const std::string& how) const;
+  Result<void> lock();
   Result<void> check(const std::string& partition);
+  Result<void> check_tables();
   Result<void> create(const std::string& partition);
   Result<void> prepare();
+  Result<void> load_about(StoredState& state);
   Result<void> load_frames(StoredState& state);
   Result<void> load_notes(StoredState& state);
   Result<void> load_configured(StoredState& state);
+  Result<void> make_ready();
   template <class Write>
   Result<void> transaction(Write write);
 
   const std::string file_;
   std::optional<Database> database_;
+  bool written_ = false;  // by this process
   Statement set_epoch_;
   Statement erase_frame_;
   Statement erase_note_;
@@ -66,7 +93,7 @@ tl::unexpected<Error> SqliteStore::unusable(const std::string& why) const {
 }
 
 tl::unexpected<Error> SqliteStore::damaged(const std::string& how) const {
-  return unusable("is damaged (" + how +
+  return unusable("is damaged (" + printable(how) +
                   "): move it away to start from the configuration, or put a copy of it back");
 }
 
@@ -81,23 +108,26 @@ Result<void> SqliteStore::open(const std::string& partition) {
   return {};
 }
 
-// Nothing is written before it is known that the file is this partition's, or new.
-Result<void> SqliteStore::check(const std::string& partition) {
-  // One process at a time, which then needs no shared memory for the log.
+// One process at a time, which then needs no shared memory for the log.
+Result<void> SqliteStore::lock() {
   auto locked = database_->run("PRAGMA busy_timeout = 200; PRAGMA locking_mode = EXCLUSIVE;");
   if (locked) locked = database_->run("BEGIN IMMEDIATE; ROLLBACK;");
-  if (!locked) {
-    const bool busy = database_->code() == SQLITE_BUSY;
-    return busy ? unusable("is in use by another process: is the partition served already?")
-                : damaged(locked.error().message);
-  }
+  if (locked) return {};
+  const bool busy = database_->code() == SQLITE_BUSY;
+  return busy ? unusable("is in use by another process: is the partition served already?")
+              : damaged(locked.error().message);
+}
+
+// Nothing is written before it is known that the file is this partition's, or new; nor are its tables looked into
+// before it is known that they are plain ones.
+Result<void> SqliteStore::check(const std::string& partition) {
+  if (auto locked = lock(); !locked) return locked;
   const auto application = database_->number("PRAGMA application_id");
   const auto format = database_->number("PRAGMA user_version");
   const auto tables = database_->number("SELECT count(*) FROM sqlite_master");
-  const auto sound = database_->text("PRAGMA quick_check(1)");
-  if (!application || !format || !tables || !sound || *sound != "ok") {
-    return damaged(sound ? *sound : sound.error().message);
-  }
+  if (!application) return damaged(application.error().message);
+  if (!format) return damaged(format.error().message);
+  if (!tables) return damaged(tables.error().message);
   if (*tables == 0 && *application == 0 && *format == 0) return create(partition);
   if (*application != kApplication) {
     return unusable("belongs to another program: name another directory, or move it away");
@@ -108,15 +138,37 @@ Result<void> SqliteStore::check(const std::string& partition) {
                     ": use the version that wrote it, or move it away to start from the "
                     "configuration");
   }
+  if (auto checked = check_tables(); !checked) return damaged(checked.error().message);
   const auto of = database_->text("SELECT partition FROM about");
   if (!of) return damaged(of.error().message);
-  if (*of == partition) return database_->run("PRAGMA synchronous = NORMAL");
+  if (*of == partition) return {};
   return unusable("is of partition " + quote(*of) + ", not of " + quote(partition) +
                   ": move it away, or put the right one back");
 }
 
+// The tables are those that were made, and nothing besides: no trigger, view or check that would run.
+Result<void> SqliteStore::check_tables() {
+  std::string schema;
+  const char* sql = "SELECT type, sql FROM sqlite_master ORDER BY rowid";
+  auto read = each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
+    schema += row.text(1);
+    return row.check_types({SQLITE_TEXT, SQLITE_TEXT});
+  });
+  if (!read) return read;
+  if (without_spaces(schema) != without_spaces(kSchema)) {
+    return fail(Errc::kState, "its tables are not those of a state");
+  }
+  const auto sound = database_->text("PRAGMA quick_check(1)");
+  if (!sound) return tl::unexpected(sound.error());
+  const auto rows = database_->number("SELECT count(*) FROM about");
+  if (!rows) return tl::unexpected(rows.error());
+  if (*sound != "ok") return fail(Errc::kState, *sound);
+  if (*rows != 1) return fail(Errc::kState, "it says of " + std::to_string(*rows) + " partitions");
+  return {};
+}
+
 Result<void> SqliteStore::create(const std::string& partition) {
-  auto done = database_->run("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;");
+  auto done = make_ready();
   if (done) done = database_->run("BEGIN IMMEDIATE");
   if (done) done = database_->run(kSchema);
   if (done) {
@@ -148,22 +200,18 @@ Result<void> SqliteStore::prepare() {
   return {};
 }
 
-Result<StoredState> SqliteStore::load() {
-  StoredState state;
-  const auto epoch = database_->number("SELECT epoch FROM about");
-  if (!epoch) return damaged(epoch.error().message);
-  state.epoch = static_cast<std::uint64_t>(*epoch);
-  for (auto part :
-       {&SqliteStore::load_frames, &SqliteStore::load_notes, &SqliteStore::load_configured}) {
-    if (auto loaded = (this->*part)(state); !loaded) return damaged(loaded.error().message);
-  }
-  return state;
+// No clock comes so far, and what is counted from there on is still greater.
+Result<std::uint64_t> read_count(const Statement& row, int column) {
+  const std::uint64_t count = row.number(column);
+  if (count > kLastCount) return fail(Errc::kState, "a time of " + std::to_string(count));
+  return count;
 }
 
-// What one row says of a frame, and whether that can be.
-Result<FrameSpec> read_frame(const Statement& row) {
+// What one row says of a frame, and whether that can be. Rows come in the order of their ids.
+Result<FrameSpec> read_frame(const Statement& row, const std::string& before) {
   FrameSpec frame{row.text(0), row.text(1), {}};
   if (auto ok = check_id(frame.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
+  if (frame.id <= before) return fail(Errc::kState, "frame " + quote(frame.id) + " out of order");
   if (!frame.parent.empty()) {
     if (auto ok = check_id(frame.parent, "parent"); !ok) return tl::unexpected(ok.error());
   }
@@ -174,53 +222,95 @@ Result<FrameSpec> read_frame(const Statement& row) {
   return frame;
 }
 
-template <class Take>
-Result<void> each_row(const Database& database, const char* sql, Take take) {
-  auto rows = Statement::prepare(database, sql);
-  if (!rows) return tl::unexpected(std::move(rows.error()));
-  for (auto row = rows->start();; row = rows->next()) {
-    if (!row) return tl::unexpected(std::move(row.error()));
-    if (!*row) return {};
-    if (auto taken = take(*rows); !taken) return taken;
+Result<Note> read_note(const Statement& row, const std::string& before) {
+  const std::uint64_t kind = row.number(2);
+  const auto since = read_count(row, 1);
+  if (!since) return tl::unexpected(since.error());
+  Note note{row.text(0), *since, static_cast<Note::Kind>(kind), row.text(3)};
+  if (auto ok = check_id(note.id, "id"); !ok) return tl::unexpected(ok.error());
+  if (note.id <= before) return fail(Errc::kState, "note of " + quote(note.id) + " out of order");
+  if (kind < 1 || kind > static_cast<std::uint64_t>(Note::Kind::kUnhung)) {
+    return fail(Errc::kState, "a note of kind " + std::to_string(kind));
   }
+  if (!note.rival.empty()) {
+    if (auto ok = check_partition_name(note.rival); !ok) return tl::unexpected(ok.error());
+  }
+  return note;
+}
+
+Result<StoredState> SqliteStore::load() {
+  StoredState state;
+  for (auto part : {&SqliteStore::load_about, &SqliteStore::load_frames, &SqliteStore::load_notes,
+                    &SqliteStore::load_configured}) {
+    if (auto loaded = (this->*part)(state); !loaded) return damaged(loaded.error().message);
+  }
+  return state;
+}
+
+Result<void> SqliteStore::load_about(StoredState& state) {
+  return each_row(*database_, "SELECT epoch FROM about", [&](const Statement& row) -> Result<void> {
+    if (auto ok = row.check_types({SQLITE_INTEGER}); !ok) return ok;
+    const auto epoch = read_count(row, 0);
+    if (!epoch) return tl::unexpected(epoch.error());
+    state.epoch = *epoch;
+    return {};
+  });
 }
 
 Result<void> SqliteStore::load_frames(StoredState& state) {
-  const char* sql = "SELECT id, parent, x_pc, since FROM frames";
+  const char* sql = "SELECT id, parent, x_pc, since FROM frames ORDER BY id";
   return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
-    auto frame = read_frame(row);
+    auto ok = row.check_types({SQLITE_TEXT, SQLITE_TEXT, SQLITE_BLOB, SQLITE_INTEGER});
+    if (!ok) return ok;
+    auto frame = read_frame(row, state.frames.empty() ? "" : state.frames.back().id);
     if (!frame) return tl::unexpected(std::move(frame.error()));
-    state.frames.push_back({frame->id, frame->parent, frame->X_PC, row.number(3)});
+    const auto since = read_count(row, 3);
+    if (!since) return tl::unexpected(since.error());
+    state.frames.push_back({frame->id, frame->parent, frame->X_PC, *since});
     return {};
   });
 }
 
 Result<void> SqliteStore::load_notes(StoredState& state) {
-  const char* sql = "SELECT id, since, kind, rival FROM notes ORDER BY since";
-  return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
-    const std::uint64_t kind = row.number(2);
-    Note note{row.text(0), row.number(1), static_cast<Note::Kind>(kind), row.text(3)};
-    if (auto ok = check_id(note.id, "id"); !ok) return ok;
-    if (kind < 1 || kind > static_cast<std::uint64_t>(Note::Kind::kUnhung)) {
-      return fail(Errc::kState, "a note of kind " + std::to_string(kind));
-    }
-    state.notes.push_back(std::move(note));
+  const char* sql = "SELECT id, since, kind, rival FROM notes ORDER BY id";
+  auto loaded = each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
+    auto ok = row.check_types({SQLITE_TEXT, SQLITE_INTEGER, SQLITE_INTEGER, SQLITE_TEXT});
+    if (!ok) return ok;
+    auto note = read_note(row, state.notes.empty() ? "" : state.notes.back().id);
+    if (!note) return tl::unexpected(std::move(note.error()));
+    state.notes.push_back(*std::move(note));
     return {};
   });
+  // The oldest are the first to go.
+  std::stable_sort(state.notes.begin(), state.notes.end(),
+                   [](const Note& a, const Note& b) { return a.since < b.since; });
+  return loaded;
 }
 
 Result<void> SqliteStore::load_configured(StoredState& state) {
-  const char* sql = "SELECT id, parent, x_pc FROM configured";
+  const char* sql = "SELECT id, parent, x_pc FROM configured ORDER BY id";
   return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
-    auto frame = read_frame(row);
+    auto ok = row.check_types({SQLITE_TEXT, SQLITE_TEXT, SQLITE_BLOB});
+    if (!ok) return ok;
+    auto frame = read_frame(row, state.configured.empty() ? "" : state.configured.back().id);
     if (!frame) return tl::unexpected(std::move(frame.error()));
     state.configured.push_back(*std::move(frame));
     return {};
   });
 }
 
+Result<void> SqliteStore::make_ready() {
+  if (written_) return {};
+  auto done = database_->run("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;");
+  if (done) database_->tidy_up_at_close();
+  written_ = done.has_value();
+  return done;
+}
+
 template <class Write>
 Result<void> SqliteStore::transaction(Write write) {
+  if (auto ready = make_ready(); !ready)
+    return unusable("cannot be written: " + ready.error().message);
   auto done = database_->run("BEGIN IMMEDIATE");
   if (done) done = write();
   if (done) done = database_->run("COMMIT");

@@ -26,7 +26,7 @@ void demand_served(const Config& config) {
   demand(check_partition_name(name).has_value(), "a partition's name is checked");
   testing::Replica replica(name);
   Partition partition(name, 1, replica.forest, replica.directory);
-  const auto loaded = partition.load(config.frames);
+  const auto loaded = partition.load(config.frames, Time{});
   demand(loaded.has_value(), "what was accepted can be loaded");
   std::set<std::string> ids;
   for (const FrameSpec& frame : config.frames) {

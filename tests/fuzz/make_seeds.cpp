@@ -1,11 +1,15 @@
-// Writes seeds: make_seeds FOLDER. One file for each message of tests/support/samples.hpp, and choices for the
-// harness of partitions; those of configurations are written by hand.
+// Writes seeds: make_seeds FOLDER. One file for each message of tests/support/samples.hpp, choices for the
+// harness of partitions, and stored states; those of configurations are written by hand.
 
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <memory>
+#include <sqlite3.h>
 #include <string>
 
+#include "store/sqlite_store.hpp"
 #include "support/samples.hpp"
 
 namespace tfdude::fuzz {
@@ -39,6 +43,68 @@ void write_choices(const std::filesystem::path& folder) {
   }
 }
 
+Bytes content(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::unique_ptr<StateStore> opened(const std::filesystem::path& file) {
+  auto store = open_sqlite_store(file, "arms");
+  if (!store) std::fprintf(stderr, "%s\n", store.error().message.c_str());
+  return store ? *std::move(store) : nullptr;
+}
+
+// Pages as small as they can be, so that a file is.
+bool shrink(const std::filesystem::path& file) {
+  sqlite3* database = nullptr;
+  sqlite3_open(file.c_str(), &database);
+  const int status = sqlite3_exec(database,
+                                  "PRAGMA journal_mode = DELETE; PRAGMA page_size = 512; VACUUM;"
+                                  "PRAGMA journal_mode = WAL;",
+                                  nullptr, nullptr, nullptr);
+  sqlite3_close(database);
+  return status == SQLITE_OK;
+}
+
+// A first byte says what the rest is: a file; or the length of its log in two bytes, the file and the log.
+Bytes state_of(std::uint8_t kind, const std::filesystem::path& file) {
+  Bytes bytes = content(file);
+  if (kind == 1) {
+    const Bytes log = content(file.string() + "-wal");
+    bytes.insert(bytes.end(), log.begin(), log.end());
+    bytes.insert(bytes.begin(), {static_cast<std::uint8_t>(log.size() / 256),
+                                 static_cast<std::uint8_t>(log.size() % 256)});
+  }
+  bytes.insert(bytes.begin(), kind);
+  return bytes;
+}
+
+bool write_states(const std::filesystem::path& folder) {
+  Random random(0x57a7e);
+  const auto file = std::filesystem::temp_directory_path() / "tfdude-seed.sqlite";
+  std::filesystem::remove(file);
+  opened(file).reset();
+  if (!shrink(file)) return false;
+  write(folder / "state", "empty", state_of(0, file));
+  const StateChange change{7,
+                           {"hand", "arm", "lamp"},
+                           {{"arm", "", random.transform(), 5}, {"hand", "arm", {}, 6}},
+                           {{"lamp", 7, Note::Kind::kGaveWay, "head"}}};
+  {
+    const auto store = opened(file);
+    if (!store || !store->save(change)) return false;
+    write(folder / "state", "log", state_of(1, file));
+    if (!store->save_configured({{"arm", "", {}}})) return false;
+  }
+  write(folder / "state", "full", state_of(0, file));
+  std::filesystem::remove(file);
+  Bytes choices(200);
+  for (std::uint8_t& byte : choices) byte = static_cast<std::uint8_t>(random.index(256));
+  choices[0] = 3;
+  write(folder / "state", "rows", choices);
+  return true;
+}
+
 }  // namespace
 }  // namespace tfdude::fuzz
 
@@ -49,4 +115,5 @@ int main(int argc, char** argv) {
   }
   tfdude::fuzz::write_samples(argv[1]);
   tfdude::fuzz::write_choices(argv[1]);
+  return tfdude::fuzz::write_states(argv[1]) ? 0 : 1;
 }

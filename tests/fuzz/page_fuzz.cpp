@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fuzz/key.hpp"
+#include "fuzz/plain_claims.hpp"
 #include "fuzz/wire.hpp"
 #include "support/replica.hpp"
 
@@ -13,6 +14,8 @@ namespace {
 
 void demand_known(const Page& page) {
   testing::Replica replica;
+  PlainClaims plain;
+  (void)plain.apply(page);
   std::set<std::string> ids;
   for (const PageEntry& entry : page.entries) ids.insert(entry.id);
   for (int times = 0; times < 2; ++times) {
@@ -22,6 +25,11 @@ void demand_known(const Page& page) {
     demand(replica.directory.epoch(*owner) == page.epoch, "a page completes its epoch");
     demand(replica.directory.info(*owner).frames == ids.size(), "frames are counted once");
     demand(replica.forest.frames().size() == ids.size(), "all frames of a page are there");
+  }
+  demand_shows(replica.forest, replica.directory, without_cycles(plain.oldest()));
+  const std::uint64_t next = replica.directory.next_stamp(Time{});
+  for (const PageEntry& entry : page.entries) {
+    demand(next > entry.since || entry.since > 1ULL << 63U, "a stamp is later than all seen");
   }
   Page later{page.partition, page.number, page.incarnation, page.epoch, {}};
   replica.directory.apply(later);

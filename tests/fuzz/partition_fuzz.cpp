@@ -1,7 +1,11 @@
 // What an owner and its hearers make of any sequence of messages, all of them valid one by one: requests of
-// peers, streams, and what other partitions say that they own. The bytes are choices, not messages.
+// peers, streams, and what other partitions say that they own; and how the owner returns. The bytes are choices, not messages.
 
+#include <algorithm>
+#include <chrono>
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
@@ -14,6 +18,8 @@
 #include "fuzz/demand.hpp"
 #include "fuzz/forest_checks.hpp"
 #include "fuzz/plain_claims.hpp"
+#include "fuzz/plain_owner.hpp"
+#include "support/memory_store.hpp"
 #include "support/replica.hpp"
 
 namespace tfdude::fuzz {
@@ -53,7 +59,7 @@ class Choices {
     return several<EdgeUpdate>(3, [this] { return EdgeUpdate{id(), transform()}; });
   }
   [[nodiscard]] Request request() {
-    Request request{upto<std::uint32_t>(600), id(), {}};
+    Request request{0, id(), {}};
     switch (upto<std::uint8_t>(4)) {
       case 0:
         request.body = AddRequest{parent(), transform()};
@@ -72,9 +78,16 @@ class Choices {
     }
     return request;
   }
+  [[nodiscard]] std::uint64_t since() { return upto<std::uint64_t>(20); }
+  [[nodiscard]] Time time() { return Time(std::chrono::nanoseconds(since())); }
+  [[nodiscard]] Note note() {
+    const auto kind = static_cast<Note::Kind>(1 + upto<std::uint8_t>(2));
+    return {id(), since(), kind, kind == Note::Kind::kRemoved ? "" : other()};
+  }
   [[nodiscard]] Page page() {
     Page page{other(), upto<std::uint32_t>(2), upto<std::uint64_t>(3), upto<std::uint64_t>(9), {}};
-    page.entries = several<PageEntry>(5, [this] { return PageEntry{id(), parent()}; });
+    page.entries = several<PageEntry>(5, [this] { return PageEntry{id(), parent(), since()}; });
+    page.notes = several<Note>(2, [this] { return note(); });
     return page;
   }
   [[nodiscard]] Presence presence() {
@@ -87,84 +100,167 @@ class Choices {
   FuzzedDataProvider data_;
 };
 
+// A process that serves a partition, and the model of what it holds and has heard.
+struct Serving {
+  explicit Serving(std::uint64_t life)
+      : incarnation(life),
+        replica(kOwn),
+        partition(kOwn, life, replica.forest, replica.directory) {}
+
+  std::uint64_t incarnation;
+  testing::Replica replica;
+  Partition partition;
+  PlainClaims others;
+};
+
 class World {
  public:
+  World() { start(Time{}, {}); }
+
   void step(Choices& choices) {
-    switch (choices.upto<std::uint8_t>(6)) {
+    const Time now = choices.time();
+    switch (choices.upto<std::uint8_t>(9)) {
       case 0:
       case 1:
-        answer(choices.peer(), choices.request());
-        break;
       case 2:
+        answer(choices.peer(), choices.request(), now);
+        break;
       case 3:
-        hear(choices.page());
+        answer_again(choices);
         break;
       case 4:
-        hear(choices.presence());
-        break;
       case 5:
-        lose(choices.other(), choices.upto<std::uint64_t>(3));
+      case 6:
+        hear(choices.page(), now);
+        break;
+      case 7:
+        hear(choices.presence(), now);
+        break;
+      case 8:
+        if (choices.upto<std::uint8_t>(1) == 0) {
+          stream({choices.edges()});
+        } else {
+          lose(choices.other(), choices.upto<std::uint64_t>(3));
+        }
         break;
       default:
-        stream({choices.edges()});
+        restart(now, choices.upto<std::uint8_t>(1) == 0);
     }
+    owner_.demand_told(*all_.life(kOwn));
   }
 
   void demand_all_is_well() const {
-    demand_consistent(own_.forest);
+    const testing::Replica& own = own_->replica;
+    demand_consistent(own.forest);
     demand_consistent(hearer_.forest);
-    others_claims_.demand_followed(own_.forest, own_.directory);
-    others_claims_.demand_counted(own_.directory);
-    all_claims_.demand_followed(hearer_.forest, hearer_.directory);
-    all_claims_.demand_counted(hearer_.directory);
-    testing::Replica late;
-    late.apply(all_claims_.pages());
-    demand_consistent(late.forest);
-    all_claims_.demand_followed(late.forest, late.directory);
-    demand_published();
-    demand_routes(own_);
+    demand_shows(own.forest, own.directory, without_cycles(owner_.with(own_->others.oldest())));
+    own_->others.demand_counted(own.directory);
+    demand_shows(hearer_.forest, hearer_.directory, without_cycles(all_.oldest()));
+    all_.demand_counted(hearer_.directory);
+    demand_late_joiner();
+    demand_stored();
+    demand_routes(own);
     demand_routes(hearer_);
   }
 
  private:
-  void answer(const PeerId& peer, const Request& request) {
-    const Reply reply = partition_.answer(peer, request);
+  void answer(const PeerId& peer, Request request, Time now) {
+    request.sequence = ++sequence_;
+    const std::uint64_t latest = latest_known();
+    const Reply reply = own_->partition.answer(peer, request, now);
     demand(reply.sequence == request.sequence, "a reply has its request's number");
-    if (const auto* error = std::get_if<Error>(&reply.body)) demand_printable(*error);
+    const auto* error = std::get_if<Error>(&reply.body);
+    if (error != nullptr) demand_printable(*error);
     if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
       const auto* transforms = std::get_if<std::vector<Transform>>(&reply.body);
       demand(transforms == nullptr || transforms->size() == lookup->segments.size(),
              "there is a transform for each segment");
+    } else {
+      const Picture others = own_->others.oldest();
+      demand(owner_.answer(request, others) == (error == nullptr), "what can be done is granted");
+      owner_.concede(others, {});
+      answered_.push_back({peer, request, reply});
     }
+    owner_.demand_held(own_->replica.forest, latest);
     publish();
-    const auto version = own_.forest.structure_version();
-    const Reply again = partition_.answer(peer, request);
-    demand(again.body.index() == reply.body.index() && again.epoch == reply.epoch,
-           "a repeated request is answered as before");
-    demand(own_.forest.structure_version() == version, "a repeated request changes nothing");
   }
 
-  void publish() {
-    for (const Page& page : partition_.take_pages()) {
-      hearer_.directory.apply(page);
-      all_claims_.apply(page);
-    }
+  void answer_again(Choices& choices) {
+    if (answered_.empty()) return;
+    const Answered& once = answered_[choices.upto(answered_.size() - 1)];
+    const auto version = own_->replica.forest.structure_version();
+    const Reply again = own_->partition.answer(once.peer, once.request, choices.time());
+    demand(own_->replica.forest.structure_version() == version,
+           "a repeated request changes nothing");
+    const bool same =
+        again.body.index() == once.reply.body.index() && again.epoch == once.reply.epoch;
+    const bool refused = std::holds_alternative<Error>(again.body);
+    demand(same || refused, "a repeated request is answered as before, or called too old");
   }
 
   template <class Said>
-  void hear(const Said& said) {
-    apply(own_, said);
+  void hear(const Said& said, Time now) {
+    const std::uint64_t latest = latest_known();
+    apply(own_->replica, said);
+    (void)own_->partition.concede(now, {});
+    const std::vector<Note> notes = own_->others.apply(said);
+    owner_.concede(own_->others.oldest(), notes);
+    owner_.demand_held(own_->replica.forest, latest);
     apply(hearer_, said);
-    others_claims_.apply(said);
-    all_claims_.apply(said);
+    (void)all_.apply(said);
+    publish();
   }
   static void apply(testing::Replica& replica, const Page& page) { replica.directory.apply(page); }
   static void apply(testing::Replica& replica, const Presence& presence) {
     replica.directory.apply(presence, Time{});
   }
 
+  void publish() {
+    demand(store_.save(own_->partition.take_unsaved()).has_value(), "memory takes all");
+    for (const Page& page : own_->partition.take_pages()) {
+      hearer_.directory.apply(page);
+      (void)all_.apply(page);
+    }
+    const Presence presence =
+        testing::presence_of(kOwn, own_->incarnation, own_->partition.page_count());
+    hearer_.directory.apply(presence, Time{});
+    (void)all_.apply(presence);
+  }
+
+  // The greatest stamp that the owner has seen, as far as it still knows it.
+  [[nodiscard]] std::uint64_t latest_known() const {
+    std::uint64_t latest = own_->others.latest();
+    for (const auto& [id, place] : owner_.places()) latest = std::max(latest, place.since);
+    return latest;
+  }
+
+  // The owner returns from what it stored, and hears all others before it begins or after.
+  void restart(Time now, bool knowing) {
+    const std::vector<Page> said = own_->others.pages();
+    start(now, knowing ? said : std::vector<Page>());
+    if (knowing) return;
+    for (const Page& page : said) hear(page, now);
+  }
+
+  void start(Time now, const std::vector<Page>& said) {
+    own_ = std::make_unique<Serving>(++lives_);
+    std::vector<Note> notes;
+    answered_.clear();
+    for (const Page& page : said) {
+      own_->replica.directory.apply(page);
+      const auto heard = own_->others.apply(page);
+      notes.insert(notes.end(), heard.begin(), heard.end());
+    }
+    const std::uint64_t latest = latest_known();
+    const auto left = store_.load();
+    demand(own_->partition.restore(*left, {}, now).has_value(), "what was left is taken");
+    owner_.concede(own_->others.oldest(), notes);
+    owner_.demand_held(own_->replica.forest, latest);
+    publish();
+  }
+
   void lose(const std::string& name, std::uint64_t incarnation) {
-    for (testing::Replica* replica : {&own_, &hearer_}) {
+    for (testing::Replica* replica : {&own_->replica, &hearer_}) {
       const bool there = replica->directory.serving(name).has_value();
       const bool news = replica->directory.lost(name, incarnation, Time{});
       demand(there || !news, "nobody is lost who was not there");
@@ -174,19 +270,32 @@ class World {
 
   void stream(const Update& update) {
     std::size_t held = 0;
-    for (const EdgeUpdate& edge : update.edges) held += own_.forest.holds(edge.id) ? 1U : 0U;
-    demand(partition_.apply(update) == held, "of a stream all is taken that is held");
+    for (const EdgeUpdate& edge : update.edges) held += owner_.holds(edge.id) ? 1U : 0U;
+    demand(own_->partition.apply(update) == held, "of a stream all is taken that is held");
   }
 
-  void demand_published() const {
-    std::size_t held = 0;
-    for (const FrameInfo& frame : own_.forest.frames()) {
-      if (frame.owner != kHeldHere) continue;
-      ++held;
-      demand(all_claims_.parents(kOwn, frame.id) == std::set<std::string>{frame.parent},
-             "what is held is published as it is");
+  // Who comes late, and hears those first who were heard last, has the same picture.
+  void demand_late_joiner() const {
+    testing::Replica late;
+    PlainClaims said;
+    auto pages = all_.pages();
+    for (auto page = pages.rbegin(); page != pages.rend(); ++page) {
+      late.directory.apply(*page);
+      (void)said.apply(*page);
     }
-    demand(partition_.frame_count() == held, "nothing is published but what is held");
+    demand_consistent(late.forest);
+    demand_shows(late.forest, late.directory, without_cycles(said.oldest()));
+  }
+
+  void demand_stored() const {
+    const auto stored = store_.load();
+    demand(stored->frames.size() == owner_.places().size(), "what is held is stored");
+    for (const StoredFrame& frame : stored->frames) {
+      const auto place = owner_.places().find(frame.id);
+      demand(place != owner_.places().end() && place->second.parent == frame.parent &&
+                 place->second.since == frame.since,
+             "it is stored as it is held");
+    }
   }
 
   static void demand_routes(const testing::Replica& replica) {
@@ -203,11 +312,20 @@ class World {
     }
   }
 
-  testing::Replica own_{kOwn};
-  Partition partition_{kOwn, 1, own_.forest, own_.directory};
+  struct Answered {
+    PeerId peer{};
+    Request request;
+    Reply reply;
+  };
+
+  mutable testing::MemoryStore store_;  // for load(), which changes nothing
+  std::uint64_t lives_ = 0;
+  std::unique_ptr<Serving> own_;
+  PlainOwner owner_{kOwn};
   testing::Replica hearer_;
-  PlainClaims others_claims_;
-  PlainClaims all_claims_;
+  PlainClaims all_;
+  std::uint32_t sequence_ = 0;
+  std::vector<Answered> answered_;
 };
 
 }  // namespace

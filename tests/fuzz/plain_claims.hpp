@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "tfdude/partition/directory.hpp"
@@ -12,104 +14,224 @@
 #include "fuzz/demand.hpp"
 #include "fuzz/forest_checks.hpp"
 
+// What must come of what partitions say, in the plainest way: everything is kept, and worked out anew each time.
 namespace tfdude::fuzz {
 
-/// What partitions have said that they own, in the plainest way: the pages of each one's last life.
-class PlainClaims {
- public:
+struct PlainClaim {
+  std::string parent;
+  std::uint64_t since = 0;
+  std::uint32_t page = 0;
+};
+
+/// A frame with the partition whose claim to it holds.
+struct PlainFrame {
+  std::string owner;
+  std::string parent;
+  std::uint64_t since = 0;
+};
+using Picture = std::map<std::string, PlainFrame>;
+
+[[nodiscard]] inline bool older(const PlainFrame& a, const PlainFrame& b) {
+  return std::tie(a.since, a.owner) < std::tie(b.since, b.owner);
+}
+
+/// The frames that hang in each cycle.
+[[nodiscard]] inline std::vector<std::set<std::string>> cycles_of(const Picture& picture) {
+  std::vector<std::set<std::string>> cycles;
+  std::set<std::string> known;
+  for (const auto& [id, frame] : picture) {
+    std::set<std::string> line;
+    auto at = picture.find(id);
+    while (at != picture.end() && line.insert(at->first).second) {
+      at = picture.find(at->second.parent);
+    }
+    if (at == picture.end() || at->first != id || !known.insert(id).second) continue;
+    known.insert(line.begin(), line.end());
+    cycles.push_back(line);
+  }
+  return cycles;
+}
+
+[[nodiscard]] inline std::string youngest_of(const std::set<std::string>& cycle,
+                                             const Picture& picture) {
+  return *std::max_element(
+      cycle.begin(), cycle.end(), [&](const std::string& a, const std::string& b) {
+        return std::make_pair(picture.at(a).since, a) < std::make_pair(picture.at(b).since, b);
+      });
+}
+
+[[nodiscard]] inline Picture without_cycles(const Picture& picture) {
+  Picture cut = picture;
+  for (const auto& cycle : cycles_of(picture)) cut[youngest_of(cycle, picture)].parent.clear();
+  return cut;
+}
+
+/// What one process of a partition has said so far.
+struct PlainLife {
+  std::uint64_t incarnation = 0;
+  std::uint64_t epoch = 0;
+  std::uint64_t latest = 0;
+  std::optional<std::uint32_t> page_count;
+  std::map<std::uint32_t, Page> pages;
+  std::map<std::string, PlainClaim> claims;
+
   void apply(const Page& page) {
-    Life& life = lives_[page.partition];
-    if (!life.advance(page.incarnation)) return;
-    life.pages[page.number] = page;
-    life.epoch = std::max(life.epoch, page.epoch);
+    pages[page.number] = page;
+    epoch = std::max(epoch, page.epoch);
+    for (auto claim = claims.begin(); claim != claims.end();) {
+      const bool listed = std::any_of(page.entries.begin(), page.entries.end(),
+                                      [&](const PageEntry& e) { return e.id == claim->first; });
+      const bool gone = claim->second.page == page.number && !listed;
+      claim = gone ? claims.erase(claim) : std::next(claim);
+    }
+    for (const Note& note : page.notes) latest = std::max(latest, note.since);
+    for (const PageEntry& entry : page.entries) {
+      latest = std::max(latest, entry.since);
+      const auto there = claims.find(entry.id);
+      // It has left this page for another since.
+      if (there != claims.end() && there->second.page != page.number &&
+          there->second.since > entry.since) {
+        continue;
+      }
+      claims[entry.id] = {entry.parent, entry.since, page.number};
+    }
   }
 
-  void apply(const Presence& presence) {
-    if (presence.serving) (void)lives_[presence.partition].advance(presence.incarnation);
+  [[nodiscard]] bool complete() const { return page_count && pages.size() >= *page_count; }
+};
+
+/// A partition over its lives: the one whose structure holds, and the one that is going to replace it.
+class PlainPartition {
+ public:
+  [[nodiscard]] const PlainLife& life() const { return life_; }
+
+  /// @return the notes that are news by it
+  std::vector<Note> apply(const Page& page) {
+    if (page.incarnation < life_.incarnation) return {};
+    PlainLife* said = life_of(page.incarnation);
+    if (said == nullptr) return {};
+    said->apply(page);
+    return said == &life_ ? page.notes : replace_if_complete();
+  }
+
+  std::vector<Note> apply(const Presence& presence) {
+    if (!presence.serving || presence.incarnation < latest_) return {};
+    PlainLife* said = life_of(presence.incarnation);
+    if (said == nullptr) return {};
+    said->page_count = presence.pages;
+    return said == &life_ ? std::vector<Note>() : replace_if_complete();
+  }
+
+ private:
+  // Null for one that has been overtaken by a later.
+  PlainLife* life_of(std::uint64_t incarnation) {
+    latest_ = std::max(latest_, incarnation);
+    if (incarnation == life_.incarnation) return &life_;
+    if (life_.pages.empty()) {
+      life_ = PlainLife{};
+      life_.incarnation = incarnation;
+      return &life_;
+    }
+    if (next_ && incarnation < next_->incarnation) return nullptr;
+    if (!next_ || incarnation > next_->incarnation) {
+      next_ = PlainLife{};
+      next_->incarnation = incarnation;
+    }
+    return &*next_;
+  }
+
+  std::vector<Note> replace_if_complete() {
+    if (!next_->complete()) return {};
+    life_ = PlainLife{};
+    life_.incarnation = next_->incarnation;
+    life_.page_count = next_->page_count;
+    std::vector<Note> notes;
+    for (const auto& [number, page] : next_->pages) {
+      life_.apply(page);
+      notes.insert(notes.end(), page.notes.begin(), page.notes.end());
+    }
+    next_.reset();
+    return notes;
+  }
+
+  PlainLife life_;
+  std::optional<PlainLife> next_;
+  std::uint64_t latest_ = 0;
+};
+
+/// What all partitions have said to one who hears them.
+class PlainClaims {
+ public:
+  /// A page or a presence. @return the notes that are news by it
+  template <class Said>
+  std::vector<Note> apply(const Said& said) {
+    return partitions_[said.partition].apply(said);
   }
 
   [[nodiscard]] std::vector<Page> pages() const {
     std::vector<Page> all;
-    for (const auto& [name, life] : lives_) {
-      for (const auto& [number, page] : life.pages) all.push_back(page);
+    for (const auto& [name, partition] : partitions_) {
+      for (const auto& [number, page] : partition.life().pages) all.push_back(page);
     }
     return all;
   }
 
-  /// The parents that a partition lists for a frame: as a rule one, as it changes its page for a moment two.
-  [[nodiscard]] std::set<std::string> parents(const std::string& partition,
-                                              const std::string& id) const {
-    std::set<std::string> parents;
-    for (const auto& [number, page] : lives_.at(partition).pages) {
-      for (const PageEntry& entry : page.entries) {
-        if (entry.id == id) parents.insert(entry.parent);
-      }
+  /// The greatest stamp that came with what holds.
+  [[nodiscard]] std::uint64_t latest() const {
+    std::uint64_t latest = 0;
+    for (const auto& [name, partition] : partitions_) {
+      latest = std::max(latest, partition.life().latest);
     }
-    return parents;
+    return latest;
   }
 
-  /// That a directory has made of it what it is to: each frame has its owner and its parent. What the process
-  /// holds itself is its own, whatever others say.
-  void demand_followed(const Forest& forest, const Directory& directory) const {
-    const Frames frames = frames_of(forest);
-    for (const auto& [name, life] : lives_) {
-      for (const std::string& id : life.ids()) {
-        demand(frames.count(id) != 0, "what is claimed is there");
+  /// The oldest claim to each frame, whether or not they make cycles.
+  [[nodiscard]] Picture oldest() const {
+    Picture picture;
+    for (const auto& [name, partition] : partitions_) {
+      for (const auto& [id, claim] : partition.life().claims) {
+        const PlainFrame frame{name, claim.parent, claim.since};
+        const auto [there, fresh] = picture.emplace(id, frame);
+        if (!fresh && older(frame, there->second)) there->second = frame;
       }
     }
-    for (const auto& [id, frame] : frames) {
-      if (frame.owner != kHeldHere) demand_rightful(frames, frame, directory.name(frame.owner));
-    }
+    return picture;
+  }
+
+  [[nodiscard]] const PlainLife* life(const std::string& partition) const {
+    const auto there = partitions_.find(partition);
+    return there != partitions_.end() ? &there->second.life() : nullptr;
   }
 
   /// That a directory which heard all of it, in this order, knows who said how much.
   void demand_counted(const Directory& directory) const {
-    for (const auto& [name, life] : lives_) {
+    for (const auto& [name, partition] : partitions_) {
       const auto owner = directory.owner(name);
+      if (!owner && partition.life().pages.empty()) continue;
       demand(owner && *owner != kHeldHere, "who said something is known");
-      demand(directory.epoch(*owner) == life.epoch, "an epoch is that of the last page");
-      demand(directory.info(*owner).frames == life.ids().size(), "frames are counted once");
+      demand(directory.epoch(*owner) == partition.life().epoch,
+             "an epoch is that of the last page");
+      demand(directory.info(*owner).frames == partition.life().claims.size(),
+             "frames are counted once");
     }
   }
 
  private:
-  struct Life {
-    bool advance(std::uint64_t to) {
-      if (to < incarnation) return false;
-      if (to > incarnation) *this = Life{to, 0, {}};
-      return true;
-    }
-
-    [[nodiscard]] std::set<std::string> ids() const {
-      std::set<std::string> ids;
-      for (const auto& [number, page] : pages) {
-        for (const PageEntry& entry : page.entries) ids.insert(entry.id);
-      }
-      return ids;
-    }
-
-    std::uint64_t incarnation = 0;
-    std::uint64_t epoch = 0;
-    std::map<std::uint32_t, Page> pages;
-  };
-
-  void demand_rightful(const Frames& frames, const FrameInfo& frame,
-                       const std::string& owner) const {
-    const auto least = std::find_if(lives_.begin(), lives_.end(), [&](const auto& life) {
-      return !parents(life.first, frame.id).empty();
-    });
-    demand(least != lives_.end() && least->first == owner, "the claim of the least name holds");
-    const auto claimed = parents(owner, frame.id);
-    if (claimed.count(frame.parent) != 0) return;
-    const bool closes_cycle =
-        std::any_of(claimed.begin(), claimed.end(), [&](const std::string& parent) {
-          const auto line = line_of(frames, parent);
-          return parent == frame.id || std::count(line.begin(), line.end(), frame.id) != 0;
-        });
-    demand(frame.parent.empty() && closes_cycle, "only what closes a cycle is cut off");
-  }
-
-  std::map<std::string, Life> lives_;  // by name: the least first
+  std::map<std::string, PlainPartition> partitions_;
 };
+
+/// That a forest shows this picture.
+inline void demand_shows(const Forest& forest, const Directory& directory, const Picture& picture) {
+  const Frames frames = frames_of(forest);
+  for (const auto& [id, frame] : picture) demand(frames.count(id) != 0, "what is claimed is there");
+  for (const auto& [id, frame] : frames) {
+    const auto expected = picture.find(id);
+    demand(expected != picture.end(), "what nobody claims is not there");
+    demand(directory.name(frame.owner) == expected->second.owner, "the oldest claim holds");
+    demand(frame.parent == expected->second.parent,
+           "a frame hangs where it is claimed to, but for the youngest in a cycle");
+    demand(frame.since == expected->second.since, "a frame is as old as it is claimed to be");
+  }
+}
 
 }  // namespace tfdude::fuzz

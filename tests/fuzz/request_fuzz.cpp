@@ -36,9 +36,10 @@ void strip(wire::Request& sample, std::vector<wire::Transform>& out) {
 void demand_answer(const Request& request) {
   testing::Replica replica("robot");
   Partition robot("robot", 1, replica.forest, replica.directory);
-  demand(robot.load({{"world", "", {}}, {"arm", "world", {}}, {"hand", "arm", {}}}).has_value(),
+  demand(robot.load({{"world", "", {}}, {"arm", "world", {}}, {"hand", "arm", {}}}, Time{})
+             .has_value(),
          "the owner has frames");
-  const Reply reply = robot.answer(PeerId{}, request);
+  const Reply reply = robot.answer(PeerId{}, request, Time{});
   demand(reply.sequence == request.sequence, "a reply has its request's number");
   const auto arrived = fastdds::from_wire(travelled<fastdds::ReplyType>(fastdds::to_wire(reply)));
   demand(arrived.has_value(), "a reply arrives");

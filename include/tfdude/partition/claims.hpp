@@ -51,9 +51,12 @@ class Claims {
   Owner add_owner(std::string name);
   [[nodiscard]] const std::string& name(Owner owner) const { return names_[owner]; }
 
+  /// Which of two claims of one partition to a frame, on two of its pages, is the one to take.
+  enum class Counts { kTheYounger, kThis };
+
   /// A partition claims a frame, perhaps once more. O(1) where nobody else does.
   /// @return whether it had not claimed it before
-  bool claim(const std::string& id, Claim claim);
+  bool claim(const std::string& id, Claim claim, Counts counts = Counts::kTheYounger);
 
   /// A page of the partition's does not claim the frame any more. What another page has claimed since stays.
   /// @return whether the claim is gone

@@ -71,6 +71,9 @@ class Directory {
   /// or seen before (Lamport 1978, rule IR1 and IR2), so that whoever knew of a change has the greater one.
   [[nodiscard]] std::uint64_t next_stamp(Time now);
 
+  /// Takes note of a stamp that was given by an earlier process of this partition.
+  void saw_stamp(std::uint64_t stamp);
+
   /// What happened to the frames of others, and of this process as far as it is reported.
   [[nodiscard]] ChangeLog& changes() { return changes_; }
 
@@ -97,6 +100,7 @@ class Directory {
 
  private:
   using PageMap = std::map<std::uint32_t, Page>;
+  using Ids = std::unordered_set<std::string_view>;
 
   /// What of a page is needed later: its ids, each after its length in one byte, since most of the memory of a
   /// large structure would else go into strings; and its notes.
@@ -127,9 +131,8 @@ class Directory {
   Known& known(const std::string& partition, Owner& owner);
   Successor* succeed(Known& partition, std::uint64_t incarnation);
   void replace_if_complete(Known& partition, Owner owner);
-  void put_page(Known& partition, Owner owner, const Page& page);
-  void unclaim_all_but(const std::unordered_set<std::string_view>& stays, Known& partition,
-                       Owner owner, std::uint32_t number);
+  void put_page(Known& partition, Owner owner, const Page& page, Ids& outdated);
+  void unclaim_all_but(const Ids& stays, Known& partition, Owner owner, std::uint32_t number);
   void report_conflicts(const Known& partition, const Page& page);
   void take_notes(const std::vector<Note>& notes);
 

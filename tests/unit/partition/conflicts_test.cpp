@@ -142,6 +142,40 @@ TEST_CASE("of two moves that make a cycle the later is undone to a root") {
   }
 }
 
+TEST_CASE("a cycle that is there only while a page is read undoes nothing") {
+  Owning arms("arms");
+  arms.directory.apply(page_of("head", {{"a", "", 10}, {"b", "a", 20}}));
+  REQUIRE(arms.ask("hand", AddRequest{"b", along_x(1)}) == "ok");
+  arms.directory.apply(page_of("head", {{"a", "hand", 30}, {"b", "", 40}}));
+  CHECK_FALSE(arms.partition.concede(kNow, {}).changed);
+  CHECK(arms.structure() ==
+        Lines{"a < hand @ head, attached", "b <  @ head", "hand < b @ arms, attached"});
+}
+
+TEST_CASE("who moves a frame that another claims, too, has the later claim to it") {
+  Owning arms("arms");
+  REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
+  arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
+  REQUIRE_FALSE(arms.partition.concede(kNow, {}).changed);
+  REQUIRE(arms.ask("camera", MoveRequest{"", {}}) == "ok");
+  CHECK(arms.partition.concede(kNow, {}).changed);
+  CHECK(arms.structure() == Lines{"camera <  @ head"});
+  CHECK(arms.conflicts().size() == 1);
+}
+
+TEST_CASE("a stamp is later than all that were stored") {
+  MemoryStore store;
+  {
+    Owning arms("arms", &store);
+    arms.start();
+    REQUIRE(arms.ask("hand", AddRequest{"", along_x(1)}, Time(std::chrono::nanoseconds(9000))) ==
+            "ok");
+  }
+  Owning arms("arms", &store);
+  arms.start();
+  CHECK(arms.directory.next_stamp(kNow) > 9000);
+}
+
 TEST_CASE("a stamp is later than all that were seen, however wrong a clock is") {
   Replica replica;
   const std::uint64_t first = replica.directory.next_stamp(kNow);

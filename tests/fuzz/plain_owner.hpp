@@ -1,0 +1,190 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "tfdude/partition/messages.hpp"
+
+#include "fuzz/plain_claims.hpp"
+
+// What an owner must make of requests and of what others claim, in the plainest way.
+namespace tfdude::fuzz {
+
+/// The time of a change that is yet to be given a stamp: later than all others.
+inline constexpr std::uint64_t kJustNow = std::numeric_limits<std::uint64_t>::max();
+
+/// The owner's frames.
+class PlainOwner {
+ public:
+  struct Place {
+    std::string parent;
+    std::uint64_t since = 0;
+  };
+  using Places = std::map<std::string, Place>;
+
+  explicit PlainOwner(std::string name) : name_(std::move(name)) {}
+
+  /// What is said of a frame that is not where it was.
+  struct Word {
+    Note::Kind kind = Note::Kind::kRemoved;
+    std::string rival;
+  };
+
+  [[nodiscard]] const Places& places() const { return places_; }
+  [[nodiscard]] bool holds(const std::string& id) const { return places_.count(id) != 0; }
+
+  /// What is in force for this process, as long as it has nothing to concede.
+  [[nodiscard]] Picture with(const Picture& others) const {
+    Picture picture = others;
+    for (const auto& [id, place] : places_) picture[id] = {name_, place.parent, place.since};
+    return picture;
+  }
+
+  /// @return whether the request is granted
+  bool answer(const Request& request, const Picture& others) {
+    const Picture picture = without_cycles(with(others));
+    if (const auto* add = std::get_if<AddRequest>(&request.body)) {
+      if (picture.count(request.id) != 0 || !hangs(request.id, add->parent, picture)) return false;
+      put(request.id, add->parent);
+      return true;
+    }
+    if (const auto* move = std::get_if<MoveRequest>(&request.body)) {
+      if (!holds(request.id) || !hangs(request.id, move->parent, picture)) return false;
+      put(request.id, move->parent);
+      return true;
+    }
+    if (const auto* update = std::get_if<UpdateRequest>(&request.body)) {
+      return std::all_of(update->edges.begin(), update->edges.end(),
+                         [this](const EdgeUpdate& edge) { return holds(edge.id); });
+    }
+    bool all = true;
+    if (const auto* removal = std::get_if<RemoveRequest>(&request.body)) {
+      for (const std::string& top : removal->tops) all = remove(top) && all;
+    }
+    return all;
+  }
+
+  /// Gives up what others claim with more right.
+  /// @param notes  what is new of what others removed
+  void concede(const Picture& others, const std::vector<Note>& notes) {
+    give_way(others);
+    for (const std::string& id : orphans(others, notes)) (void)remove(id);
+    // What was made a root is claimed later than by all others, which may bring the next cycle.
+    while (unhang(others)) give_way(others);
+  }
+
+  /// Takes over the stamps of what was changed just now, later than all that were known; all else is to be as it
+  /// is here already.
+  void demand_held(const Forest& forest, std::uint64_t latest) {
+    std::size_t held = 0;
+    for (const FrameInfo& frame : forest.frames()) {
+      if (frame.owner != kHeldHere) continue;
+      ++held;
+      const auto mine = places_.find(frame.id);
+      demand(mine != places_.end(), "what was given up is not held");
+      demand(frame.parent == mine->second.parent, "what is held hangs where it was hung");
+      if (mine->second.since == kJustNow) {
+        demand(frame.since > latest, "a stamp is later than all that were known");
+        mine->second.since = frame.since;
+      }
+      demand(frame.since == mine->second.since, "what did not change is as old as it was");
+    }
+    demand(held == places_.size(), "what was not given up is held");
+  }
+
+  /// That this life's pages tell of all frames, and of what became of others.
+  void demand_told(const PlainLife& life) const {
+    demand(life.claims.size() == places_.size(), "nothing is published but what is held");
+    for (const auto& [id, place] : places_) {
+      const auto claim = life.claims.find(id);
+      demand(claim != life.claims.end(), "what is held is published");
+      demand(claim->second.parent == place.parent && claim->second.since == place.since,
+             "what is held is published as it is");
+    }
+    std::size_t notes = 0;
+    for (const auto& [number, page] : life.pages) {
+      for (const Note& note : page.notes) {
+        ++notes;
+        const auto word = words_.find(note.id);
+        demand(word != words_.end() && word->second.kind == note.kind, "a note says what happened");
+        demand(note.kind != Note::Kind::kGaveWay || note.rival == word->second.rival,
+               "it names who was faster");
+      }
+    }
+    demand(notes == words_.size(), "whatever goes leaves a note");
+  }
+
+ private:
+  [[nodiscard]] static bool hangs(const std::string& id, const std::string& parent,
+                                  const Picture& picture) {
+    if (parent.empty()) return true;
+    if (picture.count(parent) == 0) return false;
+    std::string at = parent;
+    while (at != id && picture.count(at) != 0) at = picture.at(at).parent;
+    return at != id;
+  }
+
+  void give_way(const Picture& others) {
+    for (const auto& [id, theirs] : others) {
+      const auto mine = places_.find(id);
+      if (mine == places_.end()) continue;
+      if (!older(theirs, {name_, mine->second.parent, mine->second.since})) continue;
+      places_.erase(mine);
+      words_[id] = {Note::Kind::kGaveWay, theirs.owner};
+    }
+  }
+
+  bool unhang(const Picture& others) {
+    const Picture picture = with(others);
+    bool any = false;
+    for (const auto& cycle : cycles_of(picture)) {
+      const std::string youngest = youngest_of(cycle, picture);
+      if (picture.at(youngest).owner != name_) continue;
+      any = true;
+      put(youngest, "");
+      words_[youngest] = {Note::Kind::kUnhung, ""};
+    }
+    return any;
+  }
+
+  [[nodiscard]] std::set<std::string> orphans(const Picture& others,
+                                              const std::vector<Note>& notes) const {
+    std::set<std::string> ids;
+    for (const Note& note : notes) {
+      const bool there = holds(note.id) || others.count(note.id) != 0;
+      if (note.kind != Note::Kind::kRemoved || there) continue;
+      for (const auto& [id, place] : places_) {
+        if (place.parent == note.id && place.since < note.since) ids.insert(id);
+      }
+    }
+    return ids;
+  }
+
+  void put(const std::string& id, const std::string& parent) {
+    places_[id] = {parent, kJustNow};
+    words_.erase(id);
+  }
+
+  bool remove(const std::string& top) {
+    if (places_.erase(top) == 0) return false;
+    words_[top] = {Note::Kind::kRemoved, ""};
+    std::set<std::string> below;
+    for (const auto& [id, place] : places_) {
+      if (place.parent == top) below.insert(id);
+    }
+    for (const std::string& id : below) (void)remove(id);
+    return true;
+  }
+
+  std::string name_;
+  Places places_;
+  std::map<std::string, Word> words_;
+};
+
+}  // namespace tfdude::fuzz
