@@ -27,7 +27,7 @@ void Events::post(std::vector<Change> changes) {
     if (subscribers_.empty()) return;
     for (Change& change : changes) {
       if (waiting_.size() < kMaxWaiting) {
-        waiting_.push_back(std::move(change));
+        waiting_.push_back({std::move(change), last_subscriber_});
       } else {
         ++missed_;
       }
@@ -45,30 +45,30 @@ void Events::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-std::optional<Change> Events::next(std::unique_lock<std::mutex>& lock) {
+std::optional<Events::Waiting> Events::next(std::unique_lock<std::mutex>& lock) {
   changed_.wait(lock, [this] { return stopping_ || !waiting_.empty() || missed_ > 0; });
   if (stopping_) return std::nullopt;
   if (waiting_.empty()) {
     Change change{ChangeKind::kMissed, {}, {}, {}, {}, {}, {}};
     change.message = std::to_string(std::exchange(missed_, 0)) +
                      " changes were not told: the listeners take too long";
-    return change;
+    return Waiting{std::move(change), last_subscriber_};
   }
-  Change change = std::move(waiting_.front());
+  Waiting first = std::move(waiting_.front());
   waiting_.pop_front();
-  return change;
+  return first;
 }
 
 void Events::run() {
   std::unique_lock lock(mutex_);
-  while (const auto change = next(lock)) {
+  while (const auto waiting = next(lock)) {
     for (std::uint64_t told = 0;;) {
       const auto subscriber = subscribers_.upper_bound(told);
-      if (subscriber == subscribers_.end()) break;
+      if (subscriber == subscribers_.end() || subscriber->first > waiting->last_subscriber) break;
       told = running_ = subscriber->first;
       const auto callback = subscriber->second;
       lock.unlock();
-      (*callback)(*change);
+      (*callback)(waiting->change);
       lock.lock();
       running_ = 0;
       changed_.notify_all();

@@ -40,15 +40,21 @@ class Events {
   void stop();
 
  private:
+  /// A change, and the last of those who listened when it happened.
+  struct Waiting {
+    Change change;
+    std::uint64_t last_subscriber = 0;
+  };
+
   void run();
-  std::optional<Change> next(std::unique_lock<std::mutex>& lock);
+  std::optional<Waiting> next(std::unique_lock<std::mutex>& lock);
 
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::uint64_t, std::shared_ptr<const Callback>> subscribers_;
   std::uint64_t last_subscriber_ = 0;
   std::uint64_t running_ = 0;  // the subscriber that is being told
-  std::deque<Change> waiting_;
+  std::deque<Waiting> waiting_;
   std::size_t missed_ = 0;
   bool stopping_ = false;
   std::thread thread_;  // from the first subscription on
