@@ -77,7 +77,7 @@ bool Participant::settled() {
     const bool met_all = transport_->settled();
     const bool met_none = now >= settle_deadline_ && !transport_->awaits_presence();
     const std::lock_guard lock(structure_mutex_);
-    known = met_all ? directory_.complete() : met_none && directory_.knows_nobody();
+    known = met_all ? directory_.complete() : met_none && directory_.reachable_owners().empty();
   }
   if (known) settled_.store(true, std::memory_order_relaxed);
   return known;

@@ -151,6 +151,7 @@ class Participant final : public TransportHandler {
   [[nodiscard]] Result<void> take_frames(const std::vector<FrameSpec>& frames);
   void give_up_partition();
   void concede();
+  [[nodiscard]] bool catch_up();
   void tell_changes();
 
   const Options options_;

@@ -17,9 +17,8 @@ constexpr Milliseconds kPredecessorGone{1500};
 // How much longer than usual somebody who was met may take to say which partition it serves.
 constexpr Milliseconds kSlowPresence{3000};
 
-// A claim that was taken back just before may still be on its way here, and what takes it back behind it.
-// A page that was lost comes a heartbeat of 100 ms later, or several.
-constexpr Milliseconds kConcedeAfter{1000};
+// How often at most the others are asked whether what seems to be a conflict is one.
+constexpr Milliseconds kConcedeEvery{100};
 
 // How often own changes of the structure are published at most.
 constexpr Milliseconds kPublishEvery{1};
@@ -42,6 +41,7 @@ void log_change(const Request& request, const Reply& reply) {
   if (const auto* add = std::get_if<AddRequest>(&request.body)) {
     what = "add frame " + quote(request.id) + " under " + quote(add->parent);
   } else if (const auto* remove = std::get_if<RemoveRequest>(&request.body)) {
+    if (remove->tops.empty()) return;
     what = "remove, with all below,";
     for (const std::string& top : remove->tops) what += " " + quote(top);
   } else if (const auto* move = std::get_if<MoveRequest>(&request.body)) {
@@ -67,7 +67,7 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   }
   if (auto claimed = claim_name(); !claimed) return claimed;
   publisher_.emplace(kPublishEvery, [this] { (void)commit(); });
-  conceder_.emplace(kConcedeAfter / 4, [this] { concede(); });
+  conceder_.emplace(kConcedeEvery, [this] { concede(); });
   if (auto taken = take_frames(frames); !taken) return taken;
   if (auto serving = transport_->serve(partition_name_); !serving) return serving;
   if (auto stored = commit(); !stored) return stored;
@@ -167,17 +167,53 @@ Result<void> Participant::commit() {
   return saved;
 }
 
+// A claim may have been taken back long ago by an owner whose pages are late: what is given up must stand after all
+// of the others have told how far they are, and their structure up to there has come.
 void Participant::concede() {
-  Partition::Conceded conceded;
+  std::set<Concession> due;
   {
     const std::lock_guard lock(structure_mutex_);
-    if (partition_ != nullptr && !out_) {
-      conceded = partition_->concede(wall_clock(), kConcedeAfter);
-    }
+    if (partition_ == nullptr || out_) return;
+    due = partition_->concessions();
+  }
+  if (due.empty()) return;
+  const bool current = catch_up();
+  bool changed = false;
+  bool more = false;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (out_) return;
+    if (current) changed = partition_->concede(due, wall_clock());
+    more = !partition_->concessions().empty();
     tell_changes();
   }
-  if (conceded.pending) conceder_->ask();
-  if (conceded.changed) (void)commit();
+  if (more) conceder_->ask();
+  if (changed) (void)commit();
+}
+
+// Whether all that those who are reachable had changed when this was called is known here now.
+bool Participant::catch_up() {
+  const auto deadline = Clock::now() + options_.timeout;
+  std::vector<Part> parts;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    for (const Owner owner : directory_.reachable_owners()) {
+      const std::string& name = directory_.name(owner);
+      parts.push_back({owner, name, Request{0, name, RemoveRequest{}}});
+    }
+  }
+  const std::vector<Reply> replies = ask(parts, deadline);
+  bool current = true;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const bool answered = std::holds_alternative<Done>(replies[i].body);
+    const std::uint64_t epoch =
+        answered ? replies[i].epoch : std::numeric_limits<std::uint64_t>::max();
+    if (answered) await_epoch(parts[i], epoch, deadline);
+    const std::lock_guard lock(structure_mutex_);
+    current = current &&
+              (directory_.epoch(parts[i].owner) >= epoch || !directory_.reachable(parts[i].owner));
+  }
+  return current;
 }
 
 void Participant::save_values() {

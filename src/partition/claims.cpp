@@ -125,13 +125,14 @@ std::vector<Concession> Claims::concessions() const {
     if (!there || there->owner != kHeldHere) continue;
     const Claim& oldest = *oldest_of(claims);
     if (older(oldest, in_force(*there))) {
-      all.push_back({Concession::Kind::kGiveWay, id, oldest.owner});
+      all.push_back({Concession::Kind::kGiveWay, id, oldest.owner, there->since});
     }
   }
   for (const auto& [id, claim] : cut_) {
     const Cycle cycle = cycle_of(id, claim);
     if (cycle.held && younger(*cycle.held, cycle.youngest)) {
-      all.push_back({Concession::Kind::kUnhang, cycle.held->id, cycle.youngest.owner});
+      all.push_back(
+          {Concession::Kind::kUnhang, cycle.held->id, cycle.youngest.owner, cycle.held->since});
     }
   }
   return all;
@@ -184,6 +185,22 @@ Claims::Cycle Claims::cycle_of(const std::string& id, const Claim& claim) const 
   return cycle;
 }
 
+void Claims::cut(const FrameInfo& frame) {
+  cut_[frame.id] = {frame.owner, frame.parent, frame.since, page_of(frame.id)};
+  (void)forest_.put_remote(frame.id, {}, frame.owner, frame.since);
+  changes_.frame_moved(frame.id, {}, name(frame.owner));
+}
+
+bool Claims::make_way(const std::string& parent) {
+  std::optional<FrameInfo> youngest;
+  for (auto edge = forest_.info(parent); edge; edge = forest_.info(edge->parent)) {
+    if (edge->owner == kHeldHere) continue;
+    if (!youngest || younger(*edge, *youngest)) youngest = edge;
+  }
+  if (youngest) cut(*youngest);
+  return youngest.has_value();
+}
+
 // The frame's claimed parent lies below it, where the forest has made it a root. Of the cycle's edges that others
 // own the youngest is cut; if a held one is younger still, its owner has to concede, which mends that.
 void Claims::break_cycle(const std::string& id, const Claim& claim) {
@@ -192,9 +209,7 @@ void Claims::break_cycle(const std::string& id, const Claim& claim) {
     cut_[id] = claim;
     return;
   }
-  cut_[youngest.id] = {youngest.owner, youngest.parent, youngest.since, page_of(youngest.id)};
-  (void)forest_.put_remote(youngest.id, {}, youngest.owner, youngest.since);
-  changes_.frame_moved(youngest.id, {}, name(youngest.owner));
+  cut(youngest);
   (void)forest_.put_remote(id, claim.parent, claim.owner, claim.since);
   cut_.erase(id);
 }

@@ -185,7 +185,7 @@ std::vector<Concession> Directory::concessions() {
       for (const Note& note : page.notes) {
         for (const FrameInfo& frame : forest_.waiting_for(note.id)) {
           if (!is_orphan(frame, note)) continue;
-          all.push_back({Concession::Kind::kRemove, frame.id, owner});
+          all.push_back({Concession::Kind::kRemove, frame.id, owner, frame.since});
           orphans_ = true;  // until it is removed, or its parent is there again
         }
       }
@@ -222,9 +222,12 @@ std::optional<Owner> Directory::owner(std::string_view partition) const {
   return entry->second;
 }
 
-bool Directory::knows_nobody() const {
-  return std::none_of(partitions_.begin() + 1, partitions_.end(),
-                      [](const Known& partition) { return partition.info.reachable; });
+std::vector<Owner> Directory::reachable_owners() const {
+  std::vector<Owner> all;
+  for (Owner owner = 1; owner < partitions_.size(); ++owner) {
+    if (reachable(owner)) all.push_back(owner);
+  }
+  return all;
 }
 
 bool Directory::complete() const {

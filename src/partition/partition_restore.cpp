@@ -1,3 +1,4 @@
+#include <iterator>
 #include <map>
 
 #include "tfdude/partition/partition.hpp"
@@ -22,46 +23,56 @@ bool same(const FrameSpec& a, const FrameSpec& b) {
 
 Result<void> Partition::restore(const StoredState& state, const std::vector<FrameSpec>& configured,
                                 Time now) {
+  for (const StoredFrame& frame : state.frames) directory_.saw_stamp(frame.since);
+  for (const Note& note : state.notes) directory_.saw_stamp(note.since);
+  // All that others have no older claim to is taken before any of it is hung, so that it does not matter in which
+  // order that is done.
+  std::vector<const StoredFrame*> kept;
   std::vector<const StoredFrame*> contested;
   for (const StoredFrame& frame : state.frames) {
-    directory_.saw_stamp(frame.since);
-    const bool mine =
-        directory_.take(frame.id, frame.since) &&
-        forest_.add(frame.id, frame.parent, frame.X_PC, Forest::MissingParent::kAllow, frame.since);
-    if (mine) {
-      put(frame.id, frame.parent, frame.since);
-    } else {
-      contested.push_back(&frame);
-    }
+    (directory_.take(frame.id, frame.since) ? kept : contested).push_back(&frame);
   }
-  for (const Note& note : state.notes) {
-    directory_.saw_stamp(note.since);
-    pages_.leave(note);
+  std::vector<const StoredFrame*> circular;
+  for (const StoredFrame* frame : kept) {
+    if (!hang_again(*frame)) circular.push_back(frame);
   }
+  for (const Note& note : state.notes) pages_.leave(note);
   pages_.resume(state.epoch);
   // Only what changes from here on is not in the store.
   saved_ = true;
   pages_.watch_ids();
-  for (const StoredFrame* frame : contested) restore_contested(*frame, now);
+  for (const StoredFrame* frame : contested) {
+    give_way(frame->id, forest_.info(frame->id)->owner, now);
+  }
+  for (const StoredFrame* frame : circular) make_root(*frame, now);
+  directory_.moved();
   directory_.expect_orphans();
-  (void)concede(now, {});
+  while (concede(concessions(), now)) {
+  }
   auto taken = reconfigure(state.configured, configured, now);
   pages_.close_epoch();
   return taken;
 }
 
-void Partition::restore_contested(const StoredFrame& frame, Time now) {
-  if (const auto there = forest_.info(frame.id)) {
-    give_way(frame.id, there->owner, now);
-    return;
+// Where others have hung the parent below this frame meanwhile, the directory finds out whose claim does not hold.
+bool Partition::hang_again(const StoredFrame& frame) {
+  const auto add = [&] {
+    return forest_.add(frame.id, frame.parent, frame.X_PC, Forest::MissingParent::kAllow,
+                       frame.since);
+  };
+  auto added = add();
+  if (!added && added.error().code == Errc::kCycle && directory_.make_way(frame.parent)) {
+    added = add();
   }
-  // Others have hung the parent below this frame meanwhile.
-  const auto parent = forest_.info(frame.parent);
+  if (added) put(frame.id, frame.parent, frame.since);
+  return added.has_value();
+}
+
+void Partition::make_root(const StoredFrame& frame, Time now) {
   const std::uint64_t since = directory_.next_stamp(now);
   if (!forest_.add(frame.id, {}, frame.X_PC, Forest::MissingParent::kAllow, since)) return;
   put(frame.id, {}, since);
-  const Note note{frame.id, since, Note::Kind::kUnhung,
-                  parent ? directory_.name(parent->owner) : std::string()};
+  const Note note{frame.id, since, Note::Kind::kUnhung, name_};
   pages_.leave(note);
   directory_.changes().add(conflict_of(note, name_));
 }
@@ -92,33 +103,18 @@ Result<void> Partition::reconfigure(const std::vector<FrameSpec>& before,
   return {};
 }
 
-Partition::Conceded Partition::concede(Time now, Time::duration patience) {
-  Conceded done;
-  bool more = true;
-  // What is conceded may bring up more, or settle something else.
-  while (more) {
-    more = false;
-    std::map<Concession, Suspicion> standing;
-    for (const Concession& concession : directory_.concessions()) {
-      const auto frame = forest_.info(concession.frame);
-      if (!frame) continue;
-      Suspicion suspicion{now, frame->since};
-      const auto before = suspicions_.find(concession);
-      if (before != suspicions_.end() && before->second.frame_since == frame->since) {
-        suspicion = before->second;
-      }
-      if (now - suspicion.first < patience) {
-        standing.emplace(concession, suspicion);
-      } else {
-        more = concede(concession, now) || more;
-      }
-    }
-    suspicions_ = std::move(standing);
-    done.changed = done.changed || more;
+std::set<Concession> Partition::concessions() const {
+  std::vector<Concession> all = directory_.concessions();
+  return {std::make_move_iterator(all.begin()), std::make_move_iterator(all.end())};
+}
+
+bool Partition::concede(const std::set<Concession>& due, Time now) {
+  bool changed = false;
+  for (const Concession& concession : directory_.concessions()) {
+    if (due.count(concession) != 0) changed = concede(concession, now) || changed;
   }
-  done.pending = !suspicions_.empty();
-  if (done.changed) pages_.close_epoch();
-  return done;
+  if (changed) pages_.close_epoch();
+  return changed;
 }
 
 bool Partition::concede(const Concession& concession, Time now) {

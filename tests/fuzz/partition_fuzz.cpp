@@ -202,7 +202,8 @@ class World {
   void hear(const Said& said, Time now) {
     const std::uint64_t latest = latest_known();
     apply(own_->replica, said);
-    (void)own_->partition.concede(now, {});
+    while (own_->partition.concede(own_->partition.concessions(), now)) {
+    }
     const std::vector<Note> notes = own_->others.apply(said);
     owner_.concede(own_->others.oldest(), notes);
     owner_.demand_held(own_->replica.forest, latest);

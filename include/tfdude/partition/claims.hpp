@@ -21,8 +21,8 @@ struct Claim {
   std::uint32_t page = 0;  ///< of its owner's, where it says so
 };
 
-/// What the partition of this process has to give up because of what others claim. What is on its way may settle
-/// a conflict, such as a claim that was taken back just now: so it is done a little later.
+/// What the partition of this process would have to give up because of what others claim. What is on its way may
+/// settle it, such as a claim that was taken back: so it is done once the others were asked how far they are.
 struct Concession {
   enum class Kind : std::uint8_t {
     kGiveWay,  ///< the id was claimed earlier by `rival`: release the frame
@@ -32,9 +32,12 @@ struct Concession {
   Kind kind = Kind::kGiveWay;
   std::string frame;
   Owner rival = kHeldHere;
+  /// Since when the frame hangs where it hangs: another of its name, or a move, is another matter.
+  std::uint64_t since = 0;
 
   friend bool operator<(const Concession& a, const Concession& b) {
-    return std::tie(a.kind, a.frame, a.rival) < std::tie(b.kind, b.frame, b.rival);
+    return std::tie(a.kind, a.frame, a.rival, a.since) <
+           std::tie(b.kind, b.frame, b.rival, b.since);
   }
 };
 
@@ -69,6 +72,11 @@ class Claims {
   /// @return false where the other's claim is the older one
   [[nodiscard]] bool take(const std::string& id, std::uint64_t since);
 
+  /// This process is going to hang a frame below its own place. Cuts the way from there up to it at the youngest
+  /// claim of others, for mend() to find out who has to give way.
+  /// @return false where none of the way is others'
+  [[nodiscard]] bool make_way(const std::string& parent);
+
   /// Hangs frames where they belong that could not hang there before. None, but for cycles.
   void mend();
 
@@ -89,6 +97,7 @@ class Claims {
   void promote(const std::string& id);
   void put(const std::string& id, const Claim& claim);
   void break_cycle(const std::string& id, const Claim& claim);
+  void cut(const FrameInfo& frame);
   /// Of the cycle that a claim would close: the youngest edge that others own, and the youngest held one.
   struct Cycle {
     FrameInfo youngest;

@@ -54,12 +54,15 @@ class Directory {
   /// This process moved a frame that it holds: another's frame may hang below it now.
   void moved() { claims_.mend(); }
 
+  /// As Claims::make_way().
+  [[nodiscard]] bool make_way(const std::string& parent) { return claims_.make_way(parent); }
+
   /// As Claims::take().
   [[nodiscard]] bool take(const std::string& id, std::uint64_t since) {
     return claims_.take(id, since);
   }
 
-  /// What this process's partition would have to give up now because of what was applied.
+  /// What this process's partition would have to give up, by what was applied so far.
   /// O(contested frames and notes).
   [[nodiscard]] std::vector<Concession> concessions();
   /// This process has taken frames whose parents others may have removed before.
@@ -86,11 +89,11 @@ class Directory {
   /// Up to which epoch this partition's structure is here.
   [[nodiscard]] std::uint64_t epoch(Owner owner) const { return partitions_[owner].epoch; }
 
-  /// Whether no other partition is reachable.
-  [[nodiscard]] bool knows_nobody() const;
-
   /// Whether all pages of all reachable partitions have come.
   [[nodiscard]] bool complete() const;
+
+  /// Those other partitions that are reachable.
+  [[nodiscard]] std::vector<Owner> reachable_owners() const;
 
   /// The other partitions and, where there is one, the own; sorted by name.
   [[nodiscard]] std::vector<PartitionInfo> partitions() const;

@@ -25,7 +25,8 @@ struct AddRequest {
   Transform X_PC;
 };
 
-/// Removes frames with all that the asked partition owns below them.
+/// Removes frames with all that the asked partition owns below them. None: the reply only says how far the partition's
+/// structure is; the request's id is the partition's name then.
 struct RemoveRequest {
   std::vector<std::string> tops;
 };

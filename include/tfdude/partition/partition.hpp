@@ -1,6 +1,5 @@
 #pragma once
 
-#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -52,14 +51,12 @@ class Partition {
   /// @return how many
   std::size_t apply(const Update& update);
 
-  struct Conceded {
-    bool changed = false;  ///< the structure
-    bool pending = false;  ///< something stands that has not stood for long enough
-  };
+  /// What would have to be given up as far as the directory knows now. O(contested frames and notes).
+  [[nodiscard]] std::set<Concession> concessions() const;
 
-  /// Gives up what has had to be given up for at least `patience`, as seen by calls of this function: a claim that
-  /// was taken back may be on its way still.
-  Conceded concede(Time now, Time::duration patience);
+  /// Gives up what of these would still have to be given up: what was on its way when they were found may have
+  /// settled the rest. @return whether the structure changed; there may be other concessions then
+  bool concede(const std::set<Concession>& due, Time now);
 
   /// The pages to publish since the last call.
   [[nodiscard]] std::vector<Page> take_pages() { return pages_.take_changed(); }
@@ -81,7 +78,8 @@ class Partition {
   [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request, Time now);
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
   bool concede(const Concession& concession, Time now);
-  void restore_contested(const StoredFrame& frame, Time now);
+  [[nodiscard]] bool hang_again(const StoredFrame& frame);
+  void make_root(const StoredFrame& frame, Time now);
   [[nodiscard]] Result<void> reconfigure(const std::vector<FrameSpec>& before,
                                          const std::vector<FrameSpec>& configured, Time now);
   void put(const std::string& id, const std::string& parent, std::uint64_t since);
@@ -95,13 +93,6 @@ class Partition {
   Directory& directory_;
   Pages pages_;
   ReplyCache replies_;
-  // What would have to be conceded, since when, and since when the frame concerned hangs where it hangs: another of
-  // its name, or a move, begins anew.
-  struct Suspicion {
-    Time first{};
-    std::uint64_t frame_since = 0;
-  };
-  std::map<Concession, Suspicion> suspicions_;
   bool saved_ = false;
   std::set<std::string> updated_;  // by requests, since the last take_unsaved()
 };

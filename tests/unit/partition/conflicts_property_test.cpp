@@ -72,6 +72,7 @@ class World {
   struct Owning {
     Owning(const std::string& name, std::uint64_t incarnation)
         : replica(name), partition(name, incarnation, replica.forest, replica.directory) {}
+    bool concede(Time now) { return partition.concede(partition.concessions(), now); }
     Replica replica;
     Partition partition;
     std::map<std::uint32_t, Page> published;
@@ -168,7 +169,9 @@ class World {
     }
     if (hearer == kSpectator) return;
     const std::size_t before = owners_[hearer]->partition.frame_count();
-    if (!owners_[hearer]->partition.concede(now(hearer), {}).changed) return;
+    bool conceded = false;
+    while (owners_[hearer]->concede(now(hearer))) conceded = true;
+    if (!conceded) return;
     if (owners_[hearer]->partition.frame_count() < before) ++orphans_;
     publish(hearer);
   }

@@ -38,6 +38,7 @@ struct Owning : Replica {
     REQUIRE(store->save(partition.take_unsaved()));
     REQUIRE(store->save_configured(configured));
   }
+  bool concede() { return partition.concede(partition.concessions(), kNow); }
   std::vector<std::string> conflicts() {
     std::vector<std::string> messages;
     for (const Change& one : directory.changes().take()) {
@@ -63,7 +64,7 @@ TEST_CASE("of two partitions that add one id the later gives way, and says so") 
   SECTION("where the other was earlier") {
     arms.directory.apply(page_of("head", {{"camera", "", 900}}));
     CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ arms, attached"});
-    CHECK(arms.partition.concede(kNow, {}).changed);
+    CHECK(arms.concede());
     CHECK(arms.structure() == Lines{"camera <  @ head", "lens < camera @ arms, attached"});
     CHECK(
         arms.conflicts() ==
@@ -76,35 +77,30 @@ TEST_CASE("of two partitions that add one id the later gives way, and says so") 
   }
   SECTION("where the other was later") {
     arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
-    CHECK_FALSE(arms.partition.concede(kNow, {}).changed);
+    CHECK_FALSE(arms.concede());
     CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ arms, attached"});
     CHECK(arms.conflicts().empty());
   }
 }
 
-TEST_CASE("a claim that is taken back soon costs nobody a frame") {
+TEST_CASE("a claim that is taken back costs nobody a frame") {
   Owning arms("arms");
-  const auto later = [](int milliseconds) {
-    return kNow + std::chrono::milliseconds(milliseconds);
-  };
-  const auto patience = std::chrono::milliseconds(100);
   REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
   arms.directory.apply(page_of("head", {{"camera", "", 900}}));
-  CHECK(arms.partition.concede(later(0), patience).pending);
-  SECTION("once") {
+  const std::set<Concession> found = arms.partition.concessions();
+  REQUIRE(found.size() == 1);
+  SECTION("at all") {
     arms.directory.apply(page_of("head", {}));
-    CHECK_FALSE(arms.partition.concede(later(200), patience).pending);
-    CHECK(arms.forest.holds("camera"));
+    CHECK_FALSE(arms.partition.concede(found, kNow));
   }
   SECTION("and made again for another frame of that name") {
     REQUIRE(arms.ask("camera", RemoveRequest{{"camera"}}) == "ok");
     arms.directory.apply(page_of("head", {}));
-    REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}, later(150)) == "ok");
+    REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
     arms.directory.apply(page_of("head", {{"camera", "", 950}}));
-    CHECK(arms.partition.concede(later(200), patience).pending);
-    CHECK(arms.forest.holds("camera"));
-    CHECK(arms.partition.concede(later(300), patience).changed);
+    CHECK_FALSE(arms.partition.concede(found, kNow));
   }
+  CHECK(arms.forest.holds("camera"));
 }
 
 TEST_CASE("who watches hears of a conflict from the note of who gave way, once") {
@@ -131,13 +127,13 @@ TEST_CASE("of two moves that make a cycle the later is undone to a root") {
   REQUIRE(arms.ask("hand", MoveRequest{"neck", {}}, Time(std::chrono::nanoseconds(2000))) == "ok");
   SECTION("the own one") {
     arms.directory.apply(page_of("head", {{"neck", "hand", 1500}}));
-    CHECK(arms.partition.concede(kNow, {}).changed);
+    CHECK(arms.concede());
     CHECK(arms.structure() == Lines{"hand <  @ arms", "neck < hand @ head, attached"});
     CHECK(arms.conflicts().size() == 1);
   }
   SECTION("the other's, who is to say so") {
     arms.directory.apply(page_of("head", {{"neck", "hand", 2500}}));
-    CHECK_FALSE(arms.partition.concede(kNow, {}).changed);
+    CHECK_FALSE(arms.concede());
     CHECK(arms.structure() == Lines{"hand < neck @ arms, attached", "neck <  @ head"});
   }
 }
@@ -147,18 +143,44 @@ TEST_CASE("a cycle that is there only while a page is read undoes nothing") {
   arms.directory.apply(page_of("head", {{"a", "", 10}, {"b", "a", 20}}));
   REQUIRE(arms.ask("hand", AddRequest{"b", along_x(1)}) == "ok");
   arms.directory.apply(page_of("head", {{"a", "hand", 30}, {"b", "", 40}}));
-  CHECK_FALSE(arms.partition.concede(kNow, {}).changed);
+  CHECK_FALSE(arms.concede());
   CHECK(arms.structure() ==
         Lines{"a < hand @ head, attached", "b <  @ head", "hand < b @ arms, attached"});
+}
+
+TEST_CASE("what was conceded may bring the next cycle, of which the youngest is undone") {
+  Owning arms("arms");
+  arms.directory.apply(page_of("head", {{"a", "", 10}}));
+  REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
+  REQUIRE(arms.ask("hand", AddRequest{"camera", along_x(1)}) == "ok");
+  arms.directory.apply(page_of("head", {{"camera", "a", 20}, {"a", "hand", 30}}));
+  CHECK(arms.concede());
+  CHECK(arms.concede());
+  CHECK(arms.structure() ==
+        Lines{"a < hand @ head, attached", "camera < a @ head, attached", "hand <  @ arms"});
+}
+
+TEST_CASE("a move that makes a cycle with one that was undone is undone itself") {
+  Owning arms("arms");
+  arms.directory.apply(page_of("head", {{"a", "", 10}, {"c", "a", 10}}));
+  REQUIRE(arms.ask("hand", AddRequest{"a", along_x(1)}) == "ok");
+  arms.directory.apply(page_of("head", {{"a", "hand", 2000}, {"c", "a", 10}}));
+  REQUIRE(arms.structure() ==
+          Lines{"a <  @ head", "c < a @ head, attached", "hand < a @ arms, attached"});
+  REQUIRE(arms.ask("hand", MoveRequest{"c", {}}, Time(std::chrono::nanoseconds(3000))) == "ok");
+  CHECK(arms.concede());
+  CHECK(arms.structure() ==
+        Lines{"a < hand @ head, attached", "c < a @ head, attached", "hand <  @ arms"});
+  CHECK(arms.conflicts().size() == 1);
 }
 
 TEST_CASE("who moves a frame that another claims, too, has the later claim to it") {
   Owning arms("arms");
   REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
   arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
-  REQUIRE_FALSE(arms.partition.concede(kNow, {}).changed);
+  REQUIRE_FALSE(arms.concede());
   REQUIRE(arms.ask("camera", MoveRequest{"", {}}) == "ok");
-  CHECK(arms.partition.concede(kNow, {}).changed);
+  CHECK(arms.concede());
   CHECK(arms.structure() == Lines{"camera <  @ head"});
   CHECK(arms.conflicts().size() == 1);
 }
@@ -239,7 +261,7 @@ TEST_CASE("a frame whose parent was removed while its owner was away goes when i
     tools.start();
     CHECK(tools.structure().size() == 2);
     tools.directory.apply(removed);
-    CHECK(tools.partition.concede(kNow, {}).changed);
+    CHECK(tools.concede());
     CHECK(tools.structure().empty());
   }
   SECTION("not where the parent is there again") {
@@ -275,6 +297,43 @@ TEST_CASE(
     arms.start();
     CHECK(arms.structure() == Lines{"camera <  @ arms"});
   }
+}
+
+TEST_CASE("of a cycle that others made while a frame was away the youngest move is undone") {
+  MemoryStore store;
+  {
+    Owning arms("arms", &store);
+    arms.directory.apply(page_of("head", {{"neck", "", 10}}));
+    arms.start();
+    REQUIRE(arms.ask("hand", AddRequest{"neck", along_x(1)}) == "ok");
+  }
+  Owning arms("arms", &store);
+  SECTION("theirs") {
+    arms.directory.apply(page_of("head", {{"neck", "hand", 2000}}));
+    arms.start();
+    CHECK(arms.structure() == Lines{"hand < neck @ arms, attached", "neck <  @ head"});
+    CHECK(arms.conflicts().empty());
+  }
+  SECTION("the own one") {
+    arms.directory.apply(page_of("head", {{"neck", "hand", 500}}));
+    arms.start();
+    CHECK(arms.structure() == Lines{"hand <  @ arms", "neck < hand @ head, attached"});
+    CHECK(arms.conflicts().size() == 1);
+  }
+}
+
+TEST_CASE("others' frames hang where they belong once the frame that returns breaks their cycle") {
+  MemoryStore store;
+  {
+    Owning arms("arms", &store);
+    arms.start();
+    REQUIRE(arms.ask("hand", AddRequest{"", along_x(1)}) == "ok");
+  }
+  Owning arms("arms", &store);
+  arms.directory.apply(page_of("head", {{"hand", "neck", 1100}, {"neck", "hand", 1200}}));
+  REQUIRE(arms.structure() == Lines{"hand < neck @ head, attached", "neck <  @ head"});
+  arms.start();
+  CHECK(arms.structure() == Lines{"hand <  @ arms", "neck < hand @ head, attached"});
 }
 
 }  // namespace
