@@ -11,6 +11,7 @@
 #include "tfdude/client/client.hpp"
 
 #include "support/catch.hpp"
+#include "support/late_pages.hpp"
 #include "support/networks.hpp"
 
 namespace tfdude {
@@ -193,6 +194,30 @@ TEST_CASE("an owner hears of its own changes, too") {
   };
   CHECK(arms.hears(of(ChangeKind::kFrameAdded)));
   CHECK(arms.hears(of(ChangeKind::kFrameRemoved)));
+}
+
+TEST_CASE("a claim that was taken back costs nobody a frame, however late that is heard") {
+  const Join join = joined_by(GENERATE(0, 1));
+  auto late_transport = std::make_unique<testing::LatePages>(join("head"));
+  testing::LatePages& late = *late_transport;
+  Options options;
+  options.timeout = Milliseconds(300);
+  const Node arms = *Node::open(join("arms"), "arms", {{"arm", "", {}}});
+  Node head = *Node::open(std::move(late_transport), "head", {{"neck", "", {}}}, options);
+  Client client = *Client::open(join(""));
+  REQUIRE(client.exists("neck"));
+  late.hold("arms");
+  REQUIRE(client.add("camera", "arm", {}));
+  REQUIRE(client.remove("camera"));
+  REQUIRE(client.add("camera", "neck", {}));
+  late.let_one_through();
+  REQUIRE(late.wait_until_asked(kLong));
+  // The answer has said that there is more to come, so it stays at that however long it takes.
+  std::this_thread::sleep_for(3 * options.timeout);
+  CHECK(head.path("neck", "camera").has_value());
+  late.let_through();
+  REQUIRE(client.lookup("neck", "camera"));
+  CHECK(client.update("camera", {}));
 }
 
 }  // namespace tfdude
