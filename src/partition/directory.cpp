@@ -1,6 +1,7 @@
 #include "tfdude/partition/directory.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace tfdude {
@@ -8,10 +9,6 @@ namespace {
 
 // No clock comes so far, and one more can always be added.
 constexpr std::uint64_t kLastStamp = 1ULL << 63U;
-
-bool is_orphan(const FrameInfo& frame, const Note& note) {
-  return note.kind == Note::Kind::kRemoved && frame.owner == kHeldHere && frame.since < note.since;
-}
 
 }  // namespace
 
@@ -92,7 +89,7 @@ void Directory::apply(const Page& page) {
   Ids outdated;
   put_page(partition, owner, page, outdated);
   claims_.mend();
-  take_notes(page.notes);
+  find_orphans(page.notes, owner);
 }
 
 void Directory::replace_if_complete(Known& partition, Owner owner) {
@@ -114,7 +111,7 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
   // Of each frame the first claim that comes now replaces that of the life before, whichever is the younger.
   for (const auto& [number, page] : pages) put_page(partition, owner, page, stays);
   claims_.mend();
-  for (const auto& [number, page] : pages) take_notes(page.notes);
+  for (const auto& [number, page] : pages) find_orphans(page.notes, owner);
 }
 
 // @param outdated  frames whose claims here are of an earlier incarnation; those that the page has are taken out
@@ -167,30 +164,33 @@ void Directory::report_conflicts(const Known& partition, const Page& page) {
   }
 }
 
-void Directory::take_notes(const std::vector<Note>& notes) {
+void Directory::find_orphans(const std::vector<Note>& notes, Owner owner) {
   for (const Note& note : notes) {
     saw_stamp(note.since);
-    const auto waiting = forest_.waiting_for(note.id);
-    orphans_ = orphans_ || std::any_of(waiting.begin(), waiting.end(), [&](const FrameInfo& frame) {
-                 return is_orphan(frame, note);
-               });
+    if (note.kind != Note::Kind::kRemoved) continue;
+    for (const FrameInfo& frame : forest_.waiting_for(note.id)) {
+      if (frame.owner != kHeldHere || frame.since >= note.since) continue;
+      orphans_.insert({Concession::Kind::kRemove, frame.id, owner, frame.since});
+    }
+  }
+}
+
+void Directory::find_orphans() {
+  for (Owner owner = 1; owner < partitions_.size(); ++owner) {
+    for (const auto& [number, page] : partitions_[owner].pages) find_orphans(page.notes, owner);
   }
 }
 
 std::vector<Concession> Directory::concessions() {
-  std::vector<Concession> all = claims_.concessions();
-  if (!std::exchange(orphans_, false)) return all;
-  for (Owner owner = 1; owner < partitions_.size(); ++owner) {
-    for (const auto& [number, page] : partitions_[owner].pages) {
-      for (const Note& note : page.notes) {
-        for (const FrameInfo& frame : forest_.waiting_for(note.id)) {
-          if (!is_orphan(frame, note)) continue;
-          all.push_back({Concession::Kind::kRemove, frame.id, owner, frame.since});
-          orphans_ = true;  // until it is removed, or its parent is there again
-        }
-      }
-    }
+  // Those that were removed or moved are settled, and those whose parent is there again.
+  for (auto orphan = orphans_.begin(); orphan != orphans_.end();) {
+    const auto frame = forest_.info(orphan->frame);
+    const bool stands = frame && frame->owner == kHeldHere && frame->since == orphan->since &&
+                        !forest_.exists(frame->parent);
+    orphan = stands ? std::next(orphan) : orphans_.erase(orphan);
   }
+  std::vector<Concession> all = claims_.concessions();
+  all.insert(all.end(), orphans_.begin(), orphans_.end());
   return all;
 }
 

@@ -46,7 +46,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   }
   for (const StoredFrame* frame : circular) make_root(*frame, now);
   directory_.moved();
-  directory_.expect_orphans();
+  directory_.find_orphans();
   while (concede(concessions(), now)) {
   }
   auto taken = reconfigure(state.configured, configured, now);

@@ -178,6 +178,7 @@ class World {
     } else {
       const Picture others = own_->others.oldest();
       demand(owner_.answer(request, others) == (error == nullptr), "what can be done is granted");
+      concede(now);
       owner_.concede(others, {});
       answered_.push_back({peer, request, reply});
     }
@@ -198,12 +199,17 @@ class World {
     demand(same || refused, "a repeated request is answered as before, or called too old");
   }
 
+  // Gives up what there is to give up, as the others have nothing more to say.
+  void concede(Time now) {
+    while (own_->partition.concede(own_->partition.concessions(), now)) {
+    }
+  }
+
   template <class Said>
   void hear(const Said& said, Time now) {
     const std::uint64_t latest = latest_known();
     apply(own_->replica, said);
-    while (own_->partition.concede(own_->partition.concessions(), now)) {
-    }
+    concede(now);
     const std::vector<Note> notes = own_->others.apply(said);
     owner_.concede(own_->others.oldest(), notes);
     owner_.demand_held(own_->replica.forest, latest);

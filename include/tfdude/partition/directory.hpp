@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -63,12 +64,13 @@ class Directory {
   }
 
   /// What this process's partition would have to give up, by what was applied so far.
-  /// O(contested frames and notes).
+  /// O(contested frames).
   [[nodiscard]] std::vector<Concession> concessions();
-  /// This process has taken frames whose parents others may have removed before.
-  void expect_orphans() { orphans_ = true; }
   /// Whether there may be any. O(1).
-  [[nodiscard]] bool contested() const { return orphans_ || claims_.contested(); }
+  [[nodiscard]] bool contested() const { return !orphans_.empty() || claims_.contested(); }
+
+  /// This process has taken frames whose parents others may have removed before.
+  void find_orphans();
 
   /// A stamp for a change of the structure: the time [ns since the UNIX epoch], but later than all stamps given
   /// or seen before (Lamport 1978, rule IR1 and IR2), so that whoever knew of a change has the greater one.
@@ -137,14 +139,14 @@ class Directory {
   void put_page(Known& partition, Owner owner, const Page& page, Ids& outdated);
   void unclaim_all_but(const Ids& stays, Known& partition, Owner owner, std::uint32_t number);
   void report_conflicts(const Known& partition, const Page& page);
-  void take_notes(const std::vector<Note>& notes);
+  void find_orphans(const std::vector<Note>& notes, Owner owner);
 
   Forest& forest_;
   ChangeLog changes_;
   Claims claims_;
   std::vector<Known> partitions_;  // by Owner; the first is the own
   std::unordered_map<std::string, Owner> owners_;
-  bool orphans_ = false;  // some held frame hangs, it seems, below one that another removed
+  std::set<Concession> orphans_;  // held frames that hung below one that another removed
   std::uint64_t latest_stamp_ = 0;
 };
 

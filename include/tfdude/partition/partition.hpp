@@ -51,7 +51,7 @@ class Partition {
   /// @return how many
   std::size_t apply(const Update& update);
 
-  /// What would have to be given up as far as the directory knows now. O(contested frames and notes).
+  /// What would have to be given up as far as the directory knows now. O(contested frames).
   [[nodiscard]] std::set<Concession> concessions() const;
 
   /// Gives up what of these would still have to be given up: what was on its way when they were found may have
