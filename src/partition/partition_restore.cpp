@@ -109,9 +109,13 @@ std::set<Concession> Partition::concessions() const {
 }
 
 bool Partition::concede(const std::set<Concession>& due, Time now) {
+  using Kind = Concession::Kind;
   bool changed = false;
-  for (const Concession& concession : directory_.concessions()) {
-    if (due.count(concession) != 0) changed = concede(concession, now) || changed;
+  // What is released or removed may open a cycle, but not the other way round.
+  for (const Kind kind : {Kind::kGiveWay, Kind::kRemove, Kind::kUnhang}) {
+    for (const Concession& one : directory_.concessions()) {
+      if (one.kind == kind && due.count(one) != 0) changed = concede(one, now) || changed;
+    }
   }
   if (changed) pages_.close_epoch();
   return changed;
