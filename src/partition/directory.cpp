@@ -36,7 +36,7 @@ Directory::Successor* Directory::succeed(Known& partition, std::uint64_t incarna
   if (incarnation == partition.incarnation) return nullptr;
   if (partition.pages.empty()) {
     partition.incarnation = incarnation;
-    partition.epoch = 0;
+    partition.epoch = partition.awaited_epoch = 0;
     partition.page_count = 0;
     return nullptr;
   }
@@ -98,7 +98,7 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
   PageMap pages = std::move(successor.pages);
   partition.incarnation = successor.incarnation;
   partition.page_count = *successor.page_count;
-  partition.epoch = 0;
+  partition.epoch = partition.awaited_epoch = 0;
   partition.successor.reset();
   Ids stays;
   for (const auto& [number, page] : pages) {
@@ -133,7 +133,22 @@ void Directory::put_page(Known& partition, Owner owner, const Page& page, Ids& o
   }
   kept.ids.shrink_to_fit();
   kept.notes = page.notes;
-  partition.epoch = std::max(partition.epoch, page.epoch);
+  kept.epoch = page.epoch;
+  note_epoch(partition, page);
+}
+
+// A page that was replaced on its way comes later than those that were published after it.
+void Directory::note_epoch(Known& partition, const Page& page) {
+  if (page.epoch >= partition.awaited_epoch) {
+    partition.awaited_epoch = page.epoch;
+    partition.awaited = page.others;
+  }
+  const bool all_there =
+      std::all_of(partition.awaited.begin(), partition.awaited.end(), [&](const PageEpoch& one) {
+        const auto there = partition.pages.find(one.number);
+        return there != partition.pages.end() && there->second.epoch >= one.epoch;
+      });
+  if (all_there) partition.epoch = std::max(partition.epoch, partition.awaited_epoch);
 }
 
 // A frame that has changed its page is claimed by the other by now, as pages come in order.

@@ -1,5 +1,7 @@
 #include "tfdude/partition/pages.hpp"
 
+#include <algorithm>
+
 namespace tfdude {
 
 std::uint32_t Pages::page_with_room() {
@@ -74,20 +76,34 @@ std::optional<Note> Pages::note(const std::string& id) const {
   return pages_[known->second].notes.at(id);
 }
 
+void Pages::note_epochs() {
+  for (const std::uint32_t number : changed_) {
+    const auto before =
+        std::find_if(changed_last_.begin(), changed_last_.end(),
+                     [number](const PageEpoch& one) { return one.number == number; });
+    if (before != changed_last_.end()) changed_last_.erase(before);
+    changed_last_.push_front({number, epoch_});
+    // One more than a page tells of, as it need not tell of itself.
+    if (changed_last_.size() > kOthers + 1) changed_last_.pop_back();
+  }
+}
+
 std::vector<Page> Pages::take_changed() {
+  note_epochs();
   std::vector<Page> changed;
   changed.reserve(changed_.size());
   for (const std::uint32_t number : changed_) {
-    Page page{partition_, number, incarnation_, published_epoch_, {}, {}};
+    Page page{partition_, number, incarnation_, epoch_, {}, {}, {}};
     const Sheet& sheet = pages_[number];
     page.entries.reserve(sheet.frames.size());
     for (const auto& [id, place] : sheet.frames)
       page.entries.push_back({id, place.parent, place.since});
     for (const auto& [id, note] : sheet.notes) page.notes.push_back(note);
+    for (const PageEpoch& one : changed_last_) {
+      if (one.number != number && page.others.size() < kOthers) page.others.push_back(one);
+    }
     changed.push_back(std::move(page));
   }
-  // Only the last page completes the epoch.
-  if (!changed.empty()) changed.back().epoch = published_epoch_ = epoch_;
   changed_.clear();
   return changed;
 }

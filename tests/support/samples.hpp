@@ -113,7 +113,8 @@ bool take(const Bytes& bytes) {
            1,
            9,
            {{"base", "", 18446744073709551615ULL}},
-           {{"hand", 5, Note::Kind::kRemoved, ""}, {"base", 6, Note::Kind::kUnhung, "arms"}}}};
+           {{"hand", 5, Note::Kind::kRemoved, ""}, {"base", 6, Note::Kind::kUnhung, "arms"}},
+           {{0, 8}, {4294967295U, 18446744073709551615ULL}}}};
 }
 
 [[nodiscard]] inline std::vector<Presence> presences() {

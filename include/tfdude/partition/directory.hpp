@@ -110,6 +110,7 @@ class Directory {
   /// What of a page is needed later: its ids, each after its length in one byte, since most of the memory of a
   /// large structure would else go into strings; and its notes.
   struct KeptPage {
+    std::uint64_t epoch = 0;
     std::string ids;
     std::vector<Note> notes;
   };
@@ -122,10 +123,12 @@ class Directory {
   };
   struct Known {
     PartitionInfo info;
-    std::uint64_t live = 0;         // the latest incarnation heard of
-    std::uint64_t announced = 0;    // the latest whose presence has come
-    std::uint64_t incarnation = 0;  // that of the pages
-    std::uint64_t epoch = 0;
+    std::uint64_t live = 0;           // the latest incarnation heard of
+    std::uint64_t announced = 0;      // the latest whose presence has come
+    std::uint64_t incarnation = 0;    // that of the pages
+    std::uint64_t epoch = 0;          // up to which all has come,
+    std::uint64_t awaited_epoch = 0;  // will have once these have, too
+    std::vector<PageEpoch> awaited;
     std::uint32_t page_count = 0;
     std::map<std::uint32_t, KeptPage> pages;
     std::optional<Successor> successor;
@@ -136,6 +139,7 @@ class Directory {
   Known& known(const std::string& partition, Owner& owner);
   Successor* succeed(Known& partition, std::uint64_t incarnation);
   void replace_if_complete(Known& partition, Owner owner);
+  static void note_epoch(Known& partition, const Page& page);
   void put_page(Known& partition, Owner owner, const Page& page, Ids& outdated);
   void unclaim_all_but(const Ids& stays, Known& partition, Owner owner, std::uint32_t number);
   void report_conflicts(const Known& partition, const Page& page);

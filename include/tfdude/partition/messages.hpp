@@ -99,16 +99,24 @@ struct Note {
   }
 };
 
+/// That a page was changed last in this epoch.
+struct PageEpoch {
+  std::uint32_t number = 0;
+  std::uint64_t epoch = 0;
+};
+
 /// A piece of a partition's structure. Each page is replaced as a whole, so that a frame costs its page
 /// and not the directory, and a late joiner reads pages and not frames.
 struct Page {
   std::string partition;
   std::uint32_t number = 0;
   std::uint64_t incarnation = 0;
-  /// Once this page has come, all of the partition's structure up to this epoch has.
+  /// What it shows.
   std::uint64_t epoch = 0;
   std::vector<PageEntry> entries;
   std::vector<Note> notes{};
+  /// The other pages that were changed last: once these have come, too, all of the structure up to the page's epoch has.
+  std::vector<PageEpoch> others{};
 };
 
 /// That a partition is served, and by whom. It holds as long as its participant lives.

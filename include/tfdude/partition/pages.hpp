@@ -24,6 +24,10 @@ class Pages {
   /// Notes kept; the oldest go first.
   static constexpr std::size_t kMaxNotes = 1024;
 
+  /// Of how many that were changed before it a page tells. A page that a later one has replaced on its way is late; if
+  /// more than these were changed meanwhile, nobody knows.
+  static constexpr std::size_t kOthers = 16;
+
   struct Place {
     std::string parent;
     std::uint64_t since = 0;
@@ -71,12 +75,12 @@ class Pages {
 
   std::uint32_t page_with_room();
   void changed(std::uint32_t number, const std::string& id);
+  void note_epochs();
   void forget_note(const std::string& id);
 
   std::string partition_;
   std::uint64_t incarnation_;
   std::uint64_t epoch_;
-  std::uint64_t published_epoch_ = 0;
   std::vector<Sheet> pages_;
   PageOf page_of_;
   PageOf page_of_note_;
@@ -84,6 +88,7 @@ class Pages {
   std::deque<std::pair<std::string, std::uint64_t>> oldest_notes_;
   std::set<std::uint32_t> with_room_;
   std::set<std::uint32_t> changed_;
+  std::deque<PageEpoch> changed_last_;  // the latest first
   bool watching_ = false;
   std::set<std::string> touched_;
 };

@@ -156,6 +156,10 @@ bool well_formed_page(const std::uint8_t* data, std::size_t size) {
     walk.id();
     walk.id();
   });
+  walk.sequence([&] {
+    walk.skip(8, 8);
+    walk.ulong();
+  });
   return walk.good();
 }
 

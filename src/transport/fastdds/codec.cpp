@@ -219,6 +219,11 @@ wire::Page to_wire(const Page& page) {
     sample.notes()[i].kind(static_cast<std::uint8_t>(page.notes[i].kind));
     sample.notes()[i].rival(page.notes[i].rival);
   }
+  sample.others().resize(page.others.size());
+  for (std::size_t i = 0; i < page.others.size(); ++i) {
+    sample.others()[i].number(page.others[i].number);
+    sample.others()[i].epoch(page.others[i].epoch);
+  }
   return sample;
 }
 
@@ -297,8 +302,13 @@ Result<Note> read_note(const wire::Note& sample) {
 }  // namespace
 
 Result<Page> from_wire(const wire::Page& sample) {
-  Page page{
-      string_of(sample.partition()), sample.number(), sample.incarnation(), sample.epoch(), {}, {}};
+  Page page{string_of(sample.partition()),
+            sample.number(),
+            sample.incarnation(),
+            sample.epoch(),
+            {},
+            {},
+            {}};
   if (auto ok = check_partition_name(page.partition); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
@@ -317,6 +327,9 @@ Result<Page> from_wire(const wire::Page& sample) {
     auto read = read_note(note);
     if (!read) return tl::unexpected(std::move(read.error()));
     page.notes.push_back(*std::move(read));
+  }
+  for (const wire::PageEpoch& one : sample.others()) {
+    page.others.push_back({one.number(), one.epoch()});
   }
   return page;
 }

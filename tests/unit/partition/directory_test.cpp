@@ -108,7 +108,19 @@ TEST_CASE("a frame that changes its page stays, whichever page comes first") {
   CHECK(replica.directory.info(*replica.directory.owner("arms")).frames == 1);
 }
 
-TEST_CASE("an epoch is known once its last page has come, and never goes back") {
+TEST_CASE("an epoch is known once all that was changed for it has come") {
+  Replica replica;
+  replica.directory.apply(Page{"arms", 0, 1, 2, {}});
+  const Owner arms = *replica.directory.owner("arms");
+  REQUIRE(replica.directory.epoch(arms) == 2);
+  // Page 0 of epoch 3 was replaced on its way by that of epoch 4.
+  replica.directory.apply(Page{"arms", 1, 1, 3, {}, {}, {{0, 3}}});
+  CHECK(replica.directory.epoch(arms) == 2);
+  replica.directory.apply(Page{"arms", 0, 1, 4, {}, {}, {{1, 3}}});
+  CHECK(replica.directory.epoch(arms) == 4);
+}
+
+TEST_CASE("an epoch never goes back") {
   Replica replica;
   replica.directory.apply(Page{"arms", 0, 1, 4, {}});
   const Owner arms = *replica.directory.owner("arms");

@@ -1,7 +1,10 @@
 #include "tfdude/partition/pages.hpp"
 
+#include <algorithm>
+#include <deque>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/catch.hpp"
@@ -31,6 +34,14 @@ Structure structure_of(const std::vector<Page>& pages) {
     for (const PageEntry& entry : page.entries) structure[entry.id] = entry.parent;
   }
   return structure;
+}
+
+std::vector<std::string> others_of(const Page& page) {
+  std::vector<std::string> others;
+  for (const PageEpoch& one : page.others) {
+    others.push_back(std::to_string(one.number) + ": " + std::to_string(one.epoch));
+  }
+  return others;
 }
 
 void put_numbered(Pages& pages, std::size_t first, std::size_t count) {
@@ -100,23 +111,54 @@ TEST_CASE("room on a page is used again, also after the page was empty") {
   CHECK(pages.count() == 3);
 }
 
-TEST_CASE("only the last page completes the epoch") {
+TEST_CASE("pages tell of those that were changed before them, or with them") {
   Pages pages("robot", kLife);
   put_numbered(pages, 0, 2 * Pages::kPageSize);
   CHECK(pages.close_epoch() == kLife + 1);
   auto changed = pages.take_changed();
   REQUIRE(changed.size() == 2);
-  CHECK(changed[0].epoch == 0);
-  CHECK(changed[1].epoch == kLife + 1);
+  CHECK(others_of(changed[0]) == std::vector<std::string>{"1: 8"});
+  CHECK(others_of(changed[1]) == std::vector<std::string>{"0: 8"});
   pages.put("f0", "f1", 0);
   CHECK(pages.close_epoch() == kLife + 2);
   pages.put("f100", "f1", 0);
   CHECK(pages.close_epoch() == kLife + 3);
   changed = pages.take_changed();
   REQUIRE(changed.size() == 2);
-  CHECK(changed[0].epoch == kLife + 1);
+  CHECK(changed[0].epoch == kLife + 3);
   CHECK(changed[1].epoch == kLife + 3);
+  pages.put("f0", "", 0);
+  CHECK(pages.close_epoch() == kLife + 4);
+  changed = pages.take_changed();
+  REQUIRE(changed.size() == 1);
+  CHECK(others_of(changed[0]) == std::vector<std::string>{"1: 10"});
 }
+
+TEST_CASE("of many pages that were changed at once each tells of some") {
+  Pages pages("robot", kLife);
+  put_numbered(pages, 0, 30 * Pages::kPageSize);
+  for (const Page& page : pages.take_changed()) CHECK(page.others.size() == Pages::kOthers);
+}
+
+// Pages on a way on which a later one may take the place of an earlier one of the same number.
+class Way {
+ public:
+  void put(const Page& page) { pages_.push_back(page); }
+
+  void deliver(Random& random, Replica& replica) {
+    for (std::size_t some = random.index(4); some > 0 && !pages_.empty(); --some) {
+      const Page page = std::move(pages_.front());
+      pages_.pop_front();
+      const bool again = std::any_of(pages_.begin(), pages_.end(), [&](const Page& later) {
+        return later.number == page.number;
+      });
+      if (!again || random.index(2) == 0) replica.directory.apply(page);
+    }
+  }
+
+ private:
+  std::deque<Page> pages_;
+};
 
 TEST_CASE("a replica fed with the pages in order has the owner's structure") {
   Random random(0x9a6e5);
@@ -124,6 +166,10 @@ TEST_CASE("a replica fed with the pages in order has the owner's structure") {
   Pages pages("robot", kLife);
   Structure owned;
   Replica replica;
+  Replica late;
+  Way way;
+  std::uint64_t stamp = 0;
+  int late_has_all = 0;
   constexpr int kSteps = 3000;
   for (int step = 0; step < kSteps; ++step) {
     // Several changes at a time, some of the same frame: it may have left one page for another between.
@@ -132,7 +178,7 @@ TEST_CASE("a replica fed with the pages in order has the owner's structure") {
       if (random.index(3) > 0) id = "f" + std::to_string(random.index(300));
       if (random.index(5) < 3) {
         const std::string parent = "p" + std::to_string(random.index(10));
-        pages.put(id, parent, 0);
+        pages.put(id, parent, ++stamp);
         owned[id] = parent;
       } else {
         pages.erase(id);
@@ -143,14 +189,21 @@ TEST_CASE("a replica fed with the pages in order has the owner's structure") {
     for (const Page& page : pages.take_changed()) {
       REQUIRE(page.entries.size() <= Pages::kPageSize);
       replica.directory.apply(page);
+      way.put(page);
     }
+    way.deliver(random, late);
     std::vector<std::string> expected;
     for (const auto& [owned_id, parent] : owned)
       expected.push_back(owned_id + " < " + parent + " @ robot");
     INFO("step " << step);
     REQUIRE(lines_diff(replica.structure(), expected) == "");
     REQUIRE(pages.frame_count() == owned.size());
+    const auto known = late.directory.owner("robot");
+    if (!known || late.directory.epoch(*known) < pages.epoch()) continue;
+    ++late_has_all;
+    REQUIRE(lines_diff(late.structure(), expected) == "");
   }
+  CHECK(late_has_all > 100);
   const Owner robot = *replica.directory.owner("robot");
   CHECK(replica.directory.epoch(robot) == pages.epoch());
   CHECK(replica.directory.info(robot).frames == owned.size());

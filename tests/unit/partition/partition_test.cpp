@@ -105,7 +105,7 @@ TEST_CASE("what is loaded is published once, as one epoch") {
   REQUIRE(arms.partition.load(frames, kNow));
   const auto pages = arms.partition.take_pages();
   REQUIRE(pages.size() == 2);
-  CHECK(pages[0].epoch == 0);
+  CHECK(pages[0].epoch == kLife + 1);
   CHECK(pages[1].epoch == kLife + 1);
   CHECK(arms.partition.take_pages().empty());
   Replica other;

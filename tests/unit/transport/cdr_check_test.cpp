@@ -235,12 +235,18 @@ Cdr entries(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("robot").ulong(0).ulonglong(0).ulonglong(0).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(7).string("a").string("b");
-  return cdr.ulong(0);
+  return cdr.ulong(0).ulong(0);
 }
 Cdr notes(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("robot").ulong(0).ulonglong(0).ulonglong(0).ulong(0).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(7).octet(1).string("a").string("b");
+  return cdr.ulong(0);
+}
+Cdr others(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.string("robot").ulong(0).ulonglong(0).ulonglong(0).ulong(0).ulong(0).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(7).ulong(3);
   return cdr;
 }
 
@@ -256,7 +262,8 @@ TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
                                   {"segments of a lookup", segments, request},
                                   {"transforms of a reply", transforms, reply},
                                   {"entries of a page", entries, page},
-                                  {"notes of a page", notes, page}};
+                                  {"notes of a page", notes, page},
+                                  {"other pages of a page", others, page}};
   for (const Sequence& sequence : all) {
     INFO(sequence.name);
     CHECK(sequence.well_formed(sequence.sample(0, 0)));

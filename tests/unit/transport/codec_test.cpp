@@ -156,6 +156,11 @@ TEST_CASE("pages and presences arrive as they were sent") {
       CHECK(arrived->entries[i].since == one.entries[i].since);
     }
     CHECK(arrived->notes == one.notes);
+    REQUIRE(arrived->others.size() == one.others.size());
+    for (std::size_t i = 0; i < one.others.size(); ++i) {
+      CHECK(arrived->others[i].number == one.others[i].number);
+      CHECK(arrived->others[i].epoch == one.others[i].epoch);
+    }
   }
   for (const Presence& one : testing::presences()) {
     const auto arrived = from_wire(travelled<PresenceType>(to_wire(one)));
