@@ -1,0 +1,171 @@
+#include "tfdude/math/interpolate.hpp"
+
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "support/catch.hpp"
+#include "support/pose_diff.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::covariance_diff;
+using testing::pose_diff;
+using testing::Random;
+using testing::transform_diff;
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Both the series and the closed forms, and where one takes over from the other.
+const std::vector<double> kAngles{0.0, 1e-9, 1e-3, 0.0999, 0.1001, 1.0, 2.5, kPi - 1e-6};
+const std::vector<double> kParts{0.0, 1e-6, 0.25, 0.5, 0.9, 1.0};
+
+struct Samples {
+  Transform X0;
+  Transform X1;
+};
+
+Samples samples(Random& random, double angle, double reach = 2.0) {
+  const Pose X0 = random.pose(reach);
+  return {{X0, random.covariance()}, {X0 * exp(random.twist(angle, reach)), random.covariance()}};
+}
+
+// Of the right perturbation of the interpolated pose by that of one of the samples, by central differences.
+Matrix6d numeric_jacobian(const std::function<Pose(const Twist&)>& perturbed) {
+  constexpr double kStep = 1e-4;
+  const Pose X_inv = perturbed(Twist::Zero()).inverse();
+  Matrix6d J;
+  for (int i = 0; i < 6; ++i) {
+    const Twist step = kStep * Twist::Unit(i);
+    J.col(i) = (log(X_inv * perturbed(step)) - log(X_inv * perturbed(-step))) / (2.0 * kStep);
+  }
+  return J;
+}
+
+Covariance propagated(const Matrix6d& J, const Covariance& sigma) {
+  return Covariance::trusted(Matrix6d(J * sigma.matrix() * J.transpose()));
+}
+
+// The largest ratio of variances in any direction.
+double largest_ratio(const Matrix6d& sampled, const Matrix6d& given) {
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d> solver(sampled, given,
+                                                                  Eigen::EigenvaluesOnly);
+  return solver.eigenvalues()[5];
+}
+
+}  // namespace
+
+TEST_CASE("interpolation begins at the one sample and ends at the other") {
+  Random random(501);
+  INFO("seed " << random.seed());
+  for (const double angle : kAngles) {
+    INFO("angle " << angle);
+    const auto [X0, X1] = samples(random, angle);
+    CHECK(transform_diff(interpolate(X0, X1, 0.0), X0, 1e-9) == "");
+    CHECK(transform_diff(interpolate(X0, X1, 1.0), X1, 1e-9) == "");
+    CHECK(pose_diff(extrapolate(X0, X1, 1.0).pose, X1.pose, 1e-9) == "");
+    CHECK(covariance_diff(extrapolate(X0, X1, 1.0).covariance, X1.covariance, 1e-9) == "");
+  }
+}
+
+TEST_CASE("interpolation is the same from either end") {
+  Random random(502);
+  INFO("seed " << random.seed());
+  for (const double angle : kAngles) {
+    for (const double s : kParts) {
+      INFO("angle " << angle << ", part " << s);
+      const auto [X0, X1] = samples(random, angle);
+      CHECK(transform_diff(interpolate(X0, X1, s), interpolate(X1, X0, 1.0 - s), 1e-8) == "");
+    }
+  }
+}
+
+TEST_CASE("motion with a constant twist is met exactly") {
+  Random random(503);
+  INFO("seed " << random.seed());
+  for (const double angle : kAngles) {
+    const Pose start = random.pose();
+    const Twist xi = random.twist(angle);
+    const auto at = [&](double t) { return Transform{start * exp(t * xi), {}}; };
+    for (const double s : kParts) {
+      INFO("angle " << angle << ", part " << s);
+      CHECK(pose_diff(interpolate(at(0), at(1), s).pose, at(s).pose, 1e-8) == "");
+      CHECK(pose_diff(extrapolate(at(0), at(0.25), 1 + s).pose, at(0.25 + 0.25 * s).pose, 1e-8) ==
+            "");
+    }
+  }
+}
+
+TEST_CASE("each sample's part of the covariance is that of the Jacobian, shared as a mean is") {
+  Random random(504);
+  INFO("seed " << random.seed());
+  for (const double angle : kAngles) {
+    if (angle > 3.0) continue;  // where a small step may go round the other way
+    const auto [X0, X1] = samples(random, angle);
+    const Pose a = X0.pose;
+    const Pose b = X1.pose;
+    for (const double s : {0.25, 0.5, 0.9}) {
+      INFO("angle " << angle << ", part " << s);
+      const Matrix6d J0 = numeric_jacobian([&, s = s](const Twist& e) {
+        return interpolate({a * exp(e), {}}, {b, {}}, s).pose;
+      });
+      const Matrix6d J1 = numeric_jacobian([&, s = s](const Twist& e) {
+        return interpolate({a, {}}, {b * exp(e), {}}, s).pose;
+      });
+      const Covariance from0 = interpolate(X0, {b, {}}, s).covariance;
+      const Covariance from1 = interpolate({a, {}}, X1, s).covariance;
+      CHECK(covariance_diff(Covariance::trusted(Matrix6d((1 - s) * from0.matrix())),
+                            propagated(J0, X0.covariance), 1e-6) == "");
+      CHECK(covariance_diff(Covariance::trusted(Matrix6d(s * from1.matrix())),
+                            propagated(J1, X1.covariance), 1e-6) == "");
+    }
+  }
+}
+
+// Ten standard errors of a sample variance, √(2 / N), are 0.045.
+TEST_CASE("the covariance is no less than the sampled one, however the samples are correlated") {
+  constexpr int kSamples = 100'000;
+  Random random(505);
+  INFO("seed " << random.seed());
+  for (const double correlation : {0.0, 0.5, 1.0}) {
+    const auto [X0, X1] = samples(random, 0.7);
+    const Matrix6d root0 = X0.covariance.matrix().llt().matrixL();
+    const Matrix6d root1 = X1.covariance.matrix().llt().matrixL();
+    const double s = random.uniform(0.3, 0.7);
+    const double beyond = random.uniform(1.1, 2.0);
+    const Transform between = interpolate(X0, X1, s);
+    const Transform after = extrapolate(X0, X1, beyond);
+    const Pose between_inverse = between.pose.inverse();
+    const Pose after_inverse = after.pose.inverse();
+    Matrix6d sampled = Matrix6d::Zero();
+    Matrix6d sampled_after = Matrix6d::Zero();
+    for (int i = 0; i < kSamples; ++i) {
+      Twist first;
+      Twist second;
+      for (int k = 0; k < 6; ++k) first[k] = random.normal();
+      for (int k = 0; k < 6; ++k) second[k] = random.normal();
+      second = correlation * first + std::sqrt(1.0 - correlation * correlation) * second;
+      // Small, so that what is left out, of second order, is smaller than chance.
+      const Transform Y0{X0.pose * exp(0.1 * root0 * first), {}};
+      const Transform Y1{X1.pose * exp(0.1 * root1 * second), {}};
+      const Twist e = 10.0 * log(between_inverse * interpolate(Y0, Y1, s).pose);
+      const Twist e_after = 10.0 * log(after_inverse * extrapolate(Y0, Y1, beyond).pose);
+      sampled += e * e.transpose() / kSamples;
+      sampled_after += e_after * e_after.transpose() / kSamples;
+    }
+    INFO("correlation " << correlation << ", part " << s << " and " << beyond);
+    CHECK(largest_ratio(sampled, between.covariance.matrix()) < 1.045);
+    CHECK(largest_ratio(sampled_after, after.covariance.matrix()) < 1.045);
+    // As if the samples were independent.
+    const Matrix6d naive = (1 - s) * interpolate(X0, {X1.pose, {}}, s).covariance.matrix() +
+                           s * interpolate({X0.pose, {}}, X1, s).covariance.matrix();
+    CHECK((largest_ratio(sampled, naive) < 1.045) == (correlation == 0.0));
+  }
+}
+
+}  // namespace tfdude
