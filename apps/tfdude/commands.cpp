@@ -149,9 +149,13 @@ int run_partitions(Client& client, const Arguments& arguments) {
   std::string text;
   for (const PartitionInfo& partition : partitions) {
     json.push_back(partition_json(partition));
-    text += partition.name + "  frames " + std::to_string(partition.frames) + "  host " +
-            partition.host + "  pid " + std::to_string(partition.pid) +
-            (partition.reachable ? "\n" : "  unreachable\n");
+    text += partition.name;
+    // Nothing else is known of one that went before this process came.
+    if (!partition.host.empty()) {
+      text += "  frames " + std::to_string(partition.frames) + "  host " + partition.host +
+              "  pid " + std::to_string(partition.pid);
+    }
+    text += partition.reachable ? "\n" : "  unreachable since " + to_string(partition.since) + "\n";
   }
   return answer(arguments, {{"partitions", json}}, text);
 }

@@ -64,6 +64,15 @@ bool Participant::may_appear(Errc code) {
   }
 }
 
+Error Participant::explained(Error error) {
+  const std::lock_guard lock(structure_mutex_);
+  const auto missed = directory_.only_heard_of();
+  if (!missed || error.code == Errc::kUnknownPartition) return error;
+  return {Errc::kUnreachable, error.message + ", unless it is of partition " + quote(missed->name) +
+                                  ", which is not reachable since " + to_string(missed->since) +
+                                  ", before this process came"};
+}
+
 // What a plan has checked before anybody was asked.
 bool Participant::denies_plan(Errc code) {
   return code == Errc::kAlreadyExists || code == Errc::kUnknownParent || code == Errc::kCycle;
@@ -199,7 +208,7 @@ Result<void> Participant::remove(const std::string& id) {
                           return change(parts);
                         });
   // Gone by the time of a second attempt: what was asked for has come to be.
-  if (!removed && asked && removed.error().code == Errc::kUnknownFrame) return {};
+  if (!removed && asked && !forest_.exists(id)) return {};
   return removed;
 }
 
@@ -362,6 +371,7 @@ void Participant::on_presence(const Presence& presence) {
       const auto before = directory_.serving(presence.partition);
       directory_.apply(presence, wall_clock());
       appeared = directory_.serving(presence.partition) && !before;
+      if (appeared && partition_ != nullptr) publisher_->ask();
       // It may be the last that was missing of the structure of one who has returned.
       if (partition_ != nullptr && directory_.contested()) conceder_->ask();
     }
@@ -381,6 +391,7 @@ void Participant::on_lost(const std::string& partition, std::uint64_t incarnatio
     if (rival_ && partition == rival_->partition && rival_->incarnation == incarnation)
       rival_.reset();
     news = directory_.lost(partition, incarnation, wall_clock());
+    if (news && partition_ != nullptr) publisher_->ask();
     tell_changes();
   }
   structure_changed_.notify_all();

@@ -71,7 +71,8 @@ class Participant final : public TransportHandler {
       if (auto ok = still_in(); !ok) return tl::unexpected(std::move(ok.error()));
       const bool certain = settled();
       auto result = operation();
-      if (result || certain || !may_appear(result.error().code)) return result;
+      if (result || !may_appear(result.error().code)) return result;
+      if (certain) return tl::unexpected(explained(std::move(result.error())));
       wait_for_news();
     }
   }
@@ -93,6 +94,8 @@ class Participant final : public TransportHandler {
 
   static Time wall_clock();
   static bool may_appear(Errc code);
+  /// Of what seems not to be there, as others know more.
+  [[nodiscard]] Error explained(Error error);
   /// @return kPartitionTaken once this participant has given its partition up.
   [[nodiscard]] Result<void> still_in();
   [[nodiscard]] bool settled();

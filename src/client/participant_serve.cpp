@@ -148,10 +148,10 @@ Result<void> Participant::commit() {
     } else {
       pages = partition_->take_pages();
       if (store_ != nullptr) unsaved = partition_->take_unsaved();
-      if (partition_->page_count() != presence_.pages) {
-        presence_.pages = partition_->page_count();
-        news = presence_;
-      }
+      Presence current = presence_;
+      current.pages = partition_->page_count();
+      current.absent = directory_.absent();
+      if (!(current == presence_)) news = presence_ = std::move(current);
     }
   }
   Result<void> saved;

@@ -48,6 +48,7 @@ Directory::Successor* Directory::succeed(Known& partition, std::uint64_t incarna
 
 void Directory::apply(const Presence& presence, Time now) {
   if (!presence.serving) return;
+  note_absent(presence.absent);
   Owner owner = kHeldHere;
   Known& partition = known(presence.partition, owner);
   if (owner == kHeldHere || presence.incarnation < partition.live) return;
@@ -235,6 +236,32 @@ std::optional<Owner> Directory::owner(std::string_view partition) const {
   const auto entry = owners_.find(std::string(partition));
   if (entry == owners_.end()) return std::nullopt;
   return entry->second;
+}
+
+void Directory::note_absent(const std::vector<Absent>& absent) {
+  for (const Absent& one : absent) {
+    Owner owner = kHeldHere;
+    Known& partition = known(one.partition, owner);
+    if (owner == kHeldHere || partition.live != 0) continue;
+    partition.info.since = Time(std::chrono::nanoseconds(one.since));
+  }
+}
+
+std::vector<Absent> Directory::absent() const {
+  std::vector<Absent> all;
+  for (Owner owner = 1; owner < partitions_.size(); ++owner) {
+    const Known& partition = partitions_[owner];
+    if (partition.info.reachable || partition.live == 0 || all.size() >= kMaxItems) continue;
+    all.push_back({partition.info.name, partition.info.since.time_since_epoch().count()});
+  }
+  return all;
+}
+
+std::optional<PartitionInfo> Directory::only_heard_of() const {
+  const auto one = std::find_if(partitions_.begin() + 1, partitions_.end(),
+                                [](const Known& partition) { return partition.live == 0; });
+  if (one == partitions_.end()) return std::nullopt;
+  return one->info;
 }
 
 std::vector<Owner> Directory::reachable_owners() const {

@@ -119,7 +119,13 @@ bool take(const Bytes& bytes) {
 
 [[nodiscard]] inline std::vector<Presence> presences() {
   return {{"robot", 1, "tower", 4711, 3, true},
-          {"r", 18446744073709551615ULL, std::string(255, 'h'), 4294967295U, 4294967295U, false}};
+          {"r",
+           18446744073709551615ULL,
+           std::string(255, 'h'),
+           4294967295U,
+           4294967295U,
+           false,
+           {{"arms", -9223372036854775807}, {std::string(255, 'a'), 7}}}};
 }
 
 [[nodiscard]] inline std::vector<WireKind> wire_kinds(Random& random) {

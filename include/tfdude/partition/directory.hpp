@@ -94,6 +94,12 @@ class Directory {
   /// Whether all pages of all reachable partitions have come.
   [[nodiscard]] bool complete() const;
 
+  /// Those of whom structure is here, but who are not reachable: what to tell newcomers.
+  [[nodiscard]] std::vector<Absent> absent() const;
+
+  /// A partition that others miss, and of which nothing else is known here.
+  [[nodiscard]] std::optional<PartitionInfo> only_heard_of() const;
+
   /// Those other partitions that are reachable.
   [[nodiscard]] std::vector<Owner> reachable_owners() const;
 
@@ -137,6 +143,7 @@ class Directory {
   };
 
   Known& known(const std::string& partition, Owner& owner);
+  void note_absent(const std::vector<Absent>& absent);
   Successor* succeed(Known& partition, std::uint64_t incarnation);
   void replace_if_complete(Known& partition, Owner owner);
   static void note_epoch(Known& partition, const Page& page);

@@ -119,6 +119,16 @@ struct Page {
   std::vector<PageEpoch> others{};
 };
 
+/// A partition that was there and is not reachable.
+struct Absent {
+  std::string partition;
+  std::int64_t since = 0;  ///< [ns since the UNIX epoch], by the clock of who misses it
+
+  friend bool operator==(const Absent& a, const Absent& b) {
+    return a.partition == b.partition && a.since == b.since;
+  }
+};
+
 /// That a partition is served, and by whom. It holds as long as its participant lives.
 struct Presence {
   std::string partition;
@@ -128,10 +138,12 @@ struct Presence {
   std::uint32_t pid = 0;
   std::uint32_t pages = 0;  ///< how many pages its structure has
   bool serving = false;     ///< false: the name is only being claimed yet
+  /// Whom the sender has known, for those who come only now and cannot.
+  std::vector<Absent> absent{};
 
   friend bool operator==(const Presence& a, const Presence& b) {
     return a.partition == b.partition && a.incarnation == b.incarnation && a.host == b.host &&
-           a.pid == b.pid && a.pages == b.pages && a.serving == b.serving;
+           a.pid == b.pid && a.pages == b.pages && a.serving == b.serving && a.absent == b.absent;
   }
 };
 

@@ -172,6 +172,10 @@ bool well_formed_presence(const std::uint8_t* data, std::size_t size) {
   walk.ulong();
   walk.ulong();
   walk.boolean();
+  walk.sequence([&] {
+    walk.skip(8, 8);
+    walk.id();
+  });
   return walk.good();
 }
 

@@ -235,6 +235,11 @@ wire::Presence to_wire(const Presence& presence) {
   sample.pid(presence.pid);
   sample.pages(presence.pages);
   sample.serving(presence.serving);
+  sample.absent().resize(presence.absent.size());
+  for (std::size_t i = 0; i < presence.absent.size(); ++i) {
+    sample.absent()[i].partition(presence.absent[i].partition);
+    sample.absent()[i].since(presence.absent[i].since);
+  }
   return sample;
 }
 
@@ -340,11 +345,18 @@ Result<Presence> from_wire(const wire::Presence& sample) {
                     std::string(sample.host().c_str()),
                     sample.pid(),
                     sample.pages(),
-                    sample.serving()};
+                    sample.serving(),
+                    {}};
   if (auto ok = check_partition_name(presence.partition); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
   if (auto ok = check_id(presence.host, "host"); !ok) return tl::unexpected(std::move(ok.error()));
+  for (const wire::Absent& one : sample.absent()) {
+    presence.absent.push_back({string_of(one.partition()), one.since()});
+    if (auto ok = check_partition_name(presence.absent.back().partition); !ok) {
+      return tl::unexpected(std::move(ok.error()));
+    }
+  }
   return presence;
 }
 

@@ -129,6 +129,33 @@ TEST_CASE("an epoch never goes back") {
   CHECK(replica.directory.epoch(arms) == 4);
 }
 
+TEST_CASE("who comes too late to know a partition hears from others that it was there") {
+  Replica known;
+  known.directory.apply(presence_of("arms", 1, 1), kNow);
+  CHECK(known.directory.absent().empty());
+  REQUIRE(known.directory.lost("arms", 1, kLater));
+  Replica newcomer;
+  CHECK_FALSE(newcomer.directory.only_heard_of());
+  Presence head = presence_of("head", 1, 0);
+  head.absent = known.directory.absent();
+  newcomer.directory.apply(head, kNow);
+  REQUIRE(newcomer.directory.only_heard_of());
+  CHECK(newcomer.directory.only_heard_of()->name == "arms");
+  CHECK(newcomer.directory.only_heard_of()->since == kLater);
+  CHECK_FALSE(newcomer.directory.reachable(*newcomer.directory.owner("arms")));
+  CHECK(newcomer.directory.complete());
+  SECTION("it does not tell so itself, or it would be told for ever") {
+    CHECK(newcomer.directory.absent().empty());
+  }
+  SECTION("until it returns") {
+    newcomer.directory.apply(presence_of("arms", 2, 1), kLater);
+    CHECK_FALSE(newcomer.directory.only_heard_of());
+    CHECK(newcomer.directory.reachable(*newcomer.directory.owner("arms")));
+    newcomer.directory.apply(head, kNow);
+    CHECK(newcomer.directory.reachable(*newcomer.directory.owner("arms")));
+  }
+}
+
 TEST_CASE("a partition that went away keeps its structure and is marked") {
   Replica replica;
   replica.directory.apply(presence_of("arms", 1, 1), kNow);

@@ -192,7 +192,7 @@ TEST_CASE("the message of an error has at most 4096 bytes") {
 TEST_CASE("the name of a host has at most 255 bytes") {
   const auto host = [](const std::string& name) {
     return presence(
-        Cdr().string("r").ulonglong(0).string(name).ulong(0).ulong(0).ulong(0).octet(1));
+        Cdr().string("r").ulonglong(0).string(name).ulong(0).ulong(0).ulong(0).octet(1).ulong(0));
   };
   CHECK(host(std::string(255, 'h')));
   CHECK_FALSE(host(std::string(256, 'h')));
@@ -250,6 +250,13 @@ Cdr others(std::size_t count, std::uint64_t length) {
   return cdr;
 }
 
+Cdr absent(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.string("r").ulonglong(0).string("h").ulong(0).ulong(0).ulong(0).octet(1).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(7).string("a");
+  return cdr;
+}
+
 TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
   struct Sequence {
     const char* name;
@@ -263,7 +270,8 @@ TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
                                   {"transforms of a reply", transforms, reply},
                                   {"entries of a page", entries, page},
                                   {"notes of a page", notes, page},
-                                  {"other pages of a page", others, page}};
+                                  {"other pages of a page", others, page},
+                                  {"absent ones of a presence", absent, presence}};
   for (const Sequence& sequence : all) {
     INFO(sequence.name);
     CHECK(sequence.well_formed(sequence.sample(0, 0)));
@@ -292,7 +300,8 @@ TEST_CASE("bodies of kinds that there are not are refused") {
 TEST_CASE("a boolean is zero or one") {
   const auto serving = [](unsigned value) {
     return presence(
-        Cdr().string("r").ulonglong(0).string("h").ulong(0).ulong(0).ulong(0).octet(value));
+        Cdr().string("r").ulonglong(0).string("h").ulong(0).ulong(0).ulong(0).octet(value).ulong(
+            0));
   };
   CHECK(serving(0));
   CHECK(serving(1));

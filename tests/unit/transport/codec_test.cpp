@@ -129,6 +129,13 @@ TEST_CASE("updates arrive as they were sent, but for the edges that nobody wants
   }
 }
 
+TEST_CASE("a presence that misses what can be no partition is refused") {
+  const auto wire = to_wire(Presence{"robot", 1, "tower", 1, 1, true, {{"a,b", 1}}});
+  const auto read = from_wire(wire);
+  REQUIRE_FALSE(read);
+  CHECK(read.error().message.find("'a,b'") != std::string::npos);
+}
+
 TEST_CASE("a page with a note that means nothing is refused") {
   const auto read = [](const Note& note) {
     const auto page = from_wire(to_wire(Page{"robot", 0, 1, 1, {}, {note}}));
@@ -171,6 +178,7 @@ TEST_CASE("pages and presences arrive as they were sent") {
     CHECK(arrived->pid == one.pid);
     CHECK(arrived->pages == one.pages);
     CHECK(arrived->serving == one.serving);
+    CHECK(arrived->absent == one.absent);
   }
 }
 
