@@ -105,10 +105,12 @@ bool Peers::awaits_presence() const {
   return !all_present();
 }
 
+// How many a server hears is told by its beats: what came with its presence may be as old as that.
 bool Peers::nobody_hears_more() const {
   const std::size_t others = servers_.size() - 1 + (is_server_ ? 1 : 0);
-  return std::all_of(servers_.begin(), servers_.end(), [others](const auto& server) {
-    return server.second.silent || server.second.peers <= others;
+  return std::all_of(servers_.begin(), servers_.end(), [others](const auto& known) {
+    const Server& server = known.second;
+    return server.silent || (server.beats && server.peers <= others);
   });
 }
 
