@@ -89,7 +89,7 @@ class FastDdsTransport final : public Transport {
   Topics topics_;
 
   std::mutex presence_mutex_;
-  int looks_ = 0;  // since it last spoke
+  int looks_ = 0;                       // since it last spoke
   std::optional<wire::Presence> said_;  // what this participant serves, as last announced
 
   std::mutex outlets_mutex_;
