@@ -148,10 +148,12 @@ Result<void> Participant::commit() {
     } else {
       pages = partition_->take_pages();
       if (store_ != nullptr) unsaved = partition_->take_unsaved();
-      Presence current = presence_;
-      current.pages = partition_->page_count();
-      current.absent = directory_.absent();
-      if (!(current == presence_)) news = presence_ = std::move(current);
+      auto absent = directory_.absent();
+      if (partition_->page_count() != presence_.pages || absent != presence_.absent) {
+        presence_.pages = partition_->page_count();
+        presence_.absent = std::move(absent);
+        news = presence_;
+      }
     }
   }
   Result<void> saved;
@@ -206,12 +208,11 @@ bool Participant::catch_up() {
   bool current = true;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const bool answered = std::holds_alternative<Done>(replies[i].body);
-    const std::uint64_t epoch =
-        answered ? replies[i].epoch : std::numeric_limits<std::uint64_t>::max();
-    if (answered) await_epoch(parts[i], epoch, deadline);
+    if (answered) await_epoch(parts[i], replies[i].epoch, deadline);
     const std::lock_guard lock(structure_mutex_);
-    current = current &&
-              (directory_.epoch(parts[i].owner) >= epoch || !directory_.reachable(parts[i].owner));
+    const Owner owner = parts[i].owner;
+    const bool is_here = answered && directory_.epoch(owner) >= replies[i].epoch;
+    current = current && (is_here || !directory_.reachable(owner));
   }
   return current;
 }

@@ -118,20 +118,20 @@ void Claims::promote(const std::string& id) {
   put(id, winner);
 }
 
-std::vector<Concession> Claims::concessions() const {
-  std::vector<Concession> all;
+std::set<Concession> Claims::concessions() const {
+  std::set<Concession> all;
   for (const auto& [id, claims] : shadowed_) {
     const auto there = forest_.info(id);
     if (!there || there->owner != kHeldHere) continue;
     const Claim& oldest = *oldest_of(claims);
     if (older(oldest, in_force(*there))) {
-      all.push_back({Concession::Kind::kGiveWay, id, oldest.owner, there->since});
+      all.insert({Concession::Kind::kGiveWay, id, oldest.owner, there->since});
     }
   }
   for (const auto& [id, claim] : cut_) {
     const Cycle cycle = cycle_of(id, claim);
     if (cycle.held && younger(*cycle.held, cycle.youngest)) {
-      all.push_back(
+      all.insert(
           {Concession::Kind::kUnhang, cycle.held->id, cycle.youngest.owner, cycle.held->since});
     }
   }

@@ -197,7 +197,7 @@ void Directory::find_orphans() {
   }
 }
 
-std::vector<Concession> Directory::concessions() {
+std::set<Concession> Directory::concessions() {
   // Those that were removed or moved are settled, and those whose parent is there again.
   for (auto orphan = orphans_.begin(); orphan != orphans_.end();) {
     const auto frame = forest_.info(orphan->frame);
@@ -205,8 +205,8 @@ std::vector<Concession> Directory::concessions() {
                         !forest_.exists(frame->parent);
     orphan = stands ? std::next(orphan) : orphans_.erase(orphan);
   }
-  std::vector<Concession> all = claims_.concessions();
-  all.insert(all.end(), orphans_.begin(), orphans_.end());
+  std::set<Concession> all = claims_.concessions();
+  all.insert(orphans_.begin(), orphans_.end());
   return all;
 }
 

@@ -1,4 +1,3 @@
-#include <iterator>
 #include <map>
 
 #include "tfdude/partition/partition.hpp"
@@ -72,9 +71,7 @@ void Partition::make_root(const StoredFrame& frame, Time now) {
   const std::uint64_t since = directory_.next_stamp(now);
   if (!forest_.add(frame.id, {}, frame.X_PC, Forest::MissingParent::kAllow, since)) return;
   put(frame.id, {}, since);
-  const Note note{frame.id, since, Note::Kind::kUnhung, name_};
-  pages_.leave(note);
-  directory_.changes().add(conflict_of(note, name_));
+  tell_conflict({frame.id, since, Note::Kind::kUnhung, name_});
 }
 
 Result<void> Partition::reconfigure(const std::vector<FrameSpec>& before,
@@ -101,11 +98,6 @@ Result<void> Partition::reconfigure(const std::vector<FrameSpec>& before,
     if (auto removed = forest_.remove(frame.id)) forget(*removed, now);
   }
   return {};
-}
-
-std::set<Concession> Partition::concessions() const {
-  std::vector<Concession> all = directory_.concessions();
-  return {std::make_move_iterator(all.begin()), std::make_move_iterator(all.end())};
 }
 
 bool Partition::concede(const std::set<Concession>& due, Time now) {
@@ -144,20 +136,21 @@ bool Partition::concede(const Concession& concession, Time now) {
 }
 
 void Partition::give_way(const std::string& id, Owner rival, Time now) {
-  const Note note{id, directory_.next_stamp(now), Note::Kind::kGaveWay, directory_.name(rival)};
-  pages_.leave(note);
-  directory_.changes().add(conflict_of(note, name_));
+  tell_conflict({id, directory_.next_stamp(now), Note::Kind::kGaveWay, directory_.name(rival)});
 }
 
 void Partition::unhang(const std::string& id, Owner rival, Time now) {
   const std::uint64_t since = directory_.next_stamp(now);
   if (!forest_.move(id, {}, std::nullopt, since)) return;
   pages_.put(id, {}, since);
-  const Note note{id, since, Note::Kind::kUnhung, directory_.name(rival)};
-  pages_.leave(note);
   directory_.changes().frame_moved(id, {}, name_);
-  directory_.changes().add(conflict_of(note, name_));
+  tell_conflict({id, since, Note::Kind::kUnhung, directory_.name(rival)});
   directory_.moved();
+}
+
+void Partition::tell_conflict(const Note& note) {
+  pages_.leave(note);
+  directory_.changes().add(conflict_of(note, name_));
 }
 
 StateChange Partition::take_unsaved() {

@@ -20,7 +20,7 @@ namespace tfdude {
 /// To first order e = B1 s e1 - (s-1) B0 e0, of which the weights add up to one, but not as a mean: no correlation
 /// gives more than s (2s-1) B1 Σ1 B1ᵀ + (s-1) (2s-1) B0 Σ0 B0ᵀ, which is given (e eᵀ ≤ (1 + 1/c) x xᵀ + (1 + c) y yᵀ
 /// with c = s / (s-1)).
-/// @param s  1 gives X1, 2 as far beyond it as it is from X0; no less than 1, and with |s Log(X0⁻¹ · X1)| up to π
+/// @param s  1 gives X1, 2 as far beyond it as it is from X0; no less than 1
 [[nodiscard]] Transform extrapolate(const Transform& X0, const Transform& X1, double s);
 
 }  // namespace tfdude

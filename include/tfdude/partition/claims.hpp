@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <tuple>
 #include <unordered_map>
@@ -84,7 +85,7 @@ class Claims {
   [[nodiscard]] bool contested() const { return !shadowed_.empty() || !cut_.empty(); }
 
   /// What this process would have to concede now. O(contested frames).
-  [[nodiscard]] std::vector<Concession> concessions() const;
+  [[nodiscard]] std::set<Concession> concessions() const;
 
  private:
   [[nodiscard]] bool older(const Claim& a, const Claim& b) const;

@@ -65,7 +65,7 @@ class Directory {
 
   /// What this process's partition would have to give up, by what was applied so far.
   /// O(contested frames).
-  [[nodiscard]] std::vector<Concession> concessions();
+  [[nodiscard]] std::set<Concession> concessions();
   /// Whether there may be any. O(1).
   [[nodiscard]] bool contested() const { return !orphans_.empty() || claims_.contested(); }
 

@@ -52,7 +52,7 @@ class Partition {
   std::size_t apply(const Update& update);
 
   /// What would have to be given up as far as the directory knows now. O(contested frames).
-  [[nodiscard]] std::set<Concession> concessions() const;
+  [[nodiscard]] std::set<Concession> concessions() const { return directory_.concessions(); }
 
   /// Gives up what of these would still have to be given up: what was on its way when they were found may have
   /// settled the rest. @return whether the structure changed; there may be other concessions then
@@ -86,6 +86,7 @@ class Partition {
   void forget(const std::vector<std::string>& removed, Time now);
   void give_way(const std::string& id, Owner rival, Time now);
   void unhang(const std::string& id, Owner rival, Time now);
+  void tell_conflict(const Note& note);
   [[nodiscard]] Error at_home(Error error, std::string_view id) const;
 
   std::string name_;

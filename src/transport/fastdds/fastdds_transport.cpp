@@ -21,9 +21,10 @@ constexpr std::chrono::milliseconds kFirstBeatByServer{8000};
 
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
 
-// The DDS partition of the beats: those of a topic who are in different ones do not match.
-constexpr std::uint32_t kMany = 12;  // servers
+// Among more servers than these each speaks less often.
+constexpr std::uint32_t kMany = 12;
 
+// The DDS partition of the beats: those of a topic who are in different ones do not match.
 constexpr const char* kBeatPartition = "tfdude-beat";
 
 tl::unexpected<Error> not_created(const char* what) {

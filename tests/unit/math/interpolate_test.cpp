@@ -1,13 +1,13 @@
 #include "tfdude/math/interpolate.hpp"
 
 #include <cmath>
-#include <functional>
 #include <vector>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 #include "support/catch.hpp"
+#include "support/jacobian.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
 
@@ -15,6 +15,7 @@ namespace tfdude {
 namespace {
 
 using testing::covariance_diff;
+using testing::numeric_jacobian;
 using testing::pose_diff;
 using testing::Random;
 using testing::transform_diff;
@@ -33,18 +34,6 @@ struct Samples {
 Samples samples(Random& random, double angle, double reach = 2.0) {
   const Pose X0 = random.pose(reach);
   return {{X0, random.covariance()}, {X0 * exp(random.twist(angle, reach)), random.covariance()}};
-}
-
-// Of the right perturbation of the interpolated pose by that of one of the samples, by central differences.
-Matrix6d numeric_jacobian(const std::function<Pose(const Twist&)>& perturbed) {
-  constexpr double kStep = 1e-4;
-  const Pose X_inv = perturbed(Twist::Zero()).inverse();
-  Matrix6d J;
-  for (int i = 0; i < 6; ++i) {
-    const Twist step = kStep * Twist::Unit(i);
-    J.col(i) = (log(X_inv * perturbed(step)) - log(X_inv * perturbed(-step))) / (2.0 * kStep);
-  }
-  return J;
 }
 
 Covariance propagated(const Matrix6d& J, const Covariance& sigma) {

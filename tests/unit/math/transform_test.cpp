@@ -1,6 +1,5 @@
 #include "tfdude/math/transform.hpp"
 
-#include <functional>
 #include <type_traits>
 #include <vector>
 
@@ -8,6 +7,7 @@
 
 #include "math/climb.hpp"
 #include "support/catch.hpp"
+#include "support/jacobian.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
 
@@ -15,6 +15,7 @@ namespace tfdude {
 namespace {
 
 using testing::covariance_diff;
+using testing::numeric_jacobian;
 using testing::pose_diff;
 using testing::Random;
 using testing::transform_diff;
@@ -26,19 +27,6 @@ static_assert(sizeof(Transform) == 28 * sizeof(double));
 
 Matrix6d propagated(const Matrix6d& jacobian, const Covariance& sigma) {
   return jacobian * sigma.matrix() * jacobian.transpose();
-}
-
-// Jacobian at zero of the right perturbation of `perturbed(ξ)` by that of its arguments, by central
-// differences: no formula of the library's but exp, log and the product.
-Matrix6d numeric_jacobian(const std::function<Pose(const Twist&)>& perturbed) {
-  constexpr double kStep = 1e-4;
-  const Pose X_inv = perturbed(Twist::Zero()).inverse();
-  Matrix6d J;
-  for (int i = 0; i < 6; ++i) {
-    const Twist step = kStep * Twist::Unit(i);
-    J.col(i) = (log(X_inv * perturbed(step)) - log(X_inv * perturbed(-step))) / (2.0 * kStep);
-  }
-  return J;
 }
 
 // Poses whose Jacobians differ in kind: identity, tiny, half turns, anything.

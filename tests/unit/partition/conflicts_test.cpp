@@ -56,6 +56,13 @@ Page page_of(const std::string& partition, std::vector<PageEntry> entries,
   return {partition, 0, 1, 1, std::move(entries), std::move(notes)};
 }
 
+// A life of "arms" that ended after a root was added.
+void add_in_former_life(MemoryStore& store, const std::string& id) {
+  Owning arms("arms", &store);
+  arms.start();
+  REQUIRE(arms.ask(id, AddRequest{"", along_x(1)}) == "ok");
+}
+
 TEST_CASE("of two partitions that add one id the later gives way, and says so") {
   Owning arms("arms");
   REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
@@ -279,11 +286,7 @@ TEST_CASE("a frame whose parent was removed while its owner was away goes when i
 TEST_CASE(
     "who returns gives way to who has claimed a frame earlier, and takes it from who did later") {
   MemoryStore store;
-  {
-    Owning arms("arms", &store);
-    arms.start();
-    REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
-  }
+  add_in_former_life(store, "camera");
   Owning arms("arms", &store);
   SECTION("earlier") {
     arms.directory.apply(page_of("head", {{"camera", "", 900}}));
@@ -324,11 +327,7 @@ TEST_CASE("of a cycle that others made while a frame was away the youngest move 
 
 TEST_CASE("others' frames hang where they belong once the frame that returns breaks their cycle") {
   MemoryStore store;
-  {
-    Owning arms("arms", &store);
-    arms.start();
-    REQUIRE(arms.ask("hand", AddRequest{"", along_x(1)}) == "ok");
-  }
+  add_in_former_life(store, "hand");
   Owning arms("arms", &store);
   arms.directory.apply(page_of("head", {{"hand", "neck", 1100}, {"neck", "hand", 1200}}));
   REQUIRE(arms.structure() == Lines{"hand < neck @ head, attached", "neck <  @ head"});
