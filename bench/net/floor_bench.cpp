@@ -139,7 +139,7 @@ int main(int argc, char** argv) {
           [&] { bench::check(client.update(kFrame, X), "update"); });
   compare("lookup",
           sizes_of({1, kFrame, tfdude::LookupRequest{{{kFrom, kFrame}}}},
-                   {1, 0, std::vector<Transform>{X}}),
+                   {1, 0, tfdude::SegmentValues{{X}, {}, {}, {}}}),
           [&] { bench::check(client.lookup(kFrom, kFrame), "lookup"); });
   return 0;
 }

@@ -41,6 +41,10 @@ class Watcher final : public Transport, public TransportHandler {
     return transport_->send(to, update, deadline);
   }
   void reply(const PeerId& to, const Reply& reply) override { transport_->reply(to, reply); }
+  Result<void> watch(std::uint64_t group) override { return transport_->watch(group); }
+  void unwatch(std::uint64_t group) override { transport_->unwatch(group); }
+  void push(const State& state) override { transport_->push(state); }
+  void end_pushing(std::uint64_t group) override { transport_->end_pushing(group); }
   bool settled() const override { return transport_->settled(); }
   bool awaits_presence() const override { return transport_->awaits_presence(); }
   Milliseconds settle_time() const override { return transport_->settle_time(); }
@@ -48,6 +52,7 @@ class Watcher final : public Transport, public TransportHandler {
     handler_->on_request(from, request);
   }
   void on_reply(const Reply& reply) override { handler_->on_reply(reply); }
+  void on_state(const State& state) override { handler_->on_state(state); }
   void on_page(const Page& page) override { handler_->on_page(page); }
   void on_presence(const Presence& presence) override { handler_->on_presence(presence); }
   void on_lost(const std::string& partition, std::uint64_t incarnation) override {

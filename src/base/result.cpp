@@ -36,6 +36,12 @@ std::string_view to_string(Errc code) {
       return "transport";
     case Errc::kState:
       return "state";
+    case Errc::kNotYet:
+      return "not_yet";
+    case Errc::kTooOld:
+      return "too_old";
+    case Errc::kStampTaken:
+      return "stamp_taken";
   }
   return "unknown";
 }

@@ -1,10 +1,18 @@
 #include "tfdude/base/time.hpp"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 
 namespace tfdude {
+
+std::string in_milliseconds(std::chrono::nanoseconds duration) {
+  std::array<char, 32> text{};
+  const double ms = static_cast<double>(duration.count()) * 1e-6;
+  std::snprintf(text.data(), text.size(), std::abs(ms) < 0.1 ? "%.6f ms" : "%.3f ms", ms);
+  return text.data();
+}
 
 std::string to_string(Time time) {
   const auto milliseconds = std::chrono::floor<Milliseconds>(time.time_since_epoch());

@@ -33,35 +33,39 @@ Result<void> Client::add(const std::string& id, const std::string& parent, const
 
 Result<void> Client::remove(const std::string& id) { return participant_->remove(id); }
 
-Result<void> Client::update(const std::string& id, const Transform& X_PC) {
-  if (participant_->forest().update(id, X_PC)) return {};
-  return participant_->update({{id, X_PC}});
+Result<void> Client::update(const std::string& id, const Transform& X_PC,
+                            std::optional<Time> stamp) {
+  auto updated = participant_->forest().update(id, X_PC, stamp);
+  if (updated || !Participant::is_elsewhere(updated.error())) return updated;
+  return participant_->update({{id, X_PC}}, stamp);
 }
 
-Result<void> Client::update(Handle frame, const Transform& X_PC) {
-  if (participant_->forest().update(frame, X_PC)) return {};
+Result<void> Client::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
+  auto updated = participant_->forest().update(frame, X_PC, stamp);
+  if (updated || !Participant::is_elsewhere(updated.error())) return updated;
   const auto info = participant_->forest().info(frame);
   if (!info) return fail(Errc::kUnknownFrame, "the frame of this handle was removed");
-  return participant_->update({{info->id, X_PC}});
+  return participant_->update({{info->id, X_PC}}, stamp);
 }
 
-Result<void> Client::update(const std::vector<EdgeUpdate>& edges) {
-  return participant_->update(edges);
+Result<void> Client::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
+  return participant_->update(edges, stamp);
 }
 
-Result<void> Client::update(const std::vector<HandleUpdate>& edges) {
-  if (participant_->forest().update(edges)) return {};
+Result<void> Client::update(const std::vector<HandleUpdate>& edges, std::optional<Time> stamp) {
+  auto updated = participant_->forest().update(edges, stamp);
+  if (updated || !Participant::is_elsewhere(updated.error())) return updated;
   std::vector<EdgeUpdate> named;
   for (const HandleUpdate& edge : edges) {
     const auto info = participant_->forest().info(edge.frame);
     if (!info) return fail(Errc::kUnknownFrame, "the frame of a handle was removed");
     named.push_back({info->id, edge.X_PC});
   }
-  return participant_->update(named);
+  return participant_->update(named, stamp);
 }
 
-Result<void> Client::publish(const std::vector<EdgeUpdate>& edges) {
-  return participant_->publish(edges);
+Result<void> Client::publish(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
+  return participant_->publish(edges, stamp);
 }
 
 Result<void> Client::move(const std::string& id, const std::string& parent,
@@ -74,6 +78,57 @@ Result<Transform> Client::lookup(std::string_view a, std::string_view b) {
 }
 
 Result<Transform> Client::lookup(Handle a, Handle b) { return participant_->lookup(a, b); }
+
+Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b,
+                                        const Instant& instant) {
+  return participant_->lookup(a, b, instant);
+}
+
+Result<StampedTransform> Client::lookup(Handle a, Handle b, const Instant& instant) {
+  return participant_->lookup(a, b, instant);
+}
+
+Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b,
+                                        const Instant& instant, Milliseconds wait) {
+  return participant_->lookup_waiting(a, b, instant, wait, nullptr);
+}
+
+Result<StampedTransform> Client::lookup(std::string_view a, const Instant& at_a, std::string_view b,
+                                        const Instant& at_b, std::string_view fixed) {
+  const auto X_FA = participant_->lookup(fixed, a, at_a);
+  if (!X_FA) return tl::unexpected(X_FA.error());
+  const auto X_FB = participant_->lookup(fixed, b, at_b);
+  if (!X_FB) return tl::unexpected(X_FB.error());
+  return StampedTransform{between(*X_FA, *X_FB), X_FB->stamp};
+}
+
+PendingLookup Client::lookup_async(const std::string& a, const std::string& b,
+                                   const Instant& instant, Milliseconds wait,
+                                   PendingLookup::Callback callback) {
+  return PendingLookup(participant_->lookup_async(a, b, instant, wait, std::move(callback)));
+}
+
+std::future<Result<StampedTransform>> Client::lookup_async(const std::string& a,
+                                                           const std::string& b,
+                                                           const Instant& instant,
+                                                           Milliseconds wait) {
+  return participant_->lookup_async(a, b, instant, wait);
+}
+
+Result<void> Client::can_lookup(std::string_view a, std::string_view b, const Instant& instant) {
+  return participant_->lookup(a, b, instant).map([](const StampedTransform&) {});
+}
+
+Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
+                                const WatchOptions& options) {
+  return participant_->watch(a, b, options).map([](auto path) { return PathWatch(path); });
+}
+
+Result<std::vector<PastInfo>> Client::past(const std::string& id) { return participant_->past(id); }
+
+Result<std::vector<PastInfo>> Client::pasts(const std::string& partition) {
+  return participant_->pasts(partition);
+}
 
 Result<Pose> Client::lookup_pose(std::string_view a, std::string_view b) {
   return participant_->lookup_pose(a, b);

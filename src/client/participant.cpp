@@ -25,16 +25,21 @@ Participant::Participant(std::unique_ptr<Transport> transport, std::string parti
                          const Options& options)
     : options_(options),
       partition_name_(std::move(partition)),
+      forest_(wall_clock),
       directory_(forest_, partition_name_),
       settle_deadline_(Clock::now() + options.discovery),
       transport_(std::move(transport)) {}
 
 Participant::~Participant() {
+  pending_.cancel_all();
+  watching_.store(nullptr);
   saver_.reset();
   if (conceder_) conceder_->stop();
   if (publisher_) publisher_->stop();
   (void)commit();
   save_values();
+  watches_.reset();
+  pusher_.reset();
   transport_->stop();
 }
 
@@ -220,51 +225,28 @@ Result<void> Participant::move(const std::string& id, const MoveRequest& request
                 });
 }
 
-Result<void> Participant::update(const std::vector<EdgeUpdate>& edges) {
-  if (edges.empty() || forest_.update(edges)) return {};
-  return healed([&] { return route_update(forest_, directory_, edges); },
+Result<void> Participant::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
+  if (edges.empty()) return {};
+  auto updated = forest_.update(edges, stamp);
+  if (updated || !is_elsewhere(updated.error())) return updated;
+  return healed([&] { return route_update(forest_, directory_, edges, stamp); },
                 [&](std::vector<Part>& parts) { return change(parts); });
 }
 
-Result<void> Participant::publish(const std::vector<EdgeUpdate>& edges) {
-  if (edges.empty() || forest_.update(edges)) return {};
-  auto parts = routed([&] { return route_update(forest_, directory_, edges); });
+Result<void> Participant::publish(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
+  if (edges.empty()) return {};
+  auto updated = forest_.update(edges, stamp);
+  if (updated || !is_elsewhere(updated.error())) return updated;
+  auto parts = routed([&] { return route_update(forest_, directory_, edges, stamp); });
   if (!parts) return tl::unexpected(std::move(parts.error()));
   const auto deadline = Clock::now() + options_.timeout;
   for (Part& part : *parts) {
-    Update update{std::move(std::get<UpdateRequest>(part.request.body).edges)};
-    auto sent = part.owner == kHeldHere ? forest_.update(update.edges)
+    Update update{std::move(std::get<UpdateRequest>(part.request.body).edges), stamp};
+    auto sent = part.owner == kHeldHere ? forest_.update(update.edges, update.stamp)
                                         : transport_->send(part.partition, update, deadline);
     if (!sent) return sent;
   }
   return {};
-}
-
-Result<Transform> Participant::lookup(std::string_view a, std::string_view b) {
-  if (auto local = forest_.lookup(a, b)) return local;
-  const std::string start(a);
-  const std::string end(b);
-  return healed([&] { return route_lookup(forest_, directory_, start, end); },
-                [&](LookupPlan& plan) -> Result<Transform> {
-                  std::vector<std::vector<Transform>> answers;
-                  for (Reply& reply : ask(plan.parts, Clock::now() + options_.timeout)) {
-                    if (auto* error = std::get_if<Error>(&reply.body))
-                      return tl::unexpected(*error);
-                    auto* transforms = std::get_if<std::vector<Transform>>(&reply.body);
-                    answers.push_back(transforms != nullptr ? std::move(*transforms)
-                                                            : std::vector<Transform>());
-                  }
-                  return assemble(plan, answers);
-                });
-}
-
-Result<Transform> Participant::lookup(Handle a, Handle b) {
-  if (auto local = forest_.lookup(a, b)) return local;
-  const auto start = forest_.info(a);
-  if (!start) return fail(Errc::kUnknownStart, "the first frame was removed");
-  const auto end = forest_.info(b);
-  if (!end) return fail(Errc::kUnknownEnd, "the second frame was removed");
-  return lookup(start->id, end->id);
 }
 
 Result<std::vector<PathSegment>> Participant::path(std::string_view a, std::string_view b) {

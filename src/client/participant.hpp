@@ -12,13 +12,17 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/partition/latest.hpp"
 #include "tfdude/partition/routing.hpp"
 #include "tfdude/transport/transport.hpp"
 
 #include "client/calls.hpp"
+#include "client/cancellation.hpp"
 #include "client/deferred.hpp"
 #include "client/events.hpp"
 #include "client/periodic.hpp"
+#include "client/pusher.hpp"
+#include "client/watches.hpp"
 
 namespace tfdude {
 
@@ -44,15 +48,45 @@ class Participant final : public TransportHandler {
                                  const std::string& partition);
   [[nodiscard]] Result<void> remove(const std::string& id);
   [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request);
-  [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
-  [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges);
-  [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b);
-  [[nodiscard]] Result<Transform> lookup(Handle a, Handle b);
+  [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges,
+                                    std::optional<Time> stamp);
+  [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
+                                     std::optional<Time> stamp);
+  template <class Name>
+  [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
+    auto local = forest_.lookup(a, b);
+    if (local || is_of_time(local.error())) return local;
+    return lookup_elsewhere(a, b, {}).map(
+        [](const StampedTransform& X_AB) -> Transform { return X_AB; });
+  }
   template <class Name>
   [[nodiscard]] Result<Pose> lookup_pose(Name a, Name b) {
     if (auto local = forest_.lookup_pose(a, b)) return local;
     return lookup(a, b).map([](const Transform& X_AB) { return X_AB.pose; });
   }
+  template <class Name>
+  [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Instant& instant) {
+    auto local = forest_.lookup(a, b, instant);
+    if (local || is_of_time(local.error())) return local;
+    return lookup_elsewhere(a, b, instant);
+  }
+  /// @param cancelled  ends the wait; may be null
+  [[nodiscard]] Result<StampedTransform> lookup_waiting(std::string_view a, std::string_view b,
+                                                        const Instant& instant, Milliseconds wait,
+                                                        Cancellation* cancelled);
+  /// @return what cancels it when its last copy goes
+  [[nodiscard]] std::shared_ptr<void> lookup_async(const std::string& a, const std::string& b,
+                                                   const Instant& instant, Milliseconds wait,
+                                                   PendingLookup::Callback callback);
+  [[nodiscard]] std::future<Result<StampedTransform>> lookup_async(const std::string& a,
+                                                                   const std::string& b,
+                                                                   const Instant& instant,
+                                                                   Milliseconds wait);
+  [[nodiscard]] Result<std::shared_ptr<WatchedPath>> watch(const std::string& a,
+                                                           const std::string& b,
+                                                           const WatchOptions& options);
+  [[nodiscard]] Result<std::vector<PastInfo>> past(const std::string& id);
+  [[nodiscard]] Result<std::vector<PastInfo>> pasts(const std::string& partition);
   [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b);
   [[nodiscard]] Result<FrameInfo> info(const std::string& id);
   [[nodiscard]] std::vector<Frame> frames();
@@ -77,6 +111,14 @@ class Participant final : public TransportHandler {
     }
   }
 
+  /// Of an update or a lookup: whether it concerns what others hold.
+  static bool is_elsewhere(const Error& error) {
+    return error.code == Errc::kUnknownFrame || error.code == Errc::kNotOwner;
+  }
+  static bool is_of_time(const Error& error) {
+    return error.code == Errc::kNotYet || error.code == Errc::kTooOld;
+  }
+
   Forest& forest() { return forest_; }
   [[nodiscard]] const std::string& partition_name() const { return partition_name_; }
 
@@ -84,6 +126,7 @@ class Participant final : public TransportHandler {
   void on_request(const PeerId& from, const Request& request) override;
   void on_reply(const Reply& reply) override { calls_.on_reply(reply); }
   void on_update(const Update& update) override;
+  void on_state(const State& state) override;
   void on_page(const Page& page) override;
   void on_presence(const Presence& presence) override;
   void on_lost(const std::string& partition, std::uint64_t incarnation) override;
@@ -136,6 +179,19 @@ class Participant final : public TransportHandler {
   static constexpr int kAttempts = 3;
   static bool denies_plan(Errc code);
 
+  // Lookups that others must be asked for, and what is pushed (participant_time.cpp).
+  [[nodiscard]] Result<StampedTransform> lookup_elsewhere(std::string_view a, std::string_view b,
+                                                          const Instant& instant);
+  [[nodiscard]] Result<StampedTransform> lookup_elsewhere(Handle a, Handle b,
+                                                          const Instant& instant);
+  [[nodiscard]] Result<StampedTransform> gather(LookupPlan& plan, const std::string& a,
+                                                const std::string& b, std::optional<Time> hint);
+  [[nodiscard]] Result<std::vector<SegmentValues>> ask_values(LookupPlan& plan);
+  [[nodiscard]] Result<std::vector<PastInfo>> ask_past(Part part);
+  [[nodiscard]] Result<WatchedPath::Route> plan_watch(const WatchedPath& path);
+  [[nodiscard]] Reply answer_watch(const Request& request);
+  void look_at_watches();
+
   [[nodiscard]] Result<void> change(std::vector<Part>& parts);
   [[nodiscard]] std::vector<Reply> ask(std::vector<Part>& parts, Clock::time_point deadline);
   [[nodiscard]] Reply answer_here(const Request& request);
@@ -174,6 +230,13 @@ class Participant final : public TransportHandler {
   std::unique_ptr<StateStore> store_;  // null: nothing is kept
   std::uint64_t saved_commit_ = 0;
   Calls calls_;
+  std::mutex hints_mutex_;
+  LatestHints hints_;
+  std::mutex pushing_mutex_;          // pusher_, watches_, as they are made
+  std::unique_ptr<Pusher> pusher_;    // once somebody watches
+  std::unique_ptr<Watches> watches_;  // once this process does
+  std::atomic<Watches*> watching_{nullptr};
+  Cancellations pending_;  // lookups that wait
   std::atomic<bool> settled_{false};
   Clock::time_point settle_deadline_;
   std::unique_ptr<Transport> transport_;  // stops before the rest goes

@@ -36,6 +36,7 @@ void Participant::on_page(const Page& page) {
     tell_changes();
   }
   structure_changed_.notify_all();
+  look_at_watches();
   if (contested) conceder_->ask();
 }
 
@@ -62,6 +63,7 @@ void Participant::on_presence(const Presence& presence) {
     tell_changes();
   }
   structure_changed_.notify_all();
+  if (appeared) look_at_watches();
   const std::string who = quote(presence.partition) + " (host " + quote(presence.host) + ", pid " +
                           std::to_string(presence.pid) + ")";
   if (appeared) log().info("partition {} is there", who);

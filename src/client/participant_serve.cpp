@@ -251,6 +251,8 @@ Reply Participant::answer_here(const Request& request) {
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
     return partition_->answer_lookup(request.sequence, *lookup);
   }
+  if (std::holds_alternative<PastRequest>(request.body)) return partition_->answer_past(request);
+  if (std::holds_alternative<WatchRequest>(request.body)) return answer_watch(request);
   Reply reply;
   {
     const std::lock_guard lock(structure_mutex_);
@@ -260,6 +262,7 @@ Reply Participant::answer_here(const Request& request) {
   }
   // This process sees the change already; the others are told without making it wait.
   if (!std::holds_alternative<UpdateRequest>(request.body)) publisher_->ask();
+  look_at_watches();
   return reply;
 }
 
@@ -273,6 +276,14 @@ void Participant::on_request(const PeerId& from, const Request& request) {
   if (partition_ == nullptr) return;
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
     transport_->reply(from, partition_->answer_lookup(request.sequence, *lookup));
+    return;
+  }
+  if (std::holds_alternative<PastRequest>(request.body)) {
+    transport_->reply(from, partition_->answer_past(request));
+    return;
+  }
+  if (std::holds_alternative<WatchRequest>(request.body)) {
+    transport_->reply(from, answer_watch(request));
     return;
   }
   Reply reply;

@@ -16,14 +16,22 @@ namespace tfdude {
 ///
 /// @tparam Value  Transform, or Pose where the covariance is not asked for
 template <class Value>
-class
-    Climb {  // NOLINT(cppcoreguidelines-pro-type-member-init): pending_ is written before it is read
+class Climb {
  public:
+  Climb() {
+  }  // NOLINT(*-member-init,*-use-equals-default): what is pending is written before it is read
+
   /// Goes up one edge: X_PC is its value, C the frame reached so far, P the frame reached then.
   void up(const Value& X_PC) {
     // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only, see climb.cpp
     pending_[count_++] = reinterpret_cast<kernel::Edge>(&X_PC);
     if (count_ == pending_.size()) compute();
+  }
+
+  /// The same of a value that has no place of its own.
+  void up_computed(const Value& X_PC) {
+    computed_[count_] = X_PC;
+    up(computed_[count_]);
   }
 
   /// X_AB where A and B climbed to the same frame. Independent edges, first order.
@@ -36,6 +44,9 @@ class
   kernel::Columns X_SH_;  // the pose of the frame reached (here, H) in the start S
   kernel::Blocks left_;   // of the left perturbation of X_SH, expressed in S
   std::array<kernel::Edge, 16> pending_;
+  union {  // not set to zero, which would take as long as a short lookup
+    std::array<Value, 16> computed_;
+  };
   std::size_t count_ = 0;
 };
 

@@ -67,6 +67,12 @@ Transform interpolate(const Transform& X0, const Transform& X1, double s) {
   return {X0.pose * exp(s * xi), Covariance::trusted(sigma)};
 }
 
+Pose interpolate(const Pose& X0, const Pose& X1, double s) {
+  return X0 * exp(s * log(X0.inverse() * X1));
+}
+
+Pose extrapolate(const Pose& X0, const Pose& X1, double s) { return interpolate(X0, X1, s); }
+
 Transform extrapolate(const Transform& X0, const Transform& X1, double s) {
   const Twist xi = log(X0.pose.inverse() * X1.pose);
   const double beyond = s - 1.0;

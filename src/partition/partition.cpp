@@ -59,30 +59,41 @@ Reply Partition::answer(const Request& request, Time now) {
 Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& lookup) const {
   Reply reply;
   reply.sequence = sequence;
-  std::vector<Transform> transforms;
-  transforms.reserve(lookup.segments.size());
-  for (const PathEnds& segment : lookup.segments) {
-    const auto X = forest_.lookup_segment(segment.from, segment.to);
-    if (!X) {
-      // Whatever is missing, the caller's picture of the structure is not (or no longer) the owner's.
-      reply.body =
-          Error{Errc::kNotOwner, "partition " + quote(name_) + " does not own the path from " +
-                                     quote(segment.from) + " to " + quote(segment.to) + ": " +
-                                     X.error().message};
-      return reply;
-    }
-    transforms.push_back(*X);
+  auto values = forest_.lookup_segments(lookup.segments, lookup.instant, lookup.hint);
+  if (values) {
+    reply.body = *std::move(values);
+  } else if (values.error().code == Errc::kNotYet || values.error().code == Errc::kTooOld) {
+    reply.body = std::move(values.error());
+  } else {
+    // Whatever is missing, the caller's picture of the structure is not (or no longer) the owner's.
+    const auto missing = std::find_if(
+        lookup.segments.begin(), lookup.segments.end(),
+        [this](const PathEnds& segment) { return !forest_.lookup_segments({segment}); });
+    const std::string what =
+        missing == lookup.segments.end()
+            ? "owned no part of the path"
+            : "does not own the path from " + quote(missing->from) + " to " + quote(missing->to);
+    reply.body = Error{Errc::kNotOwner,
+                       "partition " + quote(name_) + " " + what + ": " + values.error().message};
   }
-  reply.body = std::move(transforms);
   return reply;
+}
+
+Reply Partition::answer_past(const Request& request) const {
+  const bool all = std::get<PastRequest>(request.body).all;
+  if (!all && !forest_.holds(request.id)) {
+    return {request.sequence, 0,
+            at_home(Error{Errc::kNotOwner, "no frame " + quote(request.id)}, request.id)};
+  }
+  return {request.sequence, 0, forest_.pasts(all ? std::string_view() : request.id)};
 }
 
 Result<void> Partition::apply(const Request& request, Time now) {
   return std::visit(Overloaded{[&](const AddRequest& one) { return add(request.id, one, now); },
                                [&](const RemoveRequest& one) { return remove(one, now); },
-                               [&](const UpdateRequest& one) { return update(one.edges); },
+                               [&](const UpdateRequest& one) { return update(one); },
                                [&](const MoveRequest& one) { return move(request.id, one, now); },
-                               [](const LookupRequest&) -> Result<void> { return {}; }},
+                               [](const auto&) -> Result<void> { return {}; }},
                     request.body);
 }
 
@@ -140,29 +151,30 @@ void Partition::forget(const std::vector<std::string>& removed, Time now) {
   pages_.close_epoch();
 }
 
-Result<void> Partition::update(const std::vector<EdgeUpdate>& edges) {
-  auto updated = forest_.update(edges);
+Result<void> Partition::update(const UpdateRequest& request) {
+  const std::vector<EdgeUpdate>& edges = request.edges;
+  auto updated = forest_.update(edges, request.stamp);
   if (updated) {
     if (saved_) {
       for (const EdgeUpdate& edge : edges) updated_.insert(edge.id);
     }
     return {};
   }
-  // It fails for nothing but a frame that is not held.
   const auto foreign = std::find_if(edges.begin(), edges.end(), [this](const EdgeUpdate& edge) {
     return !forest_.holds(edge.id);
   });
+  if (foreign == edges.end()) return updated;
   return tl::unexpected(at_home(std::move(updated.error()), foreign->id));
 }
 
 std::size_t Partition::apply(const Update& update) {
-  const auto owned = [this](const EdgeUpdate& edge) { return forest_.holds(edge.id); };
-  if (std::all_of(update.edges.begin(), update.edges.end(), owned)) {
-    if (forest_.update(update.edges)) return update.edges.size();
-  }
+  const auto taken = forest_.update(update.edges, update.stamp);
+  if (taken) return update.edges.size();
+  if (taken.error().code != Errc::kUnknownFrame && taken.error().code != Errc::kNotOwner) return 0;
   std::vector<EdgeUpdate> own;
-  std::copy_if(update.edges.begin(), update.edges.end(), std::back_inserter(own), owned);
-  return forest_.update(own) ? own.size() : 0;
+  std::copy_if(update.edges.begin(), update.edges.end(), std::back_inserter(own),
+               [this](const EdgeUpdate& edge) { return forest_.holds(edge.id); });
+  return forest_.update(own, update.stamp) ? own.size() : 0;
 }
 
 // A frame asked of its owner that the owner does not have has moved on, or is gone: both are healed by

@@ -48,6 +48,11 @@ Result<void> check_all_reachable(const Directory& directory, const std::vector<P
 
 }  // namespace
 
+Result<Part> route_to(const Directory& directory, Owner owner, Request request) {
+  if (auto ok = check_reachable(directory, owner); !ok) return tl::unexpected(ok.error());
+  return Part{owner, directory.name(owner), std::move(request)};
+}
+
 Result<Part> route_add(const Forest& forest, const Directory& directory, const std::string& id,
                        const AddRequest& request, const std::string& partition) {
   if (auto ok = check_id(id, "id"); !ok) return tl::unexpected(ok.error());
@@ -99,13 +104,16 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
 }
 
 Result<std::vector<Part>> route_update(const Forest& forest, const Directory& directory,
-                                       const std::vector<EdgeUpdate>& edges) {
+                                       const std::vector<EdgeUpdate>& edges,
+                                       std::optional<Time> stamp) {
   std::vector<Part> parts;
   for (const EdgeUpdate& edge : edges) {
     const auto frame = forest.info(edge.id);
     if (!frame) return unknown_frame(edge.id);
     if (auto ok = check_value(edge.id, edge.X_PC); !ok) return tl::unexpected(ok.error());
-    body_for<UpdateRequest>(parts, directory, frame->owner, edge.id).edges.push_back(edge);
+    auto& body = body_for<UpdateRequest>(parts, directory, frame->owner, edge.id);
+    body.edges.push_back(edge);
+    body.stamp = stamp;
   }
   if (auto ok = check_all_reachable(directory, parts); !ok) return tl::unexpected(ok.error());
   for (const Part& part : parts) {
@@ -140,7 +148,8 @@ Result<Part> route_move(const Forest& forest, const Directory& directory, const 
 }
 
 Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory,
-                                const std::string& a, const std::string& b) {
+                                const std::string& a, const std::string& b, const Instant& instant,
+                                std::optional<Time> hint) {
   auto segments = forest.segments(a, b);
   if (!segments) return tl::unexpected(segments.error());
   LookupPlan plan{*std::move(segments), {}};
@@ -148,8 +157,10 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
     // Of the two ends, the one that the segment's owner owns: where it goes up, the lower one.
     const auto from = forest.info(segment.from);
     const auto& id = from && from->owner == segment.owner ? segment.from : segment.to;
-    body_for<LookupRequest>(plan.parts, directory, segment.owner, id)
-        .segments.push_back({segment.from, segment.to});
+    auto& body = body_for<LookupRequest>(plan.parts, directory, segment.owner, id);
+    body.segments.push_back({segment.from, segment.to});
+    body.instant = instant;
+    body.hint = hint;
   }
   if (auto ok = check_all_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
   for (const Part& part : plan.parts) {
@@ -160,27 +171,30 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
   return plan;
 }
 
-Result<Transform> assemble(const LookupPlan& plan,
-                           const std::vector<std::vector<Transform>>& answers) {
+Result<StampedTransform> assemble(const LookupPlan& plan,
+                                  const std::vector<SegmentValues>& answers) {
   if (answers.size() != plan.parts.size()) {
     return fail(Errc::kNotOwner, std::to_string(answers.size()) + " partitions of " +
                                      std::to_string(plan.parts.size()) + " answered");
   }
   for (std::size_t i = 0; i < answers.size(); ++i) {
     const auto& asked = std::get<LookupRequest>(plan.parts[i].request.body).segments;
-    if (answers[i].size() == asked.size()) continue;
+    if (answers[i].values.size() == asked.size()) continue;
     return fail(Errc::kNotOwner, "partition " + quote(plan.parts[i].partition) + " gave " +
-                                     std::to_string(answers[i].size()) + " transforms for " +
+                                     std::to_string(answers[i].values.size()) + " transforms for " +
                                      std::to_string(asked.size()) + " segments");
   }
   std::vector<std::size_t> taken(answers.size(), 0);
-  Transform X_AB;
+  StampedTransform X_AB;
+  for (const SegmentValues& answer : answers) {
+    if (answer.stamp) X_AB.stamp = answer.stamp;
+  }
   for (const Segment& segment : plan.segments) {
     const auto part = std::find_if(plan.parts.begin(), plan.parts.end(),
                                    [&](const Part& asked) { return asked.owner == segment.owner; });
     const auto i = static_cast<std::size_t>(part - plan.parts.begin());
-    const Transform& X = answers[i][taken[i]++];
-    X_AB = &segment == &plan.segments.front() ? X : compose(X_AB, X);
+    const Transform& X = answers[i].values[taken[i]++];
+    static_cast<Transform&>(X_AB) = &segment == &plan.segments.front() ? X : compose(X_AB, X);
   }
   return X_AB;
 }

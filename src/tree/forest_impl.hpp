@@ -20,7 +20,10 @@ namespace tfdude {
 /// nothing of it.
 class Forest::Impl {
  public:
-  // --- reading, under an epoch::Guard (forest_read.cpp) ---
+  explicit Impl(Clock clock) : clock_(std::move(clock)) {}
+  ~Impl();
+
+  // --- reading, under an epoch::Guard (forest_read.cpp, forest_time.cpp) ---
 
   [[nodiscard]] std::uint64_t snapshot() const {
     return committed_.load(std::memory_order_seq_cst);
@@ -48,17 +51,55 @@ class Forest::Impl {
   /// The version of the handle's frame at that commit; null if it was not there.
   [[nodiscard]] const Version* of(Handle frame, std::uint64_t commit) const;
 
+  /// The two ends of a path as they are in one commit.
+  struct Ends {
+    const Version* a;
+    const Version* b;
+    std::uint64_t commit;
+  };
+  [[nodiscard]] Result<Ends> ends(std::string_view a, std::string_view b) const;
+  [[nodiscard]] Result<Ends> ends(Handle a, Handle b) const;
+
+  [[nodiscard]] static tl::unexpected<Error> unknown_start(std::string_view id);
+  [[nodiscard]] static tl::unexpected<Error> unknown_end(std::string_view id);
+  [[nodiscard]] static tl::unexpected<Error> not_connected(const Version& a, const Version& b);
+
   /// Both ends climb to where they meet. Frames that are not there end the climb, or may be passed.
   enum class Absent { kEnds, kMayPass };
-  template <class Value>
-  [[nodiscard]] Result<Value> walk(const Version* a, const Version* b, std::uint64_t commit,
-                                   Absent absent) const;
 
-  /// From handle to handle; Value is Transform, or Pose where the covariance is not asked for.
+  /// The walk that all lookups share. `take` is handed the climb that an edge belongs to and the edge, whose value it
+  /// adds to that; the walk ends in an error of its.
+  template <class Value, class Take>
+  [[nodiscard]] Result<Value> walk(const Ends& ends, Absent absent, Take take) const;
+
+  /// X_AB at the newest instant that all moving edges have: that of the newest sample of `limiting`, null where none
+  /// is moving.
   template <class Value>
-  [[nodiscard]] Result<Value> look_up(Handle a, Handle b) const;
+  [[nodiscard]] Result<Value> walk_newest(const Ends& ends, Absent absent,
+                                          const HeldVersion*& limiting) const;
+
+  /// X_AB at t. @param any_moving  is set where an edge is; may be null
   template <class Value>
-  [[nodiscard]] Result<Value> look_up(std::string_view a, std::string_view b) const;
+  [[nodiscard]] Result<Value> walk_at(const Ends& ends, Absent absent, std::int64_t t,
+                                      const Instant& instant, bool* any_moving) const;
+
+  // The same for many segments.
+  [[nodiscard]] Result<std::vector<Ends>> all_ends(const std::vector<PathEnds>& segments) const;
+  [[nodiscard]] Result<std::vector<Transform>> newest_values(const std::vector<Ends>& segments,
+                                                             const HeldVersion*& limiting) const;
+  [[nodiscard]] Result<std::vector<Transform>> values_at(const std::vector<Ends>& segments,
+                                                         std::int64_t t, const Instant& instant,
+                                                         bool* any_moving) const;
+
+  /// Value is Transform, or Pose where the covariance is not asked for; Name is an id or a handle.
+  template <class Value, class Name>
+  [[nodiscard]] Result<Value> look_up(Name a, Name b) const;
+  template <class Name>
+  [[nodiscard]] Result<StampedTransform> look_up(Name a, Name b, const Instant& instant) const;
+
+  /// Calls visit(edge, from, to) for the edges from a to b, in order; an edge's version is that of its child.
+  template <class Visit>
+  [[nodiscard]] static Result<void> for_each_edge(const Ends& ends, Visit visit);
 
   [[nodiscard]] FrameInfo info_of(const Version& version, std::uint64_t commit) const;
 
@@ -82,9 +123,29 @@ class Forest::Impl {
     return version.held() && version.generation == frame.generation ? &version : nullptr;
   }
 
+  /// One edge, whose slot is checked.
+  [[nodiscard]] Result<void> update_one(std::uint32_t slot, const Transform& X_PC,
+                                        std::optional<Time> stamp);
+
   /// All of them as one commit, or none; `frame` gives the id or the handle of an update.
   template <class Update, class Frame>
-  [[nodiscard]] Result<void> update_all(const std::vector<Update>& edges, Frame frame);
+  [[nodiscard]] Result<void> update_all(const std::vector<Update>& edges, Frame frame,
+                                        std::optional<Time> stamp);
+
+  // Of the past (forest_past.cpp).
+
+  /// Of what stamp an update is to be for all these edges: that given, or the clock's where it counts, later than all
+  /// that these have.
+  [[nodiscard]] Result<std::int64_t> stamp_for(const std::uint32_t* slots, std::size_t count,
+                                               std::optional<Time> given) const;
+  /// @return kTooOld, kStampTaken; both are counted
+  [[nodiscard]] Result<void> check_sample(const HeldVersion& newest, std::int64_t stamp) const;
+  /// Pushes a checked update: a sample where the edge is moving or is to be, else the value for all times.
+  void push_value(std::uint32_t slot, const Transform& X_PC, std::int64_t stamp);
+  /// Makes the fresh version static, with nothing of the past that its predecessor has, but as much to be kept.
+  void forget_past(HeldVersion& fresh);
+  /// A ring with all its samples, of which the newest may still be the newest version: that one is superseded next.
+  void give_back(Ring* ring, std::uint32_t slot);
 
   /// The newest versions of an id and of the parent that it is to have; null where not interned.
   struct Pair {
@@ -119,9 +180,15 @@ class Forest::Impl {
   void commit_structure();
 
   SlotArray slots_;
+  EdgeTiming default_timing_;
+  std::function<void()> commit_listener_;
   std::atomic<std::uint64_t> structure_version_{0};
   mutable WriteLock mutex_;
   Graph graph_;
+
+  [[nodiscard]] const HeldVersion& newest_value(std::uint32_t slot) const {
+    return static_cast<const HeldVersion&>(newest(slot));
+  }
 
  private:
   // How many superseded versions may wait before the readers are asked: rare enough to cost little (locked
@@ -130,6 +197,10 @@ class Forest::Impl {
 
   template <class T>
   T& push(VersionPool<T>& pool, std::uint32_t slot);
+  void append_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
+  void insert_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
+  void drop_samples(Ring& ring);
+  void replace(Ring* ring);
   void hang(Version& fresh, std::uint32_t parent) const;
   void renew_depths(std::uint32_t top);
   void release(Version& fresh);
@@ -137,10 +208,13 @@ class Forest::Impl {
   void collect();
 
   IdTable ids_;
+  const Clock clock_;
   std::atomic<std::uint64_t> committed_{0};
   VersionPool<HeldVersion> held_pool_;
   VersionPool<Version> remote_pool_;
-  std::vector<Version*> superseded_;         // by commits since the readers were last asked
+  std::vector<Version*> superseded_;  // by commits since the readers were last asked
+  std::vector<std::unique_ptr<Ring>> superseded_rings_;  // likewise
+  std::vector<std::unique_ptr<Ring>> retired_rings_;
   std::vector<const Name*> released_names_;  // by the commit being made
   std::vector<std::uint32_t> free_slots_;
   std::vector<std::uint32_t> to_update_;  // of the update being made; kept for its memory

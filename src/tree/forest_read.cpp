@@ -4,38 +4,9 @@
 
 #include "tfdude/base/id.hpp"
 
-#include "math/climb.hpp"
 #include "tree/forest_impl.hpp"
 
 namespace tfdude {
-namespace {
-
-tl::unexpected<Error> unknown_start(std::string_view id) {
-  return fail(Errc::kUnknownStart, "no frame " + quote(id) + " to start from");
-}
-
-tl::unexpected<Error> unknown_end(std::string_view id) {
-  return fail(Errc::kUnknownEnd, "no frame " + quote(id) + " to end at");
-}
-
-tl::unexpected<Error> not_connected(const Version& a, const Version& b) {
-  return fail(Errc::kNotConnected, "frames " + quote(a.name->text) + " and " + quote(b.name->text) +
-                                       " have no common root");
-}
-
-// Of a held version.
-template <class Value>
-const Value& value_of(const Version& version) {
-  const Transform& X_PC = static_cast<const HeldVersion&>(version).X_PC;
-  if constexpr (std::is_same_v<Value, Pose>) {
-    return X_PC.pose;
-  } else {
-    return X_PC;
-  }
-}
-
-}  // namespace
-
 const Version* Forest::Impl::named(std::string_view id, std::uint64_t commit) const {
   const Name* name = ids_.find(id);
   if (name == nullptr) return nullptr;
@@ -49,31 +20,35 @@ const Version* Forest::Impl::of(Handle frame, std::uint64_t commit) const {
   return version->present() && version->generation == frame.generation ? version : nullptr;
 }
 
-template <class Value>
-Result<Value> Forest::Impl::walk(const Version* a, const Version* b, std::uint64_t commit,
-                                 Absent absent) const {
-  const Version* const start = a;
-  const Version* const end = b;
-  Climb<Value> climb_a;
-  Climb<Value> climb_b;
-  // An edge held by another; from there on only the errors matter, and kNotConnected goes first.
-  const Version* elsewhere = nullptr;
-  while (a != b) {
-    const bool from_a = a->depth >= b->depth;
-    const Version*& here = from_a ? a : b;
-    const bool top = absent == Absent::kEnds ? here->depth == 0 : here->above == nullptr;
-    if (top) return not_connected(*start, *end);
-    if (!here->held()) elsewhere = here;
-    if (elsewhere == nullptr) {
-      (from_a ? climb_a : climb_b).up(value_of<Value>(*here));
-    }
-    here = at(*here->above, commit);
-  }
-  if (elsewhere != nullptr) {
-    return fail(Errc::kNotOwner,
-                "the edge of " + quote(elsewhere->name->text) + " is held by another partition");
-  }
-  return join(std::move(climb_a), std::move(climb_b));
+Result<Forest::Impl::Ends> Forest::Impl::ends(std::string_view a, std::string_view b) const {
+  const std::uint64_t commit = snapshot();
+  const Version* start = present(a, commit);
+  if (start == nullptr) return unknown_start(a);
+  const Version* end = present(b, commit);
+  if (end == nullptr) return unknown_end(b);
+  return Ends{start, end, commit};
+}
+
+Result<Forest::Impl::Ends> Forest::Impl::ends(Handle a, Handle b) const {
+  const std::uint64_t commit = snapshot();
+  const Version* start = of(a, commit);
+  if (start == nullptr) return fail(Errc::kUnknownStart, "the first frame was removed");
+  const Version* end = of(b, commit);
+  if (end == nullptr) return fail(Errc::kUnknownEnd, "the second frame was removed");
+  return Ends{start, end, commit};
+}
+
+tl::unexpected<Error> Forest::Impl::unknown_start(std::string_view id) {
+  return fail(Errc::kUnknownStart, "no frame " + quote(id) + " to start from");
+}
+
+tl::unexpected<Error> Forest::Impl::unknown_end(std::string_view id) {
+  return fail(Errc::kUnknownEnd, "no frame " + quote(id) + " to end at");
+}
+
+tl::unexpected<Error> Forest::Impl::not_connected(const Version& a, const Version& b) {
+  return fail(Errc::kNotConnected, "frames " + quote(a.name->text) + " and " + quote(b.name->text) +
+                                       " have no common root");
 }
 
 FrameInfo Forest::Impl::info_of(const Version& version, std::uint64_t commit) const {
@@ -89,89 +64,58 @@ FrameInfo Forest::Impl::info_of(const Version& version, std::uint64_t commit) co
   return info;
 }
 
-Forest::Forest() : impl_(std::make_unique<Impl>()) {}
+Forest::Forest(Clock clock) : impl_(std::make_unique<Impl>(std::move(clock))) {}
 Forest::~Forest() = default;
 
-template <class Value>
-Result<Value> Forest::Impl::look_up(std::string_view a, std::string_view b) const {
-  const epoch::Guard guard;
-  const std::uint64_t commit = snapshot();
-  const Version* start = present(a, commit);
-  if (start == nullptr) return unknown_start(a);
-  const Version* end = present(b, commit);
-  if (end == nullptr) return unknown_end(b);
-  return walk<Value>(start, end, commit, Absent::kEnds);
-}
-
-template <class Value>
-Result<Value> Forest::Impl::look_up(Handle a, Handle b) const {
-  const epoch::Guard guard;
-  const std::uint64_t commit = snapshot();
-  const Version* start = of(a, commit);
-  if (start == nullptr) return fail(Errc::kUnknownStart, "the first frame was removed");
-  const Version* end = of(b, commit);
-  if (end == nullptr) return fail(Errc::kUnknownEnd, "the second frame was removed");
-  return walk<Value>(start, end, commit, Absent::kEnds);
-}
-
-Result<Transform> Forest::lookup(std::string_view a, std::string_view b) const {
-  return impl_->look_up<Transform>(a, b);
-}
-
-Result<Transform> Forest::lookup(Handle a, Handle b) const {
-  return impl_->look_up<Transform>(a, b);
-}
-
-Result<Pose> Forest::lookup_pose(std::string_view a, std::string_view b) const {
-  return impl_->look_up<Pose>(a, b);
-}
-
-Result<Pose> Forest::lookup_pose(Handle a, Handle b) const { return impl_->look_up<Pose>(a, b); }
-
-Result<Transform> Forest::lookup_segment(std::string_view from, std::string_view to) const {
-  const epoch::Guard guard;
-  const std::uint64_t commit = impl_->snapshot();
-  const Version* start = impl_->named(from, commit);
-  if (start == nullptr) return unknown_start(from);
-  const Version* end = impl_->named(to, commit);
-  if (end == nullptr) return unknown_end(to);
-  return impl_->walk<Transform>(start, end, commit, Impl::Absent::kMayPass);
-}
-
-Result<std::vector<Segment>> Forest::segments(std::string_view a, std::string_view b) const {
-  const epoch::Guard guard;
-  const std::uint64_t commit = impl_->snapshot();
-  const Version* start = impl_->present(a, commit);
-  if (start == nullptr) return unknown_start(a);
-  const Version* end = impl_->present(b, commit);
-  if (end == nullptr) return unknown_end(b);
-  const Version* up = start;
-  const Version* down = end;
-  std::vector<Segment> runs;
+template <class Visit>
+Result<void> Forest::Impl::for_each_edge(const Ends& ends, Visit visit) {
+  const Version* up = ends.a;
+  const Version* down = ends.b;
   std::vector<const Version*> descent;  // the edges below the common ancestor towards b, from b
-  const auto append = [&runs](const Version& edge, const Version& from, const Version& to) {
-    if (runs.empty() || runs.back().owner != edge.owner) {
-      runs.push_back({edge.owner, from.name->text, {}});
-    }
-    runs.back().to = to.name->text;
-  };
   while (up != down) {
     const bool from_a = up->depth >= down->depth;
     const Version*& here = from_a ? up : down;
-    if (here->depth == 0) return not_connected(*start, *end);
-    const Version* parent = Impl::at(*here->above, commit);
+    if (here->depth == 0) return not_connected(*ends.a, *ends.b);
+    const Version* parent = at(*here->above, ends.commit);
     if (from_a) {
-      append(*here, *here, *parent);
+      visit(*here, *here, *parent);
     } else {
       descent.push_back(here);
     }
     here = parent;
   }
   for (auto edge = descent.rbegin(); edge != descent.rend(); ++edge) {
-    append(**edge, *up, **edge);
+    visit(**edge, *up, **edge);
     up = *edge;
   }
+  return {};
+}
+
+Result<std::vector<Segment>> Forest::segments(std::string_view a, std::string_view b) const {
+  const epoch::Guard guard;
+  const auto ends = impl_->ends(a, b);
+  if (!ends) return tl::unexpected(ends.error());
+  std::vector<Segment> runs;
+  const auto append = [&runs](const Version& edge, const Version& from, const Version& to) {
+    if (runs.empty() || runs.back().owner != edge.owner) {
+      runs.push_back({edge.owner, from.name->text, {}});
+    }
+    runs.back().to = to.name->text;
+  };
+  if (auto ok = Impl::for_each_edge(*ends, append); !ok) return tl::unexpected(ok.error());
   return runs;
+}
+
+Result<std::vector<FrameInfo>> Forest::edges(std::string_view a, std::string_view b) const {
+  const epoch::Guard guard;
+  const auto ends = impl_->ends(a, b);
+  if (!ends) return tl::unexpected(ends.error());
+  std::vector<FrameInfo> all;
+  const auto append = [&](const Version& edge, const Version&, const Version&) {
+    all.push_back(impl_->info_of(edge, ends->commit));
+  };
+  if (auto ok = Impl::for_each_edge(*ends, append); !ok) return tl::unexpected(ok.error());
+  return all;
 }
 
 std::optional<Handle> Forest::find(std::string_view id) const {

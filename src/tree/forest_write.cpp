@@ -92,16 +92,28 @@ T& Forest::Impl::push(VersionPool<T>& pool, std::uint32_t slot) {
   fresh->owner = old->owner;
   fresh->slot = slot;
   fresh->generation = old->generation;
-  superseded_.push_back(old);
+  // A sample stays until its ring drops it.
+  if (!old->held() || !static_cast<const HeldVersion*>(old)->kept) superseded_.push_back(old);
   // Readers skip the fresh version by its number until commit(), so the rest may be filled in later.
   head.store(fresh, std::memory_order_release);
   return *fresh;
 }
 
 HeldVersion& Forest::Impl::push_held(std::uint32_t slot, const Transform& X_PC) {
+  const Version& old = newest(slot);
   HeldVersion& fresh = push(held_pool_, slot);
   fresh.owner = kHeldHere;
   fresh.X_PC = X_PC;
+  fresh.kept = false;
+  if (old.held()) {
+    const auto& before = static_cast<const HeldVersion&>(old);
+    fresh.stamp = before.stamp;
+    fresh.number = before.number;
+    fresh.ring = before.ring;
+  } else {
+    fresh.stamp = kAlways;
+    fresh.ring = nullptr;
+  }
   return fresh;
 }
 
@@ -128,6 +140,7 @@ void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
 }
 
 void Forest::Impl::make_absent(std::uint32_t slot) {
+  if (newest(slot).held()) give_back(newest_value(slot).ring, slot);
   Version& fresh = push_remote(slot);
   const std::uint32_t parent = fresh.parent;
   if (parent != kNoSlot) graph_.unlink(parent, slot);
@@ -174,6 +187,7 @@ void Forest::Impl::commit() {
   }
   released_names_.clear();
   if (superseded_.size() > kCollectAt) collect();
+  if (commit_listener_) commit_listener_();
 }
 
 void Forest::Impl::commit_structure() {
@@ -193,10 +207,18 @@ void Forest::Impl::collect() {
     }
   }
   superseded_.clear();
+  for (std::unique_ptr<Ring>& ring : superseded_rings_) {
+    ring->retire_tag = tag;
+    retired_rings_.push_back(std::move(ring));
+  }
+  superseded_rings_.clear();
   const std::uint64_t below = epoch::safe_below();
   held_pool_.collect(below);
   remote_pool_.collect(below);
   ids_.collect(tag, below);
+  const auto unseen = [below](const auto& ring) { return ring->retire_tag < below; };
+  retired_rings_.erase(std::remove_if(retired_rings_.begin(), retired_rings_.end(), unseen),
+                       retired_rings_.end());
 }
 
 Result<void> Forest::add(std::string_view id, std::string_view parent, const Transform& X_PC,
@@ -248,28 +270,39 @@ Result<void> Forest::release(std::string_view id) {
   return {};
 }
 
-Result<void> Forest::update(std::string_view id, const Transform& X_PC) {
-  if (!is_finite(X_PC)) return check_value(id, X_PC);
+Result<void> Forest::Impl::update_one(std::uint32_t slot, const Transform& X_PC,
+                                      std::optional<Time> stamp) {
+  if (!is_finite(X_PC)) return check_value(newest(slot).name->text, X_PC);
+  const HeldVersion& old = newest_value(slot);
+  if (!stamp && old.ring == nullptr && !default_timing_.moving) {
+    push_held(slot, X_PC);
+  } else {
+    const auto at = stamp_for(&slot, 1, stamp);
+    if (!at) return tl::unexpected(at.error());
+    if (auto ok = check_sample(old, *at); !ok) return ok;
+    push_value(slot, X_PC, *at);
+  }
+  commit();
+  return {};
+}
+
+Result<void> Forest::update(std::string_view id, const Transform& X_PC, std::optional<Time> stamp) {
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
-  impl_->push_held(*slot, X_PC);
-  impl_->commit();
-  return {};
+  return impl_->update_one(*slot, X_PC, stamp);
 }
 
-Result<void> Forest::update(Handle frame, const Transform& X_PC) {
+Result<void> Forest::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
   const std::lock_guard lock(impl_->mutex_);
   const Version* version = impl_->newest_held(frame);
   if (version == nullptr) return tl::unexpected(impl_->held_slot(frame).error());
-  if (!is_finite(X_PC)) return check_value(version->name->text, X_PC);
-  impl_->push_held(frame.slot, X_PC);
-  impl_->commit();
-  return {};
+  return impl_->update_one(frame.slot, X_PC, stamp);
 }
 
 template <class Update, class Frame>
-Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame frame) {
+Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame frame,
+                                      std::optional<Time> stamp) {
   const std::lock_guard lock(mutex_);
   to_update_.clear();
   for (const Update& edge : edges) {
@@ -278,17 +311,22 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
     if (!is_finite(edge.X_PC)) return check_value(newest(*slot).name->text, edge.X_PC);
     to_update_.push_back(*slot);
   }
-  for (std::size_t i = 0; i < edges.size(); ++i) push_held(to_update_[i], edges[i].X_PC);
+  const auto at = stamp_for(to_update_.data(), to_update_.size(), stamp);
+  if (!at) return tl::unexpected(at.error());
+  for (const std::uint32_t slot : to_update_) {
+    if (auto ok = check_sample(newest_value(slot), *at); !ok) return ok;
+  }
+  for (std::size_t i = 0; i < edges.size(); ++i) push_value(to_update_[i], edges[i].X_PC, *at);
   commit();
   return {};
 }
 
-Result<void> Forest::update(const std::vector<EdgeUpdate>& edges) {
-  return impl_->update_all(edges, &EdgeUpdate::id);
+Result<void> Forest::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
+  return impl_->update_all(edges, &EdgeUpdate::id, stamp);
 }
 
-Result<void> Forest::update(const std::vector<HandleUpdate>& edges) {
-  return impl_->update_all(edges, &HandleUpdate::frame);
+Result<void> Forest::update(const std::vector<HandleUpdate>& edges, std::optional<Time> stamp) {
+  return impl_->update_all(edges, &HandleUpdate::frame, stamp);
 }
 
 Result<void> Forest::move(std::string_view id, std::string_view parent,
@@ -307,7 +345,9 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   const auto& old = static_cast<const HeldVersion&>(*pair.frame);
   const std::uint32_t parent_slot = impl_->parent_slot(pair);
   old.name->hung(since);
-  impl_->relink(impl_->push_held(*slot, X_PC.value_or(old.X_PC)), parent_slot);
+  HeldVersion& fresh = impl_->push_held(*slot, X_PC.value_or(old.X_PC));
+  impl_->forget_past(fresh);
+  impl_->relink(fresh, parent_slot);
   impl_->commit_structure();
   return {};
 }
@@ -336,6 +376,11 @@ Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Ow
     impl_->commit_structure();
   }
   return acyclic;
+}
+
+void Forest::on_commit(std::function<void()> listener) {
+  const std::lock_guard lock(impl_->mutex_);
+  impl_->commit_listener_ = std::move(listener);
 }
 
 void Forest::drop_remote(std::string_view id, Owner owner) {

@@ -11,6 +11,7 @@
 
 #include "tree/epoch.hpp"
 #include "tree/id_table.hpp"
+#include "tree/ring.hpp"
 
 namespace tfdude {
 
@@ -48,6 +49,12 @@ struct Version {
 /// A version of an edge whose value is held here.
 struct HeldVersion : Version {
   Transform X_PC;
+  std::int64_t stamp = kAlways;  // of the newest sample
+  std::uint64_t number = 0;      // its number in the ring
+  Ring* ring = nullptr;  // null: there is no past, nor anything known of how it is to be kept
+  bool kept = false;     // by a ring, as a sample; only the writer looks
+
+  [[nodiscard]] bool moving() const { return stamp != kAlways; }
 };
 
 /// Blocks of one version type, reused in the order in which readers let go of them. One writer at a time.

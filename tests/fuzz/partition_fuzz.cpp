@@ -172,8 +172,8 @@ class World {
     const auto* error = std::get_if<Error>(&reply.body);
     if (error != nullptr) demand_printable(*error);
     if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
-      const auto* transforms = std::get_if<std::vector<Transform>>(&reply.body);
-      demand(transforms == nullptr || transforms->size() == lookup->segments.size(),
+      const auto* found = std::get_if<SegmentValues>(&reply.body);
+      demand(found == nullptr || found->values.size() == lookup->segments.size(),
              "there is a transform for each segment");
     } else {
       const Picture others = own_->others.oldest();

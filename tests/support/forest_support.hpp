@@ -43,4 +43,12 @@ template <class T>
          (frame.attached ? ", attached" : "");
 }
 
+/// The value of one segment, as its owner gives it.
+[[nodiscard]] inline Result<Transform> lookup_segment(const Forest& forest, const std::string& from,
+                                                      const std::string& to) {
+  return forest.lookup_segments({{from, to}}).map([](const SegmentValues& found) {
+    return found.values.at(0);
+  });
+}
+
 }  // namespace tfdude::testing

@@ -65,6 +65,10 @@ class LatePages final : public Transport, private TransportHandler {
     return real_->send(partition, update, deadline);
   }
   void reply(const PeerId& to, const Reply& reply) override { real_->reply(to, reply); }
+  Result<void> watch(std::uint64_t group) override { return real_->watch(group); }
+  void unwatch(std::uint64_t group) override { real_->unwatch(group); }
+  void push(const State& state) override { real_->push(state); }
+  void end_pushing(std::uint64_t group) override { real_->end_pushing(group); }
   bool settled() const override { return real_->settled(); }
   bool awaits_presence() const override { return real_->awaits_presence(); }
   Milliseconds settle_time() const override { return real_->settle_time(); }
@@ -75,6 +79,7 @@ class LatePages final : public Transport, private TransportHandler {
   }
   void on_reply(const Reply& reply) override { handler_->on_reply(reply); }
   void on_update(const Update& update) override { handler_->on_update(update); }
+  void on_state(const State& state) override { handler_->on_state(state); }
   void on_page(const Page& page) override {
     const std::lock_guard lock(mutex_);
     if (page.partition != held_) return handler_->on_page(page);

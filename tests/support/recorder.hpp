@@ -23,6 +23,7 @@ struct Heard {
   std::vector<Request> requests;
   std::vector<Reply> replies;
   std::vector<Update> updates;
+  std::vector<State> states;
   std::vector<Page> pages;
   std::vector<Presence> presences;
   std::vector<std::pair<std::string, std::uint64_t>> lost;
@@ -96,6 +97,9 @@ class Recorder final : public TransportHandler {
   }
   void on_update(const Update& update) override {
     record([&] { heard_.updates.push_back(update); });
+  }
+  void on_state(const State& state) override {
+    record([&] { heard_.states.push_back(state); });
   }
   void on_page(const Page& page) override {
     record([&] { heard_.pages.push_back(page); });

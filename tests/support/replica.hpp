@@ -33,7 +33,7 @@ struct Replica {
     for (const Page& page : pages) directory.apply(page);
   }
 
-  Forest forest;
+  Forest forest{[] { return Time(std::chrono::seconds(1)); }};  // at which the clock stands
   Directory directory;
 };
 

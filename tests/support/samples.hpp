@@ -79,29 +79,74 @@ bool take(const Bytes& bytes) {
 
 [[nodiscard]] inline std::vector<Request> requests(Random& random) {
   const auto edge = [&](const std::string& id) { return EdgeUpdate{id, random.transform()}; };
-  return {{1, "hand", AddRequest{"arm", random.transform()}},
-          {2, "hand", AddRequest{"", random.transform()}},
-          {3, "hand", RemoveRequest{{"hand", "arm_1", "\xc3\xa4rmel"}}},
-          {4, "hand", UpdateRequest{{edge("hand")}}},
-          {5, "hand", UpdateRequest{{edge("hand"), edge("arm"), edge("x")}}},
-          {6, "hand", MoveRequest{"arm", std::nullopt}},
-          {7, "hand", MoveRequest{"", random.transform()}},
-          {8, "hand", LookupRequest{{{"hand", "arm"}, {"camera", "world"}}}},
-          {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), std::nullopt}}};
+  return {
+      {1, "hand", AddRequest{"arm", random.transform()}},
+      {2, "hand", AddRequest{"", random.transform()}},
+      {3, "hand", RemoveRequest{{"hand", "arm_1", "\xc3\xa4rmel"}}},
+      {4, "hand", UpdateRequest{{edge("hand")}}},
+      {5, "hand", UpdateRequest{{edge("hand"), edge("arm"), edge("x")}}},
+      {6, "hand", MoveRequest{"arm", std::nullopt}},
+      {7, "hand", MoveRequest{"", random.transform()}},
+      {8, "hand", LookupRequest{{{"hand", "arm"}, {"camera", "world"}}}},
+      {9, "hand", UpdateRequest{{edge("hand"), edge("arm")}, time_of(1)}},
+      {10, "hand",
+       LookupRequest{{{"hand", "arm"}},
+                     {time_of(1'700'000'000'000'000'000), std::chrono::nanoseconds(7), time_of(9)},
+                     time_of(8)}},
+      {11, "hand", LookupRequest{{}, {}, time_of(INT64_MAX)}},
+      {12, "hand", WatchRequest{{"hand", "arm"}, {}, std::chrono::nanoseconds(1000)}},
+      {13, "hand", WatchRequest{{}, {{"hand", "arm"}}}},
+      {14, "hand", PastRequest{}},
+      {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), std::nullopt}}};
+}
+
+[[nodiscard]] inline PastInfo past_info(const std::string& id) {
+  PastInfo past;
+  past.id = id;
+  past.samples = 2048;
+  past.bytes = 700'000;
+  past.span_limit = std::chrono::seconds(10);
+  past.count_limit = 4096;
+  past.oldest = time_of(1);
+  past.newest = time_of(1'700'000'000'000'000'000);
+  past.mean_gap = std::chrono::nanoseconds(3);
+  past.max_gap = std::chrono::nanoseconds(4);
+  past.jitter = std::chrono::nanoseconds(5);
+  past.refused_old = 6;
+  past.refused_equal = 7;
+  return past;
 }
 
 [[nodiscard]] inline std::vector<Reply> replies(Random& random) {
   return {{1, 10, Done{}},
           {2, 18446744073709551615ULL, Error{Errc::kCycle, "no, \xc3\xa4 \x07 \xff"}},
           {3, 0, Error{Errc::kTransport, ""}},
-          {4, 30, std::vector<Transform>{}},
-          {5, 40, std::vector<Transform>{random.transform(), Transform(), random.transform()}}};
+          {4, 30, SegmentValues{}},
+          {5, 40, SegmentValues{{random.transform(), Transform(), random.transform()}, {}, {}, {}}},
+          {6, 40,
+           SegmentValues{{random.transform()},
+                         time_of(1'700'000'000'000'000'001),
+                         std::chrono::nanoseconds(5),
+                         {random.transform()}}},
+          {7, 1, State{1, {}}},
+          {8, 1,
+           State{18446744073709551615ULL,
+                 {{0, std::nullopt, random.transform()}, {7, time_of(5), Transform()}}}},
+          {9, 1, std::vector<PastInfo>{}},
+          {10, 1, std::vector<PastInfo>{past_info("hand"), PastInfo{}}}};
+}
+
+[[nodiscard]] inline std::vector<State> states(Random& random) {
+  return {{},
+          {1, {{4294967295U, time_of(INT64_MAX), random.transform()}}},
+          {2, {{0, std::nullopt, Transform()}, {1, time_of(1), random.transform()}}}};
 }
 
 [[nodiscard]] inline std::vector<Update> updates(Random& random) {
   return {{},
           {{{"hand", random.transform()}}},
-          {{{"a", random.transform()}, {"ab", Transform()}, {"abc", random.transform()}}}};
+          {{{"a", random.transform()}, {"ab", Transform()}, {"abc", random.transform()}}},
+          {{{"hand", random.transform()}}, time_of(1'700'000'000'000'000'000)}};
 }
 
 [[nodiscard]] inline std::vector<Page> pages() {
@@ -144,6 +189,11 @@ bool take(const Bytes& bytes) {
     kinds.push_back({"update of " + std::to_string(one.edges.size()),
                      serialized<UpdateType>(to_wire(one)), well_formed_update,
                      take<UpdateType, wire::Update>});
+  }
+  for (const State& one : states(random)) {
+    kinds.push_back({"state of " + std::to_string(one.entries.size()),
+                     serialized<StateType>(to_wire(one)), well_formed_state,
+                     take<StateType, wire::State>});
   }
   for (const Page& one : pages()) {
     kinds.push_back({"page " + std::to_string(one.number), serialized<PageType>(to_wire(one)),

@@ -28,6 +28,9 @@ enum class Errc : std::uint8_t {
   kConfig = 14,           ///< a file (configuration, profile) is missing or broken
   kTransport = 15,        ///< the transport could not be set up
   kState = 16,            ///< what is kept of a partition could not be read or written
+  kNotYet = 17,           ///< an edge has no data of that instant yet
+  kTooOld = 18,           ///< an edge has no data of that instant any more
+  kStampTaken = 19,       ///< update: the edge has another sample of that stamp
 };
 
 /// The stable snake_case name of a code, as the command line prints it in JSON.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <string>
 
 namespace tfdude {
@@ -10,6 +11,15 @@ namespace tfdude {
 using Time = std::chrono::time_point<std::chrono::system_clock, std::chrono::nanoseconds>;
 
 using Milliseconds = std::chrono::milliseconds;
+
+/// As it travels and is kept: nanoseconds since the UNIX epoch.
+[[nodiscard]] inline std::int64_t nanoseconds(Time time) { return time.time_since_epoch().count(); }
+[[nodiscard]] inline Time time_of(std::int64_t nanoseconds) {
+  return Time(std::chrono::nanoseconds(nanoseconds));
+}
+
+/// For people: "12.3 ms", "0.004 ms".
+[[nodiscard]] std::string in_milliseconds(std::chrono::nanoseconds duration);
 
 /// For people: "2026-11-21 14:03:59.125 UTC".
 [[nodiscard]] std::string to_string(Time time);

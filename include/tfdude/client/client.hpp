@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
+#include "tfdude/client/watch.hpp"
 #include "tfdude/partition/change.hpp"
 #include "tfdude/partition/directory.hpp"
 #include "tfdude/partition/partition.hpp"
@@ -36,6 +38,8 @@ struct Options {
   std::string state;
   /// How often at most values that were streamed, or set by the Node's own process, are stored.
   Milliseconds save_every{1000};
+  /// How much is kept of the past of a Node's edges, where a frame says nothing else.
+  EdgeTiming history{};
 };
 
 /// A frame and where it stands.
@@ -63,6 +67,21 @@ class Subscription {
 
  private:
   std::shared_ptr<void> token_;
+};
+
+/// A lookup that waits for its data; cancelled when destroyed: its callback is not called any more then.
+class PendingLookup {
+ public:
+  using Callback = std::function<void(Result<StampedTransform>)>;
+
+  PendingLookup() = default;
+  explicit PendingLookup(std::shared_ptr<void> task) : task_(std::move(task)) {}
+
+  /// As destroying it; waits for a callback under way, unless called from that.
+  void cancel() { task_.reset(); }
+
+ private:
+  std::shared_ptr<void> task_;
 };
 
 /// A process's access to all frames of a domain. See Node for a process that owns frames.
@@ -103,19 +122,30 @@ class Client {
 
   /// Gives the edge from a frame's parent to the frame a new value, acknowledged by its owner. On a Node an
   /// own edge costs no network, no lock that readers know, no allocation.
-  /// @return kUnknownFrame.
-  [[nodiscard]] Result<void> update(const std::string& id, const Transform& X_PC);
-  [[nodiscard]] Result<void> update(Handle frame, const Transform& X_PC);
+  ///
+  /// With a stamp (of the source's clock) the value is a sample, and the edge is moving from its first one on: between
+  /// samples it is interpolated, before and after them it has no value. Without a stamp it is, on a moving edge, a
+  /// sample of when its owner gets it, and on a static edge the value for all times.
+  /// @return kUnknownFrame, kTooOld (older than what is kept), kStampTaken.
+  [[nodiscard]] Result<void> update(const std::string& id, const Transform& X_PC,
+                                    std::optional<Time> stamp = std::nullopt);
+  [[nodiscard]] Result<void> update(Handle frame, const Transform& X_PC,
+                                    std::optional<Time> stamp = std::nullopt);
 
   /// Many edges: each owner applies its share as one, so that nobody sees half of it. Another process takes
-  /// at most kMaxItems edges at once.
-  [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
-  [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges);
+  /// at most kMaxItems edges at once. All are of one stamp, so that lookups at an instant see all or none, whoever owns
+  /// them.
+  [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges,
+                                    std::optional<Time> stamp = std::nullopt);
+  [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges,
+                                    std::optional<Time> stamp = std::nullopt);
 
   /// Streams new edge values to their owners, unacknowledged: the path for joints at 1 kHz and more. A
-  /// share that an owner cannot take in time may be lost, never torn.
+  /// share that an owner cannot take in time may be lost, never torn. Stamps are as for update(); samples that an owner
+  /// refuses it counts (pasts()).
   /// @return kUnknownFrame.
-  [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges);
+  [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
+                                     std::optional<Time> stamp = std::nullopt);
 
   /// Hangs a frame with all below it under a new parent (empty: makes it a root); it stays its owner's.
   /// @param X_PC  the new edge's value; where absent, the old edge's is kept
@@ -123,16 +153,59 @@ class Client {
   [[nodiscard]] Result<void> move(const std::string& id, const std::string& parent,
                                   const std::optional<Transform>& X_PC = std::nullopt);
 
-  /// X_AB, the pose of frame b in frame a, with the covariance of its right perturbation, expressed in b.
-  /// Edges are taken as independent; first order. On a Node a path of own edges costs no network, no lock
-  /// and no allocation; else one round trip, whatever the number of partitions on the path.
-  /// @return kUnknownStart, kUnknownEnd, kNotConnected.
+  /// X_AB, the pose of frame b in frame a, with the covariance of its right perturbation, expressed in b, at the newest
+  /// instant of which all moving edges on the path have data. Edges are taken as independent; first order. On a Node a
+  /// path of own edges costs no network, no lock and no allocation; else one round trip, whatever the number of
+  /// partitions on the path, or two where these have no common instant near that which was foreseen (see latest.hpp):
+  /// where the answer was foreseen, it may be up to two samples of the slowest edge older than the newest.
+  /// @return kUnknownStart, kUnknownEnd, kNotConnected, kNotYet, kTooOld (no instant of which all edges have data).
   [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b);
   [[nodiscard]] Result<Transform> lookup(Handle a, Handle b);
 
   /// The same without its covariance. On a path of own edges this takes a fraction of the time.
   [[nodiscard]] Result<Pose> lookup_pose(std::string_view a, std::string_view b);
   [[nodiscard]] Result<Pose> lookup_pose(Handle a, Handle b);
+
+  /// X_AB at an instant: all partitions answer for the same.
+  /// @return as above; kNotYet, kTooOld (naming the edge that has no data of it, and the gap).
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
+                                                const Instant& instant);
+  [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Instant& instant);
+
+  /// The same, waiting for frames and data that are not there yet. What is not kept any more fails at once.
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
+                                                const Instant& instant, Milliseconds wait);
+
+  /// Frame b at one instant seen from frame a at another, by way of a frame that is taken as fixed meanwhile:
+  /// X_AF(at_a) X_FB(at_b). The two ways are taken as independent.
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, const Instant& at_a,
+                                                std::string_view b, const Instant& at_b,
+                                                std::string_view fixed);
+
+  /// As lookup() with a wait, answering to a function, on a thread of the library's that holds no lock. The function may
+  /// use the client, and must not throw. Ends before the client is destroyed at the latest.
+  [[nodiscard]] PendingLookup lookup_async(const std::string& a, const std::string& b,
+                                           const Instant& instant, Milliseconds wait,
+                                           PendingLookup::Callback callback);
+  /// The same, answering to a future.
+  [[nodiscard]] std::future<Result<StampedTransform>> lookup_async(const std::string& a,
+                                                                   const std::string& b,
+                                                                   const Instant& instant,
+                                                                   Milliseconds wait);
+
+  /// Whether lookup() would answer; if not, why.
+  [[nodiscard]] Result<void> can_lookup(std::string_view a, std::string_view b,
+                                        const Instant& instant = {});
+
+  /// Has the path's owners push what changes on it; waits until its first values are here, Options::timeout at most.
+  /// @return as lookup().
+  [[nodiscard]] Result<PathWatch> watch(const std::string& a, const std::string& b,
+                                        const WatchOptions& options = {});
+
+  /// What is kept of the past of one edge; nothing for one that is static. @return kUnknownFrame.
+  [[nodiscard]] Result<std::vector<PastInfo>> past(const std::string& id);
+  /// That of a partition's moving edges, of kMaxItems at most. @return kUnknownPartition.
+  [[nodiscard]] Result<std::vector<PastInfo>> pasts(const std::string& partition);
 
   /// Finds a frame once, for calls that then need no hashing. @return kUnknownFrame.
   [[nodiscard]] Result<Handle> find(std::string_view id);

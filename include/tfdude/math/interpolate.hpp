@@ -15,6 +15,9 @@ namespace tfdude {
 /// @note Of two rotations that are a half turn apart the way between them is one of two.
 [[nodiscard]] Transform interpolate(const Transform& X0, const Transform& X1, double s);
 
+/// The same without the covariance.
+[[nodiscard]] Pose interpolate(const Pose& X0, const Pose& X1, double s);
+
 /// X_AB beyond the second of two samples, with their twist.
 ///
 /// To first order e = B1 s e1 - (s-1) B0 e0, of which the weights add up to one, but not as a mean: no correlation
@@ -22,5 +25,8 @@ namespace tfdude {
 /// with c = s / (s-1)).
 /// @param s  1 gives X1, 2 as far beyond it as it is from X0; no less than 1
 [[nodiscard]] Transform extrapolate(const Transform& X0, const Transform& X1, double s);
+
+/// The same without the covariance.
+[[nodiscard]] Pose extrapolate(const Pose& X0, const Pose& X1, double s);
 
 }  // namespace tfdude

@@ -1,13 +1,16 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
 #include "tfdude/base/result.hpp"
+#include "tfdude/base/time.hpp"
 #include "tfdude/math/transform.hpp"
 #include "tfdude/tree/forest.hpp"
 
@@ -33,6 +36,7 @@ struct RemoveRequest {
 
 struct UpdateRequest {
   std::vector<EdgeUpdate> edges;  ///< at least one
+  std::optional<Time> stamp{};    ///< of all of them
 };
 
 struct MoveRequest {
@@ -40,13 +44,27 @@ struct MoveRequest {
   std::optional<Transform> X_PC;  ///< kept where absent
 };
 
-struct PathEnds {
-  std::string from;
-  std::string to;
-};
-
 struct LookupRequest {
   std::vector<PathEnds> segments;  ///< at least one
+  Instant instant{};
+  /// Of what other instant the answer may be of use; see LatestHints.
+  std::optional<Time> hint{};
+};
+
+/// Asks for the values of edges, now and whenever they change: these are pushed to the group of watchers that have
+/// asked for the same, until it is not renewed for kWatchLease.
+struct WatchRequest {
+  std::vector<std::string> edges;      ///< by their child frames;
+  std::vector<PathEnds> segments{};    ///< or, instead, composed transforms of whole segments
+  std::chrono::nanoseconds period{0};  ///< no more often than this; 0: every sample
+};
+
+/// How long an owner pushes to watchers of whom it hears nothing.
+inline constexpr Milliseconds kWatchLease{5000};
+
+/// What is kept of the past of the edge that the request's id names or, instead, of all that the partition has.
+struct PastRequest {
+  bool all = false;
 };
 
 /// A request to one partition.
@@ -55,7 +73,22 @@ struct Request {
   std::uint32_t sequence = 0;
   /// The frame concerned, by which a reader filters: one that the partition owns, or the new one of an add.
   std::string id;
-  std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest> body;
+  std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
+               PastRequest>
+      body;
+};
+
+/// The value of one of the edges, or segments, that a group watches.
+struct StateEntry {
+  std::uint32_t index = 0;  ///< in the WatchRequest
+  std::optional<Time> stamp;
+  Transform X;
+};
+
+/// Values of watched edges, in the order in which they became what they are.
+struct State {
+  std::uint64_t group = 0;  ///< watch_group() of the owner and the request
+  std::vector<StateEntry> entries;
 };
 
 struct Done {};
@@ -64,13 +97,17 @@ struct Reply {
   std::uint32_t sequence = 0;
   /// The partition's structure after the request; a directory that has this epoch shows its effect.
   std::uint64_t epoch = 0;
-  /// Done, or why not, or one transform a segment.
-  std::variant<Done, Error, std::vector<Transform>> body;
+  /// Done, or why not; or what was asked for.
+  std::variant<Done, Error, SegmentValues, State, std::vector<PastInfo>> body;
 };
+
+/// Which watchers share what an owner sends: a number of the owner and of what they ask for (FNV-1a, 64 bits).
+[[nodiscard]] std::uint64_t watch_group(std::string_view partition, const WatchRequest& request);
 
 /// Edge values streamed without a reply; applied as one commit by each owner of some of them.
 struct Update {
   std::vector<EdgeUpdate> edges;
+  std::optional<Time> stamp{};  ///< of all of them
 };
 
 struct PageEntry {

@@ -19,7 +19,7 @@ namespace tfdude {
 /// The rules of an owner: what it answers to each request, and what it publishes of its structure.
 ///
 /// @par Thread safety  The caller serializes all functions that change the structure, answer() among
-///   them, with those of the directory; answer_lookup() and apply() may run beside anything.
+///   them, with those of the directory; answer_lookup(), answer_past() and apply() may run beside anything.
 class Partition {
  public:
   Partition(std::string name, std::uint64_t incarnation, Forest& forest, Directory& directory);
@@ -46,6 +46,9 @@ class Partition {
 
   /// Answers a request that reads.
   [[nodiscard]] Reply answer_lookup(std::uint32_t sequence, const LookupRequest& lookup) const;
+
+  /// What is kept of the past of the edges that a request asks for; kMaxItems edges at most.
+  [[nodiscard]] Reply answer_past(const Request& request) const;
 
   /// Applies those edges of a stream that are owned here, as one commit.
   /// @return how many
@@ -76,7 +79,7 @@ class Partition {
   [[nodiscard]] Result<void> add(const std::string& id, const AddRequest& request, Time now);
   [[nodiscard]] Result<void> remove(const RemoveRequest& request, Time now);
   [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request, Time now);
-  [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
+  [[nodiscard]] Result<void> update(const UpdateRequest& request);
   bool concede(const Concession& concession, Time now);
   [[nodiscard]] bool hang_again(const StoredFrame& frame);
   void make_root(const StoredFrame& frame, Time now);

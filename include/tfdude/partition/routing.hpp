@@ -28,6 +28,9 @@ struct LookupPlan {
   std::vector<Part> parts;        ///< each with its owner's segments in the order of the path
 };
 
+/// A request to one owner. @return kUnreachable.
+[[nodiscard]] Result<Part> route_to(const Directory& directory, Owner owner, Request request);
+
 /// @param partition  the new frame's owner; empty: that of its parent
 /// @return kAlreadyExists, kUnknownParent, kUnknownPartition, kInvalidInput, kUnreachable.
 [[nodiscard]] Result<Part> route_add(const Forest& forest, const Directory& directory,
@@ -44,19 +47,24 @@ struct LookupPlan {
 /// @return kUnknownFrame, kUnreachable, kInvalidInput.
 [[nodiscard]] Result<std::vector<Part>> route_update(const Forest& forest,
                                                      const Directory& directory,
-                                                     const std::vector<EdgeUpdate>& edges);
+                                                     const std::vector<EdgeUpdate>& edges,
+                                                     std::optional<Time> stamp = std::nullopt);
 
 /// @return kUnknownFrame, kUnknownParent, kCycle, kUnreachable.
 [[nodiscard]] Result<Part> route_move(const Forest& forest, const Directory& directory,
                                       const std::string& id, const MoveRequest& request);
 
+/// @param hint  another instant that may be wanted, see LatestHints
 /// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable, kInvalidInput.
 [[nodiscard]] Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory,
-                                              const std::string& a, const std::string& b);
+                                              const std::string& a, const std::string& b,
+                                              const Instant& instant = {},
+                                              std::optional<Time> hint = std::nullopt);
 
-/// X_AB of the answers to a plan's parts (same order); identity where the plan has none.
+/// X_AB of the answers to a plan's parts (same order); identity where the plan has none. The values must be of one
+/// instant (one_instant()).
 /// @return kNotOwner where an answer has not as many transforms as it was asked for.
-[[nodiscard]] Result<Transform> assemble(const LookupPlan& plan,
-                                         const std::vector<std::vector<Transform>>& answers);
+[[nodiscard]] Result<StampedTransform> assemble(const LookupPlan& plan,
+                                                const std::vector<SegmentValues>& answers);
 
 }  // namespace tfdude

@@ -14,6 +14,7 @@ struct FrameSpec {
   std::string id;
   std::string parent;
   Transform X_PC;
+  std::optional<EdgeTiming> timing{};  ///< absent: the partition's
 };
 
 /// A frame with what outlives its process.

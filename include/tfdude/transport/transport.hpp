@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -21,6 +22,8 @@ class TransportHandler {
   virtual void on_request(const PeerId& from, const Request& request) = 0;
   virtual void on_reply(const Reply& reply) = 0;
   virtual void on_update(const Update& update) = 0;
+  /// Of a group that is watched.
+  virtual void on_state(const State& state) = 0;
   virtual void on_page(const Page& page) = 0;
   /// Another participant's presence.
   virtual void on_presence(const Presence& presence) = 0;
@@ -66,6 +69,14 @@ class Transport {
                                           Deadline deadline) = 0;
 
   virtual void reply(const PeerId& to, const Reply& reply) = 0;
+
+  /// Starts to receive what is pushed to a group of watchers, or ends that.
+  [[nodiscard]] virtual Result<void> watch(std::uint64_t group) = 0;
+  virtual void unwatch(std::uint64_t group) = 0;
+
+  /// Sends to those who watch the group, or gives back what was needed for that. May be lost.
+  virtual void push(const State& state) = 0;
+  virtual void end_pushing(std::uint64_t group) = 0;
 
   /// Whether the presence of all who were there when this participant started should have come by now.
   [[nodiscard]] virtual bool settled() const = 0;

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +12,7 @@
 #include <vector>
 
 #include "tfdude/base/result.hpp"
+#include "tfdude/base/time.hpp"
 #include "tfdude/math/transform.hpp"
 
 namespace tfdude {
@@ -37,6 +40,80 @@ struct EdgeUpdate {
 struct HandleUpdate {
   Handle frame;
   Transform X_PC;
+};
+
+/// How an edge behaves in time.
+struct EdgeTiming {
+  /// How much of its past is kept: samples that are not older than this before the newest,
+  std::chrono::nanoseconds span = std::chrono::seconds(10);
+  /// and no more than so many; at least 2.
+  std::size_t count = 2048;
+  /// How much the edge may have strayed from the geodesic between two samples, or from its last value: covariance
+  /// a second. Between samples at distance Δt, a of the way: a (1-a) Δt Q, as of a Brownian bridge.
+  Covariance process_noise{};
+  /// It is moving from its first update on; else from the first that is given a stamp.
+  bool moving = false;
+};
+
+/// What a lookup asks of time.
+struct Instant {
+  std::optional<Time>
+      at;  ///< absent: the newest instant of which all moving edges of the path have data
+  /// How far beyond an edge's newest sample its motion may be taken to go on as between its last two.
+  std::chrono::nanoseconds extrapolate{0};
+  /// Until when the answer is to hold: the process noise of the moving edges from the instant of the answer until then
+  /// is added to its covariance.
+  std::optional<Time> age_noise_until;
+};
+
+/// A transform and the instant of which it tells; absent: it holds for all times, as of static edges only.
+struct StampedTransform : Transform {
+  std::optional<Time> stamp;
+};
+
+/// The ends of a run of edges.
+struct PathEnds {
+  std::string from;
+  std::string to;
+};
+
+/// What one owner says of its part of a path: all of one commit, and of one instant.
+struct SegmentValues {
+  std::vector<Transform> values;  ///< one a segment
+  std::optional<Time> stamp;
+  /// Since the sample before the newest, of the edge whose newest sample is the oldest.
+  std::chrono::nanoseconds period{0};
+  std::vector<Transform> at_hint;  ///< the same at another instant; empty if that is not to be had
+};
+
+/// What of a held edge somebody has seen already: to begin with, nothing.
+struct EdgeCursor {
+  Handle frame;
+  std::optional<Time> stamp;  ///< of the newest sample seen
+  std::uint64_t commit = 0;   ///< in which a value was written that holds for all times
+};
+
+/// A value of the edge of a cursor, by the cursor's index.
+struct News {
+  std::uint32_t index = 0;
+  std::optional<Time> stamp;
+  Transform X;
+};
+
+/// What is kept of one edge's past.
+struct PastInfo {
+  std::string id;
+  std::size_t samples = 0;
+  std::size_t bytes = 0;
+  std::chrono::nanoseconds span_limit{0};
+  std::size_t count_limit = 0;
+  std::optional<Time> oldest;
+  std::optional<Time> newest;
+  std::chrono::nanoseconds mean_gap{0};  ///< between samples
+  std::chrono::nanoseconds max_gap{0};
+  std::chrono::nanoseconds jitter{0};  ///< standard deviation of the gaps
+  std::uint64_t refused_old = 0;       ///< samples that were older than what is kept,
+  std::uint64_t refused_equal = 0;     ///< or of the stamp of another
 };
 
 /// A run of edges on a path that one owner holds: X from `from` to `to`.
@@ -67,6 +144,8 @@ struct ChangedEdge {
 /// A frame may name a parent that is not there (yet); it is then a root, and is connected when the
 /// parent appears.
 ///
+/// @par Time  The value of a static edge holds for all times. An edge is moving from its first sample on, which is an
+///   update with a stamp; then only its samples tell where it is, between two of them by interpolate().
 /// @par Thread safety  All functions may be called from any thread. Lookups, find, exists, info and frames
 ///   take no lock and never wait: every commit (of one edge or of many) pushes new versions of its edges
 ///   and becomes visible by one store, and a reader sees the forest as it was at one commit. Writers take
@@ -74,7 +153,10 @@ struct ChangedEdge {
 /// @par Memory  Superseded versions are reused as soon as no reader can see them (epochs, see epoch.hpp).
 class Forest {
  public:
-  Forest();
+  using Clock = std::function<Time()>;
+
+  /// @param clock  stamps what is given none where the edge is moving; without one that is refused
+  explicit Forest(Clock clock = nullptr);
   ~Forest();
   Forest(const Forest&) = delete;
   Forest& operator=(const Forest&) = delete;
@@ -97,17 +179,32 @@ class Forest {
   /// O(subtree). @return kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<void> release(std::string_view id);
 
-  /// Gives an edge a new value. Allocation-free.
-  /// @return kUnknownFrame, kNotOwner, kInvalidInput (not finite).
-  [[nodiscard]] Result<void> update(std::string_view id, const Transform& X_PC);
-  [[nodiscard]] Result<void> update(Handle frame, const Transform& X_PC);
+  /// Gives an edge a new value; with a stamp, a sample of it. Without one the clock's time is taken for a moving edge,
+  /// while a static edge has its value replaced. Allocation-free, but while an edge's past grows to its limits and
+  /// where a sample is older than another: then O(samples).
+  /// @return kUnknownFrame, kNotOwner, kInvalidInput (not finite; a stamp before 1970), kTooOld (older than what is
+  ///   kept), kStampTaken (equal in stamp to another sample).
+  [[nodiscard]] Result<void> update(std::string_view id, const Transform& X_PC,
+                                    std::optional<Time> stamp = std::nullopt);
+  [[nodiscard]] Result<void> update(Handle frame, const Transform& X_PC,
+                                    std::optional<Time> stamp = std::nullopt);
 
-  /// Gives many edges new values as one commit: all or, on an error, none; no reader sees a part.
-  [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges);
-  [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges);
+  /// Gives many edges new values as one commit, and of one stamp: all or, on an error, none; no reader sees a part.
+  [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges,
+                                    std::optional<Time> stamp = std::nullopt);
+  [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges,
+                                    std::optional<Time> stamp = std::nullopt);
+
+  /// Says how an edge behaves in time; what was kept of its past goes.
+  /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the field).
+  [[nodiscard]] Result<void> set_timing(std::string_view id, const EdgeTiming& timing);
+
+  /// That of all edges for which nothing else is said, from their first sample on.
+  [[nodiscard]] Result<void> set_default_timing(const EdgeTiming& timing);
 
   /// Hangs a held frame, with all below it, under a new parent; empty makes it a root. Keeps the edge's
-  /// value where X_PC is not given. O(subtree).
+  /// value where X_PC is not given, but nothing of its past, which was that of another edge: it is static until its next
+  /// sample. O(subtree).
   /// @return kUnknownFrame, kNotOwner, kUnknownParent, kCycle, kInvalidInput (not finite).
   [[nodiscard]] Result<void> move(std::string_view id, std::string_view parent,
                                   const std::optional<Transform>& X_PC = std::nullopt,
@@ -125,9 +222,10 @@ class Forest {
 
   // --- reading ---
 
-  /// X_AB. Allocation-free on success; O(depth of both below their common ancestor).
+  /// X_AB at the newest instant of which all moving edges on the path have data. Allocation-free on success;
+  /// O(depth of both below their common ancestor).
   /// @return kUnknownStart, kUnknownEnd, kNotConnected, kNotOwner (an edge on the path is held
-  ///   elsewhere: see segments()).
+  ///   elsewhere: see segments()), kNotYet and kTooOld (an edge has no data of that instant, named with the gap).
   [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b) const;
   [[nodiscard]] Result<Transform> lookup(Handle a, Handle b) const;
 
@@ -135,13 +233,25 @@ class Forest {
   [[nodiscard]] Result<Pose> lookup_pose(std::string_view a, std::string_view b) const;
   [[nodiscard]] Result<Pose> lookup_pose(Handle a, Handle b) const;
 
-  /// As lookup, for a segment that somebody else's path needs: its ends may be frames that are not there,
+  /// X_AB at an instant.
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
+                                                const Instant& instant) const;
+  [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Instant& instant) const;
+
+  /// As lookup, for segments that somebody else's path needs: their ends may be frames that are not there,
   /// as long as held edges name them as their parent.
-  [[nodiscard]] Result<Transform> lookup_segment(std::string_view from, std::string_view to) const;
+  /// @param hint  another instant that may be wanted
+  [[nodiscard]] Result<SegmentValues> lookup_segments(
+      const std::vector<PathEnds>& segments, const Instant& instant = {},
+      std::optional<Time> hint = std::nullopt) const;
 
   /// The path from a to b as runs of edges by owner, in order; empty where a is b.
   /// @return kUnknownStart, kUnknownEnd, kNotConnected.
   [[nodiscard]] Result<std::vector<Segment>> segments(std::string_view a, std::string_view b) const;
+
+  /// The edges of the path from a to b, in order, each named by its child.
+  /// @return kUnknownStart, kUnknownEnd, kNotConnected.
+  [[nodiscard]] Result<std::vector<FrameInfo>> edges(std::string_view a, std::string_view b) const;
 
   [[nodiscard]] std::optional<Handle> find(std::string_view id) const;
   [[nodiscard]] bool exists(std::string_view id) const { return find(id).has_value(); }
@@ -167,6 +277,19 @@ class Forest {
   /// what to ask for next. Takes no lock. O(slots).
   [[nodiscard]] std::pair<std::vector<ChangedEdge>, std::uint64_t> changed_since(
       std::uint64_t commit) const;
+
+  /// What was written to held edges since the cursors, which are moved on: all of one commit, older stamps first and
+  /// those that hold for all times before them. Samples that came late, after younger ones, are not told.
+  /// @param newest_only  of each edge only the newest sample
+  [[nodiscard]] std::vector<News> news(std::vector<EdgeCursor>& cursors, bool newest_only) const;
+
+  /// Calls a function after each commit, from the thread that made it, which holds the forest's lock: it must be quick
+  /// and not write to the forest. Null: nobody.
+  void on_commit(std::function<void()> listener);
+
+  /// What is kept of the past of held edges, those that are moving; of one where an id is given. Takes no lock. O(slots
+  /// and samples).
+  [[nodiscard]] std::vector<PastInfo> pasts(std::string_view id = {}) const;
 
   /// Grows with every change of the structure (not of values).
   [[nodiscard]] std::uint64_t structure_version() const;

@@ -54,6 +54,20 @@ std::string_view CdrWalk::string(std::size_t max_bytes) {
   return text;
 }
 
+void CdrWalk::path_ends() {
+  id();
+  id();
+}
+
+void CdrWalk::state() {
+  skip(8, 8);
+  sequence([&] {
+    skip(8, 8);
+    transform();
+    ulong();
+  });
+}
+
 std::string_view CdrWalk::edge() {
   const std::string_view child = id();
   transform();
@@ -80,16 +94,26 @@ void request_body(CdrWalk& walk) {
       break;
     case 3:  // update
       walk.transform();
+      walk.skip(8, 8);
       walk.sequence([&] { walk.edge(); });
       break;
     case 4:  // move
       walk.id();
       break;
     case 6:  // lookup
-      walk.sequence([&] {
-        walk.id();
-        walk.id();
-      });
+      walk.sequence([&] { walk.path_ends(); });
+      break;
+    case 7:  // lookup at an instant
+      walk.skip(4 * 8, 8);
+      walk.sequence([&] { walk.path_ends(); });
+      break;
+    case 8:  // watch
+      walk.skip(8, 8);
+      walk.sequence([&] { walk.id(); });
+      walk.sequence([&] { walk.path_ends(); });
+      break;
+    case 9:  // past
+      walk.octet();
       break;
     default:
       walk.skip(static_cast<std::size_t>(-1), 1);  // no such request
@@ -127,15 +151,36 @@ bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
     case 3:
       walk.octet();
       break;
+    case 4:
+      walk.skip(2 * 8, 8);
+      walk.sequence([&] { walk.transform(); });
+      walk.sequence([&] { walk.transform(); });
+      break;
+    case 5:
+      walk.state();
+      break;
+    case 6:
+      walk.sequence([&] {
+        walk.skip(11 * 8, 8);
+        walk.id();
+      });
+      break;
     default:
       return false;
   }
   return walk.good();
 }
 
+bool well_formed_state(const std::uint8_t* data, std::size_t size) {
+  CdrWalk walk(data, size);
+  walk.state();
+  return walk.good();
+}
+
 bool well_formed_update(const std::uint8_t* data, std::size_t size) {
   CdrWalk walk(data, size);
   walk.sequence([&] { walk.edge(); });
+  walk.skip(8, 8);
   return walk.good();
 }
 

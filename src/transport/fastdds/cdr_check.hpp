@@ -14,6 +14,7 @@ namespace tfdude::fastdds {
 [[nodiscard]] bool well_formed_request(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_reply(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_update(const std::uint8_t* data, std::size_t size);
+[[nodiscard]] bool well_formed_state(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_page(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_presence(const std::uint8_t* data, std::size_t size);
 
@@ -61,6 +62,8 @@ class CdrWalk {
 
   std::string_view id() { return string(255); }
   void transform() { skip(28 * sizeof(double), 8); }
+  void path_ends();
+  void state();
   std::string_view edge();
 
  private:
@@ -81,6 +84,7 @@ bool any_edge(const std::uint8_t* data, std::size_t size, Predicate predicate) {
     const std::string_view id = walk.edge();
     if (!found && walk.good()) found = predicate(id);
   });
+  walk.skip(8, 8);
   return found && walk.good();
 }
 

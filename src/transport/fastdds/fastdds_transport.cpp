@@ -79,10 +79,12 @@ Result<void> FastDdsTransport::create_participant() {
   topics_.reply = create_topic(kReplyTopic, edds::TypeSupport(new ReplyType));
   topics_.request = create_topic(kRequestTopic, edds::TypeSupport(new RequestType));
   topics_.update = create_topic(kUpdateTopic, edds::TypeSupport(new UpdateType));
-  const bool all = topics_.presence != nullptr && topics_.directory != nullptr &&
-                   topics_.reply != nullptr && topics_.request != nullptr &&
-                   topics_.update != nullptr;
-  return all ? Result<void>() : not_created("the topics");
+  topics_.state = create_topic(kStateTopic, edds::TypeSupport(new StateType));
+  for (const auto* topic : {topics_.presence, topics_.directory, topics_.reply, topics_.request,
+                            topics_.update, topics_.state}) {
+    if (topic == nullptr) return not_created("the topics");
+  }
+  return {};
 }
 
 // The profile's lease is for what is noticed here; DDS itself keeps a match for longer (see Peers).
@@ -103,6 +105,8 @@ edds::Topic* FastDdsTransport::create_topic(const char* name, const edds::TypeSu
 
 Result<void> FastDdsTransport::create_endpoints() {
   using Prefix = ertps::GuidPrefix_t;
+  states_.emplace(*participant_, *topics_.state,
+                  [this](const State& state) { handler_->on_state(state); });
   presence_ = std::make_unique<Inlet<wire::Presence>>(
       *participant_, *topics_.presence, std::string(), "presence_reader",
       Inlet<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
@@ -172,8 +176,7 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
       *participant_, *updates, partition, "update_reader",
       Inlet<wire::Update>::Calls{
           [this](const wire::Update& sample, const Prefix&) { take_update(sample); }, nullptr});
-  if (!requests_->good() || !updates_->good()) return not_created("the readers");
-  return {};
+  return requests_->good() && updates_->good() ? Result<void>() : not_created("the readers");
 }
 
 // A server passes on what it hears several times a second, one step of the discovery at a time.
@@ -191,6 +194,7 @@ void FastDdsTransport::stop() {
   beats_.reset();
   presence_.reset();
   worker_->stop();
+  states_.reset();
   reply_outlets_.clear();
   request_outlets_.clear();
   update_outlets_.clear();

@@ -13,6 +13,7 @@
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/owned_filter.hpp"
 #include "transport/fastdds/peers.hpp"
+#include "transport/fastdds/state_channels.hpp"
 #include "transport/fastdds/worker.hpp"
 
 namespace tfdude::fastdds {
@@ -37,6 +38,10 @@ class FastDdsTransport final : public Transport {
                     Deadline deadline) override;
   Result<void> send(const std::string& partition, const Update& update, Deadline deadline) override;
   void reply(const PeerId& to, const Reply& reply) override;
+  Result<void> watch(std::uint64_t group) override { return states_->watch(group); }
+  void unwatch(std::uint64_t group) override { states_->unwatch(group); }
+  void push(const State& state) override { states_->push(state); }
+  void end_pushing(std::uint64_t group) override { states_->end_pushing(group); }
   bool settled() const override { return peers_.settled(); }
   bool awaits_presence() const override { return peers_.awaits_presence(); }
   Milliseconds settle_time() const override;
@@ -50,6 +55,7 @@ class FastDdsTransport final : public Transport {
     edds::Topic* request = nullptr;
     edds::Topic* reply = nullptr;
     edds::Topic* update = nullptr;
+    edds::Topic* state = nullptr;
     edds::Topic* directory = nullptr;
     edds::Topic* presence = nullptr;
   };
@@ -108,6 +114,7 @@ class FastDdsTransport final : public Transport {
   std::unique_ptr<Inlet<wire::Page>> pages_;
   std::unique_ptr<Inlet<wire::Presence>> presence_;
   std::unique_ptr<Inlet<wire::Presence>> beats_;
+  std::optional<StateChannels> states_;
   std::optional<Worker> worker_;
 };
 

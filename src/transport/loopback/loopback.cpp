@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <map>
 #include <mutex>
+#include <set>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -18,6 +19,7 @@ class LoopbackNetwork::Hub {
   struct Member {
     PeerId id{};
     std::string serves;
+    std::set<std::uint64_t> watches;
     std::optional<Presence> presence;
     std::map<std::uint32_t, Page> pages;
 
@@ -190,6 +192,24 @@ class LoopbackTransport final : public Transport {
     hub_->deliver([&](const auto& member) { return member.id == to; },
                   [&](TransportHandler& handler) { handler.on_reply(reply); });
   }
+
+  Result<void> watch(std::uint64_t group) override {
+    const std::lock_guard lock(hub_->members_mutex_);
+    self_->watches.insert(group);
+    return {};
+  }
+
+  void unwatch(std::uint64_t group) override {
+    const std::lock_guard lock(hub_->members_mutex_);
+    self_->watches.erase(group);
+  }
+
+  void push(const State& state) override {
+    hub_->deliver([&](const auto& member) { return member.watches.count(state.group) > 0; },
+                  [&](TransportHandler& handler) { handler.on_state(state); });
+  }
+
+  void end_pushing(std::uint64_t) override {}
 
   [[nodiscard]] bool settled() const override { return true; }
   [[nodiscard]] bool awaits_presence() const override { return false; }

@@ -32,6 +32,9 @@ constexpr Named kCodes[] = {
     {Errc::kConfig, 14, "config"},
     {Errc::kTransport, 15, "transport"},
     {Errc::kState, 16, "state"},
+    {Errc::kNotYet, 17, "not_yet"},
+    {Errc::kTooOld, 18, "too_old"},
+    {Errc::kStampTaken, 19, "stamp_taken"},
 };
 
 TEST_CASE("codes keep their numbers and names") {

@@ -244,8 +244,9 @@ TEST_CASE("a lookup is answered with a transform a segment") {
       "tool",
       LookupRequest{{{"tool", "arm"}, {"base", "hand"}, {"camera", "tool"}, {"arm", "arm"}}});
   CHECK(reply.sequence == 1);
-  const auto* transforms = std::get_if<std::vector<Transform>>(&reply.body);
-  REQUIRE(transforms != nullptr);
+  const auto* found = std::get_if<SegmentValues>(&reply.body);
+  REQUIRE(found != nullptr);
+  const auto* transforms = &found->values;
   REQUIRE(transforms->size() == 4);
   CHECK((*transforms)[0].pose.translation().x() == -110);
   CHECK((*transforms)[1].pose.translation().x() == 11);
@@ -298,7 +299,7 @@ TEST_CASE("a repeated lookup is answered with what holds now") {
   const Request lookup{9, "hand", LookupRequest{{{"arm", "hand"}}}};
   const auto x = [&] {
     const Reply reply = arms.partition.answer(peer, lookup, kNow);
-    return std::get<std::vector<Transform>>(reply.body).at(0).pose.translation().x();
+    return std::get<SegmentValues>(reply.body).values.at(0).pose.translation().x();
   };
   CHECK(x() == 10);
   REQUIRE(said(arms.ask("hand", UpdateRequest{{{"hand", along_x(20)}}})) == "ok");

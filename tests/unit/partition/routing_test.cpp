@@ -278,6 +278,10 @@ TEST_CASE("a lookup that cannot succeed is not sent") {
   CHECK(lookup("world", "hand") == "ok");
 }
 
+SegmentValues values(std::vector<Transform> transforms) {
+  return {std::move(transforms), std::nullopt, {}, {}};
+}
+
 TEST_CASE("answers are put together in the order of the path") {
   const Known known;
   const auto plan = route_lookup(known.forest, known.directory, "foot", "gem");
@@ -285,7 +289,7 @@ TEST_CASE("answers are put together in the order of the path") {
   // A quarter turn about z that is not the first makes the order matter.
   Transform turn;
   turn.pose = exp((Twist() << 0, 0, 0, 0, 0, 1.5707963267948966).finished());
-  const auto X = assemble(*plan, {{along_x(1), along_x(10)}, {turn, along_x(100)}});
+  const auto X = assemble(*plan, {values({along_x(1), along_x(10)}), values({turn, along_x(100)})});
   REQUIRE(X);
   CHECK((X->pose.translation() - Eigen::Vector3d(1, 110, 0)).norm() < 1e-9);
 }
@@ -294,9 +298,9 @@ TEST_CASE("answers with too few or too many transforms are refused, not put toge
   const Known known;
   const auto plan = route_lookup(known.forest, known.directory, "foot", "gem");
   REQUIRE(plan);
-  const std::vector<Transform> two(2);
-  const std::vector<Transform> one(1);
-  const std::vector<Transform> three(3);
+  const SegmentValues two = values(std::vector<Transform>(2));
+  const SegmentValues one = values(std::vector<Transform>(1));
+  const SegmentValues three = values(std::vector<Transform>(3));
   CHECK(outcome(assemble(*plan, {two, two})) == "ok");
   CHECK(outcome(assemble(*plan, {one, two})) == "not_owner");
   CHECK(outcome(assemble(*plan, {two, {}})) == "not_owner");

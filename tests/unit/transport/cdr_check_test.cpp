@@ -61,6 +61,7 @@ class Cdr {
 };
 
 bool request(const Cdr& cdr) { return well_formed_request(cdr.bytes().data(), cdr.bytes().size()); }
+bool state(const Cdr& cdr) { return well_formed_state(cdr.bytes().data(), cdr.bytes().size()); }
 bool reply(const Cdr& cdr) { return well_formed_reply(cdr.bytes().data(), cdr.bytes().size()); }
 bool update(const Cdr& cdr) { return well_formed_update(cdr.bytes().data(), cdr.bytes().size()); }
 bool page(const Cdr& cdr) { return well_formed_page(cdr.bytes().data(), cdr.bytes().size()); }
@@ -145,7 +146,7 @@ TEST_CASE("random bytes pass at no topic, or can be read") {
 TEST_CASE("only plain CDR passes, of either byte order") {
   for (const bool big_endian : {false, true}) {
     Cdr cdr(big_endian);
-    cdr.ulong(1).edge("hand");
+    cdr.ulong(1).edge("hand").ulonglong(7);
     CHECK(update(cdr));
     wire::Update sample;
     REQUIRE(testing::deserialized<UpdateType>(cdr.bytes(), sample));
@@ -205,7 +206,7 @@ Cdr edges(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.edge("e");
-  return cdr;
+  return cdr.ulonglong(0);
 }
 Cdr tops(std::size_t count, std::uint64_t length) {
   Cdr cdr;
@@ -215,7 +216,7 @@ Cdr tops(std::size_t count, std::uint64_t length) {
 }
 Cdr more_edges(std::size_t count, std::uint64_t length) {
   Cdr cdr;
-  cdr.string("hand").octet(3).transform().ulong(length);
+  cdr.string("hand").octet(3).transform().ulonglong(0).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.edge("e");
   return cdr.ulong(0).ulong(0);
 }
@@ -224,6 +225,57 @@ Cdr segments(std::size_t count, std::uint64_t length) {
   cdr.string("hand").octet(6).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.string("a").string("b");
   return cdr.ulong(0).ulong(0);
+}
+Cdr segments_at(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.string("hand").octet(7).ulonglong(1).ulonglong(2).ulonglong(3).ulonglong(4).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.string("a").string("b");
+  return cdr.ulong(0).ulong(0);
+}
+Cdr watched(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.string("hand").octet(8).ulonglong(1).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.string("a");
+  return cdr.ulong(0).ulong(0).ulong(0);
+}
+Cdr watched_segments(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.string("hand").octet(8).ulonglong(1).ulong(0).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.string("a").string("b");
+  return cdr.ulong(0).ulong(0);
+}
+Cdr stamped(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.ulonglong(0).ulong(0).octet(4).ulonglong(1).ulonglong(2).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.transform();
+  return cdr.ulong(0);
+}
+Cdr at_hint(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.ulonglong(0).ulong(0).octet(4).ulonglong(1).ulonglong(2).ulong(0).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.transform();
+  return cdr;
+}
+Cdr state_entries(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.ulonglong(0).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(1).transform().ulong(3);
+  return cdr;
+}
+Cdr replied_entries(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.ulonglong(0).ulong(0).octet(5).ulonglong(0).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(1).transform().ulong(3);
+  return cdr;
+}
+Cdr pasts(std::size_t count, std::uint64_t length) {
+  Cdr cdr;
+  cdr.ulonglong(0).ulong(0).octet(6).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (int field = 0; field < 11; ++field) cdr.ulonglong(1);
+    cdr.string("a");
+  }
+  return cdr;
 }
 Cdr transforms(std::size_t count, std::uint64_t length) {
   Cdr cdr;
@@ -267,7 +319,15 @@ TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
                                   {"tops of a remove", tops, request},
                                   {"further edges of an update", more_edges, request},
                                   {"segments of a lookup", segments, request},
+                                  {"segments of a lookup at an instant", segments_at, request},
+                                  {"watched edges", watched, request},
+                                  {"watched segments", watched_segments, request},
                                   {"transforms of a reply", transforms, reply},
+                                  {"stamped transforms of a reply", stamped, reply},
+                                  {"transforms at a hint", at_hint, reply},
+                                  {"entries of a state", state_entries, state},
+                                  {"entries of a replied state", replied_entries, reply},
+                                  {"pasts", pasts, reply},
                                   {"entries of a page", entries, page},
                                   {"notes of a page", notes, page},
                                   {"other pages of a page", others, page},
@@ -288,11 +348,11 @@ TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
 
 TEST_CASE("bodies of kinds that there are not are refused") {
   for (unsigned kind = 0; kind < 256; ++kind) {
-    if (kind >= 1 && kind <= 6) continue;
+    if (kind >= 1 && kind <= 9) continue;
     CHECK_FALSE(request(Cdr().string("hand").octet(kind).string("arm").ulong(0).ulong(0)));
   }
   for (unsigned kind = 0; kind < 256; ++kind) {
-    if (kind >= 1 && kind <= 3) continue;
+    if (kind >= 1 && kind <= 6) continue;
     CHECK_FALSE(reply(Cdr().ulonglong(0).ulong(0).octet(kind).octet(0)));
   }
 }
@@ -331,7 +391,7 @@ TEST_CASE("partitions are addressed by their FNV-1a") {
 }
 
 TEST_CASE("a filter looks at the edges of an update until one is owned") {
-  const Bytes bytes = Cdr().ulong(3).edge("a").edge("b").edge("c").bytes();
+  const Bytes bytes = Cdr().ulong(3).edge("a").edge("b").edge("c").ulonglong(0).bytes();
   std::string seen;
   const auto owned = [&](const std::string& own) {
     seen.clear();

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,14 @@ void check_same(const std::vector<EdgeUpdate>& actual, const std::vector<EdgeUpd
   }
 }
 
+void check_same(const std::vector<PathEnds>& actual, const std::vector<PathEnds>& expected) {
+  REQUIRE(actual.size() == expected.size());
+  for (std::size_t i = 0; i < actual.size(); ++i) {
+    CHECK(actual[i].from == expected[i].from);
+    CHECK(actual[i].to == expected[i].to);
+  }
+}
+
 void check_same(const Request& actual, const Request& expected) {
   CHECK(actual.sequence == expected.sequence);
   CHECK(actual.id == expected.id);
@@ -53,19 +62,63 @@ void check_same(const Request& actual, const Request& expected) {
     CHECK(std::get<RemoveRequest>(actual.body).tops == remove->tops);
   } else if (const auto* update = std::get_if<UpdateRequest>(&expected.body)) {
     check_same(std::get<UpdateRequest>(actual.body).edges, update->edges);
+    CHECK(std::get<UpdateRequest>(actual.body).stamp == update->stamp);
   } else if (const auto* move = std::get_if<MoveRequest>(&expected.body)) {
     CHECK(std::get<MoveRequest>(actual.body).parent == move->parent);
     const auto& X_PC = std::get<MoveRequest>(actual.body).X_PC;
     REQUIRE(X_PC.has_value() == move->X_PC.has_value());
     if (X_PC) check_same(*X_PC, *move->X_PC);
-  } else {
-    const auto& segments = std::get<LookupRequest>(expected.body).segments;
-    const auto& arrived = std::get<LookupRequest>(actual.body).segments;
-    REQUIRE(arrived.size() == segments.size());
-    for (std::size_t i = 0; i < segments.size(); ++i) {
-      CHECK(arrived[i].from == segments[i].from);
-      CHECK(arrived[i].to == segments[i].to);
-    }
+  } else if (const auto* watch = std::get_if<WatchRequest>(&expected.body)) {
+    const auto& arrived = std::get<WatchRequest>(actual.body);
+    CHECK(arrived.edges == watch->edges);
+    CHECK(arrived.period == watch->period);
+    check_same(arrived.segments, watch->segments);
+  } else if (const auto* past = std::get_if<PastRequest>(&expected.body)) {
+    CHECK(std::get<PastRequest>(actual.body).all == past->all);
+  } else if (const auto* lookup_at = std::get_if<LookupRequest>(&expected.body)) {
+    const LookupRequest& lookup = *lookup_at;
+    const auto& arrived = std::get<LookupRequest>(actual.body);
+    CHECK(arrived.instant.at == lookup.instant.at);
+    CHECK(arrived.instant.extrapolate == lookup.instant.extrapolate);
+    CHECK(arrived.instant.age_noise_until == lookup.instant.age_noise_until);
+    CHECK(arrived.hint == lookup.hint);
+    check_same(arrived.segments, lookup.segments);
+  }
+}
+
+void check_same(const std::vector<Transform>& actual, const std::vector<Transform>& expected) {
+  REQUIRE(actual.size() == expected.size());
+  for (std::size_t i = 0; i < actual.size(); ++i) check_same(actual[i], expected[i]);
+}
+
+void check_same(const State& actual, const State& expected) {
+  CHECK(actual.group == expected.group);
+  REQUIRE(actual.entries.size() == expected.entries.size());
+  for (std::size_t i = 0; i < actual.entries.size(); ++i) {
+    CHECK(actual.entries[i].index == expected.entries[i].index);
+    CHECK(actual.entries[i].stamp == expected.entries[i].stamp);
+    check_same(actual.entries[i].X, expected.entries[i].X);
+  }
+}
+
+// All fields in one text.
+std::string listed(const PastInfo& past) {
+  std::ostringstream text;
+  const auto stamp = [](const std::optional<Time>& time) { return time ? nanoseconds(*time) : 0; };
+  text << past.id << ' ' << past.samples << ' ' << past.bytes << ' ' << past.span_limit.count()
+       << ' ' << past.count_limit << ' ' << stamp(past.oldest) << ' ' << stamp(past.newest) << ' '
+       << past.mean_gap.count() << ' ' << past.max_gap.count() << ' ' << past.jitter.count() << ' '
+       << past.refused_old << ' ' << past.refused_equal;
+  return text.str();
+}
+
+TEST_CASE("states arrive as they were sent") {
+  Random random(0xc0de7);
+  INFO("seed " << random.seed());
+  for (const State& one : testing::states(random)) {
+    const auto arrived = from_wire(travelled<StateType>(to_wire(one)));
+    REQUIRE(arrived);
+    check_same(*arrived, one);
   }
 }
 
@@ -93,10 +146,18 @@ TEST_CASE("replies arrive as they were sent") {
     if (const auto* error = std::get_if<Error>(&one.body)) {
       CHECK(std::get<Error>(arrived->body).code == error->code);
       CHECK(std::get<Error>(arrived->body).message == printable(error->message));
-    } else if (const auto* transforms = std::get_if<std::vector<Transform>>(&one.body)) {
-      const auto& came = std::get<std::vector<Transform>>(arrived->body);
-      REQUIRE(came.size() == transforms->size());
-      for (std::size_t i = 0; i < came.size(); ++i) check_same(came[i], (*transforms)[i]);
+    } else if (const auto* values = std::get_if<SegmentValues>(&one.body)) {
+      const auto& came = std::get<SegmentValues>(arrived->body);
+      CHECK(came.stamp == values->stamp);
+      CHECK(came.period == values->period);
+      check_same(came.values, values->values);
+      check_same(came.at_hint, values->at_hint);
+    } else if (const auto* state = std::get_if<State>(&one.body)) {
+      check_same(std::get<State>(arrived->body), *state);
+    } else if (const auto* pasts = std::get_if<std::vector<PastInfo>>(&one.body)) {
+      const auto& came = std::get<std::vector<PastInfo>>(arrived->body);
+      REQUIRE(came.size() == pasts->size());
+      for (std::size_t i = 0; i < came.size(); ++i) CHECK(listed(came[i]) == listed((*pasts)[i]));
     }
   }
 }
@@ -249,7 +310,8 @@ TEST_CASE("values that no transform has are refused, with frame and field") {
     check_refused(from_wire(update, [](std::string_view) { return true; }), "frame 'culprit'",
                   bad.field);
     CHECK(from_wire(update, [](std::string_view id) { return id == "hand"; }));
-    wire::Reply reply = to_wire(Reply{1, 2, std::vector<Transform>(2)});
+    wire::Reply reply =
+        to_wire(Reply{1, 2, SegmentValues{std::vector<Transform>(2), std::nullopt, {}, {}}});
     reply.body().transforms()[1] = x_pc;
     // What another has computed may be of any size, and semi-definite to its rounding only.
     const bool only_for_users = std::isfinite(bad.value) && bad.index > 3;

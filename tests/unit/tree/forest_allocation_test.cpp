@@ -78,7 +78,6 @@ TEST_CASE("lookups and queries of one frame do not allocate") {
   CHECK(allocations_of([&] { return forest.lookup(bottom, top).has_value(); }) == 0);
   CHECK(allocations_of([&] { return forest.lookup(a, b).has_value(); }) == 0);
   CHECK(allocations_of([&] { return forest.lookup_pose(a, b).has_value(); }) == 0);
-  CHECK(allocations_of([&] { return forest.lookup_segment(top, bottom).has_value(); }) == 0);
   CHECK(allocations_of([&] { return forest.holds(bottom) && !forest.holds(absent); }) == 0);
   CHECK(allocations_of([&] { return forest.find(bottom) && !forest.find(absent); }) == 0);
   CHECK(allocations_of([&] { return forest.exists(bottom) && !forest.exists(absent); }) == 0);

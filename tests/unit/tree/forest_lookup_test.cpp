@@ -221,22 +221,22 @@ TEST_CASE("a segment may end at a frame that only held edges name") {
   REQUIRE(forest.add("c", "missing", along_x(100), kAllow));
   REQUIRE(forest.add("d", "other", along_x(1000), kAllow));
   REQUIRE(forest.add("r", "", along_x(7)));
-  CHECK(x_of(forest.lookup_segment("missing", "b")) == 11);
-  CHECK(x_of(forest.lookup_segment("b", "missing")) == -11);
-  CHECK(x_of(forest.lookup_segment("b", "c")) == 89);
-  CHECK(x_of(forest.lookup_segment("a", "b")) == 10);
-  CHECK(x_of(forest.lookup_segment("missing", "missing")) == 0);
-  CHECK(outcome(forest.lookup_segment("missing", "d")) == "not_connected");
-  CHECK(outcome(forest.lookup_segment("missing", "other")) == "not_connected");
-  CHECK(outcome(forest.lookup_segment("r", "a")) == "not_connected");
-  CHECK(outcome(forest.lookup_segment("a", "r")) == "not_connected");
-  CHECK(outcome(forest.lookup_segment("never", "a")) == "unknown_start");
-  CHECK(outcome(forest.lookup_segment("a", "never")) == "unknown_end");
+  CHECK(x_of(testing::lookup_segment(forest, "missing", "b")) == 11);
+  CHECK(x_of(testing::lookup_segment(forest, "b", "missing")) == -11);
+  CHECK(x_of(testing::lookup_segment(forest, "b", "c")) == 89);
+  CHECK(x_of(testing::lookup_segment(forest, "a", "b")) == 10);
+  CHECK(x_of(testing::lookup_segment(forest, "missing", "missing")) == 0);
+  CHECK(outcome(testing::lookup_segment(forest, "missing", "d")) == "not_connected");
+  CHECK(outcome(testing::lookup_segment(forest, "missing", "other")) == "not_connected");
+  CHECK(outcome(testing::lookup_segment(forest, "r", "a")) == "not_connected");
+  CHECK(outcome(testing::lookup_segment(forest, "a", "r")) == "not_connected");
+  CHECK(outcome(testing::lookup_segment(forest, "never", "a")) == "unknown_start");
+  CHECK(outcome(testing::lookup_segment(forest, "a", "never")) == "unknown_end");
   REQUIRE(forest.put_remote("far", "missing", 1));
-  CHECK(outcome(forest.lookup_segment("missing", "far")) == "not_owner");
+  CHECK(outcome(testing::lookup_segment(forest, "missing", "far")) == "not_owner");
   // Nobody names it any more: it is forgotten.
   REQUIRE(forest.remove("d"));
-  CHECK(outcome(forest.lookup_segment("a", "other")) == "unknown_end");
+  CHECK(outcome(testing::lookup_segment(forest, "a", "other")) == "unknown_end");
 }
 
 // ---- what is there

@@ -48,7 +48,7 @@ TEST_CASE("a frame under a missing parent is refused and leaves no trace") {
   Forest forest;
   CHECK(outcome(forest.add("base", "world", along_x(1))) == "unknown_parent");
   CHECK(forest.frames().empty());
-  CHECK(outcome(forest.lookup_segment("world", "world")) == "unknown_start");
+  CHECK(outcome(testing::lookup_segment(forest, "world", "world")) == "unknown_start");
   CHECK(forest.structure_version() == 0);
 }
 

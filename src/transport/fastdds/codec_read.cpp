@@ -1,32 +1,17 @@
-#include "transport/fastdds/codec.hpp"
-
 #include <algorithm>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
 #include "math/flat.hpp"
-#include "transport/fastdds/cdr_check.hpp"
+#include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/kinds.hpp"
 
+// From what travels.
 namespace tfdude::fastdds {
 namespace {
 
-// The discriminators of wire::RequestBody and wire::ReplyBody.
-enum RequestKind : std::uint8_t {
-  kAdd = 1,
-  kRemove = 2,
-  kUpdate = 3,
-  kMove = 4,
-  kMoveAndUpdate = 5,
-  kLookup = 6
-};
-enum ReplyKind : std::uint8_t { kError = 1, kTransforms = 2, kDoneReply = 3 };
-
-constexpr std::size_t kMaxMessage = 4096;
-
 std::string_view text(const wire::Id& id) { return {id.c_str(), id.size()}; }
-
-wire::Transform to_wire(const Transform& X) { return to_flat(X); }
 
 Result<Transform> from_wire(const wire::Transform& in, std::string_view frame) {
   const auto pose =
@@ -39,11 +24,18 @@ Result<Transform> from_wire(const wire::Transform& in, std::string_view frame) {
   return Transform{*pose, *covariance};
 }
 
-wire::Edge to_wire(const EdgeUpdate& edge) {
-  wire::Edge out;
-  out.id(edge.id);
-  out.x_pc(to_wire(edge.X_PC));
-  return out;
+Result<std::optional<Time>> stamp_from_wire(std::int64_t stamp, const char* field) {
+  if (stamp < 0) {
+    return fail(Errc::kInvalidInput,
+                std::string(field) + " of " + std::to_string(stamp) + " ns is before 1970");
+  }
+  return stamp == 0 ? std::nullopt : std::optional<Time>(time_of(stamp));
+}
+
+Result<std::chrono::nanoseconds> duration_from_wire(std::int64_t duration, const char* field) {
+  if (duration >= 0) return std::chrono::nanoseconds(duration);
+  return fail(Errc::kInvalidInput,
+              std::string(field) + " of " + std::to_string(duration) + " ns is negative");
 }
 
 Result<EdgeUpdate> edge_from_wire(std::string_view id, const wire::Transform& x_pc) {
@@ -53,52 +45,11 @@ Result<EdgeUpdate> edge_from_wire(std::string_view id, const wire::Transform& x_
   return EdgeUpdate{std::string(id), *X_PC};
 }
 
-struct BodyWriter {
-  wire::RequestBody& out;
-
-  void operator()(const AddRequest& add) {
-    wire::Add body;
-    body.parent(add.parent);
-    body.x_pc(to_wire(add.X_PC));
-    out.add(std::move(body));
-  }
-  void operator()(const RemoveRequest& remove) {
-    wire::Remove body;
-    for (const std::string& top : remove.tops) body.tops().emplace_back(top);
-    out.remove(std::move(body));
-  }
-  void operator()(const UpdateRequest& update) {
-    wire::UpdateBody body;
-    body.x_pc(to_wire(update.edges.front().X_PC));
-    for (auto edge = update.edges.begin() + 1; edge != update.edges.end(); ++edge) {
-      body.more().push_back(to_wire(*edge));
-    }
-    out.update(std::move(body));
-  }
-  void operator()(const MoveRequest& move) {
-    if (move.X_PC) {
-      wire::MoveAndUpdate body;
-      body.parent(move.parent);
-      body.x_pc(to_wire(*move.X_PC));
-      out.move_and_update(std::move(body));
-    } else {
-      wire::Move body;
-      body.parent(move.parent);
-      out.move(std::move(body));
-    }
-  }
-  void operator()(const LookupRequest& lookup) {
-    std::vector<wire::PathEnds> body(lookup.segments.size());
-    for (std::size_t i = 0; i < body.size(); ++i) {
-      body[i].from(lookup.segments[i].from);
-      body[i].to(lookup.segments[i].to);
-    }
-    out.lookup(std::move(body));
-  }
-};
-
 Result<UpdateRequest> update_from_wire(std::string_view first, const wire::UpdateBody& body) {
   UpdateRequest update;
+  auto stamp = stamp_from_wire(body.stamp(), "a stamp");
+  if (!stamp) return tl::unexpected(std::move(stamp.error()));
+  update.stamp = *stamp;
   update.edges.reserve(1 + body.more().size());
   auto edge = edge_from_wire(first, body.x_pc());
   if (!edge) return tl::unexpected(std::move(edge.error()));
@@ -112,6 +63,37 @@ Result<UpdateRequest> update_from_wire(std::string_view first, const wire::Updat
 }
 
 std::string string_of(const wire::Id& id) { return std::string(text(id)); }
+
+std::vector<PathEnds> read_segments(const std::vector<wire::PathEnds>& body) {
+  std::vector<PathEnds> segments;
+  segments.reserve(body.size());
+  for (const wire::PathEnds& ends : body) {
+    segments.push_back({string_of(ends.from()), string_of(ends.to())});
+  }
+  return segments;
+}
+
+Result<LookupRequest> read_lookup(const wire::LookupAt& body) {
+  const auto at = stamp_from_wire(body.at(), "the instant of a lookup");
+  if (!at) return tl::unexpected(at.error());
+  const auto hint = stamp_from_wire(body.hint(), "the hint of a lookup");
+  if (!hint) return tl::unexpected(hint.error());
+  const auto until = stamp_from_wire(body.age_noise_until(), "the end of a lookup's noise");
+  if (!until) return tl::unexpected(until.error());
+  const auto extrapolate = duration_from_wire(body.extrapolate(), "an extrapolation");
+  if (!extrapolate) return tl::unexpected(extrapolate.error());
+  return LookupRequest{read_segments(body.segments()), {*at, *extrapolate, *until}, *hint};
+}
+
+Result<WatchRequest> read_watch(const wire::Watch& body) {
+  const auto period = duration_from_wire(body.period(), "the period of a watch");
+  if (!period) return tl::unexpected(period.error());
+  WatchRequest watch;
+  for (const wire::Id& edge : body.edges()) watch.edges.push_back(string_of(edge));
+  watch.segments = read_segments(body.segments());
+  watch.period = *period;
+  return watch;
+}
 
 // The ids in a body need no check here: those that name nothing that is there are refused as unknown, and
 // new ones are checked where they are added.
@@ -145,103 +127,30 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
       request.body = MoveRequest{string_of(body.move_and_update().parent()), *X_PC};
       return {};
     }
-    case kLookup: {
-      LookupRequest lookup;
-      for (const wire::PathEnds& ends : body.lookup()) {
-        lookup.segments.push_back({string_of(ends.from()), string_of(ends.to())});
-      }
-      request.body = std::move(lookup);
+    case kLookup:
+      request.body = LookupRequest{read_segments(body.lookup())};
+      return {};
+    case kLookupAt: {
+      auto lookup = read_lookup(body.lookup_at());
+      if (!lookup) return tl::unexpected(std::move(lookup.error()));
+      request.body = *std::move(lookup);
       return {};
     }
+    case kWatch: {
+      auto watch = read_watch(body.watch());
+      if (!watch) return tl::unexpected(std::move(watch.error()));
+      request.body = *std::move(watch);
+      return {};
+    }
+    case kPast:
+      request.body = PastRequest{body.past() != 0};
+      return {};
     default:
       return fail(Errc::kInvalidInput, "no request of kind " + std::to_string(body._d()));
   }
 }
 
 }  // namespace
-
-void write_wire(const Request& request, std::string_view partition, wire::Request& sample) {
-  sample.id(request.id);
-  std::visit(BodyWriter{sample.body()}, request.body);
-  sample.addressee(addressee_of(partition));
-  sample.sequence_number(request.sequence);
-}
-
-wire::Request to_wire(const Request& request, std::string_view partition) {
-  wire::Request sample;
-  write_wire(request, partition, sample);
-  return sample;
-}
-
-wire::Reply to_wire(const Reply& reply) {
-  wire::Reply sample;
-  sample.epoch(reply.epoch);
-  sample.sequence_number(reply.sequence);
-  if (const auto* error = std::get_if<Error>(&reply.body)) {
-    wire::ErrorBody body;
-    body.code(static_cast<std::uint8_t>(error->code));
-    body.message(error->message.substr(0, kMaxMessage));
-    sample.body().error(std::move(body));
-  } else if (const auto* transforms = std::get_if<std::vector<Transform>>(&reply.body)) {
-    std::vector<wire::Transform> body;
-    body.reserve(transforms->size());
-    for (const Transform& X : *transforms) body.push_back(to_wire(X));
-    sample.body().transforms(std::move(body));
-  } else {
-    sample.body().done(0);
-  }
-  return sample;
-}
-
-wire::Update to_wire(const Update& update) {
-  wire::Update sample;
-  sample.edges().reserve(update.edges.size());
-  for (const EdgeUpdate& edge : update.edges) sample.edges().push_back(to_wire(edge));
-  return sample;
-}
-
-wire::Page to_wire(const Page& page) {
-  wire::Page sample;
-  sample.partition(page.partition);
-  sample.number(page.number);
-  sample.incarnation(page.incarnation);
-  sample.epoch(page.epoch);
-  sample.entries().resize(page.entries.size());
-  for (std::size_t i = 0; i < page.entries.size(); ++i) {
-    sample.entries()[i].id(page.entries[i].id);
-    sample.entries()[i].parent(page.entries[i].parent);
-    sample.entries()[i].since(page.entries[i].since);
-  }
-  sample.notes().resize(page.notes.size());
-  for (std::size_t i = 0; i < page.notes.size(); ++i) {
-    sample.notes()[i].id(page.notes[i].id);
-    sample.notes()[i].since(page.notes[i].since);
-    sample.notes()[i].kind(static_cast<std::uint8_t>(page.notes[i].kind));
-    sample.notes()[i].rival(page.notes[i].rival);
-  }
-  sample.others().resize(page.others.size());
-  for (std::size_t i = 0; i < page.others.size(); ++i) {
-    sample.others()[i].number(page.others[i].number);
-    sample.others()[i].epoch(page.others[i].epoch);
-  }
-  return sample;
-}
-
-wire::Presence to_wire(const Presence& presence) {
-  wire::Presence sample;
-  sample.partition(presence.partition);
-  sample.incarnation(presence.incarnation);
-  sample.host(presence.host);
-  sample.pid(presence.pid);
-  sample.pages(presence.pages);
-  sample.serving(presence.serving);
-  sample.absent().resize(presence.absent.size());
-  for (std::size_t i = 0; i < presence.absent.size(); ++i) {
-    sample.absent()[i].partition(presence.absent[i].partition);
-    sample.absent()[i].since(presence.absent[i].since);
-  }
-  return sample;
-}
 
 Result<Request> from_wire(const wire::Request& sample) {
   Request request;
@@ -252,32 +161,118 @@ Result<Request> from_wire(const wire::Request& sample) {
   return request;
 }
 
+namespace {
+
+Result<std::vector<Transform>> read_values(const std::vector<wire::Transform>& body) {
+  std::vector<Transform> values;
+  values.reserve(body.size());
+  for (const wire::Transform& in : body) {
+    auto X = computed_from(in);
+    if (!X) return fail_at("a reply", X.error());
+    values.push_back(*X);
+  }
+  return values;
+}
+
+Result<SegmentValues> read_stamped(const wire::Transforms& body) {
+  SegmentValues found;
+  const auto stamp = stamp_from_wire(body.stamp(), "the stamp of a reply");
+  if (!stamp) return tl::unexpected(stamp.error());
+  found.stamp = *stamp;
+  found.period = std::chrono::nanoseconds(body.period());
+  auto values = read_values(body.values());
+  if (!values) return tl::unexpected(std::move(values.error()));
+  found.values = *std::move(values);
+  auto at_hint = read_values(body.at_hint());
+  if (!at_hint) return tl::unexpected(std::move(at_hint.error()));
+  found.at_hint = *std::move(at_hint);
+  return found;
+}
+
+PastInfo read_past(const wire::Past& body) {
+  const auto stamp = [](std::int64_t ns) {
+    return ns > 0 ? std::optional<Time>(time_of(ns)) : std::nullopt;
+  };
+  PastInfo past;
+  past.id = printable(text(body.id()));
+  past.samples = body.samples();
+  past.bytes = body.bytes();
+  past.span_limit = std::chrono::nanoseconds(body.span_limit());
+  past.count_limit = body.count_limit();
+  past.oldest = stamp(body.oldest());
+  past.newest = stamp(body.newest());
+  past.mean_gap = std::chrono::nanoseconds(body.mean_gap());
+  past.max_gap = std::chrono::nanoseconds(body.max_gap());
+  past.jitter = std::chrono::nanoseconds(body.jitter());
+  past.refused_old = body.refused_old();
+  past.refused_equal = body.refused_equal();
+  return past;
+}
+
+template <class Body, class Read>
+Result<void> put(Reply& reply, Result<Read> read) {
+  if (!read) return tl::unexpected(std::move(read.error()));
+  reply.body = Body(*std::move(read));
+  return {};
+}
+
+Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
+  switch (body._d()) {
+    case kError:
+      // For people to read, though its sender may have put anything in it.
+      reply.body = Error{static_cast<Errc>(body.error().code()), printable(body.error().message())};
+      return {};
+    case kTransforms:
+      return put<SegmentValues>(reply, read_values(body.transforms()).map([](auto&& values) {
+        return SegmentValues{std::move(values), std::nullopt, {}, {}};
+      }));
+    case kDoneReply:
+      return {};
+    case kStamped:
+      return put<SegmentValues>(reply, read_stamped(body.stamped()));
+    case kState:
+      return put<State>(reply, tfdude::fastdds::from_wire(body.state()));
+    case kPasts: {
+      std::vector<PastInfo> pasts;
+      for (const wire::Past& past : body.pasts()) pasts.push_back(read_past(past));
+      reply.body = std::move(pasts);
+      return {};
+    }
+    default:
+      return fail(Errc::kInvalidInput, "no reply of kind " + std::to_string(body._d()));
+  }
+}
+
+}  // namespace
+
 Result<Reply> from_wire(const wire::Reply& sample) {
   Reply reply;
   reply.sequence = sample.sequence_number();
   reply.epoch = sample.epoch();
-  const wire::ReplyBody& body = sample.body();
-  if (body._d() == kError) {
-    // For people to read, though its sender may have put anything in it.
-    reply.body = Error{static_cast<Errc>(body.error().code()), printable(body.error().message())};
-  } else if (body._d() == kTransforms) {
-    std::vector<Transform> transforms;
-    transforms.reserve(body.transforms().size());
-    for (const wire::Transform& in : body.transforms()) {
-      auto X = computed_from(in);
-      if (!X) return fail_at("a reply", X.error());
-      transforms.push_back(*X);
-    }
-    reply.body = std::move(transforms);
-  } else if (body._d() != kDoneReply) {
-    return fail(Errc::kInvalidInput, "no reply of kind " + std::to_string(body._d()));
-  }
+  if (auto ok = read_body(sample.body(), reply); !ok) return tl::unexpected(std::move(ok.error()));
   return reply;
+}
+
+Result<State> from_wire(const wire::State& sample) {
+  State state;
+  state.group = sample.group();
+  state.entries.reserve(sample.entries().size());
+  for (const wire::StateEntry& entry : sample.entries()) {
+    const auto stamp = stamp_from_wire(entry.stamp(), "the stamp of a state");
+    if (!stamp) return tl::unexpected(stamp.error());
+    auto X = computed_from(entry.x());
+    if (!X) return fail_at("a state", X.error());
+    state.entries.push_back({entry.index(), *stamp, *X});
+  }
+  return state;
 }
 
 Result<Update> from_wire(const wire::Update& sample,
                          const std::function<bool(std::string_view)>& accept) {
   Update update;
+  const auto stamp = stamp_from_wire(sample.stamp(), "the stamp of an update");
+  if (!stamp) return tl::unexpected(stamp.error());
+  update.stamp = *stamp;
   update.edges.reserve(sample.edges().size());
   for (const wire::Edge& edge : sample.edges()) {
     if (!accept(text(edge.id()))) continue;

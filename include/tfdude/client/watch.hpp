@@ -1,0 +1,55 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "tfdude/base/result.hpp"
+#include "tfdude/base/time.hpp"
+#include "tfdude/tree/forest.hpp"
+
+namespace tfdude {
+
+/// How a path is watched.
+struct WatchOptions {
+  /// How often at most an owner sends what has changed [Hz]; 0: every sample.
+  double rate = 0;
+  /// One composed transform for each partition on the path instead of all its edges: fewer bytes, but between samples the
+  /// segment is interpolated as a whole.
+  bool composed = false;
+  /// How much of the past is kept here.
+  EdgeTiming timing{};
+  /// Called when the path has found another way, or why there is none for now: one call at a time, from a thread of
+  /// the library's that holds no lock. Must not throw.
+  std::function<void(const std::string& what)> on_route;
+};
+
+class WatchedPath;
+
+/// A path whose owners push what changes on it, so that it is read from this process's memory. Watched as long as a copy of
+/// this lives; it may outlive the Client, and then gets nothing new.
+/// @par Thread safety  All functions.
+class PathWatch {
+ public:
+  explicit PathWatch(std::shared_ptr<WatchedPath> path) : path_(std::move(path)) {}
+
+  /// X_AB at the newest instant that has come of all its moving edges. No network, lock or allocation.
+  /// @return as Forest::lookup; while the path is not known, why.
+  [[nodiscard]] Result<StampedTransform> latest() const { return lookup({}); }
+  [[nodiscard]] Result<StampedTransform> at(Time t) const;
+  [[nodiscard]] Result<StampedTransform> lookup(const Instant& instant) const;
+
+  /// How many messages have come; grows with each.
+  [[nodiscard]] std::uint64_t messages() const;
+
+  /// Waits until more have come than so many; false at the deadline.
+  [[nodiscard]] bool wait_for_more(std::uint64_t messages,
+                                   std::chrono::steady_clock::time_point deadline) const;
+
+ private:
+  std::shared_ptr<WatchedPath> path_;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,309 @@
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include "tfdude/base/id.hpp"
+
+#include "client/participant.hpp"
+
+// Lookups at an instant over several partitions, those that wait, and paths that are pushed.
+namespace tfdude {
+namespace {
+
+// How often is looked for data that have not come yet: soon after they should be there, else at this rate.
+constexpr Milliseconds kLookAgain{1};
+constexpr Milliseconds kLongestSleep{50};
+
+// What may come yet.
+bool is_worth_waiting(const Error& error, const Instant& instant) {
+  switch (error.code) {
+    case Errc::kNotYet:
+    case Errc::kUnknownStart:
+    case Errc::kUnknownEnd:
+    case Errc::kNotConnected:
+    case Errc::kUnreachable:
+    case Errc::kTimeout:
+    case Errc::kNotOwner:
+      return true;
+    case Errc::kTooOld:
+      // Of the newest common instant: where one edge is ahead of what another has.
+      return !instant.at;
+    default:
+      return false;
+  }
+}
+
+/// A lookup on a thread of its own.
+class AsyncLookup final : public Cancellations::Task {
+ public:
+  using Job = std::function<void(Cancellation&)>;
+
+  explicit AsyncLookup(Job job)
+      : thread_([this, job = std::move(job)] {
+          job(cancellation_);
+          done_ = true;
+        }) {}
+  ~AsyncLookup() override { stop(); }
+  AsyncLookup(const AsyncLookup&) = delete;
+  AsyncLookup& operator=(const AsyncLookup&) = delete;
+
+  [[nodiscard]] bool done() const override { return done_; }
+
+  void stop() override {
+    cancellation_.cancel();
+    const std::lock_guard lock(join_mutex_);
+    if (!thread_.joinable()) return;
+    if (thread_.get_id() == std::this_thread::get_id()) {
+      thread_.detach();  // its callback ends it
+    } else {
+      thread_.join();
+    }
+  }
+
+ private:
+  Cancellation cancellation_;
+  std::atomic<bool> done_{false};
+  std::mutex join_mutex_;
+  std::thread thread_;  // last: it uses the rest
+};
+
+}  // namespace
+
+Result<std::vector<SegmentValues>> Participant::ask_values(LookupPlan& plan) {
+  std::vector<SegmentValues> answers;
+  for (Reply& reply : ask(plan.parts, Clock::now() + options_.timeout)) {
+    if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
+    auto* values = std::get_if<SegmentValues>(&reply.body);
+    answers.push_back(values != nullptr ? std::move(*values) : SegmentValues());
+  }
+  return answers;
+}
+
+Result<StampedTransform> Participant::gather(LookupPlan& plan, const std::string& a,
+                                             const std::string& b, std::optional<Time> hint) {
+  auto answers = ask_values(plan);
+  if (!answers) return tl::unexpected(std::move(answers.error()));
+  const bool newest =
+      !plan.parts.empty() && !std::get<LookupRequest>(plan.parts.front().request.body).instant.at;
+  if (!newest || plan.parts.size() == 1) return assemble(plan, *answers);
+  {
+    const std::lock_guard lock(hints_mutex_);
+    hints_.note(a, b, Clock::now(), *answers);
+  }
+  OneInstant found = one_instant(*std::move(answers), hint);
+  if (!found.ask_again) return assemble(plan, found.answers);
+  for (Part& part : plan.parts) {
+    auto& lookup = std::get<LookupRequest>(part.request.body);
+    lookup.instant.at = found.ask_again;
+    lookup.hint.reset();
+  }
+  answers = ask_values(plan);
+  if (!answers) return tl::unexpected(std::move(answers.error()));
+  return assemble(plan, *answers);
+}
+
+Result<StampedTransform> Participant::lookup_elsewhere(std::string_view a, std::string_view b,
+                                                       const Instant& instant) {
+  const std::string start(a);
+  const std::string end(b);
+  std::optional<Time> hint;
+  if (!instant.at) {
+    const std::lock_guard lock(hints_mutex_);
+    hint = hints_.guess(a, b, Clock::now());
+  }
+  return healed([&] { return route_lookup(forest_, directory_, start, end, instant, hint); },
+                [&](LookupPlan& plan) { return gather(plan, start, end, hint); });
+}
+
+Result<StampedTransform> Participant::lookup_elsewhere(Handle a, Handle b, const Instant& instant) {
+  const auto start = forest_.info(a);
+  if (!start) return fail(Errc::kUnknownStart, "the first frame was removed");
+  const auto end = forest_.info(b);
+  if (!end) return fail(Errc::kUnknownEnd, "the second frame was removed");
+  return lookup_elsewhere(start->id, end->id, instant);
+}
+
+Result<StampedTransform> Participant::lookup_waiting(std::string_view a, std::string_view b,
+                                                     const Instant& instant, Milliseconds wait,
+                                                     Cancellation* cancelled) {
+  const auto deadline = Clock::now() + wait;
+  Cancellation nobody;
+  Cancellation& cancellation = cancelled != nullptr ? *cancelled : nobody;
+  while (true) {
+    auto found = lookup(a, b, instant);
+    const auto now = Clock::now();
+    if (found || now >= deadline || !is_worth_waiting(found.error(), instant)) return found;
+    // Most sources stamp by a clock that runs as the wall clock does.
+    std::chrono::nanoseconds pause = kLookAgain;
+    if (instant.at) {
+      pause = std::clamp<std::chrono::nanoseconds>(*instant.at - wall_clock(), kLookAgain,
+                                                   kLongestSleep);
+    }
+    if (cancellation.wait_until(std::min(deadline, now + pause))) {
+      return fail(Errc::kTimeout, "the lookup was cancelled: " + found.error().message);
+    }
+  }
+}
+
+std::shared_ptr<void> Participant::lookup_async(const std::string& a, const std::string& b,
+                                                const Instant& instant, Milliseconds wait,
+                                                PendingLookup::Callback callback) {
+  auto task = std::make_shared<AsyncLookup>(
+      [this, a, b, instant, wait, callback = std::move(callback)](Cancellation& cancellation) {
+        auto found = lookup_waiting(a, b, instant, wait, &cancellation);
+        if (!cancellation.wait_until(Clock::time_point::min())) callback(std::move(found));
+      });
+  pending_.add(task);
+  return task;
+}
+
+std::future<Result<StampedTransform>> Participant::lookup_async(const std::string& a,
+                                                                const std::string& b,
+                                                                const Instant& instant,
+                                                                Milliseconds wait) {
+  auto promise = std::make_shared<std::promise<Result<StampedTransform>>>();
+  auto future = promise->get_future();
+  pending_.keep(
+      std::make_shared<AsyncLookup>([this, a, b, instant, wait, promise](auto& cancellation) {
+        promise->set_value(lookup_waiting(a, b, instant, wait, &cancellation));
+      }));
+  return future;
+}
+
+Result<std::vector<PastInfo>> Participant::ask_past(Part part) {
+  std::vector<Part> parts{std::move(part)};
+  Reply reply = std::move(ask(parts, Clock::now() + options_.timeout).front());
+  if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
+  auto* pasts = std::get_if<std::vector<PastInfo>>(&reply.body);
+  return pasts != nullptr ? std::move(*pasts) : std::vector<PastInfo>();
+}
+
+Result<std::vector<PastInfo>> Participant::past(const std::string& id) {
+  return healed(
+      [&]() -> Result<Part> {
+        const auto info = forest_.info(id);
+        if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+        return route_to(directory_, info->owner, Request{0, id, PastRequest{}});
+      },
+      [&](Part& part) { return ask_past(part); });
+}
+
+Result<std::vector<PastInfo>> Participant::pasts(const std::string& partition) {
+  return healed(
+      [&]() -> Result<Part> {
+        const auto owner = directory_.owner(partition);
+        if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+        return route_to(directory_, *owner, Request{0, partition, PastRequest{true}});
+      },
+      [&](Part& part) { return ask_past(part); });
+}
+
+// --- pushed paths ---
+
+Result<WatchedPath::Route> Participant::plan_watch(const WatchedPath& path) {
+  const std::lock_guard lock(structure_mutex_);
+  const WatchOptions& options = path.options();
+  auto edges = forest_.edges(path.a(), path.b());
+  if (!edges) return tl::unexpected(std::move(edges.error()));
+  WatchedPath::Route route;
+  const auto part_of = [&](Owner owner, const std::string& id) -> std::size_t {
+    for (std::size_t i = 0; i < route.parts.size(); ++i) {
+      if (route.parts[i].owner == owner) return i;
+    }
+    WatchRequest request;
+    if (options.rate > 0) {
+      request.period = std::chrono::nanoseconds(std::llround(1e9 / options.rate));
+    }
+    route.parts.push_back({owner, directory_.name(owner), Request{0, id, std::move(request)}});
+    const auto serving = directory_.serving(directory_.name(owner));
+    route.sources.push_back({directory_.name(owner), serving ? serving->incarnation : 0, 0, {}});
+    return route.parts.size() - 1;
+  };
+  if (options.composed) {
+    const auto segments = forest_.segments(path.a(), path.b());
+    if (!segments) return tl::unexpected(segments.error());
+    for (const Segment& segment : *segments) {
+      const auto from = forest_.info(segment.from);
+      const auto& id = from && from->owner == segment.owner ? segment.from : segment.to;
+      const std::size_t part = part_of(segment.owner, id);
+      std::get<WatchRequest>(route.parts[part].request.body)
+          .segments.push_back({segment.from, segment.to});
+      route.sources[part].frames.push_back(segment.to);
+      route.edges.push_back({segment.to, segment.from, segment.owner, true, 0});
+    }
+  } else {
+    for (FrameInfo& edge : *edges) {
+      const std::size_t part = part_of(edge.owner, edge.id);
+      std::get<WatchRequest>(route.parts[part].request.body).edges.push_back(edge.id);
+      route.sources[part].frames.push_back(edge.id);
+    }
+    route.edges = *std::move(edges);
+  }
+  for (std::size_t i = 0; i < route.parts.size(); ++i) {
+    const Part& part = route.parts[i];
+    if (part.owner != kHeldHere && !directory_.reachable(part.owner)) {
+      return fail(Errc::kUnreachable, "partition " + quote(part.partition) + " is not reachable");
+    }
+    route.sources[i].group = watch_group(part.partition, std::get<WatchRequest>(part.request.body));
+  }
+  return route;
+}
+
+Result<std::shared_ptr<WatchedPath>> Participant::watch(const std::string& a, const std::string& b,
+                                                        const WatchOptions& options) {
+  if (!(options.rate >= 0) || options.rate > 1e6) {
+    return fail(Errc::kInvalidInput, "the rate of a watch must be within 0 and 1e6 Hz, not " +
+                                         std::to_string(options.rate));
+  }
+  auto known = routed([&] { return forest_.segments(a, b); });
+  if (!known) return tl::unexpected(std::move(known.error()));
+  Watches* watches = nullptr;
+  {
+    const std::lock_guard lock(pushing_mutex_);
+    if (watches_ == nullptr) {
+      watches_ = std::make_unique<Watches>(Watches::Links{
+          [this](const WatchedPath& path) { return plan_watch(path); },
+          [this](std::vector<Part>& parts) { return ask(parts, Clock::now() + options_.timeout); },
+          [this](std::uint64_t group) { return transport_->watch(group); },
+          [this](std::uint64_t group) { transport_->unwatch(group); }});
+      watching_.store(watches_.get());
+    }
+    watches = watches_.get();
+  }
+  auto path = watches->watch(a, b, options);
+  if (auto live = path->wait_until_live(Clock::now() + options_.timeout); !live) {
+    return tl::unexpected(std::move(live.error()));
+  }
+  return path;
+}
+
+Reply Participant::answer_watch(const Request& request) {
+  const auto& watch = std::get<WatchRequest>(request.body);
+  Pusher* pusher = nullptr;
+  {
+    const std::lock_guard lock(pushing_mutex_);
+    if (pusher_ == nullptr) {
+      pusher_ = std::make_unique<Pusher>(
+          forest_,
+          [this](const State& state) {
+            transport_->push(state);
+            if (Watches* watches = watching_.load()) watches->on_state(state);
+          },
+          [this](std::uint64_t group) { transport_->end_pushing(group); });
+    }
+    pusher = pusher_.get();
+  }
+  auto state = pusher->watch(watch_group(partition_name_, watch), watch);
+  if (!state) return {request.sequence, 0, std::move(state.error())};
+  return {request.sequence, 0, *std::move(state)};
+}
+
+void Participant::on_state(const State& state) {
+  if (Watches* watches = watching_.load()) watches->on_state(state);
+}
+
+void Participant::look_at_watches() {
+  if (Watches* watches = watching_.load()) watches->look_again();
+}
+
+}  // namespace tfdude

@@ -1,0 +1,112 @@
+#include "client/pusher.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tfdude {
+
+Pusher::Pusher(Forest& forest, Push push, End end)
+    : forest_(forest), push_(std::move(push)), end_(std::move(end)), thread_([this] { run(); }) {}
+
+Pusher::~Pusher() {
+  forest_.on_commit(nullptr);
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_one();
+  thread_.join();
+}
+
+Result<State> Pusher::watch(std::uint64_t group, const WatchRequest& request) {
+  Result<State> snapshot;
+  {
+    const std::lock_guard lock(groups_mutex_);
+    const bool first = groups_.empty();
+    auto known = groups_.find(group);
+    if (known == groups_.end()) {
+      known = groups_.emplace(group, Group{WatchedGroup(group, request), {}, Clock::now()}).first;
+    }
+    snapshot = known->second.watched.snapshot(forest_);
+    if (!snapshot) {
+      groups_.erase(known);
+    } else {
+      known->second.lease = Clock::now() + kWatchLease;
+    }
+    if (first && !groups_.empty()) forest_.on_commit([this] { ask(); });
+  }
+  ask();
+  return snapshot;
+}
+
+void Pusher::ask() {
+  if (asked_.exchange(true)) return;
+  // The lock keeps the notice from falling between the thread's look and its sleep.
+  { const std::lock_guard lock(mutex_); }
+  changed_.notify_one();
+}
+
+std::vector<State> Pusher::take_due(Clock::time_point now, std::vector<std::uint64_t>& ended,
+                                    std::optional<Clock::time_point>& next) {
+  std::vector<State> due;
+  const std::lock_guard lock(groups_mutex_);
+  for (auto group = groups_.begin(); group != groups_.end();) {
+    if (now >= group->second.lease) {
+      ended.push_back(group->first);
+      group = groups_.erase(group);
+      continue;
+    }
+    Group& one = group->second;
+    const auto period = one.watched.request().period;
+    if (now >= one.due) {
+      State state = one.watched.news(forest_);
+      if (!state.entries.empty()) {
+        due.push_back(std::move(state));
+        // On the beat, as long as that can be kept.
+        one.due = std::max(one.due + period, now - period);
+      }
+    } else {
+      next = next ? std::min(*next, one.due) : one.due;
+    }
+    ++group;
+  }
+  if (groups_.empty()) {
+    forest_.on_commit(nullptr);
+  } else {
+    // To end what is not renewed.
+    const auto look = now + std::chrono::seconds(1);
+    next = next ? std::min(*next, look) : look;
+  }
+  return due;
+}
+
+void Pusher::run() {
+  std::optional<Clock::time_point> next;
+  std::unique_lock lock(mutex_);
+  while (true) {
+    const auto woken = [this] { return stopping_ || asked_.load(); };
+    if (next) {
+      changed_.wait_until(lock, *next, woken);
+    } else {
+      changed_.wait(lock, woken);
+    }
+    if (stopping_) return;
+    lock.unlock();
+    // Before the look, so that what is written meanwhile is not missed.
+    asked_.store(false);
+    next.reset();
+    std::vector<std::uint64_t> ended;
+    for (State& state : take_due(Clock::now(), ended, next)) {
+      // In pieces that a message can hold.
+      for (std::size_t from = 0; from < state.entries.size(); from += kMaxItems) {
+        const auto begin = state.entries.begin() + static_cast<std::ptrdiff_t>(from);
+        const auto count = std::min(kMaxItems, state.entries.size() - from);
+        push_({state.group, {begin, begin + static_cast<std::ptrdiff_t>(count)}});
+      }
+    }
+    for (const std::uint64_t group : ended) end_(group);
+    lock.lock();
+  }
+}
+
+}  // namespace tfdude

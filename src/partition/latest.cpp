@@ -1,0 +1,76 @@
+#include "tfdude/partition/latest.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+namespace tfdude {
+namespace {
+
+// Of the owner whose newest is the oldest; null where all is static.
+const SegmentValues* slowest(const std::vector<SegmentValues>& answers) {
+  const SegmentValues* found = nullptr;
+  for (const SegmentValues& answer : answers) {
+    if (!answer.stamp) continue;
+    if (found == nullptr || *answer.stamp < *found->stamp) found = &answer;
+  }
+  return found;
+}
+
+bool all_of(const std::vector<SegmentValues>& answers, Time instant) {
+  return std::all_of(answers.begin(), answers.end(), [&](const SegmentValues& answer) {
+    return !answer.stamp || *answer.stamp == instant;
+  });
+}
+
+// Whether each answer has values of the hint; those that then are its own.
+bool take_hint(std::vector<SegmentValues>& answers, Time hint) {
+  const bool all = std::all_of(answers.begin(), answers.end(), [&](const SegmentValues& answer) {
+    return !answer.stamp || *answer.stamp == hint || !answer.at_hint.empty();
+  });
+  if (!all) return false;
+  for (SegmentValues& answer : answers) {
+    if (!answer.stamp || *answer.stamp == hint) continue;
+    answer.values = std::move(answer.at_hint);
+    answer.stamp = hint;
+  }
+  return true;
+}
+
+std::size_t hash_of(std::string_view a, std::string_view b) {
+  const std::hash<std::string_view> hash;
+  constexpr std::size_t kOdd = 0x9E3779B97F4A7C15U;
+  return (hash(a) * kOdd) ^ hash(b);
+}
+
+}  // namespace
+
+OneInstant one_instant(std::vector<SegmentValues> answers, std::optional<Time> hint) {
+  const SegmentValues* last = slowest(answers);
+  if (last == nullptr || all_of(answers, *last->stamp)) return {std::move(answers), std::nullopt};
+  const Time newest = *last->stamp;
+  const bool near = hint && *hint <= newest && *hint >= newest - 2 * last->period;
+  if (near && take_hint(answers, *hint)) return {std::move(answers), std::nullopt};
+  return {{}, newest};
+}
+
+std::optional<Time> LatestHints::guess(std::string_view a, std::string_view b, Steady now) const {
+  const std::size_t path = hash_of(a, b);
+  const Entry& entry = entries_[path % kEntries];
+  if (entry.path != path || !entry.newest) return std::nullopt;
+  return *entry.newest + (now - entry.seen) - entry.period;
+}
+
+void LatestHints::note(std::string_view a, std::string_view b, Steady now,
+                       const std::vector<SegmentValues>& answers) {
+  const SegmentValues* last = slowest(answers);
+  const std::size_t path = hash_of(a, b);
+  Entry& entry = entries_[path % kEntries];
+  if (last == nullptr || all_of(answers, *last->stamp)) {
+    if (entry.path == path) entry.newest.reset();
+  } else {
+    entry = {path, last->stamp, now, last->period};
+  }
+}
+
+}  // namespace tfdude

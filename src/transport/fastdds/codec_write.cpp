@@ -1,0 +1,239 @@
+#include <utility>
+
+#include "math/flat.hpp"
+#include "transport/fastdds/cdr_check.hpp"
+#include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/kinds.hpp"
+
+// Into what travels.
+namespace tfdude::fastdds {
+namespace {
+
+constexpr std::size_t kMaxMessage = 4096;
+
+std::int64_t wire_stamp(std::optional<Time> stamp) { return stamp ? nanoseconds(*stamp) : 0; }
+
+wire::Edge wire_edge(const EdgeUpdate& edge) {
+  wire::Edge out;
+  out.id(edge.id);
+  out.x_pc(to_flat(edge.X_PC));
+  return out;
+}
+
+std::vector<wire::PathEnds> wire_segments(const std::vector<PathEnds>& segments) {
+  std::vector<wire::PathEnds> body(segments.size());
+  for (std::size_t i = 0; i < body.size(); ++i) {
+    body[i].from(segments[i].from);
+    body[i].to(segments[i].to);
+  }
+  return body;
+}
+
+struct BodyWriter {
+  wire::RequestBody& out;
+
+  void operator()(const AddRequest& add) {
+    wire::Add body;
+    body.parent(add.parent);
+    body.x_pc(to_flat(add.X_PC));
+    out.add(std::move(body));
+  }
+  void operator()(const RemoveRequest& remove) {
+    wire::Remove body;
+    for (const std::string& top : remove.tops) body.tops().emplace_back(top);
+    out.remove(std::move(body));
+  }
+  void operator()(const UpdateRequest& update) {
+    wire::UpdateBody body;
+    body.x_pc(to_flat(update.edges.front().X_PC));
+    body.stamp(wire_stamp(update.stamp));
+    for (auto edge = update.edges.begin() + 1; edge != update.edges.end(); ++edge) {
+      body.more().push_back(wire_edge(*edge));
+    }
+    out.update(std::move(body));
+  }
+  void operator()(const MoveRequest& move) {
+    if (move.X_PC) {
+      wire::MoveAndUpdate body;
+      body.parent(move.parent);
+      body.x_pc(to_flat(*move.X_PC));
+      out.move_and_update(std::move(body));
+    } else {
+      wire::Move body;
+      body.parent(move.parent);
+      out.move(std::move(body));
+    }
+  }
+  void operator()(const LookupRequest& lookup) {
+    auto segments = wire_segments(lookup.segments);
+    const Instant& instant = lookup.instant;
+    const bool plain = !instant.at && !lookup.hint && !instant.age_noise_until &&
+                       instant.extrapolate == std::chrono::nanoseconds(0);
+    if (plain) {
+      out.lookup(std::move(segments));
+      return;
+    }
+    wire::LookupAt body;
+    body.at(wire_stamp(instant.at));
+    body.hint(wire_stamp(lookup.hint));
+    body.extrapolate(instant.extrapolate.count());
+    body.age_noise_until(wire_stamp(instant.age_noise_until));
+    body.segments(std::move(segments));
+    out.lookup_at(std::move(body));
+  }
+  void operator()(const WatchRequest& watch) {
+    wire::Watch body;
+    body.period(watch.period.count());
+    for (const std::string& edge : watch.edges) body.edges().emplace_back(edge);
+    body.segments(wire_segments(watch.segments));
+    out.watch(std::move(body));
+  }
+  void operator()(const PastRequest& past) { out.past(past.all ? 1 : 0); }
+};
+
+}  // namespace
+
+void write_wire(const Request& request, std::string_view partition, wire::Request& sample) {
+  sample.id(request.id);
+  std::visit(BodyWriter{sample.body()}, request.body);
+  sample.addressee(addressee_of(partition));
+  sample.sequence_number(request.sequence);
+}
+
+wire::Request to_wire(const Request& request, std::string_view partition) {
+  wire::Request sample;
+  write_wire(request, partition, sample);
+  return sample;
+}
+
+namespace {
+
+std::vector<wire::Transform> wire_values(const std::vector<Transform>& values) {
+  std::vector<wire::Transform> body;
+  body.reserve(values.size());
+  for (const Transform& X : values) body.push_back(to_flat(X));
+  return body;
+}
+
+wire::Past wire_past(const PastInfo& past) {
+  wire::Past body;
+  body.samples(past.samples);
+  body.bytes(past.bytes);
+  body.span_limit(past.span_limit.count());
+  body.count_limit(past.count_limit);
+  body.oldest(wire_stamp(past.oldest));
+  body.newest(wire_stamp(past.newest));
+  body.mean_gap(past.mean_gap.count());
+  body.max_gap(past.max_gap.count());
+  body.jitter(past.jitter.count());
+  body.refused_old(past.refused_old);
+  body.refused_equal(past.refused_equal);
+  body.id(past.id);
+  return body;
+}
+
+struct ReplyWriter {
+  wire::ReplyBody& out;
+
+  void operator()(const Done&) { out.done(0); }
+  void operator()(const Error& error) {
+    wire::ErrorBody body;
+    body.code(static_cast<std::uint8_t>(error.code));
+    body.message(error.message.substr(0, kMaxMessage));
+    out.error(std::move(body));
+  }
+  void operator()(const SegmentValues& found) {
+    if (!found.stamp && found.at_hint.empty()) {
+      out.transforms(wire_values(found.values));
+      return;
+    }
+    wire::Transforms body;
+    body.stamp(wire_stamp(found.stamp));
+    body.period(found.period.count());
+    body.values(wire_values(found.values));
+    body.at_hint(wire_values(found.at_hint));
+    out.stamped(std::move(body));
+  }
+  void operator()(const State& state) { out.state(to_wire(state)); }
+  void operator()(const std::vector<PastInfo>& pasts) {
+    std::vector<wire::Past> body;
+    for (std::size_t i = 0; i < pasts.size() && i < kMaxItems; ++i)
+      body.push_back(wire_past(pasts[i]));
+    out.pasts(std::move(body));
+  }
+};
+
+}  // namespace
+
+wire::Reply to_wire(const Reply& reply) {
+  wire::Reply sample;
+  sample.epoch(reply.epoch);
+  sample.sequence_number(reply.sequence);
+  std::visit(ReplyWriter{sample.body()}, reply.body);
+  return sample;
+}
+
+wire::Update to_wire(const Update& update) {
+  wire::Update sample;
+  sample.edges().reserve(update.edges.size());
+  for (const EdgeUpdate& edge : update.edges) sample.edges().push_back(wire_edge(edge));
+  sample.stamp(wire_stamp(update.stamp));
+  return sample;
+}
+
+wire::State to_wire(const State& state) {
+  wire::State sample;
+  sample.group(state.group);
+  sample.entries().resize(state.entries.size());
+  for (std::size_t i = 0; i < state.entries.size(); ++i) {
+    sample.entries()[i].index(state.entries[i].index);
+    sample.entries()[i].stamp(wire_stamp(state.entries[i].stamp));
+    sample.entries()[i].x(to_flat(state.entries[i].X));
+  }
+  return sample;
+}
+
+wire::Page to_wire(const Page& page) {
+  wire::Page sample;
+  sample.partition(page.partition);
+  sample.number(page.number);
+  sample.incarnation(page.incarnation);
+  sample.epoch(page.epoch);
+  sample.entries().resize(page.entries.size());
+  for (std::size_t i = 0; i < page.entries.size(); ++i) {
+    sample.entries()[i].id(page.entries[i].id);
+    sample.entries()[i].parent(page.entries[i].parent);
+    sample.entries()[i].since(page.entries[i].since);
+  }
+  sample.notes().resize(page.notes.size());
+  for (std::size_t i = 0; i < page.notes.size(); ++i) {
+    sample.notes()[i].id(page.notes[i].id);
+    sample.notes()[i].since(page.notes[i].since);
+    sample.notes()[i].kind(static_cast<std::uint8_t>(page.notes[i].kind));
+    sample.notes()[i].rival(page.notes[i].rival);
+  }
+  sample.others().resize(page.others.size());
+  for (std::size_t i = 0; i < page.others.size(); ++i) {
+    sample.others()[i].number(page.others[i].number);
+    sample.others()[i].epoch(page.others[i].epoch);
+  }
+  return sample;
+}
+
+wire::Presence to_wire(const Presence& presence) {
+  wire::Presence sample;
+  sample.partition(presence.partition);
+  sample.incarnation(presence.incarnation);
+  sample.host(presence.host);
+  sample.pid(presence.pid);
+  sample.pages(presence.pages);
+  sample.serving(presence.serving);
+  sample.absent().resize(presence.absent.size());
+  for (std::size_t i = 0; i < presence.absent.size(); ++i) {
+    sample.absent()[i].partition(presence.absent[i].partition);
+    sample.absent()[i].since(presence.absent[i].since);
+  }
+  return sample;
+}
+
+}  // namespace tfdude::fastdds

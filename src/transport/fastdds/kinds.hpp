@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+
+namespace tfdude::fastdds {
+
+// The discriminators of wire::RequestBody and wire::ReplyBody.
+enum RequestKind : std::uint8_t {
+  kAdd = 1,
+  kRemove = 2,
+  kUpdate = 3,
+  kMove = 4,
+  kMoveAndUpdate = 5,
+  kLookup = 6,
+  kLookupAt = 7,
+  kWatch = 8,
+  kPast = 9
+};
+enum ReplyKind : std::uint8_t {
+  kError = 1,
+  kTransforms = 2,
+  kDoneReply = 3,
+  kStamped = 4,
+  kState = 5,
+  kPasts = 6
+};
+
+}  // namespace tfdude::fastdds

@@ -1,0 +1,65 @@
+#include "transport/fastdds/state_channels.hpp"
+
+#include <utility>
+
+#include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/topics.hpp"
+
+namespace tfdude::fastdds {
+namespace {
+
+std::string partition_of(std::uint64_t group) { return "watch " + std::to_string(group); }
+
+}  // namespace
+
+Result<void> StateChannels::watch(std::uint64_t group) {
+  const std::lock_guard lock(mutex_);
+  auto& inlet = inlets_[group];
+  if (inlet != nullptr) return {};
+  inlet = std::make_unique<Inlet<wire::State>>(
+      participant_, topic_, partition_of(group), "update_reader",
+      Inlet<wire::State>::Calls{[this](const wire::State& sample, const ertps::GuidPrefix_t&) {
+                                  if (const auto state = from_wire(sample)) {
+                                    deliver_(*state);
+                                  } else {
+                                    log_refused(kStateTopic, state.error());
+                                  }
+                                },
+                                nullptr});
+  if (inlet->good()) return {};
+  inlets_.erase(group);
+  return fail(Errc::kTransport, "Fast DDS could not make a reader of what is watched");
+}
+
+// Closed without the lock: a sample may be on its way to somebody who waits for it.
+void StateChannels::unwatch(std::uint64_t group) {
+  std::unique_ptr<Inlet<wire::State>> closed;  // outlives the lock
+  const std::lock_guard lock(mutex_);
+  const auto known = inlets_.find(group);
+  if (known == inlets_.end()) return;
+  closed = std::move(known->second);
+  inlets_.erase(known);
+}
+
+void StateChannels::push(const State& state) {
+  std::shared_ptr<Outlet> outlet;
+  {
+    const std::lock_guard lock(mutex_);
+    auto& entry = outlets_[state.group];
+    if (entry == nullptr) {
+      entry = std::make_shared<Outlet>(participant_, topic_, partition_of(state.group),
+                                       "update_writer");
+    }
+    outlet = entry;
+  }
+  if (!outlet->good()) return;
+  wire::State sample = to_wire(state);
+  outlet->write(&sample);
+}
+
+void StateChannels::end_pushing(std::uint64_t group) {
+  const std::lock_guard lock(mutex_);
+  outlets_.erase(group);
+}
+
+}  // namespace tfdude::fastdds

@@ -1,0 +1,189 @@
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+
+#include "tree/forest_impl.hpp"
+
+// What an update does to the past of its edge.
+namespace tfdude {
+namespace {
+
+std::chrono::nanoseconds apart(std::int64_t earlier, std::int64_t later) {
+  return std::chrono::nanoseconds(later - earlier);
+}
+
+Result<void> check_timing(const EdgeTiming& timing) {
+  if (timing.span <= std::chrono::nanoseconds(0)) {
+    return fail(Errc::kInvalidInput,
+                "history span must be positive, not " + in_milliseconds(timing.span));
+  }
+  constexpr std::size_t kMaxCount = 1U << 24U;
+  if (timing.count < 2 || timing.count > kMaxCount) {
+    return fail(Errc::kInvalidInput, "history count must be within 2 to " +
+                                         std::to_string(kMaxCount) + ", not " +
+                                         std::to_string(timing.count));
+  }
+  return {};
+}
+
+}  // namespace
+
+Forest::Impl::~Impl() {
+  for (std::uint32_t slot = 0; slot < slots_.size(); ++slot) {
+    if (newest(slot).held()) delete newest_value(slot).ring;
+  }
+}
+
+Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::size_t count,
+                                             std::optional<Time> given) const {
+  if (given) {
+    // Zero is how "no stamp" travels.
+    if (nanoseconds(*given) > 0) return nanoseconds(*given);
+    return fail(Errc::kInvalidInput, "the stamp must be after 1970-01-01, not " +
+                                         std::to_string(nanoseconds(*given)) + " ns");
+  }
+  bool moving = false;
+  std::int64_t newest = kAlways;
+  for (std::size_t i = 0; i < count; ++i) {
+    const HeldVersion& edge = newest_value(slots[i]);
+    const EdgeTiming& timing = edge.ring != nullptr ? edge.ring->timing() : default_timing_;
+    moving = moving || edge.moving() || timing.moving;
+    newest = std::max(newest, edge.stamp);
+  }
+  if (!moving) return kAlways;
+  if (!clock_) {
+    return fail(Errc::kInvalidInput, "frame " + quote(newest_value(slots[0]).name->text) +
+                                         " is moving: its update needs a stamp");
+  }
+  // Where the clock was set back, time goes on as little as it can.
+  return newest == kAlways ? nanoseconds(clock_()) : std::max(nanoseconds(clock_()), newest + 1);
+}
+
+Result<void> Forest::Impl::check_sample(const HeldVersion& newest, std::int64_t stamp) const {
+  if (!newest.moving() || stamp > newest.stamp || stamp == kAlways) return {};
+  const Ring& ring = *newest.ring;
+  const std::uint64_t place = ring.place_of(stamp);
+  if (place < ring.next() && ring.stamp(place) == stamp) {
+    ring.refused().equal.fetch_add(1, std::memory_order_relaxed);
+    return fail(Errc::kStampTaken, "frame " + quote(newest.name->text) +
+                                       " has a sample of that stamp, " + to_string(time_of(stamp)));
+  }
+  const bool full = ring.count() >= ring.timing().count;
+  const std::int64_t limit = newest.stamp - ring.timing().span.count();
+  if (stamp >= limit && (!full || place > ring.oldest())) return {};
+  ring.refused().old.fetch_add(1, std::memory_order_relaxed);
+  const std::string what = "frame " + quote(newest.name->text) + ": the sample is ";
+  if (stamp < limit) {
+    return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, newest.stamp)) +
+                                   " older than the newest, more than the " +
+                                   in_milliseconds(ring.timing().span) + " that are kept");
+  }
+  return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, ring.stamp(ring.oldest()))) +
+                                 " older than the oldest of the " +
+                                 std::to_string(ring.timing().count) + " that are kept");
+}
+
+void Forest::Impl::push_value(std::uint32_t slot, const Transform& X_PC, std::int64_t stamp) {
+  const HeldVersion& old = newest_value(slot);
+  if (stamp == kAlways) {
+    push_held(slot, X_PC);
+  } else if (!old.moving() || stamp > old.stamp) {
+    append_sample(old, X_PC, stamp);
+  } else {
+    insert_sample(old, X_PC, stamp);
+  }
+}
+
+void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_PC,
+                                 std::int64_t stamp) {
+  Ring* ring = newest.ring;
+  if (ring == nullptr) {
+    ring = new Ring(default_timing_);
+  } else if (ring->full()) {
+    ring = ring->grown().release();
+    replace(newest.ring);
+  }
+  HeldVersion& fresh = push_held(newest.slot, X_PC);
+  fresh.ring = ring;
+  fresh.stamp = stamp;
+  fresh.number = ring->next();
+  fresh.kept = true;
+  ring->append(&fresh, stamp);
+  drop_samples(*ring);
+}
+
+// The newest stays what it is, in a version that knows of the ring with the sample.
+void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_PC,
+                                 std::int64_t stamp) {
+  const std::uint64_t place = newest.ring->place_of(stamp);
+  if (place < newest.ring->next() && newest.ring->stamp(place) == stamp) {
+    // Twice in one update: the later counts, and nobody has seen the earlier.
+    newest.ring->sample(place)->X_PC = X_PC;
+    if (newest.stamp == stamp) const_cast<HeldVersion&>(newest).X_PC = X_PC;
+    return;
+  }
+  HeldVersion* sample = held_pool_.take();
+  *sample = HeldVersion{};
+  sample->depth = 0;  // so that it counts as held
+  sample->X_PC = X_PC;
+  sample->stamp = stamp;
+  sample->kept = true;
+  Ring* ring = newest.ring->with(sample, stamp, place).release();
+  replace(newest.ring);
+  HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
+  fresh.ring = ring;
+  fresh.number = ring->next() - 1;
+  drop_samples(*ring);
+}
+
+void Forest::Impl::drop_samples(Ring& ring) {
+  const std::int64_t limit = ring.stamp(ring.next() - 1) - ring.timing().span.count();
+  while (ring.count() > ring.timing().count || ring.stamp(ring.oldest()) < limit) {
+    HeldVersion* dropped = ring.drop_oldest();
+    dropped->kept = false;
+    superseded_.push_back(dropped);
+  }
+}
+
+void Forest::Impl::replace(Ring* ring) { superseded_rings_.emplace_back(ring); }
+
+void Forest::Impl::give_back(Ring* ring, std::uint32_t slot) {
+  if (ring == nullptr) return;
+  const Version* head = &newest(slot);
+  for (std::uint64_t number = ring->oldest(); number < ring->next(); ++number) {
+    HeldVersion* sample = ring->sample(number);
+    sample->kept = false;
+    if (sample != head) superseded_.push_back(sample);
+  }
+  replace(ring);
+}
+
+void Forest::Impl::forget_past(HeldVersion& fresh) {
+  Ring* before = fresh.ring;
+  if (before == nullptr) return;
+  fresh.ring = new Ring(before->timing());
+  fresh.stamp = kAlways;
+  give_back(before, fresh.slot);
+}
+
+Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
+  if (auto ok = check_timing(timing); !ok) return fail_at("frame " + quote(id), ok.error());
+  const std::lock_guard lock(impl_->mutex_);
+  const auto slot = impl_->held_slot(id);
+  if (!slot) return tl::unexpected(slot.error());
+  HeldVersion& fresh = impl_->push_held(*slot, impl_->newest_value(*slot).X_PC);
+  impl_->forget_past(fresh);
+  delete fresh.ring;  // nobody has seen it
+  fresh.ring = new Ring(timing);
+  impl_->commit();
+  return {};
+}
+
+Result<void> Forest::set_default_timing(const EdgeTiming& timing) {
+  if (auto ok = check_timing(timing); !ok) return ok;
+  const std::lock_guard lock(impl_->mutex_);
+  impl_->default_timing_ = timing;
+  return {};
+}
+
+}  // namespace tfdude

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+
+#include "tfdude/tree/forest.hpp"
+
+namespace tfdude {
+
+struct HeldVersion;
+
+/// The stamp of a value that holds for all times.
+inline constexpr std::int64_t kAlways = INT64_MIN;
+
+/// The past of one edge: its samples in the order of their stamps, each the version that showed it first.
+///
+/// Samples are numbered; the one with number n lies in slot n modulo the capacity. Appending changes nothing that a
+/// reader looks at: it begins at the version that it sees of the edge, which knows the number of its own sample,
+/// and goes back from there. Whatever else there is to do (to grow, to insert) is done in a copy, which the next
+/// version names. One writer at a time; readers under an epoch::Guard.
+class Ring {
+ public:
+  /// The two samples around an instant; null: there is none.
+  struct Bracket {
+    const HeldVersion* before = nullptr;
+    const HeldVersion* after = nullptr;
+  };
+
+  explicit Ring(const EdgeTiming& timing) : Ring(timing, kFirstCapacity) {}
+
+  [[nodiscard]] const EdgeTiming& timing() const { return timing_; }
+  [[nodiscard]] bool has_noise() const { return has_noise_; }
+
+  /// The samples around t, the newest that the reader sees being number `newest`, younger than t.
+  /// @return nothing where all are younger. O(1) where the samples come at an even rate, else O(log n).
+  [[nodiscard]] Bracket around(std::int64_t t, std::uint64_t newest) const;
+
+  /// The stamp of a sample that is kept still; kAlways if it is not.
+  [[nodiscard]] std::int64_t stamp(std::uint64_t number) const;
+  [[nodiscard]] HeldVersion* sample(std::uint64_t number) const;
+  [[nodiscard]] std::uint64_t oldest() const { return first_.load(std::memory_order_acquire); }
+
+  // --- writing ---
+
+  [[nodiscard]] std::uint64_t next() const { return next_; }
+  [[nodiscard]] std::uint64_t count() const {
+    return next_ - first_.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] bool full() const { return count() > mask_; }
+
+  /// The number that a sample of this stamp is to have: those from there on are younger.
+  [[nodiscard]] std::uint64_t place_of(std::int64_t stamp) const;
+
+  /// There must be room, and no sample be younger.
+  void append(HeldVersion* sample, std::int64_t stamp);
+
+  /// Forgets the oldest sample. @return it
+  [[nodiscard]] HeldVersion* drop_oldest();
+
+  /// A copy with room for twice as many.
+  [[nodiscard]] std::unique_ptr<Ring> grown() const;
+
+  /// A copy with one more sample at its place.
+  [[nodiscard]] std::unique_ptr<Ring> with(HeldVersion* sample, std::int64_t stamp,
+                                           std::uint64_t place) const;
+
+  [[nodiscard]] std::size_t bytes() const { return sizeof(Ring) + (mask_ + 1) * sizeof(Slot); }
+
+  /// Samples that were refused as older than what is kept, and as equal in stamp to another.
+  struct Refused {
+    std::atomic<std::uint64_t> old{0};
+    std::atomic<std::uint64_t> equal{0};
+  };
+  /// Shared with the copies.
+  [[nodiscard]] Refused& refused() const { return *refused_; }
+
+  std::uint64_t retire_tag = 0;
+
+ private:
+  static constexpr std::uint64_t kFirstCapacity = 8;
+  struct Slot {
+    std::atomic<std::int64_t> stamp{kAlways};
+    std::atomic<HeldVersion*> sample{nullptr};
+  };
+
+  Ring(const EdgeTiming& timing, std::uint64_t capacity)
+      : timing_(timing),
+        has_noise_(timing.process_noise.upper() != Covariance::Upper{}),
+        mask_(capacity - 1),
+        slots_(new Slot[capacity]) {}
+  [[nodiscard]] std::unique_ptr<Ring> empty_copy(std::uint64_t capacity) const;
+  [[nodiscard]] Slot& slot(std::uint64_t number) const { return slots_[number & mask_]; }
+  [[nodiscard]] std::int64_t stamp_at(std::uint64_t number) const {
+    return slot(number).stamp.load(std::memory_order_acquire);
+  }
+
+  const EdgeTiming timing_;
+  const bool has_noise_;
+  const std::uint64_t mask_;
+  std::atomic<std::uint64_t> first_{0};
+  std::uint64_t next_ = 0;
+  std::unique_ptr<Slot[]> slots_;  // NOLINT(modernize-avoid-c-arrays): atomics cannot be moved
+  std::shared_ptr<Refused> refused_ = std::make_shared<Refused>();
+};
+
+}  // namespace tfdude

@@ -1,0 +1,303 @@
+// Time over partitions, once over each transport: one instant for all, waiting for data, and paths that are pushed.
+
+#include <atomic>
+#include <chrono>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/networks.hpp"
+#include "support/pose_diff.hpp"
+#include "support/process.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::along_x;
+using testing::Join;
+using testing::joined_by;
+using testing::outcome;
+using testing::Random;
+
+Time wall_clock() {
+  return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
+}
+
+double x_of(const Result<StampedTransform>& X) {
+  return X ? X->pose.translation().x() : std::numeric_limits<double>::quiet_NaN();
+}
+
+// world -> base -> arm -> hand -> tool, of three partitions and a client without frames.
+struct Chain {
+  explicit Chain(const Join& join) {
+    base.emplace(*Node::open(join("base"), "base", {{"world", "", {}}, {"base", "world", {}}}));
+    arm.emplace(*Node::open(join("arm"), "arm", {{"arm", "base", {}}, {"hand", "arm", {}}}));
+    tool.emplace(*Node::open(join("tool"), "tool", {{"tool", "hand", along_x(5)}}));
+    client.emplace(*Client::open(join("")));
+  }
+  std::optional<Node> base;
+  std::optional<Node> arm;
+  std::optional<Node> tool;
+  std::optional<Client> client;
+};
+
+Instant at(Time t) { return {t, 0ns, {}}; }
+Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
+
+// Each edge with a twist of its own, from the epoch of the test on: interpolation is exact for it.
+class Motion {
+ public:
+  Motion(std::uint64_t seed, Time start) : random_(seed), start_(start) {
+    for (const char* id : {"base", "arm", "hand", "tool"}) {
+      edges_.push_back({id, random_.pose(), random_.twist(2.0, 3.0)});
+    }
+  }
+  std::uint64_t seed() const { return random_.seed(); }
+  Random& random() { return random_; }
+  Pose edge(std::size_t i, Time t) const {
+    return edges_[i].X * exp(std::chrono::duration<double>(t - start_).count() * edges_[i].twist);
+  }
+  const char* id(std::size_t i) const { return edges_[i].id; }
+  // world to tool
+  Pose whole(Time t) const { return edge(0, t) * edge(1, t) * edge(2, t) * edge(3, t); }
+
+ private:
+  struct Edge {
+    const char* id;
+    Pose X;
+    Twist twist;
+  };
+  Random random_;
+  Time start_;
+  std::vector<Edge> edges_;
+};
+
+// A source of samples at 1 kHz, each published late by up to three of them.
+class Source {
+ public:
+  Source(Node& node, const Motion& motion, std::vector<std::size_t> edges, std::uint64_t seed)
+      : thread_([this, &node, &motion, edges = std::move(edges), seed] {
+          Random random(seed);
+          while (!stop_) {
+            const Time stamp = wall_clock();
+            std::this_thread::sleep_for(std::chrono::microseconds(random.index(3000)));
+            std::vector<EdgeUpdate> batch;
+            for (const std::size_t i : edges) {
+              batch.push_back({motion.id(i), {motion.edge(i, stamp), {}}});
+            }
+            if (!node.update(batch, stamp)) ++failed_;
+            std::this_thread::sleep_until(
+                std::chrono::time_point_cast<std::chrono::system_clock::duration>(stamp + 1ms));
+          }
+        }) {}
+  ~Source() {
+    stop_ = true;
+    thread_.join();
+  }
+  int failed() const { return failed_; }
+
+ private:
+  std::atomic<bool> stop_{false};
+  std::atomic<int> failed_{0};
+  std::thread thread_;
+};
+
+}  // namespace
+
+TEST_CASE("all partitions answer for the same instant") {
+  Chain chain(joined_by(GENERATE(0, 1)));
+  for (const int t : {1000, 2000, 3000}) {
+    REQUIRE(chain.client->update("base", along_x(t), ms(t)));
+    REQUIRE(chain.client->update({{"arm", along_x(2 * t)}, {"hand", along_x(3 * t)}}, ms(t - 500)));
+  }
+  for (Client* caller : std::vector<Client*>{&*chain.client, &*chain.base, &*chain.tool}) {
+    const auto newest = caller->lookup("world", "tool", Instant{});
+    REQUIRE(newest);
+    CHECK(newest->stamp == ms(2500));
+    CHECK(x_of(newest) == Approx(2500 + 5 * 3000 + 5));
+    CHECK(x_of(caller->lookup("world", "tool", at(ms(1500)))) == Approx(1500 + 5 * 2000 + 5));
+    CHECK(x_of(caller->lookup("tool", "world", at(ms(1500)))) == Approx(-(1500 + 5 * 2000 + 5)));
+    const auto early = caller->lookup("world", "tool", at(ms(999)));
+    CHECK(outcome(early) == "too_old");
+    CHECK(early.error().message.find("'base'") != std::string::npos);
+    const auto late = caller->lookup("world", "hand", at(ms(2750)));
+    CHECK(outcome(late) == "not_yet");
+    CHECK(late.error().message.find("250.000 ms older") != std::string::npos);
+    CHECK(outcome(caller->can_lookup("world", "hand", at(ms(2750)))) == "not_yet");
+    CHECK(outcome(caller->can_lookup("world", "hand")) == "ok");
+    CHECK(x_of(caller->lookup("world", "hand", {ms(2750), 250ms, {}})) == Approx(2750 + 5 * 3250));
+    // The tool at one instant, seen from the hand at another: over the world.
+    const auto travelled = caller->lookup("hand", at(ms(1500)), "tool", at(ms(2500)), "world");
+    CHECK(x_of(travelled) == Approx((2500 + 5 * 3000 + 5) - (1500 + 5 * 2000)));
+    CHECK(caller->past("arm")->at(0).samples == 3);
+    CHECK(caller->past("tool")->empty());
+    CHECK(caller->pasts("arm")->size() == 2);
+    CHECK(outcome(caller->past("nobody")) == "unknown_frame");
+    CHECK(outcome(caller->pasts("nobody")) == "unknown_partition");
+  }
+  CHECK(outcome(chain.client->update("arm", {}, ms(500))) == "stamp_taken");
+  CHECK(chain.client->past("arm")->at(0).refused_equal == 1);
+}
+
+TEST_CASE(
+    "of partitions in motion every answer is the motion at its stamp, unlike that of each one's "
+    "newest") {
+  Chain chain(joined_by(GENERATE(0, 1)));
+  Motion motion(4242, wall_clock());
+  INFO("seed " << motion.seed());
+  const Source base(*chain.base, motion, {0}, motion.seed() + 1);
+  const Source arm(*chain.arm, motion, {1, 2}, motion.seed() + 2);
+  const Source tool(*chain.tool, motion, {3}, motion.seed() + 3);
+  for (const char* id : {"base", "arm", "hand", "tool"}) {
+    REQUIRE(testing::eventually([&] { return !chain.client->past(id)->empty(); }));
+  }
+  int naive_wrong = 0;
+  constexpr int kLookups = 300;
+  for (int i = 0; i < kLookups; ++i) {
+    const auto found = chain.client->lookup("world", "tool", Instant{});
+    REQUIRE(found);
+    REQUIRE(found->stamp.has_value());
+    REQUIRE(testing::pose_diff(found->pose, motion.whole(*found->stamp), 1e-8) == "");
+    // Not old either: where lookups follow each other, no more than a moment.
+    REQUIRE(wall_clock() - *found->stamp < 5s);
+    const auto one = chain.client->lookup("world", "base", Instant{});
+    const auto two = chain.client->lookup("base", "hand", Instant{});
+    const auto three = chain.client->lookup("hand", "tool", Instant{});
+    REQUIRE((one && two && three));
+    const Pose naive = one->pose * two->pose * three->pose;
+    const auto off = [&](Time t) {
+      return !testing::pose_diff(naive, motion.whole(t), 1e-8).empty();
+    };
+    naive_wrong += off(*one->stamp) && off(*two->stamp) && off(*three->stamp) ? 1 : 0;
+    const Time past = *found->stamp - 20ms;
+    if (const auto then = chain.client->lookup("world", "tool", at(past))) {
+      REQUIRE(then->stamp == past);
+      REQUIRE(testing::pose_diff(then->pose, motion.whole(past), 1e-8) == "");
+    }
+  }
+  CHECK(naive_wrong > kLookups / 2);
+  CHECK(base.failed() + arm.failed() + tool.failed() == 0);
+}
+
+TEST_CASE("a lookup waits for its data, no longer than it may, and not for what is gone") {
+  Chain chain(joined_by(GENERATE(0, 1)));
+  REQUIRE(chain.arm->update("arm", along_x(1), ms(1000)));
+  REQUIRE(chain.arm->update("arm", along_x(2), ms(2000)));
+  const auto start = std::chrono::steady_clock::now();
+  CHECK(outcome(chain.client->lookup("world", "tool", at(ms(500)), 20'000ms)) == "too_old");
+  CHECK(std::chrono::steady_clock::now() - start < 10s);
+  CHECK(outcome(chain.client->lookup("world", "tool", at(ms(3000)), 20ms)) == "not_yet");
+  auto future = chain.client->lookup_async("world", "tool", at(ms(3000)), 20'000ms);
+  std::promise<double> called;
+  auto pending = chain.client->lookup_async(
+      "world", "later", at(ms(3000)), 20'000ms,
+      [&](const Result<StampedTransform>& X) { called.set_value(x_of(X)); });
+  CHECK(future.wait_for(20ms) == std::future_status::timeout);
+  REQUIRE(chain.arm->update("arm", along_x(4), ms(4000)));
+  REQUIRE(chain.tool->add("later", "tool", along_x(100)));
+  CHECK(x_of(future.get()) == Approx(3 + 5));
+  CHECK(called.get_future().get() == Approx(3 + 5 + 100));
+  std::atomic<int> calls{0};
+  auto cancelled =
+      chain.client->lookup_async("world", "never", {}, 20'000ms, [&](const auto&) { ++calls; });
+  cancelled.cancel();
+  auto left =
+      chain.client->lookup_async("world", "never", {}, 20'000ms, [&](const auto&) { ++calls; });
+  auto abandoned = chain.client->lookup_async("world", "never", {}, 20'000ms);
+  chain.client.reset();
+  CHECK(outcome(abandoned.get()) == "timeout");
+  CHECK(calls == 0);
+}
+
+TEST_CASE("a watched path is read without asking, and follows what its owners write") {
+  Chain chain(joined_by(GENERATE(0, 1)));
+  REQUIRE(chain.base->update("base", along_x(1000), ms(1000)));
+  for (Client* caller : std::vector<Client*>{&*chain.client, &*chain.arm}) {
+    auto path = caller->watch("world", "tool");
+    REQUIRE(path);
+    CHECK(x_of(path->latest()) == x_of(caller->lookup("world", "tool", Instant{})));
+    const int from = caller == &*chain.client ? 1000 : 2000;
+    for (int t = from + 10; t <= from + 500; t += 10) {
+      REQUIRE(chain.base->update("base", along_x(t), ms(t)));
+      REQUIRE(chain.tool->update("tool", along_x(1)));
+    }
+    REQUIRE(testing::eventually([&] { return x_of(path->latest()) == from + 500 + 1; }));
+    CHECK(path->latest()->stamp == ms(from + 500));
+    CHECK(x_of(path->at(ms(from + 333))) == Approx(from + 333 + 1));
+    CHECK(outcome(path->at(ms(from + 501))) == "not_yet");
+    REQUIRE(chain.tool->update("tool", along_x(5)));
+    REQUIRE(testing::eventually([&] { return x_of(path->latest()) == from + 500 + 5; }));
+  }
+  CHECK(outcome(chain.client->watch("world", "nobody")) == "unknown_end");
+  WatchOptions options;
+  options.rate = -1;
+  CHECK(outcome(chain.client->watch("world", "tool", options)) == "invalid_input");
+}
+
+TEST_CASE("a watched path finds its new way when frames are moved, removed and added again") {
+  Chain chain(joined_by(GENERATE(0, 1)));
+  std::atomic<int> told{0};
+  WatchOptions options;
+  options.on_route = [&](const std::string&) { ++told; };
+  auto path = chain.client->watch("world", "tool", options);
+  REQUIRE(path);
+  REQUIRE(chain.client->move("tool", "base", along_x(7)));
+  REQUIRE(testing::eventually([&] { return x_of(path->latest()) == 7; }));
+  REQUIRE(testing::eventually([&] { return told == 1; }));
+  REQUIRE(chain.base->update("base", along_x(1000), ms(1000)));
+  REQUIRE(testing::eventually([&] { return x_of(path->latest()) == 1007; }));
+  REQUIRE(chain.client->remove("tool"));
+  REQUIRE(testing::eventually([&] { return outcome(path->latest()) == "unknown_end"; }));
+  REQUIRE(chain.client->add("tool", "arm", along_x(9), "tool"));
+  REQUIRE(testing::eventually([&] { return x_of(path->latest()) == 1009; }));
+  CHECK(told >= 3);
+}
+
+TEST_CASE("a watched path goes on when an owner returns") {
+  const auto join = joined_by(GENERATE(0, 1));
+  Chain chain(join);
+  auto path = chain.client->watch("world", "tool");
+  REQUIRE(path);
+  REQUIRE(chain.tool->update("tool", along_x(5), ms(1000)));
+  REQUIRE(testing::eventually([&] { return path->latest()->stamp == ms(1000); }));
+  chain.tool.reset();
+  REQUIRE(testing::eventually(
+      [&] { return outcome(chain.client->lookup("world", "tool")) == "unreachable"; }));
+  CHECK(x_of(path->latest()) == 5);  // what is known still, with its stamp
+  chain.tool.emplace(*Node::open(join("tool"), "tool", {{"tool", "hand", along_x(6)}}));
+  REQUIRE(testing::eventually([&] { return x_of(path->latest()) == 6; }));
+  REQUIRE(chain.tool->update("tool", along_x(7), ms(500)));
+  REQUIRE(testing::eventually([&] { return x_of(path->latest()) == 7; }));
+}
+
+TEST_CASE("segments may be pushed composed, and no more often than wanted") {
+  Chain chain(joined_by(GENERATE(0, 1)));
+  WatchOptions options;
+  options.composed = true;
+  options.rate = 20;
+  auto path = chain.client->watch("tool", "base", options);
+  REQUIRE(path);
+  CHECK(x_of(path->latest()) == -5);
+  const auto start = std::chrono::steady_clock::now();
+  std::int64_t t = 0;
+  const std::uint64_t before = path->messages();
+  while (std::chrono::steady_clock::now() - start < 500ms) {
+    ++t;
+    REQUIRE(chain.arm->update({{"arm", along_x(1)}, {"hand", along_x(1)}}, ms(t)));
+    std::this_thread::sleep_for(1ms);
+  }
+  const auto over = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  REQUIRE(testing::eventually([&] { return path->latest()->stamp == ms(t); }));
+  CHECK(x_of(path->latest()) == -7);
+  // Besides those of the rate there are the renewals, one a second of each of two owners.
+  CHECK(static_cast<double>(path->messages() - before) <= 20 * over + 2 + 2 * (over + 1));
+}
+
+}  // namespace tfdude

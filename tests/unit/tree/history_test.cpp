@@ -1,0 +1,343 @@
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "tfdude/math/interpolate.hpp"
+#include "tfdude/tree/forest.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/pose_diff.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::outcome;
+using testing::transform_diff;
+using testing::x_of;
+using namespace std::chrono_literals;
+
+Time at(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
+
+Instant instant(std::int64_t milliseconds) { return {at(milliseconds), 0ns, {}}; }
+
+Instant extrapolating(std::int64_t milliseconds, std::chrono::nanoseconds limit) {
+  return {at(milliseconds), limit, {}};
+}
+
+double x_of(const Result<StampedTransform>& X) {
+  return X ? X->pose.translation().x() : std::numeric_limits<double>::quiet_NaN();
+}
+
+std::string message(const Result<StampedTransform>& X) { return X ? "" : X.error().message; }
+
+bool says(const std::string& message, const std::vector<std::string>& parts) {
+  return std::all_of(parts.begin(), parts.end(), [&](const std::string& part) {
+    return message.find(part) != std::string::npos;
+  });
+}
+
+// world -> arm -> hand, the edges of arm and hand with samples at 1,000 and 2,000 ms.
+struct Arm {
+  Arm() {
+    REQUIRE(forest.add("world", "", {}));
+    REQUIRE(forest.add("base", "world", along_x(1)));
+    REQUIRE(forest.add("arm", "base", along_x(7)));
+    REQUIRE(forest.add("hand", "arm", along_x(7)));
+    for (const int second : {1, 2}) {
+      REQUIRE(forest.update("arm", along_x(10 * second), at(1000 * second)));
+      REQUIRE(forest.update("hand", along_x(100 * second), at(1000 * second)));
+    }
+  }
+  Result<StampedTransform> hand(const Instant& when) const {
+    return forest.lookup("world", "hand", when);
+  }
+
+  std::int64_t clock_ms = 5000;
+  Forest forest{[this] { return at(clock_ms); }};
+};
+
+}  // namespace
+
+TEST_CASE("a static edge holds for all times") {
+  Forest forest;
+  REQUIRE(forest.add("world", "", {}));
+  REQUIRE(forest.add("base", "world", along_x(1)));
+  for (const std::int64_t when : {1LL, 1'700'000'000'000LL}) {
+    const auto X = forest.lookup("world", "base", instant(when));
+    CHECK(x_of(X) == 1);
+    CHECK_FALSE(X->stamp.has_value());
+  }
+  REQUIRE(forest.update("base", along_x(2)));
+  CHECK(x_of(forest.lookup("world", "base", instant(1))) == 2);
+  CHECK_FALSE(forest.lookup("world", "base", Instant{})->stamp.has_value());
+}
+
+TEST_CASE("a moving edge is where its samples say, and nowhere else") {
+  const Arm arm;
+  CHECK(x_of(arm.hand(instant(1000))) == 111);
+  CHECK(x_of(arm.hand(instant(1500))) == Approx(166));
+  CHECK(x_of(arm.hand(instant(2000))) == 221);
+  CHECK(arm.hand(instant(1500))->stamp == at(1500));
+  CHECK(outcome(arm.hand(instant(2001))) == "not_yet");
+  CHECK(says(message(arm.hand(instant(2001))),
+             {"'hand'", "1.000 ms older", "1970-01-01 00:00:02.001"}));
+  CHECK(outcome(arm.hand(instant(750))) == "too_old");
+  CHECK(says(message(arm.hand(instant(750))), {"'hand'", "250.000 ms younger"}));
+  CHECK(x_of(arm.forest.lookup("world", "base", instant(1))) == 1);
+}
+
+TEST_CASE("the newest instant is that which all moving edges of the path have") {
+  Arm arm;
+  CHECK(arm.hand({})->stamp == at(2000));
+  REQUIRE(arm.forest.update("arm", along_x(40), at(3000)));
+  CHECK(arm.hand({})->stamp == at(2000));
+  CHECK(x_of(arm.hand({})) == 221);
+  CHECK(arm.forest.lookup("world", "arm", Instant{})->stamp == at(3000));
+  CHECK(x_of(arm.forest.lookup("world", "arm")) == 41);
+  REQUIRE(arm.forest.update("hand", along_x(500), at(2500)));
+  CHECK(arm.hand({})->stamp == at(2500));
+  CHECK(x_of(arm.hand({})) == Approx(1 + 30 + 500));
+  CHECK(x_of(arm.forest.lookup("world", "hand")) == Approx(531));
+  CHECK(arm.forest.lookup_pose("world", "hand")->translation().x() == Approx(531));
+}
+
+TEST_CASE("edges without a common instant have no newest one, and the younger is named") {
+  Arm arm;
+  REQUIRE(arm.forest.add("tip", "hand", {}));
+  REQUIRE(arm.forest.update("tip", along_x(1), at(2003)));
+  const auto X = arm.forest.lookup("world", "tip", Instant{});
+  CHECK(outcome(X) == "too_old");
+  CHECK(says(message(X), {"'tip'", "3.000 ms younger"}));
+}
+
+TEST_CASE("a sample may come late, but not twice and not after what is kept") {
+  Arm arm;
+  REQUIRE(arm.forest.update("hand", along_x(1000), at(1500)));
+  CHECK(x_of(arm.forest.lookup("arm", "hand", instant(1500))) == 1000);
+  CHECK(x_of(arm.forest.lookup("arm", "hand", instant(1750))) == Approx(600));
+  CHECK(x_of(arm.forest.lookup("arm", "hand", instant(1250))) == Approx(550));
+  CHECK(x_of(arm.forest.lookup("arm", "hand")) == 200);
+  const auto twice = arm.forest.update("hand", along_x(3), at(1500));
+  CHECK(outcome(twice) == "stamp_taken");
+  CHECK(says(twice.error().message, {"'hand'", "1970-01-01 00:00:01.500"}));
+  CHECK(outcome(arm.forest.update("hand", along_x(3), at(2000))) == "stamp_taken");
+  REQUIRE(arm.forest.update("hand", along_x(300), at(12'000)));
+  const auto old = arm.forest.update("hand", along_x(3), at(1999));
+  CHECK(outcome(old) == "too_old");
+  CHECK(says(old.error().message, {"'hand'", "10001.000 ms older", "10000.000 ms"}));
+  REQUIRE(arm.forest.update("hand", along_x(3), at(2001)));
+  const auto past = arm.forest.pasts("hand").at(0);
+  CHECK(past.refused_old == 1);
+  CHECK(past.refused_equal == 2);
+  CHECK(past.samples == 3);
+  CHECK(past.oldest == at(2000));
+}
+
+TEST_CASE("a batch is of one stamp, and taken as a whole or not at all") {
+  Arm arm;
+  REQUIRE(arm.forest.update({{"arm", along_x(30)}, {"hand", along_x(300)}}, at(3000)));
+  CHECK(x_of(arm.hand({})) == 331);
+  CHECK(outcome(arm.forest.update({{"base", along_x(5)}, {"hand", along_x(0)}}, at(3000))) ==
+        "stamp_taken");
+  CHECK(x_of(arm.forest.lookup("world", "base")) == 1);
+  // The later of two for one edge counts, as without stamps; also of a late one.
+  for (const std::int64_t when : {4000, 3500}) {
+    REQUIRE(arm.forest.update({{"arm", along_x(0)}, {"arm", along_x(50)}}, at(when)));
+    CHECK(x_of(arm.forest.lookup("base", "arm", instant(when))) == 50);
+  }
+  CHECK(arm.forest.pasts("arm").at(0).samples == 5);
+}
+
+TEST_CASE("what is kept has limits of number and of time") {
+  Arm arm;
+  EdgeTiming timing;
+  timing.count = 5;
+  timing.span = 100ms;
+  REQUIRE(arm.forest.set_timing("arm", timing));
+  CHECK_FALSE(arm.forest.lookup("world", "arm", Instant{})->stamp.has_value());
+  for (int i = 1; i <= 100; ++i) REQUIRE(arm.forest.update("arm", along_x(i), at(i)));
+  CHECK(arm.forest.pasts("arm").at(0).samples == 5);
+  CHECK(x_of(arm.forest.lookup("base", "arm", instant(96))) == 96);
+  CHECK(outcome(arm.forest.lookup("base", "arm", instant(95))) == "too_old");
+  const auto before_all = arm.forest.update("arm", along_x(0), at(95));
+  CHECK(outcome(before_all) == "too_old");
+  CHECK(says(before_all.error().message, {"'arm'", "1.000 ms older", "the 5 that"}));
+  REQUIRE(arm.forest.update("arm", along_x(0), at(250)));
+  CHECK(arm.forest.pasts("arm").at(0).samples == 1);
+  timing.count = 1;
+  CHECK(outcome(arm.forest.set_timing("arm", timing)) == "invalid_input");
+  timing = {};
+  timing.span = 0ms;
+  CHECK(outcome(arm.forest.set_timing("arm", timing)) == "invalid_input");
+  CHECK(outcome(arm.forest.set_timing("nobody", {})) == "unknown_frame");
+}
+
+TEST_CASE("memory is bounded, however many samples come") {
+  Arm arm;
+  EdgeTiming timing;
+  timing.count = 100;
+  REQUIRE(arm.forest.set_timing("arm", timing));
+  for (int i = 1; i <= 200; ++i) REQUIRE(arm.forest.update("arm", along_x(i), at(i)));
+  const std::size_t bytes = arm.forest.pasts("arm").at(0).bytes;
+  for (int i = 201; i <= 20'000; ++i) REQUIRE(arm.forest.update("arm", along_x(i), at(i)));
+  CHECK(arm.forest.pasts("arm").at(0).bytes == bytes);
+  CHECK(bytes < 100 * 400);
+}
+
+TEST_CASE("beyond the newest sample there is an answer only where it is asked for") {
+  Arm arm;
+  CHECK(outcome(arm.hand(extrapolating(2100, 99ms))) == "not_yet");
+  CHECK(says(message(arm.hand(extrapolating(2100, 99ms))), {"100.000 ms", "99.000 ms"}));
+  CHECK(x_of(arm.hand(extrapolating(2100, 100ms))) == Approx(1 + 21 + 210));
+  REQUIRE(arm.forest.add("tip", "hand", {}));
+  REQUIRE(arm.forest.update("tip", along_x(1), at(2000)));
+  const auto alone = arm.forest.lookup("world", "tip", extrapolating(2001, 1s));
+  CHECK(outcome(alone) == "not_yet");
+  CHECK(says(message(alone), {"'tip'", "the only one"}));
+}
+
+TEST_CASE("process noise is added between samples, beyond them, and with age where asked for") {
+  Arm arm;
+  EdgeTiming timing;
+  timing.process_noise = *Covariance::from_stddev({2, 0, 0, 0, 0, 0});
+  REQUIRE(arm.forest.set_timing("hand", timing));
+  for (const int second : {1, 2}) {
+    REQUIRE(arm.forest.update("hand", along_x(100 * second), at(1000 * second)));
+  }
+  const auto variance = [&](const Instant& when) {
+    return arm.forest.lookup("arm", "hand", when)->covariance.upper()[0];
+  };
+  CHECK(variance(instant(2000)) == 0);
+  CHECK(variance(instant(1500)) == Approx(0.25 * 4));
+  CHECK(variance(instant(1100)) == Approx(0.09 * 4));
+  CHECK(variance(extrapolating(2500, 1s)) == Approx(0.5 * 4));
+  CHECK(variance({std::nullopt, 0ns, at(5000)}) == Approx(3 * 4));
+  CHECK(variance({at(1500), 0ns, at(1600)}) == Approx((0.25 + 0.1) * 4));
+  CHECK(variance({at(1500), 0ns, at(1400)}) == Approx(0.25 * 4));  // not younger than it is
+}
+
+TEST_CASE(
+    "an update without a stamp is of now where the edge is moving, and for all times where it is "
+    "not") {
+  Arm arm;
+  REQUIRE(arm.forest.update("arm", along_x(50)));
+  CHECK(arm.forest.lookup("world", "arm", Instant{})->stamp == at(5000));
+  REQUIRE(arm.forest.update("base", along_x(3)));
+  CHECK(arm.forest.pasts("base").empty());
+  // The clock is set back: time goes on none the less.
+  arm.clock_ms = 3000;
+  REQUIRE(arm.forest.update("arm", along_x(60)));
+  CHECK(arm.forest.lookup("world", "arm", Instant{})->stamp == at(5000) + 1ns);
+  CHECK(x_of(arm.forest.lookup("base", "arm")) == 60);
+  EdgeTiming timing;
+  timing.moving = true;
+  REQUIRE(arm.forest.set_timing("base", timing));
+  REQUIRE(arm.forest.update("base", along_x(4)));
+  CHECK(arm.forest.lookup("world", "base", Instant{})->stamp == at(3000));
+  Forest timeless;
+  REQUIRE(timeless.add("world", "", {}));
+  REQUIRE(timeless.update("world", {}, at(1)));
+  CHECK(outcome(timeless.update("world", {})) == "invalid_input");
+  CHECK(outcome(timeless.update("world", {}, Time{})) == "invalid_input");
+  CHECK(outcome(timeless.update("world", {}, at(-5))) == "invalid_input");
+}
+
+TEST_CASE("the partition's limits count where a frame has none of its own") {
+  Forest forest([] { return at(1); });
+  EdgeTiming timing;
+  timing.count = 3;
+  timing.moving = true;
+  REQUIRE(forest.set_default_timing(timing));
+  REQUIRE(forest.add("a", "", {}));
+  for (int i = 0; i < 10; ++i) REQUIRE(forest.update("a", along_x(i)));
+  CHECK(forest.pasts("a").at(0).samples == 3);
+  CHECK(forest.pasts("a").at(0).count_limit == 3);
+}
+
+TEST_CASE("who is moved or removed loses its past, which was that of another edge") {
+  Arm arm;
+  REQUIRE(arm.forest.move("hand", "base"));
+  CHECK_FALSE(arm.forest.lookup("base", "hand", Instant{})->stamp.has_value());
+  CHECK(x_of(arm.forest.lookup("base", "hand", instant(1))) == 200);
+  REQUIRE(arm.forest.update("hand", along_x(1), at(10)));
+  CHECK(arm.forest.pasts("hand").at(0).samples == 1);
+  REQUIRE(arm.forest.remove("arm"));
+  REQUIRE(arm.forest.add("arm", "base", along_x(3)));
+  CHECK(x_of(arm.forest.lookup("base", "arm", instant(1))) == 3);
+  CHECK(arm.forest.pasts("arm").empty());
+  // What hangs elsewhere because a frame above it was moved keeps its past.
+  REQUIRE(arm.forest.add("tip", "hand", {}));
+  REQUIRE(arm.forest.update("tip", along_x(1), at(1)));
+  REQUIRE(arm.forest.update("tip", along_x(2), at(2)));
+  REQUIRE(arm.forest.move("hand", "arm"));
+  CHECK(x_of(arm.forest.lookup("hand", "tip", instant(1))) == 1);
+  REQUIRE(arm.forest.update("tip", along_x(3), at(3)));
+  CHECK(arm.forest.pasts("tip").at(0).samples == 3);
+}
+
+TEST_CASE("several segments are of one instant, and a hint is answered where it can be") {
+  Arm arm;
+  REQUIRE(arm.forest.update("arm", along_x(40), at(3000)));
+  const std::vector<PathEnds> segments{{"base", "arm"}, {"arm", "hand"}, {"world", "base"}};
+  const auto newest = arm.forest.lookup_segments(segments, {}, at(1500));
+  REQUIRE(newest);
+  CHECK(newest->stamp == at(2000));
+  CHECK(newest->period == 1000ms);
+  CHECK(newest->values.at(0).pose.translation().x() == 20);
+  CHECK(newest->values.at(1).pose.translation().x() == 200);
+  CHECK(newest->values.at(2).pose.translation().x() == 1);
+  REQUIRE(newest->at_hint.size() == 3);
+  CHECK(newest->at_hint[0].pose.translation().x() == Approx(15));
+  CHECK(arm.forest.lookup_segments(segments, {}, at(2500))->at_hint.empty());
+  CHECK(arm.forest.lookup_segments({{"world", "base"}}, {}, at(1))->at_hint.empty());
+  CHECK_FALSE(arm.forest.lookup_segments({{"world", "base"}})->stamp.has_value());
+  CHECK(outcome(arm.forest.lookup_segments(segments, instant(2500))) == "not_yet");
+  CHECK(arm.forest.lookup_segments(segments, instant(1250))->stamp == at(1250));
+}
+
+TEST_CASE("rate, gaps and jitter of what is kept") {
+  Arm arm;
+  for (const int ms : {2010, 2020, 2030, 2060}) REQUIRE(arm.forest.update("arm", {}, at(ms)));
+  const auto past = arm.forest.pasts("arm").at(0);
+  CHECK(past.id == "arm");
+  CHECK(past.samples == 6);
+  CHECK(past.oldest == at(1000));
+  CHECK(past.newest == at(2060));
+  CHECK(past.max_gap == 1000ms);
+  CHECK(past.mean_gap == 212ms);
+  CHECK(past.jitter > 390ms);
+  CHECK(past.jitter < 400ms);
+  CHECK(arm.forest.pasts().size() == 2);
+  CHECK(arm.forest.pasts("nobody").empty());
+}
+
+TEST_CASE("news are told once, those of one stamp together") {
+  Arm arm;
+  std::vector<EdgeCursor> cursors;
+  for (const char* id : {"base", "arm", "hand"}) cursors.push_back({*arm.forest.find(id), {}, 0});
+  const auto told = [&](bool newest_only = false) {
+    std::string text;
+    for (const News& one : arm.forest.news(cursors, newest_only)) {
+      text += std::to_string(one.index) + "@" +
+              (one.stamp ? std::to_string(nanoseconds(*one.stamp) / 1'000'000) : "-") + " ";
+    }
+    return text;
+  };
+  CHECK(told() == "0@- 1@2000 2@2000 ");
+  CHECK(told() == "");
+  REQUIRE(arm.forest.update({{"arm", {}}, {"hand", {}}}, at(3000)));
+  REQUIRE(arm.forest.update("hand", {}, at(3500)));
+  REQUIRE(arm.forest.update({{"arm", {}}, {"hand", {}}}, at(4000)));
+  REQUIRE(arm.forest.update("base", along_x(2)));
+  CHECK(told() == "0@- 1@3000 2@3000 2@3500 1@4000 2@4000 ");
+  REQUIRE(arm.forest.update("hand", {}, at(4500)));
+  REQUIRE(arm.forest.update("hand", {}, at(5000)));
+  CHECK(told(true) == "2@5000 ");
+  REQUIRE(arm.forest.remove("hand"));
+  CHECK(told() == "");
+}
+
+}  // namespace tfdude
