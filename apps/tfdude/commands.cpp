@@ -8,6 +8,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "render.hpp"
+#include "time_render.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -21,9 +22,8 @@ void print_error(std::string_view code, std::string_view message) {
   print(dump({{"error", {{"code", code}, {"message", message}}}}) + "\n");
 }
 
-int answer(const Arguments& arguments, const nlohmann::json& json, const std::string& text) {
-  print(arguments.json ? dump(json) + "\n" : text);
-  return kDone;
+Time wall_clock() {
+  return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
 }
 
 // Those that end what goes on and on; main() has blocked them.
@@ -50,6 +50,24 @@ int none_there(Client& client, const Arguments& arguments, bool found) {
                 arguments);
 }
 
+int finish(Client& client, const Result<void>& changed, const Arguments& arguments,
+           const std::string& what) {
+  if (!changed) return refuse(client, changed.error(), arguments);
+  return answer(arguments, {{"done", what}, {"id", arguments.id}},
+                what + " " + arguments.id + "\n");
+}
+
+int refuse_pose(const Error& error, const Arguments& arguments) {
+  return report({error.code, "frame " + quote(arguments.id) + ": " + error.message}, arguments);
+}
+
+}  // namespace
+
+int answer(const Arguments& arguments, const nlohmann::json& json, const std::string& text) {
+  print(arguments.json ? dump(json) + "\n" : text);
+  return kDone;
+}
+
 int refuse(Client& client, const Error& error, const Arguments& arguments) {
   switch (error.code) {
     case Errc::kUnknownFrame:
@@ -65,32 +83,12 @@ int refuse(Client& client, const Error& error, const Arguments& arguments) {
   return report(error, arguments);
 }
 
-int finish(Client& client, const Result<void>& changed, const Arguments& arguments,
-           const std::string& what) {
-  if (!changed) return refuse(client, changed.error(), arguments);
-  return answer(arguments, {{"done", what}, {"id", arguments.id}},
-                what + " " + arguments.id + "\n");
+bool interrupted_within(double seconds) {
+  const sigset_t stop_signals = signals_to_stop();
+  const auto whole = static_cast<std::time_t>(seconds);
+  const timespec pause{whole, static_cast<long>((seconds - static_cast<double>(whole)) * 1e9)};
+  return sigtimedwait(&stop_signals, nullptr, &pause) >= 0;
 }
-
-int refuse_pose(const Error& error, const Arguments& arguments) {
-  return report({error.code, "frame " + quote(arguments.id) + ": " + error.message}, arguments);
-}
-
-int print_lookup(Client& client, const Arguments& arguments) {
-  const auto X_AB = client.lookup(arguments.id, arguments.other);
-  if (!X_AB) return refuse(client, X_AB.error(), arguments);
-  std::vector<std::string> partitions;
-  if (arguments.json) {
-    const auto path = client.path(arguments.id, arguments.other);
-    if (path) {
-      for (const PathSegment& segment : *path) partitions.push_back(segment.partition);
-    }
-  }
-  return answer(arguments, lookup_json(arguments.id, arguments.other, *X_AB, partitions),
-                describe(*X_AB, arguments.covariance));
-}
-
-}  // namespace
 
 int report_usage(const std::string& message) {
   print_error("usage", message);
@@ -155,6 +153,13 @@ int run_partitions(Client& client, const Arguments& arguments) {
       text += "  frames " + std::to_string(partition.frames) + "  host " + partition.host +
               "  pid " + std::to_string(partition.pid);
     }
+    if (const auto pasts = client.pasts(partition.name); partition.reachable && pasts) {
+      const PastSum sum = sum_of(*pasts);
+      json.back()["moving"] = sum.edges;
+      json.back()["samples"] = sum.samples;
+      json.back()["history_bytes"] = sum.bytes;
+      if (sum.edges > 0) text += "  history " + describe(sum);
+    }
     text += partition.reachable ? "\n" : "  unreachable since " + to_string(partition.since) + "\n";
   }
   return answer(arguments, {{"partitions", json}}, text);
@@ -170,7 +175,13 @@ int run_add(Client& client, const Arguments& arguments) {
 int run_update(Client& client, const Arguments& arguments) {
   const auto X_PC = arguments.spec.build();
   if (!X_PC) return refuse_pose(X_PC.error(), arguments);
-  const auto updated = client.update(arguments.id, *X_PC);
+  std::optional<Time> stamp;
+  if (!arguments.stamp.empty()) {
+    const auto parsed = parse_stamp(arguments.stamp, wall_clock());
+    if (!parsed) return report(parsed.error(), arguments);
+    stamp = *parsed;
+  }
+  const auto updated = client.update(arguments.id, *X_PC, stamp);
   return finish(client, updated, arguments, "updated");
 }
 
@@ -188,10 +199,6 @@ int run_move(Client& client, const Arguments& arguments) {
   }
   const auto moved = client.move(arguments.id, arguments.parent, X_PC);
   return finish(client, moved, arguments, "moved");
-}
-
-int run_lookup(Client& client, const Arguments& arguments) {
-  return print_lookup(client, arguments);
 }
 
 int run_parent(Client& client, const Arguments& arguments) {
@@ -220,18 +227,6 @@ int run_exists(Client& client, const Arguments& arguments) {
   if (const int status = none_there(client, arguments, exists); status != kDone) return status;
   answer(arguments, {{"id", arguments.id}, {"exists", exists}}, exists ? "yes\n" : "no\n");
   return exists ? kDone : kRefused;
-}
-
-int run_watch(Client& client, const Arguments& arguments) {
-  const sigset_t stop_signals = signals_to_stop();
-  const double period = 1.0 / arguments.rate;
-  const timespec pause{
-      static_cast<std::time_t>(period),
-      static_cast<long>((period - static_cast<double>(static_cast<std::time_t>(period))) * 1e9)};
-  do {
-    (void)print_lookup(client, arguments);
-  } while (sigtimedwait(&stop_signals, nullptr, &pause) < 0);
-  return kDone;
 }
 
 int run_events(Client& client, const Arguments& arguments) {

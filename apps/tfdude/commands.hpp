@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include <nlohmann/json.hpp>
+
 #include "tfdude/client/client.hpp"
 #include "tfdude/math/transform_spec.hpp"
 
@@ -24,7 +26,28 @@ struct Arguments {
   TransformSpec spec;
   bool covariance = false;
   double rate = 2.0;
+  std::string stamp;  ///< as written, see parse_stamp(); also the instant of a lookup
+  std::string other_stamp;
+  std::string fixed;
+  double extrapolate_ms = 0;
+  bool age_noise = false;
+  double wait_ms = 0;
+  bool composed = false;
+  bool once = false;
 };
+
+/// A stamp as written on the command line: decimal seconds since the epoch, exact to nanoseconds, or, where negative,
+/// before now. @return kInvalidInput naming the text.
+[[nodiscard]] Result<Time> parse_stamp(const std::string& text, Time now);
+
+/// How long to wait between the lines of what goes on and on, until it is interrupted.
+/// @return whether it was
+[[nodiscard]] bool interrupted_within(double seconds);
+
+/// Prints an answer as JSON or as text, and returns the exit status.
+int answer(const Arguments& arguments, const nlohmann::json& json, const std::string& text);
+/// Prints what the service said against it, and returns the exit status.
+int refuse(Client& client, const Error& error, const Arguments& arguments);
 
 // Each runs one command, prints its answer and returns the exit status.
 int run_tree(Client& client, const Arguments& arguments);
@@ -41,6 +64,9 @@ int run_roots(Client& client, const Arguments& arguments);
 int run_exists(Client& client, const Arguments& arguments);
 int run_watch(Client& client, const Arguments& arguments);
 int run_events(Client& client, const Arguments& arguments);
+int run_history(Client& client, const Arguments& arguments);
+int run_echo(Client& client, const Arguments& arguments);
+int run_monitor(Client& client, const Arguments& arguments);
 
 /// Prints what is wrong with the command line itself, as JSON, and returns the exit status.
 int report_usage(const std::string& message);

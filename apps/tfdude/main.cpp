@@ -73,6 +73,68 @@ void add_ends(CLI::App* command, Arguments& arguments) {
   command->add_option("B", arguments.other, "the frame seen")->required();
 }
 
+void add_stamp(CLI::App* command, const char* name, std::string& stamp, const char* help) {
+  command->add_option(name, stamp, help)->type_name("SECONDS")->check([](const std::string& text) {
+    const auto parsed = cli::parse_stamp(text, Time(std::chrono::seconds(INT32_MAX)));
+    return parsed ? std::string() : parsed.error().message;
+  });
+}
+
+void add_milliseconds(CLI::App* command, const char* name, double& value, const char* help) {
+  command->add_option(name, value, help)->type_name("MS")->check([](const std::string& text) {
+    // Not CLI::Range, which takes NaN.
+    const double ms = std::strtod(text.c_str(), nullptr);
+    return ms >= 0 && ms <= 3.6e6 ? "" : text + " is not within 0 to 3600000";
+  });
+}
+
+void add_rate(CLI::App* command, double& rate, const char* help) {
+  command->add_option("--rate", rate, help)->check([](const std::string& text) {
+    const double hertz = std::strtod(text.c_str(), nullptr);
+    return hertz >= 0.001 && hertz <= 1000.0 ? "" : text + " is not within 0.001 to 1000";
+  });
+}
+
+void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen) {
+  auto* lookup = add_command(app, "lookup", "pose of B in A, with its uncertainty",
+                             "lookup world hand_left --cov", cli::run_lookup, chosen);
+  add_ends(lookup, arguments);
+  lookup->add_flag("--cov", arguments.covariance, "print the full covariance");
+  add_stamp(lookup, "--at", arguments.stamp,
+            "of which instant: seconds since the epoch or, negative, before now");
+  auto* fixed = lookup->add_option("--fixed", arguments.fixed,
+                                   "a frame that is taken as fixed between --at, of A, and --at-b");
+  add_stamp(lookup, "--at-b", arguments.other_stamp, "of which instant B is");
+  lookup->get_option("--at-b")->needs(fixed);
+  add_milliseconds(lookup, "--extrapolate", arguments.extrapolate_ms,
+                   "how far an edge may be taken to go on beyond its newest sample");
+  lookup->add_flag("--age-noise", arguments.age_noise,
+                   "add the process noise of the edges from then until now");
+  add_milliseconds(lookup, "--wait", arguments.wait_ms, "how long to wait for frames and data");
+}
+
+// Those that go on and on.
+void add_following_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
+  auto* watch = add_command(app, "watch", "follow what the owners of a path push",
+                            "watch world hand_left --rate 5", cli::run_watch, chosen);
+  auto* echo = add_command(app, "echo", "the same on one page: position, angles, uncertainty, age",
+                           "echo world hand_left", cli::run_echo, chosen);
+  for (CLI::App* command : {watch, echo}) {
+    add_ends(command, arguments);
+    add_rate(command, arguments.rate, "lines a second, and how often an owner sends at most [Hz]");
+    command->add_flag("--composed", arguments.composed,
+                      "have each owner send its part of the path as one transform");
+  }
+  watch->add_flag("--cov", arguments.covariance, "print the full covariance");
+  auto* monitor = add_command(app, "monitor", "rate, age and jitter of all moving edges",
+                              "monitor --once", cli::run_monitor, chosen);
+  add_rate(monitor, arguments.rate, "how often a second [Hz]");
+  monitor->add_flag("--once", arguments.once, "print it once");
+  add_id(add_command(app, "history", "what is kept of an edge's past", "history hand_left",
+                     cli::run_history, chosen),
+         arguments);
+}
+
 void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   add_command(app, "tree", "draw all frames with their owners", "tree", cli::run_tree, chosen);
   add_command(app, "frames", "list all frames", "--json frames", cli::run_frames, chosen);
@@ -87,19 +149,7 @@ void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
   add_id(add_command(app, "exists", "whether a frame exists", "exists camera", cli::run_exists,
                      chosen),
          arguments);
-  auto* lookup = add_command(app, "lookup", "pose of B in A, with its uncertainty",
-                             "lookup world hand_left --cov", cli::run_lookup, chosen);
-  add_ends(lookup, arguments);
-  lookup->add_flag("--cov", arguments.covariance, "print the full covariance");
-  auto* watch = add_command(app, "watch", "look up again and again",
-                            "watch world hand_left --rate 5", cli::run_watch, chosen);
-  add_ends(watch, arguments);
-  watch->add_option("--rate", arguments.rate, "times a second [Hz]")
-      ->check([](const std::string& text) {
-        // Not CLI::Range, which takes NaN.
-        const double rate = std::strtod(text.c_str(), nullptr);
-        return rate >= 0.001 && rate <= 1000.0 ? "" : text + " is not within 0.001 to 1000";
-      });
+  add_lookup_command(app, arguments, chosen);
 }
 
 void add_events_command(CLI::App& app, Command& chosen) {
@@ -118,6 +168,8 @@ void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen)
                              "update tool --rpy 0 0 1.57", cli::run_update, chosen);
   add_id(update, arguments);
   add_pose_options(*update, arguments);
+  add_stamp(update, "--stamp", arguments.stamp,
+            "make it a sample of this instant: seconds since the epoch or, negative, before now");
   add_id(add_command(app, "remove", "remove a frame and all below it", "remove tool",
                      cli::run_remove, chosen),
          arguments);
@@ -150,6 +202,7 @@ int main(int argc, char** argv) {
   app.fallthrough();
   add_common_options(app, arguments, timeout_ms);
   add_reading_commands(app, arguments, command);
+  add_following_commands(app, arguments, command);
   add_events_command(app, command);
   add_changing_commands(app, arguments, command);
   try {
@@ -172,13 +225,14 @@ int main(int argc, char** argv) {
   if (by_server && app.count("--timeout") == 0) timeout_ms = kTimeoutByServer;
   arguments.options.timeout = Milliseconds(timeout_ms);
   arguments.options.discovery = arguments.options.timeout;
-  // Before any thread starts, so that watch and events can wait for them.
+  // Before any thread starts, so that what goes on and on can wait for them.
   sigset_t stop_signals;
   sigemptyset(&stop_signals);
   sigaddset(&stop_signals, SIGINT);
   sigaddset(&stop_signals, SIGTERM);
-  if (app.got_subcommand("watch") || app.got_subcommand("events"))
-    pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
+  for (const char* name : {"watch", "echo", "monitor", "events"}) {
+    if (app.got_subcommand(name)) pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
+  }
   const int status = run(arguments, command);
   const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
   if (!written) std::perror("tfdude: standard output");

@@ -82,6 +82,7 @@ void Participant::on_lost(const std::string& partition, std::uint64_t incarnatio
   }
   structure_changed_.notify_all();
   if (!news) return;
+  look_at_watches();
   log().info("partition {} has gone or fallen silent", quote(partition));
   calls_.on_lost(partition);
 }

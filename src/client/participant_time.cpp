@@ -242,7 +242,9 @@ Result<WatchedPath::Route> Participant::plan_watch(const WatchedPath& path) {
   for (std::size_t i = 0; i < route.parts.size(); ++i) {
     const Part& part = route.parts[i];
     if (part.owner != kHeldHere && !directory_.reachable(part.owner)) {
-      return fail(Errc::kUnreachable, "partition " + quote(part.partition) + " is not reachable");
+      return fail(Errc::kUnreachable, "partition " + quote(part.partition) +
+                                          " is not reachable since " +
+                                          to_string(directory_.info(part.owner).since));
     }
     route.sources[i].group = watch_group(part.partition, std::get<WatchRequest>(part.request.body));
   }

@@ -54,6 +54,17 @@ void WatchedPath::interrupt(Error why) {
   live_.store(false, std::memory_order_release);
 }
 
+void WatchedPath::set_health(Result<void> health) {
+  const std::lock_guard lock(mutex_);
+  health_ = std::move(health);
+}
+
+Result<void> WatchedPath::health() const {
+  const std::lock_guard lock(mutex_);
+  if (!live()) return tl::unexpected(why_not_);
+  return health_;
+}
+
 void WatchedPath::follow(const Route& route, const std::vector<State>& values) {
   {
     const std::lock_guard lock(mutex_);
@@ -211,11 +222,15 @@ bool Watches::attend(WatchedPath& path, bool renew) {
   const bool was_live = path.live();
   if (!route) {
     // What is here goes on to be told, with its stamps; the owner may return.
-    if (was_live && route.error().code == Errc::kUnreachable) return true;
+    if (was_live && route.error().code == Errc::kUnreachable) {
+      path.set_health(tl::unexpected(std::move(route.error())));
+      return true;
+    }
     if (was_live && path.options().on_route) path.options().on_route(route.error().message);
     path.interrupt(std::move(route.error()));
     return false;
   }
+  path.set_health({});
   const bool same = path.follows(*route);
   if (same && !renew) return true;
   for (const WatchedPath::Source& source : route->sources) {
@@ -269,6 +284,8 @@ Result<StampedTransform> PathWatch::at(Time t) const {
   instant.at = t;
   return path_->lookup(instant);
 }
+
+Result<void> PathWatch::health() const { return path_->health(); }
 
 std::uint64_t PathWatch::messages() const { return path_->messages(); }
 

@@ -25,6 +25,7 @@ class WatchedPath {
 
   [[nodiscard]] Result<StampedTransform> lookup(const Instant& instant) const;
 
+  [[nodiscard]] Result<void> health() const;
   [[nodiscard]] std::uint64_t messages() const { return messages_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool wait_for_more(std::uint64_t messages,
                                    std::chrono::steady_clock::time_point deadline) const;
@@ -56,6 +57,8 @@ class WatchedPath {
   void follow(const Route& route, const std::vector<State>& values);
   /// Why there is no answer for now.
   void interrupt(Error why);
+  /// Whether all owners are there.
+  void set_health(Result<void> health);
   [[nodiscard]] const std::vector<Source>& sources() const { return route_.sources; }
 
   // --- from any thread ---
@@ -77,6 +80,7 @@ class WatchedPath {
   mutable std::mutex mutex_;                 // of the rest; route_ is changed by one thread only
   Route route_;
   Error why_not_;
+  Result<void> health_;
 };
 
 /// The paths that a participant watches, and the thread that tells their owners so, again and again: that is how an

@@ -41,6 +41,10 @@ class PathWatch {
   [[nodiscard]] Result<StampedTransform> at(Time t) const;
   [[nodiscard]] Result<StampedTransform> lookup(const Instant& instant) const;
 
+  /// Whether all owners of the path are there; while one is not, what it told last is still answered.
+  /// @return kUnreachable, naming the partition; while the path is not known, why.
+  [[nodiscard]] Result<void> health() const;
+
   /// How many messages have come; grows with each.
   [[nodiscard]] std::uint64_t messages() const;
 

@@ -1,0 +1,204 @@
+#include <algorithm>
+#include <cctype>
+#include <cstdio>
+#include <optional>
+#include <unistd.h>
+
+#include "tfdude/base/id.hpp"
+
+#include "commands.hpp"
+#include "render.hpp"
+#include "time_render.hpp"
+
+// Commands that have to do with time.
+namespace tfdude::cli {
+namespace {
+
+Time wall_clock() {
+  return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
+}
+
+std::chrono::nanoseconds from_milliseconds(double milliseconds) {
+  return std::chrono::nanoseconds(static_cast<std::int64_t>(milliseconds * 1e6));
+}
+
+Result<Instant> instant_of(const std::string& stamp, const Arguments& arguments) {
+  const Time now = wall_clock();
+  Instant instant;
+  if (!stamp.empty()) {
+    const auto at = parse_stamp(stamp, now);
+    if (!at) return tl::unexpected(at.error());
+    instant.at = *at;
+  }
+  instant.extrapolate = from_milliseconds(arguments.extrapolate_ms);
+  if (arguments.age_noise) instant.age_noise_until = now;
+  return instant;
+}
+
+Result<StampedTransform> look_up(Client& client, const Arguments& arguments) {
+  const auto at = instant_of(arguments.stamp, arguments);
+  if (!at) return tl::unexpected(at.error());
+  if (!arguments.fixed.empty()) {
+    const auto other = instant_of(arguments.other_stamp, arguments);
+    if (!other) return tl::unexpected(other.error());
+    return client.lookup(arguments.id, *at, arguments.other, *other, arguments.fixed);
+  }
+  const Milliseconds wait(static_cast<long>(arguments.wait_ms));
+  if (wait.count() == 0) return client.lookup(arguments.id, arguments.other, *at);
+  return client.lookup(arguments.id, arguments.other, *at, wait);
+}
+
+nlohmann::json json_of(Client& client, const Arguments& arguments, const StampedTransform& X_AB) {
+  std::vector<std::string> partitions;
+  if (const auto path = client.path(arguments.id, arguments.other)) {
+    for (const PathSegment& segment : *path) partitions.push_back(segment.partition);
+  }
+  auto json = lookup_json(arguments.id, arguments.other, X_AB, partitions);
+  add_stamp(json, X_AB.stamp);
+  return json;
+}
+
+// Calls show(path) at the rate until interrupted; while the path cannot be watched, or an owner is not there, says so.
+template <class Show>
+int follow(Client& client, const Arguments& arguments, Show show) {
+  std::optional<PathWatch> path;
+  WatchOptions options;
+  options.rate = arguments.rate;
+  options.composed = arguments.composed;
+  do {
+    if (!path) {
+      auto watched = client.watch(arguments.id, arguments.other, options);
+      if (watched) {
+        path = *std::move(watched);
+      } else {
+        (void)refuse(client, watched.error(), arguments);
+        continue;
+      }
+    }
+    if (const auto health = path->health(); !health) {
+      (void)report(health.error(), arguments);
+      continue;
+    }
+    const auto X_AB = path->latest();
+    if (X_AB) {
+      show(*X_AB);
+    } else {
+      (void)report(X_AB.error(), arguments);
+    }
+  } while (!interrupted_within(1.0 / arguments.rate));
+  return kDone;
+}
+
+// In a terminal the text takes the place of the one before, which had as many lines as are told.
+void redraw(const std::string& text, std::ptrdiff_t& drawn) {
+  const bool terminal = isatty(STDOUT_FILENO) != 0;
+  if (terminal && drawn > 0) std::printf("\x1b[%tdA\x1b[J", drawn);
+  std::fputs(text.c_str(), stdout);
+  if (!terminal) std::fputs("\n", stdout);
+  std::fflush(stdout);
+  drawn = std::count(text.begin(), text.end(), '\n');
+}
+
+}  // namespace
+
+// Not by way of a double, which would round a stamp of today to a quarter of a microsecond.
+Result<Time> parse_stamp(const std::string& text, Time now) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  constexpr std::size_t kDigits = 9;
+  const auto bad = [&] {
+    return fail(Errc::kInvalidInput,
+                quote(text) +
+                    " is not a stamp: decimal seconds since the epoch or, where "
+                    "negative, before now");
+  };
+  const bool before_now = !text.empty() && text[0] == '-';
+  const std::string digits = text.substr(before_now ? 1 : 0);
+  const std::size_t point = std::min(digits.find('.'), digits.size());
+  const std::string whole = digits.substr(0, point);
+  std::string fraction = point < digits.size() ? digits.substr(point + 1) : "";
+  const auto all_digits = [](const std::string& part) {
+    return std::all_of(part.begin(), part.end(), [](unsigned char c) { return std::isdigit(c); });
+  };
+  if (whole.size() + fraction.size() == 0 || whole.size() > kDigits + 1) return bad();
+  if (!all_digits(whole) || !all_digits(fraction)) return bad();
+  fraction.resize(kDigits, '0');
+  const std::int64_t seconds = whole.empty() ? 0 : std::stoll(whole);
+  if (seconds > INT64_MAX / kSecond - 1) return bad();
+  const std::int64_t ns = seconds * kSecond + std::stoll(fraction);
+  const Time stamp = before_now ? now - std::chrono::nanoseconds(ns) : time_of(ns);
+  if (nanoseconds(stamp) <= 0) return bad();
+  return stamp;
+}
+
+int run_lookup(Client& client, const Arguments& arguments) {
+  const auto X_AB = look_up(client, arguments);
+  if (!X_AB) return refuse(client, X_AB.error(), arguments);
+  std::string text = describe(*X_AB, arguments.covariance);
+  if (X_AB->stamp) text += describe_stamp(X_AB->stamp, wall_clock());
+  return answer(arguments, arguments.json ? json_of(client, arguments, *X_AB) : nlohmann::json(),
+                text);
+}
+
+int run_watch(Client& client, const Arguments& arguments) {
+  return follow(client, arguments, [&](const StampedTransform& X_AB) {
+    std::string text = describe(X_AB, arguments.covariance);
+    if (X_AB.stamp) text += describe_stamp(X_AB.stamp, wall_clock());
+    (void)answer(arguments, arguments.json ? json_of(client, arguments, X_AB) : nlohmann::json(),
+                 text);
+  });
+}
+
+int run_echo(Client& client, const Arguments& arguments) {
+  std::ptrdiff_t drawn = 0;
+  return follow(client, arguments, [&](const StampedTransform& X_AB) {
+    if (arguments.json) {
+      (void)answer(arguments, json_of(client, arguments, X_AB), "");
+    } else {
+      redraw(echo_lines(arguments.id, arguments.other, X_AB, wall_clock()), drawn);
+    }
+  });
+}
+
+int run_history(Client& client, const Arguments& arguments) {
+  const auto pasts = client.past(arguments.id);
+  if (!pasts) return refuse(client, pasts.error(), arguments);
+  const Time now = wall_clock();
+  if (pasts->empty() || !pasts->front().newest) {
+    return answer(arguments, {{"id", arguments.id}, {"moving", false}, {"samples", 0}},
+                  arguments.id + " is static: it holds for all times\n");
+  }
+  return answer(arguments, past_json(pasts->front(), now), describe(pasts->front(), now));
+}
+
+int run_monitor(Client& client, const Arguments& arguments) {
+  std::ptrdiff_t drawn = 0;
+  do {
+    nlohmann::json json = nlohmann::json::array();
+    std::string text;
+    const auto partitions = client.partitions();
+    if (partitions.empty() && arguments.once) {
+      return refuse(client, {Errc::kUnknownPartition, "no partition"}, arguments);
+    }
+    for (const PartitionInfo& partition : partitions) {
+      const auto pasts = client.pasts(partition.name);
+      const Time now = wall_clock();
+      nlohmann::json one{{"partition", partition.name}, {"reachable", pasts.has_value()}};
+      if (pasts) {
+        one["edges"] = nlohmann::json::array();
+        for (const PastInfo& past : *pasts) one["edges"].push_back(past_json(past, now));
+        text += monitor_table(partition.name, *pasts, now);
+      } else {
+        text += "partition " + partition.name + ": " + pasts.error().message + "\n";
+      }
+      json.push_back(std::move(one));
+    }
+    if (arguments.json) {
+      (void)answer(arguments, {{"partitions", std::move(json)}}, "");
+    } else {
+      redraw(text, drawn);
+    }
+  } while (!arguments.once && !interrupted_within(1.0 / arguments.rate));
+  return kDone;
+}
+
+}  // namespace tfdude::cli

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "tfdude/client/client.hpp"
+
+// What has to do with time, as text for people, and as JSON for programs.
+namespace tfdude::cli {
+
+/// "1700000000.123456789": seconds since the epoch, exact.
+[[nodiscard]] std::string seconds_of(Time stamp);
+
+/// The line that says of when a transform is.
+[[nodiscard]] std::string describe_stamp(const std::optional<Time>& stamp, Time now);
+
+/// Of a transform's JSON: `stamp` in seconds and `stamp_ns`, both null where it holds for all times.
+void add_stamp(nlohmann::json& json, const std::optional<Time>& stamp);
+
+/// The past of one edge, or that it has none.
+[[nodiscard]] std::string describe(const PastInfo& past, Time now);
+[[nodiscard]] nlohmann::json past_json(const PastInfo& past, Time now);
+
+/// What a partition keeps of the past.
+struct PastSum {
+  std::size_t edges = 0;
+  std::size_t samples = 0;
+  std::size_t bytes = 0;
+};
+[[nodiscard]] PastSum sum_of(const std::vector<PastInfo>& pasts);
+[[nodiscard]] std::string describe(const PastSum& sum);
+
+/// A transform in few lines that are always as many: position, angles, standard deviations, age.
+[[nodiscard]] std::string echo_lines(const std::string& a, const std::string& b,
+                                     const StampedTransform& X_AB, Time now);
+
+/// One partition's moving edges as a table.
+[[nodiscard]] std::string monitor_table(const std::string& partition,
+                                        const std::vector<PastInfo>& pasts, Time now);
+
+}  // namespace tfdude::cli
