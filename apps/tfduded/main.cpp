@@ -80,7 +80,9 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
     spdlog::error("{}", config.error().message);
     return kWrongUsage;
   }
-  auto node = tfdude::Node::open(config->partition, config->frames, arguments.options);
+  tfdude::Options options = arguments.options;
+  options.history = config->history;
+  auto node = tfdude::Node::open(config->partition, config->frames, options);
   if (!node) {
     spdlog::error("partition {}: {}", tfdude::quote(config->partition), node.error().message);
     const auto code = node.error().code;

@@ -10,17 +10,17 @@
 #include <limits>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <string_view>
 #include <system_error>
 #include <unordered_map>
 #include <utility>
 
-#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/math/transform_spec.hpp"
+
+#include "client/yaml_quirks.hpp"
 
 namespace tfdude {
 namespace {
@@ -28,9 +28,11 @@ namespace {
 // Longest file that is read: room for half a million frames, and an end to /dev/zero.
 constexpr std::size_t kMaxFileBytes = std::size_t{64} << 20U;
 
-constexpr std::array<std::string_view, 2> kFileKeys = {"partition", "frames"};
-constexpr std::array<std::string_view, 7> kFrameKeys = {"id",   "parent", "xyz", "rpy",
-                                                        "quat", "stddev", "cov"};
+constexpr std::array<std::string_view, 3> kFileKeys = {"partition", "history", "frames"};
+constexpr std::array<std::string_view, 8> kFrameKeys = {"id",   "parent", "xyz", "rpy",
+                                                        "quat", "stddev", "cov", "history"};
+constexpr std::array<std::string_view, 4> kHistoryKeys = {"span", "count", "process_noise",
+                                                          "moving"};
 
 // A key's value; where there is none, it is the key that has a place in the file.
 struct Field {
@@ -40,19 +42,6 @@ struct Field {
 
 // What a mapping holds, by key.
 using Fields = std::map<std::string, Field, std::less<>>;
-
-bool is_quoted(const YAML::Node& scalar) { return scalar.Tag() == "!"; }
-
-// YAML's own spellings of infinity and NaN in those that from_chars() knows; "+1" without its plus.
-std::string plain_number(const std::string& text) {
-  std::string number = text.substr(!text.empty() && text[0] == '+' ? 1 : 0);
-  const std::size_t sign = !number.empty() && number[0] == '-' ? 1 : 0;
-  const std::string rest = number.substr(sign);
-  for (const char* word : {".inf", ".Inf", ".INF", ".nan", ".NaN", ".NAN"}) {
-    if (rest == word) number.erase(sign, 1);
-  }
-  return number;
-}
 
 // The key whose line a complaint of TransformSpec::build() belongs to.
 std::string_view blamed_key(const std::string& message, const TransformSpec& spec) {
@@ -70,7 +59,6 @@ class Reader {
  public:
   explicit Reader(std::string name) : name_(std::move(name)) {}
 
-  [[nodiscard]] Result<void> check_bytes(const std::string& text) const;
   [[nodiscard]] Result<Config> config(const YAML::Node& root) const;
   [[nodiscard]] tl::unexpected<Error> error(Errc code, const YAML::Mark& mark,
                                             const std::string& message) const;
@@ -86,7 +74,12 @@ class Reader {
   [[nodiscard]] Result<void> numbers(const Fields& fields, std::string_view key,
                                      const std::string& place,
                                      std::optional<std::array<double, N>>& out) const;
-  [[nodiscard]] Result<FrameSpec> frame(const YAML::Node& node, std::size_t index) const;
+  [[nodiscard]] Result<void> number(const Fields& fields, std::string_view key,
+                                    const std::string& place, std::optional<double>& out) const;
+  [[nodiscard]] Result<EdgeTiming> history(const Field& field, const std::string& place,
+                                           EdgeTiming timing) const;
+  [[nodiscard]] Result<FrameSpec> frame(const YAML::Node& node, std::size_t index,
+                                        const EdgeTiming& timing) const;
   [[nodiscard]] Result<void> check_no_cycle(const YAML::Node& list,
                                             const std::vector<FrameSpec>& frames) const;
   [[nodiscard]] Result<std::string> id(const Fields& fields, std::string_view key,
@@ -101,20 +94,6 @@ tl::unexpected<Error> Reader::error(Errc code, const YAML::Mark& mark,
                                     const std::string& message) const {
   const std::string line = mark.is_null() ? "" : ":" + std::to_string(mark.line + 1);
   return fail(code, name_ + line + ": " + message);
-}
-
-// YAML allows no control characters, and yaml-cpp takes some of them for the end of the file.
-Result<void> Reader::check_bytes(const std::string& text) const {
-  int line = 1;
-  for (const char c : text) {
-    if (c == '\n') ++line;
-    if ((c >= 0 && c < ' ' && c != '\n' && c != '\r' && c != '\t') || c == '\x7f') {
-      return fail(Errc::kConfig, name_ + ":" + std::to_string(line) +
-                                     ": holds the control character " +
-                                     tfdude::quote(std::string_view(&c, 1)));
-    }
-  }
-  return {};
 }
 
 template <std::size_t N>
@@ -226,7 +205,57 @@ Result<Transform> Reader::transform(const YAML::Node& node, const Fields& fields
                place + ": " + (named ? "" : std::string(key) + ": ") + message);
 }
 
-Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index) const {
+Result<void> Reader::number(const Fields& fields, std::string_view key, const std::string& place,
+                            std::optional<double>& out) const {
+  const auto found = fields.find(key);
+  if (found == fields.end()) return {};
+  const auto value = number(found->second.value, place + ": " + found->first);
+  if (!value) return tl::unexpected(value.error());
+  out = *value;
+  return {};
+}
+
+// What is left out is as in `timing`.
+Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
+                                   EdgeTiming timing) const {
+  const std::string what = place + ": history";
+  const auto entries = fields(field.value, kHistoryKeys, what);
+  if (!entries) return tl::unexpected(entries.error());
+  std::optional<double> span;
+  std::optional<double> count;
+  std::optional<std::array<double, 6>> noise;
+  const auto read = number(*entries, "span", what, span)
+                        .and_then([&] { return number(*entries, "count", what, count); })
+                        .and_then([&] { return numbers(*entries, "process_noise", what, noise); });
+  if (!read) return tl::unexpected(read.error());
+  const auto refuse = [&](const std::string& key, const std::string& why) {
+    return error(Errc::kInvalidInput, entries->find(key)->second.mark, what + ": " + key + why);
+  };
+  constexpr double kLongest = 1e6;
+  if (span && !(*span >= 1e-6 && *span <= kLongest)) {
+    return refuse("span", " is not within 1e-6 and 1e6 seconds");
+  }
+  constexpr double kMost = 1U << 24U;
+  if (count && !(*count >= 2 && *count <= kMost && *count == std::floor(*count))) {
+    return refuse("count", " is not a whole number within 2 and 16777216");
+  }
+  if (span) timing.span = std::chrono::nanoseconds(std::llround(*span * 1e9));
+  if (count) timing.count = static_cast<std::size_t>(*count);
+  if (noise) {
+    const auto rate = Covariance::from_stddev(*noise);
+    if (!rate) return refuse("process_noise", ": " + rate.error().message);
+    timing.process_noise = *rate;
+  }
+  if (const auto moving = entries->find("moving"); moving != entries->end()) {
+    const std::string& said = moving->second.value.Scalar();
+    if (said != "true" && said != "false") return refuse("moving", " is neither true nor false");
+    timing.moving = said == "true";
+  }
+  return timing;
+}
+
+Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index,
+                                const EdgeTiming& timing) const {
   const std::string nth = "frames[" + std::to_string(index) + "]";
   // The message of a bad key names the frame too, where the id can be made out.
   const auto is_id = [](const auto& entry) {
@@ -256,6 +285,11 @@ Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index) const
   auto X_PC = transform(node, *entries, place);
   if (!X_PC) return tl::unexpected(X_PC.error());
   spec.X_PC = *X_PC;
+  if (const auto found = entries->find("history"); found != entries->end()) {
+    auto own = history(found->second, place, timing);
+    if (!own) return tl::unexpected(own.error());
+    spec.timing = *own;
+  }
   return spec;
 }
 
@@ -296,13 +330,18 @@ Result<Config> Reader::config(const YAML::Node& root) const {
     }
     config.partition = *std::move(name);
   }
+  if (const auto found = entries->find("history"); found != entries->end()) {
+    auto timing = history(found->second, "the file", config.history);
+    if (!timing) return tl::unexpected(timing.error());
+    config.history = *timing;
+  }
   const auto found = entries->find("frames");
   if (found == entries->end()) return config;
   const YAML::Node& list = found->second.value;
   if (!list.IsSequence()) return error(Errc::kConfig, found->second.mark, "frames is not a list");
   std::unordered_map<std::string, int> line_of;
   for (const YAML::Node& node : list) {
-    auto spec = frame(node, config.frames.size());
+    auto spec = frame(node, config.frames.size(), config.history);
     if (!spec) return tl::unexpected(spec.error());
     const auto [known, fresh] = line_of.emplace(spec->id, node.Mark().line + 1);
     if (!fresh) {
@@ -316,42 +355,11 @@ Result<Config> Reader::config(const YAML::Node& root) const {
   return config;
 }
 
-// Notes where a document begins, and what else it holds is of no interest.
-class DocumentStart final : public YAML::EventHandler {
- public:
-  [[nodiscard]] const YAML::Mark& mark() const { return mark_; }
-
-  void OnDocumentStart(const YAML::Mark& mark) override { mark_ = mark; }
-  void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
-                const std::string&) override {}
-  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
-                       YAML::EmitterStyle::value) override {}
-  void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
-                  YAML::EmitterStyle::value) override {}
-  void OnMapEnd() override {}
-
- private:
-  YAML::Mark mark_;
-};
-
-// Not by YAML::LoadAll(), which for "!!str ," finds one document after the other where it stands, and never ends.
-std::optional<YAML::Mark> second_document(const std::string& text) {
-  std::istringstream stream(text);
-  YAML::Parser parser(stream);
-  DocumentStart handler;
-  const bool two = parser.HandleNextDocument(handler) && parser.HandleNextDocument(handler);
-  return two ? std::optional(handler.mark()) : std::nullopt;
-}
-
 }  // namespace
 
 Result<Config> parse_config(const std::string& text, const std::string& name) {
   const Reader reader(name);
-  if (auto ok = reader.check_bytes(text); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_bytes(name, text); !ok) return tl::unexpected(ok.error());
   try {
     const YAML::Node document = YAML::Load(text);
     if (const auto second = second_document(text)) {

@@ -90,6 +90,7 @@ Result<StoredState> Participant::open_store() {
 }
 
 Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
+  if (auto set = forest_.set_default_timing(options_.history); !set) return set;
   StoredState state;
   if (!options_.state.empty()) {
     auto stored = open_store();
@@ -109,6 +110,11 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
   auto taken = store_ != nullptr ? partition->restore(state, frames, wall_clock())
                                  : partition->load(frames, wall_clock());
   if (!taken) return taken;
+  for (const FrameSpec& frame : frames) {
+    // One that was removed by request has no edge to keep a past of.
+    if (!frame.timing || !forest_.holds(frame.id)) continue;
+    if (auto set = forest_.set_timing(frame.id, *frame.timing); !set) return set;
+  }
   partition_ = std::move(partition);
   presence_.pages = partition_->page_count();
   presence_.serving = true;

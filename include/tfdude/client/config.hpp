@@ -11,6 +11,7 @@ namespace tfdude {
 /// What a daemon's YAML file says. docs/configuration.md describes the keys.
 struct Config {
   std::string partition;  ///< empty where the file names none
+  EdgeTiming history;     ///< of frames that say nothing else
   std::vector<FrameSpec> frames;
 };
 

@@ -106,6 +106,43 @@ TEST_CASE("what a configuration may leave out") {
   CHECK(tfdude::parse_config("frames: [{id: größe ✓}]", "f")->frames[0].id == "größe ✓");
 }
 
+TEST_CASE("how much is kept of the past is said for the file and for each frame") {
+  const auto config = tfdude::parse_config(
+      "history: {span: 2.5, count: 100}\n"
+      "frames:\n"
+      "  - {id: a}\n"
+      "  - {id: b, history: {count: 7, moving: true, process_noise: [1, 2, 3, 0.1, 0.2, 0.3]}}\n",
+      "f");
+  REQUIRE(config.has_value());
+  CHECK(config->history.span == std::chrono::milliseconds(2500));
+  CHECK(config->history.count == 100);
+  CHECK_FALSE(config->history.moving);
+  CHECK_FALSE(config->frames[0].timing.has_value());
+  REQUIRE(config->frames[1].timing.has_value());
+  CHECK(config->frames[1].timing->span == std::chrono::milliseconds(2500));
+  CHECK(config->frames[1].timing->count == 7);
+  CHECK(config->frames[1].timing->moving);
+  CHECK(config->frames[1].timing->process_noise.upper()[0] == 1);
+  CHECK(config->frames[1].timing->process_noise.stddev()[5] == tfdude::testing::Approx(0.3));
+  const auto refused = [](const std::string& history, const std::string& why) {
+    const auto bad =
+        tfdude::parse_config("frames:\n  - {id: a, history: " + history + "}\n", "robot.yaml");
+    REQUIRE_FALSE(bad.has_value());
+    CAPTURE(bad.error().message);
+    CHECK(bad.error().message.rfind("robot.yaml:2: frame 'a': history" + why, 0) == 0);
+  };
+  refused("{span: 0}", ": span is not within");
+  refused("{span: .nan}", ": span is not a finite number");
+  refused("{count: 1}", ": count is not a whole number within");
+  refused("{count: 2.5}", ": count is not a whole number within");
+  refused("{process_noise: [1, 2]}", ": process_noise has 2, not 6 numbers");
+  refused("{process_noise: [-1, 0, 0, 0, 0, 0]}", ": process_noise: stddev[0]");
+  refused("{moving: perhaps}", ": moving is neither true nor false");
+  refused("{spam: 1}", ": unknown key 'spam'; known are span, count, process_noise, moving");
+  refused("3", " is not a mapping");
+  CHECK_FALSE(tfdude::parse_config("history: {span: -1}\n", "f").has_value());
+}
+
 TEST_CASE("anchors and aliases stand for their values") {
   const auto config = tfdude::parse_config(
       "frames:\n  - {id: a, stddev: &joint [1, 1, 1, 1, 1, 1]}\n  - {id: b, stddev: *joint}\n",
@@ -122,10 +159,12 @@ TEST_CASE("a file of the wrong structure is refused") {
   check_refused({"", Errc::kConfig, "robot.yaml: is empty"});
   check_refused({"# only a comment\n\n", Errc::kConfig, "robot.yaml: is empty"});
   check_refused({"---\n", Errc::kConfig, "robot.yaml: is empty"});
-  check_refused({"hello", Errc::kConfig,
-                 "robot.yaml:1: the file is not a mapping with the keys partition, frames"});
-  check_refused({"partition: a\nframe: []\n", Errc::kConfig,
-                 "robot.yaml:2: the file: unknown key 'frame'; known are partition, frames"});
+  check_refused(
+      {"hello", Errc::kConfig,
+       "robot.yaml:1: the file is not a mapping with the keys partition, history, frames"});
+  check_refused(
+      {"partition: a\nframe: []\n", Errc::kConfig,
+       "robot.yaml:2: the file: unknown key 'frame'; known are partition, history, frames"});
   check_refused({"partition: a\npartition: a\n", Errc::kConfig,
                  "robot.yaml:2: the file: partition is given twice"});
   check_refused({"partition: [a]\n", Errc::kConfig, "robot.yaml:1: partition is not text"});
@@ -140,7 +179,7 @@ TEST_CASE("a file of the wrong structure is refused") {
   check_refused(
       {"frames:\n  - world\n", Errc::kConfig,
        "robot.yaml:2: frames[0] is not a mapping with the keys id, parent, xyz, rpy, quat, "
-       "stddev, cov"});
+       "stddev, cov, history"});
   check_refused({"frames:\n  - {id: a}\n  - parent: a\n", Errc::kConfig,
                  "robot.yaml:3: frames[1]: id is missing"});
   check_refused({"partition: a\x04\nframes: []\n", Errc::kConfig,
@@ -160,7 +199,7 @@ TEST_CASE("a bad frame is refused by name and line") {
   check_refused(
       {camera("    pos: [1, 2, 3]"), Errc::kConfig,
        "robot.yaml:4: frame 'camera': unknown key 'pos'; known are id, parent, xyz, rpy, quat, "
-       "stddev, cov"});
+       "stddev, cov, history"});
   check_refused({camera("    parent: world\n    xyz: [1, 2, 3]\n    xyz: [1, 2, 3]"), Errc::kConfig,
                  "robot.yaml:6: frame 'camera': xyz is given twice"});
   check_refused({camera("    xyz: [1, 2]"), Errc::kConfig,
