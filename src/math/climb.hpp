@@ -28,11 +28,8 @@ class Climb {
     if (count_ == pending_.size()) compute();
   }
 
-  /// The same of a value that has no place of its own.
-  void up_computed(const Value& X_PC) {
-    computed_[count_] = X_PC;
-    up(computed_[count_]);
-  }
+  /// Where to compute a value that has no place of its own, for up() next.
+  [[nodiscard]] Value& place() { return computed_[count_]; }
 
   /// X_AB where A and B climbed to the same frame. Independent edges, first order.
   template <class V>

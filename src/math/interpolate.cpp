@@ -4,6 +4,8 @@
 #include <cmath>
 #include <complex>
 
+#include "math/kernel.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -58,20 +60,42 @@ Matrix6d carried(const Covariance& sigma, const Twist& xi, double s, double weig
   return weight * (B * sigma.matrix() * B.transpose());
 }
 
+// What the kernel takes a pose or a transform for; climb.cpp asserts it.
+template <class Value>
+const double* numbers(const Value& X) {
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
+  return reinterpret_cast<const double*>(&X);
+}
+template <class Value>
+double* numbers(Value& X) {
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
+  return reinterpret_cast<double*>(&X);
+}
+
 }  // namespace
 
-Transform interpolate(const Transform& X0, const Transform& X1, double s) {
+void interpolate(const Transform& X0, const Transform& X1, double s, Transform& X) {
+  if (kernel::functions().blend(numbers(X0), numbers(X1), s, numbers(X))) return;
   const Twist xi = log(X0.pose.inverse() * X1.pose);
   const Matrix6d sigma =
       carried(X0.covariance, -xi, 1.0 - s, 1.0 - s) + carried(X1.covariance, xi, s, s);
-  return {X0.pose * exp(s * xi), Covariance::trusted(sigma)};
+  X = {X0.pose * exp(s * xi), Covariance::trusted(sigma)};
 }
 
-Pose interpolate(const Pose& X0, const Pose& X1, double s) {
+void interpolate(const Pose& X0, const Pose& X1, double s, Pose& X) {
+  if (kernel::functions().blend_pose(numbers(X0), numbers(X1), s, numbers(X))) return;
+  X = X0 * exp(s * log(X0.inverse() * X1));
+}
+
+Transform interpolate(const Transform& X0, const Transform& X1, double s) {
+  Transform X;
+  interpolate(X0, X1, s, X);
+  return X;
+}
+
+Pose extrapolate(const Pose& X0, const Pose& X1, double s) {
   return X0 * exp(s * log(X0.inverse() * X1));
 }
-
-Pose extrapolate(const Pose& X0, const Pose& X1, double s) { return interpolate(X0, X1, s); }
 
 Transform extrapolate(const Transform& X0, const Transform& X1, double s) {
   const Twist xi = log(X0.pose.inverse() * X1.pose);

@@ -1,5 +1,7 @@
 #include "math/kernel.hpp"
 
+#include <cstring>
+
 namespace tfdude::kernel {
 namespace {
 
@@ -7,7 +9,9 @@ using V4 = double __attribute__((vector_size(32)));
 
 namespace any {
 #include "math/kernel_body.ipp"
-}
+// After it, of which it uses the products.
+#include "math/kernel_blend.ipp"
+}  // namespace any
 
 // clang, which only checks this, has another pragma for it.
 #if defined(__x86_64__) && !defined(__clang__)
@@ -15,17 +19,20 @@ namespace any {
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 namespace avx2 {
+#include "math/kernel_blend.ipp"  // NOLINT(readability-duplicate-include)
 #include "math/kernel_body.ipp"  // NOLINT(readability-duplicate-include): the same for another processor
 }  // namespace avx2
 #pragma GCC pop_options
 
-const Functions kForAvx2{avx2::climb_pose, avx2::climb_both, avx2::quotient, avx2::transport};
+const Functions kForAvx2{avx2::climb_pose, avx2::climb_both, avx2::quotient,
+                         avx2::transport,  avx2::blend,      avx2::blend_pose};
 const bool kAvx2 = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
 #endif
 
 }  // namespace
 
-const Functions kPortable{any::climb_pose, any::climb_both, any::quotient, any::transport};
+const Functions kPortable{any::climb_pose, any::climb_both, any::quotient,
+                          any::transport,  any::blend,      any::blend_pose};
 
 const Functions& functions() {
 #if defined(TFDUDE_HAS_AVX2)

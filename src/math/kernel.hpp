@@ -36,6 +36,9 @@ struct Functions {
   Columns (*quotient)(const Columns& X, const Columns& Y);
   /// sum += Ad(X) Σ Ad(X)ᵀ, Σ an upper triangle row by row.
   void (*add_transported)(const Columns& X, const double* upper, Blocks& sum);
+  /// As interpolate(), where the two are less than 0.1 rad apart; else nothing. X has room for an edge.
+  bool (*blend)(Edge X0, Edge X1, double s, double* X);
+  bool (*blend_pose)(Edge X0, Edge X1, double s, double* X);
 };
 
 /// For any processor of the architecture.

@@ -14,10 +14,9 @@ inline V4 load(const double* column) { return *reinterpret_cast<const V4*>(colum
 
 inline void store(double* column, V4 value) { *reinterpret_cast<V4*>(column) = value; }
 
-// Ad(X) = [R, G; 0, R] with G = [t]×R, so the parts of Ad Σ Adᵀ are, with A = R P + G Cᵀ, B = R C + G Q and
+// sum += Ad Σ Adᵀ for Ad = [R, G; 0, R], as Ad(X) is with G = [t]×R: the parts of Ad Σ Adᵀ are, with A = R P + G Cᵀ, B = R C + G Q and
 // D = R Q: A Rᵀ + B Gᵀ, B Rᵀ and D Rᵀ. 81 products of columns and numbers.
-inline void sandwich(const V4* R, V4 t, const double* u, Blocks& sum) {
-  const V4 G[3] = {cross(t, R[0]), cross(t, R[1]), cross(t, R[2])};
+inline void sandwich(const V4* R, const V4* G, const double* u, Blocks& sum) {
   // Rows of R and G, as numbers: through memory, since loads that spread a number over all lanes are free
   // where shuffles are not.
   alignas(32) double r[3][4];
@@ -40,6 +39,11 @@ inline void sandwich(const V4* R, V4 t, const double* u, Blocks& sum) {
     store(sum.C[j], load(sum.C[j]) + combine(B, r[0][j], r[1][j], r[2][j]));
     store(sum.Q[j], load(sum.Q[j]) + combine(D, r[0][j], r[1][j], r[2][j]));
   }
+}
+
+inline void sandwich(const V4* R, V4 t, const double* u, Blocks& sum) {
+  const V4 G[3] = {cross(t, R[0]), cross(t, R[1]), cross(t, R[2])};
+  sandwich(R, G, u, sum);
 }
 
 // R_SP = R_SC R_PCᵀ, t_SP = t_SC - R_SP p_PC, with R_PC from the quaternion.

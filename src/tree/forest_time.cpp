@@ -55,7 +55,8 @@ tl::unexpected<Error> not_yet(const HeldVersion& edge, std::int64_t t, const std
 
 // Beyond the newest sample, as far as is allowed.
 template <class Value>
-Result<Value> value_beyond(const HeldVersion& edge, std::int64_t t, const Instant& instant) {
+Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Instant& instant,
+                            Value& X) {
   const std::int64_t beyond = t - edge.stamp;
   const std::int64_t limit = instant.extrapolate.count();
   if (limit == 0) return not_yet(edge, t, "");
@@ -68,23 +69,26 @@ Result<Value> value_beyond(const HeldVersion& edge, std::int64_t t, const Instan
       edge.number > edge.ring->oldest() ? edge.ring->sample(edge.number - 1) : nullptr;
   if (before == nullptr) return not_yet(edge, t, ", and the only one: its motion is not known");
   const double s = seconds(t - before->stamp) / seconds(edge.stamp - before->stamp);
-  Value X = extrapolate(value_of<Value>(*before), value_of<Value>(edge), s);
+  X = extrapolate(value_of<Value>(*before), value_of<Value>(edge), s);
   add_noise(X, edge, seconds(beyond));
-  return X;
+  return {};
 }
 
-// Of a moving edge, at another instant than that of its newest sample.
+// X of a moving edge at an instant.
 template <class Value>
-Result<Value> value_at(const HeldVersion& edge, std::int64_t t, const Instant& instant) {
-  if (t > edge.stamp) return value_beyond<Value>(edge, t, instant);
+Result<void> compute_at(const HeldVersion& edge, std::int64_t t, const Instant& instant, Value& X) {
+  if (t > edge.stamp) return compute_beyond<Value>(edge, t, instant, X);
+  if (t == edge.stamp) {
+    X = value_of<Value>(edge);
+    return {};
+  }
   const auto [before, after] = edge.ring->around(t, edge.number);
   if (before == nullptr) return too_old(edge, t);
-  if (before->stamp == t) return value_of<Value>(*before);
-  const double between = seconds(after->stamp - before->stamp);
-  const double s = seconds(t - before->stamp) / between;
-  Value X = interpolate(value_of<Value>(*before), value_of<Value>(*after), s);
-  if (edge.ring->has_noise()) add_noise(X, edge, s * (1.0 - s) * between);
-  return X;
+  const auto span = static_cast<double>(after->stamp - before->stamp);
+  const double s = static_cast<double>(t - before->stamp) / span;
+  interpolate(value_of<Value>(*before), value_of<Value>(*after), s, X);
+  if (edge.ring->has_noise()) add_noise(X, edge, s * (1.0 - s) * span * 1e-9);
+  return {};
 }
 
 }  // namespace
@@ -149,10 +153,10 @@ Result<Value> Forest::Impl::walk_at(const Ends& ends, Absent absent, std::int64_
       climb.up(value_of<Value>(edge));
       return {};
     }
-    auto value = edge.stamp == t ? value_of<Value>(edge) : value_at<Value>(edge, t, instant);
-    if (!value) return tl::unexpected(std::move(value.error()));
-    if (age != 0) add_noise(*value, edge, seconds(age));
-    climb.up_computed(*value);
+    Value& X = climb.place();
+    if (auto computed = compute_at<Value>(edge, t, instant, X); !computed) return computed;
+    if (age != 0) add_noise(X, edge, seconds(age));
+    climb.up(X);
     return {};
   });
 }

@@ -12,11 +12,14 @@ namespace tfdude {
 /// (1-s) B0 Σ0 B0ᵀ + s B1 Σ1 B1ᵀ, which is that of e where both are fully correlated and alike, and no less
 /// than it for any correlation, since y ↦ y yᵀ is convex.
 /// @param s  where: 0 gives X0, 1 gives X1; in [0, 1]
+/// Where the two are less than 0.1 rad apart and have the same covariance, that is given as it is, as long as
+/// what it lacks is below a millionth: s (1-s)/4 ad(ξ) Σ ad(ξ)ᵀ.
 /// @note Of two rotations that are a half turn apart the way between them is one of two.
 [[nodiscard]] Transform interpolate(const Transform& X0, const Transform& X1, double s);
 
-/// The same without the covariance.
-[[nodiscard]] Pose interpolate(const Pose& X0, const Pose& X1, double s);
+/// The same into a place of the caller's, which must be another than X0 and X1; and without the covariance.
+void interpolate(const Transform& X0, const Transform& X1, double s, Transform& X);
+void interpolate(const Pose& X0, const Pose& X1, double s, Pose& X);
 
 /// X_AB beyond the second of two samples, with their twist.
 ///
