@@ -9,8 +9,6 @@ using V4 = double __attribute__((vector_size(32)));
 
 namespace any {
 #include "math/kernel_body.ipp"
-// After it, of which it uses the products.
-#include "math/kernel_blend.ipp"
 }  // namespace any
 
 // clang, which only checks this, has another pragma for it.
@@ -19,7 +17,6 @@ namespace any {
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 namespace avx2 {
-#include "math/kernel_blend.ipp"  // NOLINT(readability-duplicate-include)
 #include "math/kernel_body.ipp"  // NOLINT(readability-duplicate-include): the same for another processor
 }  // namespace avx2
 #pragma GCC pop_options

@@ -1,4 +1,4 @@
-// Of kernel.cpp, as kernel_body.ipp: interpolation between two samples of an edge that are little apart.
+// The end of kernel_body.ipp: interpolation between two samples of an edge that are little apart.
 
 struct Vec {
   double x, y, z;

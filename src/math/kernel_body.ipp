@@ -104,3 +104,5 @@ void transport(const Columns& X, const double* upper, Blocks& sum) {
   const V4 R[3] = {load(X.R[0]), load(X.R[1]), load(X.R[2])};
   sandwich(R, load(X.t), upper, sum);
 }
+
+#include "math/kernel_blend.ipp"

@@ -49,7 +49,9 @@ OneInstant one_instant(std::vector<SegmentValues> answers, std::optional<Time> h
   const SegmentValues* last = slowest(answers);
   if (last == nullptr || all_of(answers, *last->stamp)) return {std::move(answers), std::nullopt};
   const Time newest = *last->stamp;
-  const bool near = hint && *hint <= newest && *hint >= newest - 2 * last->period;
+  std::chrono::nanoseconds longest{0};
+  for (const SegmentValues& answer : answers) longest = std::max(longest, answer.period);
+  const bool near = hint && *hint <= newest && *hint >= newest - 2 * longest;
   if (near && take_hint(answers, *hint)) return {std::move(answers), std::nullopt};
   return {{}, newest};
 }
@@ -57,8 +59,8 @@ OneInstant one_instant(std::vector<SegmentValues> answers, std::optional<Time> h
 std::optional<Time> LatestHints::guess(std::string_view a, std::string_view b, Steady now) const {
   const std::size_t path = hash_of(a, b);
   const Entry& entry = entries_[path % kEntries];
-  if (entry.path != path || !entry.newest) return std::nullopt;
-  return *entry.newest + (now - entry.seen) - entry.period;
+  if (entry.path != path || !entry.certain) return std::nullopt;
+  return *entry.certain + (now - entry.seen);
 }
 
 void LatestHints::note(std::string_view a, std::string_view b, Steady now,
@@ -66,10 +68,17 @@ void LatestHints::note(std::string_view a, std::string_view b, Steady now,
   const SegmentValues* last = slowest(answers);
   const std::size_t path = hash_of(a, b);
   Entry& entry = entries_[path % kEntries];
-  if (last == nullptr || all_of(answers, *last->stamp)) {
-    if (entry.path == path) entry.newest.reset();
-  } else {
-    entry = {path, last->stamp, now, last->period};
+  if (last == nullptr) return;
+  const bool known = entry.path == path;
+  const bool same = all_of(answers, *last->stamp);
+  const int together = same ? (known ? entry.together + 1 : kStreak) : 0;
+  entry = {path, last->stamp, now, std::min(together, kStreak)};
+  if (together >= kStreak) {
+    entry.certain.reset();
+    return;
+  }
+  for (const SegmentValues& answer : answers) {
+    if (answer.stamp) entry.certain = std::min(*entry.certain, *answer.stamp - answer.period);
   }
 }
 

@@ -93,8 +93,9 @@ State WatchedGroup::composed_news(const Forest& forest) {
   sent_.resize(found->values.size());
   for (std::uint32_t i = 0; i < found->values.size(); ++i) {
     StateEntry entry{i, found->stamp, found->values[i]};
+    const auto& sent = sent_[i];
     const bool again =
-        entry.stamp ? entry.stamp == sent_[i].stamp : !sent_[i].stamp && same(entry.X, sent_[i].X);
+        sent && entry.stamp == sent->stamp && (entry.stamp || same(entry.X, sent->X));
     if (again) continue;
     sent_[i] = entry;
     state.entries.push_back(std::move(entry));

@@ -14,7 +14,7 @@
 //
 // Each owner answers of its own newest instant and, where it has it, of the one that the caller guesses. The newest
 // common instant T is the oldest of these. Where all answered of T, that is the answer. Else it is that of the guess, if
-// all had it and it is at most two samples of the slowest edge older than T. Else all are asked once more, of T.
+// all had it and it is no older than T by two periods of the slowest edge. Else all are asked once more, of T.
 namespace tfdude {
 
 /// What the answers of a path's owners come to.
@@ -27,13 +27,14 @@ struct OneInstant {
 /// @param hint  the guess that was sent with it
 [[nodiscard]] OneInstant one_instant(std::vector<SegmentValues> answers, std::optional<Time> hint);
 
-/// Guesses for the next lookup of a path, from the last: samples go on coming as they did, and the guess is a period of
-/// the slowest edge behind, so that it is there whichever way the two lookups lie between two samples. Not thread-safe.
+/// Guesses for the next lookup of a path, from the last: samples go on coming as they did, and whichever way the two
+/// lookups lie between two samples of an owner, its newest is at most a period older than that would make it. Not
+/// thread-safe.
 class LatestHints {
  public:
   using Steady = std::chrono::steady_clock::time_point;
 
-  /// Nothing where the path's partitions had the same newest instant, or were not asked yet.
+  /// Nothing where the path's partitions have the same newest instant time after time, or were not asked yet.
   [[nodiscard]] std::optional<Time> guess(std::string_view a, std::string_view b, Steady now) const;
 
   /// Takes note of what the owners said of their newest.
@@ -42,12 +43,13 @@ class LatestHints {
 
  private:
   struct Entry {
-    std::size_t path = 0;  // hash
-    std::optional<Time> newest;
+    std::size_t path = 0;         // hash
+    std::optional<Time> certain;  // what all have had a period later, at the latest
     Steady seen;
-    std::chrono::nanoseconds period{0};
+    int together = 0;  // how many times in a row all had the same newest
   };
 
+  static constexpr int kStreak = 8;
   static constexpr std::size_t kEntries = 256;
   std::array<Entry, kEntries> entries_{};  // by hash; the later of two takes the place
 };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,8 +31,8 @@ class WatchedGroup {
 
   std::uint64_t id_;
   WatchRequest request_;
-  std::vector<EdgeCursor> cursors_;  // by edge
-  std::vector<StateEntry> sent_;     // by segment
+  std::vector<EdgeCursor> cursors_;              // by edge
+  std::vector<std::optional<StateEntry>> sent_;  // by segment
 };
 
 }  // namespace tfdude

@@ -38,6 +38,26 @@ TEST_CASE("the portable kernel and that of this processor agree") {
   CHECK(covariance_diff(here.covariance, portable.covariance, 1e-12) == "");
 }
 
+TEST_CASE("the portable kernel and that of this processor interpolate alike") {
+  Random random(251);
+  INFO("seed " << random.seed());
+  for (int i = 0; i < 100; ++i) {
+    const Transform X0 = random.transform();
+    const Transform X1{X0.pose * exp(random.twist(random.uniform(0, 0.12), 0.3)),
+                       i % 2 == 0 ? X0.covariance : random.covariance()};
+    const auto blended = [&](const kernel::Functions& functions, Transform& X) {
+      return functions.blend(reinterpret_cast<kernel::Edge>(&X0),
+                             reinterpret_cast<kernel::Edge>(&X1), 0.01 * i,
+                             reinterpret_cast<double*>(&X));
+    };
+    Transform here;
+    Transform portable;
+    REQUIRE(blended(kernel::functions(), here) == blended(kernel::kPortable, portable));
+    CHECK(pose_diff(here.pose, portable.pose, 1e-13) == "");
+    CHECK(covariance_diff(here.covariance, portable.covariance, 1e-12) == "");
+  }
+}
+
 TEST_CASE("columns keep the pose") {
   Random random(251);
   INFO("seed " << random.seed());

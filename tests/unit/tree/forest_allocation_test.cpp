@@ -104,6 +104,27 @@ TEST_CASE("updates do not allocate") {
   CHECK(allocations_of([&] { return forest.update(batch_by_handle).has_value(); }) == 0);
 }
 
+TEST_CASE("with a past, too, neither updates nor lookups allocate") {
+  Forest forest;
+  plant_chain(forest);
+  Random random(703);
+  std::vector<HandleUpdate> batch;
+  EdgeTiming timing;
+  timing.count = 64;
+  for (int i = 0; i < 20; ++i) {
+    REQUIRE(forest.set_timing(deep_id(i), timing));
+    batch.push_back({forest.find(deep_id(i)).value(), random.transform()});
+  }
+  std::int64_t t = 1'000'000;
+  CHECK(allocations_of([&] { return forest.update(batch, time_of(t += 1000)).has_value(); }) == 0);
+  const Handle a = forest.find(deep_id(0)).value();
+  const Handle b = forest.find(deep_id(kDepth - 1)).value();
+  Instant instant;
+  CHECK(allocations_of([&] { return forest.lookup(a, b, instant).has_value(); }) == 0);
+  instant.at = time_of(t - 12'345);
+  CHECK(allocations_of([&] { return forest.lookup(a, b, instant).has_value(); }) == 0);
+}
+
 // ---- memory does not grow with the past
 
 constexpr int kCycles = 200'000;
@@ -170,6 +191,12 @@ TEST_CASE("a forest gives back all its memory") {
       REQUIRE(forest.add(std::to_string(i), "world", Transform()));
       if (i % 3 != 0) REQUIRE(forest.remove(std::to_string(i)));
     }
+    for (int i = 0; i < 30; ++i) {
+      for (int t = 1; t < 300; ++t)
+        REQUIRE(forest.update(deep_id(i), Transform(), time_of(10 * t)));
+      REQUIRE(forest.update(deep_id(i), Transform(), time_of(15)));
+    }
+    REQUIRE(forest.move(deep_id(5), "world"));
     REQUIRE(forest.remove(deep_id(10)));
   }
   const std::int64_t left = guard.live_bytes();

@@ -1,0 +1,154 @@
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tfdude/tree/forest.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/random.hpp"
+
+// Readers of the past while it is written: rings grow, wrap round, are copied for late samples, and go.
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::outcome;
+using testing::Random;
+
+constexpr int kLinks = 4;
+constexpr int kReaders = 3;
+constexpr int kAnswers = 300;  // of each kind, or a reader has proved nothing
+constexpr int kMostRounds = 2'000'000;
+
+std::string link_id(int i) { return i == 0 ? "world" : "link " + std::to_string(i); }
+
+// At stamp t every link is t metres long, so that the chain is kLinks · t at any instant.
+struct Reader {
+  std::string finding;
+  std::atomic<int> newest{0};
+  std::atomic<int> past{0};
+  std::atomic<int> too_old{0};
+
+  void take(const Result<StampedTransform>& X, std::atomic<int>& kind) {
+    if (!X) {
+      if (X.error().code == Errc::kTooOld) {
+        too_old.fetch_add(1);
+      } else if (finding.empty()) {
+        finding = "lookup failed: " + X.error().message;
+      }
+      return;
+    }
+    const double expected = kLinks * static_cast<double>(nanoseconds(*X->stamp));
+    const double x = X->pose.translation().x();
+    if (std::abs(x - expected) > 1e-9 * expected && finding.empty()) {
+      finding = "x is " + std::to_string(x) + ", not " + std::to_string(expected);
+    }
+    kind.fetch_add(1);
+  }
+
+  void run(const Forest& forest, const std::atomic<bool>& stop, std::uint64_t seed) {
+    Random random(seed);
+    const Handle a = forest.find(link_id(0)).value();
+    const Handle b = forest.find(link_id(kLinks)).value();
+    while (!stop.load(std::memory_order_acquire) && finding.empty()) {
+      const auto found = forest.lookup(a, b, Instant{});
+      take(found, newest);
+      if (!found) continue;
+      Instant then;
+      then.at = *found->stamp - std::chrono::nanoseconds(random.index(400));
+      take(forest.lookup(a, b, then), past);
+      (void)forest.pasts(link_id(1));
+    }
+  }
+
+  bool done() const {
+    return !finding.empty() || (newest > kAnswers && past > kAnswers && too_old > kAnswers);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("every answer is of one instant while rings wrap round and late samples come") {
+  Forest forest;
+  REQUIRE(forest.add("world", "", along_x(0)));
+  EdgeTiming timing;
+  timing.count = 16;
+  for (int i = 1; i <= kLinks; ++i) {
+    REQUIRE(forest.add(link_id(i), link_id(i - 1), along_x(0)));
+    REQUIRE(forest.set_timing(link_id(i), timing));
+  }
+  const auto write = [&](std::int64_t t) {
+    std::vector<EdgeUpdate> batch;
+    for (int i = 1; i <= kLinks; ++i)
+      batch.push_back({link_id(i), along_x(static_cast<double>(t))});
+    return forest.update(batch, time_of(t)).has_value();
+  };
+  std::int64_t t = 1000;
+  REQUIRE(write(t));
+  Reader readers[kReaders];
+  std::atomic<bool> stop{false};
+  std::vector<std::thread> threads;
+  for (int i = 0; i < kReaders; ++i) {
+    threads.emplace_back([&, i] { readers[i].run(forest, stop, 900U + static_cast<unsigned>(i)); });
+  }
+  const auto all_done = [&] {
+    for (const Reader& reader : readers) {
+      if (!reader.done()) return false;
+    }
+    return true;
+  };
+  int refused = 0;
+  for (int round = 0; round < kMostRounds && (round < 2000 || !all_done()); ++round) {
+    t += 20;
+    refused += write(t) ? 0 : 1;
+    if (round % 16 == 0) refused += write(t - 30) ? 0 : 1;
+  }
+  stop.store(true, std::memory_order_release);
+  for (std::thread& thread : threads) thread.join();
+  CHECK(refused == 0);
+  for (const Reader& reader : readers) {
+    CHECK(reader.finding.empty());
+    CHECK(reader.newest > kAnswers);
+    CHECK(reader.past > kAnswers);
+    CHECK(reader.too_old > kAnswers);
+  }
+}
+
+TEST_CASE("a past may go while it is read") {
+  Forest forest;
+  REQUIRE(forest.add("world", "", {}));
+  REQUIRE(forest.add("arm", "world", {}));
+  std::atomic<bool> stop{false};
+  std::atomic<int> answers{0};
+  std::atomic<int> wrong{0};
+  std::thread reader([&] {
+    while (!stop.load()) {
+      const auto X = forest.lookup("world", "arm", Instant{});
+      if (!X) continue;
+      ++answers;
+      const double x = X->pose.translation().x();
+      if (X->stamp && x != static_cast<double>(nanoseconds(*X->stamp))) ++wrong;
+    }
+  });
+  int failed = 0;
+  for (int round = 0; round < kMostRounds && (round < 500 || answers < kAnswers); ++round) {
+    for (int t = 1; t <= 40; ++t) failed += forest.update("arm", along_x(t), time_of(t)) ? 0 : 1;
+    if (round % 2 == 0) {
+      failed += forest.move("arm", "world") ? 0 : 1;
+    } else {
+      failed += forest.remove("arm") && forest.add("arm", "world", {}) ? 0 : 1;
+    }
+  }
+  stop.store(true);
+  reader.join();
+  CHECK(failed == 0);
+  CHECK(wrong == 0);
+  CHECK(answers >= kAnswers);
+}
+
+}  // namespace tfdude
