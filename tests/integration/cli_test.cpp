@@ -46,8 +46,8 @@ json object(const ThesisDaemons& d, Arguments arguments) {
 }
 
 const std::vector<std::string> kCommands = {
-    "tree",   "frames", "partitions", "roots",  "parent", "children", "exists",
-    "lookup", "watch",  "add",        "update", "remove", "move",
+    "tree",  "frames", "partitions", "roots",  "parent", "children", "exists",  "lookup",
+    "watch", "add",    "update",     "remove", "move",   "echo",     "monitor", "history",
 };
 
 }  // namespace

@@ -1,0 +1,155 @@
+// Time on the command line, with real daemons.
+
+#include <chrono>
+#include <csignal>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "support/catch.hpp"
+#include "support/process.hpp"
+#include "support/thesis.hpp"
+
+namespace tfdude {
+namespace {
+
+using nlohmann::json;
+using testing::CliResult;
+using testing::ContainsSubstring;
+using testing::eventually;
+using testing::in_time;
+using testing::Process;
+using testing::ThesisDaemons;
+using Arguments = std::vector<std::string>;
+
+std::string text(const ThesisDaemons& d, const Arguments& arguments) {
+  const CliResult result = d.domain.cli(arguments);
+  INFO(result.err);
+  CHECK(result.status == 0);
+  return result.out;
+}
+
+json answered(const ThesisDaemons& d, Arguments arguments, int status = 0) {
+  arguments.insert(arguments.begin(), "--json");
+  const CliResult result = d.domain.cli(arguments);
+  INFO(result.out);
+  CHECK(result.status == status);
+  return json::parse(result.out);
+}
+
+void sample(const ThesisDaemons& d, const std::string& id, const std::string& x,
+            const std::string& stamp) {
+  CHECK(text(d, {"update", id, "--xyz", x, "0", "0", "--stamp", stamp}) == "updated " + id + "\n");
+}
+
+}  // namespace
+
+TEST_CASE("time: samples are stamped, and looked up at an instant") {
+  const ThesisDaemons d;
+  sample(d, "arm_1", "1", "100.000000001");
+  sample(d, "arm_1", "2", "101.000000001");
+  const json between = answered(d, {"lookup", "robot_1", "arm_1", "--at", "100.500000001"});
+  CHECK(between.at("translation").at(0).get<double>() == testing::Approx(1.5));
+  CHECK(between.at("stamp_ns") == 100'500'000'001);
+  const json newest = answered(d, {"lookup", "robot_1", "arm_1"});
+  CHECK(newest.at("stamp_ns") == 101'000'000'001);
+  CHECK(answered(d, {"lookup", "world", "camera"}).at("stamp").is_null());
+  CHECK_THAT(text(d, {"lookup", "robot_1", "arm_1", "--at", "100.25"}),
+             ContainsSubstring("stamp        100.250000000  ("));
+  const json early = answered(d, {"lookup", "world", "hand_left", "--at", "99.5"}, 1);
+  CHECK(early.at("error").at("code") == "too_old");
+  CHECK_THAT(early.at("error").at("message").get<std::string>(),
+             ContainsSubstring("'arm_1'") && ContainsSubstring("500.000 ms"));
+  const json late = answered(d, {"lookup", "world", "hand_left", "--at", "101.1"}, 1);
+  CHECK(late.at("error").at("code") == "not_yet");
+  const json beyond =
+      answered(d, {"lookup", "robot_1", "arm_1", "--at", "101.1", "--extrapolate", "100"});
+  CHECK(beyond.at("translation").at(0).get<double>() == testing::Approx(2.1));
+  CHECK(answered(d, {"lookup", "robot_1", "arm_1", "--at", "101.2", "--extrapolate", "100"}, 1)
+            .at("error")
+            .at("code") == "not_yet");
+  const json travelled = answered(d, {"lookup", "arm_1", "arm_1", "--fixed", "world", "--at",
+                                      "100.000000001", "--at-b", "101.000000001"});
+  CHECK(travelled.at("translation").at(0).get<double>() == testing::Approx(1.0));
+}
+
+TEST_CASE("time: negative stamps are before now") {
+  const ThesisDaemons d;
+  sample(d, "arm_1", "5", "-2");
+  sample(d, "arm_1", "5", "-1");
+  CHECK(answered(d, {"lookup", "robot_1", "arm_1", "--at", "-1.5"}).at("translation").at(0) == 5.0);
+  CHECK(answered(d, {"lookup", "robot_1", "arm_1", "--at", "-0"}, 1).at("error").at("code") ==
+        "not_yet");
+  const auto start = std::chrono::steady_clock::now();
+  const CliResult waited =
+      d.domain.cli({"lookup", "robot_1", "arm_1", "--at", "-0", "--wait", "300"});
+  CHECK(waited.status == 1);
+  CHECK(std::chrono::steady_clock::now() - start >= std::chrono::milliseconds(300));
+}
+
+TEST_CASE("time: what is no stamp is refused before anything is sent") {
+  const ThesisDaemons d;
+  for (const char* stamp : {"", "x", "1.2.3", "1e3", "--", "99999999999", "0", "1 2"}) {
+    INFO(stamp);
+    CHECK(d.domain.cli({"update", "arm_1", "--stamp", stamp}).status == 2);
+    CHECK(d.domain.cli({"lookup", "world", "arm_1", "--at", stamp}).status == 2);
+  }
+  CHECK(d.domain.cli({"lookup", "world", "arm_1", "--extrapolate", "-1"}).status == 2);
+  CHECK(d.domain.cli({"lookup", "world", "arm_1", "--at-b", "1"}).status == 2);
+  CHECK_THAT(text(d, {"history", "arm_1"}), ContainsSubstring("arm_1 is static"));
+}
+
+TEST_CASE("time: histories and rates are shown, with what was refused") {
+  const ThesisDaemons d;
+  for (int i = 0; i < 5; ++i) sample(d, "arm_1", "1", std::to_string(100 + i));
+  CHECK(answered(d, {"update", "arm_1", "--stamp", "102"}, 1).at("error").at("code") ==
+        "stamp_taken");
+  CHECK(answered(d, {"update", "arm_1", "--stamp", "90"}, 1).at("error").at("code") == "too_old");
+  const json history = answered(d, {"history", "arm_1"});
+  CHECK(history.at("samples") == 5);
+  CHECK(history.at("span") == 4.0);
+  CHECK(history.at("rate") == 1.0);
+  CHECK(history.at("max_gap") == 1.0);
+  CHECK(history.at("refused_old") == 1);
+  CHECK(history.at("refused_equal") == 1);
+  CHECK_THAT(text(d, {"history", "arm_1"}), ContainsSubstring("samples      5 of at most 2048") &&
+                                                ContainsSubstring("rate         1.000 Hz"));
+  CHECK(answered(d, {"history", "nobody"}, 1).at("error").at("code") == "unknown_frame");
+  const json monitor = answered(d, {"monitor", "--once"});
+  CHECK(monitor.at("partitions").at(0).at("edges").at(0).at("id") == "arm_1");
+  CHECK(monitor.at("partitions").at(1).at("edges").empty());
+  CHECK_THAT(text(d, {"monitor", "--once"}), ContainsSubstring("arm_1"));
+  const json partitions = answered(d, {"partitions"});
+  CHECK(partitions.at("partitions").at(0).at("samples") == 5);
+  CHECK(partitions.at("partitions").at(0).at("history_bytes") > 1000);
+  CHECK_THAT(text(d, {"partitions"}), ContainsSubstring("history 5 samples of 1 edges"));
+}
+
+TEST_CASE("time: a watched path shows what is written, and finds its way after a move") {
+  const ThesisDaemons d;
+  Process watch = d.domain.start_cli({"--json", "watch", "world", "hand_left", "--rate", "100"});
+  REQUIRE(watch.wait_for_line("{\"covariance", in_time()));
+  sample(d, "arm_1", "1", "100");
+  REQUIRE(eventually([&] {
+    (void)watch.runs();
+    return watch.out().find("\"stamp_ns\":100000000000") != std::string::npos;
+  }));
+  CHECK(text(d, {"move", "hand_left", "--parent", "camera", "--xyz", "0", "0", "7"}) ==
+        "moved hand_left\n");
+  CHECK(eventually([&] {
+    (void)watch.runs();
+    const auto line = watch.out().rfind("{\"cov");
+    return line != std::string::npos &&
+           watch.out().find("\"partitions\":[\"robot\",\"arms\"],", line) != std::string::npos &&
+           watch.out().find("\"stamp_ns\":null", line) != std::string::npos;
+  }));
+  watch.signal(SIGINT);
+  CHECK(watch.wait(in_time()) == 0);
+  Process echo = d.domain.start_cli({"echo", "world", "hand_left", "--rate", "50"});
+  REQUIRE(echo.wait_for_line("age       none", in_time()));
+  echo.signal(SIGINT);
+  CHECK(echo.wait(in_time()) == 0);
+}
+
+}  // namespace tfdude
