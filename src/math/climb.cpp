@@ -3,6 +3,7 @@
 #include <type_traits>
 
 #include "math/columns.hpp"
+#include "math/interpolate_far.hpp"
 
 namespace tfdude {
 
@@ -11,7 +12,38 @@ static_assert(std::is_standard_layout_v<Pose> && sizeof(Pose) == 7 * sizeof(doub
 static_assert(std::is_standard_layout_v<Transform> && sizeof(Transform) == 28 * sizeof(double));
 
 template <class Value>
+void Climb<Value>::up_between(const Value& X0, const Value& X1, double s) {
+  // NOLINTBEGIN(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
+  blends_[blend_count_++] = {reinterpret_cast<kernel::Edge>(&X0),
+                             reinterpret_cast<kernel::Edge>(&X1), s,
+                             reinterpret_cast<double*>(&place())};
+  // NOLINTEND(cppcoreguidelines-pro-type-reinterpret-cast)
+  up(place());
+}
+
+template <class Value>
+void Climb<Value>::blend() {
+  const kernel::Functions& functions = kernel::functions();
+  if constexpr (std::is_same_v<Value, Transform>) {
+    functions.blend_with_covariance(blends_.data(), blend_count_);
+  } else {
+    functions.blend_poses(blends_.data(), blend_count_);
+  }
+  for (std::size_t i = 0; i < blend_count_; ++i) {
+    const kernel::Blend& one = blends_[i];
+    if (one.near) continue;
+    // NOLINTBEGIN(cppcoreguidelines-pro-type-reinterpret-cast): what they were before
+    interpolate_far(*reinterpret_cast<const Value*>(one.X0),
+                    *reinterpret_cast<const Value*>(one.X1), one.s,
+                    *reinterpret_cast<Value*>(one.X));
+    // NOLINTEND(cppcoreguidelines-pro-type-reinterpret-cast)
+  }
+  blend_count_ = 0;
+}
+
+template <class Value>
 void Climb<Value>::compute() {
+  if (blend_count_ > 0) blend();
   if constexpr (std::is_same_v<Value, Transform>) {
     kernel::functions().climb_with_covariance(X_SH_, left_, pending_.data(), count_);
   } else {

@@ -28,6 +28,9 @@ class Climb {
     if (count_ == pending_.size()) compute();
   }
 
+  /// The same, X_PC being a part s of the way from X0 to X1 (interpolate()); these must stay where they are, too.
+  void up_between(const Value& X0, const Value& X1, double s);
+
   /// Where to compute a value that has no place of its own, for up() next.
   [[nodiscard]] Value& place() { return computed_[count_]; }
 
@@ -37,14 +40,20 @@ class Climb {
 
  private:
   void compute();
+  void blend();
 
   kernel::Columns X_SH_;  // the pose of the frame reached (here, H) in the start S
   kernel::Blocks left_;   // of the left perturbation of X_SH, expressed in S
   std::array<kernel::Edge, 16> pending_;
-  union {  // not set to zero, which would take as long as a short lookup
+  // Not set to zero, which would take as long as a short lookup.
+  union {
     std::array<Value, 16> computed_;
   };
+  union {
+    std::array<kernel::Blend, 16> blends_;  // what of the pending is to be computed first
+  };
   std::size_t count_ = 0;
+  std::size_t blend_count_ = 0;
 };
 
 template <class Value>

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 
+#include "math/interpolate_far.hpp"
 #include "math/kernel.hpp"
 
 namespace tfdude {
@@ -75,7 +76,12 @@ double* numbers(Value& X) {
 }  // namespace
 
 void interpolate(const Transform& X0, const Transform& X1, double s, Transform& X) {
-  if (kernel::functions().blend(numbers(X0), numbers(X1), s, numbers(X))) return;
+  kernel::Blend one{numbers(X0), numbers(X1), s, numbers(X)};
+  kernel::functions().blend_with_covariance(&one, 1);
+  if (!one.near) interpolate_far(X0, X1, s, X);
+}
+
+void interpolate_far(const Transform& X0, const Transform& X1, double s, Transform& X) {
   const Twist xi = log(X0.pose.inverse() * X1.pose);
   const Matrix6d sigma =
       carried(X0.covariance, -xi, 1.0 - s, 1.0 - s) + carried(X1.covariance, xi, s, s);
@@ -83,7 +89,12 @@ void interpolate(const Transform& X0, const Transform& X1, double s, Transform& 
 }
 
 void interpolate(const Pose& X0, const Pose& X1, double s, Pose& X) {
-  if (kernel::functions().blend_pose(numbers(X0), numbers(X1), s, numbers(X))) return;
+  kernel::Blend one{numbers(X0), numbers(X1), s, numbers(X)};
+  kernel::functions().blend_poses(&one, 1);
+  if (!one.near) interpolate_far(X0, X1, s, X);
+}
+
+void interpolate_far(const Pose& X0, const Pose& X1, double s, Pose& X) {
   X = X0 * exp(s * log(X0.inverse() * X1));
 }
 

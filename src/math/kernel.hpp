@@ -26,6 +26,15 @@ struct alignas(32) Blocks {
 /// An edge as it lies in Transform: quaternion x, y, z, w, translation, upper triangle of the covariance.
 using Edge = const double*;
 
+/// What is to be interpolated.
+struct Blend {
+  Edge X0 = nullptr;
+  Edge X1 = nullptr;
+  double s = 0;
+  double* X = nullptr;  ///< where to; room for an edge, another than X0 and X1
+  bool near = false;    ///< says whether the two are less than 0.1 rad apart; else X is not written
+};
+
 /// Compiled for one instruction set.
 struct Functions {
   /// X_SH := X_SC · X_PC⁻¹ for each edge in turn, C the frame reached so far.
@@ -36,9 +45,9 @@ struct Functions {
   Columns (*quotient)(const Columns& X, const Columns& Y);
   /// sum += Ad(X) Σ Ad(X)ᵀ, Σ an upper triangle row by row.
   void (*add_transported)(const Columns& X, const double* upper, Blocks& sum);
-  /// As interpolate(), where the two are less than 0.1 rad apart; else nothing. X has room for an edge.
-  bool (*blend)(Edge X0, Edge X1, double s, double* X);
-  bool (*blend_pose)(Edge X0, Edge X1, double s, double* X);
+  /// As interpolate(), for those pairs that are near: X_0 to X_count.
+  void (*blend_poses)(Blend* all, std::size_t count);
+  void (*blend_with_covariance)(Blend* all, std::size_t count);
 };
 
 /// For any processor of the architecture.

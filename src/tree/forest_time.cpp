@@ -74,20 +74,48 @@ Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Insta
   return {};
 }
 
-// X of a moving edge at an instant.
+// What a walk knows of the instant it is about.
+struct Moment {
+  std::int64_t t;
+  std::int64_t age;  // until when it is to hold, where noise is added for that
+  const Instant& instant;
+  std::uint64_t back = 0;  // see Ring::around()
+};
+
+// A moving edge, up which the climb goes.
 template <class Value>
-Result<void> compute_at(const HeldVersion& edge, std::int64_t t, const Instant& instant, Value& X) {
-  if (t > edge.stamp) return compute_beyond<Value>(edge, t, instant, X);
-  if (t == edge.stamp) {
-    X = value_of<Value>(edge);
+Result<void> climb_at(Climb<Value>& climb, const HeldVersion& edge, Moment& moment) {
+  const std::int64_t t = moment.t;
+  if (t > edge.stamp) {
+    Value& X = climb.place();
+    auto computed = compute_beyond<Value>(edge, t, moment.instant, X);
+    if (!computed) return computed;
+    if (moment.age != 0) add_noise(X, edge, seconds(moment.age));
+    climb.up(X);
     return {};
   }
-  const auto [before, after] = edge.ring->around(t, edge.number);
-  if (before == nullptr) return too_old(edge, t);
+  const HeldVersion* before = &edge;
+  const HeldVersion* after = &edge;
+  if (t < edge.stamp) {
+    const auto found = edge.ring->around(t, edge.number, moment.back);
+    if (found.before == nullptr) return too_old(edge, t);
+    before = found.before;
+    after = before->stamp == t ? before : found.after;
+  }
   const auto span = static_cast<double>(after->stamp - before->stamp);
-  const double s = static_cast<double>(t - before->stamp) / span;
-  interpolate(value_of<Value>(*before), value_of<Value>(*after), s, X);
-  if (edge.ring->has_noise()) add_noise(X, edge, s * (1.0 - s) * span * 1e-9);
+  const double s = after == before ? 0 : static_cast<double>(t - before->stamp) / span;
+  const double noise = seconds(moment.age) + s * (1.0 - s) * span * 1e-9;
+  if (edge.ring->has_noise() && noise > 0) {
+    Value& X = climb.place();
+    X = value_of<Value>(*before);
+    if (after != before) interpolate(value_of<Value>(*before), value_of<Value>(*after), s, X);
+    add_noise(X, edge, noise);
+    climb.up(X);
+  } else if (after == before) {
+    climb.up(value_of<Value>(*before));
+  } else {
+    climb.up_between(value_of<Value>(*before), value_of<Value>(*after), s);
+  }
   return {};
 }
 
@@ -147,16 +175,13 @@ Result<Value> Forest::Impl::walk_at(const Ends& ends, Absent absent, std::int64_
   const std::int64_t age =
       instant.age_noise_until ? std::max(nanoseconds(*instant.age_noise_until) - t, std::int64_t{0})
                               : 0;
+  Moment moment{t, age, instant};
   return walk<Value>(ends, absent, [&](auto& climb, const HeldVersion& edge) -> Result<void> {
-    if (edge.moving() && any_moving != nullptr) *any_moving = true;
-    if (!edge.moving() || (edge.stamp == t && age == 0)) {
-      climb.up(value_of<Value>(edge));
-      return {};
+    if (edge.moving()) {
+      if (any_moving != nullptr) *any_moving = true;
+      return climb_at<Value>(climb, edge, moment);
     }
-    Value& X = climb.place();
-    if (auto computed = compute_at<Value>(edge, t, instant, X); !computed) return computed;
-    if (age != 0) add_noise(X, edge, seconds(age));
-    climb.up(X);
+    climb.up(value_of<Value>(edge));
     return {};
   });
 }

@@ -4,11 +4,22 @@
 
 namespace tfdude {
 
-Ring::Bracket Ring::around(std::int64_t t, std::uint64_t newest) const {
+// A slot is written anew only after the sample in it was dropped; so all that was read before holds.
+Ring::Bracket Ring::pair(std::uint64_t before) const {
+  const Bracket found{slot(before).sample.load(std::memory_order_acquire),
+                      slot(before + 1).sample.load(std::memory_order_acquire)};
+  return oldest() <= before ? found : Bracket{};
+}
+
+Ring::Bracket Ring::around(std::int64_t t, std::uint64_t newest, std::uint64_t& back) const {
   // How far a guess may be off until halving is quicker.
   constexpr int kSteps = 4;
   std::uint64_t low = oldest();
   std::uint64_t high = newest;
+  if (back > 0 && back <= high - low) {
+    const std::uint64_t same = high - back;
+    if (stamp_at(same) <= t && t < stamp_at(same + 1)) return pair(same);
+  }
   const std::int64_t first = stamp_at(low);
   const std::int64_t last = stamp_at(high);
   if (low >= high || t < first) return {};
@@ -23,10 +34,8 @@ Ring::Bracket Ring::around(std::int64_t t, std::uint64_t newest) const {
       high = at--;
     }
   }
-  const Bracket found{slot(low).sample.load(std::memory_order_acquire),
-                      slot(high).sample.load(std::memory_order_acquire)};
-  // A slot is written anew only after the sample in it was dropped; so all that was read above holds.
-  return oldest() <= low ? found : Bracket{};
+  back = newest - low;
+  return pair(low);
 }
 
 HeldVersion* Ring::sample(std::uint64_t number) const {

@@ -33,8 +33,10 @@ class Ring {
   [[nodiscard]] bool has_noise() const { return has_noise_; }
 
   /// The samples around t, the newest that the reader sees being number `newest`, younger than t.
+  /// @param back  how many samples before the newest they were for an edge that this one may go along with; then for
+  ///   this
   /// @return nothing where all are younger. O(1) where the samples come at an even rate, else O(log n).
-  [[nodiscard]] Bracket around(std::int64_t t, std::uint64_t newest) const;
+  [[nodiscard]] Bracket around(std::int64_t t, std::uint64_t newest, std::uint64_t& back) const;
 
   /// The stamp of a sample that is kept still; kAlways if it is not.
   [[nodiscard]] std::int64_t stamp(std::uint64_t number) const;
@@ -90,6 +92,7 @@ class Ring {
         mask_(capacity - 1),
         slots_(new Slot[capacity]) {}
   [[nodiscard]] std::unique_ptr<Ring> empty_copy(std::uint64_t capacity) const;
+  [[nodiscard]] Bracket pair(std::uint64_t before) const;
   [[nodiscard]] Slot& slot(std::uint64_t number) const { return slots_[number & mask_]; }
   [[nodiscard]] std::int64_t stamp_at(std::uint64_t number) const {
     return slot(number).stamp.load(std::memory_order_acquire);

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "tfdude/math/transform.hpp"
+
+namespace tfdude {
+
+/// As interpolate(), by closed forms: for samples that the kernel's series are not for.
+void interpolate_far(const Transform& X0, const Transform& X1, double s, Transform& X);
+void interpolate_far(const Pose& X0, const Pose& X1, double s, Pose& X);
+
+}  // namespace tfdude
