@@ -41,8 +41,10 @@ Result<void> Client::update(const std::string& id, const Transform& X_PC,
 }
 
 Result<void> Client::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
-  auto updated = participant_->forest().update(frame, X_PC, stamp);
-  if (updated || !Participant::is_elsewhere(updated.error())) return updated;
+  if (auto updated = participant_->forest().update(frame, X_PC, stamp);
+      updated || !Participant::is_elsewhere(updated.error())) {
+    return updated;
+  }
   const auto info = participant_->forest().info(frame);
   if (!info) return fail(Errc::kUnknownFrame, "the frame of this handle was removed");
   return participant_->update({{info->id, X_PC}}, stamp);

@@ -123,9 +123,12 @@ class Forest::Impl {
     return version.held() && version.generation == frame.generation ? &version : nullptr;
   }
 
-  /// One edge, whose slot is checked.
-  [[nodiscard]] Result<void> update_one(std::uint32_t slot, const Transform& X_PC,
+  /// One edge, with a value that was checked, of which may_be_moving() or a stamp says that it may be a sample.
+  [[nodiscard]] Result<void> update_one(const HeldVersion& edge, const Transform& X_PC,
                                         std::optional<Time> stamp);
+  [[nodiscard]] bool may_be_moving(const HeldVersion& edge) const {
+    return edge.ring != nullptr || default_timing_.moving;
+  }
 
   /// All of them as one commit, or none; `frame` gives the id or the handle of an update.
   template <class Update, class Frame>
@@ -199,6 +202,7 @@ class Forest::Impl {
   T& push(VersionPool<T>& pool, std::uint32_t slot);
   void append_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
   void insert_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
+  void drop_oldest(Ring& ring);
   void drop_samples(Ring& ring);
   void replace(Ring* ring);
   void hang(Version& fresh, std::uint32_t parent) const;

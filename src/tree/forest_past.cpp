@@ -99,9 +99,13 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_P
   Ring* ring = newest.ring;
   if (ring == nullptr) {
     ring = new Ring(default_timing_);
-  } else if (ring->full()) {
-    ring = ring->grown().release();
-    replace(newest.ring);
+  } else {
+    // First, so that a ring of as many slots as samples will do. At least two are kept: this is not the newest.
+    if (ring->count() >= ring->timing().count) drop_oldest(*ring);
+    if (ring->full()) {
+      ring = ring->grown().release();
+      replace(newest.ring);
+    }
   }
   HeldVersion& fresh = push_held(newest.slot, X_PC);
   fresh.ring = ring;
@@ -136,12 +140,16 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_P
   drop_samples(*ring);
 }
 
+void Forest::Impl::drop_oldest(Ring& ring) {
+  HeldVersion* dropped = ring.drop_oldest();
+  dropped->kept = false;
+  superseded_.push_back(dropped);
+}
+
 void Forest::Impl::drop_samples(Ring& ring) {
   const std::int64_t limit = ring.stamp(ring.next() - 1) - ring.timing().span.count();
   while (ring.count() > ring.timing().count || ring.stamp(ring.oldest()) < limit) {
-    HeldVersion* dropped = ring.drop_oldest();
-    dropped->kept = false;
-    superseded_.push_back(dropped);
+    drop_oldest(ring);
   }
 }
 

@@ -92,8 +92,9 @@ T& Forest::Impl::push(VersionPool<T>& pool, std::uint32_t slot) {
   fresh->owner = old->owner;
   fresh->slot = slot;
   fresh->generation = old->generation;
+  fresh->kept = false;
   // A sample stays until its ring drops it.
-  if (!old->held() || !static_cast<const HeldVersion*>(old)->kept) superseded_.push_back(old);
+  if (!old->kept) superseded_.push_back(old);
   // Readers skip the fresh version by its number until commit(), so the rest may be filled in later.
   head.store(fresh, std::memory_order_release);
   return *fresh;
@@ -104,7 +105,6 @@ HeldVersion& Forest::Impl::push_held(std::uint32_t slot, const Transform& X_PC) 
   HeldVersion& fresh = push(held_pool_, slot);
   fresh.owner = kHeldHere;
   fresh.X_PC = X_PC;
-  fresh.kept = false;
   if (old.held()) {
     const auto& before = static_cast<const HeldVersion&>(old);
     fresh.stamp = before.stamp;
@@ -270,18 +270,13 @@ Result<void> Forest::release(std::string_view id) {
   return {};
 }
 
-Result<void> Forest::Impl::update_one(std::uint32_t slot, const Transform& X_PC,
+Result<void> Forest::Impl::update_one(const HeldVersion& edge, const Transform& X_PC,
                                       std::optional<Time> stamp) {
-  if (!is_finite(X_PC)) return check_value(newest(slot).name->text, X_PC);
-  const HeldVersion& old = newest_value(slot);
-  if (!stamp && old.ring == nullptr && !default_timing_.moving) {
-    push_held(slot, X_PC);
-  } else {
-    const auto at = stamp_for(&slot, 1, stamp);
-    if (!at) return tl::unexpected(at.error());
-    if (auto ok = check_sample(old, *at); !ok) return ok;
-    push_value(slot, X_PC, *at);
-  }
+  const std::uint32_t slot = edge.slot;
+  const auto at = stamp_for(&slot, 1, stamp);
+  if (!at) return tl::unexpected(at.error());
+  if (auto ok = check_sample(edge, *at); !ok) return ok;
+  push_value(slot, X_PC, *at);
   commit();
   return {};
 }
@@ -290,14 +285,24 @@ Result<void> Forest::update(std::string_view id, const Transform& X_PC, std::opt
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
-  return impl_->update_one(*slot, X_PC, stamp);
+  const HeldVersion& edge = impl_->newest_value(*slot);
+  if (!is_finite(X_PC)) return check_value(id, X_PC);
+  if (stamp || impl_->may_be_moving(edge)) return impl_->update_one(edge, X_PC, stamp);
+  impl_->push_held(*slot, X_PC);
+  impl_->commit();
+  return {};
 }
 
 Result<void> Forest::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
   const std::lock_guard lock(impl_->mutex_);
   const Version* version = impl_->newest_held(frame);
   if (version == nullptr) return tl::unexpected(impl_->held_slot(frame).error());
-  return impl_->update_one(frame.slot, X_PC, stamp);
+  if (!is_finite(X_PC)) return check_value(version->name->text, X_PC);
+  const auto& edge = static_cast<const HeldVersion&>(*version);
+  if (stamp || impl_->may_be_moving(edge)) return impl_->update_one(edge, X_PC, stamp);
+  impl_->push_held(frame.slot, X_PC);
+  impl_->commit();
+  return {};
 }
 
 template <class Update, class Frame>

@@ -32,8 +32,9 @@ struct Version {
   std::int32_t depth = kAbsent;  // parent's + 1, so 0 where there is none or it is absent
   Owner owner = kHeldHere;
   std::uint32_t slot = kNoSlot;
-  std::uint32_t generation =
-      0;  // which frame it is; new whenever one appears, even under a kept name
+  // Which frame it is; new whenever one appears, even under a kept name.
+  std::uint32_t generation = 0;
+  bool kept = false;  // by a ring, as a sample; only the writer looks
   // Bookkeeping of the pool, not for readers.
   std::uint64_t retire_tag = 0;
   Version* next = nullptr;
@@ -48,11 +49,10 @@ struct Version {
 
 /// A version of an edge whose value is held here.
 struct HeldVersion : Version {
-  Transform X_PC;
   std::int64_t stamp = kAlways;  // of the newest sample
   std::uint64_t number = 0;      // its number in the ring
-  Ring* ring = nullptr;  // null: there is no past, nor anything known of how it is to be kept
-  bool kept = false;     // by a ring, as a sample; only the writer looks
+  Ring* ring = nullptr;  // null: there is no past, nor anything said of how it is to be kept
+  Transform X_PC;
 
   [[nodiscard]] bool moving() const { return stamp != kAlways; }
 };
