@@ -1,0 +1,231 @@
+// What the past costs a process with frames of its own, beside tf2's BufferCore on the same tree with the same
+// samples: set an edge whose past is full, look up between two samples, and memory.
+//
+// Keys: core/OPERATION/WHO/DEPTH/FRAMES, where the operation is one of
+//   set_past          a sample a millisecond: ours keeps 2,048, tf2 ten seconds, both by default
+//   lookup_at         18.5 samples of 1 kHz before the newest
+//   lookup_at_far     200.5 of them
+//   lookup_at_100hz   18.5 samples of 100 Hz
+//   past_bytes        bytes a sample, of an edge's full past; WHO is then ours, as Node::past() counts them, or
+//                     ours_heap and tf2_heap, by which the heap grew
+// Lookups are of trees of which all edges move: each turns at 1 rad/s, and has samples of 2 s, at the same instants.
+
+#include <cstdlib>
+#include <malloc.h>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+#include "tfdude/transport/loopback.hpp"
+
+#include "core/trees.hpp"
+
+namespace {
+
+using namespace tfdude;
+using std::chrono::nanoseconds;
+
+constexpr std::size_t kFrames = 100;
+constexpr std::size_t kDepths[] = {2, 8, 30};
+constexpr nanoseconds kMillisecond{1000000};
+constexpr nanoseconds kSpan = std::chrono::seconds(2);
+constexpr double kTurning = 1.0;  // of each edge [rad/s]
+
+// Samples until nothing grows any more: beyond our 2,048 and tf2's ten seconds.
+constexpr int kFull = 11000;
+
+Time start() { return time_of(1000000000); }
+
+ros::Time for_tf2(Time time) {
+  ros::Time stamp;
+  return stamp.fromNSec(static_cast<std::uint64_t>(tfdude::nanoseconds(time)));
+}
+
+Node open_node(const bench::Tree& tree) {
+  LoopbackNetwork network;
+  auto node = Node::open(network.join(), "bench", tree.frames);
+  if (!node) std::abort();
+  return *std::move(node);
+}
+
+/// A tree in motion, which ours and tf2 both have the samples of.
+class Moving {
+ public:
+  Moving(std::size_t depth, nanoseconds period)
+      : tree_(bench::up_down_tree(depth, kFrames)), node_(open_node(tree_)) {
+    testing::Random random(11);
+    std::vector<Twist> turning;
+    for (std::size_t i = 1; i < tree_.frames.size(); ++i) {
+      turning.push_back(random.twist(kTurning, 0));
+    }
+    for (Time stamp = start(); stamp - start() < kSpan; stamp += period) sample(turning, stamp);
+  }
+
+  [[nodiscard]] const bench::Tree& tree() const { return tree_; }
+  [[nodiscard]] Node& node() { return node_; }
+  [[nodiscard]] const tf2::BufferCore& buffer() const { return buffer_; }
+  [[nodiscard]] Time newest() const { return newest_; }
+
+ private:
+  void sample(const std::vector<Twist>& turning, Time stamp) {
+    const double elapsed = std::chrono::duration<double>(stamp - start()).count();
+    std::vector<EdgeUpdate> edges;
+    for (std::size_t i = 1; i < tree_.frames.size(); ++i) {
+      FrameSpec frame = tree_.frames[i];
+      frame.X_PC.pose = frame.X_PC.pose * exp(Twist(elapsed * turning[i - 1]));
+      buffer_.setTransform(bench::stamped(frame, for_tf2(stamp)), "bench", false);
+      edges.push_back({frame.id, frame.X_PC});
+    }
+    if (!node_.update(edges, stamp)) std::abort();
+    newest_ = stamp;
+  }
+
+  bench::Tree tree_;
+  Node node_;
+  tf2::BufferCore buffer_;
+  Time newest_;
+};
+
+/// A lookup: along how many edges, of how far a past.
+struct Case {
+  std::size_t depth;
+  nanoseconds period;
+  double samples_ago;
+};
+
+Moving& moving(const Case& of) {
+  static std::map<std::pair<std::size_t, std::int64_t>, Moving> trees;
+  const std::pair key{of.depth, of.period.count()};
+  return trees.try_emplace(key, of.depth, of.period).first->second;
+}
+
+Time instant_of(const Case& of) {
+  const double ago = of.samples_ago * static_cast<double>(of.period.count());
+  return moving(of).newest() - nanoseconds(static_cast<std::int64_t>(ago));
+}
+
+void look_up_by_handle(benchmark::State& state, Case of) {
+  Node& node = moving(of).node();
+  const Handle a = *node.find(moving(of).tree().from);
+  const Handle b = *node.find(moving(of).tree().to);
+  Instant instant;
+  instant.at = instant_of(of);
+  if (!node.lookup(a, b, instant)) std::abort();
+  for (auto _ : state) benchmark::DoNotOptimize(node.lookup(a, b, instant));
+}
+
+void look_up_tf2(benchmark::State& state, Case of) {
+  const tf2::BufferCore& buffer = moving(of).buffer();
+  const bench::Tree& tree = moving(of).tree();
+  const ros::Time at = for_tf2(instant_of(of));
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(buffer.lookupTransform(tree.from, tree.to, at));
+  }
+}
+
+/// One edge of a tree, given a sample a millisecond.
+class Ours {
+ public:
+  explicit Ours(const bench::Tree& tree)
+      : node_(open_node(tree)), edge_(*node_.find(tree.from)), X_(tree.frames[1].X_PC) {}
+
+  auto set() { return node_.update(edge_, X_, now_ += kMillisecond); }
+  [[nodiscard]] Node& node() { return node_; }
+
+ private:
+  Node node_;
+  Handle edge_;
+  Transform X_;
+  Time now_ = start();
+};
+
+class Tf2 {
+ public:
+  explicit Tf2(const bench::Tree& tree) : message_(bench::stamped(tree.frames[1], ros::Time(1))) {
+    bench::fill(buffer_, tree);
+    message_.child_frame_id = tree.from;
+  }
+
+  bool set() {
+    message_.header.stamp += ros::Duration(0, kMillisecond.count());
+    return buffer_.setTransform(message_, "bench", false);
+  }
+
+ private:
+  tf2::BufferCore buffer_;
+  geometry_msgs::TransformStamped message_;
+};
+
+template <class Who>
+void set_with_past(benchmark::State& state) {
+  // From the child of the root, which is what the message of tf2 says, too.
+  Who who(bench::up_down_tree(2, kFrames));
+  for (int i = 0; i < kFull; ++i) {
+    if (!who.set()) std::abort();
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(who.set());
+}
+
+void count_past(benchmark::State& state) {
+  const bench::Tree tree = bench::up_down_tree(2, kFrames);
+  Ours ours(tree);
+  for (int i = 0; i < kFull; ++i) (void)ours.set();
+  for (auto _ : state) {
+    const PastInfo past = ours.node().past(tree.from)->front();
+    state.counters["bytes"] = static_cast<double>(past.bytes) / static_cast<double>(past.samples);
+  }
+}
+
+double heap_bytes() {
+  const auto info = ::mallinfo2();
+  return static_cast<double>(info.uordblks + info.hblkhd);
+}
+
+/// @param samples  as many as are kept; the heap grows by these alone
+template <class Who>
+void weigh_past(benchmark::State& state, int samples) {
+  const bench::Tree tree = bench::up_down_tree(2, kFrames);
+  for (auto _ : state) {
+    Who who(tree);
+    const double before = heap_bytes();
+    for (int i = 0; i < samples; ++i) (void)who.set();
+    state.counters["bytes"] = (heap_bytes() - before) / samples;
+  }
+}
+
+std::string key(const std::string& name, std::size_t depth) {
+  return "core/" + name + "/" + std::to_string(depth) + "/" + std::to_string(kFrames);
+}
+
+void enter_lookups(const std::string& name, nanoseconds period, double samples_ago) {
+  for (const std::size_t depth : kDepths) {
+    const Case of{depth, period, samples_ago};
+    benchmark::RegisterBenchmark(key(name + "/ours_by_handle", depth).c_str(), look_up_by_handle,
+                                 of);
+    benchmark::RegisterBenchmark(key(name + "/tf2", depth).c_str(), look_up_tf2, of);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  enter_lookups("lookup_at", kMillisecond, 18.5);
+  enter_lookups("lookup_at_far", kMillisecond, 200.5);
+  enter_lookups("lookup_at_100hz", 10 * kMillisecond, 18.5);
+  benchmark::RegisterBenchmark(key("set_past/ours_by_handle", 2).c_str(), set_with_past<Ours>);
+  benchmark::RegisterBenchmark(key("set_past/tf2", 2).c_str(), set_with_past<Tf2>);
+  constexpr int kKeptByOurs = 2048;
+  constexpr int kKeptByTf2 = 10000;
+  benchmark::RegisterBenchmark(key("past_bytes/ours", 2).c_str(), count_past)->Iterations(1);
+  benchmark::RegisterBenchmark(key("past_bytes/ours_heap", 2).c_str(), weigh_past<Ours>,
+                               kKeptByOurs)
+      ->Iterations(1);
+  benchmark::RegisterBenchmark(key("past_bytes/tf2_heap", 2).c_str(), weigh_past<Tf2>, kKeptByTf2)
+      ->Iterations(1);
+  benchmark::Initialize(&argc, argv);
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}
