@@ -11,7 +11,6 @@
 #include <condition_variable>
 #include <mutex>
 #include <string>
-#include <thread>
 
 #include "net/floor_dds.hpp"
 #include "net/harness.hpp"
@@ -36,32 +35,18 @@ struct Sizes {
   std::uint32_t reply;
 };
 
-template <class PubSubType, class Sample>
-std::uint32_t payload_size(Sample sample) {
-  PubSubType type;
-#if TFDUDE_FASTDDS_MAJOR == 2
-  return type.getSerializedSizeProvider(&sample)();
-#else
-  return type.calculate_serialized_size(&sample, edds::DEFAULT_DATA_REPRESENTATION);
-#endif
-}
-
 Sizes sizes_of(const tfdude::Request& request, const tfdude::Reply& reply) {
   namespace codec = tfdude::fastdds;
-  return {payload_size<wire::RequestPubSubType>(codec::to_wire(request, kPartition)),
-          payload_size<wire::ReplyPubSubType>(codec::to_wire(reply))};
+  return {bench::payload_size<wire::RequestPubSubType>(codec::to_wire(request, kPartition)),
+          bench::payload_size<wire::ReplyPubSubType>(codec::to_wire(reply))};
 }
 
 /// Writes, and waits for the listener of the reply's reader, as our client does.
 class DdsPing final : public edds::DataReaderListener {
  public:
   explicit DdsPing(std::uint32_t domain)
-      : endpoints_(domain, bench::kPingTopic, bench::kPongTopic, *this) {
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-    while (!endpoints_.matched()) {
-      if (std::chrono::steady_clock::now() > deadline) bench::give_up("no DDS echo was met");
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
+      : endpoints_(domain, bench::kPingTopic, bench::kPongTopic, *this, "call") {
+    bench::await_match(endpoints_);
   }
 
   void prepare(const Sizes& sizes) {

@@ -1,11 +1,16 @@
 #include "net/floor_dds.hpp"
 
+#include <chrono>
+#include <thread>
+
+#include "net/harness.hpp"
+
 namespace bench {
 
 namespace edds = fastdds::edds;
 
 FloorEndpoints::FloorEndpoints(std::uint32_t domain, const char* to, const char* from,
-                               edds::DataReaderListener& listener) {
+                               edds::DataReaderListener& listener, const std::string& profiles) {
   const edds::TypeSupport type(new PingType);
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
       domain, fastdds::participant_qos());
@@ -15,9 +20,10 @@ FloorEndpoints::FloorEndpoints(std::uint32_t domain, const char* to, const char*
       participant_->create_topic(from, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
   auto* publisher = participant_->create_publisher(edds::PUBLISHER_QOS_DEFAULT);
   auto* subscriber = participant_->create_subscriber(edds::SUBSCRIBER_QOS_DEFAULT);
-  writer_ = publisher->create_datawriter(to_topic, fastdds::writer_qos(*publisher, "call_writer"));
+  writer_ =
+      publisher->create_datawriter(to_topic, fastdds::writer_qos(*publisher, profiles + "_writer"));
   reader_ = subscriber->create_datareader(
-      from_topic, fastdds::reader_qos(*subscriber, "call_reader"), &listener);
+      from_topic, fastdds::reader_qos(*subscriber, profiles + "_reader"), &listener);
 }
 
 FloorEndpoints::~FloorEndpoints() {
@@ -31,6 +37,14 @@ bool FloorEndpoints::matched() const {
   writer_->get_publication_matched_status(readers);
   reader_->get_subscription_matched_status(writers);
   return readers.current_count > 0 && writers.current_count > 0;
+}
+
+void await_match(const FloorEndpoints& endpoints) {
+  const auto deadline = Clock::now() + std::chrono::seconds(20);
+  while (!endpoints.matched()) {
+    if (Clock::now() > deadline) give_up("no other end of the bare DDS was met");
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
 }
 
 }  // namespace bench

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstdint>
+#include <string>
+
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/profiles.hpp"
 
@@ -9,7 +12,7 @@
 #include <floorPubSubTypes.hpp>
 #endif
 
-// Bare Fast DDS, with QoS from the very profiles that our transport takes for requests and replies.
+// Bare Fast DDS, with QoS from the very profiles that our transport takes for its own.
 namespace bench {
 
 namespace fastdds = tfdude::fastdds;
@@ -24,12 +27,24 @@ inline bool any_payload(const std::uint8_t*, std::size_t) { return true; }
 /// Preallocates as our types do.
 using PingType = fastdds::CheckedType<wire::PingPubSubType, any_payload>;
 
+/// Bytes of a sample's CDR payload.
+template <class PubSubType, class Sample>
+std::uint32_t payload_size(Sample sample) {
+  PubSubType type;
+#if TFDUDE_FASTDDS_MAJOR == 2
+  return type.getSerializedSizeProvider(&sample)();
+#else
+  return type.calculate_serialized_size(&sample, fastdds::edds::DEFAULT_DATA_REPRESENTATION);
+#endif
+}
+
 /// A participant with one writer and one reader. Nothing is checked for null: the process ends by a signal
 /// where the library cannot make something, and its log says why.
 class FloorEndpoints {
  public:
+  /// @param profiles  what the names of the profiles of both begin with: "call", "update"
   FloorEndpoints(std::uint32_t domain, const char* to, const char* from,
-                 fastdds::edds::DataReaderListener& listener);
+                 fastdds::edds::DataReaderListener& listener, const std::string& profiles);
   ~FloorEndpoints();
   FloorEndpoints(const FloorEndpoints&) = delete;
   FloorEndpoints& operator=(const FloorEndpoints&) = delete;
@@ -42,5 +57,8 @@ class FloorEndpoints {
   fastdds::edds::DataWriter* writer_;
   fastdds::edds::DataReader* reader_;
 };
+
+/// Gives up where nobody is met.
+void await_match(const FloorEndpoints& endpoints);
 
 }  // namespace bench

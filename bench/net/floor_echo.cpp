@@ -19,7 +19,7 @@ namespace edds = tfdude::fastdds::edds;
 class DdsEcho final : public edds::DataReaderListener {
  public:
   explicit DdsEcho(std::uint32_t domain)
-      : endpoints_(domain, bench::kPongTopic, bench::kPingTopic, *this) {}
+      : endpoints_(domain, bench::kPongTopic, bench::kPingTopic, *this, "call") {}
 
   void on_data_available(edds::DataReader* reader) override {
     if (!tfdude::fastdds::ok(reader->take_next_sample(&sample_, &info_)) || !info_.valid_data)

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <thread>
 #include <utility>
 
@@ -62,6 +63,24 @@ tfdude::Transform await_lookup(tfdude::Client& client, const std::string& a, con
     auto X = client.lookup(a, b);
     if (X || Clock::now() > deadline) return must(std::move(X), "waiting for the frames");
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+}
+
+double shared_clock() {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+// A sleep comes some 60 us too late.
+void sleep_until(double moment) {
+  constexpr double kOversleep = 100e-6;
+  while (true) {
+    const double left = moment - shared_clock();
+    if (left <= 0) return;
+    if (left > kOversleep) {
+      std::this_thread::sleep_for(std::chrono::duration<double>(left - kOversleep));
+    }
   }
 }
 

@@ -47,6 +47,11 @@ Value must(tfdude::Result<Value> outcome, const char* what) {
 /// client looks round for.
 tfdude::Transform await_lookup(tfdude::Client& client, const std::string& a, const std::string& b);
 
+/// Now [s] by a clock that all processes of one computer share.
+double shared_clock();
+/// Until then by that clock, the end of it awake.
+void sleep_until(double moment);
+
 /// One side of a comparison: once() makes the calls and writes one value for each of the figures.
 struct Turn {
   std::vector<Series> figures;

@@ -114,7 +114,7 @@ class Publisher {
     const double start = shared_clock();
     std::uint64_t published = 0;
     while (shared_clock() < start + seconds) {
-      if (rate > 0) sleep_until(start + static_cast<double>(published) / rate);
+      if (rate > 0) bench::sleep_until(start + static_cast<double>(published) / rate);
       publish();
       ++published;
     }
@@ -129,18 +129,6 @@ class Publisher {
   void publish() {
     edges_[0].X_PC.pose = Pose::trusted(Eigen::Quaterniond::Identity(), {shared_clock(), 0, 0});
     bench::check(client_.publish(edges_), "publish");
-  }
-
-  // A sleep comes some 60 us too late; the rest is waited for awake.
-  static void sleep_until(double moment) {
-    constexpr double kOversleep = 100e-6;
-    while (true) {
-      const double left = moment - shared_clock();
-      if (left <= 0) return;
-      if (left > kOversleep) {
-        std::this_thread::sleep_for(std::chrono::duration<double>(left - kOversleep));
-      }
-    }
   }
 
   // Until all is applied, or nothing more comes.

@@ -1,6 +1,5 @@
 #include "net/stream_owner.hpp"
 
-#include <ctime>
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -79,12 +78,6 @@ StreamState& map_stream_state(const std::string& file) {
   ::close(descriptor);
   if (mapped == MAP_FAILED) give_up(file + " could not be mapped");
   return *static_cast<StreamState*>(mapped);
-}
-
-double shared_clock() {
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 std::unique_ptr<Transport> watch(std::unique_ptr<Transport> transport, AppliedListener& listener) {

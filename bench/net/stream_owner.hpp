@@ -23,9 +23,6 @@ struct StreamState {
 /// Made or opened; zero at first. Stays mapped.
 StreamState& map_stream_state(const std::string& file);
 
-/// Now [s] by a clock that all processes of one computer share.
-double shared_clock();
-
 /// Called after each update that has come to an owner, when it has been applied.
 class AppliedListener {
  public:
