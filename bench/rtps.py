@@ -47,8 +47,9 @@ def _datagrams(path):
         if struct.unpack(order + "I", header[20:24])[0] != 1:
             raise ValueError(f"{path} is not of Ethernet or the loopback interface")
         while len(record := file.read(16)) == 16:
-            seconds, fraction, kept, _ = struct.unpack(order + "IIII", record)
-            frame = file.read(kept)
+            seconds, fraction, kept, length = struct.unpack(order + "IIII", record)
+            # What was not kept of it counts, though it cannot be read.
+            frame = file.read(kept).ljust(length, b"\0")
             if frame[12:14] == b"\x08\x00":
                 yield seconds * 10**9 + fraction * nanoseconds, frame[14:]
 

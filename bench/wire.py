@@ -20,6 +20,7 @@ import processes
 import rtps
 
 PAUSE_S = 0.2  # after an operation: several of DDS's heartbeats and acknowledgements
+FLUSH_S = 1.5  # the kernel hands packets to a capture in blocks, up to a second late
 IDLE_S = 2.0
 PARTITIONS = 6
 PATHS = (1, 2, 4)  # partitions on the path
@@ -83,14 +84,14 @@ def client_of(bin_dir, domain, work):
 
 
 @contextlib.contextmanager
-def capturing(file, domain):
-    """Captures a domain's packets until the block is left."""
+def capturing(file, domain, kept=0):
+    """Captures a domain's packets until the block is left; of each so many bytes, or all."""
     first = 7400 + 250 * domain  # RTPS 2.2, section 9.6.1.1
     # Presence has sockets of its own, with ports from the range for such.
     ports = f"udp and (dst portrange {first}-{first + 249} or dst portrange 49152-65535)"
     try:
         process = subprocess.Popen(
-            ["tcpdump", "-i", "lo", "-w", file, "-U", "-Z", "root", "-B", "16384", ports],
+            ["tcpdump", "-i", "lo", "-w", file, "-U", "-Z", "root", "-B", "16384", "-s", str(kept), ports],
             stderr=subprocess.PIPE, bufsize=0)
     except FileNotFoundError as error:
         raise processes.Skipped("tcpdump is not installed") from error
@@ -102,9 +103,12 @@ def capturing(file, domain):
             except RuntimeError as error:
                 raise processes.Skipped("capturing is not permitted: " + " ".join(said)) from error
         yield
-        time.sleep(PAUSE_S)
+        time.sleep(FLUSH_S)
     finally:
         processes.end(process, signal.SIGINT)
+    summary = process.stderr.read().decode()
+    if "\n0 packets dropped by kernel" not in summary:
+        raise RuntimeError(f"the capture is not complete: {summary}")
 
 
 def part_of(capture, packet):
