@@ -11,30 +11,25 @@ import time
 import traceback
 
 import machine
+import net_stage
 import plots
 import processes
 import programs
+import pushed
 import report
 import targets
 import wire
 
 BENCH = pathlib.Path(__file__).resolve().parent
 RESULTS = BENCH / "results"
-STAGES = ("core", "contention", "net", "wire")
+STAGES = ("core", "contention", "net", "wire", "pushed")
 
 
 def stage(name):
     """What yields the figures, given quick, the binaries' folder and a folder to work in."""
-    if name == "wire":
-        return wire.run
-    if name == "net":
-        try:
-            import net_stage
-        except ModuleNotFoundError as error:
-            if error.name != "net_stage":
-                raise
-            raise processes.Skipped("bench/net_stage.py is not there") from error
-        return net_stage.run
+    modules = {"net": net_stage, "wire": wire, "pushed": pushed}
+    if name in modules:
+        return modules[name].run
     return getattr(programs, name)
 
 

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "net/floor_dds.hpp"
+#include "net/harness.hpp"
+
+// What the benchmarks of pushed paths push, and the bare samples beside it.
+namespace bench {
+
+inline constexpr const char* kBase = "base";
+
+/// Of a chain: the first hangs on the base, each other on the one before.
+inline std::string joint(int number) { return "joint_" + std::to_string(number); }
+
+/// The owner of such a chain, all joints of which move at once.
+class PushedRobot {
+ public:
+  PushedRobot(int joints, const tfdude::Options& options) : node_(open(joints, options)) {
+    for (int i = 0; i < joints; ++i) edges_.push_back({must(node_.find(joint(i)), "a joint"), {}});
+  }
+
+  /// The stamp is the moment just before the update, by shared_clock().
+  void move() {
+    ++steps_;
+    const double half_angle = 0.0005 * steps_;  // 1 rad/s at 1 kHz
+    const Eigen::Quaterniond turn(std::cos(half_angle), 0, 0, std::sin(half_angle));
+    for (auto& edge : edges_) edge.X_PC = {tfdude::Pose::trusted(turn, {0, 0, 0.1}), noise_};
+    check(node_.update(edges_, tfdude::Time(Clock::now().time_since_epoch())), "update");
+  }
+
+ private:
+  static tfdude::Node open(int joints, const tfdude::Options& options) {
+    std::vector<tfdude::FrameSpec> frames{{kBase, "", {}}};
+    for (int i = 0; i < joints; ++i) frames.push_back({joint(i), i > 0 ? joint(i - 1) : kBase, {}});
+    return must(tfdude::Node::open("robot", frames, options), "a node");
+  }
+
+  tfdude::Node node_;
+  std::vector<tfdude::HandleUpdate> edges_;
+  tfdude::Covariance noise_ =
+      must(tfdude::Covariance::from_stddev({1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3}), "a covariance");
+  int steps_ = 0;
+};
+
+/// Reads nothing.
+class NoListener final : public fastdds::edds::DataReaderListener {};
+
+/// Sends samples of a size as values are pushed, to whoever listens.
+class BareSender {
+ public:
+  BareSender(std::uint32_t domain, std::uint32_t bytes)
+      : endpoints_(domain, kPingTopic, kPongTopic, listener_, "update") {
+    ping_.filler().resize(bytes - kPingOverhead);
+  }
+
+  /// Begins with the moment, as PushedRobot's stamps.
+  void send() {
+    const std::int64_t now = std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
+    std::memcpy(ping_.filler().data(), &now, sizeof now);
+    endpoints_.write(ping_);
+  }
+
+ private:
+  NoListener listener_;
+  wire::Ping ping_;
+  FloorEndpoints endpoints_;
+};
+
+}  // namespace bench
