@@ -16,9 +16,15 @@ def pinned():
 
 def core(quick, bin_dir, _work):
     """Google Benchmark's figures: a repetition is a value. Repetitions of all are interleaved."""
-    program = bin_dir / "core_bench"
-    if not program.exists():
-        raise processes.Skipped("core_bench is not built")
+    for name in ("core_bench", "time_bench"):
+        program = bin_dir / name
+        if not program.exists():
+            raise processes.Skipped(f"{name} is not built")
+        yield from google_benchmark(program, quick)
+
+
+def google_benchmark(program, quick):
+    """Runs one such program."""
     repetitions, seconds = (5, 0.02) if quick else (11, 0.2)
     printed = processes.output_of(
         pinned() + [program, f"--benchmark_repetitions={repetitions}",
@@ -28,8 +34,11 @@ def core(quick, bin_dir, _work):
     for run in json.loads(printed)["benchmarks"]:
         if run["run_type"] == "iteration":
             # Of the processor: nothing in these waits, and what else runs is not theirs.
-            entry = (run["repetition_index"], run["cpu_time"], run["time_unit"])
-            measured.setdefault(run["run_name"], []).append(entry)
+            value, unit = run["cpu_time"], run["time_unit"]
+            if "bytes" in run:  # what is weighed, not timed
+                value, unit = run["bytes"], "bytes"
+            key = run["run_name"].removesuffix("/iterations:1")
+            measured.setdefault(key, []).append((run["repetition_index"], value, unit))
     for key, entries in measured.items():
         yield figures.summary(key, entries[0][2], [value for _, value, _ in sorted(entries)])
 

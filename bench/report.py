@@ -41,8 +41,29 @@ payload.
 CORE = """\
 Nanoseconds. Ours carries a covariance unless it says pose only; tf2 has none.
 """
+PAST = """\
+In lookups of a while ago all edges move, turning at 1 rad/s, and both sides are asked for the same
+instant between the same samples, again and again. Ours keeps 2,048 samples of an edge by default,
+tf2 those of ten seconds. A sample of an edge with a full past takes {ours} bytes by
+what `past()` says and {heap} by how the heap grows; {tf2} in tf2, without a covariance.
+"""
 CONTENTION = """\
 A writer of 100 joints at 1 kHz, and a reader that looks up a path of 30 of them again and again.
+"""
+PUSHED = """\
+A path of ten edges that another process watches; its owner updates all of them at 1 kHz.
+Microseconds from just before `update()` until a waiting thread has read the new value, beside one
+bare Fast DDS sample of as many bytes and equal QoS, in turns, a core for each process: from before
+`write()` until a waiting thread has it, and until the listener has it, which is one wake-up less.
+"""
+PUSHED_BYTES = """\
+Bytes of a robot with 30 joints, which all move at once. Ours is watched from base to tip, as if all
+joints were one chain: every edge, or the path composed to one transform; both with covariance. For
+tf2 no middleware is here: its message is computed ({tf2} CDR bytes: one `TFMessage` of all 30
+`TransformStamped`, with names such as `left_shoulder_pan_link`), and samples of that size were
+sent by bare Fast DDS to as many listeners. Counted on the loopback interface; UDP is with
+acknowledgements, and for ours with the watchers' renewals. Each watcher is a participant of its own
+and is sent its own copy. Presence and discovery are left out on both sides.
 """
 SCALE = """\
 How the median grows with the number of each. The exponent is that of a power law fitted over all
@@ -198,7 +219,13 @@ def core_rows(figures):
     found = (("ours_by_handle", "by handle"), ("ours_by_name", "by name"),
              ("ours_pose", "pose only, by handle"))
     operations = (("lookup", found, "look up {who}, depth {depth:,} of {frames:,}"),
+                  ("lookup_at", found, "look up {who} 18.5 samples ago at 1 kHz, depth {depth:,}"),
+                  ("lookup_at_far", found,
+                   "look up {who} 200.5 samples ago at 1 kHz, depth {depth:,}"),
+                  ("lookup_at_100hz", found,
+                   "look up {who} 18.5 samples ago at 100 Hz, depth {depth:,}"),
                   ("set", found[:2], "set an edge {who}, {frames:,} frames"),
+                  ("set_past", found, "set an edge {who} whose past is full"),
                   ("add_remove", (("ours", "node"), ("ours_forest", "forest")),
                    "add and remove a leaf, {who}, {frames:,} frames"))
     for operation, all_of_ours, name in operations:
@@ -216,7 +243,12 @@ def core_rows(figures):
 
 def core_section(figures, drawn, home):
     """Beside tf2."""
-    return [CORE, table(("operation", "ours", "tf2", "ours / tf2"), core_rows(figures)),
+    def bytes_of(who):
+        return value(figures, f"core/past_bytes/{who}/2/100", convert=as_measured)
+
+    memory = PAST.format(ours=bytes_of("ours"), heap=bytes_of("ours_heap"),
+                         tf2=bytes_of("tf2_heap"))
+    return [CORE, table(("operation", "ours", "tf2", "ours / tf2"), core_rows(figures)), memory,
             picture(drawn, "core", home)]
 
 
@@ -231,6 +263,32 @@ def contention_section(figures, drawn, home):
                                            for which in ("median", "p99", "p99.9", "max"))))
     return [CONTENTION, table(("figure", "median", "p99", "p99.9", "max"), rows),
             picture(drawn, "contention", home)]
+
+
+def pushed_section(figures, _drawn, _home):
+    """Watched paths: latency beside bare DDS, bytes beside tf2."""
+    ours = "pushed/latency/ours"
+    rows = [(name, *(value(figures, key, which) for which in ("median", "p90", "p99")),
+             number(ratio(figures, ours, key)), number(ratio(figures, ours, key, "p99")))
+            for name, key in (("ours", ours), ("bare DDS, waiting thread", "pushed/latency/dds"),
+                              ("bare DDS, listener", "pushed/latency/dds_listener"))]
+    head = ("latency", "median", "p90", "p99", "ours / this, median", "ours / this, p99")
+    latest = value(figures, "pushed/latest", convert=nanoseconds)
+    cases = sorted({tuple(map(int, key.split("/")[3:])) for key in figures
+                    if key.startswith("pushed/udp/")})
+    sizes = []
+    for rate, watchers in cases:
+        def kilobytes(what, who, case=f"{rate}/{watchers}"):
+            return value(figures, f"pushed/{what}/{who}/{case}",
+                         convert=lambda figure, which: figure[which] / 1e3)
+        sizes.append((f"{rate:,} Hz, {watchers} watching",
+                      *(f"{kilobytes('payload', who)} / {kilobytes('udp', who)}"
+                        for who in ("edges", "composed", "tf2"))))
+    return [PUSHED, table(head, rows),
+            f"Reading the newest value meanwhile, with covariance: {latest} ns.\n",
+            PUSHED_BYTES.format(tf2=value(figures, "pushed/message/tf2", convert=as_measured)),
+            table(("payload / UDP, kB a second", "ours, edges", "ours, composed", "tf2's size"),
+                  sizes)]
 
 
 def scale_table(figures, what):
@@ -266,6 +324,7 @@ SECTIONS = (
     ("On the wire: the thesis's table 5.1", ("wire/",), wire_section),
     ("The floor", ("floor/",), floor_section),
     ("Streamed updates", ("stream/",), stream_section),
+    ("Pushed paths", ("pushed/",), pushed_section),
     ("Own frames, beside tf2", ("core/",), core_section),
     ("A reader beside a writer", ("contention/",), contention_section),
     ("Cost as work grows", ("scale/", "core/"), scale_section),

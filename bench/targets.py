@@ -116,6 +116,22 @@ def _core():
                      unit="µs")
 
 
+def _past():
+    for operation, what in (("lookup_at", "1 kHz"), ("lookup_at_100hz", "100 Hz")):
+        for depth in (2, 8, 30):
+            ours, tf2 = (f"core/{operation}/{who}/{depth}/100" for who in ("ours_by_handle", "tf2"))
+            yield Target("The past", f"lookup between samples of {what}, depth {depth}: "
+                         "by handle, with covariance / tf2", ratio_of(ours, tf2), 0.5)
+
+
+def _pushed():
+    for which in ("median", "p99"):
+        yield Target("Pushed", f"from before update() to a watcher's thread, {which}: ours / bare DDS",
+                     ratio_of("pushed/latency/ours", "pushed/latency/dds", which), 1.5)
+    yield Target("Pushed", "newest value of a path of 10 edges, with covariance",
+                 value_of("pushed/latest", "median", microseconds), 1, unit="µs")
+
+
 def _contention():
     for reader, what in (("covariance", "with covariance"), ("pose", "of the pose only")):
         key = f"contention/ours/{reader}"
@@ -132,7 +148,7 @@ ALL = (
     Target("Across partitions",
            "lookup over 2 to 16 partitions, the worst: decentralized / centralized",
            _worst_over_partitions, 1.3),
-    *_wire(), *_floor(), *_stream(), *_core(), *_contention(),
+    *_wire(), *_floor(), *_stream(), *_core(), *_past(), *_contention(), *_pushed(),
 )
 # Why a target is not reached, by the start of "GROUP: NAME"; said only where it is not.
 WHY = {
@@ -146,6 +162,13 @@ WHY = {
     "Core: set an edge":
         "Two fifths of it are the one locked instruction of the writers' lock, which waits until "
         "the former update's 290 bytes have left the store buffer.",
+    "The past: lookup between samples":
+        "Each edge is interpolated on its geodesic, where tf2 goes straight from one translation to "
+        "the other, and the covariances of both samples are carried to the instant: two products of "
+        "6x6 matrices for each, which tf2 has not.",
+    "Pushed: from before update()":
+        "update() does not wait for the network: it wakes a thread that looks for what is new and "
+        "sends it. That wake-up is what the bare sample, which is sent by the caller, has not.",
     "Core: add and remove a leaf in 100,000 frames, through a node":
         "A node also plans, keeps the pages that others get, and wakes their publisher.",
 }
