@@ -32,14 +32,18 @@ Participant::Participant(std::unique_ptr<Transport> transport, std::string parti
 
 Participant::~Participant() {
   pending_.cancel_all();
-  watching_.store(nullptr);
+  {
+    const std::lock_guard lock(pushing_mutex_);
+    leaving_ = true;
+  }
+  // Both are used by the transport's threads until that has stopped.
+  if (watches_ != nullptr) watches_->stop();
+  if (pusher_ != nullptr) pusher_->stop();
   saver_.reset();
   if (conceder_) conceder_->stop();
   if (publisher_) publisher_->stop();
   (void)commit();
   save_values();
-  watches_.reset();
-  pusher_.reset();
   transport_->stop();
 }
 

@@ -232,7 +232,8 @@ class Participant final : public TransportHandler {
   Calls calls_;
   std::mutex hints_mutex_;
   LatestHints hints_;
-  std::mutex pushing_mutex_;          // pusher_, watches_, as they are made
+  std::mutex pushing_mutex_;          // pusher_ and watches_, as they are made, and leaving_
+  bool leaving_ = false;
   std::unique_ptr<Pusher> pusher_;    // once somebody watches
   std::unique_ptr<Watches> watches_;  // once this process does
   std::atomic<Watches*> watching_{nullptr};

@@ -39,18 +39,18 @@ class AsyncLookup final : public Cancellations::Task {
   using Job = std::function<void(Cancellation&)>;
 
   explicit AsyncLookup(Job job)
-      : thread_([this, job = std::move(job)] {
-          job(cancellation_);
-          done_ = true;
+      : thread_([shared = shared_, job = std::move(job)] {
+          job(shared->cancellation);
+          shared->done = true;
         }) {}
   ~AsyncLookup() override { stop(); }
   AsyncLookup(const AsyncLookup&) = delete;
   AsyncLookup& operator=(const AsyncLookup&) = delete;
 
-  [[nodiscard]] bool done() const override { return done_; }
+  [[nodiscard]] bool done() const override { return shared_->done; }
 
   void stop() override {
-    cancellation_.cancel();
+    shared_->cancellation.cancel();
     const std::lock_guard lock(join_mutex_);
     if (!thread_.joinable()) return;
     if (thread_.get_id() == std::this_thread::get_id()) {
@@ -61,8 +61,13 @@ class AsyncLookup final : public Cancellations::Task {
   }
 
  private:
-  Cancellation cancellation_;
-  std::atomic<bool> done_{false};
+  // What the thread has still where its callback has ended it.
+  struct Shared {
+    Cancellation cancellation;
+    std::atomic<bool> done{false};
+  };
+
+  const std::shared_ptr<Shared> shared_ = std::make_shared<Shared>();
   std::mutex join_mutex_;
   std::thread thread_;  // last: it uses the rest
 };
@@ -284,6 +289,10 @@ Reply Participant::answer_watch(const Request& request) {
   Pusher* pusher = nullptr;
   {
     const std::lock_guard lock(pushing_mutex_);
+    if (leaving_) {
+      const std::string who = "partition " + quote(partition_name_);
+      return {request.sequence, 0, Error{Errc::kNotOwner, who + " is leaving"}};
+    }
     if (pusher_ == nullptr) {
       pusher_ = std::make_unique<Pusher>(
           forest_,

@@ -8,14 +8,14 @@ namespace tfdude {
 Pusher::Pusher(Forest& forest, Push push, End end)
     : forest_(forest), push_(std::move(push)), end_(std::move(end)), thread_([this] { run(); }) {}
 
-Pusher::~Pusher() {
+void Pusher::stop() {
   forest_.on_commit(nullptr);
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
   }
   changed_.notify_one();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 Result<State> Pusher::watch(std::uint64_t group, const WatchRequest& request) {

@@ -26,9 +26,12 @@ class Pusher {
 
   /// @param push  called from the thread, without a lock
   Pusher(Forest& forest, Push push, End end);
-  ~Pusher();
+  ~Pusher() { stop(); }
   Pusher(const Pusher&) = delete;
   Pusher& operator=(const Pusher&) = delete;
+
+  /// Nothing is pushed any more. Who asks to watch then is answered still.
+  void stop();
 
   /// Begins to push to a group, or goes on for another lease. @return all values now; kNotOwner.
   [[nodiscard]] Result<State> watch(std::uint64_t group, const WatchRequest& request);

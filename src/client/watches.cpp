@@ -153,13 +153,15 @@ Result<void> WatchedPath::wait_until_live(std::chrono::steady_clock::time_point 
 
 Watches::Watches(Links links) : links_(std::move(links)), thread_([this] { run(); }) {}
 
-Watches::~Watches() {
+void Watches::stop() {
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
   }
   changed_.notify_one();
+  if (!thread_.joinable()) return;
   thread_.join();
+  const std::lock_guard lock(mutex_);
   for (const auto& path : paths_) {
     path->interrupt({Errc::kTransport, "the client that watched the path has gone"});
   }

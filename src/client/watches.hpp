@@ -97,9 +97,12 @@ class Watches {
   };
 
   explicit Watches(Links links);
-  ~Watches();
+  ~Watches() { stop(); }
   Watches(const Watches&) = delete;
   Watches& operator=(const Watches&) = delete;
+
+  /// The paths get nothing new from now on, and say so.
+  void stop();
 
   /// @return the path; watched as long as somebody else has it
   [[nodiscard]] std::shared_ptr<WatchedPath> watch(const std::string& a, const std::string& b,

@@ -2,6 +2,8 @@
 
 #include <atomic>
 #include <chrono>
+#include <limits>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -204,6 +206,19 @@ TEST_CASE("a lookup waits for its data, no longer than it may, and not for what 
   REQUIRE(chain.tool->add("later", "tool", along_x(100)));
   CHECK(x_of(future.get()) == Approx(3 + 5));
   CHECK(called.get_future().get() == Approx(3 + 5 + 100));
+  // A callback may end what called it.
+  std::atomic<bool> ended{false};
+  PendingLookup ends_itself;
+  std::mutex held;
+  {
+    const std::lock_guard lock(held);
+    ends_itself = chain.client->lookup_async("world", "tool", {}, 1000ms, [&](const auto&) {
+      const std::lock_guard wait(held);
+      ends_itself.cancel();
+      ended = true;
+    });
+  }
+  REQUIRE(testing::eventually([&] { return ended.load(); }));
   std::atomic<int> calls{0};
   auto cancelled =
       chain.client->lookup_async("world", "never", {}, 20'000ms, [&](const auto&) { ++calls; });
