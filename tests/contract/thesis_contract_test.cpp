@@ -13,6 +13,7 @@
 #include "support/catch.hpp"
 #include "support/networks.hpp"
 #include "support/pose_diff.hpp"
+#include "support/process.hpp"
 #include "support/random.hpp"
 
 namespace tfdude {
@@ -28,6 +29,9 @@ struct Robot {
     arms.emplace(*Node::open(join("arms"), "arms",
                              load_config(TFDUDE_EXAMPLES "/thesis/arms.yaml")->frames));
     client.emplace(*Client::open(join("")));
+    // Who was there before hears of a newcomer's frames a moment later.
+    for (Client* one : all())
+      REQUIRE(testing::eventually([&] { return one->frames().size() == 9; }));
   }
   std::vector<Client*> all() { return {&*robot, &*arms, &*client}; }
 
