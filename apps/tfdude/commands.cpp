@@ -22,10 +22,6 @@ void print_error(std::string_view code, std::string_view message) {
   print(dump({{"error", {{"code", code}, {"message", message}}}}) + "\n");
 }
 
-Time wall_clock() {
-  return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
-}
-
 // Those that end what goes on and on; main() has blocked them.
 sigset_t signals_to_stop() {
   sigset_t signals;
@@ -62,6 +58,10 @@ int refuse_pose(const Error& error, const Arguments& arguments) {
 }
 
 }  // namespace
+
+Time wall_clock() {
+  return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
+}
 
 int answer(const Arguments& arguments, const nlohmann::json& json, const std::string& text) {
   print(arguments.json ? dump(json) + "\n" : text);
@@ -153,14 +153,18 @@ int run_partitions(Client& client, const Arguments& arguments) {
       text += "  frames " + std::to_string(partition.frames) + "  host " + partition.host +
               "  pid " + std::to_string(partition.pid);
     }
-    if (const auto pasts = client.pasts(partition.name); partition.reachable && pasts) {
+    if (!partition.reachable) {
+      text += "  unreachable since " + to_string(partition.since) + "\n";
+      continue;
+    }
+    if (const auto pasts = client.pasts(partition.name)) {
       const PastSum sum = sum_of(*pasts);
       json.back()["moving"] = sum.edges;
       json.back()["samples"] = sum.samples;
       json.back()["history_bytes"] = sum.bytes;
       if (sum.edges > 0) text += "  history " + describe(sum);
     }
-    text += partition.reachable ? "\n" : "  unreachable since " + to_string(partition.since) + "\n";
+    text += "\n";
   }
   return answer(arguments, {{"partitions", json}}, text);
 }

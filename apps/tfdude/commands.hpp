@@ -36,6 +36,8 @@ struct Arguments {
   bool once = false;
 };
 
+[[nodiscard]] Time wall_clock();
+
 /// A stamp as written on the command line: decimal seconds since the epoch, exact to nanoseconds, or, where negative,
 /// before now. @return kInvalidInput naming the text.
 [[nodiscard]] Result<Time> parse_stamp(const std::string& text, Time now);

@@ -1,22 +1,13 @@
 #include "render.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <map>
+
+#include "format.hpp"
 
 namespace tfdude::cli {
 namespace {
-
-constexpr double kDegrees = 57.29577951308232;
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-  std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(), pattern, values...);
-  return text.data();
-}
 
 using Children = std::map<std::string, std::vector<const Frame*>>;
 

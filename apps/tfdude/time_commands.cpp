@@ -14,10 +14,6 @@
 namespace tfdude::cli {
 namespace {
 
-Time wall_clock() {
-  return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
-}
-
 std::chrono::nanoseconds from_milliseconds(double milliseconds) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(milliseconds * 1e6));
 }

@@ -1,19 +1,9 @@
 #include "time_render.hpp"
 
-#include <array>
-#include <cstdio>
+#include "format.hpp"
 
 namespace tfdude::cli {
 namespace {
-
-constexpr double kDegrees = 57.29577951308232;
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-  std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(), pattern, values...);
-  return text.data();
-}
 
 double seconds(std::chrono::nanoseconds duration) {
   return static_cast<double>(duration.count()) * 1e-9;

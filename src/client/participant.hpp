@@ -232,7 +232,7 @@ class Participant final : public TransportHandler {
   Calls calls_;
   std::mutex hints_mutex_;
   LatestHints hints_;
-  std::mutex pushing_mutex_;          // pusher_ and watches_, as they are made, and leaving_
+  std::mutex pushing_mutex_;  // pusher_ and watches_, as they are made, and leaving_
   bool leaving_ = false;
   std::unique_ptr<Pusher> pusher_;    // once somebody watches
   std::unique_ptr<Watches> watches_;  // once this process does

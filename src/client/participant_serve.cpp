@@ -23,12 +23,6 @@ constexpr Milliseconds kConcedeEvery{100};
 // How often own changes of the structure are published at most.
 constexpr Milliseconds kPublishEvery{1};
 
-std::uint64_t nanoseconds_since_epoch() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return static_cast<std::uint64_t>(
-      std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
-}
-
 std::string host_name() {
   std::array<char, 256> name{};
   if (gethostname(name.data(), name.size() - 1) != 0) return "unknown";
@@ -59,7 +53,7 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   {
     const std::lock_guard lock(structure_mutex_);
     presence_ = {partition_name_,
-                 nanoseconds_since_epoch(),
+                 static_cast<std::uint64_t>(nanoseconds(wall_clock())),
                  host_name(),
                  static_cast<std::uint32_t>(getpid()),
                  0,

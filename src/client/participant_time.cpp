@@ -206,52 +206,20 @@ Result<std::vector<PastInfo>> Participant::pasts(const std::string& partition) {
 // --- pushed paths ---
 
 Result<WatchedPath::Route> Participant::plan_watch(const WatchedPath& path) {
-  const std::lock_guard lock(structure_mutex_);
   const WatchOptions& options = path.options();
-  auto edges = forest_.edges(path.a(), path.b());
-  if (!edges) return tl::unexpected(std::move(edges.error()));
-  WatchedPath::Route route;
-  const auto part_of = [&](Owner owner, const std::string& id) -> std::size_t {
-    for (std::size_t i = 0; i < route.parts.size(); ++i) {
-      if (route.parts[i].owner == owner) return i;
-    }
-    WatchRequest request;
-    if (options.rate > 0) {
-      request.period = std::chrono::nanoseconds(std::llround(1e9 / options.rate));
-    }
-    route.parts.push_back({owner, directory_.name(owner), Request{0, id, std::move(request)}});
-    const auto serving = directory_.serving(directory_.name(owner));
-    route.sources.push_back({directory_.name(owner), serving ? serving->incarnation : 0, 0, {}});
-    return route.parts.size() - 1;
-  };
-  if (options.composed) {
-    const auto segments = forest_.segments(path.a(), path.b());
-    if (!segments) return tl::unexpected(segments.error());
-    for (const Segment& segment : *segments) {
-      const auto from = forest_.info(segment.from);
-      const auto& id = from && from->owner == segment.owner ? segment.from : segment.to;
-      const std::size_t part = part_of(segment.owner, id);
-      std::get<WatchRequest>(route.parts[part].request.body)
-          .segments.push_back({segment.from, segment.to});
-      route.sources[part].frames.push_back(segment.to);
-      route.edges.push_back({segment.to, segment.from, segment.owner, true, 0});
-    }
-  } else {
-    for (FrameInfo& edge : *edges) {
-      const std::size_t part = part_of(edge.owner, edge.id);
-      std::get<WatchRequest>(route.parts[part].request.body).edges.push_back(edge.id);
-      route.sources[part].frames.push_back(edge.id);
-    }
-    route.edges = *std::move(edges);
-  }
-  for (std::size_t i = 0; i < route.parts.size(); ++i) {
-    const Part& part = route.parts[i];
-    if (part.owner != kHeldHere && !directory_.reachable(part.owner)) {
-      return fail(Errc::kUnreachable, "partition " + quote(part.partition) +
-                                          " is not reachable since " +
-                                          to_string(directory_.info(part.owner).since));
-    }
-    route.sources[i].group = watch_group(part.partition, std::get<WatchRequest>(part.request.body));
+  std::chrono::nanoseconds period{0};
+  if (options.rate > 0) period = std::chrono::nanoseconds(std::llround(1e9 / options.rate));
+  const std::lock_guard lock(structure_mutex_);
+  auto plan = route_watch(forest_, directory_, path.a(), path.b(), options.composed, period);
+  if (!plan) return tl::unexpected(std::move(plan.error()));
+  WatchedPath::Route route{std::move(plan->edges), {}, std::move(plan->parts)};
+  for (const Part& part : route.parts) {
+    const auto& request = std::get<WatchRequest>(part.request.body);
+    const auto serving = directory_.serving(part.partition);
+    WatchedPath::Source source{part.partition, serving ? serving->incarnation : 0,
+                               watch_group(part.partition, request), request.edges};
+    for (const PathEnds& segment : request.segments) source.frames.push_back(segment.to);
+    route.sources.push_back(std::move(source));
   }
   return route;
 }

@@ -113,9 +113,8 @@ void WatchedPath::apply(const State& state) {
 void WatchedPath::write(const Source& source, const State& state) {
   auto entry = state.entries.begin();
   while (entry != state.entries.end()) {
-    const auto end = std::find_if(entry, state.entries.end(), [&](const StateEntry& other) {
-      return other.stamp != entry->stamp;
-    });
+    const auto end = std::find_if(entry, state.entries.end(),
+                                  [&](const News& other) { return other.stamp != entry->stamp; });
     std::vector<EdgeUpdate> together;
     for (auto one = entry; one != end; ++one) {
       if (one->index >= source.frames.size()) return;
@@ -129,7 +128,7 @@ void WatchedPath::write(const Source& source, const State& state) {
   }
 }
 
-void WatchedPath::write(const std::string& frame, const StateEntry& entry) {
+void WatchedPath::write(const std::string& frame, const News& entry) {
   const auto written = mirror_.update(frame, entry.X, entry.stamp);
   if (written || entry.stamp) return;
   // It was moving, and is not any more.

@@ -67,7 +67,7 @@ class WatchedPath {
 
  private:
   void write(const Source& source, const State& state);
-  void write(const std::string& frame, const StateEntry& entry);
+  void write(const std::string& frame, const News& entry);
   void rebuild(const Route& route);
 
   const std::string a_;

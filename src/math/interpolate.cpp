@@ -6,6 +6,7 @@
 
 #include "math/interpolate_far.hpp"
 #include "math/kernel.hpp"
+#include "math/small_angle.hpp"
 
 namespace tfdude {
 namespace {
@@ -17,11 +18,7 @@ constexpr double kSmallAngle = 0.1;
 // ad(ξ) are 0, once in a block, and ±iθ, twice each, so the polynomial of fourth degree that agrees with g there, at ±iθ
 // with its derivative, is g (Higham, Functions of Matrices, definition 1.4).
 std::array<double, 4> coefficients(double s, double angle) {
-  if (angle < kSmallAngle) {
-    const double rest = 1.0 - s;
-    return {0.5 * rest, rest * (1.0 - 2.0 * s) / 12.0, -s * rest * rest / 24.0,
-            -1.0 / 720.0 + s * s * (1.0 / 72.0 - s / 48.0 + s * s / 120.0)};
-  }
+  if (angle < kSmallAngle) return small_angle_coefficients(s);
   using Complex = std::complex<double>;
   const Complex down_s = std::exp(Complex(0.0, -s * angle));
   const Complex down = std::exp(Complex(0.0, -angle));

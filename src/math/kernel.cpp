@@ -2,6 +2,8 @@
 
 #include <cstring>
 
+#include "math/small_angle.hpp"
+
 namespace tfdude::kernel {
 namespace {
 

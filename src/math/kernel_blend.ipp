@@ -68,9 +68,9 @@ inline Ways ways_between(const Poses& X0, const Poses& X1, V4& sine2) {
 inline Poses go(const Poses& X0, const Ways& ways, V4 s) {
   const V4 f = s * s * ways.angle2;
   const Vec once = cross(ways.theta, ways.rho);
-  const Vec t = s * ways.rho + (s * s * (0.5 - f * (1.0 / 24 - f * (1.0 / 720)))) * once +
-                (s * s * s * (1.0 / 6 - f * (1.0 / 120 - f * (1.0 / 5040)))) *
-                    cross(ways.theta, once);
+  const Vec t =
+      s * ways.rho + (s * s * (0.5 - f * (1.0 / 24 - f * (1.0 / 720)))) * once +
+      (s * s * s * (1.0 / 6 - f * (1.0 / 120 - f * (1.0 / 5040)))) * cross(ways.theta, once);
   const V4 h = 0.25 * f;
   const Vec v = (0.5 * s * (1.0 - h * (1.0 / 6 - h * (1.0 / 120)))) * ways.theta;
   const V4 w = 1.0 - h * (0.5 - h * (1.0 / 24 - h * (1.0 / 720)));
@@ -96,7 +96,8 @@ inline double square(const double* a) { return a[0] * a[0] + a[1] * a[1] + a[2] 
 inline void carry(const Way& way, const double* c, const double* upper, Blocks& sum) {
   const double a = c[0] - c[2] * way.angle2;
   const double b = c[1] - c[3] * way.angle2;
-  const double along = way.theta[0] * way.rho[0] + way.theta[1] * way.rho[1] + way.theta[2] * way.rho[2];
+  const double along =
+      way.theta[0] * way.rho[0] + way.theta[1] * way.rho[1] + way.theta[2] * way.rho[2];
   const double da = -2.0 * along * c[2];
   const double db = -2.0 * along * c[3];
   const double* t = way.theta;
@@ -127,15 +128,11 @@ inline void store_upper(const Blocks& sum, double* u) {
   }
 }
 
-// Coefficients of Jr(s ξ) Jr⁻¹(ξ), as coefficients() of interpolate.cpp.
 inline void carry_weighted(const Way& way, double s, double weight, const double* upper,
                            Blocks& sum) {
-  const double rest = 1.0 - s;
-  const double c[4] = {0.5 * rest, rest * (1.0 - 2.0 * s) / 12.0, -s * rest * rest / 24.0,
-                       -1.0 / 720.0 + s * s * (1.0 / 72.0 - s / 48.0 + s * s / 120.0)};
   double weighted[21];
   for (int k = 0; k < 21; ++k) weighted[k] = weight * upper[k];
-  carry(way, c, weighted, sum);
+  carry(way, small_angle_coefficients(s).data(), weighted, sum);
 }
 
 // The same covariance at both ends is what it is between them, but for s (1-s)/4 ad(ξ) Σ ad(ξ)ᵀ and terms of fourth order:
@@ -143,8 +140,8 @@ inline void carry_weighted(const Way& way, double s, double weight, const double
 inline bool add_bulge(const Way& way, double s, const double* upper, Blocks& sum) {
   constexpr double kLittle = 16e-6;
   const double turned = upper[15] + upper[18] + upper[20];
-  const bool stays = way.angle2 < kLittle && square(way.rho) * turned <=
-                                                 kLittle * (upper[0] + upper[6] + upper[11]);
+  const bool stays = way.angle2 < kLittle &&
+                     square(way.rho) * turned <= kLittle * (upper[0] + upper[6] + upper[11]);
   if (stays) return false;
   const V4 theta{way.theta[0], way.theta[1], way.theta[2], 0};
   const V4 rho{way.rho[0], way.rho[1], way.rho[2], 0};

@@ -46,6 +46,12 @@ Result<void> check_all_reachable(const Directory& directory, const std::vector<P
   return {};
 }
 
+// Of the two ends, the one that the segment's owner owns: where it goes up, the lower one.
+const std::string& owned_end(const Forest& forest, const Segment& segment) {
+  const auto from = forest.info(segment.from);
+  return from && from->owner == segment.owner ? segment.from : segment.to;
+}
+
 }  // namespace
 
 Result<Part> route_to(const Directory& directory, Owner owner, Request request) {
@@ -154,10 +160,8 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
   if (!segments) return tl::unexpected(segments.error());
   LookupPlan plan{*std::move(segments), {}};
   for (const Segment& segment : plan.segments) {
-    // Of the two ends, the one that the segment's owner owns: where it goes up, the lower one.
-    const auto from = forest.info(segment.from);
-    const auto& id = from && from->owner == segment.owner ? segment.from : segment.to;
-    auto& body = body_for<LookupRequest>(plan.parts, directory, segment.owner, id);
+    auto& body =
+        body_for<LookupRequest>(plan.parts, directory, segment.owner, owned_end(forest, segment));
     body.segments.push_back({segment.from, segment.to});
     body.instant = instant;
     body.hint = hint;
@@ -167,6 +171,40 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
     const auto& share = std::get<LookupRequest>(part.request.body).segments;
     if (auto ok = check_size(part, share.size(), "segments"); !ok)
       return tl::unexpected(ok.error());
+  }
+  return plan;
+}
+
+Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
+                              const std::string& a, const std::string& b, bool composed,
+                              std::chrono::nanoseconds period) {
+  WatchPlan plan;
+  const auto body_of = [&](Owner owner, const std::string& id) -> WatchRequest& {
+    auto& body = body_for<WatchRequest>(plan.parts, directory, owner, id);
+    body.period = period;
+    return body;
+  };
+  if (composed) {
+    const auto segments = forest.segments(a, b);
+    if (!segments) return tl::unexpected(segments.error());
+    for (const Segment& segment : *segments) {
+      body_of(segment.owner, owned_end(forest, segment))
+          .segments.push_back({segment.from, segment.to});
+      plan.edges.push_back({segment.to, segment.from, segment.owner, true, 0});
+    }
+  } else {
+    auto edges = forest.edges(a, b);
+    if (!edges) return tl::unexpected(std::move(edges.error()));
+    for (const FrameInfo& edge : *edges) {
+      body_of(edge.owner, edge.id).edges.push_back(edge.id);
+    }
+    plan.edges = *std::move(edges);
+  }
+  if (auto ok = check_all_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
+  for (const Part& part : plan.parts) {
+    const auto& body = std::get<WatchRequest>(part.request.body);
+    const std::size_t items = std::max(body.edges.size(), body.segments.size());
+    if (auto ok = check_size(part, items, "edges"); !ok) return tl::unexpected(ok.error());
   }
   return plan;
 }

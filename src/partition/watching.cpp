@@ -70,20 +70,13 @@ Result<State> WatchedGroup::snapshot(const Forest& forest) {
       !std::equal(cursors.begin(), cursors.end(), cursors_.begin(), moved)) {
     cursors_ = cursors;
   }
-  State state{id_, {}};
-  for (News& one : forest.news(cursors, true))
-    state.entries.push_back({one.index, one.stamp, one.X});
-  return state;
+  return State{id_, forest.news(cursors, true)};
 }
 
 State WatchedGroup::news(const Forest& forest) {
   if (!request_.segments.empty()) return composed_news(forest);
-  State state{id_, {}};
   const bool newest_only = request_.period > std::chrono::nanoseconds(0);
-  for (News& one : forest.news(cursors_, newest_only)) {
-    state.entries.push_back({one.index, one.stamp, one.X});
-  }
-  return state;
+  return {id_, forest.news(cursors_, newest_only)};
 }
 
 State WatchedGroup::composed_news(const Forest& forest) {
@@ -92,7 +85,7 @@ State WatchedGroup::composed_news(const Forest& forest) {
   if (!found) return state;
   sent_.resize(found->values.size());
   for (std::uint32_t i = 0; i < found->values.size(); ++i) {
-    StateEntry entry{i, found->stamp, found->values[i]};
+    News entry{i, found->stamp, found->values[i]};
     const auto& sent = sent_[i];
     const bool again =
         sent && entry.stamp == sent->stamp && (entry.stamp || same(entry.X, sent->X));

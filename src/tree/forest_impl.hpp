@@ -123,7 +123,7 @@ class Forest::Impl {
     return version.held() && version.generation == frame.generation ? &version : nullptr;
   }
 
-  /// One edge, with a value that was checked, of which may_be_moving() or a stamp says that it may be a sample.
+  /// One edge, given by its newest version.
   [[nodiscard]] Result<void> update_one(const HeldVersion& edge, const Transform& X_PC,
                                         std::optional<Time> stamp);
   [[nodiscard]] bool may_be_moving(const HeldVersion& edge) const {

@@ -272,11 +272,16 @@ Result<void> Forest::release(std::string_view id) {
 
 Result<void> Forest::Impl::update_one(const HeldVersion& edge, const Transform& X_PC,
                                       std::optional<Time> stamp) {
+  if (!is_finite(X_PC)) return check_value(edge.name->text, X_PC);
   const std::uint32_t slot = edge.slot;
-  const auto at = stamp_for(&slot, 1, stamp);
-  if (!at) return tl::unexpected(at.error());
-  if (auto ok = check_sample(edge, *at); !ok) return ok;
-  push_value(slot, X_PC, *at);
+  if (stamp || may_be_moving(edge)) {
+    const auto at = stamp_for(&slot, 1, stamp);
+    if (!at) return tl::unexpected(at.error());
+    if (auto ok = check_sample(edge, *at); !ok) return ok;
+    push_value(slot, X_PC, *at);
+  } else {
+    push_held(slot, X_PC);
+  }
   commit();
   return {};
 }
@@ -285,24 +290,14 @@ Result<void> Forest::update(std::string_view id, const Transform& X_PC, std::opt
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
-  const HeldVersion& edge = impl_->newest_value(*slot);
-  if (!is_finite(X_PC)) return check_value(id, X_PC);
-  if (stamp || impl_->may_be_moving(edge)) return impl_->update_one(edge, X_PC, stamp);
-  impl_->push_held(*slot, X_PC);
-  impl_->commit();
-  return {};
+  return impl_->update_one(impl_->newest_value(*slot), X_PC, stamp);
 }
 
 Result<void> Forest::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
   const std::lock_guard lock(impl_->mutex_);
   const Version* version = impl_->newest_held(frame);
   if (version == nullptr) return tl::unexpected(impl_->held_slot(frame).error());
-  if (!is_finite(X_PC)) return check_value(version->name->text, X_PC);
-  const auto& edge = static_cast<const HeldVersion&>(*version);
-  if (stamp || impl_->may_be_moving(edge)) return impl_->update_one(edge, X_PC, stamp);
-  impl_->push_held(frame.slot, X_PC);
-  impl_->commit();
-  return {};
+  return impl_->update_one(static_cast<const HeldVersion&>(*version), X_PC, stamp);
 }
 
 template <class Update, class Frame>

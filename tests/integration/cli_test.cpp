@@ -19,17 +19,9 @@ using testing::ContainsSubstring;
 using testing::eventually;
 using testing::in_time;
 using testing::Process;
+using testing::text;
 using testing::ThesisDaemons;
 using Arguments = std::vector<std::string>;
-
-/// What a command prints for people, where all is well.
-std::string text(const ThesisDaemons& d, const Arguments& arguments) {
-  const CliResult result = d.domain.cli(arguments);
-  INFO(result.err);
-  CHECK(result.status == 0);
-  CHECK(result.err.empty());
-  return result.out;
-}
 
 /// One line of JSON, and nothing else.
 json parse_line(const CliResult& result) {

@@ -20,15 +20,9 @@ using testing::ContainsSubstring;
 using testing::eventually;
 using testing::in_time;
 using testing::Process;
+using testing::text;
 using testing::ThesisDaemons;
 using Arguments = std::vector<std::string>;
-
-std::string text(const ThesisDaemons& d, const Arguments& arguments) {
-  const CliResult result = d.domain.cli(arguments);
-  INFO(result.err);
-  CHECK(result.status == 0);
-  return result.out;
-}
 
 json answered(const ThesisDaemons& d, Arguments arguments, int status = 0) {
   arguments.insert(arguments.begin(), "--json");

@@ -2,7 +2,9 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "support/catch.hpp"
 #include "support/test_domain.hpp"
 
 namespace tfdude::testing {
@@ -17,5 +19,15 @@ struct ThesisDaemons {
   Process robot = domain.serve(kRobotFile);
   std::optional<Process> arms = domain.serve(kArmsFile);
 };
+
+/// What a command prints for people, where all is well.
+[[nodiscard]] inline std::string text(const ThesisDaemons& d,
+                                      const std::vector<std::string>& arguments) {
+  const CliResult result = d.domain.cli(arguments);
+  INFO(result.err);
+  CHECK(result.status == 0);
+  CHECK(result.err.empty());
+  return result.out;
+}
 
 }  // namespace tfdude::testing

@@ -78,17 +78,10 @@ struct Request {
       body;
 };
 
-/// The value of one of the edges, or segments, that a group watches.
-struct StateEntry {
-  std::uint32_t index = 0;  ///< in the WatchRequest
-  std::optional<Time> stamp;
-  Transform X;
-};
-
 /// Values of watched edges, in the order in which they became what they are.
 struct State {
-  std::uint64_t group = 0;  ///< watch_group() of the owner and the request
-  std::vector<StateEntry> entries;
+  std::uint64_t group = 0;    ///< watch_group() of the owner and the request
+  std::vector<News> entries;  ///< by the index of the edge, or segment, in the request
 };
 
 struct Done {};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -60,6 +61,20 @@ struct LookupPlan {
                                               const std::string& a, const std::string& b,
                                               const Instant& instant = {},
                                               std::optional<Time> hint = std::nullopt);
+
+/// A watch: the edges that tell where b is in a, in order, and a WatchRequest for each owner of some of them.
+struct WatchPlan {
+  std::vector<FrameInfo>
+      edges;  ///< where it is composed, one a segment, named by the frame where that ends
+  std::vector<Part> parts;
+};
+
+/// @param composed  whole segments are watched instead of their edges
+/// @param period  no more often than this; 0: every sample
+/// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable, kInvalidInput.
+[[nodiscard]] Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
+                                            const std::string& a, const std::string& b,
+                                            bool composed, std::chrono::nanoseconds period);
 
 /// X_AB of the answers to a plan's parts (same order); identity where the plan has none. The values must be of one
 /// instant (one_instant()).

@@ -31,8 +31,8 @@ class WatchedGroup {
 
   std::uint64_t id_;
   WatchRequest request_;
-  std::vector<EdgeCursor> cursors_;              // by edge
-  std::vector<std::optional<StateEntry>> sent_;  // by segment
+  std::vector<EdgeCursor> cursors_;        // by edge
+  std::vector<std::optional<News>> sent_;  // by segment
 };
 
 }  // namespace tfdude

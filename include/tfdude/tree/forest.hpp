@@ -93,7 +93,7 @@ struct EdgeCursor {
   std::uint64_t commit = 0;   ///< in which a value was written that holds for all times
 };
 
-/// A value of the edge of a cursor, by the cursor's index.
+/// A value of one of several edges, by its index among them.
 struct News {
   std::uint32_t index = 0;
   std::optional<Time> stamp;

@@ -30,7 +30,7 @@ struct PushingOwner {
   }
   void push(const State& state) {
     const std::lock_guard lock(mutex);
-    for (const StateEntry& entry : state.entries) pushed[state.group].push_back(entry.stamp);
+    for (const News& entry : state.entries) pushed[state.group].push_back(entry.stamp);
   }
   std::size_t count(std::uint64_t group) {
     const std::lock_guard lock(mutex);

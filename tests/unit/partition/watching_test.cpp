@@ -29,7 +29,7 @@ struct Arm {
 // "index@stamp=x", in the order of the entries.
 std::string listed(const State& state) {
   std::string text;
-  for (const StateEntry& entry : state.entries) {
+  for (const News& entry : state.entries) {
     text += std::to_string(entry.index) + "@" +
             (entry.stamp ? std::to_string(nanoseconds(*entry.stamp) / 1'000'000) : "-") + "=" +
             std::to_string(std::lround(entry.X.pose.translation().x())) + " ";
