@@ -18,7 +18,8 @@ DDS_FOLDER = "src/transport/fastdds/"
 
 # (what, pattern of the include, folders or files that may include it)
 CONFINED = [
-    ("Boost", r"boost/", ["src/tree/graph.hpp"]),
+    ("Boost", r"boost/(?!math/)", ["src/tree/graph.hpp"]),
+    ("Boost.Math", r"boost/math/", ["src/math/fusion.cpp"]),
     ("DDS", r"(fastdds|fastrtps|fastcdr)/", [DDS_FOLDER]),
     ("yaml-cpp", r"yaml-cpp/", ["src/client/"]),
     ("SQLite", r"sqlite3\.h$", ["src/store/"]),
@@ -103,8 +104,9 @@ class Checker:
             if re.match(pattern, name) and layer in layers:
                 self.report(path, position, "barred", f"<{name}>: {layer} does without {what}")
         standard = "/" not in name and "." not in name
-        if layer == "math" and not standard and not name.startswith("Eigen/"):
-            self.report(path, position, "math", f"<{name}>: math knows only Eigen, base and std")
+        if layer == "math" and not standard and not name.startswith(("Eigen/", "boost/math/")):
+            self.report(path, position, "math",
+                        f"<{name}>: math knows only Eigen, Boost.Math, base and std")
 
     def check_own(self, path, layer, position, name, target):
         other = layer_of(target)

@@ -1,0 +1,93 @@
+#include "tfdude/math/fusion.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include <boost/math/distributions/chi_squared.hpp>
+
+#include "tfdude/math/perturbation.hpp"
+
+#include "math/minimum.hpp"
+#include "math/semidefinite.hpp"
+
+namespace tfdude {
+namespace {
+
+constexpr int kMostIterations = 100;
+constexpr double kConverged = 1e-12;
+// Of what two estimates know exactly, a difference that can be rounding.
+constexpr double kAgrees = 1e-9;
+
+// N(mean, covariance) of the perturbation of some pose.
+struct Gaussian {
+  Twist mean;
+  Matrix6d covariance;
+};
+
+// What an estimate says of δ in X_true = X Exp(δ): Log(Xₖ⁻¹ X Exp(δ)) = e + Jr⁻¹(e) δ is of mean zero, and Jr(e) e = e.
+Gaussian seen_from(const Pose& X, const Transform& estimate) {
+  const Twist e = log(estimate.pose.inverse() * X);
+  const Matrix6d J = right_jacobian(e);
+  return {-e, J * estimate.covariance.matrix() * J.transpose()};
+}
+
+// Product of two Gaussians by the gain, which needs no inverse of either. False where they contradict each other.
+bool merge(Gaussian& sum, const Gaussian& more) {
+  const Matrix6d S = sum.covariance + more.covariance;
+  const Matrix6d inverse = pseudo_inverse(S);
+  const Twist innovation = more.mean - sum.mean;
+  if ((innovation - S * (inverse * innovation)).cwiseAbs().maxCoeff() > kAgrees) return false;
+  const Matrix6d gain = sum.covariance * inverse;
+  const Matrix6d rest = Matrix6d::Identity() - gain;
+  sum.mean += gain * innovation;
+  sum.covariance =
+      rest * sum.covariance * rest.transpose() + gain * more.covariance * gain.transpose();
+  return true;
+}
+
+Transform weighted(const Transform& X, double weight) {
+  return {X.pose, Covariance::trusted(Matrix6d(X.covariance.matrix() / weight))};
+}
+
+}  // namespace
+
+Result<Fused> fuse(const std::vector<Transform>& estimates) {
+  if (estimates.empty()) return fail(Errc::kInvalidInput, "no estimate to fuse");
+  Pose X = estimates.front().pose;
+  for (int iteration = 1; iteration <= kMostIterations; ++iteration) {
+    Gaussian sum = seen_from(X, estimates.front());
+    for (std::size_t k = 1; k < estimates.size(); ++k) {
+      if (!merge(sum, seen_from(X, estimates[k]))) {
+        return fail(Errc::kInvalidInput,
+                    "estimate " + std::to_string(k) +
+                        " contradicts those before it in what all know exactly");
+      }
+    }
+    X = X * exp(sum.mean);
+    // The size that a translation has is rounded to.
+    const double scale = 1.0 + X.translation().cwiseAbs().maxCoeff();
+    if (sum.mean.cwiseAbs().maxCoeff() <= kConverged * scale) {
+      return Fused{{X, Covariance::trusted(nearest_semidefinite(sum.covariance))}, iteration};
+    }
+  }
+  return fail(Errc::kInvalidInput, "the estimates lie too far apart to be fused");
+}
+
+Result<Fused> intersect(const Transform& A, const Transform& B) {
+  const Twist unit = units_of(A.covariance.matrix().diagonal() + B.covariance.matrix().diagonal());
+  const auto size_at = [&](double omega) {
+    const auto fused = fuse({weighted(A, omega), weighted(B, 1.0 - omega)});
+    if (!fused) return std::numeric_limits<double>::infinity();
+    return unit.dot(fused->X.covariance.matrix().diagonal());
+  };
+  const double omega = minimum_within_unit(size_at);
+  if (unit.dot(A.covariance.matrix().diagonal()) <= size_at(omega)) return Fused{A, 0};
+  if (unit.dot(B.covariance.matrix().diagonal()) <= size_at(omega)) return Fused{B, 0};
+  return fuse({weighted(A, omega), weighted(B, 1.0 - omega)});
+}
+
+double chi_squared_quantile(double probability, int dimensions) {
+  return boost::math::quantile(boost::math::chi_squared(dimensions), probability);
+}
+
+}  // namespace tfdude

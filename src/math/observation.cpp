@@ -1,0 +1,217 @@
+#include "tfdude/math/observation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/math/fusion.hpp"
+#include "tfdude/math/perturbation.hpp"
+
+#include "math/joint_prior.hpp"
+#include "math/minimum.hpp"
+#include "math/observed_shares.hpp"
+#include "math/semidefinite.hpp"
+
+namespace tfdude {
+namespace {
+
+constexpr int kMostIterations = 100;
+constexpr double kConverged = 1e-12;
+// Of a difference in what is known exactly on both sides, what can be rounding.
+constexpr double kAgrees = 1e-9;
+
+// h(ξ) = Log(Z⁻¹ X_AB(ξ)) where the path is now, and its derivative by each edge's ξ.
+struct Linear {
+  Twist h;
+  std::vector<Matrix6d> H;
+};
+
+Linear linearize(const std::vector<ObservedEdge>& path, const std::vector<Twist>& xi,
+                 const Transform& Z_AB) {
+  Linear linear{Twist::Zero(), std::vector<Matrix6d>(path.size())};
+  Pose X_FB;  // F: where the path is, coming from its end
+  for (std::size_t k = path.size(); k-- > 0;) {
+    const Pose X_PC = path[k].X_PC.pose * exp(xi[k]);
+    const Pose X_CB = path[k].up ? X_PC.inverse() * X_FB : X_FB;
+    const double sign = path[k].up ? -1.0 : 1.0;
+    linear.H[k] = sign * adjoint(X_CB.inverse()) * right_jacobian(xi[k]);
+    X_FB = path[k].up ? X_CB : X_PC * X_CB;
+  }
+  linear.h = log(Z_AB.pose.inverse() * X_FB);
+  const Matrix6d outer = right_jacobian(linear.h).inverse();
+  for (Matrix6d& H : linear.H) H = (outer * H).eval();
+  return linear;
+}
+
+// One observation under way.
+class Update {
+ public:
+  Update(const std::vector<ObservedEdge>& path, const Transform& Z_AB,
+         const ObserveOptions& options)
+      : path_(path),
+        Z_AB_(Z_AB),
+        options_(options),
+        prior_(path),
+        xi_(path.size(), Twist::Zero()),
+        linear_(linearize(path, xi_, Z_AB)),
+        R_(Z_AB.covariance.matrix()),
+        independent_(options.independent) {}
+
+  Result<Observation> run() {
+    if (auto ok = count_unknown(); !ok) return tl::unexpected(std::move(ok.error()));
+    Observation observation;
+    judge(observation);
+    for (const ObservedEdge& edge : path_) observation.edges.push_back({edge.X_PC, false, {}});
+    if (independent_) note_surprise(observation);
+    if (!observation.accepted) return observation;
+    if (!independent_ && !weigh()) return observation;
+    if (auto ok = iterate(); !ok) return tl::unexpected(std::move(ok.error()));
+    apply(observation);
+    return observation;
+  }
+
+ private:
+  // What is unknown counts to the measurement, unless it is all there is to correct.
+  Result<void> count_unknown() {
+    std::vector<std::size_t> unknown;
+    for (std::size_t k = 0; k < path_.size(); ++k) {
+      if (path_[k].X_PC.unknown && !path_[k].X_PC.unknown->matrix().isZero(0)) unknown.push_back(k);
+    }
+    if (!prior_.edges().empty()) {
+      Covariance R = Z_AB_.covariance;
+      for (const std::size_t k : unknown) {
+        const Matrix6d& H = linear_.H[k];
+        R = bound(
+            R, Covariance::trusted(Matrix6d(H * path_[k].X_PC.unknown->matrix() * H.transpose())));
+      }
+      R_ = R.matrix();
+    } else if (unknown.size() == 1) {
+      prior_.take_unknown(unknown.front());
+    } else if (unknown.empty()) {
+      return fail(Errc::kInvalidInput, "no edge of the path has any uncertainty to be corrected");
+    } else {
+      return fail(Errc::kInvalidInput,
+                  "all uncertain edges of the path are of unknown correlation, " +
+                      std::to_string(unknown.size()) + " of them: which to correct is not known");
+    }
+    independent_ = independent_ && unknown.empty();
+    return {};
+  }
+
+  void judge(Observation& observation) const {
+    const Moments m = prior_.moments(linear_.H);
+    const Matrix6d S =
+        independent_ ? Matrix6d(m.of_path + R_)
+                     : bound(Covariance::trusted(m.of_path), Covariance::trusted(R_)).matrix();
+    const Matrix6d inverse = pseudo_inverse(S, &observation.dimensions);
+    const Twist rest = linear_.h - S * (inverse * linear_.h);
+    const bool impossible = rest.cwiseAbs().maxCoeff() > kAgrees;
+    observation.distance_squared =
+        impossible ? std::numeric_limits<double>::infinity() : linear_.h.dot(inverse * linear_.h);
+    const bool gated = options_.gate < 1 && observation.dimensions > 0;
+    observation.limit = gated ? chi_squared_quantile(options_.gate, observation.dimensions)
+                              : std::numeric_limits<double>::infinity();
+    observation.accepted = !impossible && observation.distance_squared <= observation.limit;
+  }
+
+  // Of the corrections that this observation alone would make.
+  void note_surprise(Observation& observation) const {
+    const Moments m = prior_.moments(linear_.H);
+    const Matrix6d S = m.of_path + R_;
+    const Matrix6d inverse = pseudo_inverse(S);
+    for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
+      const Matrix6d gain = m.with_edge[i] * inverse;
+      const Matrix6d weight = gain.transpose() * pseudo_inverse(prior_.marginal(i)) * gain;
+      const Matrix6d share = weight * S;
+      observation.edges[prior_.edges()[i]].surprise = {
+          linear_.h.dot(weight * linear_.h), share.trace(), 2.0 * (share * share).trace()};
+    }
+  }
+
+  // Covariance intersection: both sides are made less sure, so that the edges gain most. False where that is nothing.
+  bool weigh() {
+    const Moments m = prior_.moments(linear_.H);
+    const auto size_at = [&](double omega) {
+      const Matrix6d inverse = pseudo_inverse(m.of_path / omega + R_ / (1.0 - omega));
+      double sum = 0;
+      for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
+        const Twist before = prior_.marginal(i).diagonal();
+        const Twist taken =
+            (m.with_edge[i] * inverse * m.with_edge[i].transpose()).diagonal() / omega;
+        sum += units_of(before).dot(before - taken) / omega;
+      }
+      return sum;
+    };
+    const double omega = minimum_within_unit(size_at);
+    double before = 0;
+    for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
+      before += units_of(prior_.marginal(i).diagonal()).dot(prior_.marginal(i).diagonal());
+    }
+    if (size_at(omega) >= before) return false;
+    prior_.widen(1.0 / omega);
+    R_ /= 1.0 - omega;
+    return true;
+  }
+
+  Result<void> iterate() {
+    const auto& edges = prior_.edges();
+    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+      const Moments m = prior_.moments(linear_.H);
+      Twist seen = -linear_.h;
+      for (const std::size_t k : edges) seen += linear_.H[k] * xi_[k];
+      const Twist weighted = pseudo_inverse(m.of_path + R_) * seen;
+      double change = 0;
+      for (std::size_t i = 0; i < edges.size(); ++i) {
+        const Twist next = m.with_edge[i] * weighted;
+        const double scale = 1.0 + next.cwiseAbs().maxCoeff();
+        change = std::max(change, (next - xi_[edges[i]]).cwiseAbs().maxCoeff() / scale);
+        xi_[edges[i]] = next;
+      }
+      linear_ = linearize(path_, xi_, Z_AB_);
+      if (change <= kConverged) return {};
+    }
+    return fail(Errc::kInvalidInput,
+                "the measurement lies too far from where the path is, towards half a turn");
+  }
+
+  void apply(Observation& observation) {
+    const auto corrected = corrected_errors(prior_, linear_.H, R_, path_);
+    for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
+      const std::size_t k = prior_.edges()[i];
+      ObservedResult& result = observation.edges[k];
+      // The error is now that of another pose.
+      const Matrix6d J = right_jacobian(xi_[k]);
+      const Covariance own =
+          Covariance::trusted(nearest_semidefinite(J * corrected[i].own * J.transpose()));
+      (prior_.is_of_unknown() ? result.X_PC.unknown.emplace() : result.X_PC.own) = own;
+      result.X_PC.pose = result.X_PC.pose * exp(xi_[k]);
+      result.X_PC.shares = corrected[i].shares;
+      for (Share& share : result.X_PC.shares) share.factor = (J * share.factor).eval();
+      result.corrected = true;
+    }
+  }
+
+  const std::vector<ObservedEdge>& path_;
+  const Transform& Z_AB_;
+  const ObserveOptions& options_;
+  JointPrior prior_;
+  std::vector<Twist> xi_;
+  Linear linear_;
+  Matrix6d R_;
+  bool independent_;
+};
+
+}  // namespace
+
+Result<Observation> observe(const std::vector<ObservedEdge>& path, const Transform& Z_AB,
+                            const ObserveOptions& options) {
+  if (!(options.gate > 0 && options.gate <= 1)) {
+    return fail(Errc::kInvalidInput,
+                "gate must be above 0 and no more than 1, not " + std::to_string(options.gate));
+  }
+  return Update(path, Z_AB, options).run();
+}
+
+}  // namespace tfdude

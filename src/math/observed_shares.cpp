@@ -1,0 +1,165 @@
+#include "math/observed_shares.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+
+#include "math/semidefinite.hpp"
+
+namespace tfdude {
+namespace {
+
+using Matrix = Eigen::MatrixXd;
+
+// The most columns of each sign that a path's own source has.
+constexpr Eigen::Index kColumns = 6;
+constexpr double kRounding = 1e-14;
+
+// L with L Lᵀ = A⁺.
+Matrix6d inverse_root(const Matrix6d& semidefinite) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(pseudo_inverse(semidefinite));
+  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+}
+
+// Whichever way the path is walked.
+std::string source_of(const std::vector<ObservedEdge>& path) {
+  std::vector<std::string_view> ids;
+  ids.reserve(path.size());
+  for (const ObservedEdge& edge : path) ids.push_back(edge.id);
+  std::sort(ids.begin(), ids.end());
+  std::uint64_t hash = 14695981039346656037ULL;  // FNV-1a
+  const auto mix = [&hash](unsigned char byte) { hash = (hash ^ byte) * 1099511628211ULL; };
+  for (const std::string_view id : ids) {
+    for (const char c : id) mix(static_cast<unsigned char>(c));
+    mix(0);
+  }
+  char name[32];
+  std::snprintf(name, sizeof name, "%016llx", static_cast<unsigned long long>(hash));
+  return std::string(kObservedPrefix) + name;
+}
+
+// Columns over all edges, six rows each, that add to the joint covariance or subtract from it.
+class SignedColumns {
+ public:
+  explicit SignedColumns(std::size_t edges) : columns_(6 * static_cast<Eigen::Index>(edges), 0) {}
+
+  void append(const std::vector<Factor>& factors, bool subtracts) {
+    const Eigen::Index first = columns_.cols();
+    const Eigen::Index more = factors.front().cols();
+    columns_.conservativeResize(Eigen::NoChange, first + more);
+    for (std::size_t i = 0; i < factors.size(); ++i) {
+      columns_.block(6 * static_cast<Eigen::Index>(i), first, 6, more) = factors[i];
+    }
+    signs_.conservativeResize(first + more);
+    signs_.tail(more).setConstant(subtracts ? -1.0 : 1.0);
+  }
+
+  // The same sum of the fewest columns, as shares of one source. All who have it are on the path: what is too little to be
+  // kept may be left out where it subtracts, and what adds goes to the own parts, as no correlation of n parts is more
+  // than n times their sum.
+  void give(std::vector<CorrectedError>& edges, const std::string& name) const {
+    const Eigen::HouseholderQR<Matrix> qr(columns_);
+    const Eigen::Index rank = std::min(columns_.rows(), columns_.cols());
+    const Matrix thin = qr.householderQ() * Matrix::Identity(columns_.rows(), rank);
+    const Matrix upper = qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>();
+    const Eigen::SelfAdjointEigenSolver<Matrix> solver(upper * signs_.asDiagonal() *
+                                                       upper.transpose());
+    const Eigen::VectorXd& values = solver.eigenvalues();  // ascending
+    const Matrix vectors = thin * solver.eigenvectors();
+    const double least = kRounding * values.cwiseAbs().maxCoeff();
+    Matrix less(columns_.rows(), 0);
+    Matrix more(columns_.rows(), 0);
+    const auto put = [&](Matrix& to, Eigen::Index k) {
+      to.conservativeResize(Eigen::NoChange, to.cols() + 1);
+      to.rightCols(1) = vectors.col(k) * std::sqrt(std::abs(values[k]));
+    };
+    for (Eigen::Index k = 0; k < rank && values[k] < -least && less.cols() < kColumns; ++k) {
+      put(less, k);
+    }
+    for (Eigen::Index k = rank; k-- > 0 && values[k] > least;) {
+      if (more.cols() < kColumns) {
+        put(more, k);
+        continue;
+      }
+      for (std::size_t i = 0; i < edges.size(); ++i) {
+        const Twist part = vectors.col(k).segment<6>(6 * static_cast<Eigen::Index>(i));
+        edges[i].own += static_cast<double>(edges.size()) * values[k] * part * part.transpose();
+      }
+    }
+    share(edges, name, less, true);
+    share(edges, name, more, false);
+  }
+
+ private:
+  static void share(std::vector<CorrectedError>& edges, const std::string& name, const Matrix& all,
+                    bool subtracts) {
+    if (all.cols() == 0) return;
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      const Factor part = all.middleRows(6 * static_cast<Eigen::Index>(i), 6);
+      edges[i].shares.push_back({name, subtracts, part});
+    }
+  }
+
+  Matrix columns_;
+  Eigen::VectorXd signs_;
+};
+
+}  // namespace
+
+std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
+                                             const std::vector<Matrix6d>& H, const Matrix6d& R,
+                                             const std::vector<ObservedEdge>& path) {
+  const auto& edges = prior.edges();
+  const Moments m = prior.moments(H);
+  const Matrix6d inverse = pseudo_inverse(m.of_path + R);
+  Matrix6d S_0 = R;
+  std::vector<Matrix6d> gains;
+  std::vector<CorrectedError> corrected;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    S_0 += H[edges[i]] * prior.own()[i] * H[edges[i]].transpose();
+    gains.push_back(m.with_edge[i] * inverse);
+    corrected.push_back({prior.own()[i], {}});
+  }
+  const bool alone = edges.size() == 1;
+  if (alone) {
+    // What others know of it, they know by shares: the rest is its own.
+    const Matrix6d rest = Matrix6d::Identity() - gains[0] * H[edges[0]];
+    corrected[0].own =
+        rest * prior.own()[0] * rest.transpose() + gains[0] * R * gains[0].transpose();
+  }
+  const std::string name = source_of(path);
+  SignedColumns of_path(edges.size());
+  for (const JointPrior::Source& source : prior.sources()) {
+    const Factor on_path = source.on_path(prior, H);
+    std::vector<Factor> factors = source.factors;
+    for (std::size_t i = 0; i < edges.size(); ++i) factors[i] -= gains[i] * on_path;
+    if (!alone && source.name == name) {
+      of_path.append(factors, source.subtracts);
+      continue;
+    }
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      if (!factors[i].isZero(0)) {
+        corrected[i].shares.push_back({source.name, source.subtracts, factors[i]});
+      }
+    }
+  }
+  if (alone) return corrected;
+  const Matrix6d root = inverse_root(S_0);
+  std::vector<Factor> less;
+  std::vector<Factor> more;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const Matrix6d N = prior.own()[i] * H[edges[i]].transpose();
+    less.emplace_back(N * root);
+    more.emplace_back((gains[i] * S_0 - N) * root);
+  }
+  of_path.append(less, true);
+  if (!prior.sources().empty()) of_path.append(more, false);
+  of_path.give(corrected, name);
+  return corrected;
+}
+
+}  // namespace tfdude

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include "math/joint_prior.hpp"
+
+namespace tfdude {
+
+/// What an uncertain edge's error is after an observation.
+struct CorrectedError {
+  Matrix6d own;
+  std::vector<Share> shares;
+};
+
+/// The joint covariance after a measurement of error R, P - P Hᵀ S⁻¹ H P, in the form of own parts and shares; by uncertain
+/// edge of the prior.
+///
+/// With N = own Hᵀ, C = Σ H F, S₀ = H own Hᵀ + R and K = P Hᵀ S⁻¹, what a Schmidt-Kalman update leaves of shares is
+/// F' = F - K C, and the rest of the joint covariance is own - N S₀⁻¹ Nᵀ + (K S₀ - N) S₀⁻¹ (K S₀ - N)ᵀ: two shares of a
+/// source of this path's own, one that subtracts and, where there were shares, one that adds. If the path was observed
+/// before they become one with those of that time.
+[[nodiscard]] std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
+                                                           const std::vector<Matrix6d>& H,
+                                                           const Matrix6d& R,
+                                                           const std::vector<ObservedEdge>& path);
+
+}  // namespace tfdude

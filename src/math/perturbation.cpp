@@ -1,0 +1,48 @@
+#include "tfdude/math/perturbation.hpp"
+
+namespace tfdude {
+namespace {
+
+// diag(R, R): turns both halves of a twist, and nothing else.
+Pose turning(const Eigen::Quaterniond& rotation) {
+  return Pose::trusted(rotation, Eigen::Vector3d::Zero());
+}
+
+}  // namespace
+
+Covariance left_covariance(const Transform& X) { return X.covariance.transported(X.pose); }
+
+Transform from_left_covariance(const Pose& X, const Covariance& left) {
+  return {X, left.transported(X.inverse())};
+}
+
+Covariance ros_covariance(const Transform& X) {
+  return X.covariance.transported(turning(X.pose.rotation()));
+}
+
+Transform from_ros_covariance(const Pose& X, const Covariance& ros) {
+  return {X, ros.transported(turning(X.rotation().conjugate()))};
+}
+
+Matrix6d small_adjoint(const Twist& xi) {
+  Matrix6d ad = Matrix6d::Zero();
+  ad.topLeftCorner<3, 3>() = skew(xi.tail<3>());
+  ad.bottomRightCorner<3, 3>() = ad.topLeftCorner<3, 3>();
+  ad.topRightCorner<3, 3>() = skew(xi.head<3>());
+  return ad;
+}
+
+Matrix6d right_jacobian(const Twist& xi) {
+  // Angles of up to π need some 25 terms; the translation enters linearly, whatever its size.
+  constexpr int kTerms = 30;
+  const Matrix6d step = -small_adjoint(xi);
+  Matrix6d term = Matrix6d::Identity();
+  Matrix6d sum = term;
+  for (int k = 1; k < kTerms; ++k) {
+    term = (term * step / (k + 1)).eval();
+    sum += term;
+  }
+  return sum;
+}
+
+}  // namespace tfdude

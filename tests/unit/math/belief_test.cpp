@@ -1,0 +1,224 @@
+#include "tfdude/math/belief.hpp"
+
+#include <cmath>
+
+#include "math/semidefinite.hpp"
+#include "support/catch.hpp"
+#include "support/pose_diff.hpp"
+#include "support/random.hpp"
+#include "support/sampling.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::ContainsSubstring;
+using testing::covariance_diff;
+using testing::Gaussian;
+using testing::Random;
+using testing::transform_diff;
+
+constexpr int kSamples = 100'000;
+
+Belief belief(const Transform& X, std::vector<Share> shares = {}) {
+  return {X.pose, X.covariance, std::nullopt, std::move(shares)};
+}
+
+Factor random_factor(Random& random, Eigen::Index columns, double metres, double radians) {
+  Factor factor(6, columns);
+  for (Eigen::Index j = 0; j < columns; ++j) {
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      factor(i, j) = random.normal() * (i < 3 ? metres : radians);
+    }
+  }
+  return factor;
+}
+
+TEST_CASE("Beliefs with nothing in common compose as transforms do") {
+  Random random(611);
+  INFO("seed " << random.seed());
+  for (int i = 0; i < 200; ++i) {
+    const Transform X_AB = random.transform();
+    const Transform X_BC = random.transform();
+    const Transform sum = settle(compose(belief(X_AB), belief(X_BC), Order::kSecond));
+    CHECK(transform_diff(sum, compose(X_AB, X_BC), 1e-12) == "");
+    CHECK(transform_diff(settle(inverse(belief(X_AB))), inverse(X_AB), 1e-12) == "");
+  }
+}
+
+TEST_CASE(
+    "A source that two edges share in full cancels on the way back, and doubles on the way on") {
+  Random random(612);
+  INFO("seed " << random.seed());
+  for (const Order order : {Order::kSecond, Order::kFourth}) {
+    const Share share{"calibration", false, random_factor(random, 2, 0.1, 0.1)};
+    const Transform exact{random.pose(), {}};
+    const Belief X_AB = belief(exact, {share});
+    const Transform there_and_back = settle(compose(X_AB, inverse(X_AB), order));
+    CHECK(testing::pose_diff(there_and_back.pose, {}, 1e-12) == "");
+    CHECK(there_and_back.covariance.matrix().cwiseAbs().maxCoeff() < 1e-18);
+    const Belief still{Pose(), {}, std::nullopt, {share}};
+    const Transform twice = settle(compose(still, still, Order::kSecond));
+    const Matrix6d expected = 4.0 * share.factor * share.factor.transpose();
+    CHECK(covariance_diff(twice.covariance, Covariance::trusted(expected), 1e-12) == "");
+  }
+}
+
+TEST_CASE("A source of fewer columns on one edge is as if the others were zero") {
+  Random random(613);
+  Share two{"s", false, random_factor(random, 2, 0.1, 0.1)};
+  Share one{"s", false, two.factor.leftCols(1)};
+  const Transform sum = settle(compose(belief({}, {one}), belief({}, {two}), Order::kSecond));
+  Factor total = two.factor;
+  total.leftCols(1) *= 2.0;
+  CHECK(covariance_diff(sum.covariance, Covariance::trusted(Matrix6d(total * total.transpose())),
+                        1e-12) == "");
+}
+
+// The second moment of the errors of X_AB X_BC, where both have own errors and shares of a source.
+Matrix6d sampled_product(const Belief& X_AB, const Belief& X_BC, Random& random, int samples) {
+  const Gaussian own_1(X_AB.own);
+  const Gaussian own_2(X_BC.own);
+  const Pose mean_inverse = (X_AB.pose * X_BC.pose).inverse();
+  return testing::second_moment(samples, [&] {
+    Twist e_1 = own_1(random);
+    Twist e_2 = own_2(random);
+    Eigen::VectorXd s(6);
+    for (Eigen::Index i = 0; i < 6; ++i) s[i] = random.normal();
+    for (const Share& share : X_AB.shares) e_1 += share.factor * s.head(share.factor.cols());
+    for (const Share& share : X_BC.shares) e_2 += share.factor * s.head(share.factor.cols());
+    return log(mean_inverse * (X_AB.pose * exp(e_1)) * (X_BC.pose * exp(e_2)));
+  });
+}
+
+TEST_CASE("Shares of a source propagate as samples show, and independence would not do") {
+  Random random(614);
+  INFO("seed " << random.seed());
+  for (int i = 0; i < 3; ++i) {
+    const Belief X_AB = belief(random.transform(2.0, 0.003, 0.003),
+                               {{"s", false, random_factor(random, 3, 0.01, 0.01)}});
+    const Belief X_BC = belief(random.transform(2.0, 0.003, 0.003),
+                               {{"s", false, random_factor(random, 2, 0.01, 0.01)}});
+    const Matrix6d sampled = sampled_product(X_AB, X_BC, random, kSamples);
+    const Transform shared = settle(compose(X_AB, X_BC, Order::kSecond));
+    CHECK(testing::moment_diff(sampled, shared.covariance.matrix(), kSamples, 5e-3) == "");
+    const Transform as_if = compose(settle(X_AB), settle(X_BC));
+    CHECK(testing::moment_diff(sampled, as_if.covariance.matrix(), kSamples, 5e-3) != "");
+  }
+}
+
+TEST_CASE("Fourth order is nearer to samples than second, for independent and for shared errors") {
+  Random random(615);
+  INFO("seed " << random.seed());
+  for (const double shared : {0.0, 0.15}) {
+    INFO("shared " << shared);
+    double second = 0;
+    double fourth = 0;
+    for (int i = 0; i < 5; ++i) {
+      Belief X_AB = belief(random.transform(0.5, 0.15, 0.15));
+      Belief X_BC = belief(random.transform(0.5, 0.15, 0.15));
+      if (shared > 0) {
+        X_AB.shares = {{"s", false, random_factor(random, 3, shared, shared)}};
+        X_BC.shares = {{"s", false, random_factor(random, 3, shared, shared)}};
+      }
+      const Matrix6d sampled = sampled_product(X_AB, X_BC, random, 400'000);
+      const auto error = [&](Order order) {
+        return (settle(compose(X_AB, X_BC, order)).covariance.matrix() - sampled).norm() /
+               sampled.norm();
+      };
+      second += error(Order::kSecond);
+      fourth += error(Order::kFourth);
+    }
+    INFO("mean relative errors " << second / 5 << " and " << fourth / 5);
+    CHECK(fourth < 0.4 * second);
+  }
+}
+
+TEST_CASE("What is unknown is bounded, whatever the correlation") {
+  Random random(616);
+  INFO("seed " << random.seed());
+  for (int i = 0; i < 200; ++i) {
+    const Covariance A = random.covariance(1.0, 0.01);
+    const Covariance B = random.covariance(0.1, 0.3);
+    const Matrix6d sum = bound(A, B).matrix();
+    // Any cross-covariance is A^{1/2} M B^{1/2} with |M| ≤ 1, the worst are turns.
+    const Eigen::MatrixXd M =
+        Eigen::HouseholderQR<Eigen::MatrixXd>(Eigen::MatrixXd::NullaryExpr(6, 6, [&](auto, auto) {
+          return random.normal();
+        })).householderQ();
+    const Matrix6d root_a = A.matrix().llt().matrixL();
+    const Matrix6d root_b = B.matrix().llt().matrixL();
+    const Matrix6d cross = root_a * M * root_b.transpose();
+    const Matrix6d worst = A.matrix() + B.matrix() + cross + cross.transpose();
+    CHECK(testing::domination(sum, worst) > -1e-12);
+  }
+  const Covariance A = random.covariance();
+  CHECK(covariance_diff(bound(A, {}), A, 0) == "");
+  // The same error twice: reached.
+  CHECK(covariance_diff(bound(A, A), Covariance::trusted(Matrix6d(4.0 * A.matrix())), 1e-12) == "");
+}
+
+TEST_CASE(
+    "A path with unknown parts dominates samples of correlated errors; the independent sum does "
+    "not") {
+  Random random(617);
+  INFO("seed " << random.seed());
+  for (const double correlation : {1.0, 0.5, -0.5, -1.0}) {
+    INFO("correlation " << correlation);
+    Belief X_AB{random.pose(), {}, random.covariance(0.01, 0.01), {}};
+    Belief X_BC{random.pose(), {}, random.covariance(0.01, 0.01), {}};
+    const Matrix6d root_1 = X_AB.unknown->matrix().llt().matrixL();
+    const Matrix6d root_2 = X_BC.unknown->matrix().llt().matrixL();
+    const Pose mean_inverse = (X_AB.pose * X_BC.pose).inverse();
+    const Matrix6d sampled = testing::second_moment(kSamples, [&] {
+      Twist s;
+      Twist t;
+      for (int i = 0; i < 6; ++i) s[i] = random.normal();
+      for (int i = 0; i < 6; ++i) t[i] = random.normal();
+      const Twist e_2 = root_2 * (correlation * s + std::sqrt(1 - correlation * correlation) * t);
+      return log(mean_inverse * (X_AB.pose * exp(root_1 * s)) * (X_BC.pose * exp(e_2)));
+    });
+    const Transform bounded = settle(compose(X_AB, X_BC, Order::kSecond));
+    CHECK(testing::domination(bounded.covariance.matrix(), sampled) > -0.01);
+    const Transform independent =
+        compose(Transform{X_AB.pose, *X_AB.unknown}, Transform{X_BC.pose, *X_BC.unknown});
+    CHECK(testing::domination(independent.covariance.matrix(), sampled) < -0.05);
+  }
+}
+
+TEST_CASE(
+    "Composed beliefs stay positive semi-definite, to fourth order and for errors of a radian, "
+    "too") {
+  Random random(618);
+  INFO("seed " << random.seed());
+  for (const double size : {0.01, 0.3, 1.0}) {
+    for (int i = 0; i < 200; ++i) {
+      Belief X = belief({});
+      for (int k = 0; k < 10; ++k) {
+        X = compose(X, belief(random.transform(1.0, size, size)), Order::kFourth);
+      }
+      CHECK(is_semidefinite(settle(X).covariance.matrix()));
+    }
+  }
+}
+
+TEST_CASE("Shares that make no sense are refused by name") {
+  Random random(619);
+  const Share good{"s", false, random_factor(random, 2, 1, 1)};
+  CHECK(check_shares({good}));
+  const auto refusal = [](const std::vector<Share>& shares) {
+    const auto ok = check_shares(shares);
+    REQUIRE_FALSE(ok);
+    CHECK(ok.error().code == Errc::kInvalidInput);
+    return ok.error().message;
+  };
+  CHECK_THAT(refusal({good, good}), ContainsSubstring("'s'") && ContainsSubstring("twice"));
+  CHECK_THAT(refusal({{"", false, good.factor}}), ContainsSubstring("source"));
+  CHECK_THAT(refusal({{"s", false, Factor(6, 0)}}), ContainsSubstring("columns"));
+  CHECK_THAT(refusal({{"s", false, Factor::Zero(6, 37)}}), ContainsSubstring("37"));
+  Factor bad = good.factor;
+  bad(3, 1) = std::nan("");
+  CHECK_THAT(refusal({{"s", false, bad}}), ContainsSubstring("not a number"));
+}
+
+}  // namespace
+}  // namespace tfdude
