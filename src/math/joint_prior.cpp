@@ -29,9 +29,9 @@ Factor JointPrior::Source::on_path(const JointPrior& prior, const std::vector<Ma
   return sum;
 }
 
-JointPrior::JointPrior(const std::vector<ObservedEdge>& path) : path_(path) {
-  for (std::size_t k = 0; k < path.size(); ++k) {
-    const Belief& X = path[k].X_PC;
+JointPrior::JointPrior(const std::vector<ObservedEdge>& all) : all_(all) {
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const Belief& X = all[k].X_PC;
     const bool shares = std::any_of(X.shares.begin(), X.shares.end(),
                                     [](const Share& share) { return !share.factor.isZero(0); });
     if (!shares && X.own.matrix().isZero(0)) continue;
@@ -39,7 +39,7 @@ JointPrior::JointPrior(const std::vector<ObservedEdge>& path) : path_(path) {
     own_.push_back(X.own.matrix());
   }
   for (std::size_t i = 0; i < edges_.size(); ++i) {
-    for (const Share& share : path[edges_[i]].X_PC.shares) {
+    for (const Share& share : all[edges_[i]].X_PC.shares) {
       Source& source = source_of(sources_, share);
       source.factors.resize(edges_.size(), Factor(6, 0));
       source.factors[i] = share.factor;
@@ -54,7 +54,7 @@ JointPrior::JointPrior(const std::vector<ObservedEdge>& path) : path_(path) {
 
 void JointPrior::take_unknown(std::size_t edge) {
   edges_ = {edge};
-  own_ = {path_[edge].X_PC.unknown->matrix()};
+  own_ = {all_[edge].X_PC.unknown->matrix()};
   of_unknown_ = true;
 }
 

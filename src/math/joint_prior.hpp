@@ -7,13 +7,13 @@
 
 namespace tfdude {
 
-/// What the edges of a path have to do with its end: G = P Hᵀ by edge, and H P Hᵀ.
+/// What the edges have to do with the end of the path: P Hᵀ by edge, and H P Hᵀ.
 struct Moments {
   std::vector<Matrix6d> with_edge;
   Matrix6d of_path;
 };
 
-/// The joint covariance P of the uncertain edges of a path: P_ij = δ_ij own_i + Σ ± F_i F_jᵀ over the sources.
+/// The joint covariance P of the uncertain ones of some edges: P_ij = δ_ij own_i + Σ ± F_i F_jᵀ over the sources.
 class JointPrior {
  public:
   /// What the edges have from one source; a factor for each uncertain edge, all of the same columns.
@@ -28,13 +28,13 @@ class JointPrior {
   };
 
   /// The own parts and shares of the edges; those that have neither are not of them.
-  explicit JointPrior(const std::vector<ObservedEdge>& path);
+  explicit JointPrior(const std::vector<ObservedEdge>& all);
 
   /// Takes the edge's unknown part for its own; there must be no uncertain edge else.
   void take_unknown(std::size_t edge);
   [[nodiscard]] bool is_of_unknown() const { return of_unknown_; }
 
-  /// Which of the path's edges are uncertain.
+  /// Which of all are uncertain.
   [[nodiscard]] const std::vector<std::size_t>& edges() const { return edges_; }
   [[nodiscard]] const std::vector<Matrix6d>& own() const { return own_; }
   [[nodiscard]] const std::vector<Source>& sources() const { return sources_; }
@@ -42,14 +42,14 @@ class JointPrior {
   /// P_ii.
   [[nodiscard]] Matrix6d marginal(std::size_t i) const;
 
-  /// @param H  by edge of the path
+  /// @param H  by edge, of all
   [[nodiscard]] Moments moments(const std::vector<Matrix6d>& H) const;
 
   /// P times a factor.
   void widen(double by);
 
  private:
-  const std::vector<ObservedEdge>& path_;
+  const std::vector<ObservedEdge>& all_;
   std::vector<std::size_t> edges_;
   std::vector<Matrix6d> own_;
   std::vector<Source> sources_;

@@ -28,16 +28,18 @@ struct Linear {
   std::vector<Matrix6d> H;
 };
 
-Linear linearize(const std::vector<ObservedEdge>& path, const std::vector<Twist>& xi,
+Linear linearize(const std::vector<ObservedEdge>& edges, const std::vector<Twist>& xi,
                  const Transform& Z_AB) {
-  Linear linear{Twist::Zero(), std::vector<Matrix6d>(path.size())};
+  Linear linear{Twist::Zero(), std::vector<Matrix6d>(edges.size())};
   Pose X_FB;  // F: where the path is, coming from its end
-  for (std::size_t k = path.size(); k-- > 0;) {
-    const Pose X_PC = path[k].X_PC.pose * exp(xi[k]);
-    const Pose X_CB = path[k].up ? X_PC.inverse() * X_FB : X_FB;
-    const double sign = path[k].up ? -1.0 : 1.0;
-    linear.H[k] = sign * adjoint(X_CB.inverse()) * right_jacobian(xi[k]);
-    X_FB = path[k].up ? X_CB : X_PC * X_CB;
+  for (std::size_t k = edges.size(); k-- > 0;) {
+    linear.H[k].setZero();
+    if (edges[k].way == ObservedEdge::Way::kBeside) continue;
+    const bool up = edges[k].way == ObservedEdge::Way::kUp;
+    const Pose X_PC = edges[k].X_PC.pose * exp(xi[k]);
+    const Pose X_CB = up ? X_PC.inverse() * X_FB : X_FB;
+    linear.H[k] = (up ? -1.0 : 1.0) * adjoint(X_CB.inverse()) * right_jacobian(xi[k]);
+    X_FB = up ? X_CB : X_PC * X_CB;
   }
   linear.h = log(Z_AB.pose.inverse() * X_FB);
   const Matrix6d outer = right_jacobian(linear.h).inverse();
@@ -48,14 +50,15 @@ Linear linearize(const std::vector<ObservedEdge>& path, const std::vector<Twist>
 // One observation under way.
 class Update {
  public:
-  Update(const std::vector<ObservedEdge>& path, const Transform& Z_AB,
+  Update(const std::vector<ObservedEdge>& edges, const Transform& Z_AB, const std::string& source,
          const ObserveOptions& options)
-      : path_(path),
+      : all_(edges),
         Z_AB_(Z_AB),
+        source_(source),
         options_(options),
-        prior_(path),
-        xi_(path.size(), Twist::Zero()),
-        linear_(linearize(path, xi_, Z_AB)),
+        prior_(edges),
+        xi_(edges.size(), Twist::Zero()),
+        linear_(linearize(edges, xi_, Z_AB)),
         R_(Z_AB.covariance.matrix()),
         independent_(options.independent) {}
 
@@ -63,7 +66,7 @@ class Update {
     if (auto ok = count_unknown(); !ok) return tl::unexpected(std::move(ok.error()));
     Observation observation;
     judge(observation);
-    for (const ObservedEdge& edge : path_) observation.edges.push_back({edge.X_PC, false, {}});
+    for (const ObservedEdge& edge : all_) observation.edges.push_back({edge.X_PC, false, {}});
     if (independent_) note_surprise(observation);
     if (!observation.accepted) return observation;
     if (!independent_ && !weigh()) return observation;
@@ -76,15 +79,16 @@ class Update {
   // What is unknown counts to the measurement, unless it is all there is to correct.
   Result<void> count_unknown() {
     std::vector<std::size_t> unknown;
-    for (std::size_t k = 0; k < path_.size(); ++k) {
-      if (path_[k].X_PC.unknown && !path_[k].X_PC.unknown->matrix().isZero(0)) unknown.push_back(k);
+    for (std::size_t k = 0; k < all_.size(); ++k) {
+      if (all_[k].way == ObservedEdge::Way::kBeside) continue;
+      if (all_[k].X_PC.unknown && !all_[k].X_PC.unknown->matrix().isZero(0)) unknown.push_back(k);
     }
     if (!prior_.edges().empty()) {
       Covariance R = Z_AB_.covariance;
       for (const std::size_t k : unknown) {
         const Matrix6d& H = linear_.H[k];
         R = bound(
-            R, Covariance::trusted(Matrix6d(H * path_[k].X_PC.unknown->matrix() * H.transpose())));
+            R, Covariance::trusted(Matrix6d(H * all_[k].X_PC.unknown->matrix() * H.transpose())));
       }
       R_ = R.matrix();
     } else if (unknown.size() == 1) {
@@ -122,6 +126,7 @@ class Update {
     const Matrix6d S = m.of_path + R_;
     const Matrix6d inverse = pseudo_inverse(S);
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
+      if (all_[prior_.edges()[i]].way == ObservedEdge::Way::kBeside) continue;
       const Matrix6d gain = m.with_edge[i] * inverse;
       const Matrix6d weight = gain.transpose() * pseudo_inverse(prior_.marginal(i)) * gain;
       const Matrix6d share = weight * S;
@@ -169,7 +174,7 @@ class Update {
         change = std::max(change, (next - xi_[edges[i]]).cwiseAbs().maxCoeff() / scale);
         xi_[edges[i]] = next;
       }
-      linear_ = linearize(path_, xi_, Z_AB_);
+      linear_ = linearize(all_, xi_, Z_AB_);
       if (change <= kConverged) return {};
     }
     return fail(Errc::kInvalidInput,
@@ -177,7 +182,7 @@ class Update {
   }
 
   void apply(Observation& observation) {
-    const auto corrected = corrected_errors(prior_, linear_.H, R_, path_);
+    const auto corrected = corrected_errors(prior_, linear_.H, R_, source_);
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
       const std::size_t k = prior_.edges()[i];
       ObservedResult& result = observation.edges[k];
@@ -193,8 +198,9 @@ class Update {
     }
   }
 
-  const std::vector<ObservedEdge>& path_;
+  const std::vector<ObservedEdge>& all_;
   const Transform& Z_AB_;
+  const std::string& source_;
   const ObserveOptions& options_;
   JointPrior prior_;
   std::vector<Twist> xi_;
@@ -205,13 +211,13 @@ class Update {
 
 }  // namespace
 
-Result<Observation> observe(const std::vector<ObservedEdge>& path, const Transform& Z_AB,
-                            const ObserveOptions& options) {
+Result<Observation> observe(const std::vector<ObservedEdge>& edges, const Transform& Z_AB,
+                            const std::string& source, const ObserveOptions& options) {
   if (!(options.gate > 0 && options.gate <= 1)) {
     return fail(Errc::kInvalidInput,
                 "gate must be above 0 and no more than 1, not " + std::to_string(options.gate));
   }
-  return Update(path, Z_AB, options).run();
+  return Update(edges, Z_AB, source, options).run();
 }
 
 }  // namespace tfdude

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <cstdio>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
@@ -15,31 +13,13 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 
-// The most columns of each sign that a path's own source has.
-constexpr Eigen::Index kColumns = 6;
+// What of the largest eigenvalue can be rounding.
 constexpr double kRounding = 1e-14;
 
 // L with L Lᵀ = A⁺.
 Matrix6d inverse_root(const Matrix6d& semidefinite) {
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(pseudo_inverse(semidefinite));
   return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
-}
-
-// Whichever way the path is walked.
-std::string source_of(const std::vector<ObservedEdge>& path) {
-  std::vector<std::string_view> ids;
-  ids.reserve(path.size());
-  for (const ObservedEdge& edge : path) ids.push_back(edge.id);
-  std::sort(ids.begin(), ids.end());
-  std::uint64_t hash = 14695981039346656037ULL;  // FNV-1a
-  const auto mix = [&hash](unsigned char byte) { hash = (hash ^ byte) * 1099511628211ULL; };
-  for (const std::string_view id : ids) {
-    for (const char c : id) mix(static_cast<unsigned char>(c));
-    mix(0);
-  }
-  char name[32];
-  std::snprintf(name, sizeof name, "%016llx", static_cast<unsigned long long>(hash));
-  return std::string(kObservedPrefix) + name;
 }
 
 // Columns over all edges, six rows each, that add to the joint covariance or subtract from it.
@@ -58,9 +38,9 @@ class SignedColumns {
     signs_.tail(more).setConstant(subtracts ? -1.0 : 1.0);
   }
 
-  // The same sum of the fewest columns, as shares of one source. All who have it are on the path: what is too little to be
-  // kept may be left out where it subtracts, and what adds goes to the own parts, as no correlation of n parts is more
-  // than n times their sum.
+  // The same sum of the fewest columns, as shares of one source. All who have it are here: so what there is no room for may
+  // be left out where it subtracts, and what adds goes to the own parts, as no correlation of n parts is more than n
+  // times their sum.
   void give(std::vector<CorrectedError>& edges, const std::string& name) const {
     const Eigen::HouseholderQR<Matrix> qr(columns_);
     const Eigen::Index rank = std::min(columns_.rows(), columns_.cols());
@@ -77,11 +57,12 @@ class SignedColumns {
       to.conservativeResize(Eigen::NoChange, to.cols() + 1);
       to.rightCols(1) = vectors.col(k) * std::sqrt(std::abs(values[k]));
     };
-    for (Eigen::Index k = 0; k < rank && values[k] < -least && less.cols() < kColumns; ++k) {
+    for (Eigen::Index k = 0; k < rank && values[k] < -least && less.cols() < kMaxFactorColumns;
+         ++k) {
       put(less, k);
     }
     for (Eigen::Index k = rank; k-- > 0 && values[k] > least;) {
-      if (more.cols() < kColumns) {
+      if (more.cols() < kMaxFactorColumns) {
         put(more, k);
         continue;
       }
@@ -112,7 +93,7 @@ class SignedColumns {
 
 std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
                                              const std::vector<Matrix6d>& H, const Matrix6d& R,
-                                             const std::vector<ObservedEdge>& path) {
+                                             const std::string& new_source) {
   const auto& edges = prior.edges();
   const Moments m = prior.moments(H);
   const Matrix6d inverse = pseudo_inverse(m.of_path + R);
@@ -131,14 +112,13 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
     corrected[0].own =
         rest * prior.own()[0] * rest.transpose() + gains[0] * R * gains[0].transpose();
   }
-  const std::string name = source_of(path);
-  SignedColumns of_path(edges.size());
+  SignedColumns observed(edges.size());
   for (const JointPrior::Source& source : prior.sources()) {
     const Factor on_path = source.on_path(prior, H);
     std::vector<Factor> factors = source.factors;
     for (std::size_t i = 0; i < edges.size(); ++i) factors[i] -= gains[i] * on_path;
-    if (!alone && source.name == name) {
-      of_path.append(factors, source.subtracts);
+    if (!alone && source.name.rfind(kObservedPrefix, 0) == 0) {
+      observed.append(factors, source.subtracts);
       continue;
     }
     for (std::size_t i = 0; i < edges.size(); ++i) {
@@ -156,9 +136,9 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
     less.emplace_back(N * root);
     more.emplace_back((gains[i] * S_0 - N) * root);
   }
-  of_path.append(less, true);
-  if (!prior.sources().empty()) of_path.append(more, false);
-  of_path.give(corrected, name);
+  observed.append(less, true);
+  if (!prior.sources().empty()) observed.append(more, false);
+  observed.give(corrected, new_source);
   return corrected;
 }
 

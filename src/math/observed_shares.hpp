@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "math/joint_prior.hpp"
@@ -16,12 +17,12 @@ struct CorrectedError {
 /// edge of the prior.
 ///
 /// With N = own Hᵀ, C = Σ H F, S₀ = H own Hᵀ + R and K = P Hᵀ S⁻¹, what a Schmidt-Kalman update leaves of shares is
-/// F' = F - K C, and the rest of the joint covariance is own - N S₀⁻¹ Nᵀ + (K S₀ - N) S₀⁻¹ (K S₀ - N)ᵀ: two shares of a
-/// source of this path's own, one that subtracts and, where there were shares, one that adds. If the path was observed
-/// before they become one with those of that time.
+/// F' = F - K C, and the rest of the joint covariance is own - N S₀⁻¹ Nᵀ + (K S₀ - N) S₀⁻¹ (K S₀ - N)ᵀ: two shares of the
+/// new source, one that subtracts and, where there were shares, one that adds. Those of sources that earlier observations
+/// have made become one with them.
 [[nodiscard]] std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
                                                            const std::vector<Matrix6d>& H,
                                                            const Matrix6d& R,
-                                                           const std::vector<ObservedEdge>& path);
+                                                           const std::string& source);
 
 }  // namespace tfdude

@@ -9,11 +9,15 @@
 // A measurement of where one end of a path is seen from the other, and what it tells of the path's edges.
 namespace tfdude {
 
-/// One edge of an observed path.
+/// An edge that an observation concerns.
 struct ObservedEdge {
-  std::string id;   ///< for messages
-  Belief X_PC;      ///< as its owner believes it to be
-  bool up = false;  ///< the path goes from the child to the parent
+  enum class Way : std::uint8_t {
+    kDown,    ///< the path goes from the parent to the child,
+    kUp,      ///< or from the child to the parent;
+    kBeside,  ///< or not along it, but its error has to do with that of an edge of the path by an earlier observation
+  };
+  Belief X_PC;  ///< as its owner believes it to be
+  Way way = Way::kDown;
 };
 
 /// How a measurement is judged.
@@ -46,26 +50,30 @@ struct Observation {
   int dimensions = 0;                 ///< that it has a distance in
   double limit = 0;                   ///< the gate's; infinite if there is none
   bool accepted = false;              ///< within the limit
-  std::vector<ObservedResult> edges;  ///< in the order of the path; corrected where accepted
+  std::vector<ObservedResult> edges;  ///< in the order given; corrected where accepted
 };
 
 /// Distributes a measurement of X_AB over the edges of the path from A to B: the most probable perturbations ξᵢ of all
 /// edges at once, of which Σ ξᵀ P⁻¹ ξ + eᵀ R⁻¹ e with e = Log(Z⁻¹ X_AB(ξ)) is least, by Gauss-Newton (an iterated
 /// Kalman update); P is the joint covariance that the edges' beliefs make. Edges without uncertainty stay as they are.
 ///
-/// What the edges know of each other afterwards is kept in shares of a source named after the path, so that it is exact to
-/// first order for every path, and a second observation is not counted as if it were of edges with independent errors.
-/// Shares of other sources are kept as a Schmidt-Kalman filter keeps them: what others hold of a source need not change.
-/// An edge that is the only uncertain one takes all of the correction, and needs none of that.
+/// What the edges know of each other afterwards is kept in shares of a new source, which takes the place of those that
+/// earlier observations have left: so it is exact to first order for every path, and a second observation is not counted as
+/// if it were of edges with independent errors. Shares of other sources are kept as a Schmidt-Kalman filter keeps them:
+/// what others hold of such a source need not change. An uncertain edge that is alone takes all of the correction, and
+/// needs no share. More columns than a factor may have are left out so that no covariance becomes too small.
 ///
 /// Parts of unknown correlation count to the measurement's error: it is then not independent of the rest. An edge that is
 /// alone with such a part is corrected by covariance intersection.
-/// O(edges), and O(edges · columns²) for the shares.
+/// O(edges · columns²).
+/// @param edges  those of the path in its order, and among them, anywhere, all others that have a share of a source that an
+///   observation has made in common with them
 /// @param Z_AB  the measurement
+/// @param source  the name of the new source: kObservedPrefix and something that no other observation has
 /// @return kInvalidInput: no edge has any uncertainty, several are of unknown correlation and no other is uncertain,
 ///   a gate that is not within (0, 1], nothing that converges.
-[[nodiscard]] Result<Observation> observe(const std::vector<ObservedEdge>& path,
-                                          const Transform& Z_AB,
+[[nodiscard]] Result<Observation> observe(const std::vector<ObservedEdge>& edges,
+                                          const Transform& Z_AB, const std::string& source,
                                           const ObserveOptions& options = {});
 
 }  // namespace tfdude

@@ -1,0 +1,189 @@
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "tfdude/math/observation.hpp"
+#include "tfdude/math/perturbation.hpp"
+
+#include "support/random.hpp"
+#include "support/sampling.hpp"
+
+namespace tfdude::testing {
+
+/// A chain of edges with its truth, whose paths are observed; frame i is the parent of frame i + 1, by edge i.
+class ObservedChain {
+ public:
+  ObservedChain(Random& random, std::size_t edges) {
+    for (std::size_t i = 0; i < edges; ++i) {
+      const Transform X = random.transform(1.0, 0.003, 0.003);
+      edges_.push_back({{X.pose, X.covariance, std::nullopt, {}}, ObservedEdge::Way::kDown});
+      cluster_.push_back(i);
+      truth_.push_back(X.pose);
+    }
+  }
+
+  [[nodiscard]] const std::vector<ObservedEdge>& edges() const { return edges_; }
+
+  void set_exact(std::size_t edge) {
+    edges_[edge].X_PC.own = {};
+    edges_[edge].X_PC.shares.clear();
+  }
+
+  void add_source(const std::string& name, const std::vector<std::size_t>& edges, Random& random) {
+    for (const std::size_t edge : edges) {
+      Factor factor =
+          Factor::NullaryExpr(6, 3, [&](auto, auto) { return 0.003 * random.normal(); });
+      edges_[edge].X_PC.shares.push_back({name, false, factor});
+    }
+    sources_.push_back(name);
+  }
+
+  /// Draws the truth from what is believed. @param lies  of this edge the errors are `by` times as large
+  void make_true(Random& random, std::size_t lies = SIZE_MAX, double by = 1.0) {
+    std::vector<Eigen::Vector3d> drawn;
+    for (std::size_t k = 0; k < sources_.size(); ++k) {
+      const double x = random.normal();
+      const double y = random.normal();
+      drawn.emplace_back(x, y, random.normal());
+    }
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      Twist e = Gaussian(edges_[i].X_PC.own)(random);
+      for (const Share& share : edges_[i].X_PC.shares) {
+        const auto k = std::find(sources_.begin(), sources_.end(), share.source) - sources_.begin();
+        e += share.factor * drawn[static_cast<std::size_t>(k)];
+      }
+      truth_[i] = edges_[i].X_PC.pose * exp(i == lies ? Twist(by * e) : e);
+    }
+  }
+
+  /// The edges between two frames, in the order of the path.
+  [[nodiscard]] std::vector<ObservedEdge> path(std::size_t from, std::size_t to) const {
+    std::vector<ObservedEdge> path(
+        edges_.begin() + static_cast<std::ptrdiff_t>(std::min(from, to)),
+        edges_.begin() + static_cast<std::ptrdiff_t>(std::max(from, to)));
+    if (from > to) {
+      std::reverse(path.begin(), path.end());
+      for (ObservedEdge& edge : path) edge.way = ObservedEdge::Way::kUp;
+    }
+    return path;
+  }
+
+  [[nodiscard]] Belief believed(std::size_t from, std::size_t to) const {
+    Belief X;
+    for (const ObservedEdge& edge : path(from, to)) {
+      X = compose(X, edge.way == ObservedEdge::Way::kUp ? inverse(edge.X_PC) : edge.X_PC,
+                  Order::kSecond);
+    }
+    return X;
+  }
+
+  [[nodiscard]] Pose truth(std::size_t from, std::size_t to) const {
+    Pose X;
+    for (std::size_t i = std::min(from, to); i < std::max(from, to); ++i) X = X * truth_[i];
+    return from > to ? X.inverse() : X;
+  }
+
+  /// A measurement with noise of R.
+  Observation observe(std::size_t from, std::size_t to, const Covariance& R, Random& random) {
+    const Pose Z = truth(from, to) * exp(Gaussian(R)(random)).inverse();
+    return take(from, to, {Z, R});
+  }
+
+  /// A measurement of just what is believed: it changes no pose.
+  void observe_exactly(std::size_t from, std::size_t to, const Covariance& R) {
+    take(from, to, {believed(from, to).pose, R});
+  }
+
+  /// As if edges knew nothing of each other.
+  void forget_shares() {
+    for (ObservedEdge& edge : edges_) {
+      edge.X_PC.own = settle(edge.X_PC).covariance;
+      edge.X_PC.shares.clear();
+    }
+    for (std::size_t i = 0; i < edges_.size(); ++i) cluster_[i] = i;
+  }
+
+  /// The joint covariance of all edges that their beliefs make.
+  [[nodiscard]] Eigen::MatrixXd dense() const {
+    const auto size = static_cast<Eigen::Index>(6 * edges_.size());
+    Eigen::MatrixXd P = Eigen::MatrixXd::Zero(size, size);
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      for (std::size_t j = 0; j < edges_.size(); ++j) {
+        auto block =
+            P.block<6, 6>(static_cast<Eigen::Index>(6 * i), static_cast<Eigen::Index>(6 * j));
+        if (i == j) block = edges_[i].X_PC.own.matrix();
+        for (const Share& a : edges_[i].X_PC.shares) {
+          for (const Share& b : edges_[j].X_PC.shares) {
+            if (a.source != b.source || a.subtracts != b.subtracts) continue;
+            block += (a.subtracts ? -1.0 : 1.0) * a.factor * b.factor.transpose();
+          }
+        }
+      }
+    }
+    return P;
+  }
+
+  /// What an observation makes of it: a Kalman update whose gain is zero for edges that have nothing to do with it.
+  [[nodiscard]] Eigen::MatrixXd dense_update(const Eigen::MatrixXd& P, std::size_t from,
+                                             std::size_t to, const Covariance& R) const {
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(6, P.cols());
+    Eigen::MatrixXd concerns = Eigen::MatrixXd::Zero(P.rows(), P.cols());
+    for (std::size_t i = std::min(from, to); i < std::max(from, to); ++i) {
+      const Pose X_toC = believed(to, i + 1).pose;
+      const auto at = static_cast<Eigen::Index>(6 * i);
+      H.middleCols<6>(at) = (from > to ? -1.0 : 1.0) * adjoint(X_toC);
+    }
+    for (const std::size_t i : concerned(from, to)) {
+      const auto at = static_cast<Eigen::Index>(6 * i);
+      concerns.block<6, 6>(at, at).setIdentity();
+    }
+    const Matrix6d S = H * P * H.transpose() + R.matrix();
+    const Eigen::MatrixXd K = concerns * P * H.transpose() * S.inverse();
+    const Eigen::MatrixXd rest = Eigen::MatrixXd::Identity(P.rows(), P.cols()) - K * H;
+    return rest * P * rest.transpose() + K * R.matrix() * K.transpose();
+  }
+
+ private:
+  // The edges of the path, and those that were observed together with one of them.
+  [[nodiscard]] std::vector<std::size_t> concerned(std::size_t from, std::size_t to) const {
+    std::vector<std::size_t> all;
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      for (std::size_t k = std::min(from, to); k < std::max(from, to); ++k) {
+        if (cluster_[i] != cluster_[k]) continue;
+        all.push_back(i);
+        break;
+      }
+    }
+    return all;
+  }
+
+  Observation take(std::size_t from, std::size_t to, const Transform& Z) {
+    std::vector<ObservedEdge> given = path(from, to);
+    std::vector<std::size_t> index;
+    for (std::size_t k = 0; k < given.size(); ++k)
+      index.push_back(from > to ? from - 1 - k : from + k);
+    const auto all = concerned(from, to);
+    for (const std::size_t i : all) {
+      if (i >= std::min(from, to) && i < std::max(from, to)) continue;
+      given.push_back({edges_[i].X_PC, ObservedEdge::Way::kBeside});
+      index.push_back(i);
+    }
+    const std::string source = std::string(kObservedPrefix) + std::to_string(++count_);
+    auto observed = tfdude::observe(given, Z, source, {1.0, true});
+    if (!observed) throw std::runtime_error(observed.error().message);
+    for (std::size_t k = 0; k < index.size(); ++k) edges_[index[k]].X_PC = observed->edges[k].X_PC;
+    const std::size_t together = cluster_[all.front()];
+    for (const std::size_t i : all) cluster_[i] = together;
+    return *observed;
+  }
+
+  std::vector<ObservedEdge> edges_;
+  std::vector<std::size_t> cluster_;  // edges of the same number have been observed together
+  std::vector<Pose> truth_;
+  std::vector<std::string> sources_;
+  int count_ = 0;
+};
+
+}  // namespace tfdude::testing

@@ -1,0 +1,304 @@
+#include "tfdude/math/observation.hpp"
+
+#include <cmath>
+#include <cstring>
+
+#include "tfdude/math/fusion.hpp"
+
+#include "math/semidefinite.hpp"
+#include "support/catch.hpp"
+#include "support/observed_chain.hpp"
+#include "support/pose_diff.hpp"
+#include "support/random.hpp"
+#include "support/sampling.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::ContainsSubstring;
+using testing::Gaussian;
+using testing::ObservedChain;
+using testing::Random;
+
+constexpr int kRuns = 1000;
+constexpr auto kDown = ObservedEdge::Way::kDown;
+constexpr auto kUp = ObservedEdge::Way::kUp;
+const std::string kSource = "observed:once";
+
+// Mean normalized squared errors of one quantity over the runs, which must lie where 99 % of all such means do.
+class Consistency {
+ public:
+  void add(const Belief& X, const Pose& truth) {
+    const Twist e = log(X.pose.inverse() * truth);
+    int rank = 0;
+    const Matrix6d inverse = pseudo_inverse(settle(X).covariance.matrix(), &rank);
+    sum_ += e.dot(inverse * e);
+    dimensions_ += rank;
+    ++runs_;
+  }
+  [[nodiscard]] double mean() const { return sum_ / runs_; }
+  [[nodiscard]] double low() const { return chi_squared_quantile(0.005, dimensions_) / runs_; }
+  [[nodiscard]] double high() const { return chi_squared_quantile(0.995, dimensions_) / runs_; }
+
+ private:
+  double sum_ = 0;
+  int dimensions_ = 0;
+  int runs_ = 0;
+};
+
+#define CHECK_CONSISTENT(one)                                                  \
+  do {                                                                         \
+    INFO((one).mean() << " within " << (one).low() << " to " << (one).high()); \
+    CHECK(((one).mean() > (one).low() && (one).mean() < (one).high()));        \
+  } while (false)
+
+struct Ends {
+  std::size_t from;
+  std::size_t to;
+};
+
+// Each run a new robot of the same uncertainties, whose paths are observed one after the other.
+std::vector<Consistency> simulate(Random& random, const std::vector<Ends>& observed,
+                                  const std::vector<Ends>& asked, bool keep_shares) {
+  std::vector<Consistency> found(asked.size());
+  for (int run = 0; run < kRuns; ++run) {
+    ObservedChain chain(random, 5);
+    chain.add_source("s", {0, 2, 4}, random);
+    chain.set_exact(1);
+    chain.make_true(random);
+    for (const Ends& ends : observed) {
+      chain.observe(ends.from, ends.to, random.covariance(0.001, 0.001), random);
+      if (!keep_shares) chain.forget_shares();
+    }
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      found[i].add(chain.believed(asked[i].from, asked[i].to),
+                   chain.truth(asked[i].from, asked[i].to));
+    }
+  }
+  return found;
+}
+
+TEST_CASE("After observations edges and paths are as sure as they say, over 1,000 runs") {
+  Random random(631);
+  INFO("seed " << random.seed());
+  const std::vector<Ends> asked = {{0, 1}, {2, 3}, {3, 4}, {4, 5}, {0, 5}, {0, 3}, {2, 5}, {3, 0}};
+  const std::vector<std::vector<Ends>> plans = {
+      {{0, 4}}, {{0, 4}, {0, 4}, {0, 4}}, {{0, 4}, {2, 5}, {5, 1}, {0, 4}}};
+  for (const auto& plan : plans) {
+    INFO(plan.size() << " observations");
+    const auto found = simulate(random, plan, asked, true);
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      INFO("from " << asked[i].from << " to " << asked[i].to);
+      CHECK_CONSISTENT(found[i]);
+    }
+  }
+}
+
+TEST_CASE("Without what edges know of each other, a path that is observed again and again is not") {
+  Random random(632);
+  INFO("seed " << random.seed());
+  const auto found = simulate(random, std::vector<Ends>(8, {0, 4}), {{0, 1}}, false);
+  INFO(found[0].mean() << ", at most " << found[0].high());
+  CHECK(found[0].mean() > 1.5 * found[0].high());
+}
+
+TEST_CASE(
+    "The joint covariance is that of a dense filter, edges off the path and sources included") {
+  Random random(633);
+  INFO("seed " << random.seed());
+  for (int run = 0; run < 20; ++run) {
+    ObservedChain chain(random, 5);
+    chain.add_source("s", {0, 2, 4}, random);
+    chain.add_source("t", {1, 2}, random);
+    chain.set_exact(3);
+    Eigen::MatrixXd P = chain.dense();
+    for (const Ends& ends :
+         std::vector<Ends>{{0, 2}, {0, 2}, {1, 5}, {5, 2}, {0, 3}, {1, 5}, {0, 1}, {5, 0}}) {
+      const Covariance R = random.covariance(0.003, 0.003);
+      P = chain.dense_update(P, ends.from, ends.to, R);
+      chain.observe_exactly(ends.from, ends.to, R);
+      const Eigen::MatrixXd rest = chain.dense() - P.topLeftCorner(30, 30);
+      INFO("from " << ends.from << " to " << ends.to << ", differs by "
+                   << rest.cwiseAbs().maxCoeff() << " of " << P.cwiseAbs().maxCoeff());
+      CHECK(rest.cwiseAbs().maxCoeff() < 1e-9 * P.cwiseAbs().maxCoeff());
+    }
+    // However often all was observed.
+    for (std::size_t i = 0; i < 5; ++i) {
+      Eigen::Index columns = 0;
+      for (const Share& share : chain.edges()[i].X_PC.shares) columns += share.factor.cols();
+      CHECK(columns <= 3 + 3 + 2 * kMaxFactorColumns);
+    }
+  }
+}
+
+TEST_CASE("What there is no room for makes the joint covariance larger, not smaller") {
+  Random random(640);
+  INFO("seed " << random.seed());
+  ObservedChain chain(random, 9);
+  Eigen::MatrixXd P = chain.dense();
+  for (int i = 0; i < 30; ++i) {
+    const Ends ends{random.index(5), 5 + random.index(5)};
+    const Covariance R = random.covariance(0.003, 0.003);
+    P = chain.dense_update(P, ends.from, ends.to, R);
+    chain.observe_exactly(ends.from, ends.to, R);
+    for (const ObservedEdge& edge : chain.edges()) {
+      for (const Share& share : edge.X_PC.shares) CHECK(share.factor.cols() <= kMaxFactorColumns);
+    }
+    const Eigen::VectorXd values =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(chain.dense() - P).eigenvalues();
+    CHECK(values[0] > -1e-9 * P.cwiseAbs().maxCoeff());
+  }
+  // There was no room.
+  CHECK((chain.dense() - P).cwiseAbs().maxCoeff() > 1e-6 * P.cwiseAbs().maxCoeff());
+}
+
+TEST_CASE("A measurement of one uncertain edge is fused with it") {
+  Random random(634);
+  INFO("seed " << random.seed());
+  for (int i = 0; i < 50; ++i) {
+    const Transform X = random.transform(2.0, 0.1, 0.1);
+    const Transform Z{X.pose * exp(0.1 * random.twist(1.0, 1.0)), random.covariance(0.1, 0.1)};
+    const auto observed =
+        observe({{{X.pose, X.covariance, std::nullopt, {}}, kDown}}, Z, kSource, {1.0, true});
+    const auto fused = fuse({X, Z});
+    REQUIRE(observed);
+    REQUIRE(fused);
+    CHECK(testing::transform_diff(settle(observed->edges[0].X_PC), fused->X, 1e-8) == "");
+    CHECK(observed->edges[0].X_PC.shares.empty());
+  }
+}
+
+TEST_CASE("The gate refuses what is too far, says how far, and changes nothing") {
+  Random random(635);
+  INFO("seed " << random.seed());
+  ObservedChain chain(random, 3);
+  Pose Z = chain.believed(0, 3).pose;
+  const Covariance R = random.covariance(0.001, 0.001);
+  const auto right = observe(chain.path(0, 3), {Z, R}, kSource);
+  REQUIRE(right);
+  CHECK(right->accepted);
+  CHECK(right->distance_squared == testing::Approx(0).margin(1e-12));
+  CHECK(right->dimensions == 6);
+  CHECK(right->limit == testing::Approx(22.458).epsilon(1e-4));
+  Z = Z * exp(0.5 * Twist::Unit(3));
+  const auto wrong = observe(chain.path(0, 3), {Z, R}, kSource);
+  REQUIRE(wrong);
+  CHECK_FALSE(wrong->accepted);
+  CHECK(wrong->distance_squared > 100.0);
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK_FALSE(wrong->edges[i].corrected);
+    const Belief& before = chain.edges()[i].X_PC;
+    CHECK(std::memcmp(&wrong->edges[i].X_PC.pose, &before.pose, sizeof(Pose)) == 0);
+    CHECK(wrong->edges[i].surprise.squares > 0);
+  }
+  const auto ungated = observe(chain.path(0, 3), {Z, R}, kSource, {1.0, true});
+  REQUIRE(ungated);
+  CHECK(ungated->accepted);
+  CHECK_FALSE(observe(chain.path(0, 3), {Z, R}, kSource, {0.0, true}));
+  CHECK_FALSE(observe(chain.path(0, 3), {Z, R}, kSource, {std::nan(""), true}));
+}
+
+TEST_CASE("Edges that are known exactly stay as they are to the last bit") {
+  Random random(636);
+  ObservedChain chain(random, 4);
+  chain.set_exact(1);
+  chain.set_exact(2);
+  chain.make_true(random);
+  const auto before = chain.edges();
+  chain.observe(0, 4, random.covariance(0.001, 0.001), random);
+  for (const std::size_t i : {std::size_t{1}, std::size_t{2}}) {
+    CHECK(std::memcmp(&chain.edges()[i].X_PC.pose, &before[i].X_PC.pose, sizeof(Pose)) == 0);
+    CHECK(chain.edges()[i].X_PC.own.upper() == Covariance::Upper{});
+    CHECK(chain.edges()[i].X_PC.shares.empty());
+  }
+  CHECK(testing::pose_diff(chain.edges()[0].X_PC.pose, before[0].X_PC.pose, 1e-9) != "");
+  ObservedChain exact(random, 2);
+  exact.set_exact(0);
+  exact.set_exact(1);
+  const auto nothing =
+      observe(exact.path(0, 2), {exact.believed(0, 2).pose, random.covariance()}, kSource);
+  REQUIRE_FALSE(nothing);
+  CHECK_THAT(nothing.error().message, ContainsSubstring("no edge of the path"));
+}
+
+TEST_CASE("An exact measurement far away is met exactly") {
+  Random random(637);
+  INFO("seed " << random.seed());
+  for (int i = 0; i < 20; ++i) {
+    ObservedChain chain(random, 4);
+    const Pose Z = chain.believed(0, 4).pose * exp(random.twist(0.8, 1.0));
+    const auto observed = observe(chain.path(0, 4), {Z, {}}, kSource, {1.0, true});
+    REQUIRE(observed);
+    Pose X;
+    for (const ObservedResult& edge : observed->edges) X = X * edge.X_PC.pose;
+    CHECK(testing::pose_diff(X, Z, 1e-9) == "");
+  }
+}
+
+TEST_CASE(
+    "What is of unknown correlation is observed without gaining from what may be the same twice") {
+  Random random(638);
+  INFO("seed " << random.seed());
+  const Transform X = random.transform(1.0, 0.1, 0.1);
+  const Belief alone{X.pose, {}, X.covariance, {}};
+  const Transform Z{X.pose, random.covariance(0.01, 0.01)};
+  // By covariance intersection: the same again tells nothing more.
+  const auto once = observe({{alone, kDown}}, Z, kSource);
+  REQUIRE(once);
+  CHECK(once->accepted);
+  const Belief& after = once->edges[0].X_PC;
+  REQUIRE(after.unknown);
+  CHECK(after.own.upper() == Covariance::Upper{});
+  const auto twice = observe({{after, kDown}}, Z, kSource);
+  REQUIRE(twice);
+  CHECK(twice->edges[0].X_PC.unknown->matrix().trace() > 0.99 * after.unknown->matrix().trace());
+  const auto as_if = fuse({X, Z, Z});
+  REQUIRE(as_if);
+  CHECK(as_if->X.covariance.matrix().trace() < 0.7 * after.unknown->matrix().trace());
+
+  const auto both = observe({{alone, kDown}, {alone, kUp}}, Z, kSource);
+  REQUIRE_FALSE(both);
+  CHECK_THAT(both.error().message, ContainsSubstring("2 of them"));
+  // Beside an edge that may be corrected, the unknown one stays.
+  const Belief known{random.pose(), random.covariance(1.0, 1.0), std::nullopt, {}};
+  const auto mixed = observe({{alone, kDown}, {known, kDown}},
+                             {X.pose * known.pose, random.covariance(0.001, 0.001)}, kSource);
+  REQUIRE(mixed);
+  CHECK_FALSE(mixed->edges[0].corrected);
+  CHECK(mixed->edges[1].corrected);
+  // No better than what is between it and the measurement.
+  const Matrix6d left = mixed->edges[1].X_PC.own.matrix();
+  CHECK(left.trace() < known.own.matrix().trace());
+  CHECK(testing::domination(left, X.covariance.transported(known.pose.inverse()).matrix()) > -1e-9);
+}
+
+TEST_CASE(
+    "Surprise is as expected where the covariance is right, and tells which edge's is too small") {
+  Random random(639);
+  INFO("seed " << random.seed());
+  for (const double lie : {1.0, 3.0}) {
+    INFO("the errors of edge 2 are " << lie << " times what it says");
+    std::vector<Surprise> sum(3);
+    for (int run = 0; run < kRuns; ++run) {
+      ObservedChain chain(random, 3);
+      chain.make_true(random, 2, lie);
+      const auto observed = chain.observe(0, 3, random.covariance(0.001, 0.001), random);
+      for (std::size_t i = 0; i < 3; ++i) {
+        sum[i].squares += observed.edges[i].surprise.squares;
+        sum[i].expected += observed.edges[i].surprise.expected;
+        sum[i].variance += observed.edges[i].surprise.variance;
+      }
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double ratio = sum[i].squares / sum[i].expected;
+      const double deviations = (sum[i].squares - sum[i].expected) / std::sqrt(sum[i].variance);
+      INFO("edge " << i << ": ratio " << ratio << ", " << deviations << " standard deviations");
+      if (lie == 1.0) CHECK(std::abs(deviations) < 4.0);
+      if (lie > 1.0 && i == 2) CHECK(ratio > 2.5);
+      if (lie > 1.0 && i != 2) CHECK(ratio < sum[2].squares / sum[2].expected);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tfdude
