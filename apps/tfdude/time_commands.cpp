@@ -18,24 +18,24 @@ std::chrono::nanoseconds from_milliseconds(double milliseconds) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(milliseconds * 1e6));
 }
 
-Result<Instant> instant_of(const std::string& stamp, const Arguments& arguments) {
+Result<Query> query_of(const std::string& stamp, const Arguments& arguments) {
   const Time now = wall_clock();
-  Instant instant;
+  Query query;
   if (!stamp.empty()) {
     const auto at = parse_stamp(stamp, now);
     if (!at) return tl::unexpected(at.error());
-    instant.at = *at;
+    query.at = *at;
   }
-  instant.extrapolate = from_milliseconds(arguments.extrapolate_ms);
-  if (arguments.age_noise) instant.age_noise_until = now;
-  return instant;
+  query.extrapolate = from_milliseconds(arguments.extrapolate_ms);
+  if (arguments.age_noise) query.age_noise_until = now;
+  return query;
 }
 
 Result<StampedTransform> look_up(Client& client, const Arguments& arguments) {
-  const auto at = instant_of(arguments.stamp, arguments);
+  const auto at = query_of(arguments.stamp, arguments);
   if (!at) return tl::unexpected(at.error());
   if (!arguments.fixed.empty()) {
-    const auto other = instant_of(arguments.other_stamp, arguments);
+    const auto other = query_of(arguments.other_stamp, arguments);
     if (!other) return tl::unexpected(other.error());
     return client.lookup(arguments.id, *at, arguments.other, *other, arguments.fixed);
   }

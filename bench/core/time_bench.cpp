@@ -111,12 +111,12 @@ Time instant_of(const Case& of) {
 /// tf2 does are one.
 void check_agreement(const Case& of) {
   const bench::Tree& tree = moving(of).tree();
-  Instant instant;
-  instant.at = instant_of(of);
-  const auto ours = moving(of).node().lookup(tree.from, tree.to, instant);
+  Query query;
+  query.at = instant_of(of);
+  const auto ours = moving(of).node().lookup(tree.from, tree.to, query);
   const auto theirs = moving(of)
                           .buffer()
-                          .lookupTransform(tree.from, tree.to, for_tf2(*instant.at))
+                          .lookupTransform(tree.from, tree.to, for_tf2(*query.at))
                           .transform.translation;
   constexpr double kTolerance = 1e-9;  // [m]
   const Eigen::Vector3d p(theirs.x, theirs.y, theirs.z);
@@ -127,10 +127,10 @@ void look_up_by_handle(benchmark::State& state, Case of) {
   Node& node = moving(of).node();
   const Handle a = *node.find(moving(of).tree().from);
   const Handle b = *node.find(moving(of).tree().to);
-  Instant instant;
-  instant.at = instant_of(of);
+  Query query;
+  query.at = instant_of(of);
   check_agreement(of);
-  for (auto _ : state) benchmark::DoNotOptimize(node.lookup(a, b, instant));
+  for (auto _ : state) benchmark::DoNotOptimize(node.lookup(a, b, query));
 }
 
 void look_up_tf2(benchmark::State& state, Case of) {

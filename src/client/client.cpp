@@ -82,21 +82,21 @@ Result<Transform> Client::lookup(std::string_view a, std::string_view b) {
 Result<Transform> Client::lookup(Handle a, Handle b) { return participant_->lookup(a, b); }
 
 Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b,
-                                        const Instant& instant) {
-  return participant_->lookup(a, b, instant);
+                                        const Query& query) {
+  return participant_->lookup(a, b, query);
 }
 
-Result<StampedTransform> Client::lookup(Handle a, Handle b, const Instant& instant) {
-  return participant_->lookup(a, b, instant);
+Result<StampedTransform> Client::lookup(Handle a, Handle b, const Query& query) {
+  return participant_->lookup(a, b, query);
 }
 
 Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b,
-                                        const Instant& instant, Milliseconds wait) {
-  return participant_->lookup_waiting(a, b, instant, wait, nullptr);
+                                        const Query& query, Milliseconds wait) {
+  return participant_->lookup_waiting(a, b, query, wait, nullptr);
 }
 
-Result<StampedTransform> Client::lookup(std::string_view a, const Instant& at_a, std::string_view b,
-                                        const Instant& at_b, std::string_view fixed) {
+Result<StampedTransform> Client::lookup(std::string_view a, const Query& at_a, std::string_view b,
+                                        const Query& at_b, std::string_view fixed) {
   const auto X_FA = participant_->lookup(fixed, a, at_a);
   if (!X_FA) return tl::unexpected(X_FA.error());
   const auto X_FB = participant_->lookup(fixed, b, at_b);
@@ -105,20 +105,20 @@ Result<StampedTransform> Client::lookup(std::string_view a, const Instant& at_a,
 }
 
 PendingLookup Client::lookup_async(const std::string& a, const std::string& b,
-                                   const Instant& instant, Milliseconds wait,
+                                   const Query& query, Milliseconds wait,
                                    PendingLookup::Callback callback) {
-  return PendingLookup(participant_->lookup_async(a, b, instant, wait, std::move(callback)));
+  return PendingLookup(participant_->lookup_async(a, b, query, wait, std::move(callback)));
 }
 
 std::future<Result<StampedTransform>> Client::lookup_async(const std::string& a,
                                                            const std::string& b,
-                                                           const Instant& instant,
+                                                           const Query& query,
                                                            Milliseconds wait) {
-  return participant_->lookup_async(a, b, instant, wait);
+  return participant_->lookup_async(a, b, query, wait);
 }
 
-Result<void> Client::can_lookup(std::string_view a, std::string_view b, const Instant& instant) {
-  return participant_->lookup(a, b, instant).map([](const StampedTransform&) {});
+Result<void> Client::can_lookup(std::string_view a, std::string_view b, const Query& query) {
+  return participant_->lookup(a, b, query).map([](const StampedTransform&) {});
 }
 
 Result<PathWatch> Client::watch(const std::string& a, const std::string& b,

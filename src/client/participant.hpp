@@ -65,22 +65,22 @@ class Participant final : public TransportHandler {
     return lookup(a, b).map([](const Transform& X_AB) { return X_AB.pose; });
   }
   template <class Name>
-  [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Instant& instant) {
-    auto local = forest_.lookup(a, b, instant);
+  [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Query& query) {
+    auto local = forest_.lookup(a, b, query);
     if (local || is_of_time(local.error())) return local;
-    return lookup_elsewhere(a, b, instant);
+    return lookup_elsewhere(a, b, query);
   }
   /// @param cancelled  ends the wait; may be null
   [[nodiscard]] Result<StampedTransform> lookup_waiting(std::string_view a, std::string_view b,
-                                                        const Instant& instant, Milliseconds wait,
+                                                        const Query& query, Milliseconds wait,
                                                         Cancellation* cancelled);
   /// @return what cancels it when its last copy goes
   [[nodiscard]] std::shared_ptr<void> lookup_async(const std::string& a, const std::string& b,
-                                                   const Instant& instant, Milliseconds wait,
+                                                   const Query& query, Milliseconds wait,
                                                    PendingLookup::Callback callback);
   [[nodiscard]] std::future<Result<StampedTransform>> lookup_async(const std::string& a,
                                                                    const std::string& b,
-                                                                   const Instant& instant,
+                                                                   const Query& query,
                                                                    Milliseconds wait);
   [[nodiscard]] Result<std::shared_ptr<WatchedPath>> watch(const std::string& a,
                                                            const std::string& b,
@@ -181,9 +181,9 @@ class Participant final : public TransportHandler {
 
   // Lookups that others must be asked for, and what is pushed (participant_time.cpp).
   [[nodiscard]] Result<StampedTransform> lookup_elsewhere(std::string_view a, std::string_view b,
-                                                          const Instant& instant);
+                                                          const Query& query);
   [[nodiscard]] Result<StampedTransform> lookup_elsewhere(Handle a, Handle b,
-                                                          const Instant& instant);
+                                                          const Query& query);
   [[nodiscard]] Result<StampedTransform> gather(LookupPlan& plan, const std::string& a,
                                                 const std::string& b, std::optional<Time> hint);
   [[nodiscard]] Result<std::vector<SegmentValues>> ask_values(LookupPlan& plan);

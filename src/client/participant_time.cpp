@@ -15,7 +15,7 @@ constexpr Milliseconds kLookAgain{1};
 constexpr Milliseconds kLongestSleep{50};
 
 // What may come yet.
-bool is_worth_waiting(const Error& error, const Instant& instant) {
+bool is_worth_waiting(const Error& error, const Query& query) {
   switch (error.code) {
     case Errc::kNotYet:
     case Errc::kUnknownStart:
@@ -27,7 +27,7 @@ bool is_worth_waiting(const Error& error, const Instant& instant) {
       return true;
     case Errc::kTooOld:
       // Of the newest common instant: where one edge is ahead of what another has.
-      return !instant.at;
+      return !query.at;
     default:
       return false;
   }
@@ -89,7 +89,7 @@ Result<StampedTransform> Participant::gather(LookupPlan& plan, const std::string
   auto answers = ask_values(plan);
   if (!answers) return tl::unexpected(std::move(answers.error()));
   const bool newest =
-      !plan.parts.empty() && !std::get<LookupRequest>(plan.parts.front().request.body).instant.at;
+      !plan.parts.empty() && !std::get<LookupRequest>(plan.parts.front().request.body).query.at;
   if (!newest || plan.parts.size() == 1) return assemble(plan, *answers);
   {
     const std::lock_guard lock(hints_mutex_);
@@ -99,7 +99,7 @@ Result<StampedTransform> Participant::gather(LookupPlan& plan, const std::string
   if (!found.ask_again) return assemble(plan, found.answers);
   for (Part& part : plan.parts) {
     auto& lookup = std::get<LookupRequest>(part.request.body);
-    lookup.instant.at = found.ask_again;
+    lookup.query.at = found.ask_again;
     lookup.hint.reset();
   }
   answers = ask_values(plan);
@@ -108,40 +108,40 @@ Result<StampedTransform> Participant::gather(LookupPlan& plan, const std::string
 }
 
 Result<StampedTransform> Participant::lookup_elsewhere(std::string_view a, std::string_view b,
-                                                       const Instant& instant) {
+                                                       const Query& query) {
   const std::string start(a);
   const std::string end(b);
   std::optional<Time> hint;
-  if (!instant.at) {
+  if (!query.at) {
     const std::lock_guard lock(hints_mutex_);
     hint = hints_.guess(a, b, Clock::now());
   }
-  return healed([&] { return route_lookup(forest_, directory_, start, end, instant, hint); },
+  return healed([&] { return route_lookup(forest_, directory_, start, end, query, hint); },
                 [&](LookupPlan& plan) { return gather(plan, start, end, hint); });
 }
 
-Result<StampedTransform> Participant::lookup_elsewhere(Handle a, Handle b, const Instant& instant) {
+Result<StampedTransform> Participant::lookup_elsewhere(Handle a, Handle b, const Query& query) {
   const auto start = forest_.info(a);
   if (!start) return fail(Errc::kUnknownStart, "the first frame was removed");
   const auto end = forest_.info(b);
   if (!end) return fail(Errc::kUnknownEnd, "the second frame was removed");
-  return lookup_elsewhere(start->id, end->id, instant);
+  return lookup_elsewhere(start->id, end->id, query);
 }
 
 Result<StampedTransform> Participant::lookup_waiting(std::string_view a, std::string_view b,
-                                                     const Instant& instant, Milliseconds wait,
+                                                     const Query& query, Milliseconds wait,
                                                      Cancellation* cancelled) {
   const auto deadline = Clock::now() + wait;
   Cancellation nobody;
   Cancellation& cancellation = cancelled != nullptr ? *cancelled : nobody;
   while (true) {
-    auto found = lookup(a, b, instant);
+    auto found = lookup(a, b, query);
     const auto now = Clock::now();
-    if (found || now >= deadline || !is_worth_waiting(found.error(), instant)) return found;
+    if (found || now >= deadline || !is_worth_waiting(found.error(), query)) return found;
     // Most sources stamp by a clock that runs as the wall clock does.
     std::chrono::nanoseconds pause = kLookAgain;
-    if (instant.at) {
-      pause = std::clamp<std::chrono::nanoseconds>(*instant.at - wall_clock(), kLookAgain,
+    if (query.at) {
+      pause = std::clamp<std::chrono::nanoseconds>(*query.at - wall_clock(), kLookAgain,
                                                    kLongestSleep);
     }
     if (cancellation.wait_until(std::min(deadline, now + pause))) {
@@ -151,11 +151,11 @@ Result<StampedTransform> Participant::lookup_waiting(std::string_view a, std::st
 }
 
 std::shared_ptr<void> Participant::lookup_async(const std::string& a, const std::string& b,
-                                                const Instant& instant, Milliseconds wait,
+                                                const Query& query, Milliseconds wait,
                                                 PendingLookup::Callback callback) {
   auto task = std::make_shared<AsyncLookup>(
-      [this, a, b, instant, wait, callback = std::move(callback)](Cancellation& cancellation) {
-        auto found = lookup_waiting(a, b, instant, wait, &cancellation);
+      [this, a, b, query, wait, callback = std::move(callback)](Cancellation& cancellation) {
+        auto found = lookup_waiting(a, b, query, wait, &cancellation);
         if (!cancellation.wait_until(Clock::time_point::min())) callback(std::move(found));
       });
   pending_.add(task);
@@ -164,13 +164,13 @@ std::shared_ptr<void> Participant::lookup_async(const std::string& a, const std:
 
 std::future<Result<StampedTransform>> Participant::lookup_async(const std::string& a,
                                                                 const std::string& b,
-                                                                const Instant& instant,
+                                                                const Query& query,
                                                                 Milliseconds wait) {
   auto promise = std::make_shared<std::promise<Result<StampedTransform>>>();
   auto future = promise->get_future();
   pending_.keep(
-      std::make_shared<AsyncLookup>([this, a, b, instant, wait, promise](auto& cancellation) {
-        promise->set_value(lookup_waiting(a, b, instant, wait, &cancellation));
+      std::make_shared<AsyncLookup>([this, a, b, query, wait, promise](auto& cancellation) {
+        promise->set_value(lookup_waiting(a, b, query, wait, &cancellation));
       }));
   return future;
 }

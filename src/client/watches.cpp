@@ -25,9 +25,9 @@ WatchedPath::WatchedPath(std::string a, std::string b, WatchOptions options)
   (void)mirror_.set_default_timing(options_.timing);
 }
 
-Result<StampedTransform> WatchedPath::lookup(const Instant& instant) const {
+Result<StampedTransform> WatchedPath::lookup(const Query& query) const {
   if (live_.load(std::memory_order_acquire)) {
-    auto found = mirror_.lookup(a_, b_, instant);
+    auto found = mirror_.lookup(a_, b_, query);
     if (found || live_.load(std::memory_order_acquire)) return found;
   }
   const std::lock_guard lock(mutex_);
@@ -276,14 +276,14 @@ void Watches::close_unused(const std::vector<std::shared_ptr<WatchedPath>>& path
   }
 }
 
-Result<StampedTransform> PathWatch::lookup(const Instant& instant) const {
-  return path_->lookup(instant);
+Result<StampedTransform> PathWatch::lookup(const Query& query) const {
+  return path_->lookup(query);
 }
 
 Result<StampedTransform> PathWatch::at(Time t) const {
-  Instant instant;
-  instant.at = t;
-  return path_->lookup(instant);
+  Query query;
+  query.at = t;
+  return path_->lookup(query);
 }
 
 Result<void> PathWatch::health() const { return path_->health(); }

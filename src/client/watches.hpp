@@ -23,7 +23,7 @@ class WatchedPath {
  public:
   WatchedPath(std::string a, std::string b, WatchOptions options);
 
-  [[nodiscard]] Result<StampedTransform> lookup(const Instant& instant) const;
+  [[nodiscard]] Result<StampedTransform> lookup(const Query& query) const;
 
   [[nodiscard]] Result<void> health() const;
   [[nodiscard]] std::uint64_t messages() const { return messages_.load(std::memory_order_relaxed); }

@@ -2,6 +2,8 @@
 
 #include <type_traits>
 
+#include "tfdude/math/interpolate.hpp"
+
 #include "math/columns.hpp"
 #include "math/interpolate_far.hpp"
 
@@ -71,6 +73,22 @@ Value join(Climb<Value>&& from_a, Climb<Value>&& from_b) {
   } else {
     return X_AB;
   }
+}
+
+void Climb<Belief>::up(const Transform& X_PC) {
+  Belief edge;
+  edge.pose = X_PC.pose;
+  (unknown_ ? edge.unknown.emplace() : edge.own) = X_PC.covariance;
+  if (shares_ != nullptr) edge.shares = *shares_;
+  X_SH_ = compose(X_SH_, inverse(edge), order_);
+}
+
+void Climb<Belief>::up_between(const Transform& X0, const Transform& X1, double s) {
+  up(interpolate(X0, X1, s));
+}
+
+Belief join(Climb<Belief>&& from_a, Climb<Belief>&& from_b) {
+  return compose(from_a.X_SH_, inverse(from_b.X_SH_), from_a.order_);
 }
 
 template class Climb<Transform>;

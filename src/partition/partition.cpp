@@ -59,7 +59,7 @@ Reply Partition::answer(const Request& request, Time now) {
 Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& lookup) const {
   Reply reply;
   reply.sequence = sequence;
-  auto values = forest_.lookup_segments(lookup.segments, lookup.instant, lookup.hint);
+  auto values = forest_.lookup_segments(lookup.segments, lookup.query, lookup.hint);
   if (values) {
     reply.body = *std::move(values);
   } else if (values.error().code == Errc::kNotYet || values.error().code == Errc::kTooOld) {

@@ -154,7 +154,7 @@ Result<Part> route_move(const Forest& forest, const Directory& directory, const 
 }
 
 Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory,
-                                const std::string& a, const std::string& b, const Instant& instant,
+                                const std::string& a, const std::string& b, const Query& query,
                                 std::optional<Time> hint) {
   auto segments = forest.segments(a, b);
   if (!segments) return tl::unexpected(segments.error());
@@ -163,7 +163,7 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
     auto& body =
         body_for<LookupRequest>(plan.parts, directory, segment.owner, owned_end(forest, segment));
     body.segments.push_back({segment.from, segment.to});
-    body.instant = instant;
+    body.query = query;
     body.hint = hint;
   }
   if (auto ok = check_all_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());

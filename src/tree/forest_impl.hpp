@@ -12,6 +12,12 @@
 
 namespace tfdude {
 
+/// What a walk comes to, with the ties of what has any.
+struct Reached {
+  Transform X;
+  Ties ties;
+};
+
 /// The shared state of Forest: what readers see (ids_, slots_, committed_) and what writers keep beside it
 /// under mutex_ (graph_, free slots, pools).
 ///
@@ -70,32 +76,47 @@ class Forest::Impl {
   /// The walk that all lookups share. `take` is handed the climb that an edge belongs to and the edge, whose value it
   /// adds to that; the walk ends in an error of its.
   template <class Value, class Take>
-  [[nodiscard]] Result<Value> walk(const Ends& ends, Absent absent, Take take) const;
+  [[nodiscard]] Result<Value> walk(const Ends& ends, Absent absent, Order order, Take take) const;
 
-  /// X_AB at the newest instant that all moving edges have: that of the newest sample of `limiting`, null where none
-  /// is moving.
+  /// What a walk has met.
+  struct Met {
+    const HeldVersion* limiting =
+        nullptr;  ///< whose newest sample is the oldest; null where none is moving
+    bool moving = false;
+    bool tied = false;  ///< an edge has ties: a Transform is not enough, and none is given
+  };
+
+  /// X_AB at the newest instant that all moving edges have: that of the newest sample of Met::limiting.
   template <class Value>
-  [[nodiscard]] Result<Value> walk_newest(const Ends& ends, Absent absent,
-                                          const HeldVersion*& limiting) const;
+  [[nodiscard]] Result<Value> walk_newest(const Ends& ends, Absent absent, Order order,
+                                          Met& met) const;
 
-  /// X_AB at t. @param any_moving  is set where an edge is; may be null
+  /// X_AB at t.
   template <class Value>
   [[nodiscard]] Result<Value> walk_at(const Ends& ends, Absent absent, std::int64_t t,
-                                      const Instant& instant, bool* any_moving) const;
+                                      const Query& query, Met& met) const;
+
+  [[nodiscard]] Result<Reached> reach_newest(const Ends& ends, Absent absent, Order order,
+                                             Met& met) const;
+  [[nodiscard]] Result<Reached> reach_at(const Ends& ends, Absent absent, std::int64_t t,
+                                         const Query& query, Met& met) const;
 
   // The same for many segments.
   [[nodiscard]] Result<std::vector<Ends>> all_ends(const std::vector<PathEnds>& segments) const;
-  [[nodiscard]] Result<std::vector<Transform>> newest_values(const std::vector<Ends>& segments,
-                                                             const HeldVersion*& limiting) const;
-  [[nodiscard]] Result<std::vector<Transform>> values_at(const std::vector<Ends>& segments,
-                                                         std::int64_t t, const Instant& instant,
-                                                         bool* any_moving) const;
+  [[nodiscard]] Result<std::vector<Reached>> newest_values(const std::vector<Ends>& segments,
+                                                           Order order, Met& met) const;
+  [[nodiscard]] Result<std::vector<Reached>> values_at(const std::vector<Ends>& segments,
+                                                       std::int64_t t, const Query& query,
+                                                       Met& met) const;
+
+  /// Adds what each single edge was observed with.
+  void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) const;
 
   /// Value is Transform, or Pose where the covariance is not asked for; Name is an id or a handle.
   template <class Value, class Name>
   [[nodiscard]] Result<Value> look_up(Name a, Name b) const;
   template <class Name>
-  [[nodiscard]] Result<StampedTransform> look_up(Name a, Name b, const Instant& instant) const;
+  [[nodiscard]] Result<StampedTransform> look_up(Name a, Name b, const Query& query) const;
 
   /// Calls visit(edge, from, to) for the edges from a to b, in order; an edge's version is that of its child.
   template <class Visit>
@@ -149,6 +170,20 @@ class Forest::Impl {
   void forget_past(HeldVersion& fresh);
   /// A ring with all its samples, of which the newest may still be the newest version: that one is superseded next.
   void give_back(Ring* ring, std::uint32_t slot);
+
+  // Of what errors have to do with each other (forest_ties.cpp).
+
+  /// Gives the fresh version other ties; null for none.
+  void set_ties(HeldVersion& fresh, std::unique_ptr<EdgeTies> ties);
+  /// What an observation has said of the edge goes with its value.
+  void end_revision(HeldVersion& fresh) {
+    if (fresh.ties != nullptr && fresh.ties->revised) tie_as_said(fresh);
+  }
+  void tie_as_said(HeldVersion& fresh);
+  [[nodiscard]] Result<void> check_revision(const HeldVersion& edge, const Revision& revision,
+                                            std::optional<Time> stamp, std::uint64_t seen) const;
+  /// The moving edge's sample of that stamp, where there is one, becomes another.
+  void replace_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
 
   /// The newest versions of an id and of the parent that it is to have; null where not interned.
   struct Pair {
@@ -219,6 +254,8 @@ class Forest::Impl {
   std::vector<Version*> superseded_;  // by commits since the readers were last asked
   std::vector<std::unique_ptr<Ring>> superseded_rings_;  // likewise
   std::vector<std::unique_ptr<Ring>> retired_rings_;
+  std::vector<std::unique_ptr<EdgeTies>> superseded_ties_;  // likewise
+  std::vector<std::unique_ptr<EdgeTies>> retired_ties_;
   std::vector<const Name*> released_names_;  // by the commit being made
   std::vector<std::uint32_t> free_slots_;
   std::vector<std::uint32_t> to_update_;  // of the update being made; kept for its memory

@@ -45,11 +45,15 @@ PastInfo past_of(const HeldVersion& edge) {
   return info;
 }
 
+Correlation correlation_of(const HeldVersion& edge) {
+  return edge.ties != nullptr ? edge.ties->now : Correlation();
+}
+
 void add_news(const HeldVersion& edge, std::uint32_t index, EdgeCursor& cursor, bool newest_only,
               std::vector<News>& news) {
   if (!edge.moving()) {
     if (edge.commit <= cursor.commit && cursor.commit != 0) return;
-    news.push_back({index, std::nullopt, edge.X_PC});
+    news.push_back({index, std::nullopt, edge.X_PC, correlation_of(edge)});
     cursor.commit = edge.commit;
     cursor.stamp.reset();
     return;
@@ -62,9 +66,13 @@ void add_news(const HeldVersion& edge, std::uint32_t index, EdgeCursor& cursor, 
   while (!one && first > ring.oldest() && ring.stamp(first - 1) > seen) --first;
   for (std::uint64_t number = first; number < edge.number; ++number) {
     const HeldVersion* sample = ring.sample(number);
-    if (sample != nullptr) news.push_back({index, time_of(sample->stamp), sample->X_PC});
+    if (sample != nullptr) {
+      news.push_back({index, time_of(sample->stamp), sample->X_PC, correlation_of(edge)});
+    }
   }
-  if (edge.stamp > seen) news.push_back({index, time_of(edge.stamp), edge.X_PC});
+  if (edge.stamp > seen) {
+    news.push_back({index, time_of(edge.stamp), edge.X_PC, correlation_of(edge)});
+  }
   cursor.stamp = time_of(std::max(edge.stamp, seen));
 }
 

@@ -13,8 +13,12 @@
 namespace tfdude {
 namespace {
 
+// What a walk adds up: of an edge it needs as much as a Transform for a Belief.
 template <class Value>
-const Value& value_of(const HeldVersion& version) {
+using OfEdge = std::conditional_t<std::is_same_v<Value, Pose>, Pose, Transform>;
+
+template <class Value>
+const OfEdge<Value>& value_of(const HeldVersion& version) {
   if constexpr (std::is_same_v<Value, Pose>) {
     return version.X_PC.pose;
   } else {
@@ -55,15 +59,15 @@ tl::unexpected<Error> not_yet(const HeldVersion& edge, std::int64_t t, const std
 
 // Beyond the newest sample, as far as is allowed.
 template <class Value>
-Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Instant& instant,
-                            Value& X) {
+Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Query& query,
+                            OfEdge<Value>& X) {
   const std::int64_t beyond = t - edge.stamp;
-  const std::int64_t limit = instant.extrapolate.count();
+  const std::int64_t limit = query.extrapolate.count();
   if (limit == 0) return not_yet(edge, t, "");
   if (beyond > limit) {
     return not_yet(
         edge, t,
-        ", and no more than " + in_milliseconds(instant.extrapolate) + " is to be extrapolated");
+        ", and no more than " + in_milliseconds(query.extrapolate) + " is to be extrapolated");
   }
   const HeldVersion* before =
       edge.number > edge.ring->oldest() ? edge.ring->sample(edge.number - 1) : nullptr;
@@ -78,7 +82,7 @@ Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Insta
 struct Moment {
   std::int64_t t;
   std::int64_t age;  // until when it is to hold, where noise is added for that
-  const Instant& instant;
+  const Query& query;
   std::uint64_t back = 0;  // see Ring::around()
 };
 
@@ -87,8 +91,8 @@ template <class Value>
 Result<void> climb_at(Climb<Value>& climb, const HeldVersion& edge, Moment& moment) {
   const std::int64_t t = moment.t;
   if (t > edge.stamp) {
-    Value& X = climb.place();
-    auto computed = compute_beyond<Value>(edge, t, moment.instant, X);
+    OfEdge<Value>& X = climb.place();
+    auto computed = compute_beyond<Value>(edge, t, moment.query, X);
     if (!computed) return computed;
     if (moment.age != 0) add_noise(X, edge, seconds(moment.age));
     climb.up(X);
@@ -106,7 +110,7 @@ Result<void> climb_at(Climb<Value>& climb, const HeldVersion& edge, Moment& mome
   const double s = after == before ? 0 : static_cast<double>(t - before->stamp) / span;
   const double noise = seconds(moment.age) + s * (1.0 - s) * span * 1e-9;
   if (edge.ring->has_noise() && noise > 0) {
-    Value& X = climb.place();
+    OfEdge<Value>& X = climb.place();
     X = value_of<Value>(*before);
     if (after != before) interpolate(value_of<Value>(*before), value_of<Value>(*after), s, X);
     add_noise(X, edge, noise);
@@ -119,14 +123,31 @@ Result<void> climb_at(Climb<Value>& climb, const HeldVersion& edge, Moment& mome
   return {};
 }
 
+void tie(Climb<Belief>& climb, const HeldVersion& edge) {
+  if (edge.ties == nullptr) {
+    climb.tie(false, nullptr);
+  } else {
+    climb.tie(edge.ties->now.unknown, &edge.ties->now.shares);
+  }
+}
+
+template <class Value>
+Climb<Value> begin_climb(Order order) {
+  if constexpr (std::is_same_v<Value, Belief>) {
+    return Climb<Belief>(order);
+  } else {
+    return Climb<Value>();
+  }
+}
+
 }  // namespace
 
 template <class Value, class Take>
-Result<Value> Forest::Impl::walk(const Ends& ends, Absent absent, Take take) const {
+Result<Value> Forest::Impl::walk(const Ends& ends, Absent absent, Order order, Take take) const {
   const Version* a = ends.a;
   const Version* b = ends.b;
-  Climb<Value> climb_a;
-  Climb<Value> climb_b;
+  Climb<Value> climb_a = begin_climb<Value>(order);
+  Climb<Value> climb_b = begin_climb<Value>(order);
   // What went wrong first; from there on only the errors matter, and kNotConnected goes first.
   std::optional<Error> error;
   while (a != b) {
@@ -138,7 +159,10 @@ Result<Value> Forest::Impl::walk(const Ends& ends, Absent absent, Take take) con
       error = Error{Errc::kNotOwner,
                     "the edge of " + quote(here->name->text) + " is held by another partition"};
     } else if (!error) {
-      Result<void> taken = take(from_a ? climb_a : climb_b, static_cast<const HeldVersion&>(*here));
+      const auto& edge = static_cast<const HeldVersion&>(*here);
+      Climb<Value>& climb = from_a ? climb_a : climb_b;
+      if constexpr (std::is_same_v<Value, Belief>) tie(climb, edge);
+      Result<void> taken = take(climb, edge);
       if (!taken) error = std::move(taken.error());
     }
     here = at(*here->above, ends.commit);
@@ -147,43 +171,84 @@ Result<Value> Forest::Impl::walk(const Ends& ends, Absent absent, Take take) con
   return join(std::move(climb_a), std::move(climb_b));
 }
 
+// Only a Belief has room for what an edge is tied to.
 template <class Value>
-Result<Value> Forest::Impl::walk_newest(const Ends& ends, Absent absent,
-                                        const HeldVersion*& limiting) const {
+bool leaves_out_ties(const HeldVersion& edge) {
+  return std::is_same_v<Value, Transform> && edge.ties != nullptr;
+}
+
+template <class Value>
+Result<Value> Forest::Impl::walk_newest(const Ends& ends, Absent absent, Order order,
+                                        Met& met) const {
   // Mostly all moving edges have their newest sample of the same instant, or none is moving: then all values are as
   // they lie there.
-  limiting = nullptr;
   bool mixed = false;
-  auto newest = walk<Value>(ends, absent, [&](auto& climb, const HeldVersion& edge) {
+  auto newest = walk<Value>(ends, absent, order, [&](auto& climb, const HeldVersion& edge) {
     if (edge.moving()) {
-      if (limiting == nullptr) limiting = &edge;
-      if (edge.stamp != limiting->stamp) {
+      if (met.limiting == nullptr) met.limiting = &edge;
+      if (edge.stamp != met.limiting->stamp) {
         mixed = true;
-        if (edge.stamp < limiting->stamp) limiting = &edge;
+        if (edge.stamp < met.limiting->stamp) met.limiting = &edge;
       }
     }
-    if (!mixed) climb.up(value_of<Value>(edge));
+    if (leaves_out_ties<Value>(edge)) met.tied = true;
+    if (!mixed && !met.tied) climb.up(value_of<Value>(edge));
     return Result<void>();
   });
-  if (!newest || !mixed) return newest;
-  return walk_at<Value>(ends, absent, limiting->stamp, {}, nullptr);
+  met.moving = met.limiting != nullptr;
+  if (!newest || !mixed || met.tied) return newest;
+  Query query;
+  query.order = order;
+  return walk_at<Value>(ends, absent, met.limiting->stamp, query, met);
 }
 
 template <class Value>
 Result<Value> Forest::Impl::walk_at(const Ends& ends, Absent absent, std::int64_t t,
-                                    const Instant& instant, bool* any_moving) const {
-  const std::int64_t age =
-      instant.age_noise_until ? std::max(nanoseconds(*instant.age_noise_until) - t, std::int64_t{0})
-                              : 0;
-  Moment moment{t, age, instant};
-  return walk<Value>(ends, absent, [&](auto& climb, const HeldVersion& edge) -> Result<void> {
-    if (edge.moving()) {
-      if (any_moving != nullptr) *any_moving = true;
-      return climb_at<Value>(climb, edge, moment);
-    }
-    climb.up(value_of<Value>(edge));
-    return {};
-  });
+                                    const Query& query, Met& met) const {
+  const std::int64_t age = query.age_noise_until
+                               ? std::max(nanoseconds(*query.age_noise_until) - t, std::int64_t{0})
+                               : 0;
+  Moment moment{t, age, query};
+  return walk<Value>(ends, absent, query.order,
+                     [&](auto& climb, const HeldVersion& edge) -> Result<void> {
+                       if (leaves_out_ties<Value>(edge)) met.tied = true;
+                       if (edge.moving()) {
+                         met.moving = true;
+                         return climb_at<Value>(climb, edge, moment);
+                       }
+                       if (!met.tied) climb.up(value_of<Value>(edge));
+                       return {};
+                     });
+}
+
+namespace {
+
+Reached reached_of(Belief&& X) {
+  return {{X.pose, X.own}, {std::move(X.unknown), std::move(X.shares), {}}};
+}
+
+}  // namespace
+
+Result<Reached> Forest::Impl::reach_newest(const Ends& ends, Absent absent, Order order,
+                                           Met& met) const {
+  if (order == Order::kSecond) {
+    const auto plain = walk_newest<Transform>(ends, absent, order, met);
+    if (!plain) return tl::unexpected(plain.error());
+    if (!met.tied) return Reached{*plain, {}};
+  }
+  met = {};
+  return walk_newest<Belief>(ends, absent, order, met).map(reached_of);
+}
+
+Result<Reached> Forest::Impl::reach_at(const Ends& ends, Absent absent, std::int64_t t,
+                                       const Query& query, Met& met) const {
+  if (query.order == Order::kSecond) {
+    const auto plain = walk_at<Transform>(ends, absent, t, query, met);
+    if (!plain) return tl::unexpected(plain.error());
+    if (!met.tied) return Reached{*plain, {}};
+  }
+  met = {};
+  return walk_at<Belief>(ends, absent, t, query, met).map(reached_of);
 }
 
 template <class Value, class Name>
@@ -191,114 +256,37 @@ Result<Value> Forest::Impl::look_up(Name a, Name b) const {
   const epoch::Guard guard;
   const auto found = ends(a, b);
   if (!found) return tl::unexpected(found.error());
-  const HeldVersion* limiting = nullptr;
-  return walk_newest<Value>(*found, Absent::kEnds, limiting);
+  Met met;
+  auto newest = walk_newest<Value>(*found, Absent::kEnds, Order::kSecond, met);
+  if constexpr (std::is_same_v<Value, Transform>) {
+    if (newest && met.tied) {
+      met = {};
+      return walk_newest<Belief>(*found, Absent::kEnds, Order::kSecond, met).map(settle);
+    }
+  }
+  return newest;
 }
 
 template <class Name>
-Result<StampedTransform> Forest::Impl::look_up(Name a, Name b, const Instant& instant) const {
+Result<StampedTransform> Forest::Impl::look_up(Name a, Name b, const Query& query) const {
   const epoch::Guard guard;
   const auto found = ends(a, b);
   if (!found) return tl::unexpected(found.error());
-  std::int64_t t = 0;
-  if (instant.at) {
-    t = nanoseconds(*instant.at);
-  } else {
-    const HeldVersion* limiting = nullptr;
-    const auto newest = walk_newest<Transform>(*found, Absent::kEnds, limiting);
-    if (!newest) return tl::unexpected(newest.error());
-    if (limiting == nullptr) return StampedTransform{*newest, std::nullopt};
-    t = limiting->stamp;
-    if (!instant.age_noise_until) return StampedTransform{*newest, time_of(t)};
+  Met met;
+  std::optional<Time> at = query.at;
+  Result<Reached> X_AB;
+  if (!at) {
+    X_AB = reach_newest(*found, Absent::kEnds, query.order, met);
+    if (X_AB && met.moving) at = time_of(met.limiting->stamp);
   }
-  bool moving = false;
-  const auto X_AB = walk_at<Transform>(*found, Absent::kEnds, t, instant, &moving);
-  if (!X_AB) return tl::unexpected(X_AB.error());
-  return StampedTransform{*X_AB, moving ? std::optional<Time>(time_of(t)) : std::nullopt};
-}
-
-Result<std::vector<Forest::Impl::Ends>> Forest::Impl::all_ends(
-    const std::vector<PathEnds>& segments) const {
-  const std::uint64_t commit = snapshot();
-  std::vector<Ends> all;
-  all.reserve(segments.size());
-  for (const PathEnds& segment : segments) {
-    const Version* start = named(segment.from, commit);
-    if (start == nullptr) return unknown_start(segment.from);
-    const Version* end = named(segment.to, commit);
-    if (end == nullptr) return unknown_end(segment.to);
-    all.push_back({start, end, commit});
+  if (query.at || (at && query.age_noise_until)) {
+    met = {};
+    X_AB = reach_at(*found, Absent::kEnds, nanoseconds(*at), query, met);
   }
-  return all;
-}
-
-Result<std::vector<Transform>> Forest::Impl::values_at(const std::vector<Ends>& segments,
-                                                       std::int64_t t, const Instant& instant,
-                                                       bool* any_moving) const {
-  std::vector<Transform> values;
-  values.reserve(segments.size());
-  for (const Ends& ends : segments) {
-    const auto X = walk_at<Transform>(ends, Absent::kMayPass, t, instant, any_moving);
-    if (!X) return tl::unexpected(X.error());
-    values.push_back(*X);
-  }
-  return values;
-}
-
-// Each segment's newest, and of those with moving edges that whose newest is the oldest.
-Result<std::vector<Transform>> Forest::Impl::newest_values(const std::vector<Ends>& segments,
-                                                           const HeldVersion*& limiting) const {
-  std::vector<Transform> values;
-  values.reserve(segments.size());
-  bool mixed = false;
-  for (const Ends& ends : segments) {
-    const HeldVersion* of_this = nullptr;
-    const auto X = walk_newest<Transform>(ends, Absent::kMayPass, of_this);
-    if (!X) return tl::unexpected(X.error());
-    values.push_back(*X);
-    if (of_this == nullptr) continue;
-    if (limiting == nullptr) limiting = of_this;
-    mixed = mixed || of_this->stamp != limiting->stamp;
-    if (of_this->stamp < limiting->stamp) limiting = of_this;
-  }
-  if (mixed) return values_at(segments, limiting->stamp, {}, nullptr);
-  return values;
-}
-
-Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
-                                              const Instant& instant,
-                                              std::optional<Time> hint) const {
-  const epoch::Guard guard;
-  const auto ends = impl_->all_ends(segments);
-  if (!ends) return tl::unexpected(ends.error());
-  SegmentValues found;
-  std::optional<std::int64_t> t;
-  if (instant.at) {
-    t = nanoseconds(*instant.at);
-  } else {
-    const HeldVersion* limiting = nullptr;
-    auto newest = impl_->newest_values(*ends, limiting);
-    if (!newest) return tl::unexpected(std::move(newest.error()));
-    found.values = *std::move(newest);
-    if (limiting == nullptr) return found;
-    found.stamp = time_of(limiting->stamp);
-    const std::int64_t before =
-        limiting->number > 0 ? limiting->ring->stamp(limiting->number - 1) : kAlways;
-    if (before != kAlways) found.period = std::chrono::nanoseconds(limiting->stamp - before);
-    if (instant.age_noise_until) t = limiting->stamp;
-  }
-  bool moving = false;
-  if (t) {
-    auto values = impl_->values_at(*ends, *t, instant, &moving);
-    if (!values) return tl::unexpected(std::move(values.error()));
-    found.values = *std::move(values);
-    if (moving) found.stamp = time_of(*t);
-  }
-  if (hint && hint != found.stamp) {
-    auto values = impl_->values_at(*ends, nanoseconds(*hint), instant, &moving);
-    if (values) found.at_hint = *std::move(values);
-  }
-  return found;
+  if (!X_AB) return tl::unexpected(std::move(X_AB.error()));
+  if (!met.moving) at.reset();
+  if (X_AB->ties.empty()) return StampedTransform{X_AB->X, at, {query.order, false, {}}};
+  return settled(belief_of(X_AB->X, X_AB->ties), query.order, at);
 }
 
 Result<Transform> Forest::lookup(std::string_view a, std::string_view b) const {
@@ -312,11 +300,11 @@ Result<Pose> Forest::lookup_pose(std::string_view a, std::string_view b) const {
 }
 Result<Pose> Forest::lookup_pose(Handle a, Handle b) const { return impl_->look_up<Pose>(a, b); }
 Result<StampedTransform> Forest::lookup(std::string_view a, std::string_view b,
-                                        const Instant& instant) const {
-  return impl_->look_up(a, b, instant);
+                                        const Query& query) const {
+  return impl_->look_up(a, b, query);
 }
-Result<StampedTransform> Forest::lookup(Handle a, Handle b, const Instant& instant) const {
-  return impl_->look_up(a, b, instant);
+Result<StampedTransform> Forest::lookup(Handle a, Handle b, const Query& query) const {
+  return impl_->look_up(a, b, query);
 }
 
 }  // namespace tfdude

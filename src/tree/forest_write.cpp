@@ -110,9 +110,11 @@ HeldVersion& Forest::Impl::push_held(std::uint32_t slot, const Transform& X_PC) 
     fresh.stamp = before.stamp;
     fresh.number = before.number;
     fresh.ring = before.ring;
+    fresh.ties = before.ties;
   } else {
     fresh.stamp = kAlways;
     fresh.ring = nullptr;
+    fresh.ties = nullptr;
   }
   return fresh;
 }
@@ -140,7 +142,10 @@ void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
 }
 
 void Forest::Impl::make_absent(std::uint32_t slot) {
-  if (newest(slot).held()) give_back(newest_value(slot).ring, slot);
+  if (newest(slot).held()) {
+    give_back(newest_value(slot).ring, slot);
+    superseded_ties_.emplace_back(newest_value(slot).ties);
+  }
   Version& fresh = push_remote(slot);
   const std::uint32_t parent = fresh.parent;
   if (parent != kNoSlot) graph_.unlink(parent, slot);
@@ -212,13 +217,22 @@ void Forest::Impl::collect() {
     retired_rings_.push_back(std::move(ring));
   }
   superseded_rings_.clear();
+  for (std::unique_ptr<EdgeTies>& ties : superseded_ties_) {
+    if (ties == nullptr) continue;
+    ties->retire_tag = tag;
+    retired_ties_.push_back(std::move(ties));
+  }
+  superseded_ties_.clear();
   const std::uint64_t below = epoch::safe_below();
   held_pool_.collect(below);
   remote_pool_.collect(below);
   ids_.collect(tag, below);
-  const auto unseen = [below](const auto& ring) { return ring->retire_tag < below; };
-  retired_rings_.erase(std::remove_if(retired_rings_.begin(), retired_rings_.end(), unseen),
-                       retired_rings_.end());
+  const auto drop_unseen = [below](auto& retired) {
+    const auto unseen = [below](const auto& one) { return one->retire_tag < below; };
+    retired.erase(std::remove_if(retired.begin(), retired.end(), unseen), retired.end());
+  };
+  drop_unseen(retired_rings_);
+  drop_unseen(retired_ties_);
 }
 
 Result<void> Forest::add(std::string_view id, std::string_view parent, const Transform& X_PC,
@@ -270,65 +284,6 @@ Result<void> Forest::release(std::string_view id) {
   return {};
 }
 
-Result<void> Forest::Impl::update_one(const HeldVersion& edge, const Transform& X_PC,
-                                      std::optional<Time> stamp) {
-  if (!is_finite(X_PC)) return check_value(edge.name->text, X_PC);
-  const std::uint32_t slot = edge.slot;
-  if (stamp || may_be_moving(edge)) {
-    const auto at = stamp_for(&slot, 1, stamp);
-    if (!at) return tl::unexpected(at.error());
-    if (auto ok = check_sample(edge, *at); !ok) return ok;
-    push_value(slot, X_PC, *at);
-  } else {
-    push_held(slot, X_PC);
-  }
-  commit();
-  return {};
-}
-
-Result<void> Forest::update(std::string_view id, const Transform& X_PC, std::optional<Time> stamp) {
-  const std::lock_guard lock(impl_->mutex_);
-  const auto slot = impl_->held_slot(id);
-  if (!slot) return tl::unexpected(slot.error());
-  return impl_->update_one(impl_->newest_value(*slot), X_PC, stamp);
-}
-
-Result<void> Forest::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
-  const std::lock_guard lock(impl_->mutex_);
-  const Version* version = impl_->newest_held(frame);
-  if (version == nullptr) return tl::unexpected(impl_->held_slot(frame).error());
-  return impl_->update_one(static_cast<const HeldVersion&>(*version), X_PC, stamp);
-}
-
-template <class Update, class Frame>
-Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame frame,
-                                      std::optional<Time> stamp) {
-  const std::lock_guard lock(mutex_);
-  to_update_.clear();
-  for (const Update& edge : edges) {
-    const auto slot = held_slot(edge.*frame);
-    if (!slot) return tl::unexpected(slot.error());
-    if (!is_finite(edge.X_PC)) return check_value(newest(*slot).name->text, edge.X_PC);
-    to_update_.push_back(*slot);
-  }
-  const auto at = stamp_for(to_update_.data(), to_update_.size(), stamp);
-  if (!at) return tl::unexpected(at.error());
-  for (const std::uint32_t slot : to_update_) {
-    if (auto ok = check_sample(newest_value(slot), *at); !ok) return ok;
-  }
-  for (std::size_t i = 0; i < edges.size(); ++i) push_value(to_update_[i], edges[i].X_PC, *at);
-  commit();
-  return {};
-}
-
-Result<void> Forest::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
-  return impl_->update_all(edges, &EdgeUpdate::id, stamp);
-}
-
-Result<void> Forest::update(const std::vector<HandleUpdate>& edges, std::optional<Time> stamp) {
-  return impl_->update_all(edges, &HandleUpdate::frame, stamp);
-}
-
 Result<void> Forest::move(std::string_view id, std::string_view parent,
                           const std::optional<Transform>& X_PC, std::uint64_t since) {
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
@@ -347,6 +302,7 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   old.name->hung(since);
   HeldVersion& fresh = impl_->push_held(*slot, X_PC.value_or(old.X_PC));
   impl_->forget_past(fresh);
+  if (X_PC) impl_->end_revision(fresh);
   impl_->relink(fresh, parent_slot);
   impl_->commit_structure();
   return {};

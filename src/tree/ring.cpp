@@ -91,4 +91,13 @@ std::unique_ptr<Ring> Ring::with(HeldVersion* sample, std::int64_t stamp,
   return copy;
 }
 
+std::unique_ptr<Ring> Ring::replaced(HeldVersion* sample, std::uint64_t place) const {
+  auto copy = empty_copy(mask_ + 1);
+  for (std::uint64_t number = oldest(); number < next_; ++number) {
+    HeldVersion* own = slot(number).sample.load(std::memory_order_relaxed);
+    copy->append(number == place ? sample : own, stamp_at(number));
+  }
+  return copy;
+}
+
 }  // namespace tfdude

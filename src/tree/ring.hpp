@@ -67,6 +67,9 @@ class Ring {
   [[nodiscard]] std::unique_ptr<Ring> with(HeldVersion* sample, std::int64_t stamp,
                                            std::uint64_t place) const;
 
+  /// A copy with another sample, of the same stamp, at a place.
+  [[nodiscard]] std::unique_ptr<Ring> replaced(HeldVersion* sample, std::uint64_t place) const;
+
   [[nodiscard]] std::size_t bytes() const { return sizeof(Ring) + (mask_ + 1) * sizeof(Slot); }
 
   /// Samples that were refused as older than what is kept, and as equal in stamp to another.

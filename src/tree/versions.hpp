@@ -47,11 +47,20 @@ struct Version {
   [[nodiscard]] bool held() const { return present() && owner == kHeldHere; }
 };
 
+/// What an edge's error has to do with others'. Immutable, shared by the edge's versions.
+struct EdgeTies {
+  Correlation said;
+  Correlation now;       ///< after observations, until the next update
+  bool revised = false;  ///< the two differ
+  std::uint64_t retire_tag = 0;
+};
+
 /// A version of an edge whose value is held here.
 struct HeldVersion : Version {
   std::int64_t stamp = kAlways;  // of the newest sample
   std::uint64_t number = 0;      // its number in the ring
-  Ring* ring = nullptr;  // null: there is no past, nor anything said of how it is to be kept
+  Ring* ring = nullptr;      // null: there is no past, nor anything said of how it is to be kept
+  EdgeTies* ties = nullptr;  // null: independent of all else
   Transform X_PC;
 
   [[nodiscard]] bool moving() const { return stamp != kAlways; }

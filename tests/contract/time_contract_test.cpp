@@ -50,7 +50,7 @@ struct Chain {
   std::optional<Client> client;
 };
 
-Instant at(Time t) { return {t, 0ns, {}}; }
+Query at(Time t) { return {t, 0ns, {}}; }
 Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
 
 // Each edge with a twist of its own, from the epoch of the test on: interpolation is exact for it.
@@ -120,7 +120,7 @@ TEST_CASE("all partitions answer for the same instant") {
     REQUIRE(chain.client->update({{"arm", along_x(2 * t)}, {"hand", along_x(3 * t)}}, ms(t - 500)));
   }
   for (Client* caller : std::vector<Client*>{&*chain.client, &*chain.base, &*chain.tool}) {
-    const auto newest = caller->lookup("world", "tool", Instant{});
+    const auto newest = caller->lookup("world", "tool", Query{});
     REQUIRE(newest);
     CHECK(newest->stamp == ms(2500));
     CHECK(x_of(newest) == Approx(2500 + 5 * 3000 + 5));
@@ -161,19 +161,19 @@ TEST_CASE(
     REQUIRE(testing::eventually([&] { return !chain.client->past(id)->empty(); }));
   }
   // The first sample of one may be younger than the newest of another.
-  REQUIRE(chain.client->lookup("world", "tool", Instant{}, 5000ms));
+  REQUIRE(chain.client->lookup("world", "tool", Query{}, 5000ms));
   int naive_wrong = 0;
   constexpr int kLookups = 300;
   for (int i = 0; i < kLookups; ++i) {
-    const auto found = chain.client->lookup("world", "tool", Instant{});
+    const auto found = chain.client->lookup("world", "tool", Query{});
     REQUIRE(found);
     REQUIRE(found->stamp.has_value());
     REQUIRE(testing::pose_diff(found->pose, motion.whole(*found->stamp), 1e-8) == "");
     // Not old either: where lookups follow each other, no more than a moment.
     REQUIRE(wall_clock() - *found->stamp < 5s);
-    const auto one = chain.client->lookup("world", "base", Instant{});
-    const auto two = chain.client->lookup("base", "hand", Instant{});
-    const auto three = chain.client->lookup("hand", "tool", Instant{});
+    const auto one = chain.client->lookup("world", "base", Query{});
+    const auto two = chain.client->lookup("base", "hand", Query{});
+    const auto three = chain.client->lookup("hand", "tool", Query{});
     REQUIRE((one && two && three));
     const Pose naive = one->pose * two->pose * three->pose;
     const auto off = [&](Time t) {
@@ -239,7 +239,7 @@ TEST_CASE("a watched path is read without asking, and follows what its owners wr
   for (Client* caller : std::vector<Client*>{&*chain.client, &*chain.arm}) {
     auto path = caller->watch("world", "tool");
     REQUIRE(path);
-    CHECK(x_of(path->latest()) == x_of(caller->lookup("world", "tool", Instant{})));
+    CHECK(x_of(path->latest()) == x_of(caller->lookup("world", "tool", Query{})));
     const int from = caller == &*chain.client ? 1000 : 2000;
     for (int t = from + 10; t <= from + 500; t += 10) {
       REQUIRE(chain.base->update("base", along_x(t), ms(t)));

@@ -169,33 +169,33 @@ class Client {
   /// X_AB at an instant: all partitions answer for the same.
   /// @return as above; kNotYet, kTooOld (naming the edge that has no data of it, and the gap).
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
-                                                const Instant& instant);
-  [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Instant& instant);
+                                                const Query& query);
+  [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Query& query);
 
   /// The same, waiting for frames and data that are not there yet. What is not kept any more fails at once.
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
-                                                const Instant& instant, Milliseconds wait);
+                                                const Query& query, Milliseconds wait);
 
   /// Frame b at one instant seen from frame a at another, by way of a frame that is taken as fixed meanwhile:
   /// X_AF(at_a) X_FB(at_b). The two ways are taken as independent.
-  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, const Instant& at_a,
-                                                std::string_view b, const Instant& at_b,
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, const Query& at_a,
+                                                std::string_view b, const Query& at_b,
                                                 std::string_view fixed);
 
   /// As lookup() with a wait, answering to a function, on a thread of the library's that holds no lock. The function may
   /// use the client, and must not throw. Ends before the client is destroyed at the latest.
   [[nodiscard]] PendingLookup lookup_async(const std::string& a, const std::string& b,
-                                           const Instant& instant, Milliseconds wait,
+                                           const Query& query, Milliseconds wait,
                                            PendingLookup::Callback callback);
   /// The same, answering to a future.
   [[nodiscard]] std::future<Result<StampedTransform>> lookup_async(const std::string& a,
                                                                    const std::string& b,
-                                                                   const Instant& instant,
+                                                                   const Query& query,
                                                                    Milliseconds wait);
 
   /// Whether lookup() would answer; if not, why.
   [[nodiscard]] Result<void> can_lookup(std::string_view a, std::string_view b,
-                                        const Instant& instant = {});
+                                        const Query& query = {});
 
   /// Has the path's owners push what changes on it; waits until its first values are here, Options::timeout at most.
   /// @return as lookup().

@@ -39,7 +39,7 @@ class PathWatch {
   /// @return as Forest::lookup; while the path is not known, why.
   [[nodiscard]] Result<StampedTransform> latest() const { return lookup({}); }
   [[nodiscard]] Result<StampedTransform> at(Time t) const;
-  [[nodiscard]] Result<StampedTransform> lookup(const Instant& instant) const;
+  [[nodiscard]] Result<StampedTransform> lookup(const Query& query) const;
 
   /// Whether all owners of the path are there; while one is not, what it told last is still answered.
   /// @return kUnreachable, naming the partition; while the path is not known, why.

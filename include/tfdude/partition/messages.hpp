@@ -46,7 +46,7 @@ struct MoveRequest {
 
 struct LookupRequest {
   std::vector<PathEnds> segments;  ///< at least one
-  Instant instant{};
+  Query query{};
   /// Of what other instant the answer may be of use; see LatestHints.
   std::optional<Time> hint{};
 };

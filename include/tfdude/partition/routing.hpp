@@ -59,7 +59,7 @@ struct LookupPlan {
 /// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable, kInvalidInput.
 [[nodiscard]] Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory,
                                               const std::string& a, const std::string& b,
-                                              const Instant& instant = {},
+                                              const Query& query = {},
                                               std::optional<Time> hint = std::nullopt);
 
 /// A watch: the edges that tell where b is in a, in order, and a WatchRequest for each owner of some of them.

@@ -13,7 +13,9 @@
 
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
+#include "tfdude/math/belief.hpp"
 #include "tfdude/math/transform.hpp"
+#include "tfdude/tree/correlation.hpp"
 
 namespace tfdude {
 
@@ -55,8 +57,8 @@ struct EdgeTiming {
   bool moving = false;
 };
 
-/// What a lookup asks of time.
-struct Instant {
+/// What a lookup asks for: of what time, and how far covariance is to be propagated.
+struct Query {
   std::optional<Time>
       at;  ///< absent: the newest instant of which all moving edges of the path have data
   /// How far beyond an edge's newest sample its motion may be taken to go on as between its last two.
@@ -64,12 +66,25 @@ struct Instant {
   /// Until when the answer is to hold: the process noise of the moving edges from the instant of the answer until then
   /// is added to its covariance.
   std::optional<Time> age_noise_until;
+  Order order = Order::kSecond;
+};
+
+/// What the covariance of an answer rests on. Errors that nothing is said of are taken as independent.
+struct Basis {
+  Order order = Order::kSecond;
+  /// Edges of unknown correlation are on the path: the covariance is a bound that holds for any.
+  bool bound = false;
+  std::vector<std::string> sources;  ///< that edges of the path share; those of observations, too
 };
 
 /// A transform and the instant of which it tells; absent: it holds for all times, as of static edges only.
 struct StampedTransform : Transform {
   std::optional<Time> stamp;
+  Basis basis{};
 };
+
+/// The one transform that a belief comes to, and what that rests on.
+[[nodiscard]] StampedTransform settled(const Belief& X, Order order, std::optional<Time> stamp);
 
 /// The ends of a run of edges.
 struct PathEnds {
@@ -84,6 +99,10 @@ struct SegmentValues {
   /// Since the sample before the newest, of the edge whose newest sample is the oldest.
   std::chrono::nanoseconds period{0};
   std::vector<Transform> at_hint;  ///< the same at another instant; empty if that is not to be had
+  /// By segment, whose values' covariances are of own parts then; empty if no edge is tied to any other.
+  std::vector<Ties> ties{};
+  std::vector<Ties> ties_at_hint{};
+  std::uint64_t commit = 0;  ///< of which the values are; see revise()
 };
 
 /// What of a held edge somebody has seen already: to begin with, nothing.
@@ -98,6 +117,7 @@ struct News {
   std::uint32_t index = 0;
   std::optional<Time> stamp;
   Transform X;
+  Correlation correlation{};
 };
 
 /// What is kept of one edge's past.
@@ -202,6 +222,20 @@ class Forest {
   /// That of all edges for which nothing else is said, from their first sample on.
   [[nodiscard]] Result<void> set_default_timing(const EdgeTiming& timing);
 
+  /// Says how an edge's error hangs together with those of others, from now on and for all its past. Updates leave that as
+  /// it is.
+  /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the source).
+  [[nodiscard]] Result<void> correlate(std::string_view id, const Correlation& correlation);
+
+  /// Gives edges the values that an observation makes of them, as one commit: all, or on an error none. What it says of
+  /// correlation holds until the edge's next update; on a moving edge, whose next sample comes anyway, it is not kept, and
+  /// the covariance must be the whole of it. A sample of the very stamp is replaced.
+  /// @param stamp  of moving edges
+  /// @param seen  the commit of the values that were observed
+  /// @return as update(); kChangedMeanwhile (a static edge was written since `seen`, or a moving one has no stamp given).
+  [[nodiscard]] Result<void> revise(const std::vector<Revision>& edges, std::optional<Time> stamp,
+                                    std::uint64_t seen);
+
   /// Hangs a held frame, with all below it, under a new parent; empty makes it a root. Keeps the edge's
   /// value where X_PC is not given, but nothing of its past, which was that of another edge: it is static until its next
   /// sample. O(subtree).
@@ -235,15 +269,17 @@ class Forest {
 
   /// X_AB at an instant.
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
-                                                const Instant& instant) const;
-  [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Instant& instant) const;
+                                                const Query& query) const;
+  [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Query& query) const;
 
   /// As lookup, for segments that somebody else's path needs: their ends may be frames that are not there,
   /// as long as held edges name them as their parent.
   /// @param hint  another instant that may be wanted
-  [[nodiscard]] Result<SegmentValues> lookup_segments(
-      const std::vector<PathEnds>& segments, const Instant& instant = {},
-      std::optional<Time> hint = std::nullopt) const;
+  /// @param edges  the segments are single edges, whose own correlation is wanted in full
+  [[nodiscard]] Result<SegmentValues> lookup_segments(const std::vector<PathEnds>& segments,
+                                                      const Query& query = {},
+                                                      std::optional<Time> hint = std::nullopt,
+                                                      bool edges = false) const;
 
   /// The path from a to b as runs of edges by owner, in order; empty where a is b.
   /// @return kUnknownStart, kUnknownEnd, kNotConnected.

@@ -66,18 +66,18 @@ struct BodyWriter {
   }
   void operator()(const LookupRequest& lookup) {
     auto segments = wire_segments(lookup.segments);
-    const Instant& instant = lookup.instant;
-    const bool plain = !instant.at && !lookup.hint && !instant.age_noise_until &&
-                       instant.extrapolate == std::chrono::nanoseconds(0);
+    const Query& query = lookup.query;
+    const bool plain = !query.at && !lookup.hint && !query.age_noise_until &&
+                       query.extrapolate == std::chrono::nanoseconds(0);
     if (plain) {
       out.lookup(std::move(segments));
       return;
     }
     wire::LookupAt body;
-    body.at(wire_stamp(instant.at));
+    body.at(wire_stamp(query.at));
     body.hint(wire_stamp(lookup.hint));
-    body.extrapolate(instant.extrapolate.count());
-    body.age_noise_until(wire_stamp(instant.age_noise_until));
+    body.extrapolate(query.extrapolate.count());
+    body.age_noise_until(wire_stamp(query.age_noise_until));
     body.segments(std::move(segments));
     out.lookup_at(std::move(body));
   }

@@ -78,9 +78,9 @@ void check_same(const Request& actual, const Request& expected) {
   } else if (const auto* lookup_at = std::get_if<LookupRequest>(&expected.body)) {
     const LookupRequest& lookup = *lookup_at;
     const auto& arrived = std::get<LookupRequest>(actual.body);
-    CHECK(arrived.instant.at == lookup.instant.at);
-    CHECK(arrived.instant.extrapolate == lookup.instant.extrapolate);
-    CHECK(arrived.instant.age_noise_until == lookup.instant.age_noise_until);
+    CHECK(arrived.query.at == lookup.query.at);
+    CHECK(arrived.query.extrapolate == lookup.query.extrapolate);
+    CHECK(arrived.query.age_noise_until == lookup.query.age_noise_until);
     CHECK(arrived.hint == lookup.hint);
     check_same(arrived.segments, lookup.segments);
   }

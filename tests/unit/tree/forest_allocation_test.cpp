@@ -119,10 +119,10 @@ TEST_CASE("with a past, too, neither updates nor lookups allocate") {
   CHECK(allocations_of([&] { return forest.update(batch, time_of(t += 1000)).has_value(); }) == 0);
   const Handle a = forest.find(deep_id(0)).value();
   const Handle b = forest.find(deep_id(kDepth - 1)).value();
-  Instant instant;
-  CHECK(allocations_of([&] { return forest.lookup(a, b, instant).has_value(); }) == 0);
-  instant.at = time_of(t - 12'345);
-  CHECK(allocations_of([&] { return forest.lookup(a, b, instant).has_value(); }) == 0);
+  Query query;
+  CHECK(allocations_of([&] { return forest.lookup(a, b, query).has_value(); }) == 0);
+  query.at = time_of(t - 12'345);
+  CHECK(allocations_of([&] { return forest.lookup(a, b, query).has_value(); }) == 0);
 }
 
 // ---- memory does not grow with the past

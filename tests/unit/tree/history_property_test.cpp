@@ -169,11 +169,11 @@ TEST_CASE("100,000 lookups at random instants agree with an oracle that keeps ev
       const std::string b = id_of(random.index(kFrames));
       std::optional<std::int64_t> when;
       if (random.index(4) > 0) when = now - static_cast<std::int64_t>(random.index(2500));
-      Instant instant;
-      if (when) instant.at = time_of(*when);
+      Query query;
+      if (when) query.at = time_of(*when);
       Transform X_AB;
       const std::string code = oracle.lookup(a, b, when, X_AB);
-      const auto found = forest.lookup(a, b, instant);
+      const auto found = forest.lookup(a, b, query);
       INFO(a << " to " << b << " at " << (when ? std::to_string(*when) : "the newest") << ": "
              << outcome(found));
       REQUIRE((found ? "ok" : "none") == code);

@@ -21,9 +21,9 @@ using namespace std::chrono_literals;
 
 Time at(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
 
-Instant instant(std::int64_t milliseconds) { return {at(milliseconds), 0ns, {}}; }
+Query query(std::int64_t milliseconds) { return {at(milliseconds), 0ns, {}}; }
 
-Instant extrapolating(std::int64_t milliseconds, std::chrono::nanoseconds limit) {
+Query extrapolating(std::int64_t milliseconds, std::chrono::nanoseconds limit) {
   return {at(milliseconds), limit, {}};
 }
 
@@ -51,7 +51,7 @@ struct Arm {
       REQUIRE(forest.update("hand", along_x(100 * second), at(1000 * second)));
     }
   }
-  Result<StampedTransform> hand(const Instant& when) const {
+  Result<StampedTransform> hand(const Query& when) const {
     return forest.lookup("world", "hand", when);
   }
 
@@ -66,27 +66,27 @@ TEST_CASE("a static edge holds for all times") {
   REQUIRE(forest.add("world", "", {}));
   REQUIRE(forest.add("base", "world", along_x(1)));
   for (const std::int64_t when : {1LL, 1'700'000'000'000LL}) {
-    const auto X = forest.lookup("world", "base", instant(when));
+    const auto X = forest.lookup("world", "base", query(when));
     CHECK(x_of(X) == 1);
     CHECK_FALSE(X->stamp.has_value());
   }
   REQUIRE(forest.update("base", along_x(2)));
-  CHECK(x_of(forest.lookup("world", "base", instant(1))) == 2);
-  CHECK_FALSE(forest.lookup("world", "base", Instant{})->stamp.has_value());
+  CHECK(x_of(forest.lookup("world", "base", query(1))) == 2);
+  CHECK_FALSE(forest.lookup("world", "base", Query{})->stamp.has_value());
 }
 
 TEST_CASE("a moving edge is where its samples say, and nowhere else") {
   const Arm arm;
-  CHECK(x_of(arm.hand(instant(1000))) == 111);
-  CHECK(x_of(arm.hand(instant(1500))) == Approx(166));
-  CHECK(x_of(arm.hand(instant(2000))) == 221);
-  CHECK(arm.hand(instant(1500))->stamp == at(1500));
-  CHECK(outcome(arm.hand(instant(2001))) == "not_yet");
-  CHECK(says(message(arm.hand(instant(2001))),
+  CHECK(x_of(arm.hand(query(1000))) == 111);
+  CHECK(x_of(arm.hand(query(1500))) == Approx(166));
+  CHECK(x_of(arm.hand(query(2000))) == 221);
+  CHECK(arm.hand(query(1500))->stamp == at(1500));
+  CHECK(outcome(arm.hand(query(2001))) == "not_yet");
+  CHECK(says(message(arm.hand(query(2001))),
              {"'hand'", "1.000 ms older", "1970-01-01 00:00:02.001"}));
-  CHECK(outcome(arm.hand(instant(750))) == "too_old");
-  CHECK(says(message(arm.hand(instant(750))), {"'hand'", "250.000 ms younger"}));
-  CHECK(x_of(arm.forest.lookup("world", "base", instant(1))) == 1);
+  CHECK(outcome(arm.hand(query(750))) == "too_old");
+  CHECK(says(message(arm.hand(query(750))), {"'hand'", "250.000 ms younger"}));
+  CHECK(x_of(arm.forest.lookup("world", "base", query(1))) == 1);
 }
 
 TEST_CASE("the newest instant is that which all moving edges of the path have") {
@@ -95,7 +95,7 @@ TEST_CASE("the newest instant is that which all moving edges of the path have") 
   REQUIRE(arm.forest.update("arm", along_x(40), at(3000)));
   CHECK(arm.hand({})->stamp == at(2000));
   CHECK(x_of(arm.hand({})) == 221);
-  CHECK(arm.forest.lookup("world", "arm", Instant{})->stamp == at(3000));
+  CHECK(arm.forest.lookup("world", "arm", Query{})->stamp == at(3000));
   CHECK(x_of(arm.forest.lookup("world", "arm")) == 41);
   REQUIRE(arm.forest.update("hand", along_x(500), at(2500)));
   CHECK(arm.hand({})->stamp == at(2500));
@@ -108,7 +108,7 @@ TEST_CASE("edges without a common instant have no newest one, and the younger is
   Arm arm;
   REQUIRE(arm.forest.add("tip", "hand", {}));
   REQUIRE(arm.forest.update("tip", along_x(1), at(2003)));
-  const auto X = arm.forest.lookup("world", "tip", Instant{});
+  const auto X = arm.forest.lookup("world", "tip", Query{});
   CHECK(outcome(X) == "too_old");
   CHECK(says(message(X), {"'tip'", "3.000 ms younger"}));
 }
@@ -116,9 +116,9 @@ TEST_CASE("edges without a common instant have no newest one, and the younger is
 TEST_CASE("a sample may come late, but not twice and not after what is kept") {
   Arm arm;
   REQUIRE(arm.forest.update("hand", along_x(1000), at(1500)));
-  CHECK(x_of(arm.forest.lookup("arm", "hand", instant(1500))) == 1000);
-  CHECK(x_of(arm.forest.lookup("arm", "hand", instant(1750))) == Approx(600));
-  CHECK(x_of(arm.forest.lookup("arm", "hand", instant(1250))) == Approx(550));
+  CHECK(x_of(arm.forest.lookup("arm", "hand", query(1500))) == 1000);
+  CHECK(x_of(arm.forest.lookup("arm", "hand", query(1750))) == Approx(600));
+  CHECK(x_of(arm.forest.lookup("arm", "hand", query(1250))) == Approx(550));
   CHECK(x_of(arm.forest.lookup("arm", "hand")) == 200);
   const auto twice = arm.forest.update("hand", along_x(3), at(1500));
   CHECK(outcome(twice) == "stamp_taken");
@@ -146,7 +146,7 @@ TEST_CASE("a batch is of one stamp, and taken as a whole or not at all") {
   // The later of two for one edge counts, as without stamps; also of a late one.
   for (const std::int64_t when : {4000, 3500}) {
     REQUIRE(arm.forest.update({{"arm", along_x(0)}, {"arm", along_x(50)}}, at(when)));
-    CHECK(x_of(arm.forest.lookup("base", "arm", instant(when))) == 50);
+    CHECK(x_of(arm.forest.lookup("base", "arm", query(when))) == 50);
   }
   CHECK(arm.forest.pasts("arm").at(0).samples == 5);
 }
@@ -157,11 +157,11 @@ TEST_CASE("what is kept has limits of number and of time") {
   timing.count = 5;
   timing.span = 100ms;
   REQUIRE(arm.forest.set_timing("arm", timing));
-  CHECK_FALSE(arm.forest.lookup("world", "arm", Instant{})->stamp.has_value());
+  CHECK_FALSE(arm.forest.lookup("world", "arm", Query{})->stamp.has_value());
   for (int i = 1; i <= 100; ++i) REQUIRE(arm.forest.update("arm", along_x(i), at(i)));
   CHECK(arm.forest.pasts("arm").at(0).samples == 5);
-  CHECK(x_of(arm.forest.lookup("base", "arm", instant(96))) == 96);
-  CHECK(outcome(arm.forest.lookup("base", "arm", instant(95))) == "too_old");
+  CHECK(x_of(arm.forest.lookup("base", "arm", query(96))) == 96);
+  CHECK(outcome(arm.forest.lookup("base", "arm", query(95))) == "too_old");
   const auto before_all = arm.forest.update("arm", along_x(0), at(95));
   CHECK(outcome(before_all) == "too_old");
   CHECK(says(before_all.error().message, {"'arm'", "1.000 ms older", "the 5 that"}));
@@ -207,12 +207,12 @@ TEST_CASE("process noise is added between samples, beyond them, and with age whe
   for (const int second : {1, 2}) {
     REQUIRE(arm.forest.update("hand", along_x(100 * second), at(1000 * second)));
   }
-  const auto variance = [&](const Instant& when) {
+  const auto variance = [&](const Query& when) {
     return arm.forest.lookup("arm", "hand", when)->covariance.upper()[0];
   };
-  CHECK(variance(instant(2000)) == 0);
-  CHECK(variance(instant(1500)) == Approx(0.25 * 4));
-  CHECK(variance(instant(1100)) == Approx(0.09 * 4));
+  CHECK(variance(query(2000)) == 0);
+  CHECK(variance(query(1500)) == Approx(0.25 * 4));
+  CHECK(variance(query(1100)) == Approx(0.09 * 4));
   CHECK(variance(extrapolating(2500, 1s)) == Approx(0.5 * 4));
   CHECK(variance({std::nullopt, 0ns, at(5000)}) == Approx(3 * 4));
   CHECK(variance({at(1500), 0ns, at(1600)}) == Approx((0.25 + 0.1) * 4));
@@ -224,19 +224,19 @@ TEST_CASE(
     "not") {
   Arm arm;
   REQUIRE(arm.forest.update("arm", along_x(50)));
-  CHECK(arm.forest.lookup("world", "arm", Instant{})->stamp == at(5000));
+  CHECK(arm.forest.lookup("world", "arm", Query{})->stamp == at(5000));
   REQUIRE(arm.forest.update("base", along_x(3)));
   CHECK(arm.forest.pasts("base").empty());
   // The clock is set back: time goes on none the less.
   arm.clock_ms = 3000;
   REQUIRE(arm.forest.update("arm", along_x(60)));
-  CHECK(arm.forest.lookup("world", "arm", Instant{})->stamp == at(5000) + 1ns);
+  CHECK(arm.forest.lookup("world", "arm", Query{})->stamp == at(5000) + 1ns);
   CHECK(x_of(arm.forest.lookup("base", "arm")) == 60);
   EdgeTiming timing;
   timing.moving = true;
   REQUIRE(arm.forest.set_timing("base", timing));
   REQUIRE(arm.forest.update("base", along_x(4)));
-  CHECK(arm.forest.lookup("world", "base", Instant{})->stamp == at(3000));
+  CHECK(arm.forest.lookup("world", "base", Query{})->stamp == at(3000));
   Forest timeless;
   REQUIRE(timeless.add("world", "", {}));
   REQUIRE(timeless.update("world", {}, at(1)));
@@ -260,20 +260,20 @@ TEST_CASE("the partition's limits count where a frame has none of its own") {
 TEST_CASE("who is moved or removed loses its past, which was that of another edge") {
   Arm arm;
   REQUIRE(arm.forest.move("hand", "base"));
-  CHECK_FALSE(arm.forest.lookup("base", "hand", Instant{})->stamp.has_value());
-  CHECK(x_of(arm.forest.lookup("base", "hand", instant(1))) == 200);
+  CHECK_FALSE(arm.forest.lookup("base", "hand", Query{})->stamp.has_value());
+  CHECK(x_of(arm.forest.lookup("base", "hand", query(1))) == 200);
   REQUIRE(arm.forest.update("hand", along_x(1), at(10)));
   CHECK(arm.forest.pasts("hand").at(0).samples == 1);
   REQUIRE(arm.forest.remove("arm"));
   REQUIRE(arm.forest.add("arm", "base", along_x(3)));
-  CHECK(x_of(arm.forest.lookup("base", "arm", instant(1))) == 3);
+  CHECK(x_of(arm.forest.lookup("base", "arm", query(1))) == 3);
   CHECK(arm.forest.pasts("arm").empty());
   // What hangs elsewhere because a frame above it was moved keeps its past.
   REQUIRE(arm.forest.add("tip", "hand", {}));
   REQUIRE(arm.forest.update("tip", along_x(1), at(1)));
   REQUIRE(arm.forest.update("tip", along_x(2), at(2)));
   REQUIRE(arm.forest.move("hand", "arm"));
-  CHECK(x_of(arm.forest.lookup("hand", "tip", instant(1))) == 1);
+  CHECK(x_of(arm.forest.lookup("hand", "tip", query(1))) == 1);
   REQUIRE(arm.forest.update("tip", along_x(3), at(3)));
   CHECK(arm.forest.pasts("tip").at(0).samples == 3);
 }
@@ -294,8 +294,8 @@ TEST_CASE("several segments are of one instant, and a hint is answered where it 
   CHECK(arm.forest.lookup_segments(segments, {}, at(2500))->at_hint.empty());
   CHECK(arm.forest.lookup_segments({{"world", "base"}}, {}, at(1))->at_hint.empty());
   CHECK_FALSE(arm.forest.lookup_segments({{"world", "base"}})->stamp.has_value());
-  CHECK(outcome(arm.forest.lookup_segments(segments, instant(2500))) == "not_yet");
-  CHECK(arm.forest.lookup_segments(segments, instant(1250))->stamp == at(1250));
+  CHECK(outcome(arm.forest.lookup_segments(segments, query(2500))) == "not_yet");
+  CHECK(arm.forest.lookup_segments(segments, query(1250))->stamp == at(1250));
 }
 
 TEST_CASE("rate, gaps and jitter of what is kept") {

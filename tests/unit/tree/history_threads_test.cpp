@@ -56,10 +56,10 @@ struct Reader {
     const Handle a = forest.find(link_id(0)).value();
     const Handle b = forest.find(link_id(kLinks)).value();
     while (!stop.load(std::memory_order_acquire) && finding.empty()) {
-      const auto found = forest.lookup(a, b, Instant{});
+      const auto found = forest.lookup(a, b, Query{});
       take(found, newest);
       if (!found) continue;
-      Instant then;
+      Query then;
       then.at = *found->stamp - std::chrono::nanoseconds(random.index(400));
       take(forest.lookup(a, b, then), past);
       (void)forest.pasts(link_id(1));
@@ -128,7 +128,7 @@ TEST_CASE("a past may go while it is read") {
   std::atomic<int> wrong{0};
   std::thread reader([&] {
     while (!stop.load()) {
-      const auto X = forest.lookup("world", "arm", Instant{});
+      const auto X = forest.lookup("world", "arm", Query{});
       if (!X) continue;
       ++answers;
       const double x = X->pose.translation().x();

@@ -1,0 +1,112 @@
+#include <algorithm>
+#include <utility>
+
+#include "tree/forest_impl.hpp"
+
+// Lookups of segments that somebody else's path needs.
+namespace tfdude {
+
+Result<std::vector<Forest::Impl::Ends>> Forest::Impl::all_ends(
+    const std::vector<PathEnds>& segments) const {
+  const std::uint64_t commit = snapshot();
+  std::vector<Ends> all;
+  all.reserve(segments.size());
+  for (const PathEnds& segment : segments) {
+    const Version* start = named(segment.from, commit);
+    if (start == nullptr) return unknown_start(segment.from);
+    const Version* end = named(segment.to, commit);
+    if (end == nullptr) return unknown_end(segment.to);
+    all.push_back({start, end, commit});
+  }
+  return all;
+}
+
+Result<std::vector<Reached>> Forest::Impl::values_at(const std::vector<Ends>& segments,
+                                                     std::int64_t t, const Query& query,
+                                                     Met& met) const {
+  std::vector<Reached> values;
+  values.reserve(segments.size());
+  for (const Ends& ends : segments) {
+    Met of_this;
+    auto X = reach_at(ends, Absent::kMayPass, t, query, of_this);
+    if (!X) return tl::unexpected(X.error());
+    values.push_back(*std::move(X));
+    met.moving = met.moving || of_this.moving;
+  }
+  return values;
+}
+
+// Each segment's newest, and of those with moving edges that whose newest is the oldest.
+Result<std::vector<Reached>> Forest::Impl::newest_values(const std::vector<Ends>& segments,
+                                                         Order order, Met& met) const {
+  std::vector<Reached> values;
+  values.reserve(segments.size());
+  bool mixed = false;
+  for (const Ends& ends : segments) {
+    Met of_this;
+    auto X = reach_newest(ends, Absent::kMayPass, order, of_this);
+    if (!X) return tl::unexpected(X.error());
+    values.push_back(*std::move(X));
+    const HeldVersion* limiting = of_this.limiting;
+    if (limiting == nullptr) continue;
+    if (met.limiting == nullptr) met.limiting = limiting;
+    mixed = mixed || limiting->stamp != met.limiting->stamp;
+    if (limiting->stamp < met.limiting->stamp) met.limiting = limiting;
+  }
+  if (!mixed) return values;
+  Query query;
+  query.order = order;
+  return values_at(segments, met.limiting->stamp, query, met);
+}
+
+namespace {
+
+// Ties are told where any segment has some.
+void tell(std::vector<Reached>&& from, std::vector<Transform>& values, std::vector<Ties>& ties) {
+  values.clear();
+  for (const auto& one : from) values.push_back(one.X);
+  const auto none = [](const auto& one) { return one.ties.empty(); };
+  if (std::all_of(from.begin(), from.end(), none)) return;
+  for (auto& one : from) ties.push_back(std::move(one.ties));
+}
+
+}  // namespace
+
+Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
+                                              const Query& query, std::optional<Time> hint,
+                                              bool edges) const {
+  const epoch::Guard guard;
+  const auto ends = impl_->all_ends(segments);
+  if (!ends) return tl::unexpected(ends.error());
+  SegmentValues found;
+  if (!ends->empty()) found.commit = ends->front().commit;
+  Impl::Met met;
+  auto t = query.at;
+  if (!t) {
+    auto newest = impl_->newest_values(*ends, query.order, met);
+    if (!newest) return tl::unexpected(std::move(newest.error()));
+    tell(*std::move(newest), found.values, found.ties);
+    if (const HeldVersion* limiting = met.limiting) {
+      found.stamp = time_of(limiting->stamp);
+      const std::int64_t before =
+          limiting->number > 0 ? limiting->ring->stamp(limiting->number - 1) : kAlways;
+      if (before != kAlways) found.period = std::chrono::nanoseconds(limiting->stamp - before);
+      if (query.age_noise_until) t = found.stamp;
+    }
+  }
+  if (t) {
+    auto values = impl_->values_at(*ends, nanoseconds(*t), query, met);
+    if (!values) return tl::unexpected(std::move(values.error()));
+    found.ties.clear();
+    tell(*std::move(values), found.values, found.ties);
+    if (met.moving) found.stamp = t;
+  }
+  if (edges) impl_->tell_observed_with(*ends, found);
+  if (hint && found.stamp && hint != found.stamp) {
+    auto values = impl_->values_at(*ends, nanoseconds(*hint), query, met);
+    if (values) tell(*std::move(values), found.at_hint, found.ties_at_hint);
+  }
+  return found;
+}
+
+}  // namespace tfdude

@@ -1,0 +1,136 @@
+#include <algorithm>
+#include <cmath>
+
+#include "tfdude/base/id.hpp"
+
+#include "math/finite.hpp"
+#include "tree/forest_impl.hpp"
+
+// What the errors of edges have to do with each other.
+namespace tfdude {
+
+Belief belief_of(const Transform& X, const Ties& ties) {
+  return {X.pose, X.covariance, ties.unknown, ties.shares};
+}
+
+StampedTransform settled(const Belief& X, Order order, std::optional<Time> stamp) {
+  StampedTransform found{settle(X), stamp, {order, X.unknown.has_value(), {}}};
+  std::vector<std::string>& sources = found.basis.sources;
+  for (const Share& share : X.shares) sources.push_back(share.source);
+  std::sort(sources.begin(), sources.end());
+  sources.erase(std::unique(sources.begin(), sources.end()), sources.end());
+  return found;
+}
+
+void Forest::Impl::set_ties(HeldVersion& fresh, std::unique_ptr<EdgeTies> ties) {
+  superseded_ties_.emplace_back(fresh.ties);
+  fresh.ties = ties.release();
+}
+
+void Forest::Impl::tie_as_said(HeldVersion& fresh) {
+  const Correlation& said = fresh.ties->said;
+  std::unique_ptr<EdgeTies> ties;
+  if (!said.empty()) ties.reset(new EdgeTies{said, said, false, 0});
+  set_ties(fresh, std::move(ties));
+}
+
+Result<void> Forest::correlate(std::string_view id, const Correlation& correlation) {
+  if (auto ok = check_shares(correlation.shares); !ok) {
+    return fail_at("frame " + quote(id), ok.error());
+  }
+  const std::lock_guard lock(impl_->mutex_);
+  const auto slot = impl_->held_slot(id);
+  if (!slot) return tl::unexpected(slot.error());
+  HeldVersion& fresh = impl_->push_held(*slot, impl_->newest_value(*slot).X_PC);
+  std::unique_ptr<EdgeTies> ties;
+  if (!correlation.empty()) ties.reset(new EdgeTies{correlation, correlation, false, 0});
+  impl_->set_ties(fresh, std::move(ties));
+  impl_->commit();
+  return {};
+}
+
+void Forest::Impl::tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) const {
+  const auto edge_of = [](const Ends& ends) -> const HeldVersion* {
+    const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;
+    return child->held() ? static_cast<const HeldVersion*>(child) : nullptr;
+  };
+  found.ties.resize(edges.size());
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const HeldVersion* edge = edge_of(edges[i]);
+    if (edge == nullptr || edge->ties == nullptr) continue;
+    found.ties[i].observed_with = edge->ties->now.observed_with;
+  }
+}
+
+Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revision& revision,
+                                          std::optional<Time> stamp, std::uint64_t seen) const {
+  const std::string who = "frame " + quote(revision.id);
+  if (!is_finite(revision.X_PC)) return check_value(revision.id, revision.X_PC);
+  if (auto ok = check_shares(revision.correlation.shares); !ok) return fail_at(who, ok.error());
+  if (!edge.moving()) {
+    if (edge.commit <= seen) return {};
+    return fail(Errc::kChangedMeanwhile, who + " was written while it was observed");
+  }
+  if (!stamp) return fail(Errc::kChangedMeanwhile, who + " is moving since it was observed");
+  const std::int64_t at = nanoseconds(*stamp);
+  const std::uint64_t place = edge.ring->place_of(at);
+  const bool there = place < edge.ring->next() && edge.ring->stamp(place) == at;
+  return there ? Result<void>() : check_sample(edge, at);
+}
+
+void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_PC,
+                                  std::int64_t stamp) {
+  const std::uint64_t place = newest.ring->place_of(stamp);
+  if (place == newest.ring->next() || newest.ring->stamp(place) != stamp) {
+    push_value(newest.slot, X_PC, stamp);
+    return;
+  }
+  HeldVersion* before = newest.ring->sample(place);
+  Ring* superseded = newest.ring;
+  HeldVersion* sample = nullptr;
+  HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
+  if (before->stamp == fresh.stamp) {
+    sample = &fresh;
+    fresh.X_PC = X_PC;
+  } else {
+    sample = held_pool_.take();
+    *sample = HeldVersion{};
+    sample->depth = 0;  // so that it counts as held
+    sample->X_PC = X_PC;
+    sample->stamp = stamp;
+  }
+  sample->kept = true;
+  fresh.ring = superseded->replaced(sample, place).release();
+  fresh.number = fresh.ring->next() - 1;
+  replace(superseded);
+  before->kept = false;
+  superseded_.push_back(before);
+}
+
+Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Time> stamp,
+                            std::uint64_t seen) {
+  const std::lock_guard lock(impl_->mutex_);
+  std::vector<std::uint32_t> slots;
+  for (const Revision& edge : edges) {
+    const auto slot = impl_->held_slot(edge.id);
+    if (!slot) return tl::unexpected(slot.error());
+    auto ok = impl_->check_revision(impl_->newest_value(*slot), edge, stamp, seen);
+    if (!ok) return ok;
+    slots.push_back(*slot);
+  }
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const HeldVersion& newest = impl_->newest_value(slots[i]);
+    if (newest.moving()) {
+      impl_->replace_sample(newest, edges[i].X_PC, nanoseconds(*stamp));
+      continue;
+    }
+    const Correlation said = newest.ties != nullptr ? newest.ties->said : Correlation();
+    HeldVersion& fresh = impl_->push_held(slots[i], edges[i].X_PC);
+    impl_->set_ties(fresh,
+                    std::unique_ptr<EdgeTies>(new EdgeTies{said, edges[i].correlation, true, 0}));
+  }
+  impl_->commit();
+  return {};
+}
+
+}  // namespace tfdude

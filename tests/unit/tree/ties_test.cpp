@@ -1,0 +1,252 @@
+#include <chrono>
+
+#include "tfdude/tree/forest.hpp"
+
+#include "support/catch.hpp"
+#include "support/pose_diff.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ContainsSubstring;
+using testing::covariance_diff;
+using testing::Random;
+using testing::transform_diff;
+
+Time at(std::chrono::milliseconds since) { return Time(1'000'000s + since); }
+
+Share share(Random& random, const std::string& source) {
+  const Factor factor =
+      Factor::NullaryExpr(6, 2, [&](auto, auto) { return 0.01 * random.normal(); });
+  return {source, false, factor};
+}
+
+Correlation shared(const Share& share) { return {false, {share}, {}}; }
+
+// world ─ a ─ b, and world ─ c.
+class Robot {
+ public:
+  explicit Robot(Random& random) {
+    add("world", "", {});
+    X_WA = add("a", "world", random.transform());
+    X_AB = add("b", "a", random.transform());
+    X_WC = add("c", "world", random.transform());
+  }
+  Transform add(const std::string& id, const std::string& parent, const Transform& X) {
+    REQUIRE(forest.add(id, parent, X));
+    return X;
+  }
+
+  Forest forest{[] { return at(0ms); }};
+  Transform X_WA;
+  Transform X_AB;
+  Transform X_WC;
+};
+
+Belief with(const Transform& X, std::vector<Share> shares) {
+  return {X.pose, X.covariance, std::nullopt, std::move(shares)};
+}
+
+TEST_CASE("Lookups count a source once, whichever way they go") {
+  Random random(651);
+  INFO("seed " << random.seed());
+  Robot robot(random);
+  const Share s = share(random, "s");
+  const Share t = share(random, "s");
+  REQUIRE(robot.forest.correlate("a", shared(s)));
+  REQUIRE(robot.forest.correlate("c", shared(t)));
+  const Belief expected =
+      compose(inverse(with(robot.X_WA, {s})), with(robot.X_WC, {t}), Order::kSecond);
+  const auto X_AC = robot.forest.lookup("a", "c");
+  REQUIRE(X_AC);
+  CHECK(transform_diff(*X_AC, settle(expected), 1e-12) == "");
+  const auto with_basis = robot.forest.lookup("a", "c", Query{});
+  REQUIRE(with_basis);
+  CHECK(transform_diff(*with_basis, *X_AC, 1e-12) == "");
+  CHECK(with_basis->basis.sources == std::vector<std::string>{"s"});
+  CHECK_FALSE(with_basis->basis.bound);
+  // The same error on both sides of a mounting is none between them.
+  REQUIRE(robot.forest.update("c", robot.X_WA));
+  REQUIRE(robot.forest.correlate("c", shared(s)));
+  const auto X_exact = robot.forest.lookup("a", "c");
+  REQUIRE(X_exact);
+  const Transform own = between(robot.X_WA, robot.X_WA);
+  CHECK(covariance_diff(X_exact->covariance, own.covariance, 1e-12) == "");
+  // And none is said of paths without it.
+  const auto X_AB = robot.forest.lookup("a", "b", Query{});
+  REQUIRE(X_AB);
+  CHECK(X_AB->basis.sources.empty());
+  CHECK(transform_diff(*X_AB, robot.X_AB, 1e-12) == "");
+}
+
+TEST_CASE("Of unknown correlation a path is bounded, and says so") {
+  Random random(652);
+  INFO("seed " << random.seed());
+  Robot robot(random);
+  REQUIRE(robot.forest.correlate("a", {true, {}, {}}));
+  REQUIRE(robot.forest.correlate("b", {true, {}, {}}));
+  const auto X_WB = robot.forest.lookup("world", "b", Query{});
+  REQUIRE(X_WB);
+  CHECK(X_WB->basis.bound);
+  const Covariance moved = robot.X_WA.covariance.transported(robot.X_AB.pose.inverse());
+  CHECK(covariance_diff(X_WB->covariance, bound(moved, robot.X_AB.covariance), 1e-12) == "");
+  REQUIRE(robot.forest.correlate("a", {}));
+  REQUIRE(robot.forest.correlate("b", {}));
+  const auto independent = robot.forest.lookup("world", "b", Query{});
+  REQUIRE(independent);
+  CHECK_FALSE(independent->basis.bound);
+  CHECK(transform_diff(*independent, compose(robot.X_WA, robot.X_AB), 1e-12) == "");
+}
+
+TEST_CASE("A lookup to fourth order says so, and is that of the composed beliefs") {
+  Random random(653);
+  INFO("seed " << random.seed());
+  Forest forest;
+  const Transform X_WA = random.transform(1.0, 0.3, 0.3);
+  const Transform X_WB = random.transform(1.0, 0.3, 0.3);
+  REQUIRE(forest.add("world", "", {}));
+  REQUIRE(forest.add("a", "world", X_WA));
+  REQUIRE(forest.add("b", "world", X_WB));
+  Query query;
+  query.order = Order::kFourth;
+  const auto X_AB = forest.lookup("a", "b", query);
+  REQUIRE(X_AB);
+  CHECK(X_AB->basis.order == Order::kFourth);
+  const Belief expected = compose(inverse(with(X_WA, {})), with(X_WB, {}), Order::kFourth);
+  CHECK(transform_diff(*X_AB, settle(expected), 1e-12) == "");
+  const auto second = forest.lookup("a", "b", Query{});
+  REQUIRE(second);
+  CHECK(covariance_diff(X_AB->covariance, second->covariance, 0.01) != "");
+}
+
+TEST_CASE("A source is counted at an instant between samples, too") {
+  Random random(654);
+  INFO("seed " << random.seed());
+  Robot robot(random);
+  const Share s = share(random, "s");
+  REQUIRE(robot.forest.correlate("a", shared(s)));
+  REQUIRE(robot.forest.correlate("b", shared(s)));
+  const Transform still{robot.X_WA.pose, {}};
+  REQUIRE(robot.forest.update("a", still, at(0ms)));
+  REQUIRE(robot.forest.update("a", still, at(10ms)));
+  REQUIRE(robot.forest.update("b", still, at(3ms)));
+  Query query;
+  query.at = at(3ms);
+  const auto then = robot.forest.lookup("world", "b", query);
+  const auto newest = robot.forest.lookup("world", "b");
+  const Transform expected = settle(compose(with(still, {s}), with(still, {s}), Order::kSecond));
+  REQUIRE(then);
+  REQUIRE(newest);
+  CHECK(transform_diff(*then, expected, 1e-9) == "");
+  CHECK(transform_diff(*newest, expected, 1e-9) == "");
+}
+
+TEST_CASE("Segments tell their ties, by which the caller composes the path as one forest would") {
+  Random random(655);
+  INFO("seed " << random.seed());
+  Robot robot(random);
+  REQUIRE(robot.forest.correlate("a", shared(share(random, "s"))));
+  REQUIRE(robot.forest.correlate("b", {true, {share(random, "s"), share(random, "t")}, {}}));
+  const auto parts = robot.forest.lookup_segments({{"c", "world"}, {"world", "a"}, {"a", "b"}});
+  REQUIRE(parts);
+  REQUIRE(parts->ties.size() == 3);
+  CHECK(parts->ties[0].empty());
+  Belief X;
+  for (std::size_t i = 0; i < 3; ++i) {
+    X = compose(X, belief_of(parts->values[i], parts->ties[i]), Order::kSecond);
+  }
+  const auto whole = robot.forest.lookup("c", "b");
+  REQUIRE(whole);
+  CHECK(transform_diff(settle(X), *whole, 1e-9) == "");
+  const auto untied = robot.forest.lookup_segments({{"c", "world"}});
+  REQUIRE(untied);
+  CHECK(untied->ties.empty());
+}
+
+TEST_CASE("A revision of static edges holds until their next update") {
+  Random random(656);
+  INFO("seed " << random.seed());
+  Robot robot(random);
+  const Share said = share(random, "s");
+  REQUIRE(robot.forest.correlate("a", shared(said)));
+  const auto edges = std::vector<PathEnds>{{"world", "a"}, {"a", "b"}};
+  const auto seen = robot.forest.lookup_segments(edges, {}, std::nullopt, true);
+  REQUIRE(seen);
+  Share observed = share(random, "observed:1");
+  observed.subtracts = true;
+  observed.factor *= 0.01;
+  const Correlation now{false, {said, observed}, {"a", "b"}};
+  REQUIRE(robot.forest.revise({{"a", robot.X_WA, now}, {"b", robot.X_AB, now}}, std::nullopt,
+                              seen->commit));
+  const auto after = robot.forest.lookup_segments(edges, {}, std::nullopt, true);
+  REQUIRE(after);
+  CHECK(after->ties[0].shares.size() == 2);
+  CHECK(after->ties[1].observed_with == std::vector<std::string>{"a", "b"});
+  // What was seen is old now.
+  const auto again = robot.forest.revise({{"a", robot.X_WA, now}}, std::nullopt, seen->commit);
+  REQUIRE_FALSE(again);
+  CHECK(again.error().code == Errc::kChangedMeanwhile);
+  REQUIRE(robot.forest.update("a", robot.X_WA));
+  const auto updated = robot.forest.lookup_segments(edges, {}, std::nullopt, true);
+  REQUIRE(updated);
+  CHECK(updated->ties[0].shares.size() == 1);
+  CHECK(updated->ties[0].observed_with.empty());
+  CHECK(updated->ties[1].shares.size() == 2);
+}
+
+TEST_CASE("A revision of a moving edge is a sample, or replaces that of its stamp") {
+  Random random(657);
+  INFO("seed " << random.seed());
+  Robot robot(random);
+  for (int i = 0; i < 20; ++i) {
+    REQUIRE(robot.forest.update("a", random.transform(), at(10ms * i)));
+  }
+  const Transform X = random.transform();
+  for (const auto stamp : {at(190ms), at(50ms), at(55ms), at(195ms)}) {
+    REQUIRE(robot.forest.revise({{"a", X, {}}}, stamp, 0));
+    Query query;
+    query.at = stamp;
+    const auto found = robot.forest.lookup("world", "a", query);
+    REQUIRE(found);
+    CHECK(transform_diff(*found, X, 1e-12) == "");
+  }
+  const auto past = robot.forest.pasts("a");
+  REQUIRE(past.size() == 1);
+  CHECK(past[0].samples == 22);
+  const auto undated = robot.forest.revise({{"a", X, {}}}, std::nullopt, 1'000'000);
+  REQUIRE_FALSE(undated);
+  CHECK(undated.error().code == Errc::kChangedMeanwhile);
+  REQUIRE(robot.forest.update("a", X, at(200ms)));
+}
+
+TEST_CASE("What cannot be meant is refused, and changes nothing") {
+  Random random(658);
+  Robot robot(random);
+  Share bad = share(random, "s");
+  bad.factor(0, 0) = std::nan("");
+  const auto refused = robot.forest.correlate("a", shared(bad));
+  REQUIRE_FALSE(refused);
+  CHECK_THAT(refused.error().message, ContainsSubstring("'a'") && ContainsSubstring("'s'"));
+  CHECK_FALSE(robot.forest.correlate("nobody", {true, {}, {}}));
+  const Transform X = random.transform();
+  CHECK_FALSE(robot.forest.revise({{"a", X, {}}, {"nobody", X, {}}}, std::nullopt, 1'000'000));
+  const auto X_WA = robot.forest.value("a");
+  REQUIRE(X_WA);
+  CHECK(transform_diff(*X_WA, robot.X_WA, 0) == "");
+}
+
+TEST_CASE("News of an edge tell what it is tied to") {
+  Random random(659);
+  Robot robot(random);
+  std::vector<EdgeCursor> cursors{{*robot.forest.find("a"), std::nullopt, 0}};
+  CHECK(robot.forest.news(cursors, true).at(0).correlation.empty());
+  REQUIRE(robot.forest.correlate("a", {true, {}, {}}));
+  const auto news = robot.forest.news(cursors, true);
+  REQUIRE(news.size() == 1);
+  CHECK(news[0].correlation.unknown);
+}
+
+}  // namespace
+}  // namespace tfdude
