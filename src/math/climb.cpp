@@ -80,7 +80,7 @@ void Climb<Belief>::up(const Transform& X_PC) {
   edge.pose = X_PC.pose;
   (unknown_ ? edge.unknown.emplace() : edge.own) = X_PC.covariance;
   if (shares_ != nullptr) edge.shares = *shares_;
-  X_SH_ = compose(X_SH_, inverse(edge), order_);
+  X_HS_ = compose(edge, X_HS_, order_);
 }
 
 void Climb<Belief>::up_between(const Transform& X0, const Transform& X1, double s) {
@@ -88,7 +88,7 @@ void Climb<Belief>::up_between(const Transform& X0, const Transform& X1, double 
 }
 
 Belief join(Climb<Belief>&& from_a, Climb<Belief>&& from_b) {
-  return compose(from_a.X_SH_, inverse(from_b.X_SH_), from_a.order_);
+  return compose(inverse(from_a.X_HS_), from_b.X_HS_, from_a.order_);
 }
 
 template class Climb<Transform>;

@@ -80,7 +80,7 @@ class Climb<Belief> {
 
  private:
   Order order_;
-  Belief X_SH_;
+  Belief X_HS_;  // errors in the start's frame, in which they are needed
   Transform computed_;
   bool unknown_ = false;
   const std::vector<Share>* shares_ = nullptr;
