@@ -34,6 +34,8 @@ struct Arguments {
   double wait_ms = 0;
   bool composed = false;
   bool once = false;
+  int order = 2;
+  ObserveOptions observe;
 };
 
 [[nodiscard]] Time wall_clock();
@@ -68,6 +70,8 @@ int run_watch(Client& client, const Arguments& arguments);
 int run_events(Client& client, const Arguments& arguments);
 int run_history(Client& client, const Arguments& arguments);
 int run_echo(Client& client, const Arguments& arguments);
+int run_observe(Client& client, const Arguments& arguments);
+int run_fuse(Client& client, const Arguments& arguments);
 int run_monitor(Client& client, const Arguments& arguments);
 
 /// Prints what is wrong with the command line itself, as JSON, and returns the exit status.

@@ -110,6 +110,8 @@ void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen) {
                    "how far an edge may be taken to go on beyond its newest sample");
   lookup->add_flag("--age-noise", arguments.age_noise,
                    "add the process noise of the edges from then until now");
+  lookup->add_option("--order", arguments.order, "how far covariance is propagated")
+      ->check(CLI::IsMember({2, 4}));
   add_milliseconds(lookup, "--wait", arguments.wait_ms, "how long to wait for frames and data");
 }
 
@@ -150,6 +152,33 @@ void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
                      chosen),
          arguments);
   add_lookup_command(app, arguments, chosen);
+}
+
+void add_measuring_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
+  auto* observe = add_command(app, "observe", "take a measurement of B in A into account",
+                              "observe world tool --xyz 0.8 0.1 1.1 --stddev 1e-3 1e-3 1e-3 "
+                              "2e-3 2e-3 2e-3",
+                              cli::run_observe, chosen);
+  add_ends(observe, arguments);
+  auto* fuse = add_command(app, "fuse", "merge a measurement with what an edge holds",
+                           "fuse camera --xyz 0.1 0 0.3 --stddev 1e-3 1e-3 1e-3 2e-3 2e-3 2e-3",
+                           cli::run_fuse, chosen);
+  add_id(fuse, arguments);
+  for (CLI::App* command : {observe, fuse}) {
+    add_pose_options(*command, arguments);
+    add_stamp(command, "--stamp", arguments.stamp,
+              "when it was measured: seconds since the epoch or, negative, before now");
+    command
+        ->add_option("--gate", arguments.observe.gate,
+                     "which part of right measurements is accepted; 1: all, however far")
+        ->check([](const std::string& text) {
+          const double gate = std::strtod(text.c_str(), nullptr);
+          return gate > 0 && gate <= 1 ? "" : text + " is not above 0 and at most 1";
+        });
+    command->add_flag_callback(
+        "--correlated", [&arguments] { arguments.observe.independent = false; },
+        "it may have to do with what the edges hold: by covariance intersection");
+  }
 }
 
 void add_events_command(CLI::App& app, Command& chosen) {
@@ -205,6 +234,7 @@ int main(int argc, char** argv) {
   add_following_commands(app, arguments, command);
   add_events_command(app, command);
   add_changing_commands(app, arguments, command);
+  add_measuring_commands(app, arguments, command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -9,6 +9,7 @@
 #include "commands.hpp"
 #include "render.hpp"
 #include "time_render.hpp"
+#include "uncertainty_render.hpp"
 
 // Commands that have to do with time.
 namespace tfdude::cli {
@@ -28,6 +29,7 @@ Result<Query> query_of(const std::string& stamp, const Arguments& arguments) {
   }
   query.extrapolate = from_milliseconds(arguments.extrapolate_ms);
   if (arguments.age_noise) query.age_noise_until = now;
+  query.order = arguments.order == 4 ? Order::kFourth : Order::kSecond;
   return query;
 }
 
@@ -51,6 +53,7 @@ nlohmann::json json_of(Client& client, const Arguments& arguments, const Stamped
   }
   auto json = lookup_json(arguments.id, arguments.other, X_AB, partitions);
   add_stamp(json, X_AB.stamp);
+  json["basis"] = basis_json(X_AB.basis);
   return json;
 }
 
@@ -131,6 +134,7 @@ int run_lookup(Client& client, const Arguments& arguments) {
   if (!X_AB) return refuse(client, X_AB.error(), arguments);
   std::string text = describe(*X_AB, arguments.covariance);
   if (X_AB->stamp) text += describe_stamp(X_AB->stamp, wall_clock());
+  text += describe(X_AB->basis);
   return answer(arguments, arguments.json ? json_of(client, arguments, *X_AB) : nlohmann::json(),
                 text);
 }
@@ -183,6 +187,11 @@ int run_monitor(Client& client, const Arguments& arguments) {
         one["edges"] = nlohmann::json::array();
         for (const PastInfo& past : *pasts) one["edges"].push_back(past_json(past, now));
         text += monitor_table(partition.name, *pasts, now);
+        if (const auto observed = client.consistency(partition.name)) {
+          one["observed"] = nlohmann::json::array();
+          for (const auto& edge : *observed) one["observed"].push_back(consistency_json(edge));
+          text += consistency_table(*observed);
+        }
       } else {
         text += "partition " + partition.name + ": " + pasts.error().message + "\n";
       }

@@ -1,5 +1,7 @@
 #include "tfdude/client/client.hpp"
 
+#include <algorithm>
+
 #include "tfdude/base/id.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
@@ -90,8 +92,8 @@ Result<StampedTransform> Client::lookup(Handle a, Handle b, const Query& query) 
   return participant_->lookup(a, b, query);
 }
 
-Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b,
-                                        const Query& query, Milliseconds wait) {
+Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b, const Query& query,
+                                        Milliseconds wait) {
   return participant_->lookup_waiting(a, b, query, wait, nullptr);
 }
 
@@ -104,15 +106,13 @@ Result<StampedTransform> Client::lookup(std::string_view a, const Query& at_a, s
   return StampedTransform{between(*X_FA, *X_FB), X_FB->stamp};
 }
 
-PendingLookup Client::lookup_async(const std::string& a, const std::string& b,
-                                   const Query& query, Milliseconds wait,
-                                   PendingLookup::Callback callback) {
+PendingLookup Client::lookup_async(const std::string& a, const std::string& b, const Query& query,
+                                   Milliseconds wait, PendingLookup::Callback callback) {
   return PendingLookup(participant_->lookup_async(a, b, query, wait, std::move(callback)));
 }
 
 std::future<Result<StampedTransform>> Client::lookup_async(const std::string& a,
-                                                           const std::string& b,
-                                                           const Query& query,
+                                                           const std::string& b, const Query& query,
                                                            Milliseconds wait) {
   return participant_->lookup_async(a, b, query, wait);
 }
@@ -124,6 +124,25 @@ Result<void> Client::can_lookup(std::string_view a, std::string_view b, const Qu
 Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
                                 const WatchOptions& options) {
   return participant_->watch(a, b, options).map([](auto path) { return PathWatch(path); });
+}
+
+Result<Observed> Client::observe(const std::string& a, const std::string& b, const Transform& X_AB,
+                                 std::optional<Time> stamp, const ObserveOptions& options) {
+  return participant_->observe(a, b, X_AB, stamp, options);
+}
+
+Result<Observed> Client::fuse(const std::string& id, const Transform& X_PC,
+                              std::optional<Time> stamp, const ObserveOptions& options) {
+  const auto above = parent(id);
+  if (!above) return tl::unexpected(above.error());
+  if (above->empty()) {
+    return fail(Errc::kInvalidInput, "frame " + quote(id) + " is a root: it has no edge");
+  }
+  return participant_->observe(*above, id, X_PC, stamp, options);
+}
+
+Result<std::vector<EdgeConsistency>> Client::consistency(const std::string& partition) {
+  return participant_->consistency(partition);
 }
 
 Result<std::vector<PastInfo>> Client::past(const std::string& id) { return participant_->past(id); }
@@ -196,6 +215,16 @@ Result<Node> Node::open(std::unique_ptr<Transport> transport, const std::string&
 }
 
 std::size_t Node::own_frames() const { return participant_->own_frames(); }
+
+Result<void> Node::correlate(const std::string& id, const Correlation& correlation) {
+  const auto observed = std::find_if(correlation.shares.begin(), correlation.shares.end(),
+                                     [](const Share& share) { return is_observed(share); });
+  if (observed != correlation.shares.end()) {
+    return fail(Errc::kInvalidInput, "frame " + quote(id) + ": source " + quote(observed->source) +
+                                         ": names of this kind are given to observations");
+  }
+  return participant_->forest().correlate(id, correlation);
+}
 
 const std::string& Node::partition() const { return participant_->partition_name(); }
 

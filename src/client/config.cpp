@@ -3,23 +3,20 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <map>
 #include <optional>
 #include <string_view>
 #include <system_error>
 #include <unordered_map>
 #include <utility>
 
-#include <yaml-cpp/yaml.h>
-
 #include "tfdude/base/id.hpp"
 #include "tfdude/math/transform_spec.hpp"
 
+#include "client/yaml_fields.hpp"
 #include "client/yaml_quirks.hpp"
 
 namespace tfdude {
@@ -29,19 +26,10 @@ namespace {
 constexpr std::size_t kMaxFileBytes = std::size_t{64} << 20U;
 
 constexpr std::array<std::string_view, 3> kFileKeys = {"partition", "history", "frames"};
-constexpr std::array<std::string_view, 8> kFrameKeys = {"id",   "parent", "xyz", "rpy",
-                                                        "quat", "stddev", "cov", "history"};
+constexpr std::array<std::string_view, 10> kFrameKeys = {
+    "id", "parent", "xyz", "rpy", "quat", "stddev", "cov", "history", "correlation", "sources"};
 constexpr std::array<std::string_view, 4> kHistoryKeys = {"span", "count", "process_noise",
                                                           "moving"};
-
-// A key's value; where there is none, it is the key that has a place in the file.
-struct Field {
-  YAML::Node value;
-  YAML::Mark mark;
-};
-
-// What a mapping holds, by key.
-using Fields = std::map<std::string, Field, std::less<>>;
 
 // The key whose line a complaint of TransformSpec::build() belongs to.
 std::string_view blamed_key(const std::string& message, const TransformSpec& spec) {
@@ -54,30 +42,20 @@ std::string_view blamed_key(const std::string& message, const TransformSpec& spe
   return {};
 }
 
-// Reads the nodes of one file; the name is for messages.
-class Reader {
+// Reads what a daemon's file may hold.
+class Reader : public YamlFields {
  public:
-  explicit Reader(std::string name) : name_(std::move(name)) {}
+  using YamlFields::YamlFields;
 
   [[nodiscard]] Result<Config> config(const YAML::Node& root) const;
-  [[nodiscard]] tl::unexpected<Error> error(Errc code, const YAML::Mark& mark,
-                                            const std::string& message) const;
 
  private:
-  template <std::size_t N>
-  [[nodiscard]] Result<Fields> fields(const YAML::Node& map,
-                                      const std::array<std::string_view, N>& allowed,
-                                      const std::string& what) const;
-  [[nodiscard]] Result<std::string> text(const Field& field, const std::string& what) const;
-  [[nodiscard]] Result<double> number(const YAML::Node& node, const std::string& what) const;
-  template <std::size_t N>
-  [[nodiscard]] Result<void> numbers(const Fields& fields, std::string_view key,
-                                     const std::string& place,
-                                     std::optional<std::array<double, N>>& out) const;
-  [[nodiscard]] Result<void> number(const Fields& fields, std::string_view key,
-                                    const std::string& place, std::optional<double>& out) const;
   [[nodiscard]] Result<EdgeTiming> history(const Field& field, const std::string& place,
                                            EdgeTiming timing) const;
+  [[nodiscard]] Result<Correlation> correlation(const Fields& fields,
+                                                const std::string& place) const;
+  [[nodiscard]] Result<Share> share(const std::string& source, const Field& field,
+                                    const std::string& place) const;
   [[nodiscard]] Result<FrameSpec> frame(const YAML::Node& node, std::size_t index,
                                         const EdgeTiming& timing) const;
   [[nodiscard]] Result<void> check_no_cycle(const YAML::Node& list,
@@ -86,93 +64,7 @@ class Reader {
                                        const std::string& place) const;
   [[nodiscard]] Result<Transform> transform(const YAML::Node& node, const Fields& fields,
                                             const std::string& place) const;
-
-  std::string name_;
 };
-
-tl::unexpected<Error> Reader::error(Errc code, const YAML::Mark& mark,
-                                    const std::string& message) const {
-  const std::string line = mark.is_null() ? "" : ":" + std::to_string(mark.line + 1);
-  return fail(code, name_ + line + ": " + message);
-}
-
-template <std::size_t N>
-Result<Fields> Reader::fields(const YAML::Node& map, const std::array<std::string_view, N>& allowed,
-                              const std::string& what) const {
-  std::string known;
-  for (const auto key : allowed) known.append(known.empty() ? "" : ", ").append(key);
-  if (!map.IsMap()) {
-    return error(Errc::kConfig, map.Mark(), what + " is not a mapping with the keys " + known);
-  }
-  Fields fields;
-  const auto about = [&](std::string_view rest) { return std::string(what).append(rest); };
-  for (const auto& entry : map) {
-    const YAML::Node& key_node = entry.first;
-    if (!key_node.IsScalar()) {
-      return error(Errc::kConfig, key_node.Mark(), about(": a key is not plain text"));
-    }
-    const std::string& key = key_node.Scalar();
-    if (std::find(allowed.begin(), allowed.end(), key) == allowed.end()) {
-      return error(
-          Errc::kConfig, key_node.Mark(),
-          about(": unknown key ").append(tfdude::quote(key)).append("; known are ") + known);
-    }
-    const YAML::Mark mark = entry.second.IsNull() ? key_node.Mark() : entry.second.Mark();
-    if (!fields.emplace(key, Field{entry.second, mark}).second) {
-      return error(Errc::kConfig, key_node.Mark(),
-                   about(": ").append(key).append(" is given twice"));
-    }
-  }
-  return fields;
-}
-
-Result<std::string> Reader::text(const Field& field, const std::string& what) const {
-  if (field.value.IsNull()) return error(Errc::kConfig, field.mark, what + " has no value");
-  if (!field.value.IsScalar()) return error(Errc::kConfig, field.mark, what + " is not text");
-  return field.value.Scalar();
-}
-
-Result<double> Reader::number(const YAML::Node& node, const std::string& what) const {
-  if (!node.IsScalar() || is_quoted(node)) {
-    return error(Errc::kConfig, node.Mark(), what + " is not a number");
-  }
-  const std::string written = plain_number(node.Scalar());
-  double value = 0;
-  const auto [end, code] = std::from_chars(written.data(), written.data() + written.size(), value);
-  if (code == std::errc::invalid_argument || end != written.data() + written.size()) {
-    return error(Errc::kConfig, node.Mark(),
-                 what + " is " + tfdude::quote(node.Scalar()) + ", which is not a number");
-  }
-  if (code == std::errc::result_out_of_range) {
-    return error(Errc::kInvalidInput, node.Mark(),
-                 what + " is " + node.Scalar() + ", which no double can hold");
-  }
-  if (!std::isfinite(value)) {
-    return error(Errc::kInvalidInput, node.Mark(), what + " is not a finite number");
-  }
-  return value;
-}
-
-template <std::size_t N>
-Result<void> Reader::numbers(const Fields& fields, std::string_view key, const std::string& place,
-                             std::optional<std::array<double, N>>& out) const {
-  const auto found = fields.find(key);
-  if (found == fields.end()) return {};
-  const YAML::Node& list = found->second.value;
-  const std::string what = place + ": " + found->first;
-  if (!list.IsSequence() || list.size() != N) {
-    const std::string has =
-        list.IsSequence() ? " has " + std::to_string(list.size()) + ", not " : " is not a list of ";
-    return error(Errc::kConfig, found->second.mark, what + has + std::to_string(N) + " numbers");
-  }
-  out.emplace();
-  for (std::size_t i = 0; i < N; ++i) {
-    const auto value = number(list[i], what + "[" + std::to_string(i) + "]");
-    if (!value) return tl::unexpected(value.error());
-    (*out)[i] = *value;
-  }
-  return {};
-}
 
 Result<std::string> Reader::id(const Fields& fields, std::string_view key,
                                const std::string& place) const {
@@ -203,16 +95,6 @@ Result<Transform> Reader::transform(const YAML::Node& node, const Fields& fields
                      message.find("both given") != std::string::npos;
   return error(X_PC.error().code, field == fields.end() ? node.Mark() : field->second.mark,
                place + ": " + (named ? "" : std::string(key) + ": ") + message);
-}
-
-Result<void> Reader::number(const Fields& fields, std::string_view key, const std::string& place,
-                            std::optional<double>& out) const {
-  const auto found = fields.find(key);
-  if (found == fields.end()) return {};
-  const auto value = number(found->second.value, place + ": " + found->first);
-  if (!value) return tl::unexpected(value.error());
-  out = *value;
-  return {};
 }
 
 // What is left out is as in `timing`.
@@ -254,6 +136,57 @@ Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
   return timing;
 }
 
+// A list of columns, each the error for one standard deviation of one dimension of the source.
+Result<Share> Reader::share(const std::string& source, const Field& field,
+                            const std::string& place) const {
+  const std::string what = place + ": source " + tfdude::quote(source);
+  Share share{source, false, {}};
+  if (!field.value.IsSequence() || field.value.size() == 0) {
+    return error(Errc::kConfig, field.mark, what + " is not a list of columns of 6 numbers");
+  }
+  share.factor.resize(6, static_cast<Eigen::Index>(field.value.size()));
+  for (std::size_t j = 0; j < field.value.size(); ++j) {
+    const YAML::Node column = field.value[j];
+    const std::string nth = what + "[" + std::to_string(j) + "]";
+    if (!column.IsSequence() || column.size() != 6) {
+      return error(Errc::kConfig, column.Mark(), nth + " is not a list of 6 numbers");
+    }
+    for (std::size_t i = 0; i < 6; ++i) {
+      const auto value = number(column[i], nth + "[" + std::to_string(i) + "]");
+      if (!value) return tl::unexpected(value.error());
+      share.factor(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = *value;
+    }
+  }
+  if (auto ok = check_shares({share}); !ok) {
+    return error(Errc::kInvalidInput, field.mark, place + ": " + ok.error().message);
+  }
+  if (!is_observed(share)) return share;
+  return error(Errc::kInvalidInput, field.mark, what + ": such names are given to observations");
+}
+
+Result<Correlation> Reader::correlation(const Fields& entries, const std::string& place) const {
+  Correlation correlation;
+  if (const auto found = entries.find("correlation"); found != entries.end()) {
+    const auto said = text(found->second, place + ": correlation");
+    if (!said) return tl::unexpected(said.error());
+    if (*said != "unknown" && *said != "independent") {
+      return error(Errc::kInvalidInput, found->second.mark,
+                   place + ": correlation is neither unknown nor independent");
+    }
+    correlation.unknown = *said == "unknown";
+  }
+  if (const auto found = entries.find("sources"); found != entries.end()) {
+    const auto sources = fields(found->second.value, place + ": sources");
+    if (!sources) return tl::unexpected(sources.error());
+    for (const auto& [source, field] : *sources) {
+      auto one = share(source, field, place);
+      if (!one) return tl::unexpected(std::move(one.error()));
+      correlation.shares.push_back(*std::move(one));
+    }
+  }
+  return correlation;
+}
+
 Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index,
                                 const EdgeTiming& timing) const {
   const std::string nth = "frames[" + std::to_string(index) + "]";
@@ -290,6 +223,9 @@ Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index,
     if (!own) return tl::unexpected(own.error());
     spec.timing = *own;
   }
+  auto ties = correlation(*entries, place);
+  if (!ties) return tl::unexpected(std::move(ties.error()));
+  spec.correlation = *std::move(ties);
   return spec;
 }
 

@@ -13,6 +13,7 @@
 
 #include "tfdude/client/client.hpp"
 #include "tfdude/partition/latest.hpp"
+#include "tfdude/partition/observing.hpp"
 #include "tfdude/partition/routing.hpp"
 #include "tfdude/transport/transport.hpp"
 
@@ -85,6 +86,11 @@ class Participant final : public TransportHandler {
   [[nodiscard]] Result<std::shared_ptr<WatchedPath>> watch(const std::string& a,
                                                            const std::string& b,
                                                            const WatchOptions& options);
+  // Measurements (participant_observe.cpp).
+  [[nodiscard]] Result<Observed> observe(const std::string& a, const std::string& b,
+                                         const Transform& X_AB, std::optional<Time> stamp,
+                                         const ObserveOptions& options);
+  [[nodiscard]] Result<std::vector<EdgeConsistency>> consistency(const std::string& partition);
   [[nodiscard]] Result<std::vector<PastInfo>> past(const std::string& id);
   [[nodiscard]] Result<std::vector<PastInfo>> pasts(const std::string& partition);
   [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b);
@@ -182,11 +188,13 @@ class Participant final : public TransportHandler {
   // Lookups that others must be asked for, and what is pushed (participant_time.cpp).
   [[nodiscard]] Result<StampedTransform> lookup_elsewhere(std::string_view a, std::string_view b,
                                                           const Query& query);
-  [[nodiscard]] Result<StampedTransform> lookup_elsewhere(Handle a, Handle b,
-                                                          const Query& query);
+  [[nodiscard]] Result<StampedTransform> lookup_elsewhere(Handle a, Handle b, const Query& query);
   [[nodiscard]] Result<StampedTransform> gather(LookupPlan& plan, const std::string& a,
                                                 const std::string& b, std::optional<Time> hint);
-  [[nodiscard]] Result<std::vector<SegmentValues>> ask_values(LookupPlan& plan);
+  [[nodiscard]] Result<std::vector<SegmentValues>> ask_values(std::vector<Part>& parts);
+  [[nodiscard]] std::string new_source();
+  [[nodiscard]] Result<ObservedPath> ask_observed(ObservePlan& plan);
+  [[nodiscard]] Result<bool> revise(std::vector<Part> parts);
   [[nodiscard]] Result<std::vector<PastInfo>> ask_past(Part part);
   [[nodiscard]] Result<WatchedPath::Route> plan_watch(const WatchedPath& path);
   [[nodiscard]] Reply answer_watch(const Request& request);
@@ -238,6 +246,7 @@ class Participant final : public TransportHandler {
   std::unique_ptr<Watches> watches_;  // once this process does
   std::atomic<Watches*> watching_{nullptr};
   Cancellations pending_;  // lookups that wait
+  std::atomic<std::uint64_t> observations_{0};
   std::atomic<bool> settled_{false};
   Clock::time_point settle_deadline_;
   std::unique_ptr<Transport> transport_;  // stops before the rest goes

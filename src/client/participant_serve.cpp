@@ -105,9 +105,12 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
                                  : partition->load(frames, wall_clock());
   if (!taken) return taken;
   for (const FrameSpec& frame : frames) {
-    // One that was removed by request has no edge to keep a past of.
-    if (!frame.timing || !forest_.holds(frame.id)) continue;
-    if (auto set = forest_.set_timing(frame.id, *frame.timing); !set) return set;
+    // One that was removed by request has no edge of which to say anything.
+    if (!forest_.holds(frame.id)) continue;
+    Result<void> set;
+    if (frame.timing) set = forest_.set_timing(frame.id, *frame.timing);
+    if (set && !frame.correlation.empty()) set = forest_.correlate(frame.id, frame.correlation);
+    if (!set) return set;
   }
   partition_ = std::move(partition);
   presence_.pages = partition_->page_count();

@@ -74,9 +74,9 @@ class AsyncLookup final : public Cancellations::Task {
 
 }  // namespace
 
-Result<std::vector<SegmentValues>> Participant::ask_values(LookupPlan& plan) {
+Result<std::vector<SegmentValues>> Participant::ask_values(std::vector<Part>& parts) {
   std::vector<SegmentValues> answers;
-  for (Reply& reply : ask(plan.parts, Clock::now() + options_.timeout)) {
+  for (Reply& reply : ask(parts, Clock::now() + options_.timeout)) {
     if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
     auto* values = std::get_if<SegmentValues>(&reply.body);
     answers.push_back(values != nullptr ? std::move(*values) : SegmentValues());
@@ -86,7 +86,7 @@ Result<std::vector<SegmentValues>> Participant::ask_values(LookupPlan& plan) {
 
 Result<StampedTransform> Participant::gather(LookupPlan& plan, const std::string& a,
                                              const std::string& b, std::optional<Time> hint) {
-  auto answers = ask_values(plan);
+  auto answers = ask_values(plan.parts);
   if (!answers) return tl::unexpected(std::move(answers.error()));
   const bool newest =
       !plan.parts.empty() && !std::get<LookupRequest>(plan.parts.front().request.body).query.at;
@@ -102,7 +102,7 @@ Result<StampedTransform> Participant::gather(LookupPlan& plan, const std::string
     lookup.query.at = found.ask_again;
     lookup.hint.reset();
   }
-  answers = ask_values(plan);
+  answers = ask_values(plan.parts);
   if (!answers) return tl::unexpected(std::move(answers.error()));
   return assemble(plan, *answers);
 }
@@ -141,8 +141,8 @@ Result<StampedTransform> Participant::lookup_waiting(std::string_view a, std::st
     // Most sources stamp by a clock that runs as the wall clock does.
     std::chrono::nanoseconds pause = kLookAgain;
     if (query.at) {
-      pause = std::clamp<std::chrono::nanoseconds>(*query.at - wall_clock(), kLookAgain,
-                                                   kLongestSleep);
+      pause =
+          std::clamp<std::chrono::nanoseconds>(*query.at - wall_clock(), kLookAgain, kLongestSleep);
     }
     if (cancellation.wait_until(std::min(deadline, now + pause))) {
       return fail(Errc::kTimeout, "the lookup was cancelled: " + found.error().message);
@@ -274,6 +274,12 @@ Reply Participant::answer_watch(const Request& request) {
   }
   auto state = pusher->watch(watch_group(partition_name_, watch), watch);
   if (!state) return {request.sequence, 0, std::move(state.error())};
+  if (tied_entries(*state) > kMaxTies) {
+    return {request.sequence, 0,
+            Error{Errc::kInvalidInput, "partition " + quote(partition_name_) + " has more than " +
+                                           std::to_string(kMaxTies) +
+                                           " edges of the path that are tied to others"}};
+  }
   return {request.sequence, 0, *std::move(state)};
 }
 

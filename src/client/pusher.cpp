@@ -98,9 +98,10 @@ void Pusher::run() {
     std::vector<std::uint64_t> ended;
     for (State& state : take_due(Clock::now(), ended, next)) {
       // In pieces that a message can hold.
-      for (std::size_t from = 0; from < state.entries.size(); from += kMaxItems) {
+      const std::size_t most = tied_entries(state) > kMaxTies ? kMaxTies : kMaxItems;
+      for (std::size_t from = 0; from < state.entries.size(); from += most) {
         const auto begin = state.entries.begin() + static_cast<std::ptrdiff_t>(from);
-        const auto count = std::min(kMaxItems, state.entries.size() - from);
+        const auto count = std::min(most, state.entries.size() - from);
         push_({state.group, {begin, begin + static_cast<std::ptrdiff_t>(count)}});
       }
     }

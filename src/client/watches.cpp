@@ -85,7 +85,9 @@ void WatchedPath::rebuild(const Route& route) {
   };
   for (const FrameInfo& frame : mirror_.frames()) {
     const std::string* parent = parent_of(frame.id);
-    if (parent == nullptr || *parent != frame.parent) (void)mirror_.release(frame.id);
+    if (parent != nullptr && *parent == frame.parent) continue;
+    (void)mirror_.release(frame.id);
+    ties_.erase(frame.id);
   }
   constexpr auto kAllow = Forest::MissingParent::kAllow;
   for (const FrameInfo& edge : route.edges) {
@@ -120,6 +122,7 @@ void WatchedPath::write(const Source& source, const State& state) {
       if (one->index >= source.frames.size()) return;
       together.push_back({source.frames[one->index], one->X});
     }
+    for (auto one = entry; one != end; ++one) tie(source.frames[one->index], one->correlation);
     // Some may be here already, where they were told twice.
     if (!entry->stamp || !mirror_.update(together, entry->stamp)) {
       for (auto one = entry; one != end; ++one) write(source.frames[one->index], *one);
@@ -128,14 +131,23 @@ void WatchedPath::write(const Source& source, const State& state) {
   }
 }
 
+// Seldom changes, and is told again with each value.
+void WatchedPath::tie(const std::string& frame, const Correlation& correlation) {
+  Correlation& known = ties_[frame];
+  if (known == correlation) return;
+  if (mirror_.correlate(frame, correlation)) known = correlation;
+}
+
 void WatchedPath::write(const std::string& frame, const News& entry) {
   const auto written = mirror_.update(frame, entry.X, entry.stamp);
   if (written || entry.stamp) return;
   // It was moving, and is not any more.
+  ties_.erase(frame);
   const auto info = mirror_.info(frame);
   if (!info) return;
   (void)mirror_.release(frame);
   (void)mirror_.add(frame, info->parent, entry.X, Forest::MissingParent::kAllow);
+  tie(frame, entry.correlation);
 }
 
 bool WatchedPath::wait_for_more(std::uint64_t messages,

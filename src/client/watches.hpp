@@ -10,6 +10,7 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <unordered_map>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
@@ -68,12 +69,14 @@ class WatchedPath {
  private:
   void write(const Source& source, const State& state);
   void write(const std::string& frame, const News& entry);
+  void tie(const std::string& frame, const Correlation& correlation);
   void rebuild(const Route& route);
 
   const std::string a_;
   const std::string b_;
   const WatchOptions options_;
   Forest mirror_;
+  std::unordered_map<std::string, Correlation> ties_;  // of the mirror's edges
   std::atomic<bool> live_{false};
   std::atomic<std::uint64_t> messages_{0};
   mutable std::condition_variable changed_;  // messages_, live_

@@ -102,6 +102,8 @@ Covariance add_fourth(const Errors& e, Shares& shares) {
 
 }  // namespace
 
+bool is_observed(const Share& share) { return share.source.rfind(kObservedPrefix, 0) == 0; }
+
 Belief inverse(const Belief& X_AB) {
   Belief X_BA;
   X_BA.pose = X_AB.pose.inverse();
@@ -164,6 +166,10 @@ Covariance bound(const Covariance& A, const Covariance& B) {
 }
 
 Result<void> check_shares(const std::vector<Share>& shares) {
+  if (shares.size() > kMaxShares) {
+    return fail(Errc::kInvalidInput, std::to_string(shares.size()) + " sources, of at most " +
+                                         std::to_string(kMaxShares));
+  }
   for (const Share& share : shares) {
     if (auto ok = check_id(share.source, "source"); !ok) return ok;
     const std::string who = "source " + quote(share.source) + ": ";

@@ -117,7 +117,7 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
     const Factor on_path = source.on_path(prior, H);
     std::vector<Factor> factors = source.factors;
     for (std::size_t i = 0; i < edges.size(); ++i) factors[i] -= gains[i] * on_path;
-    if (!alone && source.name.rfind(kObservedPrefix, 0) == 0) {
+    if (!alone && is_observed({source.name, source.subtracts, {}})) {
       observed.append(factors, source.subtracts);
       continue;
     }

@@ -14,6 +14,12 @@ struct Overloaded : Visitors... {
 template <class... Visitors>
 Overloaded(Visitors...) -> Overloaded<Visitors...>;
 
+bool are_too_many(const std::vector<Ties>& all) {
+  return all.size() > kMaxTies || std::any_of(all.begin(), all.end(), [](const Ties& ties) {
+           return ties.shares.size() > kMaxTies;
+         });
+}
+
 }  // namespace
 
 Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest,
@@ -51,6 +57,10 @@ Reply Partition::answer(const Request& request, Time now) {
   }
   Reply reply;
   reply.sequence = request.sequence;
+  if (const auto* asked = std::get_if<ConsistencyRequest>(&request.body)) {
+    reply.body = consistency(request.id, asked->all);
+    return reply;
+  }
   if (auto done = apply(request, now); !done) reply.body = std::move(done.error());
   reply.epoch = pages_.epoch();
   return reply;
@@ -59,8 +69,12 @@ Reply Partition::answer(const Request& request, Time now) {
 Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& lookup) const {
   Reply reply;
   reply.sequence = sequence;
-  auto values = forest_.lookup_segments(lookup.segments, lookup.query, lookup.hint);
-  if (values) {
+  auto values = forest_.lookup_segments(lookup.segments, lookup.query, lookup.hint, lookup.edges);
+  if (values && are_too_many(values->ties)) {
+    reply.body = Error{Errc::kInvalidInput, "partition " + quote(name_) + " has more than " +
+                                                std::to_string(kMaxTies) +
+                                                " segments of the path, or sources in one of them"};
+  } else if (values) {
     reply.body = *std::move(values);
   } else if (values.error().code == Errc::kNotYet || values.error().code == Errc::kTooOld) {
     reply.body = std::move(values.error());
@@ -93,6 +107,7 @@ Result<void> Partition::apply(const Request& request, Time now) {
                                [&](const RemoveRequest& one) { return remove(one, now); },
                                [&](const UpdateRequest& one) { return update(one); },
                                [&](const MoveRequest& one) { return move(request.id, one, now); },
+                               [&](const ReviseRequest& one) { return revise(one); },
                                [](const auto&) -> Result<void> { return {}; }},
                     request.body);
 }
@@ -126,6 +141,7 @@ Result<void> Partition::move(const std::string& id, const MoveRequest& request, 
   if (auto moved = forest_.move(id, request.parent, request.X_PC, since); !moved) {
     return tl::unexpected(at_home(std::move(moved.error()), id));
   }
+  consistency_.erase(id);
   pages_.put(id, request.parent, since);
   pages_.close_epoch();
   directory_.changes().frame_moved(id, request.parent, name_);
@@ -143,6 +159,7 @@ void Partition::forget(const std::vector<std::string>& removed, Time now) {
   if (removed.empty()) return;
   const std::uint64_t since = directory_.next_stamp(now);
   for (auto id = removed.rbegin(); id != removed.rend(); ++id) {
+    consistency_.erase(*id);
     pages_.erase(*id);
     pages_.leave({*id, since, Note::Kind::kRemoved, {}});
     directory_.changes().frame_removed(*id, name_);
@@ -165,6 +182,39 @@ Result<void> Partition::update(const UpdateRequest& request) {
   });
   if (foreign == edges.end()) return updated;
   return tl::unexpected(at_home(std::move(updated.error()), foreign->id));
+}
+
+Result<void> Partition::revise(const ReviseRequest& request) {
+  std::vector<Revision> edges;
+  for (const ReviseRequest::Edge& edge : request.edges) {
+    if (!forest_.holds(edge.id)) {
+      return tl::unexpected(at_home(Error{Errc::kNotOwner, "no frame " + quote(edge.id)}, edge.id));
+    }
+    if (edge.revision) edges.push_back(*edge.revision);
+  }
+  if (!edges.empty()) {
+    if (auto revised = forest_.revise(edges, request.stamp, request.seen); !revised) return revised;
+  }
+  for (const ReviseRequest::Edge& edge : request.edges) {
+    if (edge.revision && saved_) updated_.insert(edge.id);
+    if (!(edge.surprise.expected > 0)) continue;
+    EdgeConsistency& so_far = consistency_[edge.id];
+    so_far.id = edge.id;
+    ++so_far.observations;
+    so_far.refused += edge.refused ? 1 : 0;
+    so_far.sum.squares += edge.surprise.squares;
+    so_far.sum.expected += edge.surprise.expected;
+    so_far.sum.variance += edge.surprise.variance;
+  }
+  return {};
+}
+
+std::vector<EdgeConsistency> Partition::consistency(const std::string& id, bool all) const {
+  std::vector<EdgeConsistency> found;
+  for (const auto& [edge, one] : consistency_) {
+    if ((all || edge == id) && found.size() < kMaxItems) found.push_back(one);
+  }
+  return found;
 }
 
 std::size_t Partition::apply(const Update& update) {

@@ -209,6 +209,51 @@ Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
   return plan;
 }
 
+namespace {
+
+// The answers in the order of the path.
+template <class Take>
+void each_segment(const LookupPlan& plan, Take take) {
+  std::vector<std::size_t> taken(plan.parts.size(), 0);
+  for (const Segment& segment : plan.segments) {
+    const auto part = std::find_if(plan.parts.begin(), plan.parts.end(),
+                                   [&](const Part& asked) { return asked.owner == segment.owner; });
+    const auto i = static_cast<std::size_t>(part - plan.parts.begin());
+    take(i, taken[i]++);
+  }
+}
+
+StampedTransform composed(const LookupPlan& plan, const std::vector<SegmentValues>& answers) {
+  std::optional<Time> stamp;
+  bool tied = false;
+  for (const SegmentValues& answer : answers) {
+    if (answer.stamp) stamp = answer.stamp;
+    tied = tied || !answer.ties.empty();
+  }
+  const Order order = plan.parts.empty()
+                          ? Order::kSecond
+                          : std::get<LookupRequest>(plan.parts[0].request.body).query.order;
+  if (tied || order == Order::kFourth) {
+    Belief X_AB;
+    each_segment(plan, [&](std::size_t i, std::size_t k) {
+      const Ties none;
+      const Ties& ties = k < answers[i].ties.size() ? answers[i].ties[k] : none;
+      X_AB = compose(X_AB, belief_of(answers[i].values[k], ties), order);
+    });
+    return settled(X_AB, order, stamp);
+  }
+  StampedTransform X_AB{{}, stamp, {}};
+  bool first = true;
+  each_segment(plan, [&](std::size_t i, std::size_t k) {
+    const Transform& X = answers[i].values[k];
+    static_cast<Transform&>(X_AB) = first ? X : compose(X_AB, X);
+    first = false;
+  });
+  return X_AB;
+}
+
+}  // namespace
+
 Result<StampedTransform> assemble(const LookupPlan& plan,
                                   const std::vector<SegmentValues>& answers) {
   if (answers.size() != plan.parts.size()) {
@@ -222,19 +267,7 @@ Result<StampedTransform> assemble(const LookupPlan& plan,
                                      std::to_string(answers[i].values.size()) + " transforms for " +
                                      std::to_string(asked.size()) + " segments");
   }
-  std::vector<std::size_t> taken(answers.size(), 0);
-  StampedTransform X_AB;
-  for (const SegmentValues& answer : answers) {
-    if (answer.stamp) X_AB.stamp = answer.stamp;
-  }
-  for (const Segment& segment : plan.segments) {
-    const auto part = std::find_if(plan.parts.begin(), plan.parts.end(),
-                                   [&](const Part& asked) { return asked.owner == segment.owner; });
-    const auto i = static_cast<std::size_t>(part - plan.parts.begin());
-    const Transform& X = answers[i].values[taken[i]++];
-    static_cast<Transform&>(X_AB) = &segment == &plan.segments.front() ? X : compose(X_AB, X);
-  }
-  return X_AB;
+  return composed(plan, answers);
 }
 
 }  // namespace tfdude

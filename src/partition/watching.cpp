@@ -25,11 +25,34 @@ class Fingerprint {
   std::uint64_t value_ = 14695981039346656037U;
 };
 
+// As an edge: what a segment has of its own counts as unknown, too, where a part of it is.
+void tie(News& entry, const Ties& ties) {
+  entry.correlation.shares = ties.shares;
+  if (!ties.unknown) return;
+  entry.correlation.unknown = true;
+  entry.X.covariance = bound(entry.X.covariance, *ties.unknown);
+}
+
+std::vector<News> entries_of(const SegmentValues& found) {
+  std::vector<News> entries;
+  for (std::uint32_t i = 0; i < found.values.size(); ++i) {
+    entries.push_back({i, found.stamp, found.values[i], {}});
+    if (!found.ties.empty()) tie(entries.back(), found.ties[i]);
+  }
+  return entries;
+}
+
 bool same(const Transform& a, const Transform& b) {
   return a.pose.matrix() == b.pose.matrix() && a.covariance.upper() == b.covariance.upper();
 }
 
 }  // namespace
+
+std::size_t tied_entries(const State& state) {
+  return static_cast<std::size_t>(
+      std::count_if(state.entries.begin(), state.entries.end(),
+                    [](const News& entry) { return !entry.correlation.empty(); }));
+}
 
 std::uint64_t watch_group(std::string_view partition, const WatchRequest& request) {
   Fingerprint print;
@@ -48,11 +71,7 @@ Result<State> WatchedGroup::snapshot(const Forest& forest) {
   if (!request_.segments.empty()) {
     auto found = forest.lookup_segments(request_.segments);
     if (!found) return tl::unexpected(std::move(found.error()));
-    State state{id_, {}};
-    for (std::uint32_t i = 0; i < found->values.size(); ++i) {
-      state.entries.push_back({i, found->stamp, found->values[i]});
-    }
-    return state;
+    return State{id_, entries_of(*found)};
   }
   std::vector<EdgeCursor> cursors;
   for (const std::string& edge : request_.edges) {
@@ -84,13 +103,13 @@ State WatchedGroup::composed_news(const Forest& forest) {
   const auto found = forest.lookup_segments(request_.segments);
   if (!found) return state;
   sent_.resize(found->values.size());
-  for (std::uint32_t i = 0; i < found->values.size(); ++i) {
-    News entry{i, found->stamp, found->values[i]};
-    const auto& sent = sent_[i];
-    const bool again =
-        sent && entry.stamp == sent->stamp && (entry.stamp || same(entry.X, sent->X));
+  for (News& entry : entries_of(*found)) {
+    const auto& sent = sent_[entry.index];
+    const bool again = sent && entry.stamp == sent->stamp &&
+                       entry.correlation == sent->correlation &&
+                       (entry.stamp || same(entry.X, sent->X));
     if (again) continue;
-    sent_[i] = entry;
+    sent_[entry.index] = entry;
     state.entries.push_back(std::move(entry));
   }
   return state;

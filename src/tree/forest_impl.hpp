@@ -182,6 +182,13 @@ class Forest::Impl {
   void tie_as_said(HeldVersion& fresh);
   [[nodiscard]] Result<void> check_revision(const HeldVersion& edge, const Revision& revision,
                                             std::optional<Time> stamp, std::uint64_t seen) const;
+  /// With the whole covariance that an edge has but for shares of declared sources: what is kept of an observed one where
+  /// shares of observations are not.
+  [[nodiscard]] static Transform whole(const Transform& X_PC, const Correlation& correlation);
+  [[nodiscard]] static Transform whole(const HeldVersion& edge) {
+    const bool observed = edge.ties != nullptr && edge.ties->revised;
+    return observed ? whole(edge.X_PC, edge.ties->now) : edge.X_PC;
+  }
   /// The moving edge's sample of that stamp, where there is one, becomes another.
   void replace_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
 

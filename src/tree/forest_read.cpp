@@ -154,7 +154,7 @@ Result<Transform> Forest::value(std::string_view id) const {
   if (!version->held()) {
     return fail(Errc::kNotOwner, "frame " + quote(id) + " is held by another partition");
   }
-  return static_cast<const HeldVersion*>(version)->X_PC;
+  return Impl::whole(*static_cast<const HeldVersion*>(version));
 }
 
 std::vector<FrameInfo> Forest::frames() const {
@@ -223,7 +223,8 @@ std::pair<std::vector<ChangedEdge>, std::uint64_t> Forest::changed_since(
   for (std::uint32_t slot = 0; slot < impl_->slots_.size(); ++slot) {
     const Version* version = impl_->at(slot, now);
     if (!version->held() || version->commit <= commit) continue;
-    changed.push_back({version->name->text, static_cast<const HeldVersion*>(version)->X_PC});
+    changed.push_back(
+        {version->name->text, Impl::whole(*static_cast<const HeldVersion*>(version))});
   }
   return {std::move(changed), now};
 }

@@ -107,6 +107,13 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_
   superseded_.push_back(before);
 }
 
+Transform Forest::Impl::whole(const Transform& X_PC, const Correlation& correlation) {
+  Belief observed{X_PC.pose, X_PC.covariance, std::nullopt, {}};
+  std::copy_if(correlation.shares.begin(), correlation.shares.end(),
+               std::back_inserter(observed.shares), is_observed);
+  return settle(observed);
+}
+
 Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Time> stamp,
                             std::uint64_t seen) {
   const std::lock_guard lock(impl_->mutex_);
@@ -121,7 +128,8 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const HeldVersion& newest = impl_->newest_value(slots[i]);
     if (newest.moving()) {
-      impl_->replace_sample(newest, edges[i].X_PC, nanoseconds(*stamp));
+      const Transform X_PC = Impl::whole(edges[i].X_PC, edges[i].correlation);
+      impl_->replace_sample(newest, X_PC, nanoseconds(*stamp));
       continue;
     }
     const Correlation said = newest.ties != nullptr ? newest.ties->said : Correlation();

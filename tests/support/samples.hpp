@@ -77,6 +77,15 @@ bool take(const Bytes& bytes) {
   return true;
 }
 
+[[nodiscard]] inline Correlation correlation(Random& random) {
+  const auto factor = [&](Eigen::Index columns) -> Factor {
+    return Factor::NullaryExpr(6, columns, [&](auto, auto) { return random.normal(); });
+  };
+  return {true,
+          {{"calibration", false, factor(1)}, {"observed:1.2.3", true, factor(kMaxFactorColumns)}},
+          {"hand", std::string(255, 'o')}};
+}
+
 [[nodiscard]] inline std::vector<Request> requests(Random& random) {
   const auto edge = [&](const std::string& id) { return EdgeUpdate{id, random.transform()}; };
   return {
@@ -97,7 +106,30 @@ bool take(const Bytes& bytes) {
       {12, "hand", WatchRequest{{"hand", "arm"}, {}, std::chrono::nanoseconds(1000)}},
       {13, "hand", WatchRequest{{}, {{"hand", "arm"}}}},
       {14, "hand", PastRequest{}},
+      {15, "hand", LookupRequest{{{"arm", "hand"}}, {{}, {}, {}, Order::kFourth}, {}, true}},
+      {16, "hand",
+       ReviseRequest{{{"hand", {1.5, 2.5, 3.5}, true, {}},
+                      {"arm",
+                       {4.5, 5.5, 6.5},
+                       false,
+                       Revision{"arm", random.transform(), correlation(random)}}},
+                     time_of(17),
+                     18446744073709551615ULL}},
+      {17, "hand", ConsistencyRequest{true}},
       {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), std::nullopt}}};
+}
+
+[[nodiscard]] inline SegmentValues tied_values(Random& random) {
+  SegmentValues found;
+  found.values = {random.transform(), random.transform()};
+  found.stamp = time_of(5);
+  found.period = std::chrono::nanoseconds(6);
+  found.at_hint = {random.transform(), random.transform()};
+  const Correlation some = correlation(random);
+  found.ties = {{}, {random.covariance(), some.shares, some.observed_with}};
+  found.ties_at_hint = {{random.covariance(), {}, {}}, {}};
+  found.commit = 77;
+  return found;
 }
 
 [[nodiscard]] inline PastInfo past_info(const std::string& id) {
@@ -133,12 +165,15 @@ bool take(const Bytes& bytes) {
            State{18446744073709551615ULL,
                  {{0, std::nullopt, random.transform()}, {7, time_of(5), Transform()}}}},
           {9, 1, std::vector<PastInfo>{}},
+          {11, 1, tied_values(random)},
+          {12, 1, std::vector<EdgeConsistency>{{"hand", 7, 3, {1.5, 2.5, 3.5}}, {}}},
           {10, 1, std::vector<PastInfo>{past_info("hand"), PastInfo{}}}};
 }
 
 [[nodiscard]] inline std::vector<State> states(Random& random) {
   return {{},
           {1, {{4294967295U, time_of(INT64_MAX), random.transform()}}},
+          {3, {{1, {}, random.transform(), correlation(random)}, {2, {}, random.transform()}}},
           {2, {{0, std::nullopt, Transform()}, {1, time_of(1), random.transform()}}}};
 }
 

@@ -12,26 +12,26 @@ namespace tfdude {
 /// What went wrong, by what a caller can do about it. The numbers travel on the wire: never reuse
 /// one.
 enum class Errc : std::uint8_t {
-  kInvalidInput = 1,      ///< a field breaks its rule; the message names the field
-  kUnknownFrame = 2,      ///< no frame of that id
-  kUnknownStart = 3,      ///< lookup: no frame of the first id
-  kUnknownEnd = 4,        ///< lookup: no frame of the second id
-  kUnknownParent = 5,     ///< add, move: no frame of the parent's id
-  kUnknownPartition = 6,  ///< no partition of that name
-  kAlreadyExists = 7,     ///< add: the id is taken
-  kNotConnected = 8,      ///< lookup: the frames have no common root
-  kCycle = 9,             ///< move: the new parent lies below the frame
-  kNotOwner = 10,         ///< the partition asked does not own the edge now; healed by a retry
-  kPartitionTaken = 11,   ///< another live daemon serves a partition of this name
-  kUnreachable = 12,      ///< the owner is known to be down
-  kTimeout = 13,          ///< the owner did not answer in time
-  kConfig = 14,           ///< a file (configuration, profile) is missing or broken
-  kTransport = 15,        ///< the transport could not be set up
-  kState = 16,            ///< what is kept of a partition could not be read or written
-  kNotYet = 17,           ///< an edge has no data of that instant yet
-  kTooOld = 18,           ///< an edge has no data of that instant any more
-  kStampTaken = 19,       ///< update: the edge has another sample of that stamp
-  kChangedMeanwhile = 20, ///< observe: an edge was written while it was observed
+  kInvalidInput = 1,       ///< a field breaks its rule; the message names the field
+  kUnknownFrame = 2,       ///< no frame of that id
+  kUnknownStart = 3,       ///< lookup: no frame of the first id
+  kUnknownEnd = 4,         ///< lookup: no frame of the second id
+  kUnknownParent = 5,      ///< add, move: no frame of the parent's id
+  kUnknownPartition = 6,   ///< no partition of that name
+  kAlreadyExists = 7,      ///< add: the id is taken
+  kNotConnected = 8,       ///< lookup: the frames have no common root
+  kCycle = 9,              ///< move: the new parent lies below the frame
+  kNotOwner = 10,          ///< the partition asked does not own the edge now; healed by a retry
+  kPartitionTaken = 11,    ///< another live daemon serves a partition of this name
+  kUnreachable = 12,       ///< the owner is known to be down
+  kTimeout = 13,           ///< the owner did not answer in time
+  kConfig = 14,            ///< a file (configuration, profile) is missing or broken
+  kTransport = 15,         ///< the transport could not be set up
+  kState = 16,             ///< what is kept of a partition could not be read or written
+  kNotYet = 17,            ///< an edge has no data of that instant yet
+  kTooOld = 18,            ///< an edge has no data of that instant any more
+  kStampTaken = 19,        ///< update: the edge has another sample of that stamp
+  kChangedMeanwhile = 20,  ///< observe: an edge was written while it was observed
 };
 
 /// The stable snake_case name of a code, as the command line prints it in JSON.

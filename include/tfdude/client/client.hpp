@@ -13,6 +13,7 @@
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
 #include "tfdude/client/watch.hpp"
+#include "tfdude/math/observation.hpp"
 #include "tfdude/partition/change.hpp"
 #include "tfdude/partition/directory.hpp"
 #include "tfdude/partition/partition.hpp"
@@ -55,6 +56,16 @@ struct PathSegment {
   std::string partition;
   std::string from;
   std::string to;
+};
+
+/// What came of a measurement.
+struct Observed {
+  double distance_squared = 0;  ///< of it from what was believed: squared Mahalanobis distance
+  int dimensions = 0;           ///< in which it has one
+  double limit = 0;             ///< of the gate
+  bool accepted = false;
+  std::vector<std::string> corrected;  ///< edges whose values have changed
+  std::optional<Time> stamp;           ///< of moving edges
 };
 
 class Participant;
@@ -154,7 +165,8 @@ class Client {
                                   const std::optional<Transform>& X_PC = std::nullopt);
 
   /// X_AB, the pose of frame b in frame a, with the covariance of its right perturbation, expressed in b, at the newest
-  /// instant of which all moving edges on the path have data. Edges are taken as independent; first order. On a Node a
+  /// instant of which all moving edges on the path have data. Edges are taken as their owners say (Correlation), of which
+  /// nothing is said as independent; covariance to second order. On a Node a
   /// path of own edges costs no network, no lock and no allocation; else one round trip, whatever the number of
   /// partitions on the path, or two where these have no common instant near that which was foreseen (see latest.hpp):
   /// where the answer was foreseen, it may be up to two samples of the slowest edge older than the newest.
@@ -201,6 +213,29 @@ class Client {
   /// @return as lookup().
   [[nodiscard]] Result<PathWatch> watch(const std::string& a, const std::string& b,
                                         const WatchOptions& options = {});
+
+  /// Takes a measurement of X_AB into account: distributes it over the edges between a and b by their uncertainty (see
+  /// tfdude/math/observation.hpp), whoever owns them; each owner applies its part as one commit. Moving edges are corrected
+  /// by a sample of the measurement's stamp. A measurement that the gate refuses changes nothing, which is no error.
+  /// Takes two round trips and more, as edges are asked one by one, with those that were observed together with them.
+  /// @param X_AB  its covariance is that of the measurement's own error
+  /// @param stamp  when it was taken; absent: the newest instant of which all moving edges have data
+  /// @return as lookup(); kChangedMeanwhile (an edge goes on being written), kInvalidInput (no edge is uncertain, or all
+  ///   that are have an unknown correlation). Where only some owners have applied their part, the error says so.
+  [[nodiscard]] Result<Observed> observe(const std::string& a, const std::string& b,
+                                         const Transform& X_AB,
+                                         std::optional<Time> stamp = std::nullopt,
+                                         const ObserveOptions& options = {});
+
+  /// The same for the edge from a frame's parent to the frame: merges a measurement with what the edge holds.
+  /// @return as observe(); kUnknownFrame, kInvalidInput (a root).
+  [[nodiscard]] Result<Observed> fuse(const std::string& id, const Transform& X_PC,
+                                      std::optional<Time> stamp = std::nullopt,
+                                      const ObserveOptions& options = {});
+
+  /// How well covariances agree with what was observed, of those edges of a partition that were observed since its process
+  /// began; of kMaxItems at most. @return kUnknownPartition.
+  [[nodiscard]] Result<std::vector<EdgeConsistency>> consistency(const std::string& partition);
 
   /// What is kept of the past of one edge; nothing for one that is static. @return kUnknownFrame.
   [[nodiscard]] Result<std::vector<PastInfo>> past(const std::string& id);
@@ -258,6 +293,11 @@ class Node : public Client {
                                          const std::string& partition,
                                          const std::vector<FrameSpec>& frames = {},
                                          const Options& options = {});
+
+  /// Says how the error of an own edge hangs together with those of others: for all its values, also those of the past,
+  /// until it is said anew. Not kept for the next process.
+  /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the source).
+  [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
 
   [[nodiscard]] const std::string& partition() const;
   /// How many frames the partition has.

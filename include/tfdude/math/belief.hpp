@@ -20,6 +20,9 @@ using Factor = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 /// The most columns of a factor.
 inline constexpr Eigen::Index kMaxFactorColumns = 36;
 
+/// The most shares of one error.
+inline constexpr std::size_t kMaxShares = 128;
+
 /// What an error has from a source that others have a share of, too: F s, where s has k independent dimensions of variance
 /// one. Where two factors of a source differ in columns, the missing ones are zero.
 struct Share {
@@ -28,10 +31,18 @@ struct Share {
   /// that was observed is less than its edges' errors make it, each of which is hardly known better.
   bool subtracts = false;
   Factor factor;
+
+  friend bool operator==(const Share& a, const Share& b) {
+    return a.source == b.source && a.subtracts == b.subtracts &&
+           a.factor.cols() == b.factor.cols() && a.factor == b.factor;
+  }
 };
 
 /// How the names of sources begin that observations make (observation.hpp).
 inline constexpr std::string_view kObservedPrefix = "observed:";
+
+/// Whether an observation has made the share's source.
+[[nodiscard]] bool is_observed(const Share& share);
 
 /// X_AB with all that is known of its error e = η + Σ F s + u, X = X̄ · Exp(e): what a path's segments must tell each
 /// other, so that what they have in common is counted once.
@@ -63,7 +74,7 @@ struct Belief {
 /// the ε that makes the sum of both traces, of translation and of rotation, each in units of A + B, the smallest.
 [[nodiscard]] Covariance bound(const Covariance& A, const Covariance& B);
 
-/// @return kInvalidInput naming the source: an empty name, one longer than an id, no column, more than
+/// @return kInvalidInput: more than kMaxShares; naming the source: an empty name, one longer than an id, no column, more than
 ///   kMaxFactorColumns, a number that is not finite or beyond the root of kMaxVariance, one source twice.
 [[nodiscard]] Result<void> check_shares(const std::vector<Share>& shares);
 

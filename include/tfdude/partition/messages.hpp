@@ -11,7 +11,7 @@
 
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
-#include "tfdude/math/transform.hpp"
+#include "tfdude/math/observation.hpp"
 #include "tfdude/tree/forest.hpp"
 
 // What participants say to each other, free of any transport. idl/tfdude.idl has the same on the wire.
@@ -22,6 +22,9 @@ using PeerId = std::array<std::uint8_t, 12>;
 
 /// The most edges, subtrees, segments or entries that one message holds.
 inline constexpr std::size_t kMaxItems = 4096;
+
+/// The most edges of one owner that are observed at once or tied to others on one path, and shares of each.
+inline constexpr std::uint32_t kMaxTies = kMaxShares;
 
 struct AddRequest {
   std::string parent;  ///< empty: a root
@@ -49,6 +52,27 @@ struct LookupRequest {
   Query query{};
   /// Of what other instant the answer may be of use; see LatestHints.
   std::optional<Time> hint{};
+  bool edges =
+      false;  ///< each segment is an edge, to be observed: all that its error is tied to is wanted
+};
+
+/// What an observation has come to for edges of one owner.
+struct ReviseRequest {
+  struct Edge {
+    std::string id;
+    Surprise surprise;
+    bool refused = false;  ///< the measurement, by its gate
+    std::optional<Revision> revision;
+  };
+  std::vector<Edge> edges;      ///< at least one
+  std::optional<Time> stamp{};  ///< of which moving edges were observed
+  std::uint64_t seen = 0;       ///< SegmentValues::commit of what was observed
+};
+
+/// How well the covariance of the edge that the request's id names, or of all that the partition has, agrees with
+/// observations.
+struct ConsistencyRequest {
+  bool all = false;
 };
 
 /// Asks for the values of edges, now and whenever they change: these are pushed to the group of watchers that have
@@ -74,7 +98,7 @@ struct Request {
   /// The frame concerned, by which a reader filters: one that the partition owns, or the new one of an add.
   std::string id;
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
-               PastRequest>
+               PastRequest, ReviseRequest, ConsistencyRequest>
       body;
 };
 
@@ -84,6 +108,17 @@ struct State {
   std::vector<News> entries;  ///< by the index of the edge, or segment, in the request
 };
 
+/// What observations have said of one edge's covariance so far.
+struct EdgeConsistency {
+  std::string id;
+  std::uint64_t observations = 0;
+  std::uint64_t refused = 0;  ///< of these, by the gate
+  Surprise sum;               ///< over all of them
+};
+
+/// How many entries are tied to others; a message holds no more than kMaxTies of them.
+[[nodiscard]] std::size_t tied_entries(const State& state);
+
 struct Done {};
 
 struct Reply {
@@ -91,7 +126,9 @@ struct Reply {
   /// The partition's structure after the request; a directory that has this epoch shows its effect.
   std::uint64_t epoch = 0;
   /// Done, or why not; or what was asked for.
-  std::variant<Done, Error, SegmentValues, State, std::vector<PastInfo>> body;
+  std::variant<Done, Error, SegmentValues, State, std::vector<PastInfo>,
+               std::vector<EdgeConsistency>>
+      body;
 };
 
 /// Which watchers share what an owner sends: a number of the owner and of what they ask for (FNV-1a, 64 bits).

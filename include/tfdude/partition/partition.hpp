@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -80,6 +81,8 @@ class Partition {
   [[nodiscard]] Result<void> remove(const RemoveRequest& request, Time now);
   [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request, Time now);
   [[nodiscard]] Result<void> update(const UpdateRequest& request);
+  [[nodiscard]] Result<void> revise(const ReviseRequest& request);
+  [[nodiscard]] std::vector<EdgeConsistency> consistency(const std::string& id, bool all) const;
   bool concede(const Concession& concession, Time now);
   [[nodiscard]] bool hang_again(const StoredFrame& frame);
   void make_root(const StoredFrame& frame, Time now);
@@ -97,6 +100,7 @@ class Partition {
   Directory& directory_;
   Pages pages_;
   ReplyCache replies_;
+  std::map<std::string, EdgeConsistency> consistency_;  // of edges that were observed
   bool saved_ = false;
   std::set<std::string> updated_;  // by requests, since the last take_unsaved()
 };

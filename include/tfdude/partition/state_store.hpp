@@ -15,6 +15,7 @@ struct FrameSpec {
   std::string parent;
   Transform X_PC;
   std::optional<EdgeTiming> timing{};  ///< absent: the partition's
+  Correlation correlation{};
 };
 
 /// A frame with what outlives its process.

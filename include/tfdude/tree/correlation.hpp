@@ -16,6 +16,9 @@ struct Correlation {
   std::vector<std::string> observed_with;
 
   [[nodiscard]] bool empty() const { return !unknown && shares.empty() && observed_with.empty(); }
+  friend bool operator==(const Correlation& a, const Correlation& b) {
+    return a.unknown == b.unknown && a.shares == b.shares && a.observed_with == b.observed_with;
+  }
 };
 
 /// What a Belief has beside its pose and own part.

@@ -228,8 +228,8 @@ class Forest {
   [[nodiscard]] Result<void> correlate(std::string_view id, const Correlation& correlation);
 
   /// Gives edges the values that an observation makes of them, as one commit: all, or on an error none. What it says of
-  /// correlation holds until the edge's next update; on a moving edge, whose next sample comes anyway, it is not kept, and
-  /// the covariance must be the whole of it. A sample of the very stamp is replaced.
+  /// correlation holds until the edge's next update; on a moving edge, whose next sample comes anyway, it is only added to
+  /// the covariance. A sample of the very stamp is replaced.
   /// @param stamp  of moving edges
   /// @param seen  the commit of the values that were observed
   /// @return as update(); kChangedMeanwhile (a static edge was written since `seen`, or a moving one has no stamp given).
@@ -295,7 +295,8 @@ class Forest {
   [[nodiscard]] bool holds(std::string_view id) const;
   [[nodiscard]] std::optional<FrameInfo> info(std::string_view id) const;
   [[nodiscard]] std::optional<FrameInfo> info(Handle frame) const;
-  /// The value of a held edge. @return kUnknownFrame, kNotOwner.
+  /// The value of a held edge, to be kept: what observations have left of shares is added to its covariance.
+  /// @return kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<Transform> value(std::string_view id) const;
 
   /// All frames of one commit, in no particular order. O(n).

@@ -59,6 +59,33 @@ void CdrWalk::path_ends() {
   id();
 }
 
+void CdrWalk::transforms() {
+  sequence([&] { transform(); });
+}
+
+void CdrWalk::ties() {
+  constexpr std::uint32_t kMaxFactor = 216;
+  octet();
+  sequence([&] { skip(8, 8); }, Covariance::kSize);
+  sequence(
+      [&] {
+        octet();
+        sequence([&] { skip(8, 8); }, kMaxFactor);
+        id();
+      },
+      kMaxTies);
+  sequence([&] { id(); }, kMaxTies);
+}
+
+void CdrWalk::revised_edge() {
+  skip(3 * 8, 8);
+  id();
+  octet();
+  octet();
+  transform();
+  ties();
+}
+
 void CdrWalk::state() {
   skip(8, 8);
   sequence([&] {
@@ -66,6 +93,12 @@ void CdrWalk::state() {
     transform();
     ulong();
   });
+  sequence(
+      [&] {
+        ulong();
+        ties();
+      },
+      kMaxTies);
 }
 
 std::string_view CdrWalk::edge() {
@@ -106,14 +139,21 @@ void request_body(CdrWalk& walk) {
     case 7:  // lookup at an instant
       walk.skip(4 * 8, 8);
       walk.sequence([&] { walk.path_ends(); });
+      walk.octet();
+      walk.octet();
       break;
     case 8:  // watch
       walk.skip(8, 8);
       walk.sequence([&] { walk.id(); });
       walk.sequence([&] { walk.path_ends(); });
       break;
-    case 9:  // past
+    case 9:   // past
+    case 11:  // consistency
       walk.octet();
+      break;
+    case 10:  // revise
+      walk.skip(2 * 8, 8);
+      walk.sequence([&] { walk.revised_edge(); }, kMaxTies);
       break;
     default:
       walk.skip(static_cast<std::size_t>(-1), 1);  // no such request
@@ -146,15 +186,15 @@ bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
       walk.string(kMaxMessage);
       break;
     case 2:
-      walk.sequence([&] { walk.transform(); });
+      walk.transforms();
       break;
     case 3:
       walk.octet();
       break;
     case 4:
       walk.skip(2 * 8, 8);
-      walk.sequence([&] { walk.transform(); });
-      walk.sequence([&] { walk.transform(); });
+      walk.transforms();
+      walk.transforms();
       break;
     case 5:
       walk.state();
@@ -162,6 +202,19 @@ bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
     case 6:
       walk.sequence([&] {
         walk.skip(11 * 8, 8);
+        walk.id();
+      });
+      break;
+    case 7:
+      walk.skip(3 * 8, 8);
+      walk.transforms();
+      walk.transforms();
+      walk.sequence([&] { walk.ties(); }, kMaxTies);
+      walk.sequence([&] { walk.ties(); }, kMaxTies);
+      break;
+    case 8:
+      walk.sequence([&] {
+        walk.skip(5 * 8, 8);
         walk.id();
       });
       break;

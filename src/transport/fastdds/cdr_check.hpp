@@ -54,15 +54,18 @@ class CdrWalk {
   std::string_view string(std::size_t max_bytes);
   /// Reads a sequence's length, then calls element() as often, as long as all is good.
   template <class Element>
-  void sequence(Element element) {
+  void sequence(Element element, std::uint32_t most = kMaxItems) {
     const std::uint32_t length = ulong();
-    if (length > kMaxItems) good_ = false;
+    if (length > most) good_ = false;
     for (std::uint32_t i = 0; i < length && good_; ++i) element();
   }
 
   std::string_view id() { return string(255); }
   void transform() { skip(28 * sizeof(double), 8); }
   void path_ends();
+  void transforms();
+  void ties();
+  void revised_edge();
   void state();
   std::string_view edge();
 

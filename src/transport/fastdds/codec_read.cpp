@@ -1,17 +1,17 @@
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
 #include "math/flat.hpp"
 #include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/codec_ties.hpp"
 #include "transport/fastdds/kinds.hpp"
 
 // From what travels.
 namespace tfdude::fastdds {
 namespace {
-
-std::string_view text(const wire::Id& id) { return {id.c_str(), id.size()}; }
 
 Result<Transform> from_wire(const wire::Transform& in, std::string_view frame) {
   const auto pose =
@@ -62,8 +62,6 @@ Result<UpdateRequest> update_from_wire(std::string_view first, const wire::Updat
   return update;
 }
 
-std::string string_of(const wire::Id& id) { return std::string(text(id)); }
-
 std::vector<PathEnds> read_segments(const std::vector<wire::PathEnds>& body) {
   std::vector<PathEnds> segments;
   segments.reserve(body.size());
@@ -82,7 +80,12 @@ Result<LookupRequest> read_lookup(const wire::LookupAt& body) {
   if (!until) return tl::unexpected(until.error());
   const auto extrapolate = duration_from_wire(body.extrapolate(), "an extrapolation");
   if (!extrapolate) return tl::unexpected(extrapolate.error());
-  return LookupRequest{read_segments(body.segments()), {*at, *extrapolate, *until}, *hint};
+  if (body.order() != 2 && body.order() != 4) {
+    return fail(Errc::kInvalidInput,
+                "the order of a lookup is 2 or 4, not " + std::to_string(body.order()));
+  }
+  const Query query{*at, *extrapolate, *until, static_cast<Order>(body.order())};
+  return LookupRequest{read_segments(body.segments()), query, *hint, body.edges() != 0};
 }
 
 Result<WatchRequest> read_watch(const wire::Watch& body) {
@@ -93,6 +96,30 @@ Result<WatchRequest> read_watch(const wire::Watch& body) {
   watch.segments = read_segments(body.segments());
   watch.period = *period;
   return watch;
+}
+
+Result<ReviseRequest> read_revise(const wire::Revise& body) {
+  const auto stamp = stamp_from_wire(body.stamp(), "the stamp of an observation");
+  if (!stamp) return tl::unexpected(stamp.error());
+  ReviseRequest revise{{}, *stamp, body.seen()};
+  for (const wire::RevisedEdge& in : body.edges()) {
+    const Surprise surprise{in.squares(), in.expected(), in.variance()};
+    ReviseRequest::Edge edge{string_of(in.id()), surprise, in.refused() != 0, {}};
+    if (!std::isfinite(surprise.squares + surprise.expected + surprise.variance)) {
+      return fail(Errc::kInvalidInput,
+                  "frame " + quote(edge.id) + ": its surprise is not a finite number");
+    }
+    if (in.revised() != 0) {
+      auto X_PC = computed_from(in.x_pc());
+      if (!X_PC) return fail_at("frame " + quote(edge.id), X_PC.error());
+      auto correlation = read_correlation(in.ties());
+      if (!correlation) return fail_at("frame " + quote(edge.id), correlation.error());
+      edge.revision = Revision{edge.id, *X_PC, *std::move(correlation)};
+    }
+    revise.edges.push_back(std::move(edge));
+  }
+  if (!revise.edges.empty()) return revise;
+  return fail(Errc::kInvalidInput, "an observation of no edge");
 }
 
 // The ids in a body need no check here: those that name nothing that is there are refused as unknown, and
@@ -145,6 +172,15 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
     case kPast:
       request.body = PastRequest{body.past() != 0};
       return {};
+    case kRevise: {
+      auto revise = read_revise(body.revise());
+      if (!revise) return tl::unexpected(std::move(revise.error()));
+      request.body = *std::move(revise);
+      return {};
+    }
+    case kConsistency:
+      request.body = ConsistencyRequest{body.consistency() != 0};
+      return {};
     default:
       return fail(Errc::kInvalidInput, "no request of kind " + std::to_string(body._d()));
   }
@@ -187,6 +223,33 @@ Result<SegmentValues> read_stamped(const wire::Transforms& body) {
   if (!at_hint) return tl::unexpected(std::move(at_hint.error()));
   found.at_hint = *std::move(at_hint);
   return found;
+}
+
+Result<SegmentValues> read_tied(const wire::TiedTransforms& body) {
+  wire::Transforms plain;
+  plain.stamp(body.stamp());
+  plain.period(body.period());
+  plain.values(body.values());
+  plain.at_hint(body.at_hint());
+  auto found = read_stamped(plain);
+  if (!found) return found;
+  found->commit = body.seen();
+  for (const auto& [in, out] : {std::pair{&body.ties(), &found->ties},
+                                std::pair{&body.ties_at_hint(), &found->ties_at_hint}}) {
+    for (const wire::Ties& one : *in) {
+      auto ties = read_ties(one);
+      if (!ties) return fail_at("a reply", ties.error());
+      out->push_back(*std::move(ties));
+    }
+  }
+  return found;
+}
+
+EdgeConsistency read_consistency(const wire::Consistency& body) {
+  return {printable(text(body.id())),
+          body.observations(),
+          body.refused(),
+          {body.squares(), body.expected(), body.variance()}};
 }
 
 PastInfo read_past(const wire::Past& body) {
@@ -238,6 +301,14 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
       reply.body = std::move(pasts);
       return {};
     }
+    case kTied:
+      return put<SegmentValues>(reply, read_tied(body.tied()));
+    case kConsistencies: {
+      std::vector<EdgeConsistency> all;
+      for (const wire::Consistency& one : body.consistency()) all.push_back(read_consistency(one));
+      reply.body = std::move(all);
+      return {};
+    }
     default:
       return fail(Errc::kInvalidInput, "no reply of kind " + std::to_string(body._d()));
   }
@@ -262,7 +333,16 @@ Result<State> from_wire(const wire::State& sample) {
     if (!stamp) return tl::unexpected(stamp.error());
     auto X = computed_from(entry.x());
     if (!X) return fail_at("a state", X.error());
-    state.entries.push_back({entry.index(), *stamp, *X});
+    state.entries.push_back({entry.index(), *stamp, *X, {}});
+  }
+  for (const wire::StateTies& one : sample.ties()) {
+    if (one.entry() >= state.entries.size()) {
+      return fail(Errc::kInvalidInput, "a state: ties of entry " + std::to_string(one.entry()) +
+                                           ", of " + std::to_string(state.entries.size()));
+    }
+    auto correlation = read_correlation(one.ties());
+    if (!correlation) return fail_at("a state", correlation.error());
+    state.entries[one.entry()].correlation = *std::move(correlation);
   }
   return state;
 }
@@ -281,78 +361,6 @@ Result<Update> from_wire(const wire::Update& sample,
     update.edges.push_back(*std::move(read));
   }
   return update;
-}
-
-namespace {
-
-Result<Note> read_note(const wire::Note& sample) {
-  constexpr auto kLast = static_cast<std::uint8_t>(Note::Kind::kUnhung);
-  if (sample.kind() < 1 || sample.kind() > kLast) {
-    return fail(Errc::kInvalidInput, "kind " + std::to_string(sample.kind()) + " of a note");
-  }
-  Note note{string_of(sample.id()), sample.since(), static_cast<Note::Kind>(sample.kind()),
-            string_of(sample.rival())};
-  if (auto ok = check_id(note.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
-  if (!note.rival.empty()) {
-    if (auto ok = check_partition_name(note.rival); !ok) return tl::unexpected(ok.error());
-  }
-  return note;
-}
-
-}  // namespace
-
-Result<Page> from_wire(const wire::Page& sample) {
-  Page page{string_of(sample.partition()),
-            sample.number(),
-            sample.incarnation(),
-            sample.epoch(),
-            {},
-            {},
-            {}};
-  if (auto ok = check_partition_name(page.partition); !ok) {
-    return tl::unexpected(std::move(ok.error()));
-  }
-  page.entries.reserve(sample.entries().size());
-  for (const wire::PageEntry& entry : sample.entries()) {
-    PageEntry read{string_of(entry.id()), string_of(entry.parent()), entry.since()};
-    if (auto ok = check_id(read.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
-    if (!read.parent.empty()) {
-      if (auto ok = check_id(read.parent, "parent"); !ok)
-        return tl::unexpected(std::move(ok.error()));
-    }
-    page.entries.push_back(std::move(read));
-  }
-  page.notes.reserve(sample.notes().size());
-  for (const wire::Note& note : sample.notes()) {
-    auto read = read_note(note);
-    if (!read) return tl::unexpected(std::move(read.error()));
-    page.notes.push_back(*std::move(read));
-  }
-  for (const wire::PageEpoch& one : sample.others()) {
-    page.others.push_back({one.number(), one.epoch()});
-  }
-  return page;
-}
-
-Result<Presence> from_wire(const wire::Presence& sample) {
-  Presence presence{string_of(sample.partition()),
-                    sample.incarnation(),
-                    std::string(sample.host().c_str()),
-                    sample.pid(),
-                    sample.pages(),
-                    sample.serving(),
-                    {}};
-  if (auto ok = check_partition_name(presence.partition); !ok) {
-    return tl::unexpected(std::move(ok.error()));
-  }
-  if (auto ok = check_id(presence.host, "host"); !ok) return tl::unexpected(std::move(ok.error()));
-  for (const wire::Absent& one : sample.absent()) {
-    presence.absent.push_back({string_of(one.partition()), one.since()});
-    if (auto ok = check_partition_name(presence.absent.back().partition); !ok) {
-      return tl::unexpected(std::move(ok.error()));
-    }
-  }
-  return presence;
 }
 
 }  // namespace tfdude::fastdds

@@ -29,6 +29,54 @@ std::vector<wire::PathEnds> wire_segments(const std::vector<PathEnds>& segments)
   return body;
 }
 
+std::vector<wire::Share> wire_shares(const std::vector<Share>& shares) {
+  std::vector<wire::Share> body(shares.size());
+  for (std::size_t i = 0; i < body.size(); ++i) {
+    const Factor& factor = shares[i].factor;
+    body[i].subtracts(shares[i].subtracts ? 1 : 0);
+    body[i].factor().assign(factor.data(), factor.data() + factor.size());
+    body[i].source(shares[i].source);
+  }
+  return body;
+}
+
+wire::Ties wire_ties(const Ties& ties) {
+  wire::Ties body;
+  if (ties.unknown) {
+    const Covariance::Upper& upper = ties.unknown->upper();
+    body.unknown_part().assign(upper.begin(), upper.end());
+  }
+  body.shares(wire_shares(ties.shares));
+  for (const std::string& id : ties.observed_with) body.observed_with().emplace_back(id);
+  return body;
+}
+
+wire::Ties wire_ties(const Correlation& correlation) {
+  wire::Ties body = wire_ties(Ties{std::nullopt, correlation.shares, correlation.observed_with});
+  body.unknown(correlation.unknown ? 1 : 0);
+  return body;
+}
+
+std::vector<wire::Ties> wire_ties(const std::vector<Ties>& all) {
+  std::vector<wire::Ties> body;
+  body.reserve(all.size());
+  for (const Ties& ties : all) body.push_back(wire_ties(ties));
+  return body;
+}
+
+wire::RevisedEdge wire_revised(const ReviseRequest::Edge& edge) {
+  wire::RevisedEdge body;
+  body.squares(edge.surprise.squares);
+  body.expected(edge.surprise.expected);
+  body.variance(edge.surprise.variance);
+  body.id(edge.id);
+  body.refused(edge.refused ? 1 : 0);
+  body.revised(edge.revision ? 1 : 0);
+  body.x_pc(to_flat(edge.revision ? edge.revision->X_PC : Transform()));
+  if (edge.revision) body.ties(wire_ties(edge.revision->correlation));
+  return body;
+}
+
 struct BodyWriter {
   wire::RequestBody& out;
 
@@ -68,7 +116,8 @@ struct BodyWriter {
     auto segments = wire_segments(lookup.segments);
     const Query& query = lookup.query;
     const bool plain = !query.at && !lookup.hint && !query.age_noise_until &&
-                       query.extrapolate == std::chrono::nanoseconds(0);
+                       query.extrapolate == std::chrono::nanoseconds(0) &&
+                       query.order == Order::kSecond && !lookup.edges;
     if (plain) {
       out.lookup(std::move(segments));
       return;
@@ -79,6 +128,8 @@ struct BodyWriter {
     body.extrapolate(query.extrapolate.count());
     body.age_noise_until(wire_stamp(query.age_noise_until));
     body.segments(std::move(segments));
+    body.order(static_cast<std::uint8_t>(query.order));
+    body.edges(lookup.edges ? 1 : 0);
     out.lookup_at(std::move(body));
   }
   void operator()(const WatchRequest& watch) {
@@ -89,6 +140,14 @@ struct BodyWriter {
     out.watch(std::move(body));
   }
   void operator()(const PastRequest& past) { out.past(past.all ? 1 : 0); }
+  void operator()(const ReviseRequest& revise) {
+    wire::Revise body;
+    body.stamp(wire_stamp(revise.stamp));
+    body.seen(revise.seen);
+    for (const ReviseRequest::Edge& edge : revise.edges) body.edges().push_back(wire_revised(edge));
+    out.revise(std::move(body));
+  }
+  void operator()(const ConsistencyRequest& asked) { out.consistency(asked.all ? 1 : 0); }
 };
 
 }  // namespace
@@ -143,6 +202,18 @@ struct ReplyWriter {
     out.error(std::move(body));
   }
   void operator()(const SegmentValues& found) {
+    if (!found.ties.empty() || !found.ties_at_hint.empty()) {
+      wire::TiedTransforms body;
+      body.stamp(wire_stamp(found.stamp));
+      body.period(found.period.count());
+      body.seen(found.commit);
+      body.values(wire_values(found.values));
+      body.at_hint(wire_values(found.at_hint));
+      body.ties(wire_ties(found.ties));
+      body.ties_at_hint(wire_ties(found.ties_at_hint));
+      out.tied(std::move(body));
+      return;
+    }
     if (!found.stamp && found.at_hint.empty()) {
       out.transforms(wire_values(found.values));
       return;
@@ -160,6 +231,18 @@ struct ReplyWriter {
     for (std::size_t i = 0; i < pasts.size() && i < kMaxItems; ++i)
       body.push_back(wire_past(pasts[i]));
     out.pasts(std::move(body));
+  }
+  void operator()(const std::vector<EdgeConsistency>& all) {
+    std::vector<wire::Consistency> body(all.size());
+    for (std::size_t i = 0; i < body.size(); ++i) {
+      body[i].observations(all[i].observations);
+      body[i].refused(all[i].refused);
+      body[i].squares(all[i].sum.squares);
+      body[i].expected(all[i].sum.expected);
+      body[i].variance(all[i].sum.variance);
+      body[i].id(all[i].id);
+    }
+    out.consistency(std::move(body));
   }
 };
 
@@ -189,6 +272,11 @@ wire::State to_wire(const State& state) {
     sample.entries()[i].index(state.entries[i].index);
     sample.entries()[i].stamp(wire_stamp(state.entries[i].stamp));
     sample.entries()[i].x(to_flat(state.entries[i].X));
+    const Correlation& correlation = state.entries[i].correlation;
+    if (correlation.empty()) continue;
+    sample.ties().emplace_back();
+    sample.ties().back().entry(static_cast<std::uint32_t>(i));
+    sample.ties().back().ties(wire_ties(correlation));
   }
   return sample;
 }

@@ -14,7 +14,9 @@ enum RequestKind : std::uint8_t {
   kLookup = 6,
   kLookupAt = 7,
   kWatch = 8,
-  kPast = 9
+  kPast = 9,
+  kRevise = 10,
+  kConsistency = 11
 };
 enum ReplyKind : std::uint8_t {
   kError = 1,
@@ -22,7 +24,9 @@ enum ReplyKind : std::uint8_t {
   kDoneReply = 3,
   kStamped = 4,
   kState = 5,
-  kPasts = 6
+  kPasts = 6,
+  kTied = 7,
+  kConsistencies = 8
 };
 
 }  // namespace tfdude::fastdds

@@ -35,6 +35,7 @@ constexpr Named kCodes[] = {
     {Errc::kNotYet, 17, "not_yet"},
     {Errc::kTooOld, 18, "too_old"},
     {Errc::kStampTaken, 19, "stamp_taken"},
+    {Errc::kChangedMeanwhile, 20, "changed_meanwhile"},
 };
 
 TEST_CASE("codes keep their numbers and names") {

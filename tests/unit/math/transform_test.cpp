@@ -68,7 +68,8 @@ TEST_CASE("inverse propagates by the Jacobian of the inverse") {
     CHECK((J + adjoint(X_AB)).norm() < 1e-10);
     const Covariance sigma_AB = random.covariance();
     const Covariance sigma_BA = Covariance::trusted(propagated(J, sigma_AB));
-    CHECK(transform_diff(inverse({X_AB, sigma_AB}), {X_AB.inverse(), sigma_BA}, 1e-15, 1e-9) == "");
+    CHECK(transform_diff(inverse(Transform{X_AB, sigma_AB}), {X_AB.inverse(), sigma_BA}, 1e-15,
+                         1e-9) == "");
   }
 }
 

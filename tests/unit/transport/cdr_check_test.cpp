@@ -230,7 +230,7 @@ Cdr segments_at(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("hand").octet(7).ulonglong(1).ulonglong(2).ulonglong(3).ulonglong(4).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.string("a").string("b");
-  return cdr.ulong(0).ulong(0);
+  return cdr.octet(2).octet(0).ulong(0).ulong(0);
 }
 Cdr watched(std::size_t count, std::uint64_t length) {
   Cdr cdr;
@@ -260,13 +260,13 @@ Cdr state_entries(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.ulonglong(0).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(1).transform().ulong(3);
-  return cdr;
+  return cdr.ulong(0);
 }
 Cdr replied_entries(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.ulonglong(0).ulong(0).octet(5).ulonglong(0).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(1).transform().ulong(3);
-  return cdr;
+  return cdr.ulong(0);
 }
 Cdr pasts(std::size_t count, std::uint64_t length) {
   Cdr cdr;
@@ -348,11 +348,11 @@ TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
 
 TEST_CASE("bodies of kinds that there are not are refused") {
   for (unsigned kind = 0; kind < 256; ++kind) {
-    if (kind >= 1 && kind <= 9) continue;
+    if (kind >= 1 && kind <= 11) continue;
     CHECK_FALSE(request(Cdr().string("hand").octet(kind).string("arm").ulong(0).ulong(0)));
   }
   for (unsigned kind = 0; kind < 256; ++kind) {
-    if (kind >= 1 && kind <= 6) continue;
+    if (kind >= 1 && kind <= 8) continue;
     CHECK_FALSE(reply(Cdr().ulonglong(0).ulong(0).octet(kind).octet(0)));
   }
 }

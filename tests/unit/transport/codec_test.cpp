@@ -51,6 +51,40 @@ void check_same(const std::vector<PathEnds>& actual, const std::vector<PathEnds>
   }
 }
 
+void check_same(const Surprise& actual, const Surprise& expected) {
+  CHECK(actual.squares == expected.squares);
+  CHECK(actual.expected == expected.expected);
+  CHECK(actual.variance == expected.variance);
+}
+
+void check_same(const ReviseRequest& actual, const ReviseRequest& expected) {
+  CHECK(actual.stamp == expected.stamp);
+  CHECK(actual.seen == expected.seen);
+  REQUIRE(actual.edges.size() == expected.edges.size());
+  for (std::size_t i = 0; i < actual.edges.size(); ++i) {
+    const ReviseRequest::Edge& came = actual.edges[i];
+    const ReviseRequest::Edge& sent = expected.edges[i];
+    CHECK(came.id == sent.id);
+    CHECK(came.refused == sent.refused);
+    check_same(came.surprise, sent.surprise);
+    REQUIRE(came.revision.has_value() == sent.revision.has_value());
+    if (!came.revision) continue;
+    CHECK(came.revision->id == sent.revision->id);
+    check_same(came.revision->X_PC, sent.revision->X_PC);
+    CHECK(came.revision->correlation == sent.revision->correlation);
+  }
+}
+
+void check_same(const std::vector<Ties>& actual, const std::vector<Ties>& expected) {
+  REQUIRE(actual.size() == expected.size());
+  for (std::size_t i = 0; i < actual.size(); ++i) {
+    CHECK(actual[i].shares == expected[i].shares);
+    CHECK(actual[i].observed_with == expected[i].observed_with);
+    REQUIRE(actual[i].unknown.has_value() == expected[i].unknown.has_value());
+    if (actual[i].unknown) CHECK(actual[i].unknown->upper() == expected[i].unknown->upper());
+  }
+}
+
 void check_same(const Request& actual, const Request& expected) {
   CHECK(actual.sequence == expected.sequence);
   CHECK(actual.id == expected.id);
@@ -81,8 +115,14 @@ void check_same(const Request& actual, const Request& expected) {
     CHECK(arrived.query.at == lookup.query.at);
     CHECK(arrived.query.extrapolate == lookup.query.extrapolate);
     CHECK(arrived.query.age_noise_until == lookup.query.age_noise_until);
+    CHECK(arrived.query.order == lookup.query.order);
     CHECK(arrived.hint == lookup.hint);
+    CHECK(arrived.edges == lookup.edges);
     check_same(arrived.segments, lookup.segments);
+  } else if (const auto* revise = std::get_if<ReviseRequest>(&expected.body)) {
+    check_same(std::get<ReviseRequest>(actual.body), *revise);
+  } else if (const auto* asked = std::get_if<ConsistencyRequest>(&expected.body)) {
+    CHECK(std::get<ConsistencyRequest>(actual.body).all == asked->all);
   }
 }
 
@@ -98,6 +138,7 @@ void check_same(const State& actual, const State& expected) {
     CHECK(actual.entries[i].index == expected.entries[i].index);
     CHECK(actual.entries[i].stamp == expected.entries[i].stamp);
     check_same(actual.entries[i].X, expected.entries[i].X);
+    CHECK(actual.entries[i].correlation == expected.entries[i].correlation);
   }
 }
 
@@ -152,8 +193,20 @@ TEST_CASE("replies arrive as they were sent") {
       CHECK(came.period == values->period);
       check_same(came.values, values->values);
       check_same(came.at_hint, values->at_hint);
+      check_same(came.ties, values->ties);
+      check_same(came.ties_at_hint, values->ties_at_hint);
+      CHECK(came.commit == values->commit);
     } else if (const auto* state = std::get_if<State>(&one.body)) {
       check_same(std::get<State>(arrived->body), *state);
+    } else if (const auto* all = std::get_if<std::vector<EdgeConsistency>>(&one.body)) {
+      const auto& came = std::get<std::vector<EdgeConsistency>>(arrived->body);
+      REQUIRE(came.size() == all->size());
+      for (std::size_t i = 0; i < came.size(); ++i) {
+        CHECK(came[i].id == (*all)[i].id);
+        CHECK(came[i].observations == (*all)[i].observations);
+        CHECK(came[i].refused == (*all)[i].refused);
+        check_same(came[i].sum, (*all)[i].sum);
+      }
     } else if (const auto* pasts = std::get_if<std::vector<PastInfo>>(&one.body)) {
       const auto& came = std::get<std::vector<PastInfo>>(arrived->body);
       REQUIRE(came.size() == pasts->size());

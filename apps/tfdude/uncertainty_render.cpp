@@ -1,0 +1,99 @@
+#include "uncertainty_render.hpp"
+
+#include <cmath>
+
+#include "format.hpp"
+#include "time_render.hpp"
+
+namespace tfdude::cli {
+namespace {
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+// How many times larger its variance should be.
+double factor_of(const EdgeConsistency& edge) {
+  return edge.sum.expected > 0 ? edge.sum.squares / edge.sum.expected : 0.0;
+}
+
+// By how many standard deviations the squares are not what they should be.
+double deviation_of(const EdgeConsistency& edge) {
+  if (!(edge.sum.variance > 0)) return 0.0;
+  return (edge.sum.squares - edge.sum.expected) / std::sqrt(edge.sum.variance);
+}
+
+// Where chance alone comes one time in a hundred.
+const char* verdict_of(const EdgeConsistency& edge) {
+  constexpr double kBeyondChance = 2.576;
+  const double deviation = deviation_of(edge);
+  if (deviation > kBeyondChance) return "too sure";
+  return deviation < -kBeyondChance ? "too careful" : "agrees";
+}
+
+}  // namespace
+
+std::string describe(const Basis& basis) {
+  std::string text;
+  if (basis.order == Order::kFourth) text += "fourth order";
+  if (basis.bound) text += std::string(text.empty() ? "" : "; ") + "bound for unknown correlation";
+  if (!basis.sources.empty()) {
+    text += (text.empty() ? "" : "; ") + std::string("shared: ") + joined(basis.sources);
+  }
+  return text.empty() ? "" : "basis        " + text + "\n";
+}
+
+nlohmann::json basis_json(const Basis& basis) {
+  return {
+      {"order", static_cast<int>(basis.order)}, {"bound", basis.bound}, {"sources", basis.sources}};
+}
+
+std::string describe(const Observed& observed) {
+  std::string text = observed.accepted ? "accepted" : "refused by the gate";
+  text += format("     squared distance %.3f in %d dimensions", observed.distance_squared,
+                 observed.dimensions);
+  if (std::isfinite(observed.limit)) text += format(", limit %.3f", observed.limit);
+  text += "\n";
+  if (!observed.corrected.empty()) text += "corrected    " + joined(observed.corrected) + "\n";
+  if (observed.accepted && observed.corrected.empty()) text += "corrected    nothing\n";
+  return text;
+}
+
+nlohmann::json observed_json(const Observed& observed) {
+  const auto finite = [](double value) {
+    return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json();
+  };
+  nlohmann::json json{{"accepted", observed.accepted},
+                      {"distance_squared", finite(observed.distance_squared)},
+                      {"dimensions", observed.dimensions},
+                      {"limit", finite(observed.limit)},
+                      {"corrected", observed.corrected}};
+  add_stamp(json, observed.stamp);
+  return json;
+}
+
+std::string consistency_table(const std::vector<EdgeConsistency>& edges) {
+  if (edges.empty()) return "";
+  std::string text = format("  %-24s %12s %8s %16s %12s  %s\n", "observed edge", "observations",
+                            "refused", "variance factor", "deviations", "its covariance");
+  for (const EdgeConsistency& edge : edges) {
+    text += format("  %-24s %12llu %8llu %16.2f %12.1f  %s\n", edge.id.c_str(),
+                   static_cast<unsigned long long>(edge.observations),
+                   static_cast<unsigned long long>(edge.refused), factor_of(edge),
+                   deviation_of(edge), verdict_of(edge));
+  }
+  return text;
+}
+
+nlohmann::json consistency_json(const EdgeConsistency& edge) {
+  return {{"id", edge.id},
+          {"observations", edge.observations},
+          {"refused", edge.refused},
+          {"variance_factor", factor_of(edge)},
+          {"deviations", deviation_of(edge)},
+          {"verdict", verdict_of(edge)}};
+}
+
+}  // namespace tfdude::cli

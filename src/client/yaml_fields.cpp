@@ -1,0 +1,87 @@
+#include "client/yaml_fields.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <system_error>
+
+#include "tfdude/base/id.hpp"
+
+#include "client/yaml_quirks.hpp"
+
+namespace tfdude {
+
+tl::unexpected<Error> YamlFields::error(Errc code, const YAML::Mark& mark,
+                                        const std::string& message) const {
+  const std::string line = mark.is_null() ? "" : ":" + std::to_string(mark.line + 1);
+  return fail(code, name_ + line + ": " + message);
+}
+
+Result<YamlFields::Fields> YamlFields::fields(const YAML::Node& map,
+                                              const std::vector<std::string_view>& allowed,
+                                              const std::string& what) const {
+  std::string known;
+  for (const auto key : allowed) known.append(known.empty() ? "" : ", ").append(key);
+  if (!map.IsMap()) {
+    return error(Errc::kConfig, map.Mark(),
+                 what + " is not a mapping" + (known.empty() ? "" : " with the keys " + known));
+  }
+  Fields fields;
+  const auto about = [&](std::string_view rest) { return std::string(what).append(rest); };
+  for (const auto& entry : map) {
+    const YAML::Node& key_node = entry.first;
+    if (!key_node.IsScalar()) {
+      return error(Errc::kConfig, key_node.Mark(), about(": a key is not plain text"));
+    }
+    const std::string& key = key_node.Scalar();
+    if (!allowed.empty() && std::find(allowed.begin(), allowed.end(), key) == allowed.end()) {
+      return error(
+          Errc::kConfig, key_node.Mark(),
+          about(": unknown key ").append(tfdude::quote(key)).append("; known are ") + known);
+    }
+    const YAML::Mark mark = entry.second.IsNull() ? key_node.Mark() : entry.second.Mark();
+    if (!fields.emplace(key, Field{entry.second, mark}).second) {
+      return error(Errc::kConfig, key_node.Mark(),
+                   about(": ").append(key).append(" is given twice"));
+    }
+  }
+  return fields;
+}
+
+Result<std::string> YamlFields::text(const Field& field, const std::string& what) const {
+  if (field.value.IsNull()) return error(Errc::kConfig, field.mark, what + " has no value");
+  if (!field.value.IsScalar()) return error(Errc::kConfig, field.mark, what + " is not text");
+  return field.value.Scalar();
+}
+
+Result<double> YamlFields::number(const YAML::Node& node, const std::string& what) const {
+  if (!node.IsScalar() || is_quoted(node)) {
+    return error(Errc::kConfig, node.Mark(), what + " is not a number");
+  }
+  const std::string written = plain_number(node.Scalar());
+  double value = 0;
+  const auto [end, code] = std::from_chars(written.data(), written.data() + written.size(), value);
+  if (code == std::errc::invalid_argument || end != written.data() + written.size()) {
+    return error(Errc::kConfig, node.Mark(),
+                 what + " is " + tfdude::quote(node.Scalar()) + ", which is not a number");
+  }
+  if (code == std::errc::result_out_of_range) {
+    return error(Errc::kInvalidInput, node.Mark(),
+                 what + " is " + node.Scalar() + ", which no double can hold");
+  }
+  if (!std::isfinite(value)) {
+    return error(Errc::kInvalidInput, node.Mark(), what + " is not a finite number");
+  }
+  return value;
+}
+
+Result<void> YamlFields::number(const Fields& fields, std::string_view key,
+                                const std::string& place, std::optional<double>& out) const {
+  const auto found = fields.find(key);
+  if (found == fields.end()) return {};
+  const auto value = number(found->second.value, place + ": " + found->first);
+  if (!value) return tl::unexpected(value.error());
+  out = *value;
+  return {};
+}
+
+}  // namespace tfdude

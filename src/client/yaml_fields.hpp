@@ -1,0 +1,88 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <yaml-cpp/yaml.h>
+
+#include "tfdude/base/result.hpp"
+
+namespace tfdude {
+
+/// Reads the nodes of one YAML file, with errors that name the file, the line and the key.
+class YamlFields {
+ public:
+  /// A key's value; where there is none, it is the key that has a place in the file.
+  struct Field {
+    YAML::Node value;
+    YAML::Mark mark;
+  };
+
+  /// What a mapping holds, by key.
+  using Fields = std::map<std::string, Field, std::less<>>;
+
+  /// @param name  of the file, for messages
+  explicit YamlFields(std::string name) : name_(std::move(name)) {}
+
+  [[nodiscard]] tl::unexpected<Error> error(Errc code, const YAML::Mark& mark,
+                                            const std::string& message) const;
+
+ protected:
+  /// A mapping of these keys; of any where none are given.
+  template <std::size_t N>
+  [[nodiscard]] Result<Fields> fields(const YAML::Node& map,
+                                      const std::array<std::string_view, N>& allowed,
+                                      const std::string& what) const {
+    return fields(map, std::vector<std::string_view>(allowed.begin(), allowed.end()), what);
+  }
+  [[nodiscard]] Result<Fields> fields(const YAML::Node& map, const std::string& what) const {
+    return fields(map, std::vector<std::string_view>(), what);
+  }
+
+  [[nodiscard]] Result<std::string> text(const Field& field, const std::string& what) const;
+  [[nodiscard]] Result<double> number(const YAML::Node& node, const std::string& what) const;
+
+  /// So many numbers under a key, if it is there.
+  template <std::size_t N>
+  [[nodiscard]] Result<void> numbers(const Fields& fields, std::string_view key,
+                                     const std::string& place,
+                                     std::optional<std::array<double, N>>& out) const;
+  [[nodiscard]] Result<void> number(const Fields& fields, std::string_view key,
+                                    const std::string& place, std::optional<double>& out) const;
+
+ private:
+  [[nodiscard]] Result<Fields> fields(const YAML::Node& map,
+                                      const std::vector<std::string_view>& allowed,
+                                      const std::string& what) const;
+
+  std::string name_;
+};
+
+template <std::size_t N>
+Result<void> YamlFields::numbers(const Fields& fields, std::string_view key,
+                                 const std::string& place,
+                                 std::optional<std::array<double, N>>& out) const {
+  const auto found = fields.find(key);
+  if (found == fields.end()) return {};
+  const YAML::Node& list = found->second.value;
+  const std::string what = place + ": " + found->first;
+  if (!list.IsSequence() || list.size() != N) {
+    const std::string has =
+        list.IsSequence() ? " has " + std::to_string(list.size()) + ", not " : " is not a list of ";
+    return error(Errc::kConfig, found->second.mark, what + has + std::to_string(N) + " numbers");
+  }
+  out.emplace();
+  for (std::size_t i = 0; i < N; ++i) {
+    const auto value = number(list[i], what + "[" + std::to_string(i) + "]");
+    if (!value) return tl::unexpected(value.error());
+    (*out)[i] = *value;
+  }
+  return {};
+}
+
+}  // namespace tfdude

@@ -1,0 +1,161 @@
+#include "tfdude/partition/observing.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+namespace {
+
+using Edge = ObservePlan::Edge;
+using Way = ObservedEdge::Way;
+
+bool has(const std::vector<Edge>& edges, const std::string& id) {
+  return std::any_of(edges.begin(), edges.end(),
+                     [&](const Edge& edge) { return edge.info.id == id; });
+}
+
+std::vector<Edge> along(std::vector<FrameInfo> path, const std::string& a) {
+  std::vector<Edge> edges;
+  std::string here = a;
+  for (FrameInfo& edge : path) {
+    const bool down = edge.parent == here;
+    here = down ? edge.id : edge.parent;
+    edges.push_back({std::move(edge), down ? Way::kDown : Way::kUp});
+  }
+  return edges;
+}
+
+// The answer that an edge is in, and its place there, where edges are looked at in order.
+class Places {
+ public:
+  explicit Places(const ObservePlan& plan) : plan_(plan), taken_(plan.parts.size(), 0) {}
+
+  struct Place {
+    std::size_t part;
+    std::size_t index;
+  };
+  Place next(const Edge& edge) {
+    const auto part = std::find_if(plan_.parts.begin(), plan_.parts.end(),
+                                   [&](const Part& one) { return one.owner == edge.info.owner; });
+    const auto i = static_cast<std::size_t>(part - plan_.parts.begin());
+    return {i, taken_[i]++};
+  }
+
+ private:
+  const ObservePlan& plan_;
+  std::vector<std::size_t> taken_;
+};
+
+// What an owner keeps of an edge that was observed.
+Correlation correlation_of(const Belief& X, const std::vector<std::string>& together) {
+  Correlation correlation;
+  correlation.unknown = X.unknown.has_value();
+  correlation.shares = X.shares;
+  const bool observed = std::any_of(X.shares.begin(), X.shares.end(), is_observed);
+  if (observed) correlation.observed_with = together;
+  return correlation;
+}
+
+}  // namespace
+
+Result<ObservePlan> route_observe(const Forest& forest, const Directory& directory,
+                                  const std::string& a, const std::string& b,
+                                  const std::vector<std::string>& beside,
+                                  std::optional<Time> stamp) {
+  auto path = forest.edges(a, b);
+  if (!path) return tl::unexpected(std::move(path.error()));
+  if (path->empty()) {
+    return fail(Errc::kInvalidInput, "there is no edge between " + quote(a) + " and itself");
+  }
+  ObservePlan plan{along(*std::move(path), a), {}};
+  for (const std::string& id : beside) {
+    auto info = forest.info(id);
+    if (info && !has(plan.edges, id)) plan.edges.push_back({*std::move(info), Way::kBeside});
+  }
+  for (const auto& [info, way] : plan.edges) {
+    const Owner owner = info.owner;
+    auto part = std::find_if(plan.parts.begin(), plan.parts.end(),
+                             [owner](const Part& one) { return one.owner == owner; });
+    if (part == plan.parts.end()) {
+      LookupRequest request;
+      request.query.at = stamp;
+      request.edges = true;
+      auto fresh = route_to(directory, owner, Request{0, info.id, std::move(request)});
+      if (!fresh) return tl::unexpected(std::move(fresh.error()));
+      plan.parts.push_back(*std::move(fresh));
+      part = std::prev(plan.parts.end());
+    }
+    std::get<LookupRequest>(part->request.body).segments.push_back({info.parent, info.id});
+  }
+  if (plan.edges.size() <= kMaxTies) return plan;
+  return fail(Errc::kInvalidInput, "the path from " + quote(a) + " to " + quote(b) +
+                                       ", with what was observed with it, has " +
+                                       std::to_string(plan.edges.size()) + " edges, of at most " +
+                                       std::to_string(kMaxTies) + " that are observed at once");
+}
+
+Result<ObservedPath> observed_path(const ObservePlan& plan,
+                                   const std::vector<SegmentValues>& answers) {
+  ObservedPath path;
+  for (std::size_t i = 0; i < plan.parts.size(); ++i) {
+    const auto& asked = std::get<LookupRequest>(plan.parts[i].request.body).segments;
+    const bool all = i < answers.size() && answers[i].values.size() == asked.size() &&
+                     answers[i].ties.size() == asked.size();
+    if (!all) {
+      return fail(Errc::kNotOwner, "partition " + quote(plan.parts[i].partition) +
+                                       " did not answer of all edges that it was asked for");
+    }
+    path.seen.push_back(answers[i].commit);
+    if (answers[i].stamp) path.stamp = answers[i].stamp;
+  }
+  Places places(plan);
+  for (const Edge& edge : plan.edges) {
+    const auto [part, index] = places.next(edge);
+    const Ties& ties = answers[part].ties[index];
+    path.edges.push_back({belief_of(answers[part].values[index], ties), edge.way});
+    for (const std::string& id : ties.observed_with) {
+      const bool known =
+          has(plan.edges, id) || std::count(path.missing.begin(), path.missing.end(), id) != 0;
+      if (!known) path.missing.push_back(id);
+    }
+  }
+  return path;
+}
+
+std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
+                            const Observation& observation) {
+  std::vector<std::string> together;
+  for (std::size_t k = 0; k < plan.edges.size(); ++k) {
+    if (observation.edges[k].corrected) together.push_back(plan.edges[k].info.id);
+  }
+  std::vector<Part> parts = plan.parts;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    parts[i].request.body = ReviseRequest{{}, path.stamp, path.seen[i]};
+  }
+  Places places(plan);
+  for (std::size_t k = 0; k < plan.edges.size(); ++k) {
+    const ObservedResult& result = observation.edges[k];
+    const auto [part, index] = places.next(plan.edges[k]);
+    if (!result.corrected && !(result.surprise.expected > 0)) continue;
+    ReviseRequest::Edge edge{plan.edges[k].info.id, result.surprise, !observation.accepted, {}};
+    if (result.corrected) {
+      const Belief& X = result.X_PC;
+      edge.revision =
+          Revision{edge.id, {X.pose, X.unknown ? *X.unknown : X.own}, correlation_of(X, together)};
+    }
+    std::get<ReviseRequest>(parts[part].request.body).edges.push_back(std::move(edge));
+  }
+  const auto idle = [](const Part& part) {
+    return std::get<ReviseRequest>(part.request.body).edges.empty();
+  };
+  parts.erase(std::remove_if(parts.begin(), parts.end(), idle), parts.end());
+  // The filter of an owner looks at the request's id.
+  for (Part& part : parts) {
+    part.request.id = std::get<ReviseRequest>(part.request.body).edges.front().id;
+  }
+  return parts;
+}
+
+}  // namespace tfdude

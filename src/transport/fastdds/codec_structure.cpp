@@ -1,0 +1,82 @@
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/codec_ties.hpp"
+
+// The structure, from what travels.
+namespace tfdude::fastdds {
+namespace {
+
+Result<Note> read_note(const wire::Note& sample) {
+  constexpr auto kLast = static_cast<std::uint8_t>(Note::Kind::kUnhung);
+  if (sample.kind() < 1 || sample.kind() > kLast) {
+    return fail(Errc::kInvalidInput, "kind " + std::to_string(sample.kind()) + " of a note");
+  }
+  Note note{string_of(sample.id()), sample.since(), static_cast<Note::Kind>(sample.kind()),
+            string_of(sample.rival())};
+  if (auto ok = check_id(note.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
+  if (!note.rival.empty()) {
+    if (auto ok = check_partition_name(note.rival); !ok) return tl::unexpected(ok.error());
+  }
+  return note;
+}
+
+}  // namespace
+
+Result<Page> from_wire(const wire::Page& sample) {
+  Page page{string_of(sample.partition()),
+            sample.number(),
+            sample.incarnation(),
+            sample.epoch(),
+            {},
+            {},
+            {}};
+  if (auto ok = check_partition_name(page.partition); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  page.entries.reserve(sample.entries().size());
+  for (const wire::PageEntry& entry : sample.entries()) {
+    PageEntry read{string_of(entry.id()), string_of(entry.parent()), entry.since()};
+    if (auto ok = check_id(read.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
+    if (!read.parent.empty()) {
+      if (auto ok = check_id(read.parent, "parent"); !ok)
+        return tl::unexpected(std::move(ok.error()));
+    }
+    page.entries.push_back(std::move(read));
+  }
+  page.notes.reserve(sample.notes().size());
+  for (const wire::Note& note : sample.notes()) {
+    auto read = read_note(note);
+    if (!read) return tl::unexpected(std::move(read.error()));
+    page.notes.push_back(*std::move(read));
+  }
+  for (const wire::PageEpoch& one : sample.others()) {
+    page.others.push_back({one.number(), one.epoch()});
+  }
+  return page;
+}
+
+Result<Presence> from_wire(const wire::Presence& sample) {
+  Presence presence{string_of(sample.partition()),
+                    sample.incarnation(),
+                    std::string(sample.host().c_str()),
+                    sample.pid(),
+                    sample.pages(),
+                    sample.serving(),
+                    {}};
+  if (auto ok = check_partition_name(presence.partition); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  if (auto ok = check_id(presence.host, "host"); !ok) return tl::unexpected(std::move(ok.error()));
+  for (const wire::Absent& one : sample.absent()) {
+    presence.absent.push_back({string_of(one.partition()), one.since()});
+    if (auto ok = check_partition_name(presence.absent.back().partition); !ok) {
+      return tl::unexpected(std::move(ok.error()));
+    }
+  }
+  return presence;
+}
+
+}  // namespace tfdude::fastdds
