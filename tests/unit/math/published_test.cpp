@@ -65,6 +65,10 @@ Matrix6d brackets(const Matrix6d& sigma_1, const Matrix6d& sigma_2) {
   return B;
 }
 
+Matrix6d left_of_product(const testing::SharedPair& pair, Order order) {
+  return left_covariance(settle(compose(pair.first, pair.second, order))).matrix();
+}
+
 // Of the left perturbation of X1 X2, to fourth order.
 Matrix6d as_printed(const TwoPoses& poses) {
   const Matrix6d S_1 = poses.first.covariance.matrix();
@@ -105,15 +109,22 @@ TEST_CASE("Two poses of Barfoot and Furgale: both orders are as far off as in th
   CHECK(fourth_s < 0.04);
 }
 
-TEST_CASE("Fourth order is no better than second where the errors are beyond a radian") {
+TEST_CASE("Fourth order is no better than second beyond a radian, and at one if correlated") {
   Random random(702);
   INFO("seed " << random.seed());
-  const TwoPoses poses = testing::two_poses(3.0);
+  const auto poses = testing::two_poses(3.0);
   const Matrix6d sampled = testing::sampled_product(poses, 0, random, kSamples);
   const double second = (composed(poses, Order::kSecond) - sampled).norm();
   const double fourth = (composed(poses, Order::kFourth) - sampled).norm();
   CAPTURE(second, fourth);
   CHECK(fourth > second);
+
+  const testing::SharedPair pair = testing::shared_pair(testing::two_poses(1.0), 1.0);
+  const Matrix6d twice = testing::sampled_product(testing::two_poses(1.0), 1.0, random, kSamples);
+  const double second_twice = (left_of_product(pair, Order::kSecond) - twice).norm();
+  const double fourth_twice = (left_of_product(pair, Order::kFourth) - twice).norm();
+  CAPTURE(second_twice, fourth_twice);
+  CHECK(fourth_twice > second_twice);
 }
 
 // ---- The chain
@@ -207,10 +218,6 @@ TEST_CASE("The error of fused estimates grows with theirs, and beyond half a rad
 }
 
 // ---- Correlated poses, after the idea of Mangelson et al. 2020
-
-Matrix6d left_of_product(const testing::SharedPair& pair, Order order) {
-  return left_covariance(settle(compose(pair.first, pair.second, order))).matrix();
-}
 
 TEST_CASE("Correlated poses: a shared source agrees with what is drawn, independence does not") {
   Random random(706);
