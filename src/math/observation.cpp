@@ -18,7 +18,9 @@ namespace tfdude {
 namespace {
 
 constexpr int kMostIterations = 100;
-constexpr double kConverged = 1e-12;
+// Of an edge's deviations: where a measurement is far more precise than the edges, no more is to be had.
+constexpr double kConverged = 1e-6;
+constexpr double kSmallest = 1e-12;  // [m, rad]
 // Of a difference in what is known exactly on both sides, what can be rounding.
 constexpr double kAgrees = 1e-9;
 
@@ -170,8 +172,11 @@ class Update {
       double change = 0;
       for (std::size_t i = 0; i < edges.size(); ++i) {
         const Twist next = m.with_edge[i] * weighted;
-        const double scale = 1.0 + next.cwiseAbs().maxCoeff();
-        change = std::max(change, (next - xi_[edges[i]]).cwiseAbs().maxCoeff() / scale);
+        const Twist step = (next - xi_[edges[i]]).cwiseAbs();
+        const Twist deviations = prior_.marginal(i).diagonal().cwiseMax(0.0).cwiseSqrt();
+        for (int axis = 0; axis < 6; ++axis) {
+          if (step[axis] > kSmallest) change = std::max(change, step[axis] / deviations[axis]);
+        }
         xi_[edges[i]] = next;
       }
       linear_ = linearize(all_, xi_, Z_AB_);

@@ -123,7 +123,7 @@ TEST_CASE("time: histories and rates are shown, with what was refused") {
 TEST_CASE("time: a watched path shows what is written, and finds its way after a move") {
   const ThesisDaemons d;
   Process watch = d.domain.start_cli({"--json", "watch", "world", "hand_left", "--rate", "100"});
-  REQUIRE(watch.wait_for_line("{\"covariance", in_time()));
+  REQUIRE(watch.wait_for_line("{\"basis", in_time()));
   sample(d, "arm_1", "1", "100");
   REQUIRE(eventually([&] {
     (void)watch.runs();
@@ -133,7 +133,7 @@ TEST_CASE("time: a watched path shows what is written, and finds its way after a
         "moved hand_left\n");
   CHECK(eventually([&] {
     (void)watch.runs();
-    const auto line = watch.out().rfind("{\"cov");
+    const auto line = watch.out().rfind("{\"basis");
     return line != std::string::npos &&
            watch.out().find("\"partitions\":[\"robot\",\"arms\"],", line) != std::string::npos &&
            watch.out().find("\"stamp_ns\":null", line) != std::string::npos;

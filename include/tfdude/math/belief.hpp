@@ -64,14 +64,17 @@ struct Belief {
 /// (Isserlis, Stein): what that paper leaves out. The answer is the second moment about the product of the means, which
 /// differs from the mean by terms of second order if they are correlated, of fourth order if not. Unknown parts enter
 /// to second order only.
-/// Where that series gives no covariance, as it may for errors above half a radian, terms of sixth order are added.
+/// Where that series gives no covariance, as it may for errors above half a radian, terms of sixth order are added. Beyond
+/// a radian it is no nearer to the truth than second order; docs/uncertainty.md has figures.
+/// Of X_WA⁻¹ X_WB where B's error was composed from A's, what is quadratic in A's shares counts twice as own and does not
+/// cancel: there second order is right, and fourth is too large.
 [[nodiscard]] Belief compose(const Belief& X_AB, const Belief& X_BC, Order order);
 
 /// The transform with one covariance that stands for all of the belief: a bound, where parts are unknown.
 [[nodiscard]] Transform settle(const Belief& X_AB);
 
-/// No sum of two errors of these covariances has more than this, whatever their correlation: (1 + 1/ε) A + (1 + ε) B, with
-/// the ε that makes the sum of both traces, of translation and of rotation, each in units of A + B, the smallest.
+/// No sum of two errors of these covariances has more than this, whatever their correlation (the product of two poses has,
+/// by terms of fourth order): (1 + 1/ε) A + (1 + ε) B, with the ε that makes the sum of both traces, of translation and of rotation, each in units of A + B, the smallest.
 [[nodiscard]] Covariance bound(const Covariance& A, const Covariance& B);
 
 /// @return kInvalidInput: more than kMaxShares; naming the source: an empty name, one longer than an id, no column, more than

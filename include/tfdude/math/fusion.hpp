@@ -16,6 +16,7 @@ struct Fused {
 /// Estimates with independent errors: the X of the least Σ eₖᵀ Σₖ⁻¹ eₖ with eₖ = Log(Xₖ⁻¹ X), by Gauss-Newton on the
 /// manifold, and the covariance there. Barfoot & Furgale 2014, section IV (for the left perturbation), with the full
 /// Jacobian. What an estimate knows exactly (zero variance) the result has of it.
+/// The covariance is that of the linearised problem: an eighth too small for errors of half a radian.
 /// O(estimates · iterations).
 /// @param estimates  at least one
 /// @return kInvalidInput: there are none, two contradict each other in what both know exactly, or the estimates lie so far

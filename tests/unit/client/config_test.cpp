@@ -106,6 +106,45 @@ TEST_CASE("what a configuration may leave out") {
   CHECK(tfdude::parse_config("frames: [{id: größe ✓}]", "f")->frames[0].id == "größe ✓");
 }
 
+TEST_CASE("a frame says how its error hangs together with others'") {
+  const auto config = tfdude::parse_config(
+      "frames:\n"
+      "  - {id: a}\n"
+      "  - {id: b, correlation: unknown}\n"
+      "  - {id: c, correlation: independent, sources: {belt: [[1, 2, 3, 4, 5, 6], [0, 0, 0, 0, 0, "
+      "7]], z: [[0, 0, 1, 0, 0, 0]]}}\n",
+      "robot.yaml");
+  REQUIRE(config);
+  CHECK(config->frames[0].correlation.empty());
+  CHECK(config->frames[1].correlation.unknown);
+  const auto& said = config->frames[2].correlation;
+  CHECK_FALSE(said.unknown);
+  REQUIRE(said.shares.size() == 2);
+  CHECK(said.shares[0].source == "belt");
+  CHECK(said.shares[0].factor.cols() == 2);
+  CHECK(said.shares[0].factor(5, 0) == 6);
+  CHECK(said.shares[0].factor(5, 1) == 7);
+  const auto refused = [](const std::string& what, const std::string& why) {
+    const auto bad = tfdude::parse_config("frames:\n  - {id: a, " + what + "}\n", "robot.yaml");
+    REQUIRE_FALSE(bad.has_value());
+    INFO(bad.error().message);
+    CHECK(bad.error().message.rfind("robot.yaml:2: frame 'a': " + why, 0) == 0);
+  };
+  refused("correlation: no", "correlation is neither unknown nor independent");
+  refused("correlation: [1]", "correlation is not text");
+  refused("sources: [1]", "sources is not a mapping");
+  refused("sources: {s: 1}", "source 's' is not a list of columns of 6 numbers");
+  refused("sources: {s: []}", "source 's' is not a list of columns of 6 numbers");
+  refused("sources: {s: [1, 2, 3, 4, 5, 6]}", "source 's'[0] is not a list of 6 numbers");
+  refused("sources: {s: [[1, 2, 3, 4, 5]]}", "source 's'[0] is not a list of 6 numbers");
+  refused("sources: {s: [[1, 2, 3, 4, 5, x]]}", "source 's'[0][5] is 'x', which is not a number");
+  refused("sources: {s: [[1, 2, 3, 4, 5, 1e10]]}", "source 's': an element of its factor");
+  refused("sources: {'': [[1, 2, 3, 4, 5, 6]]}", "source");
+  refused("sources: {s: [[1, 2, 3, 4, 5, 6]], s: [[1, 2, 3, 4, 5, 6]]}",
+          "sources: s is given twice");
+  refused("sources: {'observed:1': [[1, 2, 3, 4, 5, 6]]}", "source 'observed:1': such names");
+}
+
 TEST_CASE("how much is kept of the past is said for the file and for each frame") {
   const auto config = tfdude::parse_config(
       "history: {span: 2.5, count: 100}\n"

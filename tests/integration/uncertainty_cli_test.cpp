@@ -1,0 +1,131 @@
+// Uncertainty on the command line, with real daemons.
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "support/catch.hpp"
+#include "support/process.hpp"
+#include "support/test_domain.hpp"
+
+namespace tfdude {
+namespace {
+
+using nlohmann::json;
+using testing::CliResult;
+using testing::ContainsSubstring;
+using testing::Process;
+using testing::TestDomain;
+using Arguments = std::vector<std::string>;
+
+// Two edges share a source, the third is of unknown correlation; each has an owner of its own.
+class Robot {
+ public:
+  Robot() {
+    for (const char* name : {"base", "arm", "tool"}) {
+      daemons_.push_back(
+          domain_.serve(std::string(TFDUDE_EXAMPLES "/uncertainty/") + name + ".yaml"));
+    }
+  }
+
+  json answered(Arguments arguments, int status = 0) const {
+    arguments.insert(arguments.begin(), "--json");
+    const CliResult result = domain_.cli(arguments);
+    INFO(result.out << result.err);
+    CHECK(result.status == status);
+    return json::parse(result.out);
+  }
+  CliResult run(const Arguments& arguments) const { return domain_.cli(arguments); }
+
+ private:
+  TestDomain domain_;
+  std::vector<Process> daemons_;
+};
+
+double stddev(const json& lookup, std::size_t axis) {
+  return std::sqrt(lookup.at("covariance").at(axis).at(axis).get<double>());
+}
+
+const Arguments kSure = {"--stddev", "0.001", "0.001", "0.001", "0.001", "0.001", "0.001"};
+
+Arguments with(Arguments arguments, const Arguments& more) {
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+}  // namespace
+
+TEST_CASE("uncertainty: configured sources and unknown correlation show in lookups over owners") {
+  const Robot robot;
+  const json to_base = robot.answered({"lookup", "world", "base"});
+  CHECK(to_base.at("basis").at("sources") == json({"calibration"}));
+  CHECK(stddev(to_base, 5) == testing::Approx(std::hypot(0.01, 0.02)));
+  const json to_arm = robot.answered({"lookup", "world", "arm"});
+  // The turns cancel, the lever between them does not.
+  CHECK(stddev(to_arm, 5) == testing::Approx(std::hypot(0.01, 0.01)));
+  CHECK_FALSE(to_arm.at("basis").at("bound").get<bool>());
+  const json to_tool = robot.answered({"lookup", "world", "tool"});
+  CHECK(to_tool.at("basis").at("bound").get<bool>());
+  CHECK(stddev(to_tool, 3) > std::hypot(0.01, 0.01, 0.01));
+  CHECK_THAT(robot.run({"lookup", "world", "tool"}).out,
+             ContainsSubstring("basis        bound for unknown correlation; shared: calibration"));
+  CHECK_THAT(robot.run({"lookup", "arm", "arm"}).out, !ContainsSubstring("basis"));
+  const json fourth = robot.answered({"lookup", "world", "arm", "--order", "4"});
+  CHECK(fourth.at("basis").at("order") == 4);
+  CHECK(robot.run({"lookup", "world", "arm", "--order", "3"}).status == 2);
+}
+
+TEST_CASE("uncertainty: measurements correct, are gated, and are counted") {
+  const Robot robot;
+  const double before = stddev(robot.answered({"lookup", "world", "arm"}), 0);
+  const json observed =
+      robot.answered(with({"observe", "world", "arm", "--xyz", "1.01", "1", "0"}, kSure));
+  CHECK(observed.at("accepted").get<bool>());
+  CHECK(observed.at("corrected") == json({"base", "arm"}));
+  CHECK(observed.at("stamp").is_null());
+  const json after = robot.answered({"lookup", "world", "arm"});
+  CHECK(after.at("translation").at(0).get<double>() == testing::Approx(1.01).margin(0.002));
+  CHECK(stddev(after, 0) < 0.1 * before);
+  const json refused =
+      robot.answered(with({"observe", "world", "arm", "--xyz", "9", "1", "0"}, kSure), 1);
+  CHECK_FALSE(refused.at("accepted").get<bool>());
+  CHECK(refused.at("distance_squared").get<double>() > refused.at("limit").get<double>());
+  CHECK(robot.answered({"lookup", "world", "arm"}).at("translation") == after.at("translation"));
+  const CliResult text =
+      robot.run(with({"observe", "world", "arm", "--xyz", "9", "1", "0"}, kSure));
+  CHECK(text.status == 1);
+  CHECK_THAT(text.out, ContainsSubstring("refused by the gate"));
+  const json fused = robot.answered(with({"fuse", "tool", "--xyz", "0", "0", "1"}, kSure));
+  CHECK(fused.at("corrected") == json({"tool"}));
+  const json monitor = robot.answered({"monitor", "--once"});
+  for (const json& partition : monitor.at("partitions")) {
+    const std::string name = partition.at("partition");
+    const json& edges = partition.at("observed");
+    INFO(partition.dump());
+    // Nothing can be said of what is unknown.
+    CHECK(edges.size() == (name == "tool" ? 0U : 1U));
+    if (name == "tool") continue;
+    CHECK(edges.at(0).at("observations") == 3);
+    CHECK(edges.at(0).at("refused") == 2);
+    CHECK(edges.at(0).at("verdict") == "too sure");
+  }
+  CHECK_THAT(robot.run({"monitor", "--once"}).out, ContainsSubstring("too sure"));
+}
+
+TEST_CASE("uncertainty: measurements that cannot be meant are refused") {
+  const Robot robot;
+  const CliResult exact = robot.run({"observe", "world", "arm", "--xyz", "1", "1", "0"});
+  CHECK(exact.status == 1);
+  CHECK_THAT(exact.err, ContainsSubstring("--stddev or --cov"));
+  CHECK(robot.answered(with({"observe", "world", "nobody"}, kSure), 1).at("error").at("code") ==
+        "unknown_end");
+  CHECK(robot.answered(with({"fuse", "world"}, kSure), 1).at("error").at("code") ==
+        "invalid_input");
+  CHECK(robot.run(with({"observe", "world", "arm", "--gate", "0"}, kSure)).status == 2);
+  CHECK(robot.run(with({"observe", "world", "arm", "--gate", "nan"}, kSure)).status == 2);
+  CHECK(robot.run(with({"observe", "world", "arm", "--stamp", "x"}, kSure)).status == 2);
+}
+
+}  // namespace tfdude
