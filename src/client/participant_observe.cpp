@@ -42,28 +42,35 @@ Result<ObservedPath> Participant::ask_observed(ObservePlan& plan) {
   return observed_path(plan, found.answers);
 }
 
-// Nothing was applied (false), or all (true).
+// Nothing was applied (false), or all (true). One owner is asked before the others, the same for all who observe this path:
+// of two who have seen the same, one is refused there, and may try again before anything was applied.
 Result<bool> Participant::revise(std::vector<Part> parts) {
-  const std::vector<Reply> replies = ask(parts, Clock::now() + options_.timeout);
-  const Error* first = nullptr;
-  std::size_t done = 0;
-  bool conflicts = true;
-  for (const Reply& reply : replies) {
-    if (std::holds_alternative<Done>(reply.body)) {
+  if (parts.empty()) return true;
+  const auto first = std::min_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
+    return a.partition < b.partition;
+  });
+  std::iter_swap(parts.begin(), first);
+  std::vector<Part> others(std::make_move_iterator(parts.begin() + 1),
+                           std::make_move_iterator(parts.end()));
+  parts.resize(1);
+  const auto deadline = Clock::now() + options_.timeout;
+  Reply reply = std::move(ask(parts, deadline).front());
+  if (is_conflict(reply)) return false;
+  if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
+  std::size_t done = 1;
+  std::optional<Error> refused;
+  for (Reply& other : ask(others, deadline)) {
+    auto* error = std::get_if<Error>(&other.body);
+    if (error == nullptr) {
       ++done;
-      continue;
+    } else if (!refused) {
+      refused = std::move(*error);
     }
-    conflicts = conflicts && is_conflict(reply);
-    if (first == nullptr) first = std::get_if<Error>(&reply.body);
   }
-  if (first == nullptr) return true;
-  if (done == 0 && conflicts) return false;
-  Error error = *first;
-  if (done > 0) {
-    error.message += "; " + std::to_string(done) + " of " + std::to_string(parts.size()) +
-                     " partitions have applied their part of the observation";
-  }
-  return tl::unexpected(std::move(error));
+  if (!refused) return true;
+  refused->message += "; " + std::to_string(done) + " of " + std::to_string(others.size() + 1) +
+                      " partitions have applied their part of the observation";
+  return tl::unexpected(*std::move(refused));
 }
 
 Result<Observed> Participant::observe(const std::string& a, const std::string& b,

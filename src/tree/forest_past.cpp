@@ -2,10 +2,9 @@
 
 #include "tfdude/base/id.hpp"
 
-#include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
 
-// Updates, and what they do to the past of their edges.
+// What an update does to the past of its edge.
 namespace tfdude {
 namespace {
 
@@ -175,65 +174,6 @@ void Forest::Impl::forget_past(HeldVersion& fresh) {
   fresh.ring = new Ring(before->timing());
   fresh.stamp = kAlways;
   give_back(before, fresh.slot);
-}
-
-Result<void> Forest::Impl::update_one(const HeldVersion& edge, const Transform& X_PC,
-                                      std::optional<Time> stamp) {
-  if (!is_finite(X_PC)) return check_value(edge.name->text, X_PC);
-  const std::uint32_t slot = edge.slot;
-  if (stamp || may_be_moving(edge)) {
-    const auto at = stamp_for(&slot, 1, stamp);
-    if (!at) return tl::unexpected(at.error());
-    if (auto ok = check_sample(edge, *at); !ok) return ok;
-    push_value(slot, X_PC, *at);
-  } else {
-    push_value(slot, X_PC, kAlways);
-  }
-  commit();
-  return {};
-}
-
-Result<void> Forest::update(std::string_view id, const Transform& X_PC, std::optional<Time> stamp) {
-  const std::lock_guard lock(impl_->mutex_);
-  const auto slot = impl_->held_slot(id);
-  if (!slot) return tl::unexpected(slot.error());
-  return impl_->update_one(impl_->newest_value(*slot), X_PC, stamp);
-}
-
-Result<void> Forest::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
-  const std::lock_guard lock(impl_->mutex_);
-  const Version* version = impl_->newest_held(frame);
-  if (version == nullptr) return tl::unexpected(impl_->held_slot(frame).error());
-  return impl_->update_one(static_cast<const HeldVersion&>(*version), X_PC, stamp);
-}
-
-template <class Update, class Frame>
-Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame frame,
-                                      std::optional<Time> stamp) {
-  const std::lock_guard lock(mutex_);
-  to_update_.clear();
-  for (const Update& edge : edges) {
-    const auto slot = held_slot(edge.*frame);
-    if (!slot) return tl::unexpected(slot.error());
-    if (!is_finite(edge.X_PC)) return check_value(newest(*slot).name->text, edge.X_PC);
-    to_update_.push_back(*slot);
-  }
-  const auto at = stamp_for(to_update_.data(), to_update_.size(), stamp);
-  if (!at) return tl::unexpected(at.error());
-  for (const std::uint32_t slot : to_update_) {
-    if (auto ok = check_sample(newest_value(slot), *at); !ok) return ok;
-  }
-  for (std::size_t i = 0; i < edges.size(); ++i) push_value(to_update_[i], edges[i].X_PC, *at);
-  commit();
-  return {};
-}
-
-Result<void> Forest::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
-  return impl_->update_all(edges, &EdgeUpdate::id, stamp);
-}
-
-Result<void> Forest::update(const std::vector<HandleUpdate>& edges, std::optional<Time> stamp) {
-  return impl_->update_all(edges, &HandleUpdate::frame, stamp);
 }
 
 Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {

@@ -182,21 +182,23 @@ Result<Value> Forest::Impl::walk_newest(const Ends& ends, Absent absent, Order o
                                         Met& met) const {
   // Mostly all moving edges have their newest sample of the same instant, or none is moving: then all values are as
   // they lie there.
+  const HeldVersion* limiting = nullptr;
   bool mixed = false;
+  bool tied = false;
   auto newest = walk<Value>(ends, absent, order, [&](auto& climb, const HeldVersion& edge) {
     if (edge.moving()) {
-      if (met.limiting == nullptr) met.limiting = &edge;
-      if (edge.stamp != met.limiting->stamp) {
+      if (limiting == nullptr) limiting = &edge;
+      if (edge.stamp != limiting->stamp) {
         mixed = true;
-        if (edge.stamp < met.limiting->stamp) met.limiting = &edge;
+        if (edge.stamp < limiting->stamp) limiting = &edge;
       }
     }
-    if (leaves_out_ties<Value>(edge)) met.tied = true;
-    if (!mixed && !met.tied) climb.up(value_of<Value>(edge));
+    if (leaves_out_ties<Value>(edge)) tied = true;
+    if (!mixed && !tied) climb.up(value_of<Value>(edge));
     return Result<void>();
   });
-  met.moving = met.limiting != nullptr;
-  if (!newest || !mixed || met.tied) return newest;
+  met = {limiting, limiting != nullptr, tied};
+  if (!newest || !mixed || tied) return newest;
   Query query;
   query.order = order;
   return walk_at<Value>(ends, absent, met.limiting->stamp, query, met);
@@ -259,9 +261,10 @@ Result<Value> Forest::Impl::look_up(Name a, Name b) const {
   Met met;
   auto newest = walk_newest<Value>(*found, Absent::kEnds, Order::kSecond, met);
   if constexpr (std::is_same_v<Value, Transform>) {
+    // Into the same place, which then is not copied where all is independent.
     if (newest && met.tied) {
       met = {};
-      return walk_newest<Belief>(*found, Absent::kEnds, Order::kSecond, met).map(settle);
+      newest = walk_newest<Belief>(*found, Absent::kEnds, Order::kSecond, met).map(settle);
     }
   }
   return newest;

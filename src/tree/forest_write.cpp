@@ -284,6 +284,65 @@ Result<void> Forest::release(std::string_view id) {
   return {};
 }
 
+Result<void> Forest::Impl::update_one(const HeldVersion& edge, const Transform& X_PC,
+                                      std::optional<Time> stamp) {
+  if (!is_finite(X_PC)) return check_value(edge.name->text, X_PC);
+  const std::uint32_t slot = edge.slot;
+  if (stamp || may_be_moving(edge)) {
+    const auto at = stamp_for(&slot, 1, stamp);
+    if (!at) return tl::unexpected(at.error());
+    if (auto ok = check_sample(edge, *at); !ok) return ok;
+    push_value(slot, X_PC, *at);
+  } else {
+    end_revision(push_held(slot, X_PC));
+  }
+  commit();
+  return {};
+}
+
+Result<void> Forest::update(std::string_view id, const Transform& X_PC, std::optional<Time> stamp) {
+  const std::lock_guard lock(impl_->mutex_);
+  const auto slot = impl_->held_slot(id);
+  if (!slot) return tl::unexpected(slot.error());
+  return impl_->update_one(impl_->newest_value(*slot), X_PC, stamp);
+}
+
+Result<void> Forest::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
+  const std::lock_guard lock(impl_->mutex_);
+  const Version* version = impl_->newest_held(frame);
+  if (version == nullptr) return tl::unexpected(impl_->held_slot(frame).error());
+  return impl_->update_one(static_cast<const HeldVersion&>(*version), X_PC, stamp);
+}
+
+template <class Update, class Frame>
+Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame frame,
+                                      std::optional<Time> stamp) {
+  const std::lock_guard lock(mutex_);
+  to_update_.clear();
+  for (const Update& edge : edges) {
+    const auto slot = held_slot(edge.*frame);
+    if (!slot) return tl::unexpected(slot.error());
+    if (!is_finite(edge.X_PC)) return check_value(newest(*slot).name->text, edge.X_PC);
+    to_update_.push_back(*slot);
+  }
+  const auto at = stamp_for(to_update_.data(), to_update_.size(), stamp);
+  if (!at) return tl::unexpected(at.error());
+  for (const std::uint32_t slot : to_update_) {
+    if (auto ok = check_sample(newest_value(slot), *at); !ok) return ok;
+  }
+  for (std::size_t i = 0; i < edges.size(); ++i) push_value(to_update_[i], edges[i].X_PC, *at);
+  commit();
+  return {};
+}
+
+Result<void> Forest::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
+  return impl_->update_all(edges, &EdgeUpdate::id, stamp);
+}
+
+Result<void> Forest::update(const std::vector<HandleUpdate>& edges, std::optional<Time> stamp) {
+  return impl_->update_all(edges, &HandleUpdate::frame, stamp);
+}
+
 Result<void> Forest::move(std::string_view id, std::string_view parent,
                           const std::optional<Transform>& X_PC, std::uint64_t since) {
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
@@ -308,43 +367,9 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   return {};
 }
 
-Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Owner owner,
-                                std::uint64_t since) {
-  if (auto ok = check_id(id, "id"); !ok) return ok;
-  if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
-  // A version that counts as held carries a value, which there is none of.
-  if (owner == kHeldHere) return fail(Errc::kInvalidInput, "owner is this very forest");
-  const std::lock_guard lock(impl_->mutex_);
-  const Impl::Pair pair = impl_->newest_pair(id, parent);
-  if (pair.frame != nullptr && pair.frame->held()) {
-    return fail(Errc::kAlreadyExists, "frame " + quote(id) + " is held here");
-  }
-  auto acyclic = impl_->check_no_cycle(pair);
-  const Name* name = pair.frame != nullptr ? pair.frame->name : impl_->intern(id);
-  const std::uint32_t parent_slot = acyclic ? impl_->parent_slot(pair) : kNoSlot;
-  name->hung(since);
-  const Version& old = impl_->newest(name->slot);
-  if (!old.present() || old.owner != owner || old.parent != parent_slot) {
-    Version& fresh = impl_->push_remote(name->slot);
-    fresh.name = name;
-    fresh.owner = owner;
-    impl_->relink(fresh, parent_slot);
-    impl_->commit_structure();
-  }
-  return acyclic;
-}
-
 void Forest::on_commit(std::function<void()> listener) {
   const std::lock_guard lock(impl_->mutex_);
   impl_->commit_listener_ = std::move(listener);
-}
-
-void Forest::drop_remote(std::string_view id, Owner owner) {
-  const std::lock_guard lock(impl_->mutex_);
-  const Version* there = impl_->newest_named(id);
-  if (there == nullptr || !there->present() || there->owner != owner || owner == kHeldHere) return;
-  impl_->make_absent(there->slot);
-  impl_->commit_structure();
 }
 
 }  // namespace tfdude

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
@@ -257,6 +258,39 @@ TEST_CASE("uncertainty: what the gate refuses changes nothing, and is counted") 
   CHECK(consistency->at(0).sum.squares > consistency->at(0).sum.expected);
   CHECK(robot.client->consistency("base")->size() == 1);
   CHECK_FALSE(robot.client->consistency("nobody"));
+}
+
+TEST_CASE("uncertainty: two who observe one path at once both count, and count once") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Random random(671);
+  INFO("seed " << random.seed());
+  Robot robot(join, random);
+  auto other = Client::open(join(""));
+  REQUIRE(other);
+  const auto before = robot.client->lookup("world", "tool");
+  REQUIRE(before);
+  const Transform Z{before->pose, random.covariance(0.002, 0.002)};
+  constexpr int kEach = 10;
+  const auto observe_all = [&Z](Client& client, int& done) {
+    for (int i = 0; i < kEach; ++i) {
+      if (const auto observed = client.observe("world", "tool", Z)) ++done;
+    }
+  };
+  int mine = 0;
+  int others = 0;
+  std::thread thread([&] { observe_all(*other, others); });
+  observe_all(*robot.client, mine);
+  thread.join();
+  // Who finds it changed each time gives up, having changed nothing.
+  CHECK(mine + others > kEach);
+  const std::vector<Transform> all(static_cast<std::size_t>(mine + others), Z);
+  std::vector<Transform> estimates = {*before};
+  estimates.insert(estimates.end(), all.begin(), all.end());
+  const auto fused = fuse(estimates);
+  const auto after = robot.client->lookup("world", "tool");
+  REQUIRE(fused);
+  REQUIRE(after);
+  CHECK(covariance_diff(after->covariance, fused->X.covariance, 0.02) == "");
 }
 
 TEST_CASE("uncertainty: an edge is fused with a measurement of it, whoever owns it") {
