@@ -2,19 +2,20 @@
 
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "tfdude/base/id.hpp"
 
 #include "support/catch.hpp"
-#include "support/pose_diff.hpp"
+#include "support/same_messages.hpp"
 #include "support/samples.hpp"
 
 namespace tfdude::fastdds {
 namespace {
 
+using testing::check_same;
+using testing::listed;
 using testing::Random;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -27,130 +28,6 @@ Sample travelled(const Sample& sample) {
   Sample arrived;
   REQUIRE(testing::deserialized<Type>(testing::serialized<Type>(sample), arrived));
   return arrived;
-}
-
-// Unit quaternions are normalized again on arrival, all else is exact.
-void check_same(const Transform& actual, const Transform& expected) {
-  CHECK(testing::pose_diff(actual.pose, expected.pose, 1e-15) == "");
-  CHECK(actual.covariance.upper() == expected.covariance.upper());
-}
-
-void check_same(const std::vector<EdgeUpdate>& actual, const std::vector<EdgeUpdate>& expected) {
-  REQUIRE(actual.size() == expected.size());
-  for (std::size_t i = 0; i < actual.size(); ++i) {
-    CHECK(actual[i].id == expected[i].id);
-    check_same(actual[i].X_PC, expected[i].X_PC);
-  }
-}
-
-void check_same(const std::vector<PathEnds>& actual, const std::vector<PathEnds>& expected) {
-  REQUIRE(actual.size() == expected.size());
-  for (std::size_t i = 0; i < actual.size(); ++i) {
-    CHECK(actual[i].from == expected[i].from);
-    CHECK(actual[i].to == expected[i].to);
-  }
-}
-
-void check_same(const Surprise& actual, const Surprise& expected) {
-  CHECK(actual.squares == expected.squares);
-  CHECK(actual.expected == expected.expected);
-  CHECK(actual.variance == expected.variance);
-}
-
-void check_same(const ReviseRequest& actual, const ReviseRequest& expected) {
-  CHECK(actual.stamp == expected.stamp);
-  CHECK(actual.seen == expected.seen);
-  REQUIRE(actual.edges.size() == expected.edges.size());
-  for (std::size_t i = 0; i < actual.edges.size(); ++i) {
-    const ReviseRequest::Edge& came = actual.edges[i];
-    const ReviseRequest::Edge& sent = expected.edges[i];
-    CHECK(came.id == sent.id);
-    CHECK(came.refused == sent.refused);
-    check_same(came.surprise, sent.surprise);
-    REQUIRE(came.revision.has_value() == sent.revision.has_value());
-    if (!came.revision) continue;
-    CHECK(came.revision->id == sent.revision->id);
-    check_same(came.revision->X_PC, sent.revision->X_PC);
-    CHECK(came.revision->correlation == sent.revision->correlation);
-  }
-}
-
-void check_same(const std::vector<Ties>& actual, const std::vector<Ties>& expected) {
-  REQUIRE(actual.size() == expected.size());
-  for (std::size_t i = 0; i < actual.size(); ++i) {
-    CHECK(actual[i].shares == expected[i].shares);
-    CHECK(actual[i].observed_with == expected[i].observed_with);
-    REQUIRE(actual[i].unknown.has_value() == expected[i].unknown.has_value());
-    if (actual[i].unknown) CHECK(actual[i].unknown->upper() == expected[i].unknown->upper());
-  }
-}
-
-void check_same(const Request& actual, const Request& expected) {
-  CHECK(actual.sequence == expected.sequence);
-  CHECK(actual.id == expected.id);
-  REQUIRE(actual.body.index() == expected.body.index());
-  if (const auto* add = std::get_if<AddRequest>(&expected.body)) {
-    CHECK(std::get<AddRequest>(actual.body).parent == add->parent);
-    check_same(std::get<AddRequest>(actual.body).X_PC, add->X_PC);
-  } else if (const auto* remove = std::get_if<RemoveRequest>(&expected.body)) {
-    CHECK(std::get<RemoveRequest>(actual.body).tops == remove->tops);
-  } else if (const auto* update = std::get_if<UpdateRequest>(&expected.body)) {
-    check_same(std::get<UpdateRequest>(actual.body).edges, update->edges);
-    CHECK(std::get<UpdateRequest>(actual.body).stamp == update->stamp);
-  } else if (const auto* move = std::get_if<MoveRequest>(&expected.body)) {
-    CHECK(std::get<MoveRequest>(actual.body).parent == move->parent);
-    const auto& X_PC = std::get<MoveRequest>(actual.body).X_PC;
-    REQUIRE(X_PC.has_value() == move->X_PC.has_value());
-    if (X_PC) check_same(*X_PC, *move->X_PC);
-  } else if (const auto* watch = std::get_if<WatchRequest>(&expected.body)) {
-    const auto& arrived = std::get<WatchRequest>(actual.body);
-    CHECK(arrived.edges == watch->edges);
-    CHECK(arrived.period == watch->period);
-    check_same(arrived.segments, watch->segments);
-  } else if (const auto* past = std::get_if<PastRequest>(&expected.body)) {
-    CHECK(std::get<PastRequest>(actual.body).all == past->all);
-  } else if (const auto* lookup_at = std::get_if<LookupRequest>(&expected.body)) {
-    const LookupRequest& lookup = *lookup_at;
-    const auto& arrived = std::get<LookupRequest>(actual.body);
-    CHECK(arrived.query.at == lookup.query.at);
-    CHECK(arrived.query.extrapolate == lookup.query.extrapolate);
-    CHECK(arrived.query.age_noise_until == lookup.query.age_noise_until);
-    CHECK(arrived.query.order == lookup.query.order);
-    CHECK(arrived.hint == lookup.hint);
-    CHECK(arrived.edges == lookup.edges);
-    check_same(arrived.segments, lookup.segments);
-  } else if (const auto* revise = std::get_if<ReviseRequest>(&expected.body)) {
-    check_same(std::get<ReviseRequest>(actual.body), *revise);
-  } else if (const auto* asked = std::get_if<ConsistencyRequest>(&expected.body)) {
-    CHECK(std::get<ConsistencyRequest>(actual.body).all == asked->all);
-  }
-}
-
-void check_same(const std::vector<Transform>& actual, const std::vector<Transform>& expected) {
-  REQUIRE(actual.size() == expected.size());
-  for (std::size_t i = 0; i < actual.size(); ++i) check_same(actual[i], expected[i]);
-}
-
-void check_same(const State& actual, const State& expected) {
-  CHECK(actual.group == expected.group);
-  REQUIRE(actual.entries.size() == expected.entries.size());
-  for (std::size_t i = 0; i < actual.entries.size(); ++i) {
-    CHECK(actual.entries[i].index == expected.entries[i].index);
-    CHECK(actual.entries[i].stamp == expected.entries[i].stamp);
-    check_same(actual.entries[i].X, expected.entries[i].X);
-    CHECK(actual.entries[i].correlation == expected.entries[i].correlation);
-  }
-}
-
-// All fields in one text.
-std::string listed(const PastInfo& past) {
-  std::ostringstream text;
-  const auto stamp = [](const std::optional<Time>& time) { return time ? nanoseconds(*time) : 0; };
-  text << past.id << ' ' << past.samples << ' ' << past.bytes << ' ' << past.span_limit.count()
-       << ' ' << past.count_limit << ' ' << stamp(past.oldest) << ' ' << stamp(past.newest) << ' '
-       << past.mean_gap.count() << ' ' << past.max_gap.count() << ' ' << past.jitter.count() << ' '
-       << past.refused_old << ' ' << past.refused_equal;
-  return text.str();
 }
 
 TEST_CASE("states arrive as they were sent") {

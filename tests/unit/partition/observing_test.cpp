@@ -1,0 +1,183 @@
+#include "tfdude/partition/observing.hpp"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "tfdude/partition/partition.hpp"
+
+#include "support/catch.hpp"
+#include "support/pose_diff.hpp"
+#include "support/random.hpp"
+#include "support/replica.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::ContainsSubstring;
+using testing::presence_of;
+using testing::Random;
+using testing::Replica;
+using Way = ObservedEdge::Way;
+
+constexpr Time kNow{std::chrono::milliseconds(1500)};
+
+// world(robot) +- arm(arms) - hand(arms) - tool(tools), and leg(robot) beside. The process serves arms.
+struct Known : Replica {
+  explicit Known(Random& random) : Replica("arms"), partition("arms", 1, forest, directory) {
+    directory.apply(presence_of("robot", 1, 1), kNow);
+    directory.apply(Page{"robot", 0, 1, 1, {{"world", ""}, {"leg", "world"}}});
+    directory.apply(presence_of("tools", 1, 1), kNow);
+    directory.apply(Page{"tools", 0, 1, 1, {{"tool", "hand"}}});
+    X_arm = random.transform();
+    X_hand = random.transform();
+    REQUIRE(partition.load({{"arm", "world", X_arm}, {"hand", "arm", X_hand}}, kNow));
+  }
+  Partition partition;
+  Transform X_arm;
+  Transform X_hand;
+};
+
+std::vector<std::string> edges_of(const ObservePlan& plan) {
+  std::vector<std::string> texts;
+  for (const auto& edge : plan.edges) {
+    const char* way = edge.way == Way::kDown ? " down" : edge.way == Way::kUp ? " up" : " beside";
+    texts.push_back(edge.info.id + way);
+  }
+  return texts;
+}
+
+// Answers with one value an edge.
+std::vector<SegmentValues> answers_to(const ObservePlan& plan, Random& random) {
+  std::vector<SegmentValues> answers;
+  for (const Part& part : plan.parts) {
+    const auto& asked = std::get<LookupRequest>(part.request.body).segments;
+    SegmentValues answer;
+    for (std::size_t i = 0; i < asked.size(); ++i) answer.values.push_back(random.transform());
+    answer.ties.resize(asked.size());
+    answer.commit = 7 + answers.size();
+    answers.push_back(std::move(answer));
+  }
+  return answers;
+}
+
+TEST_CASE("an observation asks each owner for the edges of the path, and those beside") {
+  Random random(0x0b51);
+  const Known known(random);
+  const auto down = route_observe(known.forest, known.directory, "world", "tool", {}, kNow);
+  REQUIRE(down);
+  CHECK(edges_of(*down) == std::vector<std::string>{"arm down", "hand down", "tool down"});
+  REQUIRE(down->parts.size() == 2);
+  CHECK(down->parts[0].owner == kHeldHere);
+  CHECK(down->parts[1].partition == "tools");
+  const auto& asked = std::get<LookupRequest>(down->parts[1].request.body);
+  CHECK(asked.edges);
+  CHECK(asked.query.at == kNow);
+  REQUIRE(asked.segments.size() == 1);
+  CHECK(asked.segments[0].from == "hand");
+  CHECK(asked.segments[0].to == "tool");
+  const auto over = route_observe(known.forest, known.directory, "hand", "leg",
+                                  {"tool", "arm", "gone"}, std::nullopt);
+  REQUIRE(over);
+  CHECK(edges_of(*over) ==
+        std::vector<std::string>{"hand up", "arm up", "leg down", "tool beside"});
+}
+
+TEST_CASE("an observation of nothing, or by who cannot be reached, is refused") {
+  Random random(0x0b52);
+  Known known(random);
+  const auto refused = [&](const std::string& a, const std::string& b) {
+    const auto plan = route_observe(known.forest, known.directory, a, b, {}, {});
+    REQUIRE_FALSE(plan);
+    return plan.error().code;
+  };
+  CHECK(refused("hand", "hand") == Errc::kInvalidInput);
+  CHECK(refused("nobody", "hand") == Errc::kUnknownStart);
+  CHECK(refused("hand", "nobody") == Errc::kUnknownEnd);
+  REQUIRE(known.directory.lost("tools", 1, kNow));
+  CHECK(refused("world", "tool") == Errc::kUnreachable);
+}
+
+TEST_CASE("answers are put together in the order of the edges, and name who is missing") {
+  Random random(0x0b53);
+  const Known known(random);
+  const auto plan = route_observe(known.forest, known.directory, "tool", "world", {}, {});
+  REQUIRE(plan);
+  auto answers = answers_to(*plan, random);
+  answers[0].ties[0].observed_with = {"tool", "leg", "hand"};
+  const auto path = observed_path(*plan, answers);
+  REQUIRE(path);
+  REQUIRE(path->edges.size() == 3);
+  for (std::size_t k = 0; k < 3; ++k) CHECK(path->edges[k].way == Way::kUp);
+  CHECK(testing::pose_diff(path->edges[0].X_PC.pose, answers[0].values[0].pose, 0) == "");
+  CHECK(testing::pose_diff(path->edges[1].X_PC.pose, answers[1].values[0].pose, 0) == "");
+  CHECK(testing::pose_diff(path->edges[2].X_PC.pose, answers[1].values[1].pose, 0) == "");
+  CHECK(path->missing == std::vector<std::string>{"leg"});
+  CHECK(path->seen == std::vector<std::uint64_t>{7, 8});
+  answers[1].values.pop_back();
+  const auto short_of_one = observed_path(*plan, answers);
+  REQUIRE_FALSE(short_of_one);
+  CHECK(short_of_one.error().code == Errc::kNotOwner);
+}
+
+TEST_CASE("each owner is told its part; who has nothing to do is not asked") {
+  Random random(0x0b54);
+  const Known known(random);
+  const auto plan = route_observe(known.forest, known.directory, "world", "tool", {}, {});
+  REQUIRE(plan);
+  auto answers = answers_to(*plan, random);
+  answers[1].values[0].covariance = {};
+  const auto path = observed_path(*plan, answers);
+  REQUIRE(path);
+  Pose X_AB;
+  for (const ObservedEdge& edge : path->edges) X_AB = X_AB * edge.X_PC.pose;
+  const auto observed =
+      observe(path->edges, {X_AB, random.covariance()}, "observed:test", ObserveOptions());
+  REQUIRE(observed);
+  const auto parts = revisions(*plan, *path, *observed);
+  REQUIRE(parts.size() == 1);
+  CHECK(parts[0].request.id == "arm");
+  const auto& revise = std::get<ReviseRequest>(parts[0].request.body);
+  CHECK(revise.seen == 7);
+  REQUIRE(revise.edges.size() == 2);
+  CHECK(revise.edges[1].revision->correlation.observed_with ==
+        std::vector<std::string>{"arm", "hand"});
+}
+
+TEST_CASE("an owner applies its part once, counts it, and forgets what it counted with the frame") {
+  Random random(0x0b55);
+  Known known(random);
+  const auto seen = known.forest.lookup_segments({{"world", "arm"}}, {}, {}, true);
+  REQUIRE(seen);
+  const Transform X = random.transform();
+  const PeerId peer{};
+  Request request{
+      1, "arm",
+      ReviseRequest{{{"arm", {3, 2, 1}, false, Revision{"arm", X, {}}}}, {}, seen->commit}};
+  const auto is_done = [](const Reply& reply) { return std::holds_alternative<Done>(reply.body); };
+  CHECK(is_done(known.partition.answer(peer, request, kNow)));
+  CHECK(is_done(known.partition.answer(peer, request, kNow)));
+  CHECK(testing::transform_diff(*known.forest.lookup_segments({{"world", "arm"}})->values.begin(),
+                                X, 1e-15) == "");
+  // The same from another is late.
+  request.sequence = 2;
+  const Reply late = known.partition.answer(peer, request, kNow);
+  REQUIRE(std::holds_alternative<Error>(late.body));
+  CHECK(std::get<Error>(late.body).code == Errc::kChangedMeanwhile);
+  const auto counted = [&] {
+    const Reply reply = known.partition.answer({3, "arms", ConsistencyRequest{true}}, kNow);
+    return std::get<std::vector<EdgeConsistency>>(reply.body);
+  };
+  REQUIRE(counted().size() == 1);
+  CHECK(counted()[0].observations == 1);
+  CHECK(counted()[0].sum.squares == 3);
+  const Reply foreign = known.partition.answer(
+      {4, "tool", ReviseRequest{{{"tool", {1, 1, 1}, false, {}}}, {}, 0}}, kNow);
+  REQUIRE(std::holds_alternative<Error>(foreign.body));
+  CHECK(std::get<Error>(foreign.body).code == Errc::kNotOwner);
+  CHECK(is_done(known.partition.answer({5, "arm", MoveRequest{"leg", {}}}, kNow)));
+  CHECK(counted().empty());
+}
+
+}  // namespace
+}  // namespace tfdude
