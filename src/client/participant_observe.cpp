@@ -1,4 +1,7 @@
 #include <algorithm>
+#include <iterator>
+#include <optional>
+#include <thread>
 #include <unistd.h>
 #include <utility>
 
@@ -13,6 +16,10 @@ namespace {
 
 // How often edges that were written meanwhile, or were observed with still others, are asked for again.
 constexpr int kObserveAttempts = 8;
+
+// How often, and for how long, is waited for somebody else's observation to reach all owners.
+constexpr int kTornAttempts = 5;
+constexpr Milliseconds kTornPause{1};
 
 bool is_conflict(const Reply& reply) {
   const auto* error = std::get_if<Error>(&reply.body);
@@ -78,6 +85,7 @@ Result<Observed> Participant::observe(const std::string& a, const std::string& b
                                       const ObserveOptions& options) {
   if (auto ok = check_finite(X_AB); !ok) return fail_at("the measurement", ok.error());
   std::vector<std::string> beside;
+  int torn = 0;
   for (int attempt = 0; attempt < kObserveAttempts; ++attempt) {
     ObservePlan used;
     auto path = healed([&] { return route_observe(forest_, directory_, a, b, beside, stamp); },
@@ -90,6 +98,12 @@ Result<Observed> Participant::observe(const std::string& a, const std::string& b
     const auto there = [this](const std::string& id) { return forest_.exists(id); };
     if (std::any_of(path->missing.begin(), path->missing.end(), there)) {
       beside.insert(beside.end(), path->missing.begin(), path->missing.end());
+      continue;
+    }
+    // What one owner has been told already the others will have soon, unless an edge was given another value since.
+    if (path->torn && torn < kTornAttempts) {
+      std::this_thread::sleep_for(kTornPause * (1 << torn++));
+      --attempt;
       continue;
     }
     const auto found = tfdude::observe(path->edges, X_AB, new_source(), options);

@@ -48,6 +48,21 @@ class Places {
   std::vector<std::size_t> taken_;
 };
 
+// Whether one of those that an edge was observed with has no share of the source.
+bool lacks_source(const ObservePlan& plan, const ObservedPath& path, const Belief& X,
+                  const std::vector<std::string>& observed_with) {
+  const auto source = std::find_if(X.shares.begin(), X.shares.end(), is_observed);
+  if (source == X.shares.end()) return false;
+  for (std::size_t k = 0; k < plan.edges.size(); ++k) {
+    const std::string& id = plan.edges[k].info.id;
+    if (std::count(observed_with.begin(), observed_with.end(), id) == 0) continue;
+    const auto& shares = path.edges[k].X_PC.shares;
+    const auto same = [&](const Share& share) { return share.source == source->source; };
+    if (std::none_of(shares.begin(), shares.end(), same)) return true;
+  }
+  return false;
+}
+
 // What an owner keeps of an edge that was observed.
 Correlation correlation_of(const Belief& X, const std::vector<std::string>& together) {
   Correlation correlation;
@@ -111,8 +126,9 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
     if (answers[i].stamp) path.stamp = answers[i].stamp;
   }
   Places places(plan);
+  std::vector<Places::Place> placed;
   for (const Edge& edge : plan.edges) {
-    const auto [part, index] = places.next(edge);
+    const auto [part, index] = placed.emplace_back(places.next(edge));
     const Ties& ties = answers[part].ties[index];
     path.edges.push_back({belief_of(answers[part].values[index], ties), edge.way});
     for (const std::string& id : ties.observed_with) {
@@ -120,6 +136,11 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
           has(plan.edges, id) || std::count(path.missing.begin(), path.missing.end(), id) != 0;
       if (!known) path.missing.push_back(id);
     }
+  }
+  for (std::size_t k = 0; k < plan.edges.size() && !path.torn; ++k) {
+    const auto& [part, index] = placed[k];
+    path.torn =
+        lacks_source(plan, path, path.edges[k].X_PC, answers[part].ties[index].observed_with);
   }
   return path;
 }

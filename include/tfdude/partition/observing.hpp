@@ -27,6 +27,8 @@ struct ObservedPath {
   std::vector<std::uint64_t> seen;  ///< by part
   std::optional<Time> stamp;
   std::vector<std::string> missing;  ///< edges beside the path that must be asked for, too
+  /// An edge lacks the source that it was observed by together with another: somebody's observation may be under way.
+  bool torn = false;
 };
 
 /// @param beside  edges that were observed together with some of the path; those that are not there are left out

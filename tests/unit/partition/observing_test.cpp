@@ -114,6 +114,13 @@ TEST_CASE("answers are put together in the order of the edges, and name who is m
   CHECK(testing::pose_diff(path->edges[2].X_PC.pose, answers[1].values[1].pose, 0) == "");
   CHECK(path->missing == std::vector<std::string>{"leg"});
   CHECK(path->seen == std::vector<std::uint64_t>{7, 8});
+  CHECK_FALSE(path->torn);
+  // An observation that has reached one of its owners only.
+  const Share share{"observed:other", true, Factor::Ones(6, 1)};
+  answers[0].ties[0].shares = {share};
+  CHECK(observed_path(*plan, answers)->torn);
+  answers[1].ties[0].shares = {share};
+  CHECK_FALSE(observed_path(*plan, answers)->torn);
   answers[1].values.pop_back();
   const auto short_of_one = observed_path(*plan, answers);
   REQUIRE_FALSE(short_of_one);
