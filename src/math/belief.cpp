@@ -7,6 +7,7 @@
 
 #include "math/moments.hpp"
 #include "math/semidefinite.hpp"
+#include "math/shares.hpp"
 
 namespace tfdude {
 namespace {
@@ -16,19 +17,14 @@ using Shares = std::vector<Share>;
 Eigen::Index columns(const Share& share) { return share.factor.cols(); }
 
 void add_padded(Factor& sum, const Factor& more) {
-  if (more.cols() > sum.cols()) {
-    const Eigen::Index before = sum.cols();
-    sum.conservativeResize(Eigen::NoChange, more.cols());
-    sum.rightCols(more.cols() - before).setZero();
-  }
+  widen(sum, more.cols());
   sum.leftCols(more.cols()) += more;
 }
 
 template <class List>
 auto of_same_source(List& shares, const Share& share) -> decltype(shares.data()) {
-  const auto found = std::find_if(shares.begin(), shares.end(), [&](const Share& other) {
-    return other.source == share.source && other.subtracts == share.subtracts;
-  });
+  const auto found = std::find_if(shares.begin(), shares.end(),
+                                  [&](const Share& other) { return same_source(other, share); });
   return found == shares.end() ? nullptr : &*found;
 }
 
@@ -182,9 +178,7 @@ Result<void> check_shares(const std::vector<Share>& shares) {
       return fail(Errc::kInvalidInput,
                   who + "an element of its factor is not a number, or beyond 1e9");
     }
-    const auto same = [&](const Share& other) {
-      return other.source == share.source && other.subtracts == share.subtracts;
-    };
+    const auto same = [&](const Share& other) { return same_source(other, share); };
     if (std::count_if(shares.begin(), shares.end(), same) > 1) {
       return fail(Errc::kInvalidInput, who + "named twice");
     }

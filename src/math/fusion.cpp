@@ -15,8 +15,6 @@ namespace {
 
 constexpr int kMostIterations = 100;
 constexpr double kConverged = 1e-12;
-// Of what two estimates know exactly, a difference that can be rounding.
-constexpr double kAgrees = 1e-9;
 
 // N(mean, covariance) of the perturbation of some pose.
 struct Gaussian {
@@ -36,7 +34,7 @@ bool merge(Gaussian& sum, const Gaussian& more) {
   const Matrix6d S = sum.covariance + more.covariance;
   const Matrix6d inverse = pseudo_inverse(S);
   const Twist innovation = more.mean - sum.mean;
-  if ((innovation - S * (inverse * innovation)).cwiseAbs().maxCoeff() > kAgrees) return false;
+  if (!is_possible(innovation, S, inverse)) return false;
   const Matrix6d gain = sum.covariance * inverse;
   const Matrix6d rest = Matrix6d::Identity() - gain;
   sum.mean += gain * innovation;
@@ -75,15 +73,21 @@ Result<Fused> fuse(const std::vector<Transform>& estimates) {
 
 Result<Fused> intersect(const Transform& A, const Transform& B) {
   const Twist unit = units_of(A.covariance.matrix().diagonal() + B.covariance.matrix().diagonal());
-  const auto size_at = [&](double omega) {
-    const auto fused = fuse({weighted(A, omega), weighted(B, 1.0 - omega)});
-    if (!fused) return std::numeric_limits<double>::infinity();
-    return unit.dot(fused->X.covariance.matrix().diagonal());
+  const auto size_of = [&](const Transform& X) {
+    return unit.dot(X.covariance.matrix().diagonal());
   };
-  const double omega = minimum_within_unit(size_at);
-  if (unit.dot(A.covariance.matrix().diagonal()) <= size_at(omega)) return Fused{A, 0};
-  if (unit.dot(B.covariance.matrix().diagonal()) <= size_at(omega)) return Fused{B, 0};
-  return fuse({weighted(A, omega), weighted(B, 1.0 - omega)});
+  const auto fused_at = [&](double omega) {
+    return fuse({weighted(A, omega), weighted(B, 1.0 - omega)});
+  };
+  const double omega = minimum_within_unit([&](double at) {
+    const auto fused = fused_at(at);
+    return fused ? size_of(fused->X) : std::numeric_limits<double>::infinity();
+  });
+  auto best = fused_at(omega);
+  const double size = best ? size_of(best->X) : std::numeric_limits<double>::infinity();
+  if (size_of(A) <= size) return Fused{A, 0};
+  if (size_of(B) <= size) return Fused{B, 0};
+  return best;
 }
 
 double chi_squared_quantile(double probability, int dimensions) {

@@ -4,15 +4,10 @@
 #include <cmath>
 
 #include "math/semidefinite.hpp"
+#include "math/shares.hpp"
 
 namespace tfdude {
 namespace {
-
-void pad(Factor& factor, Eigen::Index columns) {
-  const Eigen::Index before = factor.cols();
-  factor.conservativeResize(Eigen::NoChange, columns);
-  factor.rightCols(columns - before).setZero();
-}
 
 JointPrior::Source& source_of(std::vector<JointPrior::Source>& sources, const Share& share) {
   for (JointPrior::Source& source : sources) {
@@ -48,7 +43,7 @@ JointPrior::JointPrior(const std::vector<ObservedEdge>& all) : all_(all) {
   for (Source& source : sources_) {
     Eigen::Index columns = 0;
     for (const Factor& factor : source.factors) columns = std::max(columns, factor.cols());
-    for (Factor& factor : source.factors) pad(factor, columns);
+    for (Factor& factor : source.factors) tfdude::widen(factor, columns);
   }
 }
 

@@ -21,8 +21,6 @@ constexpr int kMostIterations = 100;
 // Of an edge's deviations: where a measurement is far more precise than the edges, no more is to be had.
 constexpr double kConverged = 1e-6;
 constexpr double kSmallest = 1e-12;  // [m, rad]
-// Of a difference in what is known exactly on both sides, what can be rounding.
-constexpr double kAgrees = 1e-9;
 
 // h(ξ) = Log(Z⁻¹ X_AB(ξ)) where the path is now, and its derivative by each edge's ξ.
 struct Linear {
@@ -66,12 +64,14 @@ class Update {
 
   Result<Observation> run() {
     if (auto ok = count_unknown(); !ok) return tl::unexpected(std::move(ok.error()));
+    const Moments m = prior_.moments(linear_.H);
+    const Innovation innovation = innovation_of(m);
     Observation observation;
-    judge(observation);
+    judge(innovation, observation);
     for (const ObservedEdge& edge : all_) observation.edges.push_back({edge.X_PC, false, {}});
-    if (independent_) note_surprise(observation);
+    if (independent_) note_surprise(m, innovation, observation);
     if (!observation.accepted) return observation;
-    if (!independent_ && !weigh()) return observation;
+    if (!independent_ && !weigh(m)) return observation;
     if (auto ok = iterate(); !ok) return tl::unexpected(std::move(ok.error()));
     apply(observation);
     return observation;
@@ -106,16 +106,27 @@ class Update {
     return {};
   }
 
-  void judge(Observation& observation) const {
-    const Moments m = prior_.moments(linear_.H);
-    const Matrix6d S =
-        independent_ ? Matrix6d(m.of_path + R_)
-                     : bound(Covariance::trusted(m.of_path), Covariance::trusted(R_)).matrix();
-    const Matrix6d inverse = pseudo_inverse(S, &observation.dimensions);
-    const Twist rest = linear_.h - S * (inverse * linear_.h);
-    const bool impossible = rest.cwiseAbs().maxCoeff() > kAgrees;
-    observation.distance_squared =
-        impossible ? std::numeric_limits<double>::infinity() : linear_.h.dot(inverse * linear_.h);
+  // The covariance of h, as far as it is known.
+  struct Innovation {
+    Matrix6d S;
+    Matrix6d inverse;
+    int dimensions = 0;
+  };
+
+  [[nodiscard]] Innovation innovation_of(const Moments& m) const {
+    Innovation found;
+    found.S = independent_
+                  ? Matrix6d(m.of_path + R_)
+                  : bound(Covariance::trusted(m.of_path), Covariance::trusted(R_)).matrix();
+    found.inverse = pseudo_inverse(found.S, &found.dimensions);
+    return found;
+  }
+
+  void judge(const Innovation& innovation, Observation& observation) const {
+    const bool impossible = !is_possible(linear_.h, innovation.S, innovation.inverse);
+    observation.dimensions = innovation.dimensions;
+    observation.distance_squared = impossible ? std::numeric_limits<double>::infinity()
+                                              : linear_.h.dot(innovation.inverse * linear_.h);
     const bool gated = options_.gate < 1 && observation.dimensions > 0;
     observation.limit = gated ? chi_squared_quantile(options_.gate, observation.dimensions)
                               : std::numeric_limits<double>::infinity();
@@ -123,47 +134,51 @@ class Update {
   }
 
   // Of the corrections that this observation alone would make.
-  void note_surprise(Observation& observation) const {
-    const Moments m = prior_.moments(linear_.H);
-    const Matrix6d S = m.of_path + R_;
-    const Matrix6d inverse = pseudo_inverse(S);
+  void note_surprise(const Moments& m, const Innovation& innovation,
+                     Observation& observation) const {
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
       if (all_[prior_.edges()[i]].way == ObservedEdge::Way::kBeside) continue;
-      const Matrix6d gain = m.with_edge[i] * inverse;
+      const Matrix6d gain = m.with_edge[i] * innovation.inverse;
       const Matrix6d weight = gain.transpose() * pseudo_inverse(prior_.marginal(i)) * gain;
-      const Matrix6d share = weight * S;
+      const Matrix6d share = weight * innovation.S;
       observation.edges[prior_.edges()[i]].surprise = {
           linear_.h.dot(weight * linear_.h), share.trace(), 2.0 * (share * share).trace()};
     }
   }
 
   // Covariance intersection: both sides are made less sure, so that the edges gain most. False where that is nothing.
-  bool weigh() {
-    const Moments m = prior_.moments(linear_.H);
+  bool weigh(const Moments& m) {
+    const std::vector<Twist> variances = variances_of_edges();
+    double before = 0;
+    for (const Twist& one : variances) before += units_of(one).dot(one);
     const auto size_at = [&](double omega) {
       const Matrix6d inverse = pseudo_inverse(m.of_path / omega + R_ / (1.0 - omega));
       double sum = 0;
-      for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
-        const Twist before = prior_.marginal(i).diagonal();
+      for (std::size_t i = 0; i < variances.size(); ++i) {
         const Twist taken =
             (m.with_edge[i] * inverse * m.with_edge[i].transpose()).diagonal() / omega;
-        sum += units_of(before).dot(before - taken) / omega;
+        sum += units_of(variances[i]).dot(variances[i] - taken) / omega;
       }
       return sum;
     };
     const double omega = minimum_within_unit(size_at);
-    double before = 0;
-    for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
-      before += units_of(prior_.marginal(i).diagonal()).dot(prior_.marginal(i).diagonal());
-    }
     if (size_at(omega) >= before) return false;
     prior_.widen(1.0 / omega);
     R_ /= 1.0 - omega;
     return true;
   }
 
+  [[nodiscard]] std::vector<Twist> variances_of_edges() const {
+    std::vector<Twist> variances;
+    for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
+      variances.emplace_back(prior_.marginal(i).diagonal());
+    }
+    return variances;
+  }
+
   Result<void> iterate() {
     const auto& edges = prior_.edges();
+    const std::vector<Twist> variances = variances_of_edges();
     for (int iteration = 0; iteration < kMostIterations; ++iteration) {
       const Moments m = prior_.moments(linear_.H);
       Twist seen = -linear_.h;
@@ -173,7 +188,7 @@ class Update {
       for (std::size_t i = 0; i < edges.size(); ++i) {
         const Twist next = m.with_edge[i] * weighted;
         const Twist step = (next - xi_[edges[i]]).cwiseAbs();
-        const Twist deviations = prior_.marginal(i).diagonal().cwiseMax(0.0).cwiseSqrt();
+        const Twist deviations = variances[i].cwiseMax(0.0).cwiseSqrt();
         for (int axis = 0; axis < 6; ++axis) {
           if (step[axis] > kSmallest) change = std::max(change, step[axis] / deviations[axis]);
         }

@@ -57,4 +57,9 @@ Matrix6d pseudo_inverse(const Matrix6d& semidefinite, int* rank) {
                 unit);
 }
 
+bool is_possible(const Twist& difference, const Matrix6d& covariance, const Matrix6d& inverse) {
+  constexpr double kAgrees = 1e-9;
+  return (difference - covariance * (inverse * difference)).cwiseAbs().maxCoeff() <= kAgrees;
+}
+
 }  // namespace tfdude

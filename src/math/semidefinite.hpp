@@ -15,4 +15,9 @@ namespace tfdude {
 /// @param rank  is set to how many do not; may be null
 [[nodiscard]] Matrix6d pseudo_inverse(const Matrix6d& semidefinite, int* rank = nullptr);
 
+/// Whether errors of this covariance can make that difference: none [m, rad] is left, but for rounding, in what is known
+/// exactly. @param inverse  pseudo_inverse() of the covariance
+[[nodiscard]] bool is_possible(const Twist& difference, const Matrix6d& covariance,
+                               const Matrix6d& inverse);
+
 }  // namespace tfdude

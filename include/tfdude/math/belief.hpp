@@ -74,7 +74,8 @@ struct Belief {
 [[nodiscard]] Transform settle(const Belief& X_AB);
 
 /// No sum of two errors of these covariances has more than this, whatever their correlation (the product of two poses has,
-/// by terms of fourth order): (1 + 1/ε) A + (1 + ε) B, with the ε that makes the sum of both traces, of translation and of rotation, each in units of A + B, the smallest.
+/// by terms of fourth order): (1 + 1/ε) A + (1 + ε) B, with the ε that makes the sum of both traces, of translation and
+/// of rotation, each in units of A + B, the smallest.
 [[nodiscard]] Covariance bound(const Covariance& A, const Covariance& B);
 
 /// @return kInvalidInput: more than kMaxShares; naming the source: an empty name, one longer than an id, no column, more than
