@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/partition/joint_spec.hpp"
 #include "tfdude/partition/messages.hpp"
 #include "tfdude/tree/forest.hpp"
 
@@ -16,6 +17,8 @@ struct FrameSpec {
   Transform X_PC;
   std::optional<EdgeTiming> timing{};  ///< absent: the partition's
   Correlation correlation{};
+  /// What moves it; X_PC is its value at the joint's position before the first sample, then.
+  std::optional<JointSpec> joint{};
 };
 
 /// A frame with what outlives its process.

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tfdude/math/joint.hpp"
+
+namespace tfdude {
+
+/// What kind of joint moves a frame by one number. A fixed joint is an edge without a joint.
+enum class JointType : std::uint8_t { kRevolute = 1, kContinuous = 2, kPrismatic = 3 };
+
+/// revolute, continuous or prismatic.
+[[nodiscard]] const char* to_string(JointType type);
+
+struct JointLimits {
+  double lower = 0;  ///< [rad or m]
+  double upper = 0;
+};
+
+/// That a joint follows another: its position is multiplier · (the other's) + offset.
+struct Mimic {
+  std::string joint;
+  double multiplier = 1;
+  double offset = 0;
+};
+
+/// A joint that moves a frame: how, and what is believed before its first sample.
+struct JointSpec {
+  std::string name;
+  JointType type = JointType::kRevolute;
+  Joint joint;
+  std::optional<JointLimits> limits;
+  std::optional<Mimic> mimic;
+  /// It follows another joint, or others follow it: their errors are one error.
+  bool coupled = false;
+  bool strict = false;  ///< positions outside the limits are refused
+  double position = 0;  ///< before the first sample [rad or m]
+  double variance = 0;  ///< of that [rad² or m²]
+};
+
+/// The edge's value at a joint's position. A coupled joint's error is not in its covariance but in a share.
+[[nodiscard]] Transform value_at(const JointSpec& joint, double position, double variance);
+
+/// The position that is taken before the first sample: the one within the limits that is nearest to zero.
+[[nodiscard]] double rest_position(const std::optional<JointLimits>& limits);
+
+/// What is known of a position of which nothing is known: the mean square distance of all that are within the limits, each
+/// as likely; of a hinge without limits, those of one turn. @return 0 for a slider without limits, of which nothing can be
+///   said
+[[nodiscard]] double unmeasured_variance(JointType type, const std::optional<JointLimits>& limits,
+                                         double position);
+
+}  // namespace tfdude

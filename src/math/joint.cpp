@@ -1,0 +1,47 @@
+#include "tfdude/math/joint.hpp"
+
+namespace tfdude {
+namespace {
+
+Joint along(const Transform& X_PJ, const Eigen::Vector3d& shift, const Eigen::Vector3d& turn) {
+  Joint joint{X_PJ, {}};
+  joint.S << shift, turn;
+  return joint;
+}
+
+bool is_exact(const Covariance& covariance) {
+  for (const double element : covariance.upper()) {
+    if (element != 0) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Joint hinge(const Transform& X_PJ, const Eigen::Vector3d& axis) {
+  return along(X_PJ, Eigen::Vector3d::Zero(), axis);
+}
+
+Joint slider(const Transform& X_PJ, const Eigen::Vector3d& axis) {
+  return along(X_PJ, axis, Eigen::Vector3d::Zero());
+}
+
+Transform moved(const Joint& joint, double position, double variance) {
+  const Pose X_JC = exp(joint.S * position);
+  Covariance::Upper upper{};
+  for (std::size_t row = 0; row < 6; ++row) {
+    for (std::size_t column = row; column < 6; ++column) {
+      const auto i = static_cast<Eigen::Index>(row);
+      const auto k = static_cast<Eigen::Index>(column);
+      upper[upper_index(row, column)] = variance * joint.S[i] * joint.S[k];
+    }
+  }
+  Transform X_PC{joint.X_PJ.pose * X_JC, Covariance::trusted(upper)};
+  // Most mounts are known exactly, as far as URDF says.
+  if (!is_exact(joint.X_PJ.covariance)) {
+    X_PC.covariance += joint.X_PJ.covariance.transported(X_JC.inverse());
+  }
+  return X_PC;
+}
+
+}  // namespace tfdude
