@@ -21,6 +21,10 @@ class Watcher final : public Transport, public TransportHandler {
     handler_->on_update(update);
     listener_.on_applied();
   }
+  void on_joints(const JointUpdate& update) override {
+    handler_->on_joints(update);
+    listener_.on_applied();
+  }
 
   Result<void> start(TransportHandler& handler) override {
     handler_ = &handler;
@@ -37,6 +41,9 @@ class Watcher final : public Transport, public TransportHandler {
     return transport_->send(to, request, deadline);
   }
   Result<void> send(const std::string& to, const Update& update, Deadline deadline) override {
+    return transport_->send(to, update, deadline);
+  }
+  Result<void> send(const std::string& to, const JointUpdate& update, Deadline deadline) override {
     return transport_->send(to, update, deadline);
   }
   void reply(const PeerId& to, const Reply& reply) override { transport_->reply(to, reply); }
@@ -58,6 +65,7 @@ class Watcher final : public Transport, public TransportHandler {
     handler_->on_lost(partition, incarnation);
   }
   bool owns(std::string_view id) const override { return handler_->owns(id); }
+  bool owns_joint(std::string_view name) const override { return handler_->owns_joint(name); }
 
  private:
   std::unique_ptr<Transport> transport_;

@@ -42,6 +42,8 @@ std::string_view to_string(Errc code) {
       return "too_old";
     case Errc::kStampTaken:
       return "stamp_taken";
+    case Errc::kUnknownJoint:
+      return "unknown_joint";
     case Errc::kChangedMeanwhile:
       return "changed_meanwhile";
   }

@@ -8,6 +8,24 @@
 #include "client/participant.hpp"
 
 namespace tfdude {
+namespace {
+
+Result<JointUpdate> joint_update(const std::vector<std::string>& names,
+                                 const std::vector<double>& positions,
+                                 const std::vector<double>& variances, std::optional<Time> stamp) {
+  if (positions.size() != names.size() || variances.size() != names.size()) {
+    return fail(Errc::kInvalidInput, std::to_string(names.size()) + " joints, but " +
+                                         std::to_string(positions.size()) + " positions and " +
+                                         std::to_string(variances.size()) + " variances");
+  }
+  JointUpdate update{{}, stamp};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    update.joints.push_back({names[i], positions[i], variances[i]});
+  }
+  return update;
+}
+
+}  // namespace
 
 Client::Client(std::unique_ptr<Participant> participant) : participant_(std::move(participant)) {}
 Client::Client(Client&&) noexcept = default;
@@ -70,6 +88,28 @@ Result<void> Client::update(const std::vector<HandleUpdate>& edges, std::optiona
 
 Result<void> Client::publish(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
   return participant_->publish(edges, stamp);
+}
+
+Result<void> Client::publish_joints(const std::vector<std::string>& names,
+                                    const std::vector<double>& positions,
+                                    const std::vector<double>& variances,
+                                    std::optional<Time> stamp) {
+  auto update = joint_update(names, positions, variances, stamp);
+  if (!update) return tl::unexpected(std::move(update.error()));
+  return participant_->publish_joints(*update);
+}
+
+Result<void> Client::update_joints(const std::vector<std::string>& names,
+                                   const std::vector<double>& positions,
+                                   const std::vector<double>& variances,
+                                   std::optional<Time> stamp) {
+  auto update = joint_update(names, positions, variances, stamp);
+  if (!update) return tl::unexpected(std::move(update.error()));
+  return participant_->update_joints(*update);
+}
+
+Result<std::vector<JointInfo>> Client::joints(const std::string& partition) {
+  return participant_->joints(partition);
 }
 
 Result<void> Client::move(const std::string& id, const std::string& parent,
@@ -223,7 +263,7 @@ Result<void> Node::correlate(const std::string& id, const Correlation& correlati
     return fail(Errc::kInvalidInput, "frame " + quote(id) + ": source " + quote(observed->source) +
                                          ": names of this kind are given to observations");
   }
-  return participant_->forest().correlate(id, correlation);
+  return participant_->correlate(id, correlation);
 }
 
 const std::string& Node::partition() const { return participant_->partition_name(); }

@@ -66,6 +66,7 @@ bool Participant::may_appear(Errc code) {
     case Errc::kUnknownEnd:
     case Errc::kUnknownParent:
     case Errc::kUnknownPartition:
+    case Errc::kUnknownJoint:
     case Errc::kNotConnected:
       return true;
     default:

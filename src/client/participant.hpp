@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
 #include "tfdude/partition/latest.hpp"
 #include "tfdude/partition/observing.hpp"
@@ -29,7 +30,7 @@ namespace tfdude {
 
 /// One participant: its forest, directory, partition (if it owns one) and transport, wired together.
 ///
-/// Locks, in the order in which they may be taken: publish_mutex_, structure_mutex_. No lock is held while
+/// Locks, in the order in which they may be taken: publish_mutex_, structure_mutex_, joints_mutex_. No lock is held while
 /// a call waits for others; structure_mutex_ is not held while anything is sent.
 class Participant final : public TransportHandler {
  public:
@@ -53,6 +54,12 @@ class Participant final : public TransportHandler {
                                     std::optional<Time> stamp);
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
                                      std::optional<Time> stamp);
+  // Joints (participant_joints.cpp).
+  [[nodiscard]] Result<void> update_joints(const JointUpdate& update);
+  [[nodiscard]] Result<void> publish_joints(const JointUpdate& update);
+  [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition);
+  /// As Forest::correlate(), but for what a joint says.
+  [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
   template <class Name>
   [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
     auto local = forest_.lookup(a, b);
@@ -132,11 +139,15 @@ class Participant final : public TransportHandler {
   void on_request(const PeerId& from, const Request& request) override;
   void on_reply(const Reply& reply) override { calls_.on_reply(reply); }
   void on_update(const Update& update) override;
+  void on_joints(const JointUpdate& update) override;
   void on_state(const State& state) override;
   void on_page(const Page& page) override;
   void on_presence(const Presence& presence) override;
   void on_lost(const std::string& partition, std::uint64_t incarnation) override;
   [[nodiscard]] bool owns(std::string_view id) const override { return forest_.holds(id); }
+  [[nodiscard]] bool owns_joint(std::string_view name) const override {
+    return partition_ != nullptr && partition_->moves(name);
+  }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -195,12 +206,33 @@ class Participant final : public TransportHandler {
   [[nodiscard]] std::string new_source();
   [[nodiscard]] Result<ObservedPath> ask_observed(ObservePlan& plan);
   [[nodiscard]] Result<bool> revise(std::vector<Part> parts);
-  [[nodiscard]] Result<std::vector<PastInfo>> ask_past(Part part);
+  /// The list that is a partition's answer.
+  template <class Item>
+  [[nodiscard]] Result<std::vector<Item>> ask_list(Part part) {
+    std::vector<Part> parts{std::move(part)};
+    Reply reply = std::move(ask(parts, Clock::now() + options_.timeout).front());
+    if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
+    auto* all = std::get_if<std::vector<Item>>(&reply.body);
+    return all != nullptr ? std::move(*all) : std::vector<Item>();
+  }
+  /// The same by the partition's name, of all that it has.
+  template <class Item, class Body>
+  [[nodiscard]] Result<std::vector<Item>> ask_all(const std::string& partition, const Body& body) {
+    return healed(
+        [&]() -> Result<Part> {
+          const auto owner = directory_.owner(partition);
+          if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+          return route_to(directory_, *owner, Request{0, partition, body});
+        },
+        [&](Part& part) { return ask_list<Item>(std::move(part)); });
+  }
   [[nodiscard]] Result<WatchedPath::Route> plan_watch(const WatchedPath& path);
   [[nodiscard]] Reply answer_watch(const Request& request);
   void look_at_watches();
 
   [[nodiscard]] Result<void> change(std::vector<Part>& parts);
+  [[nodiscard]] Result<void> publish_to(const Part& part, const JointUpdate& share,
+                                        Clock::time_point deadline);
   [[nodiscard]] std::vector<Reply> ask(std::vector<Part>& parts, Clock::time_point deadline);
   [[nodiscard]] Reply answer_here(const Request& request);
   void send(Calls::Call& call, std::size_t entry, const Request& request,
@@ -234,6 +266,8 @@ class Participant final : public TransportHandler {
   std::atomic<bool> out_{false};  // another process has the partition now,
   std::string given_up_;          // and this is why
   const std::shared_ptr<Events> events_ = std::make_shared<Events>();
+  std::mutex joints_mutex_;            // what partition_ knows of joints, refused_joints_
+  std::uint64_t refused_joints_ = 0;   // updates
   std::mutex publish_mutex_;           // store_, saved_commit_
   std::unique_ptr<StateStore> store_;  // null: nothing is kept
   std::uint64_t saved_commit_ = 0;

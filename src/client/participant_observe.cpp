@@ -123,19 +123,7 @@ Result<Observed> Participant::observe(const std::string& a, const std::string& b
 }
 
 Result<std::vector<EdgeConsistency>> Participant::consistency(const std::string& partition) {
-  return healed(
-      [&]() -> Result<Part> {
-        const auto owner = directory_.owner(partition);
-        if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
-        return route_to(directory_, *owner, Request{0, partition, ConsistencyRequest{true}});
-      },
-      [&](Part& part) -> Result<std::vector<EdgeConsistency>> {
-        std::vector<Part> parts{std::move(part)};
-        Reply reply = std::move(ask(parts, Clock::now() + options_.timeout).front());
-        if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
-        auto* all = std::get_if<std::vector<EdgeConsistency>>(&reply.body);
-        return all != nullptr ? std::move(*all) : std::vector<EdgeConsistency>();
-      });
+  return ask_all<EdgeConsistency>(partition, ConsistencyRequest{true});
 }
 
 }  // namespace tfdude

@@ -29,6 +29,12 @@ std::string host_name() {
   return name.data();
 }
 
+// Whether it leaves the structure as it is.
+bool is_of_values(const Request& request) {
+  return std::holds_alternative<UpdateRequest>(request.body) ||
+         std::holds_alternative<JointUpdate>(request.body);
+}
+
 // One line a change of the structure; values change too often for it.
 void log_change(const Request& request, const Reply& reply) {
   std::string what;
@@ -99,6 +105,7 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
   };
   while (!state.frames.empty() && Clock::now() < settle_deadline_ && incomplete()) wait_for_news();
   const std::lock_guard lock(structure_mutex_);
+  const std::lock_guard joints(joints_mutex_);
   auto partition =
       std::make_unique<Partition>(partition_name_, presence_.incarnation, forest_, directory_);
   auto taken = store_ != nullptr ? partition->restore(state, frames, wall_clock())
@@ -150,7 +157,10 @@ Result<void> Participant::commit() {
       news = presence_;
     } else {
       pages = partition_->take_pages();
-      if (store_ != nullptr) unsaved = partition_->take_unsaved();
+      if (store_ != nullptr) {
+        const std::lock_guard joints(joints_mutex_);
+        unsaved = partition_->take_unsaved();
+      }
       auto absent = directory_.absent();
       if (partition_->page_count() != presence_.pages || absent != presence_.absent) {
         presence_.pages = partition_->page_count();
@@ -164,6 +174,7 @@ Result<void> Participant::commit() {
   if (!saved) {
     log().error("{}", saved.error().message);
     const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard joints(joints_mutex_);
     partition_->still_unsaved(unsaved);
   }
   for (const Page& page : pages) transport_->publish(page);
@@ -188,6 +199,7 @@ void Participant::concede() {
   {
     const std::lock_guard lock(structure_mutex_);
     if (out_) return;
+    const std::lock_guard joints(joints_mutex_);
     if (current) changed = partition_->concede(due, wall_clock());
     more = !partition_->concessions().empty();
     tell_changes();
@@ -225,8 +237,15 @@ void Participant::save_values() {
   if (store_ == nullptr || out_) return;
   const auto [edges, commit] = forest_.changed_since(saved_commit_);
   if (edges.empty()) return;
-  if (auto saved = store_->save_values(edges); !saved) {
+  std::vector<StoredJoint> joints;
+  {
+    const std::lock_guard lock(joints_mutex_);
+    joints = partition_->take_changed_joints();
+  }
+  if (auto saved = store_->save_values(edges, joints); !saved) {
     log().error("{}", saved.error().message);
+    const std::lock_guard lock(joints_mutex_);
+    partition_->still_unsaved(joints);
     return;
   }
   saved_commit_ = commit;
@@ -259,12 +278,13 @@ Reply Participant::answer_here(const Request& request) {
   Reply reply;
   {
     const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard joints(joints_mutex_);
     reply = partition_->answer(request, wall_clock());
     if (directory_.contested()) conceder_->ask();
     tell_changes();
   }
   // This process sees the change already; the others are told without making it wait.
-  if (!std::holds_alternative<UpdateRequest>(request.body)) publisher_->ask();
+  if (!is_of_values(request)) publisher_->ask();
   look_at_watches();
   return reply;
 }
@@ -292,6 +312,7 @@ void Participant::on_request(const PeerId& from, const Request& request) {
   Reply reply;
   {
     const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard joints(joints_mutex_);
     if (out_) {
       reply = {request.sequence, 0, Error{Errc::kNotOwner, given_up_}};
     } else {
@@ -303,7 +324,7 @@ void Participant::on_request(const PeerId& from, const Request& request) {
   }
   log_change(request, reply);
   // Before the reply, so that whoever gets that finds the structure changed, and the change stored.
-  if (!std::holds_alternative<UpdateRequest>(request.body) || store_ != nullptr) {
+  if (!is_of_values(request) || store_ != nullptr) {
     if (auto stored = commit(); !stored && std::holds_alternative<Done>(reply.body)) {
       reply.body = Error{Errc::kState, "done, but not stored: " + stored.error().message};
     }

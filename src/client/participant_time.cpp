@@ -175,14 +175,6 @@ std::future<Result<StampedTransform>> Participant::lookup_async(const std::strin
   return future;
 }
 
-Result<std::vector<PastInfo>> Participant::ask_past(Part part) {
-  std::vector<Part> parts{std::move(part)};
-  Reply reply = std::move(ask(parts, Clock::now() + options_.timeout).front());
-  if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
-  auto* pasts = std::get_if<std::vector<PastInfo>>(&reply.body);
-  return pasts != nullptr ? std::move(*pasts) : std::vector<PastInfo>();
-}
-
 Result<std::vector<PastInfo>> Participant::past(const std::string& id) {
   return healed(
       [&]() -> Result<Part> {
@@ -190,17 +182,11 @@ Result<std::vector<PastInfo>> Participant::past(const std::string& id) {
         if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
         return route_to(directory_, info->owner, Request{0, id, PastRequest{}});
       },
-      [&](Part& part) { return ask_past(part); });
+      [&](Part& part) { return ask_list<PastInfo>(std::move(part)); });
 }
 
 Result<std::vector<PastInfo>> Participant::pasts(const std::string& partition) {
-  return healed(
-      [&]() -> Result<Part> {
-        const auto owner = directory_.owner(partition);
-        if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
-        return route_to(directory_, *owner, Request{0, partition, PastRequest{true}});
-      },
-      [&](Part& part) { return ask_past(part); });
+  return ask_all<PastInfo>(partition, PastRequest{true});
 }
 
 // --- pushed paths ---

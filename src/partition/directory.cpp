@@ -105,8 +105,9 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
   for (const auto& [number, page] : pages) {
     for (const PageEntry& entry : page.entries) stays.insert(entry.id);
   }
-  for (const auto& [number, page] : partition.pages) {
+  for (auto& [number, page] : partition.pages) {
     unclaim_all_but(stays, partition, owner, number);
+    replace_joints(page, {}, owner);
   }
   partition.pages.clear();
   // Of each frame the first claim that comes now replaces that of the life before, whichever is the younger.
@@ -134,8 +135,39 @@ void Directory::put_page(Known& partition, Owner owner, const Page& page, Ids& o
   }
   kept.ids.shrink_to_fit();
   kept.notes = page.notes;
+  replace_joints(kept, page.joints, owner);
   kept.epoch = page.epoch;
   note_epoch(partition, page);
+}
+
+void Directory::add_joint(const PageJoint& joint, Owner owner) {
+  joint_owners_[joint.name].insert(owner);
+  if (!joint.follows.empty()) joint_owners_[joint.follows].insert(owner);
+}
+
+void Directory::replace_joints(KeptPage& kept, const std::vector<PageJoint>& joints, Owner owner) {
+  const auto forget = [&](const std::string& name) {
+    const auto known = joint_owners_.find(name);
+    if (known == joint_owners_.end()) return;
+    if (const auto one = known->second.find(owner); one != known->second.end()) {
+      known->second.erase(one);
+    }
+    if (known->second.empty()) joint_owners_.erase(known);
+  };
+  for (const PageJoint& joint : kept.joints) {
+    forget(joint.name);
+    if (!joint.follows.empty()) forget(joint.follows);
+  }
+  kept.joints = joints;
+  for (const PageJoint& joint : joints) add_joint(joint, owner);
+}
+
+std::vector<Owner> Directory::joint_owners(const std::string& name) const {
+  const auto known = joint_owners_.find(name);
+  if (known == joint_owners_.end()) return {};
+  std::vector<Owner> owners(known->second.begin(), known->second.end());
+  owners.erase(std::unique(owners.begin(), owners.end()), owners.end());
+  return owners;
 }
 
 // A page that was replaced on its way comes later than those that were published after it.

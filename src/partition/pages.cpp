@@ -37,7 +37,17 @@ void Pages::erase(const std::string& id) {
   const std::uint32_t number = known->second;
   page_of_.erase(known);
   pages_[number].frames.erase(id);
+  joints_.erase(id);
   changed(number, id);
+}
+
+void Pages::put_joint(const std::string& id, const PageJoint& joint) {
+  joints_[id] = joint;
+  changed(page_of_.at(id), id);
+}
+
+void Pages::erase_joint(const std::string& id) {
+  if (joints_.erase(id) != 0) changed(page_of_.at(id), id);
 }
 
 void Pages::leave(const Note& note) {
@@ -93,11 +103,15 @@ std::vector<Page> Pages::take_changed() {
   std::vector<Page> changed;
   changed.reserve(changed_.size());
   for (const std::uint32_t number : changed_) {
-    Page page{partition_, number, incarnation_, epoch_, {}, {}, {}};
+    Page page{partition_, number, incarnation_, epoch_, {}, {}, {}, {}};
     const Sheet& sheet = pages_[number];
     page.entries.reserve(sheet.frames.size());
-    for (const auto& [id, place] : sheet.frames)
+    for (const auto& [id, place] : sheet.frames) {
       page.entries.push_back({id, place.parent, place.since});
+      if (const auto joint = joints_.find(id); joint != joints_.end()) {
+        page.joints.push_back(joint->second);
+      }
+    }
     for (const auto& [id, note] : sheet.notes) page.notes.push_back(note);
     for (const PageEpoch& one : changed_last_) {
       if (one.number != number && page.others.size() < kOthers) page.others.push_back(one);

@@ -24,10 +24,21 @@ bool are_too_many(const std::vector<Ties>& all) {
 
 Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest,
                      Directory& directory)
-    : name_(std::move(name)), forest_(forest), directory_(directory), pages_(name_, incarnation) {}
+    : name_(std::move(name)),
+      forest_(forest),
+      directory_(directory),
+      pages_(name_, incarnation),
+      joints_(forest) {}
 
 Result<void> Partition::load(const std::vector<FrameSpec>& frames, Time now) {
-  const std::uint64_t since = directory_.next_stamp(now);
+  if (auto taken = take(frames, directory_.next_stamp(now)); !taken) return taken;
+  hang_on_joints(frames, {});
+  pages_.close_epoch();
+  return {};
+}
+
+// All of them or none.
+Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t since) {
   std::vector<std::string> loaded;
   for (const FrameSpec& frame : frames) {
     auto added =
@@ -39,8 +50,29 @@ Result<void> Partition::load(const std::vector<FrameSpec>& frames, Time now) {
     loaded.push_back(frame.id);
   }
   for (const FrameSpec& frame : frames) put(frame.id, frame.parent, since);
-  pages_.close_epoch();
   return {};
+}
+
+// A frame that hangs elsewhere than its description says was moved by hand.
+void Partition::hang_on_joints(const std::vector<FrameSpec>& frames,
+                               const std::vector<StoredJoint>& left) {
+  for (const FrameSpec& frame : frames) {
+    const auto info = forest_.info(frame.id);
+    const bool there = info && info->owner == kHeldHere && info->parent == frame.parent;
+    if (!frame.joint || !there) continue;
+    const std::string& joint = frame.joint->name;
+    const auto known = std::find_if(left.begin(), left.end(),
+                                    [&](const StoredJoint& one) { return one.name == joint; });
+    joints_.put(frame.id, *frame.joint, known != left.end() ? &*known : nullptr);
+    const PageJoint said{joint, frame.joint->mimic ? frame.joint->mimic->joint : ""};
+    pages_.put_joint(frame.id, said);
+    directory_.put_own_joint(said);
+  }
+}
+
+void Partition::let_go(const std::string& id) {
+  joints_.let_go(id);
+  pages_.erase_joint(id);
 }
 
 Reply Partition::answer(const PeerId& peer, const Request& request, Time now) {
@@ -59,6 +91,10 @@ Reply Partition::answer(const Request& request, Time now) {
   reply.sequence = request.sequence;
   if (const auto* asked = std::get_if<ConsistencyRequest>(&request.body)) {
     reply.body = consistency(request.id, asked->all);
+    return reply;
+  }
+  if (std::holds_alternative<JointsRequest>(request.body)) {
+    reply.body = joints_.infos();
     return reply;
   }
   if (auto done = apply(request, now); !done) reply.body = std::move(done.error());
@@ -108,6 +144,7 @@ Result<void> Partition::apply(const Request& request, Time now) {
                                [&](const UpdateRequest& one) { return update(one); },
                                [&](const MoveRequest& one) { return move(request.id, one, now); },
                                [&](const ReviseRequest& one) { return revise(one); },
+                               [&](const JointUpdate& one) { return set_joints(one); },
                                [](const auto&) -> Result<void> { return {}; }},
                     request.body);
 }
@@ -142,6 +179,7 @@ Result<void> Partition::move(const std::string& id, const MoveRequest& request, 
     return tl::unexpected(at_home(std::move(moved.error()), id));
   }
   consistency_.erase(id);
+  let_go(id);
   pages_.put(id, request.parent, since);
   pages_.close_epoch();
   directory_.changes().frame_moved(id, request.parent, name_);
@@ -160,6 +198,7 @@ void Partition::forget(const std::vector<std::string>& removed, Time now) {
   const std::uint64_t since = directory_.next_stamp(now);
   for (auto id = removed.rbegin(); id != removed.rend(); ++id) {
     consistency_.erase(*id);
+    joints_.let_go(*id);
     pages_.erase(*id);
     pages_.leave({*id, since, Note::Kind::kRemoved, {}});
     directory_.changes().frame_removed(*id, name_);
@@ -205,6 +244,26 @@ Result<void> Partition::revise(const ReviseRequest& request) {
     so_far.sum.squares += edge.surprise.squares;
     so_far.sum.expected += edge.surprise.expected;
     so_far.sum.variance += edge.surprise.variance;
+  }
+  return {};
+}
+
+Result<void> Partition::set_joints(const JointUpdate& update) {
+  for (const JointValue& joint : update.joints) {
+    if (joints_.moves(joint.name)) continue;
+    return fail(Errc::kNotOwner,
+                "partition " + quote(name_) + " has no joint " + quote(joint.name) + " (any more)");
+  }
+  const auto moved = joints_.apply(update);
+  if (!moved) return tl::unexpected(moved.error());
+  if (*moved == 0) {
+    return fail(Errc::kInvalidInput, "joint " + quote(update.joints.front().name) +
+                                         " moves no frame: it follows another, or its frame was "
+                                         "removed or moved");
+  }
+  if (!saved_) return {};
+  for (const JointValue& joint : update.joints) {
+    for (std::string& frame : joints_.frames_of(joint.name)) updated_.insert(std::move(frame));
   }
   return {};
 }

@@ -18,6 +18,15 @@ bool same(const FrameSpec& a, const FrameSpec& b) {
          a.X_PC.pose.rotation().coeffs() == b.X_PC.pose.rotation().coeffs();
 }
 
+// What a new description says of the edge, at the position that its joint was left in.
+FrameSpec as_left(FrameSpec frame, const std::vector<StoredJoint>& joints) {
+  for (const StoredJoint& left : joints) {
+    if (!frame.joint || frame.joint->name != left.name) continue;
+    frame.X_PC = value_at(*frame.joint, left.position, left.variance);
+  }
+  return frame;
+}
+
 }  // namespace
 
 Result<void> Partition::restore(const StoredState& state, const std::vector<FrameSpec>& configured,
@@ -48,7 +57,8 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   directory_.find_orphans();
   while (concede(concessions(), now)) {
   }
-  auto taken = reconfigure(state.configured, configured, now);
+  auto taken = reconfigure(state, configured, now);
+  if (taken) hang_on_joints(configured, state.joints);
   pages_.close_epoch();
   return taken;
 }
@@ -74,26 +84,23 @@ void Partition::make_root(const StoredFrame& frame, Time now) {
   tell_conflict({frame.id, since, Note::Kind::kUnhung, name_});
 }
 
-Result<void> Partition::reconfigure(const std::vector<FrameSpec>& before,
+Result<void> Partition::reconfigure(const StoredState& state,
                                     const std::vector<FrameSpec>& configured, Time now) {
-  const auto old = by_id(before);
+  const auto old = by_id(state.configured);
   const auto current = by_id(configured);
   std::vector<FrameSpec> fresh;
   for (const FrameSpec& frame : configured) {
     const auto was = old.find(frame.id);
     if (was != old.end() && same(*was->second, frame)) continue;
-    if (!forest_.holds(frame.id)) {
-      fresh.push_back(frame);
-      continue;
-    }
+    fresh.push_back(as_left(frame, state.joints));
+    if (!forest_.holds(frame.id)) continue;
     // Its parent may come later: as a missing one is allowed for what is loaded, so it is here.
     (void)forest_.release(frame.id);
     pages_.erase(frame.id);
     directory_.released(frame.id);
-    fresh.push_back(frame);
   }
-  if (auto loaded = load(fresh, now); !loaded) return loaded;
-  for (const FrameSpec& frame : before) {
+  if (auto taken = take(fresh, directory_.next_stamp(now)); !taken) return taken;
+  for (const FrameSpec& frame : state.configured) {
     if (current.count(frame.id) != 0) continue;
     if (auto removed = forest_.remove(frame.id)) forget(*removed, now);
   }
@@ -142,6 +149,7 @@ void Partition::give_way(const std::string& id, Owner rival, Time now) {
 void Partition::unhang(const std::string& id, Owner rival, Time now) {
   const std::uint64_t since = directory_.next_stamp(now);
   if (!forest_.move(id, {}, std::nullopt, since)) return;
+  let_go(id);
   pages_.put(id, {}, since);
   directory_.changes().frame_moved(id, {}, name_);
   tell_conflict({id, since, Note::Kind::kUnhung, directory_.name(rival)});
@@ -166,6 +174,7 @@ StateChange Partition::take_unsaved() {
     const auto X_PC = forest_.value(id);
     if (place && X_PC) change.frames.push_back({id, place->parent, *X_PC, place->since});
   }
+  if (!change.empty()) change.joints = joints_.take_changed();
   return change;
 }
 

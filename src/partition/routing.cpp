@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/partition/joints.hpp"
 
 #include "math/finite.hpp"
 
@@ -39,13 +40,6 @@ Result<void> check_size(const Part& part, std::size_t items, const char* what) {
                                        " at once, of at most " + std::to_string(kMaxItems));
 }
 
-Result<void> check_all_reachable(const Directory& directory, const std::vector<Part>& parts) {
-  for (const Part& part : parts) {
-    if (auto ok = check_reachable(directory, part.owner); !ok) return ok;
-  }
-  return {};
-}
-
 // Of the two ends, the one that the segment's owner owns: where it goes up, the lower one.
 const std::string& owned_end(const Forest& forest, const Segment& segment) {
   const auto from = forest.info(segment.from);
@@ -53,6 +47,13 @@ const std::string& owned_end(const Forest& forest, const Segment& segment) {
 }
 
 }  // namespace
+
+Result<void> check_reachable(const Directory& directory, const std::vector<Part>& parts) {
+  for (const Part& part : parts) {
+    if (auto ok = check_reachable(directory, part.owner); !ok) return ok;
+  }
+  return {};
+}
 
 Result<Part> route_to(const Directory& directory, Owner owner, Request request) {
   if (auto ok = check_reachable(directory, owner); !ok) return tl::unexpected(ok.error());
@@ -121,10 +122,29 @@ Result<std::vector<Part>> route_update(const Forest& forest, const Directory& di
     body.edges.push_back(edge);
     body.stamp = stamp;
   }
-  if (auto ok = check_all_reachable(directory, parts); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_reachable(directory, parts); !ok) return tl::unexpected(ok.error());
   for (const Part& part : parts) {
     const auto& share = std::get<UpdateRequest>(part.request.body).edges;
     if (auto ok = check_size(part, share.size(), "edges"); !ok) return tl::unexpected(ok.error());
+  }
+  return parts;
+}
+
+Result<std::vector<Part>> route_joints(const Directory& directory, const JointUpdate& update) {
+  std::vector<Part> parts;
+  for (const JointValue& joint : update.joints) {
+    const auto owners = directory.joint_owners(joint.name);
+    if (owners.empty()) return fail(Errc::kUnknownJoint, "no joint " + quote(joint.name));
+    if (auto ok = check_value(joint); !ok) return tl::unexpected(ok.error());
+    for (const Owner owner : owners) {
+      auto& body = body_for<JointUpdate>(parts, directory, owner, directory.name(owner));
+      body.joints.push_back(joint);
+      body.stamp = update.stamp;
+    }
+  }
+  for (const Part& part : parts) {
+    const auto& share = std::get<JointUpdate>(part.request.body).joints;
+    if (auto ok = check_size(part, share.size(), "joints"); !ok) return tl::unexpected(ok.error());
   }
   return parts;
 }
@@ -166,7 +186,7 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
     body.query = query;
     body.hint = hint;
   }
-  if (auto ok = check_all_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
   for (const Part& part : plan.parts) {
     const auto& share = std::get<LookupRequest>(part.request.body).segments;
     if (auto ok = check_size(part, share.size(), "segments"); !ok)
@@ -200,7 +220,7 @@ Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
     }
     plan.edges = *std::move(edges);
   }
-  if (auto ok = check_all_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
   for (const Part& part : plan.parts) {
     const auto& body = std::get<WatchRequest>(part.request.body);
     const std::size_t items = std::max(body.edges.size(), body.segments.size());

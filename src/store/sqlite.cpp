@@ -104,6 +104,8 @@ std::string Statement::text(int column) const {
   return text != nullptr ? std::string(text, static_cast<std::size_t>(size)) : std::string();
 }
 
+double Statement::real(int column) const { return sqlite3_column_double(handle_.get(), column); }
+
 std::uint64_t Statement::number(int column) const {
   return static_cast<std::uint64_t>(sqlite3_column_int64(handle_.get(), column));
 }
@@ -127,6 +129,8 @@ void Statement::bind(int at, const std::string& text) {
 void Statement::bind(int at, std::uint64_t number) {
   sqlite3_bind_int64(handle_.get(), at, static_cast<sqlite3_int64>(number));
 }
+
+void Statement::bind(int at, double number) { sqlite3_bind_double(handle_.get(), at, number); }
 
 void Statement::bind(int at, const Flat& flat) {
   sqlite3_bind_blob(handle_.get(), at, flat.data(), sizeof flat, SQLITE_TRANSIENT);

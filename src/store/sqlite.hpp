@@ -70,12 +70,14 @@ class Statement {
   [[nodiscard]] Result<void> check_types(std::initializer_list<int> types) const;
   [[nodiscard]] std::string text(int column) const;
   [[nodiscard]] std::uint64_t number(int column) const;
+  [[nodiscard]] double real(int column) const;
   /// @return kState where the column is not as large as one.
   [[nodiscard]] Result<Flat> flat(int column) const;
 
  private:
   void bind(int at, const std::string& text);
   void bind(int at, std::uint64_t number);
+  void bind(int at, double number);
   void bind(int at, const Flat& flat);
 
   struct Finalize {

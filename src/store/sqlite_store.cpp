@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/partition/joints.hpp"
 
 #include "store/sqlite.hpp"
 
@@ -16,7 +17,9 @@ using sqlite::Database;
 using sqlite::Statement;
 
 constexpr std::int64_t kApplication = 0x74666475;  // "tfdu"
-constexpr std::int64_t kFormat = 1;
+constexpr std::int64_t kFormat = 2;
+// The one that knew no joints; it is brought up to date.
+constexpr std::int64_t kFormatBefore = 1;
 constexpr std::size_t kLongestFileName = 200;
 constexpr std::uint64_t kLastCount = 1ULL << 63U;
 
@@ -28,6 +31,10 @@ constexpr const char* kSchema = R"(
   CREATE TABLE notes(id TEXT PRIMARY KEY, since INTEGER NOT NULL, kind INTEGER NOT NULL,
                      rival TEXT NOT NULL) WITHOUT ROWID;
   CREATE TABLE configured(id TEXT PRIMARY KEY, parent TEXT NOT NULL, x_pc BLOB NOT NULL)
+                     WITHOUT ROWID;
+)";
+constexpr const char* kJointsSchema = R"(
+  CREATE TABLE joints(name TEXT PRIMARY KEY, position REAL NOT NULL, variance REAL NOT NULL)
                      WITHOUT ROWID;
 )";
 
@@ -57,7 +64,8 @@ class SqliteStore final : public StateStore {
 
   Result<StoredState> load() override;
   Result<void> save(const StateChange& change) override;
-  Result<void> save_values(const std::vector<ChangedEdge>& edges) override;
+  Result<void> save_values(const std::vector<ChangedEdge>& edges,
+                           const std::vector<StoredJoint>& joints) override;
   Result<void> save_configured(const std::vector<FrameSpec>& frames) override;
 
  private:
@@ -65,14 +73,17 @@ class SqliteStore final : public StateStore {
   [[nodiscard]] tl::unexpected<Error> damaged(const std::string& how) const;
   Result<void> lock();
   Result<void> check(const std::string& partition);
-  Result<void> check_tables();
+  Result<void> check_tables(std::int64_t format);
+  Result<void> bring_up_to_date();
   Result<void> create(const std::string& partition);
   Result<void> prepare();
   Result<void> load_about(StoredState& state);
   Result<void> load_frames(StoredState& state);
   Result<void> load_notes(StoredState& state);
   Result<void> load_configured(StoredState& state);
+  Result<void> load_joints(StoredState& state);
   Result<void> make_ready();
+  Result<void> save_joints(const std::vector<StoredJoint>& joints);
   template <class Write>
   Result<void> transaction(Write write);
 
@@ -86,6 +97,7 @@ class SqliteStore final : public StateStore {
   Statement put_note_;
   Statement set_value_;
   Statement put_configured_;
+  Statement put_joint_;
 };
 
 tl::unexpected<Error> SqliteStore::unusable(const std::string& why) const {
@@ -132,22 +144,22 @@ Result<void> SqliteStore::check(const std::string& partition) {
   if (*application != kApplication) {
     return unusable("belongs to another program: name another directory, or move it away");
   }
-  if (*format != kFormat) {
+  if (*format != kFormat && *format != kFormatBefore) {
     return unusable("has format " + std::to_string(*format) + ", of which this version reads " +
                     std::to_string(kFormat) +
                     ": use the version that wrote it, or move it away to start from the "
                     "configuration");
   }
-  if (auto checked = check_tables(); !checked) return damaged(checked.error().message);
+  if (auto checked = check_tables(*format); !checked) return damaged(checked.error().message);
   const auto of = database_->text("SELECT partition FROM about");
   if (!of) return damaged(of.error().message);
-  if (*of == partition) return {};
+  if (*of == partition) return *format == kFormat ? Result<void>() : bring_up_to_date();
   return unusable("is of partition " + quote(*of) + ", not of " + quote(partition) +
                   ": move it away, or put the right one back");
 }
 
 // The tables are those that were made, and nothing besides: no trigger, view or check that would run.
-Result<void> SqliteStore::check_tables() {
+Result<void> SqliteStore::check_tables(std::int64_t format) {
   std::string schema;
   const char* sql = "SELECT type, sql FROM sqlite_master ORDER BY rowid";
   auto read = each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
@@ -155,7 +167,9 @@ Result<void> SqliteStore::check_tables() {
     return row.check_types({SQLITE_TEXT, SQLITE_TEXT});
   });
   if (!read) return read;
-  if (without_spaces(schema) != without_spaces(kSchema)) {
+  const std::string expected =
+      format == kFormat ? std::string(kSchema) + kJointsSchema : std::string(kSchema);
+  if (without_spaces(schema) != without_spaces(expected)) {
     return fail(Errc::kState, "its tables are not those of a state");
   }
   const auto sound = database_->text("PRAGMA quick_check(1)");
@@ -167,10 +181,19 @@ Result<void> SqliteStore::check_tables() {
   return {};
 }
 
+Result<void> SqliteStore::bring_up_to_date() {
+  return transaction([&]() -> Result<void> {
+    auto done = database_->run(kJointsSchema);
+    const std::string mark = "PRAGMA user_version = " + std::to_string(kFormat);
+    return done ? database_->run(mark.c_str()) : done;
+  });
+}
+
 Result<void> SqliteStore::create(const std::string& partition) {
   auto done = make_ready();
   if (done) done = database_->run("BEGIN IMMEDIATE");
   if (done) done = database_->run(kSchema);
+  if (done) done = database_->run(kJointsSchema);
   if (done) {
     auto about = Statement::prepare(*database_, "INSERT INTO about VALUES(?1, 0)");
     done = about ? about->run(partition) : tl::unexpected(about.error());
@@ -191,6 +214,7 @@ Result<void> SqliteStore::prepare() {
       {&put_note_, "INSERT OR REPLACE INTO notes VALUES(?1, ?2, ?3, ?4)"},
       {&set_value_, "UPDATE frames SET x_pc = ?2 WHERE id = ?1"},
       {&put_configured_, "INSERT INTO configured VALUES(?1, ?2, ?3)"},
+      {&put_joint_, "INSERT OR REPLACE INTO joints VALUES(?1, ?2, ?3)"},
   };
   for (const auto& [statement, sql] : all) {
     auto prepared = Statement::prepare(*database_, sql);
@@ -241,7 +265,7 @@ Result<Note> read_note(const Statement& row, const std::string& before) {
 Result<StoredState> SqliteStore::load() {
   StoredState state;
   for (auto part : {&SqliteStore::load_about, &SqliteStore::load_frames, &SqliteStore::load_notes,
-                    &SqliteStore::load_configured}) {
+                    &SqliteStore::load_configured, &SqliteStore::load_joints}) {
     if (auto loaded = (this->*part)(state); !loaded) return damaged(loaded.error().message);
   }
   return state;
@@ -299,6 +323,19 @@ Result<void> SqliteStore::load_configured(StoredState& state) {
   });
 }
 
+Result<void> SqliteStore::load_joints(StoredState& state) {
+  const char* sql = "SELECT name, position, variance FROM joints ORDER BY name";
+  return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
+    auto ok = row.check_types({SQLITE_TEXT, SQLITE_FLOAT, SQLITE_FLOAT});
+    if (!ok) return ok;
+    StoredJoint joint{row.text(0), row.real(1), row.real(2)};
+    if (ok = check_id(joint.name, "joint"); !ok) return ok;
+    if (ok = check_value({joint.name, joint.position, joint.variance}); !ok) return ok;
+    state.joints.push_back(std::move(joint));
+    return {};
+  });
+}
+
 Result<void> SqliteStore::make_ready() {
   if (written_) return {};
   auto done = database_->run("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;");
@@ -333,17 +370,26 @@ Result<void> SqliteStore::save(const StateChange& change) {
       const auto kind = static_cast<std::uint64_t>(note.kind);
       if (done) done = put_note_.run(note.id, note.since, kind, note.rival);
     }
-    return done;
+    return done ? save_joints(change.joints) : done;
   });
 }
 
-Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges) {
+Result<void> SqliteStore::save_joints(const std::vector<StoredJoint>& joints) {
+  Result<void> done;
+  for (const StoredJoint& joint : joints) {
+    if (done) done = put_joint_.run(joint.name, joint.position, joint.variance);
+  }
+  return done;
+}
+
+Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges,
+                                      const std::vector<StoredJoint>& joints) {
   return transaction([&]() -> Result<void> {
     Result<void> done;
     for (const ChangedEdge& edge : edges) {
       if (done) done = set_value_.run(edge.id, to_flat(edge.X_PC));
     }
-    return done;
+    return done ? save_joints(joints) : done;
   });
 }
 

@@ -180,6 +180,8 @@ class Forest::Impl {
     if (fresh.ties != nullptr && fresh.ties->revised) tie_as_said(fresh);
   }
   void tie_as_said(HeldVersion& fresh);
+  /// Pushes the newest value once more, with other ties.
+  void say_ties(std::uint32_t slot, const Correlation& correlation);
   [[nodiscard]] Result<void> check_revision(const HeldVersion& edge, const Revision& revision,
                                             std::optional<Time> stamp, std::uint64_t seen) const;
   /// With the whole covariance that an edge has but for shares of declared sources: what is kept of an observed one where

@@ -34,6 +34,13 @@ void Forest::Impl::tie_as_said(HeldVersion& fresh) {
   set_ties(fresh, std::move(ties));
 }
 
+void Forest::Impl::say_ties(std::uint32_t slot, const Correlation& correlation) {
+  HeldVersion& fresh = push_held(slot, newest_value(slot).X_PC);
+  std::unique_ptr<EdgeTies> ties;
+  if (!correlation.empty()) ties.reset(new EdgeTies{correlation, correlation, false, 0});
+  set_ties(fresh, std::move(ties));
+}
+
 Result<void> Forest::correlate(std::string_view id, const Correlation& correlation) {
   if (auto ok = check_shares(correlation.shares); !ok) {
     return fail_at("frame " + quote(id), ok.error());
@@ -41,10 +48,7 @@ Result<void> Forest::correlate(std::string_view id, const Correlation& correlati
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
-  HeldVersion& fresh = impl_->push_held(*slot, impl_->newest_value(*slot).X_PC);
-  std::unique_ptr<EdgeTies> ties;
-  if (!correlation.empty()) ties.reset(new EdgeTies{correlation, correlation, false, 0});
-  impl_->set_ties(fresh, std::move(ties));
+  impl_->say_ties(*slot, correlation);
   impl_->commit();
   return {};
 }

@@ -12,6 +12,15 @@ tl::unexpected<Error> unknown_frame(std::string_view id) {
   return fail(Errc::kUnknownFrame, "no frame " + quote(id));
 }
 
+const Correlation* correlation_of(const EdgeUpdate&) { return nullptr; }
+const Correlation* correlation_of(const HandleUpdate& update) { return update.correlation; }
+
+template <class Update>
+Result<void> check_said(const Update& update) {
+  const Correlation* said = correlation_of(update);
+  return said != nullptr ? check_shares(said->shares) : Result<void>();
+}
+
 }  // namespace
 
 const Version* Forest::Impl::newest_named(std::string_view id) const {
@@ -323,6 +332,9 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
     const auto slot = held_slot(edge.*frame);
     if (!slot) return tl::unexpected(slot.error());
     if (!is_finite(edge.X_PC)) return check_value(newest(*slot).name->text, edge.X_PC);
+    if (auto ok = check_said(edge); !ok) {
+      return fail_at("frame " + quote(newest(*slot).name->text), ok.error());
+    }
     to_update_.push_back(*slot);
   }
   const auto at = stamp_for(to_update_.data(), to_update_.size(), stamp);
@@ -330,7 +342,10 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   for (const std::uint32_t slot : to_update_) {
     if (auto ok = check_sample(newest_value(slot), *at); !ok) return ok;
   }
-  for (std::size_t i = 0; i < edges.size(); ++i) push_value(to_update_[i], edges[i].X_PC, *at);
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    push_value(to_update_[i], edges[i].X_PC, *at);
+    if (const Correlation* said = correlation_of(edges[i])) say_ties(to_update_[i], *said);
+  }
   commit();
   return {};
 }

@@ -149,6 +149,24 @@ TEST_CASE("an update reaches the partition that it is sent to, and brings what i
   CHECK(sender.heard().updates.empty());
 }
 
+TEST_CASE("joints reach the partition that they are sent to") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Server arms(join, "arms", 1);
+  arms.recorder.joints = {"elbow"};
+  Server legs(join, "legs", 1);
+  legs.recorder.joints = {"knee"};
+  Listener sender(join);
+  const JointUpdate update{{{"elbow", 0.5, 1e-4}, {"knee", -2, 0}}, time_of(77)};
+  REQUIRE(sender.transport->send("arms", update, Listener::soon(Recorder::kLong)));
+  CHECK(arms.hears([](const Heard& h) { return h.joints.size() == 1; }));
+  const JointUpdate heard = arms.heard().joints.at(0);
+  CHECK(heard.joints.at(0).name == "elbow");
+  CHECK(heard.joints.at(0).position == 0.5);
+  CHECK(heard.joints.at(0).variance == 1e-4);
+  CHECK(heard.stamp == time_of(77));
+  CHECK(legs.heard().joints.empty());
+}
+
 TEST_CASE("what is sent to a partition that nobody serves times out, naming it") {
   const Join join = joined_by(GENERATE(0, 1));
   const Server arms(join, "arms");

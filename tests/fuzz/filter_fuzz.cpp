@@ -26,11 +26,13 @@ class Owner final : public TransportHandler {
   void on_request(const PeerId&, const Request&) override {}
   void on_reply(const Reply&) override {}
   void on_update(const Update&) override {}
+  void on_joints(const JointUpdate&) override {}
   void on_state(const State&) override {}
   void on_page(const Page&) override {}
   void on_presence(const Presence&) override {}
   void on_lost(const std::string&, std::uint64_t) override {}
   [[nodiscard]] bool owns(std::string_view id) const override { return id == "hand" || id == "x"; }
+  [[nodiscard]] bool owns_joint(std::string_view name) const override { return name == "hand"; }
 };
 
 class Filters {

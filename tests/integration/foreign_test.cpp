@@ -1,5 +1,6 @@
 // DDS writers that are not ours: plain ones that stream updates, and ones that send what is not well formed.
 
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +11,7 @@
 #include "support/catch.hpp"
 #include "support/domain_lease.hpp"
 #include "support/foreign_writer.hpp"
+#include "support/joint_frames.hpp"
 #include "support/process.hpp"
 #include "support/random.hpp"
 
@@ -19,6 +21,8 @@ namespace {
 using testing::Bytes;
 using testing::eventually;
 using testing::ForeignWriter;
+using testing::hinge_named;
+using testing::moved_by;
 using testing::RawType;
 
 struct Counted {
@@ -67,6 +71,41 @@ TEST_CASE("a plain writer in partition * reaches the owner, and the others only 
   CHECK_FALSE(moved(other.node, "b"));
 }
 
+TEST_CASE("joints of a plain writer move the edges of who has them") {
+  const testing::DomainLease domain;
+  const auto counters = std::make_shared<FastDdsCounters>();
+  const auto transport = [&](const char* partition) {
+    return *make_fastdds_transport({domain.number(), TFDUDE_LOOPBACK_PROFILE, partition, counters});
+  };
+  auto arm = *Node::open(transport("arm"), "arm",
+                         {{"base", "", {}}, moved_by("fore", "base", hinge_named("elbow"))});
+  const auto to_all = GENERATE(true, false);
+  ForeignWriter writer(domain.number(), "tfdude/joint",
+                       fastdds::edds::TypeSupport(new wire::JointsPubSubType),
+                       to_all ? "*" : "arm");
+  writer.await_readers(1);
+  const auto sample = [](const char* name, double position, std::int64_t stamp) {
+    wire::JointPosition joint;
+    joint.id(name);
+    joint.position(position);
+    joint.variance(1e-4);
+    wire::Joints joints;
+    joints.joints({joint});
+    joints.stamp(stamp);
+    return joints;
+  };
+  wire::Joints of_others = sample("knee", 1, 0);
+  wire::Joints bad = sample("elbow", std::nan(""), 0);
+  wire::Joints good = sample("elbow", 0.5, 1'700'000'000'000'000'000);
+  for (wire::Joints* joints : {&of_others, &bad, &good}) writer.write(joints);
+  CHECK(eventually([&] { return arm.joints("arm")->at(0).position == 0.5; }));
+  const auto X = arm.lookup("base", "fore", Query{});
+  REQUIRE(X);
+  CHECK(nanoseconds(*X->stamp) == 1'700'000'000'000'000'000);
+  CHECK(std::abs(X->covariance.stddev()[5] - 0.01) < 1e-12);
+  CHECK(counters->updates_passed == 2);
+}
+
 namespace {
 
 struct Stranger {
@@ -78,6 +117,7 @@ struct Stranger {
 constexpr Stranger kStrangers[] = {
     {"tfdude/request", "tfdude::wire::Request", false},
     {"tfdude/update", "tfdude::wire::Update", false},
+    {"tfdude/joint", "tfdude::wire::Joints", false},
     {"tfdude/reply", "tfdude::wire::Reply", false},
     {"tfdude/directory", "tfdude::wire::Page", true},
     {"tfdude/presence", "tfdude::wire::Presence", true},

@@ -36,11 +36,13 @@ class MutePartition final : public TransportHandler {
   void on_request(const PeerId&, const Request&) override {}
   void on_reply(const Reply&) override {}
   void on_update(const Update&) override {}
+  void on_joints(const JointUpdate&) override {}
   void on_state(const State&) override {}
   void on_page(const Page&) override {}
   void on_presence(const Presence&) override {}
   void on_lost(const std::string&, std::uint64_t) override {}
   [[nodiscard]] bool owns(std::string_view) const override { return true; }
+  [[nodiscard]] bool owns_joint(std::string_view) const override { return true; }
 
  private:
   std::unique_ptr<Transport> transport_;

@@ -64,6 +64,10 @@ class LatePages final : public Transport, private TransportHandler {
                     Deadline deadline) override {
     return real_->send(partition, update, deadline);
   }
+  Result<void> send(const std::string& partition, const JointUpdate& update,
+                    Deadline deadline) override {
+    return real_->send(partition, update, deadline);
+  }
   void reply(const PeerId& to, const Reply& reply) override { real_->reply(to, reply); }
   Result<void> watch(std::uint64_t group) override { return real_->watch(group); }
   void unwatch(std::uint64_t group) override { real_->unwatch(group); }
@@ -79,6 +83,7 @@ class LatePages final : public Transport, private TransportHandler {
   }
   void on_reply(const Reply& reply) override { handler_->on_reply(reply); }
   void on_update(const Update& update) override { handler_->on_update(update); }
+  void on_joints(const JointUpdate& update) override { handler_->on_joints(update); }
   void on_state(const State& state) override { handler_->on_state(state); }
   void on_page(const Page& page) override {
     const std::lock_guard lock(mutex_);
@@ -91,6 +96,7 @@ class LatePages final : public Transport, private TransportHandler {
     handler_->on_lost(partition, incarnation);
   }
   bool owns(std::string_view id) const override { return handler_->owns(id); }
+  bool owns_joint(std::string_view name) const override { return handler_->owns_joint(name); }
 
   const std::unique_ptr<Transport> real_;
   TransportHandler* handler_ = nullptr;

@@ -14,6 +14,7 @@ class MemoryStore final : public StateStore {
  public:
   Result<StoredState> load() override {
     StoredState state{epoch_, {}, {}, configured_};
+    for (const auto& [name, joint] : joints_) state.joints.push_back(joint);
     for (const auto& [id, frame] : frames_) state.frames.push_back(frame);
     for (const auto& [id, note] : notes_) state.notes.push_back(note);
     return state;
@@ -26,9 +27,12 @@ class MemoryStore final : public StateStore {
     }
     for (const StoredFrame& frame : change.frames) frames_[frame.id] = frame;
     for (const Note& note : change.notes) notes_[note.id] = note;
+    for (const StoredJoint& joint : change.joints) joints_[joint.name] = joint;
     return {};
   }
-  Result<void> save_values(const std::vector<ChangedEdge>& edges) override {
+  Result<void> save_values(const std::vector<ChangedEdge>& edges,
+                           const std::vector<StoredJoint>& joints) override {
+    for (const StoredJoint& joint : joints) joints_[joint.name] = joint;
     for (const ChangedEdge& edge : edges) {
       const auto there = frames_.find(edge.id);
       if (there != frames_.end()) there->second.X_PC = edge.X_PC;
@@ -44,6 +48,7 @@ class MemoryStore final : public StateStore {
   std::uint64_t epoch_ = 0;
   std::map<std::string, StoredFrame> frames_;
   std::map<std::string, Note> notes_;
+  std::map<std::string, StoredJoint> joints_;
   std::vector<FrameSpec> configured_;
 };
 

@@ -23,6 +23,7 @@ struct Heard {
   std::vector<Request> requests;
   std::vector<Reply> replies;
   std::vector<Update> updates;
+  std::vector<JointUpdate> joints;
   std::vector<State> states;
   std::vector<Page> pages;
   std::vector<Presence> presences;
@@ -69,6 +70,8 @@ class Recorder final : public TransportHandler {
   std::function<void()> greet;
   /// Set before the transport starts: the frames held here.
   std::set<std::string, std::less<>> frames;
+  /// Likewise, the joints that move them.
+  std::set<std::string, std::less<>> joints;
 
   /// Waits until condition(heard) holds; false where it does not for long.
   template <class Condition>
@@ -98,6 +101,9 @@ class Recorder final : public TransportHandler {
   void on_update(const Update& update) override {
     record([&] { heard_.updates.push_back(update); });
   }
+  void on_joints(const JointUpdate& update) override {
+    record([&] { heard_.joints.push_back(update); });
+  }
   void on_state(const State& state) override {
     record([&] { heard_.states.push_back(state); });
   }
@@ -112,6 +118,9 @@ class Recorder final : public TransportHandler {
     record([&] { heard_.lost.emplace_back(partition, incarnation); });
   }
   [[nodiscard]] bool owns(std::string_view id) const override { return frames.count(id) != 0; }
+  [[nodiscard]] bool owns_joint(std::string_view name) const override {
+    return joints.count(name) != 0;
+  }
 
  private:
   template <class Record>

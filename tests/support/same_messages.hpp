@@ -69,6 +69,32 @@ inline void check_same(const std::vector<Ties>& actual, const std::vector<Ties>&
   }
 }
 
+// All fields in one text.
+inline std::string listed(const JointUpdate& update) {
+  std::ostringstream text;
+  text.precision(17);
+  for (const JointValue& joint : update.joints) {
+    text << joint.name << ' ' << joint.position << ' ' << joint.variance << ' ';
+  }
+  text << (update.stamp ? nanoseconds(*update.stamp) : 0);
+  return text.str();
+}
+
+// All fields in one text.
+inline std::string listed(const JointInfo& joint) {
+  std::ostringstream text;
+  text.precision(17);
+  text << joint.name << ' ' << joint.frame << ' ' << to_string(joint.type) << ' ' << joint.position
+       << ' ' << joint.variance << ' ' << joint.measured << ' ' << joint.outside << ' '
+       << joint.refused;
+  if (joint.limits) text << " limits " << joint.limits->lower << ' ' << joint.limits->upper;
+  if (joint.mimic) {
+    text << " mimics " << joint.mimic->joint << ' ' << joint.mimic->multiplier << ' '
+         << joint.mimic->offset;
+  }
+  return text.str();
+}
+
 inline void check_same(const Request& actual, const Request& expected) {
   CHECK(actual.sequence == expected.sequence);
   CHECK(actual.id == expected.id);
@@ -107,6 +133,8 @@ inline void check_same(const Request& actual, const Request& expected) {
     check_same(std::get<ReviseRequest>(actual.body), *revise);
   } else if (const auto* asked = std::get_if<ConsistencyRequest>(&expected.body)) {
     CHECK(std::get<ConsistencyRequest>(actual.body).all == asked->all);
+  } else if (const auto* joints = std::get_if<JointUpdate>(&expected.body)) {
+    CHECK(listed(std::get<JointUpdate>(actual.body)) == listed(*joints));
   }
 }
 

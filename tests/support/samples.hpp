@@ -5,14 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "support/cdr.hpp"
 #include "support/random.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/topics.hpp"
 
 // Samples as bytes: what DDS would carry.
 namespace tfdude::testing {
-
-using Bytes = std::vector<std::uint8_t>;
 
 /// What a writer of this type would send.
 template <class Type, class Sample>
@@ -69,7 +68,7 @@ template <class Type, class Sample>
 bool take(const Bytes& bytes) {
   Sample sample;
   if (!deserialized<Type>(bytes, sample)) return false;
-  if constexpr (std::is_same_v<Sample, wire::Update>) {
+  if constexpr (std::is_same_v<Sample, wire::Update> || std::is_same_v<Sample, wire::Joints>) {
     (void)fastdds::from_wire(sample, [](std::string_view) { return true; });
   } else {
     (void)fastdds::from_wire(sample);
@@ -116,6 +115,8 @@ bool take(const Bytes& bytes) {
                      time_of(17),
                      18446744073709551615ULL}},
       {17, "hand", ConsistencyRequest{true}},
+      {18, "arm", JointUpdate{{{"elbow", 0.5, 1e-4}, {"wrist", -2.0, 0}}, time_of(18)}},
+      {19, "arm", JointsRequest{}},
       {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), std::nullopt}}};
 }
 
@@ -149,6 +150,25 @@ bool take(const Bytes& bytes) {
   return past;
 }
 
+[[nodiscard]] inline std::vector<JointInfo> joint_infos() {
+  JointInfo elbow{"elbow", "forearm", JointType::kPrismatic, JointLimits{-0.25, 1.5},
+                  Mimic{"knee", -2.0, 0.125}};
+  elbow.position = 0.75;
+  elbow.variance = 1e-4;
+  elbow.measured = true;
+  elbow.outside = 7;
+  elbow.refused = 18446744073709551615ULL;
+  JointInfo wheel{"wheel", "wheel_link", JointType::kContinuous, {}, {}};
+  return {elbow, wheel};
+}
+
+[[nodiscard]] inline std::vector<JointUpdate> joint_updates() {
+  return {{},
+          {{{"elbow", 0.5, 1e-4}}},
+          {{{"a", 0.0, 0.0}, {"ab", -1.0, 2.0}, {std::string(255, 'j'), 3.0, 4.0}},
+           time_of(1'700'000'000'000'000'000)}};
+}
+
 [[nodiscard]] inline std::vector<Reply> replies(Random& random) {
   return {{1, 10, Done{}},
           {2, 18446744073709551615ULL, Error{Errc::kCycle, "no, \xc3\xa4 \x07 \xff"}},
@@ -167,6 +187,7 @@ bool take(const Bytes& bytes) {
           {9, 1, std::vector<PastInfo>{}},
           {11, 1, tied_values(random)},
           {12, 1, std::vector<EdgeConsistency>{{"hand", 7, 3, {1.5, 2.5, 3.5}}, {}}},
+          {13, 1, joint_infos()},
           {10, 1, std::vector<PastInfo>{past_info("hand"), PastInfo{}}}};
 }
 
@@ -194,7 +215,8 @@ bool take(const Bytes& bytes) {
            9,
            {{"base", "", 18446744073709551615ULL}},
            {{"hand", 5, Note::Kind::kRemoved, ""}, {"base", 6, Note::Kind::kUnhung, "arms"}},
-           {{0, 8}, {4294967295U, 18446744073709551615ULL}}}};
+           {{0, 8}, {4294967295U, 18446744073709551615ULL}},
+           {{"turn", ""}, {std::string(255, 'j'), "turn"}}}};
 }
 
 [[nodiscard]] inline std::vector<Presence> presences() {
@@ -224,6 +246,11 @@ bool take(const Bytes& bytes) {
     kinds.push_back({"update of " + std::to_string(one.edges.size()),
                      serialized<UpdateType>(to_wire(one)), well_formed_update,
                      take<UpdateType, wire::Update>});
+  }
+  for (const JointUpdate& one : joint_updates()) {
+    kinds.push_back({"joints, " + std::to_string(one.joints.size()),
+                     serialized<JointsType>(to_wire(one)), well_formed_joints,
+                     take<JointsType, wire::Joints>});
   }
   for (const State& one : states(random)) {
     kinds.push_back({"state of " + std::to_string(one.entries.size()),

@@ -32,6 +32,7 @@ enum class Errc : std::uint8_t {
   kTooOld = 18,            ///< an edge has no data of that instant any more
   kStampTaken = 19,        ///< update: the edge has another sample of that stamp
   kChangedMeanwhile = 20,  ///< observe: an edge was written while it was observed
+  kUnknownJoint = 21,      ///< no joint of that name
 };
 
 /// The stable snake_case name of a code, as the command line prints it in JSON.

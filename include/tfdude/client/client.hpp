@@ -158,6 +158,28 @@ class Client {
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
                                      std::optional<Time> stamp = std::nullopt);
 
+  /// Streams positions of joints to those who have the frames that they move, unacknowledged: about 40 bytes a joint instead
+  /// of 250 for its edge. The owners compute poses and covariances (moved()), of all joints of the call as one commit; those that
+  /// follow a joint move with it. All are of one stamp, as for update(). Whoever can be reached gets its share, also where
+  /// another cannot.
+  /// @param positions  one a name [rad or m]
+  /// @param variances  of these [rad² or m²]
+  /// @return kUnknownJoint, kInvalidInput (naming the joint: not a number, a negative variance; not one of each a name).
+  [[nodiscard]] Result<void> publish_joints(const std::vector<std::string>& names,
+                                            const std::vector<double>& positions,
+                                            const std::vector<double>& variances,
+                                            std::optional<Time> stamp = std::nullopt);
+
+  /// The same, acknowledged by the owners. @return also kInvalidInput where a joint that is strict is to leave its limits, or
+  ///   none moves a frame; kTooOld, kStampTaken.
+  [[nodiscard]] Result<void> update_joints(const std::vector<std::string>& names,
+                                           const std::vector<double>& positions,
+                                           const std::vector<double>& variances,
+                                           std::optional<Time> stamp = std::nullopt);
+
+  /// A partition's joints, and where they are; of kMaxItems at most. @return kUnknownPartition.
+  [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition);
+
   /// Hangs a frame with all below it under a new parent (empty: makes it a root); it stays its owner's.
   /// @param X_PC  the new edge's value; where absent, the old edge's is kept
   /// @return kUnknownFrame, kUnknownParent, kCycle.
@@ -296,7 +318,8 @@ class Node : public Client {
 
   /// Says how the error of an own edge hangs together with those of others: for all its values, also those of the past,
   /// until it is said anew. Not kept for the next process.
-  /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the source).
+  /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the source; a joint that follows another, or is followed, says
+  ///   it itself).
   [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
 
   [[nodiscard]] const std::string& partition() const;

@@ -49,6 +49,12 @@ class Directory {
   /// @return false where this is not news
   bool lost(std::string_view partition, std::uint64_t incarnation, Time now);
 
+  /// This process's partition has a joint.
+  void put_own_joint(const PageJoint& joint) { add_joint(joint, kHeldHere); }
+
+  /// Who has a joint of this name, or one that follows it; each once. O(log joints).
+  [[nodiscard]] std::vector<Owner> joint_owners(const std::string& name) const;
+
   /// This process released a frame that it held: another's claim to it may show now.
   void released(const std::string& id) { claims_.released(id); }
 
@@ -119,6 +125,7 @@ class Directory {
     std::uint64_t epoch = 0;
     std::string ids;
     std::vector<Note> notes;
+    std::vector<PageJoint> joints;
   };
 
   /// An incarnation that follows one whose structure is here, until all of its own has come.
@@ -149,6 +156,8 @@ class Directory {
   static void note_epoch(Known& partition, const Page& page);
   void put_page(Known& partition, Owner owner, const Page& page, Ids& outdated);
   void unclaim_all_but(const Ids& stays, Known& partition, Owner owner, std::uint32_t number);
+  void add_joint(const PageJoint& joint, Owner owner);
+  void replace_joints(KeptPage& kept, const std::vector<PageJoint>& joints, Owner owner);
   void report_conflicts(const Known& partition, const Page& page);
   void find_orphans(const std::vector<Note>& notes, Owner owner);
 
@@ -158,6 +167,7 @@ class Directory {
   std::vector<Known> partitions_;  // by Owner; the first is the own
   std::unordered_map<std::string, Owner> owners_;
   std::set<Concession> orphans_;  // held frames that hung below one that another removed
+  std::map<std::string, std::multiset<Owner>> joint_owners_;  // once a joint and page
   std::uint64_t latest_stamp_ = 0;
 };
 

@@ -12,6 +12,7 @@
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
 #include "tfdude/math/observation.hpp"
+#include "tfdude/partition/joint_spec.hpp"
 #include "tfdude/tree/forest.hpp"
 
 // What participants say to each other, free of any transport. idl/tfdude.idl has the same on the wire.
@@ -75,6 +76,22 @@ struct ConsistencyRequest {
   bool all = false;
 };
 
+/// Where one joint is.
+struct JointValue {
+  std::string name;
+  double position = 0;  ///< [rad or m]
+  double variance = 0;  ///< of that [rad² or m²]
+};
+
+/// Positions of joints, applied as one commit by each owner of some of the edges that they move. Streamed, or as a request.
+struct JointUpdate {
+  std::vector<JointValue> joints;
+  std::optional<Time> stamp{};  ///< of all of them
+};
+
+/// What is known of all joints of the partition.
+struct JointsRequest {};
+
 /// Asks for the values of edges, now and whenever they change: these are pushed to the group of watchers that have
 /// asked for the same, until it is not renewed for kWatchLease.
 struct WatchRequest {
@@ -98,8 +115,23 @@ struct Request {
   /// The frame concerned, by which a reader filters: one that the partition owns, or the new one of an add.
   std::string id;
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
-               PastRequest, ReviseRequest, ConsistencyRequest>
+               PastRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest>
       body;
+};
+
+/// A joint, and where it is.
+struct JointInfo {
+  std::string name;
+  std::string frame;  ///< the one that it moves
+  JointType type = JointType::kRevolute;
+  std::optional<JointLimits> limits;
+  std::optional<Mimic> mimic;
+  double position = 0;  ///< [rad or m]
+  double variance = 0;  ///< [rad² or m²]
+  bool measured =
+      false;  ///< by a sample, of this process or the one before; else it is an assumption
+  std::uint64_t outside = 0;  ///< positions outside the limits that were applied,
+  std::uint64_t refused = 0;  ///< or refused
 };
 
 /// Values of watched edges, in the order in which they became what they are.
@@ -127,7 +159,7 @@ struct Reply {
   std::uint64_t epoch = 0;
   /// Done, or why not; or what was asked for.
   std::variant<Done, Error, SegmentValues, State, std::vector<PastInfo>,
-               std::vector<EdgeConsistency>>
+               std::vector<EdgeConsistency>, std::vector<JointInfo>>
       body;
 };
 
@@ -146,6 +178,16 @@ struct PageEntry {
   /// When the frame was hung there, by its owner's count (Directory::next_stamp): of two claims that
   /// cannot both hold, the older does.
   std::uint64_t since = 0;
+};
+
+/// That a joint moves a frame of a page.
+struct PageJoint {
+  std::string name;
+  std::string follows;  ///< the joint that it mimics; empty: none
+
+  friend bool operator==(const PageJoint& a, const PageJoint& b) {
+    return a.name == b.name && a.follows == b.follows;
+  }
 };
 
 /// What became of a frame that is not where it was: for those who were away meanwhile, and for those who
@@ -184,6 +226,7 @@ struct Page {
   std::vector<Note> notes{};
   /// The other pages that were changed last: once these have come, too, all of the structure up to the page's epoch has.
   std::vector<PageEpoch> others{};
+  std::vector<PageJoint> joints{};
 };
 
 /// A partition that was there and is not reachable.

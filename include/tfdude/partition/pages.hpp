@@ -41,6 +41,10 @@ class Pages {
 
   void erase(const std::string& id);
 
+  /// Notes which joint moves a frame that was put.
+  void put_joint(const std::string& id, const PageJoint& joint);
+  void erase_joint(const std::string& id);
+
   /// Leaves word of a frame, in place of an earlier one.
   void leave(const Note& note);
 
@@ -84,6 +88,7 @@ class Pages {
   std::vector<Sheet> pages_;
   PageOf page_of_;
   PageOf page_of_note_;
+  std::map<std::string, PageJoint> joints_;  // by frame
   // In the order in which they were left; what stands here no longer was replaced since.
   std::deque<std::pair<std::string, std::uint64_t>> oldest_notes_;
   std::set<std::uint32_t> with_room_;

@@ -9,6 +9,7 @@
 
 #include "tfdude/base/time.hpp"
 #include "tfdude/partition/directory.hpp"
+#include "tfdude/partition/joints.hpp"
 #include "tfdude/partition/messages.hpp"
 #include "tfdude/partition/pages.hpp"
 #include "tfdude/partition/reply_cache.hpp"
@@ -20,7 +21,8 @@ namespace tfdude {
 /// The rules of an owner: what it answers to each request, and what it publishes of its structure.
 ///
 /// @par Thread safety  The caller serializes all functions that change the structure, answer() among
-///   them, with those of the directory; answer_lookup(), answer_past() and apply() may run beside anything.
+///   them, with those of the directory; answer_lookup(), answer_past(), moves() and apply() of edges may run beside
+///   anything. What has to do with joints, answer() among it, is serialized, too, and need not be with the directory.
 class Partition {
  public:
   Partition(std::string name, std::uint64_t incarnation, Forest& forest, Directory& directory);
@@ -55,6 +57,18 @@ class Partition {
   /// @return how many
   std::size_t apply(const Update& update);
 
+  /// Applies those joints of a stream that are owned here, as one commit. @return as Joints::apply()
+  [[nodiscard]] Result<std::size_t> apply(const JointUpdate& update) {
+    return joints_.apply(update);
+  }
+  /// Whether a joint of that name, or one that follows it, is owned here. Takes no lock.
+  [[nodiscard]] bool moves(std::string_view joint) const { return joints_.moves(joint); }
+  /// Whether the frame's error is that of a joint that others follow, or that follows another.
+  [[nodiscard]] bool is_coupled(std::string_view frame) const { return joints_.is_coupled(frame); }
+
+  /// The joints that have got positions since the last call.
+  [[nodiscard]] std::vector<StoredJoint> take_changed_joints() { return joints_.take_changed(); }
+
   /// What would have to be given up as far as the directory knows now. O(contested frames).
   [[nodiscard]] std::set<Concession> concessions() const { return directory_.concessions(); }
 
@@ -73,7 +87,9 @@ class Partition {
   /// It could not be saved: it will be taken again.
   void still_unsaved(const StateChange& change) {
     updated_.insert(change.erased.begin(), change.erased.end());
+    still_unsaved(change.joints);
   }
+  void still_unsaved(const std::vector<StoredJoint>& joints) { joints_.still_changed(joints); }
 
  private:
   [[nodiscard]] Result<void> apply(const Request& request, Time now);
@@ -82,11 +98,15 @@ class Partition {
   [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request, Time now);
   [[nodiscard]] Result<void> update(const UpdateRequest& request);
   [[nodiscard]] Result<void> revise(const ReviseRequest& request);
+  [[nodiscard]] Result<void> set_joints(const JointUpdate& update);
+  [[nodiscard]] Result<void> take(const std::vector<FrameSpec>& frames, std::uint64_t since);
+  void hang_on_joints(const std::vector<FrameSpec>& frames, const std::vector<StoredJoint>& left);
+  void let_go(const std::string& id);
   [[nodiscard]] std::vector<EdgeConsistency> consistency(const std::string& id, bool all) const;
   bool concede(const Concession& concession, Time now);
   [[nodiscard]] bool hang_again(const StoredFrame& frame);
   void make_root(const StoredFrame& frame, Time now);
-  [[nodiscard]] Result<void> reconfigure(const std::vector<FrameSpec>& before,
+  [[nodiscard]] Result<void> reconfigure(const StoredState& state,
                                          const std::vector<FrameSpec>& configured, Time now);
   void put(const std::string& id, const std::string& parent, std::uint64_t since);
   void forget(const std::vector<std::string>& removed, Time now);
@@ -99,6 +119,7 @@ class Partition {
   Forest& forest_;
   Directory& directory_;
   Pages pages_;
+  Joints joints_;
   ReplyCache replies_;
   std::map<std::string, EdgeConsistency> consistency_;  // of edges that were observed
   bool saved_ = false;

@@ -51,6 +51,15 @@ struct LookupPlan {
                                                      const std::vector<EdgeUpdate>& edges,
                                                      std::optional<Time> stamp = std::nullopt);
 
+/// All who have one of the joints, or one that follows it, whether they are reachable or not.
+/// @return kUnknownJoint, kInvalidInput.
+[[nodiscard]] Result<std::vector<Part>> route_joints(const Directory& directory,
+                                                     const JointUpdate& update);
+
+/// @return kUnreachable, naming the first part's partition that is not.
+[[nodiscard]] Result<void> check_reachable(const Directory& directory,
+                                           const std::vector<Part>& parts);
+
 /// @return kUnknownFrame, kUnknownParent, kCycle, kUnreachable.
 [[nodiscard]] Result<Part> route_move(const Forest& forest, const Directory& directory,
                                       const std::string& id, const MoveRequest& request);

@@ -29,6 +29,13 @@ struct StoredFrame {
   std::uint64_t since = 0;
 };
 
+/// Where a joint was, by its last sample.
+struct StoredJoint {
+  std::string name;
+  double position = 0;
+  double variance = 0;
+};
+
 /// All that outlives a partition's process.
 struct StoredState {
   std::uint64_t epoch = 0;
@@ -37,6 +44,7 @@ struct StoredState {
   /// What the configuration said when it was last taken: what it says since differs where somebody
   /// has changed it.
   std::vector<FrameSpec> configured;
+  std::vector<StoredJoint> joints{};
 };
 
 /// What to change in a stored state.
@@ -45,6 +53,7 @@ struct StateChange {
   std::vector<std::string> erased;  ///< frames and notes; before the rest
   std::vector<StoredFrame> frames;
   std::vector<Note> notes;
+  std::vector<StoredJoint> joints{};  ///< new positions
 
   [[nodiscard]] bool empty() const { return erased.empty(); }
 };
@@ -60,8 +69,9 @@ class StateStore {
   /// All of it or nothing; what was saved survives the end of the process at any instant. @return kState.
   [[nodiscard]] virtual Result<void> save(const StateChange& change) = 0;
 
-  /// New values of frames that are there; of the others it is not told.
-  [[nodiscard]] virtual Result<void> save_values(const std::vector<ChangedEdge>& edges) = 0;
+  /// New values of frames that are there, and of joints; of the others it is not told.
+  [[nodiscard]] virtual Result<void> save_values(const std::vector<ChangedEdge>& edges,
+                                                 const std::vector<StoredJoint>& joints) = 0;
 
   [[nodiscard]] virtual Result<void> save_configured(const std::vector<FrameSpec>& frames) = 0;
 };

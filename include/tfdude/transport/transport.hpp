@@ -22,6 +22,7 @@ class TransportHandler {
   virtual void on_request(const PeerId& from, const Request& request) = 0;
   virtual void on_reply(const Reply& reply) = 0;
   virtual void on_update(const Update& update) = 0;
+  virtual void on_joints(const JointUpdate& update) = 0;
   /// Of a group that is watched.
   virtual void on_state(const State& state) = 0;
   virtual void on_page(const Page& page) = 0;
@@ -31,6 +32,8 @@ class TransportHandler {
   virtual void on_lost(const std::string& partition, std::uint64_t incarnation) = 0;
   /// Whether a frame is held here: the filter before requests and updates. Must be quick and take no lock.
   [[nodiscard]] virtual bool owns(std::string_view id) const = 0;
+  /// The same of a joint.
+  [[nodiscard]] virtual bool owns_joint(std::string_view name) const = 0;
 };
 
 /// How participants reach each other; free of any IPC's words.
@@ -66,6 +69,9 @@ class Transport {
   [[nodiscard]] virtual Result<void> send(const std::string& partition, const Request& request,
                                           Deadline deadline) = 0;
   [[nodiscard]] virtual Result<void> send(const std::string& partition, const Update& update,
+                                          Deadline deadline) = 0;
+
+  [[nodiscard]] virtual Result<void> send(const std::string& partition, const JointUpdate& update,
                                           Deadline deadline) = 0;
 
   virtual void reply(const PeerId& to, const Reply& reply) = 0;

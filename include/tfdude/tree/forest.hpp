@@ -42,6 +42,8 @@ struct EdgeUpdate {
 struct HandleUpdate {
   Handle frame;
   Transform X_PC;
+  /// As Forest::correlate() with it, in the same commit; null: as before.
+  const Correlation* correlation = nullptr;
 };
 
 /// How an edge behaves in time.
@@ -210,6 +212,7 @@ class Forest {
                                     std::optional<Time> stamp = std::nullopt);
 
   /// Gives many edges new values as one commit, and of one stamp: all or, on an error, none; no reader sees a part.
+  /// @return kInvalidInput also where a correlation is none, naming the source.
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges,
                                     std::optional<Time> stamp = std::nullopt);
   [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges,

@@ -107,6 +107,12 @@ std::string_view CdrWalk::edge() {
   return child;
 }
 
+std::string_view CdrWalk::joint() {
+  const std::string_view name = id();
+  skip(2 * 8, 8);
+  return name;
+}
+
 }  // namespace detail
 
 namespace {
@@ -149,7 +155,12 @@ void request_body(CdrWalk& walk) {
       break;
     case 9:   // past
     case 11:  // consistency
+    case 13:  // joint states
       walk.octet();
+      break;
+    case 12:  // joints
+      walk.sequence([&] { walk.joint(); });
+      walk.skip(8, 8);
       break;
     case 10:  // revise
       walk.skip(2 * 8, 8);
@@ -218,6 +229,15 @@ bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
         walk.id();
       });
       break;
+    case 9:
+      walk.sequence([&] {
+        walk.skip(8 * 8, 8);
+        walk.skip(3, 1);
+        walk.id();
+        walk.id();
+        walk.id();
+      });
+      break;
     default:
       return false;
   }
@@ -233,6 +253,13 @@ bool well_formed_state(const std::uint8_t* data, std::size_t size) {
 bool well_formed_update(const std::uint8_t* data, std::size_t size) {
   CdrWalk walk(data, size);
   walk.sequence([&] { walk.edge(); });
+  walk.skip(8, 8);
+  return walk.good();
+}
+
+bool well_formed_joints(const std::uint8_t* data, std::size_t size) {
+  CdrWalk walk(data, size);
+  walk.sequence([&] { walk.joint(); });
   walk.skip(8, 8);
   return walk.good();
 }
@@ -257,6 +284,10 @@ bool well_formed_page(const std::uint8_t* data, std::size_t size) {
   walk.sequence([&] {
     walk.skip(8, 8);
     walk.ulong();
+  });
+  walk.sequence([&] {
+    walk.id();
+    walk.id();
   });
   return walk.good();
 }

@@ -14,6 +14,7 @@ namespace tfdude::fastdds {
 [[nodiscard]] bool well_formed_request(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_reply(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_update(const std::uint8_t* data, std::size_t size);
+[[nodiscard]] bool well_formed_joints(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_state(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_page(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_presence(const std::uint8_t* data, std::size_t size);
@@ -31,6 +32,10 @@ struct RequestHead {
 /// @return whether it did; false if the update is not well formed so far.
 template <class Predicate>
 [[nodiscard]] bool any_edge(const std::uint8_t* data, std::size_t size, Predicate predicate);
+
+/// The same with the name of each joint of a sample of joints.
+template <class Predicate>
+[[nodiscard]] bool any_joint(const std::uint8_t* data, std::size_t size, Predicate predicate);
 
 /// FNV-1a, 32 bits: how a request names the partition that it is addressed to.
 [[nodiscard]] constexpr std::uint32_t addressee_of(std::string_view partition) {
@@ -68,6 +73,7 @@ class CdrWalk {
   void revised_edge();
   void state();
   std::string_view edge();
+  std::string_view joint();
 
  private:
   const std::uint8_t* data_;
@@ -79,16 +85,32 @@ class CdrWalk {
 
 }  // namespace detail
 
+namespace detail {
+
+// A stamped sequence, the element of which reads its id.
 template <class Predicate>
-bool any_edge(const std::uint8_t* data, std::size_t size, Predicate predicate) {
-  detail::CdrWalk walk(data, size);
+bool any_id(const std::uint8_t* data, std::size_t size, std::string_view (CdrWalk::*element)(),
+            Predicate predicate) {
+  CdrWalk walk(data, size);
   bool found = false;
   walk.sequence([&] {
-    const std::string_view id = walk.edge();
+    const std::string_view id = (walk.*element)();
     if (!found && walk.good()) found = predicate(id);
   });
   walk.skip(8, 8);
   return found && walk.good();
+}
+
+}  // namespace detail
+
+template <class Predicate>
+bool any_edge(const std::uint8_t* data, std::size_t size, Predicate predicate) {
+  return detail::any_id(data, size, &detail::CdrWalk::edge, predicate);
+}
+
+template <class Predicate>
+bool any_joint(const std::uint8_t* data, std::size_t size, Predicate predicate) {
+  return detail::any_id(data, size, &detail::CdrWalk::joint, predicate);
 }
 
 }  // namespace tfdude::fastdds

@@ -18,6 +18,7 @@ void write_wire(const Request& request, std::string_view partition, wire::Reques
 [[nodiscard]] wire::Request to_wire(const Request& request, std::string_view partition);
 [[nodiscard]] wire::Reply to_wire(const Reply& reply);
 [[nodiscard]] wire::Update to_wire(const Update& update);
+[[nodiscard]] wire::Joints to_wire(const JointUpdate& update);
 [[nodiscard]] wire::State to_wire(const State& state);
 [[nodiscard]] wire::Page to_wire(const Page& page);
 [[nodiscard]] wire::Presence to_wire(const Presence& presence);
@@ -27,6 +28,9 @@ void write_wire(const Request& request, std::string_view partition, wire::Reques
 /// Only those edges that the predicate accepts by their id; the others are not even checked.
 [[nodiscard]] Result<Update> from_wire(const wire::Update& sample,
                                        const std::function<bool(std::string_view)>& accept);
+/// Likewise, by the name of the joint.
+[[nodiscard]] Result<JointUpdate> from_wire(const wire::Joints& sample,
+                                            const std::function<bool(std::string_view)>& accept);
 [[nodiscard]] Result<State> from_wire(const wire::State& sample);
 [[nodiscard]] Result<Page> from_wire(const wire::Page& sample);
 [[nodiscard]] Result<Presence> from_wire(const wire::Presence& sample);

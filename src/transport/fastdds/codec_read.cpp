@@ -181,6 +181,17 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
     case kConsistency:
       request.body = ConsistencyRequest{body.consistency() != 0};
       return {};
+    case kJoints: {
+      auto joints =
+          tfdude::fastdds::from_wire(body.joints(), [](std::string_view) { return true; });
+      if (!joints) return tl::unexpected(std::move(joints.error()));
+      if (joints->joints.empty()) return fail(Errc::kInvalidInput, "an update of no joint");
+      request.body = *std::move(joints);
+      return {};
+    }
+    case kJointStates:
+      request.body = JointsRequest{};
+      return {};
     default:
       return fail(Errc::kInvalidInput, "no request of kind " + std::to_string(body._d()));
   }
@@ -252,6 +263,23 @@ EdgeConsistency read_consistency(const wire::Consistency& body) {
           {body.squares(), body.expected(), body.variance()}};
 }
 
+JointInfo read_joint(const wire::JointState& body) {
+  JointInfo joint;
+  joint.name = printable(text(body.name()));
+  joint.frame = printable(text(body.frame()));
+  joint.type = static_cast<JointType>(body.type());
+  if (body.limited() != 0) joint.limits = JointLimits{body.lower(), body.upper()};
+  if (const auto leader = printable(text(body.follows())); !leader.empty()) {
+    joint.mimic = Mimic{leader, body.multiplier(), body.offset()};
+  }
+  joint.position = body.position();
+  joint.variance = body.variance();
+  joint.measured = body.measured() != 0;
+  joint.outside = body.outside();
+  joint.refused = body.refused();
+  return joint;
+}
+
 PastInfo read_past(const wire::Past& body) {
   const auto stamp = [](std::int64_t ns) {
     return ns > 0 ? std::optional<Time>(time_of(ns)) : std::nullopt;
@@ -309,6 +337,12 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
       reply.body = std::move(all);
       return {};
     }
+    case kJointInfos: {
+      std::vector<JointInfo> joints;
+      for (const wire::JointState& one : body.joint_states()) joints.push_back(read_joint(one));
+      reply.body = std::move(joints);
+      return {};
+    }
     default:
       return fail(Errc::kInvalidInput, "no reply of kind " + std::to_string(body._d()));
   }
@@ -359,6 +393,22 @@ Result<Update> from_wire(const wire::Update& sample,
     auto read = edge_from_wire(text(edge.id()), edge.x_pc());
     if (!read) return tl::unexpected(std::move(read.error()));
     update.edges.push_back(*std::move(read));
+  }
+  return update;
+}
+
+Result<JointUpdate> from_wire(const wire::Joints& sample,
+                              const std::function<bool(std::string_view)>& accept) {
+  JointUpdate update;
+  const auto stamp = stamp_from_wire(sample.stamp(), "the stamp of an update of joints");
+  if (!stamp) return tl::unexpected(stamp.error());
+  update.stamp = *stamp;
+  for (const wire::JointPosition& joint : sample.joints()) {
+    if (!accept(text(joint.id()))) continue;
+    update.joints.push_back({string_of(joint.id()), joint.position(), joint.variance()});
+    if (auto ok = check_id(update.joints.back().name, "joint"); !ok) {
+      return tl::unexpected(std::move(ok.error()));
+    }
   }
   return update;
 }

@@ -32,6 +32,7 @@ Result<Page> from_wire(const wire::Page& sample) {
             sample.epoch(),
             {},
             {},
+            {},
             {}};
   if (auto ok = check_partition_name(page.partition); !ok) {
     return tl::unexpected(std::move(ok.error()));
@@ -54,6 +55,14 @@ Result<Page> from_wire(const wire::Page& sample) {
   }
   for (const wire::PageEpoch& one : sample.others()) {
     page.others.push_back({one.number(), one.epoch()});
+  }
+  for (const wire::PageJoint& one : sample.joints()) {
+    PageJoint joint{string_of(one.name()), string_of(one.follows())};
+    if (auto ok = check_id(joint.name, "joint"); !ok) return tl::unexpected(std::move(ok.error()));
+    if (auto ok = check_id(joint.follows, "joint"); !joint.follows.empty() && !ok) {
+      return tl::unexpected(std::move(ok.error()));
+    }
+    page.joints.push_back(std::move(joint));
   }
   return page;
 }

@@ -147,6 +147,8 @@ struct BodyWriter {
     for (const ReviseRequest::Edge& edge : revise.edges) body.edges().push_back(wire_revised(edge));
     out.revise(std::move(body));
   }
+  void operator()(const JointUpdate& update) { out.joints(to_wire(update)); }
+  void operator()(const JointsRequest&) { out.joint_states(1); }
   void operator()(const ConsistencyRequest& asked) { out.consistency(asked.all ? 1 : 0); }
 };
 
@@ -188,6 +190,27 @@ wire::Past wire_past(const PastInfo& past) {
   body.refused_old(past.refused_old);
   body.refused_equal(past.refused_equal);
   body.id(past.id);
+  return body;
+}
+
+wire::JointState wire_joint(const JointInfo& joint) {
+  const JointLimits limits = joint.limits.value_or(JointLimits{});
+  const Mimic mimic = joint.mimic.value_or(Mimic{});
+  wire::JointState body;
+  body.position(joint.position);
+  body.variance(joint.variance);
+  body.lower(limits.lower);
+  body.upper(limits.upper);
+  body.multiplier(mimic.multiplier);
+  body.offset(mimic.offset);
+  body.outside(joint.outside);
+  body.refused(joint.refused);
+  body.type(static_cast<std::uint8_t>(joint.type));
+  body.limited(joint.limits ? 1 : 0);
+  body.measured(joint.measured ? 1 : 0);
+  body.name(joint.name);
+  body.frame(joint.frame);
+  body.follows(mimic.joint);
   return body;
 }
 
@@ -244,6 +267,12 @@ struct ReplyWriter {
     }
     out.consistency(std::move(body));
   }
+  void operator()(const std::vector<JointInfo>& joints) {
+    std::vector<wire::JointState> body;
+    for (std::size_t i = 0; i < joints.size() && i < kMaxItems; ++i)
+      body.push_back(wire_joint(joints[i]));
+    out.joint_states(std::move(body));
+  }
 };
 
 }  // namespace
@@ -260,6 +289,18 @@ wire::Update to_wire(const Update& update) {
   wire::Update sample;
   sample.edges().reserve(update.edges.size());
   for (const EdgeUpdate& edge : update.edges) sample.edges().push_back(wire_edge(edge));
+  sample.stamp(wire_stamp(update.stamp));
+  return sample;
+}
+
+wire::Joints to_wire(const JointUpdate& update) {
+  wire::Joints sample;
+  sample.joints().resize(update.joints.size());
+  for (std::size_t i = 0; i < update.joints.size(); ++i) {
+    sample.joints()[i].id(update.joints[i].name);
+    sample.joints()[i].position(update.joints[i].position);
+    sample.joints()[i].variance(update.joints[i].variance);
+  }
   sample.stamp(wire_stamp(update.stamp));
   return sample;
 }
@@ -304,6 +345,11 @@ wire::Page to_wire(const Page& page) {
   for (std::size_t i = 0; i < page.others.size(); ++i) {
     sample.others()[i].number(page.others[i].number);
     sample.others()[i].epoch(page.others[i].epoch);
+  }
+  sample.joints().resize(page.joints.size());
+  for (std::size_t i = 0; i < page.joints.size(); ++i) {
+    sample.joints()[i].name(page.joints[i].name);
+    sample.joints()[i].follows(page.joints[i].follows);
   }
   return sample;
 }

@@ -79,9 +79,10 @@ Result<void> FastDdsTransport::create_participant() {
   topics_.reply = create_topic(kReplyTopic, edds::TypeSupport(new ReplyType));
   topics_.request = create_topic(kRequestTopic, edds::TypeSupport(new RequestType));
   topics_.update = create_topic(kUpdateTopic, edds::TypeSupport(new UpdateType));
+  topics_.joint = create_topic(kJointTopic, edds::TypeSupport(new JointsType));
   topics_.state = create_topic(kStateTopic, edds::TypeSupport(new StateType));
   for (const auto* topic : {topics_.presence, topics_.directory, topics_.reply, topics_.request,
-                            topics_.update, topics_.state}) {
+                            topics_.update, topics_.joint, topics_.state}) {
     if (topic == nullptr) return not_created("the topics");
   }
   return {};
@@ -162,7 +163,9 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
   }
   auto* requests = create_filtered(topics_.request, partition);
   auto* updates = create_filtered(topics_.update, partition);
-  if (requests == nullptr || updates == nullptr) return not_created("the filtered topics");
+  auto* joints = create_filtered(topics_.joint, partition);
+  if (requests == nullptr || updates == nullptr || joints == nullptr)
+    return not_created("the filtered topics");
   // A peer that meets our reader is going to ask: its reply's writer is made while its request travels.
   const auto asker_matched = [this](const Prefix& from, int change) {
     if (change > 0) worker_->post([this, peer = peer_of(from)] { open_reply_outlet(peer); });
@@ -176,7 +179,12 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
       *participant_, *updates, partition, "update_reader",
       Inlet<wire::Update>::Calls{
           [this](const wire::Update& sample, const Prefix&) { take_update(sample); }, nullptr});
-  return requests_->good() && updates_->good() ? Result<void>() : not_created("the readers");
+  joints_ = std::make_unique<Inlet<wire::Joints>>(
+      *participant_, *joints, partition, "update_reader",
+      Inlet<wire::Joints>::Calls{
+          [this](const wire::Joints& sample, const Prefix&) { take_joints(sample); }, nullptr});
+  const bool good = requests_->good() && updates_->good() && joints_->good();
+  return good ? Result<void>() : not_created("the readers");
 }
 
 // A server passes on what it hears several times a second, one step of the discovery at a time.
@@ -189,6 +197,7 @@ void FastDdsTransport::stop() {
   participant_->set_listener(nullptr);
   requests_.reset();
   updates_.reset();
+  joints_.reset();
   replies_.reset();
   pages_.reset();
   beats_.reset();
@@ -198,6 +207,7 @@ void FastDdsTransport::stop() {
   reply_outlets_.clear();
   request_outlets_.clear();
   update_outlets_.clear();
+  joint_outlets_.clear();
   directory_outlet_.reset();
   beat_outlet_.reset();
   presence_outlet_.reset();
@@ -264,6 +274,13 @@ Result<void> FastDdsTransport::send(const std::string& partition, const Update& 
   return send(*to, partition, &sample, deadline);
 }
 
+Result<void> FastDdsTransport::send(const std::string& partition, const JointUpdate& update,
+                                    Deadline deadline) {
+  const auto to = outlet(joint_outlets_, topics_.joint, partition, "update_writer");
+  wire::Joints sample = to_wire(update);
+  return send(*to, partition, &sample, deadline);
+}
+
 Result<void> FastDdsTransport::send(Outlet& outlet, const std::string& partition, void* sample,
                                     Deadline deadline) const {
   if (!outlet.good()) return not_created("a writer");
@@ -326,60 +343,6 @@ void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
     }
     while (outlet.use_count() > 1) std::this_thread::yield();
   });
-}
-
-// --- receiving ---
-
-void FastDdsTransport::take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from) {
-  const PeerId peer = peer_of(from);
-  auto request = from_wire(sample);
-  if (request) {
-    handler_->on_request(peer, *request);
-    return;
-  }
-  log_refused(kRequestTopic, request.error());
-  reply(peer, Reply{sample.sequence_number(), 0, std::move(request.error())});
-}
-
-void FastDdsTransport::take_update(const wire::Update& sample) {
-  const auto update = from_wire(sample, [this](std::string_view id) { return handler_->owns(id); });
-  if (update) {
-    handler_->on_update(*update);
-  } else {
-    log_refused(kUpdateTopic, update.error());
-  }
-}
-
-void FastDdsTransport::take_reply(const wire::Reply& sample) {
-  auto reply = from_wire(sample);
-  if (reply) {
-    handler_->on_reply(*reply);
-  } else {
-    log_refused(kReplyTopic, reply.error());
-    handler_->on_reply(Reply{sample.sequence_number(), sample.epoch(), std::move(reply.error())});
-  }
-}
-
-// Before Fast DDS 2.10 nothing but this keeps a participant from hearing itself.
-void FastDdsTransport::take_page(const wire::Page& sample, const ertps::GuidPrefix_t& from) {
-  if (peer_of(from) == self_) return;
-  const auto page = from_wire(sample);
-  if (page) {
-    handler_->on_page(*page);
-  } else {
-    log_refused(kDirectoryTopic, page.error());
-  }
-}
-
-void FastDdsTransport::take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from,
-                                     bool beat) {
-  if (peer_of(from) == self_) return;
-  const auto presence = from_wire(sample);
-  if (!presence) {
-    log_refused(kPresenceTopic, presence.error());
-    return;
-  }
-  peers_.present(from, *presence, sample.peers(), beat);
 }
 
 }  // namespace tfdude::fastdds

@@ -37,6 +37,8 @@ class FastDdsTransport final : public Transport {
   Result<void> send(const std::string& partition, const Request& request,
                     Deadline deadline) override;
   Result<void> send(const std::string& partition, const Update& update, Deadline deadline) override;
+  Result<void> send(const std::string& partition, const JointUpdate& update,
+                    Deadline deadline) override;
   void reply(const PeerId& to, const Reply& reply) override;
   Result<void> watch(std::uint64_t group) override { return states_->watch(group); }
   void unwatch(std::uint64_t group) override { states_->unwatch(group); }
@@ -55,6 +57,7 @@ class FastDdsTransport final : public Transport {
     edds::Topic* request = nullptr;
     edds::Topic* reply = nullptr;
     edds::Topic* update = nullptr;
+    edds::Topic* joint = nullptr;
     edds::Topic* state = nullptr;
     edds::Topic* directory = nullptr;
     edds::Topic* presence = nullptr;
@@ -77,6 +80,7 @@ class FastDdsTransport final : public Transport {
 
   void take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from);
   void take_update(const wire::Update& sample);
+  void take_joints(const wire::Joints& sample);
   void take_reply(const wire::Reply& sample);
   void take_page(const wire::Page& sample, const ertps::GuidPrefix_t& from);
   void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from, bool beat);
@@ -101,6 +105,7 @@ class FastDdsTransport final : public Transport {
   std::mutex outlets_mutex_;
   Outlets request_outlets_;
   Outlets update_outlets_;
+  Outlets joint_outlets_;
   std::shared_mutex reply_mutex_;
   std::map<PeerId, std::shared_ptr<Outlet>> reply_outlets_;
 
@@ -110,6 +115,7 @@ class FastDdsTransport final : public Transport {
   std::unique_ptr<Outlet> directory_outlet_;
   std::unique_ptr<Inlet<wire::Request>> requests_;
   std::unique_ptr<Inlet<wire::Update>> updates_;
+  std::unique_ptr<Inlet<wire::Joints>> joints_;
   std::unique_ptr<Inlet<wire::Reply>> replies_;
   std::unique_ptr<Inlet<wire::Page>> pages_;
   std::unique_ptr<Inlet<wire::Presence>> presence_;

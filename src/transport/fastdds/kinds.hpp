@@ -16,7 +16,9 @@ enum RequestKind : std::uint8_t {
   kWatch = 8,
   kPast = 9,
   kRevise = 10,
-  kConsistency = 11
+  kConsistency = 11,
+  kJoints = 12,
+  kJointStates = 13
 };
 enum ReplyKind : std::uint8_t {
   kError = 1,
@@ -26,7 +28,8 @@ enum ReplyKind : std::uint8_t {
   kState = 5,
   kPasts = 6,
   kTied = 7,
-  kConsistencies = 8
+  kConsistencies = 8,
+  kJointInfos = 9
 };
 
 }  // namespace tfdude::fastdds

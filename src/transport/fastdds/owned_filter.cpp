@@ -24,6 +24,20 @@ bool OwnedFilters::Requests::evaluate(const SerializedPayload& payload, const Fi
   return passes;
 }
 
+bool OwnedFilters::Joints::evaluate(const SerializedPayload& payload, const FilterSampleInfo&,
+                                    const GUID_t&) const {
+  view_.counters.updates_arrived.fetch_add(1, std::memory_order_relaxed);
+  if (!well_formed_joints(payload.data, payload.length)) {
+    count_malformed(view_.counters, kJointTopic);
+    return false;
+  }
+  const bool passes = any_joint(payload.data, payload.length, [this](std::string_view name) {
+    return view_.handler.owns_joint(name);
+  });
+  if (passes) view_.counters.updates_passed.fetch_add(1, std::memory_order_relaxed);
+  return passes;
+}
+
 bool OwnedFilters::Updates::evaluate(const SerializedPayload& payload, const FilterSampleInfo&,
                                      const GUID_t&) const {
   view_.counters.updates_arrived.fetch_add(1, std::memory_order_relaxed);
@@ -41,8 +55,13 @@ ReturnCode OwnedFilters::create_content_filter(const char* filter_class_name, co
                                                const edds::TopicDataType*, const char*,
                                                const ParameterSeq&, edds::IContentFilter*& filter) {
   if (std::string_view(filter_class_name) != kClassName) return bad_parameter();
-  const bool of_requests = type_name == name_of(RequestType());
-  filter = of_requests ? static_cast<edds::IContentFilter*>(&requests_) : &updates_;
+  if (type_name == name_of(RequestType())) {
+    filter = &requests_;
+  } else if (type_name == name_of(JointsType())) {
+    filter = &joints_;
+  } else {
+    filter = &updates_;
+  }
   return done();
 }
 

@@ -14,7 +14,7 @@
 
 namespace tfdude::fastdds {
 
-/// The filters between a partition's readers and the wire: they let pass what concerns a frame that the
+/// The filters between a partition's readers and the wire: they let pass what concerns a frame or joint that the
 /// partition owns, and requests addressed to it by name; they drop what is not well formed. Evaluated at
 /// the reader, on the bytes, against the live set of owned frames: the announced expression, the partition's
 /// name, never changes.
@@ -35,7 +35,7 @@ class OwnedFilters final : public edds::IContentFilterFactory {
                                    edds::IContentFilter* filter) override;
 
  private:
-  /// What both filters look at.
+  /// What all filters look at.
   struct View {
     std::uint32_t addressee;
     const TransportHandler& handler;
@@ -62,9 +62,20 @@ class OwnedFilters final : public edds::IContentFilterFactory {
     const View& view_;
   };
 
+  class Joints final : public edds::IContentFilter {
+   public:
+    explicit Joints(const View& view) : view_(view) {}
+    [[nodiscard]] bool evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
+                                const GUID_t& reader) const override;
+
+   private:
+    const View& view_;
+  };
+
   const View view_;
   Requests requests_{view_};
   Updates updates_{view_};
+  Joints joints_{view_};
 };
 
 }  // namespace tfdude::fastdds

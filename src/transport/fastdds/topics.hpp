@@ -11,6 +11,7 @@ namespace tfdude::fastdds {
 inline constexpr const char* kRequestTopic = "tfdude/request";
 inline constexpr const char* kReplyTopic = "tfdude/reply";
 inline constexpr const char* kUpdateTopic = "tfdude/update";
+inline constexpr const char* kJointTopic = "tfdude/joint";
 inline constexpr const char* kStateTopic = "tfdude/state";
 inline constexpr const char* kDirectoryTopic = "tfdude/directory";
 inline constexpr const char* kPresenceTopic = "tfdude/presence";
@@ -18,6 +19,7 @@ inline constexpr const char* kPresenceTopic = "tfdude/presence";
 using RequestType = CheckedType<wire::RequestPubSubType, well_formed_request>;
 using ReplyType = CheckedType<wire::ReplyPubSubType, well_formed_reply>;
 using UpdateType = CheckedType<wire::UpdatePubSubType, well_formed_update>;
+using JointsType = CheckedType<wire::JointsPubSubType, well_formed_joints>;
 using StateType = CheckedType<wire::StatePubSubType, well_formed_state>;
 using PageType = CheckedType<wire::PagePubSubType, well_formed_page>;
 using PresenceType = CheckedType<wire::PresencePubSubType, well_formed_presence>;

@@ -188,6 +188,12 @@ class LoopbackTransport final : public Transport {
                    [&](TransportHandler& handler) { handler.on_update(update); });
   }
 
+  Result<void> send(const std::string& partition, const JointUpdate& update,
+                    Deadline deadline) override {
+    return send_to(partition, deadline,
+                   [&](TransportHandler& handler) { handler.on_joints(update); });
+  }
+
   void reply(const PeerId& to, const Reply& reply) override {
     hub_->deliver([&](const auto& member) { return member.id == to; },
                   [&](TransportHandler& handler) { handler.on_reply(reply); });

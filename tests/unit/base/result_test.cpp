@@ -36,6 +36,7 @@ constexpr Named kCodes[] = {
     {Errc::kTooOld, 18, "too_old"},
     {Errc::kStampTaken, 19, "stamp_taken"},
     {Errc::kChangedMeanwhile, 20, "changed_meanwhile"},
+    {Errc::kUnknownJoint, 21, "unknown_joint"},
 };
 
 TEST_CASE("codes keep their numbers and names") {

@@ -62,8 +62,9 @@ TEST_CASE("what was saved is there for the next process, to the last bit") {
     const auto store = opened(file);
     CHECK(store->load()->frames.empty());
     CHECK(outcome(store->save({3, {"hand", "lamp"}, {hand}, {gone}})) == "ok");
-    CHECK(outcome(store->save({4, {tool.id, "eye"}, {tool}, {lost}})) == "ok");
-    CHECK(outcome(store->save_values({{"hand", later}, {"nobody", later}})) == "ok");
+    CHECK(outcome(store->save({4, {tool.id, "eye"}, {tool}, {lost}, {{"wrist", 1, 1}}})) == "ok");
+    CHECK(outcome(store->save_values({{"hand", later}, {"nobody", later}},
+                                     {{"elbow", 0.5, 1e-4}, {"wrist", 3, 0}})) == "ok");
     CHECK(outcome(store->save_configured({{"hand", "arm", hand.X_PC}})) == "ok");
   }
   const auto state = opened(file)->load();
@@ -78,6 +79,11 @@ TEST_CASE("what was saved is there for the next process, to the last bit") {
   CHECK(state->frames[1].since == tool.since);
   // The oldest first.
   CHECK(state->notes == std::vector<Note>{lost, gone});
+  REQUIRE(state->joints.size() == 2);
+  CHECK(state->joints[0].name == "elbow");
+  CHECK(state->joints[0].position == 0.5);
+  CHECK(state->joints[0].variance == 1e-4);
+  CHECK(state->joints[1].position == 3);
   REQUIRE(state->configured.size() == 1);
   CHECK(to_flat(state->configured[0].X_PC) == to_flat(hand.X_PC));
 }
@@ -139,8 +145,8 @@ TEST_CASE("a file that cannot be this partition's state is refused and stays as 
     CHECK_THAT(refused(file), ContainsSubstring("is damaged"));
   }
   SECTION("of a newer format") {
-    put(file, 60, std::string("\0\0\0\2", 4));
-    CHECK_THAT(refused(file), ContainsSubstring("has format 2, of which this version reads 1"));
+    put(file, 60, std::string("\0\0\0\3", 4));
+    CHECK_THAT(refused(file), ContainsSubstring("has format 3, of which this version reads 2"));
   }
   SECTION("of another program") {
     put(file, 68, std::string("\0\0\0\2", 4));

@@ -88,6 +88,10 @@ TEST_CASE("replies arrive as they were sent") {
       const auto& came = std::get<std::vector<PastInfo>>(arrived->body);
       REQUIRE(came.size() == pasts->size());
       for (std::size_t i = 0; i < came.size(); ++i) CHECK(listed(came[i]) == listed((*pasts)[i]));
+    } else if (const auto* joints = std::get_if<std::vector<JointInfo>>(&one.body)) {
+      const auto& came = std::get<std::vector<JointInfo>>(arrived->body);
+      REQUIRE(came.size() == joints->size());
+      for (std::size_t i = 0; i < came.size(); ++i) CHECK(listed(came[i]) == listed((*joints)[i]));
     }
   }
 }
@@ -118,6 +122,30 @@ TEST_CASE("updates arrive as they were sent, but for the edges that nobody wants
     REQUIRE(some);
     CHECK(some->edges.size() == (one.edges.size() == 3 ? 1 : 0));
   }
+}
+
+TEST_CASE("joints arrive as they were sent, but for those that nobody wants") {
+  for (const JointUpdate& one : testing::joint_updates()) {
+    const auto sample = travelled<JointsType>(to_wire(one));
+    const auto all = from_wire(sample, [](std::string_view) { return true; });
+    REQUIRE(all);
+    CHECK(listed(*all) == listed(one));
+    const auto some = from_wire(sample, [](std::string_view name) { return name != "ab"; });
+    REQUIRE(some);
+    const bool has_it = std::any_of(one.joints.begin(), one.joints.end(),
+                                    [](const JointValue& joint) { return joint.name == "ab"; });
+    CHECK(some->joints.size() == one.joints.size() - (has_it ? 1 : 0));
+  }
+}
+
+TEST_CASE("a joint takes a few bytes of a sample, and its edge many more") {
+  const auto bytes_of = [](const auto& kind, const auto& message) {
+    return testing::serialized<std::decay_t<decltype(kind)>>(to_wire(message)).size();
+  };
+  const std::vector<JointValue> six(6, {"shoulder_1", 0.1, 1e-6});
+  const std::vector<EdgeUpdate> edges(6, {"shoulder_1", {}});
+  CHECK(bytes_of(JointsType(), JointUpdate{six, time_of(1)}) < 6 * 40);
+  CHECK(bytes_of(UpdateType(), Update{edges, time_of(1)}) > 6 * 240);
 }
 
 TEST_CASE("a presence that misses what can be no partition is refused") {
@@ -154,6 +182,7 @@ TEST_CASE("pages and presences arrive as they were sent") {
       CHECK(arrived->entries[i].since == one.entries[i].since);
     }
     CHECK(arrived->notes == one.notes);
+    CHECK(arrived->joints == one.joints);
     REQUIRE(arrived->others.size() == one.others.size());
     for (std::size_t i = 0; i < one.others.size(); ++i) {
       CHECK(arrived->others[i].number == one.others[i].number);

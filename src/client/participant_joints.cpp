@@ -1,0 +1,77 @@
+#include "tfdude/base/id.hpp"
+
+#include "base/log.hpp"
+#include "client/participant.hpp"
+
+// Joints: their positions to who has them, and what is known of them.
+namespace tfdude {
+
+void Participant::on_joints(const JointUpdate& update) {
+  if (partition_ == nullptr) return;
+  const std::lock_guard lock(joints_mutex_);
+  const auto moved = partition_->apply(update);
+  // Nobody else hears of it; those that are late are counted, as of any edge. The 1st, 2nd, 4th, 8th... is told.
+  if (moved || moved.error().code != Errc::kInvalidInput) return;
+  const std::uint64_t before = refused_joints_++;
+  if ((refused_joints_ & before) == 0) {
+    log().warn("refused positions of joints ({} times so far): {}", refused_joints_,
+               moved.error().message);
+  }
+}
+
+Result<void> Participant::update_joints(const JointUpdate& update) {
+  if (update.joints.empty()) return {};
+  return healed(
+      [&]() -> Result<std::vector<Part>> {
+        auto parts = route_joints(directory_, update);
+        if (!parts) return parts;
+        if (auto ok = check_reachable(directory_, *parts); !ok) return tl::unexpected(ok.error());
+        return parts;
+      },
+      [&](std::vector<Part>& parts) { return change(parts); });
+}
+
+// Whoever is there gets its share, and the error of who is not is told.
+Result<void> Participant::publish_joints(const JointUpdate& update) {
+  if (update.joints.empty()) return {};
+  auto parts = routed([&] { return route_joints(directory_, update); });
+  if (!parts) return tl::unexpected(std::move(parts.error()));
+  const auto deadline = Clock::now() + options_.timeout;
+  Result<void> outcome;
+  for (const Part& part : *parts) {
+    const auto& share = std::get<JointUpdate>(part.request.body);
+    auto sent = publish_to(part, share, deadline);
+    if (!sent && outcome) outcome = std::move(sent);
+  }
+  return outcome;
+}
+
+Result<void> Participant::publish_to(const Part& part, const JointUpdate& share,
+                                     Clock::time_point deadline) {
+  if (part.owner == kHeldHere) {
+    const std::lock_guard lock(joints_mutex_);
+    return partition_->apply(share).map([](std::size_t) {});
+  }
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (auto ok = check_reachable(directory_, {part}); !ok) return ok;
+  }
+  return transport_->send(part.partition, share, deadline);
+}
+
+Result<std::vector<JointInfo>> Participant::joints(const std::string& partition) {
+  return ask_all<JointInfo>(partition, JointsRequest{});
+}
+
+Result<void> Participant::correlate(const std::string& id, const Correlation& correlation) {
+  const std::lock_guard lock(joints_mutex_);
+  if (partition_ != nullptr && partition_->is_coupled(id)) {
+    return fail(Errc::kInvalidInput,
+                "frame " + quote(id) +
+                    " has the error of its joint, which is that of others that "
+                    "move with it");
+  }
+  return forest_.correlate(id, correlation);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,186 @@
+#include "tfdude/partition/joints.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+namespace {
+
+// The joint that says where this one is.
+const std::string& leader_of(const JointSpec& spec) {
+  return spec.mimic ? spec.mimic->joint : spec.name;
+}
+
+// What the edge shares with those of the joints that are coupled with its own: the error of one number.
+Correlation shared_error(const JointSpec& spec, double variance) {
+  if (variance == 0) return {};
+  Factor factor = spec.joint.S * std::sqrt(variance);
+  // A share's sign is that of the leader's error.
+  if (spec.mimic && spec.mimic->multiplier < 0) factor = -factor;
+  return {false, {{"joint " + leader_of(spec), false, std::move(factor)}}, {}};
+}
+
+bool is_outside(const JointSpec& spec, double position) {
+  return spec.limits && (position < spec.limits->lower || position > spec.limits->upper);
+}
+
+Error beyond_limits(const JointSpec& spec, double position) {
+  return {Errc::kInvalidInput, "joint " + quote(spec.name) + ": position " +
+                                   std::to_string(position) + " is outside its limits, " +
+                                   std::to_string(spec.limits->lower) + " to " +
+                                   std::to_string(spec.limits->upper)};
+}
+
+}  // namespace
+
+Result<void> check_value(const JointValue& joint) {
+  const std::string who = "joint " + quote(joint.name);
+  if (!std::isfinite(joint.position) || std::abs(joint.position) > kMaxTranslation) {
+    return fail(Errc::kInvalidInput, who + ": position is not a number, or beyond 1e9");
+  }
+  if (!(joint.variance >= 0) || joint.variance > kMaxVariance) {
+    return fail(Errc::kInvalidInput, who + ": variance is not a number within 0 to 1e18");
+  }
+  return {};
+}
+
+void Joints::put(const std::string& frame, const JointSpec& joint, const StoredJoint* left) {
+  const auto handle = forest_.find(frame);
+  if (!handle || !forest_.holds(frame)) return;
+  Mover mover{frame, *handle, joint, joint.position, joint.variance};
+  if (left != nullptr) {
+    mover.position = left->position;
+    mover.variance = left->variance;
+    mover.measured = true;
+  }
+  if (joint.coupled) {
+    mover.said = shared_error(joint, mover.variance);
+    mover.said_variance = mover.variance;
+    if (!mover.said.empty()) (void)forest_.correlate(frame, mover.said);
+  }
+  by_name_[joint.name];
+  by_name_[leader_of(joint)].push_back(movers_.size());
+  movers_.push_back(std::move(mover));
+}
+
+void Joints::let_go(const std::string& frame) {
+  for (Mover& mover : movers_) mover.let_go = mover.let_go || mover.frame == frame;
+}
+
+bool Joints::is_coupled(std::string_view frame) const {
+  return std::any_of(movers_.begin(), movers_.end(), [frame](const Mover& mover) {
+    return mover.spec.coupled && !mover.let_go && mover.frame == frame;
+  });
+}
+
+std::vector<std::string> Joints::frames_of(std::string_view name) const {
+  std::vector<std::string> frames;
+  const auto found = by_name_.find(name);
+  if (found == by_name_.end()) return frames;
+  for (const std::size_t index : found->second) {
+    if (!movers_[index].let_go) frames.push_back(movers_[index].frame);
+  }
+  return frames;
+}
+
+// Of frames that were removed; another of that id is another frame.
+void Joints::forget_removed() {
+  for (Mover& mover : movers_) mover.let_go = mover.let_go || !forest_.info(mover.handle);
+}
+
+Result<void> Joints::plan(const JointValue& value) {
+  const auto found = by_name_.find(value.name);
+  if (found == by_name_.end()) return {};
+  if (auto ok = check_value(value); !ok) return ok;
+  for (const std::size_t index : found->second) {
+    Mover& mover = movers_[index];
+    if (mover.let_go) continue;
+    const JointSpec& spec = mover.spec;
+    const Mimic mimic = spec.mimic.value_or(Mimic{});
+    Step step{index, mimic.multiplier * value.position + mimic.offset,
+              mimic.multiplier * mimic.multiplier * value.variance};
+    step.outside = is_outside(spec, step.position);
+    if (step.outside && spec.strict) {
+      ++mover.refused;
+      return tl::unexpected(beyond_limits(spec, step.position));
+    }
+    steps_.push_back(step);
+  }
+  return {};
+}
+
+bool Joints::is_news(const Mover& mover, std::optional<Time> stamp) const {
+  return !stamp || !mover.stamp || *mover.stamp < *stamp;
+}
+
+void Joints::take(const Step& step, std::optional<Time> stamp) {
+  Mover& mover = movers_[step.mover];
+  mover.outside += step.outside ? 1 : 0;
+  if (!is_news(mover, stamp)) return;
+  mover.position = step.position;
+  mover.variance = step.variance;
+  if (mover.spec.coupled) mover.said_variance = step.variance;
+  if (stamp) mover.stamp = stamp;
+  mover.measured = true;
+  mover.changed = true;
+}
+
+Result<std::size_t> Joints::apply(const JointUpdate& update) {
+  steps_.clear();
+  updates_.clear();
+  for (const JointValue& value : update.joints) {
+    if (auto ok = plan(value); !ok) return tl::unexpected(std::move(ok.error()));
+  }
+  if (steps_.empty()) return 0;
+  for (const Step& step : steps_) {
+    Mover& mover = movers_[step.mover];
+    HandleUpdate one{mover.handle, value_at(mover.spec, step.position, step.variance)};
+    const bool resay = mover.spec.coupled && mover.said_variance != step.variance;
+    if (resay && is_news(mover, update.stamp)) {
+      mover.said = shared_error(mover.spec, step.variance);
+      one.correlation = &mover.said;
+    }
+    updates_.push_back(one);
+  }
+  auto updated = forest_.update(updates_, update.stamp);
+  if (!updated && updated.error().code == Errc::kUnknownFrame) {
+    forget_removed();
+    return apply(update);
+  }
+  if (!updated) return tl::unexpected(std::move(updated.error()));
+  for (const Step& step : steps_) take(step, update.stamp);
+  return steps_.size();
+}
+
+std::vector<JointInfo> Joints::infos() const {
+  std::vector<JointInfo> infos;
+  for (const Mover& mover : movers_) {
+    if (mover.let_go || !forest_.info(mover.handle)) continue;
+    const JointSpec& spec = mover.spec;
+    infos.push_back({spec.name, mover.frame, spec.type, spec.limits, spec.mimic, mover.position,
+                     mover.variance, mover.measured, mover.outside, mover.refused});
+  }
+  std::sort(infos.begin(), infos.end(),
+            [](const JointInfo& a, const JointInfo& b) { return a.name < b.name; });
+  return infos;
+}
+
+std::vector<StoredJoint> Joints::take_changed() {
+  std::vector<StoredJoint> changed;
+  for (Mover& mover : movers_) {
+    if (!mover.changed) continue;
+    changed.push_back({mover.spec.name, mover.position, mover.variance});
+    mover.changed = false;
+  }
+  return changed;
+}
+
+void Joints::still_changed(const std::vector<StoredJoint>& joints) {
+  for (const StoredJoint& joint : joints) {
+    for (Mover& mover : movers_) mover.changed = mover.changed || mover.spec.name == joint.name;
+  }
+}
+
+}  // namespace tfdude

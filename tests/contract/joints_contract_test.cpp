@@ -1,0 +1,190 @@
+// Joints over partitions, once over each transport.
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/catch.hpp"
+#include "support/joint_frames.hpp"
+#include "support/networks.hpp"
+#include "support/process.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::ContainsSubstring;
+using testing::following;
+using testing::hinge_named;
+using testing::Join;
+using testing::joined_by;
+using testing::moved_by;
+using testing::outcome;
+using Names = std::vector<std::string>;
+using Numbers = std::vector<double>;
+
+constexpr std::chrono::seconds kLong{20};
+
+Time wall_clock() {
+  return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
+}
+
+// What is published may be on its way for a while.
+template <class Condition>
+bool comes_true(Condition condition) {
+  const auto end = std::chrono::steady_clock::now() + kLong;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(Milliseconds(1));
+  }
+  return true;
+}
+
+double yaw(const Result<Transform>& X) {
+  if (!X) return std::nan("");
+  return 2 * std::atan2(X->pose.rotation().z(), X->pose.rotation().w());
+}
+
+// world - turret (base) - upper - fore (arm) - hand (tool), which follows the elbow. All about z.
+struct Robot {
+  explicit Robot(const Join& join) {
+    base.emplace(
+        *Node::open(join("base"), "base",
+                    {{"world", "", {}}, moved_by("turret", "world", hinge_named("turn"))}));
+    JointSpec elbow = hinge_named("elbow");
+    elbow.coupled = true;
+    arm.emplace(*Node::open(
+        join("arm"), "arm",
+        {moved_by("upper", "turret", hinge_named("shoulder")), moved_by("fore", "upper", elbow)}));
+    tool.emplace(*Node::open(join("tool"), "tool",
+                             {moved_by("hand", "fore", following("wrist", "elbow", -1, 0))}));
+    client.emplace(*Client::open(join("")));
+  }
+  std::optional<Node> base;
+  std::optional<Node> arm;
+  std::optional<Node> tool;
+  std::optional<Client> client;
+};
+
+TEST_CASE("joints: positions reach all owners, and those who follow in other partitions") {
+  Robot robot(joined_by(GENERATE(0, 1)));
+  REQUIRE(robot.client->publish_joints({"turn", "shoulder", "elbow"}, {0.1, 0.2, 0.4},
+                                       {1e-4, 4e-4, 9e-4}));
+  const auto has_come = [&](const char* a, const char* b, double angle) {
+    return comes_true([&] { return std::abs(yaw(robot.client->lookup(a, b)) - angle) < 1e-12; });
+  };
+  CHECK(has_come("world", "fore", 0.7));
+  CHECK(has_come("fore", "hand", -0.4));
+  // The hand keeps its direction whatever the elbow does, so the elbow's error does not turn it.
+  const auto X_WH = robot.client->lookup("world", "hand", Query{});
+  REQUIRE(X_WH);
+  CHECK(std::abs(X_WH->covariance.stddev()[5] - std::sqrt(5e-4)) < 1e-9);
+  CHECK(X_WH->basis.sources == Names{"joint elbow"});
+}
+
+TEST_CASE("joints: what is updated is there when the call returns, or refused by name") {
+  Robot robot(joined_by(GENERATE(0, 1)));
+  Client& client = *robot.client;
+  CHECK(outcome(client.update_joints({"turn", "elbow"}, {0.5, 0.25}, {0, 0})) == "ok");
+  CHECK(std::abs(yaw(client.lookup("world", "turret")) - 0.5) < 1e-12);
+  CHECK(std::abs(yaw(client.lookup("fore", "hand")) + 0.25) < 1e-12);
+  CHECK(outcome(client.update_joints({"knee"}, {0}, {0})) == "unknown_joint");
+  CHECK(outcome(client.publish_joints({"knee"}, {0}, {0})) == "unknown_joint");
+  CHECK(outcome(client.update_joints({"elbow"}, {0, 1}, {0})) == "invalid_input");
+  CHECK(outcome(client.update_joints({"elbow"}, {0}, {-1})) == "invalid_input");
+  CHECK(outcome(client.update_joints({"wrist"}, {0}, {1})) == "invalid_input");
+  // Outside the limits: applied, and counted.
+  CHECK(outcome(client.update_joints({"elbow"}, {3}, {0})) == "ok");
+  const auto joints = client.joints("arm");
+  REQUIRE(joints);
+  REQUIRE(joints->size() == 2);
+  CHECK((*joints)[0].name == "elbow");
+  CHECK((*joints)[0].position == 3);
+  CHECK((*joints)[0].outside == 1);
+  CHECK((*joints)[0].limits->upper == 2);
+  CHECK((*joints)[1].measured == false);
+  CHECK(client.joints("tool")->at(0).mimic->joint == "elbow");
+  CHECK(outcome(client.joints("legs")) == "unknown_partition");
+  CHECK(outcome(robot.tool->correlate("hand", {})) == "invalid_input");
+}
+
+TEST_CASE("joints: of one stamp lookups at an instant see all, whoever owns them") {
+  Robot robot(joined_by(GENERATE(0, 1)));
+  const Time start = wall_clock();
+  std::atomic<bool> stop{false};
+  REQUIRE(robot.client->update_joints({"turn", "shoulder"}, {0, 0}, {0, 0}, start));
+  // The two turn against each other.
+  std::thread controller([&] {
+    for (int i = 1; !stop; ++i) {
+      const double angle = 0.001 * (i % 1000);
+      (void)robot.arm->publish_joints({"turn", "shoulder"}, {angle, -angle}, {0, 0},
+                                      start + Milliseconds(i));
+      std::this_thread::sleep_for(Milliseconds(1));
+    }
+  });
+  int seen = 0;
+  CHECK(comes_true([&] {
+    const auto X = robot.client->lookup("world", "upper", Query{});
+    if (X && X->stamp) {
+      CHECK(std::abs(yaw(*X)) < 1e-9);
+      ++seen;
+    }
+    return seen > 300;
+  }));
+  stop = true;
+  controller.join();
+}
+
+TEST_CASE("joints: one owner that is not there keeps no other from its share") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Robot robot(join);
+  REQUIRE(robot.client->publish_joints({"turn", "elbow"}, {0.1, 0.1}, {0, 0}));
+  robot.tool.reset();
+  REQUIRE(comes_true([&] {
+    for (const PartitionInfo& one : robot.client->partitions()) {
+      if (one.name == "tool") return !one.reachable;
+    }
+    return true;
+  }));
+  const auto published = robot.client->publish_joints({"turn", "elbow"}, {0.3, 0.4}, {0, 0});
+  CHECK(outcome(published) == "unreachable");
+  CHECK_THAT(published.error().message, ContainsSubstring("'tool'"));
+  CHECK(comes_true([&] {
+    return std::abs(yaw(robot.client->lookup("world", "turret")) - 0.3) < 1e-12 &&
+           std::abs(yaw(robot.client->lookup("upper", "fore")) - 0.4) < 1e-12;
+  }));
+  CHECK(outcome(robot.client->update_joints({"elbow"}, {0.5}, {0})) == "unreachable");
+}
+
+TEST_CASE("joints: a node that is opened again has its joints where they were") {
+  const Join join = joined_by(GENERATE(0, 1));
+  const testing::TemporaryDirectory directory;
+  Options options;
+  options.state = directory.path();
+  const std::vector<FrameSpec> frames{{"world", "", {}},
+                                      moved_by("turret", "world", hinge_named("turn"))};
+  auto client = Client::open(join(""));
+  REQUIRE(client);
+  {
+    auto node = Node::open(join("base"), "base", frames, options);
+    REQUIRE(node);
+    REQUIRE(comes_true([&] { return client->exists("turret"); }));
+    REQUIRE(client->update_joints({"turn"}, {0.75}, {1e-4}));
+  }
+  auto node = Node::open(join("base"), "base", frames, options);
+  REQUIRE(node);
+  const auto joints = node->joints("base");
+  REQUIRE(joints);
+  CHECK(joints->at(0).position == 0.75);
+  CHECK(joints->at(0).measured);
+  CHECK(std::abs(yaw(node->lookup("world", "turret")) - 0.75) < 1e-12);
+  CHECK(std::abs(node->lookup("world", "turret")->covariance.stddev()[5] - 0.01) < 1e-12);
+}
+
+}  // namespace
+}  // namespace tfdude

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include "tfdude/partition/state_store.hpp"
+
+#include "support/forest_support.hpp"
+
+// Frames that joints move.
+namespace tfdude::testing {
+
+/// A frame and the joint that moves it.
+[[nodiscard]] inline FrameSpec moved_by(const std::string& frame, const std::string& parent,
+                                        JointSpec joint) {
+  const Transform X_PC = value_at(joint, joint.position, joint.variance);
+  return {frame, parent, X_PC, {}, {}, std::move(joint)};
+}
+
+/// About the z axis, a metre along x, within -1 to 2 rad; at rest uncertain by half a radian.
+[[nodiscard]] inline JointSpec hinge_named(const std::string& name) {
+  JointSpec spec;
+  spec.name = name;
+  spec.type = JointType::kRevolute;
+  spec.joint = hinge(along_x(1), {0, 0, 1});
+  spec.limits = JointLimits{-1, 2};
+  spec.variance = 0.25;
+  return spec;
+}
+
+/// The same, following another.
+[[nodiscard]] inline JointSpec following(const std::string& name, const std::string& leader,
+                                         double multiplier, double offset) {
+  JointSpec spec = hinge_named(name);
+  spec.mimic = Mimic{leader, multiplier, offset};
+  spec.coupled = true;
+  return spec;
+}
+
+}  // namespace tfdude::testing

@@ -1,0 +1,283 @@
+#include "tfdude/partition/joints.hpp"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tfdude/partition/partition.hpp"
+#include "tfdude/partition/routing.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/joint_frames.hpp"
+#include "support/memory_store.hpp"
+#include "support/pose_diff.hpp"
+#include "support/replica.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::ContainsSubstring;
+using testing::following;
+using testing::hinge_named;
+using testing::moved_by;
+using testing::outcome;
+using testing::pose_diff;
+using testing::Replica;
+
+constexpr Time kNow{std::chrono::seconds(100)};
+
+Time at(int milliseconds) { return kNow + Milliseconds(milliseconds); }
+
+// base - upper - fore - hand, the latter two coupled, beside them a rail.
+struct Arm : Replica {
+  Arm() : Replica("arm"), partition("arm", 7, forest, directory) {}
+
+  std::vector<FrameSpec> frames() const {
+    JointSpec elbow = hinge_named("elbow");
+    elbow.coupled = true;
+    JointSpec rail = hinge_named("rail");
+    rail.type = JointType::kPrismatic;
+    rail.joint = slider(along_x(0), {0, 1, 0});
+    return {{"base", "", {}},
+            moved_by("upper", "base", hinge_named("shoulder")),
+            moved_by("fore", "upper", elbow),
+            moved_by("hand", "fore", following("wrist", "elbow", -0.5, 0.125)),
+            moved_by("cart", "base", rail)};
+  }
+  void load() { REQUIRE(partition.load(frames(), kNow)); }
+
+  Transform edge(const std::string& parent, const std::string& id) const {
+    return *forest.lookup(parent, id);
+  }
+  JointInfo info(const std::string& name) {
+    const Reply reply = partition.answer(Request{1, "arm", JointsRequest{}}, kNow);
+    for (const JointInfo& one : std::get<std::vector<JointInfo>>(reply.body)) {
+      if (one.name == name) return one;
+    }
+    FAIL("no joint " << name);
+    return {};
+  }
+
+  Partition partition;
+};
+
+TEST_CASE("before its first sample a joint is at rest, and as uncertain as its limits are wide") {
+  Arm arm;
+  arm.load();
+  CHECK(pose_diff(arm.edge("base", "upper").pose, along_x(1).pose, 1e-15) == "");
+  CHECK(arm.edge("base", "upper").covariance.stddev()[5] == 0.5);
+  CHECK_FALSE(arm.info("shoulder").measured);
+  CHECK(arm.info("shoulder").frame == "upper");
+}
+
+TEST_CASE("positions move the joints' edges as one commit") {
+  Arm arm;
+  arm.load();
+  const auto moved = arm.partition.apply(
+      JointUpdate{{{"shoulder", 0.5, 1e-4}, {"rail", -0.25, 4e-6}, {"of_others", 1, 1}}, at(1)});
+  REQUIRE(moved);
+  CHECK(*moved == 2);
+  const Transform upper = arm.edge("base", "upper");
+  CHECK(upper.pose.rotation().angularDistance(
+            Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ()))) < 1e-15);
+  CHECK(upper.covariance.stddev()[5] == 0.01);
+  CHECK(arm.edge("base", "cart").pose.translation().y() == -0.25);
+  CHECK(arm.edge("base", "cart").covariance.stddev()[1] == 0.002);
+  CHECK(arm.info("shoulder").position == 0.5);
+  CHECK(arm.info("shoulder").measured);
+  REQUIRE(arm.partition.apply(JointUpdate{{{"shoulder", 0.7, 1e-4}}, at(3)}));
+  const auto between = arm.forest.lookup("base", "upper", Query{at(2), {}, {}, {}});
+  REQUIRE(between);
+  CHECK(std::abs(2 * std::atan2(between->pose.rotation().z(), between->pose.rotation().w()) - 0.6) <
+        1e-12);
+}
+
+TEST_CASE("what follows a joint moves with it, and shares its error") {
+  Arm arm;
+  arm.load();
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.04}}, {}}));
+  CHECK(std::abs(arm.info("wrist").position - (-0.5 * 0.5 + 0.125)) < 1e-15);
+  CHECK(std::abs(arm.info("wrist").variance - 0.25 * 0.04) < 1e-15);
+  // About one axis, the error of both is (1 - 0.5) times that of the elbow: not the root of the sum of squares.
+  const auto X = arm.forest.lookup("upper", "hand", Query{});
+  REQUIRE(X);
+  CHECK(std::abs(X->covariance.stddev()[5] - 0.5 * 0.2) < 1e-12);
+  CHECK(X->basis.sources == std::vector<std::string>{"joint elbow"});
+  // Another variance is said with the value.
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.01}}, {}}));
+  CHECK(std::abs(arm.forest.lookup("upper", "hand")->covariance.stddev()[5] - 0.5 * 0.1) < 1e-12);
+  CHECK(std::abs(arm.forest.lookup("upper", "fore")->covariance.stddev()[5] - 0.1) < 1e-12);
+  // And a certain joint shares nothing.
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0}}, {}}));
+  CHECK(arm.forest.lookup("upper", "hand", Query{})->basis.sources.empty());
+  CHECK(arm.partition.is_coupled("hand"));
+  CHECK_FALSE(arm.partition.is_coupled("upper"));
+}
+
+TEST_CASE("what is said of a joint that follows another is passed over") {
+  Arm arm;
+  arm.load();
+  const auto moved = arm.partition.apply(JointUpdate{{{"wrist", 1, 1}, {"elbow", 0.5, 0.04}}, {}});
+  REQUIRE(moved);
+  CHECK(*moved == 2);
+  CHECK(std::abs(arm.info("wrist").position + 0.125) < 1e-15);
+  const Reply alone =
+      arm.partition.answer(Request{2, "arm", JointUpdate{{{"wrist", 1, 1}}, {}}}, kNow);
+  CHECK_THAT(std::get<Error>(alone.body).message,
+             ContainsSubstring("joint 'wrist' moves no frame"));
+}
+
+TEST_CASE("a position outside the limits is applied and counted, unless the joint is strict") {
+  Arm arm;
+  auto frames = arm.frames();
+  frames[1].joint->strict = true;
+  REQUIRE(arm.partition.load(frames, kNow));
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 2.5, 0.04}}, {}}));
+  CHECK(arm.info("elbow").position == 2.5);
+  CHECK(arm.info("elbow").outside == 1);
+  // The wrist's is -1.125, beyond its -1.
+  CHECK(arm.info("wrist").outside == 1);
+  const auto refused =
+      arm.partition.apply(JointUpdate{{{"elbow", 0, 0}, {"shoulder", 2.01, 0}}, {}});
+  CHECK(outcome(refused) == "invalid_input");
+  CHECK_THAT(refused.error().message,
+             ContainsSubstring("joint 'shoulder': position 2.010000 is outside its limits"));
+  CHECK(arm.info("elbow").position == 2.5);
+  CHECK(arm.info("shoulder").refused == 1);
+  REQUIRE(arm.partition.apply(JointUpdate{{{"shoulder", 2, 0}}, {}}));
+}
+
+TEST_CASE("bad positions are refused by name, and change nothing") {
+  Arm arm;
+  arm.load();
+  const double nan = std::nan("");
+  for (const JointValue& bad :
+       {JointValue{"elbow", nan, 0}, JointValue{"elbow", INFINITY, 0}, JointValue{"elbow", 2e9, 0},
+        JointValue{"elbow", 0, nan}, JointValue{"elbow", 0, -1}, JointValue{"elbow", 0, 2e18}}) {
+    const auto refused = arm.partition.apply(JointUpdate{{{"shoulder", 1, 0}, bad}, {}});
+    CHECK(outcome(refused) == "invalid_input");
+    CHECK_THAT(refused.error().message, ContainsSubstring("joint 'elbow'"));
+  }
+  CHECK(arm.info("shoulder").position == 0);
+  CHECK(pose_diff(arm.edge("base", "upper").pose, along_x(1).pose, 1e-15) == "");
+}
+
+TEST_CASE("samples that come late count for the past, not for what is told now") {
+  Arm arm;
+  arm.load();
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.04}}, at(1)}));
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.9, 0.01}}, at(5)}));
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.7, 0.09}}, at(3)}));
+  CHECK(arm.info("elbow").position == 0.9);
+  CHECK(std::abs(arm.forest.lookup("upper", "fore")->covariance.stddev()[5] - 0.1) < 1e-12);
+  CHECK(outcome(arm.partition.apply(JointUpdate{{{"elbow", 0.8, 0.01}}, at(3)})) == "stamp_taken");
+}
+
+TEST_CASE("a frame that is removed or moved by hand leaves its joint") {
+  Arm arm;
+  arm.load();
+  SECTION("removed") {
+    REQUIRE(std::holds_alternative<Done>(
+        arm.partition.answer(Request{1, "hand", RemoveRequest{{"hand"}}}, kNow).body));
+    // Another of that name is another frame.
+    REQUIRE(std::holds_alternative<Done>(
+        arm.partition.answer(Request{2, "hand", AddRequest{"fore", along_x(3)}}, kNow).body));
+  }
+  SECTION("moved") {
+    REQUIRE(std::holds_alternative<Done>(
+        arm.partition.answer(Request{1, "hand", MoveRequest{"base", along_x(3)}}, kNow).body));
+  }
+  const auto moved = arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.04}}, {}});
+  REQUIRE(moved);
+  CHECK(*moved == 1);
+  CHECK(pose_diff(arm.forest.lookup(arm.forest.info("hand")->parent, "hand")->pose, along_x(3).pose,
+                  1e-15) == "");
+}
+
+TEST_CASE("a partition comes back with its joints where they were") {
+  testing::MemoryStore store;
+  {
+    Arm arm;
+    REQUIRE(arm.partition.restore(*store.load(), arm.frames(), kNow));
+    (void)arm.partition.take_changed_joints();
+    REQUIRE(arm.partition.apply(JointUpdate{{{"shoulder", 0.5, 1e-4}, {"elbow", 0.75, 0.04}}, {}}));
+    REQUIRE(store.save(arm.partition.take_unsaved()));
+    const auto [edges, commit] = arm.forest.changed_since(0);
+    REQUIRE(store.save_values(edges, arm.partition.take_changed_joints()));
+    CHECK(arm.partition.take_changed_joints().empty());
+    REQUIRE(store.save_configured(arm.frames()));
+  }
+  Arm arm;
+  SECTION("the description is what it was") {
+    REQUIRE(arm.partition.restore(*store.load(), arm.frames(), kNow));
+    CHECK(arm.info("shoulder").position == 0.5);
+    CHECK(arm.info("shoulder").measured);
+    CHECK_FALSE(arm.info("rail").measured);
+    CHECK(std::abs(arm.edge("base", "upper").covariance.stddev()[5] - 0.01) < 1e-12);
+    CHECK(std::abs(arm.info("wrist").position + 0.25) < 1e-15);
+    CHECK(std::abs(arm.edge("upper", "hand").covariance.stddev()[5] - 0.1) < 1e-12);
+    // And goes on.
+    CHECK(*arm.partition.apply(JointUpdate{{{"elbow", 0.25, 0.01}}, {}}) == 2);
+  }
+  SECTION("the description has changed") {
+    auto frames = arm.frames();
+    JointSpec longer = *frames[1].joint;
+    longer.joint = hinge(along_x(2), {0, 0, 1});
+    frames[1] = moved_by("upper", "base", longer);
+    REQUIRE(arm.partition.restore(*store.load(), frames, kNow));
+    CHECK(arm.info("shoulder").position == 0.5);
+    CHECK(pose_diff(arm.edge("base", "upper").pose, moved(longer.joint, 0.5, 0).pose, 1e-15) == "");
+  }
+}
+
+TEST_CASE("all who have a joint, or what follows it, are asked at once") {
+  Replica caller;
+  const auto page = [](const std::string& name, std::vector<PageEntry> entries,
+                       std::vector<PageJoint> joints) {
+    return Page{name, 0, 1, 1, std::move(entries), {}, {}, std::move(joints)};
+  };
+  caller.directory.apply(Presence{"arm", 1, "host", 1, 1, true}, kNow);
+  caller.directory.apply(Presence{"tool", 1, "host", 2, 1, true}, kNow);
+  caller.directory.apply(page("arm", {{"upper", ""}}, {{"shoulder", ""}, {"elbow", ""}}));
+  caller.directory.apply(page("tool", {{"finger", ""}}, {{"grip", "elbow"}}));
+  const auto routed = [&](std::vector<JointValue> joints) {
+    return route_joints(caller.directory, {std::move(joints), kNow});
+  };
+  const auto parts = routed({{"shoulder", 1, 0}, {"elbow", 2, 0}});
+  REQUIRE(parts);
+  REQUIRE(parts->size() == 2);
+  CHECK(std::get<JointUpdate>((*parts)[0].request.body).joints.size() == 2);
+  CHECK((*parts)[1].partition == "tool");
+  CHECK(std::get<JointUpdate>((*parts)[1].request.body).joints[0].name == "elbow");
+  CHECK(*std::get<JointUpdate>((*parts)[1].request.body).stamp == kNow);
+  CHECK(outcome(routed({{"knee", 1, 0}})) == "unknown_joint");
+  CHECK(outcome(routed({{"elbow", std::nan(""), 0}})) == "invalid_input");
+  // A page that no longer has a joint takes it away; a new life replaces the old.
+  caller.directory.apply(Page{"tool", 0, 1, 2, {{"finger", ""}}, {}, {}, {}});
+  CHECK(routed({{"elbow", 2, 0}})->size() == 1);
+  caller.directory.apply(Page{"arm", 0, 2, 3, {{"upper", ""}}, {}, {}, {{"elbow", ""}}});
+  caller.directory.apply(Presence{"arm", 2, "host", 3, 1, true}, kNow);
+  CHECK(outcome(routed({{"shoulder", 1, 0}})) == "unknown_joint");
+  CHECK(routed({{"elbow", 2, 0}})->size() == 1);
+}
+
+TEST_CASE("an owner's pages say which joints move its frames, until they do not") {
+  Arm arm;
+  arm.load();
+  const auto joints = [&] {
+    std::vector<PageJoint> all;
+    for (const Page& page : arm.partition.take_pages()) {
+      all.insert(all.end(), page.joints.begin(), page.joints.end());
+    }
+    return all;
+  };
+  CHECK(joints() ==
+        std::vector<PageJoint>{{"rail", ""}, {"elbow", ""}, {"wrist", "elbow"}, {"shoulder", ""}});
+  (void)arm.partition.answer(Request{1, "hand", MoveRequest{"base", {}}}, kNow);
+  CHECK(joints() == std::vector<PageJoint>{{"rail", ""}, {"elbow", ""}, {"shoulder", ""}});
+}
+
+}  // namespace
+}  // namespace tfdude
