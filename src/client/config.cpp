@@ -2,45 +2,29 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <limits>
 #include <optional>
 #include <string_view>
-#include <system_error>
 #include <unordered_map>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
-#include "tfdude/math/transform_spec.hpp"
 
+#include "client/config_frames.hpp"
+#include "client/config_urdf.hpp"
+#include "client/file_text.hpp"
 #include "client/yaml_fields.hpp"
 #include "client/yaml_quirks.hpp"
 
 namespace tfdude {
 namespace {
 
-// Longest file that is read: room for half a million frames, and an end to /dev/zero.
-constexpr std::size_t kMaxFileBytes = std::size_t{64} << 20U;
-
-constexpr std::array<std::string_view, 3> kFileKeys = {"partition", "history", "frames"};
+constexpr std::array<std::string_view, 4> kFileKeys = {"partition", "history", "frames", "urdf"};
 constexpr std::array<std::string_view, 10> kFrameKeys = {
     "id", "parent", "xyz", "rpy", "quat", "stddev", "cov", "history", "correlation", "sources"};
 constexpr std::array<std::string_view, 4> kHistoryKeys = {"span", "count", "process_noise",
                                                           "moving"};
-
-// The key whose line a complaint of TransformSpec::build() belongs to.
-std::string_view blamed_key(const std::string& message, const TransformSpec& spec) {
-  const auto starts = [&](std::string_view word) { return message.rfind(word, 0) == 0; };
-  if (starts("translation")) return "xyz";
-  if (starts("rpy")) return "rpy";
-  if (starts("rotation")) return "quat";
-  if (starts("stddev")) return "stddev";
-  if (starts("covariance")) return spec.cov ? "cov" : "stddev";
-  return {};
-}
 
 // Reads what a daemon's file may hold.
 class Reader : public YamlFields {
@@ -58,44 +42,9 @@ class Reader : public YamlFields {
                                     const std::string& place) const;
   [[nodiscard]] Result<FrameSpec> frame(const YAML::Node& node, std::size_t index,
                                         const EdgeTiming& timing) const;
-  [[nodiscard]] Result<void> check_no_cycle(const YAML::Node& list,
-                                            const std::vector<FrameSpec>& frames) const;
-  [[nodiscard]] Result<std::string> id(const Fields& fields, std::string_view key,
-                                       const std::string& place) const;
-  [[nodiscard]] Result<Transform> transform(const YAML::Node& node, const Fields& fields,
-                                            const std::string& place) const;
+  [[nodiscard]] Result<void> frames(const Field& field, Config& config) const;
+  [[nodiscard]] Result<void> urdfs(const Field& field, Config& config) const;
 };
-
-Result<std::string> Reader::id(const Fields& fields, std::string_view key,
-                               const std::string& place) const {
-  const Field& field = fields.find(key)->second;
-  auto value = text(field, place + ": " + std::string(key));
-  if (!value) return value;
-  if (const auto ok = check_id(*value, key); !ok) {
-    return error(ok.error().code, field.mark, place + ": " + ok.error().message);
-  }
-  return value;
-}
-
-Result<Transform> Reader::transform(const YAML::Node& node, const Fields& fields,
-                                    const std::string& place) const {
-  TransformSpec spec;
-  const auto read = numbers(fields, "xyz", place, spec.xyz)
-                        .and_then([&] { return numbers(fields, "rpy", place, spec.rpy); })
-                        .and_then([&] { return numbers(fields, "quat", place, spec.quat); })
-                        .and_then([&] { return numbers(fields, "stddev", place, spec.stddev); })
-                        .and_then([&] { return numbers(fields, "cov", place, spec.cov); });
-  if (!read) return tl::unexpected(read.error());
-  auto X_PC = spec.build();
-  if (X_PC) return X_PC;
-  const std::string& message = X_PC.error().message;
-  const std::string_view key = blamed_key(message, spec);
-  const auto field = fields.find(key);
-  const bool named = message.rfind(std::string(key) + "[", 0) == 0 ||
-                     message.find("both given") != std::string::npos;
-  return error(X_PC.error().code, field == fields.end() ? node.Mark() : field->second.mark,
-               place + ": " + (named ? "" : std::string(key) + ": ") + message);
-}
 
 // What is left out is as in `timing`.
 Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
@@ -108,7 +57,8 @@ Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
   std::optional<std::array<double, 6>> noise;
   const auto read = number(*entries, "span", what, span)
                         .and_then([&] { return number(*entries, "count", what, count); })
-                        .and_then([&] { return numbers(*entries, "process_noise", what, noise); });
+                        .and_then([&] { return numbers(*entries, "process_noise", what, noise); })
+                        .and_then([&] { return flag(*entries, "moving", what, timing.moving); });
   if (!read) return tl::unexpected(read.error());
   const auto refuse = [&](const std::string& key, const std::string& why) {
     return error(Errc::kInvalidInput, entries->find(key)->second.mark, what + ": " + key + why);
@@ -127,11 +77,6 @@ Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
     const auto rate = Covariance::from_stddev(*noise);
     if (!rate) return refuse("process_noise", ": " + rate.error().message);
     timing.process_noise = *rate;
-  }
-  if (const auto moving = entries->find("moving"); moving != entries->end()) {
-    const std::string& said = moving->second.value.Scalar();
-    if (said != "true" && said != "false") return refuse("moving", " is neither true nor false");
-    timing.moving = said == "true";
   }
   return timing;
 }
@@ -229,31 +174,6 @@ Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index,
   return spec;
 }
 
-// Each frame climbs until where another has been that found its root.
-Result<void> Reader::check_no_cycle(const YAML::Node& list,
-                                    const std::vector<FrameSpec>& frames) const {
-  std::unordered_map<std::string_view, std::size_t> index;
-  for (std::size_t i = 0; i < frames.size(); ++i) index.emplace(frames[i].id, i);
-  constexpr std::size_t kNobody = std::numeric_limits<std::size_t>::max();
-  std::vector<std::size_t> visitor(frames.size(), kNobody);
-  for (std::size_t start = 0; start < frames.size(); ++start) {
-    std::size_t here = start;
-    while (visitor[here] == kNobody) {
-      visitor[here] = start;
-      const auto parent = index.find(frames[here].parent);
-      if (parent == index.end()) break;
-      if (visitor[parent->second] == start) {
-        return error(Errc::kInvalidInput, list[here].Mark(),
-                     "frame " + tfdude::quote(frames[here].id) + ": parent " +
-                         tfdude::quote(frames[here].parent) +
-                         " is the frame itself or lies below it");
-      }
-      here = parent->second;
-    }
-  }
-  return {};
-}
-
 Result<Config> Reader::config(const YAML::Node& root) const {
   const auto entries = fields(root, kFileKeys, "the file");
   if (!entries) return tl::unexpected(entries.error());
@@ -271,10 +191,18 @@ Result<Config> Reader::config(const YAML::Node& root) const {
     if (!timing) return tl::unexpected(timing.error());
     config.history = *timing;
   }
-  const auto found = entries->find("frames");
-  if (found == entries->end()) return config;
-  const YAML::Node& list = found->second.value;
-  if (!list.IsSequence()) return error(Errc::kConfig, found->second.mark, "frames is not a list");
+  if (const auto found = entries->find("frames"); found != entries->end()) {
+    if (auto ok = frames(found->second, config); !ok) return tl::unexpected(ok.error());
+  }
+  if (const auto found = entries->find("urdf"); found != entries->end()) {
+    if (auto ok = urdfs(found->second, config); !ok) return tl::unexpected(ok.error());
+  }
+  return config;
+}
+
+Result<void> Reader::frames(const Field& field, Config& config) const {
+  const YAML::Node& list = field.value;
+  if (!list.IsSequence()) return error(Errc::kConfig, field.mark, "frames is not a list");
   std::unordered_map<std::string, int> line_of;
   for (const YAML::Node& node : list) {
     auto spec = frame(node, config.frames.size(), config.history);
@@ -286,9 +214,25 @@ Result<Config> Reader::config(const YAML::Node& root) const {
                        std::to_string(known->second));
     }
     config.frames.push_back(*std::move(spec));
+    config.places.push_back(place(node.Mark()));
   }
-  if (auto ok = check_no_cycle(list, config.frames); !ok) return tl::unexpected(ok.error());
-  return config;
+  return check_no_cycle(config);
+}
+
+Result<void> Reader::urdfs(const Field& field, Config& config) const {
+  const YAML::Node& list = field.value;
+  if (!list.IsSequence()) return error(Errc::kConfig, field.mark, "urdf is not a list");
+  const UrdfFields reader(name(), std::filesystem::path(name()).parent_path().string());
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const YAML::Node node = list[i];
+    const std::string nth = "urdf[" + std::to_string(i) + "]";
+    const auto part = reader.part(node, nth);
+    if (!part) return tl::unexpected(part.error());
+    if (auto ok = add_urdf(config, *part); !ok) {
+      return error(ok.error().code, node.Mark(), nth + ": " + ok.error().message);
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -311,23 +255,9 @@ Result<Config> parse_config(const std::string& text, const std::string& name) {
 }
 
 Result<Config> load_config(const std::string& path) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) {
-    return fail(Errc::kConfig, path + ": is a directory");
-  }
-  const auto reason = [] { return std::generic_category().message(errno); };
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return fail(Errc::kConfig, path + ": cannot be opened: " + reason());
-  std::string text;
-  std::array<char, 65536> block{};
-  while (file) {
-    file.read(block.data(), block.size());
-    text.append(block.data(), static_cast<std::size_t>(file.gcount()));
-    if (text.size() > kMaxFileBytes) return fail(Errc::kConfig, path + ": is longer than 64 MiB");
-  }
-  if (file.bad()) return fail(Errc::kConfig, path + ": cannot be read: " + reason());
-  return parse_config(text, path);
+  const auto text = read_text(path);
+  if (!text) return tl::unexpected(text.error());
+  return parse_config(*text, path);
 }
 
 }  // namespace tfdude

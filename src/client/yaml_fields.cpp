@@ -5,15 +5,33 @@
 #include <system_error>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/math/transform_spec.hpp"
 
 #include "client/yaml_quirks.hpp"
 
 namespace tfdude {
+namespace {
+
+// The key whose line a complaint of TransformSpec::build() belongs to.
+std::string_view blamed_key(const std::string& message, const TransformSpec& spec) {
+  const auto starts = [&](std::string_view word) { return message.rfind(word, 0) == 0; };
+  if (starts("translation")) return "xyz";
+  if (starts("rpy")) return "rpy";
+  if (starts("rotation")) return "quat";
+  if (starts("stddev")) return "stddev";
+  if (starts("covariance")) return spec.cov ? "cov" : "stddev";
+  return {};
+}
+
+}  // namespace
 
 tl::unexpected<Error> YamlFields::error(Errc code, const YAML::Mark& mark,
                                         const std::string& message) const {
-  const std::string line = mark.is_null() ? "" : ":" + std::to_string(mark.line + 1);
-  return fail(code, name_ + line + ": " + message);
+  return fail(code, place(mark) + ": " + message);
+}
+
+std::string YamlFields::place(const YAML::Mark& mark) const {
+  return mark.is_null() ? name_ : name_ + ":" + std::to_string(mark.line + 1);
 }
 
 Result<YamlFields::Fields> YamlFields::fields(const YAML::Node& map,
@@ -82,6 +100,50 @@ Result<void> YamlFields::number(const Fields& fields, std::string_view key,
   if (!value) return tl::unexpected(value.error());
   out = *value;
   return {};
+}
+
+Result<void> YamlFields::flag(const Fields& fields, std::string_view key, const std::string& place,
+                              bool& out) const {
+  const auto found = fields.find(key);
+  if (found == fields.end()) return {};
+  const std::string& said = found->second.value.Scalar();
+  if (said != "true" && said != "false") {
+    return error(Errc::kInvalidInput, found->second.mark,
+                 place + ": " + found->first + " is neither true nor false");
+  }
+  out = said == "true";
+  return {};
+}
+
+Result<std::string> YamlFields::id(const Fields& fields, std::string_view key,
+                                   const std::string& place) const {
+  const Field& field = fields.find(key)->second;
+  auto value = text(field, place + ": " + std::string(key));
+  if (!value) return value;
+  if (const auto ok = check_id(*value, key); !ok) {
+    return error(ok.error().code, field.mark, place + ": " + ok.error().message);
+  }
+  return value;
+}
+
+Result<Transform> YamlFields::transform(const YAML::Node& node, const Fields& fields,
+                                        const std::string& place) const {
+  TransformSpec spec;
+  const auto read = numbers(fields, "xyz", place, spec.xyz)
+                        .and_then([&] { return numbers(fields, "rpy", place, spec.rpy); })
+                        .and_then([&] { return numbers(fields, "quat", place, spec.quat); })
+                        .and_then([&] { return numbers(fields, "stddev", place, spec.stddev); })
+                        .and_then([&] { return numbers(fields, "cov", place, spec.cov); });
+  if (!read) return tl::unexpected(read.error());
+  auto X_PC = spec.build();
+  if (X_PC) return X_PC;
+  const std::string& message = X_PC.error().message;
+  const std::string_view key = blamed_key(message, spec);
+  const auto field = fields.find(key);
+  const bool named = message.rfind(std::string(key) + "[", 0) == 0 ||
+                     message.find("both given") != std::string::npos;
+  return error(X_PC.error().code, field == fields.end() ? node.Mark() : field->second.mark,
+               place + ": " + (named ? "" : std::string(key) + ": ") + message);
 }
 
 }  // namespace tfdude

@@ -11,6 +11,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "tfdude/base/result.hpp"
+#include "tfdude/math/transform.hpp"
 
 namespace tfdude {
 
@@ -33,6 +34,10 @@ class YamlFields {
                                             const std::string& message) const;
 
  protected:
+  [[nodiscard]] const std::string& name() const { return name_; }
+  /// The file and the line.
+  [[nodiscard]] std::string place(const YAML::Mark& mark) const;
+
   /// A mapping of these keys; of any where none are given.
   template <std::size_t N>
   [[nodiscard]] Result<Fields> fields(const YAML::Node& map,
@@ -54,6 +59,14 @@ class YamlFields {
                                      std::optional<std::array<double, N>>& out) const;
   [[nodiscard]] Result<void> number(const Fields& fields, std::string_view key,
                                     const std::string& place, std::optional<double>& out) const;
+  [[nodiscard]] Result<void> flag(const Fields& fields, std::string_view key,
+                                  const std::string& place, bool& out) const;
+  /// What is there under `key`, as an id.
+  [[nodiscard]] Result<std::string> id(const Fields& fields, std::string_view key,
+                                       const std::string& place) const;
+  /// What xyz, rpy or quat, and stddev or cov say; identity and zero where they are not there.
+  [[nodiscard]] Result<Transform> transform(const YAML::Node& node, const Fields& fields,
+                                            const std::string& place) const;
 
  private:
   [[nodiscard]] Result<Fields> fields(const YAML::Node& map,

@@ -200,10 +200,10 @@ TEST_CASE("a file of the wrong structure is refused") {
   check_refused({"---\n", Errc::kConfig, "robot.yaml: is empty"});
   check_refused(
       {"hello", Errc::kConfig,
-       "robot.yaml:1: the file is not a mapping with the keys partition, history, frames"});
+       "robot.yaml:1: the file is not a mapping with the keys partition, history, frames, urdf"});
   check_refused(
       {"partition: a\nframe: []\n", Errc::kConfig,
-       "robot.yaml:2: the file: unknown key 'frame'; known are partition, history, frames"});
+       "robot.yaml:2: the file: unknown key 'frame'; known are partition, history, frames, urdf"});
   check_refused({"partition: a\npartition: a\n", Errc::kConfig,
                  "robot.yaml:2: the file: partition is given twice"});
   check_refused({"partition: [a]\n", Errc::kConfig, "robot.yaml:1: partition is not text"});
