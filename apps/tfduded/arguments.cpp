@@ -1,0 +1,132 @@
+#include "arguments.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+
+#include <CLI/CLI.hpp>
+
+#include "tfdude/transport/fastdds.hpp"
+
+namespace tfdude::daemon {
+namespace {
+
+// Of the XDG base directory specification. @return empty where there is no home
+std::string default_state() {
+  const char* state = std::getenv("XDG_STATE_HOME");
+  if (state != nullptr && *state == '/') return std::string(state) + "/tfdude";
+  const char* home = std::getenv("HOME");
+  return home != nullptr && *home != 0 ? std::string(home) + "/.local/state/tfdude" : std::string();
+}
+
+std::vector<std::string> split(const std::string& text) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == ',') {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+// Options that may be given again and again, each for the --urdf before it.
+class UrdfOptions {
+ public:
+  explicit UrdfOptions(CLI::App& app) : app_(app) {
+    file_ = add("--urdf", "URDF file of a robot; may be given again. For the --urdf before them:");
+    root_ = add("--root", "the frame under which the robot's root link hangs");
+    prefix_ = add("--prefix", "before the names of all its links and joints");
+    links_ = add("--links", "LINK or FROM..TO[..TO], separated by commas: these links only");
+    strict_ = app.add_flag("--strict-limits", "refuse positions outside the joints' limits")
+                  ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  }
+
+  // @throws CLI::ParseError where an option follows no --urdf, or is given twice for one
+  [[nodiscard]] std::vector<UrdfPart> parts() const {
+    std::vector<UrdfPart> parts;
+    std::map<const CLI::Option*, std::size_t> used;
+    std::map<const CLI::Option*, std::size_t> set_for;
+    for (const CLI::Option* option : app_.parse_order()) {
+      if (option != file_ && option != root_ && option != prefix_ && option != links_ &&
+          option != strict_) {
+        continue;
+      }
+      const std::string& value = option->results().at(used[option]++);
+      if (option == file_) {
+        parts.push_back({value, {}, {}, {}, {}, false, {}});
+        continue;
+      }
+      if (parts.empty()) throw CLI::ValidationError(option->get_name(), "comes before any --urdf");
+      if (set_for[option] == parts.size()) {
+        throw CLI::ValidationError(option->get_name(), "is given twice for " + parts.back().file);
+      }
+      set_for[option] = parts.size();
+      set(parts.back(), option, value);
+    }
+    return parts;
+  }
+
+ private:
+  CLI::Option* add(const std::string& name, const std::string& help) {
+    return app_.add_option(name, values_[name], help)->allow_extra_args(false);
+  }
+
+  void set(UrdfPart& part, const CLI::Option* option, const std::string& value) const {
+    if (option == root_) part.root = value;
+    if (option == prefix_) part.prefix = value;
+    if (option == links_) part.links = split(value);
+    if (option == strict_) part.strict_limits = value == "true";
+  }
+
+  CLI::App& app_;
+  std::map<std::string, std::vector<std::string>> values_;
+  CLI::Option* file_;
+  CLI::Option* root_;
+  CLI::Option* prefix_;
+  CLI::Option* links_;
+  CLI::Option* strict_;
+};
+
+}  // namespace
+
+std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
+  bool no_state = false;
+  int save_every_ms = 1000;
+  CLI::App app{"tfduded: owns a partition of the coordinate frames and serves it over DDS"};
+  app.footer("Example: tfduded --partition arms --config examples/thesis/arms.yaml --domain 7");
+  app.add_option("--partition", arguments.partition, "the partition's name");
+  app.add_option("--config", arguments.config, "YAML file of frames");
+  const UrdfOptions urdfs(app);
+  app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232")
+      ->check(CLI::Range(0, 232));
+  app.add_option("--profile", arguments.options.profile, "XML file of DDS profiles");
+  auto* state = app.add_option("--state", arguments.options.state,
+                               "directory in which to keep the frames "
+                               "(default: $XDG_STATE_HOME/tfdude or ~/.local/state/tfdude)");
+  app.add_flag("--no-state", no_state, "keep nothing: begin with --config each time")
+      ->excludes(state);
+  app.add_option("--save-every", save_every_ms, "how often at most streamed values are stored [ms]")
+      ->check(CLI::Range(1, 86'400'000));
+  app.add_option("--discovery-server", arguments.options.discovery_server,
+                 "HOST:PORT of a Fast DDS discovery server")
+      ->check([](const std::string& text) {
+        const auto good = check_discovery_server(text);
+        return good ? std::string() : good.error().message;
+      });
+  try {
+    app.parse(argc, argv);
+    arguments.urdfs = urdfs.parts();
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kWrongUsage;
+  }
+  arguments.options.save_every = Milliseconds(save_every_ms);
+  if (!arguments.options.state.empty() || no_state) return std::nullopt;
+  arguments.options.state = default_state();
+  if (!arguments.options.state.empty()) return std::nullopt;
+  std::fputs("tfduded: no home for the state: give --state DIR or --no-state\n", stderr);
+  return kWrongUsage;
+}
+
+}  // namespace tfdude::daemon
