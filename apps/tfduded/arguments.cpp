@@ -12,12 +12,14 @@ namespace tfdude::daemon {
 namespace {
 
 // Of the XDG base directory specification. @return empty where there is no home
+// NOLINTBEGIN(concurrency-mt-unsafe): there are no other threads yet
 std::string default_state() {
   const char* state = std::getenv("XDG_STATE_HOME");
   if (state != nullptr && *state == '/') return std::string(state) + "/tfdude";
   const char* home = std::getenv("HOME");
   return home != nullptr && *home != 0 ? std::string(home) + "/.local/state/tfdude" : std::string();
 }
+// NOLINTEND(concurrency-mt-unsafe)
 
 std::vector<std::string> split(const std::string& text) {
   std::vector<std::string> parts(1);

@@ -36,7 +36,7 @@ class Reader : public YamlFields {
  private:
   [[nodiscard]] Result<EdgeTiming> history(const Field& field, const std::string& place,
                                            EdgeTiming timing) const;
-  [[nodiscard]] Result<Correlation> correlation(const Fields& fields,
+  [[nodiscard]] Result<Correlation> correlation(const Fields& entries,
                                                 const std::string& place) const;
   [[nodiscard]] Result<Share> share(const std::string& source, const Field& field,
                                     const std::string& place) const;

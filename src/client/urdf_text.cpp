@@ -81,9 +81,9 @@ class TextReader {
     for (const auto* element = robot.FirstChildElement(); element != nullptr;
          element = element->NextSiblingElement()) {
       const std::string_view kind = element->Name();
-      const auto read = kind == "link"    ? link(*element)
-                        : kind == "joint" ? joint(*element)
-                                          : Result<void>();
+      auto read = kind == "link"    ? link(*element)
+                  : kind == "joint" ? joint(*element)
+                                    : Result<void>();
       if (!read) return read;
     }
     printer_.CloseElement();

@@ -122,7 +122,7 @@ Result<std::vector<std::size_t>> links_named(const UrdfTree& tree, const std::st
 }
 
 Result<std::vector<std::size_t>> links_of(const UrdfTree& tree, const std::string& entry) {
-  const auto named = links_named(tree, entry);
+  auto named = links_named(tree, entry);
   if (!named) return named;
   std::vector<bool> is_end(tree.links.size());
   for (std::size_t i = 1; i < named->size(); ++i) is_end[(*named)[i]] = true;
@@ -165,7 +165,7 @@ Result<std::vector<std::size_t>> select_links(const UrdfTree& tree,
   std::vector<std::size_t> selected;
   std::unordered_map<std::size_t, const std::string*> entry_of;
   for (const std::string& entry : entries) {
-    const auto links = links_of(tree, entry);
+    auto links = links_of(tree, entry);
     if (!links) return links;
     for (const auto link : *links) {
       const auto [other, fresh] = entry_of.emplace(link, &entry);
