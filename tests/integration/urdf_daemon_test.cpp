@@ -1,0 +1,72 @@
+// What a daemon makes of URDFs, from its command line and from its configuration.
+
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/thesis.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::CliResult;
+using testing::ContainsSubstring;
+using testing::TestDomain;
+
+const std::string kArm = TFDUDE_EXAMPLES "/robots/ur5e.urdf";
+const std::string kTwoArms = TFDUDE_EXAMPLES "/robots/two_arms.urdf";
+
+std::string ready(const TestDomain& domain, const std::vector<std::string>& arguments) {
+  testing::Process daemon = domain.start_daemon(arguments);
+  return testing::await_ready(daemon);
+}
+
+}  // namespace
+
+TEST_CASE("daemon: it serves robots of URDFs, each with its options") {
+  const TestDomain domain;
+  CHECK(ready(domain, {"--partition", "a", "--urdf", kArm}) == "ready partition=a frames=8");
+  CHECK(ready(domain, {"--partition", "b", "--urdf", kArm, "--prefix", "b_", "--urdf", kArm,
+                       "--links", "base_link..shoulder_link,tool0"}) ==
+        "ready partition=b frames=11");
+  const testing::TemporaryDirectory directory;
+  const std::string config = directory.write(
+      "c.yaml", "partition: c\nframes: [{id: world}]\nurdf: [{file: " + kArm + ", root: world}]\n");
+  CHECK(ready(domain, {"--config", config, "--urdf", kTwoArms, "--root", "world", "--prefix",
+                       "two/", "--strict-limits"}) == "ready partition=c frames=37");
+}
+
+TEST_CASE("daemon: parts of one robot are owned by several") {
+  const TestDomain domain;
+  testing::Process body = domain.start_daemon({"--partition", "body", "--urdf", kTwoArms, "--links",
+                                               "base_link..left_arm_0_link..right_arm_0_link"});
+  testing::Process left = domain.start_daemon(
+      {"--partition", "left", "--urdf", kTwoArms, "--links", "left_arm_1_link"});
+  CHECK(testing::await_ready(body) == "ready partition=body frames=8");
+  CHECK(testing::await_ready(left) == "ready partition=left frames=10");
+  const CliResult result = domain.cli({"lookup", "torso_link", "left_hand"});
+  INFO(result.err);
+  CHECK(result.status == 0);
+  // Along the arm, which is tilted by 45 degrees: 0.3105 + 0.4 + 0.39 + 0.078 m.
+  CHECK_THAT(result.out, ContainsSubstring("0.100000  0.983325  1.183325"));
+}
+
+TEST_CASE("daemon: options of no URDF, and URDFs that cannot be served, are wrong usage") {
+  const TestDomain domain;
+  const auto refused = [&](std::vector<std::string> arguments, const std::string& why) {
+    arguments.insert(arguments.begin(), {"--partition", "legs"});
+    testing::Process daemon = domain.start_daemon(arguments);
+    const CliResult result = testing::finish(daemon);
+    CHECK(result.status == 2);
+    CHECK(result.out.empty());
+    CHECK_THAT(result.err, ContainsSubstring(why));
+  };
+  refused({"--root", "world"}, "--root: comes before any --urdf");
+  refused({"--strict-limits", "--urdf", kArm}, "--strict-limits: comes before any --urdf");
+  refused({"--urdf", kArm, "--prefix", "a", "--prefix", "b"}, "--prefix: is given twice");
+  refused({"--urdf", "/nowhere.urdf"}, "/nowhere.urdf: cannot be opened");
+  refused({"--urdf", kArm, "--links", "x"}, kArm + ": links 'x': link 'x' is not there");
+  refused({"--urdf", kArm, "--urdf", kArm}, "frame 'base_link': id is taken by the frame in");
+}
+
+}  // namespace tfdude
