@@ -128,7 +128,7 @@ class TextReader {
       if (part->Attribute("quat_xyzw") != nullptr) {
         return error(*part, what + ": quat_xyzw is not known; give rpy");
       }
-      push_part(*part, kept);
+      if (auto ok = push_part(*part, kept, what); !ok) return ok;
       if (kept.element == std::string_view("parent")) joint.parent = attribute(*part, "link");
       if (kept.element == std::string_view("child")) joint.child = attribute(*part, "link");
     }
@@ -139,15 +139,25 @@ class TextReader {
     return {};
   }
 
-  void push_part(const XMLElement& part, const Kept& kept) {
+  [[nodiscard]] Result<void> push_part(const XMLElement& part, const Kept& kept,
+                                       const std::string& what) {
     printer_.OpenElement(kept.element);
-    for (const char* name : kept.attributes) push(part, name);
+    for (const char* name : kept.attributes) {
+      // urdfdom logs a bad number as a format for printf.
+      const std::string value = attribute(part, name);
+      const bool names = std::strcmp(name, "link") == 0 || std::strcmp(name, "joint") == 0;
+      if (!names && value.find('%') != std::string::npos) {
+        return error(part, what + ": " + name + " is " + quote(value) + ", which is no number");
+      }
+      push(part, name);
+    }
     if (kept.element == std::string_view("limit")) {
       // urdfdom insists on them.
       printer_.PushAttribute("effort", "0");
       printer_.PushAttribute("velocity", "0");
     }
     printer_.CloseElement();
+    return {};
   }
 
   UrdfText& text_;

@@ -81,7 +81,8 @@ std::string mutated(std::string text, Random& random) {
   if (text.empty()) return text;
   static const std::vector<std::string> kValues = {
       "=\"nan\"",  "=\"1e308 -1e308 1e308\"", "=\"\"",      "=\"0 0 0\"",     "=\"-1e-310\"",
-      "=\"1e10\"", "=\"continuous\"",         "=\"fixed\"", "=\"base_link\"", "=\"elbow_joint\""};
+      "=\"1e10\"", "=\"continuous\"",         "=\"fixed\"", "=\"base_link\"", "=\"elbow_joint\"",
+      "=\"%n%s\""};
   const auto [begin, end] = any_piece(text, random);
   const std::string part = text.substr(begin, end - begin);
   switch (random.index(7)) {

@@ -121,6 +121,27 @@ TEST_CASE("urdf: what is no URDF is refused") {
   bad_number(limits("0", "1") + "<mimic joint=\"j\" offset=\"x\"/>", "offset value (x) is not a");
 }
 
+TEST_CASE("urdf: nothing is taken for a format of printf") {
+  const std::string format = "%n%s%1.5f";
+  const auto number = [&](const std::string& name, const std::string& element) {
+    refused(pair("revolute", element),
+            "r.urdf:4: joint 'j': " + name + " is '" + format + "', which is no number");
+  };
+  number("rpy", "<origin rpy=\"" + format + "\"/>");
+  number("xyz", "<origin xyz=\"" + format + "\"/>");
+  number("xyz", "<axis xyz=\"" + format + "\"/>");
+  number("lower", "<limit lower=\"" + format + "\"/>");
+  number("multiplier", "<mimic joint=\"j\" multiplier=\"" + format + "\"/>");
+  refused(pair(format), "r.urdf:4: joint 'j': Joint [j] has no known type [" + format + "]",
+          Errc::kConfig);
+  refused(pair("continuous", "<mimic joint=\"" + format + "\"/>"),
+          "r.urdf:4: joint 'j': mimics '" + format + "', which is not there");
+  const std::string named = robot(link(format) + link("b") +
+                                  joint(format, "continuous", format, "b", "<axis xyz=\"x\"/>"));
+  CHECK_THAT(tfdude::parse_urdf(named, {"r.urdf"}).error().message,
+             tfdude::testing::ContainsSubstring("Malformed axis element for joint [" + format));
+}
+
 TEST_CASE("urdf: links and joints that make no tree are refused") {
   refused(robot(""), "r.urdf:1: has no links");
   refused(robot("<link/>\n"), "r.urdf:2: a link has no name");
