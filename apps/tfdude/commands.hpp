@@ -36,6 +36,8 @@ struct Arguments {
   bool once = false;
   int order = 2;
   ObserveOptions observe;
+  std::string out;  ///< the file of a picture
+  int samples = 0;
 };
 
 [[nodiscard]] Time wall_clock();
@@ -73,6 +75,8 @@ int run_echo(Client& client, const Arguments& arguments);
 int run_observe(Client& client, const Arguments& arguments);
 int run_fuse(Client& client, const Arguments& arguments);
 int run_monitor(Client& client, const Arguments& arguments);
+int run_plot(Client& client, const Arguments& arguments);
+int run_graph(Client& client, const Arguments& arguments);
 
 /// Prints what is wrong with the command line itself, as JSON, and returns the exit status.
 int report_usage(const std::string& message);

@@ -23,14 +23,14 @@ _tfdude_command() {
 
 _tfdude() {
   local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command words common
-  local commands="tree frames partitions roots parent children exists lookup watch echo history monitor events observe fuse add update remove move"
+  local commands="tree frames partitions roots parent children exists lookup watch echo history monitor plot graph events observe fuse add update remove move"
   local pose="--xyz --rpy --quat --stddev --cov"
   COMPREPLY=()
   command=$(_tfdude_command)
   mapfile -t common < <(_tfdude_common)
   case $previous in
-    --profile) mapfile -t COMPREPLY < <(compgen -f -- "$word"); return ;;
-    --domain | --discovery-server | --timeout | --rate | --at | --at-b | --stamp | --gate | --order | --extrapolate | --wait | --xyz | --rpy | --quat | --stddev) return ;;
+    --profile | --out) mapfile -t COMPREPLY < <(compgen -f -- "$word"); return ;;
+    --domain | --discovery-server | --timeout | --rate | --at | --at-b | --stamp | --gate | --order | --samples | --extrapolate | --wait | --xyz | --rpy | --quat | --stddev) return ;;
     --partition) words=$(timeout 0.5 tfdude "${common[@]}" partitions 2>/dev/null | cut -d' ' -f1) ;;
     --parent | --fixed) words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null) ;;
     *)
@@ -44,11 +44,13 @@ _tfdude() {
           observe | fuse) words+=" --stamp --gate --correlated $pose" ;;
           watch) words+=" --rate --composed --cov" ;;
           echo) words+=" --rate --composed" ;;
+          plot) words+=" --out --samples --at" ;;
+          graph) words+=" --out" ;;
           monitor) words+=" --rate --once" ;;
         esac
       elif [[ -z $command ]]; then
         words=$commands
-      elif [[ $command =~ ^(parent|children|exists|lookup|watch|echo|history|observe|fuse|update|remove|move)$ ]]; then
+      elif [[ $command =~ ^(parent|children|exists|lookup|watch|echo|plot|history|observe|fuse|update|remove|move)$ ]]; then
         words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null)
       fi
       ;;

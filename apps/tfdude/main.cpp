@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <unistd.h>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -181,6 +182,37 @@ void add_measuring_commands(CLI::App& app, Arguments& arguments, Command& chosen
   }
 }
 
+void add_out(CLI::App* command, Arguments& arguments, const std::vector<std::string>& endings) {
+  std::string all;
+  for (const std::string& ending : endings) all += (all.empty() ? "" : ", ") + ending;
+  command->add_option("--out", arguments.out, "the picture's file: " + all)
+      ->type_name("FILE")
+      ->required()
+      ->check([endings, all](const std::string& file) {
+        const auto dot = file.rfind('.');
+        const std::string ending = dot == std::string::npos ? "" : file.substr(dot);
+        const bool known = std::find(endings.begin(), endings.end(), ending) != endings.end();
+        return known ? "" : quote(file) + " does not end in one of " + all;
+      });
+}
+
+// Those that draw.
+void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
+  auto* plot =
+      add_command(app, "plot", "draw where B is in A, with its uncertainty",
+                  "plot world hand_left --out hand.svg --samples 2000", cli::run_plot, chosen);
+  add_ends(plot, arguments);
+  add_out(plot, arguments, {".svg", ".png"});
+  plot->add_option("--samples", arguments.samples,
+                   "how many points to draw from the uncertainty of the single edges")
+      ->check(CLI::Range(1, 100000));
+  add_stamp(plot, "--at", arguments.stamp,
+            "of which instant: seconds since the epoch or, negative, before now");
+  auto* graph = add_command(app, "graph", "draw all frames with their owners, ages, deviations",
+                            "graph --out frames.svg", cli::run_graph, chosen);
+  add_out(graph, arguments, {".svg", ".png", ".dot"});
+}
+
 void add_events_command(CLI::App& app, Command& chosen) {
   add_command(app, "events", "tell what changes: partitions that come and go, frames, conflicts",
               "--json events", cli::run_events, chosen);
@@ -235,6 +267,7 @@ int main(int argc, char** argv) {
   add_events_command(app, command);
   add_changing_commands(app, arguments, command);
   add_measuring_commands(app, arguments, command);
+  add_picture_commands(app, arguments, command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,0 +1,156 @@
+#include "graph.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "format.hpp"
+#include "svg.hpp"
+
+namespace tfdude::cli {
+namespace {
+
+constexpr const char* kHead =
+    "digraph frames {\n"
+    "  graph [rankdir=LR, bgcolor=\"#ffffff\", nodesep=0.14, ranksep=0.45, pad=0.25,\n"
+    "         fontname=\"Helvetica,Arial,sans-serif\", fontsize=11, fontcolor=\"#33414f\","
+    " labelloc=b, labeljust=l]\n"
+    "  node [shape=box, style=\"filled,rounded\", fontname=\"Helvetica,Arial,sans-serif\","
+    " fontsize=12,\n"
+    "        fontcolor=\"#1b2733\", height=0.32, margin=\"0.12,0.04\"]\n"
+    "  edge [color=\"#7d8896\", arrowsize=0.6, fontname=\"Helvetica,Arial,sans-serif\","
+    " fontsize=10,\n"
+    "        fontcolor=\"#5b6776\"]\n";
+
+struct Colours {
+  std::string fill;
+  std::string line;
+};
+
+const Colours kGrey = {"#eceef1", "#aeb4bc"};
+
+// Of hue, saturation and value in [0, 1].
+std::string colour(double hue, double saturation, double value) {
+  const auto channel = [&](double shift) {
+    const double k = std::fmod(shift + hue * 6, 6.0);
+    const double part = std::clamp(std::min(k, 4 - k), 0.0, 1.0);
+    return static_cast<int>(std::lround(255 * value * (1 - saturation * part)));
+  };
+  return format("#%02x%02x%02x", channel(5), channel(3), channel(1));
+}
+
+// Each hue is far from those before it, however many there are.
+Colours colours_of(std::size_t index) {
+  constexpr double kGolden = 0.381966011250105;
+  const double hue = std::fmod(0.08 + kGolden * static_cast<double>(index), 1.0);
+  return {colour(hue, 0.16, 0.98), colour(hue, 0.6, 0.66)};
+}
+
+// How each partition is drawn.
+using Looks = std::map<std::string, Colours>;
+
+Looks looks_of(const std::vector<PartitionInfo>& partitions) {
+  Looks looks;
+  for (std::size_t i = 0; i < partitions.size(); ++i) {
+    looks[partitions[i].name] = partitions[i].reachable ? colours_of(i) : kGrey;
+  }
+  return looks;
+}
+
+std::string age_text(std::chrono::nanoseconds age) {
+  const double seconds = static_cast<double>(age.count()) * 1e-9;
+  const double size = std::abs(seconds);
+  if (size < 1) return format("%.0f ms", seconds * 1e3);
+  if (size < 100) return format("%.1f s", seconds);
+  if (size < 6000) return format("%.0f min", seconds / 60);
+  return size < 360000 ? format("%.0f h", seconds / 3600) : format("%.0f days", seconds / 86400);
+}
+
+std::string metres_text(double metres) {
+  return metres < 1 ? format("±%.3g mm", metres * 1e3) : format("±%.3g m", metres);
+}
+
+std::string legend_row(const PartitionInfo& partition, const Colours& look) {
+  std::string text = "<TR><TD BGCOLOR=\"" + look.fill + "\" COLOR=\"" + look.line +
+                     "\" BORDER=\"1\" WIDTH=\"22\"></TD><TD ALIGN=\"LEFT\">" +
+                     xml_escape(partition.name);
+  // Nothing else is known of one that went before this process came.
+  if (!partition.host.empty()) {
+    text += "  on " + xml_escape(partition.host) + ", pid " + std::to_string(partition.pid);
+  }
+  return text + (partition.reachable ? "" : ", not reachable") + "</TD></TR>";
+}
+
+std::string legend(const std::vector<PartitionInfo>& partitions, const Looks& looks) {
+  if (partitions.empty()) return "";
+  std::string text = "  label=<<TABLE BORDER=\"0\" CELLBORDER=\"0\" CELLSPACING=\"5\">\n";
+  for (const PartitionInfo& partition : partitions) {
+    text += "    " + legend_row(partition, looks.at(partition.name)) + "\n";
+  }
+  return text + "  </TABLE>>\n";
+}
+
+}  // namespace
+
+std::string edge_text(const EdgeNote& edge, Time now) {
+  constexpr double kMetres = 1e-3;
+  constexpr double kTurn = 0.1;  // [°]
+  std::string text = edge.newest ? age_text(now - *edge.newest) : "";
+  if (!edge.covariance) return text;
+  const auto s = edge.covariance->stddev();
+  const double metres = *std::max_element(s.begin(), s.begin() + 3);
+  const double turn = *std::max_element(s.begin() + 3, s.end()) * kDegrees;
+  // What is written as a number may be a little less for rounding.
+  constexpr double kAlmost = 1 - 1e-9;
+  if (metres < kMetres * kAlmost && turn < kTurn * kAlmost) return text;
+  return text + (text.empty() ? "" : "  ") + metres_text(metres) + " " + format("±%.2g°", turn);
+}
+
+std::string dot_id(std::string_view id) {
+  std::string out = "\"";
+  for (const char c : id) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + "\"";
+}
+
+std::string dot_label(std::string_view text) { return dot_id(xml_escape(text)); }
+
+std::string draw_graph(const Graph& graph) {
+  const Looks looks = looks_of(graph.partitions);
+  const auto look_of = [&](const Frame& frame) {
+    const auto found = looks.find(frame.partition);
+    return found != looks.end() ? found->second : kGrey;
+  };
+  std::set<std::string> reachable;
+  for (const PartitionInfo& partition : graph.partitions) {
+    if (partition.reachable) reachable.insert(partition.name);
+  }
+  std::string text = kHead + legend(graph.partitions, looks);
+  std::set<std::string> missing;
+  for (const Frame& frame : graph.frames) {
+    const Colours look = look_of(frame);
+    text += "  " + dot_id(frame.id) + " [label=" + dot_label(frame.id) + ", fillcolor=\"" +
+            look.fill + "\", color=\"" + look.line + "\"]\n";
+    if (!frame.parent.empty() && !frame.attached) missing.insert(frame.parent);
+  }
+  for (const std::string& parent : missing) {
+    text += "  " + dot_id(parent) + " [label=" + dot_label(parent) +
+            ", style=\"dashed,rounded\", color=\"#aeb4bc\", fontcolor=\"#7d8896\"]\n";
+  }
+  for (const Frame& frame : graph.frames) {
+    if (frame.parent.empty()) continue;
+    text += "  " + dot_id(frame.parent) + " -> " + dot_id(frame.id);
+    const auto edge = graph.edges.find(frame.id);
+    const std::string beside = edge != graph.edges.end() ? edge_text(edge->second, graph.now) : "";
+    std::string looks_like = beside.empty() ? "" : "label=" + dot_label(" " + beside + " ");
+    if (!frame.attached || reachable.count(frame.partition) == 0) {
+      looks_like += std::string(looks_like.empty() ? "" : ", ") + "style=dashed";
+    }
+    text += looks_like.empty() ? "\n" : " [" + looks_like + "]\n";
+  }
+  return text + "}\n";
+}
+
+}  // namespace tfdude::cli

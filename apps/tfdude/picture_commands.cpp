@@ -1,0 +1,273 @@
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <fcntl.h>
+#include <map>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <system_error>
+#include <thread>
+#include <unistd.h>
+
+#include "tfdude/base/id.hpp"
+
+#include "commands.hpp"
+#include "graph.hpp"
+#include "plot.hpp"
+#include "time_render.hpp"
+
+extern char** environ;
+
+// Commands that draw.
+namespace tfdude::cli {
+namespace {
+
+// Long enough for Graphviz to lay out some thousand frames.
+constexpr std::chrono::seconds kProgramTimeout{120};
+
+// What another program is needed for a picture.
+struct Program {
+  std::vector<std::string> argv;
+  const char* package;
+};
+
+std::string reason() { return std::generic_category().message(errno); }
+
+// An open file, in memory or on disk.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (fd_ >= 0) close(fd_);
+  }
+
+  [[nodiscard]] int get() const { return fd_; }
+
+  [[nodiscard]] bool write_all(const std::string& text) const {
+    std::size_t done = 0;
+    while (done < text.size()) {
+      const ssize_t count = write(fd_, text.data() + done, text.size() - done);
+      if (count < 0 && errno != EINTR) return false;
+      if (count > 0) done += static_cast<std::size_t>(count);
+    }
+    return true;
+  }
+
+  [[nodiscard]] std::string read_all() const {
+    std::string text;
+    std::array<char, 65536> block;
+    for (ssize_t count = 0;
+         (count = pread(fd_, block.data(), block.size(), static_cast<off_t>(text.size()))) > 0;) {
+      text.append(block.data(), static_cast<std::size_t>(count));
+    }
+    return text;
+  }
+
+ private:
+  int fd_;
+};
+
+// Its status as waitpid() tells it; ended by force where it takes too long.
+std::optional<int> wait_for(pid_t pid) {
+  const auto deadline = std::chrono::steady_clock::now() + kProgramTimeout;
+  int status = 0;
+  while (waitpid(pid, &status, WNOHANG) == 0) {
+    if (std::chrono::steady_clock::now() > deadline) {
+      kill(pid, SIGKILL);
+      (void)waitpid(pid, &status, 0);
+      return std::nullopt;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return status;
+}
+
+// Without a shell; what it reads and writes are files in memory, so that nobody has to wait for anybody.
+Result<std::string> run_program(const Program& program, const std::string& input) {
+  const Descriptor in(memfd_create("in", MFD_CLOEXEC));
+  const Descriptor out(memfd_create("out", MFD_CLOEXEC));
+  const Descriptor err(memfd_create("err", MFD_CLOEXEC));
+  if (in.get() < 0 || out.get() < 0 || err.get() < 0 || !in.write_all(input) ||
+      lseek(in.get(), 0, SEEK_SET) != 0) {
+    return fail(Errc::kInvalidInput, "no memory for the picture: " + reason());
+  }
+  std::vector<char*> argv;
+  for (const std::string& word : program.argv) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, in.get(), STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, out.get(), STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, err.get(), STDERR_FILENO);
+  posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);  // sockets of DDS
+  pid_t pid = 0;
+  const int failed = posix_spawnp(&pid, argv[0], &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (failed != 0) {
+    return fail(Errc::kInvalidInput, "cannot run " + quote(program.argv[0]) + " of the package " +
+                                         program.package + ": " +
+                                         std::generic_category().message(failed));
+  }
+  const auto status = wait_for(pid);
+  if (!status) return fail(Errc::kInvalidInput, quote(program.argv[0]) + " does not end");
+  if (*status != 0) {
+    return fail(Errc::kInvalidInput,
+                quote(program.argv[0]) + " failed: " + printable(err.read_all().substr(0, 1000)));
+  }
+  return out.read_all();
+}
+
+// By way of another name, so that there is the whole file or none.
+Result<void> write_file(const std::string& file, const std::string& bytes) {
+  const std::string beside = file + "." + std::to_string(getpid()) + ".tmp";
+  const auto failed = [&] {
+    return fail(Errc::kInvalidInput, "cannot write " + quote(file) + ": " + reason());
+  };
+  const Descriptor out(open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (out.get() < 0) return failed();
+  if (out.write_all(bytes) && rename(beside.c_str(), file.c_str()) == 0) return {};
+  const auto error = failed();
+  unlink(beside.c_str());
+  return error;
+}
+
+bool ends_with(const std::string& text, std::string_view end) {
+  return text.size() > end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+// Writes the picture as it is, or as the program makes it, and says so.
+int finish(Client& client, const Arguments& arguments, const Result<std::string>& picture,
+           nlohmann::json json) {
+  if (!picture) return refuse(client, picture.error(), arguments);
+  const auto written = write_file(arguments.out, *picture);
+  if (!written) return refuse(client, written.error(), arguments);
+  json["file"] = arguments.out;
+  return answer(arguments, json, "wrote " + printable(arguments.out) + "\n");
+}
+
+// From a frame up to its root, itself included.
+std::vector<const Frame*> ancestors(const std::map<std::string, const Frame*>& frames,
+                                    const std::string& id) {
+  std::vector<const Frame*> way;
+  for (auto found = frames.find(id); found != frames.end();
+       found = frames.find(found->second->parent)) {
+    way.push_back(found->second);
+    if (!found->second->attached) break;
+  }
+  return way;
+}
+
+// The frames from A to B and the edges between them, each looked up at the instant of the answer.
+Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTransform& X_AB) {
+  const auto all = client.frames();
+  std::map<std::string, const Frame*> by_id;
+  for (const Frame& frame : all) by_id.emplace(frame.id, &frame);
+  auto up = ancestors(by_id, arguments.id);
+  auto down = ancestors(by_id, arguments.other);
+  if (up.empty() || down.empty() || up.back() != down.back()) {
+    return fail(Errc::kNotOwner, "the frames between " + quote(arguments.id) + " and " +
+                                     quote(arguments.other) + " keep changing");
+  }
+  while (up.size() > 1 && down.size() > 1 && up[up.size() - 2] == down[down.size() - 2]) {
+    up.pop_back();
+    down.pop_back();
+  }
+  // What both ends have in common is now the last of either.
+  down.pop_back();
+  std::reverse(down.begin(), down.end());
+  Plot plot{X_AB, {}, {}, arguments.samples};
+  Query query;
+  query.at = X_AB.stamp;
+  const auto add = [&](const Frame& child, bool upwards) -> Result<void> {
+    const auto X_PC = client.lookup(child.parent, child.id, query);
+    if (!X_PC) return tl::unexpected(X_PC.error());
+    plot.steps.push_back({*X_PC, upwards});
+    return {};
+  };
+  for (std::size_t i = 0; i < up.size(); ++i) {
+    plot.frames.push_back(up[i]->id);
+    if (i + 1 == up.size()) break;
+    if (const auto added = add(*up[i], true); !added) return tl::unexpected(added.error());
+  }
+  for (const Frame* frame : down) {
+    plot.frames.push_back(frame->id);
+    if (const auto added = add(*frame, false); !added) return tl::unexpected(added.error());
+  }
+  return plot;
+}
+
+// Edges of partitions that answer; one that does not is asked no more, and drawn as not reachable.
+Graph graph_of(Client& client) {
+  Graph graph{client.frames(), client.partitions(), {}, {}};
+  std::map<std::string, PartitionInfo*> by_name;
+  for (PartitionInfo& partition : graph.partitions) {
+    by_name[partition.name] = &partition;
+    if (!partition.reachable) continue;
+    const auto pasts = client.pasts(partition.name);
+    partition.reachable = pasts.has_value();
+    if (!pasts) continue;
+    for (const PastInfo& past : *pasts) graph.edges[past.id].newest = past.newest;
+  }
+  for (const Frame& frame : graph.frames) {
+    const auto owner = by_name.find(frame.partition);
+    if (!frame.attached || owner == by_name.end() || !owner->second->reachable) continue;
+    const auto X_PC = client.lookup(frame.parent, frame.id);
+    if (X_PC) {
+      graph.edges[frame.id].covariance = X_PC->covariance;
+    } else if (X_PC.error().code == Errc::kTimeout || X_PC.error().code == Errc::kUnreachable) {
+      owner->second->reachable = false;
+    }
+  }
+  graph.now = wall_clock();
+  return graph;
+}
+
+}  // namespace
+
+int run_plot(Client& client, const Arguments& arguments) {
+  Query query;
+  if (!arguments.stamp.empty()) {
+    const auto at = parse_stamp(arguments.stamp, wall_clock());
+    if (!at) return report(at.error(), arguments);
+    query.at = *at;
+  }
+  const auto X_AB = client.lookup(arguments.id, arguments.other, query);
+  if (!X_AB) return refuse(client, X_AB.error(), arguments);
+  const auto plot = plot_of(client, arguments, *X_AB);
+  if (!plot) return refuse(client, plot.error(), arguments);
+  nlohmann::json json{{"from", arguments.id}, {"to", arguments.other}, {"frames", plot->frames}};
+  if (plot->samples > 0) {
+    json["samples"] = plot->samples;
+    json["seed"] = kSampleSeed;
+  }
+  add_stamp(json, X_AB->stamp);
+  Result<std::string> picture = draw_plot(*plot);
+  if (ends_with(arguments.out, ".png")) {
+    // Twice as fine, for screens that are.
+    picture =
+        run_program({{"rsvg-convert", "--zoom", "2", "--unlimited"}, "librsvg2-bin"}, *picture);
+  }
+  return finish(client, arguments, picture, json);
+}
+
+int run_graph(Client& client, const Arguments& arguments) {
+  const Graph graph = graph_of(client);
+  if (graph.partitions.empty()) {
+    return refuse(client, {Errc::kUnknownPartition, "no partition"}, arguments);
+  }
+  nlohmann::json json{{"frames", graph.frames.size()}, {"partitions", graph.partitions.size()}};
+  Result<std::string> picture = draw_graph(graph);
+  if (ends_with(arguments.out, ".svg")) {
+    picture = run_program({{"dot", "-Tsvg"}, "graphviz"}, *picture);
+  } else if (ends_with(arguments.out, ".png")) {
+    picture = run_program({{"dot", "-Tpng", "-Gdpi=144"}, "graphviz"}, *picture);
+  }
+  return finish(client, arguments, picture, json);
+}
+
+}  // namespace tfdude::cli

@@ -1,0 +1,392 @@
+#include "plot.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "tfdude/math/perturbation.hpp"
+
+#include "format.hpp"
+#include "svg.hpp"
+
+namespace tfdude::cli {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// The layout [px]. As wide as a page shows it, so that letters keep their size.
+constexpr double kWidth = 900;
+constexpr double kLeft = 62;
+constexpr double kRight = 14;
+constexpr double kGap = 66;
+constexpr double kPanel = (kWidth - kLeft - kRight - 2 * kGap) / 3;
+constexpr double kHeader = 96;
+constexpr double kRow = kPanel + 70;  // with its heading and the axes' names
+constexpr double kFooter = 34;
+constexpr double kLine = 18;
+constexpr double kLabelSize = 11.5;
+constexpr double kLabelWidth = 100;
+constexpr int kTicks = 6;
+
+constexpr double kOuter = 3;  // standard deviations of the outer ellipse
+
+constexpr const char* kStyle =
+    "text { font-family: 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', sans-serif;"
+    " font-size: 11.5px; fill: #5b6776; }\n"
+    ".page { fill: #ffffff; }\n"
+    ".panel { fill: #f7f8fa; }\n"
+    ".grid { stroke: #e3e7ec; stroke-width: 1; }\n"
+    ".zero { stroke: #c3cad3; stroke-width: 1; }\n"
+    ".edge { fill: none; stroke: #aeb7c2; stroke-width: 1; }\n"
+    ".title { font-size: 20px; font-weight: bold; fill: #1b2733; }\n"
+    ".value { font-size: 14px; fill: #1b2733; }\n"
+    ".heading { font-size: 12.5px; font-weight: bold; fill: #33414f; }\n"
+    ".middle { text-anchor: middle; }\n"
+    ".end { text-anchor: end; }\n"
+    ".zoom { fill: none; stroke: #7d8896; stroke-width: 1; stroke-dasharray: 3 3; }\n"
+    ".chain { fill: none; stroke: #66727f; stroke-width: 1.4; stroke-linejoin: round; }\n"
+    ".frame { fill: #ffffff; stroke: #46525e; stroke-width: 1.4; }\n"
+    ".name { fill: #2d3945; stroke: #f7f8fa; stroke-width: 3; stroke-linejoin: round;"
+    " paint-order: stroke; }\n"
+    ".inner { fill: #2f6fb3; fill-opacity: 0.16; stroke: #2f6fb3; stroke-width: 1.6;"
+    " stroke-linejoin: round; }\n"
+    ".ring { fill: none; stroke: #1f5a99; stroke-width: 1.8; stroke-linejoin: round; }\n"
+    ".outer { fill: none; stroke: #2f6fb3; stroke-width: 1.2; stroke-linejoin: round; }\n"
+    ".mean { stroke: #123a66; stroke-width: 1.6; }\n"
+    ".few, .some, .many { stroke: #d9822b; stroke-linecap: round; }\n"
+    ".few { stroke-width: 3; stroke-opacity: 0.7; }\n"
+    ".some { stroke-width: 2.2; stroke-opacity: 0.45; }\n"
+    ".many { stroke-width: 1.6; stroke-opacity: 0.22; }\n";
+
+constexpr const char* kAxes[] = {"x", "y", "z"};
+struct Plane {
+  int across;
+  int up;
+};
+constexpr std::array<Plane, 3> kPlanes = {{{0, 1}, {0, 2}, {1, 2}}};
+
+Vector2d seen_in(const Plane& plane, const Vector3d& p) { return {p[plane.across], p[plane.up]}; }
+
+// All that is drawn, from the plot.
+struct Scene {
+  const Plot& plot;
+  std::vector<Vector3d> chain;
+  std::vector<Vector3d> points;  // from the mean
+  Vector3d mean;
+  Eigen::Matrix3d covariance;
+  Vector3d center;  // of the upper row
+  double reach;     // of a panel from its middle, in the upper row
+  double spread;    // the same in the lower one; 0 where nothing is uncertain
+};
+
+// A square of a plane of A, and where it is in the picture.
+struct Panel {
+  Box box;
+  Plane plane;
+  Vector2d center;
+  double reach;
+
+  [[nodiscard]] Point at(const Vector2d& p) const {
+    const double scale = kPanel / (2 * reach);
+    return {box.x + kPanel / 2 + (p.x() - center.x()) * scale,
+            box.y + kPanel / 2 - (p.y() - center.y()) * scale};
+  }
+};
+
+// A few far ones would make the picture small.
+double reach_of(const std::vector<Vector3d>& points) {
+  if (points.empty()) return 0;
+  std::vector<double> distances;
+  for (const Vector3d& p : points) distances.push_back(p.cwiseAbs().maxCoeff());
+  const auto most =
+      distances.begin() + static_cast<std::ptrdiff_t>(997 * (points.size() - 1) / 1000);
+  std::nth_element(distances.begin(), most, distances.end());
+  return *most;
+}
+
+Scene scene_of(const Plot& plot) {
+  Scene scene{plot, chain_of(plot.steps), {}, plot.X_AB.pose.translation(), {}, {}, 0, 0};
+  scene.covariance = ros_covariance(plot.X_AB).matrix().topLeftCorner<3, 3>();
+  const Vector3d outer = kOuter * scene.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  Vector3d low = scene.mean - outer;
+  Vector3d high = scene.mean + outer;
+  for (const Vector3d& p : scene.chain) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  scene.center = (low + high) / 2;
+  scene.reach = 1.2 * (high - low).maxCoeff() / 2;
+  if (!(scene.reach > 0)) scene.reach = 1;
+  scene.points = sample_ends(plot.steps, plot.samples, kSampleSeed);
+  for (Vector3d& p : scene.points) p -= scene.mean;
+  scene.spread = std::max(1.2 * outer.maxCoeff(), 1.1 * reach_of(scene.points));
+  if (scene.spread < 1e-12 * scene.reach) scene.spread = 0;  // rounding
+  return scene;
+}
+
+std::string signed_text(std::string text) {
+  return text[0] == '-' ? "−" + text.substr(1) : text;  // a minus as wide as a plus
+}
+
+// For people: "31.2 mm".
+std::string length_text(double metres) {
+  Unit unit = unit_for(metres);
+  if (unit.metres == 0.01) unit = {"mm", 1e-3};  // a centimetre is for axes
+  const double value = metres / unit.metres;
+  return format("%.*f ", value >= 100 ? 0 : value >= 10 ? 1 : 2, value) + unit.name;
+}
+
+// Down to a tenth of the deviation, or a tenth of a millimetre where there is none.
+std::string position_text(double metres, double stddev) {
+  const int decimals =
+      stddev > 0 ? std::clamp(static_cast<int>(std::ceil(1 - std::log10(stddev))), 0, 9) : 4;
+  return signed_text(format("%.*f m", decimals, metres)) + " ± " +
+         (stddev > 0 ? length_text(stddev) : "0");
+}
+
+void draw_header(Svg& svg, const Scene& scene) {
+  const Plot& plot = scene.plot;
+  const std::string stamp =
+      plot.X_AB.stamp ? to_string(*plot.X_AB.stamp) : "static: holds for all times";
+  svg.text({kWidth - kRight, 34}, stamp, "end");
+  const double room = kWidth - kLeft - kRight - text_width(stamp, kLabelSize) - 20;
+  const double each = (room - text_width(" in ", 20)) / 2;
+  const std::string& from = plot.frames.front();
+  const std::string& to = plot.frames.back();
+  // What one does not need of its half is the other's.
+  const double rest = std::max(each, 2 * each - text_width(from, 20));
+  const std::string shown = elide(to, 20, rest);
+  svg.text({kLeft, 34},
+           shown + " in " + elide(from, 20, 2 * each - std::min(2 * each, text_width(shown, 20))),
+           "title");
+  for (int axis = 0; axis < 3; ++axis) {
+    const double stddev = std::sqrt(std::max(0.0, scene.covariance(axis, axis)));
+    svg.text({kLeft + axis * (kPanel + kGap), 60},
+             kAxes[axis] + (" = " + position_text(scene.mean[axis], stddev)), "value");
+  }
+  const auto s = plot.X_AB.covariance.stddev();
+  svg.text({kLeft, 80},
+           format("rotation ± %.3g°, %.3g°, %.3g° about the axes of ", s[3] * kDegrees,
+                  s[4] * kDegrees, s[5] * kDegrees) +
+               elide(to, kLabelSize, 300) + "; ± is one standard deviation",
+           "");
+}
+
+// Ground, grid, numbers and names of the axes. `prefix` stands before their names.
+void draw_axes(Svg& svg, const Panel& panel, const char* prefix) {
+  svg.rect(panel.box, "panel");
+  const Unit unit = unit_for(panel.reach);
+  const double bottom = panel.box.bottom();
+  double widest = 0;
+  for (const int axis : {0, 1}) {
+    const double low = (panel.center[axis] - panel.reach) / unit.metres;
+    const double high = (panel.center[axis] + panel.reach) / unit.metres;
+    const Ticks ticks = ticks_within(low, high, kTicks);
+    for (const double value : ticks.values) {
+      Vector2d p = panel.center;
+      p[axis] = value * unit.metres;
+      const Point at = panel.at(p);
+      const char* look = value == 0 ? "zero" : "grid";
+      const std::string label = tick_label(value, ticks.step);
+      if (axis == 0) {
+        svg.line({at.x, panel.box.y}, {at.x, bottom}, look);
+        svg.text({at.x, bottom + 16}, label, "middle");
+      } else {
+        svg.line({panel.box.x, at.y}, {panel.box.right(), at.y}, look);
+        svg.text({panel.box.x - 6, at.y + 4}, label, "end");
+        widest = std::max(widest, text_width(label, kLabelSize));
+      }
+    }
+  }
+  const auto name = [&](int axis) {
+    return prefix + std::string(kAxes[axis]) + " [" + unit.name + "]";
+  };
+  svg.text({panel.box.x + kPanel / 2, bottom + 33}, name(panel.plane.across), "middle");
+  svg.text_up({panel.box.x - widest - 14, panel.box.y + kPanel / 2}, name(panel.plane.up),
+              "middle");
+}
+
+void draw_mean(Svg& svg, Point at) {
+  constexpr double kArm = 5;
+  svg.line({at.x - kArm, at.y}, {at.x + kArm, at.y}, "mean");
+  svg.line({at.x, at.y - kArm}, {at.x, at.y + kArm}, "mean");
+}
+
+void draw_ellipses(Svg& svg, const Panel& panel, const Scene& scene, const Vector2d& mean,
+                   bool hollow) {
+  Eigen::Matrix2d covariance;
+  const auto [across, up] = panel.plane;
+  covariance << scene.covariance(across, across), scene.covariance(across, up),
+      scene.covariance(up, across), scene.covariance(up, up);
+  const Ellipse ellipse = ellipse_of(covariance);
+  if (!(ellipse.major > 0)) return;
+  for (const double deviations : {1.0, kOuter}) {
+    std::vector<Point> outline;
+    for (const Vector2d& p : outline_of(ellipse, deviations)) outline.push_back(panel.at(mean + p));
+    svg.curve(outline, true, deviations > 1 ? "outer" : hollow ? "ring" : "inner");
+  }
+}
+
+// Where a name may stand by its dot.
+struct Spot {
+  double right;  // in units of the dot's radius and a margin
+  double down;
+  double before;  // which part of the name is left of there
+  const char* look;
+};
+constexpr Spot kSpots[] = {{1, 0, 0, "name"},           {-1, 0, 1, "name end"},
+                           {0, -1, 0.5, "name middle"}, {0, 1, 0.5, "name middle"},
+                           {0.8, -0.9, 0, "name"},      {0.8, 0.9, 0, "name"},
+                           {-0.8, -0.9, 1, "name end"}, {-0.8, 0.9, 1, "name end"}};
+
+// What has a name, and how far from it that may begin.
+struct Dot {
+  Point at;
+  double radius;
+};
+
+// Beside its dot where there is room: not over another name or dot, and rather not over the path.
+void draw_names(Svg& svg, const Panel& panel, const std::vector<std::string>& frames,
+                const std::vector<Dot>& dots) {
+  std::vector<Box> taken;
+  for (const auto& [at, radius] : dots) {
+    taken.push_back({at.x - radius, at.y - radius, 2 * radius, 2 * radius});
+  }
+  const auto is_free = [&](const Box& box, bool over_path) {
+    if (!panel.box.contains(box)) return false;
+    for (const Box& other : taken) {
+      if (other.overlaps(box)) return false;
+    }
+    for (std::size_t i = 0; i + 1 < dots.size(); ++i) {
+      if (!over_path && box.crosses(dots[i].at, dots[i + 1].at)) return false;
+    }
+    return true;
+  };
+  const auto place = [&](std::size_t i, bool over_path) {
+    constexpr double kHeight = 14;
+    const std::string name = elide(frames[i], kLabelSize, kLabelWidth);
+    const double width = text_width(name, kLabelSize);
+    const auto [at, radius] = dots[i];
+    for (const Spot& spot : kSpots) {
+      const double x = at.x + spot.right * (radius + 3);
+      const double y = at.y + spot.down * (radius + 3 + kHeight / 2);
+      const Box box{x - spot.before * width, y - kHeight / 2, width, kHeight};
+      if (!is_free(box, over_path)) continue;
+      taken.push_back(box);
+      svg.text({x, y + 4}, name, spot.look);
+      return true;
+    }
+    return false;
+  };
+  const std::size_t last = frames.size() - 1;
+  if (!place(last, false)) (void)place(last, true);
+  if (last > 0 && !place(0, false)) (void)place(0, true);
+  for (std::size_t i = 1; i < last; ++i) (void)place(i, false);
+}
+
+void draw_whole(Svg& svg, const Panel& panel, const Scene& scene) {
+  draw_axes(svg, panel, "");
+  const Vector2d mean = seen_in(panel.plane, scene.mean);
+  double side = kPanel * scene.spread / scene.reach;
+  if (side < 14 || side > 0.8 * kPanel) side = 0;  // nothing to see, or most of it
+  const Point at = panel.at(mean);
+  if (side > 0) svg.rect({at.x - side / 2, at.y - side / 2, side, side}, "zoom");
+  draw_ellipses(svg, panel, scene, mean, false);
+  constexpr double kRadius = 4;
+  std::vector<Point> path;
+  std::vector<Dot> dots;
+  for (const Vector3d& p : scene.chain) {
+    path.push_back(panel.at(seen_in(panel.plane, p)));
+    dots.push_back({path.back(), kRadius});
+  }
+  dots.back().radius = std::max(kRadius, side / 2);
+  svg.curve(path, false, "chain");
+  for (const Point& p : path) svg.circle(p, 2.6, "frame");
+  draw_mean(svg, at);
+  draw_names(svg, panel, scene.plot.frames, dots);
+  svg.rect(panel.box, "edge");
+}
+
+// Many points are spread over strokes that lie over each other, so that it is darker where there are more.
+void draw_points(Svg& svg, const Panel& panel, const std::vector<Vector3d>& points) {
+  constexpr std::size_t kStrokes = 12;
+  const char* look = points.size() <= 500 ? "few" : points.size() <= 5000 ? "some" : "many";
+  std::array<std::vector<Point>, kStrokes> strokes;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Point at = panel.at(seen_in(panel.plane, points[i]));
+    if (panel.box.contains({at.x, at.y, 0, 0})) strokes[i % kStrokes].push_back(at);
+  }
+  for (const auto& stroke : strokes) svg.dots(stroke, look);
+}
+
+void draw_zoomed(Svg& svg, const Panel& panel, const Scene& scene) {
+  draw_axes(svg, panel, "Δ");
+  draw_points(svg, panel, scene.points);
+  draw_ellipses(svg, panel, scene, Vector2d::Zero(), !scene.points.empty());
+  draw_mean(svg, panel.at(Vector2d::Zero()));
+  svg.rect(panel.box, "edge");
+}
+
+// What is what, from left to right.
+void draw_legend(Svg& svg, const Scene& scene, double y) {
+  double x = kLeft;
+  const auto entry = [&](const std::string& text, auto draw) {
+    draw(Point{x + 8, y - 4});
+    svg.text({x + 22, y}, text, "");
+    x += 22 + text_width(text, kLabelSize) + 14;
+  };
+  entry("mean", [&](Point at) { draw_mean(svg, at); });
+  entry("frames of the path", [&](Point at) {
+    svg.line({at.x - 9, at.y}, {at.x + 9, at.y}, "chain");
+    svg.circle(at, 2.6, "frame");
+  });
+  if (scene.spread == 0) return;
+  // What of a Gaussian in two dimensions is within.
+  entry("1σ: 39 %", [&](Point at) { svg.rect({at.x - 8, at.y - 5, 16, 10}, "inner"); });
+  entry("3σ: 98.9 %", [&](Point at) { svg.rect({at.x - 8, at.y - 5, 16, 10}, "outer"); });
+  if (scene.points.empty()) return;
+  entry(format("%d points, seed %llu", scene.plot.samples,
+               static_cast<unsigned long long>(kSampleSeed)),
+        [&](Point at) {
+          svg.dots({{at.x - 4, at.y + 2}, {at.x, at.y - 3}, {at.x + 4, at.y + 1}}, "few");
+        });
+}
+
+}  // namespace
+
+std::string draw_plot(const Plot& plot) {
+  const Scene scene = scene_of(plot);
+  const bool zoomed = scene.spread > 0;
+  std::string note;
+  if (plot.samples > 0 && (plot.X_AB.basis.bound || !plot.X_AB.basis.sources.empty())) {
+    note = "The points take edges as independent; the ellipses do not, since ";
+    note += plot.X_AB.basis.bound ? "the correlation of some is unknown." : "some share sources.";
+  }
+  const double legend = kHeader + (zoomed ? 2 : 1) * kRow + 14;
+  const double height = legend + kFooter - 14 + (note.empty() ? 0 : kLine);
+  Svg svg(kWidth, height, plot.frames.back() + " in " + plot.frames.front(), kStyle);
+  svg.rect({0, 0, kWidth, height}, "page");
+  draw_header(svg, scene);
+  for (const bool lower : {false, true}) {
+    if (lower && !zoomed) break;
+    const double top = kHeader + (lower ? kRow : 0);
+    svg.text({kLeft, top + 16},
+             lower ? "about the mean, as large as its uncertainty" : "the whole path", "heading");
+    double x = kLeft;
+    for (const Plane& plane : kPlanes) {
+      const Box box{x, top + 26, kPanel, kPanel};
+      if (lower) {
+        draw_zoomed(svg, {box, plane, Vector2d::Zero(), scene.spread}, scene);
+      } else {
+        draw_whole(svg, {box, plane, seen_in(plane, scene.center), scene.reach}, scene);
+      }
+      x += kPanel + kGap;
+    }
+  }
+  draw_legend(svg, scene, legend);
+  if (!note.empty()) svg.text({kLeft, legend + kLine}, note, "");
+  return svg.finish();
+}
+
+}  // namespace tfdude::cli

@@ -1,0 +1,110 @@
+#include "plot_geometry.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include <Eigen/Eigenvalues>
+
+#include "format.hpp"
+
+namespace tfdude::cli {
+namespace {
+
+constexpr double kPi = 3.141592653589793;
+
+Pose pose_of(const Step& step, const Pose& X_PC) { return step.up ? X_PC.inverse() : X_PC; }
+
+// Such that root rootᵀ is the covariance. Each axis is scaled by its own deviation first, or metres would drown radians.
+Matrix6d root_of(const Covariance& covariance) {
+  const auto stddev = covariance.stddev();
+  const Twist scale = Eigen::Map<const Twist>(stddev.data());
+  const Twist inverse = scale.unaryExpr([](double s) { return s > 0 ? 1 / s : 0.0; });
+  const Matrix6d unit = inverse.asDiagonal() * covariance.matrix() * inverse.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(unit);
+  return scale.asDiagonal() * solver.eigenvectors() *
+         solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+}
+
+}  // namespace
+
+Ellipse ellipse_of(const Eigen::Matrix2d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance);
+  const Eigen::Vector2d axes = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Vector2d major = solver.eigenvectors().col(1);
+  return {axes[1], axes[0], std::atan2(major.y(), major.x())};
+}
+
+std::vector<Eigen::Vector2d> outline_of(const Ellipse& ellipse, double deviations) {
+  constexpr int kPoints = 96;
+  std::vector<Eigen::Vector2d> points;
+  for (int i = 0; i < kPoints; ++i) {
+    const double turn = 2 * kPi * i / kPoints;
+    const Eigen::Vector2d p(ellipse.major * std::cos(turn), ellipse.minor * std::sin(turn));
+    points.emplace_back(deviations * (Eigen::Rotation2Dd(ellipse.angle) * p));
+  }
+  return points;
+}
+
+Unit unit_for(double metres) {
+  constexpr Unit kUnits[] = {{"km", 1e3}, {"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}, {"µm", 1e-6}};
+  constexpr double kFrom[] = {2e3, 0.5, 0.05, 5e-4, 5e-7};
+  for (std::size_t i = 0; i < std::size(kUnits); ++i) {
+    if (metres >= kFrom[i]) return kUnits[i];
+  }
+  return {"nm", 1e-9};
+}
+
+Ticks ticks_within(double low, double high, int most) {
+  double step = std::pow(10.0, std::floor(std::log10((high - low) / most)));
+  // One step more than the number of steps may fit.
+  const auto count = [&](double each) {
+    return std::floor(high / each) - std::ceil(low / each) + 1;
+  };
+  const double power = step;
+  for (const double factor : {1.0, 2.0, 5.0, 10.0, 20.0}) {
+    step = factor * power;
+    if (count(step) <= most) break;
+  }
+  Ticks ticks{step, {}};
+  for (double k = std::ceil(low / step); k <= std::floor(high / step); ++k) {
+    ticks.values.push_back(k == 0 ? 0.0 : k * step);  // not -0
+  }
+  return ticks;
+}
+
+std::string tick_label(double value, double step) {
+  const int decimals = std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9)));
+  const std::string text = format("%.*f", decimals, std::abs(value));
+  return value < 0 ? "−" + text : text;
+}
+
+std::vector<Eigen::Vector3d> chain_of(const std::vector<Step>& steps) {
+  Pose X;
+  std::vector<Eigen::Vector3d> chain{X.translation()};
+  for (const Step& step : steps) {
+    X = X * pose_of(step, step.X_PC.pose);
+    chain.push_back(X.translation());
+  }
+  return chain;
+}
+
+std::vector<Eigen::Vector3d> sample_ends(const std::vector<Step>& steps, int count,
+                                         std::uint64_t seed) {
+  std::vector<Matrix6d> roots;
+  for (const Step& step : steps) roots.push_back(root_of(step.X_PC.covariance));
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<double> normal;
+  std::vector<Eigen::Vector3d> ends;
+  for (int i = 0; i < count; ++i) {
+    Pose X;
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+      const Twist unit = Twist::NullaryExpr([&] { return normal(engine); });
+      X = X * pose_of(steps[k], steps[k].X_PC.pose * exp(roots[k] * unit));
+    }
+    ends.push_back(X.translation());
+  }
+  return ends;
+}
+
+}  // namespace tfdude::cli
