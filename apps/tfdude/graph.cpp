@@ -5,6 +5,7 @@
 #include <set>
 
 #include "format.hpp"
+#include "plot_geometry.hpp"
 #include "svg.hpp"
 
 namespace tfdude::cli {
@@ -46,6 +47,9 @@ Colours colours_of(std::size_t index) {
   return {colour(hue, 0.16, 0.98), colour(hue, 0.6, 0.66)};
 }
 
+// Long ones would push all others apart; Graphviz shows the whole one where a pointer rests on it.
+std::string name_of(const std::string& id) { return dot_label(elide(id, 12, 220)); }
+
 // How each partition is drawn.
 using Looks = std::map<std::string, Colours>;
 
@@ -64,10 +68,6 @@ std::string age_text(std::chrono::nanoseconds age) {
   if (size < 100) return format("%.1f s", seconds);
   if (size < 6000) return format("%.0f min", seconds / 60);
   return size < 360000 ? format("%.0f h", seconds / 3600) : format("%.0f days", seconds / 86400);
-}
-
-std::string metres_text(double metres) {
-  return metres < 1 ? format("±%.3g mm", metres * 1e3) : format("±%.3g m", metres);
 }
 
 std::string legend_row(const PartitionInfo& partition, const Colours& look) {
@@ -103,7 +103,8 @@ std::string edge_text(const EdgeNote& edge, Time now) {
   // What is written as a number may be a little less for rounding.
   constexpr double kAlmost = 1 - 1e-9;
   if (metres < kMetres * kAlmost && turn < kTurn * kAlmost) return text;
-  return text + (text.empty() ? "" : "  ") + metres_text(metres) + " " + format("±%.2g°", turn);
+  return text + (text.empty() ? "" : "  ") + "±" + length_text(metres) + " " +
+         format("±%.2g°", turn);
 }
 
 std::string dot_id(std::string_view id) {
@@ -131,12 +132,12 @@ std::string draw_graph(const Graph& graph) {
   std::set<std::string> missing;
   for (const Frame& frame : graph.frames) {
     const Colours look = look_of(frame);
-    text += "  " + dot_id(frame.id) + " [label=" + dot_label(frame.id) + ", fillcolor=\"" +
+    text += "  " + dot_id(frame.id) + " [label=" + name_of(frame.id) + ", fillcolor=\"" +
             look.fill + "\", color=\"" + look.line + "\"]\n";
     if (!frame.parent.empty() && !frame.attached) missing.insert(frame.parent);
   }
   for (const std::string& parent : missing) {
-    text += "  " + dot_id(parent) + " [label=" + dot_label(parent) +
+    text += "  " + dot_id(parent) + " [label=" + name_of(parent) +
             ", style=\"dashed,rounded\", color=\"#aeb4bc\", fontcolor=\"#7d8896\"]\n";
   }
   for (const Frame& frame : graph.frames) {

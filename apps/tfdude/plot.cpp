@@ -125,23 +125,12 @@ Scene scene_of(const Plot& plot) {
   return scene;
 }
 
-std::string signed_text(std::string text) {
-  return text[0] == '-' ? "−" + text.substr(1) : text;  // a minus as wide as a plus
-}
-
-// For people: "31.2 mm".
-std::string length_text(double metres) {
-  Unit unit = unit_for(metres);
-  if (unit.metres == 0.01) unit = {"mm", 1e-3};  // a centimetre is for axes
-  const double value = metres / unit.metres;
-  return format("%.*f ", value >= 100 ? 0 : value >= 10 ? 1 : 2, value) + unit.name;
-}
-
-// Down to a tenth of the deviation, or a tenth of a millimetre where there is none.
-std::string position_text(double metres, double stddev) {
-  const int decimals =
-      stddev > 0 ? std::clamp(static_cast<int>(std::ceil(1 - std::log10(stddev))), 0, 9) : 4;
-  return signed_text(format("%.*f m", decimals, metres)) + " ± " +
+// Down to a tenth of the deviation.
+std::string position_text(double metres, double stddev, const Unit& unit) {
+  constexpr int kExactly = 4;
+  const double tenth = 1 - std::log10(stddev / unit.metres);
+  const int decimals = stddev > 0 ? std::clamp(static_cast<int>(std::ceil(tenth)), 0, 9) : kExactly;
+  return number_text(metres / unit.metres, decimals) + " " + unit.name + " ± " +
          (stddev > 0 ? length_text(stddev) : "0");
 }
 
@@ -160,10 +149,11 @@ void draw_header(Svg& svg, const Scene& scene) {
   svg.text({kLeft, 34},
            shown + " in " + elide(from, 20, 2 * each - std::min(2 * each, text_width(shown, 20))),
            "title");
+  const Vector3d stddev = scene.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Unit unit = text_unit_for(std::max(scene.mean.cwiseAbs().maxCoeff(), stddev.maxCoeff()));
   for (int axis = 0; axis < 3; ++axis) {
-    const double stddev = std::sqrt(std::max(0.0, scene.covariance(axis, axis)));
     svg.text({kLeft + axis * (kPanel + kGap), 60},
-             kAxes[axis] + (" = " + position_text(scene.mean[axis], stddev)), "value");
+             kAxes[axis] + (" = " + position_text(scene.mean[axis], stddev[axis], unit)), "value");
   }
   const auto s = plot.X_AB.covariance.stddev();
   svg.text({kLeft, 80},
@@ -203,8 +193,8 @@ void draw_axes(Svg& svg, const Panel& panel, const char* prefix) {
     return prefix + std::string(kAxes[axis]) + " [" + unit.name + "]";
   };
   svg.text({panel.box.x + kPanel / 2, bottom + 33}, name(panel.plane.across), "middle");
-  svg.text_up({panel.box.x - widest - 14, panel.box.y + kPanel / 2}, name(panel.plane.up),
-              "middle");
+  svg.text_up({panel.box.x - std::min(widest, 38.0) - 14, panel.box.y + kPanel / 2},
+              name(panel.plane.up), "middle");
 }
 
 void draw_mean(Svg& svg, Point at) {
@@ -265,6 +255,7 @@ void draw_names(Svg& svg, const Panel& panel, const std::vector<std::string>& fr
   };
   const auto place = [&](std::size_t i, bool over_path) {
     constexpr double kHeight = 14;
+    constexpr double kBetween = 5;
     const std::string name = elide(frames[i], kLabelSize, kLabelWidth);
     const double width = text_width(name, kLabelSize);
     const auto [at, radius] = dots[i];
@@ -273,7 +264,7 @@ void draw_names(Svg& svg, const Panel& panel, const std::vector<std::string>& fr
       const double y = at.y + spot.down * (radius + 3 + kHeight / 2);
       const Box box{x - spot.before * width, y - kHeight / 2, width, kHeight};
       if (!is_free(box, over_path)) continue;
-      taken.push_back(box);
+      taken.push_back({box.x - kBetween, box.y, width + 2 * kBetween, kHeight});
       svg.text({x, y + 4}, name, spot.look);
       return true;
     }

@@ -47,12 +47,35 @@ std::vector<Eigen::Vector2d> outline_of(const Ellipse& ellipse, double deviation
 }
 
 Unit unit_for(double metres) {
-  constexpr Unit kUnits[] = {{"km", 1e3}, {"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}, {"µm", 1e-6}};
-  constexpr double kFrom[] = {2e3, 0.5, 0.05, 5e-4, 5e-7};
+  constexpr Unit kUnits[] = {{"Mm", 1e6},  {"km", 1e3},  {"m", 1},
+                             {"cm", 1e-2}, {"mm", 1e-3}, {"µm", 1e-6}};
+  constexpr double kFrom[] = {2e6, 2e3, 0.5, 0.05, 5e-4, 5e-7};
   for (std::size_t i = 0; i < std::size(kUnits); ++i) {
     if (metres >= kFrom[i]) return kUnits[i];
   }
   return {"nm", 1e-9};
+}
+
+Unit text_unit_for(double metres) {
+  const Unit unit = unit_for(metres);
+  return unit.metres == 0.01 ? Unit{"mm", 1e-3} : unit;
+}
+
+std::string number_text(double value, int decimals) {
+  std::string text = format("%.*f", decimals, std::abs(value));
+  const bool zero = text.find_first_not_of("0.") == std::string::npos;
+  return value < 0 && !zero ? "−" + text : text;
+}
+
+std::string length_text(double metres) {
+  const Unit unit = text_unit_for(metres);
+  const double value = metres / unit.metres;
+  std::string text = format("%.*f", value >= 99.95 ? 0 : value >= 9.995 ? 1 : 2, value);
+  if (text.find('.') != std::string::npos) {
+    text.erase(text.find_last_not_of('0') + 1);
+    if (text.back() == '.') text.pop_back();
+  }
+  return text + " " + unit.name;
 }
 
 Ticks ticks_within(double low, double high, int most) {
@@ -74,9 +97,7 @@ Ticks ticks_within(double low, double high, int most) {
 }
 
 std::string tick_label(double value, double step) {
-  const int decimals = std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9)));
-  const std::string text = format("%.*f", decimals, std::abs(value));
-  return value < 0 ? "−" + text : text;
+  return number_text(value, std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9))));
 }
 
 std::vector<Eigen::Vector3d> chain_of(const std::vector<Step>& steps) {

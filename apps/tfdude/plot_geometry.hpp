@@ -32,8 +32,14 @@ struct Unit {
   const char* name;
   double metres;
 };
-/// In which numbers up to this one are easy to read.
+/// In which numbers up to this one are easy to read on an axis.
 [[nodiscard]] Unit unit_for(double metres);
+/// The same for text, where nobody reads centimetres.
+[[nodiscard]] Unit text_unit_for(double metres);
+/// "31.2 mm": three digits, fewer where the rest are zeros.
+[[nodiscard]] std::string length_text(double metres);
+/// With a minus as wide as a plus, and zero without one.
+[[nodiscard]] std::string number_text(double value, int decimals);
 
 /// Multiples of 1, 2 or 5 times a power of ten within a range: at most so many, and not many fewer.
 struct Ticks {
