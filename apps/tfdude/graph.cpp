@@ -43,7 +43,7 @@ std::string colour(double hue, double saturation, double value) {
 // Each hue is far from those before it, however many there are.
 Colours colours_of(std::size_t index) {
   constexpr double kGolden = 0.381966011250105;
-  const double hue = std::fmod(0.08 + kGolden * static_cast<double>(index), 1.0);
+  const double hue = std::fmod(0.58 + kGolden * static_cast<double>(index), 1.0);
   return {colour(hue, 0.16, 0.98), colour(hue, 0.6, 0.66)};
 }
 

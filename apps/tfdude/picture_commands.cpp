@@ -17,6 +17,7 @@
 #include "commands.hpp"
 #include "graph.hpp"
 #include "plot.hpp"
+#include "svg.hpp"
 #include "time_render.hpp"
 
 extern char** environ;
@@ -263,7 +264,7 @@ int run_graph(Client& client, const Arguments& arguments) {
   nlohmann::json json{{"frames", graph.frames.size()}, {"partitions", graph.partitions.size()}};
   Result<std::string> picture = draw_graph(graph);
   if (ends_with(arguments.out, ".svg")) {
-    picture = run_program({{"dot", "-Tsvg"}, "graphviz"}, *picture);
+    picture = run_program({{"dot", "-Tsvg"}, "graphviz"}, *picture).map(xml_allowed);
   } else if (ends_with(arguments.out, ".png")) {
     picture = run_program({{"dot", "-Tpng", "-Gdpi=144"}, "graphviz"}, *picture);
   }

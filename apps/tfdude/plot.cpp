@@ -116,8 +116,8 @@ Scene scene_of(const Plot& plot) {
     high = high.cwiseMax(p);
   }
   scene.center = (low + high) / 2;
-  scene.reach = 1.2 * (high - low).maxCoeff() / 2;
-  if (!(scene.reach > 0)) scene.reach = 1;
+  scene.reach = 1.3 * (high - low).maxCoeff() / 2;
+  if (!(scene.reach > 0)) scene.reach = 1.2;  // [m]: any will do
   scene.points = sample_ends(plot.steps, plot.samples, kSampleSeed);
   for (Vector3d& p : scene.points) p -= scene.mean;
   scene.spread = std::max(1.2 * outer.maxCoeff(), 1.1 * reach_of(scene.points));
@@ -363,7 +363,8 @@ std::string draw_plot(const Plot& plot) {
     if (lower && !zoomed) break;
     const double top = kHeader + (lower ? kRow : 0);
     svg.text({kLeft, top + 16},
-             lower ? "about the mean, as large as its uncertainty" : "the whole path", "heading");
+             lower ? "about the mean, at the scale of its uncertainty" : "the whole path",
+             "heading");
     double x = kLeft;
     for (const Plane& plane : kPlanes) {
       const Box box{x, top + 26, kPanel, kPanel};

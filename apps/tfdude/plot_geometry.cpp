@@ -57,6 +57,7 @@ Unit unit_for(double metres) {
 }
 
 Unit text_unit_for(double metres) {
+  if (metres == 0) return {"m", 1};
   const Unit unit = unit_for(metres);
   return unit.metres == 0.01 ? Unit{"mm", 1e-3} : unit;
 }
@@ -68,6 +69,7 @@ std::string number_text(double value, int decimals) {
 }
 
 std::string length_text(double metres) {
+  if (metres == 0) return "0 mm";
   const Unit unit = text_unit_for(metres);
   const double value = metres / unit.metres;
   std::string text = format("%.*f", value >= 99.95 ? 0 : value >= 9.995 ? 1 : 2, value);

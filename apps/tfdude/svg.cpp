@@ -25,11 +25,10 @@ std::string attribute(std::string_view name, std::string_view value) {
 
 bool begins_code_point(char c) { return (static_cast<std::uint8_t>(c) & 0xC0U) != 0x80U; }
 
-// In units of the font's size, on the generous side. Of what is not ASCII, letters with three bytes and more may be as
-// wide as Chinese ones.
+// In units of the font's size, on the generous side. From U+3000 on letters may be as wide as Chinese ones.
 double advance(char first) {
   const auto byte = static_cast<std::uint8_t>(first);
-  if (byte >= 0xE0U) return 1.05;
+  if (byte >= 0xE3U) return 1.05;
   if (byte >= 0x80U) return 0.68;
   constexpr std::string_view kNarrow = " !'(),./:;I[]`fijlrt|";
   constexpr std::string_view kWide = "%@MWmw";
@@ -62,16 +61,20 @@ bool Box::crosses(Point a, Point b) const {
   return cut(a.x, b.x - a.x, x, right()) && cut(a.y, b.y - a.y, y, bottom());
 }
 
+std::string xml_allowed(std::string_view text) {
+  std::string out(text);
+  for (const char* bad : {"\xEF\xBF\xBE", "\xEF\xBF\xBF"}) {
+    for (auto at = out.find(bad); at != std::string::npos; at = out.find(bad, at)) {
+      out.replace(at, 3, "\xEF\xBF\xBD");
+    }
+  }
+  return out;
+}
+
 std::string xml_escape(std::string_view text) {
   std::string out;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const std::string_view three = text.substr(i, 3);
-    if (three == "\xEF\xBF\xBE" || three == "\xEF\xBF\xBF") {
-      out += "\xEF\xBF\xBD";
-      i += 2;
-      continue;
-    }
-    switch (const char c = text[i]) {
+  for (const char c : xml_allowed(text)) {
+    switch (c) {
       case '&':
         out += "&amp;";
         break;

@@ -26,7 +26,10 @@ struct Box {
   [[nodiscard]] bool crosses(Point a, Point b) const;
 };
 
-/// Text for XML: what has a meaning there is written as an entity, what may not be there as U+FFFD.
+/// Valid UTF-8 without control characters, where what may not be in XML none the less is U+FFFD.
+[[nodiscard]] std::string xml_allowed(std::string_view text);
+
+/// The same where what has a meaning in XML is written as an entity.
 [[nodiscard]] std::string xml_escape(std::string_view text);
 
 /// How wide a line of text may get in a usual sans-serif font of a size; no font is asked.

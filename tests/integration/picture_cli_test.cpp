@@ -1,0 +1,292 @@
+// Pictures on the command line, with real daemons.
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "support/catch.hpp"
+#include "support/thesis.hpp"
+
+namespace tfdude {
+namespace {
+
+using nlohmann::json;
+using testing::CliResult;
+using testing::ContainsSubstring;
+using testing::Process;
+using testing::TemporaryDirectory;
+using testing::ThesisDaemons;
+using Arguments = std::vector<std::string>;
+
+std::string read(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::size_t files_in(const TemporaryDirectory& directory) {
+  const std::filesystem::directory_iterator files(directory.path());
+  return static_cast<std::size_t>(std::distance(begin(files), end(files)));
+}
+
+CliResult run(const Arguments& argv) {
+  Process process(argv);
+  return testing::finish(process);
+}
+
+// The names of all elements of a file of XML, or why it is none.
+std::string elements_of(const std::string& file) {
+  const CliResult result =
+      run({"/usr/bin/env", "python3", "-c",
+           "import sys, xml.etree.ElementTree as x\n"
+           "print(*(e.tag.split('}')[1] for e in x.parse(sys.argv[1]).iter()))",
+           file});
+  return result.status == 0 ? result.out : "not XML: " + result.err;
+}
+
+bool is_png(const std::string& file) { return read(file).rfind("\x89PNG\r\n\x1a\n", 0) == 0; }
+
+// The command line where only the programs in one directory are found.
+CliResult run_with_path(const ThesisDaemons& d, const std::string& path, Arguments arguments) {
+  const Arguments begin{"/usr/bin/env",
+                        "PATH=" + path,
+                        TFDUDE_CLI,
+                        "--domain",
+                        std::to_string(d.domain.number()),
+                        "--profile",
+                        TFDUDE_LOOPBACK_PROFILE};
+  arguments.insert(arguments.begin(), begin.begin(), begin.end());
+  return run(arguments);
+}
+
+json answered(const ThesisDaemons& d, Arguments arguments, int status = 0) {
+  arguments.insert(arguments.begin(), "--json");
+  const CliResult result = d.domain.cli(arguments);
+  INFO(result.out << result.err);
+  CHECK(result.status == status);
+  return json::parse(result.out);
+}
+
+}  // namespace
+
+TEST_CASE("pictures: a path is drawn in each format") {
+  const ThesisDaemons d;
+  const TemporaryDirectory directory;
+  const std::string svg = directory.path() + "/hand.svg";
+  CHECK(text(d, {"plot", "world", "hand_left", "--out", svg, "--samples", "300"}) ==
+        "wrote " + svg + "\n");
+  const std::string elements = elements_of(svg);
+  CHECK_THAT(elements, ContainsSubstring("svg title style rect") && ContainsSubstring("circle"));
+  const std::string drawn = read(svg);
+  CHECK_THAT(drawn, ContainsSubstring(">hand_left in world<") &&
+                        ContainsSubstring("300 points, seed 1") && ContainsSubstring(">arm_1<"));
+  // From the lookup that the command line prints.
+  const json X = answered(d, {"lookup", "world", "hand_left"});
+  char x[32];
+  std::snprintf(x, sizeof x, "x = %.3f m", X.at("translation").at(0).get<double>());
+  CHECK_THAT(drawn, ContainsSubstring(x));
+  const std::string png = directory.path() + "/hand.png";
+  CHECK(answered(d, {"plot", "camera", "hand_left", "--out", png}) ==
+        json({{"file", png},
+              {"from", "camera"},
+              {"to", "hand_left"},
+              {"frames", {"camera", "robot_2", "robot_1", "arm_1", "arm_left", "hand_left"}},
+              {"stamp", nullptr},
+              {"stamp_ns", nullptr}}));
+  CHECK(is_png(png));
+  const json sampled =
+      answered(d, {"plot", "hand_left", "hand_left", "--out", svg, "--samples", "9"});
+  CHECK(sampled.at("frames") == json({"hand_left"}));
+  CHECK(sampled.at("samples") == 9);
+  CHECK(sampled.at("seed") == 1);
+  CHECK_THAT(read(svg), ContainsSubstring(">hand_left in hand_left<"));
+  CHECK(files_in(directory) == 2);
+}
+
+TEST_CASE("pictures: a path is drawn of an instant") {
+  const ThesisDaemons d;
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/a.svg";
+  for (const auto& [stamp, x] : {std::pair("1000", "1"), {"1002", "3"}}) {
+    (void)text(d, {"update", "arm_2", "--xyz", x, "0", "0", "--stamp", stamp});
+  }
+  const json middle = answered(d, {"plot", "arm_1", "arm_2", "--at", "1001", "--out", file});
+  CHECK(middle.at("stamp_ns") == 1'001'000'000'000);
+  CHECK_THAT(read(file),
+             ContainsSubstring("x = 2.0000 m") && ContainsSubstring("1970-01-01 00:16:41.000 UTC"));
+  const std::string before = read(file);
+  CHECK(answered(d, {"plot", "arm_1", "arm_2", "--at", "1003", "--out", file}, 1)
+            .at("error")
+            .at("code") == "not_yet");
+  CHECK(read(file) == before);
+}
+
+TEST_CASE("pictures: points say what they do not know") {
+  const testing::TestDomain domain;
+  std::vector<Process> daemons;
+  for (const char* name : {"base", "arm"}) {
+    daemons.push_back(domain.serve(std::string(TFDUDE_EXAMPLES "/uncertainty/") + name + ".yaml"));
+  }
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/arm.svg";
+  CHECK(domain.cli({"plot", "world", "arm", "--out", file}).status == 0);
+  CHECK_THAT(read(file), !ContainsSubstring("independent"));
+  CHECK(domain.cli({"plot", "world", "arm", "--out", file, "--samples", "5"}).status == 0);
+  CHECK_THAT(read(file), ContainsSubstring("take edges as independent"));
+}
+
+TEST_CASE("pictures: the forest is drawn in each format") {
+  const ThesisDaemons d;
+  const TemporaryDirectory directory;
+  const std::string dot = directory.path() + "/all.dot";
+  (void)text(d, {"update", "arm_2", "--xyz", "0", "0", "1", "--stamp", "-7200"});
+  CHECK(text(d, {"graph", "--out", dot}) == "wrote " + dot + "\n");
+  const std::string drawn = read(dot);
+  CHECK_THAT(drawn, ContainsSubstring("\"world\" -> \"robot_1\" [label=\" ±30 mm ±0.57° \"]"));
+  CHECK_THAT(drawn, ContainsSubstring("\"arm_1\" -> \"arm_2\" [label=\" 2 h \"]"));
+  CHECK_THAT(drawn, ContainsSubstring("\"arm_1\" -> \"arm_left\"\n"));
+  CHECK_THAT(drawn, ContainsSubstring("pid " + std::to_string(d.arms->pid())));
+  const CliResult plain = run({"/usr/bin/env", "dot", "-Tplain", dot});
+  CHECK(plain.status == 0);
+  const auto lines = [&](const std::string& kind) {
+    const std::regex line("(^|\n)" + kind + " ");
+    return std::distance(std::sregex_iterator(plain.out.begin(), plain.out.end(), line), {});
+  };
+  CHECK(lines("node") == 9);
+  CHECK(lines("edge") == 8);
+  const std::string svg = directory.path() + "/all.svg";
+  CHECK(answered(d, {"graph", "--out", svg}) ==
+        json({{"file", svg}, {"frames", 9}, {"partitions", 2}}));
+  CHECK_THAT(elements_of(svg), ContainsSubstring("svg g"));
+  CHECK_THAT(read(svg), ContainsSubstring(">hand_left</text>"));
+  const std::string png = directory.path() + "/all.png";
+  (void)text(d, {"graph", "--out", png});
+  CHECK(is_png(png));
+  CHECK(files_in(directory) == 3);
+}
+
+TEST_CASE("pictures: any name can be drawn") {
+  const ThesisDaemons d;
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/a.svg";
+  const Arguments names = {"<a & \"b\\", "-->", "\\N \xEF\xBF\xBE", "漢 \xF0\x9F\xA4\x96"};
+  std::string parent = "camera";
+  for (const std::string& name : names) {
+    (void)text(d, {"add", name, "--parent", parent, "--xyz", "0.1", "0", "0"});
+    parent = name;
+  }
+  (void)text(d, {"plot", "camera", parent, "--out", file});
+  CHECK_THAT(elements_of(file), ContainsSubstring("svg "));
+  CHECK_THAT(read(file), ContainsSubstring("&lt;a &amp; &quot;b\\"));
+  (void)text(d, {"graph", "--out", file});
+  CHECK_THAT(elements_of(file), ContainsSubstring("svg "));
+  const std::string drawn = read(file);
+  CHECK_THAT(drawn, ContainsSubstring("&lt;a &amp; &quot;b\\</text>"));
+  CHECK_THAT(drawn, ContainsSubstring("\\N \xEF\xBF\xBD</text>"));
+}
+
+TEST_CASE("pictures: what cannot be drawn is refused, and nothing is written") {
+  const ThesisDaemons d;
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/a";
+  for (const char* name : {"/a.jpg", "/a", "/a.svg.gz", "/svg"}) {
+    const CliResult result =
+        d.domain.cli({"plot", "world", "camera", "--out", directory.path() + name});
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, ContainsSubstring(".svg, .png"));
+  }
+  CHECK(d.domain.cli({"plot", "world", "camera", "--out", file + ".dot"}).status == 2);
+  CHECK(d.domain.cli({"plot", "world", "camera"}).status == 2);
+  const CliResult gif = d.domain.cli({"--json", "graph", "--out", file + ".gif"});
+  CHECK(gif.status == 2);
+  CHECK_THAT(gif.out, ContainsSubstring(".svg, .png, .dot") && ContainsSubstring("\"usage\""));
+  for (const char* samples : {"0", "100001", "-1", "x"}) {
+    CHECK(d.domain.cli({"plot", "world", "camera", "--out", file + ".svg", "--samples", samples})
+              .status == 2);
+  }
+  CHECK(
+      answered(d, {"plot", "world", "nowhere", "--out", file + ".svg"}, 1).at("error").at("code") ==
+      "unknown_end");
+  CHECK(d.domain.cli({"plot", "world", "camera", "--out", file + ".svg", "--at", "1x"}).status ==
+        2);
+  CHECK(files_in(directory) == 0);
+}
+
+TEST_CASE("pictures: a file that cannot be written is named, and nothing is left of it") {
+  const ThesisDaemons d;
+  const TemporaryDirectory directory;
+  const std::string nowhere = directory.path() + "/none/a.svg";
+  const CliResult lost = d.domain.cli({"plot", "world", "camera", "--out", nowhere});
+  CHECK(lost.status == 1);
+  CHECK_THAT(lost.err, ContainsSubstring("cannot write '" + nowhere + "': No such file"));
+  const std::string taken = directory.path() + "/taken.dot";
+  std::filesystem::create_directory(taken);
+  const json error = answered(d, {"graph", "--out", taken}, 1).at("error");
+  CHECK(error.at("code") == "invalid_input");
+  CHECK_THAT(error.at("message").get<std::string>(), ContainsSubstring("Is a directory"));
+  CHECK(files_in(directory) == 1);
+}
+
+TEST_CASE("pictures: a program that is missing, or fails, is named") {
+  const ThesisDaemons d;
+  const TemporaryDirectory directory;
+  const TemporaryDirectory programs;
+  const std::string file = directory.path() + "/a";
+  const auto refused = [&](const Arguments& arguments) {
+    const CliResult result = run_with_path(d, programs.path(), arguments);
+    CHECK(result.status == 1);
+    return result.err;
+  };
+  const Arguments plot{"plot", "world", "camera", "--out", file + ".png"};
+  CHECK_THAT(refused(plot), ContainsSubstring("'rsvg-convert' of the package librsvg2-bin"));
+  for (const char* ending : {".svg", ".png"}) {
+    CHECK_THAT(refused({"graph", "--out", file + ending}),
+               ContainsSubstring("'dot' of the package graphviz"));
+  }
+  CHECK(files_in(directory) == 0);
+  const std::string broken = programs.write("dot", "#!/bin/sh\necho no fonts >&2\nexit 3\n");
+  std::filesystem::permissions(broken, std::filesystem::perms::owner_all);
+  CHECK_THAT(refused({"graph", "--out", file + ".svg"}),
+             ContainsSubstring("'dot' failed: no fonts"));
+  CHECK(files_in(directory) == 0);
+  // These need nobody.
+  CHECK(run_with_path(d, programs.path(), {"graph", "--out", file + ".dot"}).status == 0);
+  CHECK(run_with_path(d, programs.path(), {"plot", "world", "camera", "--out", file + ".svg"})
+            .status == 0);
+  CHECK(files_in(directory) == 2);
+}
+
+TEST_CASE("pictures: who does not answer is grey, and nobody waits for it") {
+  ThesisDaemons d;
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/a.dot";
+  d.robot.kill();
+  // Until the others know.
+  REQUIRE(testing::eventually([&] {
+    (void)d.domain.cli({"graph", "--out", file});
+    return read(file).find("robot, not reachable") != std::string::npos;
+  }));
+  const std::string drawn = read(file);
+  CHECK_THAT(drawn, ContainsSubstring("BGCOLOR=\"#eceef1\""));
+  CHECK_THAT(drawn, ContainsSubstring("\"robot_1\" -> \"arm_1\" [style=dashed]\n"));
+  CHECK_THAT(drawn, ContainsSubstring("\"arm_left\" -> \"hand_left\" [label=\" ±2.53 mm"));
+  const CliResult plot = d.domain.cli({"plot", "arm_1", "world", "--out", file + ".svg"});
+  CHECK(plot.status == 3);
+  CHECK(files_in(directory) == 1);
+  d.arms->signal(SIGSTOP);
+  const auto begin = testing::Clock::now();
+  CHECK(d.domain.cli({"graph", "--out", file}).status != 2);
+  CHECK(testing::Clock::now() - begin < std::chrono::seconds(20));
+  d.arms->kill();
+  const CliResult nobody = d.domain.cli({"graph", "--out", file});
+  CHECK(nobody.status == 3);
+  CHECK_THAT(nobody.err, ContainsSubstring("no partition answers"));
+}
+
+}  // namespace tfdude

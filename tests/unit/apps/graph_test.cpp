@@ -1,0 +1,145 @@
+#include "tfdude/graph.hpp"
+
+#include <algorithm>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+
+namespace tfdude::cli {
+namespace {
+
+using testing::ContainsSubstring;
+
+constexpr double kDegree = 0.017453292519943295;
+const Time kNow = time_of(1'700'000'000'000'000'000);
+
+PartitionInfo partition(const std::string& name, bool reachable) {
+  PartitionInfo info;
+  info.name = name;
+  info.host = "tower";
+  info.pid = 42;
+  info.reachable = reachable;
+  return info;
+}
+
+EdgeNote note(double metres, double degrees) {
+  return {*Covariance::from_stddev({0, metres, 0, 0, 0, degrees * kDegree}), std::nullopt};
+}
+
+Graph example() {
+  Graph graph;
+  graph.frames = {{"arm", "base", "arms", true},
+                  {"base", "world", "robot", true},
+                  {"lost", "gone", "robot", false},
+                  {"world", "", "robot", false}};
+  graph.partitions = {partition("arms", true), partition("robot", true)};
+  graph.edges["arm"] = note(0.003, 0.4);
+  graph.edges["arm"].newest = kNow - std::chrono::milliseconds(12);
+  graph.now = kNow;
+  return graph;
+}
+
+// The line that begins so, whole.
+std::string line(const std::string& dot, const std::string& begin) {
+  const auto at = dot.find("\n  " + begin);
+  if (at == std::string::npos) return "";
+  return dot.substr(at + 3, dot.find('\n', at + 1) - at - 3);
+}
+
+std::string fill(const std::string& node) {
+  std::smatch found;
+  return std::regex_search(node, found, std::regex("fillcolor=\"(#[0-9a-f]{6})\"")) ? found[1]
+                                                                                    : std::string();
+}
+
+TEST_CASE("beside an edge stand its age and what is large of its deviations") {
+  EdgeNote edge = note(0.003, 0.4);
+  CHECK(edge_text(edge, kNow) == "±3 mm ±0.4°");
+  edge.newest = kNow - std::chrono::milliseconds(12);
+  CHECK(edge_text(edge, kNow) == "12 ms  ±3 mm ±0.4°");
+  CHECK(edge_text(note(0.001, 0), kNow) == "±1 mm ±0°");
+  CHECK(edge_text(note(0, 0.1), kNow) == "±0 mm ±0.1°");
+  CHECK(edge_text(note(0.0009, 0.09), kNow).empty());
+  CHECK(edge_text({}, kNow).empty());
+  edge = note(0, 0);
+  for (const auto& [seconds, text] : {std::pair(-0.5, "-500 ms"),
+                                      {3.44, "3.4 s"},
+                                      {600.0, "10 min"},
+                                      {7200.0, "2 h"},
+                                      {8.64e5, "10 days"}}) {
+    edge.newest = kNow - std::chrono::nanoseconds(static_cast<std::int64_t>(seconds * 1e9));
+    CHECK(edge_text(edge, kNow) == text);
+  }
+}
+
+TEST_CASE("names are written as DOT reads them") {
+  CHECK(dot_id("a\"b\\c") == "\"a\\\"b\\\\c\"");
+  CHECK(dot_id("<b>&amp;") == "\"<b>&amp;\"");
+  // \N would be the node's name, &amp; an ampersand.
+  CHECK(dot_label("\\N & <i>\"") == "\"\\\\N &amp; &lt;i&gt;&quot;\"");
+}
+
+TEST_CASE("a forest is drawn with its owners, edges and what is missing") {
+  const std::string dot = draw_graph(example());
+  CHECK(dot.rfind("digraph frames {\n", 0) == 0);
+  CHECK(line(dot, "\"base\" -> ") == "\"base\" -> \"arm\" [label=\" 12 ms  ±3 mm ±0.4° \"]");
+  CHECK(line(dot, "\"world\" -> ") == "\"world\" -> \"base\"");
+  CHECK(line(dot, "\"gone\" -> ") == "\"gone\" -> \"lost\" [style=dashed]");
+  CHECK_THAT(line(dot, "\"gone\" ["), ContainsSubstring("dashed"));
+  CHECK_THAT(dot, ContainsSubstring("arms  on tower, pid 42") && !ContainsSubstring("reachable"));
+  const std::string arm = fill(line(dot, "\"arm\" ["));
+  CHECK(arm.size() == 7);
+  CHECK(arm != fill(line(dot, "\"base\" [")));
+  CHECK(fill(line(dot, "\"world\" [")) == fill(line(dot, "\"base\" [")));
+  CHECK_THAT(dot, ContainsSubstring("<TD BGCOLOR=\"" + arm + "\""));
+}
+
+TEST_CASE("what is not reachable is grey, and its edges are dashed") {
+  Graph graph = example();
+  const std::string before = draw_graph(graph);
+  graph.partitions[0].reachable = false;
+  graph.edges.clear();
+  const std::string dot = draw_graph(graph);
+  CHECK(fill(line(dot, "\"arm\" [")) == "#eceef1");
+  CHECK(line(dot, "\"base\" -> ") == "\"base\" -> \"arm\" [style=dashed]");
+  CHECK_THAT(dot, ContainsSubstring("arms  on tower, pid 42, not reachable"));
+  // The others keep their colours.
+  CHECK(fill(line(dot, "\"base\" [")) == fill(line(before, "\"base\" [")));
+  graph.partitions.erase(graph.partitions.begin());
+  CHECK(fill(line(draw_graph(graph), "\"arm\" [")) == "#eceef1");
+}
+
+TEST_CASE("each partition has a colour of its own") {
+  Graph graph;
+  for (int i = 0; i < 40; ++i) {
+    const std::string name = "p" + std::to_string(i);
+    graph.partitions.push_back(partition(name, true));
+    graph.frames.push_back({"f" + std::to_string(i), "", name, false});
+  }
+  const std::string dot = draw_graph(graph);
+  std::set<std::string> colours;
+  for (const Frame& frame : graph.frames) {
+    colours.insert(fill(line(dot, "\"" + frame.id + "\" [")));
+  }
+  CHECK(colours.size() == 40);
+  CHECK(colours.count("") == 0);
+}
+
+TEST_CASE("a forest of nothing is a picture, too") {
+  CHECK_THAT(draw_graph({}), !ContainsSubstring("label=<") && ContainsSubstring("}\n"));
+}
+
+TEST_CASE("a long name is cut in the picture only") {
+  Graph graph;
+  graph.frames = {{std::string(255, 'w'), "", "p", false}};
+  const std::string node = line(draw_graph(graph), "\"w");
+  CHECK_THAT(node, ContainsSubstring("…"));
+  CHECK(std::count(node.begin(), node.end(), 'w') < 280);
+  CHECK(node.rfind("\"" + std::string(255, 'w') + "\" [", 0) == 0);
+}
+
+}  // namespace
+}  // namespace tfdude::cli
