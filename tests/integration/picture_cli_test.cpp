@@ -203,6 +203,15 @@ TEST_CASE("pictures: any name can be drawn") {
   CHECK_THAT(drawn, ContainsSubstring("\\N \xEF\xBF\xBD\n"));
 }
 
+TEST_CASE("pictures: their commands have help with an example") {
+  const testing::TestDomain domain;
+  for (const std::string command : {"plot", "graph"}) {
+    CHECK_THAT(domain.cli({"--help"}).out, ContainsSubstring("\n  " + command + " "));
+    CHECK_THAT(domain.cli({command, "--help"}).out,
+               ContainsSubstring("Example: tfdude " + command + " "));
+  }
+}
+
 TEST_CASE("pictures: what cannot be drawn is refused, and nothing is written") {
   const ThesisDaemons d;
   const TemporaryDirectory directory;

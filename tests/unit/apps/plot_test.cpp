@@ -1,5 +1,7 @@
 #include "tfdude/plot.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <regex>
 #include <string>
@@ -40,6 +42,25 @@ Plot plot_of(const std::vector<Step>& steps) {
   }
   plot.X_AB = {X, std::nullopt, {}};
   return plot;
+}
+
+struct Rect {
+  double left, top, right, bottom;
+
+  [[nodiscard]] bool contains(double x, double y) const {
+    return x >= left && x <= right && y >= top && y <= bottom;
+  }
+};
+
+std::vector<Rect> panels_of(const std::string& svg) {
+  const std::regex rect("class=\"panel\" x=\"(.*?)\" y=\"(.*?)\" width=\"(.*?)\" height=\"(.*?)\"");
+  std::vector<Rect> panels;
+  for (std::sregex_iterator it(svg.begin(), svg.end(), rect), end; it != end; ++it) {
+    const double x = std::stod((*it)[1]);
+    const double y = std::stod((*it)[2]);
+    panels.push_back({x, y, x + std::stod((*it)[3]), y + std::stod((*it)[4])});
+  }
+  return panels;
 }
 
 Transform at(double x, double y, double z, const std::array<double, 6>& stddev = {}) {
@@ -226,6 +247,75 @@ TEST_CASE("a picture shows the path, and its end once more") {
   CHECK_THAT(svg, !ContainsSubstring("points"));
 }
 
+TEST_CASE("each panel shows its plane of A, upright and to one scale") {
+  const std::string svg = draw_plot(plot_of({{at(1, 2, 4), false}}));
+  const std::regex circle("class=\"frame\" cx=\"(.*?)\" cy=\"(.*?)\"");
+  std::vector<Vector2d> dots;
+  for (std::sregex_iterator it(svg.begin(), svg.end(), circle), end; it != end; ++it) {
+    dots.emplace_back(std::stod((*it)[1]), std::stod((*it)[2]));
+  }
+  const auto panels = panels_of(svg);
+  REQUIRE(panels.size() == 3);
+  REQUIRE(dots.size() == 7);  // one in the legend
+  // Four metres and the margins on either side of them.
+  const double scale = (panels[0].right - panels[0].left) / (4 * 1.3);
+  const Vector2d moves[] = {{1, -2}, {1, -4}, {2, -4}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK((dots[2 * i + 1] - dots[2 * i] - scale * moves[i]).norm() < 0.05);
+    const Vector2d middle = (dots[2 * i] + dots[2 * i + 1]) / 2;
+    CHECK(middle.x() == Approx((panels[i].left + panels[i].right) / 2).margin(0.05));
+    CHECK(middle.y() == Approx((panels[i].top + panels[i].bottom) / 2).margin(0.05));
+  }
+}
+
+TEST_CASE("deviations are along the axes of A, though errors are along those of B") {
+  Transform X = at(0, 0, 0, {0.01, 0.03, 0.002, 0, 0, 0});
+  X.pose = *Pose::create(from_rpy(0, 0, 1.5707963267948966), {2, 1, 0.5});
+  const std::string svg = draw_plot(plot_of({{X, false}}));
+  CHECK_THAT(svg, ContainsSubstring("x = 2.000 m ± 30 mm"));
+  CHECK_THAT(svg, ContainsSubstring("y = 1.000 m ± 10 mm"));
+  CHECK_THAT(svg, ContainsSubstring("z = 0.5000 m ± 2 mm"));
+  // The outline of three deviations in the lower xy panel: as wide as it is high, three times.
+  const std::regex outer("class=\"outer\" d=\"([^\"]*)\"");
+  std::vector<std::string> outlines;
+  for (std::sregex_iterator it(svg.begin(), svg.end(), outer), end; it != end; ++it) {
+    outlines.push_back((*it)[1]);
+  }
+  REQUIRE(outlines.size() == 6);
+  const std::regex pair("[ML](-?[0-9.]+) (-?[0-9.]+)");
+  Vector2d low(1e9, 1e9);
+  Vector2d high(-1e9, -1e9);
+  for (std::sregex_iterator it(outlines[3].begin(), outlines[3].end(), pair), end; it != end;
+       ++it) {
+    const Vector2d p(std::stod((*it)[1]), std::stod((*it)[2]));
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  CHECK((high - low).x() == Approx(3 * (high - low).y()).epsilon(0.01));
+  const Rect panel = panels_of(svg).at(3);
+  CHECK((high - low).x() == Approx((panel.right - panel.left) / 1.2).epsilon(0.01));
+}
+
+TEST_CASE("points beyond a panel are not drawn") {
+  Plot plot = plot_of({{at(1, 0, 0, {0.01, 0.01, 0.01, 0, 0, 0}), false}});
+  plot.samples = 20000;
+  const std::string svg = draw_plot(plot);
+  const auto panels = panels_of(svg);
+  const std::regex dot("M([0-9.-]+) ([0-9.-]+)h0");
+  int dots = 0;
+  int outside = 0;
+  for (std::sregex_iterator it(svg.begin(), svg.end(), dot), end; it != end; ++it, ++dots) {
+    const double x = std::stod((*it)[1]);
+    const double y = std::stod((*it)[2]);
+    const bool within = std::any_of(panels.begin(), panels.end(),
+                                    [&](const Rect& panel) { return panel.contains(x, y); });
+    outside += within ? 0 : 1;
+  }
+  CHECK(outside == 3);  // those of the legend
+  CHECK(dots > 3 * 19900);
+  CHECK(dots < 3 * 20000);
+}
+
 TEST_CASE("where nothing is uncertain there is nothing to magnify") {
   for (const auto& steps : {std::vector<Step>{}, {{at(1, 2, 3), false}}}) {
     Plot plot = plot_of(steps);
@@ -289,7 +379,7 @@ TEST_CASE("nothing is drawn beyond the page, at any scale") {
   }
 }
 
-TEST_CASE("no name lies over another") {
+TEST_CASE("no name lies over another, or beyond its panel") {
   Random random(37);
   INFO("seed " << random.seed());
   std::vector<Step> steps;
@@ -307,6 +397,12 @@ TEST_CASE("no name lies over another") {
     boxes.push_back({left, left + width, y - 9, y + 2});
   }
   CHECK(boxes.size() > 12);
+  const auto panels = panels_of(svg);
+  for (const auto& box : boxes) {
+    CHECK(std::any_of(panels.begin(), panels.end(), [&](const Rect& panel) {
+      return panel.contains(box[0], box[2]) && panel.contains(box[1], box[3]);
+    }));
+  }
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
       const bool apart = boxes[i][0] >= boxes[k][1] || boxes[k][0] >= boxes[i][1] ||

@@ -1,5 +1,7 @@
 #include "tfdude/svg.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "tfdude/base/id.hpp"
