@@ -28,7 +28,7 @@ struct Colours {
   std::string line;
 };
 
-const Colours kGrey = {"#eceef1", "#aeb4bc"};
+Colours grey() { return {"#eceef1", "#aeb4bc"}; }
 
 // Of hue, saturation and value in [0, 1].
 std::string colour(double hue, double saturation, double value) {
@@ -50,13 +50,13 @@ Colours colours_of(std::size_t index) {
 // Long ones would push all others apart; Graphviz shows the whole one where a pointer rests on it.
 std::string name_of(const std::string& id) { return dot_label(elide(id, 12, 220)); }
 
-// How each partition is drawn.
+// How each partition is drawn; what is not among them, as one that is not reachable.
 using Looks = std::map<std::string, Colours>;
 
 Looks looks_of(const std::vector<PartitionInfo>& partitions) {
   Looks looks;
   for (std::size_t i = 0; i < partitions.size(); ++i) {
-    looks[partitions[i].name] = partitions[i].reachable ? colours_of(i) : kGrey;
+    looks[partitions[i].name] = partitions[i].reachable ? colours_of(i) : grey();
   }
   return looks;
 }
@@ -83,11 +83,31 @@ std::string legend_row(const PartitionInfo& partition, const Colours& look) {
 
 std::string legend(const std::vector<PartitionInfo>& partitions, const Looks& looks) {
   if (partitions.empty()) return "";
-  std::string text = "  label=<<TABLE BORDER=\"0\" CELLBORDER=\"0\" CELLSPACING=\"5\">\n";
+  std::string text = R"(  label=<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="5">)";
+  text += "\n";
   for (const PartitionInfo& partition : partitions) {
     text += "    " + legend_row(partition, looks.at(partition.name)) + "\n";
   }
   return text + "  </TABLE>>\n";
+}
+
+std::string node(const Frame& frame, const Looks& looks) {
+  const auto found = looks.find(frame.partition);
+  const Colours look = found != looks.end() ? found->second : grey();
+  return "  " + dot_id(frame.id) + " [label=" + name_of(frame.id) + ", fillcolor=\"" + look.fill +
+         "\", color=\"" + look.line + "\"]\n";
+}
+
+std::string missing_node(const std::string& id) {
+  return "  " + dot_id(id) + " [label=" + name_of(id) +
+         ", style=\"dashed,rounded\", color=\"#aeb4bc\", fontcolor=\"#7d8896\"]\n";
+}
+
+std::string arrow(const Frame& frame, const std::string& beside, bool dashed) {
+  std::string look = beside.empty() ? "" : "label=" + dot_label(" " + beside + " ");
+  if (dashed) look += std::string(look.empty() ? "" : ", ") + "style=dashed";
+  if (!look.empty()) look = " [" + look + "]";
+  return "  " + dot_id(frame.parent) + " -> " + dot_id(frame.id) + look + "\n";
 }
 
 }  // namespace
@@ -120,38 +140,23 @@ std::string dot_label(std::string_view text) { return dot_id(xml_escape(text)); 
 
 std::string draw_graph(const Graph& graph) {
   const Looks looks = looks_of(graph.partitions);
-  const auto look_of = [&](const Frame& frame) {
-    const auto found = looks.find(frame.partition);
-    return found != looks.end() ? found->second : kGrey;
-  };
   std::set<std::string> reachable;
   for (const PartitionInfo& partition : graph.partitions) {
     if (partition.reachable) reachable.insert(partition.name);
   }
   std::string text = kHead + legend(graph.partitions, looks);
+  std::string arrows;
   std::set<std::string> missing;
   for (const Frame& frame : graph.frames) {
-    const Colours look = look_of(frame);
-    text += "  " + dot_id(frame.id) + " [label=" + name_of(frame.id) + ", fillcolor=\"" +
-            look.fill + "\", color=\"" + look.line + "\"]\n";
-    if (!frame.parent.empty() && !frame.attached) missing.insert(frame.parent);
-  }
-  for (const std::string& parent : missing) {
-    text += "  " + dot_id(parent) + " [label=" + name_of(parent) +
-            ", style=\"dashed,rounded\", color=\"#aeb4bc\", fontcolor=\"#7d8896\"]\n";
-  }
-  for (const Frame& frame : graph.frames) {
+    text += node(frame, looks);
     if (frame.parent.empty()) continue;
-    text += "  " + dot_id(frame.parent) + " -> " + dot_id(frame.id);
+    if (!frame.attached) missing.insert(frame.parent);
     const auto edge = graph.edges.find(frame.id);
-    const std::string beside = edge != graph.edges.end() ? edge_text(edge->second, graph.now) : "";
-    std::string looks_like = beside.empty() ? "" : "label=" + dot_label(" " + beside + " ");
-    if (!frame.attached || reachable.count(frame.partition) == 0) {
-      looks_like += std::string(looks_like.empty() ? "" : ", ") + "style=dashed";
-    }
-    text += looks_like.empty() ? "\n" : " [" + looks_like + "]\n";
+    arrows += arrow(frame, edge != graph.edges.end() ? edge_text(edge->second, graph.now) : "",
+                    !frame.attached || reachable.count(frame.partition) == 0);
   }
-  return text + "}\n";
+  for (const std::string& parent : missing) text += missing_node(parent);
+  return text + arrows + "}\n";
 }
 
 }  // namespace tfdude::cli

@@ -20,8 +20,6 @@
 #include "svg.hpp"
 #include "time_render.hpp"
 
-extern char** environ;
-
 // Commands that draw.
 namespace tfdude::cli {
 namespace {
@@ -61,7 +59,7 @@ class Descriptor {
 
   [[nodiscard]] std::string read_all() const {
     std::string text;
-    std::array<char, 65536> block;
+    std::array<char, 65536> block{};
     for (ssize_t count = 0;
          (count = pread(fd_, block.data(), block.size(), static_cast<off_t>(text.size()))) > 0;) {
       text.append(block.data(), static_cast<std::size_t>(count));
@@ -89,7 +87,7 @@ std::optional<int> wait_for(pid_t pid) {
 }
 
 // Without a shell; what it reads and writes are files in memory, so that nobody has to wait for anybody.
-Result<std::string> run_program(const Program& program, const std::string& input) {
+Result<std::string> run_program(Program program, const std::string& input) {
   const Descriptor in(memfd_create("in", MFD_CLOEXEC));
   const Descriptor out(memfd_create("out", MFD_CLOEXEC));
   const Descriptor err(memfd_create("err", MFD_CLOEXEC));
@@ -98,7 +96,7 @@ Result<std::string> run_program(const Program& program, const std::string& input
     return fail(Errc::kInvalidInput, "no memory for the picture: " + reason());
   }
   std::vector<char*> argv;
-  for (const std::string& word : program.argv) argv.push_back(const_cast<char*>(word.c_str()));
+  for (std::string& word : program.argv) argv.push_back(word.data());
   argv.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -187,7 +185,7 @@ Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTr
   const auto add = [&](const Frame& child, bool upwards) -> Result<void> {
     const auto X_PC = client.lookup(child.parent, child.id, query);
     if (!X_PC) return tl::unexpected(X_PC.error());
-    plot.steps.push_back({*X_PC, upwards});
+    plot.steps.push_back({{X_PC->pose, X_PC->covariance}, upwards});
     return {};
   };
   for (std::size_t i = 0; i < up.size(); ++i) {

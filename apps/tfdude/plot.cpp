@@ -7,6 +7,7 @@
 #include "tfdude/math/perturbation.hpp"
 
 #include "format.hpp"
+#include "plot_names.hpp"
 #include "svg.hpp"
 
 namespace tfdude::cli {
@@ -25,8 +26,6 @@ constexpr double kHeader = 96;
 constexpr double kRow = kPanel + 70;  // with its heading and the axes' names
 constexpr double kFooter = 34;
 constexpr double kLine = 18;
-constexpr double kLabelSize = 11.5;
-constexpr double kLabelWidth = 100;
 constexpr int kTicks = 6;
 
 constexpr double kOuter = 3;  // standard deviations of the outer ellipse
@@ -98,6 +97,7 @@ struct Panel {
 double reach_of(const std::vector<Vector3d>& points) {
   if (points.empty()) return 0;
   std::vector<double> distances;
+  distances.reserve(points.size());
   for (const Vector3d& p : points) distances.push_back(p.cwiseAbs().maxCoeff());
   const auto most =
       distances.begin() + static_cast<std::ptrdiff_t>(997 * (points.size() - 1) / 1000);
@@ -218,64 +218,6 @@ void draw_ellipses(Svg& svg, const Panel& panel, const Scene& scene, const Vecto
   }
 }
 
-// Where a name may stand by its dot.
-struct Spot {
-  double right;  // in units of the dot's radius and a margin
-  double down;
-  double before;  // which part of the name is left of there
-  const char* look;
-};
-constexpr Spot kSpots[] = {{1, 0, 0, "name"},           {-1, 0, 1, "name end"},
-                           {0, -1, 0.5, "name middle"}, {0, 1, 0.5, "name middle"},
-                           {0.8, -0.9, 0, "name"},      {0.8, 0.9, 0, "name"},
-                           {-0.8, -0.9, 1, "name end"}, {-0.8, 0.9, 1, "name end"}};
-
-// What has a name, and how far from it that may begin.
-struct Dot {
-  Point at;
-  double radius;
-};
-
-// Beside its dot where there is room: not over another name or dot, and rather not over the path.
-void draw_names(Svg& svg, const Panel& panel, const std::vector<std::string>& frames,
-                const std::vector<Dot>& dots) {
-  std::vector<Box> taken;
-  for (const auto& [at, radius] : dots) {
-    taken.push_back({at.x - radius, at.y - radius, 2 * radius, 2 * radius});
-  }
-  const auto is_free = [&](const Box& box, bool over_path) {
-    if (!panel.box.contains(box)) return false;
-    for (const Box& other : taken) {
-      if (other.overlaps(box)) return false;
-    }
-    for (std::size_t i = 0; i + 1 < dots.size(); ++i) {
-      if (!over_path && box.crosses(dots[i].at, dots[i + 1].at)) return false;
-    }
-    return true;
-  };
-  const auto place = [&](std::size_t i, bool over_path) {
-    constexpr double kHeight = 14;
-    constexpr double kBetween = 5;
-    const std::string name = elide(frames[i], kLabelSize, kLabelWidth);
-    const double width = text_width(name, kLabelSize);
-    const auto [at, radius] = dots[i];
-    for (const Spot& spot : kSpots) {
-      const double x = at.x + spot.right * (radius + 3);
-      const double y = at.y + spot.down * (radius + 3 + kHeight / 2);
-      const Box box{x - spot.before * width, y - kHeight / 2, width, kHeight};
-      if (!is_free(box, over_path)) continue;
-      taken.push_back({box.x - kBetween, box.y, width + 2 * kBetween, kHeight});
-      svg.text({x, y + 4}, name, spot.look);
-      return true;
-    }
-    return false;
-  };
-  const std::size_t last = frames.size() - 1;
-  if (!place(last, false)) (void)place(last, true);
-  if (last > 0 && !place(0, false)) (void)place(0, true);
-  for (std::size_t i = 1; i < last; ++i) (void)place(i, false);
-}
-
 void draw_whole(Svg& svg, const Panel& panel, const Scene& scene) {
   draw_axes(svg, panel, "");
   const Vector2d mean = seen_in(panel.plane, scene.mean);
@@ -295,7 +237,7 @@ void draw_whole(Svg& svg, const Panel& panel, const Scene& scene) {
   svg.curve(path, false, "chain");
   for (const Point& p : path) svg.circle(p, 2.6, "frame");
   draw_mean(svg, at);
-  draw_names(svg, panel, scene.plot.frames, dots);
+  draw_names(svg, panel.box, scene.plot.frames, dots);
   svg.rect(panel.box, "edge");
 }
 
@@ -344,38 +286,43 @@ void draw_legend(Svg& svg, const Scene& scene, double y) {
         });
 }
 
+void draw_row(Svg& svg, const Scene& scene, bool zoomed, double top) {
+  svg.text({kLeft, top + 16},
+           zoomed ? "about the mean, at the scale of its uncertainty" : "the whole path",
+           "heading");
+  double x = kLeft;
+  for (const Plane& plane : kPlanes) {
+    const Box box{x, top + 26, kPanel, kPanel};
+    if (zoomed) {
+      draw_zoomed(svg, {box, plane, Vector2d::Zero(), scene.spread}, scene);
+    } else {
+      draw_whole(svg, {box, plane, seen_in(plane, scene.center), scene.reach}, scene);
+    }
+    x += kPanel + kGap;
+  }
+}
+
+// What the points do not know.
+std::string note_of(const Plot& plot) {
+  const Basis& basis = plot.X_AB.basis;
+  if (plot.samples == 0 || (!basis.bound && basis.sources.empty())) return "";
+  return std::string("The points take edges as independent; the ellipses do not, since ") +
+         (basis.bound ? "the correlation of some is unknown." : "some share sources.");
+}
+
 }  // namespace
 
 std::string draw_plot(const Plot& plot) {
   const Scene scene = scene_of(plot);
   const bool zoomed = scene.spread > 0;
-  std::string note;
-  if (plot.samples > 0 && (plot.X_AB.basis.bound || !plot.X_AB.basis.sources.empty())) {
-    note = "The points take edges as independent; the ellipses do not, since ";
-    note += plot.X_AB.basis.bound ? "the correlation of some is unknown." : "some share sources.";
-  }
+  const std::string note = note_of(plot);
   const double legend = kHeader + (zoomed ? 2 : 1) * kRow + 14;
   const double height = legend + kFooter - 14 + (note.empty() ? 0 : kLine);
   Svg svg(kWidth, height, plot.frames.back() + " in " + plot.frames.front(), kStyle);
   svg.rect({0, 0, kWidth, height}, "page");
   draw_header(svg, scene);
-  for (const bool lower : {false, true}) {
-    if (lower && !zoomed) break;
-    const double top = kHeader + (lower ? kRow : 0);
-    svg.text({kLeft, top + 16},
-             lower ? "about the mean, at the scale of its uncertainty" : "the whole path",
-             "heading");
-    double x = kLeft;
-    for (const Plane& plane : kPlanes) {
-      const Box box{x, top + 26, kPanel, kPanel};
-      if (lower) {
-        draw_zoomed(svg, {box, plane, Vector2d::Zero(), scene.spread}, scene);
-      } else {
-        draw_whole(svg, {box, plane, seen_in(plane, scene.center), scene.reach}, scene);
-      }
-      x += kPanel + kGap;
-    }
-  }
+  draw_row(svg, scene, false, kHeader);
+  if (zoomed) draw_row(svg, scene, true, kHeader + kRow);
   draw_legend(svg, scene, legend);
   if (!note.empty()) svg.text({kLeft, legend + kLine}, note, "");
   return svg.finish();

@@ -92,8 +92,9 @@ Ticks ticks_within(double low, double high, int most) {
     if (count(step) <= most) break;
   }
   Ticks ticks{step, {}};
-  for (double k = std::ceil(low / step); k <= std::floor(high / step); ++k) {
-    ticks.values.push_back(k == 0 ? 0.0 : k * step);  // not -0
+  const auto last = static_cast<long>(std::floor(high / step));
+  for (auto k = static_cast<long>(std::ceil(low / step)); k <= last; ++k) {
+    ticks.values.push_back(static_cast<double>(k) * step);
   }
   return ticks;
 }
@@ -115,6 +116,7 @@ std::vector<Eigen::Vector3d> chain_of(const std::vector<Step>& steps) {
 std::vector<Eigen::Vector3d> sample_ends(const std::vector<Step>& steps, int count,
                                          std::uint64_t seed) {
   std::vector<Matrix6d> roots;
+  roots.reserve(steps.size());
   for (const Step& step : steps) roots.push_back(root_of(step.X_PC.covariance));
   std::mt19937_64 engine(seed);
   std::normal_distribution<double> normal;

@@ -119,9 +119,9 @@ std::string elide(std::string_view text, double size, double width) {
   return std::string(text.substr(0, head)).append(kEllipsis).append(text.substr(tail));
 }
 
-Svg::Svg(double width, double height, std::string_view title, std::string_view style) {
+Svg::Svg(double width, double height, std::string_view title, std::string_view style)
+    : out_("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n") {
   const std::string size = number(width) + " " + number(height);
-  out_ = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
   out_ += "<svg xmlns=\"http://www.w3.org/2000/svg\"" + attribute("width", number(width)) +
           attribute("height", number(height)) + attribute("viewBox", "0 0 " + size) + ">\n";
   out_ += "<title>" + xml_escape(title) + "</title>\n";
