@@ -211,6 +211,13 @@ TEST_CASE("nothing is drawn beyond the page, at any scale") {
   }
 }
 
+TEST_CASE("a name keeps off the path") {
+  const std::string svg = draw_plot(plot_of({{at(1, 0, 0), false}, {at(1, 0, 0), false}}));
+  const std::regex above("class=\"name middle\"[^>]*>a1<");
+  CHECK(std::distance(std::sregex_iterator(svg.begin(), svg.end(), above), {}) ==
+        3);  // from the side, all dots are one
+}
+
 TEST_CASE("no name lies over another, or beyond its panel") {
   Random random(37);
   INFO("seed " << random.seed());
