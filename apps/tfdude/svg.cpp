@@ -32,8 +32,9 @@ double advance(char first) {
   if (byte >= 0x80U) return 0.68;
   constexpr std::string_view kNarrow = " !'(),./:;I[]`fijlrt|";
   constexpr std::string_view kWide = "%@MWmw";
-  if (kNarrow.find(first) != std::string_view::npos) return 0.38;
-  return kWide.find(first) != std::string_view::npos ? 0.96 : 0.64;
+  if (kNarrow.find(first) != std::string_view::npos) return 0.36;
+  if (kWide.find(first) != std::string_view::npos) return 0.96;
+  return first >= 'A' && first <= 'Z' ? 0.76 : 0.6;
 }
 
 }  // namespace
