@@ -71,8 +71,8 @@ std::string age_text(std::chrono::nanoseconds age) {
 }
 
 std::string legend_row(const PartitionInfo& partition, const Colours& look) {
-  std::string text = "<TR><TD BGCOLOR=\"" + look.fill + "\" COLOR=\"" + look.line +
-                     "\" BORDER=\"1\" WIDTH=\"22\"></TD><TD ALIGN=\"LEFT\">" +
+  std::string text = R"(<TR><TD BGCOLOR=")" + look.fill + R"(" COLOR=")" + look.line +
+                     R"(" BORDER="1" WIDTH="22"></TD><TD ALIGN="LEFT">)" +
                      xml_escape(partition.name);
   // Nothing else is known of one that went before this process came.
   if (!partition.host.empty()) {
