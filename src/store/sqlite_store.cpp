@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
-#include "tfdude/partition/joints.hpp"
 
+#include "store/rows.hpp"
 #include "store/sqlite.hpp"
 
 namespace tfdude {
@@ -21,7 +21,6 @@ constexpr std::int64_t kFormat = 2;
 // The one that knew no joints; it is brought up to date.
 constexpr std::int64_t kFormatBefore = 1;
 constexpr std::size_t kLongestFileName = 200;
-constexpr std::uint64_t kLastCount = 1ULL << 63U;
 
 // A file with other words than these is refused: a change of them needs another format.
 constexpr const char* kSchema = R"(
@@ -224,44 +223,6 @@ Result<void> SqliteStore::prepare() {
   return {};
 }
 
-// No clock comes so far, and what is counted from there on is still greater.
-Result<std::uint64_t> read_count(const Statement& row, int column) {
-  const std::uint64_t count = row.number(column);
-  if (count > kLastCount) return fail(Errc::kState, "a time of " + std::to_string(count));
-  return count;
-}
-
-// What one row says of a frame, and whether that can be. Rows come in the order of their ids.
-Result<FrameSpec> read_frame(const Statement& row, const std::string& before) {
-  FrameSpec frame{row.text(0), row.text(1), {}};
-  if (auto ok = check_id(frame.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
-  if (frame.id <= before) return fail(Errc::kState, "frame " + quote(frame.id) + " out of order");
-  if (!frame.parent.empty()) {
-    if (auto ok = check_id(frame.parent, "parent"); !ok) return tl::unexpected(ok.error());
-  }
-  const auto flat = row.flat(2);
-  auto X_PC = flat ? computed_from(*flat) : tl::unexpected(flat.error());
-  if (!X_PC) return fail_at("frame " + quote(frame.id), X_PC.error());
-  frame.X_PC = *X_PC;
-  return frame;
-}
-
-Result<Note> read_note(const Statement& row, const std::string& before) {
-  const std::uint64_t kind = row.number(2);
-  const auto since = read_count(row, 1);
-  if (!since) return tl::unexpected(since.error());
-  Note note{row.text(0), *since, static_cast<Note::Kind>(kind), row.text(3)};
-  if (auto ok = check_id(note.id, "id"); !ok) return tl::unexpected(ok.error());
-  if (note.id <= before) return fail(Errc::kState, "note of " + quote(note.id) + " out of order");
-  if (kind < 1 || kind > static_cast<std::uint64_t>(Note::Kind::kUnhung)) {
-    return fail(Errc::kState, "a note of kind " + std::to_string(kind));
-  }
-  if (!note.rival.empty()) {
-    if (auto ok = check_partition_name(note.rival); !ok) return tl::unexpected(ok.error());
-  }
-  return note;
-}
-
 Result<StoredState> SqliteStore::load() {
   StoredState state;
   for (auto part : {&SqliteStore::load_about, &SqliteStore::load_frames, &SqliteStore::load_notes,
@@ -326,12 +287,9 @@ Result<void> SqliteStore::load_configured(StoredState& state) {
 Result<void> SqliteStore::load_joints(StoredState& state) {
   const char* sql = "SELECT name, position, variance FROM joints ORDER BY name";
   return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
-    auto ok = row.check_types({SQLITE_TEXT, SQLITE_FLOAT, SQLITE_FLOAT});
-    if (!ok) return ok;
-    StoredJoint joint{row.text(0), row.real(1), row.real(2)};
-    if (ok = check_id(joint.name, "joint"); !ok) return ok;
-    if (ok = check_value({joint.name, joint.position, joint.variance}); !ok) return ok;
-    state.joints.push_back(std::move(joint));
+    auto joint = read_joint(row);
+    if (!joint) return tl::unexpected(std::move(joint.error()));
+    state.joints.push_back(*std::move(joint));
     return {};
   });
 }

@@ -151,13 +151,11 @@ TEST_CASE("an update reaches the partition that it is sent to, and brings what i
 
 TEST_CASE("joints reach the partition that they are sent to") {
   const Join join = joined_by(GENERATE(0, 1));
-  Server arms(join, "arms", 1);
-  arms.recorder.joints = {"elbow"};
-  Server legs(join, "legs", 1);
-  legs.recorder.joints = {"knee"};
-  Listener sender(join);
+  const Server arms(join, "arms", 1, {}, {"elbow"});
+  const Server legs(join, "legs", 1, {}, {"knee"});
+  const Listener sender(join);
   const JointUpdate update{{{"elbow", 0.5, 1e-4}, {"knee", -2, 0}}, time_of(77)};
-  REQUIRE(sender.transport->send("arms", update, Listener::soon(Recorder::kLong)));
+  REQUIRE(sender.transport->send("arms", update, Listener::soon(testing::Recorder::kLong)));
   CHECK(arms.hears([](const Heard& h) { return h.joints.size() == 1; }));
   const JointUpdate heard = arms.heard().joints.at(0);
   CHECK(heard.joints.at(0).name == "elbow");

@@ -174,9 +174,11 @@ struct Listener {
 /// One that also serves a partition: it answers each request with its incarnation as epoch.
 struct Server : Listener {
   Server(const Join& join, std::string name, std::uint64_t life = 1,
-         std::set<std::string, std::less<>> frames = {})
+         std::set<std::string, std::less<>> frames = {},
+         std::set<std::string, std::less<>> joints = {})
       : Listener(join, name), partition(std::move(name)), incarnation(life) {
     recorder.frames = std::move(frames);
+    recorder.joints = std::move(joints);
     recorder.answer = [this](const PeerId& from, const Request& request) {
       transport->reply(from, {request.sequence, incarnation, Done{}});
     };

@@ -1,0 +1,62 @@
+#include "store/rows.hpp"
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/partition/joints.hpp"
+
+namespace tfdude {
+namespace {
+
+constexpr std::uint64_t kLastCount = 1ULL << 63U;
+
+}  // namespace
+
+// No clock comes so far, and what is counted from there on is still greater.
+Result<std::uint64_t> read_count(const sqlite::Statement& row, int column) {
+  const std::uint64_t count = row.number(column);
+  if (count > kLastCount) return fail(Errc::kState, "a time of " + std::to_string(count));
+  return count;
+}
+
+// What one row says of a frame, and whether that can be. Rows come in the order of their ids.
+Result<FrameSpec> read_frame(const sqlite::Statement& row, const std::string& before) {
+  FrameSpec frame{row.text(0), row.text(1), {}};
+  if (auto ok = check_id(frame.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
+  if (frame.id <= before) return fail(Errc::kState, "frame " + quote(frame.id) + " out of order");
+  if (!frame.parent.empty()) {
+    if (auto ok = check_id(frame.parent, "parent"); !ok) return tl::unexpected(ok.error());
+  }
+  const auto flat = row.flat(2);
+  auto X_PC = flat ? computed_from(*flat) : tl::unexpected(flat.error());
+  if (!X_PC) return fail_at("frame " + quote(frame.id), X_PC.error());
+  frame.X_PC = *X_PC;
+  return frame;
+}
+
+Result<Note> read_note(const sqlite::Statement& row, const std::string& before) {
+  const std::uint64_t kind = row.number(2);
+  const auto since = read_count(row, 1);
+  if (!since) return tl::unexpected(since.error());
+  Note note{row.text(0), *since, static_cast<Note::Kind>(kind), row.text(3)};
+  if (auto ok = check_id(note.id, "id"); !ok) return tl::unexpected(ok.error());
+  if (note.id <= before) return fail(Errc::kState, "note of " + quote(note.id) + " out of order");
+  if (kind < 1 || kind > static_cast<std::uint64_t>(Note::Kind::kUnhung)) {
+    return fail(Errc::kState, "a note of kind " + std::to_string(kind));
+  }
+  if (!note.rival.empty()) {
+    if (auto ok = check_partition_name(note.rival); !ok) return tl::unexpected(ok.error());
+  }
+  return note;
+}
+
+Result<StoredJoint> read_joint(const sqlite::Statement& row) {
+  if (auto ok = row.check_types({SQLITE_TEXT, SQLITE_FLOAT, SQLITE_FLOAT}); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  StoredJoint joint{row.text(0), row.real(1), row.real(2)};
+  auto ok = check_id(joint.name, "joint");
+  if (ok) ok = check_value({joint.name, joint.position, joint.variance});
+  if (!ok) return tl::unexpected(std::move(ok.error()));
+  return joint;
+}
+
+}  // namespace tfdude

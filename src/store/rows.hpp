@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "tfdude/partition/state_store.hpp"
+
+#include "store/sqlite.hpp"
+
+// What the rows of a state say, and whether that can be. @return kState or kInvalidInput, where it cannot
+namespace tfdude {
+
+[[nodiscard]] Result<std::uint64_t> read_count(const sqlite::Statement& row, int column);
+/// Rows come in the order of their ids. @param before  the id of the row before
+[[nodiscard]] Result<FrameSpec> read_frame(const sqlite::Statement& row, const std::string& before);
+[[nodiscard]] Result<Note> read_note(const sqlite::Statement& row, const std::string& before);
+[[nodiscard]] Result<StoredJoint> read_joint(const sqlite::Statement& row);
+
+}  // namespace tfdude

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "tfdude/partition/messages.hpp"
+
+#include "transport/fastdds/compat.hpp"
+
+// What owners tell of their edges and joints, from what travels. Names are for people to read: whatever a sender has put
+// into them can be shown.
+namespace tfdude::fastdds {
+
+[[nodiscard]] EdgeConsistency read_consistency(const wire::Consistency& body);
+[[nodiscard]] JointInfo read_joint(const wire::JointState& body);
+[[nodiscard]] PastInfo read_past(const wire::Past& body);
+
+}  // namespace tfdude::fastdds
