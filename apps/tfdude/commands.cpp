@@ -46,13 +46,6 @@ int none_there(Client& client, const Arguments& arguments, bool found) {
                 arguments);
 }
 
-int finish(Client& client, const Result<void>& changed, const Arguments& arguments,
-           const std::string& what) {
-  if (!changed) return refuse(client, changed.error(), arguments);
-  return answer(arguments, {{"done", what}, {"id", arguments.id}},
-                what + " " + arguments.id + "\n");
-}
-
 int refuse_pose(const Error& error, const Arguments& arguments) {
   return report({error.code, "frame " + quote(arguments.id) + ": " + error.message}, arguments);
 }
@@ -68,6 +61,13 @@ int answer(const Arguments& arguments, const nlohmann::json& json, const std::st
   return kDone;
 }
 
+int finish(Client& client, const Result<void>& changed, const Arguments& arguments,
+           const std::string& what) {
+  if (!changed) return refuse(client, changed.error(), arguments);
+  return answer(arguments, {{"done", what}, {"id", arguments.id}},
+                what + " " + arguments.id + "\n");
+}
+
 int refuse(Client& client, const Error& error, const Arguments& arguments) {
   switch (error.code) {
     case Errc::kUnknownFrame:
@@ -75,6 +75,7 @@ int refuse(Client& client, const Error& error, const Arguments& arguments) {
     case Errc::kUnknownEnd:
     case Errc::kUnknownParent:
     case Errc::kUnknownPartition:
+    case Errc::kUnknownJoint:
       if (const int status = none_there(client, arguments, false); status != kDone) return status;
       break;
     default:
@@ -179,13 +180,9 @@ int run_add(Client& client, const Arguments& arguments) {
 int run_update(Client& client, const Arguments& arguments) {
   const auto X_PC = arguments.spec.build();
   if (!X_PC) return refuse_pose(X_PC.error(), arguments);
-  std::optional<Time> stamp;
-  if (!arguments.stamp.empty()) {
-    const auto parsed = parse_stamp(arguments.stamp, wall_clock());
-    if (!parsed) return report(parsed.error(), arguments);
-    stamp = *parsed;
-  }
-  const auto updated = client.update(arguments.id, *X_PC, stamp);
+  const auto stamp = optional_stamp(arguments.stamp, wall_clock());
+  if (!stamp) return report(stamp.error(), arguments);
+  const auto updated = client.update(arguments.id, *X_PC, *stamp);
   return finish(client, updated, arguments, "updated");
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <nlohmann/json.hpp>
@@ -38,6 +39,8 @@ struct Arguments {
   ObserveOptions observe;
   std::string out;  ///< the file of a picture
   int samples = 0;
+  double position = 0;  ///< of a joint [rad or m], and its
+  double joint_stddev = 0;
 };
 
 [[nodiscard]] Time wall_clock();
@@ -46,12 +49,18 @@ struct Arguments {
 /// before now. @return kInvalidInput naming the text.
 [[nodiscard]] Result<Time> parse_stamp(const std::string& text, Time now);
 
+/// The same where there may be none: nothing for an empty text.
+[[nodiscard]] Result<std::optional<Time>> optional_stamp(const std::string& text, Time now);
+
 /// How long to wait between the lines of what goes on and on, until it is interrupted.
 /// @return whether it was
 [[nodiscard]] bool interrupted_within(double seconds);
 
 /// Prints an answer as JSON or as text, and returns the exit status.
 int answer(const Arguments& arguments, const nlohmann::json& json, const std::string& text);
+/// Prints that something was done to the frame or joint of the command, or why not, and returns the exit status.
+int finish(Client& client, const Result<void>& changed, const Arguments& arguments,
+           const std::string& what);
 /// Prints what the service said against it, and returns the exit status.
 int refuse(Client& client, const Error& error, const Arguments& arguments);
 
@@ -74,6 +83,8 @@ int run_history(Client& client, const Arguments& arguments);
 int run_echo(Client& client, const Arguments& arguments);
 int run_observe(Client& client, const Arguments& arguments);
 int run_fuse(Client& client, const Arguments& arguments);
+int run_joint(Client& client, const Arguments& arguments);
+int run_joints(Client& client, const Arguments& arguments);
 int run_monitor(Client& client, const Arguments& arguments);
 int run_plot(Client& client, const Arguments& arguments);
 int run_graph(Client& client, const Arguments& arguments);

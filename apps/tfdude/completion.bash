@@ -23,7 +23,7 @@ _tfdude_command() {
 
 _tfdude() {
   local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command words common
-  local commands="tree frames partitions roots parent children exists lookup watch echo history monitor plot graph events observe fuse add update remove move"
+  local commands="tree frames partitions roots parent children exists lookup watch echo history monitor plot graph events joints joint observe fuse add update remove move"
   local pose="--xyz --rpy --quat --stddev --cov"
   COMPREPLY=()
   command=$(_tfdude_command)
@@ -46,10 +46,13 @@ _tfdude() {
           echo) words+=" --rate --composed" ;;
           plot) words+=" --out --samples --at" ;;
           graph) words+=" --out" ;;
+          joint) words+=" --stddev --stamp" ;;
           monitor) words+=" --rate --once" ;;
         esac
       elif [[ -z $command ]]; then
         words=$commands
+      elif [[ $command == joint ]]; then
+        words=$(timeout 0.5 tfdude "${common[@]}" joints 2>/dev/null | sed -n 's/^  \([^ ]*\) .*/\1/p')
       elif [[ $command =~ ^(parent|children|exists|lookup|watch|echo|plot|history|observe|fuse|update|remove|move)$ ]]; then
         words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null)
       fi

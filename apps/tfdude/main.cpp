@@ -213,6 +213,18 @@ void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
   add_out(graph, arguments, {".svg", ".png", ".dot"});
 }
 
+void add_joint_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
+  add_command(app, "joints", "list all joints: positions, limits, what they follow", "joints",
+              cli::run_joints, chosen);
+  auto* joint = add_command(app, "joint", "say where a joint is",
+                            "joint shoulder_pan_joint 0.5 --stddev 0.001", cli::run_joint, chosen);
+  joint->add_option("NAME", arguments.id, "the joint")->required();
+  joint->add_option("POSITION", arguments.position, "its position [rad or m]")->required();
+  joint->add_option("--stddev", arguments.joint_stddev, "standard deviation of that [rad or m]");
+  add_stamp(joint, "--stamp", arguments.stamp,
+            "make it a sample of this instant: seconds since the epoch or, negative, before now");
+}
+
 void add_events_command(CLI::App& app, Command& chosen) {
   add_command(app, "events", "tell what changes: partitions that come and go, frames, conflicts",
               "--json events", cli::run_events, chosen);
@@ -268,6 +280,7 @@ int main(int argc, char** argv) {
   add_changing_commands(app, arguments, command);
   add_measuring_commands(app, arguments, command);
   add_picture_commands(app, arguments, command);
+  add_joint_commands(app, arguments, command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

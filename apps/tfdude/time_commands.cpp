@@ -7,6 +7,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "commands.hpp"
+#include "joint_render.hpp"
 #include "render.hpp"
 #include "time_render.hpp"
 #include "uncertainty_render.hpp"
@@ -22,11 +23,9 @@ std::chrono::nanoseconds from_milliseconds(double milliseconds) {
 Result<Query> query_of(const std::string& stamp, const Arguments& arguments) {
   const Time now = wall_clock();
   Query query;
-  if (!stamp.empty()) {
-    const auto at = parse_stamp(stamp, now);
-    if (!at) return tl::unexpected(at.error());
-    query.at = *at;
-  }
+  const auto at = optional_stamp(stamp, now);
+  if (!at) return tl::unexpected(at.error());
+  query.at = *at;
   query.extrapolate = from_milliseconds(arguments.extrapolate_ms);
   if (arguments.age_noise) query.age_noise_until = now;
   query.order = arguments.order == 4 ? Order::kFourth : Order::kSecond;
@@ -129,6 +128,11 @@ Result<Time> parse_stamp(const std::string& text, Time now) {
   return stamp;
 }
 
+Result<std::optional<Time>> optional_stamp(const std::string& text, Time now) {
+  if (text.empty()) return std::nullopt;
+  return parse_stamp(text, now).map([](Time stamp) { return std::optional<Time>(stamp); });
+}
+
 int run_lookup(Client& client, const Arguments& arguments) {
   const auto X_AB = look_up(client, arguments);
   if (!X_AB) return refuse(client, X_AB.error(), arguments);
@@ -191,6 +195,11 @@ int run_monitor(Client& client, const Arguments& arguments) {
           one["observed"] = nlohmann::json::array();
           for (const auto& edge : *observed) one["observed"].push_back(consistency_json(edge));
           text += consistency_table(*observed);
+        }
+        if (const auto joints = client.joints(partition.name)) {
+          one["joints"] = nlohmann::json::array();
+          for (const JointInfo& joint : *joints) one["joints"].push_back(joint_json(joint));
+          text += outside_table(*joints);
         }
       } else {
         text += "partition " + partition.name + ": " + pasts.error().message + "\n";

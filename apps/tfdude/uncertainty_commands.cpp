@@ -17,13 +17,9 @@ int measure(Client& client, const Arguments& arguments, Measure take) {
   }
   const auto X = arguments.spec.build();
   if (!X) return report({X.error().code, "the measurement: " + X.error().message}, arguments);
-  std::optional<Time> stamp;
-  if (!arguments.stamp.empty()) {
-    const auto parsed = parse_stamp(arguments.stamp, wall_clock());
-    if (!parsed) return report(parsed.error(), arguments);
-    stamp = *parsed;
-  }
-  const auto observed = take(client, arguments, *X, stamp);
+  const auto stamp = optional_stamp(arguments.stamp, wall_clock());
+  if (!stamp) return report(stamp.error(), arguments);
+  const auto observed = take(client, arguments, *X, *stamp);
   if (!observed) return refuse(client, observed.error(), arguments);
   (void)answer(arguments, observed_json(*observed), describe(*observed));
   return observed->accepted ? kDone : kRefused;

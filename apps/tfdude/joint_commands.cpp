@@ -1,0 +1,38 @@
+#include "commands.hpp"
+#include "joint_render.hpp"
+
+// Commands that have to do with joints.
+namespace tfdude::cli {
+
+int run_joint(Client& client, const Arguments& arguments) {
+  const auto stamp = optional_stamp(arguments.stamp, wall_clock());
+  if (!stamp) return report(stamp.error(), arguments);
+  const double variance = arguments.joint_stddev * arguments.joint_stddev;
+  const auto updated =
+      client.update_joints({arguments.id}, {arguments.position}, {variance}, *stamp);
+  return finish(client, updated, arguments, "moved");
+}
+
+int run_joints(Client& client, const Arguments& arguments) {
+  const auto partitions = client.partitions();
+  if (partitions.empty()) return refuse(client, {Errc::kUnknownPartition, ""}, arguments);
+  nlohmann::json json = nlohmann::json::array();
+  std::string text;
+  for (const PartitionInfo& partition : partitions) {
+    const auto joints = client.joints(partition.name);
+    nlohmann::json one{{"partition", partition.name}, {"reachable", joints.has_value()}};
+    if (!joints) {
+      text += "partition " + partition.name + ": " + joints.error().message + "\n";
+    } else if (!joints->empty()) {
+      text += "partition " + partition.name + "\n" + joint_table(*joints);
+    }
+    if (joints) {
+      one["joints"] = nlohmann::json::array();
+      for (const JointInfo& joint : *joints) one["joints"].push_back(joint_json(joint));
+    }
+    json.push_back(std::move(one));
+  }
+  return answer(arguments, {{"partitions", std::move(json)}}, text);
+}
+
+}  // namespace tfdude::cli

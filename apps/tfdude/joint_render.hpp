@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "tfdude/partition/messages.hpp"
+
+// Joints as text for people, and as JSON for programs.
+namespace tfdude::cli {
+
+/// All joints of a partition, a line each.
+[[nodiscard]] std::string joint_table(const std::vector<JointInfo>& joints);
+
+/// Those that were told positions outside their limits; empty where none was.
+[[nodiscard]] std::string outside_table(const std::vector<JointInfo>& joints);
+
+[[nodiscard]] nlohmann::json joint_json(const JointInfo& joint);
+
+}  // namespace tfdude::cli
