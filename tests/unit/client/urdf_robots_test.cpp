@@ -8,9 +8,12 @@
 #include <Eigen/Geometry>
 
 #include "tfdude/client/urdf.hpp"
+#include "tfdude/partition/partition.hpp"
 
 #include "support/catch.hpp"
+#include "support/pose_diff.hpp"
 #include "support/random.hpp"
+#include "support/replica.hpp"
 #include "support/sampling.hpp"
 
 namespace {
@@ -220,6 +223,59 @@ TEST_CASE("robots: three hinges in a plane") {
   CHECK(tip.x() == tfdude::testing::Approx(1.8 * cos(a) + 1.5 * cos(b) + 1.2 * cos(c)));
   CHECK(tip.y() == tfdude::testing::Approx(1.8 * sin(a) + 1.5 * sin(b) + 1.2 * sin(c)));
   CHECK(tip.z() == 0);
+}
+
+TEST_CASE("robots: a degree in each hinge moves the tip by what the figure says") {
+  const auto robot = load("three_hinges.urdf");
+  const Positions q{{"hinge_1", -kPi / 2}, {"hinge_2", -kPi / 3}, {"hinge_3", -kPi / 4}};
+  Positions off = q;
+  for (auto& [name, position] : off) position += kPi / 180;
+  const Eigen::Vector3d moved = path(robot, "base", "tip", off).pose.translation() -
+                                path(robot, "base", "tip", q).pose.translation();
+  CHECK(moved.x() == tfdude::testing::Approx(0.0437).margin(5e-5));
+  CHECK(moved.y() == tfdude::testing::Approx(-0.1057).margin(5e-5));
+}
+
+// By way of an owner, whose fingers share the error of the joint that both follow.
+TEST_CASE("robots: the covariance over fingers that follow each other is that of samples") {
+  Random random(4715);
+  INFO("seed " << random.seed());
+  const auto robot = load("two_arms.urdf");
+  tfdude::testing::Replica replica("robot");
+  tfdude::Partition owner("robot", 1, replica.forest, replica.directory);
+  REQUIRE(owner.load(robot, {}));
+  constexpr double kSigma = 1e-3;
+  constexpr int kSamples = 20000;
+  const Positions q = random_positions(robot, random);
+  tfdude::JointUpdate update;
+  for (const auto& [name, position] : q) {
+    update.joints.push_back({name, position, kSigma * kSigma});
+  }
+  REQUIRE(owner.apply(update));
+  // Both fingers move by one number, away from each other.
+  const auto X_12 = replica.forest.lookup("left_finger_1", "left_finger_2");
+  REQUIRE(X_12.has_value());
+  CHECK(X_12->covariance.stddev()[1] == tfdude::testing::Approx(2 * kSigma));
+  for (const auto& [a, b] :
+       {std::pair("left_finger_1", "right_finger_2"), std::pair("right_finger_2", "left_hand")}) {
+    CAPTURE(a, b);
+    const auto X_AB = replica.forest.lookup(a, b);
+    REQUIRE(X_AB.has_value());
+    const std::string from = a;
+    const std::string to = b;
+    const auto pose = [&](const Positions& at) {
+      return path(robot, "base_link", from, at).pose.inverse() *
+             path(robot, "base_link", to, at).pose;
+    };
+    CHECK(tfdude::testing::pose_diff(X_AB->pose, pose(q), 1e-12) == "");
+    const auto sample = [&] {
+      Positions at = q;
+      for (auto& [name, position] : at) position += kSigma * random.normal();
+      return tfdude::log(X_AB->pose.inverse() * pose(at));
+    };
+    const auto sampled = tfdude::testing::second_moment(kSamples, sample);
+    CHECK(tfdude::testing::moment_diff(sampled, X_AB->covariance.matrix(), kSamples, 1e-3) == "");
+  }
 }
 
 TEST_CASE("robots: an arm's covariance is that of samples of its joints") {

@@ -1,0 +1,165 @@
+// A robot of two daemons, from one URDF, driven by joints.
+
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "support/catch.hpp"
+#include "support/process.hpp"
+#include "support/test_domain.hpp"
+
+namespace tfdude {
+namespace {
+
+using nlohmann::json;
+using testing::Approx;
+using testing::await_ready;
+using testing::CliResult;
+using testing::ContainsSubstring;
+using testing::eventually;
+using testing::Process;
+using testing::TemporaryDirectory;
+using testing::TestDomain;
+using Arguments = std::vector<std::string>;
+
+const std::string kMobileArm = TFDUDE_EXAMPLES "/robots/mobile_arm.urdf";
+
+// The base and its arm, each with a daemon that keeps its state.
+struct Robot {
+  explicit Robot(const Arguments& of_arm = {}) : of_arm_(of_arm) {
+    base.emplace(start({"--config", TFDUDE_EXAMPLES "/arm/base.yaml"}));
+    start_arm();
+  }
+
+  Process start(Arguments arguments) const {
+    arguments.insert(arguments.end(), {"--state", directory.path()});
+    Process daemon = domain.start_daemon(arguments);
+    (void)await_ready(daemon);
+    return daemon;
+  }
+  void start_arm() {
+    Arguments arguments{"--partition", "arm", "--urdf", kMobileArm, "--links", "shoulder_link"};
+    arguments.insert(arguments.end(), of_arm_.begin(), of_arm_.end());
+    arm.reset();
+    arm.emplace(start(arguments));
+  }
+
+  json answered(Arguments arguments, int status = 0) const {
+    arguments.insert(arguments.begin(), "--json");
+    const CliResult result = domain.cli(arguments);
+    INFO(result.out << result.err);
+    CHECK(result.status == status);
+    return json::parse(result.out);
+  }
+  std::string refused(const Arguments& arguments) const {
+    return answered(arguments, 1).at("error").at("message").get<std::string>();
+  }
+  json joint(const std::string& name) const {
+    const json all = answered({"joints"});
+    for (const json& partition : all.at("partitions")) {
+      for (const json& one : partition.at("joints")) {
+        if (one.at("name") == name) return one;
+      }
+    }
+    return {};
+  }
+  // The turn about z of a frame in its parent.
+  double turn(const std::string& parent, const std::string& frame) const {
+    const json q = answered({"lookup", parent, frame}).at("rotation");
+    return 2 * std::atan2(q.at(2).get<double>(), q.at(3).get<double>());
+  }
+
+  TestDomain domain;
+  TemporaryDirectory directory;
+  std::optional<Process> base;
+  std::optional<Process> arm;
+
+ private:
+  const Arguments of_arm_;
+};
+
+}  // namespace
+
+TEST_CASE("joints: one URDF over two daemons is one robot") {
+  const Robot robot;
+  const json path = robot.answered({"lookup", "world", "tool0"});
+  CHECK(path.at("partitions") == json({"base", "arm"}));
+  CHECK(robot.answered({"joints"}).at("partitions").at(0).at("joints").size() == 6);
+  CHECK(robot.joint("elbow_joint").at("frame") == "forearm_link");
+  CHECK_FALSE(robot.joint("elbow_joint").at("measured").get<bool>());
+  CHECK_THAT(robot.domain.cli({"joints"}).out, ContainsSubstring("no sample yet"));
+  robot.answered({"joint", "shoulder_pan_joint", "0.5", "--stddev", "0.001"});
+  CHECK(robot.turn("arm_mount", "shoulder_link") == Approx(0.5));
+  // Negative numbers are positions, not options.
+  robot.answered({"joint", "shoulder_pan_joint", "-0.25"});
+  CHECK(robot.turn("arm_mount", "shoulder_link") == Approx(-0.25));
+}
+
+TEST_CASE("joints: wrong input is refused by name, and changes nothing") {
+  const Robot robot;
+  CHECK_THAT(robot.refused({"joint", "knee", "1"}), ContainsSubstring("no joint 'knee'"));
+  CHECK_THAT(robot.refused({"joint", "elbow_joint", "nan"}),
+             ContainsSubstring("joint 'elbow_joint': position is not a number"));
+  CHECK_THAT(robot.refused({"joint", "elbow_joint", "1", "--stddev", "inf"}),
+             ContainsSubstring("joint 'elbow_joint': variance"));
+  CHECK(robot.domain.cli({"joint", "elbow_joint"}).status == 2);
+  CHECK(robot.domain.cli({"joint", "elbow_joint", "much"}).status == 2);
+  CHECK_FALSE(robot.joint("elbow_joint").at("measured").get<bool>());
+}
+
+TEST_CASE("joints: positions outside the limits show in monitor, unless they are refused") {
+  SECTION("applied") {
+    const Robot robot;
+    robot.answered({"joint", "elbow_joint", "3.5"});
+    CHECK(robot.joint("elbow_joint").at("outside") == 1);
+    CHECK_THAT(robot.domain.cli({"monitor", "--once"}).out,
+               ContainsSubstring("joint outside limits") && ContainsSubstring("elbow_joint"));
+  }
+  SECTION("refused") {
+    const Robot robot({"--strict-limits"});
+    CHECK_THAT(robot.refused({"joint", "elbow_joint", "3.5"}),
+               ContainsSubstring("outside its limits"));
+    CHECK(robot.joint("elbow_joint").at("outside") == 0);
+    CHECK(robot.joint("elbow_joint").at("refused") == 1);
+  }
+}
+
+TEST_CASE("joints: a daemon that is killed comes back with its joints") {
+  Robot robot;
+  robot.answered({"joint", "elbow_joint", "1.25", "--stddev", "0.01"});
+  robot.arm->kill();
+  robot.start_arm();
+  const json elbow = robot.joint("elbow_joint");
+  CHECK(elbow.at("position") == 1.25);
+  CHECK(elbow.at("variance") == Approx(1e-4));
+  CHECK(elbow.at("measured").get<bool>());
+  CHECK(robot.turn("upper_arm_link", "forearm_link") == Approx(1.25));
+  robot.answered({"joint", "elbow_joint", "1.5"});
+  CHECK(robot.turn("upper_arm_link", "forearm_link") == Approx(1.5));
+}
+
+TEST_CASE("joints: the example's controller drives the arm, and outlives a killed daemon") {
+  Robot robot;
+  Process controller({TFDUDE_CONTROLLER, "--seconds", "60", "--domain",
+                      std::to_string(robot.domain.number()), "--profile", TFDUDE_LOOPBACK_PROFILE});
+  const auto is_driven = [&] {
+    const CliResult result =
+        robot.domain.cli({"--json", "lookup", "world", "tool0", "--at", "-0.05"});
+    return result.status == 0;
+  };
+  CHECK(eventually(is_driven));
+  // The last joint has the widest path, and never rests.
+  const double before = robot.joint("wrist_3_joint").at("position").get<double>();
+  CHECK(eventually([&] {
+    return std::abs(robot.joint("wrist_3_joint").at("position").get<double>() - before) > 0.1;
+  }));
+  robot.arm->kill();
+  robot.start_arm();
+  CHECK(eventually(is_driven));
+  CHECK(controller.runs());
+}
+
+}  // namespace tfdude
