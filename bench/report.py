@@ -163,7 +163,8 @@ def thesis_section(figures, drawn, home):
 
 WIRE_NAMES = {"add": "add", "remove": "remove", "lookup_other": "look up, one other owner",
               "lookup_across": "look up, two owners", "update": "update",
-              "publish": "publish (has no reply)"}
+              "publish": "publish (has no reply)",
+              "publish_joint": "publish a joint's position"}
 
 
 def wire_section(figures, _drawn, _home):
@@ -210,7 +211,7 @@ def stream_section(figures, _drawn, _home):
         name = f"{key.removeprefix('stream/').replace('_', ' ')} [{unit_of(figures[key])}]"
         rows.append((name, *(value(figures, key, which, as_measured)
                              for which in ("median", "p90", "p99", "max"))))
-    return ["One publisher to one owner, 100 edges a sample.\n",
+    return ["One publisher to one owner, 100 edges a sample; `joints`: positions of 30 joints.\n",
             table(("figure", "median", "p90", "p99", "max"), rows)]
 
 

@@ -95,6 +95,8 @@ def _stream():
                  value_of("stream/1khz/lost", "max"), 0, unit="samples")
     yield Target("Stream", "100 edges at 1 kHz: owner's share of a core",
                  value_of("stream/1khz/owner_cpu"), 10, unit="%")
+    yield Target("Stream", "30 joints at 1 kHz: samples lost",
+                 value_of("stream/joints/1khz/lost", "max"), 0, unit="samples")
 
 
 def _core():

@@ -117,7 +117,7 @@ def part_of(capture, packet):
     if topic is None or not topic.startswith("tfdude/") or topic == "tfdude/presence":
         return None
     if rtps.DATA in packet.kinds or rtps.DATA_FRAG in packet.kinds:
-        if topic in ("tfdude/request", "tfdude/update"):
+        if topic in ("tfdude/request", "tfdude/update", "tfdude/joint"):
             return "request"
         if topic == "tfdude/reply":
             return "reply"
@@ -150,6 +150,18 @@ def figures_of(capture, operation, begins, names=None):
         yield figures.summary(f"wire/{operation}/{name}", unit, [one[name] for one in counted])
 
 
+def joint_config(work):
+    """A daemon's configuration: one link that a joint moves."""
+    limits = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    (work / "joint.urdf").write_text(
+        '<robot name="wire"><link name="fixed_link"/><link name="moved_link"/>'
+        '<joint name="tool_joint" type="revolute"><parent link="fixed_link"/>'
+        f'<child link="moved_link"/><axis xyz="0 0 1"/>{limits}</joint></robot>', encoding="utf-8")
+    config = work / "joint.yaml"
+    config.write_text("partition: joint\nurdf:\n  - file: joint.urdf\n", encoding="utf-8")
+    return config
+
+
 def measure_operations(bin_dir, work, rounds):
     """Table 5.1 on the thesis's tree, asked by a client that owns nothing."""
     file = work / "operations.pcap"
@@ -174,6 +186,21 @@ def measure_operations(bin_dir, work, rounds):
             if capture.is_of_participant(packet)]
     total = sum(packet.udp_bytes for packet in idle)
     yield figures.summary("wire/idle/udp_per_second", "bytes", [total / IDLE_S])
+
+
+def measure_joint(bin_dir, work, rounds):
+    """The position of one joint, beside the edge that `publish` sends."""
+    file = work / "joint.pcap"
+    domain, _lease = processes.lease_domain()
+    begins = []
+    with capturing(file, domain), processes.daemons(bin_dir, [joint_config(work)], domain, work):
+        with client_of(bin_dir, domain, work) as client:
+            client.settle("lookup fixed_link moved_link")
+            for turn in range(rounds + 1):
+                begin = client.perform("joint tool_joint")
+                if turn > 0:
+                    begins.append(begin)
+    yield from figures_of(rtps.Capture(file), "publish_joint", begins)
 
 
 def chain_configs(work):
@@ -214,4 +241,5 @@ def run(quick, bin_dir, work):
         raise processes.Skipped("wire_client is not built")
     rounds = 5 if quick else 20
     yield from measure_operations(bin_dir, work, rounds)
+    yield from measure_joint(bin_dir, work, rounds)
     yield from measure_chain(bin_dir, work, rounds)

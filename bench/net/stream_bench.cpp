@@ -1,4 +1,5 @@
-// Streamed updates: one publisher in one process sends all 100 edges of an owner in another at a fixed rate.
+// Streamed updates: one publisher in one process sends all 100 edges of an owner in another at a fixed rate; then the
+// positions of 30 joints, which move 30 edges more.
 //
 //   stream_bench --mode own     --shared FILE --domain DOMAIN --profile FILE
 //   stream_bench --mode publish --shared FILE --domain DOMAIN --profile FILE --seconds S --repetitions R
@@ -9,13 +10,16 @@
 //   stream/1khz/lost          samples, one value a repetition
 //   stream/highest_rate       of 1, 2, 4... kHz and as fast as publish() returns: the highest with nothing lost [Hz]
 //   stream/unthrottled/rate   as fast as publish() returns [Hz], and stream/unthrottled/lost, in percent
+//   stream/joints/...         the first three of these for the joints
 //
-// The first edge's translation carries the moment of publishing, by a clock that both share.
+// The first edge's translation carries the moment of publishing, by a clock that both share; so does the first joint's
+// position.
 
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <ctime>
+#include <functional>
 #include <string>
 #include <thread>
 #include <unistd.h>
@@ -36,10 +40,22 @@ using bench::shared_clock;
 using bench::StreamState;
 
 constexpr int kEdges = 100;
+constexpr int kJoints = 30;
 constexpr const char* kPartition = "joints";
 constexpr const char* kRoot = "base";
 
 std::string joint(int number) { return "joint_" + std::to_string(number); }
+std::string slider(int number) { return "slider_" + std::to_string(number); }
+std::string carriage(int number) { return "carriage_" + std::to_string(number); }
+
+// The first slides along x; the others are hinges, as most joints are.
+FrameSpec moved_frame(int number) {
+  JointSpec spec;
+  spec.name = slider(number);
+  spec.type = number == 0 ? JointType::kPrismatic : JointType::kContinuous;
+  spec.joint = number == 0 ? tfdude::slider({}, {1, 0, 0}) : hinge({}, {0, 0.6, 0.8});
+  return {carriage(number), kRoot, {}, {}, {}, spec};
+}
 
 // --- the owner ---
 
@@ -50,14 +66,16 @@ class Latency final : public bench::AppliedListener {
 
   void watch(Node& node) {
     root_ = must(node.find(kRoot), "the root");
-    joint_ = must(node.find(joint(0)), "the first joint");
+    edge_ = must(node.find(joint(0)), "the first edge");
+    carriage_ = must(node.find(carriage(0)), "the first joint's edge");
     node_ = &node;
   }
 
-  void on_applied() override {
+  void on_applied(bench::Streamed what) override {
     Node* node = node_;
     if (node == nullptr) return;
-    const Transform seen = must(node->lookup(root_, joint_), "a lookup");
+    const Handle first = what == bench::Streamed::kEdges ? edge_ : carriage_;
+    const Transform seen = must(node->lookup(root_, first), "a lookup");
     const double latency = 1e6 * (shared_clock() - seen.pose.translation().x());
     const std::uint64_t count = state_.latency_count.load();
     if (count < bench::kMostLatencies) state_.latencies[count] = latency;
@@ -69,7 +87,8 @@ class Latency final : public bench::AppliedListener {
   StreamState& state_;
   std::atomic<Node*> node_{nullptr};
   Handle root_;
-  Handle joint_;
+  Handle edge_;
+  Handle carriage_;
 };
 
 [[noreturn]] void own(const bench::Arguments& arguments) {
@@ -77,6 +96,7 @@ class Latency final : public bench::AppliedListener {
   const Options options = arguments.options("domain");
   std::vector<FrameSpec> frames{{kRoot, "", {}}};
   for (int i = 0; i < kEdges; ++i) frames.push_back({joint(i), kRoot, {}});
+  for (int i = 0; i < kJoints; ++i) frames.push_back(moved_frame(i));
   Latency latency(state);
   auto transport = must(make_fastdds_transport({options.domain, options.profile, kPartition, {}}),
                         "a transport");
@@ -101,8 +121,9 @@ struct Run {
 
 class Publisher {
  public:
-  Publisher(Client& client, StreamState& state) : client_(client), state_(state) {
-    for (int i = 0; i < kEdges; ++i) edges_.push_back({joint(i), {}});
+  using Publish = std::function<void()>;
+
+  Publisher(Publish publish, StreamState& state) : publish_(std::move(publish)), state_(state) {
     if (::clock_getcpuclockid(state_.owner_pid, &owner_clock_) != 0) bench::give_up("no owner");
   }
 
@@ -115,7 +136,7 @@ class Publisher {
     std::uint64_t published = 0;
     while (shared_clock() < start + seconds) {
       if (rate > 0) bench::sleep_until(start + static_cast<double>(published) / rate);
-      publish();
+      publish_();
       ++published;
     }
     const double took = shared_clock() - start;
@@ -126,11 +147,6 @@ class Publisher {
   }
 
  private:
-  void publish() {
-    edges_[0].X_PC.pose = Pose::trusted(Eigen::Quaterniond::Identity(), {shared_clock(), 0, 0});
-    bench::check(client_.publish(edges_), "publish");
-  }
-
   // Until all is applied, or nothing more comes.
   void await_rest(std::uint64_t expected) const {
     std::uint64_t seen = 0;
@@ -148,16 +164,37 @@ class Publisher {
     return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
   }
 
-  Client& client_;
+  const Publish publish_;
   StreamState& state_;
   clockid_t owner_clock_{};
-  std::vector<EdgeUpdate> edges_;
 };
 
-void measure_1khz(Publisher& publisher, const StreamState& state, double seconds, int repetitions) {
-  Series latency("stream/1khz/latency", "us");
-  Series cpu("stream/1khz/owner_cpu", "%");
-  Series lost("stream/1khz/lost", "samples");
+Publisher::Publish edges_to(Client& client) {
+  std::vector<EdgeUpdate> edges;
+  for (int i = 0; i < kEdges; ++i) edges.push_back({joint(i), {}});
+  return [&client, edges]() mutable {
+    edges[0].X_PC.pose = Pose::trusted(Eigen::Quaterniond::Identity(), {shared_clock(), 0, 0});
+    bench::check(client.publish(edges), "publish");
+  };
+}
+
+Publisher::Publish joints_to(Client& client) {
+  std::vector<std::string> names;
+  for (int i = 0; i < kJoints; ++i) names.push_back(slider(i));
+  std::vector<double> positions(kJoints, 0.5);
+  const std::vector<double> variances(kJoints, 1e-6);
+  return [&client, names, positions, variances]() mutable {
+    positions[0] = shared_clock();
+    bench::check(client.publish_joints(names, positions, variances), "publish_joints");
+  };
+}
+
+void measure_1khz(const std::string& name, Publisher& publisher, const StreamState& state,
+                  double seconds, int repetitions) {
+  (void)publisher.run(1000, 0.5);  // warm-up
+  Series latency(name + "/1khz/latency", "us");
+  Series cpu(name + "/1khz/owner_cpu", "%");
+  Series lost(name + "/1khz/lost", "samples");
   for (int i = 0; i < repetitions; ++i) {
     const Run run = publisher.run(1000, seconds);
     const std::size_t count = std::min<std::size_t>(state.latency_count, bench::kMostLatencies);
@@ -194,12 +231,13 @@ void publish(const bench::Arguments& arguments) {
   StreamState& state = bench::map_stream_state(arguments.text("shared"));
   auto client = must(Client::open(arguments.options("domain")), "a client");
   (void)must(client.find(joint(kEdges - 1)), "the owner's frames");
-  Publisher publisher(client, state);
-  (void)publisher.run(1000, 0.5);  // warm-up
+  Publisher edges(edges_to(client), state);
+  Publisher joints(joints_to(client), state);
   const int seconds = arguments.number("seconds");
   const int repetitions = arguments.number("repetitions");
-  measure_1khz(publisher, state, seconds, repetitions);
-  measure_highest(publisher, 0.25 * seconds, repetitions);
+  measure_1khz("stream", edges, state, seconds, repetitions);
+  measure_1khz("stream/joints", joints, state, seconds, repetitions);
+  measure_highest(edges, 0.25 * seconds, repetitions);
 }
 
 }  // namespace

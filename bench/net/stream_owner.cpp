@@ -19,11 +19,11 @@ class Watcher final : public Transport, public TransportHandler {
 
   void on_update(const Update& update) override {
     handler_->on_update(update);
-    listener_.on_applied();
+    listener_.on_applied(Streamed::kEdges);
   }
   void on_joints(const JointUpdate& update) override {
     handler_->on_joints(update);
-    listener_.on_applied();
+    listener_.on_applied(Streamed::kJoints);
   }
 
   Result<void> start(TransportHandler& handler) override {

@@ -23,11 +23,14 @@ struct StreamState {
 /// Made or opened; zero at first. Stays mapped.
 StreamState& map_stream_state(const std::string& file);
 
+/// What is streamed.
+enum class Streamed { kEdges, kJoints };
+
 /// Called after each update that has come to an owner, when it has been applied.
 class AppliedListener {
  public:
   virtual ~AppliedListener() = default;
-  virtual void on_applied() = 0;
+  virtual void on_applied(Streamed what) = 0;
 };
 
 /// Counts what comes to an owner without changing how it gets there: a transport between the real one and

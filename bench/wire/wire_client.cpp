@@ -4,7 +4,7 @@
 //   wire_client DOMAIN PROFILE
 //
 // Reads operations from standard input, one a line:
-//   add ID PARENT | remove ID | update ID | publish ID | lookup A B
+//   add ID PARENT | remove ID | update ID | publish ID | joint NAME | lookup A B
 // and answers each with "BEGIN done", BEGIN being when it began by the system's clock [ns], which a
 // capture has, too; or with "failed" and why.
 
@@ -36,6 +36,7 @@ Result<void> perform(Client& client, const std::string& line) {
   if (operation == "remove") return client.remove(first);
   if (operation == "update") return client.update(first, X);
   if (operation == "publish") return client.publish({{first, X}});
+  if (operation == "joint") return client.publish_joints({first}, {0.5}, {1e-6});
   if (operation == "lookup") {
     if (auto found = client.lookup(first, second); !found) return tl::unexpected(found.error());
     return {};
