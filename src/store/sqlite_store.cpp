@@ -18,9 +18,8 @@ using sqlite::Statement;
 
 constexpr std::int64_t kApplication = 0x74666475;  // "tfdu"
 constexpr std::int64_t kFormat = 2;
-// The one that knew no joints; it is brought up to date.
+// The one that knew no joints; it is brought up to date before something is written.
 constexpr std::int64_t kFormatBefore = 1;
-constexpr std::size_t kLongestFileName = 200;
 
 // A file with other words than these is refused: a change of them needs another format.
 constexpr const char* kSchema = R"(
@@ -36,6 +35,8 @@ constexpr const char* kJointsSchema = R"(
   CREATE TABLE joints(name TEXT PRIMARY KEY, position REAL NOT NULL, variance REAL NOT NULL)
                      WITHOUT ROWID;
 )";
+
+constexpr const char* kPutJoint = "INSERT OR REPLACE INTO joints VALUES(?1, ?2, ?3)";
 
 std::string without_spaces(std::string_view text) {
   std::string plain;
@@ -76,6 +77,7 @@ class SqliteStore final : public StateStore {
   Result<void> bring_up_to_date();
   Result<void> create(const std::string& partition);
   Result<void> prepare();
+  Result<void> prepare(Statement& statement, const char* sql);
   Result<void> load_about(StoredState& state);
   Result<void> load_frames(StoredState& state);
   Result<void> load_notes(StoredState& state);
@@ -88,7 +90,8 @@ class SqliteStore final : public StateStore {
 
   const std::string file_;
   std::optional<Database> database_;
-  bool written_ = false;  // by this process
+  bool written_ = false;   // by this process
+  bool outdated_ = false;  // it is of the format before
   Statement set_epoch_;
   Statement erase_frame_;
   Statement erase_note_;
@@ -152,7 +155,8 @@ Result<void> SqliteStore::check(const std::string& partition) {
   if (auto checked = check_tables(*format); !checked) return damaged(checked.error().message);
   const auto of = database_->text("SELECT partition FROM about");
   if (!of) return damaged(of.error().message);
-  if (*of == partition) return *format == kFormat ? Result<void>() : bring_up_to_date();
+  outdated_ = *format == kFormatBefore;
+  if (*of == partition) return {};
   return unusable("is of partition " + quote(*of) + ", not of " + quote(partition) +
                   ": move it away, or put the right one back");
 }
@@ -181,11 +185,13 @@ Result<void> SqliteStore::check_tables(std::int64_t format) {
 }
 
 Result<void> SqliteStore::bring_up_to_date() {
-  return transaction([&]() -> Result<void> {
-    auto done = database_->run(kJointsSchema);
-    const std::string mark = "PRAGMA user_version = " + std::to_string(kFormat);
-    return done ? database_->run(mark.c_str()) : done;
-  });
+  auto done = database_->run("BEGIN IMMEDIATE");
+  if (done) done = database_->run(kJointsSchema);
+  const std::string mark = "PRAGMA user_version = " + std::to_string(kFormat) + "; COMMIT;";
+  if (done) done = database_->run(mark.c_str());
+  if (done) done = prepare(put_joint_, kPutJoint);
+  outdated_ = !done;
+  return done;
 }
 
 Result<void> SqliteStore::create(const std::string& partition) {
@@ -213,13 +219,18 @@ Result<void> SqliteStore::prepare() {
       {&put_note_, "INSERT OR REPLACE INTO notes VALUES(?1, ?2, ?3, ?4)"},
       {&set_value_, "UPDATE frames SET x_pc = ?2 WHERE id = ?1"},
       {&put_configured_, "INSERT INTO configured VALUES(?1, ?2, ?3)"},
-      {&put_joint_, "INSERT OR REPLACE INTO joints VALUES(?1, ?2, ?3)"},
   };
+  Result<void> done;
   for (const auto& [statement, sql] : all) {
-    auto prepared = Statement::prepare(*database_, sql);
-    if (!prepared) return tl::unexpected(std::move(prepared.error()));
-    *statement = std::move(*prepared);
+    if (done) done = prepare(*statement, sql);
   }
+  return done && !outdated_ ? prepare(put_joint_, kPutJoint) : done;
+}
+
+Result<void> SqliteStore::prepare(Statement& statement, const char* sql) {
+  auto prepared = Statement::prepare(*database_, sql);
+  if (!prepared) return tl::unexpected(std::move(prepared.error()));
+  statement = std::move(*prepared);
   return {};
 }
 
@@ -285,6 +296,7 @@ Result<void> SqliteStore::load_configured(StoredState& state) {
 }
 
 Result<void> SqliteStore::load_joints(StoredState& state) {
+  if (outdated_) return {};
   const char* sql = "SELECT name, position, variance FROM joints ORDER BY name";
   return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
     auto joint = read_joint(row);
@@ -298,6 +310,7 @@ Result<void> SqliteStore::make_ready() {
   if (written_) return {};
   auto done = database_->run("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;");
   if (done) database_->tidy_up_at_close();
+  if (done && outdated_) done = bring_up_to_date();
   written_ = done.has_value();
   return done;
 }
@@ -362,28 +375,6 @@ Result<void> SqliteStore::save_configured(const std::vector<FrameSpec>& frames) 
 }
 
 }  // namespace
-
-std::string state_file(const std::string& directory, std::uint32_t domain,
-                       const std::string& partition) {
-  constexpr const char* kDigits = "0123456789abcdef";
-  std::string name;
-  std::uint32_t hash = 2166136261U;
-  for (const char c : partition) {
-    const auto byte = static_cast<unsigned char>(c);
-    hash = (hash ^ byte) * 16777619U;
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                       c == '-' || c == '_' || (c == '.' && !name.empty());
-    if (plain) {
-      name += c;
-    } else {
-      name += {'%', kDigits[byte >> 4U], kDigits[byte & 15U]};
-    }
-  }
-  if (name.size() > kLongestFileName) {
-    name = name.substr(0, kLongestFileName) + "-" + std::to_string(hash);
-  }
-  return directory + "/domain-" + std::to_string(domain) + "/" + name + ".sqlite";
-}
 
 Result<std::unique_ptr<StateStore>> open_sqlite_store(const std::string& file,
                                                       const std::string& partition) {

@@ -41,6 +41,7 @@ class Filters {
     log().set_level(spdlog::level::off);
     requests_ = created(fastdds::RequestType());
     updates_ = created(fastdds::UpdateType());
+    joints_ = created(fastdds::JointsType());
   }
 
   void run(Bytes& bytes) {
@@ -48,6 +49,8 @@ class Filters {
            "requests pass that concern the owner, and no others");
     demand(passes(*updates_, bytes) == update_concerns(bytes),
            "updates pass that concern the owner, and no others");
+    demand(passes(*joints_, bytes) == joints_concern(bytes),
+           "joints pass that the owner has, and no others");
   }
 
  private:
@@ -79,11 +82,20 @@ class Filters {
                        [this](const wire::Edge& edge) { return owner_.owns(edge.id().c_str()); });
   }
 
+  [[nodiscard]] bool joints_concern(const Bytes& bytes) const {
+    wire::Joints sample;
+    if (!testing::deserialized<fastdds::JointsType>(bytes, sample)) return false;
+    return std::any_of(
+        sample.joints().begin(), sample.joints().end(),
+        [this](const wire::JointPosition& joint) { return owner_.owns_joint(joint.id().c_str()); });
+  }
+
   Owner owner_;
   FastDdsCounters counters_;
   fastdds::OwnedFilters filters_{kPartition, owner_, counters_};
   fastdds::edds::IContentFilter* requests_ = nullptr;
   fastdds::edds::IContentFilter* updates_ = nullptr;
+  fastdds::edds::IContentFilter* joints_ = nullptr;
 };
 
 }  // namespace

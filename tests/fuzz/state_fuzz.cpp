@@ -80,12 +80,16 @@ std::vector<std::string> lines_of(const StoredState& state) {
   for (const FrameSpec& frame : state.configured) {
     lines.push_back("configured " + frame.id + " < " + frame.parent + ", " + bits(frame.X_PC));
   }
+  for (const StoredJoint& joint : state.joints) {
+    lines.push_back("joint " + joint.name + ", " + std::to_string(joint.position) + ", " +
+                    std::to_string(joint.variance));
+  }
   std::sort(lines.begin(), lines.end());
   return lines;
 }
 
 StateChange all_of(const StoredState& state) {
-  StateChange change{state.epoch, {}, state.frames, state.notes};
+  StateChange change{state.epoch, {}, state.frames, state.notes, state.joints};
   for (const StoredFrame& frame : state.frames) change.erased.push_back(frame.id);
   for (const Note& note : state.notes) change.erased.push_back(note.id);
   return change;

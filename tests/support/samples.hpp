@@ -248,7 +248,7 @@ bool take(const Bytes& bytes) {
                      take<UpdateType, wire::Update>});
   }
   for (const JointUpdate& one : joint_updates()) {
-    kinds.push_back({"joints, " + std::to_string(one.joints.size()),
+    kinds.push_back({"joint update of " + std::to_string(one.joints.size()),
                      serialized<JointsType>(to_wire(one)), well_formed_joints,
                      take<JointsType, wire::Joints>});
   }

@@ -71,6 +71,31 @@ TEST_CASE("a file with tables, triggers or views that no state has is refused as
   CHECK(content(file) == before);
 }
 
+TEST_CASE(
+    "a file of the format that knew no joints is read, and brought up to date by the first write") {
+  const TemporaryDirectory directory;
+  const std::string file = changed_by(
+      directory, "DROP TABLE joints; PRAGMA user_version = 1; PRAGMA journal_mode = DELETE");
+  const std::string before = content(file);
+  {
+    const auto store = open_sqlite_store(file, "arms");
+    REQUIRE(store);
+    const auto state = (*store)->load();
+    REQUIRE(state);
+    CHECK(state->frames.size() == 1);
+    CHECK(state->joints.empty());
+  }
+  CHECK(content(file) == before);
+  {
+    const auto store = open_sqlite_store(file, "arms");
+    REQUIRE(store);
+    REQUIRE((*store)->save_values({}, {{"elbow", 0.5, 0}}));
+  }
+  const auto store = open_sqlite_store(file, "arms");
+  REQUIRE(store);
+  CHECK((*store)->load()->joints.size() == 1);
+}
+
 TEST_CASE("a file with rows that no state has is refused as it is") {
   const TemporaryDirectory directory;
   const auto [sql, why] = GENERATE(table<std::string, std::string>({
@@ -84,6 +109,9 @@ TEST_CASE("a file with rows that no state has is refused as it is") {
       {"UPDATE about SET epoch = -1", "a time of 18446744073709551615"},
       {"INSERT INTO about VALUES('arms', 2)", "it says of 2 partitions"},
       {"DELETE FROM about", "it says of 0 partitions"},
+      {"INSERT INTO joints VALUES('elbow', 'much', 0)", "another type in column position"},
+      {"INSERT INTO joints VALUES('elbow', 1e10, 0)", "position is not a number, or beyond 1e9"},
+      {"INSERT INTO joints VALUES('elbow', 0, -1)", "variance is not a number within"},
       {"INSERT INTO notes VALUES('eye', 1, 4, '')", "a note of kind 4"},
       {"INSERT INTO notes VALUES('eye', 1, 2, 'a*')", "holds '*'"},
       {"INSERT INTO notes VALUES('eye', 1, 2, CAST(x'07' AS TEXT))", "holds a control character"},
