@@ -84,10 +84,13 @@ Result<std::vector<FrameSpec>> read_frames(const std::string& text, const UrdfPa
 }  // namespace
 
 Result<std::vector<FrameSpec>> parse_urdf(const std::string& text, const UrdfPart& part) {
+  // What messages say is for people to read.
+  UrdfPart named = part;
+  named.file = printable(part.file);
   try {
-    return read_frames(text, part);
+    return read_frames(text, named);
   } catch (const std::exception& e) {
-    return fail(Errc::kConfig, part.file + ": " + e.what());
+    return fail(Errc::kConfig, named.file + ": " + printable(e.what()));
   }
 }
 

@@ -27,7 +27,8 @@ std::string_view blamed_key(const std::string& message, const TransformSpec& spe
 
 tl::unexpected<Error> YamlFields::error(Errc code, const YAML::Mark& mark,
                                         const std::string& message) const {
-  return fail(code, place(mark) + ": " + message);
+  // A key may be any bytes.
+  return fail(code, place(mark) + ": " + printable(message));
 }
 
 std::string YamlFields::place(const YAML::Mark& mark) const {

@@ -29,6 +29,7 @@ void write_samples(const std::filesystem::path& folder) {
   Random random(0x5eed);
   for (const testing::WireKind& kind : testing::wire_kinds(random)) {
     const std::string topic = kind.name.substr(0, kind.name.find(' '));
+    if (topic == "state") continue;  // the harness of that name is given stored ones
     const std::string rest = kind.name.substr(kind.name.rfind(' ') + 1);
     write(folder / topic, rest, kind.valid);
   }

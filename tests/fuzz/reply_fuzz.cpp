@@ -16,6 +16,9 @@ void strip(wire::Reply& sample, std::vector<wire::Transform>& out) {
     for (wire::Transform& X : body.transforms()) take_out(X, out);
   } else if (body._d() == 3) {
     body.done(0);
+  } else {
+    // Of these a message does not keep all that can be said in several ways.
+    body = wire::ReplyBody();
   }
 }
 

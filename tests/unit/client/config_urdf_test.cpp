@@ -3,6 +3,7 @@
 #include <random>
 #include <string>
 
+#include "tfdude/base/id.hpp"
 #include "tfdude/client/config.hpp"
 
 #include "support/catch.hpp"
@@ -41,6 +42,16 @@ TEST_CASE("a configuration names URDFs") {
   CHECK(config->frames[13].id == "b_tool0");
   CHECK(config->frames[13].parent == "b_wrist_3_link");
   CHECK_FALSE(config->frames[10].joint->strict);
+}
+
+TEST_CASE("what a bad configuration of URDFs has of control characters does not reach a terminal") {
+  for (const char* text : {"urdf:\n  - file: x\n    joints:\n      a\x96: {}\n      a\x96: {}\n",
+                           "urdf: [{file: \"a\\e[2J\"}]\n"}) {
+    const auto config = tfdude::parse_config(text, "f.yaml");
+    REQUIRE_FALSE(config.has_value());
+    const std::string& message = config.error().message;
+    CHECK(message == tfdude::printable(message));
+  }
 }
 
 TEST_CASE("a bad entry of a URDF is refused by name and line") {
