@@ -16,4 +16,10 @@ template <class... Values>
   return text.data();
 }
 
+/// An angle [°] in a picture: two or three digits, or all that stand before the point; less than a thousandth is zero.
+[[nodiscard]] inline std::string angle_text(double degrees, int digits) {
+  if (degrees < 5e-4) return "0";
+  return degrees < 99.5 ? format("%.*g", digits, degrees) : format("%.0f", degrees);
+}
+
 }  // namespace tfdude::cli

@@ -123,8 +123,8 @@ std::string edge_text(const EdgeNote& edge, Time now) {
   // What is written as a number may be a little less for rounding.
   constexpr double kAlmost = 1 - 1e-9;
   if (metres < kMetres * kAlmost && turn < kTurn * kAlmost) return text;
-  return text + (text.empty() ? "" : "  ") + "±" + length_text(metres) + " " +
-         format("±%.2g°", turn);
+  return text + (text.empty() ? "" : "  ") + "±" + length_text(metres) + " " + "±" +
+         angle_text(turn, 2) + "°";
 }
 
 std::string dot_id(std::string_view id) {

@@ -157,8 +157,8 @@ void draw_header(Svg& svg, const Scene& scene) {
   }
   const auto s = plot.X_AB.covariance.stddev();
   svg.text({kLeft, 80},
-           format("rotation ± %.3g°, %.3g°, %.3g° about the axes of ", s[3] * kDegrees,
-                  s[4] * kDegrees, s[5] * kDegrees) +
+           "rotation ± " + angle_text(s[3] * kDegrees, 3) + "°, " + angle_text(s[4] * kDegrees, 3) +
+               "°, " + angle_text(s[5] * kDegrees, 3) + "° about the axes of " +
                elide(to, kLabelSize, 300) + "; ± is one standard deviation",
            "");
 }

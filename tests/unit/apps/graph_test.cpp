@@ -62,6 +62,9 @@ TEST_CASE("beside an edge stand its age and what is large of its deviations") {
   CHECK(edge_text(edge, kNow) == "12 ms  ±3 mm ±0.4°");
   CHECK(edge_text(note(0.001, 0), kNow) == "±1 mm ±0°");
   CHECK(edge_text(note(0, 0.1), kNow) == "±0 mm ±0.1°");
+  // Of joints that nobody has measured.
+  CHECK(edge_text(note(0, 103.923), kNow) == "±0 mm ±104°");
+  CHECK(edge_text(note(0, 99.7), kNow) == "±0 mm ±100°");
   CHECK(edge_text(note(0.0009, 0.09), kNow).empty());
   CHECK(edge_text({}, kNow).empty());
   edge = note(0, 0);
