@@ -220,7 +220,11 @@ void add_joint_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
                             "joint shoulder_pan_joint 0.5 --stddev 0.001", cli::run_joint, chosen);
   joint->add_option("NAME", arguments.id, "the joint")->required();
   joint->add_option("POSITION", arguments.position, "its position [rad or m]")->required();
-  joint->add_option("--stddev", arguments.joint_stddev, "standard deviation of that [rad or m]");
+  joint->add_option("--stddev", arguments.joint_stddev, "standard deviation of that [rad or m]")
+      ->check([](const std::string& text) {
+        const double stddev = std::strtod(text.c_str(), nullptr);
+        return stddev >= 0 && stddev <= 1e9 ? "" : text + " is not within 0 to 1e9";
+      });
   add_stamp(joint, "--stamp", arguments.stamp,
             "make it a sample of this instant: seconds since the epoch or, negative, before now");
 }
