@@ -3,6 +3,7 @@
 //
 //   arm_controller [--seconds S] [--domain N] [--profile FILE]
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -74,7 +75,8 @@ int run(const tfdude::Options& options, double seconds) {
       std::fprintf(stderr, "arm_controller: %s\n", sent ? "all owners are there" : problem.c_str());
     }
     trouble = problem;
-    next += 1ms;
+    // Cycles that were missed are not made up for.
+    next = std::max(next + 1ms, std::chrono::steady_clock::now());
     std::this_thread::sleep_until(next);
   }
   return trouble.empty() ? 0 : 1;
@@ -89,6 +91,10 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", seconds, "for how long")->check(CLI::Range(0.001, 1e6));
   app.add_option("--domain", options.domain, "DDS domain");
   app.add_option("--profile", options.profile, "XML file of DDS profiles");
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
   return run(options, seconds);
 }
