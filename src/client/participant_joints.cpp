@@ -19,8 +19,10 @@ void Participant::on_joints(const JointUpdate& update) {
   }
 }
 
+// All who have a joint are told, so all must be known.
 Result<void> Participant::update_joints(const JointUpdate& update) {
   if (update.joints.empty()) return {};
+  settle();
   return healed(
       [&]() -> Result<std::vector<Part>> {
         auto parts = route_joints(directory_, update);
@@ -34,10 +36,24 @@ Result<void> Participant::update_joints(const JointUpdate& update) {
 // Whoever is there gets its share, and the error of who is not is told.
 Result<void> Participant::publish_joints(const JointUpdate& update) {
   if (update.joints.empty()) return {};
-  auto parts = routed([&] { return route_joints(directory_, update); });
+  settle();
+  if (auto ok = still_in(); !ok) return ok;
+  JointUpdate known{{}, update.stamp};
+  Result<void> outcome;
+  Result<std::vector<Part>> parts;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    for (const JointValue& joint : update.joints) {
+      if (!directory_.joint_owners(joint.name).empty()) {
+        known.joints.push_back(joint);
+      } else if (outcome) {
+        outcome = fail(Errc::kUnknownJoint, "no joint " + quote(joint.name));
+      }
+    }
+    parts = route_joints(directory_, known);
+  }
   if (!parts) return tl::unexpected(std::move(parts.error()));
   const auto deadline = Clock::now() + options_.timeout;
-  Result<void> outcome;
   for (const Part& part : *parts) {
     const auto& share = std::get<JointUpdate>(part.request.body);
     auto sent = publish_to(part, share, deadline);

@@ -35,6 +35,12 @@ bool is_of_values(const Request& request) {
          std::holds_alternative<JointUpdate>(request.body);
 }
 
+// Whether it leaves all as it is.
+bool is_question(const Request& request) {
+  return std::holds_alternative<JointsRequest>(request.body) ||
+         std::holds_alternative<ConsistencyRequest>(request.body);
+}
+
 // One line a change of the structure; values change too often for it.
 void log_change(const Request& request, const Reply& reply) {
   std::string what;
@@ -284,7 +290,7 @@ Reply Participant::answer_here(const Request& request) {
     tell_changes();
   }
   // This process sees the change already; the others are told without making it wait.
-  if (!is_of_values(request)) publisher_->ask();
+  if (!is_of_values(request) && !is_question(request)) publisher_->ask();
   look_at_watches();
   return reply;
 }
@@ -324,7 +330,7 @@ void Participant::on_request(const PeerId& from, const Request& request) {
   }
   log_change(request, reply);
   // Before the reply, so that whoever gets that finds the structure changed, and the change stored.
-  if (!is_of_values(request) || store_ != nullptr) {
+  if (!is_question(request) && (!is_of_values(request) || store_ != nullptr)) {
     if (auto stored = commit(); !stored && std::holds_alternative<Done>(reply.body)) {
       reply.body = Error{Errc::kState, "done, but not stored: " + stored.error().message};
     }

@@ -213,6 +213,7 @@ Result<void> EdgeReader::couple(Index i) {
   joint->coupled = true;
   joint->position = mimic.multiplier * other.position + mimic.offset;
   joint->variance = mimic.multiplier * mimic.multiplier * other.variance;
+  if (auto ok = check_joint(*joint); !ok) return tree_.joint_error(i, ok.error().message);
   if (is_sane(joint->position) && joint->variance <= kMaxVariance) return {};
   return tree_.joint_error(i, "mimic: its position or the variance of that is too large");
 }

@@ -145,19 +145,19 @@ void Directory::add_joint(const PageJoint& joint, Owner owner) {
   if (!joint.follows.empty()) joint_owners_[joint.follows].insert(owner);
 }
 
-void Directory::replace_joints(KeptPage& kept, const std::vector<PageJoint>& joints, Owner owner) {
-  const auto forget = [&](const std::string& name) {
+void Directory::forget_joint(const PageJoint& joint, Owner owner) {
+  for (const std::string& name : {joint.name, joint.follows}) {
     const auto known = joint_owners_.find(name);
-    if (known == joint_owners_.end()) return;
+    if (known == joint_owners_.end()) continue;
     if (const auto one = known->second.find(owner); one != known->second.end()) {
       known->second.erase(one);
     }
     if (known->second.empty()) joint_owners_.erase(known);
-  };
-  for (const PageJoint& joint : kept.joints) {
-    forget(joint.name);
-    if (!joint.follows.empty()) forget(joint.follows);
   }
+}
+
+void Directory::replace_joints(KeptPage& kept, const std::vector<PageJoint>& joints, Owner owner) {
+  for (const PageJoint& joint : kept.joints) forget_joint(joint, owner);
   kept.joints = joints;
   for (const PageJoint& joint : joints) add_joint(joint, owner);
 }

@@ -1,6 +1,12 @@
 #include "tfdude/partition/joint_spec.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/partition/joints.hpp"
+
+#include "math/finite.hpp"
 
 namespace tfdude {
 
@@ -14,6 +20,26 @@ const char* to_string(JointType type) {
       return "revolute";
   }
 }
+
+Result<void> check_joint(const JointSpec& joint) {
+  const std::string who = "joint " + quote(joint.name);
+  if (auto ok = check_id(joint.name, "joint"); !ok) return ok;
+  const auto bad = [&](const char* what) { return fail(Errc::kInvalidInput, who + ": " + what); };
+  if (joint.mimic && !joint.coupled) return bad("follows another, so it is coupled");
+  const std::string& leader = joint.mimic ? joint.mimic->joint : joint.name;
+  if (joint.coupled && !check_id(shared_source(leader), "source")) {
+    return bad("it is coupled, and its name, or that of the joint that it follows, is too long");
+  }
+  const bool unit = std::abs(joint.joint.S.norm() - 1.0) < 1e-9;
+  if (!unit) return bad("its twist is not of unit length");
+  if (joint.limits && !(joint.limits->lower <= joint.limits->upper)) {
+    return bad("its limits are upside down");
+  }
+  if (!is_finite(joint.joint.X_PJ)) return bad("its mount is not finite");
+  return check_value({joint.name, joint.position, joint.variance});
+}
+
+std::string shared_source(const std::string& leader) { return "joint " + leader; }
 
 Transform value_at(const JointSpec& joint, double position, double variance) {
   return moved(joint.joint, position, joint.coupled ? 0.0 : variance);

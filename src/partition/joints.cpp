@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
+#include <utility>
 
 #include "tfdude/base/id.hpp"
 
@@ -19,7 +21,7 @@ Correlation shared_error(const JointSpec& spec, double variance) {
   Factor factor = spec.joint.S * std::sqrt(variance);
   // A share's sign is that of the leader's error.
   if (spec.mimic && spec.mimic->multiplier < 0) factor = -factor;
-  return {false, {{"joint " + leader_of(spec), false, std::move(factor)}}, {}};
+  return {false, {{shared_source(leader_of(spec)), false, std::move(factor)}}, {}};
 }
 
 bool is_outside(const JointSpec& spec, double position) {
@@ -27,10 +29,11 @@ bool is_outside(const JointSpec& spec, double position) {
 }
 
 Error beyond_limits(const JointSpec& spec, double position) {
-  return {Errc::kInvalidInput, "joint " + quote(spec.name) + ": position " +
-                                   std::to_string(position) + " is outside its limits, " +
-                                   std::to_string(spec.limits->lower) + " to " +
-                                   std::to_string(spec.limits->upper)};
+  std::ostringstream message;
+  message.precision(12);
+  message << "joint " << quote(spec.name) << ": position " << position << " is outside its limits, "
+          << spec.limits->lower << " to " << spec.limits->upper;
+  return {Errc::kInvalidInput, message.str()};
 }
 
 }  // namespace
@@ -46,11 +49,42 @@ Result<void> check_value(const JointValue& joint) {
   return {};
 }
 
-void Joints::put(const std::string& frame, const JointSpec& joint, const StoredJoint* left) {
+Result<void> check_joints(const std::vector<FrameSpec>& frames) {
+  for (const FrameSpec& frame : frames) {
+    if (!frame.joint) continue;
+    if (auto ok = check_joint(*frame.joint); !ok) {
+      return fail_at("frame " + quote(frame.id), ok.error());
+    }
+  }
+  return {};
+}
+
+Transform value_of(const FrameSpec& frame) {
+  const auto& joint = frame.joint;
+  return joint ? value_at(*joint, joint->position, joint->variance) : frame.X_PC;
+}
+
+std::optional<StoredJoint> left_of(const JointSpec& joint, const std::vector<StoredJoint>& left) {
+  const auto named = [&](const std::string& name) {
+    return std::find_if(left.begin(), left.end(),
+                        [&](const StoredJoint& one) { return one.name == name; });
+  };
+  if (const auto leader = joint.mimic ? named(joint.mimic->joint) : left.end();
+      leader != left.end()) {
+    const Mimic& mimic = *joint.mimic;
+    return StoredJoint{joint.name, mimic.multiplier * leader->position + mimic.offset,
+                       mimic.multiplier * mimic.multiplier * leader->variance};
+  }
+  const auto own = named(joint.name);
+  return own != left.end() ? std::optional<StoredJoint>(*own) : std::nullopt;
+}
+
+void Joints::put(const std::string& frame, const JointSpec& joint,
+                 const std::optional<StoredJoint>& left) {
   const auto handle = forest_.find(frame);
   if (!handle || !forest_.holds(frame)) return;
   Mover mover{frame, *handle, joint, joint.position, joint.variance};
-  if (left != nullptr) {
+  if (left) {
     mover.position = left->position;
     mover.variance = left->variance;
     mover.measured = true;
@@ -101,6 +135,10 @@ Result<void> Joints::plan(const JointValue& value) {
     const Mimic mimic = spec.mimic.value_or(Mimic{});
     Step step{index, mimic.multiplier * value.position + mimic.offset,
               mimic.multiplier * mimic.multiplier * value.variance};
+    if (auto ok = check_value({spec.name, step.position, step.variance}); !ok) return ok;
+    if (std::exchange(mover.planned, plans_) == plans_) {
+      return fail(Errc::kInvalidInput, "joint " + quote(value.name) + " is named twice");
+    }
     step.outside = is_outside(spec, step.position);
     if (step.outside && spec.strict) {
       ++mover.refused;
@@ -130,6 +168,7 @@ void Joints::take(const Step& step, std::optional<Time> stamp) {
 Result<std::size_t> Joints::apply(const JointUpdate& update) {
   steps_.clear();
   updates_.clear();
+  ++plans_;
   for (const JointValue& value : update.joints) {
     if (auto ok = plan(value); !ok) return tl::unexpected(std::move(ok.error()));
   }

@@ -37,7 +37,6 @@ void Pages::erase(const std::string& id) {
   const std::uint32_t number = known->second;
   page_of_.erase(known);
   pages_[number].frames.erase(id);
-  joints_.erase(id);
   changed(number, id);
 }
 
@@ -46,8 +45,13 @@ void Pages::put_joint(const std::string& id, const PageJoint& joint) {
   changed(page_of_.at(id), id);
 }
 
-void Pages::erase_joint(const std::string& id) {
-  if (joints_.erase(id) != 0) changed(page_of_.at(id), id);
+std::optional<PageJoint> Pages::erase_joint(const std::string& id) {
+  const auto there = joints_.find(id);
+  if (there == joints_.end()) return std::nullopt;
+  PageJoint joint = std::move(there->second);
+  joints_.erase(there);
+  changed(page_of_.at(id), id);
+  return joint;
 }
 
 void Pages::leave(const Note& note) {

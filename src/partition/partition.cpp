@@ -14,6 +14,13 @@ struct Overloaded : Visitors... {
 template <class... Visitors>
 Overloaded(Visitors...) -> Overloaded<Visitors...>;
 
+// Whether it changes nothing, so that a repeated one may be answered anew.
+bool reads(const Request& request) {
+  return std::holds_alternative<LookupRequest>(request.body) ||
+         std::holds_alternative<JointsRequest>(request.body) ||
+         std::holds_alternative<ConsistencyRequest>(request.body);
+}
+
 bool are_too_many(const std::vector<Ties>& all) {
   return all.size() > kMaxTies || std::any_of(all.begin(), all.end(), [](const Ties& ties) {
            return ties.shares.size() > kMaxTies;
@@ -31,6 +38,7 @@ Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest
       joints_(forest) {}
 
 Result<void> Partition::load(const std::vector<FrameSpec>& frames, Time now) {
+  if (auto ok = check_joints(frames); !ok) return ok;
   if (auto taken = take(frames, directory_.next_stamp(now)); !taken) return taken;
   hang_on_joints(frames, {});
   pages_.close_epoch();
@@ -42,7 +50,7 @@ Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t
   std::vector<std::string> loaded;
   for (const FrameSpec& frame : frames) {
     auto added =
-        forest_.add(frame.id, frame.parent, frame.X_PC, Forest::MissingParent::kAllow, since);
+        forest_.add(frame.id, frame.parent, value_of(frame), Forest::MissingParent::kAllow, since);
     if (!added) {
       for (const std::string& id : loaded) (void)forest_.remove(id);
       return added;
@@ -60,11 +68,8 @@ void Partition::hang_on_joints(const std::vector<FrameSpec>& frames,
     const auto info = forest_.info(frame.id);
     const bool there = info && info->owner == kHeldHere && info->parent == frame.parent;
     if (!frame.joint || !there) continue;
-    const std::string& joint = frame.joint->name;
-    const auto known = std::find_if(left.begin(), left.end(),
-                                    [&](const StoredJoint& one) { return one.name == joint; });
-    joints_.put(frame.id, *frame.joint, known != left.end() ? &*known : nullptr);
-    const PageJoint said{joint, frame.joint->mimic ? frame.joint->mimic->joint : ""};
+    joints_.put(frame.id, *frame.joint, left_of(*frame.joint, left));
+    const PageJoint said{frame.joint->name, frame.joint->mimic ? frame.joint->mimic->joint : ""};
     pages_.put_joint(frame.id, said);
     directory_.put_own_joint(said);
   }
@@ -72,11 +77,11 @@ void Partition::hang_on_joints(const std::vector<FrameSpec>& frames,
 
 void Partition::let_go(const std::string& id) {
   joints_.let_go(id);
-  pages_.erase_joint(id);
+  if (const auto joint = pages_.erase_joint(id)) directory_.erase_own_joint(*joint);
 }
 
 Reply Partition::answer(const PeerId& peer, const Request& request, Time now) {
-  if (std::holds_alternative<LookupRequest>(request.body)) return answer(request, now);
+  if (reads(request)) return answer(request, now);
   if (auto before = replies_.find(peer, request.sequence)) return *std::move(before);
   Reply reply = answer(request, now);
   replies_.put(peer, reply);
@@ -198,7 +203,7 @@ void Partition::forget(const std::vector<std::string>& removed, Time now) {
   const std::uint64_t since = directory_.next_stamp(now);
   for (auto id = removed.rbegin(); id != removed.rend(); ++id) {
     consistency_.erase(*id);
-    joints_.let_go(*id);
+    let_go(*id);
     pages_.erase(*id);
     pages_.leave({*id, since, Note::Kind::kRemoved, {}});
     directory_.changes().frame_removed(*id, name_);

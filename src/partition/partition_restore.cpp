@@ -13,31 +13,51 @@ std::map<std::string, const FrameSpec*> by_id(const std::vector<FrameSpec>& fram
 }
 
 bool same(const FrameSpec& a, const FrameSpec& b) {
-  return a.parent == b.parent && a.X_PC.covariance.upper() == b.X_PC.covariance.upper() &&
-         a.X_PC.pose.translation() == b.X_PC.pose.translation() &&
-         a.X_PC.pose.rotation().coeffs() == b.X_PC.pose.rotation().coeffs();
+  const Transform X = value_of(a);
+  const Transform Y = value_of(b);
+  return a.parent == b.parent && X.covariance.upper() == Y.covariance.upper() &&
+         X.pose.translation() == Y.pose.translation() &&
+         X.pose.rotation().coeffs() == Y.pose.rotation().coeffs();
 }
 
-// What a new description says of the edge, at the position that its joint was left in.
+// At the position that its joint was left in.
 FrameSpec as_left(FrameSpec frame, const std::vector<StoredJoint>& joints) {
-  for (const StoredJoint& left : joints) {
-    if (!frame.joint || frame.joint->name != left.name) continue;
-    frame.X_PC = value_at(*frame.joint, left.position, left.variance);
+  if (!frame.joint) return frame;
+  if (const auto left = left_of(*frame.joint, joints)) {
+    frame.joint->position = left->position;
+    frame.joint->variance = left->variance;
   }
   return frame;
+}
+
+// Frames as they were left; those that joints move, where these were left, by what their descriptions say today.
+std::vector<StoredFrame> frames_of(const StoredState& state,
+                                   const std::vector<FrameSpec>& configured) {
+  const auto described = by_id(configured);
+  std::vector<StoredFrame> frames = state.frames;
+  for (StoredFrame& frame : frames) {
+    const auto known = described.find(frame.id);
+    if (known == described.end() || !known->second->joint) continue;
+    if (known->second->parent != frame.parent) continue;
+    if (!left_of(*known->second->joint, state.joints)) continue;
+    frame.X_PC = value_of(as_left(*known->second, state.joints));
+  }
+  return frames;
 }
 
 }  // namespace
 
 Result<void> Partition::restore(const StoredState& state, const std::vector<FrameSpec>& configured,
                                 Time now) {
-  for (const StoredFrame& frame : state.frames) directory_.saw_stamp(frame.since);
+  if (auto ok = check_joints(configured); !ok) return ok;
+  const std::vector<StoredFrame> frames = frames_of(state, configured);
+  for (const StoredFrame& frame : frames) directory_.saw_stamp(frame.since);
   for (const Note& note : state.notes) directory_.saw_stamp(note.since);
   // All that others have no older claim to is taken before any of it is hung, so that it does not matter in which
   // order that is done.
   std::vector<const StoredFrame*> kept;
   std::vector<const StoredFrame*> contested;
-  for (const StoredFrame& frame : state.frames) {
+  for (const StoredFrame& frame : frames) {
     (directory_.take(frame.id, frame.since) ? kept : contested).push_back(&frame);
   }
   std::vector<const StoredFrame*> circular;
@@ -127,6 +147,7 @@ bool Partition::concede(const Concession& concession, Time now) {
   switch (concession.kind) {
     case Concession::Kind::kGiveWay:
       (void)forest_.release(concession.frame);
+      let_go(concession.frame);
       pages_.erase(concession.frame);
       give_way(concession.frame, concession.rival, now);
       directory_.released(concession.frame);

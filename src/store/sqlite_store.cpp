@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/partition/joints.hpp"
 
 #include "store/rows.hpp"
 #include "store/sqlite.hpp"
@@ -368,7 +369,7 @@ Result<void> SqliteStore::save_configured(const std::vector<FrameSpec>& frames) 
   return transaction([&]() -> Result<void> {
     Result<void> done = database_->run("DELETE FROM configured");
     for (const FrameSpec& frame : frames) {
-      if (done) done = put_configured_.run(frame.id, frame.parent, to_flat(frame.X_PC));
+      if (done) done = put_configured_.run(frame.id, frame.parent, to_flat(value_of(frame)));
     }
     return done;
   });

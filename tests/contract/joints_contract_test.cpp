@@ -161,6 +161,25 @@ TEST_CASE("joints: one owner that is not there keeps no other from its share") {
   CHECK(outcome(robot.client->update_joints({"elbow"}, {0.5}, {0})) == "unreachable");
 }
 
+TEST_CASE("joints: who has just come tells all owners, or says who it is that nobody knows") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Robot robot(join);
+  for (int i = 1; i <= 5; ++i) {
+    const double angle = 0.1 * i;
+    auto newcomer = Client::open(join(""));
+    REQUIRE(newcomer);
+    REQUIRE(newcomer->update_joints({"elbow"}, {angle}, {0}));
+    CHECK(std::abs(yaw(robot.client->lookup("upper", "fore")) - angle) < 1e-12);
+    CHECK(std::abs(yaw(robot.client->lookup("fore", "hand")) + angle) < 1e-12);
+  }
+  auto newcomer = Client::open(join(""));
+  const auto published = newcomer->publish_joints({"knee", "elbow"}, {1, 0.75}, {0, 0});
+  CHECK(outcome(published) == "unknown_joint");
+  CHECK_THAT(published.error().message, ContainsSubstring("'knee'"));
+  CHECK(comes_true(
+      [&] { return std::abs(yaw(robot.client->lookup("fore", "hand")) + 0.75) < 1e-12; }));
+}
+
 TEST_CASE("joints: a node that is opened again has its joints where they were") {
   const Join join = joined_by(GENERATE(0, 1));
   const testing::TemporaryDirectory directory;

@@ -51,6 +51,7 @@ class Directory {
 
   /// This process's partition has a joint.
   void put_own_joint(const PageJoint& joint) { add_joint(joint, kHeldHere); }
+  void erase_own_joint(const PageJoint& joint) { forget_joint(joint, kHeldHere); }
 
   /// Who has a joint of this name, or one that follows it; each once. O(log joints).
   [[nodiscard]] std::vector<Owner> joint_owners(const std::string& name) const;
@@ -157,6 +158,7 @@ class Directory {
   void put_page(Known& partition, Owner owner, const Page& page, Ids& outdated);
   void unclaim_all_but(const Ids& stays, Known& partition, Owner owner, std::uint32_t number);
   void add_joint(const PageJoint& joint, Owner owner);
+  void forget_joint(const PageJoint& joint, Owner owner);
   void replace_joints(KeptPage& kept, const std::vector<PageJoint>& joints, Owner owner);
   void report_conflicts(const Known& partition, const Page& page);
   void find_orphans(const std::vector<Note>& notes, Owner owner);

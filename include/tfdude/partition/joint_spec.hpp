@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/base/result.hpp"
 #include "tfdude/math/joint.hpp"
 
 namespace tfdude {
@@ -41,8 +42,16 @@ struct JointSpec {
   double variance = 0;  ///< of that [rad² or m²]
 };
 
+/// Whether that can be: for descriptions that code has made.
+/// @return kInvalidInput naming the joint: a name that is none, or, of one that others follow, longer than 249 bytes;
+///   limits upside down; a twist of no unit length; a mimic that is not coupled; what check_value() refuses
+[[nodiscard]] Result<void> check_joint(const JointSpec& joint);
+
 /// The edge's value at a joint's position. A coupled joint's error is not in its covariance but in a share.
 [[nodiscard]] Transform value_at(const JointSpec& joint, double position, double variance);
+
+/// The source of the error that a joint shares with those that follow it.
+[[nodiscard]] std::string shared_source(const std::string& leader);
 
 /// The position that is taken before the first sample: the one within the limits that is nearest to zero.
 [[nodiscard]] double rest_position(const std::optional<JointLimits>& limits);

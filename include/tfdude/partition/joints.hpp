@@ -16,6 +16,16 @@ namespace tfdude {
 /// @return kInvalidInput naming the joint and the field: not a number, too large, a negative variance.
 [[nodiscard]] Result<void> check_value(const JointValue& joint);
 
+/// check_joint() of all frames that have one; the error names the frame, too.
+[[nodiscard]] Result<void> check_joints(const std::vector<FrameSpec>& frames);
+
+/// A frame's value before anything was said of it: of one with a joint, at the joint's position.
+[[nodiscard]] Transform value_of(const FrameSpec& frame);
+
+/// Where an earlier process has left a joint: by the one that it follows, if that is among them.
+[[nodiscard]] std::optional<StoredJoint> left_of(const JointSpec& joint,
+                                                 const std::vector<StoredJoint>& left);
+
 /// The joints of a partition: turns their positions into values of the edges that they move. A joint moves its edge until
 /// the frame is removed or moved by request.
 ///
@@ -24,8 +34,9 @@ class Joints {
  public:
   explicit Joints(Forest& forest) : forest_(forest) {}
 
-  /// Has a joint move a held frame. @param left  where an earlier process left it; null: where its description says
-  void put(const std::string& frame, const JointSpec& joint, const StoredJoint* left);
+  /// Has a joint move a held frame. @param left  where an earlier process left it; absent: where its description says
+  void put(const std::string& frame, const JointSpec& joint,
+           const std::optional<StoredJoint>& left);
 
   /// The frame is moved by hand from now on.
   void let_go(const std::string& frame);
@@ -40,8 +51,8 @@ class Joints {
 
   /// Moves what these joints and those that follow them move, as one commit. Joints that others have are passed over,
   /// as are those that follow: where they are says the one that they follow.
-  /// @return how many edges were moved; kInvalidInput naming the joint: not a number, negative variance, outside the limits
-  ///   of a strict joint; as Forest::update(). Where it fails nothing is moved.
+  /// @return how many edges were moved; kInvalidInput naming the joint: not a number, too large, negative variance, named
+  ///   twice, outside the limits of a strict joint; as Forest::update(). Where it fails nothing is moved.
   [[nodiscard]] Result<std::size_t> apply(const JointUpdate& update);
 
   /// Sorted by name.
@@ -68,6 +79,7 @@ class Joints {
     bool let_go = false;
     std::uint64_t outside = 0;
     std::uint64_t refused = 0;
+    std::uint64_t planned = 0;  // which update has moved it last
     // What a coupled joint's error is said to be, for which variance.
     Correlation said{};
     double said_variance = -1;
@@ -89,6 +101,7 @@ class Joints {
   std::vector<Mover> movers_;
   // Which movers a joint has: its own and those that follow it. Of one that follows, none.
   std::map<std::string, std::vector<std::size_t>, std::less<>> by_name_;
+  std::uint64_t plans_ = 0;            // updates so far
   std::vector<Step> steps_;            // of the update being made, as
   std::vector<HandleUpdate> updates_;  // these; both kept for their memory
 };

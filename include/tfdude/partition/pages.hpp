@@ -39,11 +39,13 @@ class Pages {
   /// Notes where a frame hangs, in place of what a note says of it. O(log frames).
   void put(const std::string& id, const std::string& parent, std::uint64_t since);
 
+  /// Its joint was let go before.
   void erase(const std::string& id);
 
   /// Notes which joint moves a frame that was put.
   void put_joint(const std::string& id, const PageJoint& joint);
-  void erase_joint(const std::string& id);
+  /// @return the one that there was
+  std::optional<PageJoint> erase_joint(const std::string& id);
 
   /// Leaves word of a frame, in place of an earlier one.
   void leave(const Note& note);

@@ -17,7 +17,7 @@ struct FrameSpec {
   Transform X_PC;
   std::optional<EdgeTiming> timing{};  ///< absent: the partition's
   Correlation correlation{};
-  /// What moves it; X_PC is its value at the joint's position before the first sample, then.
+  /// What moves it; then that says what its value is before the first sample.
   std::optional<JointSpec> joint{};
 };
 

@@ -143,7 +143,7 @@ TEST_CASE("a position outside the limits is applied and counted, unless the join
       arm.partition.apply(JointUpdate{{{"elbow", 0, 0}, {"shoulder", 2.01, 0}}, {}});
   CHECK(outcome(refused) == "invalid_input");
   CHECK_THAT(refused.error().message,
-             ContainsSubstring("joint 'shoulder': position 2.010000 is outside its limits"));
+             ContainsSubstring("joint 'shoulder': position 2.01 is outside its limits, -1 to 2"));
   CHECK(arm.info("elbow").position == 2.5);
   CHECK(arm.info("shoulder").refused == 1);
   REQUIRE(arm.partition.apply(JointUpdate{{{"shoulder", 2, 0}}, {}}));
@@ -162,6 +162,49 @@ TEST_CASE("bad positions are refused by name, and change nothing") {
   }
   CHECK(arm.info("shoulder").position == 0);
   CHECK(pose_diff(arm.edge("base", "upper").pose, along_x(1).pose, 1e-15) == "");
+}
+
+TEST_CASE("where a joint cannot follow, the one that it follows is refused") {
+  Arm arm;
+  auto frames = arm.frames();
+  frames[3].joint->mimic->multiplier = 4;
+  REQUIRE(arm.partition.load(frames, kNow));
+  const auto refused = arm.partition.apply(JointUpdate{{{"elbow", 9e8, 0}}, {}});
+  CHECK(outcome(refused) == "invalid_input");
+  CHECK_THAT(refused.error().message, ContainsSubstring("joint 'wrist': position"));
+  CHECK(arm.info("elbow").position == 0);
+}
+
+TEST_CASE("a joint that is named twice in one update is refused") {
+  Arm arm;
+  arm.load();
+  const JointUpdate twice{{{"elbow", 0.1, 0}, {"shoulder", 0.1, 0}, {"elbow", 0.2, 0}}, at(1)};
+  CHECK_THAT(arm.partition.apply(twice).error().message,
+             ContainsSubstring("joint 'elbow' is named twice"));
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.2, 0}}, at(1)}));
+}
+
+TEST_CASE("descriptions of joints that cannot be meant are refused by frame and joint") {
+  const auto refused = [](auto change) {
+    Arm arm;
+    auto frames = arm.frames();
+    change(*frames[3].joint);
+    const auto loaded = arm.partition.load(frames, kNow);
+    REQUIRE_FALSE(loaded);
+    CHECK_THAT(loaded.error().message, ContainsSubstring("frame 'hand'"));
+    return loaded.error().message;
+  };
+  CHECK_THAT(refused([](JointSpec& joint) { joint.name.clear(); }), ContainsSubstring("joint"));
+  CHECK_THAT(refused([](JointSpec& joint) { joint.joint.S *= 2; }), ContainsSubstring("twist"));
+  CHECK_THAT(refused([](JointSpec& joint) { joint.coupled = false; }),
+             ContainsSubstring("coupled"));
+  CHECK_THAT(refused([](JointSpec& joint) {
+               joint.limits = JointLimits{1, 0};
+             }),
+             ContainsSubstring("upside down"));
+  CHECK_THAT(refused([](JointSpec& joint) { joint.variance = -1; }), ContainsSubstring("variance"));
+  CHECK_THAT(refused([](JointSpec& joint) { joint.mimic->joint.assign(250, 'x'); }),
+             ContainsSubstring("too long"));
 }
 
 TEST_CASE("samples that come late count for the past, not for what is told now") {
@@ -223,12 +266,21 @@ TEST_CASE("a partition comes back with its joints where they were") {
   }
   SECTION("the description has changed") {
     auto frames = arm.frames();
+    // Seen at rest: a longer mount. Not seen at rest: an axis the other way round, and another multiplier.
     JointSpec longer = *frames[1].joint;
     longer.joint = hinge(along_x(2), {0, 0, 1});
     frames[1] = moved_by("upper", "base", longer);
+    JointSpec reversed = *frames[2].joint;
+    reversed.joint = hinge(along_x(1), {0, 0, -1});
+    frames[2] = moved_by("fore", "upper", reversed);
+    frames[3].joint->mimic = Mimic{"elbow", 2, 0.125};
     REQUIRE(arm.partition.restore(*store.load(), frames, kNow));
     CHECK(arm.info("shoulder").position == 0.5);
     CHECK(pose_diff(arm.edge("base", "upper").pose, moved(longer.joint, 0.5, 0).pose, 1e-15) == "");
+    CHECK(pose_diff(arm.edge("upper", "fore").pose, moved(reversed.joint, 0.75, 0).pose, 1e-15) ==
+          "");
+    CHECK(arm.info("wrist").position == 2 * 0.75 + 0.125);
+    CHECK(std::abs(arm.edge("upper", "hand").covariance.stddev()[5] - 0.2) < 1e-12);
   }
 }
 
@@ -277,6 +329,8 @@ TEST_CASE("an owner's pages say which joints move its frames, until they do not"
         std::vector<PageJoint>{{"rail", ""}, {"elbow", ""}, {"wrist", "elbow"}, {"shoulder", ""}});
   (void)arm.partition.answer(Request{1, "hand", MoveRequest{"base", {}}}, kNow);
   CHECK(joints() == std::vector<PageJoint>{{"rail", ""}, {"elbow", ""}, {"shoulder", ""}});
+  CHECK(arm.directory.joint_owners("wrist").empty());
+  CHECK(arm.directory.joint_owners("elbow").size() == 1);
 }
 
 }  // namespace
