@@ -123,76 +123,72 @@ Result<ReviseRequest> read_revise(const wire::Revise& body) {
   return fail(Errc::kInvalidInput, "an observation of no edge");
 }
 
+Result<AddRequest> read_add(std::string_view id, const wire::Add& body) {
+  return from_wire(body.x_pc(), id).map([&](const Transform& X_PC) {
+    return AddRequest{string_of(body.parent()), X_PC};
+  });
+}
+
+Result<MoveRequest> read_move(std::string_view id, const wire::MoveAndUpdate& body) {
+  return from_wire(body.x_pc(), id).map([&](const Transform& X_PC) {
+    return MoveRequest{string_of(body.parent()), X_PC};
+  });
+}
+
+RemoveRequest read_remove(const wire::Remove& body) {
+  RemoveRequest remove;
+  for (const wire::Id& top : body.tops()) remove.tops.push_back(string_of(top));
+  return remove;
+}
+
+Result<JointUpdate> read_joints(const wire::Joints& body) {
+  auto joints = tfdude::fastdds::from_wire(body, [](std::string_view) { return true; });
+  if (joints && joints->joints.empty()) return fail(Errc::kInvalidInput, "an update of no joint");
+  return joints;
+}
+
+template <class Body>
+Result<void> take(Request& request, Result<Body> body) {
+  if (!body) return tl::unexpected(std::move(body.error()));
+  request.body = *std::move(body);
+  return {};
+}
+
 // The ids in a body need no check here: those that name nothing that is there are refused as unknown, and
 // new ones are checked where they are added.
 Result<void> read_body(const wire::Request& sample, Request& request) {
   const wire::RequestBody& body = sample.body();
+  const auto as = [&request](auto read) {
+    request.body = std::move(read);
+    return Result<void>();
+  };
   switch (body._d()) {
-    case kAdd: {
-      auto X_PC = from_wire(body.add().x_pc(), request.id);
-      if (!X_PC) return tl::unexpected(std::move(X_PC.error()));
-      request.body = AddRequest{string_of(body.add().parent()), *X_PC};
-      return {};
-    }
-    case kRemove: {
-      RemoveRequest remove;
-      for (const wire::Id& top : body.remove().tops()) remove.tops.push_back(string_of(top));
-      request.body = std::move(remove);
-      return {};
-    }
-    case kUpdate: {
-      auto update = update_from_wire(request.id, body.update());
-      if (!update) return tl::unexpected(std::move(update.error()));
-      request.body = *std::move(update);
-      return {};
-    }
+    case kAdd:
+      return take(request, read_add(request.id, body.add()));
+    case kRemove:
+      return as(read_remove(body.remove()));
+    case kUpdate:
+      return take(request, update_from_wire(request.id, body.update()));
     case kMove:
-      request.body = MoveRequest{string_of(body.move().parent()), std::nullopt};
-      return {};
-    case kMoveAndUpdate: {
-      auto X_PC = from_wire(body.move_and_update().x_pc(), request.id);
-      if (!X_PC) return tl::unexpected(std::move(X_PC.error()));
-      request.body = MoveRequest{string_of(body.move_and_update().parent()), *X_PC};
-      return {};
-    }
+      return as(MoveRequest{string_of(body.move().parent()), std::nullopt});
+    case kMoveAndUpdate:
+      return take(request, read_move(request.id, body.move_and_update()));
     case kLookup:
-      request.body = LookupRequest{read_segments(body.lookup())};
-      return {};
-    case kLookupAt: {
-      auto lookup = read_lookup(body.lookup_at());
-      if (!lookup) return tl::unexpected(std::move(lookup.error()));
-      request.body = *std::move(lookup);
-      return {};
-    }
-    case kWatch: {
-      auto watch = read_watch(body.watch());
-      if (!watch) return tl::unexpected(std::move(watch.error()));
-      request.body = *std::move(watch);
-      return {};
-    }
+      return as(LookupRequest{read_segments(body.lookup())});
+    case kLookupAt:
+      return take(request, read_lookup(body.lookup_at()));
+    case kWatch:
+      return take(request, read_watch(body.watch()));
     case kPast:
-      request.body = PastRequest{body.past() != 0};
-      return {};
-    case kRevise: {
-      auto revise = read_revise(body.revise());
-      if (!revise) return tl::unexpected(std::move(revise.error()));
-      request.body = *std::move(revise);
-      return {};
-    }
+      return as(PastRequest{body.past() != 0});
+    case kRevise:
+      return take(request, read_revise(body.revise()));
     case kConsistency:
-      request.body = ConsistencyRequest{body.consistency() != 0};
-      return {};
-    case kJoints: {
-      auto joints =
-          tfdude::fastdds::from_wire(body.joints(), [](std::string_view) { return true; });
-      if (!joints) return tl::unexpected(std::move(joints.error()));
-      if (joints->joints.empty()) return fail(Errc::kInvalidInput, "an update of no joint");
-      request.body = *std::move(joints);
-      return {};
-    }
+      return as(ConsistencyRequest{body.consistency() != 0});
+    case kJoints:
+      return take(request, read_joints(body.joints()));
     case kJointStates:
-      request.body = JointsRequest{};
-      return {};
+      return as(JointsRequest{});
     default:
       return fail(Errc::kInvalidInput, "no request of kind " + std::to_string(body._d()));
   }
