@@ -35,12 +35,6 @@ bool is_of_values(const Request& request) {
          std::holds_alternative<JointUpdate>(request.body);
 }
 
-// Whether it leaves all as it is.
-bool is_question(const Request& request) {
-  return std::holds_alternative<JointsRequest>(request.body) ||
-         std::holds_alternative<ConsistencyRequest>(request.body);
-}
-
 // One line a change of the structure; values change too often for it.
 void log_change(const Request& request, const Reply& reply) {
   std::string what;

@@ -142,7 +142,7 @@ Result<void> EdgeReader::read_position(Index i, JointSpec& joint) const {
     return tree_.joint_error(i, "position " + written(joint.position) + " is beyond 1e9");
   }
   const auto& limits = joint.limits;
-  if (limits && (joint.position < limits->lower || joint.position > limits->upper)) {
+  if (limits && !limits->contain(joint.position)) {
     return tree_.joint_error(i, "position " + written(joint.position) + " is outside its limits " +
                                     written(limits->lower) + " and " + written(limits->upper));
   }
@@ -211,8 +211,8 @@ Result<void> EdgeReader::couple(Index i) {
   mimic.joint = other.name;
   other.coupled = true;
   joint->coupled = true;
-  joint->position = mimic.multiplier * other.position + mimic.offset;
-  joint->variance = mimic.multiplier * mimic.multiplier * other.variance;
+  joint->position = mimic.position(other.position);
+  joint->variance = mimic.variance(other.variance);
   if (auto ok = check_joint(*joint); !ok) return tree_.joint_error(i, ok.error().message);
   if (is_sane(joint->position) && joint->variance <= kMaxVariance) return {};
   return tree_.joint_error(i, "mimic: its position or the variance of that is too large");

@@ -26,8 +26,7 @@ Result<void> check_joint(const JointSpec& joint) {
   if (auto ok = check_id(joint.name, "joint"); !ok) return ok;
   const auto bad = [&](const char* what) { return fail(Errc::kInvalidInput, who + ": " + what); };
   if (joint.mimic && !joint.coupled) return bad("follows another, so it is coupled");
-  const std::string& leader = joint.mimic ? joint.mimic->joint : joint.name;
-  if (joint.coupled && !check_id(shared_source(leader), "source")) {
+  if (joint.coupled && !check_id(shared_source(leader_of(joint)), "source")) {
     return bad("it is coupled, and its name, or that of the joint that it follows, is too long");
   }
   const bool unit = std::abs(joint.joint.S.norm() - 1.0) < 1e-9;

@@ -10,11 +10,6 @@
 namespace tfdude {
 namespace {
 
-// The joint that says where this one is.
-const std::string& leader_of(const JointSpec& spec) {
-  return spec.mimic ? spec.mimic->joint : spec.name;
-}
-
 // What the edge shares with those of the joints that are coupled with its own: the error of one number.
 Correlation shared_error(const JointSpec& spec, double variance) {
   if (variance == 0) return {};
@@ -22,10 +17,6 @@ Correlation shared_error(const JointSpec& spec, double variance) {
   // A share's sign is that of the leader's error.
   if (spec.mimic && spec.mimic->multiplier < 0) factor = -factor;
   return {false, {{shared_source(leader_of(spec)), false, std::move(factor)}}, {}};
-}
-
-bool is_outside(const JointSpec& spec, double position) {
-  return spec.limits && (position < spec.limits->lower || position > spec.limits->upper);
 }
 
 Error beyond_limits(const JointSpec& spec, double position) {
@@ -71,9 +62,8 @@ std::optional<StoredJoint> left_of(const JointSpec& joint, const std::vector<Sto
   };
   if (const auto leader = joint.mimic ? named(joint.mimic->joint) : left.end();
       leader != left.end()) {
-    const Mimic& mimic = *joint.mimic;
-    return StoredJoint{joint.name, mimic.multiplier * leader->position + mimic.offset,
-                       mimic.multiplier * mimic.multiplier * leader->variance};
+    return StoredJoint{joint.name, joint.mimic->position(leader->position),
+                       joint.mimic->variance(leader->variance)};
   }
   const auto own = named(joint.name);
   return own != left.end() ? std::optional<StoredJoint>(*own) : std::nullopt;
@@ -133,13 +123,12 @@ Result<void> Joints::plan(const JointValue& value) {
     if (mover.let_go) continue;
     const JointSpec& spec = mover.spec;
     const Mimic mimic = spec.mimic.value_or(Mimic{});
-    Step step{index, mimic.multiplier * value.position + mimic.offset,
-              mimic.multiplier * mimic.multiplier * value.variance};
+    Step step{index, mimic.position(value.position), mimic.variance(value.variance)};
     if (auto ok = check_value({spec.name, step.position, step.variance}); !ok) return ok;
     if (std::exchange(mover.planned, plans_) == plans_) {
       return fail(Errc::kInvalidInput, "joint " + quote(value.name) + " is named twice");
     }
-    step.outside = is_outside(spec, step.position);
+    step.outside = spec.limits && !spec.limits->contain(step.position);
     if (step.outside && spec.strict) {
       ++mover.refused;
       return tl::unexpected(beyond_limits(spec, step.position));

@@ -14,13 +14,6 @@ struct Overloaded : Visitors... {
 template <class... Visitors>
 Overloaded(Visitors...) -> Overloaded<Visitors...>;
 
-// Whether it changes nothing, so that a repeated one may be answered anew.
-bool reads(const Request& request) {
-  return std::holds_alternative<LookupRequest>(request.body) ||
-         std::holds_alternative<JointsRequest>(request.body) ||
-         std::holds_alternative<ConsistencyRequest>(request.body);
-}
-
 bool are_too_many(const std::vector<Ties>& all) {
   return all.size() > kMaxTies || std::any_of(all.begin(), all.end(), [](const Ties& ties) {
            return ties.shares.size() > kMaxTies;
@@ -28,6 +21,13 @@ bool are_too_many(const std::vector<Ties>& all) {
 }
 
 }  // namespace
+
+bool is_question(const Request& request) {
+  return std::holds_alternative<LookupRequest>(request.body) ||
+         std::holds_alternative<PastRequest>(request.body) ||
+         std::holds_alternative<JointsRequest>(request.body) ||
+         std::holds_alternative<ConsistencyRequest>(request.body);
+}
 
 Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest,
                      Directory& directory)
@@ -81,7 +81,7 @@ void Partition::let_go(const std::string& id) {
 }
 
 Reply Partition::answer(const PeerId& peer, const Request& request, Time now) {
-  if (reads(request)) return answer(request, now);
+  if (is_question(request)) return answer(request, now);
   if (auto before = replies_.find(peer, request.sequence)) return *std::move(before);
   Reply reply = answer(request, now);
   replies_.put(peer, reply);

@@ -19,6 +19,10 @@ enum class JointType : std::uint8_t { kRevolute = 1, kContinuous = 2, kPrismatic
 struct JointLimits {
   double lower = 0;  ///< [rad or m]
   double upper = 0;
+
+  [[nodiscard]] bool contain(double position) const {
+    return lower <= position && position <= upper;
+  }
 };
 
 /// That a joint follows another: its position is multiplier · (the other's) + offset.
@@ -26,6 +30,12 @@ struct Mimic {
   std::string joint;
   double multiplier = 1;
   double offset = 0;
+
+  /// Where the joint is that follows, and the variance of that.
+  [[nodiscard]] double position(double of_other) const { return multiplier * of_other + offset; }
+  [[nodiscard]] double variance(double of_other) const {
+    return multiplier * multiplier * of_other;
+  }
 };
 
 /// A joint that moves a frame: how, and what is believed before its first sample.
@@ -41,6 +51,11 @@ struct JointSpec {
   double position = 0;  ///< before the first sample [rad or m]
   double variance = 0;  ///< of that [rad² or m²]
 };
+
+/// The joint that says where this one is: itself, or the one that it follows.
+[[nodiscard]] inline const std::string& leader_of(const JointSpec& joint) {
+  return joint.mimic ? joint.mimic->joint : joint.name;
+}
 
 /// Whether that can be: for descriptions that code has made.
 /// @return kInvalidInput naming the joint: a name that is none, or, of one that others follow, longer than 249 bytes;

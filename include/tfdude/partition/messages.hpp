@@ -119,6 +119,9 @@ struct Request {
       body;
 };
 
+/// Whether a request changes nothing, so that a repeated one may be answered anew.
+[[nodiscard]] bool is_question(const Request& request);
+
 /// A joint, and where it is.
 struct JointInfo {
   std::string name;
