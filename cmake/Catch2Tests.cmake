@@ -3,6 +3,14 @@
 find_package(Catch2 REQUIRED)
 include(Catch)
 
+# Compiles the headers that all tests share once. Its one source is what CMake needs to do that.
+file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/precompiled.cpp "")
+add_library(tfdude_tests_precompiled OBJECT ${CMAKE_CURRENT_BINARY_DIR}/precompiled.cpp)
+set_target_properties(tfdude_tests_precompiled PROPERTIES POSITION_INDEPENDENT_CODE ON)
+target_include_directories(tfdude_tests_precompiled PRIVATE ${CMAKE_SOURCE_DIR}/tests)
+target_link_libraries(tfdude_tests_precompiled PRIVATE tfdude Catch2::Catch2 tfdude_options)
+target_precompile_headers(tfdude_tests_precompiled PRIVATE ${CMAKE_SOURCE_DIR}/tests/support/precompiled.hpp)
+
 # tfdude_add_tests(target LABELS label... [TIMEOUT seconds] [SKIPPED_BY regex] SOURCES file...
 # [LIBRARIES target...]): one Catch2 binary, each of its test cases a ctest test, which counts as skipped
 # where it prints what the regular expression says.
@@ -15,6 +23,9 @@ function(tfdude_add_tests target)
   # Private headers too: the library hides no symbols.
   target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests ${CMAKE_SOURCE_DIR}/src)
   target_link_libraries(${target} PRIVATE tfdude Catch2::Catch2WithMain tfdude_options ${ARG_LIBRARIES})
+  # As the shared headers are compiled: an executable's objects would be -fPIE.
+  target_compile_options(${target} PRIVATE -fPIC)
+  target_precompile_headers(${target} REUSE_FROM tfdude_tests_precompiled)
   catch_discover_tests(${target} TEST_PREFIX "${target}: "
     PROPERTIES TIMEOUT ${ARG_TIMEOUT})
   set(skipped_by "")

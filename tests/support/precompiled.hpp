@@ -1,0 +1,7 @@
+#pragma once
+
+// What most tests include, compiled once for all of them; the preset dev builds without it.
+#include <future>
+
+#include "support/catch.hpp"
+#include "tfdude/client/client.hpp"
