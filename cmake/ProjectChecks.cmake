@@ -6,6 +6,11 @@ add_test(NAME "layers: the check itself"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py --self-test)
 set_tests_properties("layers: sources" "layers: the check itself" PROPERTIES LABELS unit TIMEOUT 60)
 
+# A test whose name ctest cannot hand on, as one with a semicolon, runs nothing: that must not pass.
+add_test(NAME "suite: a test that runs nothing fails" COMMAND base_test "no test has this name")
+set_tests_properties("suite: a test that runs nothing fails" PROPERTIES LABELS unit TIMEOUT 60
+  FAIL_REGULAR_EXPRESSION "${TFDUDE_NOTHING_RAN}" WILL_FAIL TRUE)
+
 set(consumer_flags "")
 if(TFDUDE_SANITIZE)
   set(consumer_flags -fsanitize=${TFDUDE_SANITIZE})

@@ -23,6 +23,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using testing::along_x;
+using testing::Approx;
 using testing::Join;
 using testing::joined_by;
 using testing::outcome;

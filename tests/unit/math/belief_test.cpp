@@ -158,8 +158,8 @@ TEST_CASE("What is unknown is bounded, whatever the correlation") {
 }
 
 TEST_CASE(
-    "A path with unknown parts dominates samples of correlated errors; the independent sum does "
-    "not") {
+    "A path with unknown parts dominates samples of correlated errors, and the independent sum "
+    "does not") {
   Random random(617);
   INFO("seed " << random.seed());
   for (const double correlation : {1.0, 0.5, -0.5, -1.0}) {

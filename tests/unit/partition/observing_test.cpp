@@ -127,7 +127,7 @@ TEST_CASE("answers are put together in the order of the edges, and name who is m
   CHECK(short_of_one.error().code == Errc::kNotOwner);
 }
 
-TEST_CASE("each owner is told its part; who has nothing to do is not asked") {
+TEST_CASE("each owner is told its part, and who has nothing to do is not asked") {
   Random random(0x0b54);
   const Known known(random);
   const auto plan = route_observe(known.forest, known.directory, "world", "tool", {}, {});

@@ -14,6 +14,7 @@ namespace tfdude {
 namespace {
 
 using testing::along_x;
+using testing::Approx;
 using testing::outcome;
 using testing::transform_diff;
 using testing::x_of;
