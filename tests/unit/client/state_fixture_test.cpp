@@ -1,0 +1,103 @@
+// What versions before this one have stored, of which nothing may be lost.
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+#include "tfdude/client/config.hpp"
+#include "tfdude/transport/loopback.hpp"
+
+#include "store/sqlite_store.hpp"
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/process.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::Approx;
+using testing::TemporaryDirectory;
+
+const std::string kFixture = TFDUDE_FIXTURES "/format_2";
+
+// A copy of the state, where a Node of domain 0 looks for it.
+std::string copy_into(const TemporaryDirectory& directory) {
+  const std::string file = state_file(directory.path(), 0, "arms");
+  std::filesystem::create_directories(std::filesystem::path(file).parent_path());
+  std::filesystem::copy_file(kFixture + "/arms.sqlite", file);
+  return file;
+}
+
+std::vector<double> deviations(const Transform& X) {
+  const auto covariance = X.covariance.matrix();
+  std::vector<double> all;
+  for (int i = 0; i < 6; ++i) all.push_back(std::sqrt(covariance(i, i)));
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("a state of format 2 has all that was stored in it") {
+  const TemporaryDirectory directory;
+  const auto store = open_sqlite_store(copy_into(directory), "arms");
+  REQUIRE(store);
+  const auto state = (*store)->load();
+  REQUIRE(state);
+  std::vector<std::string> frames;
+  for (const StoredFrame& frame : state->frames) frames.push_back(frame.id + "<" + frame.parent);
+  CHECK(frames == std::vector<std::string>{"arm<", "bit<tool", "eye<hand", "finger<hand",
+                                           "hand<arm", "r_base<arm", "r_hand<r_lower",
+                                           "r_lower<r_upper", "r_tip<r_hand", "r_upper<r_base",
+                                           "tool<hand"});
+  std::vector<std::string> notes;
+  for (const Note& note : state->notes) notes.push_back(note.id);
+  CHECK(testing::sorted(notes) == std::vector<std::string>{"gone", "lamp", "shade"});
+  CHECK(state->configured.size() == 11);
+  REQUIRE(state->joints.size() == 1);
+  CHECK(state->joints[0].name == "r_hinge_2");
+  CHECK(state->joints[0].position == 0.25);
+  CHECK(state->joints[0].variance == Approx(0.003 * 0.003));
+}
+
+TEST_CASE("a state and a configuration of format 2 open with all that they had, again and again") {
+  const TemporaryDirectory directory;
+  copy_into(directory);
+  Options options;
+  options.state = directory.path();
+  options.discovery = Milliseconds(0);
+  const auto config = load_config(kFixture + "/arms.yaml");
+  REQUIRE(config);
+  options.history = config->history;
+  for (int round = 0; round < 2; ++round) {
+    INFO("round " << round);
+    LoopbackNetwork network;
+    auto node = Node::open(network.join(), config->partition, config->frames, options);
+    INFO((node ? "" : node.error().message));
+    REQUIRE(node);
+    CHECK(node->own_frames() == 11);
+    CHECK(testing::x_of(node->lookup("arm", "hand")) == 20);
+    const auto X_hand_tool = node->lookup("hand", "tool");
+    REQUIRE(X_hand_tool);
+    CHECK(X_hand_tool->pose.translation().z() == 100);
+    const std::vector<double> said{0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+    for (std::size_t i = 0; i < said.size(); ++i) {
+      CHECK(deviations(*X_hand_tool)[i] == Approx(said[i]));
+    }
+    CHECK(node->lookup("tool", "bit")->pose.translation().z() == 7);
+    CHECK(node->lookup("hand", "eye")->pose.translation().z() == 4);
+    CHECK(*node->parent("eye") == "hand");
+    for (const char* gone : {"lamp", "shade", "gone"}) CHECK_FALSE(node->exists(gone));
+    const auto joints = *node->joints("arms");
+    const auto moved = std::find_if(joints.begin(), joints.end(), [](const JointInfo& joint) {
+      return joint.name == "r_hinge_2";
+    });
+    REQUIRE(moved != joints.end());
+    CHECK(moved->position == 0.25);
+    CHECK(moved->measured);
+  }
+}
+
+}  // namespace tfdude
