@@ -131,11 +131,13 @@ void Hosts::cut(std::size_t host) const { run(switch_, "ip link set " + port(hos
 void Hosts::heal(std::size_t host) const { run(switch_, "ip link set " + port(host) + " up"); }
 
 Process start_discovery_server(const Hosts& hosts, std::size_t host, const std::string& backup) {
-  const std::string command = "exec fast-discovery-server -i 0";
+  // By its address: Fast DDS 3.1 cannot listen on all at once.
+  const std::string command =
+      "exec fast-discovery-server -i 0 -l " + Hosts::address(host) + " -p 11811";
   Process server = hosts.start(
       host, shell(backup.empty() ? command : "cd '" + backup + "'; " + command + " -b"));
   if (!server.wait_for_line("### Server is running ###", in_time())) {
-    throw std::runtime_error("the discovery server does not run: " + server.err());
+    throw std::runtime_error("the discovery server does not run: " + server.out() + server.err());
   }
   return server;
 }
