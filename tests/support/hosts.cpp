@@ -10,6 +10,8 @@
 #include <unistd.h>
 #include <utility>
 
+#include "support/interfaces.hpp"
+
 namespace tfdude::testing {
 namespace {
 
@@ -105,6 +107,7 @@ void Hosts::enter(std::size_t host) const {
   if (setns(hosts_.at(host).fd(), CLONE_NEWNET) != 0) {
     throw std::runtime_error(std::string("a host cannot be entered: ") + std::strerror(errno));
   }
+  read_interfaces();
 }
 
 void Hosts::lose(int percent) const {
