@@ -39,11 +39,8 @@ Participant::~Participant() {
   // Both are used by the transport's threads until that has stopped.
   if (watches_ != nullptr) watches_->stop();
   if (pusher_ != nullptr) pusher_->stop();
-  saver_.reset();
   if (conceder_) conceder_->stop();
-  if (publisher_) publisher_->stop();
-  (void)commit();
-  save_values();
+  if (commits_) commits_->stop();
   transport_->stop();
 }
 
@@ -156,7 +153,10 @@ void Participant::wait_for_replies(Calls::Call& call, const std::vector<const Re
 
 std::vector<Reply> Participant::ask(std::vector<Part>& parts, Clock::time_point deadline) {
   // What this process has changed itself comes before what it asks for: others build on that.
-  if (publisher_ && publisher_->pending()) (void)commit();
+  const bool builds = std::any_of(parts.begin(), parts.end(), [](const Part& part) {
+    return part.owner != kHeldHere && !is_question(part.request);
+  });
+  if (builds && commits_ && commits_->pending()) (void)commits_->flush(deadline);
   std::vector<std::string> partitions;
   for (const Part& part : parts) {
     if (part.owner == kHeldHere) continue;
@@ -191,9 +191,12 @@ Result<void> Participant::change(std::vector<Part>& parts) {
   Result<void> outcome;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (const auto* error = std::get_if<Error>(&replies[i].body)) {
-      if (outcome) outcome = tl::unexpected(*error);
+      // What is not stored is told, whatever else may be healed by another attempt.
+      if (outcome || error->code == Errc::kState) outcome = tl::unexpected(*error);
     } else if (parts[i].owner != kHeldHere) {
       await_epoch(parts[i], replies[i].epoch, deadline);
+    } else if (auto stored = await_stored(deadline); !stored && outcome) {
+      outcome = std::move(stored);
     }
   }
   return outcome;
@@ -201,11 +204,13 @@ Result<void> Participant::change(std::vector<Part>& parts) {
 
 Result<void> Participant::add(const std::string& id, const AddRequest& request,
                               const std::string& partition) {
-  return healed([&] { return route_add(forest_, directory_, id, request, partition); },
-                [&](Part& part) {
-                  std::vector<Part> parts{std::move(part)};
-                  return change(parts);
-                });
+  auto added = healed([&] { return route_add(forest_, directory_, id, request, partition); },
+                      [&](Part& part) {
+                        std::vector<Part> parts{std::move(part)};
+                        return change(parts);
+                      });
+  if (added) return added;
+  return tl::unexpected(unless_unsaved(std::move(added.error()), id));
 }
 
 Result<void> Participant::remove(const std::string& id) {
@@ -218,8 +223,10 @@ Result<void> Participant::remove(const std::string& id) {
                           return change(parts);
                         });
   // Gone by the time of a second attempt: what was asked for has come to be.
-  if (!removed && asked && !forest_.exists(id)) return {};
-  return removed;
+  if (removed) return removed;
+  const bool is_missing = is_elsewhere(removed.error());
+  if (is_missing && asked && !forest_.exists(id)) return {};
+  return tl::unexpected(unless_unsaved(std::move(removed.error()), id));
 }
 
 Result<void> Participant::move(const std::string& id, const MoveRequest& request) {

@@ -20,9 +20,9 @@
 
 #include "client/calls.hpp"
 #include "client/cancellation.hpp"
+#include "client/commit_loop.hpp"
 #include "client/deferred.hpp"
 #include "client/events.hpp"
-#include "client/periodic.hpp"
 #include "client/pusher.hpp"
 #include "client/watches.hpp"
 
@@ -30,9 +30,9 @@ namespace tfdude {
 
 /// One participant: its forest, directory, partition (if it owns one) and transport, wired together.
 ///
-/// Locks, in the order in which they may be taken: publish_mutex_, structure_mutex_, joints_mutex_. No lock is held while
+/// Locks, in the order in which they may be taken: structure_mutex_, joints_mutex_. No lock is held while
 /// a call waits for others; structure_mutex_ is not held while anything is sent.
-class Participant final : public TransportHandler {
+class Participant final : public TransportHandler, private CommitLoop::Effects {
  public:
   /// @param partition  the one that it is to own; empty: none
   Participant(std::unique_ptr<Transport> transport, std::string partition, const Options& options);
@@ -241,12 +241,22 @@ class Participant final : public TransportHandler {
                         Clock::time_point deadline);
   void await_structure_change(std::uint64_t version);
   void await_epoch(const Part& part, std::uint64_t epoch, Clock::time_point deadline);
-  /// Stores what was changed by request and publishes what changed of the structure. @return kState.
-  Result<void> commit();
-  void save_values();
+  // What commits_ does (participant_commit.cpp).
+  [[nodiscard]] Commit take() override;
+  void publish(const Commit& commit) override;
+  void take_back(const Commit& commit) override;
+  [[nodiscard]] ChangedValues take_values() override;
+  void take_back(const ChangedValues& values) override;
+  void reply(const PendingReply& reply) override;
+  /// Why a change is refused as long as what was changed before it cannot be stored.
+  [[nodiscard]] std::optional<Error> refusal() const;
+  /// Where an own frame is not stored, neither that it is there nor that it is gone is said.
+  [[nodiscard]] Error unless_unsaved(Error error, const std::string& id);
+  /// Waits until own changes of the structure are stored, if they are to be.
+  [[nodiscard]] Result<void> await_stored(Clock::time_point deadline);
   [[nodiscard]] Result<void> change_here(const Request& request);
   [[nodiscard]] Result<void> claim_name();
-  [[nodiscard]] Result<StoredState> open_store();
+  [[nodiscard]] Result<StoredState> open_store(std::unique_ptr<StateStore>& store);
   [[nodiscard]] Result<void> take_frames(const std::vector<FrameSpec>& frames);
   void give_up_partition();
   void concede();
@@ -266,11 +276,10 @@ class Participant final : public TransportHandler {
   std::atomic<bool> out_{false};  // another process has the partition now,
   std::string given_up_;          // and this is why
   const std::shared_ptr<Events> events_ = std::make_shared<Events>();
-  std::mutex joints_mutex_;            // what partition_ knows of joints, refused_joints_
-  std::uint64_t refused_joints_ = 0;   // updates
-  std::mutex publish_mutex_;           // store_, saved_commit_
-  std::unique_ptr<StateStore> store_;  // null: nothing is kept
-  std::uint64_t saved_commit_ = 0;
+  std::mutex joints_mutex_;           // what partition_ knows of joints, refused_joints_
+  std::uint64_t refused_joints_ = 0;  // updates
+  std::uint64_t told_epoch_ = 0;      // of what was published; under structure_mutex_
+  std::uint64_t saved_commit_ = 0;    // of values; of the thread of commits_
   Calls calls_;
   std::mutex hints_mutex_;
   LatestHints hints_;
@@ -284,10 +293,9 @@ class Participant final : public TransportHandler {
   std::atomic<bool> settled_{false};
   Clock::time_point settle_deadline_;
   std::unique_ptr<Transport> transport_;  // stops before the rest goes
-  // Publish own changes of the structure, and store values; stop before the transport.
-  std::optional<Deferred> publisher_;
+  // Both use the transport, and stop before it.
+  std::optional<CommitLoop> commits_;  // set once, before partition_
   std::optional<Deferred> conceder_;
-  std::optional<Periodic> saver_;
 };
 
 }  // namespace tfdude

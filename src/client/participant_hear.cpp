@@ -56,7 +56,7 @@ void Participant::on_presence(const Presence& presence) {
       const auto before = directory_.serving(presence.partition);
       directory_.apply(presence, wall_clock());
       appeared = directory_.serving(presence.partition) && !before;
-      if (appeared && partition_ != nullptr) publisher_->ask();
+      if (appeared && partition_ != nullptr) commits_->ask();
       // It may be the last that was missing of the structure of one who has returned.
       if (partition_ != nullptr && directory_.contested()) conceder_->ask();
     }
@@ -77,7 +77,7 @@ void Participant::on_lost(const std::string& partition, std::uint64_t incarnatio
     if (rival_ && partition == rival_->partition && rival_->incarnation == incarnation)
       rival_.reset();
     news = directory_.lost(partition, incarnation, wall_clock());
-    if (news && partition_ != nullptr) publisher_->ask();
+    if (news && partition_ != nullptr) commits_->ask();
     tell_changes();
   }
   structure_changed_.notify_all();

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <unistd.h>
@@ -20,9 +21,6 @@ constexpr Milliseconds kSlowPresence{3000};
 // How often at most the others are asked whether what seems to be a conflict is one.
 constexpr Milliseconds kConcedeEvery{100};
 
-// How often own changes of the structure are published at most.
-constexpr Milliseconds kPublishEvery{1};
-
 std::string host_name() {
   std::array<char, 256> name{};
   if (gethostname(name.data(), name.size() - 1) != 0) return "unknown";
@@ -32,25 +30,28 @@ std::string host_name() {
 // Whether it leaves the structure as it is.
 bool is_of_values(const Request& request) {
   return std::holds_alternative<UpdateRequest>(request.body) ||
-         std::holds_alternative<JointUpdate>(request.body);
+         std::holds_alternative<JointUpdate>(request.body) ||
+         std::holds_alternative<ReviseRequest>(request.body);
 }
 
 // One line a change of the structure; values change too often for it.
-void log_change(const Request& request, const Reply& reply) {
+std::string line_of(const Request& request) {
   std::string what;
   if (const auto* add = std::get_if<AddRequest>(&request.body)) {
     what = "add frame " + quote(request.id) + " under " + quote(add->parent);
   } else if (const auto* remove = std::get_if<RemoveRequest>(&request.body)) {
-    if (remove->tops.empty()) return;
     what = "remove, with all below,";
     for (const std::string& top : remove->tops) what += " " + quote(top);
   } else if (const auto* move = std::get_if<MoveRequest>(&request.body)) {
     what = "move frame " + quote(request.id) + " under " + quote(move->parent);
-  } else {
-    return;
   }
-  const auto* error = std::get_if<Error>(&reply.body);
-  log().info("{}: {}", what, error != nullptr ? "refused: " + error->message : "done");
+  return what;
+}
+
+bool is_of_structure(const Request& request) {
+  return std::holds_alternative<AddRequest>(request.body) ||
+         std::holds_alternative<RemoveRequest>(request.body) ||
+         std::holds_alternative<MoveRequest>(request.body);
 }
 
 }  // namespace
@@ -66,37 +67,35 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
                  false};
   }
   if (auto claimed = claim_name(); !claimed) return claimed;
-  publisher_.emplace(kPublishEvery, [this] { (void)commit(); });
   conceder_.emplace(kConcedeEvery, [this] { concede(); });
   if (auto taken = take_frames(frames); !taken) return taken;
   if (auto serving = transport_->serve(partition_name_); !serving) return serving;
-  if (auto stored = commit(); !stored) return stored;
-  if (store_ != nullptr) {
-    // Others are served already, and what they change is stored.
-    const std::lock_guard publishing(publish_mutex_);
-    if (auto stored = store_->save_configured(frames); !stored) return stored;
-    saver_.emplace(options_.save_every, [this] { save_values(); });
-  }
+  if (auto stored = commits_->start(frames); !stored) return stored;
   transport_->announce(presence_);
   return {};
 }
 
-Result<StoredState> Participant::open_store() {
+Result<StoredState> Participant::open_store(std::unique_ptr<StateStore>& store) {
   auto opened = open_sqlite_store(state_file(options_.state, options_.domain, partition_name_),
                                   partition_name_);
   if (!opened) return tl::unexpected(std::move(opened.error()));
-  store_ = *std::move(opened);
-  return store_->load();
+  store = *std::move(opened);
+  return store->load();
 }
 
 Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
   if (auto set = forest_.set_default_timing(options_.history); !set) return set;
   StoredState state;
+  std::unique_ptr<StateStore> store;
   if (!options_.state.empty()) {
-    auto stored = open_store();
+    auto stored = open_store(store);
     if (!stored) return tl::unexpected(std::move(stored.error()));
     state = *std::move(stored);
   }
+  const bool kept = store != nullptr;
+  CommitLoop::Periods periods;
+  periods.values = options_.save_every;
+  commits_.emplace(std::move(store), static_cast<CommitLoop::Effects&>(*this), periods);
   // What is left is judged by what the others own now.
   const auto incomplete = [this] {
     if (transport_->awaits_presence()) return true;
@@ -108,8 +107,8 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
   const std::lock_guard joints(joints_mutex_);
   auto partition =
       std::make_unique<Partition>(partition_name_, presence_.incarnation, forest_, directory_);
-  auto taken = store_ != nullptr ? partition->restore(state, frames, wall_clock())
-                                 : partition->load(frames, wall_clock());
+  auto taken = kept ? partition->restore(state, frames, wall_clock())
+                    : partition->load(frames, wall_clock());
   if (!taken) return taken;
   for (const FrameSpec& frame : frames) {
     // One that was removed by request has no edge of which to say anything.
@@ -145,44 +144,6 @@ Result<void> Participant::claim_name() {
                                          " by process " + std::to_string(rival_->pid));
 }
 
-Result<void> Participant::commit() {
-  const std::lock_guard publishing(publish_mutex_);
-  std::vector<Page> pages;
-  StateChange unsaved;
-  std::optional<Presence> news;
-  {
-    const std::lock_guard lock(structure_mutex_);
-    if (partition_ == nullptr) return {};
-    if (out_) {
-      news = presence_;
-    } else {
-      pages = partition_->take_pages();
-      if (store_ != nullptr) {
-        const std::lock_guard joints(joints_mutex_);
-        unsaved = partition_->take_unsaved();
-      }
-      auto absent = directory_.absent();
-      if (partition_->page_count() != presence_.pages || absent != presence_.absent) {
-        presence_.pages = partition_->page_count();
-        presence_.absent = std::move(absent);
-        news = presence_;
-      }
-    }
-  }
-  Result<void> saved;
-  if (!unsaved.empty()) saved = store_->save(unsaved);
-  if (!saved) {
-    log().error("{}", saved.error().message);
-    const std::lock_guard lock(structure_mutex_);
-    const std::lock_guard joints(joints_mutex_);
-    partition_->still_unsaved(unsaved);
-  }
-  for (const Page& page : pages) transport_->publish(page);
-  if (news) transport_->announce(*news);
-  structure_changed_.notify_all();
-  return saved;
-}
-
 // A claim may have been taken back long ago by an owner whose pages are late: what is given up must stand after all
 // of the others have told how far they are, and their structure up to there has come.
 void Participant::concede() {
@@ -205,7 +166,7 @@ void Participant::concede() {
     tell_changes();
   }
   if (more) conceder_->ask();
-  if (changed) (void)commit();
+  if (changed) commits_->ask();
 }
 
 // Whether all that those who are reachable had changed when this was called is known here now.
@@ -232,25 +193,6 @@ bool Participant::catch_up() {
   return current;
 }
 
-void Participant::save_values() {
-  const std::lock_guard publishing(publish_mutex_);
-  if (store_ == nullptr || out_) return;
-  const auto [edges, commit] = forest_.changed_since(saved_commit_);
-  if (edges.empty()) return;
-  std::vector<StoredJoint> joints;
-  {
-    const std::lock_guard lock(joints_mutex_);
-    joints = partition_->take_changed_joints();
-  }
-  if (auto saved = store_->save_values(edges, joints); !saved) {
-    log().error("{}", saved.error().message);
-    const std::lock_guard lock(joints_mutex_);
-    partition_->still_unsaved(joints);
-    return;
-  }
-  saved_commit_ = commit;
-}
-
 // Under structure_mutex_. Lookups find no value of this process's any more: none is better than an old one.
 void Participant::give_up_partition() {
   given_up_ = "partition " + quote(rival_->partition) + " was taken over by process " +
@@ -266,7 +208,7 @@ void Participant::give_up_partition() {
   }
   Change change{ChangeKind::kConflict, rival_->partition, {}, {}, rival_->partition, given_up_, {}};
   directory_.changes().add(std::move(change));
-  publisher_->ask();
+  commits_->ask();
 }
 
 Reply Participant::answer_here(const Request& request) {
@@ -275,6 +217,8 @@ Reply Participant::answer_here(const Request& request) {
   }
   if (std::holds_alternative<PastRequest>(request.body)) return partition_->answer_past(request);
   if (std::holds_alternative<WatchRequest>(request.body)) return answer_watch(request);
+  const auto refused = is_of_structure(request) ? refusal() : std::nullopt;
+  if (refused) return {request.sequence, 0, *refused};
   Reply reply;
   {
     const std::lock_guard lock(structure_mutex_);
@@ -284,7 +228,7 @@ Reply Participant::answer_here(const Request& request) {
     tell_changes();
   }
   // This process sees the change already; the others are told without making it wait.
-  if (!is_of_values(request) && !is_question(request)) publisher_->ask();
+  if (!is_of_values(request) && !is_question(request)) commits_->ask();
   look_at_watches();
   return reply;
 }
@@ -292,7 +236,7 @@ Reply Participant::answer_here(const Request& request) {
 Result<void> Participant::change_here(const Request& request) {
   Reply reply = answer_here(request);
   if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
-  return {};
+  return is_of_structure(request) ? await_stored(Clock::now() + options_.timeout) : Result<void>();
 }
 
 void Participant::on_request(const PeerId& from, const Request& request) {
@@ -309,27 +253,30 @@ void Participant::on_request(const PeerId& from, const Request& request) {
     transport_->reply(from, answer_watch(request));
     return;
   }
+  const bool changes = !is_question(request);
+  const auto refused = changes ? refusal() : std::nullopt;
   Reply reply;
   {
     const std::lock_guard lock(structure_mutex_);
     const std::lock_guard joints(joints_mutex_);
     if (out_) {
       reply = {request.sequence, 0, Error{Errc::kNotOwner, given_up_}};
+    } else if (refused) {
+      reply = partition_->refuse(from, request, *refused);
     } else {
       reply = partition_->answer(from, request, wall_clock());
       // A frame that was moved has the younger claim now.
       if (directory_.contested()) conceder_->ask();
     }
+    // What is not stored is not told, for as long as that may take.
+    if (!changes && commits_->failure()) reply.epoch = std::min(reply.epoch, told_epoch_);
     tell_changes();
   }
-  log_change(request, reply);
-  // Before the reply, so that whoever gets that finds the structure changed, and the change stored.
-  if (!is_question(request) && (!is_of_values(request) || store_ != nullptr)) {
-    if (auto stored = commit(); !stored && std::holds_alternative<Done>(reply.body)) {
-      reply.body = Error{Errc::kState, "done, but not stored: " + stored.error().message};
-    }
+  if (changes && (commits_->stores() || !is_of_values(request))) {
+    commits_->reply({from, std::move(reply), line_of(request)});
+  } else {
+    transport_->reply(from, reply);
   }
-  transport_->reply(from, reply);
 }
 
 void Participant::on_update(const Update& update) {

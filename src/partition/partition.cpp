@@ -23,6 +23,8 @@ bool are_too_many(const std::vector<Ties>& all) {
 }  // namespace
 
 bool is_question(const Request& request) {
+  const auto* remove = std::get_if<RemoveRequest>(&request.body);
+  if (remove != nullptr) return remove->tops.empty();
   return std::holds_alternative<LookupRequest>(request.body) ||
          std::holds_alternative<PastRequest>(request.body) ||
          std::holds_alternative<JointsRequest>(request.body) ||
@@ -84,6 +86,14 @@ Reply Partition::answer(const PeerId& peer, const Request& request, Time now) {
   if (is_question(request)) return answer(request, now);
   if (auto before = replies_.find(peer, request.sequence)) return *std::move(before);
   Reply reply = answer(request, now);
+  replies_.put(peer, reply);
+  return reply;
+}
+
+// Kept like any reply: when the request comes once more after that, it must not be applied.
+Reply Partition::refuse(const PeerId& peer, const Request& request, const Error& why) {
+  if (auto before = replies_.find(peer, request.sequence)) return *std::move(before);
+  Reply reply{request.sequence, 0, why};
   replies_.put(peer, reply);
   return reply;
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstring>
+#include <system_error>
 #include <utility>
 
 namespace tfdude::sqlite {
@@ -10,7 +11,19 @@ namespace {
 // Longer than any row that is ever written.
 constexpr int kLongestRow = 64 * 1024;
 
-tl::unexpected<Error> failed(sqlite3* handle) { return fail(Errc::kState, sqlite3_errmsg(handle)); }
+// What SQLite says, with the code by which its documentation tells more, and what the system says where that is why.
+std::string reason_of(sqlite3* handle) {
+  const int code = sqlite3_extended_errcode(handle);
+  std::string reason =
+      std::string(sqlite3_errmsg(handle)) + " (SQLite code " + std::to_string(code);
+  const int kind = code & 0xff;
+  const int error = sqlite3_system_errno(handle);
+  const bool of_system = kind == SQLITE_CANTOPEN || kind == SQLITE_IOERR;
+  if (of_system && error != 0) reason += ": " + std::generic_category().message(error);
+  return reason + ")";
+}
+
+tl::unexpected<Error> failed(sqlite3* handle) { return fail(Errc::kState, reason_of(handle)); }
 
 // A file may come from anywhere: what its schema says is not to be run, and the file not to be touched by looking.
 void distrust(sqlite3* handle) {
@@ -36,7 +49,7 @@ Result<Database> Database::open(const std::string& file) {
                       SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
   database.handle_.reset(handle);
   if (status != SQLITE_OK) {
-    return fail(Errc::kState, handle != nullptr ? sqlite3_errmsg(handle) : sqlite3_errstr(status));
+    return fail(Errc::kState, handle != nullptr ? reason_of(handle) : sqlite3_errstr(status));
   }
   distrust(handle);
   return database;
@@ -50,6 +63,35 @@ Result<void> Database::run(const char* sql) {
   if (sqlite3_exec(handle_.get(), sql, nullptr, nullptr, nullptr) != SQLITE_OK)
     return failed(handle_.get());
   return {};
+}
+
+bool Database::is_damaged() const {
+  switch (sqlite3_errcode(handle_.get())) {
+    case SQLITE_PERM:
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+    case SQLITE_NOMEM:
+    case SQLITE_READONLY:
+    case SQLITE_INTERRUPT:
+    case SQLITE_IOERR:
+    case SQLITE_FULL:
+    case SQLITE_CANTOPEN:
+    case SQLITE_PROTOCOL:
+    case SQLITE_NOLFS:
+    case SQLITE_AUTH:
+      return false;
+    default:
+      return true;
+  }
+}
+
+Result<void> Database::atomically(const std::function<Result<void>()>& write) {
+  auto done = run("BEGIN IMMEDIATE");
+  if (done) done = write();
+  if (done) done = run("COMMIT");
+  // Some failures have ended it already.
+  if (!done && sqlite3_get_autocommit(handle_.get()) == 0) (void)run("ROLLBACK");
+  return done;
 }
 
 Result<std::int64_t> Database::number(const char* sql) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <initializer_list>
 #include <memory>
 #include <sqlite3.h>
@@ -24,13 +25,16 @@ class Database {
   /// Runs statements that give no rows.
   [[nodiscard]] Result<void> run(const char* sql);
 
+  /// Runs it in a transaction: all that it writes stays, or nothing, and no transaction is left open.
+  [[nodiscard]] Result<void> atomically(const std::function<Result<void>()>& write);
+
   /// The first column of the first row, as a number; 0 where there is no row.
   [[nodiscard]] Result<std::int64_t> number(const char* sql);
   /// The same as text; empty where there is no row.
   [[nodiscard]] Result<std::string> text(const char* sql);
 
-  /// What SQLite says of the last failure.
-  [[nodiscard]] std::string reason() const { return sqlite3_errmsg(handle_.get()); }
+  /// Of a failure just now: whether the file is to blame, not the directory, the disk or the computer.
+  [[nodiscard]] bool is_damaged() const;
   [[nodiscard]] int code() const { return sqlite3_errcode(handle_.get()); }
   [[nodiscard]] sqlite3* get() const { return handle_.get(); }
 

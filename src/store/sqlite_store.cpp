@@ -71,7 +71,7 @@ class SqliteStore final : public StateStore {
 
  private:
   [[nodiscard]] tl::unexpected<Error> unusable(const std::string& why) const;
-  [[nodiscard]] tl::unexpected<Error> damaged(const std::string& how) const;
+  [[nodiscard]] tl::unexpected<Error> unreadable(const std::string& why) const;
   Result<void> lock();
   Result<void> check(const std::string& partition);
   Result<void> check_tables(std::int64_t format);
@@ -107,8 +107,14 @@ tl::unexpected<Error> SqliteStore::unusable(const std::string& why) const {
   return fail(Errc::kState, "state file " + quote(file_) + " " + why);
 }
 
-tl::unexpected<Error> SqliteStore::damaged(const std::string& how) const {
-  return unusable("is damaged (" + printable(how) +
+// Only what is known to be lost is advised to be moved away.
+tl::unexpected<Error> SqliteStore::unreadable(const std::string& why) const {
+  if (!database_->is_damaged()) {
+    return unusable("cannot be used: " + printable(why) +
+                    "; it was not changed: keep it, and see to it that it and its directory can be "
+                    "read and written");
+  }
+  return unusable("is damaged (" + printable(why) +
                   "): move it away to start from the configuration, or put a copy of it back");
 }
 
@@ -119,7 +125,7 @@ Result<void> SqliteStore::open(const std::string& partition) {
   if (!opened) return unusable("cannot be opened: " + opened.error().message);
   database_ = std::move(*opened);
   if (auto checked = check(partition); !checked) return checked;
-  if (auto prepared = prepare(); !prepared) return damaged(prepared.error().message);
+  if (auto prepared = prepare(); !prepared) return unreadable(prepared.error().message);
   return {};
 }
 
@@ -130,7 +136,7 @@ Result<void> SqliteStore::lock() {
   if (locked) return {};
   const bool busy = database_->code() == SQLITE_BUSY;
   return busy ? unusable("is in use by another process: is the partition served already?")
-              : damaged(locked.error().message);
+              : unreadable(locked.error().message);
 }
 
 // Nothing is written before it is known that the file is this partition's, or new; nor are its tables looked into
@@ -140,9 +146,9 @@ Result<void> SqliteStore::check(const std::string& partition) {
   const auto application = database_->number("PRAGMA application_id");
   const auto format = database_->number("PRAGMA user_version");
   const auto tables = database_->number("SELECT count(*) FROM sqlite_master");
-  if (!application) return damaged(application.error().message);
-  if (!format) return damaged(format.error().message);
-  if (!tables) return damaged(tables.error().message);
+  if (!application) return unreadable(application.error().message);
+  if (!format) return unreadable(format.error().message);
+  if (!tables) return unreadable(tables.error().message);
   if (*tables == 0 && *application == 0 && *format == 0) return create(partition);
   if (*application != kApplication) {
     return unusable("belongs to another program: name another directory, or move it away");
@@ -153,9 +159,9 @@ Result<void> SqliteStore::check(const std::string& partition) {
                     ": use the version that wrote it, or move it away to start from the "
                     "configuration");
   }
-  if (auto checked = check_tables(*format); !checked) return damaged(checked.error().message);
+  if (auto checked = check_tables(*format); !checked) return unreadable(checked.error().message);
   const auto of = database_->text("SELECT partition FROM about");
-  if (!of) return damaged(of.error().message);
+  if (!of) return unreadable(of.error().message);
   outdated_ = *format == kFormatBefore;
   if (*of == partition) return {};
   return unusable("is of partition " + quote(*of) + ", not of " + quote(partition) +
@@ -186,27 +192,31 @@ Result<void> SqliteStore::check_tables(std::int64_t format) {
 }
 
 Result<void> SqliteStore::bring_up_to_date() {
-  auto done = database_->run("BEGIN IMMEDIATE");
-  if (done) done = database_->run(kJointsSchema);
-  const std::string mark = "PRAGMA user_version = " + std::to_string(kFormat) + "; COMMIT;";
-  if (done) done = database_->run(mark.c_str());
-  if (done) done = prepare(put_joint_, kPutJoint);
+  auto done = database_->atomically([&] {
+    auto made = database_->run(kJointsSchema);
+    const std::string mark = "PRAGMA user_version = " + std::to_string(kFormat);
+    if (made) made = database_->run(mark.c_str());
+    return made ? prepare(put_joint_, kPutJoint) : made;
+  });
   outdated_ = !done;
   return done;
 }
 
 Result<void> SqliteStore::create(const std::string& partition) {
   auto done = make_ready();
-  if (done) done = database_->run("BEGIN IMMEDIATE");
-  if (done) done = database_->run(kSchema);
-  if (done) done = database_->run(kJointsSchema);
   if (done) {
-    auto about = Statement::prepare(*database_, "INSERT INTO about VALUES(?1, 0)");
-    done = about ? about->run(partition) : tl::unexpected(about.error());
+    done = database_->atomically([&] {
+      auto made = database_->run(kSchema);
+      if (made) made = database_->run(kJointsSchema);
+      if (!made) return made;
+      auto about = Statement::prepare(*database_, "INSERT INTO about VALUES(?1, 0)");
+      if (!about) return Result<void>(tl::unexpected(about.error()));
+      made = about->run(partition);
+      const std::string marks = "PRAGMA application_id = " + std::to_string(kApplication) +
+                                "; PRAGMA user_version = " + std::to_string(kFormat);
+      return made ? database_->run(marks.c_str()) : made;
+    });
   }
-  const std::string marks = "PRAGMA application_id = " + std::to_string(kApplication) +
-                            "; PRAGMA user_version = " + std::to_string(kFormat) + "; COMMIT;";
-  if (done) done = database_->run(marks.c_str());
   if (!done) return unusable("cannot be written: " + done.error().message);
   return {};
 }
@@ -239,7 +249,7 @@ Result<StoredState> SqliteStore::load() {
   StoredState state;
   for (auto part : {&SqliteStore::load_about, &SqliteStore::load_frames, &SqliteStore::load_notes,
                     &SqliteStore::load_configured, &SqliteStore::load_joints}) {
-    if (auto loaded = (this->*part)(state); !loaded) return damaged(loaded.error().message);
+    if (auto loaded = (this->*part)(state); !loaded) return unreadable(loaded.error().message);
   }
   return state;
 }
@@ -320,11 +330,8 @@ template <class Write>
 Result<void> SqliteStore::transaction(Write write) {
   if (auto ready = make_ready(); !ready)
     return unusable("cannot be written: " + ready.error().message);
-  auto done = database_->run("BEGIN IMMEDIATE");
-  if (done) done = write();
-  if (done) done = database_->run("COMMIT");
+  auto done = database_->atomically(write);
   if (done) return {};
-  (void)database_->run("ROLLBACK");
   return unusable("could not be written: " + done.error().message);
 }
 

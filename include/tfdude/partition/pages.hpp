@@ -63,10 +63,15 @@ class Pages {
 
   /// The pages to publish since the last call, in the order in which to publish them.
   [[nodiscard]] std::vector<Page> take_changed();
+  /// They were not published: they will be taken again, as they are then.
+  void still_changed(const std::vector<Page>& pages) {
+    for (const Page& page : pages) changed_.insert(page.number);
+  }
 
   /// The ids whose place or note has changed since the last call; none before watch_ids().
   [[nodiscard]] std::set<std::string> take_touched() { return std::exchange(touched_, {}); }
   void watch_ids() { watching_ = true; }
+  [[nodiscard]] bool is_touched(const std::string& id) const { return touched_.count(id) != 0; }
 
   [[nodiscard]] std::size_t frame_count() const { return page_of_.size(); }
   [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(pages_.size()); }

@@ -44,6 +44,9 @@ class Partition {
   /// Answers any request of a peer; a repeated one as before.
   [[nodiscard]] Reply answer(const PeerId& peer, const Request& request, Time now);
 
+  /// Refuses a change that is not to be made now; one that was answered before, is answered as before.
+  [[nodiscard]] Reply refuse(const PeerId& peer, const Request& request, const Error& why);
+
   /// Answers a request of the owner's own process.
   [[nodiscard]] Reply answer(const Request& request, Time now);
 
@@ -84,12 +87,17 @@ class Partition {
   /// What must be saved of what was changed by requests since the last call.
   [[nodiscard]] StateChange take_unsaved();
 
-  /// It could not be saved: it will be taken again.
-  void still_unsaved(const StateChange& change) {
+  /// It could not be saved, and these pages were not published: all will be taken again.
+  void still_unsaved(const StateChange& change, const std::vector<Page>& pages) {
     updated_.insert(change.erased.begin(), change.erased.end());
     still_unsaved(change.joints);
+    pages_.still_changed(pages);
   }
   void still_unsaved(const std::vector<StoredJoint>& joints) { joints_.still_changed(joints); }
+  /// Whether something that was changed of a frame by request will be taken by take_unsaved().
+  [[nodiscard]] bool is_unsaved(const std::string& id) const {
+    return updated_.count(id) != 0 || pages_.is_touched(id);
+  }
 
  private:
   [[nodiscard]] Result<void> apply(const Request& request, Time now);

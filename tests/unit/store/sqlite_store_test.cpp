@@ -3,7 +3,9 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
+#include <sqlite3.h>
 #include <string>
+#include <sys/fsuid.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <vector>
@@ -13,6 +15,7 @@
 #include "support/forest_support.hpp"
 #include "support/process.hpp"
 #include "support/random.hpp"
+#include "support/small_disk.hpp"
 
 namespace tfdude {
 namespace {
@@ -35,6 +38,16 @@ std::string refused(const std::string& file, const std::string& partition = "arm
   if (!store) return std::string(to_string(store.error().code)) + ": " + store.error().message;
   const auto state = (*store)->load();
   return state ? "ok" : std::string(to_string(state.error().code)) + ": " + state.error().message;
+}
+
+// As somebody who may only what the permissions say, on this thread.
+template <class Call>
+std::string as_nobody(Call call) {
+  constexpr uid_t kNobody = 65534;
+  const auto me = static_cast<uid_t>(setfsuid(getuid() == 0 ? kNobody : getuid()));
+  std::string result = call();
+  setfsuid(me);
+  return result;
 }
 
 void put(const std::string& file, std::streamoff at, const std::string& bytes) {
@@ -134,7 +147,8 @@ TEST_CASE("a file that cannot be this partition's state is refused and stays as 
   REQUIRE(opened(file)->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
   SECTION("no database") {
     put(file, 0, "something else altogether");
-    CHECK_THAT(refused(file), ContainsSubstring("is damaged (file is not a database): move it"));
+    CHECK_THAT(refused(file),
+               ContainsSubstring("is damaged (file is not a database (SQLite code 26)): move it"));
   }
   SECTION("cut short") {
     std::filesystem::resize_file(file, 5000);
@@ -158,6 +172,94 @@ TEST_CASE("a file that cannot be this partition's state is refused and stays as 
   const std::string before = content(file);
   CHECK(refused(file, "legs") != "ok");
   CHECK(content(file) == before);
+}
+
+TEST_CASE("a sound file in a directory that became read-only is not called damaged") {
+  const TemporaryDirectory directory;
+  const std::string file = state_file(directory.path(), 7, "arms");
+  REQUIRE(opened(file)->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
+  const auto folder = std::filesystem::path(file).parent_path();
+  const auto allow = [&](const std::filesystem::path& path, unsigned mode) {
+    std::filesystem::permissions(path, std::filesystem::perms(mode));
+  };
+  std::string message;
+  SECTION("the directory") {
+    allow(folder, 0555);
+    allow(file, 0666);
+    message = as_nobody([&] { return refused(file); });
+    CHECK_THAT(message, ContainsSubstring("SQLite code 14"));
+    CHECK_THAT(message, ContainsSubstring("Permission denied"));
+  }
+  SECTION("the file") {
+    allow(folder, 0777);
+    allow(file, 0444);
+    message = as_nobody([&] { return refused(file); });
+    CHECK_THAT(message, ContainsSubstring("SQLite code 8"));
+    CHECK_THAT(message, ContainsSubstring("attempt to write a readonly database"));
+  }
+  CHECK_THAT(message, ContainsSubstring("state file '" + file + "'"));
+  CHECK(message.find("damaged") == std::string::npos);
+  CHECK(message.find("away") == std::string::npos);
+  allow(folder, 0777);
+  allow(file, 0666);
+  CHECK(opened(file)->load()->frames.size() == 1);
+}
+
+TEST_CASE("where the disk is full nothing is lost, and storing goes on once it is not") {
+  testing::SmallDisk disk(300);
+  if (!disk.mounted()) {
+    WARN("SKIPPED: a small disk needs root");
+    return;
+  }
+  const std::string file = state_file(disk.path(), 7, "arms");
+  const auto store = opened(file);
+  REQUIRE(store->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
+  disk.fill();
+  std::string message;
+  int kept = 0;
+  for (int i = 0; i < 200 && message.empty(); ++i) {
+    const std::string id = "f" + std::to_string(i);
+    const auto saved = store->save({1, {id}, {{id, "", {}, 1}}, {}});
+    if (saved) ++kept;
+    if (!saved) message = saved.error().message;
+  }
+  CHECK_THAT(message, ContainsSubstring("database or disk is full (SQLite code 13)"));
+  CHECK_FALSE(store->save({1, {"late"}, {{"late", "", {}, 1}}, {}}));
+  CHECK(store->load()->frames.size() == static_cast<std::size_t>(kept) + 1);
+  disk.make_room();
+  CHECK(outcome(store->save({1, {"late"}, {{"late", "", {}, 1}}, {}})) == "ok");
+  CHECK(store->load()->frames.size() == static_cast<std::size_t>(kept) + 2);
+}
+
+TEST_CASE(
+    "a file of the format before that cannot be brought up to date stays as it is until it can") {
+  testing::SmallDisk disk(300);
+  if (!disk.mounted()) {
+    WARN("SKIPPED: a small disk needs root");
+    return;
+  }
+  const std::string file = state_file(disk.path(), 7, "arms");
+  REQUIRE(opened(file)->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
+  sqlite3* raw = nullptr;
+  REQUIRE(sqlite3_open(file.c_str(), &raw) == SQLITE_OK);
+  REQUIRE(sqlite3_exec(raw, "DROP TABLE joints; PRAGMA user_version = 1", nullptr, nullptr,
+                       nullptr) == SQLITE_OK);
+  sqlite3_close(raw);
+  const auto store = opened(file);
+  REQUIRE(store->load());
+  disk.fill();
+  const auto full = store->save_values({}, {{"elbow", 0.5, 0}});
+  REQUIRE_FALSE(full);
+  CHECK_THAT(full.error().message,
+             ContainsSubstring("cannot be written: database or disk is full"));
+  // No transaction was left open: the next attempt begins one.
+  const auto again = store->save_values({}, {{"elbow", 0.5, 0}});
+  REQUIRE_FALSE(again);
+  CHECK_THAT(again.error().message, ContainsSubstring("disk is full"));
+  disk.make_room();
+  CHECK(outcome(store->save_values({}, {{"elbow", 0.5, 0}})) == "ok");
+  CHECK(store->load()->joints.size() == 1);
+  CHECK(store->load()->frames.size() == 1);
 }
 
 TEST_CASE("a directory that cannot be made is named") {

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <sys/mount.h>
+
+#include "support/process.hpp"
+
+namespace tfdude::testing {
+
+/// A disk of its own, so small that it is soon full. Needs root: without, it is not mounted.
+class SmallDisk {
+ public:
+  explicit SmallDisk(int kibibytes) {
+    const std::string size = "size=" + std::to_string(kibibytes) + "k";
+    mounted_ = mount("tmpfs", path().c_str(), "tmpfs", 0, size.c_str()) == 0;
+  }
+  ~SmallDisk() {
+    if (mounted_) (void)umount2(path().c_str(), MNT_DETACH);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+
+  [[nodiscard]] bool mounted() const { return mounted_; }
+  [[nodiscard]] const std::string& path() const { return directory_.path(); }
+
+  /// To the last byte.
+  void fill() const {
+    std::ofstream filler(file(), std::ios::binary | std::ios::app);
+    const std::string block(1024, 'x');
+    while (filler.write(block.data(), static_cast<std::streamsize>(block.size())).flush()) {
+    }
+  }
+  void make_room() const { (void)std::remove(file().c_str()); }
+
+ private:
+  [[nodiscard]] std::string file() const { return path() + "/filler"; }
+
+  TemporaryDirectory directory_;
+  bool mounted_ = false;
+};
+
+}  // namespace tfdude::testing
