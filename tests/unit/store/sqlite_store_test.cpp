@@ -182,6 +182,7 @@ TEST_CASE("a sound file in a directory that became read-only is not called damag
   const auto allow = [&](const std::filesystem::path& path, unsigned mode) {
     std::filesystem::permissions(path, std::filesystem::perms(mode));
   };
+  allow(directory.path(), 0755);
   std::string message;
   SECTION("the directory") {
     allow(folder, 0555);
