@@ -35,6 +35,10 @@ class Database {
 
   /// Of a failure just now: whether the file is to blame, not the directory, the disk or the computer.
   [[nodiscard]] bool is_damaged() const;
+  /// Whether it could be opened for reading only: its first write would fail for reasons that name none.
+  [[nodiscard]] bool is_read_only() const {
+    return sqlite3_db_readonly(handle_.get(), "main") == 1;
+  }
   [[nodiscard]] int code() const { return sqlite3_errcode(handle_.get()); }
   [[nodiscard]] sqlite3* get() const { return handle_.get(); }
 

@@ -39,6 +39,10 @@ constexpr const char* kJointsSchema = R"(
 
 constexpr const char* kPutJoint = "INSERT OR REPLACE INTO joints VALUES(?1, ?2, ?3)";
 
+constexpr const char* kKeep =
+    "; it was not changed: keep it, and see to it that it and its directory can be read and "
+    "written";
+
 std::string without_spaces(std::string_view text) {
   std::string plain;
   std::copy_if(text.begin(), text.end(), std::back_inserter(plain),
@@ -110,9 +114,7 @@ tl::unexpected<Error> SqliteStore::unusable(const std::string& why) const {
 // Only what is known to be lost is advised to be moved away.
 tl::unexpected<Error> SqliteStore::unreadable(const std::string& why) const {
   if (!database_->is_damaged()) {
-    return unusable("cannot be used: " + printable(why) +
-                    "; it was not changed: keep it, and see to it that it and its directory can be "
-                    "read and written");
+    return unusable("cannot be used: " + printable(why) + kKeep);
   }
   return unusable("is damaged (" + printable(why) +
                   "): move it away to start from the configuration, or put a copy of it back");
@@ -124,6 +126,9 @@ Result<void> SqliteStore::open(const std::string& partition) {
   auto opened = error ? fail(Errc::kState, error.message()) : Database::open(file_);
   if (!opened) return unusable("cannot be opened: " + opened.error().message);
   database_ = std::move(*opened);
+  if (database_->is_read_only()) {
+    return unusable(std::string("can only be read (SQLite code 8)") + kKeep);
+  }
   if (auto checked = check(partition); !checked) return checked;
   if (auto prepared = prepare(); !prepared) return unreadable(prepared.error().message);
   return {};

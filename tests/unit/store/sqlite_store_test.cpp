@@ -188,16 +188,16 @@ TEST_CASE("a sound file in a directory that became read-only is not called damag
     allow(folder, 0555);
     allow(file, 0666);
     message = as_nobody([&] { return refused(file); });
-    CHECK_THAT(message, ContainsSubstring("SQLite code 14"));
-    CHECK_THAT(message, ContainsSubstring("Permission denied"));
+    CHECK_THAT(message, ContainsSubstring("SQLite code 1544"));
+    CHECK_THAT(message, ContainsSubstring("attempt to write a readonly database"));
   }
   SECTION("the file") {
     allow(folder, 0777);
     allow(file, 0444);
     message = as_nobody([&] { return refused(file); });
     CHECK_THAT(message, ContainsSubstring("SQLite code 8"));
-    CHECK_THAT(message, ContainsSubstring("attempt to write a readonly database"));
   }
+  CHECK_THAT(message, ContainsSubstring("keep it"));
   CHECK_THAT(message, ContainsSubstring("state file '" + file + "'"));
   CHECK(message.find("damaged") == std::string::npos);
   CHECK(message.find("away") == std::string::npos);
