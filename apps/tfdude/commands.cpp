@@ -40,7 +40,10 @@ int list(const Arguments& arguments, const char* key, const std::vector<std::str
 
 // Where nobody serves anything, nobody has answered.
 int none_there(Client& client, const Arguments& arguments, bool found) {
-  if (found || !client.partitions().empty()) return kDone;
+  if (found) return kDone;
+  const auto partitions = client.partitions();
+  if (!partitions) return report(partitions.error(), arguments);
+  if (!partitions->empty()) return kDone;
   return report({Errc::kUnreachable,
                  "no partition answers in domain " + std::to_string(arguments.options.domain)},
                 arguments);
@@ -115,24 +118,28 @@ int report(const Error& error, const Arguments& arguments) {
 
 int run_tree(Client& client, const Arguments& arguments) {
   const auto frames = client.frames();
-  if (const int status = none_there(client, arguments, !frames.empty()); status != kDone)
+  if (!frames) return report(frames.error(), arguments);
+  const auto partitions = client.partitions();
+  if (!partitions) return report(partitions.error(), arguments);
+  if (const int status = none_there(client, arguments, !frames->empty()); status != kDone)
     return status;
   std::vector<std::string> unreachable;
-  for (const PartitionInfo& partition : client.partitions()) {
+  for (const PartitionInfo& partition : *partitions) {
     if (!partition.reachable) unreachable.push_back(partition.name);
   }
   nlohmann::json json = nlohmann::json::array();
-  for (const Frame& frame : frames) json.push_back(frame_json(frame));
-  return answer(arguments, {{"frames", json}}, draw_tree(frames, unreachable));
+  for (const Frame& frame : *frames) json.push_back(frame_json(frame));
+  return answer(arguments, {{"frames", json}}, draw_tree(*frames, unreachable));
 }
 
 int run_frames(Client& client, const Arguments& arguments) {
   const auto frames = client.frames();
-  if (const int status = none_there(client, arguments, !frames.empty()); status != kDone)
+  if (!frames) return report(frames.error(), arguments);
+  if (const int status = none_there(client, arguments, !frames->empty()); status != kDone)
     return status;
   nlohmann::json json = nlohmann::json::array();
   std::string text;
-  for (const Frame& frame : frames) {
+  for (const Frame& frame : *frames) {
     json.push_back(frame_json(frame));
     text += frame.id + "\n";
   }
@@ -141,12 +148,13 @@ int run_frames(Client& client, const Arguments& arguments) {
 
 int run_partitions(Client& client, const Arguments& arguments) {
   const auto partitions = client.partitions();
-  if (const int status = none_there(client, arguments, !partitions.empty()); status != kDone) {
+  if (!partitions) return report(partitions.error(), arguments);
+  if (const int status = none_there(client, arguments, !partitions->empty()); status != kDone) {
     return status;
   }
   nlohmann::json json = nlohmann::json::array();
   std::string text;
-  for (const PartitionInfo& partition : partitions) {
+  for (const PartitionInfo& partition : *partitions) {
     json.push_back(partition_json(partition));
     text += partition.name;
     // Nothing else is known of one that went before this process came.
@@ -218,13 +226,18 @@ int run_children(Client& client, const Arguments& arguments) {
 
 int run_roots(Client& client, const Arguments& arguments) {
   const auto roots = client.roots();
-  if (const int status = none_there(client, arguments, !roots.empty()); status != kDone)
+  if (!roots) return report(roots.error(), arguments);
+  if (const int status = none_there(client, arguments, !roots->empty()); status != kDone)
     return status;
-  return list(arguments, "roots", roots);
+  return list(arguments, "roots", *roots);
 }
 
 int run_exists(Client& client, const Arguments& arguments) {
-  const bool exists = client.exists(arguments.id);
+  const auto parent = client.parent(arguments.id);
+  if (!parent && parent.error().code == Errc::kTimeout) {
+    return refuse(client, parent.error(), arguments);
+  }
+  const bool exists = parent.has_value();
   if (const int status = none_there(client, arguments, exists); status != kDone) return status;
   answer(arguments, {{"id", arguments.id}, {"exists", exists}}, exists ? "yes\n" : "no\n");
   return exists ? kDone : kRefused;

@@ -15,10 +15,11 @@ int run_joint(Client& client, const Arguments& arguments) {
 
 int run_joints(Client& client, const Arguments& arguments) {
   const auto partitions = client.partitions();
-  if (partitions.empty()) return refuse(client, {Errc::kUnknownPartition, ""}, arguments);
+  if (!partitions) return refuse(client, partitions.error(), arguments);
+  if (partitions->empty()) return refuse(client, {Errc::kUnknownPartition, ""}, arguments);
   nlohmann::json json = nlohmann::json::array();
   std::string text;
-  for (const PartitionInfo& partition : partitions) {
+  for (const PartitionInfo& partition : *partitions) {
     const auto joints = client.joints(partition.name);
     nlohmann::json one{{"partition", partition.name}, {"reachable", joints.has_value()}};
     if (!joints) {

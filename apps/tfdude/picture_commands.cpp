@@ -164,8 +164,9 @@ std::vector<const Frame*> ancestors(const std::map<std::string, const Frame*>& f
 // The frames from A to B and the edges between them, each looked up at the instant of the answer.
 Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTransform& X_AB) {
   const auto all = client.frames();
+  if (!all) return tl::unexpected(all.error());
   std::map<std::string, const Frame*> by_id;
-  for (const Frame& frame : all) by_id.emplace(frame.id, &frame);
+  for (const Frame& frame : *all) by_id.emplace(frame.id, &frame);
   auto up = ancestors(by_id, arguments.id);
   auto down = ancestors(by_id, arguments.other);
   if (up.empty() || down.empty() || up.back() != down.back()) {
@@ -201,8 +202,12 @@ Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTr
 }
 
 // Edges of partitions that answer; one that does not is asked no more, and drawn as not reachable.
-Graph graph_of(Client& client) {
-  Graph graph{client.frames(), client.partitions(), {}, {}};
+Result<Graph> graph_of(Client& client) {
+  auto frames = client.frames();
+  if (!frames) return tl::unexpected(std::move(frames.error()));
+  auto partitions = client.partitions();
+  if (!partitions) return tl::unexpected(std::move(partitions.error()));
+  Graph graph{*std::move(frames), *std::move(partitions), {}, {}};
   std::map<std::string, PartitionInfo*> by_name;
   for (PartitionInfo& partition : graph.partitions) {
     by_name[partition.name] = &partition;
@@ -255,7 +260,9 @@ int run_plot(Client& client, const Arguments& arguments) {
 }
 
 int run_graph(Client& client, const Arguments& arguments) {
-  const Graph graph = graph_of(client);
+  const auto drawn = graph_of(client);
+  if (!drawn) return refuse(client, drawn.error(), arguments);
+  const Graph& graph = *drawn;
   if (graph.partitions.empty()) {
     return refuse(client, {Errc::kUnknownPartition, "no partition"}, arguments);
   }

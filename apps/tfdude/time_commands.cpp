@@ -180,10 +180,11 @@ int run_monitor(Client& client, const Arguments& arguments) {
     nlohmann::json json = nlohmann::json::array();
     std::string text;
     const auto partitions = client.partitions();
-    if (partitions.empty() && arguments.once) {
+    if (!partitions) return refuse(client, partitions.error(), arguments);
+    if (partitions->empty() && arguments.once) {
       return refuse(client, {Errc::kUnknownPartition, "no partition"}, arguments);
     }
-    for (const PartitionInfo& partition : partitions) {
+    for (const PartitionInfo& partition : *partitions) {
       const auto pasts = client.pasts(partition.name);
       const Time now = wall_clock();
       nlohmann::json one{{"partition", partition.name}, {"reachable", pasts.has_value()}};

@@ -1,12 +1,15 @@
 #include "client/calls.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "tfdude/base/id.hpp"
 
 namespace tfdude {
 
-Calls::Call::Call(Calls& calls, const std::vector<std::string>& partitions) : calls_(calls) {
+Calls::Call::Call(Calls& calls, const std::vector<std::string>& partitions,
+                  std::function<void()> arrived)
+    : calls_(calls), tell_(std::move(arrived)) {
   const std::lock_guard lock(calls_.mutex_);
   if (calls_.idle_signals_.empty()) {
     calls_.signals_.push_back(std::make_unique<Signal>());
@@ -51,6 +54,7 @@ void Calls::Call::give_up(std::size_t entry, Error error) {
 
 void Calls::on_reply(const Reply& reply) {
   Signal* arrived = nullptr;
+  std::function<void()> tell;
   {
     const std::lock_guard lock(mutex_);
     const auto waiting = waiting_.find(reply.sequence);
@@ -59,21 +63,31 @@ void Calls::on_reply(const Reply& reply) {
     auto& entry = waiting->second.call->entries_[waiting->second.entry];
     if (entry.reply) return;
     entry.reply = reply;
-    if (call.complete()) arrived = call.arrived_;
+    if (call.complete()) {
+      arrived = call.arrived_;
+      tell = call.tell_;
+    }
   }
   if (arrived != nullptr) arrived->notify_one();
+  if (tell) tell();
 }
 
 void Calls::on_lost(const std::string& partition) {
-  const std::lock_guard lock(mutex_);
-  for (auto& [sequence, waiting] : waiting_) {
-    auto& entry = waiting.call->entries_[waiting.entry];
-    if (entry.partition != partition || entry.reply) continue;
-    entry.reply = Reply{sequence, 0,
-                        Error{Errc::kUnreachable,
-                              "partition " + quote(partition) + " went away while it was asked"}};
-    if (waiting.call->complete()) waiting.call->arrived_->notify_one();
+  std::vector<std::function<void()>> tell;
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto& [sequence, waiting] : waiting_) {
+      auto& entry = waiting.call->entries_[waiting.entry];
+      if (entry.partition != partition || entry.reply) continue;
+      entry.reply = Reply{sequence, 0,
+                          Error{Errc::kUnreachable,
+                                "partition " + quote(partition) + " went away while it was asked"}};
+      if (!waiting.call->complete()) continue;
+      waiting.call->arrived_->notify_one();
+      if (waiting.call->tell_) tell.push_back(waiting.call->tell_);
+    }
   }
+  for (const auto& one : tell) one();
 }
 
 }  // namespace tfdude

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -29,7 +30,10 @@ class Calls {
   /// Registered with Calls from begin() until it is destroyed.
   class Call {
    public:
-    Call(Calls& calls, const std::vector<std::string>& partitions);
+    /// @param arrived  told once all replies have come, by the thread that brought the last, without a lock; maybe also
+    ///   when this has been destroyed meanwhile
+    Call(Calls& calls, const std::vector<std::string>& partitions,
+         std::function<void()> arrived = {});
     ~Call();
     Call(const Call&) = delete;
     Call& operator=(const Call&) = delete;
@@ -52,6 +56,7 @@ class Calls {
     Calls& calls_;
     std::vector<Entry> entries_;
     std::condition_variable* arrived_;
+    const std::function<void()> tell_;
   };
 
   /// A reply came; unknown and repeated ones are dropped.

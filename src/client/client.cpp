@@ -66,7 +66,9 @@ Result<void> Client::update(Handle frame, const Transform& X_PC, std::optional<T
     return updated;
   }
   const auto info = participant_->forest().info(frame);
-  if (!info) return fail(Errc::kUnknownFrame, "the frame of this handle was removed");
+  if (!info)
+    return fail(Errc::kUnknownFrame,
+                "the frame of this handle was removed, or is another client's");
   return participant_->update({{info->id, X_PC}}, stamp);
 }
 
@@ -80,7 +82,8 @@ Result<void> Client::update(const std::vector<HandleUpdate>& edges, std::optiona
   std::vector<EdgeUpdate> named;
   for (const HandleUpdate& edge : edges) {
     const auto info = participant_->forest().info(edge.frame);
-    if (!info) return fail(Errc::kUnknownFrame, "the frame of a handle was removed");
+    if (!info)
+      return fail(Errc::kUnknownFrame, "the frame of a handle was removed, or is another client's");
     named.push_back({info->id, edge.X_PC});
   }
   return participant_->update(named, stamp);
@@ -134,14 +137,15 @@ Result<StampedTransform> Client::lookup(Handle a, Handle b, const Query& query) 
 
 Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b, const Query& query,
                                         Milliseconds wait) {
-  return participant_->lookup_waiting(a, b, query, wait, nullptr);
+  return participant_->lookup_waiting(a, b, query, wait);
 }
 
 Result<StampedTransform> Client::lookup(std::string_view a, const Query& at_a, std::string_view b,
                                         const Query& at_b, std::string_view fixed) {
-  const auto X_FA = participant_->lookup(fixed, a, at_a);
+  const Deadline deadline = participant_->call_deadline();
+  const auto X_FA = participant_->lookup_by(fixed, a, at_a, deadline);
   if (!X_FA) return tl::unexpected(X_FA.error());
-  const auto X_FB = participant_->lookup(fixed, b, at_b);
+  const auto X_FB = participant_->lookup_by(fixed, b, at_b, deadline);
   if (!X_FB) return tl::unexpected(X_FB.error());
   return StampedTransform{between(*X_FA, *X_FB), X_FB->stamp};
 }
@@ -168,17 +172,18 @@ Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
 
 Result<Observed> Client::observe(const std::string& a, const std::string& b, const Transform& X_AB,
                                  std::optional<Time> stamp, const ObserveOptions& options) {
-  return participant_->observe(a, b, X_AB, stamp, options);
+  return participant_->observe(a, b, X_AB, stamp, options, participant_->call_deadline());
 }
 
 Result<Observed> Client::fuse(const std::string& id, const Transform& X_PC,
                               std::optional<Time> stamp, const ObserveOptions& options) {
-  const auto above = parent(id);
-  if (!above) return tl::unexpected(above.error());
-  if (above->empty()) {
+  const Deadline deadline = participant_->call_deadline();
+  const auto edge = participant_->info(id, deadline);
+  if (!edge) return tl::unexpected(edge.error());
+  if (edge->parent.empty()) {
     return fail(Errc::kInvalidInput, "frame " + quote(id) + " is a root: it has no edge");
   }
-  return participant_->observe(*above, id, X_PC, stamp, options);
+  return participant_->observe(edge->parent, id, X_PC, stamp, options, deadline);
 }
 
 Result<std::vector<EdgeConsistency>> Client::consistency(const std::string& partition) {
@@ -198,7 +203,7 @@ Result<Pose> Client::lookup_pose(std::string_view a, std::string_view b) {
 Result<Pose> Client::lookup_pose(Handle a, Handle b) { return participant_->lookup_pose(a, b); }
 
 Result<Handle> Client::find(std::string_view id) {
-  return participant_->when_known([&]() -> Result<Handle> {
+  return participant_->when_known(participant_->call_deadline(), [&]() -> Result<Handle> {
     const auto handle = participant_->forest().find(id);
     if (!handle) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
     return *handle;
@@ -210,24 +215,32 @@ Result<std::vector<PathSegment>> Client::path(std::string_view a, std::string_vi
 }
 
 Result<std::string> Client::parent(const std::string& id) {
-  return participant_->info(id).map([](const FrameInfo& info) { return info.parent; });
+  return participant_->info(id, participant_->call_deadline()).map([](const FrameInfo& info) {
+    return info.parent;
+  });
 }
 
 Result<std::vector<std::string>> Client::children(const std::string& id) {
-  participant_->settle();
+  if (auto all = participant_->settle(participant_->call_deadline()); !all) {
+    return tl::unexpected(std::move(all.error()));
+  }
   return participant_->forest().children(id);
 }
 
-std::vector<std::string> Client::roots() {
-  participant_->settle();
+Result<std::vector<std::string>> Client::roots() {
+  if (auto all = participant_->settle(participant_->call_deadline()); !all) {
+    return tl::unexpected(std::move(all.error()));
+  }
   return participant_->forest().roots();
 }
 
-bool Client::exists(const std::string& id) { return participant_->info(id).has_value(); }
+bool Client::exists(const std::string& id) {
+  return participant_->info(id, participant_->call_deadline()).has_value();
+}
 
-std::vector<Frame> Client::frames() { return participant_->frames(); }
+Result<std::vector<Frame>> Client::frames() { return participant_->frames(); }
 
-std::vector<PartitionInfo> Client::partitions() { return participant_->partitions(); }
+Result<std::vector<PartitionInfo>> Client::partitions() { return participant_->partitions(); }
 
 Subscription Client::on_change(std::function<void(const Change&)> listener) {
   return Subscription(participant_->on_change(std::move(listener)));

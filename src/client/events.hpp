@@ -1,13 +1,8 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
-#include <map>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <thread>
 #include <vector>
 
@@ -17,6 +12,11 @@ namespace tfdude {
 
 /// Tells changes to whoever wants to know, one after the other, from a thread of its own that holds no lock
 /// meanwhile. Thread-safe.
+///
+/// After unsubscribe() has returned, the listener does not run and will not run; it has been destroyed, unless somebody else
+/// holds it. After stop() has returned this is so for all listeners. Both wait for the listener that runs, except where
+/// they are called by a listener, whatever its subscription: then they return at once, and after the listener that called
+/// stop() no other is called. A listener must not wait for a thread that waits in one of these.
 class Events {
  public:
   using Callback = std::function<void(const Change&)>;
@@ -24,40 +24,28 @@ class Events {
   /// Changes that wait to be told; of more, it is told only how many there were.
   static constexpr std::size_t kMaxWaiting = 65'536;
 
-  Events() = default;
+  Events();
   ~Events();
   Events(const Events&) = delete;
   Events& operator=(const Events&) = delete;
 
+  /// After stop() the callback is never called.
   [[nodiscard]] std::uint64_t subscribe(Callback callback);
 
-  /// Once this returns the callback is not called any more, and does not run, unless it is itself that calls.
   void unsubscribe(std::uint64_t subscriber);
 
   void post(std::vector<Change> changes);
 
-  /// Ends the telling; what waits is dropped. Not to be called from a callback.
+  /// Ends the telling; what waits is dropped. To be called by one thread, once or again.
   void stop();
 
  private:
-  /// A change, and the last of those who listened when it happened.
-  struct Waiting {
-    Change change;
-    std::uint64_t last_subscriber = 0;
-  };
+  struct State;
+  static void run(State& state);
 
-  void run();
-  std::optional<Waiting> next(std::unique_lock<std::mutex>& lock);
-
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::map<std::uint64_t, std::shared_ptr<const Callback>> subscribers_;
-  std::uint64_t last_subscriber_ = 0;
-  std::uint64_t running_ = 0;  // the subscriber that is being told
-  std::deque<Waiting> waiting_;
-  std::size_t missed_ = 0;
-  bool stopping_ = false;
-  std::thread thread_;  // from the first subscription on
+  const std::shared_ptr<State>
+      state_;           // the thread may outlive this, where a listener has stopped it
+  std::thread thread_;  // from the first subscription on; under the state's lock
 };
 
 }  // namespace tfdude

@@ -9,10 +9,6 @@
 namespace tfdude {
 namespace {
 
-// A request without a reply is sent again after this long, then twice as long, up to the second.
-constexpr Milliseconds kFirstRepeat{2};
-constexpr Milliseconds kLastRepeat{160};
-
 // How long the structure may take to reach us where a reply says that ours is old.
 constexpr Milliseconds kStructureDelay{100};
 
@@ -27,11 +23,17 @@ Participant::Participant(std::unique_ptr<Transport> transport, std::string parti
       partition_name_(std::move(partition)),
       forest_(wall_clock),
       directory_(forest_, partition_name_),
-      settle_deadline_(Clock::now() + options.discovery),
+      lookups_(forest_, calls_, hints_, links_of_lookups()),
+      settle_deadline_(Deadline(options.discovery).at()),
+      settled_at_last_(Deadline::sum(
+          settle_deadline_,
+          Deadline::sum(options.timeout, Deadline::sum(options.timeout, options.timeout)))),
       transport_(std::move(transport)) {}
 
 Participant::~Participant() {
-  pending_.cancel_all();
+  // Callbacks may use all of the rest.
+  lookups_.stop();
+  events_->stop();
   {
     const std::lock_guard lock(pushing_mutex_);
     leaving_ = true;
@@ -88,7 +90,7 @@ bool Participant::denies_plan(Errc code) {
 bool Participant::settled() {
   if (settled_.load(std::memory_order_relaxed)) return true;
   const auto now = Clock::now();
-  bool known = now >= settle_deadline_ + 3 * options_.timeout;
+  bool known = now >= settled_at_last_;
   if (!known) {
     const bool met_all = transport_->settled();
     const bool met_none = now >= settle_deadline_ && !transport_->awaits_presence();
@@ -99,94 +101,85 @@ bool Participant::settled() {
   return known;
 }
 
-void Participant::wait_for_news() {
-  std::unique_lock lock(structure_mutex_);
-  structure_changed_.wait_for(lock, kLookAround);
+Deadline Participant::call_deadline() const {
+  const auto now = Clock::now();
+  const auto meeting = settled_.load(std::memory_order_relaxed)
+                           ? Milliseconds(0)
+                           : std::chrono::ceil<Milliseconds>(settle_deadline_ - now);
+  return Deadline(Deadline::sum(options_.timeout, std::max(meeting, Milliseconds(0))), now);
 }
 
-void Participant::settle() {
-  while (!settled()) wait_for_news();
+tl::unexpected<Error> Participant::undecided(const std::string& what, const Deadline& deadline) {
+  std::string missing = "nobody was met yet";
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (const std::string* partition = directory_.incomplete()) {
+      missing = "partition " + quote(*partition) + " has not told all of its frames yet";
+    } else if (transport_->awaits_presence()) {
+      missing = "somebody was met who has not told yet what it owns";
+    } else if (!directory_.reachable_owners().empty()) {
+      missing = "there may be others who were not met yet";
+    }
+  }
+  return fail(Errc::kTimeout,
+              what + ", as far as is known after " + deadline.text() + ": " + missing);
 }
 
-void Participant::await_structure_change(std::uint64_t version) {
+void Participant::wait_for_news(const Deadline& deadline) {
   std::unique_lock lock(structure_mutex_);
-  structure_changed_.wait_for(lock, kStructureDelay,
-                              [&] { return forest_.structure_version() != version; });
+  structure_changed_.wait_until(lock, deadline.within(kLookAround).at());
+}
+
+Result<void> Participant::settle(const Deadline& deadline) {
+  while (!settled()) {
+    if (deadline.over()) return undecided("not all frames are known", deadline);
+    wait_for_news(deadline);
+  }
+  return {};
+}
+
+void Participant::await_structure_change(std::uint64_t version, const Deadline& deadline) {
+  std::unique_lock lock(structure_mutex_);
+  structure_changed_.wait_until(lock, deadline.within(kStructureDelay).at(),
+                                [&] { return forest_.structure_version() != version; });
 }
 
 // So that whoever changed something finds it changed. Past the deadline the change is made all the same.
-void Participant::await_epoch(const Part& part, std::uint64_t epoch, Clock::time_point deadline) {
+void Participant::await_epoch(const Part& part, std::uint64_t epoch, const Deadline& deadline) {
   std::unique_lock lock(structure_mutex_);
-  structure_changed_.wait_until(lock, deadline, [&] {
+  structure_changed_.wait_until(lock, deadline.at(), [&] {
     return directory_.epoch(part.owner) >= epoch || !directory_.reachable(part.owner);
   });
 }
 
-void Participant::send(Calls::Call& call, std::size_t entry, const Request& request,
-                       Clock::time_point deadline) {
-  if (auto sent = transport_->send(call.entries()[entry].partition, request, deadline); !sent) {
-    call.give_up(entry, std::move(sent.error()));
-  }
-}
-
-void Participant::wait_for_replies(Calls::Call& call, const std::vector<const Request*>& requests,
-                                   Clock::time_point deadline) {
-  Milliseconds pause = kFirstRepeat;
-  int asked = 1;
-  while (!call.wait_until(std::min(deadline, Clock::now() + pause))) {
-    const bool over = Clock::now() >= deadline;
-    for (std::size_t i = 0; i < requests.size(); ++i) {
-      if (!call.waits(i)) continue;
-      if (!over) {
-        send(call, i, *requests[i], deadline);
-        continue;
-      }
-      call.give_up(i, Error{Errc::kTimeout, "partition " + quote(call.entries()[i].partition) +
-                                                " did not answer within " +
-                                                std::to_string(options_.timeout.count()) +
-                                                " ms (asked " + std::to_string(asked) + " times)"});
-    }
-    ++asked;
-    pause = std::min(2 * pause, kLastRepeat);
-  }
-}
-
-std::vector<Reply> Participant::ask(std::vector<Part>& parts, Clock::time_point deadline) {
+std::vector<Reply> Participant::ask(std::vector<Part>& parts, const Deadline& deadline) {
   // What this process has changed itself comes before what it asks for: others build on that.
   const bool builds = std::any_of(parts.begin(), parts.end(), [](const Part& part) {
     return part.owner != kHeldHere && !is_question(part.request);
   });
-  if (builds && commits_ && commits_->pending()) (void)commits_->flush(deadline);
-  std::vector<std::string> partitions;
+  if (builds && commits_ && commits_->pending()) (void)commits_->flush(deadline.at());
   for (const Part& part : parts) {
-    if (part.owner == kHeldHere) continue;
-    partitions.push_back(part.partition);
-    transport_->prepare(part.partition);
+    if (part.owner != kHeldHere) transport_->prepare(part.partition);
   }
-  Calls::Call call(calls_, partitions);
-  std::vector<const Request*> requests;
-  for (Part& part : parts) {
-    if (part.owner == kHeldHere) continue;
-    const std::size_t entry = requests.size();
-    part.request.sequence = call.entries()[entry].sequence;
-    requests.push_back(&part.request);
-    send(call, entry, part.request, deadline);
+  const auto send = [&](const std::string& partition, const Request& request) {
+    return transport_->send(partition, request, deadline.at());
+  };
+  Asking asking(calls_, parts);
+  auto due = asking.send_due(Clock::now(), send);
+  asking.answer([this](const Request& request) { return answer_here(request); });
+  while (!asking.wait_until(std::min(due, deadline.at()))) {
+    const auto now = Clock::now();
+    if (deadline.over(now)) {
+      asking.give_up(deadline);
+      break;
+    }
+    due = asking.send_due(now, send);
   }
-  std::vector<Reply> replies(parts.size());
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    if (parts[i].owner == kHeldHere) replies[i] = answer_here(parts[i].request);
-  }
-  wait_for_replies(call, requests, deadline);
-  std::size_t entry = 0;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    if (parts[i].owner != kHeldHere) replies[i] = *call.entries()[entry++].reply;
-  }
-  return replies;
+  return asking.take_replies();
 }
 
-Result<void> Participant::change(std::vector<Part>& parts) {
-  if (parts.size() == 1 && parts[0].owner == kHeldHere) return change_here(parts[0].request);
-  const auto deadline = Clock::now() + options_.timeout;
+Result<void> Participant::change(std::vector<Part>& parts, const Deadline& deadline) {
+  if (parts.size() == 1 && parts[0].owner == kHeldHere) return change_here(parts[0].request, deadline);
   const std::vector<Reply> replies = ask(parts, deadline);
   Result<void> outcome;
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -204,24 +197,28 @@ Result<void> Participant::change(std::vector<Part>& parts) {
 
 Result<void> Participant::add(const std::string& id, const AddRequest& request,
                               const std::string& partition) {
-  auto added = healed([&] { return route_add(forest_, directory_, id, request, partition); },
-                      [&](Part& part) {
-                        std::vector<Part> parts{std::move(part)};
-                        return change(parts);
-                      });
+  const Deadline deadline = call_deadline();
+  auto added = healed(
+      deadline, [&] { return route_add(forest_, directory_, id, request, partition); },
+      [&](Part& part) {
+        std::vector<Part> parts{std::move(part)};
+        return change(parts, deadline);
+      });
   if (added) return added;
   return tl::unexpected(unless_unsaved(std::move(added.error()), id));
 }
 
 Result<void> Participant::remove(const std::string& id) {
+  const Deadline deadline = call_deadline();
   // All below it are told by name, so all must be known.
-  settle();
+  if (auto all = settle(deadline); !all) return all;
   bool asked = false;
-  auto removed = healed([&] { return route_remove(forest_, directory_, id); },
-                        [&](std::vector<Part>& parts) {
-                          asked = true;
-                          return change(parts);
-                        });
+  auto removed = healed(
+      deadline, [&] { return route_remove(forest_, directory_, id); },
+      [&](std::vector<Part>& parts) {
+        asked = true;
+        return change(parts, deadline);
+      });
   // Gone by the time of a second attempt: what was asked for has come to be.
   if (removed) return removed;
   const bool is_missing = is_elsewhere(removed.error());
@@ -230,39 +227,43 @@ Result<void> Participant::remove(const std::string& id) {
 }
 
 Result<void> Participant::move(const std::string& id, const MoveRequest& request) {
-  return healed([&] { return route_move(forest_, directory_, id, request); },
-                [&](Part& part) {
-                  std::vector<Part> parts{std::move(part)};
-                  return change(parts);
-                });
+  const Deadline deadline = call_deadline();
+  return healed(
+      deadline, [&] { return route_move(forest_, directory_, id, request); },
+      [&](Part& part) {
+        std::vector<Part> parts{std::move(part)};
+        return change(parts, deadline);
+      });
 }
 
 Result<void> Participant::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
   if (edges.empty()) return {};
   auto updated = forest_.update(edges, stamp);
   if (updated || !is_elsewhere(updated.error())) return updated;
-  return healed([&] { return route_update(forest_, directory_, edges, stamp); },
-                [&](std::vector<Part>& parts) { return change(parts); });
+  const Deadline deadline = call_deadline();
+  return healed(
+      deadline, [&] { return route_update(forest_, directory_, edges, stamp); },
+      [&](std::vector<Part>& parts) { return change(parts, deadline); });
 }
 
 Result<void> Participant::publish(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
   if (edges.empty()) return {};
   auto updated = forest_.update(edges, stamp);
   if (updated || !is_elsewhere(updated.error())) return updated;
-  auto parts = routed([&] { return route_update(forest_, directory_, edges, stamp); });
+  const Deadline deadline = call_deadline();
+  auto parts = routed(deadline, [&] { return route_update(forest_, directory_, edges, stamp); });
   if (!parts) return tl::unexpected(std::move(parts.error()));
-  const auto deadline = Clock::now() + options_.timeout;
   for (Part& part : *parts) {
     Update update{std::move(std::get<UpdateRequest>(part.request.body).edges), stamp};
     auto sent = part.owner == kHeldHere ? forest_.update(update.edges, update.stamp)
-                                        : transport_->send(part.partition, update, deadline);
+                                        : transport_->send(part.partition, update, deadline.at());
     if (!sent) return sent;
   }
   return {};
 }
 
 Result<std::vector<PathSegment>> Participant::path(std::string_view a, std::string_view b) {
-  return routed([&]() -> Result<std::vector<PathSegment>> {
+  return routed(call_deadline(), [&]() -> Result<std::vector<PathSegment>> {
     auto segments = forest_.segments(a, b);
     if (!segments) return tl::unexpected(std::move(segments.error()));
     std::vector<PathSegment> path;
@@ -274,16 +275,16 @@ Result<std::vector<PathSegment>> Participant::path(std::string_view a, std::stri
   });
 }
 
-Result<FrameInfo> Participant::info(const std::string& id) {
-  return when_known([&]() -> Result<FrameInfo> {
+Result<FrameInfo> Participant::info(const std::string& id, const Deadline& deadline) {
+  return when_known(deadline, [&]() -> Result<FrameInfo> {
     auto info = forest_.info(id);
     if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
     return *std::move(info);
   });
 }
 
-std::vector<Frame> Participant::frames() {
-  settle();
+Result<std::vector<Frame>> Participant::frames() {
+  if (auto all = settle(call_deadline()); !all) return tl::unexpected(std::move(all.error()));
   std::vector<FrameInfo> infos = forest_.frames();
   std::vector<Frame> frames;
   frames.reserve(infos.size());
@@ -302,8 +303,8 @@ std::size_t Participant::own_frames() {
   return partition_ != nullptr ? partition_->frame_count() : 0;
 }
 
-std::vector<PartitionInfo> Participant::partitions() {
-  settle();
+Result<std::vector<PartitionInfo>> Participant::partitions() {
+  if (auto all = settle(call_deadline()); !all) return tl::unexpected(std::move(all.error()));
   const std::lock_guard lock(structure_mutex_);
   auto all = directory_.partitions();
   if (partition_ == nullptr) return all;

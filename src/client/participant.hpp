@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <type_traits>
 #include <utility>
@@ -13,16 +14,18 @@
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
-#include "tfdude/partition/latest.hpp"
 #include "tfdude/partition/observing.hpp"
 #include "tfdude/partition/routing.hpp"
 #include "tfdude/transport/transport.hpp"
 
+#include "client/asking.hpp"
 #include "client/calls.hpp"
-#include "client/cancellation.hpp"
 #include "client/commit_loop.hpp"
+#include "client/deadline.hpp"
 #include "client/deferred.hpp"
 #include "client/events.hpp"
+#include "client/gathering.hpp"
+#include "client/lookups.hpp"
 #include "client/pusher.hpp"
 #include "client/watches.hpp"
 
@@ -64,8 +67,8 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
     auto local = forest_.lookup(a, b);
     if (local || is_of_time(local.error())) return local;
-    return lookup_elsewhere(a, b, {}).map(
-        [](const StampedTransform& X_AB) -> Transform { return X_AB; });
+    return lookup_elsewhere(a, b, {}, call_deadline())
+        .map([](const StampedTransform& X_AB) -> Transform { return X_AB; });
   }
   template <class Name>
   [[nodiscard]] Result<Pose> lookup_pose(Name a, Name b) {
@@ -76,12 +79,12 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Query& query) {
     auto local = forest_.lookup(a, b, query);
     if (local || is_of_time(local.error())) return local;
-    return lookup_elsewhere(a, b, query);
+    return lookup_elsewhere(a, b, query, call_deadline());
   }
-  /// @param cancelled  ends the wait; may be null
+  [[nodiscard]] Result<StampedTransform> lookup_by(std::string_view a, std::string_view b,
+                                                   const Query& query, const Deadline& deadline);
   [[nodiscard]] Result<StampedTransform> lookup_waiting(std::string_view a, std::string_view b,
-                                                        const Query& query, Milliseconds wait,
-                                                        Cancellation* cancelled);
+                                                        const Query& query, Milliseconds wait);
   /// @return what cancels it when its last copy goes
   [[nodiscard]] std::shared_ptr<void> lookup_async(const std::string& a, const std::string& b,
                                                    const Query& query, Milliseconds wait,
@@ -96,31 +99,37 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   // Measurements (participant_observe.cpp).
   [[nodiscard]] Result<Observed> observe(const std::string& a, const std::string& b,
                                          const Transform& X_AB, std::optional<Time> stamp,
-                                         const ObserveOptions& options);
+                                         const ObserveOptions& options, const Deadline& deadline);
   [[nodiscard]] Result<std::vector<EdgeConsistency>> consistency(const std::string& partition);
   [[nodiscard]] Result<std::vector<PastInfo>> past(const std::string& id);
   [[nodiscard]] Result<std::vector<PastInfo>> pasts(const std::string& partition);
   [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b);
-  [[nodiscard]] Result<FrameInfo> info(const std::string& id);
-  [[nodiscard]] std::vector<Frame> frames();
-  [[nodiscard]] std::vector<PartitionInfo> partitions();
+  [[nodiscard]] Result<FrameInfo> info(const std::string& id, const Deadline& deadline);
+  [[nodiscard]] Result<std::vector<Frame>> frames();
+  [[nodiscard]] Result<std::vector<PartitionInfo>> partitions();
   [[nodiscard]] std::size_t own_frames();
   /// @return what ends it when its last copy goes
   [[nodiscard]] std::shared_ptr<void> on_change(Events::Callback listener);
 
-  /// Waits until all that was there at the start is known, or the time for it is over.
-  void settle();
+  /// When a call that begins now must be over: after Options::timeout; while this participant may still be meeting others,
+  /// the rest of Options::discovery later.
+  [[nodiscard]] Deadline call_deadline() const;
+
+  /// Waits until all that was there at the start is known. @return kTimeout, naming what was missing.
+  [[nodiscard]] Result<void> settle(const Deadline& deadline);
 
   /// Runs an operation that may fail for what is not known yet; repeats it until it is known for sure.
+  /// @return also kTimeout, where it was not known by then
   template <class Operation>
-  auto when_known(Operation operation) -> decltype(operation()) {
+  auto when_known(const Deadline& deadline, Operation operation) -> decltype(operation()) {
     while (true) {
       if (auto ok = still_in(); !ok) return tl::unexpected(std::move(ok.error()));
       const bool certain = settled();
       auto result = operation();
       if (result || !may_appear(result.error().code)) return result;
       if (certain) return tl::unexpected(explained(std::move(result.error())));
-      wait_for_news();
+      if (deadline.over()) return undecided(result.error().message, deadline);
+      wait_for_news(deadline);
     }
   }
 
@@ -159,12 +168,14 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   /// @return kPartitionTaken once this participant has given its partition up.
   [[nodiscard]] Result<void> still_in();
   [[nodiscard]] bool settled();
-  void wait_for_news();
+  /// Why it is not known yet. @return kTimeout
+  [[nodiscard]] tl::unexpected<Error> undecided(const std::string& what, const Deadline& deadline);
+  void wait_for_news(const Deadline& deadline = Deadline(Milliseconds::max()));
 
   // Plans under structure_mutex_.
   template <class Route>
-  auto routed(Route route) -> decltype(route()) {
-    return when_known([&] {
+  auto routed(const Deadline& deadline, Route route) -> decltype(route()) {
+    return when_known(deadline, [&] {
       const std::lock_guard lock(structure_mutex_);
       return route();
     });
@@ -173,19 +184,18 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   /// Plans, asks, and plans again where the structure has changed meanwhile: the owner asked knows something
   /// newer than this process, or has not heard yet of a change that this process knows of.
   template <class Route, class Ask, class Plan = typename std::invoke_result_t<Route>::value_type>
-  std::invoke_result_t<Ask, Plan&> healed(Route route, Ask ask) {
-    const auto deadline = Clock::now() + options_.timeout;
+  std::invoke_result_t<Ask, Plan&> healed(const Deadline& deadline, Route route, Ask ask) {
     int attempts = 0;
     Milliseconds pause{5};
     while (true) {
       const std::uint64_t version = forest_.structure_version();
-      auto plan = routed(route);
+      auto plan = routed(deadline, route);
       if (!plan) return tl::unexpected(std::move(plan.error()));
       auto result = ask(*plan);
       if (result) return result;
-      if (result.error().code == Errc::kNotOwner && ++attempts < kAttempts) {
-        await_structure_change(version);
-      } else if (denies_plan(result.error().code) && Clock::now() + pause < deadline) {
+      if (result.error().code == Errc::kNotOwner && ++attempts < kAttempts && !deadline.over()) {
+        await_structure_change(version, deadline);
+      } else if (denies_plan(result.error().code) && !deadline.over(Clock::now() + pause)) {
         std::this_thread::sleep_for(pause);
         pause *= 2;
       } else {
@@ -198,19 +208,21 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
 
   // Lookups that others must be asked for, and what is pushed (participant_time.cpp).
   [[nodiscard]] Result<StampedTransform> lookup_elsewhere(std::string_view a, std::string_view b,
-                                                          const Query& query);
-  [[nodiscard]] Result<StampedTransform> lookup_elsewhere(Handle a, Handle b, const Query& query);
-  [[nodiscard]] Result<StampedTransform> gather(LookupPlan& plan, const std::string& a,
-                                                const std::string& b, std::optional<Time> hint);
-  [[nodiscard]] Result<std::vector<SegmentValues>> ask_values(std::vector<Part>& parts);
+                                                          const Query& query,
+                                                          const Deadline& deadline);
+  [[nodiscard]] Result<StampedTransform> lookup_elsewhere(Handle a, Handle b, const Query& query,
+                                                          const Deadline& deadline);
+  [[nodiscard]] Result<std::vector<SegmentValues>> ask_values(std::vector<Part>& parts,
+                                                              const Deadline& deadline);
+  [[nodiscard]] Lookups::Links links_of_lookups();
   [[nodiscard]] std::string new_source();
-  [[nodiscard]] Result<ObservedPath> ask_observed(ObservePlan& plan);
-  [[nodiscard]] Result<bool> revise(std::vector<Part> parts);
+  [[nodiscard]] Result<ObservedPath> ask_observed(ObservePlan& plan, const Deadline& deadline);
+  [[nodiscard]] Result<bool> revise(std::vector<Part> parts, const Deadline& deadline);
   /// The list that is a partition's answer.
   template <class Item>
-  [[nodiscard]] Result<std::vector<Item>> ask_list(Part part) {
+  [[nodiscard]] Result<std::vector<Item>> ask_list(Part part, const Deadline& deadline) {
     std::vector<Part> parts{std::move(part)};
-    Reply reply = std::move(ask(parts, Clock::now() + options_.timeout).front());
+    Reply reply = std::move(ask(parts, deadline).front());
     if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
     auto* all = std::get_if<std::vector<Item>>(&reply.body);
     return all != nullptr ? std::move(*all) : std::vector<Item>();
@@ -218,29 +230,27 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   /// The same by the partition's name, of all that it has.
   template <class Item, class Body>
   [[nodiscard]] Result<std::vector<Item>> ask_all(const std::string& partition, const Body& body) {
+    const Deadline deadline = call_deadline();
     return healed(
+        deadline,
         [&]() -> Result<Part> {
           const auto owner = directory_.owner(partition);
           if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
           return route_to(directory_, *owner, Request{0, partition, body});
         },
-        [&](Part& part) { return ask_list<Item>(std::move(part)); });
+        [&](Part& part) { return ask_list<Item>(std::move(part), deadline); });
   }
   [[nodiscard]] Result<WatchedPath::Route> plan_watch(const WatchedPath& path);
   [[nodiscard]] Reply answer_watch(const Request& request);
   void look_at_watches();
 
-  [[nodiscard]] Result<void> change(std::vector<Part>& parts);
+  [[nodiscard]] Result<void> change(std::vector<Part>& parts, const Deadline& deadline);
   [[nodiscard]] Result<void> publish_to(const Part& part, const JointUpdate& share,
-                                        Clock::time_point deadline);
-  [[nodiscard]] std::vector<Reply> ask(std::vector<Part>& parts, Clock::time_point deadline);
+                                        const Deadline& deadline);
+  [[nodiscard]] std::vector<Reply> ask(std::vector<Part>& parts, const Deadline& deadline);
   [[nodiscard]] Reply answer_here(const Request& request);
-  void send(Calls::Call& call, std::size_t entry, const Request& request,
-            Clock::time_point deadline);
-  void wait_for_replies(Calls::Call& call, const std::vector<const Request*>& requests,
-                        Clock::time_point deadline);
-  void await_structure_change(std::uint64_t version);
-  void await_epoch(const Part& part, std::uint64_t epoch, Clock::time_point deadline);
+  void await_structure_change(std::uint64_t version, const Deadline& deadline);
+  void await_epoch(const Part& part, std::uint64_t epoch, const Deadline& deadline);
   // What commits_ does (participant_commit.cpp).
   [[nodiscard]] Commit take() override;
   void publish(const Commit& commit) override;
@@ -253,8 +263,8 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   /// Where an own frame is not stored, neither that it is there nor that it is gone is said.
   [[nodiscard]] Error unless_unsaved(Error error, const std::string& id);
   /// Waits until own changes of the structure are stored, if they are to be.
-  [[nodiscard]] Result<void> await_stored(Clock::time_point deadline);
-  [[nodiscard]] Result<void> change_here(const Request& request);
+  [[nodiscard]] Result<void> await_stored(const Deadline& deadline);
+  [[nodiscard]] Result<void> change_here(const Request& request, const Deadline& deadline);
   [[nodiscard]] Result<void> claim_name();
   [[nodiscard]] Result<StoredState> open_store(std::unique_ptr<StateStore>& store);
   [[nodiscard]] Result<void> take_frames(const std::vector<FrameSpec>& frames);
@@ -281,17 +291,18 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   std::uint64_t told_epoch_ = 0;      // of what was published; under structure_mutex_
   std::uint64_t saved_commit_ = 0;    // of values; of the thread of commits_
   Calls calls_;
-  std::mutex hints_mutex_;
-  LatestHints hints_;
+  SharedHints hints_;
   std::mutex pushing_mutex_;  // pusher_ and watches_, as they are made, and leaving_
   bool leaving_ = false;
   std::unique_ptr<Pusher> pusher_;    // once somebody watches
   std::unique_ptr<Watches> watches_;  // once this process does
   std::atomic<Watches*> watching_{nullptr};
-  Cancellations pending_;  // lookups that wait
+  Lookups lookups_;  // that wait
   std::atomic<std::uint64_t> observations_{0};
   std::atomic<bool> settled_{false};
-  Clock::time_point settle_deadline_;
+  const Clock::time_point settle_deadline_;
+  const Clock::time_point
+      settled_at_last_;                   // who has not told by then what it owns is not waited for
   std::unique_ptr<Transport> transport_;  // stops before the rest goes
   // Both use the transport, and stop before it.
   std::optional<CommitLoop> commits_;  // set once, before partition_

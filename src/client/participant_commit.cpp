@@ -104,8 +104,8 @@ Error Participant::unless_unsaved(Error error, const std::string& id) {
   return why && partition_->is_unsaved(id) ? *std::move(why) : error;
 }
 
-Result<void> Participant::await_stored(Clock::time_point deadline) {
-  return commits_->stores() ? commits_->flush(deadline) : Result<void>();
+Result<void> Participant::await_stored(const Deadline& deadline) {
+  return commits_->stores() ? commits_->flush(deadline.at()) : Result<void>();
 }
 
 }  // namespace tfdude

@@ -63,7 +63,10 @@ void Participant::on_presence(const Presence& presence) {
     tell_changes();
   }
   structure_changed_.notify_all();
-  if (appeared) look_at_watches();
+  if (appeared) {
+    look_at_watches();
+    lookups_.look_again();
+  }
   const std::string who = quote(presence.partition) + " (host " + quote(presence.host) + ", pid " +
                           std::to_string(presence.pid) + ")";
   if (appeared) log().info("partition {} is there", who);
@@ -83,6 +86,7 @@ void Participant::on_lost(const std::string& partition, std::uint64_t incarnatio
   structure_changed_.notify_all();
   if (!news) return;
   look_at_watches();
+  lookups_.look_again();
   log().info("partition {} has gone or fallen silent", quote(partition));
   calls_.on_lost(partition);
 }

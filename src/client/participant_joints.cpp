@@ -22,21 +22,24 @@ void Participant::on_joints(const JointUpdate& update) {
 // All who have a joint are told, so all must be known.
 Result<void> Participant::update_joints(const JointUpdate& update) {
   if (update.joints.empty()) return {};
-  settle();
+  const Deadline deadline = call_deadline();
+  if (auto all = settle(deadline); !all) return all;
   return healed(
+      deadline,
       [&]() -> Result<std::vector<Part>> {
         auto parts = route_joints(directory_, update);
         if (!parts) return parts;
         if (auto ok = check_reachable(directory_, *parts); !ok) return tl::unexpected(ok.error());
         return parts;
       },
-      [&](std::vector<Part>& parts) { return change(parts); });
+      [&](std::vector<Part>& parts) { return change(parts, deadline); });
 }
 
 // Whoever is there gets its share, and the error of who is not is told.
 Result<void> Participant::publish_joints(const JointUpdate& update) {
   if (update.joints.empty()) return {};
-  settle();
+  const Deadline deadline = call_deadline();
+  if (auto all = settle(deadline); !all) return all;
   if (auto ok = still_in(); !ok) return ok;
   JointUpdate known{{}, update.stamp};
   Result<void> outcome;
@@ -53,7 +56,6 @@ Result<void> Participant::publish_joints(const JointUpdate& update) {
     parts = route_joints(directory_, known);
   }
   if (!parts) return tl::unexpected(std::move(parts.error()));
-  const auto deadline = Clock::now() + options_.timeout;
   for (const Part& part : *parts) {
     const auto& share = std::get<JointUpdate>(part.request.body);
     auto sent = publish_to(part, share, deadline);
@@ -63,7 +65,7 @@ Result<void> Participant::publish_joints(const JointUpdate& update) {
 }
 
 Result<void> Participant::publish_to(const Part& part, const JointUpdate& share,
-                                     Clock::time_point deadline) {
+                                     const Deadline& deadline) {
   if (part.owner == kHeldHere) {
     const std::lock_guard lock(joints_mutex_);
     return partition_->apply(share).map([](std::size_t) {});
@@ -72,7 +74,7 @@ Result<void> Participant::publish_to(const Part& part, const JointUpdate& share,
     const std::lock_guard lock(structure_mutex_);
     if (auto ok = check_reachable(directory_, {part}); !ok) return ok;
   }
-  return transport_->send(part.partition, share, deadline);
+  return transport_->send(part.partition, share, deadline.at());
 }
 
 Result<std::vector<JointInfo>> Participant::joints(const std::string& partition) {

@@ -34,15 +34,15 @@ std::string Participant::new_source() {
 }
 
 // The values of all edges that the plan names, of one instant.
-Result<ObservedPath> Participant::ask_observed(ObservePlan& plan) {
-  auto answers = ask_values(plan.parts);
+Result<ObservedPath> Participant::ask_observed(ObservePlan& plan, const Deadline& deadline) {
+  auto answers = ask_values(plan.parts, deadline);
   if (!answers) return tl::unexpected(std::move(answers.error()));
   OneInstant found = one_instant(*std::move(answers), std::nullopt);
   if (found.ask_again) {
     for (Part& part : plan.parts) {
       std::get<LookupRequest>(part.request.body).query.at = found.ask_again;
     }
-    answers = ask_values(plan.parts);
+    answers = ask_values(plan.parts, deadline);
     if (!answers) return tl::unexpected(std::move(answers.error()));
     found.answers = *std::move(answers);
   }
@@ -51,7 +51,7 @@ Result<ObservedPath> Participant::ask_observed(ObservePlan& plan) {
 
 // Nothing was applied (false), or all (true). One owner is asked before the others, the same for all who observe this path:
 // of two who have seen the same, one is refused there, and may try again before anything was applied.
-Result<bool> Participant::revise(std::vector<Part> parts) {
+Result<bool> Participant::revise(std::vector<Part> parts, const Deadline& deadline) {
   if (parts.empty()) return true;
   const auto first = std::min_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
     return a.partition < b.partition;
@@ -60,7 +60,6 @@ Result<bool> Participant::revise(std::vector<Part> parts) {
   std::vector<Part> others(std::make_move_iterator(parts.begin() + 1),
                            std::make_move_iterator(parts.end()));
   parts.resize(1);
-  const auto deadline = Clock::now() + options_.timeout;
   Reply reply = std::move(ask(parts, deadline).front());
   if (is_conflict(reply)) return false;
   if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
@@ -82,18 +81,19 @@ Result<bool> Participant::revise(std::vector<Part> parts) {
 
 Result<Observed> Participant::observe(const std::string& a, const std::string& b,
                                       const Transform& X_AB, std::optional<Time> stamp,
-                                      const ObserveOptions& options) {
+                                      const ObserveOptions& options, const Deadline& deadline) {
   if (auto ok = check_finite(X_AB); !ok) return fail_at("the measurement", ok.error());
   std::vector<std::string> beside;
   int torn = 0;
   for (int attempt = 0; attempt < kObserveAttempts; ++attempt) {
     ObservePlan used;
-    auto path = healed([&] { return route_observe(forest_, directory_, a, b, beside, stamp); },
-                       [&](ObservePlan& plan) {
-                         auto found = ask_observed(plan);
-                         used = std::move(plan);
-                         return found;
-                       });
+    auto path = healed(
+        deadline, [&] { return route_observe(forest_, directory_, a, b, beside, stamp); },
+        [&](ObservePlan& plan) {
+          auto found = ask_observed(plan, deadline);
+          used = std::move(plan);
+          return found;
+        });
     if (!path) return tl::unexpected(std::move(path.error()));
     const auto there = [this](const std::string& id) { return forest_.exists(id); };
     if (std::any_of(path->missing.begin(), path->missing.end(), there)) {
@@ -101,14 +101,14 @@ Result<Observed> Participant::observe(const std::string& a, const std::string& b
       continue;
     }
     // What one owner has been told already the others will have soon, unless an edge was given another value since.
-    if (path->torn && torn < kTornAttempts) {
+    if (path->torn && torn < kTornAttempts && !deadline.over()) {
       std::this_thread::sleep_for(kTornPause * (1 << torn++));
       --attempt;
       continue;
     }
     const auto found = tfdude::observe(path->edges, X_AB, new_source(), options);
     if (!found) return fail_at("the path from " + quote(a) + " to " + quote(b), found.error());
-    auto applied = revise(revisions(used, *path, *found));
+    auto applied = revise(revisions(used, *path, *found), deadline);
     if (!applied) return tl::unexpected(std::move(applied.error()));
     if (!*applied) continue;
     Observed observed{

@@ -171,7 +171,7 @@ void Participant::concede() {
 
 // Whether all that those who are reachable had changed when this was called is known here now.
 bool Participant::catch_up() {
-  const auto deadline = Clock::now() + options_.timeout;
+  const Deadline deadline(options_.timeout);
   std::vector<Part> parts;
   {
     const std::lock_guard lock(structure_mutex_);
@@ -233,10 +233,10 @@ Reply Participant::answer_here(const Request& request) {
   return reply;
 }
 
-Result<void> Participant::change_here(const Request& request) {
+Result<void> Participant::change_here(const Request& request, const Deadline& deadline) {
   Reply reply = answer_here(request);
   if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
-  return is_of_structure(request) ? await_stored(Clock::now() + options_.timeout) : Result<void>();
+  return is_of_structure(request) ? await_stored(deadline) : Result<void>();
 }
 
 void Participant::on_request(const PeerId& from, const Request& request) {

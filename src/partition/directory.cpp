@@ -304,10 +304,11 @@ std::vector<Owner> Directory::reachable_owners() const {
   return all;
 }
 
-bool Directory::complete() const {
-  return std::all_of(partitions_.begin(), partitions_.end(), [](const Known& partition) {
-    return !partition.info.reachable || partition.complete();
-  });
+const std::string* Directory::incomplete() const {
+  const auto found = std::find_if(
+      partitions_.begin(), partitions_.end(),
+      [](const Known& partition) { return partition.info.reachable && !partition.complete(); });
+  return found != partitions_.end() ? &found->info.name : nullptr;
 }
 
 std::vector<PartitionInfo> Directory::partitions() const {

@@ -228,7 +228,8 @@ class Forest::Impl {
 
   SlotArray slots_;
   EdgeTiming default_timing_;
-  std::function<void()> commit_listener_;
+  /// With whose they are.
+  std::vector<std::pair<const void*, std::function<void()>>> commit_listeners_;
   std::atomic<std::uint64_t> structure_version_{0};
   mutable WriteLock mutex_;
   Graph graph_;
@@ -246,6 +247,10 @@ class Forest::Impl {
   T& push(VersionPool<T>& pool, std::uint32_t slot);
   void append_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
   void insert_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
+  void show_commit();
+  void tell_commit() const {
+    for (const auto& [whose, listener] : commit_listeners_) listener();
+  }
   void drop_oldest(Ring& ring);
   void drop_samples(Ring& ring);
   void replace(Ring* ring);
@@ -268,7 +273,6 @@ class Forest::Impl {
   std::vector<const Name*> released_names_;  // by the commit being made
   std::vector<std::uint32_t> free_slots_;
   std::vector<std::uint32_t> to_update_;  // of the update being made; kept for its memory
-  std::uint32_t next_generation_ = 1;
 };
 
 }  // namespace tfdude

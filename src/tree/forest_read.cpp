@@ -32,9 +32,13 @@ Result<Forest::Impl::Ends> Forest::Impl::ends(std::string_view a, std::string_vi
 Result<Forest::Impl::Ends> Forest::Impl::ends(Handle a, Handle b) const {
   const std::uint64_t commit = snapshot();
   const Version* start = of(a, commit);
-  if (start == nullptr) return fail(Errc::kUnknownStart, "the first frame was removed");
+  if (start == nullptr)
+    return fail(Errc::kUnknownStart,
+                "the first frame was removed, or its handle is another client's");
   const Version* end = of(b, commit);
-  if (end == nullptr) return fail(Errc::kUnknownEnd, "the second frame was removed");
+  if (end == nullptr)
+    return fail(Errc::kUnknownEnd,
+                "the second frame was removed, or its handle is another client's");
   return Ends{start, end, commit};
 }
 

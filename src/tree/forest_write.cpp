@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <atomic>
 
 #include "tfdude/base/id.hpp"
 
@@ -7,6 +8,12 @@
 
 namespace tfdude {
 namespace {
+
+// Of the whole process, so that a handle of one forest's frame is none of another's.
+std::uint32_t next_generation() {
+  static std::atomic<std::uint32_t> last{0};
+  return last.fetch_add(1, std::memory_order_relaxed) + 1;
+}
 
 tl::unexpected<Error> unknown_frame(std::string_view id) {
   return fail(Errc::kUnknownFrame, "no frame " + quote(id));
@@ -40,7 +47,8 @@ Result<std::uint32_t> Forest::Impl::held_slot(std::string_view id) const {
 Result<std::uint32_t> Forest::Impl::held_slot(Handle frame) const {
   const Version* version = frame.slot < slots_.size() ? &newest(frame.slot) : nullptr;
   if (version == nullptr || !version->present() || version->generation != frame.generation) {
-    return fail(Errc::kUnknownFrame, "the frame of this handle was removed");
+    return fail(Errc::kUnknownFrame,
+                "the frame of this handle was removed, or is another client's");
   }
   if (!version->held()) {
     return fail(Errc::kNotOwner,
@@ -138,7 +146,7 @@ void Forest::Impl::hang(Version& fresh, std::uint32_t parent) const {
 
 void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
   const std::uint32_t old_parent = fresh.parent;
-  if (!fresh.present()) fresh.generation = next_generation_++;
+  if (!fresh.present()) fresh.generation = next_generation();
   if (old_parent != kNoSlot) graph_.unlink(old_parent, fresh.slot);
   graph_.ensure(fresh.slot);
   if (parent != kNoSlot) {
@@ -193,6 +201,17 @@ void Forest::Impl::release_if_unused(std::uint32_t slot) {
 }
 
 void Forest::Impl::commit() {
+  show_commit();
+  tell_commit();
+}
+
+void Forest::Impl::commit_structure() {
+  show_commit();
+  structure_version_.fetch_add(1, std::memory_order_release);
+  tell_commit();
+}
+
+void Forest::Impl::show_commit() {
   committed_.store(committed_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
   // Only now: a reader of the commit before may still reach a name through the version it sees.
   for (const Name* name : released_names_) {
@@ -201,12 +220,6 @@ void Forest::Impl::commit() {
   }
   released_names_.clear();
   if (superseded_.size() > kCollectAt) collect();
-  if (commit_listener_) commit_listener_();
-}
-
-void Forest::Impl::commit_structure() {
-  commit();
-  structure_version_.fetch_add(1, std::memory_order_release);
 }
 
 void Forest::Impl::collect() {
@@ -382,9 +395,13 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   return {};
 }
 
-void Forest::on_commit(std::function<void()> listener) {
+void Forest::on_commit(std::function<void()> listener, const void* whose) {
   const std::lock_guard lock(impl_->mutex_);
-  impl_->commit_listener_ = std::move(listener);
+  auto& all = impl_->commit_listeners_;
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [whose](const auto& one) { return one.first == whose; }),
+            all.end());
+  if (listener) all.emplace_back(whose, std::move(listener));
 }
 
 }  // namespace tfdude

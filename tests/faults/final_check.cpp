@@ -16,7 +16,9 @@ using Workers = std::vector<std::unique_ptr<Worker>>;
 
 Frames frames_of(Client& client) {
   Frames frames;
-  for (Frame& frame : client.frames()) frames.emplace(frame.id, std::move(frame));
+  auto all = client.frames();
+  if (!all) return frames;
+  for (Frame& frame : *all) frames.emplace(frame.id, std::move(frame));
   return frames;
 }
 
@@ -153,7 +155,9 @@ void check_all(const std::string& when, Cluster& cluster, Client& observer, cons
   const bool agree = testing::eventually([&] {
     differs.clear();
     frames = frames_of(fresh[0]);
-    for (const PartitionInfo& partition : fresh[0].partitions()) {
+    const auto partitions = fresh[0].partitions();
+    if (!partitions) differs += partitions.error().message + "\n";
+    for (const PartitionInfo& partition : partitions.value_or(std::vector<PartitionInfo>())) {
       if (!partition.reachable) differs += partition.name + " is not reachable\n";
     }
     for (auto& [name, client] : clients) {

@@ -173,8 +173,8 @@ std::vector<std::string> Worker::own(bool anchored) const {
 bool Worker::quiet() {
   if (calm_ <= kGrace) return false;
   const auto partitions = client_.partitions();
-  return partitions.size() == partitions_ &&
-         std::all_of(partitions.begin(), partitions.end(),
+  return partitions && partitions->size() == partitions_ &&
+         std::all_of(partitions->begin(), partitions->end(),
                      [](const PartitionInfo& partition) { return partition.reachable; });
 }
 

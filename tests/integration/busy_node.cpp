@@ -88,14 +88,15 @@ void add_and_remove(Work& work, Random& random) {
 
 bool sees_all(Client& client) {
   const auto partitions = client.partitions();
-  return partitions.size() == kPartitions &&
-         std::all_of(partitions.begin(), partitions.end(), [](const PartitionInfo& partition) {
+  return partitions && partitions->size() == kPartitions &&
+         std::all_of(partitions->begin(), partitions->end(), [](const PartitionInfo& partition) {
            return partition.reachable && partition.frames > 0;
          });
 }
 
 void work_on(Work& work) {
-  for (const Frame& frame : work.client.frames()) {
+  const auto frames = work.client.frames().value();
+  for (const Frame& frame : frames) {
     // Those of the configurations; others may be at work already.
     if (frame.id[0] == 'p' && !frame.parent.empty()) work.edges.push_back(frame.id);
   }

@@ -56,7 +56,8 @@ struct Five {
     for (Client* caller : callers()) {
       CHECK(structure_diff(*caller, oracle) == "");
       CHECK(lookups_diff(*caller, oracle) == "");
-      for (const Frame& frame : caller->frames()) CHECK(frame.partition == owners.at(frame.id));
+      const auto frames = caller->frames().value();
+      for (const Frame& frame : frames) CHECK(frame.partition == owners.at(frame.id));
     }
   }
 
@@ -168,8 +169,9 @@ TEST_CASE("five: a removal in the middle empties what hangs below, which can be 
   five.oracle.remove(removed);
   five.await_agreement();
   five.check_all();
-  CHECK(five.client->partitions().size() == 5);
-  for (const PartitionInfo& partition : five.client->partitions()) CHECK(partition.reachable);
+  CHECK(five.client->partitions()->size() == 5);
+  const auto partitions = five.client->partitions().value();
+  for (const PartitionInfo& partition : partitions) CHECK(partition.reachable);
   for (Process& daemon : five.daemons) CHECK(daemon.runs());
   // In the other order this time.
   std::string parent = "p0_a";

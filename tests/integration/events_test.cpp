@@ -63,7 +63,7 @@ TEST_CASE("events: a daemon that hung while its name was taken gives it up") {
   auto client = *Client::open(d.domain.options());
   REQUIRE(client.exists("hand_left"));
   d.arms->freeze();
-  REQUIRE(eventually([&] { return !client.partitions()[0].reachable; }));
+  REQUIRE(eventually([&] { return !client.partitions()->at(0).reachable; }));
   Process successor = d.domain.serve(kArmsFile);
   d.arms->signal(SIGCONT);
   const auto result = finish(*d.arms);
@@ -73,7 +73,7 @@ TEST_CASE("events: a daemon that hung while its name was taken gives it up") {
   CHECK_THAT(result.err, ContainsSubstring("while process " + std::to_string(d.arms->pid())));
   CHECK(successor.runs());
   CHECK(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
-  CHECK(client.partitions()[0].pid == static_cast<std::uint32_t>(successor.pid()));
+  CHECK(client.partitions()->at(0).pid == static_cast<std::uint32_t>(successor.pid()));
 }
 
 }  // namespace tfdude

@@ -59,7 +59,7 @@ TEST_CASE("faults: who needs a killed daemon is told at once, and others do not 
   d.arms->kill();
   check_arms_missing(client);
   check_arms_missing(client);
-  const auto partitions = client.partitions();
+  const auto partitions = client.partitions().value();
   REQUIRE(partitions.size() == 2);
   CHECK(partitions[0].name == "arms");
   CHECK_FALSE(partitions[0].reachable);
@@ -71,8 +71,8 @@ TEST_CASE("faults: who comes after a daemon was killed is told by the others wha
   d.arms->kill();
   auto newcomer = *Client::open(d.domain.options(kPatience));
   // It may come before the other daemon has noticed.
-  REQUIRE(eventually([&] { return newcomer.partitions().size() == 2; }));
-  CHECK_FALSE(newcomer.partitions()[0].reachable);
+  REQUIRE(eventually([&] { return newcomer.partitions()->size() == 2; }));
+  CHECK_FALSE(newcomer.partitions()->at(0).reachable);
   check_arms_missing(newcomer);
 }
 
@@ -107,8 +107,9 @@ TEST_CASE("faults: a killed daemon that is started again is asked again") {
     REQUIRE(after);
     CHECK(after->pose.matrix() == before->pose.matrix());
     // Host and process come with the presence, which may be behind the pages.
-    CHECK(eventually(
-        [&] { return client.partitions()[0].pid == static_cast<std::uint32_t>(d.arms->pid()); }));
+    CHECK(eventually([&] {
+      return client.partitions()->at(0).pid == static_cast<std::uint32_t>(d.arms->pid());
+    }));
   }
 }
 
@@ -175,7 +176,7 @@ TEST_CASE("faults: of two daemons of one name at the same instant exactly one se
     CHECK_THAT(lost.err, ContainsSubstring("process " + std::to_string(winner.pid())));
     auto client = *Client::open(domain.options());
     CHECK(client.lookup("arm_1", "hand_left"));
-    const auto partitions = client.partitions();
+    const auto partitions = client.partitions().value();
     REQUIRE(partitions.size() == 1);
     CHECK(partitions[0].pid == static_cast<std::uint32_t>(winner.pid()));
   }

@@ -172,8 +172,8 @@ TEST_CASE("malformed samples are counted, and change nothing") {
   CHECK(other.node.lookup("a", "a_tip"));
   REQUIRE(other.node.update("a_tip", {}));
   CHECK_FALSE(moved(owner.node, "a"));
-  CHECK(other.node.frames().size() == 4);
-  CHECK(other.node.partitions().size() == 2);
+  CHECK(other.node.frames()->size() == 4);
+  CHECK(other.node.partitions()->size() == 2);
 }
 
 }  // namespace tfdude

@@ -148,7 +148,7 @@ TEST_CASE("persistence: frames are there for others all the time while their dae
   std::size_t missing = 0;
   std::size_t looked = 0;
   std::thread watcher([&] {
-    for (; !stop; ++looked) missing += client.frames().size() == 2 ? 0U : 1U;
+    for (; !stop; ++looked) missing += client.frames()->size() == 2 ? 0U : 1U;
   });
   arms.start();
   const bool back = eventually([&] { return client.lookup("arm", "hand").has_value(); });
@@ -221,7 +221,7 @@ TEST_CASE("persistence: a removal that was missed is made up for at the return")
   auto client = *Client::open(arms.domain.options());
   REQUIRE(eventually([&] { return client.lookup("arm", "finger").has_value(); }));
   gripper.kill();
-  REQUIRE(eventually([&] { return !client.partitions()[1].reachable; }));
+  REQUIRE(eventually([&] { return !client.partitions()->at(1).reachable; }));
   REQUIRE(client.remove("hand"));
   bool gone = true;
   SECTION("in any order of the returns") {
@@ -236,7 +236,7 @@ TEST_CASE("persistence: a removal that was missed is made up for at the return")
   auto again = arms.domain.start_daemon(arguments);
   await_ready(again);
   CHECK(eventually([&] {
-    return client.partitions()[1].reachable && client.exists("gripper") != gone &&
+    return client.partitions()->at(1).reachable && client.exists("gripper") != gone &&
            client.exists("finger") != gone;
   }));
   auto fresh = *Client::open(arms.domain.options());

@@ -99,7 +99,8 @@ const std::vector<Refusal> kRefusals = {
 /// All that can be seen: the structure and each edge's value.
 std::string snapshot(Client& client) {
   std::string all;
-  for (const Frame& frame : client.frames()) {
+  const auto frames = client.frames().value();
+  for (const Frame& frame : frames) {
     all += frame.id + " " + frame.parent + " " + frame.partition + "\n";
     if (frame.parent.empty()) continue;
     const auto X_PC = client.lookup(frame.parent, frame.id);

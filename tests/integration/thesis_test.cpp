@@ -182,7 +182,7 @@ TEST_CASE("processes: a partition that lost all its frames lives on") {
   CHECK(r.oracle.ids() == std::vector<std::string>{"world"});
   r.check_agreement();
   if (r.arms) CHECK(r.arms->runs());
-  const auto partitions = r.caller().partitions();
+  const auto partitions = r.caller().partitions().value();
   REQUIRE(partitions.size() == 2);
   CHECK(partitions[0].name == "arms");
   CHECK(partitions[0].reachable);

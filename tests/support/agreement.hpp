@@ -12,7 +12,7 @@ namespace tfdude::testing {
 /// Empty if the client sees the oracle's frames with their parents, and no other; else the first that
 /// differs.
 [[nodiscard]] inline std::string structure_diff(Client& client, const Oracle& oracle) {
-  const auto frames = client.frames();
+  const auto frames = client.frames().value();
   const auto ids = oracle.ids();
   for (std::size_t i = 0; i < frames.size() || i < ids.size(); ++i) {
     const std::string seen = i < frames.size() ? frames[i].id : "nothing";

@@ -29,10 +29,10 @@ struct Options {
   std::string profile;  ///< XML file of DDS profiles; empty: the built-in ones
   /// HOST:PORT of a Fast DDS discovery server with id 0; empty: participants meet by multicast
   std::string discovery_server;
-  Milliseconds timeout{1000};  ///< how long a call waits for the partitions that it asks
-  /// How long a new participant looks round at most before it says that a frame is not there. It waits
-  /// this long only where it meets nobody; for others that it has met or heard of, and that are slow to tell what they own,
-  /// it waits three time-outs longer.
+  Milliseconds timeout{1000};  ///< how long a call may take, see Client
+  /// How long a new participant looks round at most before it says that a frame is not there. It waits this long only where
+  /// it meets nobody. Of others that it has met or heard of, and that are slow to tell what they own, calls say kTimeout,
+  /// until three time-outs later.
   Milliseconds discovery{1000};
   /// Directory in which a Node keeps its partition's frames, so that its next process has them back; empty:
   /// it keeps nothing. What others change by request is stored before they are answered.
@@ -70,25 +70,48 @@ struct Observed {
 
 class Participant;
 
-/// Keeps a listener listening; ends that when destroyed. May outlive the Client.
+/// Keeps a listener listening; ends that when destroyed, or when another is assigned to it.
+///
+/// @par Attach and detach  The listener may be called as soon as on_change() is, before that has returned. After
+///   ~Subscription has returned, and after ~Client has, whichever is first, the listener is not running and will not run:
+///   both wait for a call of it under way. Where the listener itself destroys its Subscription, another's, or the Client,
+///   that returns at once, and the listener is not called again. So a listener may use what lives longer than its
+///   Subscription, and the Client, and must not wait for a thread that destroys one of these. A Subscription that outlives
+///   its Client does nothing any more.
+/// @par Thread safety  Each Subscription is of one thread at a time.
 class Subscription {
  public:
   Subscription() = default;
   explicit Subscription(std::shared_ptr<void> token) : token_(std::move(token)) {}
+  Subscription(const Subscription&) = delete;
+  Subscription& operator=(const Subscription&) = delete;
+  Subscription(Subscription&&) = default;
+  Subscription& operator=(Subscription&&) = default;
+  ~Subscription() = default;
 
  private:
   std::shared_ptr<void> token_;
 };
 
-/// A lookup that waits for its data; cancelled when destroyed: its callback is not called any more then.
+/// A lookup that waits for its data; cancelled when destroyed.
+///
+/// @par Attach and detach  After cancel(), ~PendingLookup or ~Client has returned, the callback is not running and will
+///   not run: they wait for it where it runs, and return at once (20 ms at most) where it does not. Where the callback
+///   itself does one of these, that returns at once, too. A callback must not wait for a thread that does one of these.
+/// @par Thread safety  Each PendingLookup is of one thread at a time.
 class PendingLookup {
  public:
   using Callback = std::function<void(Result<StampedTransform>)>;
 
   PendingLookup() = default;
   explicit PendingLookup(std::shared_ptr<void> task) : task_(std::move(task)) {}
+  PendingLookup(const PendingLookup&) = delete;
+  PendingLookup& operator=(const PendingLookup&) = delete;
+  PendingLookup(PendingLookup&&) = default;
+  PendingLookup& operator=(PendingLookup&&) = default;
+  ~PendingLookup() = default;
 
-  /// As destroying it; waits for a callback under way, unless called from that.
+  /// As destroying it.
   void cancel() { task_.reset(); }
 
  private:
@@ -104,13 +127,18 @@ class PendingLookup {
 /// @par Errors  Every function may also fail with kUnreachable (a partition concerned is known to be
 ///   down), kTimeout (one did not answer in time, named in the message) or kNotOwner (the structure kept
 ///   changing while asked); those are left out below.
+/// @par Time bounds  Each call has one deadline, which counts for all that it waits for: meeting others, asking, waiting.
+///   Where nothing else is said it is Options::timeout after the call began; in the first Options::discovery of a
+///   participant, what is left of that later. A call returns 20 ms after its deadline at the latest, as far as the
+///   machine lets it run; it then fails with kTimeout, which says who or what was missing. Before everybody who is there
+///   was met, that is said instead of kUnknown... and kNotConnected.
 class Client {
  public:
-  /// Joins a domain over DDS; does not wait for anybody.
+  /// Joins a domain over DDS; does not wait for anybody. At once (some milliseconds).
   /// @return kConfig (profile), kTransport, kInvalidInput (domain).
   [[nodiscard]] static Result<Client> open(const Options& options = {});
 
-  /// Joins over any transport.
+  /// Joins over any transport. At once.
   [[nodiscard]] static Result<Client> open(std::unique_ptr<Transport> transport,
                                            const Options& options = {});
 
@@ -118,6 +146,9 @@ class Client {
   Client& operator=(const Client&) = delete;
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
+  /// Leaves. After this has returned no callback is running or will run, but for one that calls this itself, which may go
+  /// on without the Client. Lookups that wait are cancelled; futures of them are answered kTimeout. Waits for callbacks
+  /// that run, and not for anybody else.
   ~Client();
 
   /// Adds a frame; an empty parent makes a root.
@@ -132,7 +163,7 @@ class Client {
   [[nodiscard]] Result<void> remove(const std::string& id);
 
   /// Gives the edge from a frame's parent to the frame a new value, acknowledged by its owner. On a Node an
-  /// own edge costs no network, no lock that readers know, no allocation.
+  /// own edge costs no network, no lock that readers know, no allocation, and never waits.
   ///
   /// With a stamp (of the source's clock) the value is a sample, and the edge is moving from its first one on: between
   /// samples it is interpolated, before and after them it has no value. Without a stamp it is, on a moving edge, a
@@ -151,7 +182,8 @@ class Client {
   [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges,
                                     std::optional<Time> stamp = std::nullopt);
 
-  /// Streams new edge values to their owners, unacknowledged: the path for joints at 1 kHz and more. A
+  /// Streams new edge values to their owners, unacknowledged: the path for joints at 1 kHz and more. Waits, within the
+  /// bound of all calls, only until they can be reached. A
   /// share that an owner cannot take in time may be lost, never torn. Stamps are as for update(); samples that an owner
   /// refuses it counts (pasts()).
   /// @return kUnknownFrame.
@@ -192,6 +224,7 @@ class Client {
   /// path of own edges costs no network, no lock and no allocation; else one round trip, whatever the number of
   /// partitions on the path, or two where these have no common instant near that which was foreseen (see latest.hpp):
   /// where the answer was foreseen, it may be up to two samples of the slowest edge older than the newest.
+  /// A handle is of this client only: another's is that of no frame.
   /// @return kUnknownStart, kUnknownEnd, kNotConnected, kNotYet, kTooOld (no instant of which all edges have data).
   [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b);
   [[nodiscard]] Result<Transform> lookup(Handle a, Handle b);
@@ -206,7 +239,10 @@ class Client {
                                                 const Query& query);
   [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Query& query);
 
-  /// The same, waiting for frames and data that are not there yet. What is not kept any more fails at once.
+  /// The same, waiting for frames and data that are not there yet, so long at most, whatever has to be done meanwhile
+  /// (Options::timeout bounds only how long an owner is waited for before it is asked anew). Milliseconds::max(): without
+  /// end. What is not kept any more fails at once.
+  /// @return as above, what was missing last; kTimeout where there was no answer at all.
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                 const Query& query, Milliseconds wait);
 
@@ -217,17 +253,18 @@ class Client {
                                                 std::string_view fixed);
 
   /// As lookup() with a wait, answering to a function, on a thread of the library's that holds no lock. The function may
-  /// use the client, and must not throw. Ends before the client is destroyed at the latest.
+  /// use the client, destroy it or the PendingLookup, take any time (others are called by other threads meanwhile), and must
+  /// not throw. Returns at once; thousands that wait need one thread.
   [[nodiscard]] PendingLookup lookup_async(const std::string& a, const std::string& b,
                                            const Query& query, Milliseconds wait,
                                            PendingLookup::Callback callback);
-  /// The same, answering to a future.
+  /// The same, answering to a future: the wait later at most, or when the client is destroyed.
   [[nodiscard]] std::future<Result<StampedTransform>> lookup_async(const std::string& a,
                                                                    const std::string& b,
                                                                    const Query& query,
                                                                    Milliseconds wait);
 
-  /// Whether lookup() would answer; if not, why.
+  /// Whether lookup() would answer; if not, why. Takes as long as that.
   [[nodiscard]] Result<void> can_lookup(std::string_view a, std::string_view b,
                                         const Query& query = {});
 
@@ -265,6 +302,10 @@ class Client {
   [[nodiscard]] Result<std::vector<PastInfo>> pasts(const std::string& partition);
 
   /// Finds a frame once, for calls that then need no hashing. @return kUnknownFrame.
+  /// @note This and all below asks nobody: they answer from this process's replica of the structure, and wait only while a
+  ///   new participant may still be meeting others. Without a network, and where nobody is met, they wait for the
+  ///   rest of Options::discovery once, and then tell of what is known here: on a Node its own frames, else nothing.
+  ///   kTimeout where somebody was met who has not told all of his by the deadline.
   [[nodiscard]] Result<Handle> find(std::string_view id);
 
   /// Which partitions a lookup asks, in the order of the path; empty where a is b.
@@ -276,16 +317,19 @@ class Client {
   /// Sorted. @return kUnknownFrame.
   [[nodiscard]] Result<std::vector<std::string>> children(const std::string& id);
   /// Frames without a parent that is there; sorted.
-  [[nodiscard]] std::vector<std::string> roots();
+  [[nodiscard]] Result<std::vector<std::string>> roots();
+  /// Whether a frame of this id is known here at the deadline at the latest: false also where that could not be found out,
+  /// as without a network. parent() tells both apart.
   [[nodiscard]] bool exists(const std::string& id);
   /// All frames, sorted by id.
-  [[nodiscard]] std::vector<Frame> frames();
+  [[nodiscard]] Result<std::vector<Frame>> frames();
   /// All partitions, also those that are not reachable now; sorted by name.
-  [[nodiscard]] std::vector<PartitionInfo> partitions();
+  [[nodiscard]] Result<std::vector<PartitionInfo>> partitions();
 
   /// Calls a function with each change of the structure from now on: partitions that come and go, frames added,
   /// removed and moved, conflicts. What this participant knows already is not told. One call at a time, in
-  /// order, from a thread of the library's that holds no lock: it may use the client, and must not throw.
+  /// order, from a thread of the library's that holds no lock: it may use the client, end its Subscription or the client
+  /// (see Subscription), and must not throw. Returns at once.
   [[nodiscard]] Subscription on_change(std::function<void(const Change&)> listener);
 
  protected:
@@ -302,6 +346,8 @@ class Node : public Client {
   /// earlier process left of the partition is taken first; of the given frames those count that were not given,
   /// or given differently, to that process.
   ///
+  /// Takes 0.4 s as a rule; 5 s and Options::discovery at most, where a predecessor still seems to be there.
+  ///
   /// A Node learns, after a hang or a broken link, that another process has taken its partition since: it then
   /// gives way, reports a conflict without a frame, and answers every call with kPartitionTaken.
   /// @return kPartitionTaken (naming host and process), kState (naming the file), the first bad frame's error,
@@ -317,7 +363,7 @@ class Node : public Client {
                                          const Options& options = {});
 
   /// Says how the error of an own edge hangs together with those of others: for all its values, also those of the past,
-  /// until it is said anew. Not kept for the next process.
+  /// until it is said anew. Not kept for the next process. Never waits.
   /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the source; a joint that follows another, or is followed, says
   ///   it itself).
   [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);

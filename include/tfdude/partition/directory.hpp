@@ -99,7 +99,9 @@ class Directory {
   [[nodiscard]] std::uint64_t epoch(Owner owner) const { return partitions_[owner].epoch; }
 
   /// Whether all pages of all reachable partitions have come.
-  [[nodiscard]] bool complete() const;
+  [[nodiscard]] bool complete() const { return incomplete() == nullptr; }
+  /// The name of one of which they have not; null: there is none.
+  [[nodiscard]] const std::string* incomplete() const;
 
   /// Those of whom structure is here, but who are not reachable: what to tell newcomers.
   [[nodiscard]] std::vector<Absent> absent() const;

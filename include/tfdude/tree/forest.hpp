@@ -25,8 +25,9 @@ using Owner = std::uint32_t;
 /// The edge's value is held in this very forest.
 inline constexpr Owner kHeldHere = 0;
 
-/// A frame by number: found once by id, then used without hashing. Stands for this one frame until it
-/// is removed; a later frame of the same id gets another handle.
+/// A frame by number: found once by id, then used without hashing. Stands for this one frame of this one forest until
+/// it is removed; a later frame of the same id gets another handle, and to other forests of the process it is that of no
+/// frame.
 struct Handle {
   std::uint32_t slot = 0;
   std::uint32_t generation = 0;
@@ -324,8 +325,9 @@ class Forest {
   [[nodiscard]] std::vector<News> news(std::vector<EdgeCursor>& cursors, bool newest_only) const;
 
   /// Calls a function after each commit, from the thread that made it, which holds the forest's lock: it must be quick
-  /// and not write to the forest. Null: nobody.
-  void on_commit(std::function<void()> listener);
+  /// and not write to the forest. Null: none any more.
+  /// @param whose  each may have one
+  void on_commit(std::function<void()> listener, const void* whose = nullptr);
 
   /// What is kept of the past of held edges, those that are moving; of one where an id is given. Takes no lock. O(slots
   /// and samples).

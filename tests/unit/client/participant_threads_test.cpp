@@ -25,7 +25,8 @@ constexpr int kCalls = 300;
 
 std::vector<std::string> structure(Client& client) {
   std::vector<std::string> lines;
-  for (const Frame& frame : client.frames()) {
+  const auto frames = client.frames().value();
+  for (const Frame& frame : frames) {
     lines.push_back(frame.id + " < " + frame.parent + " @ " + frame.partition);
   }
   return lines;

@@ -1,0 +1,78 @@
+// How long calls take at most, once over each transport.
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <string>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/networks.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::Join;
+using testing::joined_by;
+using testing::outcome;
+using Clock = std::chrono::steady_clock;
+
+/// What the first lookup of a new client comes to, and how long it takes at best, of some clients: on a busy machine any
+/// may take longer.
+struct FirstLookup {
+  FirstLookup(const Join& join, const std::string& frame, Milliseconds wait) {
+    for (int i = 0; i < 5; ++i) {
+      auto client = *Client::open(join(""));
+      const auto start = Clock::now();
+      auto found = client.lookup("world", frame, {}, wait);
+      took = std::min(took, Clock::now() - start);
+      what = outcome(found);
+      if (!found) message = found.error().message;
+    }
+  }
+  Clock::duration took = Clock::duration::max();
+  std::string what;
+  std::string message;
+};
+
+}  // namespace
+
+TEST_CASE("bounds: alone in the domain a lookup waits no longer than it may") {
+  const int transport = GENERATE(0, 1);
+  const FirstLookup alone(joined_by(transport), "tool", 50ms);
+  INFO(alone.message);
+  CHECK(alone.took >= 50ms);
+  CHECK(alone.took < 70ms);
+  // Nobody can come unseen in one process.
+  CHECK(alone.what == (transport == 0 ? "unknown_start" : "timeout"));
+  if (transport == 0) return;
+  CHECK_THAT(alone.message, testing::ContainsSubstring("nobody was met yet"));
+  CHECK_THAT(alone.message, testing::ContainsSubstring("'world'"));
+}
+
+TEST_CASE("bounds: alone in the domain every call says after a while what it knows") {
+  auto client = *Client::open(joined_by(GENERATE(0, 1))(""));
+  CHECK(client.frames()->empty());
+  CHECK(client.partitions()->empty());
+  CHECK(client.roots()->empty());
+  CHECK_FALSE(client.exists("world"));
+  CHECK(outcome(client.children("world")) == "unknown_frame");
+  CHECK(outcome(client.lookup("world", "tool", {}, 1ms)) == "unknown_start");
+}
+
+TEST_CASE("bounds: the first lookup of a client waits no longer than it may") {
+  const Join join = joined_by(GENERATE(0, 1));
+  const auto node = *Node::open(join("robot"), "robot", {{"world", "", {}}, {"tool", "world", {}}});
+  const FirstLookup there(join, "tool", 20'000ms);
+  INFO(there.message);
+  CHECK(there.what == "ok");
+  const FirstLookup missing(join, "nobody", 30ms);
+  INFO(missing.message);
+  CHECK((missing.what == "timeout" || missing.what == "unknown_end"));
+  CHECK(missing.took < 50ms);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "tfdude/transport/transport.hpp"
+
+namespace tfdude::testing {
+
+/// A transport that hands on all that goes to another, and comes from there: what is to be otherwise is overridden.
+class Relay : public Transport, protected TransportHandler {
+ public:
+  explicit Relay(std::unique_ptr<Transport> real) : real_(std::move(real)) {}
+
+  Result<void> start(TransportHandler& handler) override {
+    handler_ = &handler;
+    return real_->start(*this);
+  }
+  void stop() override { real_->stop(); }
+  Result<void> serve(const std::string& partition) override { return real_->serve(partition); }
+  void announce(const Presence& presence) override { real_->announce(presence); }
+  void publish(const Page& page) override { real_->publish(page); }
+  void prepare(const std::string& partition) override { real_->prepare(partition); }
+  Result<void> send(const std::string& partition, const Request& request,
+                    Deadline deadline) override {
+    return real_->send(partition, request, deadline);
+  }
+  Result<void> send(const std::string& partition, const Update& update,
+                    Deadline deadline) override {
+    return real_->send(partition, update, deadline);
+  }
+  Result<void> send(const std::string& partition, const JointUpdate& update,
+                    Deadline deadline) override {
+    return real_->send(partition, update, deadline);
+  }
+  void reply(const PeerId& to, const Reply& reply) override { real_->reply(to, reply); }
+  Result<void> watch(std::uint64_t group) override { return real_->watch(group); }
+  void unwatch(std::uint64_t group) override { real_->unwatch(group); }
+  void push(const State& state) override { real_->push(state); }
+  void end_pushing(std::uint64_t group) override { real_->end_pushing(group); }
+  bool settled() const override { return real_->settled(); }
+  bool awaits_presence() const override { return real_->awaits_presence(); }
+  Milliseconds settle_time() const override { return real_->settle_time(); }
+
+ protected:
+  void on_request(const PeerId& from, const Request& request) override {
+    handler_->on_request(from, request);
+  }
+  void on_reply(const Reply& reply) override { handler_->on_reply(reply); }
+  void on_update(const Update& update) override { handler_->on_update(update); }
+  void on_joints(const JointUpdate& update) override { handler_->on_joints(update); }
+  void on_state(const State& state) override { handler_->on_state(state); }
+  void on_page(const Page& page) override { handler_->on_page(page); }
+  void on_presence(const Presence& presence) override { handler_->on_presence(presence); }
+  void on_lost(const std::string& partition, std::uint64_t incarnation) override {
+    handler_->on_lost(partition, incarnation);
+  }
+  bool owns(std::string_view id) const override { return handler_->owns(id); }
+  bool owns_joint(std::string_view name) const override { return handler_->owns_joint(name); }
+
+  TransportHandler& handler() { return *handler_; }
+  Transport& real() { return *real_; }
+
+ private:
+  const std::unique_ptr<Transport> real_;
+  TransportHandler* handler_ = nullptr;
+};
+
+}  // namespace tfdude::testing
