@@ -13,8 +13,10 @@ constexpr std::chrono::nanoseconds kAskLatest = Milliseconds(50);
 // and on behalf of all lookups that wait no more often than this.
 constexpr std::chrono::microseconds kAskEvery{250};
 
-// Whoever writes without a pause has all that waits looked at as often as that takes a quarter of a processor.
+// Whoever writes without a pause has all that waits looked at no more often than this, and so that it takes a quarter of a
+// processor at most: who writes wakes the thread, which costs it some microseconds.
 constexpr int kRest = 3;
+constexpr std::chrono::nanoseconds kShortestRest = std::chrono::microseconds(100);
 constexpr std::chrono::nanoseconds kLongestRest = Milliseconds(10);
 
 bool is_structural(Errc code) {
@@ -127,8 +129,8 @@ void Lookups::run() {
     const auto begin = Clock::now();
     const auto next = attend(all, written);
     const auto end = Clock::now();
-    const auto rested =
-        end + std::min<std::chrono::nanoseconds>(kRest * (end - begin), kLongestRest);
+    const auto rested = end + std::clamp<std::chrono::nanoseconds>(kRest * (end - begin),
+                                                                   kShortestRest, kLongestRest);
     lock.lock();
     const auto must = [this] { return stopping_ || urgent_.load(); };
     changed_.wait_until(lock, std::min(next, rested), must);
