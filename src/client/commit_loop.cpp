@@ -10,7 +10,8 @@ namespace {
 
 // What a requester is told of whose change, or of what its refusal rests on, nothing is stored.
 Error unsaved(const Reply& reply, const Error& why) {
-  if (std::holds_alternative<Error>(reply.body)) return why;
+  const auto* error = std::get_if<Error>(&reply.body);
+  if (error != nullptr) return error->code == Errc::kState ? *error : why;
   if (why.code != Errc::kState) return why;
   return {why.code,
           "changed, but not stored, and others are not told before it is: " + why.message};

@@ -1,0 +1,191 @@
+// What a daemon says and does while its disk is full, or slow.
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/small_disk.hpp"
+#include "support/test_domain.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::await_ready;
+using testing::Clock;
+using testing::ContainsSubstring;
+using testing::eventually;
+using testing::outcome;
+using testing::Process;
+using testing::SmallDisk;
+using testing::TemporaryDirectory;
+using testing::TestDomain;
+using testing::x_of;
+
+constexpr const char* kArms = R"(partition: arms
+frames:
+  - {id: arm, xyz: [1, 0, 0]}
+  - {id: hand, parent: arm, xyz: [10, 0, 0]}
+)";
+
+// Adds frames until the disk takes no more. @return those that were acknowledged
+std::vector<std::string> add_until_full(Client& client, const std::string& name,
+                                        std::string& refused) {
+  std::vector<std::string> there;
+  for (int i = 0; i < 1000; ++i) {
+    refused = name + std::to_string(i);
+    const auto added = client.add(refused, "hand", along_x(i));
+    if (added) {
+      there.push_back(refused);
+      continue;
+    }
+    CHECK(added.error().code == Errc::kState);
+    CHECK_THAT(added.error().message, ContainsSubstring("changed, but not stored"));
+    CHECK_THAT(added.error().message, ContainsSubstring("disk is full (SQLite code 13)"));
+    break;
+  }
+  return there;
+}
+
+// The longest time without a streamed value that has come to be looked up.
+Clock::duration longest_silence(Client& client, const std::atomic<bool>& stop) {
+  Clock::duration longest{0};
+  auto last = Clock::now();
+  for (int i = 1; !stop; ++i) {
+    (void)client.publish({{"hand", along_x(i)}});
+    while (!stop && x_of(client.lookup("arm", "hand")) != i) {
+      (void)client.publish({{"hand", along_x(i)}});
+    }
+    longest = std::max(longest, Clock::now() - last);
+    last = Clock::now();
+  }
+  return longest;
+}
+
+}  // namespace
+
+TEST_CASE("storing: of what a full disk does not take nothing is called done, or seen by others") {
+  const SmallDisk disk(400);
+  if (!disk.mounted()) {
+    WARN("SKIPPED: a small disk needs root");
+    return;
+  }
+  const TestDomain domain;
+  const TemporaryDirectory files;
+  const std::vector<std::string> arguments{"--config", files.write("arms.yaml", kArms), "--state",
+                                           disk.path()};
+  auto daemon = domain.start_daemon(arguments);
+  await_ready(daemon);
+  auto client = *Client::open(domain.options());
+  REQUIRE(client.add("kept", "hand", {}));
+  REQUIRE(client.add("gone", "hand", {}));
+  REQUIRE(client.remove("gone"));
+  disk.fill();
+  std::string refused;
+  auto there = add_until_full(client, "f", refused);
+
+  const auto removal = domain.cli({"remove", "kept"});
+  CHECK(removal.status == 1);
+  CHECK(removal.out.empty());
+  CHECK_THAT(removal.err, ContainsSubstring("changes nothing before it can store"));
+  CHECK_THAT(removal.err, ContainsSubstring("disk is full"));
+  CHECK(outcome(client.remove("kept")) == "state");
+  CHECK(outcome(client.move("kept", "arm")) == "state");
+  CHECK(outcome(client.update("kept", along_x(3))) == "state");
+  // Nobody has seen it, so nobody is told that it is there.
+  CHECK(outcome(client.add(refused, "hand", {})) == "state");
+  auto newcomer = *Client::open(domain.options());
+  CHECK_FALSE(newcomer.exists(refused));
+  CHECK(newcomer.exists("kept"));
+
+  SECTION("it is stored, told and done once there is room") {
+    disk.make_room();
+    CHECK(eventually([&] { return newcomer.exists(refused); }));
+    CHECK(eventually([&] { return client.remove("kept").has_value(); }));
+    there.push_back(refused);
+  }
+  SECTION("until then it is lost with the process, and nothing else is") { disk.make_room(); }
+  daemon.kill();
+  auto again = domain.start_daemon(arguments);
+  await_ready(again);
+  for (const std::string& id : there) CHECK(eventually([&] { return client.exists(id); }));
+  auto fresh = *Client::open(domain.options());
+  CHECK_FALSE(fresh.exists("gone"));
+}
+
+TEST_CASE("storing: a removal that was refused has not happened after a kill") {
+  const SmallDisk disk(400);
+  if (!disk.mounted()) {
+    WARN("SKIPPED: a small disk needs root");
+    return;
+  }
+  const TestDomain domain;
+  const TemporaryDirectory files;
+  const std::vector<std::string> arguments{"--config", files.write("arms.yaml", kArms), "--state",
+                                           disk.path()};
+  auto daemon = domain.start_daemon(arguments);
+  await_ready(daemon);
+  auto client = *Client::open(domain.options());
+  disk.fill();
+  int acknowledged = 0;
+  std::string last;
+  // Each removal is the first change that may meet the full disk.
+  for (int i = 0; i < 1000; ++i) {
+    const auto removed = client.remove("hand");
+    if (!removed) {
+      last = "hand";
+      CHECK(removed.error().code == Errc::kState);
+      break;
+    }
+    if (!client.add("hand", "arm", along_x(10))) break;
+    ++acknowledged;
+  }
+  INFO(acknowledged << " removals were stored");
+  daemon.kill();
+  disk.make_room();
+  auto again = domain.start_daemon(arguments);
+  await_ready(again);
+  auto fresh = *Client::open(domain.options());
+  CHECK(fresh.exists("hand") == (last == "hand"));
+}
+
+TEST_CASE("storing: lookups and streams go on while the disk takes a second for a sync") {
+#ifndef TFDUDE_SLOW_SYNC
+  WARN("SKIPPED: a library cannot be preloaded into a program with sanitizers");
+#else
+  const TestDomain domain;
+  const TemporaryDirectory files;
+  Process daemon({"/usr/bin/env", "LD_PRELOAD=" TFDUDE_SLOW_SYNC, "TFDUDE_SYNC_MS=1000",
+                  TFDUDE_DAEMON, "--config", files.write("arms.yaml", kArms), "--state",
+                  files.path(), "--domain", std::to_string(domain.number()), "--profile",
+                  TFDUDE_LOOPBACK_PROFILE});
+  await_ready(daemon);
+  auto client = *Client::open(domain.options());
+  auto other = *Client::open(domain.options());
+  REQUIRE(other.exists("hand"));
+  std::atomic<bool> stop{false};
+  Clock::duration silence{0};
+  std::thread streaming([&] { silence = longest_silence(other, stop); });
+  Clock::duration longest{0};
+  std::string failed;
+  // The log is synced each thousand pages, and a change that waits for that is answered after it.
+  for (int i = 0; i < 5000 && failed.empty() && longest < std::chrono::seconds(1); ++i) {
+    const auto start = Clock::now();
+    const auto added = client.add("f" + std::to_string(i), "hand", {});
+    if (!added) failed = added.error().message;
+    longest = std::max(longest, Clock::now() - start);
+  }
+  stop = true;
+  streaming.join();
+  CHECK(failed == "");
+  CHECK(longest >= std::chrono::seconds(1));
+  CHECK(silence < std::chrono::milliseconds(600));
+#endif
+}
+
+}  // namespace tfdude

@@ -1,0 +1,30 @@
+// Preloaded into a process, makes its disk slow: each sync takes TFDUDE_SYNC_MS longer.
+
+#include <chrono>
+#include <cstdlib>
+#include <sys/syscall.h>
+#include <thread>
+#include <unistd.h>
+
+namespace {
+
+void take_long() {
+  const char* milliseconds = std::getenv("TFDUDE_SYNC_MS");
+  if (milliseconds == nullptr) return;
+  std::this_thread::sleep_for(std::chrono::milliseconds(std::atoi(milliseconds)));
+}
+
+}  // namespace
+
+extern "C" {
+
+int fsync(int file) {
+  take_long();
+  return static_cast<int>(syscall(SYS_fsync, file));
+}
+
+int fdatasync(int file) {
+  take_long();
+  return static_cast<int>(syscall(SYS_fdatasync, file));
+}
+}
