@@ -59,6 +59,7 @@ class Watcher final : public Transport, public TransportHandler {
   }
   void on_reply(const Reply& reply) override { handler_->on_reply(reply); }
   void on_state(const State& state) override { handler_->on_state(state); }
+  void on_watcher(std::uint64_t group) override { handler_->on_watcher(group); }
   void on_page(const Page& page) override { handler_->on_page(page); }
   void on_presence(const Presence& presence) override { handler_->on_presence(presence); }
   void on_lost(const std::string& partition, std::uint64_t incarnation) override {

@@ -150,6 +150,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   void on_update(const Update& update) override;
   void on_joints(const JointUpdate& update) override;
   void on_state(const State& state) override;
+  void on_watcher(std::uint64_t group) override;
   void on_page(const Page& page) override;
   void on_presence(const Presence& presence) override;
   void on_lost(const std::string& partition, std::uint64_t incarnation) override;
@@ -240,7 +241,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
         },
         [&](Part& part) { return ask_list<Item>(std::move(part), deadline); });
   }
-  [[nodiscard]] Result<WatchedPath::Route> plan_watch(const WatchedPath& path);
+  [[nodiscard]] Result<WatchRoute> plan_watch(const WatchedPath& path);
   [[nodiscard]] Reply answer_watch(const Request& request);
   void look_at_watches();
 

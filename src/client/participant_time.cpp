@@ -1,4 +1,5 @@
 #include <cmath>
+#include <sstream>
 
 #include "tfdude/base/id.hpp"
 
@@ -7,19 +8,22 @@
 // Paths that are pushed.
 namespace tfdude {
 
-Result<WatchedPath::Route> Participant::plan_watch(const WatchedPath& path) {
+Result<WatchRoute> Participant::plan_watch(const WatchedPath& path) {
   const WatchOptions& options = path.options();
   std::chrono::nanoseconds period{0};
   if (options.rate > 0) period = std::chrono::nanoseconds(std::llround(1e9 / options.rate));
   const std::lock_guard lock(structure_mutex_);
   auto plan = route_watch(forest_, directory_, path.a(), path.b(), options.composed, period);
   if (!plan) return tl::unexpected(std::move(plan.error()));
-  WatchedPath::Route route{std::move(plan->edges), {}, std::move(plan->parts)};
+  WatchRoute route{std::move(plan->edges), {}, std::move(plan->parts)};
   for (const Part& part : route.parts) {
     const auto& request = std::get<WatchRequest>(part.request.body);
     const auto serving = directory_.serving(part.partition);
-    WatchedPath::Source source{part.partition, serving ? serving->incarnation : 0,
-                               watch_group(part.partition, request), request.edges};
+    const std::uint64_t incarnation = part.owner == kHeldHere ? presence_.incarnation
+                                      : serving               ? serving->incarnation
+                                                              : 0;
+    WatchRoute::Source source{
+        part.partition, incarnation, watch_group(part.partition, incarnation, request), {}};
     for (const PathEnds& segment : request.segments) source.frames.push_back(segment.to);
     route.sources.push_back(std::move(source));
   }
@@ -28,9 +32,13 @@ Result<WatchedPath::Route> Participant::plan_watch(const WatchedPath& path) {
 
 Result<std::shared_ptr<WatchedPath>> Participant::watch(const std::string& a, const std::string& b,
                                                         const WatchOptions& options) {
-  if (!(options.rate >= 0) || options.rate > 1e6) {
-    return fail(Errc::kInvalidInput, "the rate of a watch must be within 0 and 1e6 Hz, not " +
-                                         std::to_string(options.rate));
+  constexpr double kLeast = 1.0 / std::chrono::duration<double>(kMaxWatchPeriod).count();
+  const bool every_sample = options.rate == 0;
+  if (!every_sample && !(options.rate >= kLeast && options.rate <= 1e6)) {
+    std::ostringstream rate;
+    rate << options.rate;
+    return fail(Errc::kInvalidInput,
+                "the rate of a watch must be 0, or from one an hour to 1e6 Hz, not " + rate.str());
   }
   const Deadline deadline = call_deadline();
   auto known = routed(deadline, [&] { return forest_.segments(a, b); });
@@ -75,7 +83,12 @@ Reply Participant::answer_watch(const Request& request) {
     }
     pusher = pusher_.get();
   }
-  auto state = pusher->watch(watch_group(partition_name_, watch), watch);
+  std::uint64_t incarnation = 0;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    incarnation = presence_.incarnation;
+  }
+  auto state = pusher->watch(watch_group(partition_name_, incarnation, watch), watch);
   if (!state) return {request.sequence, 0, std::move(state.error())};
   if (tied_entries(*state) > kMaxTies) {
     return {request.sequence, 0,
@@ -88,6 +101,11 @@ Reply Participant::answer_watch(const Request& request) {
 
 void Participant::on_state(const State& state) {
   if (Watches* watches = watching_.load()) watches->on_state(state);
+}
+
+void Participant::on_watcher(std::uint64_t group) {
+  const std::lock_guard lock(pushing_mutex_);
+  if (pusher_ != nullptr) pusher_->tell_all(group);
 }
 
 void Participant::look_at_watches() {

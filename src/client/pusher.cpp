@@ -19,17 +19,19 @@ void Pusher::stop() {
 }
 
 Result<State> Pusher::watch(std::uint64_t group, const WatchRequest& request) {
+  if (auto ok = check_watch(request); !ok) return tl::unexpected(ok.error());
   Result<State> snapshot;
   {
     const std::lock_guard lock(groups_mutex_);
     const bool first = groups_.empty();
     auto known = groups_.find(group);
     if (known == groups_.end()) {
-      known = groups_.emplace(group, Group{WatchedGroup(group, request), {}, Clock::now()}).first;
+      known = groups_.emplace(group, Group{WatchedGroup(group, request), {}, Clock::now(), false})
+                  .first;
     }
-    snapshot = known->second.watched.snapshot(forest_);
+    snapshot = known->second.watched.snapshot(forest_, request.from);
     if (!snapshot) {
-      groups_.erase(known);
+      end(known);
     } else {
       known->second.lease = Clock::now() + kWatchLease;
     }
@@ -37,6 +39,22 @@ Result<State> Pusher::watch(std::uint64_t group, const WatchRequest& request) {
   }
   ask();
   return snapshot;
+}
+
+void Pusher::tell_all(std::uint64_t group) {
+  {
+    const std::lock_guard lock(groups_mutex_);
+    const auto known = groups_.find(group);
+    if (known == groups_.end()) return;
+    known->second.all = true;
+  }
+  ask();
+}
+
+// Told by the thread, which may be pushing to the group still.
+void Pusher::end(std::map<std::uint64_t, Group>::iterator& group) {
+  ended_.push_back(group->first);
+  group = groups_.erase(group);
 }
 
 void Pusher::ask() {
@@ -52,8 +70,7 @@ std::vector<State> Pusher::take_due(Clock::time_point now, std::vector<std::uint
   const std::lock_guard lock(groups_mutex_);
   for (auto group = groups_.begin(); group != groups_.end();) {
     if (now >= group->second.lease) {
-      ended.push_back(group->first);
-      group = groups_.erase(group);
+      end(group);
       continue;
     }
     Group& one = group->second;
@@ -68,7 +85,14 @@ std::vector<State> Pusher::take_due(Clock::time_point now, std::vector<std::uint
     } else {
       next = next ? std::min(*next, one.due) : one.due;
     }
+    if (std::exchange(one.all, false)) {
+      if (auto state = one.watched.snapshot(forest_, {})) due.push_back(*std::move(state));
+    }
     ++group;
+  }
+  // One that is watched again goes on.
+  for (const std::uint64_t group : std::exchange(ended_, {})) {
+    if (groups_.count(group) == 0) ended.push_back(group);
   }
   if (groups_.empty()) {
     forest_.on_commit(nullptr);
@@ -97,13 +121,7 @@ void Pusher::run() {
     next.reset();
     std::vector<std::uint64_t> ended;
     for (State& state : take_due(Clock::now(), ended, next)) {
-      // In pieces that a message can hold.
-      const std::size_t most = tied_entries(state) > kMaxTies ? kMaxTies : kMaxItems;
-      for (std::size_t from = 0; from < state.entries.size(); from += most) {
-        const auto begin = state.entries.begin() + static_cast<std::ptrdiff_t>(from);
-        const auto count = std::min(most, state.entries.size() - from);
-        push_({state.group, {begin, begin + static_cast<std::ptrdiff_t>(count)}});
-      }
+      for (const State& piece : pieces_of(std::move(state))) push_(piece);
     }
     for (const std::uint64_t group : ended) end_(group);
     lock.lock();

@@ -202,6 +202,7 @@ Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
   const auto body_of = [&](Owner owner, const std::string& id) -> WatchRequest& {
     auto& body = body_for<WatchRequest>(plan.parts, directory, owner, id);
     body.period = period;
+    body.composed = composed;
     return body;
   };
   if (composed) {
@@ -216,15 +217,14 @@ Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
     auto edges = forest.edges(a, b);
     if (!edges) return tl::unexpected(std::move(edges.error()));
     for (const FrameInfo& edge : *edges) {
-      body_of(edge.owner, edge.id).edges.push_back(edge.id);
+      body_of(edge.owner, edge.id).segments.push_back({edge.parent, edge.id});
     }
     plan.edges = *std::move(edges);
   }
   if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
   for (const Part& part : plan.parts) {
-    const auto& body = std::get<WatchRequest>(part.request.body);
-    const std::size_t items = std::max(body.edges.size(), body.segments.size());
-    if (auto ok = check_size(part, items, "edges"); !ok) return tl::unexpected(ok.error());
+    const std::size_t edges = std::get<WatchRequest>(part.request.body).segments.size();
+    if (auto ok = check_size(part, edges, "edges"); !ok) return tl::unexpected(ok.error());
   }
   return plan;
 }

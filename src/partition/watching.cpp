@@ -1,6 +1,7 @@
 #include "tfdude/partition/watching.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -36,7 +37,7 @@ void tie(News& entry, const Ties& ties) {
 std::vector<News> entries_of(const SegmentValues& found) {
   std::vector<News> entries;
   for (std::uint32_t i = 0; i < found.values.size(); ++i) {
-    entries.push_back({i, found.stamp, found.values[i], {}});
+    entries.push_back({i, found.stamp, found.values[i], {}, found.history, {}});
     if (!found.ties.empty()) tie(entries.back(), found.ties[i]);
   }
   return entries;
@@ -54,12 +55,13 @@ std::size_t tied_entries(const State& state) {
                     [](const News& entry) { return !entry.correlation.empty(); }));
 }
 
-std::uint64_t watch_group(std::string_view partition, const WatchRequest& request) {
+std::uint64_t watch_group(std::string_view partition, std::uint64_t incarnation,
+                          const WatchRequest& request) {
   Fingerprint print;
   print.add(partition);
+  print.add(incarnation);
   print.add(static_cast<std::uint64_t>(request.period.count()));
-  for (const std::string& edge : request.edges) print.add(edge);
-  print.add(request.segments.size());
+  print.add(std::uint64_t{request.composed});
   for (const PathEnds& ends : request.segments) {
     print.add(ends.from);
     print.add(ends.to);
@@ -67,52 +69,125 @@ std::uint64_t watch_group(std::string_view partition, const WatchRequest& reques
   return print.value();
 }
 
-Result<State> WatchedGroup::snapshot(const Forest& forest) {
-  if (!request_.segments.empty()) {
-    auto found = forest.lookup_segments(request_.segments);
-    if (!found) return tl::unexpected(std::move(found.error()));
-    return State{id_, entries_of(*found)};
-  }
+Result<void> check_watch(const WatchRequest& request) {
+  constexpr std::chrono::nanoseconds kLongest = kMaxWatchPeriod;
+  if (request.period >= std::chrono::nanoseconds(0) && request.period <= kLongest) return {};
+  return fail(Errc::kInvalidInput, "the period of a watch must be within 0 and " +
+                                       in_milliseconds(kLongest) + ", not " +
+                                       in_milliseconds(request.period));
+}
+
+WatchedGroup::WatchedGroup(std::uint64_t id, WatchRequest request)
+    : id_(id), request_(std::move(request)), sent_(request_.segments.size()) {
+  if (!request_.composed) cursors_ = fresh_cursors();
+}
+
+std::vector<EdgeCursor> WatchedGroup::fresh_cursors() const {
   std::vector<EdgeCursor> cursors;
-  for (const std::string& edge : request_.edges) {
-    const auto frame = forest.find(edge);
-    if (!frame || !forest.holds(edge)) {
-      return fail(Errc::kNotOwner, "frame " + quote(edge) + " is not of this partition");
-    }
-    cursors.push_back({*frame, std::nullopt, 0});
+  cursors.reserve(request_.segments.size());
+  for (const PathEnds& edge : request_.segments) cursors.push_back({edge.to, edge.from});
+  return cursors;
+}
+
+Result<State> WatchedGroup::snapshot(const Forest& forest, std::optional<Time> from) const {
+  if (request_.composed) return composed(forest, from);
+  auto cursors = fresh_cursors();
+  auto found = forest.news(cursors, {!from, from});
+  for (const EdgeCursor& edge : cursors) {
+    if (edge.history != 0) continue;
+    return fail(Errc::kNotOwner, "frame " + quote(edge.id) + " is not of this partition, or not " +
+                                     "below " + quote(edge.parent));
   }
-  // Frames that were removed and added again have other handles.
-  const auto moved = [](const EdgeCursor& a, const EdgeCursor& b) {
-    return a.frame.slot == b.frame.slot && a.frame.generation == b.frame.generation;
-  };
-  if (cursors_.size() != cursors.size() ||
-      !std::equal(cursors.begin(), cursors.end(), cursors_.begin(), moved)) {
-    cursors_ = cursors;
+  if (found.values.size() > kMaxItems) {
+    cursors = fresh_cursors();
+    found = forest.news(cursors, {true, {}});
   }
-  return State{id_, forest.news(cursors, true)};
+  return State{id_, std::move(found.values), 0, found.commit};
 }
 
 State WatchedGroup::news(const Forest& forest) {
-  if (!request_.segments.empty()) return composed_news(forest);
+  if (request_.composed) return composed_news(forest);
   const bool newest_only = request_.period > std::chrono::nanoseconds(0);
-  return {id_, forest.news(cursors_, newest_only)};
+  auto found = forest.news(cursors_, {newest_only, {}});
+  State state{id_, std::move(found.values), told_, found.commit};
+  if (!state.entries.empty()) told_ = state.commit;
+  return state;
+}
+
+Result<State> WatchedGroup::composed(const Forest& forest, std::optional<Time> from) const {
+  auto found = forest.lookup_segments(request_.segments);
+  if (!found) return tl::unexpected(std::move(found.error()));
+  State state{id_, entries_of(*found), 0, found->commit};
+  if (from && found->stamp && *from < *found->stamp) {
+    Query query;
+    query.at = from;
+    // Where that is not to be had, the newest must do.
+    const auto then = forest.lookup_segments(request_.segments, query);
+    if (then && then->history == found->history) {
+      const auto entries = entries_of(*then);
+      state.entries.insert(state.entries.begin(), entries.begin(), entries.end());
+    }
+  }
+  for (std::size_t i = 0; i < request_.segments.size(); ++i) {
+    state.entries[i].process_noise = Covariance();
+  }
+  return state;
 }
 
 State WatchedGroup::composed_news(const Forest& forest) {
-  State state{id_, {}};
+  State state{id_, {}, told_, told_};
   const auto found = forest.lookup_segments(request_.segments);
   if (!found) return state;
-  sent_.resize(found->values.size());
+  state.commit = found->commit;
   for (News& entry : entries_of(*found)) {
-    const auto& sent = sent_[entry.index];
-    const bool again = sent && entry.stamp == sent->stamp &&
+    auto& sent = sent_[entry.index];
+    const bool begins = !sent || entry.history != sent->history;
+    const bool again = !begins && entry.stamp == sent->stamp &&
                        entry.correlation == sent->correlation &&
                        (entry.stamp || same(entry.X, sent->X));
     if (again) continue;
-    sent_[entry.index] = entry;
+    sent = entry;
+    if (begins) entry.process_noise = Covariance();
     state.entries.push_back(std::move(entry));
   }
+  if (!state.entries.empty()) told_ = state.commit;
   return state;
+}
+
+std::vector<State> pieces_of(State&& state) {
+  const std::size_t most = tied_entries(state) > kMaxTies ? kMaxTies : kMaxItems;
+  const std::size_t count = std::max<std::size_t>((state.entries.size() + most - 1) / most, 1);
+  std::vector<State> pieces;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto begin = state.entries.begin() + static_cast<std::ptrdiff_t>(i * most);
+    const auto length = std::min(most, state.entries.size() - i * most);
+    const auto end = begin + static_cast<std::ptrdiff_t>(length);
+    pieces.push_back({state.group,
+                      {std::make_move_iterator(begin), std::make_move_iterator(end)},
+                      state.after,
+                      state.commit,
+                      static_cast<std::uint32_t>(i),
+                      static_cast<std::uint32_t>(count)});
+  }
+  return pieces;
+}
+
+std::optional<State> StatePieces::add(const State& piece) {
+  if (piece.piece == 0) {
+    whole_ = piece;
+    next_ = 0;
+  } else if (next_ != piece.piece || piece.commit != whole_.commit ||
+             piece.pieces != whole_.pieces) {
+    next_ = 0;
+    return std::nullopt;
+  } else {
+    whole_.entries.insert(whole_.entries.end(), piece.entries.begin(), piece.entries.end());
+  }
+  if (++next_ < piece.pieces) return std::nullopt;
+  next_ = 0;
+  whole_.piece = 0;
+  whole_.pieces = 1;
+  return std::move(whole_);
 }
 
 }  // namespace tfdude

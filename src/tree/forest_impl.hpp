@@ -109,6 +109,9 @@ class Forest::Impl {
                                                        std::int64_t t, const Query& query,
                                                        Met& met) const;
 
+  /// The newest history of the edges on these segments.
+  [[nodiscard]] static std::uint64_t newest_history(const std::vector<Ends>& segments);
+
   /// Adds what each single edge was observed with.
   void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) const;
 
@@ -171,6 +174,14 @@ class Forest::Impl {
   /// A ring with all its samples, of which the newest may still be the newest version: that one is superseded next.
   void give_back(Ring* ring, std::uint32_t slot);
 
+  // Of what another forest tells (forest_mirror.cpp).
+
+  /// Pushes a value of one of its edges. @return whether that is new here
+  bool push_told(const HeldVersion& edge, const News& value, bool replace);
+  bool push_told_sample(const HeldVersion& edge, const Transform& X_PC, std::int64_t stamp,
+                        bool replace);
+  void begin_told_history(std::uint32_t slot, const News& value);
+
   // Of what errors have to do with each other (forest_ties.cpp).
 
   /// Gives the fresh version other ties; null for none.
@@ -221,6 +232,11 @@ class Forest::Impl {
 
   /// Makes the frame in the slot not be there; those below it become roots.
   void make_absent(std::uint32_t slot);
+
+  /// The number of the commit that is being made.
+  [[nodiscard]] std::uint64_t commit_being_made() const {
+    return committed_.load(std::memory_order_relaxed) + 1;
+  }
 
   /// Makes all that was pushed visible at once.
   void commit();

@@ -49,45 +49,76 @@ Correlation correlation_of(const HeldVersion& edge) {
   return edge.ties != nullptr ? edge.ties->now : Correlation();
 }
 
-void add_news(const HeldVersion& edge, std::uint32_t index, EdgeCursor& cursor, bool newest_only,
-              std::vector<News>& news) {
-  if (!edge.moving()) {
-    if (edge.commit <= cursor.commit && cursor.commit != 0) return;
-    news.push_back({index, std::nullopt, edge.X_PC, correlation_of(edge)});
-    cursor.commit = edge.commit;
-    cursor.stamp.reset();
-    return;
-  }
-  const std::int64_t seen = cursor.stamp ? nanoseconds(*cursor.stamp) : kAlways;
+// The number of the first sample that may be told, of those up to the edge's newest.
+std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, std::uint64_t seen,
+                            const NewsQuery& query) {
   const Ring& ring = *edge.ring;
-  // Who has seen nothing yet is told where the edge is, not its whole past.
-  const bool one = newest_only || seen == kAlways;
   std::uint64_t first = edge.number;
-  while (!one && first > ring.oldest() && ring.stamp(first - 1) > seen) --first;
-  for (std::uint64_t number = first; number < edge.number; ++number) {
+  if (query.newest_only) return first;
+  if (cursor.history == 0) {
+    const std::int64_t from = query.from ? nanoseconds(*query.from) : edge.stamp;
+    while (first > ring.oldest() && ring.stamp(first) > from) --first;
+    return first;
+  }
+  // Those that came late lie anywhere.
+  if (ring.rewritten > seen) return ring.oldest();
+  const auto is_new = [&](std::uint64_t number) {
     const HeldVersion* sample = ring.sample(number);
-    if (sample != nullptr) {
-      news.push_back({index, time_of(sample->stamp), sample->X_PC, correlation_of(edge)});
+    return sample != nullptr && sample->commit > seen;
+  };
+  while (first > ring.oldest() && is_new(first - 1)) --first;
+  return first;
+}
+
+void add_news(const HeldVersion& edge, std::uint32_t index, const NewsQuery& query,
+              std::uint64_t commit, EdgeCursor& cursor, std::vector<News>& news) {
+  const bool begins = edge.history != cursor.history;
+  const std::uint64_t seen = begins ? 0 : cursor.commit;
+  const std::size_t before = news.size();
+  const auto tell = [&](const std::optional<Time>& stamp, const Transform& X) {
+    news.push_back({index, stamp, X, {}, edge.history, {}});
+  };
+  if (!edge.moving()) {
+    if (edge.commit > seen) tell(std::nullopt, edge.X_PC);
+  } else {
+    const Ring& ring = *edge.ring;
+    for (auto number = first_to_tell(edge, cursor, seen, query); number < edge.number; ++number) {
+      const HeldVersion* sample = ring.sample(number);
+      if (sample != nullptr && sample->commit > seen) tell(time_of(sample->stamp), sample->X_PC);
     }
+    // The edge's version may be younger than the sample that it shows.
+    const HeldVersion* newest = ring.sample(edge.number);
+    if (newest == nullptr || newest->commit > seen) tell(time_of(edge.stamp), edge.X_PC);
   }
-  if (edge.stamp > seen) {
-    news.push_back({index, time_of(edge.stamp), edge.X_PC, correlation_of(edge)});
-  }
-  cursor.stamp = time_of(std::max(edge.stamp, seen));
+  cursor.commit = commit;
+  cursor.history = edge.history;
+  if (news.size() == before) return;
+  news.back().correlation = correlation_of(edge);
+  if (!begins) return;
+  news[before].process_noise =
+      edge.ring != nullptr ? edge.ring->timing().process_noise : Covariance();
 }
 
 }  // namespace
 
-std::vector<News> Forest::news(std::vector<EdgeCursor>& cursors, bool newest_only) const {
+NewsOfCommit Forest::news(std::vector<EdgeCursor>& cursors, const NewsQuery& query) const {
   const epoch::Guard guard;
   const std::uint64_t commit = impl_->snapshot();
-  std::vector<News> all;
+  NewsOfCommit all{{}, commit};
   for (std::uint32_t index = 0; index < cursors.size(); ++index) {
-    const Version* version = impl_->of(cursors[index].frame, commit);
+    EdgeCursor& cursor = cursors[index];
+    const Version* version = impl_->of(cursor.frame, commit);
+    if (version == nullptr) version = impl_->present(cursor.id, commit);
     if (version == nullptr || !version->held()) continue;
-    add_news(static_cast<const HeldVersion&>(*version), index, cursors[index], newest_only, all);
+    const auto& edge = static_cast<const HeldVersion&>(*version);
+    // Where it hangs elsewhere, that is another history.
+    if (edge.history != cursor.history && impl_->info_of(edge, commit).parent != cursor.parent) {
+      continue;
+    }
+    cursor.frame = {version->slot, version->generation};
+    add_news(edge, index, query, commit, cursor, all.values);
   }
-  std::stable_sort(all.begin(), all.end(),
+  std::stable_sort(all.values.begin(), all.values.end(),
                    [](const News& a, const News& b) { return a.stamp < b.stamp; });
   return all;
 }

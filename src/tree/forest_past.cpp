@@ -130,11 +130,13 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_P
   }
   HeldVersion* sample = held_pool_.take();
   *sample = HeldVersion{};
+  sample->commit = commit_being_made();
   sample->depth = 0;  // so that it counts as held
   sample->X_PC = X_PC;
   sample->stamp = stamp;
   sample->kept = true;
   Ring* ring = newest.ring->with(sample, stamp, place).release();
+  ring->rewritten = sample->commit;
   replace(newest.ring);
   HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
   fresh.ring = ring;
@@ -169,6 +171,7 @@ void Forest::Impl::give_back(Ring* ring, std::uint32_t slot) {
 }
 
 void Forest::Impl::forget_past(HeldVersion& fresh) {
+  fresh.history = fresh.commit;
   Ring* before = fresh.ring;
   if (before == nullptr) return;
   fresh.ring = new Ring(before->timing());

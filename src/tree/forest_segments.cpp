@@ -59,6 +59,21 @@ Result<std::vector<Reached>> Forest::Impl::newest_values(const std::vector<Ends>
   return values_at(segments, met.limiting->stamp, query, met);
 }
 
+std::uint64_t Forest::Impl::newest_history(const std::vector<Ends>& segments) {
+  std::uint64_t newest = 0;
+  for (const Ends& ends : segments) {
+    const Version* a = ends.a;
+    const Version* b = ends.b;
+    while (a != b) {
+      const Version*& here = a->depth >= b->depth ? a : b;
+      if (here->above == nullptr) break;
+      if (here->held()) newest = std::max(newest, static_cast<const HeldVersion*>(here)->history);
+      here = at(*here->above, ends.commit);
+    }
+  }
+  return newest;
+}
+
 namespace {
 
 // Ties are told where any segment has some.
@@ -80,6 +95,7 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
   if (!ends) return tl::unexpected(ends.error());
   SegmentValues found;
   if (!ends->empty()) found.commit = ends->front().commit;
+  found.history = Impl::newest_history(*ends);
   Impl::Met met;
   auto t = query.at;
   if (!t) {

@@ -99,12 +99,14 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_
   } else {
     sample = held_pool_.take();
     *sample = HeldVersion{};
+    sample->commit = fresh.commit;
     sample->depth = 0;  // so that it counts as held
     sample->X_PC = X_PC;
     sample->stamp = stamp;
   }
   sample->kept = true;
   fresh.ring = superseded->replaced(sample, place).release();
+  fresh.ring->rewritten = fresh.commit;
   fresh.number = fresh.ring->next() - 1;
   replace(superseded);
   before->kept = false;

@@ -100,7 +100,7 @@ T& Forest::Impl::push(VersionPool<T>& pool, std::uint32_t slot) {
   auto& head = slots_[slot];
   Version* old = head.load(std::memory_order_relaxed);
   T* fresh = pool.take();
-  fresh->commit = committed_.load(std::memory_order_relaxed) + 1;
+  fresh->commit = commit_being_made();
   fresh->older = old;
   fresh->name = old->name;
   fresh->above = old->above;
@@ -128,10 +128,12 @@ HeldVersion& Forest::Impl::push_held(std::uint32_t slot, const Transform& X_PC) 
     fresh.number = before.number;
     fresh.ring = before.ring;
     fresh.ties = before.ties;
+    fresh.history = before.history;
   } else {
     fresh.stamp = kAlways;
     fresh.ring = nullptr;
     fresh.ties = nullptr;
+    fresh.history = fresh.commit;
   }
   return fresh;
 }

@@ -80,6 +80,8 @@ class Ring {
   /// Shared with the copies.
   [[nodiscard]] Refused& refused() const { return *refused_; }
 
+  /// The commit of the last sample that was not appended: inserted, or put in another's place. Set before readers see it.
+  std::uint64_t rewritten = 0;
   std::uint64_t retire_tag = 0;
 
  private:

@@ -59,8 +59,9 @@ struct EdgeTies {
 struct HeldVersion : Version {
   std::int64_t stamp = kAlways;  // of the newest sample
   std::uint64_t number = 0;      // its number in the ring
-  Ring* ring = nullptr;      // null: there is no past, nor anything said of how it is to be kept
-  EdgeTies* ties = nullptr;  // null: independent of all else
+  Ring* ring = nullptr;       // null: there is no past, nor anything said of how it is to be kept
+  EdgeTies* ties = nullptr;   // null: independent of all else
+  std::uint64_t history = 0;  // the commit with which its values began: none before is of this edge
   Transform X_PC;
 
   [[nodiscard]] bool moving() const { return stamp != kAlways; }

@@ -51,6 +51,7 @@ class Relay : public Transport, protected TransportHandler {
   void on_update(const Update& update) override { handler_->on_update(update); }
   void on_joints(const JointUpdate& update) override { handler_->on_joints(update); }
   void on_state(const State& state) override { handler_->on_state(state); }
+  void on_watcher(std::uint64_t group) override { handler_->on_watcher(group); }
   void on_page(const Page& page) override { handler_->on_page(page); }
   void on_presence(const Presence& presence) override { handler_->on_presence(presence); }
   void on_lost(const std::string& partition, std::uint64_t incarnation) override {

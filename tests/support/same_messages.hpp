@@ -114,7 +114,8 @@ inline void check_same(const Request& actual, const Request& expected) {
     if (X_PC) check_same(*X_PC, *move->X_PC);
   } else if (const auto* watch = std::get_if<WatchRequest>(&expected.body)) {
     const auto& arrived = std::get<WatchRequest>(actual.body);
-    CHECK(arrived.edges == watch->edges);
+    CHECK(arrived.composed == watch->composed);
+    CHECK(arrived.from == watch->from);
     CHECK(arrived.period == watch->period);
     check_same(arrived.segments, watch->segments);
   } else if (const auto* past = std::get_if<PastRequest>(&expected.body)) {
@@ -146,12 +147,20 @@ inline void check_same(const std::vector<Transform>& actual,
 
 inline void check_same(const State& actual, const State& expected) {
   CHECK(actual.group == expected.group);
+  CHECK(actual.after == expected.after);
+  CHECK(actual.commit == expected.commit);
+  CHECK(actual.piece == expected.piece);
+  CHECK(actual.pieces == expected.pieces);
   REQUIRE(actual.entries.size() == expected.entries.size());
   for (std::size_t i = 0; i < actual.entries.size(); ++i) {
     CHECK(actual.entries[i].index == expected.entries[i].index);
     CHECK(actual.entries[i].stamp == expected.entries[i].stamp);
     check_same(actual.entries[i].X, expected.entries[i].X);
     CHECK(actual.entries[i].correlation == expected.entries[i].correlation);
+    CHECK(actual.entries[i].history == expected.entries[i].history);
+    const auto& noise = expected.entries[i].process_noise;
+    REQUIRE(actual.entries[i].process_noise.has_value() == noise.has_value());
+    if (noise) CHECK(actual.entries[i].process_noise->upper() == noise->upper());
   }
 }
 

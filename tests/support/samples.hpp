@@ -102,8 +102,8 @@ bool take(const Bytes& bytes) {
                      {time_of(1'700'000'000'000'000'000), std::chrono::nanoseconds(7), time_of(9)},
                      time_of(8)}},
       {11, "hand", LookupRequest{{}, {}, time_of(INT64_MAX)}},
-      {12, "hand", WatchRequest{{"hand", "arm"}, {}, std::chrono::nanoseconds(1000)}},
-      {13, "hand", WatchRequest{{}, {{"hand", "arm"}}}},
+      {12, "hand", WatchRequest{{{"arm", "hand"}, {"base", "arm"}}, false, kMaxWatchPeriod}},
+      {13, "hand", WatchRequest{{{"hand", "arm"}}, true, std::chrono::nanoseconds(1), time_of(5)}},
       {14, "hand", PastRequest{}},
       {15, "hand", LookupRequest{{{"arm", "hand"}}, {{}, {}, {}, Order::kFourth}, {}, true}},
       {16, "hand",
@@ -195,7 +195,15 @@ bool take(const Bytes& bytes) {
   return {{},
           {1, {{4294967295U, time_of(INT64_MAX), random.transform()}}},
           {3, {{1, {}, random.transform(), correlation(random)}, {2, {}, random.transform()}}},
-          {2, {{0, std::nullopt, Transform()}, {1, time_of(1), random.transform()}}}};
+          {2, {{0, std::nullopt, Transform()}, {1, time_of(1), random.transform()}}},
+          {4,
+           {{0, {}, random.transform(), {}, 18446744073709551615ULL, Covariance()},
+            {1, time_of(7), Transform(), {}, 3, random.transform().covariance},
+            {1, time_of(8), Transform(), {}, 3, {}}},
+           5,
+           18446744073709551615ULL,
+           1,
+           4294967295U}};
 }
 
 [[nodiscard]] inline std::vector<Update> updates(Random& random) {

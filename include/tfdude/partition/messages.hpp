@@ -95,10 +95,15 @@ struct JointsRequest {};
 /// Asks for the values of edges, now and whenever they change: these are pushed to the group of watchers that have
 /// asked for the same, until it is not renewed for kWatchLease.
 struct WatchRequest {
-  std::vector<std::string> edges;      ///< by their child frames;
-  std::vector<PathEnds> segments{};    ///< or, instead, composed transforms of whole segments
+  std::vector<PathEnds> segments;      ///< edges, each from its parent
+  bool composed = false;               ///< or runs of edges, each told as one transform
   std::chrono::nanoseconds period{0};  ///< no more often than this; 0: every sample
+  /// The reply has the samples since the last that is not younger than this, instead of the newest only. Not of the group.
+  std::optional<Time> from{};
 };
+
+/// The longest period of a watch.
+inline constexpr std::chrono::hours kMaxWatchPeriod{1};
 
 /// How long an owner pushes to watchers of whom it hears nothing.
 inline constexpr Milliseconds kWatchLease{5000};
@@ -137,10 +142,15 @@ struct JointInfo {
   std::uint64_t refused = 0;  ///< or refused
 };
 
-/// Values of watched edges, in the order in which they became what they are.
+/// What was written to watched edges, to be taken over as one commit: a watcher that knows all up to `after` then knows
+/// all up to `commit`.
 struct State {
   std::uint64_t group = 0;    ///< watch_group() of the owner and the request
-  std::vector<News> entries;  ///< by the index of the edge, or segment, in the request
+  std::vector<News> entries;  ///< by the index of the segment in the request
+  std::uint64_t after = 0;    ///< a commit of the owner's; 0: all is told
+  std::uint64_t commit = 0;   ///< a later one
+  std::uint32_t piece = 0;    ///< which one of so many that have the entries
+  std::uint32_t pieces = 1;
 };
 
 /// What observations have said of one edge's covariance so far.
@@ -166,8 +176,10 @@ struct Reply {
       body;
 };
 
-/// Which watchers share what an owner sends: a number of the owner and of what they ask for (FNV-1a, 64 bits).
-[[nodiscard]] std::uint64_t watch_group(std::string_view partition, const WatchRequest& request);
+/// Which watchers share what an owner sends: a number of the owner, this time that it runs, and of what they ask for
+/// (FNV-1a, 64 bits).
+[[nodiscard]] std::uint64_t watch_group(std::string_view partition, std::uint64_t incarnation,
+                                        const WatchRequest& request);
 
 /// Edge values streamed without a reply; applied as one commit by each owner of some of them.
 struct Update {

@@ -10,13 +10,14 @@
 namespace tfdude {
 
 /// What came to a participant's readers of requests and updates, before and after the filters; what never
-/// came to them woke nobody.
+/// came to them woke nobody. And what it has made.
 struct FastDdsCounters {
   std::atomic<std::uint64_t> requests_arrived{0};
   std::atomic<std::uint64_t> requests_passed{0};
   std::atomic<std::uint64_t> updates_arrived{0};
   std::atomic<std::uint64_t> updates_passed{0};
   std::atomic<std::uint64_t> malformed{0};  ///< dropped: not well formed
+  std::atomic<std::uint64_t> writers{0};    ///< DDS writers that there are now
 };
 
 struct FastDdsOptions {

@@ -25,6 +25,8 @@ class TransportHandler {
   virtual void on_joints(const JointUpdate& update) = 0;
   /// Of a group that is watched.
   virtual void on_state(const State& state) = 0;
+  /// Somebody more can be reached who watches a group: from now on all that is pushed arrives there.
+  virtual void on_watcher(std::uint64_t) {}
   virtual void on_page(const Page& page) = 0;
   /// Another participant's presence.
   virtual void on_presence(const Presence& presence) = 0;

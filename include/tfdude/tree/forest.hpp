@@ -105,14 +105,17 @@ struct SegmentValues {
   /// By segment, whose values' covariances are of own parts then; empty if no edge is tied to any other.
   std::vector<Ties> ties{};
   std::vector<Ties> ties_at_hint{};
-  std::uint64_t commit = 0;  ///< of which the values are; see revise()
+  std::uint64_t commit = 0;   ///< of which the values are; see revise()
+  std::uint64_t history = 0;  ///< the newest of their edges': see News
 };
 
-/// What of a held edge somebody has seen already: to begin with, nothing.
+/// What of an edge, while it hangs under this parent, somebody has seen already: to begin with, nothing.
 struct EdgeCursor {
-  Handle frame;
-  std::optional<Time> stamp;  ///< of the newest sample seen
-  std::uint64_t commit = 0;   ///< in which a value was written that holds for all times
+  std::string id;
+  std::string parent;
+  std::uint64_t history = 0;  ///< of the values seen; 0: none
+  std::uint64_t commit = 0;   ///< up to which they were seen
+  Handle frame{};             ///< found by id where it is not there any more
 };
 
 /// A value of one of several edges, by its index among them.
@@ -120,7 +123,25 @@ struct News {
   std::uint32_t index = 0;
   std::optional<Time> stamp;
   Transform X;
-  Correlation correlation{};
+  Correlation correlation{};  ///< of the edge, with the last of its values only
+  /// Of values that have to do with each other. Where an edge is moved, or added again, or forgets its past, another one
+  /// begins, of a higher number.
+  std::uint64_t history = 0;
+  /// That of the edge, with the first of its values that is told of a history only.
+  std::optional<Covariance> process_noise{};
+};
+
+/// Values that were written to edges until a commit.
+struct NewsOfCommit {
+  std::vector<News> values;  ///< older stamps first, and before them those that hold for all times
+  std::uint64_t commit = 0;
+};
+
+/// Which samples of a moving edge are told.
+struct NewsQuery {
+  bool newest_only = false;
+  /// Where nothing was seen yet: those since the last that is not younger than this, instead of the newest.
+  std::optional<Time> from{};
 };
 
 /// What is kept of one edge's past.
@@ -319,10 +340,16 @@ class Forest {
   [[nodiscard]] std::pair<std::vector<ChangedEdge>, std::uint64_t> changed_since(
       std::uint64_t commit) const;
 
-  /// What was written to held edges since the cursors, which are moved on: all of one commit, older stamps first and
-  /// those that hold for all times before them. Samples that came late, after younger ones, are not told.
-  /// @param newest_only  of each edge only the newest sample
-  [[nodiscard]] std::vector<News> news(std::vector<EdgeCursor>& cursors, bool newest_only) const;
+  /// What was written to held edges since the cursors, which are moved on to its commit: samples, also those that came
+  /// late, after younger ones, or the value that holds for all times. An edge that is not held, or hangs under another
+  /// parent, is left out, and its cursor stays. Takes no lock.
+  [[nodiscard]] NewsOfCommit news(std::vector<EdgeCursor>& cursors, const NewsQuery& query) const;
+
+  /// Takes over what news() of another forest told, as one commit. What is here already, or older than what is kept, is
+  /// passed over; where process noise is told, the edge's past goes.
+  /// @param edges  held here, by the values' indices
+  /// @param replace  samples of which there is another with that stamp; else they are passed over
+  void take(const std::vector<Handle>& edges, const std::vector<News>& values, bool replace = true);
 
   /// Calls a function after each commit, from the thread that made it, which holds the forest's lock: it must be quick
   /// and not write to the forest. Null: none any more.

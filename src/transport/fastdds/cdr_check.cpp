@@ -87,9 +87,11 @@ void CdrWalk::revised_edge() {
 }
 
 void CdrWalk::state() {
-  skip(8, 8);
+  skip(3 * 8, 8);
+  ulong();
+  ulong();
   sequence([&] {
-    skip(8, 8);
+    skip(2 * 8, 8);
     transform();
     ulong();
   });
@@ -99,6 +101,10 @@ void CdrWalk::state() {
         ties();
       },
       kMaxTies);
+  sequence([&] {
+    ulong();
+    sequence([&] { skip(8, 8); }, Covariance::kSize);
+  });
 }
 
 std::string_view CdrWalk::edge() {
@@ -149,9 +155,9 @@ void request_body(CdrWalk& walk) {
       walk.octet();
       break;
     case 8:  // watch
-      walk.skip(8, 8);
-      walk.sequence([&] { walk.id(); });
+      walk.skip(2 * 8, 8);
       walk.sequence([&] { walk.path_ends(); });
+      walk.octet();
       break;
     case 9:   // past
     case 11:  // consistency

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/partition/watching.hpp"
 
 #include "math/flat.hpp"
 #include "transport/fastdds/codec.hpp"
@@ -93,10 +94,25 @@ Result<WatchRequest> read_watch(const wire::Watch& body) {
   const auto period = duration_from_wire(body.period(), "the period of a watch");
   if (!period) return tl::unexpected(period.error());
   WatchRequest watch;
-  for (const wire::Id& edge : body.edges()) watch.edges.push_back(string_of(edge));
+  const auto from = stamp_from_wire(body.from(), "the instant of a watch");
+  if (!from) return tl::unexpected(from.error());
   watch.segments = read_segments(body.segments());
+  watch.composed = body.composed() != 0;
   watch.period = *period;
+  watch.from = *from;
+  if (auto ok = check_watch(watch); !ok) return tl::unexpected(ok.error());
   return watch;
+}
+
+Result<Covariance> read_process_noise(const std::vector<double>& numbers) {
+  if (numbers.empty()) return Covariance();
+  if (numbers.size() != Covariance::kSize) {
+    return fail(Errc::kInvalidInput,
+                "process noise of " + std::to_string(numbers.size()) + " numbers");
+  }
+  Covariance::Upper upper{};
+  std::copy(numbers.begin(), numbers.end(), upper.begin());
+  return Covariance::from_upper(upper);
 }
 
 Result<ReviseRequest> read_revise(const wire::Revise& body) {
@@ -314,13 +330,17 @@ Result<Reply> from_wire(const wire::Reply& sample) {
 Result<State> from_wire(const wire::State& sample) {
   State state;
   state.group = sample.group();
+  state.after = sample.after();
+  state.commit = sample.commit();
+  state.piece = sample.piece();
+  state.pieces = sample.pieces();
   state.entries.reserve(sample.entries().size());
   for (const wire::StateEntry& entry : sample.entries()) {
     const auto stamp = stamp_from_wire(entry.stamp(), "the stamp of a state");
     if (!stamp) return tl::unexpected(stamp.error());
     auto X = computed_from(entry.x());
     if (!X) return fail_at("a state", X.error());
-    state.entries.push_back({entry.index(), *stamp, *X, {}});
+    state.entries.push_back({entry.index(), *stamp, *X, {}, entry.history(), {}});
   }
   for (const wire::StateTies& one : sample.ties()) {
     if (one.entry() >= state.entries.size()) {
@@ -330,6 +350,16 @@ Result<State> from_wire(const wire::State& sample) {
     auto correlation = read_correlation(one.ties());
     if (!correlation) return fail_at("a state", correlation.error());
     state.entries[one.entry()].correlation = *std::move(correlation);
+  }
+  for (const wire::StateBeginning& one : sample.beginnings()) {
+    if (one.entry() >= state.entries.size()) {
+      return fail(Errc::kInvalidInput, "a state: a history begins with entry " +
+                                           std::to_string(one.entry()) + ", of " +
+                                           std::to_string(state.entries.size()));
+    }
+    auto noise = read_process_noise(one.process_noise());
+    if (!noise) return fail_at("a state", noise.error());
+    state.entries[one.entry()].process_noise = *noise;
   }
   return state;
 }

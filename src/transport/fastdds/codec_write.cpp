@@ -135,8 +135,9 @@ struct BodyWriter {
   void operator()(const WatchRequest& watch) {
     wire::Watch body;
     body.period(watch.period.count());
-    for (const std::string& edge : watch.edges) body.edges().emplace_back(edge);
+    body.from(wire_stamp(watch.from));
     body.segments(wire_segments(watch.segments));
+    body.composed(watch.composed ? 1 : 0);
     out.watch(std::move(body));
   }
   void operator()(const PastRequest& past) { out.past(past.all ? 1 : 0); }
@@ -308,11 +309,24 @@ wire::Joints to_wire(const JointUpdate& update) {
 wire::State to_wire(const State& state) {
   wire::State sample;
   sample.group(state.group);
+  sample.after(state.after);
+  sample.commit(state.commit);
+  sample.piece(state.piece);
+  sample.pieces(state.pieces);
   sample.entries().resize(state.entries.size());
   for (std::size_t i = 0; i < state.entries.size(); ++i) {
     sample.entries()[i].index(state.entries[i].index);
     sample.entries()[i].stamp(wire_stamp(state.entries[i].stamp));
+    sample.entries()[i].history(state.entries[i].history);
     sample.entries()[i].x(to_flat(state.entries[i].X));
+    if (const auto& noise = state.entries[i].process_noise) {
+      sample.beginnings().emplace_back();
+      sample.beginnings().back().entry(static_cast<std::uint32_t>(i));
+      const Covariance::Upper& upper = noise->upper();
+      if (upper != Covariance::Upper{}) {
+        sample.beginnings().back().process_noise().assign(upper.begin(), upper.end());
+      }
+    }
     const Correlation& correlation = state.entries[i].correlation;
     if (correlation.empty()) continue;
     sample.ties().emplace_back();

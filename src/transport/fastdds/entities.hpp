@@ -9,6 +9,8 @@
 #include <mutex>
 #include <string>
 
+#include "tfdude/transport/fastdds.hpp"
+
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/profiles.hpp"
 
@@ -21,8 +23,12 @@ using Deadline = std::chrono::steady_clock::time_point;
 class Outlet final : public edds::DataWriterListener {
  public:
   /// @param partition  DDS partition; empty: the default one
+  /// @param counters  outlive it
+  /// @param on_reader  called when one more reader has been met: what is written from now on reaches it. From a thread of
+  ///   the library, which may hold locks
   Outlet(edds::DomainParticipant& participant, edds::Topic& topic, const std::string& partition,
-         const std::string& profile);
+         const std::string& profile, FastDdsCounters& counters,
+         std::function<void()> on_reader = nullptr);
   ~Outlet() override;
   Outlet(const Outlet&) = delete;
   Outlet& operator=(const Outlet&) = delete;
@@ -40,6 +46,8 @@ class Outlet final : public edds::DataWriterListener {
 
  private:
   edds::DomainParticipant& participant_;
+  FastDdsCounters& counters_;
+  const std::function<void()> on_reader_;
   edds::Publisher* publisher_ = nullptr;
   edds::DataWriter* writer_ = nullptr;
   std::mutex mutex_;

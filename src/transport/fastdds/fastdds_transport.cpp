@@ -106,8 +106,10 @@ edds::Topic* FastDdsTransport::create_topic(const char* name, const edds::TypeSu
 
 Result<void> FastDdsTransport::create_endpoints() {
   using Prefix = ertps::GuidPrefix_t;
-  states_.emplace(*participant_, *topics_.state,
-                  [this](const State& state) { handler_->on_state(state); });
+  states_.emplace(
+      *participant_, *topics_.state, *counters_,
+      StateChannels::Calls{[this](const State& state) { handler_->on_state(state); },
+                           [this](std::uint64_t group) { handler_->on_watcher(group); }});
   presence_ = std::make_unique<Inlet<wire::Presence>>(
       *participant_, *topics_.presence, std::string(), "presence_reader",
       Inlet<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
@@ -136,12 +138,12 @@ Result<void> FastDdsTransport::create_endpoints() {
     return not_created("the readers");
   }
   if (options_.partition.empty()) return {};
-  presence_outlet_ =
-      std::make_unique<Outlet>(*participant_, *topics_.presence, std::string(), "presence_writer");
-  beat_outlet_ =
-      std::make_unique<Outlet>(*participant_, *topics_.presence, kBeatPartition, "beat_writer");
+  presence_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.presence, std::string(),
+                                              "presence_writer", *counters_);
+  beat_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.presence, kBeatPartition,
+                                          "beat_writer", *counters_);
   directory_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.directory, std::string(),
-                                               "directory_writer");
+                                               "directory_writer", *counters_);
   if (!presence_outlet_->good() || !beat_outlet_->good() || !directory_outlet_->good()) {
     return not_created("the writers");
   }
@@ -251,7 +253,9 @@ std::shared_ptr<Outlet> FastDdsTransport::outlet(Outlets& outlets, edds::Topic* 
                                                  const char* profile) {
   const std::lock_guard lock(outlets_mutex_);
   auto& entry = outlets[partition];
-  if (entry == nullptr) entry = std::make_shared<Outlet>(*participant_, *topic, partition, profile);
+  if (entry == nullptr) {
+    entry = std::make_shared<Outlet>(*participant_, *topic, partition, profile, *counters_);
+  }
   return entry;
 }
 
@@ -309,10 +313,11 @@ std::shared_ptr<Outlet> FastDdsTransport::reply_outlet(const PeerId& peer) {
   return known != reply_outlets_.end() ? known->second : nullptr;
 }
 
+// Of one that has left nothing is to be made: it would be kept for ever.
 void FastDdsTransport::open_reply_outlet(const PeerId& peer) {
-  if (reply_outlet(peer) != nullptr) return;
-  auto opened =
-      std::make_shared<Outlet>(*participant_, *topics_.reply, reply_partition(peer), "call_writer");
+  if (there_.count(peer) == 0 || reply_outlet(peer) != nullptr) return;
+  auto opened = std::make_shared<Outlet>(*participant_, *topics_.reply, reply_partition(peer),
+                                         "call_writer", *counters_);
   const std::unique_lock lock(reply_mutex_);
   reply_outlets_.emplace(peer, std::move(opened));
 }
@@ -325,14 +330,21 @@ void FastDdsTransport::reply(const PeerId& to, const Reply& reply) {
   }
   worker_->post([this, to, late = std::move(sample)]() mutable {
     open_reply_outlet(to);
-    if (const auto outlet = reply_outlet(to); outlet->good()) outlet->write(&late);
+    const auto outlet = reply_outlet(to);
+    if (outlet != nullptr && outlet->good()) outlet->write(&late);
   });
+}
+
+void FastDdsTransport::met(const ertps::GuidPrefix_t& prefix, const std::string& name) {
+  peers_.met(prefix, name);
+  worker_->post([this, peer = peer_of(prefix)] { there_.insert(peer); });
 }
 
 // A callback may hold the outlet still; the worker then waits for it, so as to be the one who deletes it.
 void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
   peers_.left(prefix);
   worker_->post([this, peer = peer_of(prefix)] {
+    there_.erase(peer);
     std::shared_ptr<Outlet> outlet;
     {
       const std::unique_lock lock(reply_mutex_);

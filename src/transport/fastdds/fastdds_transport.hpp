@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <shared_mutex>
 #include <string>
 
@@ -49,7 +50,7 @@ class FastDdsTransport final : public Transport {
   Milliseconds settle_time() const override;
 
   // Of ParticipantListener, from a thread of the library.
-  void met(const ertps::GuidPrefix_t& prefix, const std::string& name) { peers_.met(prefix, name); }
+  void met(const ertps::GuidPrefix_t& prefix, const std::string& name);
   void left(const ertps::GuidPrefix_t& prefix);
 
  private:
@@ -108,6 +109,7 @@ class FastDdsTransport final : public Transport {
   Outlets joint_outlets_;
   std::shared_mutex reply_mutex_;
   std::map<PeerId, std::shared_ptr<Outlet>> reply_outlets_;
+  std::set<PeerId> there_;  // who was met and has not left; only the worker's
 
   std::unique_ptr<OwnedFilters> filters_;
   std::unique_ptr<Outlet> presence_outlet_;

@@ -20,7 +20,7 @@ Result<void> StateChannels::watch(std::uint64_t group) {
       participant_, topic_, partition_of(group), "update_reader",
       Inlet<wire::State>::Calls{[this](const wire::State& sample, const ertps::GuidPrefix_t&) {
                                   if (const auto state = from_wire(sample)) {
-                                    deliver_(*state);
+                                    calls_.on_state(*state);
                                   } else {
                                     log_refused(kStateTopic, state.error());
                                   }
@@ -48,7 +48,8 @@ void StateChannels::push(const State& state) {
     auto& entry = outlets_[state.group];
     if (entry == nullptr) {
       entry = std::make_shared<Outlet>(participant_, topic_, partition_of(state.group),
-                                       "update_writer");
+                                       "update_writer", counters_,
+                                       [this, group = state.group] { calls_.on_watcher(group); });
     }
     outlet = entry;
   }

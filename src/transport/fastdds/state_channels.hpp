@@ -16,10 +16,14 @@ namespace tfdude::fastdds {
 /// and who watches the same shares one writer. Thread-safe.
 class StateChannels {
  public:
-  using Deliver = std::function<void(const State&)>;
+  struct Calls {
+    std::function<void(const State&)> on_state;
+    std::function<void(std::uint64_t group)> on_watcher;
+  };
 
-  StateChannels(edds::DomainParticipant& participant, edds::Topic& topic, Deliver deliver)
-      : participant_(participant), topic_(topic), deliver_(std::move(deliver)) {}
+  StateChannels(edds::DomainParticipant& participant, edds::Topic& topic, FastDdsCounters& counters,
+                Calls calls)
+      : participant_(participant), topic_(topic), counters_(counters), calls_(std::move(calls)) {}
 
   [[nodiscard]] Result<void> watch(std::uint64_t group);
   void unwatch(std::uint64_t group);
@@ -29,7 +33,8 @@ class StateChannels {
  private:
   edds::DomainParticipant& participant_;
   edds::Topic& topic_;
-  const Deliver deliver_;
+  FastDdsCounters& counters_;
+  const Calls calls_;
   std::mutex mutex_;
   std::map<std::uint64_t, std::unique_ptr<Inlet<wire::State>>> inlets_;
   std::map<std::uint64_t, std::shared_ptr<Outlet>> outlets_;

@@ -26,6 +26,9 @@ struct Arm {
   Forest forest;
 };
 
+const PathEnds kArm{"base", "arm"};
+const PathEnds kHand{"arm", "hand"};
+
 // "index@stamp=x", in the order of the entries.
 std::string listed(const State& state) {
   std::string text;
@@ -41,9 +44,9 @@ std::string listed(const State& state) {
 
 TEST_CASE("a group is told all, then what changes, once") {
   Arm arm;
-  WatchedGroup group(7, {{"arm", "hand"}});
-  CHECK(group.snapshot(arm.forest)->group == 7);
-  CHECK(listed(*group.snapshot(arm.forest)) == "0@-=10 1@-=100 ");
+  WatchedGroup group(7, {{kArm, kHand}});
+  CHECK(group.snapshot(arm.forest, {})->group == 7);
+  CHECK(listed(*group.snapshot(arm.forest, {})) == "0@-=10 1@-=100 ");
   CHECK(listed(group.news(arm.forest)) == "0@-=10 1@-=100 ");
   CHECK(listed(group.news(arm.forest)).empty());
   REQUIRE(arm.forest.update({{"arm", along_x(11)}, {"hand", along_x(101)}}, ms(1)));
@@ -54,13 +57,67 @@ TEST_CASE("a group is told all, then what changes, once") {
   REQUIRE(arm.forest.update({{"arm", along_x(14)}, {"hand", along_x(104)}}, ms(4)));
   CHECK(listed(group.news(arm.forest)) == "0@3=13 1@3=103 0@4=14 1@4=104 ");
   CHECK(group.news(arm.forest).entries.empty());
-  CHECK(listed(*group.snapshot(arm.forest)) == "0@4=14 1@4=104 ");
+  CHECK(listed(*group.snapshot(arm.forest, {})) == "0@4=14 1@4=104 ");
+  CHECK(listed(*group.snapshot(arm.forest, ms(3))) == "0@3=13 1@3=103 0@4=14 1@4=104 ");
+  // Late, and earlier than what was asked for.
+  REQUIRE(arm.forest.update({{"arm", along_x(9)}, {"hand", along_x(99)}}, Time(2500us)));
+  CHECK(listed(group.news(arm.forest)) == "0@2=9 1@2=99 ");
+}
+
+TEST_CASE("news follow on from those before, and all that is told begins with nothing") {
+  Arm arm;
+  WatchedGroup group(7, {{kArm, kHand}});
+  const State first = group.news(arm.forest);
+  CHECK(first.after == 0);
+  REQUIRE(arm.forest.update("base", along_x(7)));  // nobody watches that
+  REQUIRE(arm.forest.update("arm", along_x(11)));
+  const State second = group.news(arm.forest);
+  CHECK(second.after == first.commit);
+  CHECK(second.commit == first.commit + 2);
+  CHECK(group.snapshot(arm.forest, {})->after == 0);
+  CHECK(group.snapshot(arm.forest, {})->commit == second.commit);
+  REQUIRE(arm.forest.update("arm", along_x(12)));
+  CHECK(group.news(arm.forest).after == second.commit);
+}
+
+TEST_CASE("a state in pieces is one again, if all of them come") {
+  State state{7, {}, 3, 5};
+  for (std::uint32_t i = 0; i < 2 * kMaxItems + 1; ++i) {
+    state.entries.push_back({i, ms(i + 1), along_x(i), {}, 1, {}});
+  }
+  const auto pieces = pieces_of(State(state));
+  REQUIRE(pieces.size() == 3);
+  StatePieces together;
+  CHECK_FALSE(together.add(pieces[0]));
+  CHECK_FALSE(together.add(pieces[2]));  // one is missing
+  CHECK_FALSE(together.add(pieces[0]));
+  CHECK_FALSE(together.add(pieces[1]));
+  const auto whole = together.add(pieces[2]);
+  REQUIRE(whole);
+  CHECK(listed(*whole) == listed(state));
+  CHECK(whole->after == 3);
+  CHECK(whole->commit == 5);
+  CHECK_FALSE(together.add(pieces[2]));
+  State tied{7, {}, 0, 5};
+  for (std::uint32_t i = 0; i <= kMaxTies; ++i) {
+    tied.entries.push_back({i, {}, along_x(i), {true, {}, {}}, 1, {}});
+  }
+  CHECK(pieces_of(std::move(tied)).size() == 2);
+  CHECK(pieces_of({7, {}, 0, 5}).size() == 1);
+}
+
+TEST_CASE("how often watchers may want news has an end") {
+  CHECK(check_watch({{kArm}, false, kMaxWatchPeriod}));
+  CHECK(check_watch({{kArm}}));
+  CHECK(outcome(check_watch({{kArm}, false, kMaxWatchPeriod + 1ns})) == "invalid_input");
+  CHECK(outcome(check_watch({{kArm}, false, std::chrono::nanoseconds::max()})) == "invalid_input");
+  CHECK(outcome(check_watch({{kArm}, false, -1ns})) == "invalid_input");
 }
 
 TEST_CASE("at a lower rate only the newest is told") {
   Arm arm;
-  WatchedGroup group(7, {{"arm"}, {}, 10ms});
-  REQUIRE(group.snapshot(arm.forest));
+  WatchedGroup group(7, {{kArm}, false, 10ms});
+  REQUIRE(group.snapshot(arm.forest, {}));
   for (int t = 1; t < 10; ++t) {
     REQUIRE(arm.forest.update("arm", along_x(t), ms(2 * t)));
     REQUIRE(arm.forest.update("arm", along_x(t), ms(2 * t + 1)));
@@ -71,8 +128,8 @@ TEST_CASE("at a lower rate only the newest is told") {
 
 TEST_CASE("a segment may be told as one transform") {
   Arm arm;
-  WatchedGroup group(7, {{}, {{"world", "hand"}, {"base", "base"}}});
-  CHECK(listed(*group.snapshot(arm.forest)) == "0@-=111 1@-=0 ");
+  WatchedGroup group(7, {{{"world", "hand"}, {"base", "base"}}, true});
+  CHECK(listed(*group.snapshot(arm.forest, {})) == "0@-=111 1@-=0 ");
   CHECK(listed(group.news(arm.forest)) == "0@-=111 1@-=0 ");
   CHECK(listed(group.news(arm.forest)).empty());
   REQUIRE(arm.forest.update("base", along_x(2)));
@@ -80,45 +137,59 @@ TEST_CASE("a segment may be told as one transform") {
   REQUIRE(arm.forest.update("arm", along_x(20), ms(5)));
   CHECK(listed(group.news(arm.forest)).find("0@5=122") == 0);
   CHECK(listed(group.news(arm.forest)).empty());
+  REQUIRE(arm.forest.update("arm", along_x(30), ms(7)));
+  CHECK(listed(*group.snapshot(arm.forest, ms(6))) == "0@6=127 1@6=0 0@7=132 1@7=0 ");
+  // What lies between the ends hangs elsewhere now.
+  const std::uint64_t before = group.news(arm.forest).entries.at(0).history;
+  REQUIRE(arm.forest.move("hand", "base", along_x(1)));
+  const State after = group.news(arm.forest);
+  CHECK(listed(after) == "0@-=3 1@-=0 ");
+  CHECK(after.entries.at(0).history > before);
+  CHECK(after.entries.at(0).process_noise);
 }
 
 TEST_CASE("who watches what is not owned here is told so, and what goes is left out") {
   Arm arm;
   for (const char* id : {"far", "nobody", "world"}) {
-    WatchedGroup group(7, {{"arm", id}});
-    const auto snapshot = group.snapshot(arm.forest);
+    WatchedGroup group(7, {{kArm, {"", id}}});
+    const auto snapshot = group.snapshot(arm.forest, {});
     CHECK(outcome(snapshot) == "not_owner");
     CHECK(snapshot.error().message.find("'" + std::string(id) + "'") != std::string::npos);
   }
-  WatchedGroup segments(7, {{}, {{"far", "hand"}}});
-  CHECK_FALSE(segments.snapshot(arm.forest));
+  WatchedGroup elsewhere(7, {{{"base", "hand"}}});
+  CHECK(outcome(elsewhere.snapshot(arm.forest, {})) == "not_owner");
+  CHECK(elsewhere.news(arm.forest).entries.empty());
+  WatchedGroup segments(7, {{{"far", "hand"}}, true});
+  CHECK_FALSE(segments.snapshot(arm.forest, {}));
   CHECK(segments.news(arm.forest).entries.empty());
-  WatchedGroup group(7, {{"arm", "hand"}});
-  REQUIRE(group.snapshot(arm.forest));
+  WatchedGroup group(7, {{kArm, kHand}});
+  REQUIRE(group.snapshot(arm.forest, {}));
   (void)group.news(arm.forest);
   REQUIRE(arm.forest.remove("hand"));
   REQUIRE(arm.forest.update("arm", along_x(3)));
   CHECK(listed(group.news(arm.forest)) == "0@-=3 ");
-  // One that comes back under its name is told again after the next renewal.
-  REQUIRE(arm.forest.add("hand", "arm", along_x(4)));
-  CHECK(listed(*group.snapshot(arm.forest)) == "0@-=3 1@-=4 ");
-  CHECK(listed(group.news(arm.forest)) == "0@-=3 1@-=4 ");
+  REQUIRE(arm.forest.add("hand", "base", along_x(4)));
+  CHECK(listed(group.news(arm.forest)).empty());
+  REQUIRE(arm.forest.move("hand", "arm", along_x(5)));
+  CHECK(listed(group.news(arm.forest)) == "1@-=5 ");
 }
 
 TEST_CASE("only who asks for the same of the same owner is in one group") {
-  const WatchRequest edges{{"arm", "hand"}};
+  const WatchRequest edges{{kArm, kHand}};
   std::set<std::uint64_t> groups{
-      watch_group("arms", edges),
-      watch_group("legs", edges),
-      watch_group("arms", {{"hand", "arm"}}),
-      watch_group("arms", {{"armhand"}}),
-      watch_group("arms", {{"arm", "hand"}, {}, 1ms}),
-      watch_group("arms", {{}, {{"arm", "hand"}}}),
-      watch_group("arms", {{}, {{"hand", "arm"}}}),
-      watch_group("arms", {}),
+      watch_group("arms", 1, edges),
+      watch_group("arms", 2, edges),
+      watch_group("legs", 1, edges),
+      watch_group("arms", 1, {{kHand, kArm}}),
+      watch_group("arms", 1, {{{"base", "hand"}}}),
+      watch_group("arms", 1, {{{"baseh", "and"}}}),
+      watch_group("arms", 1, {{kArm, kHand}, false, 1ms}),
+      watch_group("arms", 1, {{kArm, kHand}, true}),
+      watch_group("arms", 1, {}),
   };
-  CHECK(groups.size() == 8);
-  CHECK(watch_group("arms", {{"arm", "hand"}}) == watch_group("arms", edges));
+  CHECK(groups.size() == 9);
+  CHECK(watch_group("arms", 1, {{kArm, kHand}, false, 0ms, ms(5)}) ==
+        *groups.find(watch_group("arms", 1, edges)));
 }
 
 }  // namespace tfdude

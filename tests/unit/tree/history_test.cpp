@@ -318,10 +318,12 @@ TEST_CASE("rate, gaps and jitter of what is kept") {
 TEST_CASE("news are told once, those of one stamp together") {
   Arm arm;
   std::vector<EdgeCursor> cursors;
-  for (const char* id : {"base", "arm", "hand"}) cursors.push_back({*arm.forest.find(id), {}, 0});
+  for (const char* id : {"base", "arm", "hand"}) {
+    cursors.push_back({id, arm.forest.info(id)->parent});
+  }
   const auto told = [&](bool newest_only = false) {
     std::string text;
-    for (const News& one : arm.forest.news(cursors, newest_only)) {
+    for (const News& one : arm.forest.news(cursors, {newest_only}).values) {
       text += std::to_string(one.index) + "@" +
               (one.stamp ? std::to_string(nanoseconds(*one.stamp) / 1'000'000) : "-") + " ";
     }

@@ -240,10 +240,10 @@ TEST_CASE("What cannot be meant is refused, and changes nothing") {
 TEST_CASE("News of an edge tell what it is tied to") {
   Random random(659);
   Robot robot(random);
-  std::vector<EdgeCursor> cursors{{*robot.forest.find("a"), std::nullopt, 0}};
-  CHECK(robot.forest.news(cursors, true).at(0).correlation.empty());
+  std::vector<EdgeCursor> cursors{{"a", robot.forest.info("a")->parent}};
+  CHECK(robot.forest.news(cursors, {true}).values.at(0).correlation.empty());
   REQUIRE(robot.forest.correlate("a", {true, {}, {}}));
-  const auto news = robot.forest.news(cursors, true);
+  const auto news = robot.forest.news(cursors, {true}).values;
   REQUIRE(news.size() == 1);
   CHECK(news[0].correlation.unknown);
 }

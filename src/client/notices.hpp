@@ -1,0 +1,74 @@
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+namespace tfdude {
+
+/// Calls what users want to be called, one after the other, from a thread of its own that holds no lock: so it may call
+/// whatever it likes. Thread-safe.
+class Notices {
+ public:
+  Notices() = default;
+  ~Notices() { stop(); }
+  Notices(const Notices&) = delete;
+  Notices& operator=(const Notices&) = delete;
+
+  void post(std::function<void()> call) {
+    const std::lock_guard lock(shared_->mutex);
+    if (shared_->stopping) return;
+    shared_->waiting.push_back(std::move(call));
+    if (!thread_.joinable()) thread_ = std::thread([shared = shared_] { run(*shared); });
+    shared_->changed.notify_one();
+  }
+
+  /// Waits for the call under way, unless it is itself that calls; what waits is dropped.
+  void stop() {
+    std::thread ending;
+    {
+      const std::lock_guard lock(shared_->mutex);
+      shared_->stopping = true;
+      ending = std::move(thread_);
+    }
+    shared_->changed.notify_one();
+    if (!ending.joinable()) return;
+    if (ending.get_id() == std::this_thread::get_id()) {
+      ending.detach();  // it ends with that call
+    } else {
+      ending.join();
+    }
+  }
+
+ private:
+  // What the thread has still where its call has ended it.
+  struct Shared {
+    std::mutex mutex;
+    std::condition_variable changed;
+    std::deque<std::function<void()>> waiting;
+    bool stopping = false;
+  };
+
+  static void run(Shared& shared) {
+    std::unique_lock lock(shared.mutex);
+    while (true) {
+      shared.changed.wait(lock, [&] { return shared.stopping || !shared.waiting.empty(); });
+      if (shared.stopping) return;
+      auto call = std::move(shared.waiting.front());
+      shared.waiting.pop_front();
+      lock.unlock();
+      call();
+      call = nullptr;  // what it holds may call here as it goes
+      lock.lock();
+    }
+  }
+
+  const std::shared_ptr<Shared> shared_ = std::make_shared<Shared>();
+  std::thread thread_;  // from the first call on
+};
+
+}  // namespace tfdude

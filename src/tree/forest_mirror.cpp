@@ -1,0 +1,82 @@
+#include "math/finite.hpp"
+#include "tree/forest_impl.hpp"
+
+// What a forest takes over of another's edges.
+namespace tfdude {
+namespace {
+
+bool same(const Transform& a, const Transform& b) {
+  return a.pose.matrix() == b.pose.matrix() && a.covariance.upper() == b.covariance.upper();
+}
+
+}  // namespace
+
+// Static, until a sample of it follows.
+void Forest::Impl::begin_told_history(std::uint32_t slot, const News& value) {
+  HeldVersion& fresh = push_held(slot, value.X);
+  forget_past(fresh);
+  if (value.process_noise->upper() == Covariance::Upper{}) return;
+  EdgeTiming timing = default_timing_;
+  timing.process_noise = *value.process_noise;
+  delete fresh.ring;  // nobody has seen it
+  fresh.ring = new Ring(timing);
+}
+
+bool Forest::Impl::push_told_sample(const HeldVersion& edge, const Transform& X_PC,
+                                    std::int64_t stamp, bool replace) {
+  if (stamp <= 0) return false;
+  if (edge.moving() && stamp <= edge.stamp) {
+    const std::uint64_t place = edge.ring->place_of(stamp);
+    if (place < edge.ring->next() && edge.ring->stamp(place) == stamp) {
+      if (!replace || same(edge.ring->sample(place)->X_PC, X_PC)) return false;
+      replace_sample(edge, X_PC, stamp);
+      return true;
+    }
+    if (!check_sample(edge, stamp)) return false;
+  }
+  push_value(edge.slot, X_PC, stamp);
+  return true;
+}
+
+bool Forest::Impl::push_told(const HeldVersion& edge, const News& value, bool replace) {
+  if (!is_finite(value.X)) return false;
+  const std::uint32_t slot = edge.slot;
+  if (value.process_noise) begin_told_history(slot, value);
+  if (value.stamp) {
+    const bool taken =
+        push_told_sample(newest_value(slot), value.X, nanoseconds(*value.stamp), replace);
+    return taken || value.process_noise;
+  }
+  if (value.process_noise) return true;
+  // Within a history an edge that moves is never static again.
+  if (edge.moving() || same(edge.X_PC, value.X)) return false;
+  push_held(slot, value.X);
+  return true;
+}
+
+void Forest::take(const std::vector<Handle>& edges, const std::vector<News>& values, bool replace) {
+  const std::lock_guard lock(impl_->mutex_);
+  const auto edge_of = [&](const News& value) {
+    const Version* edge =
+        value.index < edges.size() ? impl_->newest_held(edges[value.index]) : nullptr;
+    return static_cast<const HeldVersion*>(edge);
+  };
+  bool changed = false;
+  for (const News& value : values) {
+    const HeldVersion* edge = edge_of(value);
+    if (edge != nullptr && impl_->push_told(*edge, value, replace)) changed = true;
+  }
+  std::vector<bool> tied(edges.size(), false);
+  for (auto value = values.rbegin(); value != values.rend(); ++value) {
+    const HeldVersion* edge = edge_of(*value);
+    if (edge == nullptr || tied[value->index]) continue;
+    tied[value->index] = true;
+    const Correlation before = edge->ties != nullptr ? edge->ties->now : Correlation();
+    if (before == value->correlation || !check_shares(value->correlation.shares)) continue;
+    impl_->say_ties(edge->slot, value->correlation);
+    changed = true;
+  }
+  if (changed) impl_->commit();
+}
+
+}  // namespace tfdude
