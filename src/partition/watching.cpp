@@ -173,6 +173,8 @@ std::vector<State> pieces_of(State&& state) {
 }
 
 std::optional<State> StatePieces::add(const State& piece) {
+  // A reply may come between the pieces of what is pushed.
+  if (piece.pieces <= 1) return piece;
   if (piece.piece == 0) {
     whole_ = piece;
     next_ = 0;

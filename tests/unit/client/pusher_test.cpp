@@ -119,6 +119,15 @@ TEST_CASE("a group whose frame has gone is ended, also while it is pushed to") {
   }
 }
 
+TEST_CASE("of a thousand groups that nobody renews no writer is left") {
+  PushingOwner owner;
+  for (std::uint64_t group = 1; group <= 1000; ++group) {
+    REQUIRE(owner.pusher.watch(group, {{kHand}}));
+  }
+  REQUIRE(eventually([&] { return owner.writers().size() > 500; }));
+  REQUIRE(eventually([&] { return owner.writers().empty(); }));
+}
+
 TEST_CASE("who begins to listen late is told all once more") {
   PushingOwner owner;
   REQUIRE(owner.pusher.watch(1, {{kArm, kHand}}));

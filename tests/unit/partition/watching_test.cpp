@@ -92,6 +92,7 @@ TEST_CASE("a state in pieces is one again, if all of them come") {
   CHECK_FALSE(together.add(pieces[2]));  // one is missing
   CHECK_FALSE(together.add(pieces[0]));
   CHECK_FALSE(together.add(pieces[1]));
+  CHECK(together.add({7, {}, 0, 4}));  // one for itself
   const auto whole = together.add(pieces[2]);
   REQUIRE(whole);
   CHECK(listed(*whole) == listed(state));

@@ -1,0 +1,255 @@
+// Paths that owners push, once over each transport: what reaches a watcher, and when; and what pushing leaves behind.
+
+#include <atomic>
+#include <chrono>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/networks.hpp"
+#include "support/pose_diff.hpp"
+#include "support/process.hpp"
+#include "support/random.hpp"
+#include "support/recorder.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::along_x;
+using testing::eventually;
+using testing::Join;
+using testing::joined_by;
+using testing::outcome;
+using testing::Random;
+
+Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
+
+double x_of(const Result<StampedTransform>& X) {
+  return X ? X->pose.translation().x() : std::numeric_limits<double>::quiet_NaN();
+}
+
+// world -> base -> arm -> hand, of two partitions and a client without frames.
+struct Robot {
+  explicit Robot(Join joined, const EdgeTiming& of_hand = {}) : join(std::move(joined)) {
+    base.emplace(*Node::open(join("base"), "base", {{"world", "", {}}, {"base", "world", {}}}));
+    FrameSpec hand{"hand", "arm", {}};
+    hand.timing = of_hand;
+    arm.emplace(*Node::open(join("arm"), "arm", {{"arm", "base", {}}, hand}));
+    client.emplace(*Client::open(join("")));
+  }
+  Join join;
+  std::optional<Node> base;
+  std::optional<Node> arm;
+  std::optional<Client> client;
+};
+
+// Each has a group of its own.
+WatchOptions one_more() {
+  static int count = 0;
+  WatchOptions options;
+  options.rate = 1e9 / (1000.0 + ++count);
+  return options;
+}
+
+// DDS over the loopback interface, whose writers are counted of one partition.
+class CountedDomain {
+ public:
+  std::unique_ptr<Transport> join(const std::string& partition, bool counted = false) {
+    const auto counters = counted ? counters_ : nullptr;
+    return *make_fastdds_transport({lease_.number(), TFDUDE_LOOPBACK_PROFILE, partition, counters});
+  }
+  std::uint64_t writers() const { return counters_->writers; }
+
+ private:
+  testing::DomainLease lease_;
+  std::shared_ptr<FastDdsCounters> counters_ = std::make_shared<FastDdsCounters>();
+};
+
+}  // namespace
+
+TEST_CASE("watch: late samples and process noise are what lookups see, too") {
+  Random random(1601);
+  INFO("seed " << random.seed());
+  EdgeTiming noisy;
+  noisy.process_noise = random.covariance(0.01, 0.01);
+  Robot robot(joined_by(GENERATE(0, 1)), noisy);
+  const auto path = robot.client->watch("world", "hand");
+  REQUIRE(path);
+  for (const int t : {1000, 3000, 2000, 4000, 1500, 3990}) {
+    REQUIRE(robot.arm->update("hand", random.transform(), ms(t)));
+  }
+  const auto as_looked_up = [&](std::int64_t t) {
+    Query query;
+    query.at = ms(t);
+    const auto expected = robot.client->lookup("world", "hand", query);
+    const auto watched = path->at(ms(t));
+    if (!expected || !watched) return outcome(expected) + ", watched: " + outcome(watched);
+    return testing::transform_diff(*watched, *expected, 1e-9);
+  };
+  for (int t = 1000; t <= 4000; t += 125) {
+    REQUIRE(eventually([&] { return as_looked_up(t).empty(); }));
+  }
+}
+
+TEST_CASE("watch: a value for all times that is set as a watch begins arrives at once") {
+  Robot robot(joined_by(GENERATE(0, 1)));
+  for (int i = 1; i <= 20; ++i) {
+    const auto path = robot.client->watch("world", "hand", one_more());
+    REQUIRE(path);
+    REQUIRE(robot.base->update("base", along_x(i)));
+    const auto set = std::chrono::steady_clock::now();
+    REQUIRE(eventually([&] { return x_of(path->latest()) == i; }));
+    CHECK(std::chrono::steady_clock::now() - set < 400ms);
+  }
+}
+
+TEST_CASE("watch: it begins with an instant that all edges have in common") {
+  Robot robot(joined_by(GENERATE(0, 1)));
+  for (int t = 1; t <= 50; ++t) {
+    REQUIRE(robot.base->update("base", along_x(t), ms(10 * t)));
+    REQUIRE(robot.arm->update("arm", along_x(t), ms(10 * t + 3)));
+    REQUIRE(robot.arm->update("hand", along_x(t), ms(10 * t - 7)));
+    if (t < 3) continue;
+    const auto path = robot.client->watch("world", "hand", one_more());
+    REQUIRE(path);
+    const auto found = path->latest();
+    CHECK(outcome(found) == "ok");
+    CHECK(found->stamp == ms(10 * t - 7));
+  }
+  // There is none yet where an edge has only just begun: it is waited for.
+  REQUIRE(robot.base->add("new", "base", {}));
+  REQUIRE(robot.base->update("new", along_x(1), ms(600)));
+  REQUIRE(robot.arm->move("arm", "new"));
+  REQUIRE(robot.arm->update("arm", along_x(1), ms(601)));
+  REQUIRE(eventually([&] {
+    const auto route = robot.client->path("new", "arm");
+    return route && route->size() == 1;
+  }));
+  std::thread source([&] {
+    std::this_thread::sleep_for(50ms);
+    (void)robot.base->update({{"new", along_x(2)}, {"base", along_x(2)}}, ms(602));
+    (void)robot.arm->update({{"arm", along_x(2)}, {"hand", along_x(2)}}, ms(602));
+  });
+  const auto path = robot.client->watch("world", "hand", one_more());
+  source.join();
+  REQUIRE(path);
+  CHECK(outcome(path->latest()) == "ok");
+}
+
+TEST_CASE("watch: a path is read without a break while an owner starts again") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Robot robot(join);
+  const auto path = robot.client->watch("world", "hand");
+  REQUIRE(path);
+  std::atomic<bool> stop{false};
+  std::string wrong;
+  std::thread reader([&] {
+    while (!stop && wrong.empty()) {
+      const auto found = path->latest();
+      if (!found) wrong = found.error().message;
+      if (found && x_of(found) != 0 && x_of(found) != 7) wrong = std::to_string(x_of(found));
+    }
+  });
+  robot.arm.reset();
+  robot.arm.emplace(
+      *Node::open(join("arm"), "arm", {{"arm", "base", {}}, {"hand", "arm", along_x(7)}}));
+  CHECK(eventually([&] { return x_of(path->latest()) == 7; }));
+  stop = true;
+  reader.join();
+  CHECK(wrong == "");
+}
+
+TEST_CASE("watch: a rate that is no rate is refused") {
+  Robot robot(joined_by(0));
+  for (const double rate : {-1.0, 1e-4, 1e-300, 2e6, std::numeric_limits<double>::infinity(),
+                            std::numeric_limits<double>::quiet_NaN()}) {
+    WatchOptions options;
+    options.rate = rate;
+    CHECK(outcome(robot.client->watch("world", "hand", options)) == "invalid_input");
+  }
+  WatchOptions options;
+  options.rate = 0.001;
+  CHECK(robot.client->watch("world", "hand", options));
+}
+
+// Fewer than could be, as each costs milliseconds; pusher_test.cpp has 1,000 watches.
+TEST_CASE("watch: as many writers are there after watches and clients as before") {
+  CountedDomain domain;
+  auto base = *Node::open(domain.join("base", true), "base",
+                          {{"world", "", {}}, {"base", "world", {}}, {"spare", "world", {}}});
+  auto client = *Client::open(domain.join(""));
+  REQUIRE(client.lookup("world", "base"));
+  REQUIRE(eventually([&] { return domain.writers() == 4; }));  // one of them for replies
+  const std::uint64_t before = domain.writers();
+  for (int i = 0; i < 200; ++i) REQUIRE(client.watch("world", "base", one_more()));
+  for (int i = 0; i < 20; ++i) {
+    // One whose frame goes, so that it cannot be renewed.
+    const auto path = client.watch("world", "spare", one_more());
+    REQUIRE(path);
+    REQUIRE(base.remove("spare"));
+    REQUIRE(base.add("spare", "world", {}));
+  }
+  for (int i = 0; i < 20; ++i) {
+    auto passing = *Client::open(domain.join(""));
+    REQUIRE(passing.watch("world", "base", one_more()));
+  }
+  CHECK(eventually([&] { return domain.writers() == before; }));
+}
+
+TEST_CASE("watch: a reply to a peer that has left makes no writer") {
+  CountedDomain domain;
+  testing::Recorder owner;
+  owner.frames = {"hand"};
+  std::mutex mutex;
+  std::optional<PeerId> peer;
+  owner.answer = [&](const PeerId& from, const Request&) {
+    const std::lock_guard lock(mutex);
+    peer = from;
+  };
+  const auto transport = domain.join("arms", true);
+  REQUIRE(transport->start(owner));
+  REQUIRE(transport->serve("arms"));
+  const std::uint64_t before = domain.writers();
+  const auto deadline = [] { return std::chrono::steady_clock::now() + 10s; };
+  const auto asked_by = [&](Transport& asking) {
+    {
+      const std::lock_guard lock(mutex);
+      peer.reset();
+    }
+    return eventually([&] {
+      REQUIRE(asking.send("arms", Request{1, "hand", LookupRequest{}}, deadline()));
+      const std::lock_guard lock(mutex);
+      return peer.has_value();
+    });
+  };
+  for (int i = 0; i < 20; ++i) {
+    testing::Recorder nobody;
+    const auto asking = domain.join("");
+    REQUIRE(asking->start(nobody));
+    REQUIRE(asked_by(*asking));
+    asking->stop();
+    REQUIRE(eventually([&] { return domain.writers() == before; }));
+    transport->reply(*peer, Reply{1, 0, Done{}});
+  }
+  // Of one that is there what is sent arrives, after all that was to be done before.
+  testing::Recorder asker;
+  const auto asking = domain.join("");
+  REQUIRE(asking->start(asker));
+  REQUIRE(asked_by(*asking));
+  REQUIRE(eventually([&] {
+    transport->reply(*peer, Reply{1, 0, Done{}});
+    return asker.hears([](const auto& heard) { return !heard.replies.empty(); }, 50ms);
+  }));
+  CHECK(domain.writers() == before + 1);
+}
+
+}  // namespace tfdude
