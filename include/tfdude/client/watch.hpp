@@ -14,15 +14,15 @@ namespace tfdude {
 
 /// How a path is watched.
 struct WatchOptions {
-  /// How often at most an owner sends what has changed [Hz]; 0: every sample.
+  /// How often at most an owner sends what has changed [Hz]: from once an hour to 1e6; 0: every sample.
   double rate = 0;
   /// One composed transform for each partition on the path instead of all its edges: fewer bytes, but between samples the
   /// segment is interpolated as a whole.
   bool composed = false;
-  /// How much of the past is kept here.
+  /// How much of the past is kept here. Process noise is that of the edge's owner, where it has one.
   EdgeTiming timing{};
   /// Called when the path has found another way, or why there is none for now: one call at a time, from a thread of
-  /// the library's that holds no lock. Must not throw.
+  /// the library's that holds no lock, so that it may call anything, watch() as well. Must not throw.
   std::function<void(const std::string& what)> on_route;
 };
 
@@ -35,8 +35,10 @@ class PathWatch {
  public:
   explicit PathWatch(std::shared_ptr<WatchedPath> path) : path_(std::move(path)) {}
 
-  /// X_AB at the newest instant that has come of all its moving edges. No network, lock or allocation.
-  /// @return as Forest::lookup; while the path is not known, why.
+  /// X_AB at the newest instant that has come of all its moving edges. No network, lock or allocation. Always one of the
+  /// path's transforms: what an owner wrote at once is read in one piece; while the path takes another route, or an owner
+  /// starts again, it is the last one before.
+  /// @return as Forest::lookup; why, where the path does not exist any more, or is not known yet.
   [[nodiscard]] Result<StampedTransform> latest() const { return lookup({}); }
   [[nodiscard]] Result<StampedTransform> at(Time t) const;
   [[nodiscard]] Result<StampedTransform> lookup(const Query& query) const;
@@ -45,7 +47,7 @@ class PathWatch {
   /// @return kUnreachable, naming the partition; while the path is not known, why.
   [[nodiscard]] Result<void> health() const;
 
-  /// How many messages have come; grows with each.
+  /// How many messages have come that said something new.
   [[nodiscard]] std::uint64_t messages() const;
 
   /// Waits until more have come than so many; false at the deadline.
