@@ -23,7 +23,7 @@ CONFINED = [
     ("DDS", r"(fastdds|fastrtps|fastcdr)/", [DDS_FOLDER]),
     ("yaml-cpp", r"yaml-cpp/", ["src/client/"]),
     ("urdfdom", r"(urdf_(model|parser|exception)|console_bridge)/", ["src/client/"]),
-    ("tinyxml2", r"tinyxml2\.h$", ["src/client/"]),
+    ("tinyxml2", r"tinyxml2\.h$", ["src/client/", "src/transport/fastdds/"]),
     ("SQLite", r"sqlite3\.h$", ["src/store/"]),
     ("CLI11", r"CLI/", ["apps/"]),
     ("nlohmann", r"nlohmann/", ["apps/"]),

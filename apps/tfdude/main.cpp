@@ -313,6 +313,7 @@ int main(int argc, char** argv) {
   for (const char* name : {"watch", "echo", "monitor", "events"}) {
     if (app.got_subcommand(name)) pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
   }
+  log_fastdds_to_standard_error();
   const int status = run(arguments, command);
   const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
   if (!written) std::perror("tfdude: standard output");

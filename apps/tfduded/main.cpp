@@ -13,6 +13,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/config.hpp"
+#include "tfdude/transport/fastdds.hpp"
 
 #include "arguments.hpp"
 
@@ -99,6 +100,7 @@ int main(int argc, char** argv) {
   // of the log that does not read must not hold up who serves: rather lines are lost.
   spdlog::set_default_logger(
       spdlog::create_async_nb<spdlog::sinks::stderr_color_sink_mt>("tfdude"));
+  tfdude::log_fastdds_to_standard_error();
   const int status = serve(arguments, stop_signals);
   spdlog::shutdown();
   return status;

@@ -44,8 +44,8 @@ Sizes sizes_of(const tfdude::Request& request, const tfdude::Reply& reply) {
 /// Writes, and waits for the listener of the reply's reader, as our client does.
 class DdsPing final : public edds::DataReaderListener {
  public:
-  explicit DdsPing(std::uint32_t domain)
-      : endpoints_(domain, bench::kPingTopic, bench::kPongTopic, *this, "call") {
+  DdsPing(std::uint32_t domain, const std::string& profile)
+      : endpoints_(domain, profile, bench::kPingTopic, bench::kPongTopic, *this, "call") {
     bench::await_match(endpoints_);
   }
 
@@ -105,8 +105,7 @@ int main(int argc, char** argv) {
   const bench::Arguments arguments(argc, argv);
   auto client = must(Client::open(arguments.options("central")), "a client");
   const Transform X = bench::await_lookup(client, kFrom, kFrame);
-  // After our client, which has loaded the profiles.
-  DdsPing dds(static_cast<std::uint32_t>(arguments.number("domain")));
+  DdsPing dds(static_cast<std::uint32_t>(arguments.number("domain")), arguments.text("profile"));
   UdpPing udp(arguments.number("udp-port"));
 
   const auto compare = [&](const std::string& what, const Sizes& sizes, auto ours) {

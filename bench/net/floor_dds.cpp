@@ -9,11 +9,13 @@ namespace bench {
 
 namespace edds = fastdds::edds;
 
-FloorEndpoints::FloorEndpoints(std::uint32_t domain, const char* to, const char* from,
-                               edds::DataReaderListener& listener, const std::string& profiles) {
+FloorEndpoints::FloorEndpoints(std::uint32_t domain, const std::string& profile, const char* to,
+                               const char* from, edds::DataReaderListener& listener,
+                               const std::string& kind) {
+  const auto profiles = must(fastdds::Profiles::load(profile), "the profile");
   const edds::TypeSupport type(new PingType);
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
-      domain, fastdds::participant_qos());
+      domain, profiles.participant());
   type.register_type(participant_);
   auto* to_topic = participant_->create_topic(to, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
   auto* from_topic =
@@ -21,9 +23,9 @@ FloorEndpoints::FloorEndpoints(std::uint32_t domain, const char* to, const char*
   auto* publisher = participant_->create_publisher(edds::PUBLISHER_QOS_DEFAULT);
   auto* subscriber = participant_->create_subscriber(edds::SUBSCRIBER_QOS_DEFAULT);
   writer_ =
-      publisher->create_datawriter(to_topic, fastdds::writer_qos(*publisher, profiles + "_writer"));
+      publisher->create_datawriter(to_topic, profiles.writer(*publisher, kind + "_writer"));
   reader_ = subscriber->create_datareader(
-      from_topic, fastdds::reader_qos(*subscriber, profiles + "_reader"), &listener);
+      from_topic, profiles.reader(*subscriber, kind + "_reader"), &listener);
 }
 
 FloorEndpoints::~FloorEndpoints() {

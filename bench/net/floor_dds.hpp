@@ -42,9 +42,10 @@ std::uint32_t payload_size(Sample sample) {
 /// where the library cannot make something, and its log says why.
 class FloorEndpoints {
  public:
-  /// @param profiles  what the names of the profiles of both begin with: "call", "update"
-  FloorEndpoints(std::uint32_t domain, const char* to, const char* from,
-                 fastdds::edds::DataReaderListener& listener, const std::string& profiles);
+  /// @param profile  as for our participants: a file
+  /// @param kind  what the names of the profiles of both begin with: "call", "update"
+  FloorEndpoints(std::uint32_t domain, const std::string& profile, const char* to, const char* from,
+                 fastdds::edds::DataReaderListener& listener, const std::string& kind);
   ~FloorEndpoints();
   FloorEndpoints(const FloorEndpoints&) = delete;
   FloorEndpoints& operator=(const FloorEndpoints&) = delete;

@@ -18,8 +18,8 @@ namespace edds = tfdude::fastdds::edds;
 /// Answers in the callback, through a writer that is there already.
 class DdsEcho final : public edds::DataReaderListener {
  public:
-  explicit DdsEcho(std::uint32_t domain)
-      : endpoints_(domain, bench::kPongTopic, bench::kPingTopic, *this, "call") {}
+  DdsEcho(std::uint32_t domain, const std::string& profile)
+      : endpoints_(domain, profile, bench::kPongTopic, bench::kPingTopic, *this, "call") {}
 
   void on_data_available(edds::DataReader* reader) override {
     if (!tfdude::fastdds::ok(reader->take_next_sample(&sample_, &info_)) || !info_.valid_data)
@@ -40,8 +40,7 @@ int main(int argc, char** argv) {
   std::optional<DdsEcho> dds;
   if (argc > 1) {
     const bench::Arguments arguments(argc, argv);
-    bench::check(tfdude::fastdds::load_profiles(arguments.text("profile")), "the profile");
-    dds.emplace(static_cast<std::uint32_t>(arguments.number("domain")));
+    dds.emplace(static_cast<std::uint32_t>(arguments.number("domain")), arguments.text("profile"));
   }
   bench::UdpSocket udp;
   std::printf("ready udp_port=%d\n", udp.port());

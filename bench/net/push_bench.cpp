@@ -49,7 +49,7 @@ std::uint32_t domain_of(const bench::Arguments& arguments) {
 
 [[noreturn]] void own(const bench::Arguments& arguments) {
   bench::PushedRobot robot(kJoints, arguments.options("domain"));
-  bench::BareSender bare(domain_of(arguments), pushed_bytes());
+  bench::BareSender bare(domain_of(arguments), arguments.text("profile"), pushed_bytes());
   std::fprintf(stderr, "pushed: %u bytes\n", pushed_bytes());
   std::puts("ready");
   std::fflush(stdout);
@@ -73,8 +73,8 @@ class BareReceiver final : public edds::DataReaderListener {
     Clock::time_point heard;  // by the listener
   };
 
-  explicit BareReceiver(std::uint32_t domain)
-      : endpoints_(domain, bench::kPongTopic, bench::kPingTopic, *this, "update") {}
+  BareReceiver(std::uint32_t domain, const std::string& profile)
+      : endpoints_(domain, profile, bench::kPongTopic, bench::kPingTopic, *this, "update") {}
 
   void on_data_available(edds::DataReader* reader) override {
     // More than one where this was late: then the newest.
@@ -198,8 +198,7 @@ void watch(const bench::Arguments& arguments) {
   const std::string end = bench::joint(kJoints - 1);
   (void)bench::await_lookup(client, bench::kBase, end);
   PathWatch path = must(client.watch(bench::kBase, end), "a pushed path");
-  // After our client, which has loaded the profiles.
-  BareReceiver bare(domain_of(arguments));
+  BareReceiver bare(domain_of(arguments), arguments.text("profile"));
   const int repetitions = arguments.number("repetitions");
   Watcher(path, bare).run(arguments.number("seconds"), repetitions);
   constexpr int kBatch = 20;

@@ -46,10 +46,6 @@ std::uint32_t domain_of(const Arguments& arguments) {
   return static_cast<std::uint32_t>(arguments.number("domain"));
 }
 
-void load_profiles(const Arguments& arguments) {
-  bench::check(tfdude::fastdds::load_profiles(arguments.text("profile")), "the profile");
-}
-
 [[noreturn]] void own(const Arguments& arguments) {
   bench::PushedRobot robot(arguments.number("joints"), arguments.options("domain"));
   repeat(arguments, [&] { robot.move(); });
@@ -78,16 +74,15 @@ void load_profiles(const Arguments& arguments) {
 }
 
 [[noreturn]] void send(const Arguments& arguments) {
-  load_profiles(arguments);
-  bench::BareSender sender(domain_of(arguments),
+  bench::BareSender sender(domain_of(arguments), arguments.text("profile"),
                            static_cast<std::uint32_t>(arguments.number("bytes")));
   repeat(arguments, [&] { sender.send(); });
 }
 
 class Listener final : public tfdude::fastdds::edds::DataReaderListener {
  public:
-  explicit Listener(std::uint32_t domain)
-      : endpoints_(domain, bench::kPongTopic, bench::kPingTopic, *this, "update") {}
+  Listener(std::uint32_t domain, const std::string& profile)
+      : endpoints_(domain, profile, bench::kPongTopic, bench::kPingTopic, *this, "update") {}
 
   void on_data_available(tfdude::fastdds::edds::DataReader* reader) override {
     while (tfdude::fastdds::ok(reader->take_next_sample(&ping_, &info_))) continue;
@@ -102,10 +97,9 @@ class Listener final : public tfdude::fastdds::edds::DataReaderListener {
 };
 
 [[noreturn]] void listen(const Arguments& arguments) {
-  load_profiles(arguments);
   std::deque<Listener> listeners;
   for (int i = 0; i < arguments.number("watchers"); ++i) {
-    listeners.emplace_back(domain_of(arguments));
+    listeners.emplace_back(domain_of(arguments), arguments.text("profile"));
   }
   for (const Listener& listener : listeners) listener.await_match();
   stay();

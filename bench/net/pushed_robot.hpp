@@ -54,8 +54,8 @@ class NoListener final : public fastdds::edds::DataReaderListener {};
 /// Sends samples of a size as values are pushed, to whoever listens.
 class BareSender {
  public:
-  BareSender(std::uint32_t domain, std::uint32_t bytes)
-      : endpoints_(domain, kPingTopic, kPongTopic, listener_, "update") {
+  BareSender(std::uint32_t domain, const std::string& profile, std::uint32_t bytes)
+      : endpoints_(domain, profile, kPingTopic, kPongTopic, listener_, "update") {
     ping_.filler().resize(bytes - kPingOverhead);
   }
 

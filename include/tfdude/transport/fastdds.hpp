@@ -33,9 +33,13 @@ struct FastDdsOptions {
 /// @return kInvalidInput naming it.
 [[nodiscard]] Result<void> check_discovery_server(const std::string& address);
 
-/// A participant's access to a DDS domain by Fast DDS. Switches Fast DDS's delivery inside a process off for
-/// the whole process, since it calls handlers under the library's locks, and sends its log to standard
-/// error.
+/// Sends what Fast DDS logs in this process to standard error alone: warnings go to standard output else. For programs
+/// whose output is read; a library leaves the log to its host.
+void log_fastdds_to_standard_error();
+
+/// A participant's access to a DDS domain by Fast DDS. It may live beside others of the process, ours or not, and changes
+/// none of Fast DDS's settings that they share; its profile is its own. Delivery inside the process, which calls handlers
+/// under the writer's locks, is not used whatever is set.
 /// @return kInvalidInput (domain, discovery server). start() may fail with kConfig (profile), kTransport, and
 ///   kInvalidInput where the discovery server's host has no IPv4 address.
 [[nodiscard]] Result<std::unique_ptr<Transport>> make_fastdds_transport(

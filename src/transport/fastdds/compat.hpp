@@ -28,11 +28,8 @@
 #include <fastdds/rtps/transport/ChainingTransport.h>
 #include <fastdds/rtps/transport/ChainingTransportDescriptor.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/attributes/LibrarySettingsAttributes.h>
 #include <fastrtps/utils/IPLocator.h>
-#include <fastrtps/xmlparser/XMLProfileManager.h>
 #else
-#include <fastdds/LibrarySettings.hpp>
 #include <fastdds/dds/core/ReturnCode.hpp>
 #include <fastdds/dds/core/policy/QosPolicies.hpp>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -90,12 +87,6 @@ inline std::string name_of(const edds::TopicDataType& type) { return type.getNam
 
 /// Elements of XML profiles that have another name in this version than in profiles/tfdude.xml.
 inline constexpr std::array<std::pair<const char*, const char*>, 0> kRenamedElements{};
-
-inline void switch_intraprocess_off() {
-  eprosima::fastrtps::LibrarySettingsAttributes settings;
-  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
-  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
-}
 
 /// Makes a participant meet the others by a discovery server. A participant of this version knows a server by
 /// its id, too: 0, unless told otherwise, as the servers have it.
@@ -169,12 +160,6 @@ inline constexpr std::array<std::pair<const char*, const char*>, 6> kRenamedElem
     {"initialAcknackDelay", "initial_acknack_delay"},
     {"heartbeatResponseDelay", "heartbeat_response_delay"},
 }};
-
-inline void switch_intraprocess_off() {
-  eprosima::fastdds::LibrarySettings settings;
-  settings.intraprocess_delivery = eprosima::fastdds::INTRAPROCESS_OFF;
-  edds::DomainParticipantFactory::get_instance()->set_library_settings(settings);
-}
 
 inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps::Locator_t& at) {
   discovery.discoveryProtocol = DiscoveryProtocol::CLIENT;

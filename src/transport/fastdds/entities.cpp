@@ -4,21 +4,21 @@
 
 namespace tfdude::fastdds {
 
-Outlet::Outlet(edds::DomainParticipant& participant, edds::Topic& topic,
-               const std::string& partition, const std::string& profile, FastDdsCounters& counters,
-               std::function<void()> on_reader)
-    : participant_(participant), counters_(counters), on_reader_(std::move(on_reader)) {
-  edds::PublisherQos qos = participant.get_default_publisher_qos();
+Outlet::Outlet(const Context& context, edds::Topic& topic, const std::string& partition,
+               const std::string& profile, std::function<void()> on_reader)
+    : context_(context), on_reader_(std::move(on_reader)) {
+  edds::PublisherQos qos = context.participant.get_default_publisher_qos();
   if (!partition.empty()) qos.partition().push_back(partition.c_str());
-  publisher_ = participant.create_publisher(qos);
+  publisher_ = context.participant.create_publisher(qos);
   if (publisher_ == nullptr) return;
-  writer_ = publisher_->create_datawriter(&topic, writer_qos(*publisher_, profile), this);
-  if (writer_ != nullptr) ++counters_.writers;
+  writer_ = publisher_->create_datawriter(&topic, context.profiles.writer(*publisher_, profile), this);
+  if (writer_ != nullptr) ++context_.counters.writers;
 }
 
 Outlet::~Outlet() {
-  if (writer_ != nullptr && ok(publisher_->delete_datawriter(writer_))) --counters_.writers;
-  if (publisher_ != nullptr) participant_.delete_publisher(publisher_);
+  const Gate::Pause pause(context_.gate);
+  if (writer_ != nullptr && ok(publisher_->delete_datawriter(writer_))) --context_.counters.writers;
+  if (publisher_ != nullptr) context_.participant.delete_publisher(publisher_);
 }
 
 bool Outlet::wait_until_matched(Deadline deadline) {

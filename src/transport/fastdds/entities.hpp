@@ -12,6 +12,7 @@
 #include "tfdude/transport/fastdds.hpp"
 
 #include "transport/fastdds/compat.hpp"
+#include "transport/fastdds/gate.hpp"
 #include "transport/fastdds/profiles.hpp"
 
 // DDS entities with a lifetime. Each may be null inside where the library could not make it: good() tells.
@@ -19,16 +20,22 @@ namespace tfdude::fastdds {
 
 using Deadline = std::chrono::steady_clock::time_point;
 
+/// What the entities of one participant are made with.
+struct Context {
+  edds::DomainParticipant& participant;
+  const Profiles& profiles;
+  Gate& gate;  ///< shut while one of them is deleted, so that none may be in a callback
+  FastDdsCounters& counters;
+};
+
 /// A writer with a publisher of its own, hence in a DDS partition of its own.
 class Outlet final : public edds::DataWriterListener {
  public:
   /// @param partition  DDS partition; empty: the default one
-  /// @param counters  outlive it
   /// @param on_reader  called when one more reader has been met: what is written from now on reaches it. From a thread of
   ///   the library, which may hold locks
-  Outlet(edds::DomainParticipant& participant, edds::Topic& topic, const std::string& partition,
-         const std::string& profile, FastDdsCounters& counters,
-         std::function<void()> on_reader = nullptr);
+  Outlet(const Context& context, edds::Topic& topic, const std::string& partition,
+         const std::string& profile, std::function<void()> on_reader = nullptr);
   ~Outlet() override;
   Outlet(const Outlet&) = delete;
   Outlet& operator=(const Outlet&) = delete;
@@ -45,8 +52,7 @@ class Outlet final : public edds::DataWriterListener {
                               const edds::PublicationMatchedStatus& status) override;
 
  private:
-  edds::DomainParticipant& participant_;
-  FastDdsCounters& counters_;
+  const Context context_;
   const std::function<void()> on_reader_;
   edds::Publisher* publisher_ = nullptr;
   edds::DataWriter* writer_ = nullptr;
@@ -66,14 +72,15 @@ class Inlet : public edds::DataReaderListener {
     std::function<void(const ertps::GuidPrefix_t& writer, int change)> on_matched;
   };
 
-  Inlet(edds::DomainParticipant& participant, edds::TopicDescription& topic,
-        const std::string& partition, const std::string& profile, Calls calls)
-      : participant_(participant), calls_(std::move(calls)) {
-    edds::SubscriberQos qos = participant.get_default_subscriber_qos();
+  Inlet(const Context& context, edds::TopicDescription& topic, const std::string& partition,
+        const std::string& profile, Calls calls)
+      : context_(context), calls_(std::move(calls)) {
+    edds::SubscriberQos qos = context.participant.get_default_subscriber_qos();
     if (!partition.empty()) qos.partition().push_back(partition.c_str());
-    subscriber_ = participant.create_subscriber(qos);
+    subscriber_ = context.participant.create_subscriber(qos);
     if (subscriber_ == nullptr) return;
-    reader_ = subscriber_->create_datareader(&topic, reader_qos(*subscriber_, profile), this);
+    reader_ = subscriber_->create_datareader(
+        &topic, context.profiles.reader(*subscriber_, profile), this);
   }
 
   ~Inlet() override { close(); }
@@ -83,8 +90,9 @@ class Inlet : public edds::DataReaderListener {
   [[nodiscard]] bool good() const { return reader_ != nullptr; }
 
   void close() {
+    const Gate::Pause pause(context_.gate);
     if (reader_ != nullptr) subscriber_->delete_datareader(reader_);
-    if (subscriber_ != nullptr) participant_.delete_subscriber(subscriber_);
+    if (subscriber_ != nullptr) context_.participant.delete_subscriber(subscriber_);
     reader_ = nullptr;
     subscriber_ = nullptr;
   }
@@ -121,7 +129,7 @@ class Inlet : public edds::DataReaderListener {
     edds::SampleInfo info;
   };
 
-  edds::DomainParticipant& participant_;
+  const Context context_;
   const Calls calls_;
   std::mutex mutex_;         // of batch_; the library may call from several threads
   std::deque<Taken> batch_;  // kept, for their memory

@@ -12,12 +12,16 @@ namespace {
 using Flag = std::shared_ptr<std::atomic<bool>>;
 
 struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
-  GatedDescriptor(std::shared_ptr<etransport::TransportDescriptorInterface> guarded, Flag flag)
-      : ChainingTransportDescriptor(std::move(guarded)), open(std::move(flag)) {}
+  GatedDescriptor(std::shared_ptr<etransport::TransportDescriptorInterface> guarded, Flag flag,
+                  std::shared_ptr<Gate> inward)
+      : ChainingTransportDescriptor(std::move(guarded)),
+        open(std::move(flag)),
+        gate(std::move(inward)) {}
 
   [[nodiscard]] etransport::TransportInterface* create_transport() const override;
 
   Flag open;
+  std::shared_ptr<Gate> gate;
   std::shared_ptr<Reach> reach = std::make_shared<Reach>();
 };
 
@@ -36,6 +40,13 @@ class GatedTransport final : public SendFilter {
       : SendFilter(descriptor), descriptor_(descriptor) {}
 
   etransport::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
+
+  void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
+               std::uint32_t size, const ertps::Locator_t& local,
+               const ertps::Locator_t& remote) override {
+    const Gate::Pass pass(*descriptor_.gate);
+    if (pass) SendFilter::receive(next, bytes, size, local, remote);
+  }
 
  private:
   [[nodiscard]] bool may_send(const ertps::Locator_t& to) const override {
@@ -93,7 +104,7 @@ void Entrance::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bo
                         std::all_of(transports.begin(), transports.end(), is_udp);
   if (client && udp_only) hear_by_unicast_only(qos, domain);
   for (auto& transport : transports) {
-    if (is_udp(transport)) transport = std::make_shared<GatedDescriptor>(transport, open_);
+    if (is_udp(transport)) transport = std::make_shared<GatedDescriptor>(transport, open_, gate_);
   }
 }
 

@@ -3,8 +3,10 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "transport/fastdds/compat.hpp"
+#include "transport/fastdds/gate.hpp"
 
 namespace tfdude::fastdds {
 
@@ -21,6 +23,9 @@ namespace tfdude::fastdds {
 /// - A client announces itself every 2 ms at first, later every 100 ms; servers as the profile says.
 class Entrance {
  public:
+  /// @param gate  what is received over UDP passes it
+  explicit Entrance(std::shared_ptr<Gate> gate) : gate_(std::move(gate)) {}
+
   /// Prepares a participant that is going to be created. Of transports other than UDP, and of discovery that
   /// the profile has arranged otherwise, all stays as it is.
   void prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) const;
@@ -29,6 +34,7 @@ class Entrance {
   void open() { open_->store(true, std::memory_order_relaxed); }
 
  private:
+  const std::shared_ptr<Gate> gate_;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);
 };
 

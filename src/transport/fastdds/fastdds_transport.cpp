@@ -31,15 +31,6 @@ tl::unexpected<Error> not_created(const char* what) {
   return fail(Errc::kTransport, std::string("Fast DDS could not create ") + what);
 }
 
-void prepare_library() {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    switch_intraprocess_off();
-    edds::Log::ClearConsumers();
-    edds::Log::RegisterConsumer(std::make_unique<edds::StdoutErrConsumer>());
-  });
-}
-
 }  // namespace
 
 FastDdsTransport::FastDdsTransport(FastDdsOptions options)
@@ -48,8 +39,9 @@ FastDdsTransport::FastDdsTransport(FastDdsOptions options)
 
 Result<void> FastDdsTransport::start(TransportHandler& handler) {
   handler_ = &handler;
-  prepare_library();
-  if (auto loaded = load_profiles(options_.profile); !loaded) return loaded;
+  auto profiles = Profiles::load(options_.profile);
+  if (!profiles) return tl::unexpected(std::move(profiles.error()));
+  profiles_ = *std::move(profiles);
   worker_.emplace();
   worker_->repeat(Peers::kSpeakEvery / 2, [this] { keep_in_touch(); });
   if (auto created = create_participant(); !created) return created;
@@ -57,14 +49,14 @@ Result<void> FastDdsTransport::start(TransportHandler& handler) {
 }
 
 Result<void> FastDdsTransport::create_participant() {
-  edds::DomainParticipantQos qos = participant_qos();
+  edds::DomainParticipantQos qos = profiles_->participant();
   qos.name(participant_name(options_.partition));
   qos.properties().properties().emplace_back("fastdds.ignore_local_endpoints", "true");
   take_lease(qos);
   if (!options_.discovery_server.empty()) {
     if (auto used = use_discovery_server(qos, options_.discovery_server); !used) return used;
   }
-  Entrance entrance;
+  Entrance entrance(gate_);
   entrance.prepare(qos, options_.domain, options_.partition.empty());
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
       options_.domain, qos, &participant_listener_, edds::StatusMask::none());
@@ -107,28 +99,28 @@ edds::Topic* FastDdsTransport::create_topic(const char* name, const edds::TypeSu
 Result<void> FastDdsTransport::create_endpoints() {
   using Prefix = ertps::GuidPrefix_t;
   states_.emplace(
-      *participant_, *topics_.state, *counters_,
+      context(), *topics_.state,
       StateChannels::Calls{[this](const State& state) { handler_->on_state(state); },
                            [this](std::uint64_t group) { handler_->on_watcher(group); }});
   presence_ = std::make_unique<Inlet<wire::Presence>>(
-      *participant_, *topics_.presence, std::string(), "presence_reader",
+      context(), *topics_.presence, std::string(), "presence_reader",
       Inlet<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
                                      take_presence(sample, from, false);
                                    },
                                    nullptr});
   beats_ = std::make_unique<Inlet<wire::Presence>>(
-      *participant_, *topics_.presence, kBeatPartition, "beat_reader",
+      context(), *topics_.presence, kBeatPartition, "beat_reader",
       Inlet<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
                                      take_presence(sample, from, true);
                                    },
                                    nullptr});
   pages_ = std::make_unique<Inlet<wire::Page>>(
-      *participant_, *topics_.directory, std::string(), "directory_reader",
+      context(), *topics_.directory, std::string(), "directory_reader",
       Inlet<wire::Page>::Calls{
           [this](const wire::Page& sample, const Prefix& from) { take_page(sample, from); },
           nullptr});
   replies_ = std::make_unique<Inlet<wire::Reply>>(
-      *participant_, *topics_.reply, reply_partition(self_), "call_reader",
+      context(), *topics_.reply, reply_partition(self_), "call_reader",
       Inlet<wire::Reply>::Calls{[this](const wire::Reply& sample, const Prefix& from) {
                                   peers_.heard(from);
                                   take_reply(sample);
@@ -138,12 +130,12 @@ Result<void> FastDdsTransport::create_endpoints() {
     return not_created("the readers");
   }
   if (options_.partition.empty()) return {};
-  presence_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.presence, std::string(),
-                                              "presence_writer", *counters_);
-  beat_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.presence, kBeatPartition,
-                                          "beat_writer", *counters_);
-  directory_outlet_ = std::make_unique<Outlet>(*participant_, *topics_.directory, std::string(),
-                                               "directory_writer", *counters_);
+  presence_outlet_ =
+      std::make_unique<Outlet>(context(), *topics_.presence, std::string(), "presence_writer");
+  beat_outlet_ =
+      std::make_unique<Outlet>(context(), *topics_.presence, kBeatPartition, "beat_writer");
+  directory_outlet_ = std::make_unique<Outlet>(context(), *topics_.directory, std::string(),
+                                               "directory_writer");
   if (!presence_outlet_->good() || !beat_outlet_->good() || !directory_outlet_->good()) {
     return not_created("the writers");
   }
@@ -173,16 +165,16 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
     if (change > 0) worker_->post([this, peer = peer_of(from)] { open_reply_outlet(peer); });
   };
   requests_ = std::make_unique<Inlet<wire::Request>>(
-      *participant_, *requests, partition, "call_reader",
+      context(), *requests, partition, "call_reader",
       Inlet<wire::Request>::Calls{
           [this](const wire::Request& sample, const Prefix& from) { take_request(sample, from); },
           asker_matched});
   updates_ = std::make_unique<Inlet<wire::Update>>(
-      *participant_, *updates, partition, "update_reader",
+      context(), *updates, partition, "update_reader",
       Inlet<wire::Update>::Calls{
           [this](const wire::Update& sample, const Prefix&) { take_update(sample); }, nullptr});
   joints_ = std::make_unique<Inlet<wire::Joints>>(
-      *participant_, *joints, partition, "update_reader",
+      context(), *joints, partition, "update_reader",
       Inlet<wire::Joints>::Calls{
           [this](const wire::Joints& sample, const Prefix&) { take_joints(sample); }, nullptr});
   const bool good = requests_->good() && updates_->good() && joints_->good();
@@ -196,6 +188,9 @@ Milliseconds FastDdsTransport::settle_time() const {
 
 void FastDdsTransport::stop() {
   if (participant_ == nullptr) return;
+  // From here on nothing is matched while endpoints go (see Gate); then whoever makes and deletes them, too.
+  gate_->close();
+  worker_->stop();
   participant_->set_listener(nullptr);
   requests_.reset();
   updates_.reset();
@@ -204,7 +199,6 @@ void FastDdsTransport::stop() {
   pages_.reset();
   beats_.reset();
   presence_.reset();
-  worker_->stop();
   states_.reset();
   reply_outlets_.clear();
   request_outlets_.clear();
@@ -253,9 +247,7 @@ std::shared_ptr<Outlet> FastDdsTransport::outlet(Outlets& outlets, edds::Topic* 
                                                  const char* profile) {
   const std::lock_guard lock(outlets_mutex_);
   auto& entry = outlets[partition];
-  if (entry == nullptr) {
-    entry = std::make_shared<Outlet>(*participant_, *topic, partition, profile, *counters_);
-  }
+  if (entry == nullptr) entry = std::make_shared<Outlet>(context(), *topic, partition, profile);
   return entry;
 }
 
@@ -316,8 +308,8 @@ std::shared_ptr<Outlet> FastDdsTransport::reply_outlet(const PeerId& peer) {
 // Of one that has left nothing is to be made: it would be kept for ever.
 void FastDdsTransport::open_reply_outlet(const PeerId& peer) {
   if (there_.count(peer) == 0 || reply_outlet(peer) != nullptr) return;
-  auto opened = std::make_shared<Outlet>(*participant_, *topics_.reply, reply_partition(peer),
-                                         "call_writer", *counters_);
+  auto opened =
+      std::make_shared<Outlet>(context(), *topics_.reply, reply_partition(peer), "call_writer");
   const std::unique_lock lock(reply_mutex_);
   reply_outlets_.emplace(peer, std::move(opened));
 }
@@ -360,6 +352,12 @@ void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
 }  // namespace tfdude::fastdds
 
 namespace tfdude {
+
+void log_fastdds_to_standard_error() {
+  using fastdds::edds::Log;
+  Log::ClearConsumers();
+  Log::RegisterConsumer(std::make_unique<fastdds::edds::StdoutErrConsumer>());
+}
 
 Result<std::unique_ptr<Transport>> make_fastdds_transport(const FastDdsOptions& options) {
   if (options.domain > fastdds::kMaxDomain) {

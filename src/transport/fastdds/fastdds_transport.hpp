@@ -72,6 +72,7 @@ class FastDdsTransport final : public Transport {
   edds::ContentFilteredTopic* create_filtered(edds::Topic* topic, const std::string& partition);
 
   void keep_in_touch();
+  [[nodiscard]] Context context() const { return {*participant_, *profiles_, *gate_, *counters_}; }
   std::shared_ptr<Outlet> outlet(Outlets& outlets, edds::Topic* topic, const std::string& partition,
                                  const char* profile);
   std::shared_ptr<Outlet> reply_outlet(const PeerId& peer);
@@ -87,6 +88,8 @@ class FastDdsTransport final : public Transport {
   void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from, bool beat);
 
   const FastDdsOptions options_;
+  const std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
+  std::optional<Profiles> profiles_;
   const std::shared_ptr<FastDdsCounters> counters_;
   TransportHandler* handler_ = nullptr;
   Peers peers_{[this](const Presence& presence) { handler_->on_presence(presence); },

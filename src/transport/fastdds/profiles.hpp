@@ -1,21 +1,38 @@
 #pragma once
 
 #include <string>
+#include <utility>
 
 #include "tfdude/base/result.hpp"
 
 #include "transport/fastdds/compat.hpp"
 
-// QoS by the names of profiles/tfdude.xml, without their prefix: "participant", "call_writer"...
 namespace tfdude::fastdds {
 
-/// Makes the built-in profiles known, and those of a user's file, which then take their place.
-/// @param file  empty: none
-/// @return kConfig naming the file.
-[[nodiscard]] Result<void> load_profiles(const std::string& file);
+/// QoS by the names of profiles/tfdude.xml, without their prefix ("participant", "call_writer"...): of the file that one
+/// participant named, and where that lacks one, of the built-in profiles. Other participants of the process have their
+/// own.
+class Profiles {
+ public:
+  /// @param file  empty: the built-in profiles alone
+  /// @return kConfig naming the file.
+  [[nodiscard]] static Result<Profiles> load(const std::string& file);
 
-[[nodiscard]] edds::DomainParticipantQos participant_qos();
-[[nodiscard]] edds::DataWriterQos writer_qos(edds::Publisher& publisher, const std::string& name);
-[[nodiscard]] edds::DataReaderQos reader_qos(edds::Subscriber& subscriber, const std::string& name);
+  [[nodiscard]] edds::DomainParticipantQos participant() const;
+  [[nodiscard]] edds::DataWriterQos writer(edds::Publisher& publisher,
+                                           const std::string& name) const;
+  [[nodiscard]] edds::DataReaderQos reader(edds::Subscriber& subscriber,
+                                           const std::string& name) const;
+
+ private:
+  Profiles(std::string builtin, std::string own)
+      : builtin_(std::move(builtin)), own_(std::move(own)) {}
+  template <class Read>
+  void fill(const std::string& name, Read read) const;
+
+  // What the names in the process end with.
+  std::string builtin_;
+  std::string own_;
+};
 
 }  // namespace tfdude::fastdds

@@ -17,7 +17,7 @@ Result<void> StateChannels::watch(std::uint64_t group) {
   auto& inlet = inlets_[group];
   if (inlet != nullptr) return {};
   inlet = std::make_unique<Inlet<wire::State>>(
-      participant_, topic_, partition_of(group), "update_reader",
+      context_, topic_, partition_of(group), "update_reader",
       Inlet<wire::State>::Calls{[this](const wire::State& sample, const ertps::GuidPrefix_t&) {
                                   if (const auto state = from_wire(sample)) {
                                     calls_.on_state(*state);
@@ -47,8 +47,7 @@ void StateChannels::push(const State& state) {
     const std::lock_guard lock(mutex_);
     auto& entry = outlets_[state.group];
     if (entry == nullptr) {
-      entry = std::make_shared<Outlet>(participant_, topic_, partition_of(state.group),
-                                       "update_writer", counters_,
+      entry = std::make_shared<Outlet>(context_, topic_, partition_of(state.group), "update_writer",
                                        [this, group = state.group] { calls_.on_watcher(group); });
     }
     outlet = entry;
@@ -59,8 +58,12 @@ void StateChannels::push(const State& state) {
 }
 
 void StateChannels::end_pushing(std::uint64_t group) {
+  std::shared_ptr<Outlet> ended;  // outlives the lock
   const std::lock_guard lock(mutex_);
-  outlets_.erase(group);
+  const auto known = outlets_.find(group);
+  if (known == outlets_.end()) return;
+  ended = std::move(known->second);
+  outlets_.erase(known);
 }
 
 }  // namespace tfdude::fastdds

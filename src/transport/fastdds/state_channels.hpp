@@ -21,9 +21,8 @@ class StateChannels {
     std::function<void(std::uint64_t group)> on_watcher;
   };
 
-  StateChannels(edds::DomainParticipant& participant, edds::Topic& topic, FastDdsCounters& counters,
-                Calls calls)
-      : participant_(participant), topic_(topic), counters_(counters), calls_(std::move(calls)) {}
+  StateChannels(const Context& context, edds::Topic& topic, Calls calls)
+      : context_(context), topic_(topic), calls_(std::move(calls)) {}
 
   [[nodiscard]] Result<void> watch(std::uint64_t group);
   void unwatch(std::uint64_t group);
@@ -31,9 +30,8 @@ class StateChannels {
   void end_pushing(std::uint64_t group);
 
  private:
-  edds::DomainParticipant& participant_;
+  const Context context_;
   edds::Topic& topic_;
-  FastDdsCounters& counters_;
   const Calls calls_;
   std::mutex mutex_;
   std::map<std::uint64_t, std::unique_ptr<Inlet<wire::State>>> inlets_;

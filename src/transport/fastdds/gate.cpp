@@ -1,0 +1,64 @@
+#include "transport/fastdds/gate.hpp"
+
+namespace tfdude::fastdds {
+namespace {
+
+// The gate through which this thread has let in the datagram at hand, if any.
+thread_local const Gate* entered = nullptr;
+
+}  // namespace
+
+// Who enters counts itself before it looks whether the gate is shut, and who shuts it looks the other way round: so one of
+// the two sees the other (both are sequentially consistent).
+bool Gate::enter() {
+  while (true) {
+    inside_.fetch_add(1);
+    if (!shut_.load()) break;
+    leave();
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return closed_ || pauses_ == 0; });
+    if (closed_) return false;
+  }
+  entered = this;
+  return true;
+}
+
+void Gate::leave() {
+  entered = nullptr;
+  inside_.fetch_sub(1);
+  if (!shut_.load()) return;
+  // The lock keeps the notice from falling between the other's look and its sleep.
+  { const std::lock_guard lock(mutex_); }
+  changed_.notify_all();
+}
+
+void Gate::shut() {
+  std::unique_lock lock(mutex_);
+  ++pauses_;
+  shut_.store(true);
+  wait_until_empty(lock);
+}
+
+void Gate::open() {
+  {
+    const std::lock_guard lock(mutex_);
+    --pauses_;
+    shut_.store(closed_ || pauses_ > 0);
+  }
+  changed_.notify_all();
+}
+
+void Gate::close() {
+  std::unique_lock lock(mutex_);
+  closed_ = true;
+  shut_.store(true);
+  changed_.notify_all();
+  wait_until_empty(lock);
+}
+
+void Gate::wait_until_empty(std::unique_lock<std::mutex>& lock) {
+  const int own = entered == this ? 1 : 0;
+  changed_.wait(lock, [this, own] { return inside_.load() <= own; });
+}
+
+}  // namespace tfdude::fastdds

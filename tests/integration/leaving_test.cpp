@@ -1,0 +1,92 @@
+// Endpoints that go while others are matched with them: where Fast DDS calls a listener that was taken away meanwhile.
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/domain_lease.hpp"
+
+#include "transport/fastdds/entities.hpp"
+#include "transport/fastdds/entrance.hpp"
+#include "transport/fastdds/topics.hpp"
+
+namespace tfdude::fastdds {
+namespace {
+
+using Beats = Inlet<wire::Presence>;
+
+// A participant as ours, with one topic.
+class Member {
+ public:
+  explicit Member(std::uint32_t domain) {
+    auto qos = profiles_.participant();
+    // As of our participants: with a short one Fast DDS 2.9 may wait for itself as it ends.
+    qos.wire_protocol().builtin.discovery_config.leaseDuration = {30, 0};
+    Entrance entrance(gate_);
+    entrance.prepare(qos, domain, false);
+    participant_ = factory().create_participant(domain, qos);
+    REQUIRE(participant_ != nullptr);
+    entrance.open();
+    edds::TypeSupport type(new PresenceType);
+    type.register_type(participant_);
+    topic_ = participant_->create_topic(kPresenceTopic, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
+    REQUIRE(topic_ != nullptr);
+  }
+  ~Member() {
+    gate_->close();
+    participant_->delete_contained_entities();
+    factory().delete_participant(participant_);
+  }
+  Member(const Member&) = delete;
+  Member& operator=(const Member&) = delete;
+
+  [[nodiscard]] std::unique_ptr<Beats> read(std::atomic<int>& matches) {
+    return std::make_unique<Beats>(
+        Context{*participant_, profiles_, *gate_}, *topic_, "", "presence_reader",
+        Beats::Calls{[](const wire::Presence&, const ertps::GuidPrefix_t&) {},
+                     [&matches](const ertps::GuidPrefix_t&, int) { ++matches; }});
+  }
+  [[nodiscard]] std::unique_ptr<Outlet> write() {
+    return std::make_unique<Outlet>(Context{*participant_, profiles_, *gate_}, *topic_, "",
+                                    "presence_writer");
+  }
+
+ private:
+  static edds::DomainParticipantFactory& factory() {
+    return *edds::DomainParticipantFactory::get_instance();
+  }
+
+  const Profiles profiles_ = *Profiles::load(TFDUDE_LOOPBACK_PROFILE);
+  const std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
+  edds::DomainParticipant* participant_ = nullptr;
+  edds::Topic* topic_ = nullptr;
+};
+
+}  // namespace
+
+TEST_CASE("leaving: 5,000 readers go while writers come and go") {
+  const testing::DomainLease lease;
+  Member leaver(lease.number());
+  Member newcomer(lease.number());
+  std::atomic<bool> over{false};
+  std::atomic<int> matches{0};
+  std::thread others([&] {
+    while (!over) {
+      std::vector<std::unique_ptr<Outlet>> writers;
+      for (int i = 0; i < 5; ++i) writers.push_back(newcomer.write());
+    }
+  });
+  // Several at a time: then one of them goes whenever a writer is matched with them.
+  for (int round = 0; round < 1000; ++round) {
+    std::vector<std::unique_ptr<Beats>> readers;
+    for (int i = 0; i < 5; ++i) readers.push_back(leaver.read(matches));
+  }
+  over = true;
+  others.join();
+  CHECK(matches > 100);
+}
+
+}  // namespace tfdude::fastdds

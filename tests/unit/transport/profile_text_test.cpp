@@ -1,0 +1,63 @@
+#include "transport/fastdds/profile_text.hpp"
+
+#include <string>
+
+#include "support/catch.hpp"
+
+namespace tfdude::fastdds {
+namespace {
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+constexpr const char* kDescribed =
+    "<transport_descriptors><transport_descriptor><transport_id>wire</transport_id>"
+    "</transport_descriptor></transport_descriptors>";
+
+std::string participant(const std::string& transport) {
+  return "<participant profile_name=\"one\" is_default_profile=\"true\"><rtps><userTransports>"
+         "<transport_id>" +
+         transport + "</transport_id></userTransports></rtps></participant>";
+}
+
+}  // namespace
+
+TEST_CASE("profile text: names of profiles and transports get the ending, where they are used, too") {
+  const auto xml = with_own_names(
+      std::string("<profiles>") + kDescribed + participant("wire") + "</profiles>", "@1");
+  REQUIRE(xml);
+  CHECK(has(*xml, "profile_name=\"one@1\""));
+  CHECK_FALSE(has(*xml, ">wire<"));
+  CHECK(xml->find("wire@1") != xml->rfind("wire@1"));
+}
+
+TEST_CASE("profile text: a transport that another file describes keeps its name") {
+  const auto xml = with_own_names("<profiles>" + participant("theirs") + "</profiles>", "@1");
+  REQUIRE(xml);
+  CHECK(has(*xml, ">theirs<"));
+}
+
+TEST_CASE("profile text: what would hold for the whole process is left out") {
+  const auto xml = with_own_names("<dds><log><use_default>false</use_default></log><profiles>" +
+                                      participant("wire") +
+                                      "</profiles><library_settings><intraprocess_delivery>OFF"
+                                      "</intraprocess_delivery></library_settings></dds>",
+                                  "@1");
+  REQUIRE(xml);
+  CHECK(has(*xml, "one@1"));
+  CHECK_FALSE(has(*xml, "log"));
+  CHECK_FALSE(has(*xml, "intraprocess"));
+  CHECK_FALSE(has(*xml, "is_default_profile"));
+}
+
+TEST_CASE("profile text: what is not XML or has no profiles is refused") {
+  for (const char* bad : {"", "<profiles>", "<dds></dds>", "plain text", "<dds><types/></dds>"}) {
+    INFO(bad);
+    const auto xml = with_own_names(bad, "@1");
+    REQUIRE_FALSE(xml);
+    CHECK(xml.error().code == Errc::kConfig);
+  }
+}
+
+}  // namespace tfdude::fastdds
