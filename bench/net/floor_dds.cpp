@@ -22,8 +22,7 @@ FloorEndpoints::FloorEndpoints(std::uint32_t domain, const std::string& profile,
       participant_->create_topic(from, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
   auto* publisher = participant_->create_publisher(edds::PUBLISHER_QOS_DEFAULT);
   auto* subscriber = participant_->create_subscriber(edds::SUBSCRIBER_QOS_DEFAULT);
-  writer_ =
-      publisher->create_datawriter(to_topic, profiles.writer(*publisher, kind + "_writer"));
+  writer_ = publisher->create_datawriter(to_topic, profiles.writer(*publisher, kind + "_writer"));
   reader_ = subscriber->create_datareader(
       from_topic, profiles.reader(*subscriber, kind + "_reader"), &listener);
 }

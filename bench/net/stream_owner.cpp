@@ -46,6 +46,7 @@ class Watcher final : public Transport, public TransportHandler {
   Result<void> send(const std::string& to, const JointUpdate& update, Deadline deadline) override {
     return transport_->send(to, update, deadline);
   }
+  Result<void> flush(Deadline deadline) override { return transport_->flush(deadline); }
   void reply(const PeerId& to, const Reply& reply) override { transport_->reply(to, reply); }
   Result<void> watch(std::uint64_t group) override { return transport_->watch(group); }
   void unwatch(std::uint64_t group) override { transport_->unwatch(group); }

@@ -93,6 +93,8 @@ Result<void> Client::publish(const std::vector<EdgeUpdate>& edges, std::optional
   return participant_->publish(edges, stamp);
 }
 
+Result<void> Client::flush(Milliseconds wait) { return participant_->flush(wait); }
+
 Result<void> Client::publish_joints(const std::vector<std::string>& names,
                                     const std::vector<double>& positions,
                                     const std::vector<double>& variances,

@@ -43,6 +43,9 @@ Participant::~Participant() {
   if (pusher_ != nullptr) pusher_->stop();
   if (conceder_) conceder_->stop();
   if (commits_) commits_->stop();
+  if (auto flushed = flush(std::min(options_.linger, options_.timeout)); !flushed) {
+    log().warn("leaving: {}", flushed.error().message);
+  }
   transport_->stop();
 }
 
@@ -251,16 +254,29 @@ Result<void> Participant::publish(const std::vector<EdgeUpdate>& edges, std::opt
   auto updated = forest_.update(edges, stamp);
   if (updated || !is_elsewhere(updated.error())) return updated;
   const Deadline deadline = call_deadline();
-  auto parts = routed(deadline, [&] { return route_update(forest_, directory_, edges, stamp); });
+  auto parts = routed(deadline, [&] { return route_publish(forest_, directory_, edges, stamp); });
   if (!parts) return tl::unexpected(std::move(parts.error()));
+  Result<void> outcome;
   for (Part& part : *parts) {
-    Update update{std::move(std::get<UpdateRequest>(part.request.body).edges), stamp};
-    auto sent = part.owner == kHeldHere ? forest_.update(update.edges, update.stamp)
-                                        : transport_->send(part.partition, update, deadline.at());
-    if (!sent) return sent;
+    const Update share{std::move(std::get<UpdateRequest>(part.request.body).edges), stamp};
+    auto sent = publish_to(part, share, deadline);
+    if (!sent && outcome) outcome = std::move(sent);
   }
-  return {};
+  return outcome;
 }
+
+// Whoever is there gets its share, and the error of who is not is told.
+Result<void> Participant::publish_to(const Part& part, const Update& share,
+                                     const Deadline& deadline) {
+  if (part.owner == kHeldHere) return forest_.update(share.edges, share.stamp);
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (auto ok = check_reachable(directory_, {part}); !ok) return ok;
+  }
+  return transport_->send(part.partition, share, deadline.at());
+}
+
+Result<void> Participant::flush(Milliseconds wait) { return transport_->flush(Deadline(wait).at()); }
 
 Result<std::vector<PathSegment>> Participant::path(std::string_view a, std::string_view b) {
   return routed(call_deadline(), [&]() -> Result<std::vector<PathSegment>> {

@@ -57,6 +57,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
                                     std::optional<Time> stamp);
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
                                      std::optional<Time> stamp);
+  [[nodiscard]] Result<void> flush(Milliseconds wait);
   // Joints (participant_joints.cpp).
   [[nodiscard]] Result<void> update_joints(const JointUpdate& update);
   [[nodiscard]] Result<void> publish_joints(const JointUpdate& update);
@@ -246,6 +247,8 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   void look_at_watches();
 
   [[nodiscard]] Result<void> change(std::vector<Part>& parts, const Deadline& deadline);
+  [[nodiscard]] Result<void> publish_to(const Part& part, const Update& share,
+                                        const Deadline& deadline);
   [[nodiscard]] Result<void> publish_to(const Part& part, const JointUpdate& share,
                                         const Deadline& deadline);
   [[nodiscard]] std::vector<Reply> ask(std::vector<Part>& parts, const Deadline& deadline);

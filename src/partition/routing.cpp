@@ -113,6 +113,15 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
 Result<std::vector<Part>> route_update(const Forest& forest, const Directory& directory,
                                        const std::vector<EdgeUpdate>& edges,
                                        std::optional<Time> stamp) {
+  auto parts = route_publish(forest, directory, edges, stamp);
+  if (!parts) return parts;
+  if (auto ok = check_reachable(directory, *parts); !ok) return tl::unexpected(ok.error());
+  return parts;
+}
+
+Result<std::vector<Part>> route_publish(const Forest& forest, const Directory& directory,
+                                        const std::vector<EdgeUpdate>& edges,
+                                        std::optional<Time> stamp) {
   std::vector<Part> parts;
   for (const EdgeUpdate& edge : edges) {
     const auto frame = forest.info(edge.id);
@@ -122,7 +131,6 @@ Result<std::vector<Part>> route_update(const Forest& forest, const Directory& di
     body.edges.push_back(edge);
     body.stamp = stamp;
   }
-  if (auto ok = check_reachable(directory, parts); !ok) return tl::unexpected(ok.error());
   for (const Part& part : parts) {
     const auto& share = std::get<UpdateRequest>(part.request.body).edges;
     if (auto ok = check_size(part, share.size(), "edges"); !ok) return tl::unexpected(ok.error());

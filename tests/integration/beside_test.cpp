@@ -137,8 +137,10 @@ TEST_CASE("beside: two nodes of a process ask each other, whatever delivery insi
                                  testing::kIntraprocessOff);
   testing::set_intraprocess(delivery);
   const testing::DomainLease lease;
-  auto arm = *Node::open("arm", {{"world", "", {}}, {"arm", "world", {}}}, options_of(lease.number()));
-  auto leg = *Node::open("leg", {{"hip", "world", {}}, {"leg", "hip", {}}}, options_of(lease.number()));
+  auto arm =
+      *Node::open("arm", {{"world", "", {}}, {"arm", "world", {}}}, options_of(lease.number()));
+  auto leg =
+      *Node::open("leg", {{"hip", "world", {}}, {"leg", "hip", {}}}, options_of(lease.number()));
   REQUIRE(eventually([&] { return arm.lookup("world", "leg") && leg.lookup("world", "arm"); }));
   auto by_arm = std::async(std::launch::async, [&] { return asks(arm, "arm", "leg"); });
   auto by_leg = std::async(std::launch::async, [&] { return asks(leg, "leg", "arm"); });

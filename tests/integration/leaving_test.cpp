@@ -1,6 +1,9 @@
 // Endpoints that go while others are matched with them: where Fast DDS calls a listener that was taken away meanwhile.
 
 #include <atomic>
+#include <chrono>
+#include <functional>
+#include <future>
 #include <memory>
 #include <string>
 #include <thread>
@@ -8,7 +11,6 @@
 
 #include "support/catch.hpp"
 #include "support/domain_lease.hpp"
-
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/entrance.hpp"
 #include "transport/fastdds/topics.hpp"
@@ -32,7 +34,8 @@ class Member {
     entrance.open();
     edds::TypeSupport type(new PresenceType);
     type.register_type(participant_);
-    topic_ = participant_->create_topic(kPresenceTopic, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
+    topic_ =
+        participant_->create_topic(kPresenceTopic, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
     REQUIRE(topic_ != nullptr);
   }
   ~Member() {
@@ -43,11 +46,13 @@ class Member {
   Member(const Member&) = delete;
   Member& operator=(const Member&) = delete;
 
-  [[nodiscard]] std::unique_ptr<Beats> read(std::atomic<int>& matches) {
+  [[nodiscard]] std::unique_ptr<Beats> read(
+      std::atomic<int>& matches, std::function<void()> on_sample = [] {}) {
     return std::make_unique<Beats>(
         Context{*participant_, profiles_, *gate_}, *topic_, "", "presence_reader",
-        Beats::Calls{[](const wire::Presence&, const ertps::GuidPrefix_t&) {},
-                     [&matches](const ertps::GuidPrefix_t&, int) { ++matches; }});
+        Beats::Calls{
+            [on_sample](const wire::Presence&, const ertps::GuidPrefix_t&) { on_sample(); },
+            [&matches](const ertps::GuidPrefix_t&, int) { ++matches; }});
   }
   [[nodiscard]] std::unique_ptr<Outlet> write() {
     return std::make_unique<Outlet>(Context{*participant_, profiles_, *gate_}, *topic_, "",
@@ -66,6 +71,31 @@ class Member {
 };
 
 }  // namespace
+
+TEST_CASE("leaving: nothing is handled while an endpoint is deleted") {
+  const testing::DomainLease lease;
+  Member leaver(lease.number());
+  Member other(lease.number());
+  std::promise<void> inside;
+  std::promise<void> go_on;
+  std::atomic<int> matches{0};
+  std::atomic<int> samples{0};
+  const auto busy = leaver.read(matches, [&] {
+    if (samples++ > 0) return;
+    inside.set_value();
+    go_on.get_future().wait();
+  });
+  auto idle = leaver.read(matches);
+  const auto writer = other.write();
+  REQUIRE(writer->wait_until_matched(std::chrono::steady_clock::now() + std::chrono::seconds(20)));
+  wire::Presence sample;
+  REQUIRE(writer->write(&sample));
+  REQUIRE(inside.get_future().wait_for(std::chrono::seconds(20)) == std::future_status::ready);
+  auto deleted = std::async(std::launch::async, [&] { idle.reset(); });
+  CHECK(deleted.wait_for(std::chrono::milliseconds(100)) == std::future_status::timeout);
+  go_on.set_value();
+  CHECK(deleted.wait_for(std::chrono::seconds(20)) == std::future_status::ready);
+}
 
 TEST_CASE("leaving: 5,000 readers go while writers come and go") {
   const testing::DomainLease lease;

@@ -41,6 +41,9 @@ struct Options {
   Milliseconds save_every{1000};
   /// How much is kept of the past of a Node's edges, where a frame says nothing else.
   EdgeTiming history{};
+  /// How long the end of a client waits until what it has streamed (publish, publish_joints) is acknowledged, as flush();
+  /// no longer than `timeout`.
+  Milliseconds linger{100};
 };
 
 /// A frame and where it stands.
@@ -184,11 +187,16 @@ class Client {
 
   /// Streams new edge values to their owners, unacknowledged: the path for joints at 1 kHz and more. Waits, within the
   /// bound of all calls, only until they can be reached. A
-  /// share that an owner cannot take in time may be lost, never torn. Stamps are as for update(); samples that an owner
-  /// refuses it counts (pasts()).
+  /// share that an owner cannot take in time may be lost, never torn. Whoever can be reached gets its share, also where
+  /// another cannot. Stamps are as for update(); samples that an owner refuses it counts (pasts()).
   /// @return kUnknownFrame.
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
                                      std::optional<Time> stamp = std::nullopt);
+
+  /// Waits until all that was streamed by this client has reached the owners. At most `wait`.
+  /// @return kTimeout or kUnreachable, naming one whom not all has reached. More than 64 samples at once may overwrite each
+  ///   other on their way: those count as arrived.
+  [[nodiscard]] Result<void> flush(Milliseconds wait);
 
   /// Streams positions of joints to those who have the frames that they move, unacknowledged: about 40 bytes a joint instead
   /// of 250 for its edge. The owners compute poses and covariances (moved()), of all joints of the call as one commit; those that

@@ -51,6 +51,12 @@ struct LookupPlan {
                                                      const std::vector<EdgeUpdate>& edges,
                                                      std::optional<Time> stamp = std::nullopt);
 
+/// The same of values that are streamed: whether the owners are reachable or not. @return kUnknownFrame, kInvalidInput.
+[[nodiscard]] Result<std::vector<Part>> route_publish(const Forest& forest,
+                                                      const Directory& directory,
+                                                      const std::vector<EdgeUpdate>& edges,
+                                                      std::optional<Time> stamp = std::nullopt);
+
 /// All who have one of the joints, or one that follows it, whether they are reachable or not.
 /// @return kUnknownJoint, kInvalidInput.
 [[nodiscard]] Result<std::vector<Part>> route_joints(const Directory& directory,

@@ -76,6 +76,10 @@ class Transport {
   [[nodiscard]] virtual Result<void> send(const std::string& partition, const JointUpdate& update,
                                           Deadline deadline) = 0;
 
+  /// Waits until all updates that were sent have been acknowledged by those to whom they went. @return kTimeout or
+  ///   kUnreachable, naming one who has not; what was overwritten by younger updates on its way counts as acknowledged.
+  [[nodiscard]] virtual Result<void> flush(Deadline deadline) = 0;
+
   virtual void reply(const PeerId& to, const Reply& reply) = 0;
 
   /// Starts to receive what is pushed to a group of watchers, or ends that.

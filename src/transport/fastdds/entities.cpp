@@ -26,6 +26,21 @@ bool Outlet::wait_until_matched(Deadline deadline) {
   return matched_.wait_until(lock, deadline, [this] { return readers_ > 0; });
 }
 
+bool Outlet::flush(Deadline deadline) {
+  if (!good() || !unacknowledged_.exchange(false)) return true;
+  const bool anybody = wait_until_matched(Deadline());
+  // No longer than what DDS can count.
+  const Deadline now = Deadline::clock::now();
+  const auto left = std::min(deadline, now + std::chrono::hours(24 * 365)) - std::min(now, deadline);
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(left);
+  const auto rest = std::chrono::nanoseconds(left - seconds).count();
+  const bool acknowledged =
+      anybody && ok(writer_->wait_for_acknowledgments({static_cast<std::int32_t>(seconds.count()),
+                                                       static_cast<std::uint32_t>(rest)}));
+  if (!acknowledged) unacknowledged_ = true;
+  return acknowledged;
+}
+
 void Outlet::on_publication_matched(edds::DataWriter*,
                                     const edds::PublicationMatchedStatus& status) {
   bool one_more = false;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -46,7 +47,14 @@ class Outlet final : public edds::DataWriterListener {
   [[nodiscard]] bool wait_until_matched(Deadline deadline);
 
   /// A sample of the topic's type. Thread-safe.
-  bool write(void* sample) { return fastdds::write(*writer_, sample); }
+  bool write(void* sample) {
+    unacknowledged_ = true;
+    return fastdds::write(*writer_, sample);
+  }
+
+  /// Of a reliable writer: waits until all that was written is acknowledged. False at the deadline, and where nobody is left
+  /// who could do that.
+  [[nodiscard]] bool flush(Deadline deadline);
 
   void on_publication_matched(edds::DataWriter*,
                               const edds::PublicationMatchedStatus& status) override;
@@ -59,6 +67,7 @@ class Outlet final : public edds::DataWriterListener {
   std::mutex mutex_;
   std::condition_variable matched_;
   int readers_ = 0;
+  std::atomic<bool> unacknowledged_{false};  // something may be
 };
 
 /// A reader with a subscriber of its own, hence in a DDS partition of its own. Samples are handed on one at a
@@ -79,8 +88,8 @@ class Inlet : public edds::DataReaderListener {
     if (!partition.empty()) qos.partition().push_back(partition.c_str());
     subscriber_ = context.participant.create_subscriber(qos);
     if (subscriber_ == nullptr) return;
-    reader_ = subscriber_->create_datareader(
-        &topic, context.profiles.reader(*subscriber_, profile), this);
+    reader_ = subscriber_->create_datareader(&topic, context.profiles.reader(*subscriber_, profile),
+                                             this);
   }
 
   ~Inlet() override { close(); }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "tfdude/base/id.hpp"
 
@@ -134,8 +135,8 @@ Result<void> FastDdsTransport::create_endpoints() {
       std::make_unique<Outlet>(context(), *topics_.presence, std::string(), "presence_writer");
   beat_outlet_ =
       std::make_unique<Outlet>(context(), *topics_.presence, kBeatPartition, "beat_writer");
-  directory_outlet_ = std::make_unique<Outlet>(context(), *topics_.directory, std::string(),
-                                               "directory_writer");
+  directory_outlet_ =
+      std::make_unique<Outlet>(context(), *topics_.directory, std::string(), "directory_writer");
   if (!presence_outlet_->good() || !beat_outlet_->good() || !directory_outlet_->good()) {
     return not_created("the writers");
   }
@@ -295,6 +296,25 @@ Result<void> FastDdsTransport::send(Outlet& outlet, const std::string& partition
                 "partition " + quote(partition) + " does not take what is sent to it");
   }
   return {};
+}
+
+Result<void> FastDdsTransport::flush(Deadline deadline) {
+  std::vector<std::pair<std::string, std::shared_ptr<Outlet>>> streams;
+  {
+    const std::lock_guard lock(outlets_mutex_);
+    streams.assign(update_outlets_.begin(), update_outlets_.end());
+    streams.insert(streams.end(), joint_outlets_.begin(), joint_outlets_.end());
+  }
+  Result<void> outcome;
+  for (const auto& [partition, stream] : streams) {
+    // Who is silent is not waited for; what it had acknowledged before is none the less.
+    const bool silent = peers_.silent(partition);
+    if (stream->flush(silent ? Deadline() : deadline) || !outcome) continue;
+    outcome =
+        fail(silent ? Errc::kUnreachable : Errc::kTimeout,
+             "partition " + quote(partition) + " has not acknowledged all that was streamed to it");
+  }
+  return outcome;
 }
 
 // --- replying ---

@@ -2,7 +2,6 @@
 
 #include <set>
 #include <string_view>
-
 #include <tinyxml2.h>
 
 namespace tfdude::fastdds {

@@ -194,6 +194,7 @@ class LoopbackTransport final : public Transport {
                    [&](TransportHandler& handler) { handler.on_joints(update); });
   }
 
+  Result<void> flush(Deadline /*deadline*/) override { return {}; }
   void reply(const PeerId& to, const Reply& reply) override {
     hub_->deliver([&](const auto& member) { return member.id == to; },
                   [&](TransportHandler& handler) { handler.on_reply(reply); });

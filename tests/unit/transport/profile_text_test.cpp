@@ -23,7 +23,8 @@ std::string participant(const std::string& transport) {
 
 }  // namespace
 
-TEST_CASE("profile text: names of profiles and transports get the ending, where they are used, too") {
+TEST_CASE(
+    "profile text: names of profiles and transports get the ending, where they are used, too") {
   const auto xml = with_own_names(
       std::string("<profiles>") + kDescribed + participant("wire") + "</profiles>", "@1");
   REQUIRE(xml);

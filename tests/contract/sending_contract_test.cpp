@@ -1,0 +1,87 @@
+// What is streamed: to those of several owners who live, and that it arrives though its sender ends. Once over each
+// transport.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/catch.hpp"
+#include "support/networks.hpp"
+#include "support/process.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::ContainsSubstring;
+using testing::eventually;
+using testing::Join;
+using testing::joined_by;
+using testing::outcome;
+
+Transform along_x(double x) { return {Pose({1, 0, 0, 0}, {x, 0, 0}), {}}; }
+
+bool is_at(Node& owner, const std::string& parent, const std::string& frame, double x) {
+  const auto X = owner.lookup(parent, frame);
+  return X && X->pose.translation().x() == x;
+}
+
+Node open(const Join& join, const std::string& partition) {
+  const std::string base = partition + "_base";
+  return *Node::open(join(partition), partition, {{base, "", {}}, {partition + "_tip", base, {}}});
+}
+
+}  // namespace
+
+TEST_CASE("publish: of three owners the two that live get theirs, the error names the third") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Node a = open(join, "a");
+  Node b = open(join, "b");
+  std::optional<Node> gone = open(join, "gone");
+  auto client = *Client::open(join(""));
+  const auto edges = [](double x) {
+    return std::vector<EdgeUpdate>{
+        {"gone_tip", along_x(x)}, {"a_tip", along_x(x)}, {"b_tip", along_x(x)}};
+  };
+  REQUIRE(eventually([&] { return outcome(client.publish(edges(1))) == "ok"; }));
+  REQUIRE(eventually([&] { return is_at(*gone, "gone_base", "gone_tip", 1); }));
+  gone.reset();
+  REQUIRE(eventually([&] {
+    const auto updated = client.update("gone_tip", along_x(1));
+    return !updated && updated.error().code == Errc::kUnreachable;
+  }));
+  const auto published = client.publish(edges(2));
+  REQUIRE_FALSE(published);
+  CHECK(published.error().code == Errc::kUnreachable);
+  CHECK_THAT(published.error().message, ContainsSubstring("'gone'"));
+  CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", 2); }));
+  CHECK(eventually([&] { return is_at(b, "b_base", "b_tip", 2); }));
+}
+
+TEST_CASE("publish: what was sent arrives though the client ends at once") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Node a = open(join, "a");
+  for (int run = 1; run <= 10; ++run) {
+    INFO("run " << run);
+    {
+      auto client = *Client::open(join(""));
+      REQUIRE(outcome(client.publish({{"a_tip", along_x(run)}})) == "ok");
+    }
+    // It is there when the client is gone, but for the thread that applies it.
+    CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", run); }));
+  }
+}
+
+TEST_CASE("flush: says whether all was acknowledged") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Node a = open(join, "a");
+  auto client = *Client::open(join(""));
+  CHECK(outcome(client.flush(Milliseconds(0))) == "ok");
+  REQUIRE(outcome(client.publish({{"a_tip", along_x(1)}})) == "ok");
+  CHECK(outcome(client.flush(Milliseconds(5000))) == "ok");
+  CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", 1); }));
+  CHECK(outcome(client.flush(Milliseconds::max())) == "ok");
+}
+
+}  // namespace tfdude
