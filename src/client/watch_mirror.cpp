@@ -26,7 +26,11 @@ bool WatchRoute::is_same(const WatchRoute& other) const {
 WatchMirror::WatchMirror(const std::string& a, const std::string& b, WatchRoute route,
                          const EdgeTiming& timing)
     : route_(std::move(route)), edges_(route_.edges.size()), sources_(route_.sources.size()) {
-  (void)forest_.set_default_timing(timing);
+  // It is the owner who judges a source's clock.
+  EdgeTiming told = timing;
+  told.restart_after = 0;
+  told.max_ahead = std::chrono::nanoseconds::max();
+  (void)forest_.set_default_timing(told);
   constexpr auto kAllow = Forest::MissingParent::kAllow;
   for (const FrameInfo& edge : route_.edges) {
     (void)forest_.add(edge.id, edge.parent, Transform(), kAllow);

@@ -69,7 +69,6 @@ HeldVersion* Ring::drop_oldest() {
 
 std::unique_ptr<Ring> Ring::empty_copy(std::uint64_t capacity) const {
   std::unique_ptr<Ring> copy(new Ring(timing_, capacity));
-  copy->refused_ = refused_;
   copy->rewritten = rewritten;
   return copy;
 }

@@ -72,16 +72,9 @@ class Ring {
 
   [[nodiscard]] std::size_t bytes() const { return sizeof(Ring) + (mask_ + 1) * sizeof(Slot); }
 
-  /// Samples that were refused as older than what is kept, and as equal in stamp to another.
-  struct Refused {
-    std::atomic<std::uint64_t> old{0};
-    std::atomic<std::uint64_t> equal{0};
-  };
-  /// Shared with the copies.
-  [[nodiscard]] Refused& refused() const { return *refused_; }
-
   /// The commit of the last sample that was not appended: inserted, or put in another's place. Set before readers see it.
   std::uint64_t rewritten = 0;
+
   std::uint64_t retire_tag = 0;
 
  private:
@@ -109,7 +102,6 @@ class Ring {
   std::atomic<std::uint64_t> first_{0};
   std::uint64_t next_ = 0;
   std::unique_ptr<Slot[]> slots_;  // NOLINT(modernize-avoid-c-arrays): atomics cannot be moved
-  std::shared_ptr<Refused> refused_ = std::make_shared<Refused>();
 };
 
 }  // namespace tfdude

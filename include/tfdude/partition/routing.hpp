@@ -50,6 +50,10 @@ struct LookupPlan {
                                                      const Directory& directory,
                                                      const std::vector<EdgeUpdate>& edges,
                                                      std::optional<Time> stamp = std::nullopt);
+[[nodiscard]] Result<std::vector<Part>> route_update(const Forest& forest,
+                                                     const Directory& directory,
+                                                     const std::vector<PartialUpdate>& edges,
+                                                     std::optional<Time> stamp);
 
 /// The same of values that are streamed: whether the owners are reachable or not. @return kUnknownFrame, kInvalidInput.
 [[nodiscard]] Result<std::vector<Part>> route_publish(const Forest& forest,
