@@ -102,6 +102,8 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   app.footer("Example: tfduded --partition arms --config examples/thesis/arms.yaml --domain 7");
   app.add_option("--partition", arguments.partition, "the partition's name");
   app.add_option("--config", arguments.config, "YAML file of frames");
+  app.add_flag("--check", arguments.check,
+               "only say what the configuration would change of the kept state");
   const UrdfOptions urdfs(app);
   app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232")
       ->check(CLI::Range(0, 232));

@@ -16,6 +16,7 @@ struct Arguments {
   std::string partition;
   std::string config;
   std::vector<UrdfPart> urdfs;
+  bool check = false;  ///< say what the configuration changes, and serve nothing
   Options options;
 };
 

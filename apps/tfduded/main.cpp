@@ -14,6 +14,7 @@
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/config.hpp"
 #include "tfdude/transport/fastdds.hpp"
+#include "tfdude/client/config_preview.hpp"
 
 #include "arguments.hpp"
 
@@ -63,12 +64,30 @@ int run(tfdude::Node& node, const sigset_t& stop_signals) {
   return 0;
 }
 
+// Says what serving would begin with. @return the exit status
+int check(const Arguments& arguments, const tfdude::Config& config) {
+  const auto preview =
+      tfdude::preview_config(config.partition, config.frames, arguments.options);
+  if (!preview) {
+    spdlog::error("partition {}: {}", tfdude::quote(config.partition), preview.error().message);
+    return kWrongUsage;
+  }
+  const std::string kept = preview->file.empty() ? "(none)" : preview->file;
+  std::printf("state %s: frames=%zu\n", kept.c_str(), preview->frames);
+  for (const tfdude::ConfiguredChange& change : preview->changes) {
+    std::printf("%s\n", describe(change).c_str());
+  }
+  if (preview->changes.empty()) std::puts("nothing changes");
+  return std::fflush(stdout) == 0 ? 0 : kRefused;
+}
+
 int serve(const Arguments& arguments, const sigset_t& stop_signals) {
   const auto config = configure(arguments);
   if (!config) {
     spdlog::error("{}", config.error().message);
     return kWrongUsage;
   }
+  if (arguments.check) return check(arguments, *config);
   tfdude::Options options = arguments.options;
   options.history = config->history;
   auto node = tfdude::Node::open(config->partition, config->frames, options);

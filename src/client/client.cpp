@@ -193,6 +193,10 @@ Result<Observed> Client::fuse(const std::string& id, const Transform& X_PC,
   return participant_->observe(edge->parent, id, X_PC, stamp, options, deadline);
 }
 
+Result<void> Client::correlate(const std::string& id, const Correlation& correlation) {
+  return participant_->correlate(id, correlation);
+}
+
 Result<std::vector<EdgeConsistency>> Client::consistency(const std::string& partition) {
   return participant_->consistency(partition);
 }
@@ -275,16 +279,6 @@ Result<Node> Node::open(std::unique_ptr<Transport> transport, const std::string&
 }
 
 std::size_t Node::own_frames() const { return participant_->own_frames(); }
-
-Result<void> Node::correlate(const std::string& id, const Correlation& correlation) {
-  const auto observed = std::find_if(correlation.shares.begin(), correlation.shares.end(),
-                                     [](const Share& share) { return is_observed(share); });
-  if (observed != correlation.shares.end()) {
-    return fail(Errc::kInvalidInput, "frame " + quote(id) + ": source " + quote(observed->source) +
-                                         ": names of this kind are given to observations");
-  }
-  return participant_->correlate(id, correlation);
-}
 
 const std::string& Node::partition() const { return participant_->partition_name(); }
 

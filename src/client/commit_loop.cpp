@@ -24,7 +24,8 @@ CommitLoop::CommitLoop(std::unique_ptr<StateStore> store, Effects& effects, Peri
 
 Result<void> CommitLoop::start(const std::vector<FrameSpec>& configured) {
   if (auto stored = commit(); !stored) return stored;
-  if (store_ != nullptr) {
+  // None says nothing: what the last one said is still what was taken.
+  if (store_ != nullptr && !configured.empty()) {
     if (auto stored = store_->save_configured(configured); !stored) return stored;
   }
   next_values_ = Clock::now() + periods_.values;

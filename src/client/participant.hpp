@@ -64,8 +64,6 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Result<void> update_joints(const JointUpdate& update);
   [[nodiscard]] Result<void> publish_joints(const JointUpdate& update);
   [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition);
-  /// As Forest::correlate(), but for what a joint says.
-  [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
   template <class Name>
   [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
     auto local = forest_.lookup(a, b);
@@ -103,6 +101,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Result<Observed> observe(const std::string& a, const std::string& b,
                                          const Transform& X_AB, std::optional<Time> stamp,
                                          const ObserveOptions& options, const Deadline& deadline);
+  [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
   [[nodiscard]] Result<std::vector<EdgeConsistency>> consistency(const std::string& partition);
   [[nodiscard]] Result<std::vector<PastInfo>> past(const std::string& id);
   [[nodiscard]] Result<std::vector<PastInfo>> pasts(const std::string& partition);

@@ -21,8 +21,10 @@ void Participant::tell_changes() {
   if (changes.empty()) return;
   for (Change& change : changes) {
     change.time = wall_clock();
-    const bool loser = change.partition == partition_name_;
-    if (change.kind == ChangeKind::kConflict && loser) log().error("{}", change.message);
+    const bool own = change.partition == partition_name_;
+    const bool by_own = change.rival == partition_name_;
+    if (change.kind == ChangeKind::kConflict && own) log().error("{}", change.message);
+    if (change.kind == ChangeKind::kFrameOrphaned && (own || by_own)) log().warn("{}", change.message);
   }
   events_->post(std::move(changes));
 }

@@ -93,15 +93,4 @@ Result<std::vector<JointInfo>> Participant::joints(const std::string& partition)
   }
 }
 
-Result<void> Participant::correlate(const std::string& id, const Correlation& correlation) {
-  const std::lock_guard lock(joints_mutex_);
-  if (partition_ != nullptr && partition_->is_coupled(id)) {
-    return fail(Errc::kInvalidInput,
-                "frame " + quote(id) +
-                    " has the error of its joint, which is that of others that "
-                    "move with it");
-  }
-  return forest_.correlate(id, correlation);
-}
-
 }  // namespace tfdude

@@ -122,6 +122,24 @@ Result<Observed> Participant::observe(const std::string& a, const std::string& b
                                            " were written each time that they were observed");
 }
 
+Result<void> Participant::correlate(const std::string& id, const Correlation& correlation) {
+  const Deadline deadline = call_deadline();
+  return healed(
+      deadline,
+      [&]() -> Result<Part> {
+        const auto frame = forest_.info(id);
+        if (!frame) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+        if (auto ok = check_shares(correlation.shares); !ok) {
+          return fail_at("frame " + quote(id), ok.error());
+        }
+        return route_to(directory_, frame->owner, Request{0, id, CorrelateRequest{correlation}});
+      },
+      [&](Part& part) {
+        std::vector<Part> parts{std::move(part)};
+        return change(parts, deadline);
+      });
+}
+
 Result<std::vector<EdgeConsistency>> Participant::consistency(const std::string& partition) {
   return ask_all<EdgeConsistency>(partition, ConsistencyRequest{true});
 }

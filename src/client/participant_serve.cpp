@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/partition/reconfigure.hpp"
 
 #include "base/log.hpp"
 #include "client/participant.hpp"
@@ -53,6 +54,18 @@ bool is_of_structure(const Request& request) {
   return std::holds_alternative<AddRequest>(request.body) ||
          std::holds_alternative<RemoveRequest>(request.body) ||
          std::holds_alternative<MoveRequest>(request.body);
+}
+
+// What a configuration changes of what was kept; before the first one there is nothing. Orphans are told as events, with
+// those of other partitions.
+void log_configured(const StoredState& state, const std::vector<FrameSpec>& frames) {
+  if (state.configured.empty() && state.frames.empty()) return;
+  for (const ConfiguredChange& change : configured_changes(state, frames)) {
+    if (change.kind == ConfiguredChange::Kind::kOrphan) continue;
+    const bool removes = change.kind == ConfiguredChange::Kind::kRemove;
+    log().log(removes ? spdlog::level::warn : spdlog::level::info, "configuration: {}",
+              describe(change));
+  }
 }
 
 }  // namespace
@@ -117,13 +130,12 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
   auto taken = kept ? partition->restore(state, frames, wall_clock())
                     : partition->load(frames, wall_clock());
   if (!taken) return taken;
+  log_configured(state, frames);
   for (const FrameSpec& frame : frames) {
     // One that was removed by request has no edge of which to say anything.
     if (!forest_.holds(frame.id)) continue;
-    Result<void> set;
-    if (frame.timing) set = forest_.set_timing(frame.id, *frame.timing);
-    if (set && !frame.correlation.empty()) set = forest_.correlate(frame.id, frame.correlation);
-    if (!set) return set;
+    if (!frame.timing) continue;
+    if (auto set = forest_.set_timing(frame.id, *frame.timing); !set) return set;
   }
   partition_ = std::move(partition);
   presence_.pages = partition_->page_count();

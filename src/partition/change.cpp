@@ -27,6 +27,8 @@ std::string_view to_string(ChangeKind kind) {
       return "conflict";
     case ChangeKind::kHistoryRestarted:
       return "history_restarted";
+    case ChangeKind::kFrameOrphaned:
+      return "frame_orphaned";
     case ChangeKind::kMissed:
       return "missed";
   }
@@ -55,6 +57,19 @@ Change restarted(const HistoryRestart& restart, const std::string& partition) {
           "frame " + quote(restart.id) + " of partition " + quote(partition) +
               ": its history starts again at " + to_string(restart.stamp) +
               ", as the clock of its source has jumped back from " + to_string(restart.newest),
+          {}};
+}
+
+Change orphan_of(const FrameInfo& frame, const std::string& partition,
+                 const std::string& dropped_by) {
+  return {ChangeKind::kFrameOrphaned,
+          partition,
+          frame.id,
+          frame.parent,
+          dropped_by,
+          "frame " + quote(frame.id) + " of partition " + quote(partition) +
+              " waits for its parent " + quote(frame.parent) +
+              ", which the configuration of partition " + quote(dropped_by) + " names no more",
           {}};
 }
 

@@ -86,10 +86,11 @@ void Directory::apply(const Page& page) {
     replace_if_complete(partition, owner);
     return;
   }
-  report_conflicts(partition, page);
+  const std::vector<Note> news = news_of(partition, page.notes);
   Ids outdated;
   put_page(partition, owner, page, outdated);
   claims_.mend();
+  report(news, owner);
   find_orphans(page.notes, owner);
 }
 
@@ -97,6 +98,10 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
   Successor& successor = *partition.successor;
   if (!successor.page_count || successor.pages.size() < *successor.page_count) return;
   PageMap pages = std::move(successor.pages);
+  std::vector<Note> news;
+  for (const auto& [number, page] : pages) {
+    for (Note& note : news_of(partition, page.notes)) news.push_back(std::move(note));
+  }
   partition.incarnation = successor.incarnation;
   partition.page_count = *successor.page_count;
   partition.epoch = partition.awaited_epoch = 0;
@@ -113,6 +118,7 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
   // Of each frame the first claim that comes now replaces that of the life before, whichever is the younger.
   for (const auto& [number, page] : pages) put_page(partition, owner, page, stays);
   claims_.mend();
+  report(news, owner);
   for (const auto& [number, page] : pages) find_orphans(page.notes, owner);
 }
 
@@ -199,16 +205,37 @@ void Directory::unclaim_all_but(const Ids& stays, Known& partition, Owner owner,
   }
 }
 
-// Of what is new in a page; a newcomer does not hear of what was before it came.
-void Directory::report_conflicts(const Known& partition, const Page& page) {
-  if (!changes_.watched() || partition.page_count == 0 || !partition.complete()) return;
-  const auto there = partition.pages.find(page.number);
-  for (const Note& note : page.notes) {
+// The notes that are to be reported and were not known; a newcomer does not hear of what was before it came.
+std::vector<Note> Directory::news_of(const Known& partition, const std::vector<Note>& notes) {
+  std::vector<Note> news;
+  if (partition.page_count == 0 || partition.pages.size() < partition.page_count) return news;
+  for (const Note& note : notes) {
     if (note.kind == Note::Kind::kRemoved) continue;
-    const bool known = there != partition.pages.end() &&
-                       std::find(there->second.notes.begin(), there->second.notes.end(), note) !=
-                           there->second.notes.end();
-    if (!known) changes_.add(conflict_of(note, partition.info.name));
+    const bool known =
+        std::any_of(partition.pages.begin(), partition.pages.end(), [&](const auto& page) {
+          const std::vector<Note>& there = page.second.notes;
+          return std::find(there.begin(), there.end(), note) != there.end();
+        });
+    if (!known) news.push_back(note);
+  }
+  return news;
+}
+
+void Directory::report(const std::vector<Note>& news, Owner owner) {
+  for (const Note& note : news) {
+    if (note.kind == Note::Kind::kDropped) {
+      report_orphans(note.id, owner);
+    } else if (changes_.watched()) {
+      changes_.add(conflict_of(note, name(owner)));
+    }
+  }
+}
+
+// Who owns one hears of it in any case.
+void Directory::report_orphans(const std::string& dropped, Owner by) {
+  for (const FrameInfo& frame : forest_.waiting_for(dropped)) {
+    const bool concerns = changes_.watched() || frame.owner == kHeldHere || by == kHeldHere;
+    if (concerns) changes_.add(orphan_of(frame, name(frame.owner), name(by)));
   }
 }
 

@@ -84,7 +84,9 @@ void Joints::put(const std::string& frame, const JointSpec& joint,
   if (joint.coupled) {
     mover.said = shared_error(joint, mover.variance);
     mover.said_variance = mover.variance;
-    if (!mover.said.empty()) (void)forest_.correlate(frame, mover.said);
+    // To say it anew would be the end of what observations have left, which an earlier process may have kept.
+    const auto kept = forest_.kept(frame);
+    if (kept && !(kept->ties.said == mover.said)) (void)forest_.correlate(frame, mover.said);
   }
   by_name_[joint.name];
   by_name_[leader_of(joint)].push_back(movers_.size());
@@ -172,7 +174,7 @@ Result<std::size_t> Joints::apply(const JointUpdate& update) {
   if (steps_.empty()) return 0;
   for (const Step& step : steps_) {
     Mover& mover = movers_[step.mover];
-    HandleUpdate one{mover.handle, value_at(mover.spec, step.position, step.variance)};
+    TiedUpdate one{mover.handle, value_at(mover.spec, step.position, step.variance)};
     const bool resay = mover.spec.coupled && mover.said_variance != step.variance;
     if (resay && is_news(mover, update.stamp)) {
       mover.said = shared_error(mover.spec, step.variance);

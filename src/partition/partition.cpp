@@ -53,11 +53,12 @@ Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t
   for (const FrameSpec& frame : frames) {
     auto added =
         forest_.add(frame.id, frame.parent, value_of(frame), Forest::MissingParent::kAllow, since);
+    if (added) loaded.push_back(frame.id);
+    if (added && !frame.correlation.empty()) added = forest_.correlate(frame.id, frame.correlation);
     if (!added) {
       for (const std::string& id : loaded) (void)forest_.remove(id);
       return added;
     }
-    loaded.push_back(frame.id);
   }
   for (const FrameSpec& frame : frames) put(frame.id, frame.parent, since);
   return {};
@@ -162,6 +163,9 @@ Result<void> Partition::apply(const Request& request, Time now) {
                                [&](const MoveRequest& one) { return move(request.id, one, now); },
                                [&](const ReviseRequest& one) { return revise(one); },
                                [&](const JointUpdate& one) { return set_joints(one); },
+                               [&](const CorrelateRequest& one) {
+                                 return correlate(request.id, one.correlation);
+                               },
                                [](const auto&) -> Result<void> { return {}; }},
                     request.body);
 }
@@ -273,6 +277,28 @@ Result<void> Partition::revise(const ReviseRequest& request) {
     so_far.sum.expected += edge.surprise.expected;
     so_far.sum.variance += edge.surprise.variance;
   }
+  return {};
+}
+
+Result<void> Partition::correlate(const std::string& id, const Correlation& correlation) {
+  const std::string who = "frame " + quote(id);
+  const auto observed =
+      std::find_if(correlation.shares.begin(), correlation.shares.end(), is_observed);
+  if (observed != correlation.shares.end()) {
+    return fail(Errc::kInvalidInput, who + ": source " + quote(observed->source) +
+                                         ": names of this kind are given to observations");
+  }
+  if (!correlation.observed_with.empty()) {
+    return fail(Errc::kInvalidInput, who + ": what it was observed with is said by observations");
+  }
+  if (joints_.is_coupled(id)) {
+    return fail(Errc::kInvalidInput, who + " has the error of its joint, which is that of others "
+                                           "that move with it");
+  }
+  if (auto said = forest_.correlate(id, correlation); !said) {
+    return tl::unexpected(at_home(std::move(said.error()), id));
+  }
+  if (saved_) updated_.insert(id);
   return {};
 }
 

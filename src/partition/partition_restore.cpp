@@ -1,6 +1,7 @@
 #include <map>
 
 #include "tfdude/partition/partition.hpp"
+#include "tfdude/partition/reconfigure.hpp"
 
 // How a partition outlives its process, and what it gives up where others have been faster.
 namespace tfdude {
@@ -10,14 +11,6 @@ std::map<std::string, const FrameSpec*> by_id(const std::vector<FrameSpec>& fram
   std::map<std::string, const FrameSpec*> all;
   for (const FrameSpec& frame : frames) all.emplace(frame.id, &frame);
   return all;
-}
-
-bool same(const FrameSpec& a, const FrameSpec& b) {
-  const Transform X = value_of(a);
-  const Transform Y = value_of(b);
-  return a.parent == b.parent && X.covariance.upper() == Y.covariance.upper() &&
-         X.pose.translation() == Y.pose.translation() &&
-         X.pose.rotation().coeffs() == Y.pose.rotation().coeffs();
 }
 
 // At the position that its joint was left in.
@@ -41,6 +34,7 @@ std::vector<StoredFrame> frames_of(const StoredState& state,
     if (known->second->parent != frame.parent) continue;
     if (!left_of(*known->second->joint, state.joints)) continue;
     frame.X_PC = value_of(as_left(*known->second, state.joints));
+    frame.ties.observed.reset();
   }
   return frames;
 }
@@ -93,38 +87,66 @@ bool Partition::hang_again(const StoredFrame& frame) {
   if (!added && added.error().code == Errc::kCycle && directory_.make_way(frame.parent)) {
     added = add();
   }
-  if (added) put(frame.id, frame.parent, frame.since);
-  return added.has_value();
+  if (!added) return false;
+  if (!frame.ties.empty()) (void)forest_.resume(frame.id, frame.ties);
+  put(frame.id, frame.parent, frame.since);
+  return true;
 }
 
 void Partition::make_root(const StoredFrame& frame, Time now) {
   const std::uint64_t since = directory_.next_stamp(now);
   if (!forest_.add(frame.id, {}, frame.X_PC, Forest::MissingParent::kAllow, since)) return;
+  if (!frame.ties.empty()) (void)forest_.resume(frame.id, frame.ties);
   put(frame.id, {}, since);
   tell_conflict({frame.id, since, Note::Kind::kUnhung, name_});
 }
 
 Result<void> Partition::reconfigure(const StoredState& state,
                                     const std::vector<FrameSpec>& configured, Time now) {
-  const auto old = by_id(state.configured);
-  const auto current = by_id(configured);
+  using Kind = ConfiguredChange::Kind;
+  const auto entries = by_id(configured);
   std::vector<FrameSpec> fresh;
-  for (const FrameSpec& frame : configured) {
-    const auto was = old.find(frame.id);
-    if (was != old.end() && same(*was->second, frame)) continue;
-    fresh.push_back(as_left(frame, state.joints));
-    if (!forest_.holds(frame.id)) continue;
-    // Its parent may come later: as a missing one is allowed for what is loaded, so it is here.
-    (void)forest_.release(frame.id);
-    pages_.erase(frame.id);
-    directory_.released(frame.id);
+  std::vector<std::string> dropped;
+  for (const ConfiguredChange& change : configured_changes(state, configured)) {
+    const std::string& id = change.frame;
+    switch (change.kind) {
+      case Kind::kAdd:
+      case Kind::kReplace:
+        fresh.push_back(as_left(*entries.at(id), state.joints));
+        // Its parent may come later: as a missing one is allowed for what is loaded, so it is here.
+        release(id);
+        break;
+      case Kind::kCorrelate:
+        if (!forest_.holds(id)) break;
+        if (auto said = forest_.correlate(id, entries.at(id)->correlation); !said) return said;
+        updated_.insert(id);
+        break;
+      case Kind::kRemove:
+        if (release(id)) dropped.push_back(id);
+        break;
+      case Kind::kOrphan:
+        break;
+    }
   }
   if (auto taken = take(fresh, directory_.next_stamp(now)); !taken) return taken;
-  for (const FrameSpec& frame : state.configured) {
-    if (current.count(frame.id) != 0) continue;
-    if (auto removed = forest_.remove(frame.id)) forget(*removed, now);
-  }
+  for (const std::string& id : dropped) tell_dropped(id, now);
   return {};
+}
+
+// What hangs below waits for another frame of that name.
+bool Partition::release(const std::string& id) {
+  if (!forest_.release(id)) return false;
+  let_go(id);
+  pages_.erase(id);
+  directory_.released(id);
+  return true;
+}
+
+// Others are not to remove what hung below, as they do with what a note says is removed.
+void Partition::tell_dropped(const std::string& id, Time now) {
+  pages_.leave({id, directory_.next_stamp(now), Note::Kind::kDropped, {}});
+  directory_.changes().frame_removed(id, name_);
+  directory_.report_orphans(id, kHeldHere);
 }
 
 bool Partition::concede(const std::set<Concession>& due, Time now) {
@@ -192,8 +214,9 @@ StateChange Partition::take_unsaved() {
     change.erased.push_back(id);
     if (auto note = pages_.note(id)) change.notes.push_back(*std::move(note));
     const auto place = pages_.place(id);
-    const auto X_PC = forest_.value(id);
-    if (place && X_PC) change.frames.push_back({id, place->parent, *X_PC, place->since});
+    auto edge = forest_.kept(id);
+    if (!place || !edge) continue;
+    change.frames.push_back({id, place->parent, edge->X_PC, place->since, std::move(edge->ties)});
   }
   if (!change.empty()) change.joints = joints_.take_changed();
   return change;

@@ -3,6 +3,8 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/partition/joints.hpp"
 
+#include "store/ties_blob.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -39,13 +41,37 @@ Result<Note> read_note(const sqlite::Statement& row, const std::string& before) 
   Note note{row.text(0), *since, static_cast<Note::Kind>(kind), row.text(3)};
   if (auto ok = check_id(note.id, "id"); !ok) return tl::unexpected(ok.error());
   if (note.id <= before) return fail(Errc::kState, "note of " + quote(note.id) + " out of order");
-  if (kind < 1 || kind > static_cast<std::uint64_t>(Note::Kind::kUnhung)) {
+  if (kind < 1 || kind > static_cast<std::uint64_t>(Note::Kind::kDropped)) {
     return fail(Errc::kState, "a note of kind " + std::to_string(kind));
   }
   if (!note.rival.empty()) {
     if (auto ok = check_partition_name(note.rival); !ok) return tl::unexpected(ok.error());
   }
   return note;
+}
+
+Result<Correlation> read_said(const sqlite::Statement& row) {
+  auto ok = row.check_types({SQLITE_TEXT, SQLITE_BLOB});
+  if (ok) ok = check_id(row.text(0), "id");
+  if (!ok) return tl::unexpected(std::move(ok.error()));
+  auto said = correlation_from(row.bytes(1));
+  if (!said) return fail_at("ties of " + quote(row.text(0)), said.error());
+  return said;
+}
+
+Result<KeptTies> read_ties(const sqlite::Statement& row) {
+  if (auto ok = row.check_types({SQLITE_TEXT, SQLITE_BLOB, SQLITE_BLOB}); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  auto said = read_said(row);
+  if (!said) return tl::unexpected(std::move(said.error()));
+  KeptTies ties{*std::move(said), {}};
+  if (const std::string bytes = row.bytes(2); !bytes.empty()) {
+    auto observed = correlation_from(bytes);
+    if (!observed) return fail_at("ties of " + quote(row.text(0)), observed.error());
+    ties.observed = *std::move(observed);
+  }
+  return ties;
 }
 
 Result<StoredJoint> read_joint(const sqlite::Statement& row) {

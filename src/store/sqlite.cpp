@@ -8,8 +8,8 @@
 namespace tfdude::sqlite {
 namespace {
 
-// Longer than any row that is ever written.
-constexpr int kLongestRow = 64 * 1024;
+// Longer than any row that is ever written: the ties of an edge may have 128 shares of 36 columns, twice.
+constexpr int kLongestRow = 1024 * 1024;
 
 // What SQLite says, with the code by which its documentation tells more, and what the system says where that is why.
 std::string reason_of(sqlite3* handle) {
@@ -176,6 +176,13 @@ void Statement::bind(int at, double number) { sqlite3_bind_double(handle_.get(),
 
 void Statement::bind(int at, const Flat& flat) {
   sqlite3_bind_blob(handle_.get(), at, flat.data(), sizeof flat, SQLITE_TRANSIENT);
+}
+
+void Statement::bind(int at, const Blob& blob) {
+  // An empty one is none, not NULL.
+  const char* bytes = blob.bytes.empty() ? "" : blob.bytes.data();
+  sqlite3_bind_blob(handle_.get(), at, bytes, static_cast<int>(blob.bytes.size()),
+                    SQLITE_TRANSIENT);
 }
 
 }  // namespace tfdude::sqlite

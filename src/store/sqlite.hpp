@@ -49,6 +49,11 @@ class Database {
   std::unique_ptr<sqlite3, Close> handle_;
 };
 
+/// Bytes that are no text.
+struct Blob {
+  std::string bytes;
+};
+
 /// A prepared statement, used again and again.
 class Statement {
  public:
@@ -79,6 +84,8 @@ class Statement {
   [[nodiscard]] std::string text(int column) const;
   [[nodiscard]] std::uint64_t number(int column) const;
   [[nodiscard]] double real(int column) const;
+  /// Of a text, or of a blob, all of its bytes.
+  [[nodiscard]] std::string bytes(int column) const { return text(column); }
   /// @return kState where the column is not as large as one.
   [[nodiscard]] Result<Flat> flat(int column) const;
 
@@ -87,11 +94,24 @@ class Statement {
   void bind(int at, std::uint64_t number);
   void bind(int at, double number);
   void bind(int at, const Flat& flat);
+  void bind(int at, const Blob& blob);
 
   struct Finalize {
     void operator()(sqlite3_stmt* handle) const { sqlite3_finalize(handle); }
   };
   std::unique_ptr<sqlite3_stmt, Finalize> handle_;
 };
+
+/// Calls take(row) for each row that a query gives, up to the first that it refuses.
+template <class Take>
+Result<void> each_row(const Database& database, const char* sql, Take take) {
+  auto rows = Statement::prepare(database, sql);
+  if (!rows) return tl::unexpected(std::move(rows.error()));
+  for (auto row = rows->start();; row = rows->next()) {
+    if (!row) return tl::unexpected(std::move(row.error()));
+    if (!*row) return {};
+    if (auto taken = take(*rows); !taken) return taken;
+  }
+}
 
 }  // namespace tfdude::sqlite

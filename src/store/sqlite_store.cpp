@@ -8,36 +8,18 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/partition/joints.hpp"
 
-#include "store/rows.hpp"
+#include "store/read_state.hpp"
+#include "store/schema.hpp"
 #include "store/sqlite.hpp"
+#include "store/ties_blob.hpp"
 
 namespace tfdude {
 namespace {
 
+using sqlite::Blob;
 using sqlite::Database;
+using sqlite::each_row;
 using sqlite::Statement;
-
-constexpr std::int64_t kApplication = 0x74666475;  // "tfdu"
-constexpr std::int64_t kFormat = 2;
-// The one that knew no joints; it is brought up to date before something is written.
-constexpr std::int64_t kFormatBefore = 1;
-
-// A file with other words than these is refused: a change of them needs another format.
-constexpr const char* kSchema = R"(
-  CREATE TABLE about(partition TEXT NOT NULL, epoch INTEGER NOT NULL);
-  CREATE TABLE frames(id TEXT PRIMARY KEY, parent TEXT NOT NULL, x_pc BLOB NOT NULL,
-                      since INTEGER NOT NULL) WITHOUT ROWID;
-  CREATE TABLE notes(id TEXT PRIMARY KEY, since INTEGER NOT NULL, kind INTEGER NOT NULL,
-                     rival TEXT NOT NULL) WITHOUT ROWID;
-  CREATE TABLE configured(id TEXT PRIMARY KEY, parent TEXT NOT NULL, x_pc BLOB NOT NULL)
-                     WITHOUT ROWID;
-)";
-constexpr const char* kJointsSchema = R"(
-  CREATE TABLE joints(name TEXT PRIMARY KEY, position REAL NOT NULL, variance REAL NOT NULL)
-                     WITHOUT ROWID;
-)";
-
-constexpr const char* kPutJoint = "INSERT OR REPLACE INTO joints VALUES(?1, ?2, ?3)";
 
 constexpr const char* kKeep =
     "; it was not changed: keep it, and see to it that it and its directory can be read and "
@@ -48,17 +30,6 @@ std::string without_spaces(std::string_view text) {
   std::copy_if(text.begin(), text.end(), std::back_inserter(plain),
                [](char c) { return c != ' ' && c != '\n' && c != ';'; });
   return plain;
-}
-
-template <class Take>
-Result<void> each_row(const Database& database, const char* sql, Take take) {
-  auto rows = Statement::prepare(database, sql);
-  if (!rows) return tl::unexpected(std::move(rows.error()));
-  for (auto row = rows->start();; row = rows->next()) {
-    if (!row) return tl::unexpected(std::move(row.error()));
-    if (!*row) return {};
-    if (auto taken = take(*rows); !taken) return taken;
-  }
 }
 
 class SqliteStore final : public StateStore {
@@ -82,21 +53,18 @@ class SqliteStore final : public StateStore {
   Result<void> bring_up_to_date();
   Result<void> create(const std::string& partition);
   Result<void> prepare();
+  Result<void> prepare_newer();
   Result<void> prepare(Statement& statement, const char* sql);
-  Result<void> load_about(StoredState& state);
-  Result<void> load_frames(StoredState& state);
-  Result<void> load_notes(StoredState& state);
-  Result<void> load_configured(StoredState& state);
-  Result<void> load_joints(StoredState& state);
   Result<void> make_ready();
   Result<void> save_joints(const std::vector<StoredJoint>& joints);
+  Result<void> save_ties(const std::string& id, const KeptTies& ties);
   template <class Write>
   Result<void> transaction(Write write);
 
   const std::string file_;
   std::optional<Database> database_;
   bool written_ = false;   // by this process
-  bool outdated_ = false;  // it is of the format before
+  std::int64_t format_ = kFormat;  // of the file as it is
   Statement set_epoch_;
   Statement erase_frame_;
   Statement erase_note_;
@@ -104,7 +72,11 @@ class SqliteStore final : public StateStore {
   Statement put_note_;
   Statement set_value_;
   Statement put_configured_;
+  // Of tables that an older format has not got.
   Statement put_joint_;
+  Statement erase_ties_;
+  Statement put_ties_;
+  Statement put_configured_ties_;
 };
 
 tl::unexpected<Error> SqliteStore::unusable(const std::string& why) const {
@@ -158,7 +130,7 @@ Result<void> SqliteStore::check(const std::string& partition) {
   if (*application != kApplication) {
     return unusable("belongs to another program: name another directory, or move it away");
   }
-  if (*format != kFormat && *format != kFormatBefore) {
+  if (*format < 1 || *format > kFormat) {
     return unusable("has format " + std::to_string(*format) + ", of which this version reads " +
                     std::to_string(kFormat) +
                     ": use the version that wrote it, or move it away to start from the "
@@ -167,7 +139,7 @@ Result<void> SqliteStore::check(const std::string& partition) {
   if (auto checked = check_tables(*format); !checked) return unreadable(checked.error().message);
   const auto of = database_->text("SELECT partition FROM about");
   if (!of) return unreadable(of.error().message);
-  outdated_ = *format == kFormatBefore;
+  format_ = *format;
   if (*of == partition) return {};
   return unusable("is of partition " + quote(*of) + ", not of " + quote(partition) +
                   ": move it away, or put the right one back");
@@ -182,9 +154,7 @@ Result<void> SqliteStore::check_tables(std::int64_t format) {
     return row.check_types({SQLITE_TEXT, SQLITE_TEXT});
   });
   if (!read) return read;
-  const std::string expected =
-      format == kFormat ? std::string(kSchema) + kJointsSchema : std::string(kSchema);
-  if (without_spaces(schema) != without_spaces(expected)) {
+  if (without_spaces(schema) != without_spaces(schema_of(format))) {
     return fail(Errc::kState, "its tables are not those of a state");
   }
   const auto sound = database_->text("PRAGMA quick_check(1)");
@@ -197,13 +167,14 @@ Result<void> SqliteStore::check_tables(std::int64_t format) {
 }
 
 Result<void> SqliteStore::bring_up_to_date() {
+  const std::string schema = schema_of(kFormat, format_);
+  const std::string mark = "PRAGMA user_version = " + std::to_string(kFormat);
   auto done = database_->atomically([&] {
-    auto made = database_->run(kJointsSchema);
-    const std::string mark = "PRAGMA user_version = " + std::to_string(kFormat);
+    auto made = database_->run(schema.c_str());
     if (made) made = database_->run(mark.c_str());
-    return made ? prepare(put_joint_, kPutJoint) : made;
+    return made ? prepare_newer() : made;
   });
-  outdated_ = !done;
+  if (done) format_ = kFormat;
   return done;
 }
 
@@ -211,8 +182,7 @@ Result<void> SqliteStore::create(const std::string& partition) {
   auto done = make_ready();
   if (done) {
     done = database_->atomically([&] {
-      auto made = database_->run(kSchema);
-      if (made) made = database_->run(kJointsSchema);
+      auto made = database_->run(schema_of(kFormat).c_str());
       if (!made) return made;
       auto about = Statement::prepare(*database_, "INSERT INTO about VALUES(?1, 0)");
       if (!about) return Result<void>(tl::unexpected(about.error()));
@@ -240,7 +210,22 @@ Result<void> SqliteStore::prepare() {
   for (const auto& [statement, sql] : all) {
     if (done) done = prepare(*statement, sql);
   }
-  return done && !outdated_ ? prepare(put_joint_, kPutJoint) : done;
+  return done && format_ == kFormat ? prepare_newer() : done;
+}
+
+Result<void> SqliteStore::prepare_newer() {
+  const std::pair<Statement*, const char*> all[] = {
+      {&put_joint_, "INSERT OR REPLACE INTO joints VALUES(?1, ?2, ?3)"},
+      {&erase_ties_, "DELETE FROM ties WHERE id = ?1"},
+      {&put_ties_,
+       "INSERT INTO ties SELECT ?1, ?2, ?3 WHERE EXISTS(SELECT 1 FROM frames WHERE id = ?1)"},
+      {&put_configured_ties_, "INSERT INTO configured_ties VALUES(?1, ?2)"},
+  };
+  Result<void> done;
+  for (const auto& [statement, sql] : all) {
+    if (done) done = prepare(*statement, sql);
+  }
+  return done;
 }
 
 Result<void> SqliteStore::prepare(Statement& statement, const char* sql) {
@@ -251,82 +236,15 @@ Result<void> SqliteStore::prepare(Statement& statement, const char* sql) {
 }
 
 Result<StoredState> SqliteStore::load() {
-  StoredState state;
-  for (auto part : {&SqliteStore::load_about, &SqliteStore::load_frames, &SqliteStore::load_notes,
-                    &SqliteStore::load_configured, &SqliteStore::load_joints}) {
-    if (auto loaded = (this->*part)(state); !loaded) return unreadable(loaded.error().message);
-  }
-  return state;
-}
-
-Result<void> SqliteStore::load_about(StoredState& state) {
-  return each_row(*database_, "SELECT epoch FROM about", [&](const Statement& row) -> Result<void> {
-    if (auto ok = row.check_types({SQLITE_INTEGER}); !ok) return ok;
-    const auto epoch = read_count(row, 0);
-    if (!epoch) return tl::unexpected(epoch.error());
-    state.epoch = *epoch;
-    return {};
-  });
-}
-
-Result<void> SqliteStore::load_frames(StoredState& state) {
-  const char* sql = "SELECT id, parent, x_pc, since FROM frames ORDER BY id";
-  return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
-    auto ok = row.check_types({SQLITE_TEXT, SQLITE_TEXT, SQLITE_BLOB, SQLITE_INTEGER});
-    if (!ok) return ok;
-    auto frame = read_frame(row, state.frames.empty() ? "" : state.frames.back().id);
-    if (!frame) return tl::unexpected(std::move(frame.error()));
-    const auto since = read_count(row, 3);
-    if (!since) return tl::unexpected(since.error());
-    state.frames.push_back({frame->id, frame->parent, frame->X_PC, *since});
-    return {};
-  });
-}
-
-Result<void> SqliteStore::load_notes(StoredState& state) {
-  const char* sql = "SELECT id, since, kind, rival FROM notes ORDER BY id";
-  auto loaded = each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
-    auto ok = row.check_types({SQLITE_TEXT, SQLITE_INTEGER, SQLITE_INTEGER, SQLITE_TEXT});
-    if (!ok) return ok;
-    auto note = read_note(row, state.notes.empty() ? "" : state.notes.back().id);
-    if (!note) return tl::unexpected(std::move(note.error()));
-    state.notes.push_back(*std::move(note));
-    return {};
-  });
-  // The oldest are the first to go.
-  std::stable_sort(state.notes.begin(), state.notes.end(),
-                   [](const Note& a, const Note& b) { return a.since < b.since; });
-  return loaded;
-}
-
-Result<void> SqliteStore::load_configured(StoredState& state) {
-  const char* sql = "SELECT id, parent, x_pc FROM configured ORDER BY id";
-  return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
-    auto ok = row.check_types({SQLITE_TEXT, SQLITE_TEXT, SQLITE_BLOB});
-    if (!ok) return ok;
-    auto frame = read_frame(row, state.configured.empty() ? "" : state.configured.back().id);
-    if (!frame) return tl::unexpected(std::move(frame.error()));
-    state.configured.push_back(*std::move(frame));
-    return {};
-  });
-}
-
-Result<void> SqliteStore::load_joints(StoredState& state) {
-  if (outdated_) return {};
-  const char* sql = "SELECT name, position, variance FROM joints ORDER BY name";
-  return each_row(*database_, sql, [&](const Statement& row) -> Result<void> {
-    auto joint = read_joint(row);
-    if (!joint) return tl::unexpected(std::move(joint.error()));
-    state.joints.push_back(*std::move(joint));
-    return {};
-  });
+  auto state = read_state(*database_, format_);
+  return state ? std::move(state) : unreadable(state.error().message);
 }
 
 Result<void> SqliteStore::make_ready() {
   if (written_) return {};
   auto done = database_->run("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;");
   if (done) database_->tidy_up_at_close();
-  if (done && outdated_) done = bring_up_to_date();
+  if (done && format_ != kFormat) done = bring_up_to_date();
   written_ = done.has_value();
   return done;
 }
@@ -345,10 +263,12 @@ Result<void> SqliteStore::save(const StateChange& change) {
     Result<void> done = set_epoch_.run(change.epoch);
     for (const std::string& id : change.erased) {
       if (done) done = erase_frame_.run(id);
+      if (done) done = erase_ties_.run(id);
       if (done) done = erase_note_.run(id);
     }
     for (const StoredFrame& frame : change.frames) {
       if (done) done = put_frame_.run(frame.id, frame.parent, to_flat(frame.X_PC), frame.since);
+      if (done) done = save_ties(frame.id, frame.ties);
     }
     for (const Note& note : change.notes) {
       const auto kind = static_cast<std::uint64_t>(note.kind);
@@ -366,12 +286,20 @@ Result<void> SqliteStore::save_joints(const std::vector<StoredJoint>& joints) {
   return done;
 }
 
+Result<void> SqliteStore::save_ties(const std::string& id, const KeptTies& ties) {
+  auto done = erase_ties_.run(id);
+  if (!done || ties.empty()) return done;
+  const Blob observed{ties.observed ? to_blob(*ties.observed) : std::string()};
+  return put_ties_.run(id, Blob{to_blob(ties.said)}, observed);
+}
+
 Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges,
                                       const std::vector<StoredJoint>& joints) {
   return transaction([&]() -> Result<void> {
     Result<void> done;
     for (const ChangedEdge& edge : edges) {
       if (done) done = set_value_.run(edge.id, to_flat(edge.X_PC));
+      if (done) done = save_ties(edge.id, edge.ties);
     }
     return done ? save_joints(joints) : done;
   });
@@ -379,9 +307,11 @@ Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges,
 
 Result<void> SqliteStore::save_configured(const std::vector<FrameSpec>& frames) {
   return transaction([&]() -> Result<void> {
-    Result<void> done = database_->run("DELETE FROM configured");
+    Result<void> done = database_->run("DELETE FROM configured; DELETE FROM configured_ties;");
     for (const FrameSpec& frame : frames) {
       if (done) done = put_configured_.run(frame.id, frame.parent, to_flat(value_of(frame)));
+      if (!done || frame.correlation.empty()) continue;
+      done = put_configured_ties_.run(frame.id, Blob{to_blob(frame.correlation)});
     }
     return done;
   });

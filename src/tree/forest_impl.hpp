@@ -125,6 +125,9 @@ class Forest::Impl {
   template <class Visit>
   [[nodiscard]] static Result<void> for_each_edge(const Ends& ends, Visit visit);
 
+  /// The version of a held edge in the newest commit. @return kUnknownFrame, kNotOwner.
+  [[nodiscard]] Result<const HeldVersion*> held_value(std::string_view id) const;
+
   [[nodiscard]] FrameInfo info_of(const Version& version, std::uint64_t commit) const;
 
   // --- writing, under mutex_ (forest_write.cpp) ---
@@ -212,6 +215,7 @@ class Forest::Impl {
     const bool observed = edge.ties != nullptr && edge.ties->revised;
     return observed ? whole(edge.X_PC, edge.ties->now) : edge.X_PC;
   }
+  [[nodiscard]] static ChangedEdge kept(const HeldVersion& edge);
   /// The moving edge's sample of that stamp, where there is one, becomes another.
   void replace_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
 

@@ -151,14 +151,18 @@ std::optional<FrameInfo> Forest::info(Handle frame) const {
   return impl_->info_of(*version, commit);
 }
 
-Result<Transform> Forest::value(std::string_view id) const {
-  const epoch::Guard guard;
-  const Version* version = impl_->present(id, impl_->snapshot());
+Result<const HeldVersion*> Forest::Impl::held_value(std::string_view id) const {
+  const Version* version = present(id, snapshot());
   if (version == nullptr) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
   if (!version->held()) {
     return fail(Errc::kNotOwner, "frame " + quote(id) + " is held by another partition");
   }
-  return Impl::whole(*static_cast<const HeldVersion*>(version));
+  return static_cast<const HeldVersion*>(version);
+}
+
+Result<Transform> Forest::value(std::string_view id) const {
+  const epoch::Guard guard;
+  return impl_->held_value(id).map([](const HeldVersion* edge) { return Impl::whole(*edge); });
 }
 
 std::vector<FrameInfo> Forest::frames() const {
@@ -227,8 +231,7 @@ std::pair<std::vector<ChangedEdge>, std::uint64_t> Forest::changed_since(
   for (std::uint32_t slot = 0; slot < impl_->slots_.size(); ++slot) {
     const Version* version = impl_->at(slot, now);
     if (!version->held() || version->commit <= commit) continue;
-    changed.push_back(
-        {version->name->text, Impl::whole(*static_cast<const HeldVersion*>(version))});
+    changed.push_back(Impl::kept(*static_cast<const HeldVersion*>(version)));
   }
   return {std::move(changed), now};
 }

@@ -35,7 +35,7 @@ void Forest::Impl::tie_as_said(HeldVersion& fresh) {
 }
 
 void Forest::Impl::say_ties(std::uint32_t slot, const Correlation& correlation) {
-  HeldVersion& fresh = push_held(slot, newest_value(slot).X_PC);
+  HeldVersion& fresh = push_held(slot, whole(newest_value(slot)));
   std::unique_ptr<EdgeTies> ties;
   if (!correlation.empty()) ties.reset(new EdgeTies{correlation, correlation, false, 0});
   set_ties(fresh, std::move(ties));
@@ -51,6 +51,39 @@ Result<void> Forest::correlate(std::string_view id, const Correlation& correlati
   impl_->say_ties(*slot, correlation);
   impl_->commit();
   return {};
+}
+
+Result<void> Forest::resume(std::string_view id, const KeptTies& ties) {
+  auto ok = check_shares(ties.said.shares);
+  if (ok && ties.observed) ok = check_shares(ties.observed->shares);
+  if (!ok) return fail_at("frame " + quote(id), ok.error());
+  const std::lock_guard lock(impl_->mutex_);
+  const auto slot = impl_->held_slot(id);
+  if (!slot) return tl::unexpected(slot.error());
+  HeldVersion& fresh = impl_->push_held(*slot, impl_->newest_value(*slot).X_PC);
+  std::unique_ptr<EdgeTies> resumed;
+  if (!ties.empty()) {
+    resumed.reset(new EdgeTies{ties.said, ties.observed.value_or(ties.said),
+                               ties.observed.has_value(), 0});
+  }
+  impl_->set_ties(fresh, std::move(resumed));
+  impl_->commit();
+  return {};
+}
+
+ChangedEdge Forest::Impl::kept(const HeldVersion& edge) {
+  ChangedEdge kept{edge.name->text, edge.X_PC, {}};
+  if (edge.ties == nullptr) return kept;
+  kept.ties.said = edge.ties->said;
+  if (edge.ties->revised) kept.ties.observed = edge.ties->now;
+  return kept;
+}
+
+Result<ChangedEdge> Forest::kept(std::string_view id) const {
+  const epoch::Guard guard;
+  auto edge = impl_->held_value(id);
+  if (!edge) return tl::unexpected(std::move(edge.error()));
+  return Impl::kept(**edge);
 }
 
 void Forest::Impl::tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) const {

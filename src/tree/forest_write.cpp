@@ -20,7 +20,8 @@ tl::unexpected<Error> unknown_frame(std::string_view id) {
 }
 
 const Correlation* correlation_of(const EdgeUpdate&) { return nullptr; }
-const Correlation* correlation_of(const HandleUpdate& update) { return update.correlation; }
+const Correlation* correlation_of(const HandleUpdate&) { return nullptr; }
+const Correlation* correlation_of(const TiedUpdate& update) { return update.correlation; }
 
 template <class Update>
 Result<void> check_said(const Update& update) {
@@ -349,6 +350,10 @@ Result<void> Forest::update_partial(const std::vector<PartialUpdate>& edges,
   const auto whole = impl_->completed(edges);
   if (!whole) return tl::unexpected(whole.error());
   return impl_->update_all(*whole, &EdgeUpdate::id, stamp);
+}
+
+Result<void> Forest::update(const std::vector<TiedUpdate>& edges, std::optional<Time> stamp) {
+  return impl_->update_all(edges, &TiedUpdate::frame, stamp);
 }
 
 Result<void> Forest::move(std::string_view id, std::string_view parent,

@@ -22,6 +22,7 @@
 #include "fuzz/wire.hpp"
 #include "math/flat.hpp"
 #include "store/sqlite_store.hpp"
+#include "store/ties_blob.hpp"
 #include "support/replica.hpp"
 
 namespace tfdude::fuzz {
@@ -69,16 +70,20 @@ std::vector<std::string> lines_of(const StoredState& state) {
     const Flat flat = to_flat(X);
     return std::string(reinterpret_cast<const char*>(flat.data()), sizeof flat);
   };
+  const auto ties = [](const KeptTies& kept) {
+    return to_blob(kept.said) + (kept.observed ? to_blob(*kept.observed) : std::string());
+  };
   for (const StoredFrame& frame : state.frames) {
     lines.push_back("frame " + frame.id + " < " + frame.parent + ", " +
-                    std::to_string(frame.since) + ", " + bits(frame.X_PC));
+                    std::to_string(frame.since) + ", " + bits(frame.X_PC) + ties(frame.ties));
   }
   for (const Note& note : state.notes) {
     lines.push_back("note " + note.id + ", " + std::to_string(note.since) + ", " +
                     std::to_string(static_cast<int>(note.kind)) + ", " + note.rival);
   }
   for (const FrameSpec& frame : state.configured) {
-    lines.push_back("configured " + frame.id + " < " + frame.parent + ", " + bits(frame.X_PC));
+    lines.push_back("configured " + frame.id + " < " + frame.parent + ", " + bits(frame.X_PC) +
+                    to_blob(frame.correlation));
   }
   for (const StoredJoint& joint : state.joints) {
     lines.push_back("joint " + joint.name + ", " + std::to_string(joint.position) + ", " +

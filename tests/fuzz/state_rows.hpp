@@ -30,6 +30,9 @@ class RowWriter {
         "INSERT OR REPLACE INTO notes VALUES(?1, ?4, ?5, ?2)",
         "INSERT OR REPLACE INTO configured VALUES(?1, ?2, ?3)",
         "INSERT OR REPLACE INTO joints VALUES(?1, ?4, ?5)",
+        "INSERT OR REPLACE INTO ties VALUES(?1, zeroblob(9), x'')",
+        "INSERT OR REPLACE INTO ties VALUES(?1, zeroblob(9), ?3)",
+        "INSERT OR REPLACE INTO configured_ties VALUES(?1, zeroblob(9))",
         "UPDATE about SET epoch = ?4",
         "UPDATE about SET partition = ?1",
         "INSERT INTO about VALUES('arms', ?4)",
@@ -42,8 +45,9 @@ class RowWriter {
         "CREATE INDEX i ON frames(parent)",
         "UPDATE sqlite_master SET sql = replace(sql, 'PRIMARY KEY', '') WHERE name = 'frames'",
         "UPDATE sqlite_master SET rootpage = 3 WHERE name = 'notes'",
-        "PRAGMA user_version = 3",
-        "DROP TABLE joints; PRAGMA user_version = 1",
+        "PRAGMA user_version = 4",
+        "DROP TABLE ties; DROP TABLE configured_ties; PRAGMA user_version = 2",
+        "DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joints; PRAGMA user_version = 1",
     };
     if (rarely()) {
       run(choices_.PickValueInArray(kOthers));

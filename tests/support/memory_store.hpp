@@ -35,7 +35,9 @@ class MemoryStore final : public StateStore {
     for (const StoredJoint& joint : joints) joints_[joint.name] = joint;
     for (const ChangedEdge& edge : edges) {
       const auto there = frames_.find(edge.id);
-      if (there != frames_.end()) there->second.X_PC = edge.X_PC;
+      if (there == frames_.end()) continue;
+      there->second.X_PC = edge.X_PC;
+      there->second.ties = edge.ties;
     }
     return {};
   }

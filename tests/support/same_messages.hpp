@@ -155,6 +155,8 @@ inline void check_same(const Request& actual, const Request& expected) {
     check_same(std::get<PartialUpdateRequest>(actual.body), *partial);
   } else if (const auto* from = std::get_if<JointsRequest>(&expected.body)) {
     CHECK(std::get<JointsRequest>(actual.body).after == from->after);
+  } else if (const auto* said = std::get_if<CorrelateRequest>(&expected.body)) {
+    CHECK(std::get<CorrelateRequest>(actual.body).correlation == said->correlation);
   } else if (const auto* joints = std::get_if<JointUpdate>(&expected.body)) {
     CHECK(listed(std::get<JointUpdate>(actual.body)) == listed(*joints));
   }

@@ -129,6 +129,7 @@ bool take(const Bytes& bytes) {
       {19, "arm", JointsRequest{}},
       {20, "arm", JointsRequest{"elbow"}},
       {21, "arm", partial_updates(random)},
+      {22, "arm", CorrelateRequest{correlation(random)}},
       {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), std::nullopt},
        18446744073709551610ULL}};
 }
@@ -237,7 +238,8 @@ bool take(const Bytes& bytes) {
            1,
            9,
            {{"base", "", 18446744073709551615ULL}},
-           {{"hand", 5, Note::Kind::kRemoved, ""}, {"base", 6, Note::Kind::kUnhung, "arms"}},
+           {{"hand", 5, Note::Kind::kRemoved, ""}, {"base", 6, Note::Kind::kUnhung, "arms"},
+            {"eye", 7, Note::Kind::kDropped, ""}},
            {{0, 8}, {4294967295U, 18446744073709551615ULL}},
            {{"turn", ""}, {std::string(255, 'j'), "turn"}}}};
 }

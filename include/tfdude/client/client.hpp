@@ -307,6 +307,13 @@ class Client {
                                       std::optional<Time> stamp = std::nullopt,
                                       const ObserveOptions& options = {});
 
+  /// Says how the error of an edge hangs together with those of others: for all its values, also those of the past, until it
+  /// is said anew; an empty one makes it independent. Its covariance is that of its own part from now on. Acknowledged by
+  /// its owner, and stored like a value. What observations have left of correlation goes.
+  /// @return kUnknownFrame, kInvalidInput (naming the source; the names of observations' are not to be given; a joint that
+  ///   follows another, or is followed, says it itself).
+  [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
+
   /// How well covariances agree with what was observed, of those edges of a partition that were observed since its process
   /// began; of kMaxItems at most. @return kUnknownPartition.
   [[nodiscard]] Result<std::vector<EdgeConsistency>> consistency(const std::string& partition);
@@ -359,7 +366,8 @@ class Node : public Client {
   /// Joins a domain over DDS, makes sure that nobody serves the partition, takes the frames (in any order;
   /// parents may be missing yet or belong to others) and serves them. With Options::state, what an
   /// earlier process left of the partition is taken first; of the given frames those count that were not given,
-  /// or given differently, to that process.
+  /// or given differently, to the last process that was given any, and what was given then and is not now goes, but nothing
+  /// below it: that waits for it. No frames change nothing.
   ///
   /// Takes 0.4 s as a rule; 5 s and Options::discovery at most, where a predecessor still seems to be there.
   ///
@@ -376,12 +384,6 @@ class Node : public Client {
                                          const std::string& partition,
                                          const std::vector<FrameSpec>& frames = {},
                                          const Options& options = {});
-
-  /// Says how the error of an own edge hangs together with those of others: for all its values, also those of the past,
-  /// until it is said anew. Not kept for the next process. Never waits.
-  /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the source; a joint that follows another, or is followed, says
-  ///   it itself).
-  [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
 
   [[nodiscard]] const std::string& partition() const;
   /// How many frames the partition has.

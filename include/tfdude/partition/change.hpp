@@ -19,7 +19,8 @@ enum class ChangeKind : std::uint8_t {
   kFrameMoved,  ///< hangs elsewhere, or belongs to another partition
   kConflict,    ///< one of two partitions, or of two processes that serve one, had to give way
   kHistoryRestarted,  ///< of a frame's edge, whose source's clock has jumped back; told by its owner's process only
-  kMissed,  ///< changes were not told, because the listeners took too long
+  kFrameOrphaned,  ///< waits for its parent, which that one's configuration names no more
+  kMissed,         ///< changes were not told, because the listeners took too long
 };
 
 /// The stable snake_case name of a kind, as the command line prints it in JSON.
@@ -30,8 +31,8 @@ struct Change {
   ChangeKind kind = ChangeKind::kPartitionUp;
   std::string partition;  ///< concerned: the frame's owner; of a conflict, who gave way
   std::string frame;      ///< empty where it is about a partition
-  std::string parent;     ///< of an added or moved frame; empty: a root
-  std::string rival;      ///< of a conflict: the partition that was given way to
+  std::string parent;     ///< of an added, moved or orphaned frame; empty: a root
+  std::string rival;      ///< of a conflict: the partition that was given way to; of an orphan: who had its parent
   std::string message;    ///< for people
   Time time{};            ///< by the clock of the participant that saw it
 };
@@ -41,6 +42,10 @@ struct Change {
 
 /// That the history of an edge has started again. @param partition  its owner
 [[nodiscard]] Change restarted(const HistoryRestart& restart, const std::string& partition);
+
+/// That a frame waits for its parent. @param partition  the frame's owner @param dropped_by  who had the parent
+[[nodiscard]] Change orphan_of(const FrameInfo& frame, const std::string& partition,
+                               const std::string& dropped_by);
 
 /// What happened, in the order in which it did, for those who want to know. Not thread-safe.
 class ChangeLog {
@@ -55,7 +60,7 @@ class ChangeLog {
   void frame_moved(std::string_view id, std::string_view parent, const std::string& partition);
   void frame_removed(std::string_view id, const std::string& partition);
 
-  /// A conflict is kept always: whoever had to give way logs it.
+  /// A conflict, or an orphan, is kept always: whoever it concerns logs it.
   void add(Change change) { changes_.push_back(std::move(change)); }
 
   [[nodiscard]] std::vector<Change> take() { return std::exchange(changes_, {}); }

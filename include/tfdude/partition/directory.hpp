@@ -76,6 +76,9 @@ class Directory {
   /// Whether there may be any. O(1).
   [[nodiscard]] bool contested() const { return !orphans_.empty() || claims_.contested(); }
 
+  /// A partition's configuration names a frame no more: reports what waits for that now.
+  void report_orphans(const std::string& dropped, Owner by);
+
   /// This process has taken frames whose parents others may have removed before.
   void find_orphans();
 
@@ -162,7 +165,9 @@ class Directory {
   void add_joint(const PageJoint& joint, Owner owner);
   void forget_joint(const PageJoint& joint, Owner owner);
   void replace_joints(KeptPage& kept, const std::vector<PageJoint>& joints, Owner owner);
-  void report_conflicts(const Known& partition, const Page& page);
+  [[nodiscard]] static std::vector<Note> news_of(const Known& partition,
+                                                 const std::vector<Note>& notes);
+  void report(const std::vector<Note>& news, Owner owner);
   void find_orphans(const std::vector<Note>& notes, Owner owner);
 
   Forest& forest_;

@@ -104,7 +104,7 @@ class Joints {
   std::map<std::string, std::vector<std::size_t>, std::less<>> by_name_;
   std::uint64_t plans_ = 0;            // updates so far
   std::vector<Step> steps_;            // of the update being made, as
-  std::vector<HandleUpdate> updates_;  // these; both kept for their memory
+  std::vector<TiedUpdate> updates_;    // these; both kept for their memory
 };
 
 }  // namespace tfdude

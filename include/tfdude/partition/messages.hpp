@@ -77,6 +77,11 @@ struct ReviseRequest {
   std::uint64_t incarnation = 0;  ///< SegmentValues::incarnation, whose commit that is
 };
 
+/// Says how the error of the edge that the request's id names hangs together with those of others.
+struct CorrelateRequest {
+  Correlation correlation;
+};
+
 /// How well the covariance of the edge that the request's id names, or of all that the partition has, agrees with
 /// observations.
 struct ConsistencyRequest {
@@ -130,7 +135,7 @@ struct Request {
   std::string id;
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
                PastRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
-               PartialUpdateRequest>
+               PartialUpdateRequest, CorrelateRequest>
       body;
   /// Of requests with a lower number, in whatever order they come, the sender awaits no reply. Not above `sequence`, which has
   /// its lower half only.
@@ -225,11 +230,12 @@ struct Note {
     kRemoved = 1,  ///< by request; whatever hung below it since before goes, too
     kGaveWay = 2,  ///< `rival` has claimed the same id earlier
     kUnhung = 3,   ///< its move and an earlier one, of `rival`, make a cycle: it was made a root
+    kDropped = 4,  ///< its partition's configuration names it no more; what hung below it waits for it
   };
   std::string id;
   std::uint64_t since = 0;
   Kind kind = Kind::kRemoved;
-  std::string rival;  ///< a partition; empty where removed
+  std::string rival;  ///< a partition; empty where removed or dropped
 
   friend bool operator==(const Note& a, const Note& b) {
     return a.id == b.id && a.since == b.since && a.kind == b.kind && a.rival == b.rival;

@@ -34,8 +34,7 @@ class Partition {
   [[nodiscard]] Result<void> load(const std::vector<FrameSpec>& frames, Time now);
 
   /// Takes what an earlier process of this partition left, with what the configuration changes of that:
-  /// frames whose configuration is not what it was are as it says now, those that it no longer has go, all
-  /// others are as they were left. Gives way where others have claimed a frame since. From now on what
+  /// see configured_changes(); all else is as it was left. Gives way where others have claimed a frame since. From now on what
   /// changes is kept for take_unsaved().
   /// @return the error of the first new frame of the configuration: a bad or repeated id, a cycle.
   [[nodiscard]] Result<void> restore(const StoredState& state,
@@ -67,8 +66,6 @@ class Partition {
   }
   /// Whether a joint of that name, or one that follows it, is owned here. Takes no lock.
   [[nodiscard]] bool moves(std::string_view joint) const { return joints_.moves(joint); }
-  /// Whether the frame's error is that of a joint that others follow, or that follows another.
-  [[nodiscard]] bool is_coupled(std::string_view frame) const { return joints_.is_coupled(frame); }
 
   /// The joints that have got positions since the last call.
   [[nodiscard]] std::vector<StoredJoint> take_changed_joints() { return joints_.take_changed(); }
@@ -110,6 +107,7 @@ class Partition {
   template <class Edge>
   [[nodiscard]] Result<void> told_of(const std::vector<Edge>& edges, Result<void> updated);
   [[nodiscard]] Result<void> revise(const ReviseRequest& request);
+  [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
   [[nodiscard]] Result<void> set_joints(const JointUpdate& update);
   [[nodiscard]] Result<void> take(const std::vector<FrameSpec>& frames, std::uint64_t since);
   void hang_on_joints(const std::vector<FrameSpec>& frames, const std::vector<StoredJoint>& left);
@@ -120,6 +118,8 @@ class Partition {
   void make_root(const StoredFrame& frame, Time now);
   [[nodiscard]] Result<void> reconfigure(const StoredState& state,
                                          const std::vector<FrameSpec>& configured, Time now);
+  bool release(const std::string& id);
+  void tell_dropped(const std::string& id, Time now);
   void put(const std::string& id, const std::string& parent, std::uint64_t since);
   void forget(const std::vector<std::string>& removed, Time now);
   void give_way(const std::string& id, Owner rival, Time now);

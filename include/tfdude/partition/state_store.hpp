@@ -25,8 +25,9 @@ struct FrameSpec {
 struct StoredFrame {
   std::string id;
   std::string parent;  ///< empty: a root
-  Transform X_PC;
+  Transform X_PC;  ///< its covariance is that of the edge's own part where it has ties
   std::uint64_t since = 0;
+  KeptTies ties{};
 };
 
 /// Where a joint was, by its last sample.

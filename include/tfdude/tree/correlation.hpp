@@ -21,6 +21,18 @@ struct Correlation {
   }
 };
 
+/// What of an edge's correlation outlives its process.
+struct KeptTies {
+  Correlation said{};
+  /// What observations have left, in place of that, until the edge's next value.
+  std::optional<Correlation> observed{};
+
+  [[nodiscard]] bool empty() const { return said.empty() && !observed; }
+  friend bool operator==(const KeptTies& a, const KeptTies& b) {
+    return a.said == b.said && a.observed == b.observed;
+  }
+};
+
 /// What a Belief has beside its pose and own part.
 struct Ties {
   std::optional<Covariance> unknown;

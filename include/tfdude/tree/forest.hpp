@@ -43,8 +43,13 @@ struct EdgeUpdate {
 struct HandleUpdate {
   Handle frame;
   Transform X_PC;
-  /// As Forest::correlate() with it, in the same commit; null: as before.
-  const Correlation* correlation = nullptr;
+};
+
+/// The same with how the edge's error hangs together with those of others, in the same commit.
+struct TiedUpdate {
+  Handle frame;
+  Transform X_PC;
+  const Correlation* correlation = nullptr;  ///< null: as before
 };
 
 /// Parts of a new value X_PC for the edge named by its child's id; those that are absent stay as they are.
@@ -201,10 +206,11 @@ struct FrameInfo {
   std::uint64_t since = 0;  ///< when it was hung where it hangs, as whoever did it counts
 };
 
-/// A held edge that was written at some commit or later.
+/// What of a held edge outlives its process.
 struct ChangedEdge {
   std::string id;
-  Transform X_PC;
+  Transform X_PC;   ///< its covariance is that of the edge's own part where it has ties
+  KeptTies ties{};
 };
 
 /// The coordinate frames that one process knows: a forest whose edges carry either a value (held here) or
@@ -259,10 +265,12 @@ class Forest {
                                     std::optional<Time> stamp = std::nullopt);
 
   /// Gives many edges new values as one commit, and of one stamp: all or, on an error, none; no reader sees a part.
-  /// @return kInvalidInput also where a correlation is none, naming the source.
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges,
                                     std::optional<Time> stamp = std::nullopt);
   [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges,
+                                    std::optional<Time> stamp = std::nullopt);
+  /// @return kInvalidInput also where a correlation is none, naming the source.
+  [[nodiscard]] Result<void> update(const std::vector<TiedUpdate>& edges,
                                     std::optional<Time> stamp = std::nullopt);
 
   /// Gives parts of edges new values, as one commit: what is absent stays as it is in the newest value of then.
@@ -281,6 +289,10 @@ class Forest {
   /// it is.
   /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the source).
   [[nodiscard]] Result<void> correlate(std::string_view id, const Correlation& correlation);
+
+  /// Takes up what an earlier process has kept of a held edge's correlation.
+  /// @return as correlate().
+  [[nodiscard]] Result<void> resume(std::string_view id, const KeptTies& ties);
 
   /// Gives edges the values that an observation makes of them, as one commit: all, or on an error none. What it says of
   /// correlation holds until the edge's next update; on a moving edge, whose next sample comes anyway, it is only added to
@@ -350,9 +362,11 @@ class Forest {
   [[nodiscard]] bool holds(std::string_view id) const;
   [[nodiscard]] std::optional<FrameInfo> info(std::string_view id) const;
   [[nodiscard]] std::optional<FrameInfo> info(Handle frame) const;
-  /// The value of a held edge, to be kept: what observations have left of shares is added to its covariance.
+  /// The value of a held edge: what observations have left of shares is added to its covariance.
   /// @return kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<Transform> value(std::string_view id) const;
+  /// What of a held edge outlives its process. @return as value().
+  [[nodiscard]] Result<ChangedEdge> kept(std::string_view id) const;
 
   /// All frames of one commit, in no particular order. O(n).
   [[nodiscard]] std::vector<FrameInfo> frames() const;

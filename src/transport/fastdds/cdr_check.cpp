@@ -182,6 +182,9 @@ void request_body(CdrWalk& walk) {
       walk.skip(3 * 8, 8);
       walk.sequence([&] { walk.revised_edge(); }, kMaxTies);
       break;
+    case 14:  // correlate
+      walk.ties();
+      break;
     default:
       walk.skip(static_cast<std::size_t>(-1), 1);  // no such request
   }

@@ -153,6 +153,12 @@ Result<ReviseRequest> read_revise(const wire::Revise& body) {
   return fail(Errc::kInvalidInput, "an observation of no edge");
 }
 
+Result<CorrelateRequest> read_correlate(std::string_view id, const wire::Ties& body) {
+  auto correlation = read_correlation(body);
+  if (!correlation) return fail_at("frame " + quote(id), correlation.error());
+  return CorrelateRequest{*std::move(correlation)};
+}
+
 Result<AddRequest> read_add(std::string_view id, const wire::Add& body) {
   return from_wire(body.x_pc(), id).map([&](const Transform& X_PC) {
     return AddRequest{string_of(body.parent()), X_PC};
@@ -221,6 +227,8 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
       return as(JointsRequest{string_of(body.joint_states())});
     case kPartialUpdate:
       return take(request, read_partial_update(body.partial_update()));
+    case kCorrelate:
+      return take(request, read_correlate(request.id, body.correlate()));
     default:
       return fail(Errc::kInvalidInput, "no request of kind " + std::to_string(body._d()));
   }

@@ -10,7 +10,7 @@ namespace tfdude::fastdds {
 namespace {
 
 Result<Note> read_note(const wire::Note& sample) {
-  constexpr auto kLast = static_cast<std::uint8_t>(Note::Kind::kUnhung);
+  constexpr auto kLast = static_cast<std::uint8_t>(Note::Kind::kDropped);
   if (sample.kind() < 1 || sample.kind() > kLast) {
     return fail(Errc::kInvalidInput, "kind " + std::to_string(sample.kind()) + " of a note");
   }

@@ -156,6 +156,7 @@ struct BodyWriter {
     for (const ReviseRequest::Edge& edge : revise.edges) body.edges().push_back(wire_revised(edge));
     out.revise(std::move(body));
   }
+  void operator()(const CorrelateRequest& said) { out.correlate(wire_ties(said.correlation)); }
   void operator()(const JointUpdate& update) { out.joints(to_wire(update)); }
   void operator()(const JointsRequest& asked) { out.joint_states(asked.after); }
   void operator()(const ConsistencyRequest& asked) { out.consistency(asked.all ? 1 : 0); }

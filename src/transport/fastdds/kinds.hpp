@@ -19,6 +19,7 @@ enum RequestKind : std::uint8_t {
   kConsistency = 11,
   kJoints = 12,
   kJointStates = 13,
+  kCorrelate = 14,
   kPartialUpdate = 17
 };
 enum ReplyKind : std::uint8_t {

@@ -237,10 +237,6 @@ TEST_CASE("a partition has back what it stored") {
                                     "tool < hand @ arms, attached"});
     CHECK(x_of(arms.forest.value("hand")) == 30);
   }
-  SECTION("what it no longer has goes, with what hangs below") {
-    arms.start({{"arm", "", along_x(1)}});
-    CHECK(arms.structure() == Lines{"arm <  @ arms"});
-  }
   SECTION("a bad frame in it stops all") {
     const auto state = store.load();
     CHECK(outcome(arms.partition.restore(*state, {{"a", "b", {}}, {"b", "a", {}}}, kNow)) ==

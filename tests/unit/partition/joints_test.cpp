@@ -112,8 +112,12 @@ TEST_CASE("what follows a joint moves with it, and shares its error") {
   // And a certain joint shares nothing.
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0}}, {}}));
   CHECK(arm.forest.lookup("upper", "hand", Query{})->basis.sources.empty());
-  CHECK(arm.partition.is_coupled("hand"));
-  CHECK_FALSE(arm.partition.is_coupled("upper"));
+  const auto correlate = [&](const std::string& id) {
+    const Reply reply = arm.partition.answer(Request{0, id, CorrelateRequest{{true, {}, {}}}}, Time{});
+    return std::holds_alternative<Done>(reply.body);
+  };
+  CHECK_FALSE(correlate("hand"));
+  CHECK(correlate("upper"));
 }
 
 TEST_CASE("what is said of a joint that follows another is passed over") {

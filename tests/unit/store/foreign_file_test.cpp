@@ -75,7 +75,8 @@ TEST_CASE(
     "a file of the format that knew no joints is read, and brought up to date by the first write") {
   const TemporaryDirectory directory;
   const std::string file = changed_by(
-      directory, "DROP TABLE joints; PRAGMA user_version = 1; PRAGMA journal_mode = DELETE");
+      directory, "DROP TABLE joints; DROP TABLE ties; DROP TABLE configured_ties; "
+                 "PRAGMA user_version = 1; PRAGMA journal_mode = DELETE");
   const std::string before = content(file);
   {
     const auto store = open_sqlite_store(file, "arms");
@@ -103,7 +104,7 @@ TEST_CASE("a file with rows that no state has is refused as it is") {
       {"UPDATE frames SET parent = x'41'", "another type in column parent"},
       {"UPDATE frames SET x_pc = 'text'", "another type in column x_pc"},
       {"UPDATE frames SET x_pc = zeroblob(223)", "a transform of 223 bytes"},
-      {"UPDATE frames SET x_pc = zeroblob(1000000)", "too big"},
+      {"UPDATE frames SET x_pc = zeroblob(9000000)", "too big"},
       {"UPDATE frames SET since = 1.5", "another type in column since"},
       {"UPDATE frames SET since = -1", "a time of 18446744073709551615"},
       {"UPDATE about SET epoch = -1", "a time of 18446744073709551615"},
@@ -112,7 +113,12 @@ TEST_CASE("a file with rows that no state has is refused as it is") {
       {"INSERT INTO joints VALUES('elbow', 'much', 0)", "another type in column position"},
       {"INSERT INTO joints VALUES('elbow', 1e10, 0)", "position is not a number, or beyond 1e9"},
       {"INSERT INTO joints VALUES('elbow', 0, -1)", "variance is not a number within"},
-      {"INSERT INTO notes VALUES('eye', 1, 4, '')", "a note of kind 4"},
+      {"INSERT INTO notes VALUES('eye', 1, 5, '')", "a note of kind 5"},
+      {"INSERT INTO ties VALUES('nobody', zeroblob(9), x'')", "ties of 'nobody', which is not there"},
+      {"INSERT INTO ties VALUES('hand', 'text', x'')", "another type in column said"},
+      {"INSERT INTO ties VALUES('hand', zeroblob(8), x'')", "a correlation of 8 bytes"},
+      {"INSERT INTO ties VALUES('hand', zeroblob(9), x'02')", "a correlation of 1 bytes"},
+      {"INSERT INTO configured_ties VALUES('hand', zeroblob(9))", "'hand', which is not there"},
       {"INSERT INTO notes VALUES('eye', 1, 2, 'a*')", "holds '*'"},
       {"INSERT INTO notes VALUES('eye', 1, 2, CAST(x'07' AS TEXT))", "holds a control character"},
   }));

@@ -162,7 +162,8 @@ TEST_CASE("a page with a note that means nothing is refused") {
   };
   CHECK(read({"hand", 1, Note::Kind::kGaveWay, "arms"}) == "ok");
   CHECK(read({"hand", 1, static_cast<Note::Kind>(0), ""}) == "kind 0 of a note");
-  CHECK(read({"hand", 1, static_cast<Note::Kind>(4), ""}) == "kind 4 of a note");
+  CHECK(read({"hand", 1, static_cast<Note::Kind>(5), ""}) == "kind 5 of a note");
+  CHECK(read({"hand", 1, Note::Kind::kDropped, ""}) == "ok");
   CHECK(read({"", 1, Note::Kind::kRemoved, ""}) != "ok");
   CHECK(read({"hand", 1, Note::Kind::kGaveWay, "arms,head"}) != "ok");
 }

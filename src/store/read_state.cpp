@@ -1,0 +1,129 @@
+#include "store/read_state.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "store/rows.hpp"
+#include "store/schema.hpp"
+
+namespace tfdude {
+namespace {
+
+using sqlite::Database;
+using sqlite::each_row;
+using sqlite::Statement;
+
+// Of those that are sorted by id; null where there is none.
+template <class Frame>
+Frame* find_frame(std::vector<Frame>& frames, const std::string& id) {
+  const auto at = std::lower_bound(frames.begin(), frames.end(), id,
+                                   [](const Frame& frame, const std::string& to) { return frame.id < to; });
+  return at != frames.end() && at->id == id ? &*at : nullptr;
+}
+
+Result<void> load_about(const Database& database, std::int64_t /*format*/, StoredState& state) {
+  return each_row(database, "SELECT epoch FROM about", [&](const Statement& row) -> Result<void> {
+    if (auto ok = row.check_types({SQLITE_INTEGER}); !ok) return ok;
+    const auto epoch = read_count(row, 0);
+    if (!epoch) return tl::unexpected(epoch.error());
+    state.epoch = *epoch;
+    return {};
+  });
+}
+
+Result<void> load_frames(const Database& database, std::int64_t /*format*/, StoredState& state) {
+  const char* sql = "SELECT id, parent, x_pc, since FROM frames ORDER BY id";
+  return each_row(database, sql, [&](const Statement& row) -> Result<void> {
+    auto ok = row.check_types({SQLITE_TEXT, SQLITE_TEXT, SQLITE_BLOB, SQLITE_INTEGER});
+    if (!ok) return ok;
+    auto frame = read_frame(row, state.frames.empty() ? "" : state.frames.back().id);
+    if (!frame) return tl::unexpected(std::move(frame.error()));
+    const auto since = read_count(row, 3);
+    if (!since) return tl::unexpected(since.error());
+    state.frames.push_back({frame->id, frame->parent, frame->X_PC, *since});
+    return {};
+  });
+}
+
+Result<void> load_notes(const Database& database, std::int64_t /*format*/, StoredState& state) {
+  const char* sql = "SELECT id, since, kind, rival FROM notes ORDER BY id";
+  auto loaded = each_row(database, sql, [&](const Statement& row) -> Result<void> {
+    auto ok = row.check_types({SQLITE_TEXT, SQLITE_INTEGER, SQLITE_INTEGER, SQLITE_TEXT});
+    if (!ok) return ok;
+    auto note = read_note(row, state.notes.empty() ? "" : state.notes.back().id);
+    if (!note) return tl::unexpected(std::move(note.error()));
+    state.notes.push_back(*std::move(note));
+    return {};
+  });
+  // The oldest are the first to go.
+  std::stable_sort(state.notes.begin(), state.notes.end(),
+                   [](const Note& a, const Note& b) { return a.since < b.since; });
+  return loaded;
+}
+
+Result<void> load_configured(const Database& database, std::int64_t /*format*/, StoredState& state) {
+  const char* sql = "SELECT id, parent, x_pc FROM configured ORDER BY id";
+  return each_row(database, sql, [&](const Statement& row) -> Result<void> {
+    auto ok = row.check_types({SQLITE_TEXT, SQLITE_TEXT, SQLITE_BLOB});
+    if (!ok) return ok;
+    auto frame = read_frame(row, state.configured.empty() ? "" : state.configured.back().id);
+    if (!frame) return tl::unexpected(std::move(frame.error()));
+    state.configured.push_back(*std::move(frame));
+    return {};
+  });
+}
+
+Result<void> load_joints(const Database& database, std::int64_t format, StoredState& state) {
+  if (format < kJointsFormat) return {};
+  const char* sql = "SELECT name, position, variance FROM joints ORDER BY name";
+  return each_row(database, sql, [&](const Statement& row) -> Result<void> {
+    auto joint = read_joint(row);
+    if (!joint) return tl::unexpected(std::move(joint.error()));
+    state.joints.push_back(*std::move(joint));
+    return {};
+  });
+}
+
+// Each is of a frame, or an entry, that is there.
+Result<void> load_ties(const Database& database, std::int64_t format, StoredState& state) {
+  if (format < kTiesFormat) return {};
+  const auto nobody = [](const Statement& row) {
+    return fail(Errc::kState, "ties of " + quote(row.text(0)) + ", which is not there");
+  };
+  const auto of_frame = [&](const Statement& row) -> Result<void> {
+    auto ties = read_ties(row);
+    if (!ties) return tl::unexpected(std::move(ties.error()));
+    StoredFrame* frame = find_frame(state.frames, row.text(0));
+    if (frame == nullptr) return nobody(row);
+    frame->ties = *std::move(ties);
+    return {};
+  };
+  auto loaded = each_row(database, "SELECT id, said, observed FROM ties", of_frame);
+  if (!loaded) return loaded;
+  const auto of_entry = [&](const Statement& row) -> Result<void> {
+    auto said = read_said(row);
+    if (!said) return tl::unexpected(std::move(said.error()));
+    FrameSpec* entry = find_frame(state.configured, row.text(0));
+    if (entry == nullptr) return nobody(row);
+    entry->correlation = *std::move(said);
+    return {};
+  };
+  return each_row(database, "SELECT id, said FROM configured_ties", of_entry);
+}
+
+}  // namespace
+
+Result<StoredState> read_state(const Database& database, std::int64_t format) {
+  StoredState state;
+  for (auto part : {load_about, load_frames, load_notes, load_configured, load_joints, load_ties}) {
+    if (auto loaded = part(database, format, state); !loaded) {
+      return tl::unexpected(std::move(loaded.error()));
+    }
+  }
+  return state;
+}
+
+}  // namespace tfdude

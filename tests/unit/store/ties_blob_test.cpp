@@ -1,0 +1,72 @@
+#include "store/ties_blob.hpp"
+
+#include <cmath>
+#include <string>
+
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::Random;
+
+Correlation any_correlation(Random& random) {
+  const auto factor = [&](Eigen::Index columns) -> Factor {
+    return Factor::NullaryExpr(6, columns, [&](auto, auto) { return random.normal(); });
+  };
+  return {true,
+          {{"calibration", false, factor(1)}, {"observed:1.2.3", true, factor(kMaxFactorColumns)}},
+          {"hand", std::string(255, 'o')}};
+}
+
+TEST_CASE("a correlation comes back as it was stored, to the last bit") {
+  Random random(0x7135);
+  INFO("seed " << random.seed());
+  for (int i = 0; i < 50; ++i) {
+    const Correlation correlation = any_correlation(random);
+    const auto back = correlation_from(to_blob(correlation));
+    REQUIRE(back);
+    CHECK(*back == correlation);
+  }
+  const auto none = correlation_from(to_blob({}));
+  REQUIRE(none);
+  CHECK(none->empty());
+}
+
+TEST_CASE("a stored correlation that was cut short, or went on, is refused") {
+  Random random(0x7136);
+  INFO("seed " << random.seed());
+  const std::string whole = to_blob(any_correlation(random));
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    INFO(size);
+    CHECK_FALSE(correlation_from(whole.substr(0, size)));
+  }
+  CHECK_FALSE(correlation_from(whole + '\0'));
+}
+
+TEST_CASE("a stored correlation that nobody can have said is refused") {
+  Correlation bad;
+  SECTION("a factor that is not a number") {
+    bad.shares.push_back({"supply", false, Factor::Constant(6, 1, std::nan(""))});
+  }
+  SECTION("a source named twice") {
+    bad.shares.assign(2, {"supply", false, Factor::Ones(6, 1)});
+  }
+  SECTION("an edge without a name") { bad.observed_with.emplace_back(); }
+  CHECK_FALSE(correlation_from(to_blob(bad)));
+}
+
+TEST_CASE("whatever bytes a correlation is read from, that ends") {
+  Random random(0x7137);
+  INFO("seed " << random.seed());
+  const std::string whole = to_blob(any_correlation(random));
+  for (int i = 0; i < 2000; ++i) {
+    std::string bytes = whole;
+    bytes[random.index(bytes.size())] = static_cast<char>(random.index(256));
+    if (const auto read = correlation_from(bytes)) CHECK(to_blob(*read) == bytes);
+  }
+}
+
+}  // namespace
+}  // namespace tfdude
