@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -37,6 +38,8 @@ struct Arguments {
   bool once = false;
   int order = 2;
   ObserveOptions observe;
+  bool unknown = false;              ///< correlation
+  std::vector<std::string> sources;  ///< of each column: its source's name and 6 numbers
   std::string out;  ///< the file of a picture
   int samples = 0;
   double position = 0;  ///< of a joint [rad or m], and its
@@ -83,6 +86,7 @@ int run_history(Client& client, const Arguments& arguments);
 int run_echo(Client& client, const Arguments& arguments);
 int run_observe(Client& client, const Arguments& arguments);
 int run_fuse(Client& client, const Arguments& arguments);
+int run_correlate(Client& client, const Arguments& arguments);
 int run_joint(Client& client, const Arguments& arguments);
 int run_joints(Client& client, const Arguments& arguments);
 int run_monitor(Client& client, const Arguments& arguments);

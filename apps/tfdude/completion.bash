@@ -23,14 +23,14 @@ _tfdude_command() {
 
 _tfdude() {
   local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command words common
-  local commands="tree frames partitions roots parent children exists lookup watch echo history monitor plot graph events joints joint observe fuse add update remove move"
+  local commands="tree frames partitions roots parent children exists lookup watch echo history monitor plot graph events joints joint observe fuse correlate add update remove move"
   local pose="--xyz --rpy --quat --stddev --cov"
   COMPREPLY=()
   command=$(_tfdude_command)
   mapfile -t common < <(_tfdude_common)
   case $previous in
     --profile | --out) mapfile -t COMPREPLY < <(compgen -f -- "$word"); return ;;
-    --domain | --discovery-server | --timeout | --rate | --at | --at-b | --stamp | --gate | --order | --samples | --extrapolate | --wait | --xyz | --rpy | --quat | --stddev) return ;;
+    --domain | --discovery-server | --timeout | --rate | --at | --at-b | --stamp | --gate | --source | --order | --samples | --extrapolate | --wait | --xyz | --rpy | --quat | --stddev) return ;;
     --partition) words=$(timeout 0.5 tfdude "${common[@]}" partitions 2>/dev/null | cut -d' ' -f1) ;;
     --parent | --fixed) words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null) ;;
     *)
@@ -41,6 +41,7 @@ _tfdude() {
           update) words+=" --stamp $pose" ;;
           move) words+=" --parent $pose" ;;
           lookup) words+=" --cov --at --at-b --fixed --extrapolate --age-noise --wait --order" ;;
+          correlate) words+=" --unknown --source" ;;
           observe | fuse) words+=" --stamp --gate --correlated $pose" ;;
           watch) words+=" --rate --composed --cov" ;;
           echo) words+=" --rate --composed" ;;
@@ -53,7 +54,7 @@ _tfdude() {
         words=$commands
       elif [[ $command == joint ]]; then
         words=$(timeout 0.5 tfdude "${common[@]}" joints 2>/dev/null | sed -n 's/^  \([^ ]*\) .*/\1/p')
-      elif [[ $command =~ ^(parent|children|exists|lookup|watch|echo|plot|history|observe|fuse|update|remove|move)$ ]]; then
+      elif [[ $command =~ ^(parent|children|exists|lookup|watch|echo|plot|history|observe|fuse|correlate|update|remove|move)$ ]]; then
         words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null)
       fi
       ;;

@@ -183,6 +183,22 @@ void add_measuring_commands(CLI::App& app, Arguments& arguments, Command& chosen
   }
 }
 
+void add_correlate_command(CLI::App& app, Arguments& arguments, Command& chosen) {
+  auto* correlate =
+      add_command(app, "correlate", "say how an edge's error hangs together with those of others",
+                  "correlate elbow --source supply 0 0 0 0 0 0.002", cli::run_correlate, chosen);
+  add_id(correlate, arguments);
+  correlate->add_flag("--unknown", arguments.unknown,
+                      "its own part may have to do with anything; else it is independent");
+  correlate
+      ->add_option("--source", arguments.sources,
+                   "what it shares with edges that name the same source: its error for one standard "
+                   "deviation there [m m m rad rad rad]; again for each dimension")
+      ->type_name("NAME 6 NUMBERS")
+      ->type_size(7)
+      ->allow_extra_args(false);
+}
+
 void add_out(CLI::App* command, Arguments& arguments, const std::vector<std::string>& endings) {
   std::string all;
   for (const std::string& ending : endings) all += (all.empty() ? "" : ", ") + ending;
@@ -284,6 +300,7 @@ int main(int argc, char** argv) {
   add_events_command(app, command);
   add_changing_commands(app, arguments, command);
   add_measuring_commands(app, arguments, command);
+  add_correlate_command(app, arguments, command);
   add_picture_commands(app, arguments, command);
   add_joint_commands(app, arguments, command);
   cli::require_numbers(app);

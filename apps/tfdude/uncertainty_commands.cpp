@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <cstdlib>
+#include <iterator>
+
 #include "tfdude/base/id.hpp"
 
 #include "commands.hpp"
@@ -25,7 +29,43 @@ int measure(Client& client, const Arguments& arguments, Measure take) {
   return observed->accepted ? kDone : kRefused;
 }
 
+constexpr std::size_t kRows = 6;
+
+// Columns of one source are one factor, in the order in which they are said.
+Result<std::vector<Share>> read_shares(const std::vector<std::string>& said) {
+  std::vector<Share> shares;
+  for (std::size_t at = 0; at + kRows < said.size(); at += kRows + 1) {
+    const std::string& source = said[at];
+    Twist column;
+    for (std::size_t row = 0; row < kRows; ++row) {
+      const std::string& text = said[at + 1 + row];
+      char* end = nullptr;
+      column[static_cast<Eigen::Index>(row)] = std::strtod(text.c_str(), &end);
+      if (text.empty() || *end != '\0') {
+        return fail(Errc::kInvalidInput,
+                    "--source " + quote(source) + ": " + quote(text) + " is not a number");
+      }
+    }
+    auto share = std::find_if(shares.begin(), shares.end(),
+                              [&](const Share& one) { return one.source == source; });
+    if (share == shares.end()) {
+      shares.push_back({source, false, Factor(kRows, 0)});
+      share = std::prev(shares.end());
+    }
+    share->factor.conservativeResize(Eigen::NoChange, share->factor.cols() + 1);
+    share->factor.rightCols<1>() = column;
+  }
+  return shares;
+}
+
 }  // namespace
+
+int run_correlate(Client& client, const Arguments& arguments) {
+  auto shares = read_shares(arguments.sources);
+  if (!shares) return report(shares.error(), arguments);
+  const Correlation said{arguments.unknown, *std::move(shares), {}};
+  return finish(client, client.correlate(arguments.id, said), arguments, "correlated");
+}
 
 int run_observe(Client& client, const Arguments& arguments) {
   return measure(

@@ -97,6 +97,26 @@ TEST_CASE(
   CHECK((*store)->load()->joints.size() == 1);
 }
 
+TEST_CASE("a file of the format that knew no correlation is brought up to date by the first write") {
+  const TemporaryDirectory directory;
+  const std::string file =
+      changed_by(directory, "DROP TABLE ties; DROP TABLE configured_ties; PRAGMA user_version = 2; "
+                            "PRAGMA journal_mode = DELETE");
+  const KeptTies unknown{{true, {}, {}}, {}};
+  {
+    const auto store = open_sqlite_store(file, "arms");
+    REQUIRE(store);
+    REQUIRE((*store)->load());
+    REQUIRE((*store)->save_values({{"hand", {}, unknown}}, {}));
+  }
+  const auto store = open_sqlite_store(file, "arms");
+  REQUIRE(store);
+  const auto state = (*store)->load();
+  REQUIRE(state);
+  REQUIRE(state->frames.size() == 1);
+  CHECK(state->frames[0].ties == unknown);
+}
+
 TEST_CASE("a file with rows that no state has is refused as it is") {
   const TemporaryDirectory directory;
   const auto [sql, why] = GENERATE(table<std::string, std::string>({

@@ -101,6 +101,46 @@ TEST_CASE("what was saved is there for the next process, to the last bit") {
   CHECK(to_flat(state->configured[0].X_PC) == to_flat(hand.X_PC));
 }
 
+TEST_CASE("what edges have to do with each other is kept with their values, and goes with them") {
+  Random random(0x57a7f);
+  INFO("seed " << random.seed());
+  const Correlation supply{true, {{"supply", false, Factor::Ones(6, 2)}}, {}};
+  const Correlation seen{false, {{"observed:1", true, Factor::Ones(6, 36)}}, {"arm", "tool"}};
+  const Transform X = random.transform();
+  const TemporaryDirectory directory;
+  // As large as can be.
+  Correlation most{false, {}, std::vector<std::string>(kMaxShares, std::string(255, 'o'))};
+  for (std::size_t i = 0; i < kMaxShares; ++i) {
+    most.shares.push_back({std::string(250, 's') + std::to_string(i), false,
+                           Factor::Ones(6, kMaxFactorColumns)});
+  }
+  const std::string file = state_file(directory.path(), 7, "arms");
+  {
+    const auto store = opened(file);
+    REQUIRE(store->save({1, {}, {{"a", "", X, 1, {supply, {}}}, {"b", "", X, 1, {{}, seen}},
+                                 {"c", "", X, 1, {most, most}}, {"d", "", X, 1, {supply, seen}}}, {}}));
+    REQUIRE(store->save_values({{"a", X, {supply, seen}}, {"d", X}, {"nobody", X, {supply, {}}}}, {}));
+    REQUIRE(store->save_configured({{"a", "", X, {}, supply}, {"b", "", X}}));
+  }
+  {
+    const auto store = opened(file);
+    const auto state = store->load();
+    REQUIRE(state);
+    REQUIRE(state->frames.size() == 4);
+    CHECK(state->frames[0].ties == KeptTies{supply, seen});
+    CHECK(state->frames[1].ties == KeptTies{{}, seen});
+    CHECK(state->frames[2].ties == KeptTies{most, most});
+    CHECK(state->frames[3].ties.empty());
+    CHECK(state->configured[0].correlation == supply);
+    CHECK(state->configured[1].correlation.empty());
+    REQUIRE(store->save({2, {"a", "b"}, {{"b", "", X, 2}}, {}}));
+  }
+  const auto state = opened(file)->load();
+  REQUIRE(state);
+  REQUIRE(state->frames.size() == 3);
+  CHECK(state->frames[0].ties.empty());
+}
+
 TEST_CASE("what was erased is not there") {
   const TemporaryDirectory directory;
   const std::string file = state_file(directory.path(), 7, "arms");

@@ -1,0 +1,181 @@
+// What owners that restart keep of uncertainty, once over each transport.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/catch.hpp"
+#include "support/networks.hpp"
+#include "support/observed_chain.hpp"
+#include "support/process.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::eventually;
+using testing::Join;
+using testing::joined_by;
+using testing::ObservedChain;
+using testing::Random;
+using testing::TemporaryDirectory;
+
+constexpr std::size_t kEdges = 5;
+
+std::string frame(std::size_t i) { return "frame_" + std::to_string(i); }
+
+// A chain of three owners who keep what they have; edge i leads to frame i + 1.
+class Kept {
+ public:
+  Kept(const Join& join, const ObservedChain& chain) : join_(join) {
+    frames_["a"] = {{frame(0), "", {}}, entry(chain, 0), entry(chain, 1)};
+    frames_["b"] = {entry(chain, 2), entry(chain, 3)};
+    frames_["c"] = {entry(chain, 4)};
+    for (const auto& [name, frames] : frames_) start(name, frames);
+    client.emplace(*Client::open(join_("")));
+  }
+
+  /// @param configured  with its configuration, or with none
+  void restart(const std::string& name, bool configured) {
+    nodes_.erase(name);
+    start(name, configured ? frames_.at(name) : std::vector<FrameSpec>());
+  }
+  void restart_all(bool configured) {
+    for (const auto& [name, frames] : frames_) restart(name, configured);
+  }
+
+  std::optional<Client> client;
+
+ private:
+  // With its own part; of the sources it is told as others would be.
+  static FrameSpec entry(const ObservedChain& chain, std::size_t edge) {
+    const Belief& X = chain.edges()[edge].X_PC;
+    FrameSpec spec{frame(edge + 1), frame(edge), {X.pose, X.own}};
+    if (edge == 0) spec.correlation.shares = X.shares;
+    return spec;
+  }
+  void start(const std::string& name, const std::vector<FrameSpec>& frames) {
+    Options options;
+    options.state = directory_.path();
+    auto node = Node::open(join_(name), name, frames, options);
+    INFO((node ? "" : node.error().message));
+    REQUIRE(node);
+    nodes_.emplace(name, *std::move(node));
+  }
+
+  const Join join_;
+  TemporaryDirectory directory_;
+  std::map<std::string, std::vector<FrameSpec>> frames_;
+  std::map<std::string, Node> nodes_;
+};
+
+// What the dense filter's covariance of all edges makes of a path.
+Matrix6d of_path(const ObservedChain& chain, const Eigen::MatrixXd& P, std::size_t from,
+                 std::size_t to) {
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(6, P.cols());
+  for (std::size_t i = from; i < to; ++i) {
+    H.middleCols<6>(static_cast<Eigen::Index>(6 * i)) =
+        adjoint(chain.believed(to, i + 1).pose);
+  }
+  return H * P * H.transpose();
+}
+
+// By how much the worst path differs, in parts of what it should be.
+double difference(Client& client, const ObservedChain& chain, const Eigen::MatrixXd& P) {
+  double worst = 0;
+  for (std::size_t from = 0; from < kEdges; ++from) {
+    for (std::size_t to = from + 1; to <= kEdges; ++to) {
+      const Matrix6d expected = of_path(chain, P, from, to);
+      const auto X = client.lookup(frame(from), frame(to));
+      if (!X) return std::numeric_limits<double>::infinity();
+      worst = std::max(worst, (X->covariance.matrix() - expected).norm() / expected.norm());
+    }
+  }
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("kept: owners that restart between observations know what one dense filter would") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Random random(0x4e97);
+  INFO("seed " << random.seed());
+  ObservedChain chain(random, kEdges);
+  chain.add_source("supply", {0, 3}, random);
+  Kept robot(join, chain);
+  // One says it in its configuration, of the other it is said by request.
+  REQUIRE(eventually([&] {
+    return robot.client->correlate(frame(4), {false, chain.edges()[3].X_PC.shares, {}}).has_value();
+  }));
+  Eigen::MatrixXd P = chain.dense();
+  robot.restart_all(true);
+  REQUIRE(eventually([&] { return difference(*robot.client, chain, P) < 1e-6; }));
+  constexpr std::array<std::pair<std::size_t, std::size_t>, 4> kObserved{
+      {{0, 5}, {0, 5}, {1, 4}, {0, 3}}};
+  bool configured = false;
+  for (const auto& [from, to] : kObserved) {
+    INFO("observed from " << from << " to " << to);
+    const Covariance R = random.covariance(0.001, 0.001);
+    P = chain.dense_update(P, from, to, R);
+    const Transform Z{chain.believed(from, to).pose, R};
+    REQUIRE(robot.client->observe(frame(from), frame(to), Z, {}, {1.0, true}));
+    chain.observe_exactly(from, to, R);
+    CHECK(difference(*robot.client, chain, P) < 1e-6);
+    robot.restart_all(configured);
+    configured = !configured;
+    CHECK(eventually([&] { return difference(*robot.client, chain, P) < 1e-6; }));
+    INFO("differs by " << difference(*robot.client, chain, P));
+  }
+}
+
+TEST_CASE("kept: what was said of correlation by request is there after a restart, and can be taken back") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Random random(0x4e98);
+  INFO("seed " << random.seed());
+  const ObservedChain chain(random, kEdges);
+  Kept robot(join, chain);
+  const auto bound = [&] {
+    const auto X = robot.client->lookup(frame(1), frame(4), Query{});
+    return X && X->basis.bound;
+  };
+  REQUIRE(eventually([&] { return robot.client->correlate(frame(3), {true, {}, {}}).has_value(); }));
+  CHECK(bound());
+  robot.restart("b", true);
+  CHECK(eventually(bound));
+  REQUIRE(robot.client->correlate(frame(3), {}));
+  CHECK_FALSE(bound());
+  robot.restart("b", false);
+  REQUIRE(eventually([&] { return robot.client->lookup(frame(1), frame(4)).has_value(); }));
+  CHECK_FALSE(bound());
+}
+
+TEST_CASE("kept: what nobody may say of correlation is refused, whoever owns the edge") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Random random(0x4e99);
+  INFO("seed " << random.seed());
+  const ObservedChain chain(random, kEdges);
+  Kept robot(join, chain);
+  REQUIRE(eventually([&] { return robot.client->exists(frame(5)); }));
+  const auto refused = [&](const std::string& id, const Correlation& correlation) {
+    const auto said = robot.client->correlate(id, correlation);
+    return said ? std::string("ok") : std::string(to_string(said.error().code));
+  };
+  const Share share{"supply", false, Factor::Ones(6, 1)};
+  CHECK(refused("nobody", {}) == "unknown_frame");
+  CHECK(refused(frame(5), {false, {share, share}, {}}) == "invalid_input");
+  CHECK(refused(frame(5), {false, {{"observed:1", true, share.factor}}, {}}) == "invalid_input");
+  CHECK(refused(frame(5), {false, {}, {frame(4)}}) == "invalid_input");
+  CHECK(refused(frame(5), {false, {{"supply", false, Factor::Constant(6, 1, NAN)}}, {}}) ==
+        "invalid_input");
+  CHECK(refused(frame(5), {false, {share}, {}}) == "ok");
+}
+
+}  // namespace tfdude

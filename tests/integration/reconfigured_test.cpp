@@ -1,0 +1,195 @@
+// What a daemon makes of its state where its configuration was edited, or is gone.
+
+#include <algorithm>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/pose_diff.hpp"
+#include "support/thesis.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::await_ready;
+using testing::CliResult;
+using testing::ContainsSubstring;
+using testing::eventually;
+using testing::finish;
+using testing::Process;
+using testing::TemporaryDirectory;
+using testing::TestDomain;
+using testing::x_of;
+using Arguments = std::vector<std::string>;
+
+constexpr const char* kBoth = R"(partition: arms
+frames:
+  - {id: arm, xyz: [1, 0, 0]}
+  - {id: hand, parent: arm, xyz: [10, 0, 0]}
+)";
+constexpr const char* kArmOnly = "partition: arms\nframes:\n  - {id: arm, xyz: [1, 0, 0]}\n";
+
+// A daemon of the partition "arms" that is killed and started with other arguments.
+struct Arms {
+  Arms() {
+    const std::string both = directory.write("both.yaml", kBoth);
+    with_both = {"--config", both};
+    with_arm = {"--config", directory.write("arm.yaml", kArmOnly)};
+    start(with_both);
+  }
+  void start(Arguments arguments) {
+    arguments.insert(arguments.end(), {"--state", directory.path()});
+    daemon.emplace(domain.start_daemon(arguments));
+    ready = await_ready(*daemon);
+  }
+  void restart(const Arguments& arguments) {
+    daemon->kill();
+    start(arguments);
+  }
+  CliResult check(Arguments arguments) {
+    arguments.insert(arguments.end(), {"--check", "--state", directory.path()});
+    Process process = domain.start_daemon(arguments);
+    return finish(process);
+  }
+
+  TestDomain domain;
+  TemporaryDirectory directory;
+  Arguments with_both;
+  Arguments with_arm;
+  std::optional<Process> daemon;
+  std::string ready;
+};
+
+}  // namespace
+
+TEST_CASE("reconfigured: a daemon without a configuration has its state as it was") {
+  Arms arms;
+  auto client = *Client::open(arms.domain.options());
+  REQUIRE(client.add("tool", "hand", along_x(100)));
+  REQUIRE(client.update("hand", along_x(20)));
+  arms.restart({"--partition", "arms"});
+  CHECK_THAT(arms.ready, ContainsSubstring("frames=3"));
+  REQUIRE(eventually([&] { return x_of(client.lookup("arm", "tool")) == 120; }));
+  // What the configuration said before is still known: it changes nothing.
+  arms.restart(arms.with_both);
+  CHECK_THAT(arms.ready, ContainsSubstring("frames=3"));
+  REQUIRE(eventually([&] { return x_of(client.lookup("arm", "tool")) == 120; }));
+}
+
+TEST_CASE("reconfigured: an entry that is gone takes its frame, and nothing below it, whoever owns that") {
+  Arms arms;
+  const std::string tools = arms.directory.write(
+      "tools.yaml", "partition: tools\nframes:\n  - {id: gripper, parent: hand}\n");
+  auto other = arms.domain.start_daemon({"--config", tools, "--state", arms.directory.path()});
+  await_ready(other);
+  auto client = *Client::open(arms.domain.options());
+  REQUIRE(eventually([&] { return client.lookup("arm", "gripper").has_value(); }));
+  REQUIRE(client.add("tool", "hand", along_x(100)));
+  REQUIRE(client.add("tip", "tool", along_x(1000)));
+  std::mutex mutex;
+  std::vector<std::string> heard;
+  const auto subscription = client.on_change([&](const Change& change) {
+    const std::lock_guard lock(mutex);
+    heard.push_back(std::string(to_string(change.kind)) + " " + change.frame);
+  });
+  const auto hears = [&](const std::string& what) {
+    return eventually([&] {
+      const std::lock_guard lock(mutex);
+      return std::find(heard.begin(), heard.end(), what) != heard.end();
+    });
+  };
+  arms.restart(arms.with_arm);
+  CHECK(hears("frame_removed hand"));
+  CHECK(hears("frame_orphaned tool"));
+  CHECK(hears("frame_orphaned gripper"));
+  REQUIRE(eventually([&] { return client.partitions()[0].reachable; }));
+  CHECK_FALSE(client.exists("hand"));
+  CHECK(client.parent("tool") == std::string("hand"));
+  CHECK(client.parent("gripper") == std::string("hand"));
+  CHECK(x_of(client.lookup("tool", "tip")) == 1000);
+  CHECK(eventually([&] {
+    (void)arms.daemon->runs();
+    return arms.daemon->err().find("frame 'gripper' of partition 'tools' waits for its parent "
+                                   "'hand'") != std::string::npos;
+  }));
+  CHECK_THAT(arms.daemon->err(), ContainsSubstring("configuration: frame 'hand': removed"));
+  CHECK_THAT(arms.daemon->err(),
+             ContainsSubstring("frame 'tool' of partition 'arms' waits for its parent 'hand'"));
+  // Others that come back do not take the removal for one that was asked for.
+  other.kill();
+  auto again = arms.domain.start_daemon({"--config", tools, "--state", arms.directory.path()});
+  await_ready(again);
+  REQUIRE(eventually([&] { return client.partitions()[1].reachable; }));
+  CHECK(client.exists("gripper"));
+  arms.restart(arms.with_both);
+  CHECK(eventually([&] { return x_of(client.lookup("arm", "tip")) == 1110; }));
+  CHECK(eventually([&] { return client.lookup("arm", "gripper").has_value(); }));
+}
+
+TEST_CASE("reconfigured: what a configuration would change is said beforehand, and done") {
+  Arms arms;
+  auto client = *Client::open(arms.domain.options());
+  REQUIRE(client.add("tool", "hand", along_x(100)));
+  const std::string file =
+      arms.directory.path() + "/domain-" + std::to_string(arms.domain.number()) + "/arms.sqlite";
+  // Beside the daemon that has the file open.
+  const CliResult shrunk = arms.check(arms.with_arm);
+  CHECK(shrunk.status == 0);
+  CHECK(shrunk.out == "state " + file +
+                          ": frames=3\nframe 'hand': removed, as its entry is gone\n"
+                          "frame 'tool': waits for its parent 'hand', which is removed\n");
+  const CliResult same = arms.check(arms.with_both);
+  CHECK(same.status == 0);
+  CHECK(same.out == "state " + file + ": frames=3\nnothing changes\n");
+  const CliResult none = arms.check({"--partition", "arms"});
+  CHECK(none.out == same.out);
+  const CliResult fresh = arms.check(
+      {"--config", arms.directory.write("legs.yaml", "partition: legs\nframes:\n  - {id: leg}\n")});
+  CHECK_THAT(fresh.out, ContainsSubstring("legs.sqlite: frames=0\nframe 'leg': added as a root\n"));
+  // A frame that was hung below another meanwhile cannot be above it.
+  REQUIRE(client.move("hand", ""));
+  REQUIRE(client.add("wrist", "hand", {}));
+  const CliResult cycle = arms.check({"--config", arms.directory.write("cycle.yaml", R"(partition: arms
+frames:
+  - {id: arm, xyz: [1, 0, 0]}
+  - {id: hand, parent: wrist}
+)")});
+  CHECK(cycle.status == 2);
+  CHECK_THAT(cycle.err, ContainsSubstring("cannot hang under 'wrist', which lies below it"));
+  CHECK(client.exists("wrist"));
+}
+
+TEST_CASE("reconfigured: what observations and requests have said of correlation survives a kill") {
+  Arms arms;
+  auto client = *Client::open(arms.domain.options());
+  const Covariance some = *Covariance::from_stddev({0.01, 0.01, 0.01, 0.01, 0.01, 0.01});
+  for (const auto& [id, x] : {std::pair("tool", 1.0), std::pair("tip", 2.0)}) {
+    REQUIRE(client.add(id, id == std::string("tool") ? "hand" : "tool",
+                       {along_x(x).pose, some}));
+  }
+  const CliResult said = arms.domain.cli({"correlate", "tip", "--source", "supply", "0", "0", "0",
+                                          "0", "0", "0.002"});
+  CHECK(said.status == 0);
+  CHECK_THAT(said.out, ContainsSubstring("correlated tip"));
+  REQUIRE(client.observe("hand", "tip", {along_x(3).pose, some}));
+  const auto before = client.lookup("hand", "tip", Query{});
+  REQUIRE(before);
+  REQUIRE(before->basis.sources.size() == 2);
+  arms.restart({"--partition", "arms"});
+  const auto as_before = [&] {
+    const auto after = client.lookup("hand", "tip", Query{});
+    return after && after->basis.sources == before->basis.sources &&
+           testing::transform_diff(*after, *before, 1e-12) == "";
+  };
+  CHECK(eventually(as_before));
+  CHECK(arms.domain.cli({"correlate", "tip", "--source", "supply", "0", "0", "x", "0", "0", "1"})
+            .status == 1);
+  CHECK(arms.domain.cli({"correlate", "tip", "--source", "supply", "0", "0"}).status == 2);
+}
+
+}  // namespace tfdude
