@@ -3,8 +3,12 @@
 #include <csignal>
 #include <fstream>
 #include <iterator>
+#include <sched.h>
 #include <sstream>
 #include <stdexcept>
+#include <sys/mount.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "faults/worker.hpp"
 
@@ -34,6 +38,12 @@ table ip parted {
 END
 )";
 
+// Debian's faketime, which lets a process see another wall clock, and change it by a file.
+constexpr const char* kFakeTime = "/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1";
+
+// Room for the state of all daemons, and not more.
+constexpr const char* kDiskSize = "size=16m";
+
 std::string config_of(std::size_t partition) {
   const Eigen::Vector3d t = base_edge(partition).pose.translation();
   std::ostringstream yaml;
@@ -50,7 +60,14 @@ Cluster::Cluster(std::size_t partitions, std::size_t clients,
                  std::vector<std::string> daemon_options)
     : daemon_options_(std::move(daemon_options)),
       no_links_(testing::Hosts::missing()),
+      clocks_(access(kFakeTime, R_OK) == 0),
+      variants_(partitions, Variant::kUsual),
       daemons_(partitions) {
+  mkdir(state_directory().c_str(), S_IRWXU);
+  // Seen by this thread and by the processes that it starts.
+  disk_ = unshare(CLONE_NEWNS) == 0 &&
+          mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+          mount("none", state_directory().c_str(), "tmpfs", 0, kDiskSize) == 0;
   if (no_links_.empty()) {
     hosts_.emplace(1 + partitions + clients);
     hosts_->enter(kObservers);
@@ -62,8 +79,31 @@ Cluster::Cluster(std::size_t partitions, std::size_t clients,
   }
   for (std::size_t i = 0; i < partitions; ++i) {
     (void)directory_.write(partition_name(i) + ".yaml", config_of(i));
+    (void)directory_.write(partition_name(i) + "-spare.yaml",
+                           config_of(i) + "  - id: spare_" + std::to_string(i) +
+                               "\n    parent: " + base_of(i) + "\n    xyz: [0, 0, 1]\n");
+    step_clock(i, 0);
   }
 }
+
+Cluster::~Cluster() {
+  daemons_.clear();
+  if (disk_) (void)umount2(state_directory().c_str(), MNT_DETACH);
+}
+
+void Cluster::step_clock(std::size_t partition, int seconds) const {
+  (void)directory_.write(partition_name(partition) + ".clock",
+                         (seconds < 0 ? "" : "+") + std::to_string(seconds) + "\n");
+}
+
+void Cluster::fill_disk() const {
+  std::ofstream filler(state_directory() + "/filler", std::ios::binary);
+  const std::string block(4096, 'x');
+  while (filler.write(block.data(), static_cast<std::streamsize>(block.size())).flush()) {
+  }
+}
+
+void Cluster::clear_disk() const { (void)unlink((state_directory() + "/filler").c_str()); }
 
 std::vector<std::string> Cluster::meeting() const {
   if (!domain_) return {};
@@ -94,17 +134,34 @@ std::string Cluster::log_file(std::size_t partition) const {
   return directory_.path() + "/" + partition_name(partition) + ".log";
 }
 
+std::vector<std::string> Cluster::configuration(std::size_t partition) const {
+  const std::string name = partition_name(partition);
+  switch (variants_[partition]) {
+    case Variant::kNone:
+      return {"--partition", name};
+    case Variant::kWithSpare:
+      return {"--config", directory_.path() + "/" + name + "-spare.yaml"};
+    case Variant::kUsual:
+      break;
+  }
+  return {"--config", directory_.path() + "/" + name + ".yaml"};
+}
+
+std::string Cluster::clock_file(std::size_t partition) const {
+  return directory_.path() + "/" + partition_name(partition) + ".clock";
+}
+
 void Cluster::start(std::size_t partition) {
   // Its log goes into a file, as nobody may come to read a pipe in time.
-  std::vector<std::string> command{"/bin/sh",
-                                   "-c",
-                                   "exec 2>>" + log_file(partition) + "; exec \"$0\" \"$@\"",
-                                   TFDUDE_DAEMON,
-                                   "--config",
-                                   directory_.path() + "/" + partition_name(partition) + ".yaml",
-                                   "--state",
-                                   state_directory()};
-  for (const auto& part : {meeting(), daemon_options_}) {
+  std::string script = "exec 2>>" + log_file(partition) + "; ";
+  if (clocks_) {
+    script += std::string("export FAKETIME_DONT_FAKE_MONOTONIC=1 FAKETIME_CACHE_DURATION=1") +
+              " FAKETIME_TIMESTAMP_FILE=" + clock_file(partition) + " LD_PRELOAD=" + kFakeTime +
+              "; ";
+  }
+  std::vector<std::string> command{"/bin/sh",     "-c",      script + "exec \"$0\" \"$@\"",
+                                   TFDUDE_DAEMON, "--state", state_directory()};
+  for (const auto& part : {configuration(partition), meeting(), daemon_options_}) {
     command.insert(command.end(), part.begin(), part.end());
   }
   daemons_[partition].reset();

@@ -7,6 +7,7 @@
 
 #include "tfdude/client/client.hpp"
 
+#include "faults/schedule.hpp"
 #include "support/domain_lease.hpp"
 #include "support/hosts.hpp"
 #include "support/process.hpp"
@@ -20,10 +21,14 @@ class Cluster {
  public:
   /// @param clients  how many hosts there are for clients, besides the observers' one
   Cluster(std::size_t partitions, std::size_t clients, std::vector<std::string> daemon_options);
+  ~Cluster();
+  Cluster(const Cluster&) = delete;
+  Cluster& operator=(const Cluster&) = delete;
 
   [[nodiscard]] std::size_t partitions() const { return daemons_.size(); }
   /// Why no link can be cut; empty where they can.
   [[nodiscard]] const std::string& no_links() const { return no_links_; }
+  [[nodiscard]] Means means() const { return {no_links_.empty(), clocks_, disk_}; }
   [[nodiscard]] std::string state_directory() const { return directory_.path() + "/state"; }
 
   [[nodiscard]] Client open_observer() const { return open_on(kObservers, Milliseconds(1000)); }
@@ -37,6 +42,13 @@ class Cluster {
 
   void start(std::size_t partition);
   void kill(std::size_t partition);
+  /// From its next start on.
+  void configure(std::size_t partition, Variant variant) { variants_[partition] = variant; }
+  /// Sets a daemon's wall clock this far off [s], also after a restart; needs Debian's faketime.
+  void step_clock(std::size_t partition, int seconds) const;
+  /// Leaves no byte on the disk where the daemons keep their state; needs root.
+  void fill_disk() const;
+  void clear_disk() const;
   void pause(std::size_t partition);
   void resume(std::size_t partition);
   [[nodiscard]] bool runs(std::size_t partition) const { return daemons_[partition].has_value(); }
@@ -70,6 +82,8 @@ class Cluster {
   [[nodiscard]] Client open_on(std::size_t host, Milliseconds timeout) const;
   [[nodiscard]] std::vector<std::string> meeting() const;
   [[nodiscard]] std::string log_file(std::size_t partition) const;
+  [[nodiscard]] std::string clock_file(std::size_t partition) const;
+  [[nodiscard]] std::vector<std::string> configuration(std::size_t partition) const;
   void shell(std::size_t host, const std::string& script) const;
 
   testing::TemporaryDirectory directory_;
@@ -77,6 +91,9 @@ class Cluster {
   std::string no_links_;
   std::optional<testing::Hosts> hosts_;
   std::optional<testing::DomainLease> domain_;  // without hosts
+  bool clocks_ = false;
+  bool disk_ = false;
+  std::vector<Variant> variants_;
   std::vector<std::optional<testing::Process>> daemons_;
 };
 

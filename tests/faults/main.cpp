@@ -14,6 +14,7 @@
 
 #include "faults/final_check.hpp"
 #include "faults/nemesis.hpp"
+#include "faults/rerouter.hpp"
 #include "faults/rounds.hpp"
 #include "faults/schedule.hpp"
 
@@ -44,11 +45,13 @@ void report_time(const char* what, const std::vector<double>& times, double targ
 int run(const Arguments& arguments) {
   Cluster cluster(arguments.partitions, arguments.clients, {});
   Journal journal;
-  const bool links = cluster.no_links().empty();
   std::printf("seed %llu, %.0f s, %zu daemons, %zu clients\n",
               static_cast<unsigned long long>(arguments.seed), arguments.seconds,
               arguments.partitions, arguments.clients);
-  if (!links) std::printf("no link is cut: %s\n", cluster.no_links().c_str());
+  const Means means = cluster.means();
+  if (!means.links) std::printf("no link is cut: %s\n", cluster.no_links().c_str());
+  if (!means.clocks) std::printf("no clock is stepped: needs the package faketime\n");
+  if (!means.disks) std::printf("no disk is full: needs root\n");
   std::fflush(stdout);
   for (std::size_t i = 0; i < arguments.partitions; ++i) cluster.start(i);
   for (std::size_t i = 0; i < arguments.partitions; ++i) cluster.await_ready(i);
@@ -60,11 +63,14 @@ int run(const Arguments& arguments) {
                                                random.engine()(), journal));
     workers.back()->start();
   }
+  Rerouter rerouter(cluster.open_observer(), cluster.open_observer(), arguments.partitions,
+                    journal);
   Observer observer(cluster.open_observer(Milliseconds(200)));
   Nemesis nemesis(cluster, observer, journal);
-  nemesis.run(schedule(random, arguments.seconds, arguments.partitions, arguments.clients, links),
+  nemesis.run(schedule(random, arguments.seconds, arguments.partitions, arguments.clients, means),
               arguments.seconds);
   for (const auto& worker : workers) worker->stop();
+  rerouter.stop();
   check_all("after all faults", cluster, observer.client(), workers, journal);
   nemesis.restart_all();
   check_all("after a restart of all", cluster, observer.client(), workers, journal);

@@ -23,6 +23,12 @@ std::string name_of(FaultKind kind) {
       return "unplugged cable of a daemon";
     case FaultKind::kCutClient:
       return "cut of a client";
+    case FaultKind::kReconfigure:
+      return "another configuration";
+    case FaultKind::kStepClock:
+      return "step of the clock";
+    case FaultKind::kFillDisk:
+      return "full disk";
     case FaultKind::kPart:
       break;
   }
@@ -30,6 +36,7 @@ std::string name_of(FaultKind kind) {
 }
 
 std::string target_of(const Fault& fault) {
+  if (fault.kind == FaultKind::kFillDisk) return "all daemons";
   if (fault.kind == FaultKind::kCutClient) return "client " + std::to_string(fault.target);
   std::string target = partition_name(fault.target);
   if (fault.kind == FaultKind::kPart) target += " and " + partition_name(fault.other);
@@ -68,20 +75,35 @@ void Nemesis::run(const std::vector<Fault>& faults, double seconds) {
 
 bool Nemesis::connected(std::size_t partition) const { return cut_.count(partition) == 0; }
 
+void Nemesis::kill(std::size_t partition) {
+  cluster_.kill(partition);
+  if (starting_.erase(partition) > 0) {
+    // It never served, so nobody can miss it.
+    observer_.disregard(partition);
+    journal_.calm_down();
+  } else if (connected(partition)) {
+    observer_.died(partition);
+  }
+}
+
 void Nemesis::begin(const Fault& fault) {
   journal_.disturb();
   journal_.count("fault", name_of(fault.kind));
   note("", fault);
   switch (fault.kind) {
+    case FaultKind::kReconfigure:
+      cluster_.configure(fault.target, fault.variant);
+      kill(fault.target);
+      break;
     case FaultKind::kKill:
-      cluster_.kill(fault.target);
-      if (starting_.erase(fault.target) > 0) {
-        // It never served, so nobody can miss it.
-        observer_.disregard(fault.target);
-        journal_.calm_down();
-      } else if (connected(fault.target)) {
-        observer_.died(fault.target);
-      }
+      kill(fault.target);
+      break;
+    case FaultKind::kStepClock:
+      cluster_.step_clock(fault.target, fault.step);
+      break;
+    case FaultKind::kFillDisk:
+      // A daemon that starts needs room, and says so by ending.
+      if (starting_.empty()) cluster_.fill_disk();
       break;
     case FaultKind::kPause:
       cluster_.pause(fault.target);
@@ -110,7 +132,14 @@ void Nemesis::end(const Fault& fault) {
   note("end of ", fault);
   switch (fault.kind) {
     case FaultKind::kKill:
+    case FaultKind::kReconfigure:
       start(fault.target);
+      break;
+    case FaultKind::kStepClock:
+      cluster_.step_clock(fault.target, 0);
+      break;
+    case FaultKind::kFillDisk:
+      cluster_.clear_disk();
       break;
     case FaultKind::kPause:
       cluster_.resume(fault.target);

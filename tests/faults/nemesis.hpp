@@ -25,6 +25,7 @@ class Nemesis {
   void restart_all();
 
  private:
+  void kill(std::size_t partition);
   void begin(const Fault& fault);
   void end(const Fault& fault);
   void note(const std::string& what, const Fault& fault);

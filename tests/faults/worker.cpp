@@ -14,9 +14,6 @@ constexpr std::size_t kFrames = 40;
 constexpr std::size_t kJoints = 3;
 constexpr std::size_t kRemovedKept = 10;
 
-// How long after the last fault everybody has to know everything [s].
-constexpr double kGrace = 5.0;
-
 // Denied by a replica or an owner that is behind, or rightly.
 bool denies(Errc code) {
   switch (code) {
@@ -148,8 +145,10 @@ void Worker::record(const std::string& operation, const std::vector<std::string>
     const bool expected = !result && denies(result.error().code) && !model_.frame(frame).certain();
     if (!expected) model_.note(frame, line);
   }
-  // No disk is broken here.
-  if (!result && result.error().code == Errc::kState) journal_.violation(prefix_ + " " + line);
+  // No disk is full any more.
+  if (!result && result.error().code == Errc::kState && calm_ > kGrace) {
+    journal_.violation(prefix_ + " " + line);
+  }
 }
 
 void Worker::contradiction(const std::string& what, const std::string& frame) {
