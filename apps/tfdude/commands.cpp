@@ -186,11 +186,16 @@ int run_add(Client& client, const Arguments& arguments) {
 }
 
 int run_update(Client& client, const Arguments& arguments) {
-  const auto X_PC = arguments.spec.build();
+  const TransformSpec& spec = arguments.spec;
+  const auto X_PC = spec.build();
   if (!X_PC) return refuse_pose(X_PC.error(), arguments);
+  PartialUpdate given{arguments.id};
+  if (spec.xyz) given.translation = X_PC->pose.translation();
+  if (spec.rpy || spec.quat) given.rotation = X_PC->pose.rotation();
+  if (spec.stddev || spec.cov) given.covariance = X_PC->covariance;
   const auto stamp = optional_stamp(arguments.stamp, wall_clock());
   if (!stamp) return report(stamp.error(), arguments);
-  const auto updated = client.update(arguments.id, *X_PC, *stamp);
+  const auto updated = client.update_partial({given}, *stamp);
   return finish(client, updated, arguments, "updated");
 }
 

@@ -15,6 +15,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
+#include "../numbers.hpp"
 #include "commands.hpp"
 
 namespace {
@@ -241,7 +242,7 @@ void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen)
   add->add_option("--parent", arguments.parent, "its parent")->required();
   add->add_option("--partition", arguments.partition, "its owner, if not its parent's");
   add_pose_options(*add, arguments);
-  auto* update = add_command(app, "update", "give an edge a new value",
+  auto* update = add_command(app, "update", "give parts of an edge new values; the rest stays",
                              "update tool --rpy 0 0 1.57", cli::run_update, chosen);
   add_id(update, arguments);
   add_pose_options(*update, arguments);
@@ -285,8 +286,10 @@ int main(int argc, char** argv) {
   add_measuring_commands(app, arguments, command);
   add_picture_commands(app, arguments, command);
   add_joint_commands(app, arguments, command);
+  cli::require_numbers(app);
   try {
-    app.parse(argc, argv);
+    app.name(argv[0]);
+    app.parse(cli::arguments_of(argc, argv));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     const auto unknown = app.remaining();

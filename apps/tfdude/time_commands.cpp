@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <optional>
 #include <unistd.h>
 
@@ -99,6 +101,20 @@ void redraw(const std::string& text, std::ptrdiff_t& drawn) {
 
 }  // namespace
 
+namespace {
+
+// With an exponent; a long double has 64 bits, as many as a stamp.
+std::optional<std::int64_t> nanoseconds_of_power(const std::string& text) {
+  char* end = nullptr;
+  const long double ns = std::strtold(text.c_str(), &end) * 1e9L;
+  const bool whole = end == text.c_str() + text.size();
+  constexpr long double kLast = 9223372036854775807.0L;
+  if (!whole || !(ns >= 0 && ns <= kLast)) return std::nullopt;
+  return std::llround(ns);
+}
+
+}  // namespace
+
 // Not by way of a double, which would round a stamp of today to a quarter of a microsecond.
 Result<Time> parse_stamp(const std::string& text, Time now) {
   constexpr std::int64_t kSecond = 1'000'000'000;
@@ -111,6 +127,17 @@ Result<Time> parse_stamp(const std::string& text, Time now) {
   };
   const bool before_now = !text.empty() && text[0] == '-';
   const std::string digits = text.substr(before_now ? 1 : 0);
+  const auto stamp_of = [&](std::int64_t ns) -> Result<Time> {
+    const Time stamp = before_now ? now - std::chrono::nanoseconds(ns) : time_of(ns);
+    if (nanoseconds(stamp) <= 0) return bad();
+    return stamp;
+  };
+  if (digits.find_first_of("eE") != std::string::npos &&
+      std::isdigit(static_cast<unsigned char>(digits[0])) != 0) {
+    const auto ns = nanoseconds_of_power(digits);
+    if (!ns) return bad();
+    return stamp_of(*ns);
+  }
   const std::size_t point = std::min(digits.find('.'), digits.size());
   const std::string whole = digits.substr(0, point);
   std::string fraction = point < digits.size() ? digits.substr(point + 1) : "";
@@ -122,10 +149,7 @@ Result<Time> parse_stamp(const std::string& text, Time now) {
   fraction.resize(kDigits, '0');
   const std::int64_t seconds = whole.empty() ? 0 : std::stoll(whole);
   if (seconds > INT64_MAX / kSecond - 1) return bad();
-  const std::int64_t ns = seconds * kSecond + std::stoll(fraction);
-  const Time stamp = before_now ? now - std::chrono::nanoseconds(ns) : time_of(ns);
-  if (nanoseconds(stamp) <= 0) return bad();
-  return stamp;
+  return stamp_of(seconds * kSecond + std::stoll(fraction));
 }
 
 Result<std::optional<Time>> optional_stamp(const std::string& text, Time now) {

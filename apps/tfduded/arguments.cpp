@@ -8,6 +8,8 @@
 
 #include "tfdude/transport/fastdds.hpp"
 
+#include "../numbers.hpp"
+
 namespace tfdude::daemon {
 namespace {
 
@@ -117,8 +119,10 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
         const auto good = check_discovery_server(text);
         return good ? std::string() : good.error().message;
       });
+  cli::require_numbers(app);
   try {
-    app.parse(argc, argv);
+    app.name(argv[0]);
+    app.parse(cli::arguments_of(argc, argv));
     arguments.urdfs = urdfs.parts();
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kWrongUsage;

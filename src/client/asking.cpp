@@ -31,6 +31,7 @@ Asking::Asking(Calls& calls, std::vector<Part>& parts, std::function<void()> arr
   for (Part& part : parts_) {
     if (part.owner == kHeldHere) continue;
     part.request.sequence = call_.entries()[requests_.size()].sequence;
+    part.request.awaits_from = call_.awaits_from();
     requests_.push_back(&part.request);
   }
 }

@@ -19,15 +19,15 @@ Calls::Call::Call(Calls& calls, const std::vector<std::string>& partitions,
   calls_.idle_signals_.pop_back();
   entries_.reserve(partitions.size());
   for (const std::string& partition : partitions) {
-    const std::uint32_t sequence = ++calls_.last_sequence_;
-    calls_.waiting_.emplace(sequence, Waiting{this, entries_.size()});
-    entries_.push_back({partition, sequence, std::nullopt});
+    calls_.waiting_.emplace(++calls_.last_, Waiting{this, entries_.size()});
+    entries_.push_back({partition, static_cast<std::uint32_t>(calls_.last_), std::nullopt});
   }
+  awaits_from_ = calls_.waiting_.empty() ? calls_.last_ + 1 : calls_.waiting_.begin()->first;
 }
 
 Calls::Call::~Call() {
   const std::lock_guard lock(calls_.mutex_);
-  for (const Entry& entry : entries_) calls_.waiting_.erase(entry.sequence);
+  for (const Entry& entry : entries_) calls_.waiting_.erase(calls_.number_of(entry.sequence));
   calls_.idle_signals_.push_back(arrived_);
 }
 
@@ -57,7 +57,7 @@ void Calls::on_reply(const Reply& reply) {
   std::function<void()> tell;
   {
     const std::lock_guard lock(mutex_);
-    const auto waiting = waiting_.find(reply.sequence);
+    const auto waiting = waiting_.find(number_of(reply.sequence));
     if (waiting == waiting_.end()) return;
     const Call& call = *waiting->second.call;
     auto& entry = waiting->second.call->entries_[waiting->second.entry];
@@ -76,10 +76,10 @@ void Calls::on_lost(const std::string& partition) {
   std::vector<std::function<void()>> tell;
   {
     const std::lock_guard lock(mutex_);
-    for (auto& [sequence, waiting] : waiting_) {
+    for (auto& [number, waiting] : waiting_) {
       auto& entry = waiting.call->entries_[waiting.entry];
       if (entry.partition != partition || entry.reply) continue;
-      entry.reply = Reply{sequence, 0,
+      entry.reply = Reply{entry.sequence, 0,
                           Error{Errc::kUnreachable,
                                 "partition " + quote(partition) + " went away while it was asked"}};
       if (!waiting.call->complete()) continue;

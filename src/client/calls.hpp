@@ -4,11 +4,11 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "tfdude/partition/messages.hpp"
@@ -40,6 +40,9 @@ class Calls {
 
     [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
 
+    /// The lowest number of which anybody here awaited a reply as this call began.
+    [[nodiscard]] std::uint64_t awaits_from() const { return awaits_from_; }
+
     /// Waits until all replies have come; false at the deadline.
     [[nodiscard]] bool wait_until(Clock::time_point deadline);
 
@@ -55,6 +58,7 @@ class Calls {
 
     Calls& calls_;
     std::vector<Entry> entries_;
+    std::uint64_t awaits_from_ = 0;
     std::condition_variable* arrived_;
     const std::function<void()> tell_;
   };
@@ -73,8 +77,14 @@ class Calls {
   using Signal = std::condition_variable;
 
   mutable std::mutex mutex_;
-  std::uint32_t last_sequence_ = 0;
-  std::unordered_map<std::uint32_t, Waiting> waiting_;
+  // Counted on where the number that travels begins anew, so that the lowest is the oldest.
+  using Number = std::uint64_t;
+  [[nodiscard]] Number number_of(std::uint32_t sequence) const {
+    return last_ - (static_cast<std::uint32_t>(last_) - sequence);
+  }
+
+  Number last_ = 0;
+  std::map<Number, Waiting> waiting_;
   // Signals outlive their calls, so that they are given without the mutex: else whoever wakes meets it taken and
   // sleeps once more, 2 us on one processor. A call may find another's signal: it looks again.
   std::vector<std::unique_ptr<Signal>> signals_;

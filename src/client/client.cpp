@@ -89,6 +89,11 @@ Result<void> Client::update(const std::vector<HandleUpdate>& edges, std::optiona
   return participant_->update(named, stamp);
 }
 
+Result<void> Client::update_partial(const std::vector<PartialUpdate>& edges,
+                                    std::optional<Time> stamp) {
+  return participant_->update_partial(edges, stamp);
+}
+
 Result<void> Client::publish(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
   return participant_->publish(edges, stamp);
 }

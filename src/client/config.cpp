@@ -23,8 +23,8 @@ namespace {
 constexpr std::array<std::string_view, 4> kFileKeys = {"partition", "history", "frames", "urdf"};
 constexpr std::array<std::string_view, 10> kFrameKeys = {
     "id", "parent", "xyz", "rpy", "quat", "stddev", "cov", "history", "correlation", "sources"};
-constexpr std::array<std::string_view, 4> kHistoryKeys = {"span", "count", "process_noise",
-                                                          "moving"};
+constexpr std::array<std::string_view, 6> kHistoryKeys = {"span",   "count",     "process_noise",
+                                                          "moving", "max_ahead", "restart_after"};
 
 // Reads what a daemon's file may hold.
 class Reader : public YamlFields {
@@ -34,6 +34,8 @@ class Reader : public YamlFields {
   [[nodiscard]] Result<Config> config(const YAML::Node& root) const;
 
  private:
+  [[nodiscard]] Result<void> max_ahead(const Fields& entries, const std::string& what,
+                                       std::chrono::nanoseconds& out) const;
   [[nodiscard]] Result<EdgeTiming> history(const Field& field, const std::string& place,
                                            EdgeTiming timing) const;
   [[nodiscard]] Result<Correlation> correlation(const Fields& entries,
@@ -46,6 +48,26 @@ class Reader : public YamlFields {
   [[nodiscard]] Result<void> urdfs(const Field& field, Config& config) const;
 };
 
+Result<void> Reader::max_ahead(const Fields& entries, const std::string& what,
+                               std::chrono::nanoseconds& out) const {
+  const auto found = entries.find("max_ahead");
+  if (found == entries.end()) return {};
+  const YAML::Node& value = found->second.value;
+  if (value.IsScalar() && value.Scalar() == "none") {
+    out = std::chrono::nanoseconds::max();
+    return {};
+  }
+  std::optional<double> seconds;
+  if (auto read = number(entries, "max_ahead", what, seconds); !read) return read;
+  constexpr double kLongest = 1e9;
+  if (!(*seconds >= 0 && *seconds <= kLongest)) {
+    return error(Errc::kInvalidInput, found->second.mark,
+                 what + ": max_ahead is not within 0 and 1e9 seconds, nor none");
+  }
+  out = std::chrono::nanoseconds(std::llround(*seconds * 1e9));
+  return {};
+}
+
 // What is left out is as in `timing`.
 Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
                                    EdgeTiming timing) const {
@@ -54,9 +76,12 @@ Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
   if (!entries) return tl::unexpected(entries.error());
   std::optional<double> span;
   std::optional<double> count;
+  std::optional<double> restart;
   std::optional<std::array<double, 6>> noise;
   const auto read = number(*entries, "span", what, span)
                         .and_then([&] { return number(*entries, "count", what, count); })
+                        .and_then([&] { return max_ahead(*entries, what, timing.max_ahead); })
+                        .and_then([&] { return number(*entries, "restart_after", what, restart); })
                         .and_then([&] { return numbers(*entries, "process_noise", what, noise); })
                         .and_then([&] { return flag(*entries, "moving", what, timing.moving); });
   if (!read) return tl::unexpected(read.error());
@@ -71,6 +96,10 @@ Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
   if (count && !(*count >= 2 && *count <= kMost && *count == std::floor(*count))) {
     return refuse("count", " is not a whole number within 2 and 16777216");
   }
+  if (restart && !(*restart >= 0 && *restart <= kMost && *restart == std::floor(*restart))) {
+    return refuse("restart_after", " is not a whole number within 0 and 16777216");
+  }
+  if (restart) timing.restart_after = static_cast<std::size_t>(*restart);
   if (span) timing.span = std::chrono::nanoseconds(std::llround(*span * 1e9));
   if (count) timing.count = static_cast<std::size_t>(*count);
   if (noise) {

@@ -246,6 +246,15 @@ Result<void> Participant::update(const std::vector<EdgeUpdate>& edges, std::opti
       [&](std::vector<Part>& parts) { return change(parts, deadline); });
 }
 
+Result<void> Participant::update_partial(const std::vector<PartialUpdate>& edges,
+                                         std::optional<Time> stamp) {
+  if (edges.empty()) return {};
+  const Deadline deadline = call_deadline();
+  return healed(
+      deadline, [&] { return route_update(forest_, directory_, edges, stamp); },
+      [&](std::vector<Part>& parts) { return change(parts, deadline); });
+}
+
 Result<void> Participant::publish(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
   if (edges.empty()) return {};
   auto updated = forest_.update(edges, stamp);

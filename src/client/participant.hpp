@@ -55,6 +55,8 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request);
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges,
                                     std::optional<Time> stamp);
+  [[nodiscard]] Result<void> update_partial(const std::vector<PartialUpdate>& edges,
+                                            std::optional<Time> stamp);
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
                                      std::optional<Time> stamp);
   // Joints (participant_joints.cpp).

@@ -78,7 +78,19 @@ Result<void> Participant::publish_to(const Part& part, const JointUpdate& share,
 }
 
 Result<std::vector<JointInfo>> Participant::joints(const std::string& partition) {
-  return ask_all<JointInfo>(partition, JointsRequest{});
+  std::vector<JointInfo> all;
+  while (true) {
+    const std::string last = all.empty() ? std::string() : all.back().name;
+    auto more = ask_all<JointInfo>(partition, JointsRequest{last});
+    if (!more) return more;
+    const bool end = more->size() < kMaxItems;
+    if (!more->empty() && more->back().name <= last) {
+      return fail(Errc::kInvalidInput,
+                  "partition " + quote(partition) + " tells the same joints again and again");
+    }
+    std::move(more->begin(), more->end(), std::back_inserter(all));
+    if (end) return all;
+  }
 }
 
 Result<void> Participant::correlate(const std::string& id, const Correlation& correlation) {

@@ -30,6 +30,7 @@ std::string host_name() {
 // Whether it leaves the structure as it is.
 bool is_of_values(const Request& request) {
   return std::holds_alternative<UpdateRequest>(request.body) ||
+         std::holds_alternative<PartialUpdateRequest>(request.body) ||
          std::holds_alternative<JointUpdate>(request.body) ||
          std::holds_alternative<ReviseRequest>(request.body);
 }
@@ -85,6 +86,12 @@ Result<StoredState> Participant::open_store(std::unique_ptr<StateStore>& store) 
 
 Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
   if (auto set = forest_.set_default_timing(options_.history); !set) return set;
+  forest_.on_restart([this](const HistoryRestart& restart) {
+    Change change = restarted(restart, partition_name_);
+    change.time = wall_clock();
+    log().warn("{}", change.message);
+    events_->post({std::move(change)});
+  });
   StoredState state;
   std::unique_ptr<StateStore> store;
   if (!options_.state.empty()) {
@@ -262,7 +269,7 @@ void Participant::on_request(const PeerId& from, const Request& request) {
     if (out_) {
       reply = {request.sequence, 0, Error{Errc::kNotOwner, given_up_}};
     } else if (refused) {
-      reply = partition_->refuse(from, request, *refused);
+      reply = partition_->refuse(from, request, *refused, wall_clock());
     } else {
       reply = partition_->answer(from, request, wall_clock());
       // A frame that was moved has the younger claim now.

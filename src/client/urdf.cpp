@@ -67,10 +67,10 @@ Result<std::vector<FrameSpec>> read_frames(const std::string& text, const UrdfPa
   if (!tree) return tl::unexpected(tree.error());
   const auto joints = read_urdf_joints(*read, part.file);
   if (!joints) return tl::unexpected(joints.error());
-  const auto edges = read_urdf_edges(*tree, *joints, part);
-  if (!edges) return tl::unexpected(edges.error());
   const auto links = select_links(*tree, part.links);
   if (!links) return tl::unexpected(links.error());
+  const auto edges = read_urdf_edges(*tree, *joints, part, *links);
+  if (!edges) return tl::unexpected(edges.error());
   if (auto ok = check_root(*tree, part, *links); !ok) return tl::unexpected(ok.error());
   std::vector<FrameSpec> frames;
   for (const auto link : *links) {

@@ -1,5 +1,6 @@
 #include "client/urdf_edges.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <utility>
@@ -35,8 +36,17 @@ std::optional<JointType> moving_type(const urdf::Joint& joint) {
 
 class EdgeReader {
  public:
-  EdgeReader(const UrdfTree& tree, const UrdfJoints& joints, const UrdfPart& part)
-      : tree_(tree), joints_(joints), part_(part), edges_(tree.joints.size()) {}
+  EdgeReader(const UrdfTree& tree, const UrdfJoints& joints, const UrdfPart& part,
+             const std::vector<std::size_t>& links)
+      : tree_(tree),
+        joints_(joints),
+        part_(part),
+        edges_(tree.joints.size()),
+        chosen_(tree.joints.size(), false) {
+    for (const std::size_t link : links) {
+      if (tree.links[link].joint) chosen_[*tree.links[link].joint] = true;
+    }
+  }
 
   [[nodiscard]] Result<std::vector<UrdfEdge>> edges() {
     for (const auto& [name, said] : part_.joints) {
@@ -46,8 +56,12 @@ class EdgeReader {
     }
     Result<void> ok;
     for (std::size_t i = 0; ok && i < edges_.size(); ++i) ok = read(i);
-    for (std::size_t i = 0; ok && i < edges_.size(); ++i) ok = resolve(i);
-    for (std::size_t i = 0; ok && i < edges_.size(); ++i) ok = couple(i);
+    for (std::size_t i = 0; ok && i < edges_.size(); ++i) {
+      if (auto resolved = resolve(i); chosen_[i]) ok = std::move(resolved);
+    }
+    for (std::size_t i = 0; ok && i < edges_.size(); ++i) {
+      if (auto coupled = couple(i); chosen_[i]) ok = std::move(coupled);
+    }
     if (!ok) return tl::unexpected(ok.error());
     return std::move(edges_);
   }
@@ -76,6 +90,8 @@ class EdgeReader {
   const UrdfPart& part_;
   const UrdfJoint nothing_;
   std::vector<UrdfEdge> edges_;
+  std::vector<bool>
+      chosen_;  // joints of the part: what others mimic is for those to judge who have them
 };
 
 // All but what follows from other joints.
@@ -123,11 +139,22 @@ Result<void> EdgeReader::read_limits(Index i, JointSpec& joint) const {
   if (!limits) return {};
   joint.limits = JointLimits{limits->lower, limits->upper};
   const std::string both = written(limits->lower) + " and " + written(limits->upper);
-  if (!is_sane(limits->lower) || !is_sane(limits->upper)) {
-    return tree_.joint_error(i, "limits " + both + " are beyond 1e9");
+  if (!(limits->lower <= limits->upper)) {
+    return tree_.joint_error(i, "limits " + both + " are upside down");
   }
-  if (limits->lower <= limits->upper) return {};
-  return tree_.joint_error(i, "limits " + both + " are upside down");
+  // What is further away than any position can be is none.
+  joint.limits->lower = std::max(limits->lower, -kLargest);
+  joint.limits->upper = std::min(limits->upper, kLargest);
+  if (joint.limits->lower <= -kLargest && joint.limits->upper >= kLargest) joint.limits.reset();
+  if (!joint.limits || joint.limits->lower <= joint.limits->upper) return {};
+  return tree_.joint_error(i, "limits " + both + " are beyond 1e9");
+}
+
+// Where both ends say something of where it may be.
+std::optional<JointLimits> range_of(const JointSpec& joint) {
+  const auto& limits = joint.limits;
+  const bool open = limits && (limits->lower <= -kLargest || limits->upper >= kLargest);
+  return open ? std::nullopt : limits;
 }
 
 Result<void> EdgeReader::read_position(Index i, JointSpec& joint) const {
@@ -150,7 +177,7 @@ Result<void> EdgeReader::read_position(Index i, JointSpec& joint) const {
     return tree_.joint_error(i, "stddev " + written(*said.stddev) + " is not within 0 and 1e9");
   }
   joint.variance = said.stddev ? *said.stddev * *said.stddev
-                               : unmeasured_variance(joint.type, limits, joint.position);
+                               : unmeasured_variance(joint.type, range_of(joint), joint.position);
   return {};
 }
 
@@ -221,8 +248,9 @@ Result<void> EdgeReader::couple(Index i) {
 }  // namespace
 
 Result<std::vector<UrdfEdge>> read_urdf_edges(const UrdfTree& tree, const UrdfJoints& joints,
-                                              const UrdfPart& part) {
-  return EdgeReader(tree, joints, part).edges();
+                                              const UrdfPart& part,
+                                              const std::vector<std::size_t>& links) {
+  return EdgeReader(tree, joints, part, links).edges();
 }
 
 }  // namespace tfdude

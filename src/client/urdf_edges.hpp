@@ -16,11 +16,14 @@ struct UrdfEdge {
   std::optional<JointSpec> joint;
 };
 
-/// The edges of all joints, in the order of tree.joints: what a joint mimics may be outside the part.
+/// The edges of all joints, in the order of tree.joints: what a joint mimics may be outside the part. What those outside mimic
+/// may be broken.
+/// @param links  that the part has
 /// @return kInvalidInput naming file, line and joint: an origin, axis, limit, mimic, or what the part says of a joint, that
 ///   breaks its rule.
 [[nodiscard]] Result<std::vector<UrdfEdge>> read_urdf_edges(const UrdfTree& tree,
                                                             const UrdfJoints& joints,
-                                                            const UrdfPart& part);
+                                                            const UrdfPart& part,
+                                                            const std::vector<std::size_t>& links);
 
 }  // namespace tfdude

@@ -22,7 +22,9 @@ WatchedPath::WatchedPath(std::string a, std::string b, WatchOptions options)
       options_(std::move(options)),
       why_not_{Errc::kNotYet,
                "the path from " + quote(a_) + " to " + quote(b_) + " is being asked for"} {
-  (void)mirror_.set_default_timing(options_.timing);
+  EdgeTiming timing = options_.timing;
+  timing.restart_after = 0;  // it is the owner who judges a clock
+  (void)mirror_.set_default_timing(timing);
 }
 
 Result<StampedTransform> WatchedPath::lookup(const Query& query) const {

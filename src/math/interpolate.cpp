@@ -1,5 +1,6 @@
 #include "tfdude/math/interpolate.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <complex>
@@ -11,22 +12,27 @@
 namespace tfdude {
 namespace {
 
-// Below this angle [rad] the series below are exact to 1e-9, and beyond it the closed forms to 1e-11.
-constexpr double kSmallAngle = 0.1;
+// The series lack terms of the fourth power of the larger of θ and s θ [rad], and the closed forms lose digits with its
+// inverse: where one takes over from the other both are exact to 1e-12.
+constexpr double kSmallAngle = 1e-3;
+
+// (1 - exp(-i s θ)) / s, without a difference of numbers that are nearly the same; i θ at s = 0.
+std::complex<double> turned(double s, double angle) {
+  const double half = 0.5 * s * angle;
+  const double sinc = half == 0 ? 1.0 : std::sin(half) / half;
+  return std::complex<double>(0.0, angle * sinc) * std::polar(1.0, -half);
+}
 
 // g(x) = (1 - exp(-s x)) / (s (1 - exp(-x))) at x = ad(ξ) is Jr(s ξ) Jr⁻¹(ξ), as a polynomial: the eigenvalues of
 // ad(ξ) are 0, once in a block, and ±iθ, twice each, so the polynomial of fourth degree that agrees with g there, at ±iθ
 // with its derivative, is g (Higham, Functions of Matrices, definition 1.4).
 std::array<double, 4> coefficients(double s, double angle) {
-  if (angle < kSmallAngle) return small_angle_coefficients(s);
+  if (std::max(std::abs(s), 1.0) * angle < kSmallAngle) return small_angle_coefficients(s);
   using Complex = std::complex<double>;
-  const Complex down_s = std::exp(Complex(0.0, -s * angle));
-  const Complex down = std::exp(Complex(0.0, -angle));
-  const Complex D = 1.0 - down;
-  // At s = 0 the limit is x / (1 - exp(-x)).
-  const bool at_start = s == 0;
-  const Complex N = at_start ? Complex(0.0, angle) : (1.0 - down_s) / s;
-  const Complex dN = at_start ? Complex(1.0) : down_s;
+  const Complex down = std::polar(1.0, -angle);
+  const Complex D = turned(1.0, angle);
+  const Complex N = turned(s, angle);
+  const Complex dN = std::polar(1.0, -s * angle);
   const Complex g = N / D;
   const Complex dg = (dN * D - N * down) / (D * D);
   const double angle2 = angle * angle;

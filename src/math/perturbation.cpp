@@ -32,8 +32,10 @@ Matrix6d small_adjoint(const Twist& xi) {
   return ad;
 }
 
-Matrix6d right_jacobian(const Twist& xi) {
-  // Angles of up to π need some 25 terms; the translation enters linearly, whatever its size.
+namespace {
+
+// Angles of up to π need some 25 terms; the translation enters linearly, whatever its size.
+Matrix6d right_jacobian_series(const Twist& xi) {
   constexpr int kTerms = 30;
   const Matrix6d step = -small_adjoint(xi);
   Matrix6d term = Matrix6d::Identity();
@@ -43,6 +45,25 @@ Matrix6d right_jacobian(const Twist& xi) {
     sum += term;
   }
   return sum;
+}
+
+}  // namespace
+
+// Larger angles by halves: Jr(2 ξ) = (1 + Ad(Exp(-ξ))) Jr(ξ) / 2, as Jr(ξ) is the mean of Ad(Exp(-τ ξ)), τ from 0 to 1.
+Matrix6d right_jacobian(const Twist& xi) {
+  constexpr double kPi = 3.14159265358979323846;
+  Twist part = xi;
+  int halvings = 0;
+  while (part.tail<3>().norm() > kPi && halvings < 64) {
+    part *= 0.5;
+    ++halvings;
+  }
+  Matrix6d J = right_jacobian_series(part);
+  for (; halvings > 0; --halvings) {
+    J = (0.5 * (Matrix6d::Identity() + adjoint(exp(-part))) * J).eval();
+    part *= 2.0;
+  }
+  return J;
 }
 
 }  // namespace tfdude

@@ -25,6 +25,8 @@ std::string_view to_string(ChangeKind kind) {
       return "frame_moved";
     case ChangeKind::kConflict:
       return "conflict";
+    case ChangeKind::kHistoryRestarted:
+      return "history_restarted";
     case ChangeKind::kMissed:
       return "missed";
   }
@@ -42,6 +44,18 @@ Change conflict_of(const Note& note, const std::string& partition) {
                       quote(note.rival) + " it makes a cycle; it is made a root";
   }
   return change;
+}
+
+Change restarted(const HistoryRestart& restart, const std::string& partition) {
+  return {ChangeKind::kHistoryRestarted,
+          partition,
+          restart.id,
+          {},
+          {},
+          "frame " + quote(restart.id) + " of partition " + quote(partition) +
+              ": its history starts again at " + to_string(restart.stamp) +
+              ", as the clock of its source has jumped back from " + to_string(restart.newest),
+          {}};
 }
 
 void ChangeLog::partition_up(const std::string& partition, const std::string& host,

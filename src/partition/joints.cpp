@@ -78,6 +78,8 @@ void Joints::put(const std::string& frame, const JointSpec& joint,
     mover.position = left->position;
     mover.variance = left->variance;
     mover.measured = true;
+    // The description may have been narrowed since.
+    mover.outside = joint.limits && !joint.limits->contain(mover.position) ? 1 : 0;
   }
   if (joint.coupled) {
     mover.said = shared_error(joint, mover.variance);
@@ -142,10 +144,16 @@ bool Joints::is_news(const Mover& mover, std::optional<Time> stamp) const {
   return !stamp || !mover.stamp || *mover.stamp < *stamp;
 }
 
+// Whether the edge's history has started again, so that an older sample is its newest.
+bool Joints::starts_again(const Mover& mover, Time stamp) const {
+  const auto past = forest_.pasts(mover.frame);
+  return !past.empty() && past.front().newest == stamp;
+}
+
 void Joints::take(const Step& step, std::optional<Time> stamp) {
   Mover& mover = movers_[step.mover];
   mover.outside += step.outside ? 1 : 0;
-  if (!is_news(mover, stamp)) return;
+  if (!is_news(mover, stamp) && !starts_again(mover, *stamp)) return;
   mover.position = step.position;
   mover.variance = step.variance;
   if (mover.spec.coupled) mover.said_variance = step.variance;
@@ -182,16 +190,17 @@ Result<std::size_t> Joints::apply(const JointUpdate& update) {
   return steps_.size();
 }
 
-std::vector<JointInfo> Joints::infos() const {
+std::vector<JointInfo> Joints::infos(std::string_view after) const {
   std::vector<JointInfo> infos;
   for (const Mover& mover : movers_) {
-    if (mover.let_go || !forest_.info(mover.handle)) continue;
+    if (mover.spec.name <= after || mover.let_go || !forest_.info(mover.handle)) continue;
     const JointSpec& spec = mover.spec;
     infos.push_back({spec.name, mover.frame, spec.type, spec.limits, spec.mimic, mover.position,
                      mover.variance, mover.measured, mover.outside, mover.refused});
   }
   std::sort(infos.begin(), infos.end(),
             [](const JointInfo& a, const JointInfo& b) { return a.name < b.name; });
+  if (infos.size() > kMaxItems) infos.resize(kMaxItems);
   return infos;
 }
 

@@ -4,6 +4,8 @@
 #include <functional>
 #include <utility>
 
+#include "base/saturating.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -52,7 +54,8 @@ OneInstant one_instant(std::vector<SegmentValues> answers, std::optional<Time> h
   const Time newest = *last->stamp;
   std::chrono::nanoseconds longest{0};
   for (const SegmentValues& answer : answers) longest = std::max(longest, answer.period);
-  const bool near = hint && *hint <= newest && *hint >= newest - 2 * longest;
+  const bool near =
+      hint && *hint <= newest && *hint >= earlier_by(earlier_by(newest, longest), longest);
   if (near && take_hint(answers, *hint)) return {std::move(answers), std::nullopt};
   return {{}, newest};
 }
@@ -61,7 +64,7 @@ std::optional<Time> LatestHints::guess(std::string_view a, std::string_view b, S
   const std::size_t path = hash_of(a, b);
   const Entry& entry = entries_[path % kEntries];
   if (entry.path != path || !entry.certain) return std::nullopt;
-  return *entry.certain + (now - entry.seen);
+  return later_by(*entry.certain, now - entry.seen);
 }
 
 void LatestHints::note(std::string_view a, std::string_view b, Steady now,
@@ -79,7 +82,8 @@ void LatestHints::note(std::string_view a, std::string_view b, Steady now,
     return;
   }
   for (const SegmentValues& answer : answers) {
-    if (answer.stamp) entry.certain = std::min(*entry.certain, *answer.stamp - answer.period);
+    if (answer.stamp)
+      entry.certain = std::min(*entry.certain, earlier_by(*answer.stamp, answer.period));
   }
 }
 

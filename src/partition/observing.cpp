@@ -122,7 +122,7 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
       return fail(Errc::kNotOwner, "partition " + quote(plan.parts[i].partition) +
                                        " did not answer of all edges that it was asked for");
     }
-    path.seen.push_back(answers[i].commit);
+    path.seen.push_back({answers[i].commit, answers[i].incarnation});
     if (answers[i].stamp) path.stamp = answers[i].stamp;
   }
   Places places(plan);
@@ -153,7 +153,8 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
   }
   std::vector<Part> parts = plan.parts;
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    parts[i].request.body = ReviseRequest{{}, path.stamp, path.seen[i]};
+    parts[i].request.body =
+        ReviseRequest{{}, path.stamp, path.seen[i].commit, path.seen[i].incarnation};
   }
   Places places(plan);
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {

@@ -84,17 +84,17 @@ void Partition::let_go(const std::string& id) {
 
 Reply Partition::answer(const PeerId& peer, const Request& request, Time now) {
   if (is_question(request)) return answer(request, now);
-  if (auto before = replies_.find(peer, request.sequence)) return *std::move(before);
+  if (auto before = replies_.find(peer, request, now)) return *std::move(before);
   Reply reply = answer(request, now);
-  replies_.put(peer, reply);
+  replies_.put(peer, request, reply);
   return reply;
 }
 
 // Kept like any reply: when the request comes once more after that, it must not be applied.
-Reply Partition::refuse(const PeerId& peer, const Request& request, const Error& why) {
-  if (auto before = replies_.find(peer, request.sequence)) return *std::move(before);
+Reply Partition::refuse(const PeerId& peer, const Request& request, const Error& why, Time now) {
+  if (auto before = replies_.find(peer, request, now)) return *std::move(before);
   Reply reply{request.sequence, 0, why};
-  replies_.put(peer, reply);
+  replies_.put(peer, request, reply);
   return reply;
 }
 
@@ -109,7 +109,7 @@ Reply Partition::answer(const Request& request, Time now) {
     return reply;
   }
   if (std::holds_alternative<JointsRequest>(request.body)) {
-    reply.body = joints_.infos();
+    reply.body = joints_.infos(std::get<JointsRequest>(request.body).after);
     return reply;
   }
   if (auto done = apply(request, now); !done) reply.body = std::move(done.error());
@@ -126,6 +126,7 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
                                                 std::to_string(kMaxTies) +
                                                 " segments of the path, or sources in one of them"};
   } else if (values) {
+    values->incarnation = pages_.incarnation();
     reply.body = *std::move(values);
   } else if (values.error().code == Errc::kNotYet || values.error().code == Errc::kTooOld) {
     reply.body = std::move(values.error());
@@ -157,6 +158,7 @@ Result<void> Partition::apply(const Request& request, Time now) {
   return std::visit(Overloaded{[&](const AddRequest& one) { return add(request.id, one, now); },
                                [&](const RemoveRequest& one) { return remove(one, now); },
                                [&](const UpdateRequest& one) { return update(one); },
+                               [&](const PartialUpdateRequest& one) { return update(one); },
                                [&](const MoveRequest& one) { return move(request.id, one, now); },
                                [&](const ReviseRequest& one) { return revise(one); },
                                [&](const JointUpdate& one) { return set_joints(one); },
@@ -223,17 +225,24 @@ void Partition::forget(const std::vector<std::string>& removed, Time now) {
 }
 
 Result<void> Partition::update(const UpdateRequest& request) {
-  const std::vector<EdgeUpdate>& edges = request.edges;
-  auto updated = forest_.update(edges, request.stamp);
+  return told_of(request.edges, forest_.update(request.edges, request.stamp));
+}
+
+Result<void> Partition::update(const PartialUpdateRequest& request) {
+  return told_of(request.edges, forest_.update_partial(request.edges, request.stamp));
+}
+
+// What an update has come to, of which those who save and those who ask are told.
+template <class Edge>
+Result<void> Partition::told_of(const std::vector<Edge>& edges, Result<void> updated) {
   if (updated) {
     if (saved_) {
-      for (const EdgeUpdate& edge : edges) updated_.insert(edge.id);
+      for (const Edge& edge : edges) updated_.insert(edge.id);
     }
     return {};
   }
-  const auto foreign = std::find_if(edges.begin(), edges.end(), [this](const EdgeUpdate& edge) {
-    return !forest_.holds(edge.id);
-  });
+  const auto foreign = std::find_if(edges.begin(), edges.end(),
+                                    [this](const Edge& edge) { return !forest_.holds(edge.id); });
   if (foreign == edges.end()) return updated;
   return tl::unexpected(at_home(std::move(updated.error()), foreign->id));
 }
@@ -245,6 +254,10 @@ Result<void> Partition::revise(const ReviseRequest& request) {
       return tl::unexpected(at_home(Error{Errc::kNotOwner, "no frame " + quote(edge.id)}, edge.id));
     }
     if (edge.revision) edges.push_back(*edge.revision);
+  }
+  if (request.incarnation != pages_.incarnation()) {
+    return fail(Errc::kChangedMeanwhile,
+                "partition " + quote(name_) + " has been started again since it was observed");
   }
   if (!edges.empty()) {
     if (auto revised = forest_.revise(edges, request.stamp, request.seen); !revised) return revised;

@@ -1,38 +1,70 @@
 #include "tfdude/partition/reply_cache.hpp"
 
 namespace tfdude {
+namespace {
 
-ReplyCache::Peer& ReplyCache::touch(const PeerId& peer) {
+Reply refused(std::uint32_t sequence, const std::string& why) {
+  return {sequence, 0,
+          Error{Errc::kTimeout, "request " + std::to_string(sequence) + " was not taken: " + why}};
+}
+
+}  // namespace
+
+void ReplyCache::end_below(Peer& peer, Number number) {
+  if (number <= peer.over_below) return;
+  peer.over_below = number;
+  peer.replies.erase(peer.replies.begin(), peer.replies.lower_bound(number));
+}
+
+// Null where there is no room for another peer.
+ReplyCache::Peer* ReplyCache::touch(const PeerId& peer, Time now) {
   if (const auto known = index_.find(peer); known != index_.end()) {
     peers_.splice(peers_.begin(), peers_, known->second);
-    return peers_.front();
+  } else {
+    if (peers_.size() >= kPeers) {
+      const Peer& last = peers_.back();
+      // A clock that was set back tells nothing.
+      if (last.heard <= now && now - last.heard < kSilence) return nullptr;
+      index_.erase(last.id);
+      peers_.pop_back();
+    }
+    peers_.emplace_front();
+    peers_.front().id = peer;
+    index_.emplace(peer, peers_.begin());
   }
-  if (peers_.size() >= kPeers) {
-    index_.erase(peers_.back().id);
-    peers_.pop_back();
-  }
-  peers_.emplace_front();
-  peers_.front().id = peer;
-  index_.emplace(peer, peers_.begin());
-  return peers_.front();
+  peers_.front().heard = now;
+  return &peers_.front();
 }
 
-std::optional<Reply> ReplyCache::find(const PeerId& peer, std::uint32_t sequence) {
-  const auto& entry = touch(peer).replies[sequence % kPerPeer];
-  if (!entry) return std::nullopt;
-  if (entry->sequence == sequence) return entry;
-  // The difference as signed number, so that the counter may wrap round.
-  if (static_cast<std::int32_t>(sequence - entry->sequence) > 0) return std::nullopt;
-  Reply too_old;
-  too_old.sequence = sequence;
-  too_old.body = Error{Errc::kInvalidInput, "request " + std::to_string(sequence) +
-                                                " is too old: the same peer has sent " +
-                                                std::to_string(entry->sequence) + " since"};
-  return too_old;
+std::optional<Reply> ReplyCache::find(const PeerId& from, const Request& request, Time now) {
+  Peer* peer = touch(from, now);
+  if (peer == nullptr) {
+    return refused(request.sequence, "more than " + std::to_string(kPeers) +
+                                         " others have asked for changes of late");
+  }
+  end_below(*peer, request.awaits_from);
+  const Number number = number_of(request);
+  if (number < peer->over_below) {
+    return refused(
+        request.sequence,
+        "it is not known any more whether it was applied before, as all of this peer below " +
+            std::to_string(peer->over_below) + " are over");
+  }
+  const auto before = peer->replies.find(number);
+  if (before == peer->replies.end()) return std::nullopt;
+  return before->second;
 }
 
-void ReplyCache::put(const PeerId& peer, const Reply& reply) {
-  touch(peer).replies[reply.sequence % kPerPeer] = reply;
+void ReplyCache::put(const PeerId& from, const Request& request, const Reply& reply) {
+  const Number number = number_of(request);
+  const auto known = index_.find(from);
+  if (known == index_.end()) return;
+  known->second->replies.insert_or_assign(number, reply);
+  order_.emplace_back(from, number);
+  if (order_.size() <= kReplies) return;
+  const auto& [peer, oldest] = order_.front();
+  if (const auto its = index_.find(peer); its != index_.end()) end_below(*its->second, oldest + 1);
+  order_.pop_front();
 }
 
 }  // namespace tfdude

@@ -110,24 +110,44 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
   return parts;
 }
 
-Result<std::vector<Part>> route_update(const Forest& forest, const Directory& directory,
-                                       const std::vector<EdgeUpdate>& edges,
-                                       std::optional<Time> stamp) {
+namespace {
+
+// `check` looks at one edge, before any of them is sent.
+template <class Body, class Edge, class Check>
+Result<std::vector<Part>> route_edges(const Forest& forest, const Directory& directory,
+                                      const std::vector<Edge>& edges, std::optional<Time> stamp,
+                                      Check check) {
   std::vector<Part> parts;
-  for (const EdgeUpdate& edge : edges) {
+  for (const Edge& edge : edges) {
     const auto frame = forest.info(edge.id);
     if (!frame) return unknown_frame(edge.id);
-    if (auto ok = check_value(edge.id, edge.X_PC); !ok) return tl::unexpected(ok.error());
-    auto& body = body_for<UpdateRequest>(parts, directory, frame->owner, edge.id);
+    if (Result<void> ok = check(edge); !ok) return tl::unexpected(ok.error());
+    auto& body = body_for<Body>(parts, directory, frame->owner, edge.id);
     body.edges.push_back(edge);
     body.stamp = stamp;
   }
   if (auto ok = check_reachable(directory, parts); !ok) return tl::unexpected(ok.error());
   for (const Part& part : parts) {
-    const auto& share = std::get<UpdateRequest>(part.request.body).edges;
+    const auto& share = std::get<Body>(part.request.body).edges;
     if (auto ok = check_size(part, share.size(), "edges"); !ok) return tl::unexpected(ok.error());
   }
   return parts;
+}
+
+}  // namespace
+
+Result<std::vector<Part>> route_update(const Forest& forest, const Directory& directory,
+                                       const std::vector<EdgeUpdate>& edges,
+                                       std::optional<Time> stamp) {
+  return route_edges<UpdateRequest>(forest, directory, edges, stamp, [](const EdgeUpdate& edge) {
+    return check_value(edge.id, edge.X_PC);
+  });
+}
+
+Result<std::vector<Part>> route_update(const Forest& forest, const Directory& directory,
+                                       const std::vector<PartialUpdate>& edges,
+                                       std::optional<Time> stamp) {
+  return route_edges<PartialUpdateRequest>(forest, directory, edges, stamp, check_parts);
 }
 
 Result<std::vector<Part>> route_joints(const Directory& directory, const JointUpdate& update) {

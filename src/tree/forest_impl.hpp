@@ -151,10 +151,13 @@ class Forest::Impl {
     return edge.ring != nullptr || default_timing_.moving;
   }
 
-  /// All of them as one commit, or none; `frame` gives the id or the handle of an update.
+  /// All of them as one commit, or none; `frame` gives the id or the handle of an update. Under mutex_, as all here.
   template <class Update, class Frame>
   [[nodiscard]] Result<void> update_all(const std::vector<Update>& edges, Frame frame,
                                         std::optional<Time> stamp);
+  /// The edges' values with the parts that are given.
+  [[nodiscard]] Result<std::vector<EdgeUpdate>> completed(
+      const std::vector<PartialUpdate>& edges) const;
 
   // Of the past (forest_past.cpp).
 
@@ -162,6 +165,13 @@ class Forest::Impl {
   /// that these have.
   [[nodiscard]] Result<std::int64_t> stamp_for(const std::uint32_t* slots, std::size_t count,
                                                std::optional<Time> given) const;
+  [[nodiscard]] const EdgeTiming& timing_of(const HeldVersion& edge) const {
+    return edge.ring != nullptr ? edge.ring->timing() : default_timing_;
+  }
+  /// @return kInvalidInput (naming both times) where the stamp is too far ahead of the clock, which is counted
+  [[nodiscard]] Result<void> check_ahead(const HeldVersion& edge, std::int64_t stamp) const;
+  /// Whether a sample that is older than the span is the one after which the history starts again; counts it.
+  [[nodiscard]] bool starts_again(const HeldVersion& newest, std::int64_t stamp) const;
   /// @return kTooOld, kStampTaken; both are counted
   [[nodiscard]] Result<void> check_sample(const HeldVersion& newest, std::int64_t stamp) const;
   /// Pushes a checked update: a sample where the edge is moving or is to be, else the value for all times.
@@ -230,6 +240,7 @@ class Forest::Impl {
   EdgeTiming default_timing_;
   /// With whose they are.
   std::vector<std::pair<const void*, std::function<void()>>> commit_listeners_;
+  std::function<void(const HistoryRestart&)> restart_listener_;
   std::atomic<std::uint64_t> structure_version_{0};
   mutable WriteLock mutex_;
   Graph graph_;
@@ -246,6 +257,7 @@ class Forest::Impl {
   template <class T>
   T& push(VersionPool<T>& pool, std::uint32_t slot);
   void append_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
+  void restart_history(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
   void insert_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
   void show_commit();
   void tell_commit() const {
@@ -262,6 +274,11 @@ class Forest::Impl {
 
   IdTable ids_;
   const Clock clock_;
+  // What the clock said last, for stamps that are given. It is asked anew where that does not do, and after kClockGoesFor
+  // updates, as it may have been set back.
+  static constexpr int kClockGoesFor = 64;
+  mutable std::int64_t clock_said_ = 0;
+  mutable int clock_asked_ago_ = 0;
   std::atomic<std::uint64_t> committed_{0};
   VersionPool<HeldVersion> held_pool_;
   VersionPool<Version> remote_pool_;

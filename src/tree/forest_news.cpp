@@ -8,14 +8,17 @@ namespace tfdude {
 namespace {
 
 PastInfo past_of(const HeldVersion& edge) {
-  const Ring& ring = *edge.ring;
   PastInfo info;
   info.id = edge.name->text;
+  const Refused& refused = edge.name->refused;
+  info.refused_old = refused.old.load(std::memory_order_relaxed);
+  info.refused_equal = refused.equal.load(std::memory_order_relaxed);
+  info.refused_ahead = refused.ahead.load(std::memory_order_relaxed);
+  if (edge.ring == nullptr) return info;
+  const Ring& ring = *edge.ring;
   info.span_limit = ring.timing().span;
   info.count_limit = ring.timing().count;
   info.bytes = ring.bytes();
-  info.refused_old = ring.refused().old.load(std::memory_order_relaxed);
-  info.refused_equal = ring.refused().equal.load(std::memory_order_relaxed);
   if (!edge.moving()) return info;
   double sum = 0;
   double squares = 0;
@@ -99,7 +102,8 @@ std::vector<PastInfo> Forest::pasts(std::string_view id) const {
   const auto add = [&all](const Version* version) {
     if (version == nullptr || !version->held()) return;
     const auto& edge = static_cast<const HeldVersion&>(*version);
-    if (edge.ring != nullptr) all.push_back(past_of(edge));
+    const bool refused = edge.name->refused.ahead.load(std::memory_order_relaxed) > 0;
+    if (edge.ring != nullptr || refused) all.push_back(past_of(edge));
   };
   if (!id.empty()) {
     add(impl_->present(id, commit));
@@ -107,6 +111,20 @@ std::vector<PastInfo> Forest::pasts(std::string_view id) const {
   }
   for (std::uint32_t slot = 0; slot < impl_->slots_.size(); ++slot) add(impl_->at(slot, commit));
   return all;
+}
+
+void Forest::on_commit(std::function<void()> listener, const void* whose) {
+  const std::lock_guard lock(impl_->mutex_);
+  auto& all = impl_->commit_listeners_;
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [whose](const auto& one) { return one.first == whose; }),
+            all.end());
+  if (listener) all.emplace_back(whose, std::move(listener));
+}
+
+void Forest::on_restart(std::function<void(const HistoryRestart&)> listener) {
+  const std::lock_guard lock(impl_->mutex_);
+  impl_->restart_listener_ = std::move(listener);
 }
 
 }  // namespace tfdude

@@ -2,20 +2,32 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/saturating.hpp"
 #include "tree/forest_impl.hpp"
 
 // What an update does to the past of its edge.
 namespace tfdude {
 namespace {
 
+// Both are stamps, and so positive.
 std::chrono::nanoseconds apart(std::int64_t earlier, std::int64_t later) {
   return std::chrono::nanoseconds(later - earlier);
+}
+
+// Whether a sample is one more of a row that is older than all that is kept. Samples are told before they are applied, with
+// others that may refuse: so one of the same stamp is the same row again.
+bool goes_on(const Refused::Behind& row, std::int64_t newest, std::int64_t stamp) {
+  return row.count > 0 && row.newest == newest && row.last <= stamp;
 }
 
 Result<void> check_timing(const EdgeTiming& timing) {
   if (timing.span <= std::chrono::nanoseconds(0)) {
     return fail(Errc::kInvalidInput,
                 "history span must be positive, not " + in_milliseconds(timing.span));
+  }
+  if (timing.max_ahead < std::chrono::nanoseconds(0)) {
+    return fail(Errc::kInvalidInput, "history max_ahead must not be negative, as " +
+                                         in_milliseconds(timing.max_ahead) + " is");
   }
   constexpr std::size_t kMaxCount = 1U << 24U;
   if (timing.count < 2 || timing.count > kMaxCount) {
@@ -39,17 +51,23 @@ Forest::Impl::~Impl() {
 Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::size_t count,
                                              std::optional<Time> given) const {
   if (given) {
+    const std::int64_t stamp = nanoseconds(*given);
     // Zero is how "no stamp" travels.
-    if (nanoseconds(*given) > 0) return nanoseconds(*given);
-    return fail(Errc::kInvalidInput, "the stamp must be after 1970-01-01, not " +
-                                         std::to_string(nanoseconds(*given)) + " ns");
+    if (stamp <= 0) {
+      return fail(Errc::kInvalidInput,
+                  "the stamp must be after 1970-01-01, not " + std::to_string(stamp) + " ns");
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      auto ok = check_ahead(newest_value(slots[i]), stamp);
+      if (!ok) return tl::unexpected(std::move(ok.error()));
+    }
+    return stamp;
   }
   bool moving = false;
   std::int64_t newest = kAlways;
   for (std::size_t i = 0; i < count; ++i) {
     const HeldVersion& edge = newest_value(slots[i]);
-    const EdgeTiming& timing = edge.ring != nullptr ? edge.ring->timing() : default_timing_;
-    moving = moving || edge.moving() || timing.moving;
+    moving = moving || edge.moving() || timing_of(edge).moving;
     newest = std::max(newest, edge.stamp);
   }
   if (!moving) return kAlways;
@@ -58,7 +76,37 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
                                          " is moving: its update needs a stamp");
   }
   // Where the clock was set back, time goes on as little as it can.
-  return newest == kAlways ? nanoseconds(clock_()) : std::max(nanoseconds(clock_()), newest + 1);
+  return newest == kAlways ? nanoseconds(clock_())
+                           : std::max(nanoseconds(clock_()), saturating_add(newest, 1));
+}
+
+Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t stamp) const {
+  const std::int64_t limit = timing_of(edge).max_ahead.count();
+  if (!clock_ || limit == std::chrono::nanoseconds::max().count()) return {};
+  if (++clock_asked_ago_ < kClockGoesFor && saturating_subtract(stamp, clock_said_) <= limit) {
+    return {};
+  }
+  clock_said_ = nanoseconds(clock_());
+  clock_asked_ago_ = 0;
+  const std::int64_t ahead = saturating_subtract(stamp, clock_said_);
+  if (ahead <= limit) return {};
+  edge.name->refused.ahead.fetch_add(1, std::memory_order_relaxed);
+  return fail(Errc::kInvalidInput,
+              "frame " + quote(edge.name->text) + ": the stamp, " + to_string(time_of(stamp)) +
+                  ", is " + in_milliseconds(std::chrono::nanoseconds(ahead)) +
+                  " ahead of the owner's clock, " + to_string(time_of(clock_said_)) +
+                  ", more than the " + in_milliseconds(timing_of(edge).max_ahead) + " allowed");
+}
+
+bool Forest::Impl::starts_again(const HeldVersion& newest, std::int64_t stamp) const {
+  const std::size_t needed = newest.ring->timing().restart_after;
+  Refused::Behind& row = newest.name->refused.behind;
+  if (!goes_on(row, newest.stamp, stamp)) {
+    row = {1, newest.stamp, stamp};
+  } else if (stamp > row.last) {
+    row = {row.count + 1, newest.stamp, stamp};
+  }
+  return needed > 0 && row.count >= needed;
 }
 
 Result<void> Forest::Impl::check_sample(const HeldVersion& newest, std::int64_t stamp) const {
@@ -66,14 +114,15 @@ Result<void> Forest::Impl::check_sample(const HeldVersion& newest, std::int64_t 
   const Ring& ring = *newest.ring;
   const std::uint64_t place = ring.place_of(stamp);
   if (place < ring.next() && ring.stamp(place) == stamp) {
-    ring.refused().equal.fetch_add(1, std::memory_order_relaxed);
+    newest.name->refused.equal.fetch_add(1, std::memory_order_relaxed);
     return fail(Errc::kStampTaken, "frame " + quote(newest.name->text) +
                                        " has a sample of that stamp, " + to_string(time_of(stamp)));
   }
   const bool full = ring.count() >= ring.timing().count;
   const std::int64_t limit = newest.stamp - ring.timing().span.count();
   if (stamp >= limit && (!full || place > ring.oldest())) return {};
-  ring.refused().old.fetch_add(1, std::memory_order_relaxed);
+  if (stamp < limit && starts_again(newest, stamp)) return {};
+  newest.name->refused.old.fetch_add(1, std::memory_order_relaxed);
   const std::string what = "frame " + quote(newest.name->text) + ": the sample is ";
   if (stamp < limit) {
     return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, newest.stamp)) +
@@ -91,6 +140,8 @@ void Forest::Impl::push_value(std::uint32_t slot, const Transform& X_PC, std::in
     end_revision(push_held(slot, X_PC));
   } else if (!old.moving() || stamp > old.stamp) {
     append_sample(old, X_PC, stamp);
+  } else if (stamp < old.stamp - old.ring->timing().span.count()) {
+    restart_history(old, X_PC, stamp);
   } else {
     insert_sample(old, X_PC, stamp);
   }
@@ -118,9 +169,23 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_P
   drop_samples(*ring);
 }
 
+void Forest::Impl::restart_history(const HeldVersion& newest, const Transform& X_PC,
+                                   std::int64_t stamp) {
+  const HistoryRestart restart{newest.name->text, time_of(newest.stamp), time_of(stamp)};
+  HeldVersion& fresh = push_held(newest.slot, X_PC);
+  forget_past(fresh);
+  fresh.stamp = stamp;
+  fresh.number = fresh.ring->next();
+  fresh.kept = true;
+  fresh.ring->append(&fresh, stamp);
+  newest.name->refused.behind = {};
+  if (restart_listener_) restart_listener_(restart);
+}
+
 // The newest stays what it is, in a version that knows of the ring with the sample.
 void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_PC,
                                  std::int64_t stamp) {
+  newest.name->refused.behind = {};
   const std::uint64_t place = newest.ring->place_of(stamp);
   if (place < newest.ring->next() && newest.ring->stamp(place) == stamp) {
     // Twice in one update: the later counts, and nobody has seen the earlier.

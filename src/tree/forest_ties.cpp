@@ -77,6 +77,7 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
   }
   if (!stamp) return fail(Errc::kChangedMeanwhile, who + " is moving since it was observed");
   const std::int64_t at = nanoseconds(*stamp);
+  if (auto ok = check_ahead(edge, at); !ok) return ok;
   const std::uint64_t place = edge.ring->place_of(at);
   const bool there = place < edge.ring->next() && edge.ring->stamp(place) == at;
   return there ? Result<void>() : check_sample(edge, at);

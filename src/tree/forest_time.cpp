@@ -6,6 +6,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/math/interpolate.hpp"
 
+#include "base/saturating.hpp"
 #include "math/climb.hpp"
 #include "tree/forest_impl.hpp"
 
@@ -46,9 +47,9 @@ tl::unexpected<Error> too_old(const HeldVersion& edge, std::int64_t t) {
   const std::int64_t oldest = edge.ring->stamp(edge.ring->oldest());
   // It may be dropped while it is looked at.
   if (oldest == kAlways) return no_data(Errc::kTooOld, edge, t, "it is not kept any more");
-  return no_data(
-      Errc::kTooOld, edge, t,
-      "its oldest sample is " + in_milliseconds(std::chrono::nanoseconds(oldest - t)) + " younger");
+  const std::chrono::nanoseconds gap(saturating_subtract(oldest, t));
+  return no_data(Errc::kTooOld, edge, t,
+                 "its oldest sample is " + in_milliseconds(gap) + " younger");
 }
 
 tl::unexpected<Error> not_yet(const HeldVersion& edge, std::int64_t t, const std::string& more) {
@@ -207,9 +208,10 @@ Result<Value> Forest::Impl::walk_newest(const Ends& ends, Absent absent, Order o
 template <class Value>
 Result<Value> Forest::Impl::walk_at(const Ends& ends, Absent absent, std::int64_t t,
                                     const Query& query, Met& met) const {
-  const std::int64_t age = query.age_noise_until
-                               ? std::max(nanoseconds(*query.age_noise_until) - t, std::int64_t{0})
-                               : 0;
+  const std::int64_t age =
+      query.age_noise_until
+          ? std::max(saturating_subtract(nanoseconds(*query.age_noise_until), t), std::int64_t{0})
+          : 0;
   Moment moment{t, age, query};
   return walk<Value>(ends, absent, query.order,
                      [&](auto& climb, const HeldVersion& edge) -> Result<void> {

@@ -222,41 +222,6 @@ void Forest::Impl::show_commit() {
   if (superseded_.size() > kCollectAt) collect();
 }
 
-void Forest::Impl::collect() {
-  // The store of the last commit once more, now in the order of the readers' announcements (epoch.hpp).
-  committed_.fetch_add(0, std::memory_order_seq_cst);
-  const std::uint64_t tag = epoch::retire_tag();
-  for (Version* version : superseded_) {
-    if (version->held()) {
-      held_pool_.retire(version, tag);
-    } else {
-      remote_pool_.retire(version, tag);
-    }
-  }
-  superseded_.clear();
-  for (std::unique_ptr<Ring>& ring : superseded_rings_) {
-    ring->retire_tag = tag;
-    retired_rings_.push_back(std::move(ring));
-  }
-  superseded_rings_.clear();
-  for (std::unique_ptr<EdgeTies>& ties : superseded_ties_) {
-    if (ties == nullptr) continue;
-    ties->retire_tag = tag;
-    retired_ties_.push_back(std::move(ties));
-  }
-  superseded_ties_.clear();
-  const std::uint64_t below = epoch::safe_below();
-  held_pool_.collect(below);
-  remote_pool_.collect(below);
-  ids_.collect(tag, below);
-  const auto drop_unseen = [below](auto& retired) {
-    const auto unseen = [below](const auto& one) { return one->retire_tag < below; };
-    retired.erase(std::remove_if(retired.begin(), retired.end(), unseen), retired.end());
-  };
-  drop_unseen(retired_rings_);
-  drop_unseen(retired_ties_);
-}
-
 Result<void> Forest::add(std::string_view id, std::string_view parent, const Transform& X_PC,
                          MissingParent rule, std::uint64_t since) {
   if (auto ok = check_id(id, "id"); !ok) return ok;
@@ -339,7 +304,6 @@ Result<void> Forest::update(Handle frame, const Transform& X_PC, std::optional<T
 template <class Update, class Frame>
 Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame frame,
                                       std::optional<Time> stamp) {
-  const std::lock_guard lock(mutex_);
   to_update_.clear();
   for (const Update& edge : edges) {
     const auto slot = held_slot(edge.*frame);
@@ -352,9 +316,13 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   }
   const auto at = stamp_for(to_update_.data(), to_update_.size(), stamp);
   if (!at) return tl::unexpected(at.error());
+  // All of them, as each counts what it refuses.
+  Result<void> fits;
   for (const std::uint32_t slot : to_update_) {
-    if (auto ok = check_sample(newest_value(slot), *at); !ok) return ok;
+    auto ok = check_sample(newest_value(slot), *at);
+    if (!ok && fits) fits = std::move(ok);
   }
+  if (!fits) return fits;
   for (std::size_t i = 0; i < edges.size(); ++i) {
     push_value(to_update_[i], edges[i].X_PC, *at);
     if (const Correlation* said = correlation_of(edges[i])) say_ties(to_update_[i], *said);
@@ -364,11 +332,21 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
 }
 
 Result<void> Forest::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
+  const std::lock_guard lock(impl_->mutex_);
   return impl_->update_all(edges, &EdgeUpdate::id, stamp);
 }
 
 Result<void> Forest::update(const std::vector<HandleUpdate>& edges, std::optional<Time> stamp) {
+  const std::lock_guard lock(impl_->mutex_);
   return impl_->update_all(edges, &HandleUpdate::frame, stamp);
+}
+
+Result<void> Forest::update_partial(const std::vector<PartialUpdate>& edges,
+                                    std::optional<Time> stamp) {
+  const std::lock_guard lock(impl_->mutex_);
+  const auto whole = impl_->completed(edges);
+  if (!whole) return tl::unexpected(whole.error());
+  return impl_->update_all(*whole, &EdgeUpdate::id, stamp);
 }
 
 Result<void> Forest::move(std::string_view id, std::string_view parent,
@@ -393,15 +371,6 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   impl_->relink(fresh, parent_slot);
   impl_->commit_structure();
   return {};
-}
-
-void Forest::on_commit(std::function<void()> listener, const void* whose) {
-  const std::lock_guard lock(impl_->mutex_);
-  auto& all = impl_->commit_listeners_;
-  all.erase(std::remove_if(all.begin(), all.end(),
-                           [whose](const auto& one) { return one.first == whose; }),
-            all.end());
-  if (listener) all.emplace_back(whose, std::move(listener));
 }
 
 }  // namespace tfdude

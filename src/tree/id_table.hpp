@@ -9,13 +9,28 @@
 
 namespace tfdude {
 
-/// An interned id and the slot it stands for. Immutable once it is in the table, but for `since`.
+/// What came for an edge and was not taken.
+struct Refused {
+  std::atomic<std::uint64_t> old{0};    ///< samples older than what is kept,
+  std::atomic<std::uint64_t> equal{0};  ///< of the stamp of another,
+  std::atomic<std::uint64_t> ahead{0};  ///< or too far ahead of the clock
+
+  /// Those in a row that are older than the span, while `newest` is the newest sample; for writers only.
+  struct Behind {
+    std::uint64_t count = 0;
+    std::int64_t newest = 0;
+    std::int64_t last = 0;
+  } behind;
+};
+
+/// An interned id and the slot it stands for. Immutable once it is in the table, but for `since` and `refused`.
 struct Name {
   std::string text;
   std::size_t hash = 0;
   std::uint32_t slot = 0;
   /// When its frame was hung where it hangs. Of the newest commit, whichever a reader sees.
   mutable std::atomic<std::uint64_t> since{0};
+  mutable Refused refused;
 
   void hung(std::uint64_t when) const { since.store(when, std::memory_order_relaxed); }
 };

@@ -68,9 +68,7 @@ HeldVersion* Ring::drop_oldest() {
 }
 
 std::unique_ptr<Ring> Ring::empty_copy(std::uint64_t capacity) const {
-  std::unique_ptr<Ring> copy(new Ring(timing_, capacity));
-  copy->refused_ = refused_;
-  return copy;
+  return std::unique_ptr<Ring>(new Ring(timing_, capacity));
 }
 
 std::unique_ptr<Ring> Ring::grown() const {

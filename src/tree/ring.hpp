@@ -72,14 +72,6 @@ class Ring {
 
   [[nodiscard]] std::size_t bytes() const { return sizeof(Ring) + (mask_ + 1) * sizeof(Slot); }
 
-  /// Samples that were refused as older than what is kept, and as equal in stamp to another.
-  struct Refused {
-    std::atomic<std::uint64_t> old{0};
-    std::atomic<std::uint64_t> equal{0};
-  };
-  /// Shared with the copies.
-  [[nodiscard]] Refused& refused() const { return *refused_; }
-
   std::uint64_t retire_tag = 0;
 
  private:
@@ -107,7 +99,6 @@ class Ring {
   std::atomic<std::uint64_t> first_{0};
   std::uint64_t next_ = 0;
   std::unique_ptr<Slot[]> slots_;  // NOLINT(modernize-avoid-c-arrays): atomics cannot be moved
-  std::shared_ptr<Refused> refused_ = std::make_shared<Refused>();
 };
 
 }  // namespace tfdude

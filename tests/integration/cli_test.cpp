@@ -129,6 +129,12 @@ TEST_CASE("cli: changes are made and confirmed") {
   const json updated = object(d, {"lookup", "camera", "tool"});
   CHECK(updated.at("rotation") == json({0.0, 0.0, 1.0, 0.0}));
   CHECK(updated.at("covariance")[0][0] == 0.25);
+  CHECK(updated.at("translation") == json({0.1, 0.0, -0.2}));
+  CHECK(text(d, {"update", "tool", "--xyz", "-.5", "1e-3", ".25"}) == "updated tool\n");
+  const json placed = object(d, {"lookup", "camera", "tool"});
+  CHECK(placed.at("translation") == json({-0.5, 0.001, 0.25}));
+  CHECK(placed.at("rotation") == updated.at("rotation"));
+  CHECK(placed.at("covariance") == updated.at("covariance"));
   // A move keeps the edge's value, or takes a new one.
   CHECK(text(d, {"move", "tool", "--parent", "island"}) == "moved tool\n");
   CHECK(text(d, {"parent", "tool"}) == "island\n");

@@ -12,7 +12,11 @@ namespace tfdude::testing {
 /// What one participant knows: its forest and the directory that writes others' structure into it.
 struct Replica {
   /// @param own  the partition that it serves; empty: none
-  explicit Replica(const std::string& own = {}) : directory(forest, own) {}
+  explicit Replica(const std::string& own = {}) : directory(forest, own) {
+    EdgeTiming timing;
+    timing.max_ahead = std::chrono::nanoseconds::max();  // as the clock stands
+    (void)forest.set_default_timing(timing);
+  }
   Replica(const Replica&) = delete;
   Replica& operator=(const Replica&) = delete;
 

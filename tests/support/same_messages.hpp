@@ -44,6 +44,7 @@ inline void check_same(const Surprise& actual, const Surprise& expected) {
 inline void check_same(const ReviseRequest& actual, const ReviseRequest& expected) {
   CHECK(actual.stamp == expected.stamp);
   CHECK(actual.seen == expected.seen);
+  CHECK(actual.incarnation == expected.incarnation);
   REQUIRE(actual.edges.size() == expected.edges.size());
   for (std::size_t i = 0; i < actual.edges.size(); ++i) {
     const ReviseRequest::Edge& came = actual.edges[i];
@@ -95,8 +96,24 @@ inline std::string listed(const JointInfo& joint) {
   return text.str();
 }
 
+inline void check_same(const PartialUpdateRequest& actual, const PartialUpdateRequest& expected) {
+  CHECK(actual.stamp == expected.stamp);
+  REQUIRE(actual.edges.size() == expected.edges.size());
+  for (std::size_t i = 0; i < actual.edges.size(); ++i) {
+    const PartialUpdate& came = actual.edges[i];
+    const PartialUpdate& sent = expected.edges[i];
+    CHECK(came.id == sent.id);
+    CHECK(came.translation == sent.translation);
+    REQUIRE(came.rotation.has_value() == sent.rotation.has_value());
+    if (came.rotation) CHECK(came.rotation->isApprox(*sent.rotation, 1e-15));
+    REQUIRE(came.covariance.has_value() == sent.covariance.has_value());
+    if (came.covariance) CHECK(came.covariance->upper() == sent.covariance->upper());
+  }
+}
+
 inline void check_same(const Request& actual, const Request& expected) {
   CHECK(actual.sequence == expected.sequence);
+  CHECK(actual.awaits_from == expected.awaits_from);
   CHECK(actual.id == expected.id);
   REQUIRE(actual.body.index() == expected.body.index());
   if (const auto* add = std::get_if<AddRequest>(&expected.body)) {
@@ -133,6 +150,10 @@ inline void check_same(const Request& actual, const Request& expected) {
     check_same(std::get<ReviseRequest>(actual.body), *revise);
   } else if (const auto* asked = std::get_if<ConsistencyRequest>(&expected.body)) {
     CHECK(std::get<ConsistencyRequest>(actual.body).all == asked->all);
+  } else if (const auto* partial = std::get_if<PartialUpdateRequest>(&expected.body)) {
+    check_same(std::get<PartialUpdateRequest>(actual.body), *partial);
+  } else if (const auto* from = std::get_if<JointsRequest>(&expected.body)) {
+    CHECK(std::get<JointsRequest>(actual.body).after == from->after);
   } else if (const auto* joints = std::get_if<JointUpdate>(&expected.body)) {
     CHECK(listed(std::get<JointUpdate>(actual.body)) == listed(*joints));
   }
@@ -162,7 +183,7 @@ inline std::string listed(const PastInfo& past) {
   text << past.id << ' ' << past.samples << ' ' << past.bytes << ' ' << past.span_limit.count()
        << ' ' << past.count_limit << ' ' << stamp(past.oldest) << ' ' << stamp(past.newest) << ' '
        << past.mean_gap.count() << ' ' << past.max_gap.count() << ' ' << past.jitter.count() << ' '
-       << past.refused_old << ' ' << past.refused_equal;
+       << past.refused_old << ' ' << past.refused_equal << ' ' << past.refused_ahead;
   return text.str();
 }
 

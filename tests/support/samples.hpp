@@ -85,6 +85,15 @@ bool take(const Bytes& bytes) {
           {"hand", std::string(255, 'o')}};
 }
 
+[[nodiscard]] inline PartialUpdateRequest partial_updates(Random& random) {
+  const Transform X = random.transform();
+  return {{{"hand", X.pose.translation(), {}, {}},
+           {"arm", {}, X.pose.rotation(), {}},
+           {"x", {}, {}, X.covariance},
+           {std::string(255, 'i'), X.pose.translation(), X.pose.rotation(), X.covariance}},
+          time_of(INT64_MAX)};
+}
+
 [[nodiscard]] inline std::vector<Request> requests(Random& random) {
   const auto edge = [&](const std::string& id) { return EdgeUpdate{id, random.transform()}; };
   return {
@@ -113,11 +122,15 @@ bool take(const Bytes& bytes) {
                        false,
                        Revision{"arm", random.transform(), correlation(random)}}},
                      time_of(17),
-                     18446744073709551615ULL}},
+                     18446744073709551615ULL,
+                     18446744073709551614ULL}},
       {17, "hand", ConsistencyRequest{true}},
       {18, "arm", JointUpdate{{{"elbow", 0.5, 1e-4}, {"wrist", -2.0, 0}}, time_of(18)}},
       {19, "arm", JointsRequest{}},
-      {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), std::nullopt}}};
+      {20, "arm", JointsRequest{"elbow"}},
+      {21, "arm", partial_updates(random)},
+      {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), std::nullopt},
+       18446744073709551610ULL}};
 }
 
 [[nodiscard]] inline SegmentValues tied_values(Random& random) {
@@ -130,6 +143,7 @@ bool take(const Bytes& bytes) {
   found.ties = {{}, {random.covariance(), some.shares, some.observed_with}};
   found.ties_at_hint = {{random.covariance(), {}, {}}, {}};
   found.commit = 77;
+  found.incarnation = 78;
   return found;
 }
 
@@ -147,6 +161,7 @@ bool take(const Bytes& bytes) {
   past.jitter = std::chrono::nanoseconds(5);
   past.refused_old = 6;
   past.refused_equal = 7;
+  past.refused_ahead = 8;
   return past;
 }
 

@@ -182,6 +182,12 @@ class Client {
   [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges,
                                     std::optional<Time> stamp = std::nullopt);
 
+  /// Gives parts of edges new values: translation, rotation or covariance, whichever is given. The rest stays as it is in
+  /// the edge's newest value at its owner, who decides that in the commit of the update. For the rest as update().
+  /// @return kUnknownFrame, kInvalidInput (naming the part), kTooOld, kStampTaken.
+  [[nodiscard]] Result<void> update_partial(const std::vector<PartialUpdate>& edges,
+                                            std::optional<Time> stamp = std::nullopt);
+
   /// Streams new edge values to their owners, unacknowledged: the path for joints at 1 kHz and more. Waits, within the
   /// bound of all calls, only until they can be reached. A
   /// share that an owner cannot take in time may be lost, never torn. Stamps are as for update(); samples that an owner
@@ -209,7 +215,8 @@ class Client {
                                            const std::vector<double>& variances,
                                            std::optional<Time> stamp = std::nullopt);
 
-  /// A partition's joints, and where they are; of kMaxItems at most. @return kUnknownPartition.
+  /// A partition's joints, and where they are, sorted by name. One round trip for each kMaxItems of them.
+  /// @return kUnknownPartition.
   [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition);
 
   /// Hangs a frame with all below it under a new parent (empty: makes it a root); it stays its owner's.

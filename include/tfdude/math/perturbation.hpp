@@ -22,8 +22,8 @@ namespace tfdude {
 /// The inverse of ros_covariance().
 [[nodiscard]] Transform from_ros_covariance(const Pose& X, const Covariance& ros);
 
-/// Jr(ξ), with Exp(ξ + δ) = Exp(ξ) · Exp(Jr(ξ) δ) for small δ. Its power series, Solà et al., arXiv:1812.01537,
-/// Eqs. 67 and 179. Jl(ξ) = Jr(-ξ).
+/// Jr(ξ), with Exp(ξ + δ) = Exp(ξ) · Exp(Jr(ξ) δ) for small δ, of any angle. Its power series, Solà et al.,
+/// arXiv:1812.01537, Eqs. 67 and 179. Jl(ξ) = Jr(-ξ).
 [[nodiscard]] Matrix6d right_jacobian(const Twist& xi);
 
 /// ad(ξ), with ad(ξ) η = [ξ, η]: the bracket of se(3). Barfoot & Furgale 2014, Eq. 5.

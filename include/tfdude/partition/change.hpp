@@ -18,7 +18,8 @@ enum class ChangeKind : std::uint8_t {
   kFrameRemoved,
   kFrameMoved,  ///< hangs elsewhere, or belongs to another partition
   kConflict,    ///< one of two partitions, or of two processes that serve one, had to give way
-  kMissed,      ///< changes were not told, because the listeners took too long
+  kHistoryRestarted,  ///< of a frame's edge, whose source's clock has jumped back; told by its owner's process only
+  kMissed,  ///< changes were not told, because the listeners took too long
 };
 
 /// The stable snake_case name of a kind, as the command line prints it in JSON.
@@ -37,6 +38,9 @@ struct Change {
 
 /// The conflict that a note tells of. @param partition  whose note it is
 [[nodiscard]] Change conflict_of(const Note& note, const std::string& partition);
+
+/// That the history of an edge has started again. @param partition  its owner
+[[nodiscard]] Change restarted(const HistoryRestart& restart, const std::string& partition);
 
 /// What happened, in the order in which it did, for those who want to know. Not thread-safe.
 class ChangeLog {

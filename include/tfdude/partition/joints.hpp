@@ -55,8 +55,8 @@ class Joints {
   ///   twice, outside the limits of a strict joint; as Forest::update(). Where it fails nothing is moved.
   [[nodiscard]] Result<std::size_t> apply(const JointUpdate& update);
 
-  /// Sorted by name.
-  [[nodiscard]] std::vector<JointInfo> infos() const;
+  /// Sorted by name, those that come after this one; kMaxItems at most.
+  [[nodiscard]] std::vector<JointInfo> infos(std::string_view after = {}) const;
 
   /// The frames that a joint of this name moves, with those that follow it.
   [[nodiscard]] std::vector<std::string> frames_of(std::string_view name) const;
@@ -94,6 +94,7 @@ class Joints {
 
   [[nodiscard]] Result<void> plan(const JointValue& value);
   [[nodiscard]] bool is_news(const Mover& mover, std::optional<Time> stamp) const;
+  [[nodiscard]] bool starts_again(const Mover& mover, Time stamp) const;
   void take(const Step& step, std::optional<Time> stamp);
   void forget_removed();
 

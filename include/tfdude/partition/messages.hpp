@@ -43,6 +43,12 @@ struct UpdateRequest {
   std::optional<Time> stamp{};    ///< of all of them
 };
 
+/// Parts of values; what is absent stays as it is at the owner.
+struct PartialUpdateRequest {
+  std::vector<PartialUpdate> edges;  ///< at least one
+  std::optional<Time> stamp{};       ///< of all of them
+};
+
 struct MoveRequest {
   std::string parent;             ///< empty: becomes a root
   std::optional<Transform> X_PC;  ///< kept where absent
@@ -65,9 +71,10 @@ struct ReviseRequest {
     bool refused = false;  ///< the measurement, by its gate
     std::optional<Revision> revision;
   };
-  std::vector<Edge> edges;      ///< at least one
-  std::optional<Time> stamp{};  ///< of which moving edges were observed
-  std::uint64_t seen = 0;       ///< SegmentValues::commit of what was observed
+  std::vector<Edge> edges;        ///< at least one
+  std::optional<Time> stamp{};    ///< of which moving edges were observed
+  std::uint64_t seen = 0;         ///< SegmentValues::commit of what was observed
+  std::uint64_t incarnation = 0;  ///< SegmentValues::incarnation, whose commit that is
 };
 
 /// How well the covariance of the edge that the request's id names, or of all that the partition has, agrees with
@@ -89,8 +96,10 @@ struct JointUpdate {
   std::optional<Time> stamp{};  ///< of all of them
 };
 
-/// What is known of all joints of the partition.
-struct JointsRequest {};
+/// What is known of the joints of the partition, sorted by name: of kMaxItems at most, whose names come after this one.
+struct JointsRequest {
+  std::string after{};
+};
 
 /// Asks for the values of edges, now and whenever they change: these are pushed to the group of watchers that have
 /// asked for the same, until it is not renewed for kWatchLease.
@@ -115,8 +124,12 @@ struct Request {
   /// The frame concerned, by which a reader filters: one that the partition owns, or the new one of an add.
   std::string id;
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
-               PastRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest>
+               PastRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
+               PartialUpdateRequest>
       body;
+  /// Of requests with a lower number, in whatever order they come, the sender awaits no reply. Not above `sequence`, which has
+  /// its lower half only.
+  std::uint64_t awaits_from = 0;
 };
 
 /// Whether a request changes nothing, so that a repeated one may be answered anew.

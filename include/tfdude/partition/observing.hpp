@@ -24,7 +24,11 @@ struct ObservePlan {
 /// The same with the values of all, of one instant.
 struct ObservedPath {
   std::vector<ObservedEdge> edges;
-  std::vector<std::uint64_t> seen;  ///< by part
+  struct Seen {
+    std::uint64_t commit = 0;
+    std::uint64_t incarnation = 0;
+  };
+  std::vector<Seen> seen;  ///< by part
   std::optional<Time> stamp;
   std::vector<std::string> missing;  ///< edges beside the path that must be asked for, too
   /// An edge lacks the source that it was observed by together with another: somebody's observation may be under way.

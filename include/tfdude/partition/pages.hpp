@@ -36,6 +36,8 @@ class Pages {
   Pages(std::string partition, std::uint64_t incarnation)
       : partition_(std::move(partition)), incarnation_(incarnation), epoch_(incarnation) {}
 
+  [[nodiscard]] std::uint64_t incarnation() const { return incarnation_; }
+
   /// Notes where a frame hangs, in place of what a note says of it. O(log frames).
   void put(const std::string& id, const std::string& parent, std::uint64_t since);
 

@@ -45,7 +45,8 @@ class Partition {
   [[nodiscard]] Reply answer(const PeerId& peer, const Request& request, Time now);
 
   /// Refuses a change that is not to be made now; one that was answered before, is answered as before.
-  [[nodiscard]] Reply refuse(const PeerId& peer, const Request& request, const Error& why);
+  [[nodiscard]] Reply refuse(const PeerId& peer, const Request& request, const Error& why,
+                             Time now);
 
   /// Answers a request of the owner's own process.
   [[nodiscard]] Reply answer(const Request& request, Time now);
@@ -105,6 +106,9 @@ class Partition {
   [[nodiscard]] Result<void> remove(const RemoveRequest& request, Time now);
   [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request, Time now);
   [[nodiscard]] Result<void> update(const UpdateRequest& request);
+  [[nodiscard]] Result<void> update(const PartialUpdateRequest& request);
+  template <class Edge>
+  [[nodiscard]] Result<void> told_of(const std::vector<Edge>& edges, Result<void> updated);
   [[nodiscard]] Result<void> revise(const ReviseRequest& request);
   [[nodiscard]] Result<void> set_joints(const JointUpdate& update);
   [[nodiscard]] Result<void> take(const std::vector<FrameSpec>& frames, std::uint64_t since);

@@ -50,6 +50,10 @@ struct LookupPlan {
                                                      const Directory& directory,
                                                      const std::vector<EdgeUpdate>& edges,
                                                      std::optional<Time> stamp = std::nullopt);
+[[nodiscard]] Result<std::vector<Part>> route_update(const Forest& forest,
+                                                     const Directory& directory,
+                                                     const std::vector<PartialUpdate>& edges,
+                                                     std::optional<Time> stamp);
 
 /// All who have one of the joints, or one that follows it, whether they are reachable or not.
 /// @return kUnknownJoint, kInvalidInput.

@@ -47,6 +47,17 @@ struct HandleUpdate {
   const Correlation* correlation = nullptr;
 };
 
+/// Parts of a new value X_PC for the edge named by its child's id; those that are absent stay as they are.
+struct PartialUpdate {
+  std::string id;
+  std::optional<Eigen::Vector3d> translation{};  ///< [m]
+  std::optional<Eigen::Quaterniond> rotation{};
+  std::optional<Covariance> covariance{};
+};
+
+/// @return kInvalidInput naming the frame and the part: not finite, not of unit length, too far away.
+[[nodiscard]] Result<void> check_parts(const PartialUpdate& edge);
+
 /// How an edge behaves in time.
 struct EdgeTiming {
   /// How much of its past is kept: samples that are not older than this before the newest,
@@ -58,6 +69,18 @@ struct EdgeTiming {
   Covariance process_noise{};
   /// It is moving from its first update on; else from the first that is given a stamp.
   bool moving = false;
+  /// Samples further ahead of the owner's clock than this are refused; max(): none are.
+  std::chrono::nanoseconds max_ahead = std::chrono::seconds(60);
+  /// So many samples in a row that are older than the span, each younger than the one before, start the history again: the
+  /// clock of their source has jumped back. 0: never.
+  std::size_t restart_after = 5;
+};
+
+/// That the history of an edge has started again.
+struct HistoryRestart {
+  std::string id;
+  Time newest;  ///< sample before
+  Time stamp;   ///< of the first sample of the new history
 };
 
 /// What a lookup asks for: of what time, and how far covariance is to be propagated.
@@ -105,7 +128,8 @@ struct SegmentValues {
   /// By segment, whose values' covariances are of own parts then; empty if no edge is tied to any other.
   std::vector<Ties> ties{};
   std::vector<Ties> ties_at_hint{};
-  std::uint64_t commit = 0;  ///< of which the values are; see revise()
+  std::uint64_t commit = 0;       ///< of which the values are; see revise()
+  std::uint64_t incarnation = 0;  ///< of the owner that counts the commits; see Partition
 };
 
 /// What of a held edge somebody has seen already: to begin with, nothing.
@@ -136,7 +160,8 @@ struct PastInfo {
   std::chrono::nanoseconds max_gap{0};
   std::chrono::nanoseconds jitter{0};  ///< standard deviation of the gaps
   std::uint64_t refused_old = 0;       ///< samples that were older than what is kept,
-  std::uint64_t refused_equal = 0;     ///< or of the stamp of another
+  std::uint64_t refused_equal = 0;     ///< or of the stamp of another,
+  std::uint64_t refused_ahead = 0;     ///< or too far ahead of the owner's clock
 };
 
 /// A run of edges on a path that one owner holds: X from `from` to `to`.
@@ -205,8 +230,8 @@ class Forest {
   /// Gives an edge a new value; with a stamp, a sample of it. Without one the clock's time is taken for a moving edge,
   /// while a static edge has its value replaced. Allocation-free, but while an edge's past grows to its limits and
   /// where a sample is older than another: then O(samples).
-  /// @return kUnknownFrame, kNotOwner, kInvalidInput (not finite; a stamp before 1970), kTooOld (older than what is
-  ///   kept), kStampTaken (equal in stamp to another sample).
+  /// @return kUnknownFrame, kNotOwner, kInvalidInput (not finite; a stamp before 1970, or further ahead of the clock than
+  ///   EdgeTiming::max_ahead), kTooOld (older than what is kept), kStampTaken (equal in stamp to another sample).
   [[nodiscard]] Result<void> update(std::string_view id, const Transform& X_PC,
                                     std::optional<Time> stamp = std::nullopt);
   [[nodiscard]] Result<void> update(Handle frame, const Transform& X_PC,
@@ -218,6 +243,11 @@ class Forest {
                                     std::optional<Time> stamp = std::nullopt);
   [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges,
                                     std::optional<Time> stamp = std::nullopt);
+
+  /// Gives parts of edges new values, as one commit: what is absent stays as it is in the newest value of then.
+  /// @return as update(); kInvalidInput also where a part is none (naming it).
+  [[nodiscard]] Result<void> update_partial(const std::vector<PartialUpdate>& edges,
+                                            std::optional<Time> stamp = std::nullopt);
 
   /// Says how an edge behaves in time; what was kept of its past goes.
   /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the field).
@@ -328,6 +358,9 @@ class Forest {
   /// and not write to the forest. Null: none any more.
   /// @param whose  each may have one
   void on_commit(std::function<void()> listener, const void* whose = nullptr);
+
+  /// The same for histories that have started again, before the commit that does it is visible.
+  void on_restart(std::function<void(const HistoryRestart&)> listener);
 
   /// What is kept of the past of held edges, those that are moving; of one where an id is given. Takes no lock. O(slots
   /// and samples).

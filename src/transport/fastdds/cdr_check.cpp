@@ -155,15 +155,25 @@ void request_body(CdrWalk& walk) {
       break;
     case 9:   // past
     case 11:  // consistency
-    case 13:  // joint states
       walk.octet();
+      break;
+    case 13:  // joint states
+      walk.id();
+      break;
+    case 17:  // partial update
+      walk.skip(8, 8);
+      walk.sequence([&] {
+        walk.id();
+        walk.octet();
+        walk.transform();
+      });
       break;
     case 12:  // joints
       walk.sequence([&] { walk.joint(); });
       walk.skip(8, 8);
       break;
     case 10:  // revise
-      walk.skip(2 * 8, 8);
+      walk.skip(3 * 8, 8);
       walk.sequence([&] { walk.revised_edge(); }, kMaxTies);
       break;
     default:
@@ -179,6 +189,7 @@ bool read_request_head(const std::uint8_t* data, std::size_t size, RequestHead& 
   request_body(walk);
   head.addressee = walk.ulong();
   walk.ulong();
+  walk.skip(8, 8);
   return walk.good();
 }
 
@@ -212,12 +223,12 @@ bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
       break;
     case 6:
       walk.sequence([&] {
-        walk.skip(11 * 8, 8);
+        walk.skip(12 * 8, 8);
         walk.id();
       });
       break;
     case 7:
-      walk.skip(3 * 8, 8);
+      walk.skip(4 * 8, 8);
       walk.transforms();
       walk.transforms();
       walk.sequence([&] { walk.ties(); }, kMaxTies);

@@ -47,6 +47,7 @@ PastInfo read_past(const wire::Past& body) {
   past.jitter = std::chrono::nanoseconds(body.jitter());
   past.refused_old = body.refused_old();
   past.refused_equal = body.refused_equal();
+  past.refused_ahead = body.refused_ahead();
   return past;
 }
 

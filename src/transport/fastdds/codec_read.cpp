@@ -7,6 +7,7 @@
 #include "math/flat.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_infos.hpp"
+#include "transport/fastdds/codec_partial.hpp"
 #include "transport/fastdds/codec_ties.hpp"
 #include "transport/fastdds/kinds.hpp"
 
@@ -63,6 +64,19 @@ Result<UpdateRequest> update_from_wire(std::string_view first, const wire::Updat
   return update;
 }
 
+Result<PartialUpdateRequest> read_partial_update(const wire::PartialUpdate& body) {
+  const auto stamp = stamp_from_wire(body.stamp(), "a stamp");
+  if (!stamp) return tl::unexpected(stamp.error());
+  PartialUpdateRequest update{{}, *stamp};
+  for (const wire::PartialEdge& in : body.edges()) {
+    auto edge = read_partial(in);
+    if (!edge) return tl::unexpected(std::move(edge.error()));
+    update.edges.push_back(*std::move(edge));
+  }
+  if (!update.edges.empty()) return update;
+  return fail(Errc::kInvalidInput, "an update of no edge");
+}
+
 std::vector<PathEnds> read_segments(const std::vector<wire::PathEnds>& body) {
   std::vector<PathEnds> segments;
   segments.reserve(body.size());
@@ -102,7 +116,7 @@ Result<WatchRequest> read_watch(const wire::Watch& body) {
 Result<ReviseRequest> read_revise(const wire::Revise& body) {
   const auto stamp = stamp_from_wire(body.stamp(), "the stamp of an observation");
   if (!stamp) return tl::unexpected(stamp.error());
-  ReviseRequest revise{{}, *stamp, body.seen()};
+  ReviseRequest revise{{}, *stamp, body.seen(), body.incarnation()};
   for (const wire::RevisedEdge& in : body.edges()) {
     const Surprise surprise{in.squares(), in.expected(), in.variance()};
     ReviseRequest::Edge edge{string_of(in.id()), surprise, in.refused() != 0, {}};
@@ -188,7 +202,9 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
     case kJoints:
       return take(request, read_joints(body.joints()));
     case kJointStates:
-      return as(JointsRequest{});
+      return as(JointsRequest{string_of(body.joint_states())});
+    case kPartialUpdate:
+      return take(request, read_partial_update(body.partial_update()));
     default:
       return fail(Errc::kInvalidInput, "no request of kind " + std::to_string(body._d()));
   }
@@ -199,6 +215,7 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
 Result<Request> from_wire(const wire::Request& sample) {
   Request request;
   request.sequence = sample.sequence_number();
+  request.awaits_from = sample.awaits_from();
   request.id = string_of(sample.id());
   if (auto ok = check_id(request.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
   if (auto ok = read_body(sample, request); !ok) return tl::unexpected(std::move(ok.error()));
@@ -242,6 +259,7 @@ Result<SegmentValues> read_tied(const wire::TiedTransforms& body) {
   auto found = read_stamped(plain);
   if (!found) return found;
   found->commit = body.seen();
+  found->incarnation = body.incarnation();
   for (const auto& [in, out] : {std::pair{&body.ties(), &found->ties},
                                 std::pair{&body.ties_at_hint(), &found->ties_at_hint}}) {
     for (const wire::Ties& one : *in) {

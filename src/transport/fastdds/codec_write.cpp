@@ -3,6 +3,7 @@
 #include "math/flat.hpp"
 #include "transport/fastdds/cdr_check.hpp"
 #include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/codec_partial.hpp"
 #include "transport/fastdds/kinds.hpp"
 
 // Into what travels.
@@ -100,6 +101,12 @@ struct BodyWriter {
     }
     out.update(std::move(body));
   }
+  void operator()(const PartialUpdateRequest& update) {
+    wire::PartialUpdate body;
+    body.stamp(wire_stamp(update.stamp));
+    for (const PartialUpdate& edge : update.edges) body.edges().push_back(wire_partial(edge));
+    out.partial_update(std::move(body));
+  }
   void operator()(const MoveRequest& move) {
     if (move.X_PC) {
       wire::MoveAndUpdate body;
@@ -144,11 +151,12 @@ struct BodyWriter {
     wire::Revise body;
     body.stamp(wire_stamp(revise.stamp));
     body.seen(revise.seen);
+    body.incarnation(revise.incarnation);
     for (const ReviseRequest::Edge& edge : revise.edges) body.edges().push_back(wire_revised(edge));
     out.revise(std::move(body));
   }
   void operator()(const JointUpdate& update) { out.joints(to_wire(update)); }
-  void operator()(const JointsRequest&) { out.joint_states(1); }
+  void operator()(const JointsRequest& asked) { out.joint_states(asked.after); }
   void operator()(const ConsistencyRequest& asked) { out.consistency(asked.all ? 1 : 0); }
 };
 
@@ -159,6 +167,7 @@ void write_wire(const Request& request, std::string_view partition, wire::Reques
   std::visit(BodyWriter{sample.body()}, request.body);
   sample.addressee(addressee_of(partition));
   sample.sequence_number(request.sequence);
+  sample.awaits_from(request.awaits_from);
 }
 
 wire::Request to_wire(const Request& request, std::string_view partition) {
@@ -189,6 +198,7 @@ wire::Past wire_past(const PastInfo& past) {
   body.jitter(past.jitter.count());
   body.refused_old(past.refused_old);
   body.refused_equal(past.refused_equal);
+  body.refused_ahead(past.refused_ahead);
   body.id(past.id);
   return body;
 }
@@ -230,6 +240,7 @@ struct ReplyWriter {
       body.stamp(wire_stamp(found.stamp));
       body.period(found.period.count());
       body.seen(found.commit);
+      body.incarnation(found.incarnation);
       body.values(wire_values(found.values));
       body.at_hint(wire_values(found.at_hint));
       body.ties(wire_ties(found.ties));

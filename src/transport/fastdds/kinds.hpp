@@ -18,7 +18,8 @@ enum RequestKind : std::uint8_t {
   kRevise = 10,
   kConsistency = 11,
   kJoints = 12,
-  kJointStates = 13
+  kJointStates = 13,
+  kPartialUpdate = 17
 };
 enum ReplyKind : std::uint8_t {
   kError = 1,

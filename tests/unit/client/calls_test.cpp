@@ -1,6 +1,8 @@
 #include "client/calls.hpp"
 
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "support/catch.hpp"
 
@@ -28,6 +30,17 @@ TEST_CASE("every request of every call has a number of its own, counted from one
   CHECK(first.entries()[1].sequence == 2);
   CHECK(second.entries()[0].sequence == 3);
   CHECK(first.entries()[1].partition == "b");
+}
+
+TEST_CASE("a call tells from which number on replies are awaited") {
+  Calls calls;
+  auto first = std::make_unique<Calls::Call>(calls, std::vector<std::string>{"a", "b"});
+  CHECK(first->awaits_from() == 1);
+  const Calls::Call second(calls, {"a"});
+  CHECK(second.awaits_from() == 1);
+  first.reset();
+  CHECK(Calls::Call(calls, {"a"}).awaits_from() == 3);
+  CHECK(Calls::Call(calls, {"a"}).awaits_from() == 3);
 }
 
 TEST_CASE("a call is complete when every partition has replied, in any order") {

@@ -147,15 +147,20 @@ TEST_CASE("a frame says how its error hangs together with others'") {
 
 TEST_CASE("how much is kept of the past is said for the file and for each frame") {
   const auto config = tfdude::parse_config(
-      "history: {span: 2.5, count: 100}\n"
+      "history: {span: 2.5, count: 100, max_ahead: none}\n"
       "frames:\n"
       "  - {id: a}\n"
-      "  - {id: b, history: {count: 7, moving: true, process_noise: [1, 2, 3, 0.1, 0.2, 0.3]}}\n",
+      "  - {id: b, history: {count: 7, moving: true, process_noise: [1, 2, 3, 0.1, 0.2, 0.3], "
+      "max_ahead: 1.5, restart_after: 0}}\n",
       "f");
   REQUIRE(config.has_value());
   CHECK(config->history.span == std::chrono::milliseconds(2500));
   CHECK(config->history.count == 100);
   CHECK_FALSE(config->history.moving);
+  CHECK(config->history.max_ahead == std::chrono::nanoseconds::max());
+  CHECK(config->history.restart_after == 5);
+  CHECK(config->frames[1].timing->max_ahead == std::chrono::milliseconds(1500));
+  CHECK(config->frames[1].timing->restart_after == 0);
   CHECK_FALSE(config->frames[0].timing.has_value());
   REQUIRE(config->frames[1].timing.has_value());
   CHECK(config->frames[1].timing->span == std::chrono::milliseconds(2500));
@@ -177,8 +182,15 @@ TEST_CASE("how much is kept of the past is said for the file and for each frame"
   refused("{process_noise: [1, 2]}", ": process_noise has 2, not 6 numbers");
   refused("{process_noise: [-1, 0, 0, 0, 0, 0]}", ": process_noise: stddev[0]");
   refused("{moving: perhaps}", ": moving is neither true nor false");
-  refused("{spam: 1}", ": unknown key 'spam'; known are span, count, process_noise, moving");
+  refused("{spam: 1}",
+          ": unknown key 'spam'; known are span, count, process_noise, moving, max_ahead, "
+          "restart_after");
+  refused("{max_ahead: -1}", ": max_ahead is not within 0 and 1e9 seconds, nor none");
+  refused("{max_ahead: .nan}", ": max_ahead is not a finite number");
+  refused("{max_ahead: some}", ": max_ahead is not");
+  refused("{restart_after: 1.5}", ": restart_after is not a whole number within");
   refused("3", " is not a mapping");
+  CHECK(tfdude::parse_config("history: {max_ahead: 0}\n", "f")->history.max_ahead.count() == 0);
   CHECK_FALSE(tfdude::parse_config("history: {span: -1}\n", "f").has_value());
 }
 

@@ -88,6 +88,21 @@ TEST_CASE("urdf: what cannot be mimicked is refused") {
   refused(large, "r.urdf:6: joint 'k': mimic: its multiplier or offset is beyond 1e9");
 }
 
+TEST_CASE("urdf: what joints of other parts mimic may be broken") {
+  const std::string text =
+      robot(link("a") + link("b") + link("c") + link("d") + joint("j", "continuous", "a", "b") +
+            joint("k", "continuous", "b", "c", "<mimic joint=\"nothing\"/>") +
+            joint("l", "continuous", "a", "d", "<mimic joint=\"k\"/>"));
+  CHECK(ids_of(frames_of(text, with_links({"a..a"}))) == "a");
+  CHECK(ids_of(frames_of(text, with_links({"b..b"}))) == "b");
+  for (const char* part : {"b", "d"}) {
+    const auto refused_part = tfdude::parse_urdf(text, with_links({part}));
+    REQUIRE_FALSE(refused_part);
+    CHECK_THAT(refused_part.error().message,
+               tfdude::testing::ContainsSubstring("joint 'k': mimics 'nothing', which is not there"));
+  }
+}
+
 TEST_CASE("urdf: a prefix stands before the names of links and joints") {
   UrdfPart part{"r.urdf"};
   part.prefix = "left/";

@@ -179,8 +179,8 @@ TEST_CASE("urdf: values of joints that break their rules are refused") {
           "r.urdf:4: joint 'j': origin: translation.y is beyond 1e9 m");
   refused(pair("revolute", limits("1", "-1")),
           "r.urdf:4: joint 'j': limits 1 and -1 are upside down");
-  refused(pair("prismatic", limits("0", "2e9")),
-          "r.urdf:4: joint 'j': limits 0 and 2e+09 are beyond 1e9");
+  refused(pair("prismatic", limits("2e9", "3e9")),
+          "r.urdf:4: joint 'j': limits 2e+09 and 3e+09 are beyond 1e9");
   const std::string hinge = pair("revolute", limits("-1", "2"));
   refused(hinge, with_joint("j", {2.5, {}, {}}),
           "r.urdf:4: joint 'j': position 2.5 is outside its limits -1 and 2");
@@ -195,6 +195,22 @@ TEST_CASE("urdf: values of joints that break their rules are refused") {
           "r.urdf:6: joint 'f2': has no position of its own: it mimics 'f1'");
   refused(pair("prismatic", "<origin xyz=\"9e8 0 0\"/>" + limits("0", "9e8")),
           with_joint("j", {9e8, {}, {}}), "r.urdf:4: joint 'j': translation.x is beyond 1e9 m");
+}
+
+TEST_CASE("urdf: a limit that no position can reach is none") {
+  const auto joint = [](const std::string& lower, const std::string& upper) {
+    return *frames_of(pair("revolute", limits(lower, upper)), {"r.urdf"}).back().joint;
+  };
+  const auto rotor = joint("-1e16", "1e16");
+  CHECK_FALSE(rotor.limits.has_value());
+  CHECK(rotor.position == 0);
+  CHECK(rotor.variance == Approx(M_PI * M_PI / 3));
+  const auto half = joint("0.5", "1e16");
+  REQUIRE(half.limits.has_value());
+  CHECK(half.limits->lower == 0.5);
+  CHECK(half.limits->contain(1e9));
+  CHECK(half.position == 0.5);
+  CHECK(half.variance == Approx(M_PI * M_PI / 3));
 }
 
 TEST_CASE("urdf: a joint's position before its first sample") {

@@ -6,6 +6,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "tfdude/math/perturbation.hpp"
+
 #include "support/catch.hpp"
 #include "support/jacobian.hpp"
 #include "support/pose_diff.hpp"
@@ -112,6 +114,47 @@ TEST_CASE("each sample's part of the covariance is that of the Jacobian, shared 
                             propagated(J0, X0.covariance), 1e-6) == "");
       CHECK(covariance_diff(Covariance::trusted(Matrix6d(s * from1.matrix())),
                             propagated(J1, X1.covariance), 1e-6) == "");
+    }
+  }
+}
+
+// B = Jr(s ξ) Jr⁻¹(ξ) by s = n + r: s Jr(s ξ) = Σ_{k<n} Ad(Exp(-k ξ)) Jr(ξ) + r Ad(Exp(-n ξ)) Jr(r ξ), all of them sums of
+// what is of the size of one.
+Matrix6d carrying(const Twist& xi, double s) {
+  const int n = static_cast<int>(std::floor(s));
+  const double r = s - n;
+  Matrix6d sum = Matrix6d::Zero();
+  for (int k = 0; k < n; ++k) sum += adjoint(exp(-static_cast<double>(k) * xi));
+  const Matrix6d rest = adjoint(exp(-static_cast<double>(n) * xi)) * right_jacobian(r * xi);
+  sum += r * rest * right_jacobian(xi).inverse();
+  return sum / s;
+}
+
+TEST_CASE("extrapolation is right for every angle, however far it goes") {
+  Random random(506);
+  INFO("seed " << random.seed());
+  for (const double angle : {0.0, 1e-12, 1e-8, 1e-6, 1e-5, 1e-4, 0.99e-3, 1.01e-3, 0.01, 0.05,
+                             0.0999, 0.1001, 0.5, 1.0, 2.5, kPi - 1e-6}) {
+    for (const double s : {1.0, 1.000001, 1.5, 2.0, 9.9, 60.0, 100.0, 333.3, 999.9, 1000.0}) {
+      INFO("angle " << angle << ", s " << s);
+      const auto [X0, X1] = samples(random, angle);
+      const Twist xi = log(X0.pose.inverse() * X1.pose);
+      const double beyond = s - 1.0;
+      const Matrix6d B1 = carrying(xi, s);
+      // Jl((1-s) ξ) Jl⁻¹(ξ) of negative parts: Jr((s-1) ξ) Jl⁻¹(ξ) = Jr((s-1) ξ) Jr⁻¹(ξ) Ad(Exp(-ξ)).
+      Matrix6d B0 = Matrix6d::Zero();
+      if (beyond > 0) B0 = carrying(xi, beyond) * adjoint(exp(-xi));
+      const Matrix6d expected =
+          beyond * (s + beyond) * B0 * X0.covariance.matrix() * B0.transpose() +
+          s * (s + beyond) * B1 * X1.covariance.matrix() * B1.transpose();
+      const Matrix6d given = extrapolate(X0, X1, s).covariance.matrix();
+      // Relative in all directions, so that no variance is too small either.
+      const Matrix6d root = expected.llt().matrixL();
+      const Matrix6d whitened =
+          root.triangularView<Eigen::Lower>().solve(given - expected).transpose().eval();
+      const Matrix6d relative = root.triangularView<Eigen::Lower>().solve(whitened);
+      CHECK((given - expected).norm() <= 1e-9 * expected.norm());
+      CHECK(relative.cwiseAbs().maxCoeff() < 1e-6);
     }
   }
 }

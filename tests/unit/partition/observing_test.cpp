@@ -56,6 +56,7 @@ std::vector<SegmentValues> answers_to(const ObservePlan& plan, Random& random) {
     for (std::size_t i = 0; i < asked.size(); ++i) answer.values.push_back(random.transform());
     answer.ties.resize(asked.size());
     answer.commit = 7 + answers.size();
+    answer.incarnation = 77;
     answers.push_back(std::move(answer));
   }
   return answers;
@@ -113,7 +114,10 @@ TEST_CASE("answers are put together in the order of the edges, and name who is m
   CHECK(testing::pose_diff(path->edges[1].X_PC.pose, answers[1].values[0].pose, 0) == "");
   CHECK(testing::pose_diff(path->edges[2].X_PC.pose, answers[1].values[1].pose, 0) == "");
   CHECK(path->missing == std::vector<std::string>{"leg"});
-  CHECK(path->seen == std::vector<std::uint64_t>{7, 8});
+  REQUIRE(path->seen.size() == 2);
+  CHECK(path->seen[0].commit == 7);
+  CHECK(path->seen[1].commit == 8);
+  CHECK(path->seen[1].incarnation == 77);
   CHECK_FALSE(path->torn);
   // An observation that has reached one of its owners only.
   const Share share{"observed:other", true, Factor::Ones(6, 1)};
@@ -146,6 +150,7 @@ TEST_CASE("each owner is told its part, and who has nothing to do is not asked")
   CHECK(parts[0].request.id == "arm");
   const auto& revise = std::get<ReviseRequest>(parts[0].request.body);
   CHECK(revise.seen == 7);
+  CHECK(revise.incarnation == 77);
   REQUIRE(revise.edges.size() == 2);
   CHECK(revise.edges[1].revision->correlation.observed_with ==
         std::vector<std::string>{"arm", "hand"});
@@ -160,7 +165,7 @@ TEST_CASE("an owner applies its part once, counts it, and forgets what it counte
   const PeerId peer{};
   Request request{
       1, "arm",
-      ReviseRequest{{{"arm", {3, 2, 1}, false, Revision{"arm", X, {}}}}, {}, seen->commit}};
+      ReviseRequest{{{"arm", {3, 2, 1}, false, Revision{"arm", X, {}}}}, {}, seen->commit, 1}};
   const auto is_done = [](const Reply& reply) { return std::holds_alternative<Done>(reply.body); };
   CHECK(is_done(known.partition.answer(peer, request, kNow)));
   CHECK(is_done(known.partition.answer(peer, request, kNow)));
@@ -184,6 +189,27 @@ TEST_CASE("an owner applies its part once, counts it, and forgets what it counte
   CHECK(std::get<Error>(foreign.body).code == Errc::kNotOwner);
   CHECK(is_done(known.partition.answer({5, "arm", MoveRequest{"leg", {}}}, kNow)));
   CHECK(counted().empty());
+}
+
+TEST_CASE("what an owner's predecessor was seen to have is not revised, whatever its commits") {
+  Random random(0x0b56);
+  Known known(random);
+  const LookupRequest ask{{{"world", "arm"}}, {}, {}, true};
+  const Reply reply = known.partition.answer_lookup(1, ask);
+  const auto& seen = std::get<SegmentValues>(reply.body);
+  CHECK(seen.incarnation == 1);
+  const auto revise = [&](std::uint32_t sequence, std::uint64_t incarnation, std::uint64_t commit) {
+    const Revision revision{"arm", random.transform(), {}};
+    const ReviseRequest body{{{"arm", {3, 2, 1}, false, revision}}, {}, commit, incarnation};
+    return known.partition.answer(PeerId{}, {sequence, "arm", body}, kNow);
+  };
+  for (const std::uint32_t sequence : {1U, 2U}) {
+    const Reply late = revise(sequence, 0, seen.commit + 1000 * sequence);
+    REQUIRE(std::holds_alternative<Error>(late.body));
+    CHECK(std::get<Error>(late.body).code == Errc::kChangedMeanwhile);
+    CHECK_THAT(std::get<Error>(late.body).message, testing::ContainsSubstring("'arms'"));
+  }
+  CHECK(std::holds_alternative<Done>(revise(3, 1, seen.commit).body));
 }
 
 }  // namespace

@@ -292,6 +292,23 @@ TEST_CASE("a repeated request is answered again but not applied again") {
   CHECK(said(arms.partition.answer(peer, anew, kNow)) == refused);
 }
 
+TEST_CASE("parts of values are replaced by their owner, who names what it does not have") {
+  Arms arms;
+  arms.plant();
+  const Eigen::Vector3d there(1, 2, 3);
+  const auto ask = [&](const std::vector<PartialUpdate>& edges) {
+    return said(arms.ask(edges.front().id, PartialUpdateRequest{edges}));
+  };
+  const Covariance sigma = *Covariance::from_stddev({1, 1, 1, 1, 1, 1});
+  CHECK(ask({{"hand", {}, {}, sigma}}) == "ok");
+  CHECK(ask({{"hand", there}, {"tool", there}}) == "ok");
+  const auto hand = arms.forest.lookup("arm", "hand");
+  CHECK(hand->pose.translation() == there);
+  CHECK(hand->covariance.upper() == sigma.upper());
+  CHECK(ask({{"hand", Eigen::Vector3d(9, 9, 9)}, {"world", there}}).rfind("not_owner", 0) == 0);
+  CHECK(arms.forest.lookup("arm", "hand")->pose.translation() == there);
+}
+
 TEST_CASE("a repeated lookup is answered with what holds now") {
   Arms arms;
   arms.plant();

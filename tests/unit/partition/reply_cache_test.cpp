@@ -8,84 +8,137 @@
 namespace tfdude {
 namespace {
 
-constexpr auto kPerPeer = static_cast<std::uint32_t>(ReplyCache::kPerPeer);
+constexpr auto kReplies = static_cast<std::uint32_t>(ReplyCache::kReplies);
+constexpr auto kPeers = static_cast<std::uint32_t>(ReplyCache::kPeers);
+const Time kNow = time_of(1'700'000'000'000'000'000);
 
 PeerId peer(std::size_t number) {
   PeerId id{};
   id[0] = static_cast<std::uint8_t>(number);
+  id[5] = static_cast<std::uint8_t>(number >> 16U);
   id[11] = static_cast<std::uint8_t>(number >> 8U);
   return id;
 }
 
-// Replies are told apart by their epoch.
-Reply reply(std::uint32_t sequence, std::uint64_t epoch) { return {sequence, epoch, Done{}}; }
+Request request(std::uint32_t sequence, std::uint64_t awaits_from) {
+  return {sequence, "hand", RemoveRequest{}, awaits_from};
+}
 
-TEST_CASE("a request that was never answered is new") {
-  ReplyCache cache;
-  CHECK_FALSE(cache.find(peer(1), 1));
-  cache.put(peer(1), reply(1, 10));
-  CHECK_FALSE(cache.find(peer(1), 2));
-  CHECK_FALSE(cache.find(peer(2), 1));
+/// An owner that only counts what it applies; replies are told apart by their epoch.
+class Owner {
+ public:
+  Reply answer(const PeerId& from, const Request& request, Time now = kNow) {
+    if (auto before = cache_.find(from, request, now)) return *before;
+    const Reply reply{request.sequence, ++applied_, Done{}};
+    cache_.put(from, request, reply);
+    return reply;
+  }
+  [[nodiscard]] std::uint64_t applied() const { return applied_; }
+
+ private:
+  ReplyCache cache_;
+  std::uint64_t applied_ = 0;
+};
+
+std::string refusal(const Reply& reply) {
+  const auto* error = std::get_if<Error>(&reply.body);
+  return error == nullptr ? "" : std::string(to_string(error->code)) + ": " + error->message;
 }
 
 TEST_CASE("a repeated request finds its reply as often as it is asked") {
   ReplyCache cache;
-  cache.put(peer(1), reply(1, 10));
-  cache.put(peer(1), reply(2, 20));
-  cache.put(peer(2), {1, 30, Error{Errc::kCycle, "no"}});
+  CHECK_FALSE(cache.find(peer(1), request(1, 1), kNow));
+  cache.put(peer(1), request(1, 1), {1, 10, Done{}});
+  CHECK_FALSE(cache.find(peer(1), request(2, 1), kNow));
+  cache.put(peer(1), request(2, 1), {2, 20, Done{}});
+  CHECK_FALSE(cache.find(peer(2), request(1, 1), kNow));
+  cache.put(peer(2), request(1, 1), {1, 30, Error{Errc::kCycle, "no"}});
   for (int repetition = 0; repetition < 3; ++repetition) {
-    CHECK(cache.find(peer(1), 1)->epoch == 10);
-    CHECK(cache.find(peer(1), 2)->epoch == 20);
-    const auto refused = cache.find(peer(2), 1);
+    CHECK(cache.find(peer(1), request(1, 1), kNow)->epoch == 10);
+    CHECK(cache.find(peer(1), request(2, 1), kNow)->epoch == 20);
+    const auto refused = cache.find(peer(2), request(1, 1), kNow);
     REQUIRE(refused);
     CHECK(refused->epoch == 30);
     CHECK(std::get<Error>(refused->body).message == "no");
   }
 }
 
-TEST_CASE("the last 256 replies to a peer are kept, older requests are refused") {
-  ReplyCache cache;
-  for (std::uint32_t i = 1; i <= kPerPeer; ++i) cache.put(peer(1), reply(i, i));
-  CHECK(cache.find(peer(1), 1)->epoch == 1);
-  cache.put(peer(1), reply(kPerPeer + 1, kPerPeer + 1));
-  const auto too_old = cache.find(peer(1), 1);
-  REQUIRE(too_old);
-  CHECK(too_old->sequence == 1);
-  const Error& error = std::get<Error>(too_old->body);
-  CHECK(error.code == Errc::kInvalidInput);
-  CHECK(error.message == "request 1 is too old: the same peer has sent 257 since");
-  CHECK(cache.find(peer(1), 2)->epoch == 2);
-  CHECK(cache.find(peer(1), kPerPeer + 1)->epoch == kPerPeer + 1);
+TEST_CASE("a request that was lost is applied once, however many of its peer went before") {
+  Owner owner;
+  for (std::uint32_t i = 2; i <= 10'000; ++i) (void)owner.answer(peer(1), request(i, 1));
+  CHECK(owner.applied() == 9'999);
+  const Reply late = owner.answer(peer(1), request(1, 1));
+  CHECK(refusal(late).empty());
+  CHECK(owner.applied() == 10'000);
+  CHECK(owner.answer(peer(1), request(1, 1)).epoch == late.epoch);
+  CHECK(owner.answer(peer(1), request(2, 1)).epoch == 1);
+  CHECK(owner.applied() == 10'000);
 }
 
-TEST_CASE("the counter of requests may wrap round") {
-  constexpr std::uint32_t kLast = std::numeric_limits<std::uint32_t>::max();
-  ReplyCache cache;
-  cache.put(peer(1), reply(kLast - 5, 1));
-  const std::uint32_t after = kLast - 5 + kPerPeer;  // beyond zero, in the same place
-  CHECK(after < kPerPeer);
-  CHECK_FALSE(cache.find(peer(1), after));
-  cache.put(peer(1), reply(after, 2));
-  CHECK(cache.find(peer(1), after)->epoch == 2);
-  CHECK(std::holds_alternative<Error>(cache.find(peer(1), kLast - 5)->body));
-}
-
-TEST_CASE("of 257 peers the one that asked longest ago is forgotten") {
-  ReplyCache cache;
-  for (std::size_t i = 0; i < ReplyCache::kPeers; ++i) cache.put(peer(i), reply(1, i));
-  SECTION("asking again, answered or not, is what counts") {
-    CHECK(cache.find(peer(0), 1)->epoch == 0);
-    CHECK_FALSE(cache.find(peer(1), 2));
-    cache.put(peer(1000), reply(1, 1000));
-    CHECK_FALSE(cache.find(peer(2), 1));
-    CHECK(cache.find(peer(0), 1));
-    CHECK(cache.find(peer(1), 1));
+TEST_CASE("what nobody awaits is never applied again, in whatever order it comes") {
+  Owner owner;
+  (void)owner.answer(peer(1), request(1, 1));
+  (void)owner.answer(peer(1), request(7, 5));
+  CHECK(owner.applied() == 2);
+  for (const std::uint32_t over : {1U, 4U}) {
+    CHECK(refusal(owner.answer(peer(1), request(over, 1))) ==
+          "timeout: request " + std::to_string(over) +
+              " was not taken: it is not known any more whether it was applied before, as all of "
+              "this peer "
+              "below 5 are over");
   }
-  SECTION("a peer that is new makes room by its first request") {
-    CHECK_FALSE(cache.find(peer(1000), 1));
-    CHECK(cache.find(peer(1), 1));
-    CHECK(cache.find(peer(255), 1));
-    CHECK_FALSE(cache.find(peer(0), 1));
+  CHECK(owner.applied() == 2);
+  CHECK(refusal(owner.answer(peer(1), request(5, 1))).empty());
+  CHECK(owner.applied() == 3);
+}
+
+TEST_CASE("the counter of requests may begin anew") {
+  constexpr std::uint64_t kRound = std::uint64_t{1} << 32U;
+  Owner owner;
+  (void)owner.answer(peer(1), request(0xFFFFFFFF, kRound - 1));
+  (void)owner.answer(peer(1), request(0, kRound - 1));
+  (void)owner.answer(peer(1), request(1, kRound - 1));
+  CHECK(owner.applied() == 3);
+  CHECK(owner.answer(peer(1), request(0xFFFFFFFF, kRound - 1)).epoch == 1);
+  CHECK(owner.answer(peer(1), request(0, kRound - 1)).epoch == 2);
+  // The peer has asked others for half a round and more meanwhile.
+  (void)owner.answer(peer(1), request(0xF0000000, kRound + 0xF0000000));
+  CHECK(owner.applied() == 4);
+  CHECK_FALSE(refusal(owner.answer(peer(1), request(1, kRound - 1))).empty());
+  (void)owner.answer(peer(1), request(7, std::numeric_limits<std::uint64_t>::max()));
+  CHECK(owner.applied() == 4);
+}
+
+TEST_CASE("where too many replies are awaited, what may have been applied before is refused") {
+  Owner owner;
+  for (std::uint32_t i = 2; i <= kReplies + 1; ++i) (void)owner.answer(peer(1), request(i, 1));
+  CHECK(owner.answer(peer(1), request(2, 1)).epoch == 1);
+  (void)owner.answer(peer(2), request(1, 1));
+  CHECK(owner.applied() == kReplies + 1);
+  CHECK_FALSE(refusal(owner.answer(peer(1), request(2, 1))).empty());
+  CHECK_FALSE(refusal(owner.answer(peer(1), request(1, 1))).empty());
+  CHECK(owner.answer(peer(1), request(3, 1)).epoch == 2);
+  CHECK(owner.applied() == kReplies + 1);
+}
+
+TEST_CASE("no peer is forgotten that may still repeat a request") {
+  Owner owner;
+  for (std::uint32_t i = 0; i < kPeers; ++i) (void)owner.answer(peer(i), request(1, 1));
+  const std::uint64_t before = owner.applied();
+  CHECK(refusal(owner.answer(peer(kPeers), request(1, 1))) ==
+        "timeout: request 1 was not taken: more than 65536 others have asked for changes of late");
+  (void)owner.answer(peer(0), request(1, 1));
+  CHECK(owner.applied() == before);
+  SECTION("the one that was silent for longest goes first") {
+    const Time later = kNow + ReplyCache::kSilence;
+    (void)owner.answer(peer(0), request(1, 1), later);
+    CHECK(refusal(owner.answer(peer(kPeers), request(1, 1), later)).empty());
+    CHECK(owner.applied() == before + 1);
+    (void)owner.answer(peer(0), request(1, 1), later);
+    CHECK(owner.applied() == before + 1);
+  }
+  SECTION("a clock that was set back keeps nobody out") {
+    CHECK(refusal(owner.answer(peer(kPeers), request(1, 1), time_of(1))).empty());
   }
 }
 

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cctype>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+namespace tfdude::cli {
+
+/// Whether the whole of a text is one number.
+[[nodiscard]] inline bool is_number(const std::string& text) {
+  if (text.empty() || std::isspace(static_cast<unsigned char>(text[0])) != 0) return false;
+  char* end = nullptr;
+  (void)std::strtod(text.c_str(), &end);
+  return end == text.c_str() + text.size();
+}
+
+/// Makes all options that take numbers, of all commands, refuse what is none: CLI11 takes an empty text for 0. To be called
+/// once all options are there.
+inline void require_numbers(CLI::App& app) {
+  for (CLI::Option* option : app.get_options([](CLI::Option* one) {
+         const std::string type = one->get_type_name();
+         const bool takes_text = type.rfind("TEXT", 0) == 0 || type.rfind("FILE", 0) == 0;
+         return one->get_type_size_max() > 0 && !takes_text;
+       })) {
+    option->check([](const std::string& text) {
+      return is_number(text) ? std::string() : "'" + text + "' is not a number";
+    });
+  }
+  for (CLI::App* command : app.get_subcommands({})) require_numbers(*command);
+}
+
+/// The arguments in the order that CLI::App::parse() takes, "-.5" being written "-0.5", as CLI11 takes it for an option else.
+[[nodiscard]] inline std::vector<std::string> arguments_of(int argc, char** argv) {
+  std::vector<std::string> arguments;
+  for (int i = argc - 1; i > 0; --i) {
+    std::string text = argv[i];
+    if (text.rfind("-.", 0) == 0 && is_number(text)) text.insert(1, 1, '0');
+    arguments.push_back(std::move(text));
+  }
+  return arguments;
+}
+
+}  // namespace tfdude::cli

@@ -1,0 +1,41 @@
+#include <unordered_map>
+
+#include "tfdude/base/id.hpp"
+
+#include "tree/forest_impl.hpp"
+
+// Updates that give only parts of values.
+namespace tfdude {
+namespace {
+
+Result<Transform> with_parts(const Transform& X_PC, const PartialUpdate& parts) {
+  const auto pose = Pose::create(parts.rotation.value_or(X_PC.pose.rotation()),
+                                 parts.translation.value_or(X_PC.pose.translation()));
+  if (!pose) return fail_at("frame " + quote(parts.id), pose.error());
+  return Transform{*pose, parts.covariance.value_or(X_PC.covariance)};
+}
+
+}  // namespace
+
+Result<void> check_parts(const PartialUpdate& edge) {
+  return with_parts(Transform(), edge).map([](const Transform&) {});
+}
+
+Result<std::vector<EdgeUpdate>> Forest::Impl::completed(
+    const std::vector<PartialUpdate>& edges) const {
+  std::vector<EdgeUpdate> all;
+  all.reserve(edges.size());
+  std::unordered_map<std::uint32_t, Transform> values;  // a frame may be given twice
+  for (const PartialUpdate& edge : edges) {
+    const auto slot = held_slot(edge.id);
+    if (!slot) return tl::unexpected(slot.error());
+    Transform& X_PC = values.try_emplace(*slot, whole(newest_value(*slot))).first->second;
+    auto given = with_parts(X_PC, edge);
+    if (!given) return tl::unexpected(std::move(given.error()));
+    X_PC = *given;
+    all.push_back({edge.id, X_PC});
+  }
+  return all;
+}
+
+}  // namespace tfdude

@@ -1,0 +1,109 @@
+// Requests that are lost, and those that are sent again, over each transport.
+
+#include <atomic>
+#include <map>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/catch.hpp"
+#include "support/lossy_requests.hpp"
+#include "support/networks.hpp"
+#include "support/pose_diff.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::Join;
+using testing::joined_by;
+using testing::LossyRequests;
+using testing::Random;
+
+Transform ahead(double metres) {
+  return {Pose::trusted(Eigen::Quaterniond::Identity(), {metres, 0, 0}), Covariance()};
+}
+
+Options patient() {
+  Options options;
+  options.timeout = Milliseconds(20000);
+  return options;
+}
+
+}  // namespace
+
+TEST_CASE("a change of which many sendings are lost is made once, while other threads go on") {
+  const Join join = joined_by(GENERATE(0, 1));
+  constexpr int kThreads = 3;
+  constexpr int kLost =
+      8;  // sendings of each request of the unlucky thread, beyond a second in all
+  auto owner = *Node::open(join("arms"), "arms", {{"arm", "", {}}, {"slow", "arm", {}}}, patient());
+  std::map<std::uint32_t, int> sendings;
+  const auto loses = [&sendings](const Request& request) {
+    return request.id == "slow" && std::holds_alternative<PartialUpdateRequest>(request.body) &&
+           ++sendings[request.sequence] <= kLost;
+  };
+  auto client = *Client::open(std::make_unique<LossyRequests>(join(""), loses), patient());
+  REQUIRE(client.exists("slow"));
+  std::atomic<bool> done{false};
+  std::atomic<int> others{0};
+  std::vector<std::thread> threads;
+  for (int i = 0; i < kThreads; ++i) {
+    threads.emplace_back([&] {
+      // Fewer than the owner keeps replies: of more it says that it does not know any more.
+      while (!done && others < 20'000) {
+        others += client.update("arm", ahead(1)).has_value() ? 1 : 0;
+      }
+    });
+  }
+  const auto updated = client.update_partial({{"slow", Eigen::Vector3d(5, 0, 0)}});
+  done = true;
+  for (std::thread& thread : threads) thread.join();
+  INFO((updated ? "" : updated.error().message) << ", others " << others);
+  CHECK(updated.has_value());
+  CHECK(others > 256);
+  CHECK(owner.lookup("arm", "slow")->pose.translation().x() == 5);
+}
+
+TEST_CASE("parts of a value are changed at its owner, the rest stays") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Random random(0x9a75);
+  const Transform X_PC = random.transform();
+  auto owner =
+      *Node::open(join("arms"), "arms", {{"arm", "", {}}, {"hand", "arm", X_PC}}, patient());
+  auto client = *Client::open(join(""), patient());
+  const auto hand = [&] { return *client.lookup("arm", "hand"); };
+  const Eigen::Vector3d there(1, 2, 3);
+  REQUIRE(client.update_partial({{"hand", there}}));
+  const Transform placed{*Pose::create(X_PC.pose.rotation(), there), X_PC.covariance};
+  CHECK(testing::transform_diff(hand(), placed, 1e-12) == "");
+  const Transform other = random.transform();
+  REQUIRE(client.update_partial({{"hand", {}, other.pose.rotation(), {}}}));
+  REQUIRE(owner.update_partial({{"hand", {}, {}, other.covariance}}));
+  const Transform all{*Pose::create(other.pose.rotation(), there), other.covariance};
+  CHECK(testing::transform_diff(hand(), all, 1e-12) == "");
+  const auto refused = client.update_partial({{"hand", Eigen::Vector3d(0, 2e9, 0)}});
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == Errc::kInvalidInput);
+  CHECK(testing::transform_diff(hand(), all, 1e-12) == "");
+}
+
+TEST_CASE("a sample of the future is refused by its owner, who counts it") {
+  const Join join = joined_by(GENERATE(0, 1));
+  auto owner = *Node::open(join("arms"), "arms", {{"arm", "", {}}, {"hand", "arm", {}}}, patient());
+  auto client = *Client::open(join(""), patient());
+  const auto refused = client.update("hand", ahead(1), time_of(9'000'000'000'000'000'000));
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == Errc::kInvalidInput);
+  CHECK_THAT(refused.error().message, testing::ContainsSubstring("2255-03-14"));
+  REQUIRE(client.past("hand")->size() == 1);
+  CHECK(client.past("hand")->at(0).refused_ahead == 1);
+  REQUIRE(client.update(
+      "hand", ahead(2),
+      std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now())));
+  CHECK(client.lookup("arm", "hand")->pose.translation().x() == 2);
+}
+
+}  // namespace tfdude
