@@ -283,8 +283,9 @@ TEST_CASE(
   REQUIRE(opened(file)->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
   sqlite3* raw = nullptr;
   REQUIRE(sqlite3_open(file.c_str(), &raw) == SQLITE_OK);
-  REQUIRE(sqlite3_exec(raw, "DROP TABLE joints; PRAGMA user_version = 1", nullptr, nullptr,
-                       nullptr) == SQLITE_OK);
+  const char* const older =
+      "DROP TABLE configured_ties; DROP TABLE ties; DROP TABLE joints; PRAGMA user_version = 1";
+  REQUIRE(sqlite3_exec(raw, older, nullptr, nullptr, nullptr) == SQLITE_OK);
   sqlite3_close(raw);
   const auto store = opened(file);
   REQUIRE(store->load());
