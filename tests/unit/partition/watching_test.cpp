@@ -52,7 +52,7 @@ TEST_CASE("a group is told all, then what changes, once") {
   REQUIRE(arm.forest.update({{"arm", along_x(11)}, {"hand", along_x(101)}}, ms(1)));
   REQUIRE(arm.forest.update({{"arm", along_x(12)}, {"hand", along_x(102)}}, ms(2)));
   REQUIRE(arm.forest.update("base", along_x(5)));  // nobody watches that
-  CHECK(listed(group.news(arm.forest)) == "0@2=12 1@2=102 ");
+  CHECK(listed(group.news(arm.forest)) == "0@1=11 1@1=101 0@2=12 1@2=102 ");
   REQUIRE(arm.forest.update({{"arm", along_x(13)}, {"hand", along_x(103)}}, ms(3)));
   REQUIRE(arm.forest.update({{"arm", along_x(14)}, {"hand", along_x(104)}}, ms(4)));
   CHECK(listed(group.news(arm.forest)) == "0@3=13 1@3=103 0@4=14 1@4=104 ");
