@@ -353,6 +353,7 @@ Result<void> Forest::update_partial(const std::vector<PartialUpdate>& edges,
 }
 
 Result<void> Forest::update(const std::vector<TiedUpdate>& edges, std::optional<Time> stamp) {
+  const std::lock_guard lock(impl_->mutex_);
   return impl_->update_all(edges, &TiedUpdate::frame, stamp);
 }
 

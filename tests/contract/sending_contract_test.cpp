@@ -8,19 +8,19 @@
 #include "tfdude/client/client.hpp"
 
 #include "support/catch.hpp"
+#include "support/forest_support.hpp"
 #include "support/networks.hpp"
 #include "support/process.hpp"
 
 namespace tfdude {
 namespace {
 
+using testing::along_x;
 using testing::ContainsSubstring;
 using testing::eventually;
 using testing::Join;
 using testing::joined_by;
 using testing::outcome;
-
-Transform along_x(double x) { return {Pose({1, 0, 0, 0}, {x, 0, 0}), {}}; }
 
 bool is_at(Node& owner, const std::string& parent, const std::string& frame, double x) {
   const auto X = owner.lookup(parent, frame);

@@ -49,13 +49,13 @@ class Member {
   [[nodiscard]] std::unique_ptr<Beats> read(
       std::atomic<int>& matches, std::function<void()> on_sample = [] {}) {
     return std::make_unique<Beats>(
-        Context{*participant_, profiles_, *gate_}, *topic_, "", "presence_reader",
+        Context{*participant_, profiles_, *gate_, counters_}, *topic_, "", "presence_reader",
         Beats::Calls{
             [on_sample](const wire::Presence&, const ertps::GuidPrefix_t&) { on_sample(); },
             [&matches](const ertps::GuidPrefix_t&, int) { ++matches; }});
   }
   [[nodiscard]] std::unique_ptr<Outlet> write() {
-    return std::make_unique<Outlet>(Context{*participant_, profiles_, *gate_}, *topic_, "",
+    return std::make_unique<Outlet>(Context{*participant_, profiles_, *gate_, counters_}, *topic_, "",
                                     "presence_writer");
   }
 
@@ -64,6 +64,7 @@ class Member {
     return *edds::DomainParticipantFactory::get_instance();
   }
 
+  FastDdsCounters counters_;
   const Profiles profiles_ = *Profiles::load(TFDUDE_LOOPBACK_PROFILE);
   const std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
   edds::DomainParticipant* participant_ = nullptr;

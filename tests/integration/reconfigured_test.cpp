@@ -107,7 +107,7 @@ TEST_CASE("reconfigured: an entry that is gone takes its frame, and nothing belo
   CHECK(hears("frame_removed hand"));
   CHECK(hears("frame_orphaned tool"));
   CHECK(hears("frame_orphaned gripper"));
-  REQUIRE(eventually([&] { return client.partitions()[0].reachable; }));
+  REQUIRE(eventually([&] { return client.partitions().value()[0].reachable; }));
   CHECK_FALSE(client.exists("hand"));
   CHECK(client.parent("tool") == std::string("hand"));
   CHECK(client.parent("gripper") == std::string("hand"));
@@ -124,7 +124,7 @@ TEST_CASE("reconfigured: an entry that is gone takes its frame, and nothing belo
   other.kill();
   auto again = arms.domain.start_daemon({"--config", tools, "--state", arms.directory.path()});
   await_ready(again);
-  REQUIRE(eventually([&] { return client.partitions()[1].reachable; }));
+  REQUIRE(eventually([&] { return client.partitions().value()[1].reachable; }));
   CHECK(client.exists("gripper"));
   arms.restart(arms.with_both);
   CHECK(eventually([&] { return x_of(client.lookup("arm", "tip")) == 1110; }));

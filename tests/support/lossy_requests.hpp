@@ -41,6 +41,7 @@ class LossyRequests final : public Transport {
                     Deadline deadline) override {
     return real_->send(partition, update, deadline);
   }
+  Result<void> flush(Deadline deadline) override { return real_->flush(deadline); }
   void reply(const PeerId& to, const Reply& reply) override { real_->reply(to, reply); }
   Result<void> watch(std::uint64_t group) override { return real_->watch(group); }
   void unwatch(std::uint64_t group) override { real_->unwatch(group); }

@@ -148,7 +148,7 @@ class Changer final : public CommitLoop::Effects {
 struct Running {
   explicit Running(CommitLoop::Periods periods = {std::chrono::milliseconds(1), kNever, kNever})
       : loop(std::make_unique<FakeStore>(disk, log), changer, periods) {
-    REQUIRE(loop.start({}));
+    REQUIRE(loop.start({{"world", "", {}}}));
   }
   ~Running() { disk.set(&Disk::stands_still, false); }
 
@@ -257,7 +257,7 @@ TEST_CASE("commit loop: values are stored from time to time, and at the end") {
     const auto period = GENERATE(std::chrono::milliseconds(2), kNever);
     CommitLoop loop(std::make_unique<FakeStore>(disk, log), changer,
                     {std::chrono::milliseconds(1), period, kNever});
-    REQUIRE(loop.start({}));
+    REQUIRE(loop.start({{"world", "", {}}}));
     changer.change_value();
     if (period != kNever) REQUIRE(eventually([&] { return log.has("store 1 values"); }));
   }

@@ -35,6 +35,8 @@ void plant(Forest& forest) {
 
 // ---- add
 
+using ByHandle = std::vector<HandleUpdate>;
+
 TEST_CASE("a frame is added as a root or under a parent") {
   Forest forest;
   CHECK(outcome(forest.add("world", "", along_x(5))) == "ok");
@@ -219,7 +221,7 @@ TEST_CASE("a value that is not finite is refused by frame and field") {
   for (const Result<void>& refused :
        {forest.update("arm", no_place), forest.update(arm, no_place),
         forest.update({{"hand", along_x(1)}, {"arm", no_place}}),
-        forest.update({{*forest.find("hand"), along_x(1)}, {arm, no_place}}),
+        forest.update(ByHandle{{*forest.find("hand"), along_x(1)}, {arm, no_place}}),
         forest.move("arm", "dock", no_place)}) {
     REQUIRE(outcome(refused) == "invalid_input");
     CHECK(refused.error().message == "frame 'arm': translation.y is not a finite number");
@@ -237,12 +239,12 @@ TEST_CASE("a batch by handles is applied as a whole or not at all") {
   plant(forest);
   REQUIRE(forest.put_remote("far", "world", 1));
   const auto handle = [&](const char* id) { return forest.find(id).value(); };
-  CHECK(outcome(forest.update({{handle("arm"), along_x(20)}, {handle("hand"), along_x(200)}})) ==
+  CHECK(outcome(forest.update(ByHandle{{handle("arm"), along_x(20)}, {handle("hand"), along_x(200)}})) ==
         "ok");
   CHECK(x_of(forest.lookup("base", "hand")) == 220);
-  CHECK(outcome(forest.update({{handle("arm"), along_x(30)}, {Handle{}, along_x(1)}})) ==
+  CHECK(outcome(forest.update(ByHandle{{handle("arm"), along_x(30)}, {Handle{}, along_x(1)}})) ==
         "unknown_frame");
-  CHECK(outcome(forest.update({{handle("arm"), along_x(30)}, {handle("far"), along_x(1)}})) ==
+  CHECK(outcome(forest.update(ByHandle{{handle("arm"), along_x(30)}, {handle("far"), along_x(1)}})) ==
         "not_owner");
   CHECK(x_of(forest.lookup("base", "hand")) == 220);
 }
