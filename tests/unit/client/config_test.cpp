@@ -187,7 +187,7 @@ TEST_CASE("how much is kept of the past is said for the file and for each frame"
           "restart_after");
   refused("{max_ahead: -1}", ": max_ahead is not within 0 and 1e9 seconds, nor none");
   refused("{max_ahead: .nan}", ": max_ahead is not a finite number");
-  refused("{max_ahead: some}", ": max_ahead is not");
+  refused("{max_ahead: some}", ": max_ahead is 'some', which is not a number");
   refused("{restart_after: 1.5}", ": restart_after is not a whole number within");
   refused("3", " is not a mapping");
   CHECK(tfdude::parse_config("history: {max_ahead: 0}\n", "f")->history.max_ahead.count() == 0);

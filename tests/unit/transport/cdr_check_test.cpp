@@ -134,7 +134,7 @@ TEST_CASE("only plain CDR passes, of either byte order") {
 TEST_CASE("an id has at most 255 bytes, its closing zero, and no other") {
   const auto move = [](const Cdr& id) {
     Cdr cdr(id);
-    return request(cdr.octet(4).string("arm").ulong(0).ulong(0));
+    return request(cdr.octet(4).string("arm").ulong(0).ulong(0).ulonglong(0));
   };
   CHECK(move(Cdr().string("hand")));
   CHECK(move(Cdr().string("")));
@@ -176,31 +176,31 @@ Cdr tops(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("hand").octet(2).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.string("t");
-  return cdr.ulong(0).ulong(0);
+  return cdr.ulong(0).ulong(0).ulonglong(0);
 }
 Cdr more_edges(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("hand").octet(3).transform().ulonglong(0).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.edge("e");
-  return cdr.ulong(0).ulong(0);
+  return cdr.ulong(0).ulong(0).ulonglong(0);
 }
 Cdr segments(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("hand").octet(6).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.string("a").string("b");
-  return cdr.ulong(0).ulong(0);
+  return cdr.ulong(0).ulong(0).ulonglong(0);
 }
 Cdr segments_at(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("hand").octet(7).ulonglong(1).ulonglong(2).ulonglong(3).ulonglong(4).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.string("a").string("b");
-  return cdr.octet(2).octet(0).ulong(0).ulong(0);
+  return cdr.octet(2).octet(0).ulong(0).ulong(0).ulonglong(0);
 }
 Cdr watched(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("hand").octet(8).ulonglong(1).ulonglong(2).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.string("a").string("b");
-  return cdr.octet(0).ulong(0).ulong(0);
+  return cdr.octet(0).ulong(0).ulong(0).ulonglong(0);
 }
 Cdr stamped(std::size_t count, std::uint64_t length) {
   Cdr cdr;
@@ -216,21 +216,22 @@ Cdr at_hint(std::size_t count, std::uint64_t length) {
 }
 Cdr state_entries(std::size_t count, std::uint64_t length) {
   Cdr cdr;
-  cdr.ulonglong(0).ulong(length);
-  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(1).transform().ulong(3);
-  return cdr.ulong(0);
+  cdr.ulonglong(0).ulonglong(0).ulonglong(0).ulong(0).ulong(1).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(1).ulonglong(2).transform().ulong(3);
+  return cdr.ulong(0).ulong(0);
 }
 Cdr replied_entries(std::size_t count, std::uint64_t length) {
   Cdr cdr;
-  cdr.ulonglong(0).ulong(0).octet(5).ulonglong(0).ulong(length);
-  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(1).transform().ulong(3);
-  return cdr.ulong(0);
+  cdr.ulonglong(0).ulong(0).octet(5);
+  cdr.ulonglong(0).ulonglong(0).ulonglong(0).ulong(0).ulong(1).ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(1).ulonglong(2).transform().ulong(3);
+  return cdr.ulong(0).ulong(0);
 }
 Cdr pasts(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.ulonglong(0).ulong(0).octet(6).ulong(length);
   for (std::size_t i = 0; i < count; ++i) {
-    for (int field = 0; field < 11; ++field) cdr.ulonglong(1);
+    for (int field = 0; field < 12; ++field) cdr.ulonglong(1);
     cdr.string("a");
   }
   return cdr;
@@ -275,7 +276,7 @@ Cdr asked_positions(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("arm").octet(12).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.string("elbow").ulonglong(1).ulonglong(2);
-  return cdr.ulonglong(0).ulong(0).ulong(0);
+  return cdr.ulonglong(0).ulong(0).ulong(0).ulonglong(0);
 }
 Cdr joint_states(std::size_t count, std::uint64_t length) {
   Cdr cdr;
