@@ -13,12 +13,15 @@ namespace {
 
 using Kind = ConfiguredChange::Kind;
 
+// A rotation that was stored is made a unit quaternion anew as it is read, which may change its last digit.
+constexpr double kSameRotation = 1e-14;
+
 bool same_edge(const FrameSpec& a, const FrameSpec& b) {
   const Transform X = value_of(a);
   const Transform Y = value_of(b);
   return a.parent == b.parent && X.covariance.upper() == Y.covariance.upper() &&
          X.pose.translation() == Y.pose.translation() &&
-         X.pose.rotation().coeffs() == Y.pose.rotation().coeffs();
+         X.pose.rotation().coeffs().isApprox(Y.pose.rotation().coeffs(), kSameRotation);
 }
 
 // @param was  the entry when the configuration was taken last; null: there was none
