@@ -23,7 +23,7 @@ inline void require_numbers(CLI::App& app) {
   for (CLI::Option* option : app.get_options([](CLI::Option* one) {
          const std::string type = one->get_type_name();
          const bool takes_text = type.rfind("TEXT", 0) == 0 || type.rfind("FILE", 0) == 0;
-         return one->get_type_size_max() > 0 && !takes_text;
+         return one->get_items_expected_max() > 0 && !takes_text;  // a flag expects none
        })) {
     option->check([](const std::string& text) {
       return is_number(text) ? std::string() : "'" + text + "' is not a number";
