@@ -22,12 +22,16 @@ namespace tfdude::cli {
 inline void require_numbers(CLI::App& app) {
   for (CLI::Option* option : app.get_options([](CLI::Option* one) {
          const std::string type = one->get_type_name();
-         const bool takes_text = type.rfind("TEXT", 0) == 0 || type.rfind("FILE", 0) == 0;
+         const bool takes_text = type.rfind("TEXT", 0) == 0 || type.rfind("FILE", 0) == 0 ||
+                                 type.rfind("NAME", 0) == 0;  // with numbers, which are read later
          return one->get_items_expected_max() > 0 && !takes_text;  // a flag expects none
        })) {
-    option->check([](const std::string& text) {
-      return is_number(text) ? std::string() : "'" + text + "' is not a number";
-    });
+    // Before what else is checked of it, as its range.
+    option->transform(CLI::Validator(
+        [](const std::string& text) {
+          return is_number(text) ? std::string() : "'" + text + "' is not a number";
+        },
+        std::string()));
   }
   for (CLI::App* command : app.get_subcommands({})) require_numbers(*command);
 }

@@ -161,7 +161,7 @@ TEST_CASE("pictures: the forest is drawn in each format") {
   CHECK(text(d, {"graph", "--out", dot}) == "wrote " + dot + "\n");
   const std::string drawn = read(dot);
   CHECK_THAT(drawn, ContainsSubstring("\"world\" -> \"robot_1\" [label=\" ±30 mm ±0.57° \"]"));
-  CHECK_THAT(drawn, ContainsSubstring("\"arm_1\" -> \"arm_2\" [label=\" 2 h \"]"));
+  CHECK_THAT(drawn, ContainsSubstring("\"arm_1\" -> \"arm_2\" [label=\" 2 h  ±1 mm ±0.057° \"]"));
   CHECK_THAT(drawn, ContainsSubstring("\"arm_1\" -> \"arm_left\"\n"));
   CHECK_THAT(drawn, ContainsSubstring("pid " + std::to_string(d.arms->pid())));
   const CliResult plain = run({"/usr/bin/env", "dot", "-Tplain", dot});
