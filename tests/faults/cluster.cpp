@@ -42,7 +42,7 @@ END
 constexpr const char* kFakeTime = "/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1";
 
 // Room for the state of all daemons, and not more.
-constexpr const char* kDiskSize = "size=16m";
+constexpr const char* kDiskSize = "size=64m";
 
 std::string config_of(std::size_t partition) {
   const Eigen::Vector3d t = base_edge(partition).pose.translation();
