@@ -96,7 +96,7 @@ WatchedPath::Taken WatchedPath::take(const State& state) {
     taken.lacks = latest != nullptr && latest->lacks();
     if (news) messages_.fetch_add(1, std::memory_order_relaxed);
   }
-  if (news) changed_.notify_all();
+  changed_.notify_all();  // samples of the past are no news, but waited for
   return taken;
 }
 
