@@ -182,7 +182,7 @@ Result<std::size_t> Joints::apply(const JointUpdate& update) {
     }
     updates_.push_back(one);
   }
-  auto updated = forest_.update(updates_, update.stamp);
+  auto updated = forest_.update_tied(updates_, update.stamp);
   if (!updated && updated.error().code == Errc::kUnknownFrame) {
     forget_removed();
     return apply(update);

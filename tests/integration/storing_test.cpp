@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -32,6 +33,26 @@ frames:
   - {id: arm, xyz: [1, 0, 0]}
   - {id: hand, parent: arm, xyz: [10, 0, 0]}
 )";
+
+// A daemon that keeps its state on a disk, and can be killed and started again.
+struct Arms {
+  explicit Arms(const SmallDisk& disk)
+      : arguments{"--config", files.write("arms.yaml", kArms), "--state", disk.path()},
+        daemon(domain.start_daemon(arguments)) {
+    await_ready(*daemon);
+  }
+
+  void restart() {
+    daemon->kill();
+    daemon.emplace(domain.start_daemon(arguments));
+    await_ready(*daemon);
+  }
+
+  TestDomain domain;
+  TemporaryDirectory files;
+  std::vector<std::string> arguments;
+  std::optional<Process> daemon;
+};
 
 // Adds frames until the disk takes no more. @return those that were acknowledged
 std::vector<std::string> add_until_full(Client& client, const std::string& name,
@@ -75,12 +96,8 @@ TEST_CASE("storing: of what a full disk does not take nothing is called done, or
     WARN("SKIPPED: a small disk needs root");
     return;
   }
-  const TestDomain domain;
-  const TemporaryDirectory files;
-  const std::vector<std::string> arguments{"--config", files.write("arms.yaml", kArms), "--state",
-                                           disk.path()};
-  auto daemon = domain.start_daemon(arguments);
-  await_ready(daemon);
+  Arms arms(disk);
+  const TestDomain& domain = arms.domain;
   auto client = *Client::open(domain.options());
   REQUIRE(client.add("kept", "hand", {}));
   REQUIRE(client.add("gone", "hand", {}));
@@ -110,9 +127,7 @@ TEST_CASE("storing: of what a full disk does not take nothing is called done, or
     there.push_back(refused);
   }
   SECTION("until then it is lost with the process, and nothing else is") { disk.make_room(); }
-  daemon.kill();
-  auto again = domain.start_daemon(arguments);
-  await_ready(again);
+  arms.restart();
   for (const std::string& id : there) CHECK(eventually([&] { return client.exists(id); }));
   auto fresh = *Client::open(domain.options());
   CHECK_FALSE(fresh.exists("gone"));
@@ -124,13 +139,8 @@ TEST_CASE("storing: a removal that was refused has not happened after a kill") {
     WARN("SKIPPED: a small disk needs root");
     return;
   }
-  const TestDomain domain;
-  const TemporaryDirectory files;
-  const std::vector<std::string> arguments{"--config", files.write("arms.yaml", kArms), "--state",
-                                           disk.path()};
-  auto daemon = domain.start_daemon(arguments);
-  await_ready(daemon);
-  auto client = *Client::open(domain.options());
+  Arms arms(disk);
+  auto client = *Client::open(arms.domain.options());
   disk.fill();
   int acknowledged = 0;
   std::string last;
@@ -146,11 +156,9 @@ TEST_CASE("storing: a removal that was refused has not happened after a kill") {
     ++acknowledged;
   }
   INFO(acknowledged << " removals were stored");
-  daemon.kill();
   disk.make_room();
-  auto again = domain.start_daemon(arguments);
-  await_ready(again);
-  auto fresh = *Client::open(domain.options());
+  arms.restart();
+  auto fresh = *Client::open(arms.domain.options());
   CHECK(fresh.exists("hand") == (last == "hand"));
 }
 

@@ -13,39 +13,40 @@
 namespace tfdude::testing {
 
 #if TFDUDE_FASTDDS_MAJOR == 2
+namespace settings = eprosima::fastrtps;
+#else
+namespace settings = eprosima::fastdds;
+#endif
 
-using Intraprocess = eprosima::fastrtps::IntraprocessDeliveryType;
-inline constexpr auto kIntraprocessOff = eprosima::fastrtps::INTRAPROCESS_OFF;
-inline constexpr auto kIntraprocessUserData = eprosima::fastrtps::INTRAPROCESS_USER_DATA_ONLY;
-inline constexpr auto kIntraprocessFull = eprosima::fastrtps::INTRAPROCESS_FULL;
+using Intraprocess = settings::IntraprocessDeliveryType;
+inline constexpr auto kIntraprocessOff = settings::INTRAPROCESS_OFF;
+inline constexpr auto kIntraprocessUserData = settings::INTRAPROCESS_USER_DATA_ONLY;
+inline constexpr auto kIntraprocessFull = settings::INTRAPROCESS_FULL;
+
+#if TFDUDE_FASTDDS_MAJOR == 2
 
 inline void set_intraprocess(Intraprocess delivery) {
-  eprosima::fastrtps::LibrarySettingsAttributes settings;
-  settings.intraprocess_delivery = delivery;
-  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+  settings::LibrarySettingsAttributes wanted;
+  wanted.intraprocess_delivery = delivery;
+  settings::xmlparser::XMLProfileManager::library_settings(wanted);
 }
 
 inline Intraprocess intraprocess() {
-  return eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings().intraprocess_delivery;
+  return settings::xmlparser::XMLProfileManager::library_settings().intraprocess_delivery;
 }
 
 #else
 
-using Intraprocess = eprosima::fastdds::IntraprocessDeliveryType;
-inline constexpr auto kIntraprocessOff = eprosima::fastdds::INTRAPROCESS_OFF;
-inline constexpr auto kIntraprocessUserData = eprosima::fastdds::INTRAPROCESS_USER_DATA_ONLY;
-inline constexpr auto kIntraprocessFull = eprosima::fastdds::INTRAPROCESS_FULL;
-
 inline void set_intraprocess(Intraprocess delivery) {
-  eprosima::fastdds::LibrarySettings settings;
-  settings.intraprocess_delivery = delivery;
-  fastdds::edds::DomainParticipantFactory::get_instance()->set_library_settings(settings);
+  settings::LibrarySettings wanted;
+  wanted.intraprocess_delivery = delivery;
+  fastdds::edds::DomainParticipantFactory::get_instance()->set_library_settings(wanted);
 }
 
 inline Intraprocess intraprocess() {
-  eprosima::fastdds::LibrarySettings settings;
-  fastdds::edds::DomainParticipantFactory::get_instance()->get_library_settings(settings);
-  return settings.intraprocess_delivery;
+  settings::LibrarySettings found;
+  fastdds::edds::DomainParticipantFactory::get_instance()->get_library_settings(found);
+  return found.intraprocess_delivery;
 }
 
 #endif

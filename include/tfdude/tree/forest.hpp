@@ -269,9 +269,9 @@ class Forest {
                                     std::optional<Time> stamp = std::nullopt);
   [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges,
                                     std::optional<Time> stamp = std::nullopt);
-  /// @return kInvalidInput also where a correlation is none, naming the source.
-  [[nodiscard]] Result<void> update(const std::vector<TiedUpdate>& edges,
-                                    std::optional<Time> stamp = std::nullopt);
+  /// The same with correlations. @return as update(); kInvalidInput also where a correlation is none, naming the source.
+  [[nodiscard]] Result<void> update_tied(const std::vector<TiedUpdate>& edges,
+                                         std::optional<Time> stamp = std::nullopt);
 
   /// Gives parts of edges new values, as one commit: what is absent stays as it is in the newest value of then.
   /// @return as update(); kInvalidInput also where a part is none (naming it).
