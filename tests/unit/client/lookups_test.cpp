@@ -26,6 +26,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using testing::along_x;
+using testing::Approx;
 using testing::ContainsSubstring;
 using testing::eventually;
 using testing::outcome;

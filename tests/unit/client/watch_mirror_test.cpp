@@ -10,6 +10,7 @@ namespace tfdude {
 namespace {
 
 using testing::along_x;
+using testing::Approx;
 using testing::outcome;
 
 Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
