@@ -62,8 +62,9 @@ void log_configured(const StoredState& state, const std::vector<FrameSpec>& fram
   if (state.configured.empty() && state.frames.empty()) return;
   for (const ConfiguredChange& change : configured_changes(state, frames)) {
     if (change.kind == ConfiguredChange::Kind::kOrphan) continue;
-    const bool removes = change.kind == ConfiguredChange::Kind::kRemove;
-    log().log(removes ? spdlog::level::warn : spdlog::level::info, "configuration: {}",
+    const bool loses = change.kind == ConfiguredChange::Kind::kRemove ||
+                       change.kind == ConfiguredChange::Kind::kRest;
+    log().log(loses ? spdlog::level::warn : spdlog::level::info, "configuration: {}",
               describe(change));
   }
 }
@@ -185,7 +186,9 @@ void Participant::concede() {
     tell_changes();
   }
   if (more) conceder_->ask();
-  if (changed) commits_->ask();
+  if (!changed) return;
+  commits_->ask();
+  look_at_watches();
 }
 
 // Whether all that those who are reachable had changed when this was called is known here now.

@@ -29,15 +29,20 @@ Error beyond_limits(const JointSpec& spec, double position) {
 
 }  // namespace
 
+bool is_position(double position) {
+  return std::isfinite(position) && std::abs(position) <= kMaxTranslation;
+}
+
+bool is_variance(double variance) { return variance >= 0 && variance <= kMaxVariance; }
+
 Result<void> check_value(const JointValue& joint) {
-  const std::string who = "joint " + quote(joint.name);
-  if (!std::isfinite(joint.position) || std::abs(joint.position) > kMaxTranslation) {
-    return fail(Errc::kInvalidInput, who + ": position is not a number, or beyond 1e9");
-  }
-  if (!(joint.variance >= 0) || joint.variance > kMaxVariance) {
-    return fail(Errc::kInvalidInput, who + ": variance is not a number within 0 to 1e18");
-  }
-  return {};
+  const char* what = nullptr;
+  if (!is_position(joint.position))
+    what = ": position is not a number, or beyond 1e9";
+  else if (!is_variance(joint.variance))
+    what = ": variance is not a number within 0 to 1e18";
+  if (what == nullptr) return {};
+  return fail(Errc::kInvalidInput, "joint " + quote(joint.name) + what);
 }
 
 Result<void> check_joints(const std::vector<FrameSpec>& frames) {
@@ -63,7 +68,7 @@ std::optional<StoredJoint> left_of(const JointSpec& joint, const std::vector<Sto
   if (const auto leader = joint.mimic ? named(joint.mimic->joint) : left.end();
       leader != left.end()) {
     return StoredJoint{joint.name, joint.mimic->position(leader->position),
-                       joint.mimic->variance(leader->variance)};
+                       joint.mimic->variance(leader->variance), joint.type};
   }
   const auto own = named(joint.name);
   return own != left.end() ? std::optional<StoredJoint>(*own) : std::nullopt;
@@ -128,7 +133,9 @@ Result<void> Joints::plan(const JointValue& value) {
     const JointSpec& spec = mover.spec;
     const Mimic mimic = spec.mimic.value_or(Mimic{});
     Step step{index, mimic.position(value.position), mimic.variance(value.variance)};
-    if (auto ok = check_value({spec.name, step.position, step.variance}); !ok) return ok;
+    if (!is_position(step.position) || !is_variance(step.variance)) {
+      return check_value({spec.name, step.position, step.variance});
+    }
     if (std::exchange(mover.planned, plans_) == plans_) {
       return fail(Errc::kInvalidInput, "joint " + quote(value.name) + " is named twice");
     }
@@ -210,7 +217,7 @@ std::vector<StoredJoint> Joints::take_changed() {
   std::vector<StoredJoint> changed;
   for (Mover& mover : movers_) {
     if (!mover.changed) continue;
-    changed.push_back({mover.spec.name, mover.position, mover.variance});
+    changed.push_back({mover.spec.name, mover.position, mover.variance, mover.spec.type});
     mover.changed = false;
   }
   return changed;

@@ -24,7 +24,8 @@ FrameSpec as_left(FrameSpec frame, const std::vector<StoredJoint>& joints) {
 }
 
 // Frames as they were left; those that joints move, where these were left, by what their descriptions say today.
-std::vector<StoredFrame> frames_of(const StoredState& state,
+// @param joints  those of the state that are still meant
+std::vector<StoredFrame> frames_of(const StoredState& state, const std::vector<StoredJoint>& joints,
                                    const std::vector<FrameSpec>& configured) {
   const auto described = by_id(configured);
   std::vector<StoredFrame> frames = state.frames;
@@ -33,7 +34,7 @@ std::vector<StoredFrame> frames_of(const StoredState& state,
     if (known == described.end() || !known->second->joint) continue;
     if (known->second->parent != frame.parent) continue;
     if (!left_of(*known->second->joint, state.joints)) continue;
-    frame.X_PC = value_of(as_left(*known->second, state.joints));
+    frame.X_PC = value_of(as_left(*known->second, joints));
     frame.ties.observed.reset();
   }
   return frames;
@@ -44,7 +45,8 @@ std::vector<StoredFrame> frames_of(const StoredState& state,
 Result<void> Partition::restore(const StoredState& state, const std::vector<FrameSpec>& configured,
                                 Time now) {
   if (auto ok = check_joints(configured); !ok) return ok;
-  const std::vector<StoredFrame> frames = frames_of(state, configured);
+  const std::vector<StoredJoint> joints = still_meant(state.joints, configured);
+  const std::vector<StoredFrame> frames = frames_of(state, joints, configured);
   for (const StoredFrame& frame : frames) directory_.saw_stamp(frame.since);
   for (const Note& note : state.notes) directory_.saw_stamp(note.since);
   // All that others have no older claim to is taken before any of it is hung, so that it does not matter in which
@@ -71,8 +73,8 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   directory_.find_orphans();
   while (concede(concessions(), now)) {
   }
-  auto taken = reconfigure(state, configured, now);
-  if (taken) hang_on_joints(configured, state.joints);
+  auto taken = reconfigure(state, joints, configured, now);
+  if (taken) hang_on_joints(configured, joints);
   pages_.close_epoch();
   return taken;
 }
@@ -102,6 +104,7 @@ void Partition::make_root(const StoredFrame& frame, Time now) {
 }
 
 Result<void> Partition::reconfigure(const StoredState& state,
+                                    const std::vector<StoredJoint>& joints,
                                     const std::vector<FrameSpec>& configured, Time now) {
   using Kind = ConfiguredChange::Kind;
   const auto entries = by_id(configured);
@@ -112,7 +115,7 @@ Result<void> Partition::reconfigure(const StoredState& state,
     switch (change.kind) {
       case Kind::kAdd:
       case Kind::kReplace:
-        fresh.push_back(as_left(*entries.at(id), state.joints));
+        fresh.push_back(as_left(*entries.at(id), joints));
         // Its parent may come later: as a missing one is allowed for what is loaded, so it is here.
         release(id);
         break;
@@ -124,6 +127,7 @@ Result<void> Partition::reconfigure(const StoredState& state,
       case Kind::kRemove:
         if (release(id)) dropped.push_back(id);
         break;
+      case Kind::kRest:
       case Kind::kOrphan:
         break;
     }

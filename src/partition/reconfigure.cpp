@@ -31,7 +31,53 @@ std::optional<Kind> effect(const FrameSpec& entry, const FrameSpec* was, bool is
   return std::nullopt;
 }
 
+bool is_same_unit(JointType a, JointType b) {
+  return (a == JointType::kPrismatic) == (b == JointType::kPrismatic);
+}
+
+// By the names of stored joints: why their positions are numbers of another unit now; empty where they are not.
+using Meanings = std::map<std::string_view, std::string>;
+
+Meanings meanings_of(const std::vector<StoredJoint>& joints,
+                     const std::vector<FrameSpec>& configured) {
+  std::map<std::string_view, JointType> described;
+  for (const FrameSpec& frame : configured) {
+    if (frame.joint) described.emplace(frame.joint->name, frame.joint->type);
+  }
+  Meanings meanings;
+  for (const StoredJoint& joint : joints) {
+    std::string& why = meanings[joint.name];
+    const auto now = described.find(joint.name);
+    if (now == described.end() || !joint.type || is_same_unit(*joint.type, now->second)) continue;
+    why = "joint " + quote(joint.name) + " is " + to_string(now->second) + ", and was " +
+          to_string(*joint.type);
+  }
+  return meanings;
+}
+
+// Why the number that tells where a frame's joint was left, see left_of(), means nothing any more; null: it does.
+const std::string* why_at_rest(const Meanings& meanings, const FrameSpec& frame) {
+  if (!frame.joint) return nullptr;
+  auto found = meanings.find(leader_of(*frame.joint));
+  if (found == meanings.end()) found = meanings.find(frame.joint->name);
+  return found != meanings.end() && !found->second.empty() ? &found->second : nullptr;
+}
+
 }  // namespace
+
+std::vector<StoredJoint> still_meant(const std::vector<StoredJoint>& joints,
+                                     const std::vector<FrameSpec>& configured) {
+  const Meanings meanings = meanings_of(joints, configured);
+  std::set<std::string_view> at_rest;
+  for (const FrameSpec& frame : configured) {
+    if (why_at_rest(meanings, frame) != nullptr) at_rest.insert(frame.joint->name);
+  }
+  std::vector<StoredJoint> meant;
+  for (const StoredJoint& joint : joints) {
+    if (at_rest.count(joint.name) == 0) meant.push_back(joint);
+  }
+  return meant;
+}
 
 std::vector<ConfiguredChange> configured_changes(const StoredState& state,
                                                  const std::vector<FrameSpec>& configured) {
@@ -41,7 +87,11 @@ std::vector<ConfiguredChange> configured_changes(const StoredState& state,
   for (const FrameSpec& frame : state.configured) before.emplace(frame.id, &frame);
   std::map<std::string_view, std::string_view> parents;  // of those that are there
   for (const StoredFrame& frame : state.frames) parents.emplace(frame.id, frame.parent);
+  const Meanings meanings = meanings_of(state.joints, configured);
   for (const FrameSpec& entry : configured) {
+    if (const auto* why = why_at_rest(meanings, entry)) {
+      changes.push_back({Kind::kRest, entry.id, {}, *why});
+    }
     const auto was = before.find(entry.id);
     const bool is_there = parents.count(entry.id) != 0;
     const auto kind = effect(entry, was != before.end() ? was->second : nullptr, is_there);
@@ -65,8 +115,7 @@ std::vector<ConfiguredChange> configured_changes(const StoredState& state,
 
 std::string describe(const ConfiguredChange& change) {
   const std::string frame = "frame " + quote(change.frame);
-  const std::string under =
-      change.parent.empty() ? " as a root" : " under " + quote(change.parent);
+  const std::string under = change.parent.empty() ? " as a root" : " under " + quote(change.parent);
   switch (change.kind) {
     case Kind::kAdd:
       return frame + ": added" + under;
@@ -76,6 +125,8 @@ std::string describe(const ConfiguredChange& change) {
       return frame + ": its correlation is as its entry says now";
     case Kind::kRemove:
       return frame + ": removed, as its entry is gone";
+    case Kind::kRest:
+      return frame + ": at rest, its stored position is not taken: " + change.why;
     case Kind::kOrphan:
       return frame + ": waits for its parent " + quote(change.parent) + ", which is removed";
   }

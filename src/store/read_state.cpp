@@ -78,7 +78,10 @@ Result<void> load_configured(const Database& database, std::int64_t /*format*/, 
 
 Result<void> load_joints(const Database& database, std::int64_t format, StoredState& state) {
   if (format < kJointsFormat) return {};
-  const char* sql = "SELECT name, position, variance FROM joints ORDER BY name";
+  const char* sql = format < kTiesFormat
+                        ? "SELECT name, position, variance, 0 FROM joints ORDER BY name"
+                        : "SELECT name, position, variance, coalesce(type, 0) FROM joints "
+                          "LEFT JOIN joint_types USING(name) ORDER BY name";
   return each_row(database, sql, [&](const Statement& row) -> Result<void> {
     auto joint = read_joint(row);
     if (!joint) return tl::unexpected(std::move(joint.error()));

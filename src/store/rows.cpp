@@ -75,13 +75,19 @@ Result<KeptTies> read_ties(const sqlite::Statement& row) {
 }
 
 Result<StoredJoint> read_joint(const sqlite::Statement& row) {
-  if (auto ok = row.check_types({SQLITE_TEXT, SQLITE_FLOAT, SQLITE_FLOAT}); !ok) {
+  if (auto ok = row.check_types({SQLITE_TEXT, SQLITE_FLOAT, SQLITE_FLOAT, SQLITE_INTEGER}); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
   StoredJoint joint{row.text(0), row.real(1), row.real(2)};
   auto ok = check_id(joint.name, "joint");
   if (ok) ok = check_value({joint.name, joint.position, joint.variance});
   if (!ok) return tl::unexpected(std::move(ok.error()));
+  const auto type = row.number(3);
+  if (type == kNoType) return joint;
+  if (type > static_cast<std::uint64_t>(JointType::kPrismatic)) {
+    return fail(Errc::kState, "joint " + quote(joint.name) + " of type " + std::to_string(type));
+  }
+  joint.type = static_cast<JointType>(type);
   return joint;
 }
 

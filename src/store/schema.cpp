@@ -14,14 +14,15 @@ constexpr std::array<const char*, kFormat> kSchemas{R"(
   CREATE TABLE configured(id TEXT PRIMARY KEY, parent TEXT NOT NULL, x_pc BLOB NOT NULL)
                      WITHOUT ROWID;
 )",
-                                              R"(
+                                                    R"(
   CREATE TABLE joints(name TEXT PRIMARY KEY, position REAL NOT NULL, variance REAL NOT NULL)
                      WITHOUT ROWID;
 )",
-                                              R"(
+                                                    R"(
   CREATE TABLE ties(id TEXT PRIMARY KEY, said BLOB NOT NULL, observed BLOB NOT NULL)
                      WITHOUT ROWID;
   CREATE TABLE configured_ties(id TEXT PRIMARY KEY, said BLOB NOT NULL) WITHOUT ROWID;
+  CREATE TABLE joint_types(name TEXT PRIMARY KEY, type INTEGER NOT NULL) WITHOUT ROWID;
 )"};
 
 }  // namespace

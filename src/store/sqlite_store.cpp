@@ -9,6 +9,7 @@
 #include "tfdude/partition/joints.hpp"
 
 #include "store/read_state.hpp"
+#include "store/rows.hpp"
 #include "store/schema.hpp"
 #include "store/sqlite.hpp"
 #include "store/ties_blob.hpp"
@@ -74,6 +75,7 @@ class SqliteStore final : public StateStore {
   Statement put_configured_;
   // Of tables that an older format has not got.
   Statement put_joint_;
+  Statement put_joint_type_;
   Statement erase_ties_;
   Statement put_ties_;
   Statement put_configured_ties_;
@@ -216,6 +218,7 @@ Result<void> SqliteStore::prepare() {
 Result<void> SqliteStore::prepare_newer() {
   const std::pair<Statement*, const char*> all[] = {
       {&put_joint_, "INSERT OR REPLACE INTO joints VALUES(?1, ?2, ?3)"},
+      {&put_joint_type_, "INSERT OR REPLACE INTO joint_types VALUES(?1, ?2)"},
       {&erase_ties_, "DELETE FROM ties WHERE id = ?1"},
       {&put_ties_,
        "INSERT INTO ties SELECT ?1, ?2, ?3 WHERE EXISTS(SELECT 1 FROM frames WHERE id = ?1)"},
@@ -281,7 +284,9 @@ Result<void> SqliteStore::save(const StateChange& change) {
 Result<void> SqliteStore::save_joints(const std::vector<StoredJoint>& joints) {
   Result<void> done;
   for (const StoredJoint& joint : joints) {
+    const auto type = joint.type ? static_cast<std::uint64_t>(*joint.type) : kNoType;
     if (done) done = put_joint_.run(joint.name, joint.position, joint.variance);
+    if (done) done = put_joint_type_.run(joint.name, type);
   }
   return done;
 }

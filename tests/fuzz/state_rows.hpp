@@ -30,6 +30,7 @@ class RowWriter {
         "INSERT OR REPLACE INTO notes VALUES(?1, ?4, ?5, ?2)",
         "INSERT OR REPLACE INTO configured VALUES(?1, ?2, ?3)",
         "INSERT OR REPLACE INTO joints VALUES(?1, ?4, ?5)",
+        "INSERT OR REPLACE INTO joint_types VALUES(?1, ?4)",
         "INSERT OR REPLACE INTO ties VALUES(?1, zeroblob(9), x'')",
         "INSERT OR REPLACE INTO ties VALUES(?1, zeroblob(9), ?3)",
         "INSERT OR REPLACE INTO configured_ties VALUES(?1, zeroblob(9))",
@@ -46,8 +47,10 @@ class RowWriter {
         "UPDATE sqlite_master SET sql = replace(sql, 'PRIMARY KEY', '') WHERE name = 'frames'",
         "UPDATE sqlite_master SET rootpage = 3 WHERE name = 'notes'",
         "PRAGMA user_version = 4",
-        "DROP TABLE ties; DROP TABLE configured_ties; PRAGMA user_version = 2",
-        "DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joints; PRAGMA user_version = 1",
+        "DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; PRAGMA user_version "
+        "= 2",
+        "DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; DROP TABLE joints; "
+        "PRAGMA user_version = 1",
     };
     if (rarely()) {
       run(choices_.PickValueInArray(kOthers));

@@ -16,6 +16,10 @@ namespace tfdude {
 /// @return kInvalidInput naming the joint and the field: not a number, too large, a negative variance.
 [[nodiscard]] Result<void> check_value(const JointValue& joint);
 
+/// What check_value() takes.
+[[nodiscard]] bool is_position(double position);
+[[nodiscard]] bool is_variance(double variance);
+
 /// check_joint() of all frames that have one; the error names the frame, too.
 [[nodiscard]] Result<void> check_joints(const std::vector<FrameSpec>& frames);
 

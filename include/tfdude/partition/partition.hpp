@@ -117,6 +117,7 @@ class Partition {
   [[nodiscard]] bool hang_again(const StoredFrame& frame);
   void make_root(const StoredFrame& frame, Time now);
   [[nodiscard]] Result<void> reconfigure(const StoredState& state,
+                                         const std::vector<StoredJoint>& joints,
                                          const std::vector<FrameSpec>& configured, Time now);
   bool release(const std::string& id);
   void tell_dropped(const std::string& id, Time now);

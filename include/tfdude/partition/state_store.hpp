@@ -35,6 +35,7 @@ struct StoredJoint {
   std::string name;
   double position = 0;
   double variance = 0;
+  std::optional<JointType> type{};  ///< of then; absent: it was stored without
 };
 
 /// All that outlives a partition's process.

@@ -59,6 +59,7 @@ TEST_CASE("a state of format 2 has all that was stored in it") {
   REQUIRE(state->joints.size() == 1);
   CHECK(state->joints[0].name == "r_hinge_2");
   CHECK(state->joints[0].position == 0.25);
+  CHECK_FALSE(state->joints[0].type);
   CHECK(state->joints[0].variance == Approx(0.003 * 0.003));
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tfdude/partition/partition.hpp"
+#include "tfdude/partition/reconfigure.hpp"
 #include "tfdude/partition/routing.hpp"
 
 #include "support/catch.hpp"
@@ -285,6 +286,51 @@ TEST_CASE("a partition comes back with its joints where they were") {
           "");
     CHECK(arm.info("wrist").position == 2 * 0.75 + 0.125);
     CHECK(std::abs(arm.edge("upper", "hand").covariance.stddev()[5] - 0.2) < 1e-12);
+  }
+  SECTION("limits have been narrowed: what is outside is kept, and counted") {
+    auto frames = arm.frames();
+    frames[1].joint->limits = JointLimits{-0.25, 0.25};
+    REQUIRE(arm.partition.restore(*store.load(), frames, kNow));
+    CHECK(arm.info("shoulder").position == 0.5);
+    CHECK(arm.info("shoulder").outside == 1);
+    CHECK(arm.info("elbow").outside == 0);
+  }
+  SECTION(
+      "a joint that turned slides now: its number is none of metres, nor that of its follower") {
+    auto frames = arm.frames();
+    const FrameSpec before = frames[2];
+    frames[2].joint->type = JointType::kPrismatic;
+    frames[2].joint->joint = slider(along_x(1), {0, 0, 1});
+    // Seen at rest or not.
+    frames[2].joint->variance = GENERATE(0.25, 0.09);
+    const auto changes = configured_changes(*store.load(), frames);
+    REQUIRE(changes.size() >= 2);
+    CHECK(
+        describe(changes[0]) ==
+        "frame 'fore': at rest, its stored position is not taken: joint 'elbow' is prismatic, and "
+        "was revolute");
+    REQUIRE(arm.partition.restore(*store.load(), frames, kNow));
+    CHECK(arm.info("elbow").position == 0);
+    CHECK_FALSE(arm.info("elbow").measured);
+    CHECK(arm.info("wrist").position == frames[3].joint->position);
+    CHECK_FALSE(arm.info("wrist").measured);
+    CHECK(pose_diff(arm.edge("upper", "fore").pose, along_x(1).pose, 1e-15) == "");
+    CHECK(arm.info("shoulder").position == 0.5);
+    // Its first sample is stored as what it is now.
+    REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.125, 1e-4}}, {}}));
+    REQUIRE(store.save_values({}, arm.partition.take_changed_joints()));
+    Arm next;
+    REQUIRE(next.partition.restore(*store.load(), frames, kNow));
+    CHECK(next.info("elbow").position == 0.125);
+    CHECK(next.info("elbow").measured);
+  }
+  SECTION("a hinge without limits is as good as one with them") {
+    auto frames = arm.frames();
+    frames[1].joint->type = JointType::kContinuous;
+    frames[1].joint->limits.reset();
+    REQUIRE(arm.partition.restore(*store.load(), frames, kNow));
+    CHECK(arm.info("shoulder").position == 0.5);
+    CHECK(arm.info("shoulder").measured);
   }
 }
 

@@ -75,8 +75,9 @@ TEST_CASE(
     "a file of the format that knew no joints is read, and brought up to date by the first write") {
   const TemporaryDirectory directory;
   const std::string file = changed_by(
-      directory, "DROP TABLE joints; DROP TABLE ties; DROP TABLE configured_ties; "
-                 "PRAGMA user_version = 1; PRAGMA journal_mode = DELETE");
+      directory,
+      "DROP TABLE joints; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; "
+      "PRAGMA user_version = 1; PRAGMA journal_mode = DELETE");
   const std::string before = content(file);
   {
     const auto store = open_sqlite_store(file, "arms");
@@ -99,9 +100,10 @@ TEST_CASE(
 
 TEST_CASE("a file of the format that knew no correlation is brought up to date by the first write") {
   const TemporaryDirectory directory;
-  const std::string file =
-      changed_by(directory, "DROP TABLE ties; DROP TABLE configured_ties; PRAGMA user_version = 2; "
-                            "PRAGMA journal_mode = DELETE");
+  const std::string file = changed_by(directory,
+                                      "DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE "
+                                      "joint_types; PRAGMA user_version = 2; "
+                                      "PRAGMA journal_mode = DELETE");
   const KeptTies unknown{{true, {}, {}}, {}};
   {
     const auto store = open_sqlite_store(file, "arms");
@@ -133,8 +135,13 @@ TEST_CASE("a file with rows that no state has is refused as it is") {
       {"INSERT INTO joints VALUES('elbow', 'much', 0)", "another type in column position"},
       {"INSERT INTO joints VALUES('elbow', 1e10, 0)", "position is not a number, or beyond 1e9"},
       {"INSERT INTO joints VALUES('elbow', 0, -1)", "variance is not a number within"},
+      {"INSERT INTO joints VALUES('elbow', 0, 0); INSERT INTO joint_types VALUES('elbow', 4)",
+       "joint 'elbow' of type 4"},
+      {"INSERT INTO joints VALUES('elbow', 0, 0); INSERT INTO joint_types VALUES('elbow', 'hinge')",
+       "another type in column"},
       {"INSERT INTO notes VALUES('eye', 1, 5, '')", "a note of kind 5"},
-      {"INSERT INTO ties VALUES('nobody', zeroblob(9), x'')", "ties of 'nobody', which is not there"},
+      {"INSERT INTO ties VALUES('nobody', zeroblob(9), x'')",
+       "ties of 'nobody', which is not there"},
       {"INSERT INTO ties VALUES('hand', 'text', x'')", "another type in column said"},
       {"INSERT INTO ties VALUES('hand', zeroblob(8), x'')", "a correlation of 8 bytes"},
       {"INSERT INTO ties VALUES('hand', zeroblob(9), x'02')", "a correlation of 1 bytes"},

@@ -76,8 +76,9 @@ TEST_CASE("what was saved is there for the next process, to the last bit") {
     CHECK(store->load()->frames.empty());
     CHECK(outcome(store->save({3, {"hand", "lamp"}, {hand}, {gone}})) == "ok");
     CHECK(outcome(store->save({4, {tool.id, "eye"}, {tool}, {lost}, {{"wrist", 1, 1}}})) == "ok");
-    CHECK(outcome(store->save_values({{"hand", later}, {"nobody", later}},
-                                     {{"elbow", 0.5, 1e-4}, {"wrist", 3, 0}})) == "ok");
+    CHECK(outcome(store->save_values(
+              {{"hand", later}, {"nobody", later}},
+              {{"elbow", 0.5, 1e-4, JointType::kPrismatic}, {"wrist", 3, 0}})) == "ok");
     CHECK(outcome(store->save_configured({{"hand", "arm", hand.X_PC}})) == "ok");
   }
   const auto state = opened(file)->load();
@@ -96,7 +97,9 @@ TEST_CASE("what was saved is there for the next process, to the last bit") {
   CHECK(state->joints[0].name == "elbow");
   CHECK(state->joints[0].position == 0.5);
   CHECK(state->joints[0].variance == 1e-4);
+  CHECK(state->joints[0].type == JointType::kPrismatic);
   CHECK(state->joints[1].position == 3);
+  CHECK_FALSE(state->joints[1].type);
   REQUIRE(state->configured.size() == 1);
   CHECK(to_flat(state->configured[0].X_PC) == to_flat(hand.X_PC));
 }
@@ -284,7 +287,8 @@ TEST_CASE(
   sqlite3* raw = nullptr;
   REQUIRE(sqlite3_open(file.c_str(), &raw) == SQLITE_OK);
   const char* const older =
-      "DROP TABLE configured_ties; DROP TABLE ties; DROP TABLE joints; PRAGMA user_version = 1";
+      "DROP TABLE joint_types; DROP TABLE configured_ties; DROP TABLE ties; DROP TABLE joints; "
+      "PRAGMA user_version = 1";
   REQUIRE(sqlite3_exec(raw, older, nullptr, nullptr, nullptr) == SQLITE_OK);
   sqlite3_close(raw);
   const auto store = opened(file);
