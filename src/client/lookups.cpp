@@ -159,6 +159,7 @@ Lookups::Clock::time_point Lookups::attend(All& all, bool written) {
 bool Lookups::attend(Lookup& lookup, bool written) {
   if (lookup.callback != nullptr && !lookup.callback->waits()) return true;
   if (lookup.asking) return go_on_asking(lookup);
+  if (written && lookup.far) hurry(lookup);
   const auto now = Clock::now();
   const bool may_be_here = lookup.version != version() || (written && !lookup.far);
   if (now < lookup.next && !may_be_here && !lookup.deadline.over(now)) return false;
@@ -222,7 +223,16 @@ bool Lookups::judge(Lookup& lookup, Found found, bool far) {
   }
   lookup.far = far;
   lookup.next = next_attempt(lookup, far);
+  // It may have come while they were asked.
+  if (far) hurry(lookup);
   return false;
+}
+
+/// Those who push what is wanted are asked once more, out of turn.
+void Lookups::hurry(Lookup& lookup) {
+  if (lookup.hurried || !links_.was_pushed(lookup.wanted)) return;
+  lookup.hurried = true;
+  lookup.next = Clock::now();
 }
 
 // What is lacking here wakes the thread when it comes.

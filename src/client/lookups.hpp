@@ -26,7 +26,8 @@ namespace tfdude {
 [[nodiscard]] bool is_worth_waiting(const Error& error, const Query& query);
 
 /// The lookups of a participant that wait for their data. One thread attends to all of them: it sleeps until something is
-/// written to the forest here, or the structure changes; who owns what is lacking is asked again, ever less often. It
+/// written to the forest here, or the structure changes; who owns what is lacking is asked again, ever less often, and once
+/// more as soon as it has pushed here what does. It
 /// never waits for anybody else, and runs nothing of the user's.
 /// @par Thread safety  All functions.
 class Lookups {
@@ -47,6 +48,8 @@ class Lookups {
     /// Sends a request once. @return kNotYet where its partition cannot be reached yet.
     Asking::Send send;
     std::function<Reply(const Request&)> answer_here;
+    /// Whether what others have pushed here would do: then they have it, too.
+    std::function<bool(const Wanted&)> was_pushed;
     /// What is to be said where the time is over: the error of the last attempt, or that it was too early to know.
     std::function<Error(Error last, const Deadline&)> last_word;
     /// Of the sources that stamp samples.
@@ -72,6 +75,9 @@ class Lookups {
   /// Another partition came or went.
   void look_again();
 
+  /// Others have pushed something. At once, where nobody waits.
+  void pushed() { wake(written_); }
+
  private:
   struct Lookup {
     Lookup(Wanted what, const Deadline& by, Error why)
@@ -89,6 +95,7 @@ class Lookups {
     Clock::time_point next = Clock::time_point::min();  // attempt, or look at what is under way
     std::uint64_t version = 0;                          // of the structure at the last attempt
     bool far = false;                                   // others lacked something then
+    bool hurried = false;                               // was asked anew for what they have pushed
     std::optional<Gathering> gathering;                 // under way,
     std::optional<Deadline> until;                      // as long as this
     std::optional<Asking> asking;
@@ -104,6 +111,7 @@ class Lookups {
   [[nodiscard]] bool ask(Lookup& lookup);
   [[nodiscard]] bool go_on_asking(Lookup& lookup);
   [[nodiscard]] bool judge(Lookup& lookup, Found found, bool far);
+  void hurry(Lookup& lookup);
   [[nodiscard]] Clock::time_point next_attempt(const Lookup& lookup, bool far) const;
   void finish(Lookup& lookup, Found found);
   static void give_up(Lookup& lookup);

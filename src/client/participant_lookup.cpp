@@ -91,6 +91,10 @@ Lookups::Links Participant::links_of_lookups() {
             return sent;
           },
           [this](const Request& request) { return answer_here(request); },
+          [this](const Lookups::Wanted& wanted) {
+            const Watches* watches = watching_.load();
+            return watches != nullptr && watches->can_answer(wanted.a, wanted.b, wanted.query);
+          },
           [this](Error last, const Deadline& deadline) {
             if (!may_appear(last.code)) return last;
             return settled() ? explained(std::move(last))

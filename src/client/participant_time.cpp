@@ -100,7 +100,10 @@ Reply Participant::answer_watch(const Request& request) {
 }
 
 void Participant::on_state(const State& state) {
-  if (Watches* watches = watching_.load()) watches->on_state(state);
+  Watches* watches = watching_.load();
+  if (watches == nullptr) return;
+  watches->on_state(state);
+  lookups_.pushed();
 }
 
 void Participant::on_watcher(std::uint64_t group) {

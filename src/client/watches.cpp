@@ -71,6 +71,13 @@ void Watches::on_state(const State& state) {
   changed_.notify_one();
 }
 
+bool Watches::can_answer(const std::string& a, const std::string& b, const Query& query) const {
+  const std::lock_guard lock(mutex_);
+  return std::any_of(paths_.begin(), paths_.end(), [&](const Path& path) {
+    return path->a() == a && path->b() == b && path->lookup(query).has_value();
+  });
+}
+
 void Watches::wait(std::unique_lock<std::mutex>& lock, Clock::time_point renew_at) {
   while (!stopping_ && !asked_) {
     const auto wake_at = lacking_ ? std::min(renew_at, last_round_ + kRetryAfter) : renew_at;

@@ -44,6 +44,10 @@ class Watches {
   /// What was pushed.
   void on_state(const State& state);
 
+  /// Whether a path that is watched could be looked up so from what has been pushed.
+  [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,
+                                const Query& query) const;
+
   /// The structure has changed, or who is there.
   void look_again();
 
@@ -65,7 +69,7 @@ class Watches {
   const Links links_;
   Notices notices_;
   std::set<std::uint64_t> open_;  // groups; only the thread's
-  std::mutex mutex_;              // of the rest
+  mutable std::mutex mutex_;      // of the rest
   std::condition_variable changed_;
   std::vector<Path> paths_;
   bool asked_ = false;

@@ -1,5 +1,6 @@
 // Paths that owners push, once over each transport: what reaches a watcher, and when; and what pushing leaves behind.
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <limits>
@@ -75,6 +76,33 @@ class CountedDomain {
 };
 
 }  // namespace
+
+TEST_CASE("watch: a lookup that waits is looked at again as soon as its path is pushed") {
+  Robot robot(joined_by(GENERATE(0, 1)));
+  const auto watched = robot.client->watch("arm", "hand");
+  REQUIRE(watched);
+  std::vector<double> late;
+  // So far ahead that the owner is asked each 50 ms only.
+  const auto now = std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
+  REQUIRE(robot.arm->update("hand", along_x(0), now));
+  for (int i = 1; i <= 15; ++i) {
+    const Time stamp = now + i * 1s;
+    Query query;
+    query.at = stamp;
+    auto waiting = robot.client->lookup_async("arm", "hand", query, 20s);
+    std::this_thread::sleep_for(Milliseconds(60 + 7 * i % 50));
+    REQUIRE(robot.arm->update("hand", along_x(i), stamp));
+    const auto written = std::chrono::steady_clock::now();
+    const auto found = waiting.get();
+    late.push_back(
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - written)
+            .count());
+    CHECK(x_of(found) == i);
+  }
+  std::sort(late.begin(), late.end());
+  INFO("median " << late[late.size() / 2] << " ms");
+  CHECK(late[late.size() / 2] < 10);
+}
 
 TEST_CASE("watch: late samples and process noise are what lookups see, too") {
   Random random(1601);
