@@ -98,6 +98,14 @@ Result<void> Client::publish(const std::vector<EdgeUpdate>& edges, std::optional
   return participant_->publish(edges, stamp);
 }
 
+Result<EdgeStream> Client::stream(const std::vector<std::string>& edges) {
+  return participant_->stream(edges);
+}
+
+Result<JointStream> Client::stream_joints(const std::vector<std::string>& names) {
+  return participant_->stream_joints(names);
+}
+
 Result<void> Client::flush(Milliseconds wait) { return participant_->flush(wait); }
 
 Result<void> Client::publish_joints(const std::vector<std::string>& names,

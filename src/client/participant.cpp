@@ -24,6 +24,7 @@ Participant::Participant(std::unique_ptr<Transport> transport, std::string parti
       forest_(wall_clock),
       directory_(forest_, partition_name_),
       lookups_(forest_, calls_, hints_, links_of_lookups()),
+      streams_(links_of_edge_streams(), links_of_joint_streams()),
       settle_deadline_(Deadline(options.discovery).at()),
       settled_at_last_(Deadline::sum(
           settle_deadline_,
@@ -34,6 +35,7 @@ Participant::~Participant() {
   // Callbacks may use all of the rest.
   lookups_.stop();
   events_->stop();
+  streams_.stop();
   {
     const std::lock_guard lock(pushing_mutex_);
     leaving_ = true;

@@ -27,6 +27,7 @@
 #include "client/gathering.hpp"
 #include "client/lookups.hpp"
 #include "client/pusher.hpp"
+#include "client/streams.hpp"
 #include "client/watches.hpp"
 
 namespace tfdude {
@@ -60,6 +61,9 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
                                      std::optional<Time> stamp);
   [[nodiscard]] Result<void> flush(Milliseconds wait);
+  // Without waiting (participant_streams.cpp).
+  [[nodiscard]] Result<EdgeStream> stream(const std::vector<std::string>& edges);
+  [[nodiscard]] Result<JointStream> stream_joints(const std::vector<std::string>& names);
   // Joints (participant_joints.cpp).
   [[nodiscard]] Result<void> update_joints(const JointUpdate& update);
   [[nodiscard]] Result<void> publish_joints(const JointUpdate& update);
@@ -245,7 +249,11 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   }
   [[nodiscard]] Result<WatchRoute> plan_watch(const WatchedPath& path);
   [[nodiscard]] Reply answer_watch(const Request& request);
+  /// The structure has changed, or who is there: watched paths and streams may go another way.
   void look_at_watches();
+  [[nodiscard]] Destination destination(Owner owner) const;
+  [[nodiscard]] SenderLinks<Update> links_of_edge_streams();
+  [[nodiscard]] SenderLinks<JointUpdate> links_of_joint_streams();
 
   [[nodiscard]] Result<void> change(std::vector<Part>& parts, const Deadline& deadline);
   [[nodiscard]] Result<void> publish_to(const Part& part, const Update& share,
@@ -303,6 +311,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   std::unique_ptr<Watches> watches_;  // once this process does
   std::atomic<Watches*> watching_{nullptr};
   Lookups lookups_;  // that wait
+  Streams streams_;  // that do not
   std::atomic<std::uint64_t> observations_{0};
   std::atomic<bool> settled_{false};
   const Clock::time_point settle_deadline_;

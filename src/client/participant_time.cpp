@@ -113,6 +113,7 @@ void Participant::on_watcher(std::uint64_t group) {
 
 void Participant::look_at_watches() {
   if (Watches* watches = watching_.load()) watches->look_again();
+  streams_.look_again();
 }
 
 }  // namespace tfdude

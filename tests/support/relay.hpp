@@ -34,6 +34,12 @@ class Relay : public Transport, protected TransportHandler {
                     Deadline deadline) override {
     return real_->send(partition, update, deadline);
   }
+  std::unique_ptr<Channel<Update>> update_channel(const std::string& partition) override {
+    return real_->update_channel(partition);
+  }
+  std::unique_ptr<Channel<JointUpdate>> joint_channel(const std::string& partition) override {
+    return real_->joint_channel(partition);
+  }
   Result<void> flush(Transport::Deadline deadline) override { return real_->flush(deadline); }
   void reply(const PeerId& to, const Reply& reply) override { real_->reply(to, reply); }
   Result<void> watch(std::uint64_t group) override { return real_->watch(group); }

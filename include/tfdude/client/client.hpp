@@ -12,6 +12,7 @@
 
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
+#include "tfdude/client/stream.hpp"
 #include "tfdude/client/watch.hpp"
 #include "tfdude/math/observation.hpp"
 #include "tfdude/partition/change.hpp"
@@ -191,13 +192,18 @@ class Client {
   [[nodiscard]] Result<void> update_partial(const std::vector<PartialUpdate>& edges,
                                             std::optional<Time> stamp = std::nullopt);
 
-  /// Streams new edge values to their owners, unacknowledged: the path for joints at 1 kHz and more. Waits, within the
-  /// bound of all calls, only until they can be reached. A
-  /// share that an owner cannot take in time may be lost, never torn. Whoever can be reached gets its share, also where
-  /// another cannot. Stamps are as for update(); samples that an owner refuses it counts (pasts()).
+  /// Streams new edge values to their owners, unacknowledged: the path for joints at 1 kHz and more. Waits, within the bound
+  /// of all calls, only until they can be reached. A share that an owner cannot take in time may be lost, never torn. Whoever
+  /// can be reached gets its share, also where another cannot. Stamps as for update(); refused samples are counted (pasts()).
   /// @return kUnknownFrame.
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
                                      std::optional<Time> stamp = std::nullopt);
+
+  /// Edges, or joints, to which a real-time thread streams without waiting (stream.hpp); they may come later. Asks nobody, but
+  /// makes what is needed to send to those who are known (some milliseconds).
+  /// @return kInvalidInput: one that is no id, or is named twice; more than kMaxItems.
+  [[nodiscard]] Result<EdgeStream> stream(const std::vector<std::string>& edges);
+  [[nodiscard]] Result<JointStream> stream_joints(const std::vector<std::string>& names);
 
   /// Waits until all that was streamed by this client has reached the owners. At most `wait`.
   /// @return kTimeout or kUnreachable, naming one whom not all has reached. More than 64 samples at once may overwrite each

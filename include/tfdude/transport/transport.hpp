@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -36,6 +37,17 @@ class TransportHandler {
   [[nodiscard]] virtual bool owns(std::string_view id) const = 0;
   /// The same of a joint.
   [[nodiscard]] virtual bool owns_joint(std::string_view name) const = 0;
+};
+
+/// A way to one partition for a thread that must not wait; found once, used by one thread at a time. Not used any more when the
+/// transport stops.
+template <class Message>
+class Channel {
+ public:
+  virtual ~Channel() = default;
+
+  /// As Transport::send(), at once or not at all. @return false where nobody is there to take it, or it is not taken now
+  [[nodiscard]] virtual bool try_send(const Message& message) = 0;
 };
 
 /// How participants reach each other; free of any IPC's words.
@@ -75,6 +87,12 @@ class Transport {
 
   [[nodiscard]] virtual Result<void> send(const std::string& partition, const JointUpdate& update,
                                           Deadline deadline) = 0;
+
+  /// For messages that are alike, of which the first makes room for the rest. Begins to connect, as prepare(); never null.
+  [[nodiscard]] virtual std::unique_ptr<Channel<Update>> update_channel(
+      const std::string& partition) = 0;
+  [[nodiscard]] virtual std::unique_ptr<Channel<JointUpdate>> joint_channel(
+      const std::string& partition) = 0;
 
   /// Waits until all updates that were sent have been acknowledged by those to whom they went. @return kTimeout or
   ///   kUnreachable, naming one who has not; what was overwritten by younger updates on its way counts as acknowledged.

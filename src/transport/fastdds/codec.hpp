@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <optional>
 #include <string_view>
 
 #include "tfdude/base/result.hpp"
@@ -12,9 +14,17 @@
 // error says which frame and field.
 namespace tfdude::fastdds {
 
+/// One that is absent travels as 0.
+[[nodiscard]] inline std::int64_t wire_stamp(std::optional<Time> stamp) {
+  return stamp ? nanoseconds(*stamp) : 0;
+}
+
 /// Into a sample that may have been used before: the generated union has a place for every kind of request, some
 /// 1.5 KB, which take longer to make than to fill.
 void write_wire(const Request& request, std::string_view partition, wire::Request& sample);
+/// Likewise, without allocating where the sample has held as many edges or joints of names as long.
+void write_wire(const Update& update, wire::Update& sample);
+void write_wire(const JointUpdate& update, wire::Joints& sample);
 [[nodiscard]] wire::Request to_wire(const Request& request, std::string_view partition);
 [[nodiscard]] wire::Reply to_wire(const Reply& reply);
 [[nodiscard]] wire::Update to_wire(const Update& update);

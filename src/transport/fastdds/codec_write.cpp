@@ -12,8 +12,6 @@ namespace {
 
 constexpr std::size_t kMaxMessage = 4096;
 
-std::int64_t wire_stamp(std::optional<Time> stamp) { return stamp ? nanoseconds(*stamp) : 0; }
-
 wire::Edge wire_edge(const EdgeUpdate& edge) {
   wire::Edge out;
   out.id(edge.id);
@@ -295,26 +293,6 @@ wire::Reply to_wire(const Reply& reply) {
   sample.epoch(reply.epoch);
   sample.sequence_number(reply.sequence);
   std::visit(ReplyWriter{sample.body()}, reply.body);
-  return sample;
-}
-
-wire::Update to_wire(const Update& update) {
-  wire::Update sample;
-  sample.edges().reserve(update.edges.size());
-  for (const EdgeUpdate& edge : update.edges) sample.edges().push_back(wire_edge(edge));
-  sample.stamp(wire_stamp(update.stamp));
-  return sample;
-}
-
-wire::Joints to_wire(const JointUpdate& update) {
-  wire::Joints sample;
-  sample.joints().resize(update.joints.size());
-  for (std::size_t i = 0; i < update.joints.size(); ++i) {
-    sample.joints()[i].id(update.joints[i].name);
-    sample.joints()[i].position(update.joints[i].position);
-    sample.joints()[i].variance(update.joints[i].variance);
-  }
-  sample.stamp(wire_stamp(update.stamp));
   return sample;
 }
 

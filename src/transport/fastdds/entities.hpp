@@ -43,6 +43,9 @@ class Outlet final : public edds::DataWriterListener {
 
   [[nodiscard]] bool good() const { return writer_ != nullptr; }
 
+  /// Whether a reader has been met. Does not wait.
+  [[nodiscard]] bool matched() const { return readers_ > 0; }
+
   /// Waits until a reader has been met; false at the deadline.
   [[nodiscard]] bool wait_until_matched(Deadline deadline);
 
@@ -66,7 +69,7 @@ class Outlet final : public edds::DataWriterListener {
   edds::DataWriter* writer_ = nullptr;
   std::mutex mutex_;
   std::condition_variable matched_;
-  int readers_ = 0;
+  std::atomic<int> readers_{0};              // changed under mutex_
   std::atomic<bool> unacknowledged_{false};  // something may be
 };
 

@@ -40,6 +40,8 @@ class FastDdsTransport final : public Transport {
   Result<void> send(const std::string& partition, const Update& update, Deadline deadline) override;
   Result<void> send(const std::string& partition, const JointUpdate& update,
                     Deadline deadline) override;
+  std::unique_ptr<Channel<Update>> update_channel(const std::string& partition) override;
+  std::unique_ptr<Channel<JointUpdate>> joint_channel(const std::string& partition) override;
   Result<void> flush(Deadline deadline) override;
   void reply(const PeerId& to, const Reply& reply) override;
   Result<void> watch(std::uint64_t group) override { return states_->watch(group); }

@@ -129,6 +129,25 @@ class LoopbackNetwork::Hub {
   std::condition_variable serving_;
 };
 
+template <class Hub, class Message>
+class LoopbackChannel final : public Channel<Message> {
+ public:
+  using Take = void (TransportHandler::*)(const Message&);
+
+  LoopbackChannel(std::shared_ptr<Hub> hub, std::string partition, Take take)
+      : hub_(std::move(hub)), partition_(std::move(partition)), take_(take) {}
+
+  bool try_send(const Message& message) override {
+    return hub_->deliver([&](const auto& member) { return member.serves == partition_; },
+                         [&](TransportHandler& handler) { (handler.*take_)(message); }) > 0;
+  }
+
+ private:
+  const std::shared_ptr<Hub> hub_;
+  const std::string partition_;
+  const Take take_;
+};
+
 class LoopbackTransport final : public Transport {
  public:
   explicit LoopbackTransport(std::shared_ptr<LoopbackNetwork::Hub> hub) : hub_(std::move(hub)) {}
@@ -194,6 +213,14 @@ class LoopbackTransport final : public Transport {
                    [&](TransportHandler& handler) { handler.on_joints(update); });
   }
 
+  std::unique_ptr<Channel<Update>> update_channel(const std::string& partition) override {
+    return std::make_unique<To<Update>>(hub_, partition, &TransportHandler::on_update);
+  }
+
+  std::unique_ptr<Channel<JointUpdate>> joint_channel(const std::string& partition) override {
+    return std::make_unique<To<JointUpdate>>(hub_, partition, &TransportHandler::on_joints);
+  }
+
   Result<void> flush(Deadline /*deadline*/) override { return {}; }
   void reply(const PeerId& to, const Reply& reply) override {
     hub_->deliver([&](const auto& member) { return member.id == to; },
@@ -224,6 +251,8 @@ class LoopbackTransport final : public Transport {
 
  private:
   using Member = LoopbackNetwork::Hub::Member;
+  template <class Message>
+  using To = LoopbackChannel<LoopbackNetwork::Hub, Message>;
 
   template <class Call>
   void tell_others(Call call) {

@@ -1,0 +1,124 @@
+#include "client/streams.hpp"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/partition/joints.hpp"
+
+#include "math/finite.hpp"
+
+namespace tfdude {
+namespace {
+
+// How often at most it is looked where all are.
+constexpr Milliseconds kPlanEvery{1};
+
+Result<void> check_names(const std::vector<std::string>& names, const char* what) {
+  if (names.size() > kMaxItems) {
+    return fail(Errc::kInvalidInput, "a stream of " + std::to_string(names.size()) + " " + what +
+                                         "s, of at most " + std::to_string(kMaxItems));
+  }
+  std::set<std::string_view> known;
+  for (const std::string& name : names) {
+    if (auto ok = check_id(name, what); !ok) return ok;
+    if (!known.insert(name).second) {
+      return fail(Errc::kInvalidInput, std::string(what) + " " + quote(name) + " is named twice");
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Streams::Streams(SenderLinks<Update> of_edges, SenderLinks<JointUpdate> of_joints)
+    : of_edges_(std::move(of_edges)), of_joints_(std::move(of_joints)) {}
+
+void Streams::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+  }
+  if (Deferred* planner = planning_.load()) planner->stop();
+  for (const auto& sender : senders()) sender->close();
+}
+
+std::vector<std::shared_ptr<PlannedSender>> Streams::senders() {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::shared_ptr<PlannedSender>> there;
+  for (const auto& known : senders_) {
+    if (auto sender = known.lock()) there.push_back(std::move(sender));
+  }
+  senders_.assign(there.begin(), there.end());
+  return there;
+}
+
+void Streams::add(const std::shared_ptr<PlannedSender>& sender) {
+  const std::lock_guard lock(mutex_);
+  if (stopped_) {
+    sender->close();
+    return;
+  }
+  senders_.push_back(sender);
+  if (planner_ != nullptr) return;
+  planner_ = std::make_unique<Deferred>(kPlanEvery, [this] {
+    for (const auto& one : senders()) one->plan();
+  });
+  planning_.store(planner_.get());
+}
+
+template <class Message>
+std::shared_ptr<Sender<Message>> Streams::open(const std::vector<std::string>& names,
+                                               const SenderLinks<Message>& links) {
+  auto sender = std::make_shared<Sender<Message>>(names, links);
+  // First, so that no change is missed meanwhile.
+  add(sender);
+  sender->plan();
+  return sender;
+}
+
+Result<EdgeStream> Streams::edges(const std::vector<std::string>& ids) {
+  if (auto ok = check_names(ids, "frame"); !ok) return tl::unexpected(std::move(ok.error()));
+  return EdgeStream(open(ids, of_edges_));
+}
+
+Result<JointStream> Streams::joints(const std::vector<std::string>& names) {
+  if (auto ok = check_names(names, "joint"); !ok) return tl::unexpected(std::move(ok.error()));
+  return JointStream(open(names, of_joints_));
+}
+
+EdgeStream::EdgeStream(std::shared_ptr<Sender<Update>> sender) : sender_(std::move(sender)) {}
+EdgeStream::EdgeStream(EdgeStream&&) noexcept = default;
+EdgeStream& EdgeStream::operator=(EdgeStream&&) noexcept = default;
+EdgeStream::~EdgeStream() = default;
+
+const std::vector<NotSent>& EdgeStream::try_publish(const std::vector<Transform>& X_PC,
+                                                    std::optional<Time> stamp) {
+  if (X_PC.size() != sender_->size()) return sender_->refuse(Errc::kInvalidInput);
+  return sender_->send(
+      stamp, [&](std::size_t i) { return is_finite(X_PC[i]); },
+      [&](EdgeUpdate& edge, std::size_t i) { edge.X_PC = X_PC[i]; });
+}
+
+JointStream::JointStream(std::shared_ptr<Sender<JointUpdate>> sender)
+    : sender_(std::move(sender)) {}
+JointStream::JointStream(JointStream&&) noexcept = default;
+JointStream& JointStream::operator=(JointStream&&) noexcept = default;
+JointStream::~JointStream() = default;
+
+const std::vector<NotSent>& JointStream::try_publish(const std::vector<double>& positions,
+                                                     const std::vector<double>& variances,
+                                                     std::optional<Time> stamp) {
+  if (positions.size() != sender_->size() || variances.size() != sender_->size()) {
+    return sender_->refuse(Errc::kInvalidInput);
+  }
+  return sender_->send(
+      stamp, [&](std::size_t i) { return is_position(positions[i]) && is_variance(variances[i]); },
+      [&](JointValue& joint, std::size_t i) {
+        joint.position = positions[i];
+        joint.variance = variances[i];
+      });
+}
+
+}  // namespace tfdude

@@ -1,0 +1,37 @@
+#include "math/flat.hpp"
+#include "transport/fastdds/codec.hpp"
+
+namespace tfdude::fastdds {
+
+void write_wire(const Update& update, wire::Update& sample) {
+  sample.edges().resize(update.edges.size());
+  for (std::size_t i = 0; i < update.edges.size(); ++i) {
+    sample.edges()[i].id(update.edges[i].id);
+    sample.edges()[i].x_pc(to_flat(update.edges[i].X_PC));
+  }
+  sample.stamp(wire_stamp(update.stamp));
+}
+
+wire::Update to_wire(const Update& update) {
+  wire::Update sample;
+  write_wire(update, sample);
+  return sample;
+}
+
+void write_wire(const JointUpdate& update, wire::Joints& sample) {
+  sample.joints().resize(update.joints.size());
+  for (std::size_t i = 0; i < update.joints.size(); ++i) {
+    sample.joints()[i].id(update.joints[i].name);
+    sample.joints()[i].position(update.joints[i].position);
+    sample.joints()[i].variance(update.joints[i].variance);
+  }
+  sample.stamp(wire_stamp(update.stamp));
+}
+
+wire::Joints to_wire(const JointUpdate& update) {
+  wire::Joints sample;
+  write_wire(update, sample);
+  return sample;
+}
+
+}  // namespace tfdude::fastdds

@@ -1,0 +1,196 @@
+// Streams that never wait, once over each transport.
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/joint_frames.hpp"
+#include "support/networks.hpp"
+#include "support/process.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::eventually;
+using testing::following;
+using testing::hinge_named;
+using testing::Join;
+using testing::joined_by;
+using testing::moved_by;
+using testing::outcome;
+using Clock = std::chrono::steady_clock;
+
+// "1 unreachable gone", one after the other.
+std::string text(const std::vector<NotSent>& all) {
+  std::string lines;
+  for (const NotSent& one : all) {
+    if (!lines.empty()) lines += ", ";
+    lines += std::to_string(one.index) + " " + std::string(to_string(one.why));
+    if (!one.partition.empty()) lines += " " + std::string(one.partition);
+  }
+  return lines.empty() ? "all sent" : lines;
+}
+
+// A stream of as many edges, all of them sent to the same place, and how long each call took.
+struct Loop {
+  EdgeStream stream;
+  std::vector<Clock::duration> times;
+
+  std::string send(std::vector<double> x) {
+    std::vector<Transform> values;
+    for (const double one : x) values.push_back(along_x(one));
+    const auto begin = Clock::now();
+    const auto& not_sent = stream.try_publish(values);
+    times.push_back(Clock::now() - begin);
+    return text(not_sent);
+  }
+
+  [[nodiscard]] double median_ms() {
+    std::sort(times.begin(), times.end());
+    return std::chrono::duration<double, std::milli>(times[times.size() / 2]).count();
+  }
+};
+
+bool is_at(Client& owner, const std::string& parent, const std::string& frame, double x) {
+  const auto X = owner.lookup(parent, frame);
+  return X && X->pose.translation().x() == x;
+}
+
+Node open(const Join& join, const std::string& partition) {
+  const std::string base = partition + "_base";
+  return *Node::open(join(partition), partition, {{base, "", {}}, {partition + "_tip", base, {}}});
+}
+
+double yaw(const Result<Transform>& X) {
+  if (!X) return std::nan("");
+  return 2 * std::atan2(X->pose.rotation().z(), X->pose.rotation().w());
+}
+
+}  // namespace
+
+TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waited for") {
+  const Join join = joined_by(GENERATE(0, 1));
+  auto client = *Client::open(join(""));
+  Loop loop{*client.stream({"gone_tip", "a_tip"}), {}};
+  CHECK(loop.send({1, 1}) == "0 unknown_frame, 1 unknown_frame");
+  Node a = open(join, "a");
+  CHECK(eventually([&] { return loop.send({2, 2}) == "0 unknown_frame"; }));
+  CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", 2); }));
+
+  std::optional<Node> gone = open(join, "gone");
+  CHECK(eventually([&] { return loop.send({3, 3}) == "all sent"; }));
+  CHECK(eventually([&] { return is_at(*gone, "gone_base", "gone_tip", 3); }));
+
+  gone.reset();
+  CHECK(eventually([&] { return loop.send({4, 4}) == "0 unreachable gone"; }));
+  CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", 4); }));
+
+  gone = open(join, "gone");
+  // Also where DDS has met its predecessor only, for whom it waits longer than we do.
+  CHECK(eventually([&] {
+    return loop.send({5, 5}) == "all sent" && is_at(*gone, "gone_base", "gone_tip", 5);
+  }));
+
+  REQUIRE(outcome(client.remove("gone_tip")) == "ok");
+  REQUIRE(outcome(client.add("gone_tip", "a_base", along_x(0))) == "ok");
+  CHECK(eventually([&] {
+    return loop.send({6, 6}) == "all sent" && is_at(a, "a_base", "gone_tip", 6);
+  }));
+  CHECK(loop.median_ms() < 5);
+}
+
+TEST_CASE("streams: stamps are those of the source, of all edges the same") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Node a = open(join, "a");
+  Node b = open(join, "b");
+  REQUIRE(eventually([&] { return b.exists("a_tip"); }));
+  // One of another, one of its own.
+  auto stream = *b.stream({"a_tip", "b_tip"});
+  auto stamp = std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
+  REQUIRE(eventually([&] {
+    stamp += Milliseconds(1);
+    return stream.try_publish({along_x(7), along_x(8)}, stamp).empty();
+  }));
+  CHECK(is_at(b, "b_base", "b_tip", 8));
+  CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", 7); }));
+  const auto past = a.past("a_tip");
+  REQUIRE(past);
+  REQUIRE(past->size() == 1);
+  CHECK(past->front().newest == stamp);
+  // The one that it owns says at once what it makes of it.
+  CHECK(text(stream.try_publish({along_x(7), along_x(8)}, stamp)) == "1 stamp_taken b");
+}
+
+TEST_CASE("streams: of what is invalid nothing is sent") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Node a = open(join, "a");
+  auto client = *Client::open(join(""));
+  auto stream = *client.stream({"a_tip", "a_base"});
+  REQUIRE(eventually([&] { return stream.try_publish({along_x(1), along_x(1)}).empty(); }));
+  REQUIRE(eventually([&] { return is_at(a, "a_base", "a_tip", 1); }));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  CHECK(text(stream.try_publish({along_x(2), along_x(nan)})) == "1 invalid_input");
+  CHECK(text(stream.try_publish({along_x(2)})) == "0 invalid_input, 1 invalid_input");
+  REQUIRE(stream.try_publish({along_x(3), along_x(3)}).empty());
+  CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", 3); }));
+
+  CHECK(outcome(client.stream({"a_tip", "a_tip"})) == "invalid_input");
+  CHECK(outcome(client.stream({""})) == "invalid_input");
+  CHECK(outcome(client.stream_joints(std::vector<std::string>(kMaxItems + 1, "j"))) ==
+        "invalid_input");
+  CHECK(client.stream({})->try_publish({}).empty());
+}
+
+TEST_CASE("streams: positions of joints reach all who have them, and who is missing is named") {
+  const Join join = joined_by(GENERATE(0, 1));
+  JointSpec elbow = hinge_named("elbow");
+  elbow.coupled = true;
+  Node arm = *Node::open(join("arm"), "arm",
+                         {{"world", "", {}},
+                          moved_by("upper", "world", hinge_named("shoulder")),
+                          moved_by("fore", "upper", elbow)});
+  std::optional<Node> tool = *Node::open(
+      join("tool"), "tool", {moved_by("hand", "fore", following("wrist", "elbow", -1, 0))});
+  auto client = *Client::open(join(""));
+  auto stream = *client.stream_joints({"shoulder", "elbow", "knee"});
+  const auto send = [&](double shoulder, double elbow_position) {
+    return text(stream.try_publish({shoulder, elbow_position, 0}, {0, 1e-4, 0}));
+  };
+  // At first it may know of one owner only.
+  CHECK(eventually([&] {
+    return send(0.1, 0.2) == "2 unknown_joint" &&
+           std::abs(yaw(arm.lookup("world", "upper")) - 0.1) < 1e-12 &&
+           std::abs(yaw(arm.lookup("upper", "fore")) - 0.2) < 1e-12 &&
+           std::abs(yaw(tool->lookup("fore", "hand")) + 0.2) < 1e-12;
+  }));
+  CHECK(text(stream.try_publish({0, std::nan(""), 0}, {0, 0, -1})) ==
+        "1 invalid_input, 2 invalid_input");
+  tool.reset();
+  REQUIRE(eventually([&] { return send(0.3, 0.4) == "2 unknown_joint, 1 unreachable tool"; }));
+  CHECK(eventually([&] { return std::abs(yaw(arm.lookup("upper", "fore")) - 0.4) < 1e-12; }));
+  // The owner itself.
+  auto own = *arm.stream_joints({"shoulder"});
+  CHECK(eventually([&] { return text(own.try_publish({0.5}, {0})) == "all sent"; }));
+  CHECK(std::abs(yaw(arm.lookup("world", "upper")) - 0.5) < 1e-12);
+}
+
+TEST_CASE("streams: one that outlives its client sends nothing any more") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Node a = open(join, "a");
+  std::optional<Client> client = *Client::open(join(""));
+  auto stream = *client->stream({"a_tip"});
+  REQUIRE(eventually([&] { return stream.try_publish({along_x(1)}).empty(); }));
+  client.reset();
+  CHECK(text(stream.try_publish({along_x(2)})) == "0 transport");
+}
+
+}  // namespace tfdude
