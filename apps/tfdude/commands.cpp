@@ -163,7 +163,8 @@ int run_partitions(Client& client, const Arguments& arguments) {
               "  pid " + std::to_string(partition.pid);
     }
     if (!partition.reachable) {
-      text += "  unreachable since " + to_string(partition.since) + "\n";
+      text += (partition.stopped ? "  stopped since " : "  lost since ") +
+              to_string(partition.since) + "\n";
       continue;
     }
     if (const auto pasts = client.pasts(partition.name)) {
@@ -202,6 +203,11 @@ int run_update(Client& client, const Arguments& arguments) {
 int run_remove(Client& client, const Arguments& arguments) {
   const auto removed = client.remove(arguments.id);
   return finish(client, removed, arguments, "removed");
+}
+
+int run_forget(Client& client, const Arguments& arguments) {
+  const auto forgotten = client.forget(arguments.id);
+  return finish(client, forgotten, arguments, "forgotten");
 }
 
 int run_move(Client& client, const Arguments& arguments) {

@@ -74,6 +74,7 @@ int run_partitions(Client& client, const Arguments& arguments);
 int run_add(Client& client, const Arguments& arguments);
 int run_update(Client& client, const Arguments& arguments);
 int run_remove(Client& client, const Arguments& arguments);
+int run_forget(Client& client, const Arguments& arguments);
 int run_move(Client& client, const Arguments& arguments);
 int run_lookup(Client& client, const Arguments& arguments);
 int run_parent(Client& client, const Arguments& arguments);

@@ -23,7 +23,7 @@ _tfdude_command() {
 
 _tfdude() {
   local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command words common
-  local commands="tree frames partitions roots parent children exists lookup watch echo history monitor plot graph events joints joint observe fuse correlate add update remove move"
+  local commands="tree frames partitions roots parent children exists lookup watch echo history monitor plot graph events joints joint observe fuse correlate add update remove forget move"
   local pose="--xyz --rpy --quat --stddev --cov"
   COMPREPLY=()
   command=$(_tfdude_command)

@@ -267,6 +267,10 @@ void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen)
   add_id(add_command(app, "remove", "remove a frame and all below it", "remove tool",
                      cli::run_remove, chosen),
          arguments);
+  add_command(app, "forget", "keep nothing of a partition that is gone for good", "forget arm",
+              cli::run_forget, chosen)
+      ->add_option("PARTITION", arguments.id, "the partition; refused while it is there")
+      ->required();
   auto* move = add_command(app, "move", "hang a frame under a new parent",
                            "move tool --parent arm_2", cli::run_move, chosen);
   add_id(move, arguments);

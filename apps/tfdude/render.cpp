@@ -108,11 +108,13 @@ nlohmann::json frame_json(const Frame& frame) {
 }
 
 nlohmann::json partition_json(const PartitionInfo& partition) {
-  return {{"name", partition.name},
-          {"host", partition.host},
-          {"pid", partition.pid},
-          {"frames", partition.frames},
-          {"reachable", partition.reachable}};
+  nlohmann::json json{{"name", partition.name},
+                      {"host", partition.host},
+                      {"pid", partition.pid},
+                      {"frames", partition.frames},
+                      {"reachable", partition.reachable}};
+  if (!partition.reachable) json["absence"] = partition.stopped ? "stopped" : "lost";
+  return json;
 }
 
 nlohmann::json change_json(const Change& change) {
@@ -125,6 +127,9 @@ nlohmann::json change_json(const Change& change) {
                                                               {"rival", change.rival}};
   for (const auto& [key, name] : names) {
     if (!name.empty()) json[key] = name;
+  }
+  if (change.kind == ChangeKind::kPartitionDown) {
+    json["absence"] = change.stopped ? "stopped" : "lost";
   }
   return json;
 }

@@ -52,6 +52,9 @@ Result<void> Client::add(const std::string& id, const std::string& parent, const
 }
 
 Result<void> Client::remove(const std::string& id) { return participant_->remove(id); }
+Result<void> Client::forget(const std::string& partition) {
+  return participant_->forget(partition);
+}
 
 Result<void> Client::update(const std::string& id, const Transform& X_PC,
                             std::optional<Time> stamp) {

@@ -43,11 +43,13 @@ Participant::~Participant() {
   // Both are used by the transport's threads until that has stopped.
   if (watches_ != nullptr) watches_->stop();
   if (pusher_ != nullptr) pusher_->stop();
+  if (gone_look_) gone_look_->stop();
   if (conceder_) conceder_->stop();
   if (commits_) commits_->stop();
   if (auto flushed = flush(std::min(options_.linger, options_.timeout)); !flushed) {
     log().warn("leaving: {}", flushed.error().message);
   }
+  say_goodbye();
   transport_->stop();
 }
 
@@ -84,7 +86,7 @@ Error Participant::explained(Error error) {
   if (!missed || error.code == Errc::kUnknownPartition) return error;
   return {Errc::kUnreachable, error.message + ", unless it is of partition " + quote(missed->name) +
                                   ", which is not reachable since " + to_string(missed->since) +
-                                  ", before this process came"};
+                                  ", before this process came: it " + why_absent(*missed)};
 }
 
 // What a plan has checked before anybody was asked.
@@ -184,7 +186,8 @@ std::vector<Reply> Participant::ask(std::vector<Part>& parts, const Deadline& de
 }
 
 Result<void> Participant::change(std::vector<Part>& parts, const Deadline& deadline) {
-  if (parts.size() == 1 && parts[0].owner == kHeldHere) return change_here(parts[0].request, deadline);
+  if (parts.size() == 1 && parts[0].owner == kHeldHere)
+    return change_here(parts[0].request, deadline);
   const std::vector<Reply> replies = ask(parts, deadline);
   Result<void> outcome;
   for (std::size_t i = 0; i < parts.size(); ++i) {

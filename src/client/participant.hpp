@@ -14,6 +14,8 @@
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
+#include "tfdude/partition/incarnation.hpp"
+#include "tfdude/partition/name_claim.hpp"
 #include "tfdude/partition/observing.hpp"
 #include "tfdude/partition/routing.hpp"
 #include "tfdude/transport/transport.hpp"
@@ -114,6 +116,8 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Result<std::vector<Frame>> frames();
   [[nodiscard]] Result<std::vector<PartitionInfo>> partitions();
   [[nodiscard]] std::size_t own_frames();
+  /// @return kUnknownPartition, kPartitionTaken where it is there.
+  [[nodiscard]] Result<void> forget(const std::string& partition);
   /// @return what ends it when its last copy goes
   [[nodiscard]] std::shared_ptr<void> on_change(Events::Callback listener);
 
@@ -281,7 +285,12 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Result<void> claim_name();
   [[nodiscard]] Result<StoredState> open_store(std::unique_ptr<StateStore>& store);
   [[nodiscard]] Result<void> take_frames(const std::vector<FrameSpec>& frames);
-  void give_up_partition();
+  void say_goodbye();
+  void announce_own();
+  void overtake();
+  void give_up_partition(const Presence& rival);
+  void look_for_gone();
+  void await_gone();
   void concede();
   [[nodiscard]] bool catch_up();
   void tell_changes();
@@ -290,12 +299,15 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   // The directory's copy moves as others appear.
   const std::string partition_name_;
   Forest forest_;
-  std::mutex structure_mutex_;  // directory_, partition_, rival_, given_up_
+  std::mutex
+      structure_mutex_;  // directory_, partition_, claim_, incarnations_, given_up_, presence_
   std::condition_variable structure_changed_;
   Directory directory_;
   std::unique_ptr<Partition> partition_;  // set once, before the transport serves
   Presence presence_;
-  std::optional<Presence> rival_;
+  Presence announced_;  // as it was said last
+  NameClaim claim_;
+  IncarnationSource incarnations_;
   std::atomic<bool> out_{false};  // another process has the partition now,
   std::string given_up_;          // and this is why
   const std::shared_ptr<Events> events_ = std::make_shared<Events>();
@@ -305,7 +317,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   std::uint64_t saved_commit_ = 0;    // of values; of the thread of commits_
   Calls calls_;
   SharedHints hints_;
-  std::mutex pushing_mutex_;  // pusher_ and watches_, as they are made, and leaving_
+  std::mutex pushing_mutex_;  // pusher_, watches_ and gone_look_, as they are made, and leaving_
   bool leaving_ = false;
   std::unique_ptr<Pusher> pusher_;    // once somebody watches
   std::unique_ptr<Watches> watches_;  // once this process does
@@ -321,6 +333,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   // Both use the transport, and stop before it.
   std::optional<CommitLoop> commits_;  // set once, before partition_
   std::optional<Deferred> conceder_;
+  std::optional<Deferred> gone_look_;  // once somebody is silent
 };
 
 }  // namespace tfdude

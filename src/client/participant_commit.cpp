@@ -22,12 +22,14 @@ Commit Participant::take() {
     const std::lock_guard joints(joints_mutex_);
     commit.change = partition_->take_unsaved();
   }
-  auto absent = directory_.absent();
-  if (partition_->page_count() != presence_.pages || absent != presence_.absent) {
-    commit.presence = presence_;
-    commit.presence->pages = partition_->page_count();
-    commit.presence->absent = std::move(absent);
-  }
+  Presence news = presence_;
+  news.pages = partition_->page_count();
+  news.absent = directory_.absent();
+  if (news == announced_) return commit;
+  // Stored with the epoch, which is above the incarnation.
+  const bool lives_anew = news.incarnation != announced_.incarnation;
+  if (lives_anew || news.absent != announced_.absent) commit.change.absent = news.absent;
+  commit.presence = std::move(news);
   return commit;
 }
 
@@ -42,6 +44,7 @@ void Participant::publish(const Commit& commit) {
       presence_.absent = commit.presence->absent;
       news = presence_;
     }
+    if (news) announced_ = *news;
     if (!commit.refused) told_epoch_ = commit.change.epoch;
   }
   for (const Page& page : commit.pages) transport_->publish(page);
@@ -58,6 +61,7 @@ void Participant::take_back(const Commit& commit) {
     partition_->still_unsaved(commit.change, commit.pages);
     if (commit.presence && commit.presence->absent != presence_.absent && !out_) {
       presence_.absent = commit.presence->absent;
+      announced_.absent = presence_.absent;
       news = presence_;
     }
   }

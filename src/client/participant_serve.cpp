@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <array>
-#include <limits>
+#include <random>
 #include <unistd.h>
 
 #include "tfdude/base/id.hpp"
@@ -19,8 +19,16 @@ constexpr Milliseconds kPredecessorGone{1500};
 // How much longer than usual somebody who was met may take to say which partition it serves.
 constexpr Milliseconds kSlowPresence{3000};
 
+// How long one who claimed the name earlier may take to decide.
+constexpr Milliseconds kDecision{3000};
+
 // How often at most the others are asked whether what seems to be a conflict is one.
 constexpr Milliseconds kConcedeEvery{100};
+
+std::uint64_t random_number() {
+  std::random_device device;
+  return (std::uint64_t{device()} << 32U) | device();
+}
 
 std::string host_name() {
   std::array<char, 256> name{};
@@ -44,6 +52,8 @@ std::string line_of(const Request& request) {
   } else if (const auto* remove = std::get_if<RemoveRequest>(&request.body)) {
     what = "remove, with all below,";
     for (const std::string& top : remove->tops) what += " " + quote(top);
+  } else if (const auto* forget = std::get_if<ForgetRequest>(&request.body)) {
+    what = "forget partition " + quote(forget->partition);
   } else if (const auto* move = std::get_if<MoveRequest>(&request.body)) {
     what = "move frame " + quote(request.id) + " under " + quote(move->parent);
   }
@@ -53,6 +63,7 @@ std::string line_of(const Request& request) {
 bool is_of_structure(const Request& request) {
   return std::holds_alternative<AddRequest>(request.body) ||
          std::holds_alternative<RemoveRequest>(request.body) ||
+         std::holds_alternative<ForgetRequest>(request.body) ||
          std::holds_alternative<MoveRequest>(request.body);
 }
 
@@ -74,20 +85,38 @@ void log_configured(const StoredState& state, const std::vector<FrameSpec>& fram
 Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   {
     const std::lock_guard lock(structure_mutex_);
-    presence_ = {partition_name_,
-                 static_cast<std::uint64_t>(nanoseconds(wall_clock())),
-                 host_name(),
-                 static_cast<std::uint32_t>(getpid()),
-                 0,
-                 false};
+    presence_ = {partition_name_, 0, host_name(), static_cast<std::uint32_t>(getpid()), 0, false};
+    presence_.incarnation = incarnations_.next(wall_clock(), random_number());
+    presence_.ticket = presence_.incarnation;
+    claim_.claim(presence_);
   }
   if (auto claimed = claim_name(); !claimed) return claimed;
   conceder_.emplace(kConcedeEvery, [this] { concede(); });
   if (auto taken = take_frames(frames); !taken) return taken;
   if (auto serving = transport_->serve(partition_name_); !serving) return serving;
   if (auto stored = commits_->start(frames); !stored) return stored;
-  transport_->announce(presence_);
+  announce_own();
   return {};
+}
+
+void Participant::announce_own() {
+  Presence said;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    said = announced_ = presence_;
+  }
+  transport_->announce(said);
+}
+
+// The last word. Nothing is said where nothing was.
+void Participant::say_goodbye() {
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (presence_.partition.empty() || announced_.stopped) return;
+    presence_.serving = presence_.taken = false;
+    presence_.stopped = true;
+  }
+  announce_own();
 }
 
 Result<StoredState> Participant::open_store(std::unique_ptr<StateStore>& store) {
@@ -123,9 +152,14 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
     const std::lock_guard lock(structure_mutex_);
     return !directory_.complete();
   };
-  while (!state.frames.empty() && Clock::now() < settle_deadline_ && incomplete()) wait_for_news();
+  const bool any = !state.frames.empty() || !frames.empty();
+  while (any && Clock::now() < settle_deadline_ && incomplete()) wait_for_news();
+  if (any) await_gone();
   const std::lock_guard lock(structure_mutex_);
   const std::lock_guard joints(joints_mutex_);
+  incarnations_.saw(state.epoch);
+  if (const auto latest = directory_.hidden_by(0)) incarnations_.saw(*latest);
+  presence_.incarnation = incarnations_.next(wall_clock(), random_number());
   auto partition =
       std::make_unique<Partition>(partition_name_, presence_.incarnation, forest_, directory_);
   auto taken = kept ? partition->restore(state, frames, wall_clock())
@@ -145,23 +179,52 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
   return {};
 }
 
-// Says that the name is to be taken, and looks round for as long as participants need to meet. Of two
-// who claim at once, the earlier has it; one who was killed may still seem to serve for a moment.
+// Who is said to be silent may be there again in a moment, or gone: that decides whose a frame is.
+void Participant::await_gone() {
+  const auto patience = Clock::now() + 2 * Absences::kGrace;
+  const auto undecided = [this] {
+    const std::lock_guard lock(structure_mutex_);
+    return directory_.awaits_silent();
+  };
+  while (Clock::now() < patience && undecided()) wait_for_news();
+}
+
+// Says that the name is to be taken, looks round for as long as participants need to meet, and takes it if it may
+// (NameClaim); one who was killed may still seem to serve for a moment.
 Result<void> Participant::claim_name() {
-  transport_->announce(presence_);
+  announce_own();
   const auto met = Clock::now() + transport_->settle_time();
   {
     std::unique_lock lock(structure_mutex_);
-    structure_changed_.wait_until(lock, met, [this] { return rival_ && rival_->serving; });
+    structure_changed_.wait_until(lock, met, [this] { return claim_.served(); });
   }
   while (transport_->awaits_presence() && Clock::now() < met + kSlowPresence) wait_for_news();
-  std::unique_lock lock(structure_mutex_);
-  structure_changed_.wait_until(lock, Clock::now() + kPredecessorGone,
-                                [this] { return !rival_ || !rival_->serving; });
-  if (!rival_ || (!rival_->serving && rival_->incarnation > presence_.incarnation)) return {};
-  return fail(Errc::kPartitionTaken, "partition " + quote(rival_->partition) +
-                                         " is served already, on host " + rival_->host +
-                                         " by process " + std::to_string(rival_->pid));
+  using Turn = NameClaim::Turn;
+  Turn turn = Turn::kOthers;
+  {
+    std::unique_lock lock(structure_mutex_);
+    structure_changed_.wait_until(lock, Clock::now() + kPredecessorGone,
+                                  [this] { return !claim_.served(); });
+    turn = claim_.to_take();
+    presence_.taken = turn == Turn::kMine;
+  }
+  if (turn == Turn::kMine) {
+    announce_own();
+    std::unique_lock lock(structure_mutex_);
+    structure_changed_.wait_until(lock, Clock::now() + kDecision,
+                                  [&] { return (turn = claim_.to_serve()) != Turn::kWait; });
+    if (turn != Turn::kOthers) return {};
+  }
+  std::optional<Presence> rival;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    rival = claim_.rival();
+  }
+  say_goodbye();
+  const std::string who =
+      rival ? ", on host " + rival->host + " by process " + std::to_string(rival->pid) : "";
+  return fail(Errc::kPartitionTaken,
+              "partition " + quote(partition_name_) + " is served already" + who);
 }
 
 // A claim may have been taken back long ago by an owner whose pages are late: what is given up must stand after all
@@ -216,20 +279,34 @@ bool Participant::catch_up() {
 }
 
 // Under structure_mutex_. Lookups find no value of this process's any more: none is better than an old one.
-void Participant::give_up_partition() {
-  given_up_ = "partition " + quote(rival_->partition) + " was taken over by process " +
-              std::to_string(rival_->pid) + " on host " + rival_->host + " while process " +
+void Participant::give_up_partition(const Presence& rival) {
+  given_up_ = "partition " + quote(rival.partition) + " was taken over by process " +
+              std::to_string(rival.pid) + " on host " + rival.host + " while process " +
               std::to_string(presence_.pid) + " on host " + presence_.host +
               " was not heard, which has given it up";
   presence_.serving = false;
-  // A claim that everybody may ignore.
-  presence_.incarnation = std::numeric_limits<std::uint64_t>::max();
+  presence_.stopped = true;
   out_ = true;
   for (const FrameInfo& frame : forest_.frames()) {
     if (frame.owner == kHeldHere) (void)forest_.release(frame.id);
   }
-  Change change{ChangeKind::kConflict, rival_->partition, {}, {}, rival_->partition, given_up_, {}};
+  Change change{ChangeKind::kConflict, rival.partition, {}, {}, rival.partition, given_up_, {}};
   directory_.changes().add(std::move(change));
+  commits_->ask();
+}
+
+// Under structure_mutex_. Others know of a later incarnation of this partition, so that they do not hear this one: a
+// predecessor that had another clock, or this very process, which they have forgotten.
+void Participant::overtake() {
+  const auto latest = directory_.hidden_by(presence_.incarnation);
+  if (partition_ == nullptr || out_ || !latest || claim_.served()) return;
+  incarnations_.saw(*latest);
+  presence_.incarnation = incarnations_.next(wall_clock(), random_number());
+  partition_->overtake(presence_.incarnation);
+  log().warn(
+      "others have known a later process of partition {}, whose clock was ahead: this one "
+      "takes its place",
+      quote(partition_name_));
   commits_->ask();
 }
 

@@ -29,6 +29,8 @@ std::string_view to_string(ChangeKind kind) {
       return "history_restarted";
     case ChangeKind::kFrameOrphaned:
       return "frame_orphaned";
+    case ChangeKind::kFrameTakenOver:
+      return "frame_taken_over";
     case ChangeKind::kMissed:
       return "missed";
   }
@@ -39,7 +41,7 @@ Change conflict_of(const Note& note, const std::string& partition) {
   Change change{ChangeKind::kConflict, partition, note.id, {}, note.rival, {}, {}};
   change.message = "frame " + quote(note.id) + ": ";
   if (note.kind == Note::Kind::kGaveWay) {
-    change.message += "claimed by partition " + quote(note.rival) + " and later by " +
+    change.message += "claimed by partition " + quote(note.rival) + ", which keeps it, and by " +
                       quote(partition) + ", which gives way";
   } else {
     change.message += "moved by partition " + quote(partition) + " so that with a move by " +
@@ -86,15 +88,17 @@ void ChangeLog::partition_up(const std::string& partition, const std::string& ho
        {}});
 }
 
-void ChangeLog::partition_down(const std::string& partition) {
+void ChangeLog::partition_down(const std::string& partition, bool stopped) {
   if (!watched_) return;
   add({ChangeKind::kPartitionDown,
        partition,
        {},
        {},
        {},
-       "partition " + quote(partition) + " has gone or fallen silent",
-       {}});
+       "partition " + quote(partition) +
+           (stopped ? " was stopped" : " is lost: it is not heard any more"),
+       {},
+       stopped});
 }
 
 void ChangeLog::frame_added(std::string_view id, std::string_view parent,
@@ -118,6 +122,19 @@ void ChangeLog::frame_moved(std::string_view id, std::string_view parent,
        std::string(parent),
        {},
        "frame " + quote(id) + " of partition " + quote(partition) + " moved" + under(parent),
+       {}});
+}
+
+void ChangeLog::frame_taken_over(std::string_view id, std::string_view parent,
+                                 const std::string& partition, const std::string& before) {
+  if (!watched_) return;
+  add({ChangeKind::kFrameTakenOver,
+       partition,
+       std::string(id),
+       std::string(parent),
+       before,
+       "frame " + quote(id) + " of partition " + quote(before) +
+           ", which is not there, is now of " + quote(partition) + under(parent),
        {}});
 }
 

@@ -13,26 +13,24 @@ bool younger(const FrameInfo& a, const FrameInfo& b) {
   return std::tie(a.since, a.id) > std::tie(b.since, b.id);
 }
 
+std::vector<const Claim*> all_of(const std::vector<Claim>& claims) {
+  std::vector<const Claim*> all;
+  all.reserve(claims.size() + 1);
+  for (const Claim& claim : claims) all.push_back(&claim);
+  return all;
+}
+
+std::vector<const Claim*> all_of(const std::vector<Claim>& claims, const Claim& one) {
+  auto all = all_of(claims);
+  all.push_back(&one);
+  return all;
+}
+
 }  // namespace
-
-Owner Claims::add_owner(std::string name) {
-  names_.push_back(std::move(name));
-  return static_cast<Owner>(names_.size() - 1);
-}
-
-bool Claims::older(const Claim& a, const Claim& b) const {
-  return std::tie(a.since, name(a.owner)) < std::tie(b.since, name(b.owner));
-}
 
 std::uint32_t Claims::page_of(std::string_view id) const {
   const auto frame = forest_.find(id);
   return frame && frame->slot < page_of_slot_.size() ? page_of_slot_[frame->slot] : 0;
-}
-
-template <class List>
-auto Claims::oldest_of(List& claims) const {
-  return std::min_element(claims.begin(), claims.end(),
-                          [this](const Claim& a, const Claim& b) { return older(a, b); });
 }
 
 Claim Claims::in_force(const FrameInfo& there) const {
@@ -96,26 +94,79 @@ void Claims::released(const std::string& id) {
   mend();
 }
 
-bool Claims::take(const std::string& id, std::uint64_t since) {
+bool Claims::may_take_from(Owner owner) const {
+  return succession_.standing(owner) == Succession::Standing::kGone ||
+         succession_.outlived(kHeldHere, owner);
+}
+
+Owner Claims::holder(const std::string& id) const {
+  const auto there = forest_.info(id);
+  if (!there) return kHeldHere;
+  if (!may_take_from(there->owner)) return there->owner;
+  const auto claims = shadowed_.find(id);
+  if (claims == shadowed_.end()) return kHeldHere;
+  const auto other =
+      std::find_if(claims->second.begin(), claims->second.end(),
+                   [this](const Claim& claim) { return !may_take_from(claim.owner); });
+  return other != claims->second.end() ? other->owner : kHeldHere;
+}
+
+bool Claims::take(const std::string& id) {
   const auto there = forest_.info(id);
   if (!there || there->owner == kHeldHere) return true;
+  if (holder(id) != kHeldHere) return false;
   Claim theirs = in_force(*there);
-  if (!older({kHeldHere, {}, since, 0}, theirs)) return false;
   forest_.drop_remote(id, theirs.owner);
   cut_.erase(id);
   shadow(id, std::move(theirs));
   return true;
 }
 
-// Puts the oldest claim in force, unless this process holds the frame: then it is for the owner to concede.
+// Puts the claim in force that holds, unless this process holds the frame: then it is for the owner to concede.
 void Claims::promote(const std::string& id) {
   const auto claims = shadowed_.find(id);
   if (claims == shadowed_.end() || forest_.holds(id)) return;
-  const auto oldest = oldest_of(claims->second);
-  const Claim winner = *oldest;
-  claims->second.erase(oldest);
-  if (claims->second.empty()) shadowed_.erase(claims);
-  put(id, winner);
+  const Claim heir = succession_.heir(all_of(claims->second));
+  auto& others = claims->second;
+  others.erase(std::find_if(others.begin(), others.end(),
+                            [&](const Claim& claim) { return claim.owner == heir.owner; }));
+  if (others.empty()) shadowed_.erase(claims);
+  put(id, heir);
+}
+
+// Who is there, or who gives way to whom, has changed.
+void Claims::reconsider() {
+  std::vector<std::string> contested;
+  contested.reserve(shadowed_.size());
+  for (const auto& [id, claims] : shadowed_) contested.push_back(id);
+  std::sort(contested.begin(), contested.end());
+  for (const std::string& id : contested) {
+    const auto there = forest_.info(id);
+    if (!there || there->owner == kHeldHere) continue;
+    const Claim now = in_force(*there);
+    if (succession_.heir(all_of(shadowed_[id], now)).owner == now.owner) continue;
+    shadow(id, now);
+    cut_.erase(id);
+    promote(id);
+  }
+  mend();
+}
+
+void Claims::set_standing(Owner owner, Succession::Standing standing) {
+  if (succession_.set_standing(owner, standing)) reconsider();
+}
+
+void Claims::set_outlived(Owner owner, std::set<Owner> outlived) {
+  if (succession_.set_outlived(owner, std::move(outlived))) reconsider();
+}
+
+bool Claims::contests_held(Owner owner) const {
+  return std::any_of(shadowed_.begin(), shadowed_.end(), [&](const auto& known) {
+    const auto& [id, claims] = known;
+    return forest_.holds(id) &&
+           std::any_of(claims.begin(), claims.end(),
+                       [owner](const Claim& claim) { return claim.owner == owner; });
+  });
 }
 
 std::set<Concession> Claims::concessions() const {
@@ -123,10 +174,12 @@ std::set<Concession> Claims::concessions() const {
   for (const auto& [id, claims] : shadowed_) {
     const auto there = forest_.info(id);
     if (!there || there->owner != kHeldHere) continue;
-    const Claim& oldest = *oldest_of(claims);
-    if (older(oldest, in_force(*there))) {
-      all.insert({Concession::Kind::kGiveWay, id, oldest.owner, there->since});
-    }
+    const Claim own = in_force(*there);
+    const Claim& heir = succession_.heir(all_of(claims, own));
+    // Nothing is given up for one who is not there: it may never return.
+    if (heir.owner == kHeldHere || succession_.standing(heir.owner) != Succession::Standing::kThere)
+      continue;
+    all.insert({Concession::Kind::kGiveWay, id, heir.owner, there->since});
   }
   for (const auto& [id, claim] : cut_) {
     const Cycle cycle = cycle_of(id, claim);
@@ -167,6 +220,9 @@ void Claims::put(const std::string& id, const Claim& claim) {
   if (!after) return;
   if (!before) {
     changes_.frame_added(id, after->parent, name(claim.owner));
+  } else if (before->owner != after->owner &&
+             succession_.standing(before->owner) == Succession::Standing::kGone) {
+    changes_.frame_taken_over(id, after->parent, name(claim.owner), name(before->owner));
   } else if (before->parent != after->parent || before->owner != after->owner) {
     changes_.frame_moved(id, after->parent, name(claim.owner));
   }

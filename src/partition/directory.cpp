@@ -47,11 +47,23 @@ Directory::Successor* Directory::succeed(Known& partition, std::uint64_t incarna
 }
 
 void Directory::apply(const Presence& presence, Time now) {
-  if (!presence.serving) return;
-  note_absent(presence.absent);
+  if (!presence.serving && !presence.stopped) return;
   Owner owner = kHeldHere;
-  Known& partition = known(presence.partition, owner);
-  if (owner == kHeldHere || presence.incarnation < partition.live) return;
+  (void)known(presence.partition, owner);
+  if (owner == kHeldHere) return;
+  if (presence.serving && !partitions_[owner].outdated(presence.incarnation)) {
+    hear_absent(owner, presence.absent, now);
+  }
+  Known& partition = partitions_[owner];
+  if (presence.stopped) {
+    const bool known_to_be_there = partition.info.reachable;
+    if (known_to_be_there && partition.live == presence.incarnation)
+      went(partition, owner, true, now);
+    return;
+  }
+  if (drop_outdated(partition, presence.incarnation)) return;
+  // Of one that has stopped this is an older word.
+  if (partition.info.stopped && partition.live == presence.incarnation) return;
   partition.live = presence.incarnation;
   if (Successor* successor = succeed(partition, presence.incarnation)) {
     successor->page_count = presence.pages;
@@ -66,32 +78,37 @@ void Directory::apply(const Presence& presence, Time now) {
   info.host = presence.host;
   info.pid = presence.pid;
   if (!info.reachable || info.since == Time{}) info.since = now;
-  info.reachable = true;
+  came_back(partition, owner);
+  settle_returns();
 }
 
 void Directory::apply(const Page& page) {
   Owner owner = kHeldHere;
   Known& partition = known(page.partition, owner);
-  if (owner == kHeldHere || page.incarnation < partition.incarnation) return;
+  if (owner == kHeldHere) return;
+  // One that is to be followed by another is still what is known of the partition.
+  const bool current = !partition.pages.empty() && page.incarnation == partition.incarnation;
+  if (!current && drop_outdated(partition, page.incarnation)) return;
   if (page.incarnation > partition.live) {
     // Whoever tells something new of an incarnation lives, even where the presence, which is handed
     // the time, comes after a page.
     partition.live = page.incarnation;
     if (!partition.info.reachable) partition.info.since = Time{};
-    partition.info.reachable = true;
+    came_back(partition, owner);
   }
   if (Successor* successor = succeed(partition, page.incarnation)) {
     if (page.incarnation < successor->incarnation) return;
     successor->pages.insert_or_assign(page.number, page);
     replace_if_complete(partition, owner);
-    return;
+  } else {
+    const std::vector<Note> news = news_of(partition, page.notes);
+    Ids outdated;
+    put_page(partition, owner, page, outdated);
+    claims_.mend();
+    report(news, owner);
+    find_orphans(page.notes, owner);
   }
-  const std::vector<Note> news = news_of(partition, page.notes);
-  Ids outdated;
-  put_page(partition, owner, page, outdated);
-  claims_.mend();
-  report(news, owner);
-  find_orphans(page.notes, owner);
+  settle_returns();
 }
 
 void Directory::replace_if_complete(Known& partition, Owner owner) {
@@ -280,47 +297,16 @@ std::uint64_t Directory::next_stamp(Time now) {
   return latest_stamp_;
 }
 
-bool Directory::lost(std::string_view partition, std::uint64_t incarnation, Time now) {
-  const auto number = owner(partition);
-  if (!number || *number == kHeldHere) return false;
-  Known& gone = partitions_[*number];
-  if (gone.live != incarnation || !gone.info.reachable) return false;
-  gone.info.reachable = false;
-  gone.info.since = now;
-  changes_.partition_down(gone.info.name);
-  return true;
+std::optional<Owner> Directory::owner(std::string_view partition) const {
+  const auto number = number_of(partition);
+  const bool hidden = number && *number != kHeldHere && !partitions_[*number].listed();
+  return hidden ? std::nullopt : number;
 }
 
-std::optional<Owner> Directory::owner(std::string_view partition) const {
+std::optional<Owner> Directory::number_of(std::string_view partition) const {
   const auto entry = owners_.find(std::string(partition));
   if (entry == owners_.end()) return std::nullopt;
   return entry->second;
-}
-
-void Directory::note_absent(const std::vector<Absent>& absent) {
-  for (const Absent& one : absent) {
-    Owner owner = kHeldHere;
-    Known& partition = known(one.partition, owner);
-    if (owner == kHeldHere || partition.live != 0) continue;
-    partition.info.since = Time(std::chrono::nanoseconds(one.since));
-  }
-}
-
-std::vector<Absent> Directory::absent() const {
-  std::vector<Absent> all;
-  for (Owner owner = 1; owner < partitions_.size(); ++owner) {
-    const Known& partition = partitions_[owner];
-    if (partition.info.reachable || partition.live == 0 || all.size() >= kMaxItems) continue;
-    all.push_back({partition.info.name, partition.info.since.time_since_epoch().count()});
-  }
-  return all;
-}
-
-std::optional<PartitionInfo> Directory::only_heard_of() const {
-  const auto one = std::find_if(partitions_.begin() + 1, partitions_.end(),
-                                [](const Known& partition) { return partition.live == 0; });
-  if (one == partitions_.end()) return std::nullopt;
-  return one->info;
 }
 
 std::vector<Owner> Directory::reachable_owners() const {
@@ -340,8 +326,9 @@ const std::string* Directory::incomplete() const {
 
 std::vector<PartitionInfo> Directory::partitions() const {
   std::vector<PartitionInfo> all;
-  for (const Known& partition : partitions_) {
-    if (!partition.info.name.empty()) all.push_back(partition.info);
+  if (!partitions_.front().info.name.empty()) all.push_back(partitions_.front().info);
+  for (auto one = partitions_.begin() + 1; one != partitions_.end(); ++one) {
+    if (one->listed()) all.push_back(one->info);
   }
   std::sort(all.begin(), all.end(),
             [](const PartitionInfo& a, const PartitionInfo& b) { return a.name < b.name; });

@@ -90,6 +90,14 @@ std::optional<Note> Pages::note(const std::string& id) const {
   return pages_[known->second].notes.at(id);
 }
 
+void Pages::overtake(std::uint64_t incarnation) {
+  incarnation_ = incarnation;
+  resume(incarnation);
+  for (std::uint32_t number = 0; number < count(); ++number) changed_.insert(number);
+  changed_last_.clear();
+  close_epoch();
+}
+
 void Pages::note_epochs() {
   for (const std::uint32_t number : changed_) {
     const auto before =

@@ -51,12 +51,17 @@ Result<void> Partition::load(const std::vector<FrameSpec>& frames, Time now) {
 Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t since) {
   std::vector<std::string> loaded;
   for (const FrameSpec& frame : frames) {
+    // What a partition has that is gone is there for the taking.
+    (void)directory_.take(frame.id);
     auto added =
         forest_.add(frame.id, frame.parent, value_of(frame), Forest::MissingParent::kAllow, since);
     if (added) loaded.push_back(frame.id);
     if (added && !frame.correlation.empty()) added = forest_.correlate(frame.id, frame.correlation);
     if (!added) {
-      for (const std::string& id : loaded) (void)forest_.remove(id);
+      for (const std::string& id : loaded) {
+        (void)forest_.remove(id);
+        directory_.released(id);
+      }
       return added;
     }
   }
@@ -166,6 +171,7 @@ Result<void> Partition::apply(const Request& request, Time now) {
                                [&](const CorrelateRequest& one) {
                                  return correlate(request.id, one.correlation);
                                },
+                               [&](const ForgetRequest& one) { return forget_partition(one, now); },
                                [](const auto&) -> Result<void> { return {}; }},
                     request.body);
 }

@@ -1,5 +1,6 @@
 #include <map>
 
+#include "tfdude/base/id.hpp"
 #include "tfdude/partition/partition.hpp"
 #include "tfdude/partition/reconfigure.hpp"
 
@@ -47,14 +48,15 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   if (auto ok = check_joints(configured); !ok) return ok;
   const std::vector<StoredJoint> joints = still_meant(state.joints, configured);
   const std::vector<StoredFrame> frames = frames_of(state, joints, configured);
+  directory_.restore(state.absent);
   for (const StoredFrame& frame : frames) directory_.saw_stamp(frame.since);
   for (const Note& note : state.notes) directory_.saw_stamp(note.since);
-  // All that others have no older claim to is taken before any of it is hung, so that it does not matter in which
-  // order that is done.
+  // All that nobody has who is there is taken before any of it is hung, so that it does not matter in which order that
+  // is done.
   std::vector<const StoredFrame*> kept;
   std::vector<const StoredFrame*> contested;
   for (const StoredFrame& frame : frames) {
-    (directory_.take(frame.id, frame.since) ? kept : contested).push_back(&frame);
+    (directory_.take(frame.id) ? kept : contested).push_back(&frame);
   }
   std::vector<const StoredFrame*> circular;
   for (const StoredFrame* frame : kept) {
@@ -66,7 +68,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   saved_ = true;
   pages_.watch_ids();
   for (const StoredFrame* frame : contested) {
-    give_way(frame->id, forest_.info(frame->id)->owner, now);
+    give_way(frame->id, directory_.holder(frame->id), now);
   }
   for (const StoredFrame* frame : circular) make_root(*frame, now);
   directory_.moved();
@@ -191,6 +193,11 @@ bool Partition::concede(const Concession& concession, Time now) {
 
 void Partition::give_way(const std::string& id, Owner rival, Time now) {
   tell_conflict({id, directory_.next_stamp(now), Note::Kind::kGaveWay, directory_.name(rival)});
+}
+
+Result<void> Partition::forget_partition(const ForgetRequest& request, Time now) {
+  if (auto ok = check_partition_name(request.partition); !ok) return ok;
+  return directory_.forget(request.partition, request.incarnation, now);
 }
 
 void Partition::unhang(const std::string& id, Owner rival, Time now) {

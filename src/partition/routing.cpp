@@ -19,7 +19,8 @@ Result<void> check_reachable(const Directory& directory, Owner owner) {
   const PartitionInfo& info = directory.info(owner);
   return fail(Errc::kUnreachable, "partition " + quote(info.name) + " (host " + info.host +
                                       ", pid " + std::to_string(info.pid) +
-                                      ") is not reachable since " + to_string(info.since));
+                                      ") is not reachable since " + to_string(info.since) +
+                                      ": it " + why_absent(info));
 }
 
 // The owner's part, made where it is not there yet: about this id, with an empty body of this kind.

@@ -15,12 +15,14 @@ class MemoryStore final : public StateStore {
   Result<StoredState> load() override {
     StoredState state{epoch_, {}, {}, configured_};
     for (const auto& [name, joint] : joints_) state.joints.push_back(joint);
+    state.absent = absent_;
     for (const auto& [id, frame] : frames_) state.frames.push_back(frame);
     for (const auto& [id, note] : notes_) state.notes.push_back(note);
     return state;
   }
   Result<void> save(const StateChange& change) override {
     epoch_ = change.epoch;
+    if (change.absent) absent_ = *change.absent;
     for (const std::string& id : change.erased) {
       frames_.erase(id);
       notes_.erase(id);
@@ -51,6 +53,7 @@ class MemoryStore final : public StateStore {
   std::map<std::string, StoredFrame> frames_;
   std::map<std::string, Note> notes_;
   std::map<std::string, StoredJoint> joints_;
+  std::vector<Absent> absent_;
   std::vector<FrameSpec> configured_;
 };
 

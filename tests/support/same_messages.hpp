@@ -157,6 +157,9 @@ inline void check_same(const Request& actual, const Request& expected) {
     CHECK(std::get<JointsRequest>(actual.body).after == from->after);
   } else if (const auto* said = std::get_if<CorrelateRequest>(&expected.body)) {
     CHECK(std::get<CorrelateRequest>(actual.body).correlation == said->correlation);
+  } else if (const auto* forget = std::get_if<ForgetRequest>(&expected.body)) {
+    CHECK(std::get<ForgetRequest>(actual.body).partition == forget->partition);
+    CHECK(std::get<ForgetRequest>(actual.body).incarnation == forget->incarnation);
   } else if (const auto* joints = std::get_if<JointUpdate>(&expected.body)) {
     CHECK(listed(std::get<JointUpdate>(actual.body)) == listed(*joints));
   }

@@ -130,6 +130,7 @@ bool take(const Bytes& bytes) {
       {20, "arm", JointsRequest{"elbow"}},
       {21, "arm", partial_updates(random)},
       {22, "arm", CorrelateRequest{correlation(random)}},
+      {30, "base", ForgetRequest{"arm", 18446744073709551615ULL}},
       {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), std::nullopt},
        18446744073709551610ULL}};
 }
@@ -252,7 +253,11 @@ bool take(const Bytes& bytes) {
            4294967295U,
            4294967295U,
            false,
-           {{"arms", -9223372036854775807}, {std::string(255, 'a'), 7}}}};
+           {{"arms", -9223372036854775807, Absent::Kind::kForgotten, 18446744073709551615ULL},
+            {std::string(255, 'a'), 7, Absent::Kind::kSilent, 1}},
+           true,
+           true,
+           18446744073709551614ULL}};
 }
 
 [[nodiscard]] inline std::vector<WireKind> wire_kinds(Random& random) {

@@ -68,10 +68,12 @@ std::vector<std::string> TestDomain::command(const char* program,
   return command;
 }
 
-Process TestDomain::start_daemon(const std::vector<std::string>& arguments) const {
+Process TestDomain::start_daemon(const std::vector<std::string>& arguments,
+                                 const std::vector<std::string>& wrapper) const {
   const bool keeps = std::count(arguments.begin(), arguments.end(), "--state") > 0;
   auto daemon = command(TFDUDE_DAEMON, arguments);
   if (!keeps) daemon.emplace_back("--no-state");
+  daemon.insert(daemon.begin(), wrapper.begin(), wrapper.end());
   return start(kFirstDaemonHost + daemons_++ % kDaemonHosts, daemon);
 }
 

@@ -41,7 +41,9 @@ class TestDomain {
   [[nodiscard]] Options options(Milliseconds timeout = Milliseconds(20000)) const;
 
   /// Starts a daemon; await_ready() tells when it serves.
-  [[nodiscard]] Process start_daemon(const std::vector<std::string>& arguments) const;
+  /// @param wrapper  a program, with arguments, that is to start it
+  [[nodiscard]] Process start_daemon(const std::vector<std::string>& arguments,
+                                     const std::vector<std::string>& wrapper = {}) const;
   /// Starts a daemon for a configuration, and waits until it serves.
   [[nodiscard]] Process serve(const std::string& config) const;
 

@@ -166,6 +166,12 @@ class Client {
   /// @return kUnknownFrame.
   [[nodiscard]] Result<void> remove(const std::string& id);
 
+  /// Says that a partition which is not there is gone for good: nothing of it is kept by anybody, neither by those who
+  /// are away now and hear of it when they return. Its own file is not touched; if it is started again, it is new.
+  /// Thread-safe; takes `timeout` at most, beside the discovery.
+  /// @return kUnknownPartition; kPartitionTaken where it is there, for this participant or for one that was told
+  [[nodiscard]] Result<void> forget(const std::string& partition);
+
   /// Gives the edge from a frame's parent to the frame a new value, acknowledged by its owner. On a Node an
   /// own edge costs no network, no lock that readers know, no allocation, and never waits.
   ///

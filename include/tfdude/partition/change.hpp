@@ -20,6 +20,7 @@ enum class ChangeKind : std::uint8_t {
   kConflict,    ///< one of two partitions, or of two processes that serve one, had to give way
   kHistoryRestarted,  ///< of a frame's edge, whose source's clock has jumped back; told by its owner's process only
   kFrameOrphaned,  ///< waits for its parent, which that one's configuration names no more
+  kFrameTakenOver,  ///< belongs to a partition that is there, since the one that had it is not
   kMissed,         ///< changes were not told, because the listeners took too long
 };
 
@@ -32,9 +33,12 @@ struct Change {
   std::string partition;  ///< concerned: the frame's owner; of a conflict, who gave way
   std::string frame;      ///< empty where it is about a partition
   std::string parent;     ///< of an added, moved or orphaned frame; empty: a root
-  std::string rival;      ///< of a conflict: the partition that was given way to; of an orphan: who had its parent
-  std::string message;    ///< for people
-  Time time{};            ///< by the clock of the participant that saw it
+  /// Of a conflict: the partition that was given way to; of an orphan: who had its parent; of a frame taken over: the
+  /// one that had it.
+  std::string rival;
+  std::string message;   ///< for people
+  Time time{};           ///< by the clock of the participant that saw it
+  bool stopped = false;  ///< of a partition that is down: it has said so; else it was lost
 };
 
 /// The conflict that a note tells of. @param partition  whose note it is
@@ -55,9 +59,12 @@ class ChangeLog {
   [[nodiscard]] bool watched() const { return watched_; }
 
   void partition_up(const std::string& partition, const std::string& host, std::uint32_t pid);
-  void partition_down(const std::string& partition);
+  void partition_down(const std::string& partition, bool stopped);
   void frame_added(std::string_view id, std::string_view parent, const std::string& partition);
   void frame_moved(std::string_view id, std::string_view parent, const std::string& partition);
+  /// @param before  the partition that had it, and is not there
+  void frame_taken_over(std::string_view id, std::string_view parent, const std::string& partition,
+                        const std::string& before);
   void frame_removed(std::string_view id, const std::string& partition);
 
   /// A conflict, or an orphan, is kept always: whoever it concerns logs it.

@@ -7,9 +7,11 @@
 #include <string>
 #include <tuple>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "tfdude/partition/change.hpp"
+#include "tfdude/partition/succession.hpp"
 #include "tfdude/tree/forest.hpp"
 
 namespace tfdude {
@@ -42,18 +44,26 @@ struct Concession {
   }
 };
 
-/// Which of all claims are in force: writes those into the forest. Of two partitions that claim a frame the
-/// older claim holds, of claims of the same age that of the lesser name; in each cycle of claims the
-/// youngest does not, and its frame is a root (of the same age: that of the greater id). So what is in force is
-/// a function of the claims, not of the order in which they came. A held frame stays until its owner
-/// concedes; whoever does not own it sees the outcome at once. Not thread-safe.
+/// Which of all claims are in force: writes those into the forest. Of several partitions that claim a frame
+/// Succession says whose claim holds; in each cycle of claims the youngest does not, and its frame is a root (of
+/// the same age: that of the greater id). So what is in force is a function of the claims and of who is there, not of
+/// the order in which they came. A held frame stays until its owner concedes; whoever does not own it sees the
+/// outcome at once. Not thread-safe.
 class Claims {
  public:
   Claims(Forest& forest, ChangeLog& changes) : forest_(forest), changes_(changes) {}
 
   /// Numbers the partitions; the first is this process's own.
-  Owner add_owner(std::string name);
-  [[nodiscard]] const std::string& name(Owner owner) const { return names_[owner]; }
+  Owner add_owner(std::string name) { return succession_.add_owner(std::move(name)); }
+  [[nodiscard]] const std::string& name(Owner owner) const { return succession_.name(owner); }
+
+  /// Whether a partition is there; all are at first. O(contested frames) where that is news.
+  void set_standing(Owner owner, Succession::Standing standing);
+  /// Whom a partition says that it has outlived. O(contested frames) where that is news.
+  void set_outlived(Owner owner, std::set<Owner> outlived);
+
+  /// Whether a frame that this process holds is claimed by that partition, too. O(contested frames).
+  [[nodiscard]] bool contests_held(Owner owner) const;
 
   /// Which of two claims of one partition to a frame, on two of its pages, is the one to take.
   enum class Counts { kTheYounger, kThis };
@@ -69,9 +79,12 @@ class Claims {
   /// This process released a frame that it held: another's claim to it may be in force now.
   void released(const std::string& id);
 
-  /// This process is going to hold a frame that may be another's now.
-  /// @return false where the other's claim is the older one
-  [[nodiscard]] bool take(const std::string& id, std::uint64_t since);
+  /// This process is going to hold a frame that may be another's now. Who comes gives way to who is there already,
+  /// whichever claim is the older one, unless this process's partition has outlived that.
+  /// @return false where it has to give way
+  [[nodiscard]] bool take(const std::string& id);
+  /// To whom it has to give way then.
+  [[nodiscard]] Owner holder(const std::string& id) const;
 
   /// This process is going to hang a frame below its own place. Cuts the way from there up to it at the youngest
   /// claim of others, for mend() to find out who has to give way.
@@ -88,14 +101,13 @@ class Claims {
   [[nodiscard]] std::set<Concession> concessions() const;
 
  private:
-  [[nodiscard]] bool older(const Claim& a, const Claim& b) const;
-  template <class List>
-  [[nodiscard]] auto oldest_of(List& claims) const;
+  [[nodiscard]] bool may_take_from(Owner owner) const;
   [[nodiscard]] Claim in_force(const FrameInfo& there) const;
   [[nodiscard]] Claim* shadowed(const std::string& id, Owner owner);
   [[nodiscard]] std::uint32_t page_of(std::string_view id) const;
   void shadow(const std::string& id, Claim claim);
   void promote(const std::string& id);
+  void reconsider();
   void put(const std::string& id, const Claim& claim);
   void break_cycle(const std::string& id, const Claim& claim);
   void cut(const FrameInfo& frame);
@@ -108,7 +120,7 @@ class Claims {
 
   Forest& forest_;
   ChangeLog& changes_;
-  std::vector<std::string> names_;
+  Succession succession_;
   // Frames that several partitions claim: all claims but the one in force.
   std::unordered_map<std::string, std::vector<Claim>> shadowed_;
   std::vector<std::uint32_t> page_of_slot_;  // of the claims in force

@@ -8,11 +8,14 @@
 #include <string_view>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "tfdude/base/time.hpp"
+#include "tfdude/partition/absences.hpp"
 #include "tfdude/partition/change.hpp"
 #include "tfdude/partition/claims.hpp"
+#include "tfdude/partition/incarnation.hpp"
 #include "tfdude/partition/messages.hpp"
 #include "tfdude/tree/forest.hpp"
 
@@ -25,8 +28,14 @@ struct PartitionInfo {
   std::uint32_t pid = 0;
   std::size_t frames = 0;
   bool reachable = false;
-  Time since{};  ///< reachable or not since then, by the caller's clock
+  Time since{};          ///< reachable or not since then, by the caller's clock
+  bool stopped = false;  ///< of one that is not reachable: it has said so; else it was lost
 };
+
+/// "was stopped" or "is lost", of a partition that is not reachable.
+[[nodiscard]] inline const char* why_absent(const PartitionInfo& partition) {
+  return partition.stopped ? "was stopped" : "is lost";
+}
 
 /// A participant's replica of the structure: which partition owns which frame. Writes what the owners
 /// publish into the participant's forest and names the forest's owner numbers. What it holds is a function
@@ -38,7 +47,7 @@ class Directory {
   Directory(const Directory&) = delete;
   Directory& operator=(const Directory&) = delete;
 
-  /// A partition is served. A later incarnation replaces an earlier one.
+  /// A partition is served, or ends. A later incarnation replaces an earlier one.
   void apply(const Presence& presence, Time now);
 
   /// A piece of a partition's structure. That of an incarnation which is new, where an earlier one is known,
@@ -48,6 +57,36 @@ class Directory {
   /// The partition's participant has gone; its structure is kept.
   /// @return false where this is not news
   bool lost(std::string_view partition, std::uint64_t incarnation, Time now);
+
+  /// Those who have been silent for Absences::kGrace now count as gone: frames that others claim, too, are theirs.
+  /// To be called again while any_silent(). @return whether there are such
+  bool look_for_gone(Absences::Steady now);
+  [[nodiscard]] bool any_silent() const { return absences_.any_silent(); }
+
+  /// Whether somebody whom this process has not met is said to be silent: it may be there again in a moment.
+  [[nodiscard]] bool awaits_silent() const;
+
+  /// Nothing is kept of a partition that is not there.
+  /// @param incarnation  the latest that whoever says so has heard of
+  /// @return kPartitionTaken where it is there.
+  [[nodiscard]] Result<void> forget(const std::string& partition, std::uint64_t incarnation,
+                                    Time now);
+  /// The latest incarnation that was heard of; 0: of none.
+  [[nodiscard]] std::uint64_t latest_incarnation(const std::string& partition) const;
+
+  /// Whom an earlier process of this partition missed.
+  void restore(const std::vector<Absent>& absent);
+
+  /// Others know of an incarnation of this process's partition that is not this one, and would hide it: the greatest.
+  [[nodiscard]] std::optional<std::uint64_t> hidden_by(std::uint64_t own) const;
+
+  /// Of whom something was dropped for its age since the last call; each incarnation once.
+  struct Outdated {
+    std::string partition;
+    std::uint64_t incarnation = 0;
+    std::uint64_t latest = 0;
+  };
+  [[nodiscard]] std::vector<Outdated> take_outdated() { return std::exchange(outdated_, {}); }
 
   /// This process's partition has a joint.
   void put_own_joint(const PageJoint& joint) { add_joint(joint, kHeldHere); }
@@ -65,10 +104,9 @@ class Directory {
   /// As Claims::make_way().
   [[nodiscard]] bool make_way(const std::string& parent) { return claims_.make_way(parent); }
 
-  /// As Claims::take().
-  [[nodiscard]] bool take(const std::string& id, std::uint64_t since) {
-    return claims_.take(id, since);
-  }
+  /// As Claims::take() and Claims::holder().
+  [[nodiscard]] bool take(const std::string& id) { return claims_.take(id); }
+  [[nodiscard]] Owner holder(const std::string& id) const { return claims_.holder(id); }
 
   /// What this process's partition would have to give up, by what was applied so far.
   /// O(contested frames).
@@ -106,8 +144,8 @@ class Directory {
   /// The name of one of which they have not; null: there is none.
   [[nodiscard]] const std::string* incomplete() const;
 
-  /// Those of whom structure is here, but who are not reachable: what to tell newcomers.
-  [[nodiscard]] std::vector<Absent> absent() const;
+  /// Whom this participant misses: what to tell others.
+  [[nodiscard]] std::vector<Absent> absent() const { return absences_.all(); }
 
   /// A partition that others miss, and of which nothing else is known here.
   [[nodiscard]] std::optional<PartitionInfo> only_heard_of() const;
@@ -151,12 +189,29 @@ class Directory {
     std::uint32_t page_count = 0;
     std::map<std::uint32_t, KeptPage> pages;
     std::optional<Successor> successor;
+    std::uint64_t heard_of = 0;  // the latest incarnation that others have spoken of
+    bool forgotten = false;      // up to that one
+    bool missed_by_others = false;
+    bool said_silent = false;  // by others
+    [[nodiscard]] bool listed() const { return !forgotten && (live != 0 || missed_by_others); }
+    std::uint64_t reported = 0;  // the last that was dropped for its age
 
+    [[nodiscard]] bool outdated(std::uint64_t one) const {
+      return one < live || one < heard_of || (forgotten && one == heard_of);
+    }
     [[nodiscard]] bool complete() const { return !successor && pages.size() >= page_count; }
   };
 
   Known& known(const std::string& partition, Owner& owner);
-  void note_absent(const std::vector<Absent>& absent);
+  [[nodiscard]] std::optional<Owner> number_of(std::string_view partition) const;
+  void hear_absent(Owner from, const std::vector<Absent>& absent, Time now);
+  void hear_of(const Absent& one, Time now);
+  bool drop_outdated(Known& partition, std::uint64_t incarnation);
+  void came_back(Known& partition, Owner owner);
+  void went(Known& partition, Owner owner, bool stopped, Time now);
+  void drop_structure(Known& partition, Owner owner);
+  void settle_returns();
+  void tell_claims();
   Successor* succeed(Known& partition, std::uint64_t incarnation);
   void replace_if_complete(Known& partition, Owner owner);
   static void note_epoch(Known& partition, const Page& page);
@@ -178,6 +233,11 @@ class Directory {
   std::set<Concession> orphans_;  // held frames that hung below one that another removed
   std::map<std::string, std::multiset<Owner>> joint_owners_;  // once a joint and page
   std::uint64_t latest_stamp_ = 0;
+  Absences absences_;
+  std::uint64_t own_heard_of_ =
+      0;  // the latest incarnation of the own partition that others have spoken of,
+  std::uint64_t own_forgotten_ = 0;  // or have forgotten
+  std::vector<Outdated> outdated_;
 };
 
 }  // namespace tfdude

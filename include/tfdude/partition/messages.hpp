@@ -106,6 +106,12 @@ struct JointsRequest {
   std::string after{};
 };
 
+/// Says that another partition, which is not there, is gone for good; the request's id is the name of the one asked.
+struct ForgetRequest {
+  std::string partition;
+  std::uint64_t incarnation = 0;  ///< the latest that was heard of
+};
+
 /// Asks for the values of edges, now and whenever they change: these are pushed to the group of watchers that have
 /// asked for the same, until it is not renewed for kWatchLease.
 struct WatchRequest {
@@ -135,7 +141,7 @@ struct Request {
   std::string id;
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
                PastRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
-               PartialUpdateRequest, CorrelateRequest>
+               PartialUpdateRequest, CorrelateRequest, ForgetRequest>
       body;
   /// Of requests with a lower number, in whatever order they come, the sender awaits no reply. Not above `sequence`, which has
   /// its lower half only.
@@ -263,31 +269,46 @@ struct Page {
   std::vector<PageJoint> joints{};
 };
 
-/// A partition that was there and is not reachable.
+/// A partition that a participant has known, or heard of, and that is not there.
 struct Absent {
+  enum class Kind : std::uint8_t {
+    kSilent = 1,     ///< since a moment only: it may just be busy
+    kLost = 2,       ///< it has fallen silent without a word
+    kStopped = 3,    ///< it said that it ends
+    kBack = 4,       ///< it is there again, but what both claim is not settled yet
+    kForgotten = 5,  ///< somebody said that it is gone for good: nothing of it is kept
+  };
   std::string partition;
   std::int64_t since = 0;  ///< [ns since the UNIX epoch], by the clock of who misses it
+  Kind kind = Kind::kLost;
+  std::uint64_t incarnation = 0;  ///< the latest that was heard of
 
   friend bool operator==(const Absent& a, const Absent& b) {
-    return a.partition == b.partition && a.since == b.since;
+    return a.partition == b.partition && a.since == b.since && a.kind == b.kind &&
+           a.incarnation == b.incarnation;
   }
 };
 
 /// That a partition is served, and by whom. It holds as long as its participant lives.
 struct Presence {
   std::string partition;
-  /// When its process took the name [ns since the UNIX epoch]; the later is the newer.
+  /// Which process of the partition's it is: the greater is the later (IncarnationSource).
   std::uint64_t incarnation = 0;
   std::string host;
   std::uint32_t pid = 0;
   std::uint32_t pages = 0;  ///< how many pages its structure has
-  bool serving = false;     ///< false: the name is only being claimed yet
-  /// Whom the sender has known, for those who come only now and cannot.
+  bool serving = false;     ///< false: the name is only being claimed yet, or not any more
+  /// Whom the sender misses, for those who come only now and cannot, and for those who come back: whom it lists as
+  /// lost, stopped or back has to give way to it (Succession).
   std::vector<Absent> absent{};
+  bool taken = false;        ///< the name is taken; it will be served once the frames are there
+  bool stopped = false;      ///< it is the last word: the process ends, or has given the name up
+  std::uint64_t ticket = 0;  ///< of its claim to the name (NameClaim); the same as long as it lives
 
   friend bool operator==(const Presence& a, const Presence& b) {
     return a.partition == b.partition && a.incarnation == b.incarnation && a.host == b.host &&
-           a.pid == b.pid && a.pages == b.pages && a.serving == b.serving && a.absent == b.absent;
+           a.pid == b.pid && a.pages == b.pages && a.serving == b.serving && a.absent == b.absent &&
+           a.taken == b.taken && a.stopped == b.stopped && a.ticket == b.ticket;
   }
 };
 

@@ -58,6 +58,9 @@ class Pages {
   /// Goes on counting from here, if that is ahead.
   void resume(std::uint64_t epoch) { epoch_ = epoch > epoch_ ? epoch : epoch_; }
 
+  /// Goes on as a later incarnation: all pages are published again.
+  void overtake(std::uint64_t incarnation);
+
   /// Closes a change of structure, of as many frames as it has; the epoch that shows it. It begins with the
   /// incarnation, so that it grows over all of a partition's lives.
   std::uint64_t close_epoch() { return ++epoch_; }

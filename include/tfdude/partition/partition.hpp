@@ -77,6 +77,9 @@ class Partition {
   /// settled the rest. @return whether the structure changed; there may be other concessions then
   bool concede(const std::set<Concession>& due, Time now);
 
+  /// Goes on as a later incarnation, since others know of one that hides this.
+  void overtake(std::uint64_t incarnation) { pages_.overtake(incarnation); }
+
   /// The pages to publish since the last call.
   [[nodiscard]] std::vector<Page> take_pages() { return pages_.take_changed(); }
   [[nodiscard]] std::uint32_t page_count() const { return pages_.count(); }
@@ -124,6 +127,7 @@ class Partition {
   void put(const std::string& id, const std::string& parent, std::uint64_t since);
   void forget(const std::vector<std::string>& removed, Time now);
   void give_way(const std::string& id, Owner rival, Time now);
+  [[nodiscard]] Result<void> forget_partition(const ForgetRequest& request, Time now);
   void unhang(const std::string& id, Owner rival, Time now);
   void tell_conflict(const Note& note);
   [[nodiscard]] Error at_home(Error error, std::string_view id) const;

@@ -47,6 +47,7 @@ struct StoredState {
   /// has changed it.
   std::vector<FrameSpec> configured;
   std::vector<StoredJoint> joints{};
+  std::vector<Absent> absent{};  ///< whom the partition missed
 };
 
 /// What to change in a stored state.
@@ -56,8 +57,10 @@ struct StateChange {
   std::vector<StoredFrame> frames;
   std::vector<Note> notes;
   std::vector<StoredJoint> joints{};  ///< new positions
+  std::optional<std::vector<Absent>>
+      absent{};  ///< all whom the partition misses, where that has changed
 
-  [[nodiscard]] bool empty() const { return erased.empty(); }
+  [[nodiscard]] bool empty() const { return erased.empty() && !absent; }
 };
 
 /// Where a partition's state is kept. Not thread-safe.

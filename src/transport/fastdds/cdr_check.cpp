@@ -174,6 +174,10 @@ void request_body(CdrWalk& walk) {
         walk.transform();
       });
       break;
+    case 20:  // forget
+      walk.skip(8, 8);
+      walk.id();
+      break;
     case 12:  // joints
       walk.sequence([&] { walk.joint(); });
       walk.skip(8, 8);
@@ -323,8 +327,13 @@ bool well_formed_presence(const std::uint8_t* data, std::size_t size) {
   walk.boolean();
   walk.sequence([&] {
     walk.skip(8, 8);
+    walk.skip(8, 8);
+    walk.octet();
     walk.id();
   });
+  walk.skip(8, 8);
+  walk.octet();
+  walk.octet();
   return walk.good();
 }
 

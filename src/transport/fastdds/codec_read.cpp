@@ -229,6 +229,8 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
       return take(request, read_partial_update(body.partial_update()));
     case kCorrelate:
       return take(request, read_correlate(request.id, body.correlate()));
+    case kForget:
+      return as(ForgetRequest{string_of(body.forget().partition()), body.forget().incarnation()});
     default:
       return fail(Errc::kInvalidInput, "no request of kind " + std::to_string(body._d()));
   }

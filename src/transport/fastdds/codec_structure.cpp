@@ -74,13 +74,20 @@ Result<Presence> from_wire(const wire::Presence& sample) {
                     sample.pid(),
                     sample.pages(),
                     sample.serving(),
-                    {}};
+                    {},
+                    sample.taken() != 0,
+                    sample.stopped() != 0,
+                    sample.ticket()};
   if (auto ok = check_partition_name(presence.partition); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
   if (auto ok = check_id(presence.host, "host"); !ok) return tl::unexpected(std::move(ok.error()));
   for (const wire::Absent& one : sample.absent()) {
-    presence.absent.push_back({string_of(one.partition()), one.since()});
+    const auto kind = static_cast<Absent::Kind>(one.kind());
+    if (kind < Absent::Kind::kSilent || kind > Absent::Kind::kForgotten) {
+      return fail(Errc::kInvalidInput, "absent: no kind " + std::to_string(one.kind()));
+    }
+    presence.absent.push_back({string_of(one.partition()), one.since(), kind, one.incarnation()});
     if (auto ok = check_partition_name(presence.absent.back().partition); !ok) {
       return tl::unexpected(std::move(ok.error()));
     }

@@ -157,6 +157,12 @@ struct BodyWriter {
   void operator()(const CorrelateRequest& said) { out.correlate(wire_ties(said.correlation)); }
   void operator()(const JointUpdate& update) { out.joints(to_wire(update)); }
   void operator()(const JointsRequest& asked) { out.joint_states(asked.after); }
+  void operator()(const ForgetRequest& asked) {
+    wire::Forget body;
+    body.partition(asked.partition);
+    body.incarnation(asked.incarnation);
+    out.forget(std::move(body));
+  }
   void operator()(const ConsistencyRequest& asked) { out.consistency(asked.all ? 1 : 0); }
 };
 
@@ -370,7 +376,12 @@ wire::Presence to_wire(const Presence& presence) {
   for (std::size_t i = 0; i < presence.absent.size(); ++i) {
     sample.absent()[i].partition(presence.absent[i].partition);
     sample.absent()[i].since(presence.absent[i].since);
+    sample.absent()[i].kind(static_cast<std::uint8_t>(presence.absent[i].kind));
+    sample.absent()[i].incarnation(presence.absent[i].incarnation);
   }
+  sample.taken(presence.taken ? 1 : 0);
+  sample.stopped(presence.stopped ? 1 : 0);
+  sample.ticket(presence.ticket);
   return sample;
 }
 

@@ -22,6 +22,9 @@ constexpr std::chrono::milliseconds kFirstBeatByServer{8000};
 
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
 
+// How long the others may take to hear that this participant ends.
+constexpr std::chrono::milliseconds kLastWord{100};
+
 // Among more servers than these each speaks less often.
 constexpr std::uint32_t kMany = 12;
 
@@ -189,6 +192,7 @@ Milliseconds FastDdsTransport::settle_time() const {
 
 void FastDdsTransport::stop() {
   if (participant_ == nullptr) return;
+  if (presence_outlet_ != nullptr) presence_outlet_->flush(kLastWord);
   // From here on nothing is matched while endpoints go (see Gate); then whoever makes and deletes them, too.
   gate_->close();
   worker_->stop();

@@ -20,7 +20,8 @@ enum RequestKind : std::uint8_t {
   kJoints = 12,
   kJointStates = 13,
   kCorrelate = 14,
-  kPartialUpdate = 17
+  kPartialUpdate = 17,
+  kForget = 20
 };
 enum ReplyKind : std::uint8_t {
   kError = 1,

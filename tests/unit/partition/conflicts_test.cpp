@@ -73,9 +73,8 @@ TEST_CASE("of two partitions that add one id the later gives way, and says so") 
     CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ arms, attached"});
     CHECK(arms.concede());
     CHECK(arms.structure() == Lines{"camera <  @ head", "lens < camera @ arms, attached"});
-    CHECK(
-        arms.conflicts() ==
-        Lines{"frame 'camera': claimed by partition 'head' and later by 'arms', which gives way"});
+    CHECK(arms.conflicts() == Lines{"frame 'camera': claimed by partition 'head', which keeps it, "
+                                    "and by 'arms', which gives way"});
     const auto pages = arms.partition.take_pages();
     REQUIRE(pages.size() == 1);
     REQUIRE(pages[0].notes.size() == 1);
@@ -279,8 +278,15 @@ TEST_CASE("a frame whose parent was removed while its owner was away goes when i
   }
 }
 
+// Counts as gone from now on.
+void bury(Directory& directory, const std::string& partition) {
+  REQUIRE(directory.lost(partition, 1, kNow));
+  (void)directory.look_for_gone({});
+  REQUIRE(directory.look_for_gone(Absences::Steady{} + Absences::kGrace));
+}
+
 TEST_CASE(
-    "who returns gives way to who has claimed a frame earlier, and takes it from who did later") {
+    "who returns gives way to who is there, whichever claim is the older, but not to who is gone") {
   MemoryStore store;
   add_in_former_life(store, "camera");
   Owning arms("arms", &store);
@@ -294,7 +300,29 @@ TEST_CASE(
   SECTION("later") {
     arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
     arms.start();
+    CHECK(arms.structure() == Lines{"camera <  @ head"});
+    CHECK(arms.conflicts().size() == 1);
+  }
+  SECTION("gone") {
+    arms.directory.apply(page_of("head", {{"camera", "", 900}}));
+    bury(arms.directory, "head");
+    arms.start();
     CHECK(arms.structure() == Lines{"camera <  @ arms"});
+    CHECK(arms.conflicts().empty());
+  }
+}
+
+TEST_CASE("a configured frame of a partition that is gone is taken") {
+  Owning arms("arms");
+  arms.directory.apply(page_of("head", {{"camera", "", 900}, {"lens", "camera", 900}}));
+  SECTION("not while that is there") {
+    CHECK_FALSE(arms.partition.load({{"lamp", "", along_x(1)}, {"camera", "", along_x(1)}}, kNow));
+    CHECK(arms.structure() == Lines{"camera <  @ head", "lens < camera @ head, attached"});
+  }
+  SECTION("else") {
+    bury(arms.directory, "head");
+    REQUIRE(arms.partition.load({{"camera", "", along_x(1)}}, kNow));
+    CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ head, attached"});
   }
 }
 
@@ -327,6 +355,7 @@ TEST_CASE("others' frames hang where they belong once the frame that returns bre
   Owning arms("arms", &store);
   arms.directory.apply(page_of("head", {{"hand", "neck", 1100}, {"neck", "hand", 1200}}));
   REQUIRE(arms.structure() == Lines{"hand < neck @ head, attached", "neck <  @ head"});
+  bury(arms.directory, "head");
   arms.start();
   CHECK(arms.structure() == Lines{"hand <  @ arms", "neck < hand @ head, attached"});
 }

@@ -1,0 +1,197 @@
+#include <algorithm>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/partition/directory.hpp"
+
+// Who is not there, who has come back, and of whom nothing is to be kept.
+namespace tfdude {
+
+using Standing = Succession::Standing;
+
+bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
+  if (!partition.outdated(incarnation)) return false;
+  if (partition.reported != incarnation) {
+    partition.reported = incarnation;
+    outdated_.push_back(
+        {partition.info.name, incarnation, std::max(partition.live, partition.heard_of)});
+  }
+  return true;
+}
+
+void Directory::came_back(Known& partition, Owner owner) {
+  partition.info.reachable = true;
+  partition.info.stopped = false;
+  partition.forgotten = false;
+  partition.said_silent = false;
+  const bool missed = absences_.returned(partition.info.name);
+  claims_.set_standing(owner, Standing::kThere);
+  if (missed) tell_claims();
+}
+
+void Directory::went(Known& partition, Owner owner, bool stopped, Time now) {
+  partition.info.reachable = false;
+  partition.info.stopped = stopped;
+  partition.info.since = now;
+  if (stopped) {
+    absences_.stopped(partition.info.name, partition.live, now);
+  } else {
+    absences_.lost(partition.info.name, partition.live, now);
+  }
+  changes_.partition_down(partition.info.name, stopped);
+  const auto missed = absences_.find(partition.info.name);
+  const bool silent = missed && missed->kind == Absent::Kind::kSilent;
+  claims_.set_standing(owner, silent ? Standing::kSilent : Standing::kGone);
+  tell_claims();
+}
+
+bool Directory::lost(std::string_view partition, std::uint64_t incarnation, Time now) {
+  const auto number = number_of(partition);
+  if (!number || *number == kHeldHere) return false;
+  Known& gone = partitions_[*number];
+  if (gone.live != incarnation || !gone.info.reachable) return false;
+  went(gone, *number, false, now);
+  return true;
+}
+
+bool Directory::look_for_gone(Absences::Steady now) {
+  const auto gone = absences_.look(now);
+  for (const std::string& name : gone) {
+    if (const auto number = number_of(name)) claims_.set_standing(*number, Standing::kGone);
+  }
+  if (!gone.empty()) tell_claims();
+  return !gone.empty();
+}
+
+// Whom this participant has outlived itself.
+void Directory::tell_claims() {
+  std::set<Owner> outlived;
+  for (const Absent& one : absences_.all()) {
+    const auto number = number_of(one.partition);
+    if (number && Absences::outlived(one.kind)) outlived.insert(*number);
+  }
+  claims_.set_outlived(kHeldHere, std::move(outlived));
+}
+
+void Directory::hear_absent(Owner from, const std::vector<Absent>& absent, Time now) {
+  std::set<Owner> outlived;
+  for (const Absent& one : absent) {
+    Owner number = kHeldHere;
+    (void)known(one.partition, number);
+    if (Absences::outlived(one.kind)) outlived.insert(number);
+    if (number != kHeldHere) {
+      hear_of(one, now);
+    } else if (one.incarnation < IncarnationSource::kEnd) {
+      std::uint64_t& latest = one.kind == Absent::Kind::kForgotten ? own_forgotten_ : own_heard_of_;
+      latest = std::max(latest, one.incarnation);
+    }
+  }
+  claims_.set_outlived(from, std::move(outlived));
+}
+
+void Directory::hear_of(const Absent& one, Time now) {
+  Owner number = kHeldHere;
+  Known& partition = known(one.partition, number);
+  if (partition.info.reachable) return;
+  if (one.kind == Absent::Kind::kForgotten) {
+    // Another may have heard of a later life.
+    if (one.incarnation >= std::max(partition.live, partition.heard_of))
+      (void)forget(one.partition, one.incarnation, now);
+    return;
+  }
+  // What was forgotten here others may not have heard of yet.
+  if (partition.forgotten && one.incarnation <= partition.heard_of) return;
+  if (one.incarnation < IncarnationSource::kEnd) {
+    partition.heard_of = std::max(partition.heard_of, one.incarnation);
+  }
+  partition.forgotten = false;
+  if (partition.live != 0 || one.kind == Absent::Kind::kBack) return;
+  partition.missed_by_others = true;
+  partition.info.since = Time(std::chrono::nanoseconds(one.since));
+  partition.info.stopped = one.kind == Absent::Kind::kStopped;
+  partition.said_silent = one.kind == Absent::Kind::kSilent;
+  absences_.told(one);
+  tell_claims();
+}
+
+void Directory::restore(const std::vector<Absent>& absent) {
+  for (const Absent& one : absent) {
+    if (one.kind == Absent::Kind::kSilent) continue;
+    Absent told = one;
+    // This process has not met it yet.
+    if (told.kind == Absent::Kind::kBack) told.kind = Absent::Kind::kLost;
+    hear_of(told, Time(std::chrono::nanoseconds(one.since)));
+  }
+}
+
+bool Directory::awaits_silent() const {
+  return std::any_of(partitions_.begin() + 1, partitions_.end(), [](const Known& partition) {
+    return partition.said_silent && partition.live == 0;
+  });
+}
+
+Result<void> Directory::forget(const std::string& partition, std::uint64_t incarnation, Time now) {
+  Owner number = kHeldHere;
+  Known& gone = known(partition, number);
+  if (number == kHeldHere || gone.info.reachable) {
+    return fail(Errc::kPartitionTaken,
+                "partition " + quote(partition) + " is there: stop it before it is forgotten");
+  }
+  const std::uint64_t sound = incarnation < IncarnationSource::kEnd ? incarnation : 0;
+  gone.heard_of = std::max({gone.heard_of, gone.live, sound});
+  gone.forgotten = true;
+  gone.said_silent = false;
+  drop_structure(gone, number);
+  absences_.forget(partition, gone.heard_of, now);
+  claims_.set_standing(number, Standing::kGone);
+  tell_claims();
+  claims_.mend();
+  return {};
+}
+
+void Directory::drop_structure(Known& partition, Owner owner) {
+  for (auto& [number, page] : partition.pages) {
+    unclaim_all_but({}, partition, owner, number);
+    replace_joints(page, {}, owner);
+  }
+  partition.pages.clear();
+  partition.successor.reset();
+  partition.page_count = 0;
+}
+
+std::uint64_t Directory::latest_incarnation(const std::string& partition) const {
+  const auto number = number_of(partition);
+  if (!number) return 0;
+  return std::max(partitions_[*number].live, partitions_[*number].heard_of);
+}
+
+std::optional<std::uint64_t> Directory::hidden_by(std::uint64_t own) const {
+  const std::uint64_t latest = std::max(own_heard_of_, own_forgotten_);
+  const bool hidden = own_heard_of_ > own || own_forgotten_ >= own;
+  return hidden ? std::optional(latest) : std::nullopt;
+}
+
+// Once all that one who is back claims has come, and nothing of it is held here, too.
+void Directory::settle_returns() {
+  bool settled = false;
+  for (const std::string& name : absences_.back()) {
+    const auto number = number_of(name);
+    if (!number) continue;
+    const Known& partition = partitions_[*number];
+    if (!partition.info.reachable || partition.announced != partition.live) continue;
+    if (!partition.complete() || claims_.contests_held(*number)) continue;
+    absences_.settled(name);
+    settled = true;
+  }
+  if (settled) tell_claims();
+}
+
+std::optional<PartitionInfo> Directory::only_heard_of() const {
+  const auto one = std::find_if(
+      partitions_.begin() + 1, partitions_.end(),
+      [](const Known& partition) { return partition.live == 0 && partition.listed(); });
+  if (one == partitions_.end()) return std::nullopt;
+  return one->info;
+}
+
+}  // namespace tfdude

@@ -1,0 +1,58 @@
+#include "tfdude/partition/succession.hpp"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+#include "tfdude/partition/claims.hpp"
+
+namespace tfdude {
+namespace {
+
+using List = std::vector<const Claim*>;
+
+// Those that meet the condition; all where none does.
+template <class Condition>
+List preferred(const List& claims, Condition condition) {
+  List some;
+  std::copy_if(claims.begin(), claims.end(), std::back_inserter(some), condition);
+  return some.empty() ? claims : some;
+}
+
+}  // namespace
+
+Owner Succession::add_owner(std::string name) {
+  owners_.push_back({std::move(name), Standing::kThere, {}});
+  return static_cast<Owner>(owners_.size() - 1);
+}
+
+bool Succession::set_standing(Owner owner, Standing standing) {
+  return std::exchange(owners_[owner].standing, standing) != standing;
+}
+
+bool Succession::set_outlived(Owner owner, std::set<Owner> outlived) {
+  if (owners_[owner].outlived == outlived) return false;
+  owners_[owner].outlived = std::move(outlived);
+  return true;
+}
+
+bool Succession::outlived(Owner first, Owner second) const {
+  return owners_[first].outlived.count(second) != 0 && owners_[second].outlived.count(first) == 0;
+}
+
+bool Succession::older(const Claim& a, const Claim& b) const {
+  return std::tie(a.since, name(a.owner)) < std::tie(b.since, name(b.owner));
+}
+
+const Claim& Succession::heir(const std::vector<const Claim*>& claims) const {
+  const List there = preferred(
+      claims, [this](const Claim* one) { return standing(one->owner) != Standing::kGone; });
+  const List left = preferred(there, [&](const Claim* one) {
+    return std::none_of(there.begin(), there.end(),
+                        [&](const Claim* other) { return outlived(other->owner, one->owner); });
+  });
+  return **std::min_element(left.begin(), left.end(),
+                            [this](const Claim* a, const Claim* b) { return older(*a, *b); });
+}
+
+}  // namespace tfdude

@@ -1,0 +1,141 @@
+// Who serves a name, who is told of partitions that end, and what becomes of their frames, over each transport.
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+
+#include "support/catch.hpp"
+#include "support/networks.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::Join;
+using testing::joined_by;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::seconds kLong{20};
+
+template <class Condition>
+bool comes(Condition condition) {
+  const auto end = Clock::now() + kLong;
+  while (!condition()) {
+    if (Clock::now() > end) return false;
+    std::this_thread::sleep_for(Milliseconds(2));
+  }
+  return true;
+}
+
+std::string owner_of(Client& client, const std::string& id) {
+  for (const Frame& frame : client.frames()) {
+    if (frame.id == id) return frame.partition;
+  }
+  return "nobody";
+}
+
+PartitionInfo info_of(Client& client, const std::string& name) {
+  for (const PartitionInfo& one : client.partitions()) {
+    if (one.name == name) return one;
+  }
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("of two who claim a name at once exactly one serves") {
+  const int transport = GENERATE(0, 1);
+  const Join join = joined_by(transport);
+  const int tries = transport == 0 ? 1000 : 10;
+  for (int round = 0; round < tries; ++round) {
+    INFO("try " << round);
+    const std::string name = "arms_" + std::to_string(round);
+    std::array<std::optional<Node>, 2> nodes;
+    std::atomic<int> ready{0};
+    const auto claim = [&](std::size_t which) {
+      ++ready;
+      while (ready < 2) std::this_thread::yield();
+      auto opened = Node::open(join(name), name, {});
+      if (opened) nodes[which].emplace(*std::move(opened));
+    };
+    std::thread other([&] { claim(1); });
+    claim(0);
+    other.join();
+    REQUIRE(nodes[0].has_value() != nodes[1].has_value());
+  }
+}
+
+TEST_CASE("an orderly end is told apart from a loss, and its frames are those of who serves them") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Node base = *Node::open(join("base"), "base", {{"world", "", {}}});
+  Client client = *Client::open(join(""));
+  std::mutex mutex;
+  std::vector<Change> heard;
+  Subscription subscription = client.on_change([&](const Change& change) {
+    const std::lock_guard lock(mutex);
+    heard.push_back(change);
+  });
+  {
+    Node arm = *Node::open(join("arm"), "arm", {{"hand", "world", {}}});
+    REQUIRE(comes([&] { return owner_of(client, "hand") == "arm"; }));
+  }
+  REQUIRE(comes([&] { return !info_of(client, "arm").reachable; }));
+  CHECK(info_of(client, "arm").stopped);
+  const auto unreachable = client.lookup("world", "hand");
+  REQUIRE_FALSE(unreachable);
+  CHECK(unreachable.error().code == Errc::kUnreachable);
+  CHECK_THAT(unreachable.error().message, testing::ContainsSubstring("it was stopped"));
+  Node left = *Node::open(join("left_arm"), "left_arm", {{"hand", "world", {}}});
+  CHECK(comes([&] { return owner_of(client, "hand") == "left_arm"; }));
+  CHECK(comes([&] { return owner_of(base, "hand") == "left_arm"; }));
+  CHECK(client.lookup("world", "hand"));
+  const auto told = [&](ChangeKind kind, const std::string& partition) {
+    const std::lock_guard lock(mutex);
+    return std::any_of(heard.begin(), heard.end(), [&](const Change& one) {
+      return one.kind == kind && one.partition == partition &&
+             (kind != ChangeKind::kPartitionDown || one.stopped);
+    });
+  };
+  CHECK(comes([&] { return told(ChangeKind::kPartitionDown, "arm"); }));
+  CHECK(comes([&] { return told(ChangeKind::kFrameTakenOver, "left_arm"); }));
+}
+
+TEST_CASE("a partition that is gone is forgotten by all, and only then") {
+  const Join join = joined_by(GENERATE(0, 1));
+  Node base = *Node::open(join("base"), "base", {{"world", "", {}}});
+  Node head = *Node::open(join("head"), "head", {{"neck", "world", {}}});
+  Client client = *Client::open(join(""));
+  std::optional<Node> arm(*Node::open(join("arm"), "arm", {{"hand", "world", {}}}));
+  REQUIRE(comes([&] { return client.exists("hand"); }));
+  REQUIRE(comes([&] { return client.exists("neck"); }));
+  const auto refused = client.forget("arm");
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == Errc::kPartitionTaken);
+  CHECK(client.exists("hand"));
+  CHECK_FALSE(base.forget("base"));
+  CHECK(client.forget("leg").error().code == Errc::kUnknownPartition);
+  arm.reset();
+  REQUIRE(comes([&] { return !info_of(client, "arm").reachable; }));
+  REQUIRE(comes([&] { return !info_of(base, "arm").reachable; }));
+  REQUIRE(comes([&] { return !info_of(head, "arm").reachable; }));
+  const auto forgotten = client.forget("arm");
+  INFO((forgotten ? "" : forgotten.error().message));
+  REQUIRE(forgotten);
+  for (Client* one : std::array<Client*, 3>{&base, &head, &client}) {
+    CHECK(comes([&] { return !one->exists("hand"); }));
+    CHECK(comes([&] { return info_of(*one, "arm").name.empty(); }));
+  }
+  // Started again it is as new.
+  arm.emplace(*Node::open(join("arm"), "arm", {{"hand", "world", {}}}));
+  CHECK(comes([&] { return owner_of(client, "hand") == "arm"; }));
+  CHECK(comes([&] { return client.lookup("world", "hand").has_value(); }));
+}
+
+}  // namespace tfdude

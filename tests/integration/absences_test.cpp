@@ -1,0 +1,187 @@
+// Partitions that are gone for good, and those that come back: with real daemons.
+
+#include <csignal>
+#include <filesystem>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/thesis.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::await_ready;
+using testing::Clock;
+using testing::ContainsSubstring;
+using testing::eventually;
+using testing::Process;
+using testing::TemporaryDirectory;
+using testing::TestDomain;
+using testing::x_of;
+
+std::string owner_of(Client& client, const std::string& id) {
+  for (const Frame& frame : client.frames()) {
+    if (frame.id == id) return frame.partition;
+  }
+  return "nobody";
+}
+
+// A base, and an arm whose frames another daemon may serve instead.
+struct Robot {
+  Robot() {
+    const std::string frames =
+        "frames:\n  - {id: arm, parent: world, xyz: [1, 0, 0]}\n"
+        "  - {id: hand, parent: arm, xyz: [10, 0, 0]}\n";
+    base_config = directory.write("base.yaml", "partition: base\nframes:\n  - {id: world}\n");
+    arm_config = directory.write("arm.yaml", "partition: arm\n" + frames);
+    left_config = directory.write("left.yaml", "partition: left_arm\n" + frames);
+    base.emplace(start(base_config));
+    arm.emplace(start(arm_config));
+  }
+  [[nodiscard]] Process start(const std::string& config,
+                              const std::vector<std::string>& wrapper = {}) const {
+    Process daemon =
+        domain.start_daemon({"--config", config, "--state", directory.path()}, wrapper);
+    await_ready(daemon);
+    return daemon;
+  }
+
+  TestDomain domain;
+  TemporaryDirectory directory;
+  std::string base_config;
+  std::string arm_config;
+  std::string left_config;
+  std::optional<Process> base;
+  std::optional<Process> arm;
+  std::optional<Process> left;
+};
+
+}  // namespace
+
+TEST_CASE("absences: frames of a dead daemon are those of one that serves them, and stay so") {
+  Robot robot;
+  auto client = *Client::open(robot.domain.options());
+  REQUIRE(client.lookup("world", "hand"));
+  std::mutex mutex;
+  std::vector<Change> heard;
+  Subscription subscription = client.on_change([&](const Change& change) {
+    const std::lock_guard lock(mutex);
+    heard.push_back(change);
+  });
+  const bool orderly = GENERATE(false, true);
+  const auto death = Clock::now();
+  if (orderly) {
+    robot.arm->signal(SIGTERM);
+    REQUIRE(robot.arm->wait(testing::in_time()));
+  } else {
+    robot.arm->kill();
+  }
+  robot.left.emplace(robot.start(robot.left_config));
+  const auto served = Clock::now();
+  REQUIRE(eventually([&] { return owner_of(client, "hand") == "left_arm"; }));
+  const std::chrono::duration<double> since_death = Clock::now() - death;
+  const std::chrono::duration<double> since_served = Clock::now() - served;
+  INFO("agreed " << since_death.count() << " s after the death, " << since_served.count()
+                 << " s after it was served");
+  // Three seconds on a machine that is not busy with other tests.
+  CHECK(since_death < std::chrono::seconds(10));
+  REQUIRE(client.lookup("world", "hand"));
+  const auto fresh = robot.domain.cli({"--json", "partitions"});
+  CHECK_THAT(fresh.out,
+             ContainsSubstring(orderly ? R"("absence":"stopped")" : R"("absence":"lost")"));
+  const auto told = [&](const Change& expected) {
+    const std::lock_guard lock(mutex);
+    return std::any_of(heard.begin(), heard.end(), [&](const Change& one) {
+      return one.kind == expected.kind && one.partition == expected.partition &&
+             one.rival == expected.rival &&
+             (one.kind != ChangeKind::kPartitionDown || one.stopped == orderly);
+    });
+  };
+  CHECK(eventually([&] { return told({ChangeKind::kPartitionDown, "arm", {}, {}, {}, {}, {}}); }));
+  CHECK(eventually([&] {
+    return told({ChangeKind::kFrameTakenOver, "left_arm", {}, {}, "arm", {}, {}});
+  }));
+  // What is acknowledged meanwhile outlives the return of the one that was away.
+  REQUIRE(client.update("hand", along_x(77)));
+  REQUIRE(client.add("tool", "hand", along_x(5)));
+  robot.arm.emplace(robot.start(robot.arm_config));
+  CHECK(eventually([&] {
+    return told({ChangeKind::kConflict, "arm", {}, {}, "left_arm", {}, {}});
+  }));
+  CHECK(owner_of(client, "hand") == "left_arm");
+  const auto X = client.lookup("world", "tool");
+  REQUIRE(X);
+  CHECK(x_of(X) == 83);
+  auto late = *Client::open(robot.domain.options());
+  CHECK(late.exists("tool"));
+  CHECK(owner_of(late, "hand") == "left_arm");
+}
+
+TEST_CASE("absences: a daemon that hung while another took its frames gives way to that") {
+  Robot robot;
+  auto client = *Client::open(robot.domain.options());
+  REQUIRE(client.lookup("world", "hand"));
+  robot.arm->freeze();
+  robot.left.emplace(robot.start(robot.left_config));
+  REQUIRE(eventually([&] { return owner_of(client, "hand") == "left_arm"; }));
+  REQUIRE(eventually([&] { return client.update("hand", along_x(77)).has_value(); }));
+  robot.arm->signal(SIGCONT);
+  REQUIRE(eventually([&] {
+    for (const PartitionInfo& one : client.partitions()) {
+      if (one.name == "arm") return one.reachable && one.frames == 0;
+    }
+    return false;
+  }));
+  CHECK(owner_of(client, "hand") == "left_arm");
+  CHECK(x_of(client.lookup("world", "hand")) == 78);
+}
+
+TEST_CASE("absences: what is forgotten stays so for a daemon that was away") {
+  Robot robot;
+  const auto refused = robot.domain.cli({"forget", "arm"});
+  CHECK(refused.status != 0);
+  CHECK_THAT(refused.err, ContainsSubstring("partition 'arm' is there"));
+  auto client = *Client::open(robot.domain.options());
+  REQUIRE(client.exists("hand"));
+  const std::string head_config = robot.directory.write(
+      "head.yaml", "partition: head\nframes:\n  - {id: neck, parent: world}\n");
+  Process head = robot.start(head_config);
+  robot.arm->kill();
+  REQUIRE(eventually([&] { return !client.partitions()[0].reachable; }));
+  head.kill();
+  const auto forgotten = robot.domain.cli({"forget", "arm"});
+  INFO(forgotten.err);
+  REQUIRE(forgotten.status == 0);
+  CHECK(eventually([&] { return !client.exists("hand"); }));
+  const Process again = robot.start(head_config);
+  CHECK(eventually([&] { return client.exists("neck"); }));
+  const auto partitions = robot.domain.cli({"partitions"});
+  CHECK(partitions.out.find("arm") == std::string::npos);
+  CHECK_FALSE(client.exists("hand"));
+}
+
+TEST_CASE("absences: a daemon whose clock is behind that of its dead predecessor is heard") {
+  if (!std::filesystem::exists("/usr/bin/faketime")) {
+    WARN("skipped: needs faketime");
+    return;
+  };
+  Robot robot;
+  auto client = *Client::open(robot.domain.options());
+  REQUIRE(client.lookup("world", "hand"));
+  robot.arm->kill();
+  const std::string state =
+      robot.directory.path() + "/domain-" + std::to_string(robot.domain.number()) + "/arm.sqlite";
+  const bool keeps = GENERATE(true, false);
+  if (!keeps) std::filesystem::remove(state);
+  robot.arm.emplace(robot.start(robot.arm_config, {"/usr/bin/faketime", "-f", "-10d"}));
+  CHECK(eventually([&] { return client.lookup("world", "hand").has_value(); }));
+}
+
+}  // namespace tfdude

@@ -1,0 +1,433 @@
+// That all who hear the same agree who has a frame, and that who is there keeps what it has, whatever partitions die,
+// hang, return and are forgotten, and in whatever order that is heard.
+
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "tfdude/partition/partition.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/memory_store.hpp"
+#include "support/random.hpp"
+#include "support/replica.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::lines_diff;
+using testing::MemoryStore;
+using testing::presence_of;
+using testing::Random;
+using testing::Replica;
+
+struct Silence {
+  std::string partition;
+  std::uint64_t incarnation = 0;
+};
+using Said = std::variant<Presence, Page, Silence>;
+
+constexpr std::size_t kOwners = 4;
+constexpr std::size_t kSpectator = kOwners;
+constexpr std::size_t kFrames = 8;  // few, so that they are often fought over
+
+struct Counts {
+  std::size_t kept = 0;
+  std::size_t inherited = 0;
+  std::size_t forgotten = 0;
+  std::size_t conflicts = 0;
+};
+
+class World {
+ public:
+  World(Random& random, Counts& counts) : random_(random), counts_(counts) {
+    spectator_.directory.changes().watch();
+    for (std::size_t who = 0; who < kOwners; ++who) start(who, false);
+  }
+
+  void step() {
+    const std::size_t what = random_.index(40);
+    const std::size_t who = random_.index(kOwners);
+    if (what < 20) {
+      deliver_one();
+    } else if (what < 30) {
+      if (serves(who)) change(who);
+    } else if (what < 32) {
+      if (serves(who)) end(who);
+    } else if (what < 34) {
+      if (serves(who)) hang(who);
+    } else if (what < 35) {
+      if (there(who)) blink(who);
+    } else if (what < 37) {
+      come_back(who);
+    } else if (what < 39) {
+      grow_late();
+    } else if (!there(who)) {
+      forget(who);
+    }
+  }
+
+  /// All that was said is heard, and whoever is not there counts as gone.
+  void settle() {
+    drain();
+    grow_late();
+  }
+
+  void demand_agreement() {
+    for (std::size_t who = 0; who < kOwners; ++who) {
+      if (!serves(who)) continue;
+      INFO("owner " << who << " and the spectator");
+      REQUIRE(lines_diff(owned_by_those_there(owners_[who]->replica),
+                         owned_by_those_there(spectator_)) == "");
+    }
+    // Whatever somebody has who is there is not another's who is not.
+    for (std::size_t who = 0; who < kOwners; ++who) {
+      if (!serves(who)) continue;
+      for (const FrameInfo& frame : owners_[who]->replica.forest.frames()) {
+        if (frame.owner != kHeldHere) continue;
+        INFO("frame " << frame.id << " of " << name(who));
+        REQUIRE(spectator_.directory.name(spectator_.forest.info(frame.id)->owner) == name(who));
+      }
+    }
+  }
+
+  void return_all() {
+    for (std::size_t who = 0; who < kOwners; ++who) come_back(who);
+    settle();
+  }
+
+ private:
+  struct Owning {
+    Owning(const std::string& name, std::uint64_t incarnation)
+        : replica(name), partition(name, incarnation, replica.forest, replica.directory) {}
+    Replica replica;
+    Partition partition;
+    std::map<std::uint32_t, Page> published;
+    Presence presence;
+    bool hangs = false;
+    bool announced = false;
+  };
+
+  static std::string name(std::size_t who) { return "p" + std::to_string(who); }
+  static std::string frame(std::size_t number) { return "f" + std::to_string(number); }
+  Time now() { return Time(std::chrono::milliseconds(++clock_)); }
+
+  bool there(std::size_t who) const { return owners_[who] != nullptr; }
+  bool serves(std::size_t who) const { return there(who) && !owners_[who]->hangs; }
+  Replica& replica(std::size_t who) {
+    return who == kSpectator ? spectator_ : owners_[who]->replica;
+  }
+
+  // Of those frames that somebody has who is there.
+  std::vector<std::string> owned_by_those_there(const Replica& replica) const {
+    std::vector<std::string> lines;
+    for (const FrameInfo& frame : replica.forest.frames()) {
+      const std::string& owner = replica.directory.name(frame.owner);
+      const bool is_there = serves(static_cast<std::size_t>(owner.back() - '0'));
+      if (is_there) lines.push_back(frame.id + " < " + frame.parent + " @ " + owner);
+    }
+    std::sort(lines.begin(), lines.end());
+    return lines;
+  }
+
+  // Frames that nobody has who is there, among them perhaps those of one who is not.
+  std::vector<FrameSpec> some_free_frames() {
+    std::vector<FrameSpec> frames;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const std::string id = frame(random_.index(kFrames));
+      bool free = frames.empty() || frames.back().id != id;
+      for (std::size_t who = 0; who < kOwners; ++who) {
+        free = free && !(there(who) && owners_[who]->replica.forest.holds(id));
+      }
+      if (free) frames.push_back({id, "", along_x(1)});
+    }
+    return frames;
+  }
+
+  void start(std::size_t who, bool configured) {
+    const std::vector<FrameSpec> frames =
+        configured ? some_free_frames() : std::vector<FrameSpec>();
+    // Those who serve have been met, and all that they have to say was heard.
+    auto owner = std::make_unique<Owning>(name(who), ++lives_);
+    for (std::size_t other = 0; other < kOwners; ++other) {
+      if (!serves(other)) continue;
+      owner->replica.directory.apply(owners_[other]->presence, now());
+      for (const auto& [number, page] : owners_[other]->published) {
+        owner->replica.directory.apply(page);
+      }
+    }
+    owner->replica.directory.restore(absent_[who]);
+    const auto state = stores_[who].load();
+    REQUIRE(owner->partition.restore(*state, frames, now()));
+    owner->presence = presence_of(name(who), lives_, 0);
+    owners_[who] = std::move(owner);
+    publish(who);
+  }
+
+  // It dies, or ends in order.
+  void end(std::size_t who) {
+    const Presence last = owners_[who]->presence;
+    const bool stopped = random_.index(3) == 0;
+    absent_[who] = owners_[who]->replica.directory.absent();
+    owners_[who].reset();
+    for (auto queue = queues_.begin(); queue != queues_.end();) {
+      const bool lost = queue->first.second == who || (!stopped && queue->first.first == who);
+      queue = lost ? queues_.erase(queue) : std::next(queue);
+    }
+    if (stopped) {
+      Presence word = last;
+      word.serving = false;
+      word.stopped = true;
+      say_to_all(who, word);
+    } else {
+      say_to_all(who, Silence{name(who), last.incarnation});
+    }
+  }
+
+  void hang(std::size_t who) {
+    owners_[who]->hangs = true;
+    say_to_all(who, Silence{name(who), owners_[who]->presence.incarnation});
+  }
+
+  // Is not heard for a moment.
+  void blink(std::size_t who) {
+    if (owners_[who]->hangs) return;
+    say_to_all(who, Silence{name(who), owners_[who]->presence.incarnation});
+    say_to_all(who, owners_[who]->presence);
+  }
+
+  void come_back(std::size_t who) {
+    if (serves(who)) return;
+    settle();
+    const auto before = claims_of_others(who);
+    const bool hung = there(who);
+    if (hung) {
+      owners_[who]->hangs = false;
+      // Whoever came meanwhile it hears now, and it is heard.
+      for (std::size_t other = 0; other < kOwners; ++other) {
+        if (other == who || !serves(other)) continue;
+        say({other, who}, owners_[other]->presence);
+        for (const auto& [number, page] : owners_[other]->published) say({other, who}, page);
+        for (const auto& [number, page] : owners_[who]->published) say({who, other}, page);
+      }
+      say_to_all(who, owners_[who]->presence);
+    } else {
+      start(who, random_.index(2) == 0);
+    }
+    drain();
+    for (const auto& [id, owner] : before) {
+      // One that has hung gives way to those who know that it was gone, or a witness has told them.
+      if (hung && knew_.count(owner) == 0) continue;
+      INFO("frame " << id << " of " << name(owner) << ", and " << name(who)
+                    << (hung ? " hung" : " was dead"));
+      REQUIRE(owners_[owner]->replica.forest.holds(id));
+      ++counts_.kept;
+    }
+    knew_.clear();
+  }
+
+  // What those who serve have, and the one who is to come back claims, too.
+  std::vector<std::pair<std::string, std::size_t>> claims_of_others(std::size_t who) {
+    std::set<std::string> theirs;
+    if (there(who)) {
+      for (const FrameInfo& frame : owners_[who]->replica.forest.frames()) {
+        if (frame.owner == kHeldHere) theirs.insert(frame.id);
+      }
+    } else {
+      const StoredState stored = *stores_[who].load();
+      for (const StoredFrame& frame : stored.frames) theirs.insert(frame.id);
+    }
+    std::vector<std::pair<std::string, std::size_t>> claims;
+    for (std::size_t other = 0; other < kOwners; ++other) {
+      if (other == who || !serves(other)) continue;
+      // Of two who both say that they have outlived the other the older claim holds.
+      const bool mutual = there(who) && misses(who, other);
+      if (misses(other, who) && !mutual) knew_.insert(other);
+      for (const std::string& id : theirs) {
+        // Below what its partition has removed meanwhile it may have to go for another reason.
+        const auto info = owners_[other]->replica.forest.info(id);
+        if (info && info->owner == kHeldHere && info->parent.empty())
+          claims.emplace_back(id, other);
+      }
+    }
+    return claims;
+  }
+
+  bool misses(std::size_t who, std::size_t whom) const {
+    const auto absent = owners_[who]->replica.directory.absent();
+    return std::any_of(absent.begin(), absent.end(), [&](const Absent& one) {
+      return one.partition == name(whom) && Absences::outlived(one.kind);
+    });
+  }
+
+  void forget(std::size_t who) {
+    settle();
+    std::size_t asked = 0;
+    for (std::size_t other = 0; other < kOwners; ++other) {
+      if (!serves(other) || random_.index(3) == 0) continue;
+      const Reply reply = owners_[other]->partition.answer(
+          Request{0, name(other), ForgetRequest{name(who), lives_of(who)}}, now());
+      REQUIRE(std::holds_alternative<Done>(reply.body));
+      publish(other);
+      ++asked;
+    }
+    if (asked == 0) return;
+    drain();
+    ++counts_.forgotten;
+    for (std::size_t other = 0; other <= kOwners; ++other) {
+      if (other < kOwners && !serves(other)) continue;
+      INFO("of " << name(who) << " nothing is kept at " << other);
+      REQUIRE_FALSE(replica(other).directory.owner(name(who)));
+      for (const FrameInfo& frame : replica(other).forest.frames()) {
+        REQUIRE(replica(other).directory.name(frame.owner) != name(who));
+      }
+    }
+  }
+  std::uint64_t lives_of(std::size_t who) const { return last_life_[who]; }
+
+  void publish(std::size_t who) {
+    Owning& owner = *owners_[who];
+    for (const Change& one : owner.replica.directory.changes().take()) {
+      counts_.conflicts += one.kind == ChangeKind::kConflict ? 1 : 0;
+    }
+    REQUIRE(stores_[who].save(owner.partition.take_unsaved()));
+    const auto pages = owner.partition.take_pages();
+    for (const Page& page : pages) owner.published[page.number] = page;
+    Presence presence = owner.presence;
+    presence.pages = owner.partition.page_count();
+    presence.absent = owner.replica.directory.absent();
+    last_life_[who] = presence.incarnation;
+    const bool news = !(presence == owner.presence) || !std::exchange(owner.announced, true);
+    owner.presence = presence;
+    for (std::size_t hearer = 0; hearer <= kOwners; ++hearer) {
+      if (hearer == who || (hearer < kOwners && !there(hearer))) continue;
+      for (const Page& page : pages) say({who, hearer}, page);
+      if (news) say({who, hearer}, presence);
+    }
+  }
+
+  void say(const std::pair<std::size_t, std::size_t>& way, const Said& said) {
+    queues_[way].push_back(said);
+  }
+  void say_to_all(std::size_t who, const Said& said) {
+    for (std::size_t hearer = 0; hearer <= kOwners; ++hearer) {
+      if (hearer != who && (hearer == kSpectator || there(hearer))) say({who, hearer}, said);
+    }
+  }
+
+  void change(std::size_t who) {
+    Owning& owner = *owners_[who];
+    const std::string id = frame(random_.index(kFrames));
+    const std::string other = frame(random_.index(kFrames));
+    const std::string parent = owner.replica.forest.exists(other) ? other : "";
+    Request request{0, id, AddRequest{parent, along_x(1)}};
+    if (owner.replica.forest.holds(id)) {
+      request.body = MoveRequest{parent, {}};
+      if (random_.index(3) == 0) request.body = RemoveRequest{{id}};
+    }
+    (void)owner.partition.answer(request, now());
+    publish(who);
+  }
+
+  bool deaf(std::size_t who) const { return who != kSpectator && !serves(who); }
+
+  bool deliver_one() {
+    std::vector<std::pair<std::size_t, std::size_t>> ways;
+    for (const auto& [way, said] : queues_) {
+      if (!deaf(way.second)) ways.push_back(way);
+    }
+    if (ways.empty()) return false;
+    const auto queue = queues_.find(ways[random_.index(ways.size())]);
+    const std::size_t hearer = queue->first.second;
+    const Said said = std::move(queue->second.front());
+    queue->second.pop_front();
+    if (queue->second.empty()) queues_.erase(queue);
+    Directory& directory = replica(hearer).directory;
+    if (const auto* page = std::get_if<Page>(&said)) directory.apply(*page);
+    if (const auto* presence = std::get_if<Presence>(&said)) directory.apply(*presence, now());
+    if (const auto* silence = std::get_if<Silence>(&said)) {
+      (void)directory.lost(silence->partition, silence->incarnation, now());
+    }
+    (void)directory.look_for_gone(steady_);
+    heard(hearer);
+    return true;
+  }
+
+  void heard(std::size_t hearer) {
+    if (hearer == kSpectator) {
+      for (const Change& one : spectator_.directory.changes().take()) {
+        counts_.inherited += one.kind == ChangeKind::kFrameTakenOver ? 1 : 0;
+      }
+      return;
+    }
+    // Who has more to say is waited for before anything is given up.
+    const bool all_heard = std::none_of(queues_.begin(), queues_.end(), [&](const auto& queue) {
+      return queue.first.second == hearer;
+    });
+    Partition& partition = owners_[hearer]->partition;
+    while (all_heard && partition.concede(partition.concessions(), now())) {
+    }
+    publish(hearer);
+  }
+
+  void drain() {
+    while (deliver_one()) {
+    }
+  }
+
+  void grow_late() {
+    steady_ += Absences::kGrace;
+    for (std::size_t who = 0; who <= kOwners; ++who) {
+      if (deaf(who)) continue;
+      if (replica(who).directory.look_for_gone(steady_)) heard(who);
+    }
+    drain();
+  }
+
+  Random& random_;
+  Counts& counts_;
+  std::array<std::unique_ptr<Owning>, kOwners> owners_;
+  std::array<MemoryStore, kOwners> stores_;
+  std::array<std::vector<Absent>, kOwners> absent_;
+  std::array<std::uint64_t, kOwners> last_life_{};
+  std::set<std::size_t> knew_;
+  Replica spectator_;
+  std::map<std::pair<std::size_t, std::size_t>, std::deque<Said>> queues_;  // by owner and hearer
+  std::uint64_t lives_ = 0;
+  std::size_t clock_ = 0;
+  Absences::Steady steady_{};
+};
+
+TEST_CASE("who is there has its frames, all agree on that, and it keeps them when others return") {
+  Random random(0xab5e);
+  INFO("seed " << random.seed());
+  Counts counts;
+  for (int round = 0; round < 300; ++round) {
+    INFO("round " << round);
+    World world(random, counts);
+    for (int part = 0; part < 3; ++part) {
+      for (int step = 0; step < 100; ++step) world.step();
+      world.settle();
+      world.demand_agreement();
+    }
+    world.return_all();
+    world.demand_agreement();
+  }
+  // Else it has shown nothing.
+  CHECK(counts.kept > 100);
+  CHECK(counts.inherited > 100);
+  CHECK(counts.forgotten > 100);
+  CHECK(counts.conflicts > 100);
+}
+
+}  // namespace
+}  // namespace tfdude
