@@ -289,6 +289,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   void announce_own();
   void overtake();
   void give_up_partition(const Presence& rival);
+  void start_to_look_for_gone();
   void look_for_gone();
   void await_gone();
   void concede();

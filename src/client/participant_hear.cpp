@@ -89,7 +89,10 @@ void Participant::on_presence(const Presence& presence) {
                           std::to_string(presence.pid) + ")";
   if (appeared) log().info("partition {} is there", who);
   if (ended) log().info("partition {} was stopped", who);
-  if (ended) calls_.on_lost(presence.partition);
+  if (ended) {
+    calls_.on_lost(presence.partition);
+    start_to_look_for_gone();
+  }
   if (rivals) log().error("partition {} is served by another process, too", who);
 }
 
@@ -108,6 +111,10 @@ void Participant::on_lost(const std::string& partition, std::uint64_t incarnatio
   lookups_.look_again();
   log().info("partition {} is lost: it is not heard any more", quote(partition));
   calls_.on_lost(partition);
+  start_to_look_for_gone();
+}
+
+void Participant::start_to_look_for_gone() {
   const std::lock_guard lock(pushing_mutex_);
   if (leaving_) return;
   if (!gone_look_) gone_look_.emplace(kLookForGone, [this] { look_for_gone(); });

@@ -5,8 +5,8 @@
 namespace tfdude {
 
 void Absences::put(const std::string& partition, std::uint64_t incarnation, Time now,
-                   Absent::Kind kind) {
-  missed_[partition] = {{partition, now.time_since_epoch().count(), kind, incarnation}, {}};
+                   Absent::Kind kind, Absent::Kind then) {
+  missed_[partition] = {{partition, now.time_since_epoch().count(), kind, incarnation}, then, {}};
   limit();
 }
 
@@ -17,20 +17,25 @@ void Absences::limit() {
   }));
 }
 
-void Absences::lost(const std::string& partition, std::uint64_t incarnation, Time now) {
+void Absences::put_for_now(const std::string& partition, std::uint64_t incarnation, Time now,
+                           Absent::Kind then) {
   // What is not settled yet of an absence before this one still is not.
   const auto before = missed_.find(partition);
   const bool again = before != missed_.end() && before->second.absent.kind == Absent::Kind::kBack;
-  put(partition, incarnation, now, again ? Absent::Kind::kLost : Absent::Kind::kSilent);
+  put(partition, incarnation, now, again ? then : Absent::Kind::kSilent, then);
+}
+
+void Absences::lost(const std::string& partition, std::uint64_t incarnation, Time now) {
+  put_for_now(partition, incarnation, now, Absent::Kind::kLost);
 }
 
 void Absences::stopped(const std::string& partition, std::uint64_t incarnation, Time now) {
-  put(partition, incarnation, now, Absent::Kind::kStopped);
+  put_for_now(partition, incarnation, now, Absent::Kind::kStopped);
 }
 
 void Absences::told(const Absent& absent) {
   if (absent.kind == Absent::Kind::kSilent || absent.kind == Absent::Kind::kBack) return;
-  if (missed_.emplace(absent.partition, Missed{absent, {}}).second) limit();
+  if (missed_.emplace(absent.partition, Missed{absent, absent.kind, {}}).second) limit();
 }
 
 bool Absences::returned(const std::string& partition) {
@@ -57,16 +62,19 @@ void Absences::forget(const std::string& partition, std::uint64_t incarnation, T
   if (before && before->kind == Absent::Kind::kForgotten && before->incarnation >= incarnation) {
     return;
   }
-  put(partition, incarnation, now, Absent::Kind::kForgotten);
+  put(partition, incarnation, now, Absent::Kind::kForgotten, Absent::Kind::kForgotten);
 }
 
 std::vector<std::string> Absences::look(Steady now) {
+  // Who has not looked for so long has hung itself: it cannot say who was there meanwhile.
+  const bool hung = looked_ && now - *looked_ > kGrace / 2;
+  looked_ = now;
   std::vector<std::string> gone;
   for (auto& [name, missed] : missed_) {
     if (missed.absent.kind != Absent::Kind::kSilent) continue;
-    if (!missed.noticed) missed.noticed = now;
+    if (!missed.noticed || hung) missed.noticed = now;
     if (now - *missed.noticed < kGrace) continue;
-    missed.absent.kind = Absent::Kind::kLost;
+    missed.absent.kind = missed.then;
     gone.push_back(name);
   }
   return gone;

@@ -40,7 +40,7 @@ void Directory::went(Known& partition, Owner owner, bool stopped, Time now) {
   }
   changes_.partition_down(partition.info.name, stopped);
   const auto missed = absences_.find(partition.info.name);
-  const bool silent = missed && missed->kind == Absent::Kind::kSilent;
+  const bool silent = !stopped && missed && missed->kind == Absent::Kind::kSilent;
   claims_.set_standing(owner, silent ? Standing::kSilent : Standing::kGone);
   tell_claims();
 }

@@ -18,7 +18,9 @@ class Absences {
  public:
   using Steady = std::chrono::steady_clock::time_point;
 
-  /// A silence is an absence once it has lasted for this long after it was noticed.
+  /// A silence is an absence, and one that has stopped counts as outlived, once it has lasted for this long after it
+  /// was noticed. Else who has hung itself, and then hears at once how another stopped and started again, would seem to
+  /// have outlived that.
   static constexpr std::chrono::milliseconds kGrace{500};
 
   /// How many are kept. The oldest go first.
@@ -40,7 +42,8 @@ class Absences {
   /// Nothing is to be kept of a partition that is not there.
   void forget(const std::string& partition, std::uint64_t incarnation, Time now);
 
-  /// @return those who have been silent for long enough now
+  /// To be called at least twice in kGrace while any_silent(): time in which it was not does not count.
+  /// @return those who have been away for long enough now
   std::vector<std::string> look(Steady now);
 
   [[nodiscard]] bool any_silent() const;
@@ -59,12 +62,17 @@ class Absences {
  private:
   struct Missed {
     Absent absent;
+    Absent::Kind then;              // what a silence becomes
     std::optional<Steady> noticed;  // of a silence
   };
-  void put(const std::string& partition, std::uint64_t incarnation, Time now, Absent::Kind kind);
+  void put_for_now(const std::string& partition, std::uint64_t incarnation, Time now,
+                   Absent::Kind then);
+  void put(const std::string& partition, std::uint64_t incarnation, Time now, Absent::Kind kind,
+           Absent::Kind then);
   void limit();
 
   std::map<std::string, Missed> missed_;
+  std::optional<Steady> looked_;
 };
 
 }  // namespace tfdude

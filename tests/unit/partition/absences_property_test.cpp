@@ -385,10 +385,12 @@ class World {
   }
 
   void grow_late() {
-    steady_ += Absences::kGrace;
-    for (std::size_t who = 0; who <= kOwners; ++who) {
-      if (deaf(who)) continue;
-      if (replica(who).directory.look_for_gone(steady_)) heard(who);
+    for (int part = 0; part < 3; ++part) {
+      if (part > 0) steady_ += Absences::kGrace / 2;
+      for (std::size_t who = 0; who <= kOwners; ++who) {
+        if (deaf(who)) continue;
+        if (replica(who).directory.look_for_gone(steady_)) heard(who);
+      }
     }
     drain();
   }

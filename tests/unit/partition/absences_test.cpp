@@ -46,7 +46,10 @@ struct Witness : Replica {
     CHECK(directory.lost(partition, incarnation, kNow));
     (void)directory.look_for_gone(kStart);
   }
-  void wait() { CHECK(directory.look_for_gone(kStart + Absences::kGrace)); }
+  void wait() {
+    CHECK_FALSE(directory.look_for_gone(kStart + Absences::kGrace / 2));
+    CHECK(directory.look_for_gone(kStart + Absences::kGrace));
+  }
   std::string owner_of(const std::string& id) const {
     const auto frame = forest.info(id);
     return frame ? directory.name(frame->owner) : "nobody";
@@ -67,6 +70,7 @@ TEST_CASE("a short silence changes nothing but who is reachable") {
   CHECK(base.owner_of("hand") == "arm");
   REQUIRE(base.directory.absent().size() == 1);
   CHECK(base.directory.absent()[0].kind == Kind::kSilent);
+  CHECK_FALSE(base.directory.look_for_gone(kStart + Absences::kGrace / 2));
   CHECK_FALSE(base.directory.look_for_gone(kStart + Absences::kGrace - milliseconds(1)));
   CHECK(base.owner_of("hand") == "arm");
   base.hear("arm", 1, 10);
@@ -104,6 +108,26 @@ TEST_CASE("one that comes later has the frame at once") {
   CHECK(base.owner_of("hand") == "left_arm");
 }
 
+TEST_CASE("who has hung itself has outlived nobody of whom it then hears late") {
+  Witness base;
+  base.lose("arm", 1);
+  SECTION("a silence during which it hung is not long") {
+    CHECK_FALSE(base.directory.look_for_gone(kStart + 20 * Absences::kGrace));
+    REQUIRE(base.directory.absent().size() == 1);
+    CHECK(base.directory.absent()[0].kind == Kind::kSilent);
+  }
+  SECTION("nor does one count that stopped and started again meanwhile") {
+    base.hear("arm", 1, 10);
+    Presence last = presence_of("arm", 1, 1);
+    last.stopped = true;
+    base.directory.apply(last, kNow);
+    CHECK(base.directory.partitions()[0].stopped);
+    (void)base.directory.look_for_gone(kStart + 20 * Absences::kGrace);
+    base.hear("arm", 2, 10);
+    CHECK(base.directory.absent().empty());
+  }
+}
+
 TEST_CASE("a stop is told apart from a death") {
   Witness base;
   Presence last = presence_of("arm", 1, 1);
@@ -115,8 +139,11 @@ TEST_CASE("a stop is told apart from a death") {
   SECTION("a stop") {
     base.directory.apply(last, kNow);
     CHECK(down().stopped);
-    CHECK(base.directory.absent()[0].kind == Kind::kStopped);
+    CHECK(base.directory.absent()[0].kind == Kind::kSilent);
     CHECK(base.directory.partitions()[0].stopped);
+    (void)base.directory.look_for_gone(kStart);
+    base.wait();
+    CHECK(base.directory.absent()[0].kind == Kind::kStopped);
     // That it is gone, and a beat that was late, change nothing of that.
     CHECK_FALSE(base.directory.lost("arm", 1, kNow));
     base.directory.apply(presence_of("arm", 1, 1), kNow);
@@ -195,6 +222,7 @@ TEST_CASE("nothing is given up for one who is silent") {
   }
   SECTION("it is gone") {
     (void)replica.directory.look_for_gone(kStart);
+    (void)replica.directory.look_for_gone(kStart + Absences::kGrace / 2);
     CHECK(replica.directory.look_for_gone(kStart + Absences::kGrace));
     replica.directory.apply(presence_of("arm", 7, 1), kNow);
     CHECK(partition.concessions().empty());

@@ -282,6 +282,7 @@ TEST_CASE("a frame whose parent was removed while its owner was away goes when i
 void bury(Directory& directory, const std::string& partition) {
   REQUIRE(directory.lost(partition, 1, kNow));
   (void)directory.look_for_gone({});
+  (void)directory.look_for_gone(Absences::Steady{} + Absences::kGrace / 2);
   REQUIRE(directory.look_for_gone(Absences::Steady{} + Absences::kGrace));
 }
 
