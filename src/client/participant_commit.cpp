@@ -26,9 +26,6 @@ Commit Participant::take() {
   news.pages = partition_->page_count();
   news.absent = directory_.absent();
   if (news == announced_) return commit;
-  // Stored with the epoch, which is above the incarnation.
-  const bool lives_anew = news.incarnation != announced_.incarnation;
-  if (lives_anew || news.absent != announced_.absent) commit.change.absent = news.absent;
   commit.presence = std::move(news);
   return commit;
 }

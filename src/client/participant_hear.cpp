@@ -58,6 +58,7 @@ void Participant::on_presence(const Presence& presence) {
   bool appeared = false;
   bool ended = false;
   bool rivals = false;
+  bool silent = false;
   {
     const std::lock_guard lock(structure_mutex_);
     if (presence.partition == partition_name_) {
@@ -77,6 +78,7 @@ void Participant::on_presence(const Presence& presence) {
       if (partition_ != nullptr) commits_->ask();
       // It may be the last that was missing of the structure of one who has returned.
       if (partition_ != nullptr && directory_.contested()) conceder_->ask();
+      silent = directory_.any_silent();
     }
     tell_changes();
   }
@@ -89,10 +91,8 @@ void Participant::on_presence(const Presence& presence) {
                           std::to_string(presence.pid) + ")";
   if (appeared) log().info("partition {} is there", who);
   if (ended) log().info("partition {} was stopped", who);
-  if (ended) {
-    calls_.on_lost(presence.partition);
-    start_to_look_for_gone();
-  }
+  if (ended) calls_.on_lost(presence.partition);
+  if (silent) start_to_look_for_gone();
   if (rivals) log().error("partition {} is served by another process, too", who);
 }
 

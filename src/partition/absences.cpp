@@ -35,6 +35,12 @@ void Absences::stopped(const std::string& partition, std::uint64_t incarnation, 
 
 void Absences::told(const Absent& absent) {
   if (absent.kind == Absent::Kind::kSilent || absent.kind == Absent::Kind::kBack) return;
+  Absent silent = absent;
+  silent.kind = Absent::Kind::kSilent;
+  if (missed_.emplace(absent.partition, Missed{silent, absent.kind, {}, true}).second) limit();
+}
+
+void Absences::resume(const Absent& absent) {
   if (missed_.emplace(absent.partition, Missed{absent, absent.kind, {}}).second) limit();
 }
 
@@ -75,6 +81,7 @@ std::vector<std::string> Absences::look(Steady now) {
     if (!missed.noticed || hung) missed.noticed = now;
     if (now - *missed.noticed < kGrace) continue;
     missed.absent.kind = missed.then;
+    missed.hearsay = false;
     gone.push_back(name);
   }
   return gone;
@@ -102,7 +109,9 @@ std::optional<Absent> Absences::find(const std::string& partition) const {
 
 std::vector<Absent> Absences::all() const {
   std::vector<Absent> all;
-  for (const auto& [name, missed] : missed_) all.push_back(missed.absent);
+  for (const auto& [name, missed] : missed_) {
+    if (!missed.hearsay) all.push_back(missed.absent);
+  }
   return all;
 }
 

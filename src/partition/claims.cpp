@@ -9,10 +9,6 @@ namespace tfdude {
 
 namespace {
 
-bool younger(const FrameInfo& a, const FrameInfo& b) {
-  return std::tie(a.since, a.id) > std::tie(b.since, b.id);
-}
-
 std::vector<const Claim*> all_of(const std::vector<Claim>& claims) {
   std::vector<const Claim*> all;
   all.reserve(claims.size() + 1);
@@ -27,6 +23,12 @@ std::vector<const Claim*> all_of(const std::vector<Claim>& claims, const Claim& 
 }
 
 }  // namespace
+
+bool Claims::gives_way(const FrameInfo& a, const FrameInfo& b) const {
+  const bool a_gone = succession_.standing(a.owner) == Succession::Standing::kGone;
+  const bool b_gone = succession_.standing(b.owner) == Succession::Standing::kGone;
+  return std::tie(a_gone, a.since, a.id) > std::tie(b_gone, b.since, b.id);
+}
 
 std::uint32_t Claims::page_of(std::string_view id) const {
   const auto frame = forest_.find(id);
@@ -183,7 +185,7 @@ std::set<Concession> Claims::concessions() const {
   }
   for (const auto& [id, claim] : cut_) {
     const Cycle cycle = cycle_of(id, claim);
-    if (cycle.held && younger(*cycle.held, cycle.youngest)) {
+    if (cycle.held && gives_way(*cycle.held, cycle.youngest)) {
       all.insert(
           {Concession::Kind::kUnhang, cycle.held->id, cycle.youngest.owner, cycle.held->since});
     }
@@ -221,7 +223,7 @@ void Claims::put(const std::string& id, const Claim& claim) {
   if (!before) {
     changes_.frame_added(id, after->parent, name(claim.owner));
   } else if (before->owner != after->owner &&
-             succession_.standing(before->owner) == Succession::Standing::kGone) {
+             succession_.standing(before->owner) != Succession::Standing::kThere) {
     changes_.frame_taken_over(id, after->parent, name(claim.owner), name(before->owner));
   } else if (before->parent != after->parent || before->owner != after->owner) {
     changes_.frame_moved(id, after->parent, name(claim.owner));
@@ -233,8 +235,8 @@ Claims::Cycle Claims::cycle_of(const std::string& id, const Claim& claim) const 
   for (auto edge = forest_.info(claim.parent); edge && edge->id != id;
        edge = forest_.info(edge->parent)) {
     if (edge->owner == kHeldHere) {
-      if (!cycle.held || younger(*edge, *cycle.held)) cycle.held = edge;
-    } else if (younger(*edge, cycle.youngest)) {
+      if (!cycle.held || gives_way(*edge, *cycle.held)) cycle.held = edge;
+    } else if (gives_way(*edge, cycle.youngest)) {
       cycle.youngest = *edge;
     }
   }
@@ -251,14 +253,14 @@ bool Claims::make_way(const std::string& parent) {
   std::optional<FrameInfo> youngest;
   for (auto edge = forest_.info(parent); edge; edge = forest_.info(edge->parent)) {
     if (edge->owner == kHeldHere) continue;
-    if (!youngest || younger(*edge, *youngest)) youngest = edge;
+    if (!youngest || gives_way(*edge, *youngest)) youngest = edge;
   }
   if (youngest) cut(*youngest);
   return youngest.has_value();
 }
 
 // The frame's claimed parent lies below it, where the forest has made it a root. Of the cycle's edges that others
-// own the youngest is cut; if a held one is younger still, its owner has to concede, which mends that.
+// own that is cut which gives way to all; if a held one gives way to that still, its owner has to concede, which mends it.
 void Claims::break_cycle(const std::string& id, const Claim& claim) {
   const FrameInfo youngest = cycle_of(id, claim).youngest;
   if (youngest.id == id) {

@@ -43,6 +43,9 @@ void Directory::went(Known& partition, Owner owner, bool stopped, Time now) {
   const bool silent = !stopped && missed && missed->kind == Absent::Kind::kSilent;
   claims_.set_standing(owner, silent ? Standing::kSilent : Standing::kGone);
   tell_claims();
+  if (partition.to_forget >= std::max(partition.live, partition.heard_of)) {
+    (void)forget(partition.info.name, partition.to_forget, now);
+  }
 }
 
 bool Directory::lost(std::string_view partition, std::uint64_t incarnation, Time now) {
@@ -78,6 +81,8 @@ void Directory::hear_absent(Owner from, const std::vector<Absent>& absent, Time 
   for (const Absent& one : absent) {
     Owner number = kHeldHere;
     (void)known(one.partition, number);
+    // Whoever speaks is there.
+    if (number == from) continue;
     if (Absences::outlived(one.kind)) outlived.insert(number);
     if (number != kHeldHere) {
       hear_of(one, now);
@@ -92,7 +97,13 @@ void Directory::hear_absent(Owner from, const std::vector<Absent>& absent, Time 
 void Directory::hear_of(const Absent& one, Time now) {
   Owner number = kHeldHere;
   Known& partition = known(one.partition, number);
-  if (partition.info.reachable) return;
+  if (partition.info.reachable) {
+    // Whoever was away itself may notice only later that it is not there.
+    if (one.kind == Absent::Kind::kForgotten) {
+      partition.to_forget = std::max(partition.to_forget, one.incarnation);
+    }
+    return;
+  }
   if (one.kind == Absent::Kind::kForgotten) {
     // Another may have heard of a later life.
     if (one.incarnation >= std::max(partition.live, partition.heard_of))
@@ -120,6 +131,9 @@ void Directory::restore(const std::vector<Absent>& absent) {
     Absent told = one;
     // This process has not met it yet.
     if (told.kind == Absent::Kind::kBack) told.kind = Absent::Kind::kLost;
+    const auto number = number_of(one.partition);
+    const bool met = number && partitions_[*number].info.reachable;
+    if (!met && told.kind != Absent::Kind::kForgotten) absences_.resume(told);
     hear_of(told, Time(std::chrono::nanoseconds(one.since)));
   }
 }

@@ -229,6 +229,12 @@ StateChange Partition::take_unsaved() {
     if (!place || !edge) continue;
     change.frames.push_back({id, place->parent, edge->X_PC, place->since, std::move(edge->ties)});
   }
+  // With the first of a process its incarnation is stored, too: the epoch is above that.
+  auto absent = directory_.absent();
+  if (saved_ && saved_absent_ != absent) {
+    saved_absent_ = absent;
+    change.absent = std::move(absent);
+  }
   if (!change.empty()) change.joints = joints_.take_changed();
   return change;
 }

@@ -90,6 +90,17 @@ Result<void> load_joints(const Database& database, std::int64_t format, StoredSt
   });
 }
 
+Result<void> load_absent(const Database& database, std::int64_t format, StoredState& state) {
+  if (format < kAbsentFormat) return {};
+  const char* sql = "SELECT partition, since, kind, incarnation FROM absent ORDER BY partition";
+  return each_row(database, sql, [&](const Statement& row) -> Result<void> {
+    auto absent = read_absent(row);
+    if (!absent) return tl::unexpected(std::move(absent.error()));
+    state.absent.push_back(*std::move(absent));
+    return {};
+  });
+}
+
 // Each is of a frame, or an entry, that is there.
 Result<void> load_ties(const Database& database, std::int64_t format, StoredState& state) {
   if (format < kTiesFormat) return {};
@@ -121,7 +132,8 @@ Result<void> load_ties(const Database& database, std::int64_t format, StoredStat
 
 Result<StoredState> read_state(const Database& database, std::int64_t format) {
   StoredState state;
-  for (auto part : {load_about, load_frames, load_notes, load_configured, load_joints, load_ties}) {
+  for (auto part : {load_about, load_frames, load_notes, load_configured, load_joints, load_ties,
+                    load_absent}) {
     if (auto loaded = part(database, format, state); !loaded) {
       return tl::unexpected(std::move(loaded.error()));
     }

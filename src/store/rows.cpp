@@ -91,4 +91,19 @@ Result<StoredJoint> read_joint(const sqlite::Statement& row) {
   return joint;
 }
 
+Result<Absent> read_absent(const sqlite::Statement& row) {
+  auto ok = row.check_types({SQLITE_TEXT, SQLITE_INTEGER, SQLITE_INTEGER, SQLITE_INTEGER});
+  const std::string partition = row.text(0);
+  if (ok) ok = check_partition_name(partition);
+  if (!ok) return tl::unexpected(std::move(ok.error()));
+  const std::uint64_t kind = row.number(2);
+  if (kind < 1 || kind > static_cast<std::uint64_t>(Absent::Kind::kForgotten)) {
+    return fail(Errc::kState, "an absence of kind " + std::to_string(kind));
+  }
+  const auto incarnation = read_count(row, 3);
+  if (!incarnation) return tl::unexpected(incarnation.error());
+  const auto since = static_cast<std::int64_t>(row.number(1));
+  return Absent{partition, since, static_cast<Absent::Kind>(kind), *incarnation};
+}
+
 }  // namespace tfdude

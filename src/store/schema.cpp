@@ -23,6 +23,8 @@ constexpr std::array<const char*, kFormat> kSchemas{R"(
                      WITHOUT ROWID;
   CREATE TABLE configured_ties(id TEXT PRIMARY KEY, said BLOB NOT NULL) WITHOUT ROWID;
   CREATE TABLE joint_types(name TEXT PRIMARY KEY, type INTEGER NOT NULL) WITHOUT ROWID;
+  CREATE TABLE absent(partition TEXT PRIMARY KEY, since INTEGER NOT NULL, kind INTEGER NOT NULL,
+                      incarnation INTEGER NOT NULL) WITHOUT ROWID;
 )"};
 
 }  // namespace

@@ -10,7 +10,8 @@ inline constexpr std::int64_t kApplication = 0x74666475;  // "tfdu"
 
 inline constexpr std::int64_t kJointsFormat = 2;  ///< the first that has joints,
 inline constexpr std::int64_t kTiesFormat =
-    3;  ///< and the types of these, and what edges' errors have to do with each other
+    3;  ///< and the types of these, and what edges' errors have to do with each other,
+inline constexpr std::int64_t kAbsentFormat = 3;  ///< and whom the partition misses
 inline constexpr std::int64_t kFormat = 3;
 
 /// What makes the tables of a format, or those that it has more than an older one. A file with other words than these is

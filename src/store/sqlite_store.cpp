@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/partition/incarnation.hpp"
 #include "tfdude/partition/joints.hpp"
 
 #include "store/read_state.hpp"
@@ -58,6 +59,7 @@ class SqliteStore final : public StateStore {
   Result<void> prepare(Statement& statement, const char* sql);
   Result<void> make_ready();
   Result<void> save_joints(const std::vector<StoredJoint>& joints);
+  Result<void> save_absent(const std::vector<Absent>& absent);
   Result<void> save_ties(const std::string& id, const KeptTies& ties);
   template <class Write>
   Result<void> transaction(Write write);
@@ -79,6 +81,8 @@ class SqliteStore final : public StateStore {
   Statement erase_ties_;
   Statement put_ties_;
   Statement put_configured_ties_;
+  Statement clear_absent_;
+  Statement put_absent_;
 };
 
 tl::unexpected<Error> SqliteStore::unusable(const std::string& why) const {
@@ -223,6 +227,8 @@ Result<void> SqliteStore::prepare_newer() {
       {&put_ties_,
        "INSERT INTO ties SELECT ?1, ?2, ?3 WHERE EXISTS(SELECT 1 FROM frames WHERE id = ?1)"},
       {&put_configured_ties_, "INSERT INTO configured_ties VALUES(?1, ?2)"},
+      {&clear_absent_, "DELETE FROM absent"},
+      {&put_absent_, "INSERT INTO absent VALUES(?1, ?2, ?3, ?4)"},
   };
   Result<void> done;
   for (const auto& [statement, sql] : all) {
@@ -277,8 +283,21 @@ Result<void> SqliteStore::save(const StateChange& change) {
       const auto kind = static_cast<std::uint64_t>(note.kind);
       if (done) done = put_note_.run(note.id, note.since, kind, note.rival);
     }
+    if (done && change.absent) done = save_absent(*change.absent);
     return done ? save_joints(change.joints) : done;
   });
+}
+
+Result<void> SqliteStore::save_absent(const std::vector<Absent>& absent) {
+  Result<void> done = clear_absent_.run();
+  for (const Absent& one : absent) {
+    // What others have said of themselves may be beyond what can be read again.
+    const std::uint64_t incarnation = std::min(one.incarnation, IncarnationSource::kEnd);
+    const auto kind = static_cast<std::uint64_t>(one.kind);
+    const auto since = static_cast<std::uint64_t>(one.since);
+    if (done) done = put_absent_.run(one.partition, since, kind, incarnation);
+  }
+  return done;
 }
 
 Result<void> SqliteStore::save_joints(const std::vector<StoredJoint>& joints) {

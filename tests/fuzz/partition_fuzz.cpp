@@ -209,6 +209,8 @@ class World {
   void hear(const Said& said, Time now) {
     const std::uint64_t latest = latest_known();
     apply(own_->replica, said);
+    const auto owner = own_->replica.directory.owner(said.partition);
+    if (owner && own_->replica.directory.reachable(*owner)) owner_.hears(said.partition);
     concede(now);
     const std::vector<Note> notes = own_->others.apply(said);
     owner_.concede(own_->others.oldest(), notes);
@@ -251,6 +253,7 @@ class World {
 
   void start(Time now, const std::vector<Page>& said) {
     own_ = std::make_unique<Serving>(++lives_);
+    owner_.hears_all();
     std::vector<Note> notes;
     answered_.clear();
     for (const Page& page : said) {
@@ -272,6 +275,7 @@ class World {
       const bool news = replica->directory.lost(name, incarnation, Time{});
       demand(there || !news, "nobody is lost who was not there");
       demand(!news || !replica->directory.serving(name), "who is lost is not there");
+      if (news && replica == &own_->replica) owner_.misses(name);
     }
   }
 

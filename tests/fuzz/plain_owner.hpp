@@ -70,6 +70,11 @@ class PlainOwner {
     return all;
   }
 
+  /// Somebody is not heard for the moment: nothing is given up for it.
+  void misses(const std::string& partition) { silent_.insert(partition); }
+  void hears(const std::string& partition) { silent_.erase(partition); }
+  void hears_all() { silent_.clear(); }
+
   /// Gives up what others claim with more right.
   /// @param notes  what is new of what others removed
   void concede(const Picture& others, const std::vector<Note>& notes) {
@@ -134,6 +139,7 @@ class PlainOwner {
     for (const auto& [id, theirs] : others) {
       const auto mine = places_.find(id);
       if (mine == places_.end()) continue;
+      if (silent_.count(theirs.owner) != 0) continue;
       if (!older(theirs, {name_, mine->second.parent, mine->second.since})) continue;
       places_.erase(mine);
       words_[id] = {Note::Kind::kGaveWay, theirs.owner};
@@ -183,6 +189,7 @@ class PlainOwner {
   }
 
   std::string name_;
+  std::set<std::string> silent_;
   Places places_;
   std::map<std::string, Word> words_;
 };

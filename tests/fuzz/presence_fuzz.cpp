@@ -13,13 +13,13 @@ void demand_known(const Presence& presence) {
   testing::Replica replica;
   replica.directory.apply(presence, Time{});
   const auto there = replica.directory.serving(presence.partition);
-  demand(there.has_value() == presence.serving, "who serves is there");
-  Presence said = presence;
-  said.absent.clear();
+  const bool serves = presence.serving && !presence.stopped;
+  demand(there.has_value() == serves, "who serves is there");
+  const Presence said{presence.partition, presence.incarnation, presence.host,
+                      presence.pid,       presence.pages,       true};
   demand(!there || *there == said, "a partition is known as it said");
-  demand(
-      replica.directory.lost(presence.partition, presence.incarnation, Time{}) == presence.serving,
-      "who was there can be lost");
+  demand(replica.directory.lost(presence.partition, presence.incarnation, Time{}) == serves,
+         "who was there can be lost");
   demand(!replica.directory.serving(presence.partition), "who was lost is not there");
 }
 

@@ -34,6 +34,7 @@ class RowWriter {
         "INSERT OR REPLACE INTO ties VALUES(?1, zeroblob(9), x'')",
         "INSERT OR REPLACE INTO ties VALUES(?1, zeroblob(9), ?3)",
         "INSERT OR REPLACE INTO configured_ties VALUES(?1, zeroblob(9))",
+        "INSERT OR REPLACE INTO absent VALUES(?1, ?4, ?5, ?4)",
         "UPDATE about SET epoch = ?4",
         "UPDATE about SET partition = ?1",
         "INSERT INTO about VALUES('arms', ?4)",
@@ -47,9 +48,9 @@ class RowWriter {
         "UPDATE sqlite_master SET sql = replace(sql, 'PRIMARY KEY', '') WHERE name = 'frames'",
         "UPDATE sqlite_master SET rootpage = 3 WHERE name = 'notes'",
         "PRAGMA user_version = 4",
-        "DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; PRAGMA user_version "
+        "DROP TABLE absent; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; PRAGMA user_version "
         "= 2",
-        "DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; DROP TABLE joints; "
+        "DROP TABLE absent; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; DROP TABLE joints; "
         "PRAGMA user_version = 1",
     };
     if (rarely()) {

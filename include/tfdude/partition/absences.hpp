@@ -30,8 +30,11 @@ class Absences {
   void lost(const std::string& partition, std::uint64_t incarnation, Time now);
   void stopped(const std::string& partition, std::uint64_t incarnation, Time now);
 
-  /// Another one misses a partition that was not met here; or it was missed when this process's predecessor ended.
+  /// Another one misses a partition that was not met here. What is only told counts once it has stood for kGrace: else
+  /// who has hung itself, and hears late what others said meanwhile, would take it for its own experience.
   void told(const Absent& absent);
+  /// It was missed when this process's predecessor ended.
+  void resume(const Absent& absent);
 
   /// It is there. @return whether it was missed
   bool returned(const std::string& partition);
@@ -50,7 +53,7 @@ class Absences {
   [[nodiscard]] std::vector<std::string> back() const;
   [[nodiscard]] std::optional<Absent> find(const std::string& partition) const;
 
-  /// Sorted by name.
+  /// Sorted by name; without what was told just now.
   [[nodiscard]] std::vector<Absent> all() const;
 
   /// Whether an absence of this kind gives who notices it the frames that both claim.
@@ -64,6 +67,7 @@ class Absences {
     Absent absent;
     Absent::Kind then;              // what a silence becomes
     std::optional<Steady> noticed;  // of a silence
+    bool hearsay = false;           // is not told on
   };
   void put_for_now(const std::string& partition, std::uint64_t incarnation, Time now,
                    Absent::Kind then);

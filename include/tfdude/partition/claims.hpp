@@ -45,8 +45,8 @@ struct Concession {
 };
 
 /// Which of all claims are in force: writes those into the forest. Of several partitions that claim a frame
-/// Succession says whose claim holds; in each cycle of claims the youngest does not, and its frame is a root (of
-/// the same age: that of the greater id). So what is in force is a function of the claims and of who is there, not of
+/// Succession says whose claim holds; in each cycle of claims the youngest does not, of those of partitions that are
+/// gone where there are such, and its frame is a root (of the same age: that of the greater id). So what is in force is a function of the claims and of who is there, not of
 /// the order in which they came. A held frame stays until its owner concedes; whoever does not own it sees the
 /// outcome at once. Not thread-safe.
 class Claims {
@@ -102,6 +102,8 @@ class Claims {
 
  private:
   [[nodiscard]] bool may_take_from(Owner owner) const;
+  /// Of two edges in a cycle: whether the first one is to be cut rather than the second.
+  [[nodiscard]] bool gives_way(const FrameInfo& a, const FrameInfo& b) const;
   [[nodiscard]] Claim in_force(const FrameInfo& there) const;
   [[nodiscard]] Claim* shadowed(const std::string& id, Owner owner);
   [[nodiscard]] std::uint32_t page_of(std::string_view id) const;

@@ -78,7 +78,10 @@ class Partition {
   bool concede(const std::set<Concession>& due, Time now);
 
   /// Goes on as a later incarnation, since others know of one that hides this.
-  void overtake(std::uint64_t incarnation) { pages_.overtake(incarnation); }
+  void overtake(std::uint64_t incarnation) {
+    pages_.overtake(incarnation);
+    saved_absent_.reset();
+  }
 
   /// The pages to publish since the last call.
   [[nodiscard]] std::vector<Page> take_pages() { return pages_.take_changed(); }
@@ -92,6 +95,7 @@ class Partition {
   void still_unsaved(const StateChange& change, const std::vector<Page>& pages) {
     updated_.insert(change.erased.begin(), change.erased.end());
     still_unsaved(change.joints);
+    if (change.absent) saved_absent_.reset();
     pages_.still_changed(pages);
   }
   void still_unsaved(const std::vector<StoredJoint>& joints) { joints_.still_changed(joints); }
@@ -141,6 +145,7 @@ class Partition {
   std::map<std::string, EdgeConsistency> consistency_;  // of edges that were observed
   bool saved_ = false;
   std::set<std::string> updated_;  // by requests, since the last take_unsaved()
+  std::optional<std::vector<Absent>> saved_absent_;  // whom the store says that this partition misses
 };
 
 }  // namespace tfdude

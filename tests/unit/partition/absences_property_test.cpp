@@ -180,7 +180,8 @@ class World {
     absent_[who] = owners_[who]->replica.directory.absent();
     owners_[who].reset();
     for (auto queue = queues_.begin(); queue != queues_.end();) {
-      const bool lost = queue->first.second == who || (!stopped && queue->first.first == who);
+      if (!stopped && queue->first.first == who) lose(queue->second);
+      const bool lost = queue->first.second == who || queue->second.empty();
       queue = lost ? queues_.erase(queue) : std::next(queue);
     }
     if (stopped) {
@@ -191,6 +192,20 @@ class World {
     } else {
       say_to_all(who, Silence{name(who), last.incarnation});
     }
+  }
+
+  // What is on its way from one who dies. That somebody is not heard any more is no message: whoever has not been told of
+  // an end notices it.
+  static void lose(std::deque<Said>& queue) {
+    std::deque<Said> noticed;
+    for (const Said& said : queue) {
+      const auto* presence = std::get_if<Presence>(&said);
+      if (std::holds_alternative<Silence>(said)) noticed.push_back(said);
+      if (presence != nullptr && presence->stopped) {
+        noticed.emplace_back(Silence{presence->partition, presence->incarnation});
+      }
+    }
+    queue = std::move(noticed);
   }
 
   void hang(std::size_t who) {
@@ -379,9 +394,15 @@ class World {
     publish(hearer);
   }
 
+  // What an owner did itself may be to be given up, too.
   void drain() {
-    while (deliver_one()) {
-    }
+    do {
+      while (deliver_one()) {
+      }
+      for (std::size_t who = 0; who < kOwners; ++who) {
+        if (serves(who)) heard(who);
+      }
+    } while (deliver_one());
   }
 
   void grow_late() {

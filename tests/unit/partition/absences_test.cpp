@@ -193,7 +193,11 @@ TEST_CASE("who holds what one claims who is away keeps it when that returns") {
   base.absent = {{"arm", 0, Kind::kLost, 7}};
   replica.directory.apply(base, kNow);
   REQUIRE(partition.load({{"hand", "", along_x(1)}}, kNow));
-  // It says so itself from then on.
+  // It says so itself once that has been so for a while.
+  CHECK(replica.directory.absent().empty());
+  CHECK_FALSE(replica.directory.look_for_gone(kStart));
+  CHECK_FALSE(replica.directory.look_for_gone(kStart + Absences::kGrace / 2));
+  CHECK(replica.directory.look_for_gone(kStart + Absences::kGrace));
   REQUIRE(replica.directory.absent().size() == 1);
   CHECK(replica.directory.absent()[0].incarnation == 7);
   replica.directory.apply(presence_of("arm", 7, 1), kNow);
@@ -273,6 +277,46 @@ TEST_CASE("what is forgotten is gone, for those as well who were away when it wa
   base.hear("arm", 2, 10);
   CHECK(base.owner_of("hand") == "arm");
   CHECK(base.directory.absent().empty());
+}
+
+TEST_CASE("who has hung itself has outlived nobody of whose absence it is told late") {
+  Witness arms("arms");
+  Presence head = presence_of("head", 1, 0);
+  head.absent = {{"leg", 0, Kind::kStopped, 4}};
+  arms.directory.apply(head, kNow);
+  CHECK(arms.directory.any_silent());
+  // All of this it hears at once.
+  arms.directory.apply(presence_of("leg", 5, 0), kNow);
+  CHECK(arms.directory.absent().empty());
+  CHECK_FALSE(arms.directory.any_silent());
+}
+
+TEST_CASE("what was forgotten while it still seemed to be there is forgotten as that ends") {
+  Witness base;
+  Presence head = presence_of("head", 1, 0);
+  head.absent = {{"arm", 0, Kind::kForgotten, 1}};
+  base.directory.apply(head, kNow);
+  const bool lives_anew = GENERATE(false, true);
+  if (lives_anew) base.hear("arm", 2, 10);
+  CHECK(base.directory.lost("arm", lives_anew ? 2 : 1, kNow));
+  CHECK(base.directory.owner("arm").has_value() == lives_anew);
+  CHECK(base.forest.exists("hand") == lives_anew);
+}
+
+TEST_CASE("in a cycle who is there keeps the parent, not who is gone") {
+  Replica base("base");
+  base.directory.apply(presence_of("arm", 1, 1), kNow);
+  base.directory.apply(page_of("arm", {{"hand", "tool", 10}}));
+  base.directory.apply(presence_of("bench", 1, 1), kNow);
+  base.directory.apply(page_of("bench", {{"tool", "hand", 20}}));
+  CHECK(base.structure() == Lines{"hand < tool @ arm, attached", "tool <  @ bench"});
+  Presence last = presence_of("arm", 1, 1);
+  last.stopped = true;
+  base.directory.apply(last, kNow);
+  CHECK(base.structure() == Lines{"hand <  @ arm", "tool < hand @ bench, attached"});
+  base.directory.apply(presence_of("arm", 2, 1), kNow);
+  base.directory.apply(page_of("arm", {{"hand", "tool", 10}}, 2));
+  CHECK(base.structure() == Lines{"hand < tool @ arm, attached", "tool <  @ bench"});
 }
 
 TEST_CASE("who is there is not forgotten") {
@@ -366,7 +410,7 @@ TEST_CASE("who restarts misses whom its predecessor missed") {
 TEST_CASE("absences are bounded") {
   Absences absences;
   for (std::size_t i = 0; i < 2 * Absences::kMost; ++i) {
-    absences.told({"p" + std::to_string(i), static_cast<std::int64_t>(i), Kind::kLost, 1});
+    absences.resume({"p" + std::to_string(i), static_cast<std::int64_t>(i), Kind::kLost, 1});
   }
   CHECK(absences.all().size() == Absences::kMost);
   CHECK_FALSE(absences.find("p0"));

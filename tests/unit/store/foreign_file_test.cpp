@@ -76,7 +76,7 @@ TEST_CASE(
   const TemporaryDirectory directory;
   const std::string file = changed_by(
       directory,
-      "DROP TABLE joints; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; "
+      "DROP TABLE absent; DROP TABLE joints; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; "
       "PRAGMA user_version = 1; PRAGMA journal_mode = DELETE");
   const std::string before = content(file);
   {
@@ -101,7 +101,7 @@ TEST_CASE(
 TEST_CASE("a file of the format that knew no correlation is brought up to date by the first write") {
   const TemporaryDirectory directory;
   const std::string file = changed_by(directory,
-                                      "DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE "
+                                      "DROP TABLE absent; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE "
                                       "joint_types; PRAGMA user_version = 2; "
                                       "PRAGMA journal_mode = DELETE");
   const KeptTies unknown{{true, {}, {}}, {}};
@@ -129,6 +129,9 @@ TEST_CASE("a file with rows that no state has is refused as it is") {
       {"UPDATE frames SET x_pc = zeroblob(9000000)", "too big"},
       {"UPDATE frames SET since = 1.5", "another type in column since"},
       {"UPDATE frames SET since = -1", "a time of 18446744073709551615"},
+      {"INSERT INTO absent VALUES('head', 1, 6, 1)", "an absence of kind 6"},
+      {"INSERT INTO absent VALUES('head', 1, 1, -1)", "a time of 18446744073709551615"},
+      {"INSERT INTO absent VALUES('', 1, 1, 1)", "partition"},
       {"UPDATE about SET epoch = -1", "a time of 18446744073709551615"},
       {"INSERT INTO about VALUES('arms', 2)", "it says of 2 partitions"},
       {"DELETE FROM about", "it says of 0 partitions"},

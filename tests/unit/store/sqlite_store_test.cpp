@@ -10,6 +10,8 @@
 #include <unistd.h>
 #include <vector>
 
+#include "tfdude/partition/incarnation.hpp"
+
 #include "math/flat.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
@@ -102,6 +104,31 @@ TEST_CASE("what was saved is there for the next process, to the last bit") {
   CHECK_FALSE(state->joints[1].type);
   REQUIRE(state->configured.size() == 1);
   CHECK(to_flat(state->configured[0].X_PC) == to_flat(hand.X_PC));
+}
+
+TEST_CASE("whom a partition misses is kept as it was said last, by itself") {
+  const TemporaryDirectory directory;
+  const std::string file = state_file(directory.path(), 7, "arms");
+  const Absent lost{"head", -5, Absent::Kind::kLost, 7};
+  const Absent stopped{"base", 1'800'000'000'000'000'000, Absent::Kind::kStopped, 1};
+  // What nobody is to say can be said, and is not to make the file one that is refused.
+  const Absent most{"far", 0, Absent::Kind::kForgotten, ~0ULL};
+  {
+    const auto store = opened(file);
+    REQUIRE(store->save({1, {}, {}, {}, {}, {{lost, stopped}}}));
+    REQUIRE(store->save({2, {"hand"}, {{"hand", "", {}, 1}}, {}}));
+  }
+  {
+    const auto store = opened(file);
+    CHECK(store->load()->absent == std::vector<Absent>{stopped, lost});
+    REQUIRE(store->save({3, {}, {}, {}, {}, {{most}}}));
+  }
+  const auto state = opened(file)->load();
+  REQUIRE(state);
+  REQUIRE(state->absent.size() == 1);
+  CHECK(state->absent[0].partition == "far");
+  CHECK(state->absent[0].kind == Absent::Kind::kForgotten);
+  CHECK(state->absent[0].incarnation >= IncarnationSource::kEnd);
 }
 
 TEST_CASE("what edges have to do with each other is kept with their values, and goes with them") {
@@ -287,7 +314,7 @@ TEST_CASE(
   sqlite3* raw = nullptr;
   REQUIRE(sqlite3_open(file.c_str(), &raw) == SQLITE_OK);
   const char* const older =
-      "DROP TABLE joint_types; DROP TABLE configured_ties; DROP TABLE ties; DROP TABLE joints; "
+      "DROP TABLE absent; DROP TABLE joint_types; DROP TABLE configured_ties; DROP TABLE ties; DROP TABLE joints; "
       "PRAGMA user_version = 1";
   REQUIRE(sqlite3_exec(raw, older, nullptr, nullptr, nullptr) == SQLITE_OK);
   sqlite3_close(raw);
