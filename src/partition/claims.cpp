@@ -223,7 +223,9 @@ void Claims::put(const std::string& id, const Claim& claim) {
   if (!before) {
     changes_.frame_added(id, after->parent, name(claim.owner));
   } else if (before->owner != after->owner &&
-             succession_.standing(before->owner) != Succession::Standing::kThere) {
+             (succession_.standing(before->owner) != Succession::Standing::kThere ||
+              succession_.outlived(after->owner, before->owner))) {
+    // Others may have noticed it before.
     changes_.frame_taken_over(id, after->parent, name(claim.owner), name(before->owner));
   } else if (before->parent != after->parent || before->owner != after->owner) {
     changes_.frame_moved(id, after->parent, name(claim.owner));

@@ -168,6 +168,11 @@ TEST_CASE("who returns without having ended gives way to who says that it has ou
   base.hear("left_arm", 1, 20, {missed});
   base.hear("arm", 1, 10);
   CHECK(base.owner_of("hand") == "left_arm");
+  // Another notices the absence later than the one that says so.
+  Witness head("head");
+  head.hear("left_arm", 1, 20, {missed});
+  CHECK(head.owner_of("hand") == "left_arm");
+  CHECK(head.told(ChangeKind::kFrameTakenOver).size() == 1);
   // The same to one who was not there.
   Replica late;
   Presence there = presence_of("left_arm", 1, 1);
