@@ -40,7 +40,7 @@ struct Arguments {
   ObserveOptions observe;
   bool unknown = false;              ///< correlation
   std::vector<std::string> sources;  ///< of each column: its source's name and 6 numbers
-  std::string out;  ///< the file of a picture
+  std::string out;                   ///< the file of a picture
   int samples = 0;
   double position = 0;  ///< of a joint [rad or m], and its
   double joint_stddev = 0;

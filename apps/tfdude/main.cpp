@@ -191,9 +191,10 @@ void add_correlate_command(CLI::App& app, Arguments& arguments, Command& chosen)
   correlate->add_flag("--unknown", arguments.unknown,
                       "its own part may have to do with anything; else it is independent");
   correlate
-      ->add_option("--source", arguments.sources,
-                   "what it shares with edges that name the same source: its error for one standard "
-                   "deviation there [m m m rad rad rad]; again for each dimension")
+      ->add_option(
+          "--source", arguments.sources,
+          "what it shares with edges that name the same source: its error for one standard "
+          "deviation there [m m m rad rad rad]; again for each dimension")
       ->type_name("NAME 6 NUMBERS")
       ->type_size(7)
       ->allow_extra_args(false);

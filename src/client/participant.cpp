@@ -290,7 +290,9 @@ Result<void> Participant::publish_to(const Part& part, const Update& share,
   return transport_->send(part.partition, share, deadline.at());
 }
 
-Result<void> Participant::flush(Milliseconds wait) { return transport_->flush(Deadline(wait).at()); }
+Result<void> Participant::flush(Milliseconds wait) {
+  return transport_->flush(Deadline(wait).at());
+}
 
 Result<std::vector<PathSegment>> Participant::path(std::string_view a, std::string_view b) {
   return routed(call_deadline(), [&]() -> Result<std::vector<PathSegment>> {

@@ -36,7 +36,8 @@ void Participant::tell_changes() {
     const bool own = change.partition == partition_name_;
     const bool by_own = change.rival == partition_name_;
     if (change.kind == ChangeKind::kConflict && own) log().error("{}", change.message);
-    if (change.kind == ChangeKind::kFrameOrphaned && (own || by_own)) log().warn("{}", change.message);
+    if (change.kind == ChangeKind::kFrameOrphaned && (own || by_own))
+      log().warn("{}", change.message);
   }
   events_->post(std::move(changes));
 }

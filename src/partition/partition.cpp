@@ -298,8 +298,9 @@ Result<void> Partition::correlate(const std::string& id, const Correlation& corr
     return fail(Errc::kInvalidInput, who + ": what it was observed with is said by observations");
   }
   if (joints_.is_coupled(id)) {
-    return fail(Errc::kInvalidInput, who + " has the error of its joint, which is that of others "
-                                           "that move with it");
+    return fail(Errc::kInvalidInput, who +
+                                         " has the error of its joint, which is that of others "
+                                         "that move with it");
   }
   if (auto said = forest_.correlate(id, correlation); !said) {
     return tl::unexpected(at_home(std::move(said.error()), id));

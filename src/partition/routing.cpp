@@ -152,8 +152,8 @@ Result<std::vector<Part>> route_update(const Forest& forest, const Directory& di
 Result<std::vector<Part>> route_update(const Forest& forest, const Directory& directory,
                                        const std::vector<PartialUpdate>& edges,
                                        std::optional<Time> stamp) {
-  return all_reachable(directory, route_edges<PartialUpdateRequest>(forest, directory, edges, stamp,
-                                                                    check_parts));
+  return all_reachable(
+      directory, route_edges<PartialUpdateRequest>(forest, directory, edges, stamp, check_parts));
 }
 
 Result<std::vector<Part>> route_publish(const Forest& forest, const Directory& directory,

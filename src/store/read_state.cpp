@@ -19,8 +19,9 @@ using sqlite::Statement;
 // Of those that are sorted by id; null where there is none.
 template <class Frame>
 Frame* find_frame(std::vector<Frame>& frames, const std::string& id) {
-  const auto at = std::lower_bound(frames.begin(), frames.end(), id,
-                                   [](const Frame& frame, const std::string& to) { return frame.id < to; });
+  const auto at =
+      std::lower_bound(frames.begin(), frames.end(), id,
+                       [](const Frame& frame, const std::string& to) { return frame.id < to; });
   return at != frames.end() && at->id == id ? &*at : nullptr;
 }
 
@@ -64,7 +65,8 @@ Result<void> load_notes(const Database& database, std::int64_t /*format*/, Store
   return loaded;
 }
 
-Result<void> load_configured(const Database& database, std::int64_t /*format*/, StoredState& state) {
+Result<void> load_configured(const Database& database, std::int64_t /*format*/,
+                             StoredState& state) {
   const char* sql = "SELECT id, parent, x_pc FROM configured ORDER BY id";
   return each_row(database, sql, [&](const Statement& row) -> Result<void> {
     auto ok = row.check_types({SQLITE_TEXT, SQLITE_TEXT, SQLITE_BLOB});

@@ -66,7 +66,7 @@ class SqliteStore final : public StateStore {
 
   const std::string file_;
   std::optional<Database> database_;
-  bool written_ = false;   // by this process
+  bool written_ = false;           // by this process
   std::int64_t format_ = kFormat;  // of the file as it is
   Statement set_epoch_;
   Statement erase_frame_;

@@ -82,7 +82,8 @@ class Choices {
   [[nodiscard]] Time time() { return Time(std::chrono::nanoseconds(since())); }
   [[nodiscard]] Note note() {
     const auto kind = static_cast<Note::Kind>(1 + upto<std::uint8_t>(3));
-    return {id(), since(), kind, kind == Note::Kind::kRemoved || kind == Note::Kind::kDropped ? "" : other()};
+    return {id(), since(), kind,
+            kind == Note::Kind::kRemoved || kind == Note::Kind::kDropped ? "" : other()};
   }
   [[nodiscard]] Page page() {
     Page page{other(), upto<std::uint32_t>(2), upto<std::uint64_t>(3), upto<std::uint64_t>(9), {}};

@@ -48,9 +48,11 @@ class RowWriter {
         "UPDATE sqlite_master SET sql = replace(sql, 'PRIMARY KEY', '') WHERE name = 'frames'",
         "UPDATE sqlite_master SET rootpage = 3 WHERE name = 'notes'",
         "PRAGMA user_version = 4",
-        "DROP TABLE absent; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; PRAGMA user_version "
+        "DROP TABLE absent; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; "
+        "PRAGMA user_version "
         "= 2",
-        "DROP TABLE absent; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; DROP TABLE joints; "
+        "DROP TABLE absent; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; "
+        "DROP TABLE joints; "
         "PRAGMA user_version = 1",
     };
     if (rarely()) {

@@ -183,9 +183,9 @@ TEST_CASE("absences: a daemon whose clock is behind that of its dead predecessor
       robot.directory.path() + "/domain-" + std::to_string(robot.domain.number()) + "/arm.sqlite";
   const bool keeps = GENERATE(true, false);
   if (!keeps) std::filesystem::remove(state);
-  robot.arm.emplace(robot.start(robot.arm_config,
-                                {"/usr/bin/env", "FAKETIME=-10d", "FAKETIME_DONT_FAKE_MONOTONIC=1",
-                                 "LD_PRELOAD=" + fake}));
+  robot.arm.emplace(robot.start(
+      robot.arm_config,
+      {"/usr/bin/env", "FAKETIME=-10d", "FAKETIME_DONT_FAKE_MONOTONIC=1", "LD_PRELOAD=" + fake}));
   CHECK(eventually([&] { return client.lookup("world", "hand").has_value(); }));
 }
 

@@ -19,9 +19,9 @@ enum class ChangeKind : std::uint8_t {
   kFrameMoved,  ///< hangs elsewhere, or belongs to another partition
   kConflict,    ///< one of two partitions, or of two processes that serve one, had to give way
   kHistoryRestarted,  ///< of a frame's edge, whose source's clock has jumped back; told by its owner's process only
-  kFrameOrphaned,  ///< waits for its parent, which that one's configuration names no more
+  kFrameOrphaned,   ///< waits for its parent, which that one's configuration names no more
   kFrameTakenOver,  ///< belongs to a partition that is there, since the one that had it is not
-  kMissed,         ///< changes were not told, because the listeners took too long
+  kMissed,          ///< changes were not told, because the listeners took too long
 };
 
 /// The stable snake_case name of a kind, as the command line prints it in JSON.

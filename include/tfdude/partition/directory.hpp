@@ -189,8 +189,8 @@ class Directory {
     std::uint32_t page_count = 0;
     std::map<std::uint32_t, KeptPage> pages;
     std::optional<Successor> successor;
-    std::uint64_t heard_of = 0;  // the latest incarnation that others have spoken of
-    bool forgotten = false;      // up to that one
+    std::uint64_t heard_of = 0;   // the latest incarnation that others have spoken of
+    bool forgotten = false;       // up to that one
     std::uint64_t to_forget = 0;  // up to that one, once it is not heard here, either
     bool missed_by_others = false;
     bool said_silent = false;  // by others

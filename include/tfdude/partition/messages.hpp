@@ -236,7 +236,8 @@ struct Note {
     kRemoved = 1,  ///< by request; whatever hung below it since before goes, too
     kGaveWay = 2,  ///< `rival` has claimed the same id earlier
     kUnhung = 3,   ///< its move and an earlier one, of `rival`, make a cycle: it was made a root
-    kDropped = 4,  ///< its partition's configuration names it no more; what hung below it waits for it
+    kDropped =
+        4,  ///< its partition's configuration names it no more; what hung below it waits for it
   };
   std::string id;
   std::uint64_t since = 0;

@@ -145,7 +145,8 @@ class Partition {
   std::map<std::string, EdgeConsistency> consistency_;  // of edges that were observed
   bool saved_ = false;
   std::set<std::string> updated_;  // by requests, since the last take_unsaved()
-  std::optional<std::vector<Absent>> saved_absent_;  // whom the store says that this partition misses
+  std::optional<std::vector<Absent>>
+      saved_absent_;  // whom the store says that this partition misses
 };
 
 }  // namespace tfdude

@@ -25,7 +25,7 @@ struct FrameSpec {
 struct StoredFrame {
   std::string id;
   std::string parent;  ///< empty: a root
-  Transform X_PC;  ///< its covariance is that of the edge's own part where it has ties
+  Transform X_PC;      ///< its covariance is that of the edge's own part where it has ties
   std::uint64_t since = 0;
   KeptTies ties{};
 };

@@ -74,10 +74,10 @@ TEST_CASE("a file with tables, triggers or views that no state has is refused as
 TEST_CASE(
     "a file of the format that knew no joints is read, and brought up to date by the first write") {
   const TemporaryDirectory directory;
-  const std::string file = changed_by(
-      directory,
-      "DROP TABLE absent; DROP TABLE joints; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE joint_types; "
-      "PRAGMA user_version = 1; PRAGMA journal_mode = DELETE");
+  const std::string file = changed_by(directory,
+                                      "DROP TABLE absent; DROP TABLE joints; DROP TABLE ties; DROP "
+                                      "TABLE configured_ties; DROP TABLE joint_types; "
+                                      "PRAGMA user_version = 1; PRAGMA journal_mode = DELETE");
   const std::string before = content(file);
   {
     const auto store = open_sqlite_store(file, "arms");
@@ -98,12 +98,14 @@ TEST_CASE(
   CHECK((*store)->load()->joints.size() == 1);
 }
 
-TEST_CASE("a file of the format that knew no correlation is brought up to date by the first write") {
+TEST_CASE(
+    "a file of the format that knew no correlation is brought up to date by the first write") {
   const TemporaryDirectory directory;
-  const std::string file = changed_by(directory,
-                                      "DROP TABLE absent; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE "
-                                      "joint_types; PRAGMA user_version = 2; "
-                                      "PRAGMA journal_mode = DELETE");
+  const std::string file =
+      changed_by(directory,
+                 "DROP TABLE absent; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE "
+                 "joint_types; PRAGMA user_version = 2; "
+                 "PRAGMA journal_mode = DELETE");
   const KeptTies unknown{{true, {}, {}}, {}};
   {
     const auto store = open_sqlite_store(file, "arms");

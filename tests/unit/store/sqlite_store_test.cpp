@@ -141,15 +141,21 @@ TEST_CASE("what edges have to do with each other is kept with their values, and 
   // As large as can be.
   Correlation most{false, {}, std::vector<std::string>(kMaxShares, std::string(255, 'o'))};
   for (std::size_t i = 0; i < kMaxShares; ++i) {
-    most.shares.push_back({std::string(250, 's') + std::to_string(i), false,
-                           Factor::Ones(6, kMaxFactorColumns)});
+    most.shares.push_back(
+        {std::string(250, 's') + std::to_string(i), false, Factor::Ones(6, kMaxFactorColumns)});
   }
   const std::string file = state_file(directory.path(), 7, "arms");
   {
     const auto store = opened(file);
-    REQUIRE(store->save({1, {}, {{"a", "", X, 1, {supply, {}}}, {"b", "", X, 1, {{}, seen}},
-                                 {"c", "", X, 1, {most, most}}, {"d", "", X, 1, {supply, seen}}}, {}}));
-    REQUIRE(store->save_values({{"a", X, {supply, seen}}, {"d", X}, {"nobody", X, {supply, {}}}}, {}));
+    REQUIRE(store->save({1,
+                         {},
+                         {{"a", "", X, 1, {supply, {}}},
+                          {"b", "", X, 1, {{}, seen}},
+                          {"c", "", X, 1, {most, most}},
+                          {"d", "", X, 1, {supply, seen}}},
+                         {}}));
+    REQUIRE(
+        store->save_values({{"a", X, {supply, seen}}, {"d", X}, {"nobody", X, {supply, {}}}}, {}));
     REQUIRE(store->save_configured({{"a", "", X, {}, supply}, {"b", "", X}}));
   }
   {
@@ -314,7 +320,8 @@ TEST_CASE(
   sqlite3* raw = nullptr;
   REQUIRE(sqlite3_open(file.c_str(), &raw) == SQLITE_OK);
   const char* const older =
-      "DROP TABLE absent; DROP TABLE joint_types; DROP TABLE configured_ties; DROP TABLE ties; DROP TABLE joints; "
+      "DROP TABLE absent; DROP TABLE joint_types; DROP TABLE configured_ties; DROP TABLE ties; "
+      "DROP TABLE joints; "
       "PRAGMA user_version = 1";
   REQUIRE(sqlite3_exec(raw, older, nullptr, nullptr, nullptr) == SQLITE_OK);
   sqlite3_close(raw);
