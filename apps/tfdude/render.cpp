@@ -113,7 +113,7 @@ nlohmann::json partition_json(const PartitionInfo& partition) {
                       {"pid", partition.pid},
                       {"frames", partition.frames},
                       {"reachable", partition.reachable}};
-  if (!partition.reachable) json["absence"] = partition.stopped ? "stopped" : "lost";
+  if (!partition.reachable) json["reason"] = partition.stopped ? "stopped" : "lost";
   return json;
 }
 
@@ -129,7 +129,7 @@ nlohmann::json change_json(const Change& change) {
     if (!name.empty()) json[key] = name;
   }
   if (change.kind == ChangeKind::kPartitionDown) {
-    json["absence"] = change.stopped ? "stopped" : "lost";
+    json["reason"] = change.stopped ? "stopped" : "lost";
   }
   return json;
 }

@@ -96,7 +96,7 @@ TEST_CASE("absences: frames of a dead daemon are those of one that serves them, 
   REQUIRE(client.lookup("world", "hand"));
   const auto fresh = robot.domain.cli({"--json", "partitions"});
   CHECK_THAT(fresh.out,
-             ContainsSubstring(orderly ? R"("absence":"stopped")" : R"("absence":"lost")"));
+             ContainsSubstring(orderly ? R"("reason":"stopped")" : R"("reason":"lost")"));
   const auto told = [&](const Change& expected) {
     const std::lock_guard lock(mutex);
     return std::any_of(heard.begin(), heard.end(), [&](const Change& one) {

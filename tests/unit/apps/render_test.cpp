@@ -127,9 +127,16 @@ TEST_CASE("a partition as JSON says who and where") {
   info.host = "tower";
   info.pid = 7;
   info.frames = 3;
-  CHECK(
-      partition_json(info) ==
-      json({{"name", "arms"}, {"host", "tower"}, {"pid", 7}, {"frames", 3}, {"reachable", false}}));
+  info.reachable = true;
+  json said{{"name", "arms"}, {"host", "tower"}, {"pid", 7}, {"frames", 3}, {"reachable", true}};
+  CHECK(partition_json(info) == said);
+  info.reachable = false;
+  said["reachable"] = false;
+  said["reason"] = "lost";
+  CHECK(partition_json(info) == said);
+  info.stopped = true;
+  said["reason"] = "stopped";
+  CHECK(partition_json(info) == said);
 }
 
 TEST_CASE("JSON is one line, whatever the texts hold") {

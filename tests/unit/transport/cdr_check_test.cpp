@@ -154,10 +154,16 @@ TEST_CASE("the message of an error has at most 4096 bytes") {
   CHECK_FALSE(error(std::string(4097, 'm')));
 }
 
+// The fields of a presence until its list of those who are absent.
+Cdr presence_from(const std::string& host, unsigned serving) {
+  Cdr cdr;
+  cdr.string("r").ulonglong(0).string(host).ulong(0).ulong(0).ulong(0).octet(serving);
+  return cdr;
+}
+
 TEST_CASE("the name of a host has at most 255 bytes") {
   const auto host = [](const std::string& name) {
-    return presence(
-        Cdr().string("r").ulonglong(0).string(name).ulong(0).ulong(0).ulong(0).octet(1).ulong(0));
+    return presence(presence_from(name, 1).ulong(0).ulonglong(0).octet(0).octet(0));
   };
   CHECK(host(std::string(255, 'h')));
   CHECK_FALSE(host(std::string(256, 'h')));
@@ -289,10 +295,10 @@ Cdr joint_states(std::size_t count, std::uint64_t length) {
 }
 
 Cdr absent(std::size_t count, std::uint64_t length) {
-  Cdr cdr;
-  cdr.string("r").ulonglong(0).string("h").ulong(0).ulong(0).ulong(0).octet(1).ulong(length);
-  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(7).string("a");
-  return cdr;
+  Cdr cdr = presence_from("h", 1);
+  cdr.ulong(length);
+  for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(7).ulonglong(8).octet(1).string("a");
+  return cdr.ulonglong(0).octet(0).octet(0);
 }
 
 TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
@@ -348,9 +354,7 @@ TEST_CASE("bodies of kinds that there are not are refused") {
 
 TEST_CASE("a boolean is zero or one") {
   const auto serving = [](unsigned value) {
-    return presence(
-        Cdr().string("r").ulonglong(0).string("h").ulong(0).ulong(0).ulong(0).octet(value).ulong(
-            0));
+    return presence(presence_from("h", value).ulong(0).ulonglong(0).octet(0).octet(0));
   };
   CHECK(serving(0));
   CHECK(serving(1));
