@@ -147,8 +147,13 @@ TEST_CASE("persistence: frames are there for others all the time while their dae
   std::atomic<bool> stop{false};
   std::size_t missing = 0;
   std::size_t looked = 0;
+  std::string error;
   std::thread watcher([&] {
-    for (; !stop; ++looked) missing += client.frames()->size() == 2 ? 0U : 1U;
+    for (; !stop; ++looked) {
+      const auto frames = client.frames();
+      if (!frames) error = frames.error().message;
+      missing += frames && frames->size() == 2 ? 0U : 1U;
+    }
   });
   arms.start();
   const bool back = eventually([&] { return client.lookup("arm", "hand").has_value(); });
@@ -156,6 +161,7 @@ TEST_CASE("persistence: frames are there for others all the time while their dae
   watcher.join();
   CHECK(back);
   CHECK(looked > 0);
+  CHECK(error == "");
   CHECK(missing == 0);
 }
 

@@ -53,6 +53,7 @@ void FastDdsTransport::take_page(const wire::Page& sample, const ertps::GuidPref
   const auto page = from_wire(sample);
   if (page) {
     handler_->on_page(*page);
+    peers_.sent_page(from, *page);
   } else {
     log_refused(kDirectoryTopic, page.error());
   }

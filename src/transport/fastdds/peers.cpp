@@ -40,8 +40,24 @@ void Peers::left(const ertps::GuidPrefix_t& prefix) {
   const std::lock_guard lock(mutex_);
   const auto known = servers_.find(peer_of(prefix));
   if (known == servers_.end()) return;
-  if (known->second.presence && !known->second.silent) gone_(*known->second.presence);
+  const Server& server = known->second;
+  if (server.said() != nullptr && !server.silent) gone_(*server.said());
   servers_.erase(known);
+}
+
+void Peers::sent_page(const ertps::GuidPrefix_t& prefix, const Page& page) {
+  {
+    const std::lock_guard lock(mutex_);
+    const auto known = servers_.find(peer_of(prefix));
+    if (known == servers_.end()) return;
+    Server& server = known->second;
+    if (!server.presence) {
+      server.by_page.emplace();
+      server.by_page->partition = page.partition;
+      server.by_page->incarnation = page.incarnation;
+    }
+  }
+  heard(prefix);
 }
 
 void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers,
@@ -62,7 +78,7 @@ void Peers::heard(const ertps::GuidPrefix_t& prefix) {
   if (known == servers_.end()) return;
   Server& server = known->second;
   server.last_heard = Clock::now();
-  if (std::exchange(server.silent, false)) there_(*server.presence);
+  if (std::exchange(server.silent, false) && server.presence) there_(*server.presence);
 }
 
 void Peers::look_for_silent(Clock::time_point now) {
@@ -70,9 +86,10 @@ void Peers::look_for_silent(Clock::time_point now) {
   const auto late = now - std::exchange(last_look_, now) - kSpeakEvery;
   for (auto& [id, server] : servers_) {
     if (late > Clock::duration::zero()) server.last_heard += late;
-    if (!server.presence || server.silent || now - server.last_heard < patience(server)) continue;
+    const Presence* said = server.said();
+    if (said == nullptr || server.silent || now - server.last_heard < patience(server)) continue;
     server.silent = true;
-    gone_(*server.presence);
+    gone_(*said);
   }
 }
 
@@ -115,8 +132,9 @@ bool Peers::nobody_hears_more() const {
 }
 
 bool Peers::all_present() const {
-  return std::all_of(servers_.begin(), servers_.end(),
-                     [](const auto& server) { return server.second.presence.has_value(); });
+  return std::all_of(servers_.begin(), servers_.end(), [](const auto& known) {
+    return known.second.presence || known.second.silent;
+  });
 }
 
 }  // namespace tfdude::fastdds

@@ -46,7 +46,8 @@ class Peers {
   static constexpr std::chrono::milliseconds kSpeakEvery{60};
 
   /// @param there  a peer said what it serves, or is heard again
-  /// @param gone   a peer that had said so has left or fallen silent
+  /// @param gone   a peer that had said so, or sent a page, has left or fallen silent; of one that sent only pages, with
+  ///               what these say of it
   Peers(Tell there, Tell gone) : there_(std::move(there)), gone_(std::move(gone)) {}
 
   /// To be called before anybody is met.
@@ -67,6 +68,8 @@ class Peers {
   /// @param beat   whether this is said again and again
   void present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers,
                bool beat);
+  /// A server sent a page, which may come before what it says of itself.
+  void sent_page(const ertps::GuidPrefix_t& prefix, const Page& page);
   /// A server sent something else: a sign of life, should what it says of itself be late.
   void heard(const ertps::GuidPrefix_t& prefix);
 
@@ -84,7 +87,8 @@ class Peers {
   /// more others than this participant knows.
   [[nodiscard]] bool settled() const;
 
-  /// Whether some server was met that has not said yet what it serves.
+  /// Whether some server was met that has not said yet what it serves. One that has sent a page, and then nothing more for
+  /// as long as a first beat may take, is not waited for.
   [[nodiscard]] bool awaits_presence() const;
 
  private:
@@ -93,10 +97,16 @@ class Peers {
 
   struct Server {
     std::optional<Presence> presence;
+    std::optional<Presence> by_page;  // what its pages say, before there is a presence
     std::size_t peers = 0;
     Clock::time_point last_heard;
     bool beats = false;
     bool silent = false;
+
+    [[nodiscard]] const Presence* said() const {
+      if (presence) return &*presence;
+      return by_page ? &*by_page : nullptr;
+    }
   };
 
   /// How long this one may be silent.

@@ -1,7 +1,9 @@
 #include "transport/fastdds/peers.hpp"
 
 #include <chrono>
+#include <cstdint>
 #include <thread>
+#include <vector>
 
 #include "support/catch.hpp"
 
@@ -41,6 +43,47 @@ TEST_CASE("who was met counts as all there are only once its beats say how many 
     std::this_thread::sleep_for(Peers::kQuiet);
     CHECK(peers.settled());
   }
+}
+
+TEST_CASE("who sends a page and then nothing is gone, and not waited for") {
+  std::vector<std::uint64_t> gone;
+  Peers peers([](const Presence&) {},
+              [&](const Presence& one) { gone.push_back(one.incarnation); });
+  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), false);
+  peers.met(prefix_of(1), participant_name("arms"));
+  Page page;
+  page.partition = "arms";
+  page.incarnation = 7;
+  peers.sent_page(prefix_of(1), page);
+  CHECK(peers.awaits_presence());
+  // Looked at in time, until it has been silent for too long.
+  const auto start = Peers::Clock::now();
+  for (auto late = Peers::kSpeakEvery; late < std::chrono::seconds(62);
+       late += Peers::kSpeakEvery) {
+    peers.look_for_silent(start + late);
+  }
+  CHECK_FALSE(peers.awaits_presence());
+  CHECK(gone == std::vector<std::uint64_t>{7});
+  SECTION("it has only been slow") {
+    peers.present(prefix_of(1), presence_of("arms"), 0, true);
+    peers.left(prefix_of(1));
+    CHECK(gone == std::vector<std::uint64_t>{7, 1});
+  }
+  SECTION("it is told of once") {
+    peers.left(prefix_of(1));
+    CHECK(gone.size() == 1);
+  }
+}
+
+TEST_CASE("who was met and has told nothing yet is waited for") {
+  Peers peers([](const Presence&) {}, [](const Presence&) {});
+  peers.configure(std::chrono::seconds(1), std::chrono::seconds(1), false);
+  peers.met(prefix_of(1), participant_name("arms"));
+  const auto start = Peers::Clock::now();
+  for (auto late = Peers::kSpeakEvery; late < std::chrono::seconds(9); late += Peers::kSpeakEvery) {
+    peers.look_for_silent(start + late);
+  }
+  CHECK(peers.awaits_presence());
 }
 
 }  // namespace tfdude::fastdds
