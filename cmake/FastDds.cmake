@@ -6,6 +6,8 @@ find_package(fastdds QUIET)
 if(fastdds_FOUND)
   set(TFDUDE_FASTDDS_MAJOR 3)
   set(_fastdds_target fastdds)
+  # So says tinyxml2, through Fast DDS, to some targets; precompiled headers that all share want it of all.
+  add_compile_definitions(_FILE_OFFSET_BITS=64)
 else()
   find_package(fastrtps 2.9 REQUIRED)
   set(TFDUDE_FASTDDS_MAJOR 2)

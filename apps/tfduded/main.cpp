@@ -13,8 +13,8 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/config.hpp"
-#include "tfdude/transport/fastdds.hpp"
 #include "tfdude/client/config_preview.hpp"
+#include "tfdude/transport/fastdds.hpp"
 
 #include "arguments.hpp"
 
@@ -66,8 +66,7 @@ int run(tfdude::Node& node, const sigset_t& stop_signals) {
 
 // Says what serving would begin with. @return the exit status
 int check(const Arguments& arguments, const tfdude::Config& config) {
-  const auto preview =
-      tfdude::preview_config(config.partition, config.frames, arguments.options);
+  const auto preview = tfdude::preview_config(config.partition, config.frames, arguments.options);
   if (!preview) {
     spdlog::error("partition {}: {}", tfdude::quote(config.partition), preview.error().message);
     return kWrongUsage;

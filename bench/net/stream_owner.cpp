@@ -5,9 +5,8 @@
 #include <unistd.h>
 #include <utility>
 
-#include "support/relay.hpp"
-
 #include "net/harness.hpp"
+#include "support/relay.hpp"
 
 namespace bench {
 namespace {

@@ -73,7 +73,8 @@ Result<StoredState> read_state_copy(const std::string& file, const std::string& 
   bool kept_still = false;
   for (int attempt = 0; attempt < kAttempts && !kept_still; ++attempt) {
     if (attempt > 0) std::this_thread::sleep_for(kPause);
-    if (const auto failed = copy_once(file, copy, kept_still)) return unreadable(file, failed.message());
+    if (const auto failed = copy_once(file, copy, kept_still))
+      return unreadable(file, failed.message());
   }
   if (!kept_still) return unreadable(file, "it is written all the time");
   auto store = open_sqlite_store(copy, partition);

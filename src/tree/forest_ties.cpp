@@ -63,8 +63,8 @@ Result<void> Forest::resume(std::string_view id, const KeptTies& ties) {
   HeldVersion& fresh = impl_->push_held(*slot, impl_->newest_value(*slot).X_PC);
   std::unique_ptr<EdgeTies> resumed;
   if (!ties.empty()) {
-    resumed.reset(new EdgeTies{ties.said, ties.observed.value_or(ties.said),
-                               ties.observed.has_value(), 0});
+    resumed.reset(
+        new EdgeTies{ties.said, ties.observed.value_or(ties.said), ties.observed.has_value(), 0});
   }
   impl_->set_ties(fresh, std::move(resumed));
   impl_->commit();

@@ -352,8 +352,7 @@ Result<void> Forest::update_partial(const std::vector<PartialUpdate>& edges,
   return impl_->update_all(*whole, &EdgeUpdate::id, stamp);
 }
 
-Result<void> Forest::update_tied(const std::vector<TiedUpdate>& edges,
-                                 std::optional<Time> stamp) {
+Result<void> Forest::update_tied(const std::vector<TiedUpdate>& edges, std::optional<Time> stamp) {
   const std::lock_guard lock(impl_->mutex_);
   return impl_->update_all(edges, &TiedUpdate::frame, stamp);
 }

@@ -82,8 +82,7 @@ Matrix6d of_path(const ObservedChain& chain, const Eigen::MatrixXd& P, std::size
                  std::size_t to) {
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(6, P.cols());
   for (std::size_t i = from; i < to; ++i) {
-    H.middleCols<6>(static_cast<Eigen::Index>(6 * i)) =
-        adjoint(chain.believed(to, i + 1).pose);
+    H.middleCols<6>(static_cast<Eigen::Index>(6 * i)) = adjoint(chain.believed(to, i + 1).pose);
   }
   return H * P * H.transpose();
 }
@@ -136,7 +135,9 @@ TEST_CASE("kept: owners that restart between observations know what one dense fi
   }
 }
 
-TEST_CASE("kept: what was said of correlation by request is there after a restart, and can be taken back") {
+TEST_CASE(
+    "kept: what was said of correlation by request is there after a restart, and can be taken "
+    "back") {
   const Join join = joined_by(GENERATE(0, 1));
   Random random(0x4e98);
   INFO("seed " << random.seed());
@@ -146,7 +147,9 @@ TEST_CASE("kept: what was said of correlation by request is there after a restar
     const auto X = robot.client->lookup(frame(1), frame(4), Query{});
     return X && X->basis.bound;
   };
-  REQUIRE(eventually([&] { return robot.client->correlate(frame(3), {true, {}, {}}).has_value(); }));
+  REQUIRE(eventually([&] {
+    return robot.client->correlate(frame(3), {true, {}, {}}).has_value();
+  }));
   CHECK(bound());
   robot.restart("b", true);
   CHECK(eventually(bound));

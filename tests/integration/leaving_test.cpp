@@ -55,8 +55,8 @@ class Member {
             [&matches](const ertps::GuidPrefix_t&, int) { ++matches; }});
   }
   [[nodiscard]] std::unique_ptr<Outlet> write() {
-    return std::make_unique<Outlet>(Context{*participant_, profiles_, *gate_, counters_}, *topic_, "",
-                                    "presence_writer");
+    return std::make_unique<Outlet>(Context{*participant_, profiles_, *gate_, counters_}, *topic_,
+                                    "", "presence_writer");
   }
 
  private:

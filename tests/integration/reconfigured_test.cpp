@@ -81,7 +81,9 @@ TEST_CASE("reconfigured: a daemon without a configuration has its state as it wa
   REQUIRE(eventually([&] { return x_of(client.lookup("arm", "tool")) == 120; }));
 }
 
-TEST_CASE("reconfigured: an entry that is gone takes its frame, and nothing below it, whoever owns that") {
+TEST_CASE(
+    "reconfigured: an entry that is gone takes its frame, and nothing below it, whoever owns "
+    "that") {
   Arms arms;
   const std::string tools = arms.directory.write(
       "tools.yaml", "partition: tools\nframes:\n  - {id: gripper, parent: hand}\n");
@@ -114,8 +116,9 @@ TEST_CASE("reconfigured: an entry that is gone takes its frame, and nothing belo
   CHECK(x_of(client.lookup("tool", "tip")) == 1000);
   CHECK(eventually([&] {
     (void)arms.daemon->runs();
-    return arms.daemon->err().find("frame 'gripper' of partition 'tools' waits for its parent "
-                                   "'hand'") != std::string::npos;
+    return arms.daemon->err().find(
+               "frame 'gripper' of partition 'tools' waits for its parent "
+               "'hand'") != std::string::npos;
   }));
   CHECK_THAT(arms.daemon->err(), ContainsSubstring("configuration: frame 'hand': removed"));
   CHECK_THAT(arms.daemon->err(),
@@ -154,7 +157,8 @@ TEST_CASE("reconfigured: what a configuration would change is said beforehand, a
   // A frame that was hung below another meanwhile cannot be above it.
   REQUIRE(client.move("hand", ""));
   REQUIRE(client.add("wrist", "hand", {}));
-  const CliResult cycle = arms.check({"--config", arms.directory.write("cycle.yaml", R"(partition: arms
+  const CliResult cycle =
+      arms.check({"--config", arms.directory.write("cycle.yaml", R"(partition: arms
 frames:
   - {id: arm, xyz: [1, 0, 0]}
   - {id: hand, parent: wrist}
@@ -169,11 +173,10 @@ TEST_CASE("reconfigured: what observations and requests have said of correlation
   auto client = *Client::open(arms.domain.options());
   const Covariance some = *Covariance::from_stddev({0.01, 0.01, 0.01, 0.01, 0.01, 0.01});
   for (const auto& [id, x] : {std::pair("tool", 1.0), std::pair("tip", 2.0)}) {
-    REQUIRE(client.add(id, id == std::string("tool") ? "hand" : "tool",
-                       {along_x(x).pose, some}));
+    REQUIRE(client.add(id, id == std::string("tool") ? "hand" : "tool", {along_x(x).pose, some}));
   }
-  const CliResult said = arms.domain.cli({"correlate", "tip", "--source", "supply", "0", "0", "0",
-                                          "0", "0", "0.002"});
+  const CliResult said =
+      arms.domain.cli({"correlate", "tip", "--source", "supply", "0", "0", "0", "0", "0", "0.002"});
   CHECK(said.status == 0);
   CHECK_THAT(said.out, ContainsSubstring("correlated tip"));
   REQUIRE(client.observe("hand", "tip", {along_x(3).pose, some}));

@@ -3,5 +3,6 @@
 // What most tests include, compiled once for all of them; the preset dev builds without it.
 #include <future>
 
-#include "support/catch.hpp"
 #include "tfdude/client/client.hpp"
+
+#include "support/catch.hpp"

@@ -10,8 +10,8 @@ namespace tfdude {
 
 /// What a Node that is opened with some frames would make of what is kept of its partition.
 struct ConfigPreview {
-  std::string file;           ///< in which that is kept; empty: nothing is kept
-  std::size_t frames = 0;     ///< that are kept now
+  std::string file;        ///< in which that is kept; empty: nothing is kept
+  std::size_t frames = 0;  ///< that are kept now
   std::vector<ConfiguredChange> changes;
 };
 

@@ -133,8 +133,8 @@ struct SegmentValues {
   /// By segment, whose values' covariances are of own parts then; empty if no edge is tied to any other.
   std::vector<Ties> ties{};
   std::vector<Ties> ties_at_hint{};
-  std::uint64_t commit = 0;   ///< of which the values are; see revise()
-  std::uint64_t history = 0;  ///< the newest of their edges': see News
+  std::uint64_t commit = 0;       ///< of which the values are; see revise()
+  std::uint64_t history = 0;      ///< the newest of their edges': see News
   std::uint64_t incarnation = 0;  ///< of the owner that counts the commits; see Partition
 };
 
@@ -209,7 +209,7 @@ struct FrameInfo {
 /// What of a held edge outlives its process.
 struct ChangedEdge {
   std::string id;
-  Transform X_PC;   ///< its covariance is that of the edge's own part where it has ties
+  Transform X_PC;  ///< its covariance is that of the edge's own part where it has ties
   KeptTies ties{};
 };
 

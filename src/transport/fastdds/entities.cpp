@@ -11,7 +11,8 @@ Outlet::Outlet(const Context& context, edds::Topic& topic, const std::string& pa
   if (!partition.empty()) qos.partition().push_back(partition.c_str());
   publisher_ = context.participant.create_publisher(qos);
   if (publisher_ == nullptr) return;
-  writer_ = publisher_->create_datawriter(&topic, context.profiles.writer(*publisher_, profile), this);
+  writer_ =
+      publisher_->create_datawriter(&topic, context.profiles.writer(*publisher_, profile), this);
   if (writer_ != nullptr) ++context_.counters.writers;
 }
 
@@ -31,7 +32,8 @@ bool Outlet::flush(Deadline deadline) {
   const bool anybody = wait_until_matched(Deadline());
   // No longer than what DDS can count.
   const Deadline now = Deadline::clock::now();
-  const auto left = std::min(deadline, now + std::chrono::hours(24 * 365)) - std::min(now, deadline);
+  const auto left =
+      std::min(deadline, now + std::chrono::hours(24 * 365)) - std::min(now, deadline);
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(left);
   const auto rest = std::chrono::nanoseconds(left - seconds).count();
   const bool acknowledged =

@@ -98,8 +98,9 @@ TEST_CASE("urdf: what joints of other parts mimic may be broken") {
   for (const char* part : {"b", "d"}) {
     const auto refused_part = tfdude::parse_urdf(text, with_links({part}));
     REQUIRE_FALSE(refused_part);
-    CHECK_THAT(refused_part.error().message,
-               tfdude::testing::ContainsSubstring("joint 'k': mimics 'nothing', which is not there"));
+    CHECK_THAT(
+        refused_part.error().message,
+        tfdude::testing::ContainsSubstring("joint 'k': mimics 'nothing', which is not there"));
   }
 }
 

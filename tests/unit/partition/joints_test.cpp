@@ -114,7 +114,8 @@ TEST_CASE("what follows a joint moves with it, and shares its error") {
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0}}, {}}));
   CHECK(arm.forest.lookup("upper", "hand", Query{})->basis.sources.empty());
   const auto correlate = [&](const std::string& id) {
-    const Reply reply = arm.partition.answer(Request{0, id, CorrelateRequest{{true, {}, {}}}}, Time{});
+    const Reply reply =
+        arm.partition.answer(Request{0, id, CorrelateRequest{{true, {}, {}}}}, Time{});
     return std::holds_alternative<Done>(reply.body);
   };
   CHECK_FALSE(correlate("hand"));

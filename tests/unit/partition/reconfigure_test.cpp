@@ -105,8 +105,9 @@ TEST_CASE("an entry that is gone takes its frame and nothing below it") {
     CHECK(second.described() ==
           Lines{"frame 'hand': removed, as its entry is gone",
                 "frame 'tool': waits for its parent 'hand', which is removed"});
-    CHECK(second.orphans() == Lines{"frame 'tool' of partition 'arms' waits for its parent 'hand', which the "
-                                    "configuration of partition 'arms' names no more"});
+    CHECK(second.orphans() ==
+          Lines{"frame 'tool' of partition 'arms' waits for its parent 'hand', which the "
+                "configuration of partition 'arms' names no more"});
   }
   SECTION("which stays so") {
     Life third(store, {kArm}, 3);
@@ -146,8 +147,8 @@ TEST_CASE("an entry of a frame that was removed, or moved, at run time") {
   SECTION("counts where it is edited") {
     Life third(store, {{"arm", "", along_x(2)}, {"hand", "arm", along_x(11)}}, 3);
     CHECK(third.structure() == Lines{"arm <  @ arms", "hand < arm @ arms, attached"});
-    CHECK(third.described() ==
-          Lines{"frame 'arm': added as a root", "frame 'hand': as its entry says now, under 'arm'"});
+    CHECK(third.described() == Lines{"frame 'arm': added as a root",
+                                     "frame 'hand': as its entry says now, under 'arm'"});
   }
   SECTION("takes what is left where it is gone") {
     Life third(store, {kArm}, 3);

@@ -50,9 +50,7 @@ TEST_CASE("a stored correlation that nobody can have said is refused") {
   SECTION("a factor that is not a number") {
     bad.shares.push_back({"supply", false, Factor::Constant(6, 1, std::nan(""))});
   }
-  SECTION("a source named twice") {
-    bad.shares.assign(2, {"supply", false, Factor::Ones(6, 1)});
-  }
+  SECTION("a source named twice") { bad.shares.assign(2, {"supply", false, Factor::Ones(6, 1)}); }
   SECTION("an edge without a name") { bad.observed_with.emplace_back(); }
   CHECK_FALSE(correlation_from(to_blob(bad)));
 }

@@ -239,13 +239,13 @@ TEST_CASE("a batch by handles is applied as a whole or not at all") {
   plant(forest);
   REQUIRE(forest.put_remote("far", "world", 1));
   const auto handle = [&](const char* id) { return forest.find(id).value(); };
-  CHECK(outcome(forest.update(ByHandle{{handle("arm"), along_x(20)}, {handle("hand"), along_x(200)}})) ==
-        "ok");
+  CHECK(outcome(forest.update(
+            ByHandle{{handle("arm"), along_x(20)}, {handle("hand"), along_x(200)}})) == "ok");
   CHECK(x_of(forest.lookup("base", "hand")) == 220);
   CHECK(outcome(forest.update(ByHandle{{handle("arm"), along_x(30)}, {Handle{}, along_x(1)}})) ==
         "unknown_frame");
-  CHECK(outcome(forest.update(ByHandle{{handle("arm"), along_x(30)}, {handle("far"), along_x(1)}})) ==
-        "not_owner");
+  CHECK(outcome(forest.update(
+            ByHandle{{handle("arm"), along_x(30)}, {handle("far"), along_x(1)}})) == "not_owner");
   CHECK(x_of(forest.lookup("base", "hand")) == 220);
 }
 
