@@ -81,7 +81,9 @@ inline bool ok(const ReturnCode& code) { return code == ReturnCode::RETCODE_OK; 
 inline ReturnCode bad_parameter() { return ReturnCode::RETCODE_BAD_PARAMETER; }
 inline ReturnCode done() { return ReturnCode::RETCODE_OK; }
 
-inline bool write(edds::DataWriter& writer, void* data) { return writer.write(data); }
+inline bool write(edds::DataWriter& writer, void* data, ertps::WriteParams& params) {
+  return writer.write(data, params);
+}
 
 inline std::string name_of(const edds::TopicDataType& type) { return type.getName(); }
 
@@ -148,7 +150,9 @@ inline bool ok(ReturnCode code) { return code == edds::RETCODE_OK; }
 inline ReturnCode bad_parameter() { return edds::RETCODE_BAD_PARAMETER; }
 inline ReturnCode done() { return edds::RETCODE_OK; }
 
-inline bool write(edds::DataWriter& writer, void* data) { return ok(writer.write(data)); }
+inline bool write(edds::DataWriter& writer, void* data, ertps::WriteParams& params) {
+  return ok(writer.write(data, params));
+}
 
 inline std::string name_of(const edds::TopicDataType& type) { return type.get_name(); }
 

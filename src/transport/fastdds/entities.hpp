@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -58,10 +59,7 @@ class Outlet final : public edds::DataWriterListener {
   }
 
   /// A sample of the topic's type. Thread-safe.
-  bool write(void* sample) {
-    unacknowledged_ = true;
-    return fastdds::write(*writer_, sample);
-  }
+  bool write(void* sample);
 
   /// Of a reliable writer: waits until all that was written is acknowledged. False at the deadline, and where nobody is left
   /// who could do that.
@@ -79,6 +77,8 @@ class Outlet final : public edds::DataWriterListener {
   std::condition_variable matched_;
   std::atomic<int> readers_{0};              // changed under mutex_
   std::atomic<bool> unacknowledged_{false};  // something may be
+  std::recursive_mutex writing_;             // as Fast DDS's own
+  std::int64_t written_ = 0;                 // source timestamp of the last sample [ns]
 };
 
 /// A reader with a subscriber of its own, hence in a DDS partition of its own. Samples are handed on one at a
