@@ -27,17 +27,13 @@ bool Outlet::wait_until_matched(Deadline deadline) {
   return matched_.wait_until(lock, deadline, [this] { return readers_ > 0; });
 }
 
-// Fast DDS 2.9 keeps the samples of a reader in the order of their source timestamps and looks for those of one writer in
-// the order in which they were written. Where these differ, as after a step of the clock, it passes samples over, and then
-// ends the process by an assertion. So a writer's timestamps grow, whatever the clock does.
 bool Outlet::write(void* sample) {
-  constexpr std::int64_t kStep = 1000;  // [ns]; the format has fractions of its own
   unacknowledged_ = true;
+  // Numbers and timestamps are given in one order.
   const std::lock_guard lock(writing_);
   const auto now = std::chrono::system_clock::now().time_since_epoch();
-  written_ = std::max<std::int64_t>(written_ + kStep, std::chrono::nanoseconds(now).count());
   ertps::Time_t stamp;
-  stamp.from_ns(written_);
+  stamp.from_ns(source_stamp_.next(std::chrono::nanoseconds(now).count()));
   ertps::WriteParams params;
   params.source_timestamp(stamp);
   return fastdds::write(*writer_, sample, params);

@@ -15,6 +15,7 @@
 
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/gate.hpp"
+#include "transport/fastdds/growing_stamp.hpp"
 #include "transport/fastdds/profiles.hpp"
 
 // DDS entities with a lifetime. Each may be null inside where the library could not make it: good() tells.
@@ -78,7 +79,7 @@ class Outlet final : public edds::DataWriterListener {
   std::atomic<int> readers_{0};              // changed under mutex_
   std::atomic<bool> unacknowledged_{false};  // something may be
   std::recursive_mutex writing_;             // as Fast DDS's own
-  std::int64_t written_ = 0;                 // source timestamp of the last sample [ns]
+  GrowingStamp source_stamp_;                // under writing_
 };
 
 /// A reader with a subscriber of its own, hence in a DDS partition of its own. Samples are handed on one at a
