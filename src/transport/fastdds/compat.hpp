@@ -220,6 +220,12 @@ class CheckedType final : public Generated {
 
 #endif
 
+/// With the clock's time as its source timestamp.
+inline bool write(edds::DataWriter& writer, void* data) {
+  ertps::WriteParams params;
+  return write(writer, data, params);
+}
+
 /// A transport that sends through another, to whom it may, and sees from whom something comes.
 class SendFilter : public etransport::ChainingTransport {
  public:
