@@ -254,8 +254,10 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Result<WatchRoute> plan_watch(const WatchedPath& path);
   [[nodiscard]] Reply answer_watch(const Request& request);
   /// The structure has changed, or who is there: watched paths and streams may go another way.
-  void look_at_watches();
-  [[nodiscard]] Destination destination(Owner owner) const;
+  void look_at_routes();
+  template <class OwnersOf>
+  [[nodiscard]] std::vector<std::vector<Destination>> destinations(
+      const std::vector<std::string>& names, OwnersOf owners_of);
   [[nodiscard]] SenderLinks<Update> links_of_edge_streams();
   [[nodiscard]] SenderLinks<JointUpdate> links_of_joint_streams();
 
@@ -285,6 +287,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Result<void> claim_name();
   [[nodiscard]] Result<StoredState> open_store(std::unique_ptr<StateStore>& store);
   [[nodiscard]] Result<void> take_frames(const std::vector<FrameSpec>& frames);
+  [[nodiscard]] std::uint64_t next_incarnation() const;
   void say_goodbye();
   void announce_own();
   void overtake();

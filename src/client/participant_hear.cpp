@@ -51,7 +51,7 @@ void Participant::on_page(const Page& page) {
     tell_changes();
   }
   structure_changed_.notify_all();
-  look_at_watches();
+  look_at_routes();
   if (contested) conceder_->ask();
 }
 
@@ -85,7 +85,7 @@ void Participant::on_presence(const Presence& presence) {
   }
   structure_changed_.notify_all();
   if (appeared || ended) {
-    look_at_watches();
+    look_at_routes();
     lookups_.look_again();
   }
   const std::string who = quote(presence.partition) + " (host " + quote(presence.host) + ", pid " +
@@ -108,7 +108,7 @@ void Participant::on_lost(const std::string& partition, std::uint64_t incarnatio
   }
   structure_changed_.notify_all();
   if (!news) return;
-  look_at_watches();
+  look_at_routes();
   lookups_.look_again();
   log().info("partition {} is lost: it is not heard any more", quote(partition));
   calls_.on_lost(partition);
@@ -135,7 +135,7 @@ void Participant::look_for_gone() {
   if (more) gone_look_->ask();
   if (!gone) return;
   structure_changed_.notify_all();
-  look_at_watches();
+  look_at_routes();
   lookups_.look_again();
 }
 
@@ -144,11 +144,11 @@ Result<void> Participant::forget(const std::string& partition) {
   // All who are there are to be told.
   if (auto all = settle(deadline); !all) return all;
   auto parts = routed(deadline, [&]() -> Result<std::vector<Part>> {
-    const auto owner = directory_.owner(partition);
-    if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
-    if (*owner == kHeldHere || directory_.reachable(*owner)) {
-      return fail(Errc::kPartitionTaken,
-                  "partition " + quote(partition) + " is there: stop it before it is forgotten");
+    if (!directory_.owner(partition)) {
+      return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+    }
+    if (auto ok = directory_.check_not_there(partition); !ok) {
+      return tl::unexpected(std::move(ok.error()));
     }
     const ForgetRequest body{partition, directory_.latest_incarnation(partition)};
     std::vector<Part> all;
@@ -169,7 +169,7 @@ Result<void> Participant::forget(const std::string& partition) {
     tell_changes();
   }
   structure_changed_.notify_all();
-  look_at_watches();
+  look_at_routes();
   return forgotten;
 }
 

@@ -25,11 +25,6 @@ constexpr Milliseconds kDecision{3000};
 // How often at most the others are asked whether what seems to be a conflict is one.
 constexpr Milliseconds kConcedeEvery{100};
 
-std::uint64_t random_number() {
-  std::random_device device;
-  return (std::uint64_t{device()} << 32U) | device();
-}
-
 std::string host_name() {
   std::array<char, 256> name{};
   if (gethostname(name.data(), name.size() - 1) != 0) return "unknown";
@@ -86,7 +81,7 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   {
     const std::lock_guard lock(structure_mutex_);
     presence_ = {partition_name_, 0, host_name(), static_cast<std::uint32_t>(getpid()), 0, false};
-    presence_.incarnation = incarnations_.next(wall_clock(), random_number());
+    presence_.incarnation = next_incarnation();
     presence_.ticket = presence_.incarnation;
     claim_.claim(presence_);
   }
@@ -97,6 +92,12 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   if (auto stored = commits_->start(frames); !stored) return stored;
   announce_own();
   return {};
+}
+
+// Under structure_mutex_.
+std::uint64_t Participant::next_incarnation() const {
+  std::random_device device;
+  return incarnations_.next(wall_clock(), device());
 }
 
 void Participant::announce_own() {
@@ -159,7 +160,7 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
   const std::lock_guard joints(joints_mutex_);
   incarnations_.saw(state.epoch);
   if (const auto latest = directory_.hidden_by(0)) incarnations_.saw(*latest);
-  presence_.incarnation = incarnations_.next(wall_clock(), random_number());
+  presence_.incarnation = next_incarnation();
   auto partition =
       std::make_unique<Partition>(partition_name_, presence_.incarnation, forest_, directory_);
   auto taken = kept ? partition->restore(state, frames, wall_clock())
@@ -251,7 +252,7 @@ void Participant::concede() {
   if (more) conceder_->ask();
   if (!changed) return;
   commits_->ask();
-  look_at_watches();
+  look_at_routes();
 }
 
 // Whether all that those who are reachable had changed when this was called is known here now.
@@ -301,7 +302,7 @@ void Participant::overtake() {
   const auto latest = directory_.hidden_by(presence_.incarnation);
   if (partition_ == nullptr || out_ || !latest || claim_.served()) return;
   incarnations_.saw(*latest);
-  presence_.incarnation = incarnations_.next(wall_clock(), random_number());
+  presence_.incarnation = next_incarnation();
   partition_->overtake(presence_.incarnation);
   log().warn(
       "others have known a later process of partition {}, whose clock was ahead: this one "
@@ -328,7 +329,7 @@ Reply Participant::answer_here(const Request& request) {
   }
   // This process sees the change already; the others are told without making it wait.
   if (!is_of_values(request) && !is_question(request)) commits_->ask();
-  look_at_watches();
+  look_at_routes();
   return reply;
 }
 

@@ -5,19 +5,28 @@
 // What is streamed without waiting.
 namespace tfdude {
 
-Destination Participant::destination(Owner owner) const {
-  return {owner, directory_.name(owner), owner == kHeldHere || directory_.reachable(owner)};
+// @param owners_of  of the name of an edge or joint
+template <class OwnersOf>
+std::vector<std::vector<Destination>> Participant::destinations(
+    const std::vector<std::string>& names, OwnersOf owners_of) {
+  std::vector<std::vector<Destination>> found(names.size());
+  const std::lock_guard lock(structure_mutex_);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    for (const Owner owner : owners_of(names[i])) {
+      const bool there = owner == kHeldHere || directory_.reachable(owner);
+      found[i].push_back({owner, directory_.name(owner), there});
+    }
+  }
+  return found;
 }
 
 SenderLinks<Update> Participant::links_of_edge_streams() {
   SenderLinks<Update> links;
   links.find = [this](const std::vector<std::string>& ids) {
-    std::vector<std::vector<Destination>> found(ids.size());
-    const std::lock_guard lock(structure_mutex_);
-    for (std::size_t i = 0; i < ids.size(); ++i) {
-      if (const auto frame = forest_.info(ids[i])) found[i].push_back(destination(frame->owner));
-    }
-    return found;
+    return destinations(ids, [this](const std::string& id) {
+      const auto frame = forest_.info(id);
+      return frame ? std::vector<Owner>{frame->owner} : std::vector<Owner>{};
+    });
   };
   links.connect = [this](const std::string& to) { return transport_->update_channel(to); };
   links.apply_here = [this](const Update& update) {
@@ -31,14 +40,8 @@ SenderLinks<Update> Participant::links_of_edge_streams() {
 SenderLinks<JointUpdate> Participant::links_of_joint_streams() {
   SenderLinks<JointUpdate> links;
   links.find = [this](const std::vector<std::string>& names) {
-    std::vector<std::vector<Destination>> found(names.size());
-    const std::lock_guard lock(structure_mutex_);
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      for (const Owner owner : directory_.joint_owners(names[i])) {
-        found[i].push_back(destination(owner));
-      }
-    }
-    return found;
+    return destinations(names,
+                        [this](const std::string& name) { return directory_.joint_owners(name); });
   };
   links.connect = [this](const std::string& to) { return transport_->joint_channel(to); };
   links.apply_here = [this](const JointUpdate& update) -> Result<void> {

@@ -111,7 +111,7 @@ void Participant::on_watcher(std::uint64_t group) {
   if (pusher_ != nullptr) pusher_->tell_all(group);
 }
 
-void Participant::look_at_watches() {
+void Participant::look_at_routes() {
   if (Watches* watches = watching_.load()) watches->look_again();
   streams_.look_again();
 }

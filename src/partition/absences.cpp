@@ -17,20 +17,13 @@ void Absences::limit() {
   }));
 }
 
-void Absences::put_for_now(const std::string& partition, std::uint64_t incarnation, Time now,
-                           Absent::Kind then) {
+void Absences::went(const std::string& partition, std::uint64_t incarnation, bool stopped,
+                    Time now) {
+  const Absent::Kind then = stopped ? Absent::Kind::kStopped : Absent::Kind::kLost;
   // What is not settled yet of an absence before this one still is not.
   const auto before = missed_.find(partition);
   const bool again = before != missed_.end() && before->second.absent.kind == Absent::Kind::kBack;
   put(partition, incarnation, now, again ? then : Absent::Kind::kSilent, then);
-}
-
-void Absences::lost(const std::string& partition, std::uint64_t incarnation, Time now) {
-  put_for_now(partition, incarnation, now, Absent::Kind::kLost);
-}
-
-void Absences::stopped(const std::string& partition, std::uint64_t incarnation, Time now) {
-  put_for_now(partition, incarnation, now, Absent::Kind::kStopped);
 }
 
 void Absences::told(const Absent& absent) {

@@ -33,11 +33,7 @@ void Directory::went(Known& partition, Owner owner, bool stopped, Time now) {
   partition.info.reachable = false;
   partition.info.stopped = stopped;
   partition.info.since = now;
-  if (stopped) {
-    absences_.stopped(partition.info.name, partition.live, now);
-  } else {
-    absences_.lost(partition.info.name, partition.live, now);
-  }
+  absences_.went(partition.info.name, partition.live, stopped, now);
   changes_.partition_down(partition.info.name, stopped);
   const auto missed = absences_.find(partition.info.name);
   const bool silent = !stopped && missed && missed->kind == Absent::Kind::kSilent;
@@ -144,13 +140,18 @@ bool Directory::awaits_silent() const {
   });
 }
 
+Result<void> Directory::check_not_there(const std::string& partition) const {
+  const auto number = number_of(partition);
+  // The own one counts as reachable.
+  if (!number || !partitions_[*number].info.reachable) return {};
+  return fail(Errc::kPartitionTaken,
+              "partition " + quote(partition) + " is there: stop it before it is forgotten");
+}
+
 Result<void> Directory::forget(const std::string& partition, std::uint64_t incarnation, Time now) {
+  if (auto ok = check_not_there(partition); !ok) return ok;
   Owner number = kHeldHere;
   Known& gone = known(partition, number);
-  if (number == kHeldHere || gone.info.reachable) {
-    return fail(Errc::kPartitionTaken,
-                "partition " + quote(partition) + " is there: stop it before it is forgotten");
-  }
   const std::uint64_t sound = incarnation < IncarnationSource::kEnd ? incarnation : 0;
   gone.heard_of = std::max({gone.heard_of, gone.live, sound});
   gone.forgotten = true;

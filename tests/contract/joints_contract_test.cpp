@@ -25,6 +25,7 @@ using testing::Join;
 using testing::joined_by;
 using testing::moved_by;
 using testing::outcome;
+using testing::yaw;
 using Names = std::vector<std::string>;
 using Numbers = std::vector<double>;
 
@@ -43,11 +44,6 @@ bool comes_true(Condition condition) {
     std::this_thread::sleep_for(Milliseconds(1));
   }
   return true;
-}
-
-double yaw(const Result<Transform>& X) {
-  if (!X) return std::nan("");
-  return 2 * std::atan2(X->pose.rotation().z(), X->pose.rotation().w());
 }
 
 // world - turret (base) - upper - fore (arm) - hand (tool), which follows the elbow. All about z.

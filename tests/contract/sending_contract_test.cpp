@@ -11,6 +11,7 @@
 #include "support/forest_support.hpp"
 #include "support/networks.hpp"
 #include "support/process.hpp"
+#include "support/tip_nodes.hpp"
 
 namespace tfdude {
 namespace {
@@ -18,27 +19,19 @@ namespace {
 using testing::along_x;
 using testing::ContainsSubstring;
 using testing::eventually;
+using testing::is_at;
 using testing::Join;
 using testing::joined_by;
+using testing::open_with_tip;
 using testing::outcome;
-
-bool is_at(Node& owner, const std::string& parent, const std::string& frame, double x) {
-  const auto X = owner.lookup(parent, frame);
-  return X && X->pose.translation().x() == x;
-}
-
-Node open(const Join& join, const std::string& partition) {
-  const std::string base = partition + "_base";
-  return *Node::open(join(partition), partition, {{base, "", {}}, {partition + "_tip", base, {}}});
-}
 
 }  // namespace
 
 TEST_CASE("publish: of three owners the two that live get theirs, the error names the third") {
   const Join join = joined_by(GENERATE(0, 1));
-  Node a = open(join, "a");
-  Node b = open(join, "b");
-  std::optional<Node> gone = open(join, "gone");
+  Node a = open_with_tip(join, "a");
+  Node b = open_with_tip(join, "b");
+  std::optional<Node> gone = open_with_tip(join, "gone");
   auto client = *Client::open(join(""));
   const auto edges = [](double x) {
     return std::vector<EdgeUpdate>{
@@ -61,7 +54,7 @@ TEST_CASE("publish: of three owners the two that live get theirs, the error name
 
 TEST_CASE("publish: what was sent arrives though the client ends at once") {
   const Join join = joined_by(GENERATE(0, 1));
-  Node a = open(join, "a");
+  Node a = open_with_tip(join, "a");
   for (int run = 1; run <= 10; ++run) {
     INFO("run " << run);
     {
@@ -75,7 +68,7 @@ TEST_CASE("publish: what was sent arrives though the client ends at once") {
 
 TEST_CASE("flush: says whether all was acknowledged") {
   const Join join = joined_by(GENERATE(0, 1));
-  Node a = open(join, "a");
+  Node a = open_with_tip(join, "a");
   auto client = *Client::open(join(""));
   CHECK(outcome(client.flush(Milliseconds(0))) == "ok");
   REQUIRE(outcome(client.publish({{"a_tip", along_x(1)}})) == "ok");

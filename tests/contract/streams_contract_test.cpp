@@ -15,6 +15,7 @@
 #include "support/joint_frames.hpp"
 #include "support/networks.hpp"
 #include "support/process.hpp"
+#include "support/tip_nodes.hpp"
 
 namespace tfdude {
 namespace {
@@ -23,10 +24,13 @@ using testing::along_x;
 using testing::eventually;
 using testing::following;
 using testing::hinge_named;
+using testing::is_at;
 using testing::Join;
 using testing::joined_by;
 using testing::moved_by;
+using testing::open_with_tip;
 using testing::outcome;
+using testing::yaw;
 using Clock = std::chrono::steady_clock;
 
 // "1 unreachable gone", one after the other.
@@ -60,21 +64,6 @@ struct Loop {
   }
 };
 
-bool is_at(Client& owner, const std::string& parent, const std::string& frame, double x) {
-  const auto X = owner.lookup(parent, frame);
-  return X && X->pose.translation().x() == x;
-}
-
-Node open(const Join& join, const std::string& partition) {
-  const std::string base = partition + "_base";
-  return *Node::open(join(partition), partition, {{base, "", {}}, {partition + "_tip", base, {}}});
-}
-
-double yaw(const Result<Transform>& X) {
-  if (!X) return std::nan("");
-  return 2 * std::atan2(X->pose.rotation().z(), X->pose.rotation().w());
-}
-
 }  // namespace
 
 TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waited for") {
@@ -82,11 +71,11 @@ TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waite
   auto client = *Client::open(join(""));
   Loop loop{*client.stream({"gone_tip", "a_tip"}), {}};
   CHECK(loop.send({1, 1}) == "0 unknown_frame, 1 unknown_frame");
-  Node a = open(join, "a");
+  Node a = open_with_tip(join, "a");
   CHECK(eventually([&] { return loop.send({2, 2}) == "0 unknown_frame"; }));
   CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", 2); }));
 
-  std::optional<Node> gone = open(join, "gone");
+  std::optional<Node> gone = open_with_tip(join, "gone");
   CHECK(eventually([&] { return loop.send({3, 3}) == "all sent"; }));
   CHECK(eventually([&] { return is_at(*gone, "gone_base", "gone_tip", 3); }));
 
@@ -94,7 +83,7 @@ TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waite
   CHECK(eventually([&] { return loop.send({4, 4}) == "0 unreachable gone"; }));
   CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", 4); }));
 
-  gone = open(join, "gone");
+  gone = open_with_tip(join, "gone");
   // Also where DDS has met its predecessor only, for whom it waits longer than we do.
   CHECK(eventually([&] {
     return loop.send({5, 5}) == "all sent" && is_at(*gone, "gone_base", "gone_tip", 5);
@@ -110,8 +99,8 @@ TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waite
 
 TEST_CASE("streams: stamps are those of the source, of all edges the same") {
   const Join join = joined_by(GENERATE(0, 1));
-  Node a = open(join, "a");
-  Node b = open(join, "b");
+  Node a = open_with_tip(join, "a");
+  Node b = open_with_tip(join, "b");
   REQUIRE(eventually([&] { return b.exists("a_tip"); }));
   // One of another, one of its own.
   auto stream = *b.stream({"a_tip", "b_tip"});
@@ -132,7 +121,7 @@ TEST_CASE("streams: stamps are those of the source, of all edges the same") {
 
 TEST_CASE("streams: of what is invalid nothing is sent") {
   const Join join = joined_by(GENERATE(0, 1));
-  Node a = open(join, "a");
+  Node a = open_with_tip(join, "a");
   auto client = *Client::open(join(""));
   auto stream = *client.stream({"a_tip", "a_base"});
   REQUIRE(eventually([&] { return stream.try_publish({along_x(1), along_x(1)}).empty(); }));
@@ -185,7 +174,7 @@ TEST_CASE("streams: positions of joints reach all who have them, and who is miss
 
 TEST_CASE("streams: one that outlives its client sends nothing any more") {
   const Join join = joined_by(GENERATE(0, 1));
-  Node a = open(join, "a");
+  Node a = open_with_tip(join, "a");
   std::optional<Client> client = *Client::open(join(""));
   auto stream = *client->stream({"a_tip"});
   REQUIRE(eventually([&] { return stream.try_publish({along_x(1)}).empty(); }));

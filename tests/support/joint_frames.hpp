@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -35,6 +36,12 @@ namespace tfdude::testing {
   spec.mimic = Mimic{leader, multiplier, offset};
   spec.coupled = true;
   return spec;
+}
+
+/// The turn about z [rad]; not a number where there is none.
+[[nodiscard]] inline double yaw(const Result<Transform>& X) {
+  if (!X) return std::nan("");
+  return 2 * std::atan2(X->pose.rotation().z(), X->pose.rotation().w());
 }
 
 }  // namespace tfdude::testing

@@ -27,8 +27,7 @@ class Absences {
   static constexpr std::size_t kMost = 256;
 
   /// A partition that was there is not heard any more, or has said that it ends.
-  void lost(const std::string& partition, std::uint64_t incarnation, Time now);
-  void stopped(const std::string& partition, std::uint64_t incarnation, Time now);
+  void went(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now);
 
   /// Another one misses a partition that was not met here. What is only told counts once it has stood for kGrace: else
   /// who has hung itself, and hears late what others said meanwhile, would take it for its own experience.
@@ -69,8 +68,6 @@ class Absences {
     std::optional<Steady> noticed;  // of a silence
     bool hearsay = false;           // is not told on
   };
-  void put_for_now(const std::string& partition, std::uint64_t incarnation, Time now,
-                   Absent::Kind then);
   void put(const std::string& partition, std::uint64_t incarnation, Time now, Absent::Kind kind,
            Absent::Kind then);
   void limit();

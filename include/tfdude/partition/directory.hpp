@@ -66,9 +66,11 @@ class Directory {
   /// Whether somebody whom this process has not met is said to be silent: it may be there again in a moment.
   [[nodiscard]] bool awaits_silent() const;
 
+  /// Whether a partition may be forgotten. @return kPartitionTaken where it is there
+  [[nodiscard]] Result<void> check_not_there(const std::string& partition) const;
   /// Nothing is kept of a partition that is not there.
   /// @param incarnation  the latest that whoever says so has heard of
-  /// @return kPartitionTaken where it is there.
+  /// @return as check_not_there().
   [[nodiscard]] Result<void> forget(const std::string& partition, std::uint64_t incarnation,
                                     Time now);
   /// The latest incarnation that was heard of; 0: of none.

@@ -51,14 +51,6 @@ class Outlet final : public edds::DataWriterListener {
   /// Waits until a reader has been met; false at the deadline.
   [[nodiscard]] bool wait_until_matched(Deadline deadline);
 
-  /// Waits, for so long at most, until all readers have what was written reliably.
-  void flush(std::chrono::milliseconds wait) {
-    if (writer_ == nullptr) return;
-    const auto nanoseconds = static_cast<std::uint32_t>((wait.count() % 1000) * 1'000'000);
-    (void)writer_->wait_for_acknowledgments(
-        {static_cast<std::int32_t>(wait.count() / 1000), nanoseconds});
-  }
-
   /// A sample of the topic's type. Thread-safe.
   bool write(void* sample);
 

@@ -192,7 +192,9 @@ Milliseconds FastDdsTransport::settle_time() const {
 
 void FastDdsTransport::stop() {
   if (participant_ == nullptr) return;
-  if (presence_outlet_ != nullptr) presence_outlet_->flush(kLastWord);
+  if (presence_outlet_ != nullptr) {
+    (void)presence_outlet_->flush(std::chrono::steady_clock::now() + kLastWord);
+  }
   // From here on nothing is matched while endpoints go (see Gate); then whoever makes and deletes them, too.
   gate_->close();
   worker_->stop();

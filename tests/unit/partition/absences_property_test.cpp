@@ -17,6 +17,7 @@
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/memory_store.hpp"
+#include "support/owning.hpp"
 #include "support/random.hpp"
 #include "support/replica.hpp"
 
@@ -24,6 +25,8 @@ namespace tfdude {
 namespace {
 
 using testing::along_x;
+using testing::any_change;
+using testing::fought_frame;
 using testing::lines_diff;
 using testing::MemoryStore;
 using testing::presence_of;
@@ -106,19 +109,13 @@ class World {
   }
 
  private:
-  struct Owning {
-    Owning(const std::string& name, std::uint64_t incarnation)
-        : replica(name), partition(name, incarnation, replica.forest, replica.directory) {}
-    Replica replica;
-    Partition partition;
-    std::map<std::uint32_t, Page> published;
-    Presence presence;
+  struct Owning : testing::Owning {
+    using testing::Owning::Owning;
     bool hangs = false;
     bool announced = false;
   };
 
   static std::string name(std::size_t who) { return "p" + std::to_string(who); }
-  static std::string frame(std::size_t number) { return "f" + std::to_string(number); }
   Time now() { return Time(std::chrono::milliseconds(++clock_)); }
 
   bool there(std::size_t who) const { return owners_[who] != nullptr; }
@@ -143,7 +140,7 @@ class World {
   std::vector<FrameSpec> some_free_frames() {
     std::vector<FrameSpec> frames;
     for (std::size_t i = 0; i < 2; ++i) {
-      const std::string id = frame(random_.index(kFrames));
+      const std::string id = fought_frame(random_.index(kFrames));
       bool free = frames.empty() || frames.back().id != id;
       for (std::size_t who = 0; who < kOwners; ++who) {
         free = free && !(there(who) && owners_[who]->replica.forest.holds(id));
@@ -341,14 +338,7 @@ class World {
 
   void change(std::size_t who) {
     Owning& owner = *owners_[who];
-    const std::string id = frame(random_.index(kFrames));
-    const std::string other = frame(random_.index(kFrames));
-    const std::string parent = owner.replica.forest.exists(other) ? other : "";
-    Request request{0, id, AddRequest{parent, along_x(1)}};
-    if (owner.replica.forest.holds(id)) {
-      request.body = MoveRequest{parent, {}};
-      if (random_.index(3) == 0) request.body = RemoveRequest{{id}};
-    }
+    const Request request = any_change(random_, owner.replica.forest, kFrames);
     (void)owner.partition.answer(request, now());
     publish(who);
   }

@@ -15,15 +15,17 @@
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/memory_store.hpp"
+#include "support/owning.hpp"
 #include "support/random.hpp"
 #include "support/replica.hpp"
 
 namespace tfdude {
 namespace {
 
-using testing::along_x;
+using testing::any_change;
 using testing::lines_diff;
 using testing::MemoryStore;
+using testing::Owning;
 using testing::presence_of;
 using testing::Random;
 using testing::Replica;
@@ -69,18 +71,7 @@ class World {
   [[nodiscard]] std::size_t orphans() const { return orphans_; }
 
  private:
-  struct Owning {
-    Owning(const std::string& name, std::uint64_t incarnation)
-        : replica(name), partition(name, incarnation, replica.forest, replica.directory) {}
-    bool concede(Time now) { return partition.concede(partition.concessions(), now); }
-    Replica replica;
-    Partition partition;
-    std::map<std::uint32_t, Page> published;
-    Presence presence;
-  };
-
   static std::string name(std::size_t who) { return "p" + std::to_string(who); }
-  static std::string frame(std::size_t number) { return "f" + std::to_string(number); }
 
   // Clocks that are up to a second apart, where an hour of events takes some seconds.
   Time now(std::size_t who) { return Time(std::chrono::milliseconds(++clock_ + 300 * who)); }
@@ -135,14 +126,7 @@ class World {
 
   void change(std::size_t who) {
     Owning& owner = *owners_[who];
-    const std::string id = frame(random_.index(kFrames));
-    const std::string other = frame(random_.index(kFrames));
-    const std::string parent = owner.replica.forest.exists(other) ? other : "";
-    Request request{0, id, AddRequest{parent, along_x(1)}};
-    if (owner.replica.forest.holds(id)) {
-      request.body = MoveRequest{parent, {}};
-      if (random_.index(3) == 0) request.body = RemoveRequest{{id}};
-    }
+    const Request request = any_change(random_, owner.replica.forest, kFrames);
     (void)owner.partition.answer(request, now(who));
     publish(who);
   }
@@ -170,7 +154,8 @@ class World {
     if (hearer == kSpectator) return;
     const std::size_t before = owners_[hearer]->partition.frame_count();
     bool conceded = false;
-    while (owners_[hearer]->concede(now(hearer))) conceded = true;
+    Partition& partition = owners_[hearer]->partition;
+    while (partition.concede(partition.concessions(), now(hearer))) conceded = true;
     if (!conceded) return;
     if (owners_[hearer]->partition.frame_count() < before) ++orphans_;
     publish(hearer);
