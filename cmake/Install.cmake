@@ -30,4 +30,5 @@ if(EXISTS ${CMAKE_SOURCE_DIR}/apps/tfdude/completion.bash)
   install(FILES apps/tfdude/completion.bash RENAME tfdude
     DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 endif()
+install(FILES idl/tfdude.idl DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude/idl)  # where examples/other-dds looks for it
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tfdude)

@@ -1,10 +1,19 @@
-# Tests of the project itself rather than of its code: the layers, and that the installed package works.
+# Tests of the project itself rather than of its code: the layers, the IDL, and that the installed package works.
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
 add_test(NAME "layers: sources" COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py)
 add_test(NAME "layers: the check itself"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py --self-test)
 set_tests_properties("layers: sources" "layers: the check itself" PROPERTIES LABELS unit TIMEOUT 60)
+
+# Other vendors' compilers take the IDL, though names that differ by their case alone are one name to them.
+find_program(IDLC idlc REQUIRED)
+file(GLOB idl_files CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/idl/*.idl)
+foreach(idl ${idl_files})
+  get_filename_component(name ${idl} NAME)
+  add_test(NAME "idl: idlc compiles ${name}" COMMAND ${IDLC} -o ${CMAKE_BINARY_DIR}/Testing/idlc ${idl})
+  set_tests_properties("idl: idlc compiles ${name}" PROPERTIES LABELS unit TIMEOUT 60)
+endforeach()
 
 # A test whose name ctest cannot hand on, as one with a semicolon, runs nothing: that must not pass.
 add_test(NAME "suite: a test that runs nothing fails" COMMAND base_test "no test has this name")

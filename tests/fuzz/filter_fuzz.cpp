@@ -86,7 +86,7 @@ class Filters {
     wire::Joints sample;
     if (!testing::deserialized<fastdds::JointsType>(bytes, sample)) return false;
     return std::any_of(
-        sample.joints().begin(), sample.joints().end(),
+        sample.positions().begin(), sample.positions().end(),
         [this](const wire::JointPosition& joint) { return owner_.owns_joint(joint.id().c_str()); });
   }
 

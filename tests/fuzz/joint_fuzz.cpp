@@ -15,11 +15,11 @@ namespace {
 void strip(wire::Joints&, std::vector<wire::Transform>&) {}
 
 void demand_same_names(const Bytes& bytes, const wire::Joints& sample) {
-  auto joint = sample.joints().begin();
+  auto joint = sample.positions().begin();
   const bool differs = fastdds::any_joint(bytes.data(), bytes.size(), [&](std::string_view name) {
-    return joint == sample.joints().end() || name != (joint++)->id().c_str();
+    return joint == sample.positions().end() || name != (joint++)->id().c_str();
   });
-  demand(!differs && joint == sample.joints().end(), "names are read as the whole is");
+  demand(!differs && joint == sample.positions().end(), "names are read as the whole is");
 }
 
 /// An arm whose elbow a hand follows.

@@ -25,3 +25,7 @@ foreach(program tfduded tfdude)
     run(${work}/moved/bin/${program} --help)
   endif()
 endforeach()
+
+# The example of another DDS is a project of its own, and finds the installed IDL.
+run(${CMAKE_COMMAND} -S ${work}/moved/share/tfdude/examples/other-dds -B ${work}/other-dds -G Ninja)
+run(${CMAKE_COMMAND} --build ${work}/other-dds)

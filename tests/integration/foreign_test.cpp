@@ -90,7 +90,7 @@ TEST_CASE("joints of a plain writer move the edges of who has them") {
     joint.position(position);
     joint.variance(1e-4);
     wire::Joints joints;
-    joints.joints({joint});
+    joints.positions({joint});
     joints.stamp(stamp);
     return joints;
   };

@@ -6,7 +6,7 @@
 
 namespace tfdude::fastdds {
 
-EdgeConsistency read_consistency(const wire::Consistency& body) {
+EdgeConsistency read_consistency(const wire::EdgeConsistency& body) {
   return {printable(text(body.id())),
           body.observations(),
           body.refused(),

@@ -8,7 +8,7 @@
 // into them can be shown.
 namespace tfdude::fastdds {
 
-[[nodiscard]] EdgeConsistency read_consistency(const wire::Consistency& body);
+[[nodiscard]] EdgeConsistency read_consistency(const wire::EdgeConsistency& body);
 [[nodiscard]] JointInfo read_joint(const wire::JointState& body);
 [[nodiscard]] PastInfo read_past(const wire::Past& body);
 

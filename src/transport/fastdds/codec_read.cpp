@@ -104,7 +104,7 @@ Result<LookupRequest> read_lookup(const wire::LookupAt& body) {
   return LookupRequest{read_segments(body.segments()), query, *hint, body.edges() != 0};
 }
 
-Result<WatchRequest> read_watch(const wire::Watch& body) {
+Result<WatchRequest> read_watch(const wire::WatchBody& body) {
   const auto period = duration_from_wire(body.period(), "the period of a watch");
   if (!period) return tl::unexpected(period.error());
   WatchRequest watch;
@@ -129,7 +129,7 @@ Result<Covariance> read_process_noise(const std::vector<double>& numbers) {
   return Covariance::from_upper(upper);
 }
 
-Result<ReviseRequest> read_revise(const wire::Revise& body) {
+Result<ReviseRequest> read_revise(const wire::ReviseBody& body) {
   const auto stamp = stamp_from_wire(body.stamp(), "the stamp of an observation");
   if (!stamp) return tl::unexpected(stamp.error());
   ReviseRequest revise{{}, *stamp, body.seen(), body.incarnation()};
@@ -153,13 +153,13 @@ Result<ReviseRequest> read_revise(const wire::Revise& body) {
   return fail(Errc::kInvalidInput, "an observation of no edge");
 }
 
-Result<CorrelateRequest> read_correlate(std::string_view id, const wire::Ties& body) {
+Result<CorrelateRequest> read_correlate(std::string_view id, const wire::Correlation& body) {
   auto correlation = read_correlation(body);
   if (!correlation) return fail_at("frame " + quote(id), correlation.error());
   return CorrelateRequest{*std::move(correlation)};
 }
 
-Result<AddRequest> read_add(std::string_view id, const wire::Add& body) {
+Result<AddRequest> read_add(std::string_view id, const wire::AddBody& body) {
   return from_wire(body.x_pc(), id).map([&](const Transform& X_PC) {
     return AddRequest{string_of(body.parent()), X_PC};
   });
@@ -171,9 +171,9 @@ Result<MoveRequest> read_move(std::string_view id, const wire::MoveAndUpdate& bo
   });
 }
 
-RemoveRequest read_remove(const wire::Remove& body) {
+RemoveRequest read_remove(const wire::RemoveBody& body) {
   RemoveRequest remove;
-  for (const wire::Id& top : body.tops()) remove.tops.push_back(string_of(top));
+  for (const wire::Identifier& top : body.tops()) remove.tops.push_back(string_of(top));
   return remove;
 }
 
@@ -222,7 +222,7 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
     case kConsistency:
       return as(ConsistencyRequest{body.consistency() != 0});
     case kJoints:
-      return take(request, read_joints(body.joints()));
+      return take(request, read_joints(body.joint_update()));
     case kJointStates:
       return as(JointsRequest{string_of(body.joint_states())});
     case kPartialUpdate:
@@ -261,7 +261,7 @@ Result<std::vector<Transform>> read_values(const std::vector<wire::Transform>& b
   return values;
 }
 
-Result<SegmentValues> read_stamped(const wire::Transforms& body) {
+Result<SegmentValues> read_stamped(const wire::StampedTransforms& body) {
   SegmentValues found;
   const auto stamp = stamp_from_wire(body.stamp(), "the stamp of a reply");
   if (!stamp) return tl::unexpected(stamp.error());
@@ -277,7 +277,7 @@ Result<SegmentValues> read_stamped(const wire::Transforms& body) {
 }
 
 Result<SegmentValues> read_tied(const wire::TiedTransforms& body) {
-  wire::Transforms plain;
+  wire::StampedTransforms plain;
   plain.stamp(body.stamp());
   plain.period(body.period());
   plain.values(body.values());
@@ -288,7 +288,7 @@ Result<SegmentValues> read_tied(const wire::TiedTransforms& body) {
   found->incarnation = body.incarnation();
   for (const auto& [in, out] : {std::pair{&body.ties(), &found->ties},
                                 std::pair{&body.ties_at_hint(), &found->ties_at_hint}}) {
-    for (const wire::Ties& one : *in) {
+    for (const wire::Correlation& one : *in) {
       auto ties = read_ties(one);
       if (!ties) return fail_at("a reply", ties.error());
       out->push_back(*std::move(ties));
@@ -319,7 +319,7 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
     case kStamped:
       return put<SegmentValues>(reply, read_stamped(body.stamped()));
     case kState:
-      return put<State>(reply, tfdude::fastdds::from_wire(body.state()));
+      return put<State>(reply, tfdude::fastdds::from_wire(body.watched()));
     case kPasts: {
       std::vector<PastInfo> pasts;
       for (const wire::Past& past : body.pasts()) pasts.push_back(read_past(past));
@@ -330,7 +330,8 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
       return put<SegmentValues>(reply, read_tied(body.tied()));
     case kConsistencies: {
       std::vector<EdgeConsistency> all;
-      for (const wire::Consistency& one : body.consistency()) all.push_back(read_consistency(one));
+      for (const wire::EdgeConsistency& one : body.consistency())
+        all.push_back(read_consistency(one));
       reply.body = std::move(all);
       return {};
     }
@@ -414,7 +415,7 @@ Result<JointUpdate> from_wire(const wire::Joints& sample,
   const auto stamp = stamp_from_wire(sample.stamp(), "the stamp of an update of joints");
   if (!stamp) return tl::unexpected(stamp.error());
   update.stamp = *stamp;
-  for (const wire::JointPosition& joint : sample.joints()) {
+  for (const wire::JointPosition& joint : sample.positions()) {
     if (!accept(text(joint.id()))) continue;
     update.joints.push_back({string_of(joint.id()), joint.position(), joint.variance()});
     if (auto ok = check_id(update.joints.back().name, "joint"); !ok) {

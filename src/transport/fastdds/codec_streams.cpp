@@ -19,11 +19,11 @@ wire::Update to_wire(const Update& update) {
 }
 
 void write_wire(const JointUpdate& update, wire::Joints& sample) {
-  sample.joints().resize(update.joints.size());
+  sample.positions().resize(update.joints.size());
   for (std::size_t i = 0; i < update.joints.size(); ++i) {
-    sample.joints()[i].id(update.joints[i].name);
-    sample.joints()[i].position(update.joints[i].position);
-    sample.joints()[i].variance(update.joints[i].variance);
+    sample.positions()[i].id(update.joints[i].name);
+    sample.positions()[i].position(update.joints[i].position);
+    sample.positions()[i].variance(update.joints[i].variance);
   }
   sample.stamp(wire_stamp(update.stamp));
 }

@@ -5,7 +5,7 @@
 
 namespace tfdude::fastdds {
 
-Result<Ties> read_ties(const wire::Ties& body) {
+Result<Ties> read_ties(const wire::Correlation& body) {
   Ties ties;
   const std::vector<double>& part = body.unknown_part();
   if (!part.empty()) {
@@ -29,11 +29,12 @@ Result<Ties> read_ties(const wire::Ties& body) {
                            Eigen::Map<const Factor>(numbers.data(), 6, columns)});
   }
   if (auto ok = check_shares(ties.shares); !ok) return tl::unexpected(ok.error());
-  for (const wire::Id& id : body.observed_with()) ties.observed_with.push_back(string_of(id));
+  for (const wire::Identifier& id : body.observed_with())
+    ties.observed_with.push_back(string_of(id));
   return ties;
 }
 
-Result<Correlation> read_correlation(const wire::Ties& body) {
+Result<Correlation> read_correlation(const wire::Correlation& body) {
   auto ties = read_ties(body);
   if (!ties) return tl::unexpected(std::move(ties.error()));
   return Correlation{body.unknown() != 0, std::move(ties->shares), std::move(ties->observed_with)};

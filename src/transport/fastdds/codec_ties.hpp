@@ -10,11 +10,15 @@
 // Pieces that several messages have, from what travels.
 namespace tfdude::fastdds {
 
-[[nodiscard]] inline std::string_view text(const wire::Id& id) { return {id.c_str(), id.size()}; }
-[[nodiscard]] inline std::string string_of(const wire::Id& id) { return std::string(text(id)); }
+[[nodiscard]] inline std::string_view text(const wire::Identifier& id) {
+  return {id.c_str(), id.size()};
+}
+[[nodiscard]] inline std::string string_of(const wire::Identifier& id) {
+  return std::string(text(id));
+}
 
 /// @return kInvalidInput naming the source, or the part of unknown correlation.
-[[nodiscard]] Result<Ties> read_ties(const wire::Ties& body);
-[[nodiscard]] Result<Correlation> read_correlation(const wire::Ties& body);
+[[nodiscard]] Result<Ties> read_ties(const wire::Correlation& body);
+[[nodiscard]] Result<Correlation> read_correlation(const wire::Correlation& body);
 
 }  // namespace tfdude::fastdds

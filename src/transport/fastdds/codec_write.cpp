@@ -39,8 +39,8 @@ std::vector<wire::Share> wire_shares(const std::vector<Share>& shares) {
   return body;
 }
 
-wire::Ties wire_ties(const Ties& ties) {
-  wire::Ties body;
+wire::Correlation wire_ties(const Ties& ties) {
+  wire::Correlation body;
   if (ties.unknown) {
     const Covariance::Upper& upper = ties.unknown->upper();
     body.unknown_part().assign(upper.begin(), upper.end());
@@ -50,14 +50,15 @@ wire::Ties wire_ties(const Ties& ties) {
   return body;
 }
 
-wire::Ties wire_ties(const Correlation& correlation) {
-  wire::Ties body = wire_ties(Ties{std::nullopt, correlation.shares, correlation.observed_with});
+wire::Correlation wire_ties(const Correlation& correlation) {
+  wire::Correlation body =
+      wire_ties(Ties{std::nullopt, correlation.shares, correlation.observed_with});
   body.unknown(correlation.unknown ? 1 : 0);
   return body;
 }
 
-std::vector<wire::Ties> wire_ties(const std::vector<Ties>& all) {
-  std::vector<wire::Ties> body;
+std::vector<wire::Correlation> wire_ties(const std::vector<Ties>& all) {
+  std::vector<wire::Correlation> body;
   body.reserve(all.size());
   for (const Ties& ties : all) body.push_back(wire_ties(ties));
   return body;
@@ -80,13 +81,13 @@ struct BodyWriter {
   wire::RequestBody& out;
 
   void operator()(const AddRequest& add) {
-    wire::Add body;
+    wire::AddBody body;
     body.parent(add.parent);
     body.x_pc(to_flat(add.X_PC));
     out.add(std::move(body));
   }
   void operator()(const RemoveRequest& remove) {
-    wire::Remove body;
+    wire::RemoveBody body;
     for (const std::string& top : remove.tops) body.tops().emplace_back(top);
     out.remove(std::move(body));
   }
@@ -112,7 +113,7 @@ struct BodyWriter {
       body.x_pc(to_flat(*move.X_PC));
       out.move_and_update(std::move(body));
     } else {
-      wire::Move body;
+      wire::MoveBody body;
       body.parent(move.parent);
       out.move(std::move(body));
     }
@@ -138,7 +139,7 @@ struct BodyWriter {
     out.lookup_at(std::move(body));
   }
   void operator()(const WatchRequest& watch) {
-    wire::Watch body;
+    wire::WatchBody body;
     body.period(watch.period.count());
     body.from(wire_stamp(watch.from));
     body.segments(wire_segments(watch.segments));
@@ -147,7 +148,7 @@ struct BodyWriter {
   }
   void operator()(const PastRequest& past) { out.past(past.all ? 1 : 0); }
   void operator()(const ReviseRequest& revise) {
-    wire::Revise body;
+    wire::ReviseBody body;
     body.stamp(wire_stamp(revise.stamp));
     body.seen(revise.seen);
     body.incarnation(revise.incarnation);
@@ -155,10 +156,10 @@ struct BodyWriter {
     out.revise(std::move(body));
   }
   void operator()(const CorrelateRequest& said) { out.correlate(wire_ties(said.correlation)); }
-  void operator()(const JointUpdate& update) { out.joints(to_wire(update)); }
+  void operator()(const JointUpdate& update) { out.joint_update(to_wire(update)); }
   void operator()(const JointsRequest& asked) { out.joint_states(asked.after); }
   void operator()(const ForgetRequest& asked) {
-    wire::Forget body;
+    wire::ForgetBody body;
     body.partition(asked.partition);
     body.incarnation(asked.incarnation);
     out.forget(std::move(body));
@@ -258,14 +259,14 @@ struct ReplyWriter {
       out.transforms(wire_values(found.values));
       return;
     }
-    wire::Transforms body;
+    wire::StampedTransforms body;
     body.stamp(wire_stamp(found.stamp));
     body.period(found.period.count());
     body.values(wire_values(found.values));
     body.at_hint(wire_values(found.at_hint));
     out.stamped(std::move(body));
   }
-  void operator()(const State& state) { out.state(to_wire(state)); }
+  void operator()(const State& state) { out.watched(to_wire(state)); }
   void operator()(const std::vector<PastInfo>& pasts) {
     std::vector<wire::Past> body;
     for (std::size_t i = 0; i < pasts.size() && i < kMaxItems; ++i)
@@ -273,7 +274,7 @@ struct ReplyWriter {
     out.pasts(std::move(body));
   }
   void operator()(const std::vector<EdgeConsistency>& all) {
-    std::vector<wire::Consistency> body(all.size());
+    std::vector<wire::EdgeConsistency> body(all.size());
     for (std::size_t i = 0; i < body.size(); ++i) {
       body[i].observations(all[i].observations);
       body[i].refused(all[i].refused);

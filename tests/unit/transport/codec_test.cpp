@@ -1,6 +1,9 @@
 #include "transport/fastdds/codec.hpp"
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
@@ -324,6 +327,32 @@ TEST_CASE("a presence with a bad name is refused") {
   check_refused(from_wire(to_wire(Presence{"robot", 1, "", 1, 1, true})), "host", "empty");
   check_refused(from_wire(to_wire(Presence{"robot", 1, "a\033[2J", 1, 1, true})), "host",
                 "control character");
+}
+
+// ---- what was captured before
+
+template <class Type, class Sample>
+void check_stored(const char* topic) {
+  int count = 0;
+  for (const auto& file : std::filesystem::directory_iterator(std::string(TFDUDE_SEEDS) + topic)) {
+    INFO(file.path());
+    std::ifstream in(file.path(), std::ios::binary);
+    const testing::Bytes stored{std::istreambuf_iterator<char>(in), {}};
+    Sample sample;
+    REQUIRE(testing::deserialized<Type>(stored, sample));
+    CHECK(testing::serialized<Type>(sample) == stored);
+    ++count;
+  }
+  CHECK(count > 0);
+}
+
+TEST_CASE("messages that were captured before are read, and are the same bytes when sent on") {
+  check_stored<RequestType, wire::Request>("request");
+  check_stored<ReplyType, wire::Reply>("reply");
+  check_stored<UpdateType, wire::Update>("update");
+  check_stored<JointsType, wire::Joints>("joint");
+  check_stored<PageType, wire::Page>("page");
+  check_stored<PresenceType, wire::Presence>("presence");
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ bool well_formed(const wire::State& sample) {
   return well_formed_state(bytes.data(), bytes.size());
 }
 
-wire::State state_of(const wire::Ties& ties, std::size_t count = 1) {
+wire::State state_of(const wire::Correlation& ties, std::size_t count = 1) {
   wire::State state;
   state.entries().resize(1);
   state.entries()[0].x()[3] = 1.0;
@@ -34,7 +34,7 @@ wire::Share share(std::size_t numbers, const std::string& source = "s") {
 }
 
 TEST_CASE("ties: what is longer than its bound is not well formed") {
-  wire::Ties ties;
+  wire::Correlation ties;
   CHECK(well_formed(state_of(ties)));
   CHECK(well_formed(state_of(ties, kMaxTies)));
   CHECK_FALSE(well_formed(state_of(ties, kMaxTies + 1)));
@@ -59,13 +59,13 @@ TEST_CASE("ties: what is longer than its bound is not well formed") {
 }
 
 TEST_CASE("ties: what cannot be meant is refused when it is read") {
-  const auto refusal = [](const wire::Ties& ties) {
+  const auto refusal = [](const wire::Correlation& ties) {
     const auto read = from_wire(state_of(ties));
     REQUIRE_FALSE(read);
     CHECK(read.error().code == Errc::kInvalidInput);
     return read.error().message;
   };
-  wire::Ties ties;
+  wire::Correlation ties;
   ties.shares().assign(1, share(7));
   CHECK_THAT(refusal(ties), ContainsSubstring("7 numbers"));
   ties.shares().assign(1, share(0));
