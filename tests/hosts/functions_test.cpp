@@ -66,19 +66,19 @@ TEST_CASE("hosts: a client on a fourth host uses what three others own") {
   }
 }
 
-TEST_CASE("hosts: a discovery server may come late, be killed, and come again") {
+TEST_CASE("hosts: a discovery server may come late, end, and come again") {
   if (testing::skip_without_hosts()) return;
   RobotHosts r(true);
   r.start_daemons();
   auto early = *Client::open(r.options());
-  r.start_server_with_backup();
+  r.start_server_again();
   check_agreement(r, early);
-  r.server->kill();
+  r.end_server();
   // Those who have met go on without it.
   REQUIRE(early.add("marker", "tool", kX));
   r.oracle.add("marker", "tool", kX);
   check_agreement(r, early);
-  r.start_server_with_backup();
+  r.start_server_again();
   auto late = r.open_client(RobotHosts::kArms);
   check_agreement(r, late);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <csignal>
 #include <fstream>
 #include <iterator>
 #include <optional>
@@ -45,9 +46,17 @@ class RobotHosts {
 
   void start_server() { server.emplace(start_discovery_server(hosts, kServer)); }
 
-  /// With what its predecessor knew.
-  void start_server_with_backup() {
-    server.emplace(start_discovery_server(hosts, kServer, directory_.path()));
+  /// So that it may end and be started again: with what its predecessor knew, where it can read that.
+  void start_server_again() {
+    const std::string kept = discovery_server_reads_backup() ? directory_.path() : std::string();
+    server.emplace(start_discovery_server(hosts, kServer, kept));
+  }
+
+  /// As suddenly as those who have met it can bear.
+  void end_server() {
+    if (discovery_server_reads_backup()) return server->kill();
+    server->signal(SIGINT);
+    REQUIRE(server->wait(in_time()));
   }
 
   /// Starts the daemons, and waits until they serve.

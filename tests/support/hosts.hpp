@@ -80,6 +80,8 @@ class Hosts {
 /// @param backup  a directory in which it keeps what it knows for its successor; empty: it does not
 [[nodiscard]] Process start_discovery_server(const Hosts& hosts, std::size_t host,
                                              const std::string& backup = {});
+/// Whether a server can be killed, and its successor read what it has kept: that of Fast DDS 3.1 crashes as it reads.
+[[nodiscard]] constexpr bool discovery_server_reads_backup() { return TFDUDE_FASTDDS_MAJOR == 2; }
 /// Where the others find it, for --discovery-server.
 [[nodiscard]] std::string discovery_address(std::size_t host);
 
