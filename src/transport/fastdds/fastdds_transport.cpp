@@ -56,6 +56,9 @@ Result<void> FastDdsTransport::create_participant() {
   edds::DomainParticipantQos qos = profiles_->participant();
   qos.name(participant_name(options_.partition));
   qos.properties().properties().emplace_back("fastdds.ignore_local_endpoints", "true");
+  // Fast DDS 3 describes types to the others in a way that Cyclone DDS takes for other types than its own; without, it goes
+  // by their names.
+  qos.properties().properties().emplace_back("fastdds.type_propagation", "disabled");
   take_lease(qos);
   if (!options_.discovery_server.empty()) {
     if (auto used = use_discovery_server(qos, options_.discovery_server); !used) return used;
