@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Enforces the layers: check_layers.py [--root DIR], or --self-test to check this check.
+"""Enforces the layers: check_layers.py [--root DIR], --self-test to check this check, or --picture to print who
+includes whom, as docs/architecture.md has it.
 
 A layer may include headers of itself and of the layers before it. What is foreign to a layer (DDS,
 YAML, threads, the clock ...) stays where the tables below put it. Tests and benchmarks are exempt.
@@ -12,7 +13,8 @@ import sys
 import tempfile
 import unittest
 
-LAYERS = ["base", "math", "tree", "partition", "store", "transport", "client", "apps"]
+LAYERS = ["base", "math", "types", "tree", "partition", "description", "store", "transport", "runtime",
+          "client", "apps"]
 SUFFIXES = {".hpp", ".cpp", ".h", ".cc", ".ipp"}
 DDS_FOLDER = "src/transport/fastdds/"
 
@@ -21,21 +23,21 @@ CONFINED = [
     ("Boost", r"boost/(?!math/)", ["src/tree/graph.hpp"]),
     ("Boost.Math", r"boost/math/", ["src/math/fusion.cpp"]),
     ("DDS", r"(fastdds|fastrtps|fastcdr)/", [DDS_FOLDER]),
-    ("yaml-cpp", r"yaml-cpp/", ["src/client/"]),
-    ("urdfdom", r"(urdf_(model|parser|exception)|console_bridge)/", ["src/client/"]),
-    ("tinyxml2", r"tinyxml2\.h$", ["src/client/", "src/transport/fastdds/"]),
+    ("yaml-cpp", r"yaml-cpp/", ["src/description/"]),
+    ("urdfdom", r"(urdf_(model|parser|exception)|console_bridge)/", ["src/description/"]),
+    ("tinyxml2", r"tinyxml2\.h$", ["src/description/", "src/transport/fastdds/"]),
     ("SQLite", r"sqlite3\.h$", ["src/store/"]),
     ("CLI11", r"CLI/", ["apps/"]),
     ("nlohmann", r"nlohmann/", ["apps/"]),
 ]
 # (what, pattern of the include, layers that must do without it)
 BARRED = [
-    ("threads", r"(thread|future|condition_variable)$", ["math", "tree", "partition"]),
-    ("locks and atomics", r"(mutex|shared_mutex|atomic)$", ["math", "partition"]),
-    ("input and output", r"(iostream|fstream|spdlog/.*)$", ["math", "tree", "partition"]),
+    ("threads", r"(thread|future|condition_variable)$", ["math", "types", "tree", "partition"]),
+    ("locks and atomics", r"(mutex|shared_mutex|atomic)$", ["math", "types", "partition"]),
+    ("input and output", r"(iostream|fstream|spdlog/.*)$", ["math", "types", "tree", "partition"]),
 ]
 CLOCK = re.compile(r"::\s*now\s*\(|\b(clock_gettime|gettimeofday)\b|\btime\s*\(\s*(nullptr|NULL|0)\s*\)")
-CLOCKLESS = ["base", "math", "tree", "partition"]
+CLOCKLESS = ["base", "math", "types", "tree", "partition", "description", "store"]
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 COMMENT_OR_LITERAL = re.compile(
@@ -71,6 +73,7 @@ class Checker:
             for part in ("", "PubSubTypes", "CdrAux", "TypeObjectSupport")
             for tail in (part + ".h", part + ".hpp", part + ".ipp")}
         self.findings = []
+        self.arrows = set()  # (layer, layer that it includes)
 
     def report(self, path, position, rule, message):
         line = self.files[path].count("\n", 0, position) + 1 if position is not None else 1
@@ -112,10 +115,14 @@ class Checker:
 
     def check_own(self, path, layer, position, name, target):
         other = layer_of(target)
+        if other not in (None, layer):
+            self.arrows.add((layer, other))
         if other is None or LAYERS.index(other) > LAYERS.index(layer):
             self.report(path, position, "arrow", f'{layer} may not include "{name}" of {other}')
         if path.startswith("include/") and not target.startswith("include/"):
             self.report(path, position, "public", f'a public header includes the private "{name}"')
+        if layer == "apps" and target.startswith("src/") and not target.startswith(DDS_FOLDER):
+            self.report(path, position, "public", f'a program includes the private "{name}"')
         if target.startswith(DDS_FOLDER) and not path.startswith(DDS_FOLDER):
             self.report(path, position, "confined", f'"{name}" may bring DDS along: only in {DDS_FOLDER}')
 
@@ -126,6 +133,21 @@ class Checker:
         for path in self.files:
             if path.startswith("include/") and path.removeprefix("include/") not in listed:
                 self.report(path, None, "listed", "is not in the header list of src/CMakeLists.txt")
+
+    def picture(self):
+        """Who includes whom, in Mermaid's words, but for what follows from the rest."""
+        def reaches(start, end):
+            return any(other == end or reaches(other, end)
+                       for layer, other in self.arrows if layer == start)
+        shown = [(layer, other) for layer, other in sorted(self.arrows)
+                 if not any(reaches(between, other) for start, between in self.arrows
+                            if start == layer and between != other)]
+        return "".join(["```mermaid\n", "graph TD\n", *(f"  {a} --> {b}\n" for a, b in shown), "```\n"])
+
+    def check_picture(self):
+        page = self.root / "docs/architecture.md"
+        if page.exists() and self.picture() not in page.read_text(encoding="utf-8"):
+            self.findings.append(("picture", "docs/architecture.md: [picture] is not what --picture prints"))
 
     def run(self):
         for path, text in self.files.items():
@@ -139,6 +161,8 @@ class Checker:
                 for match in CLOCK.finditer(strip_comments(text, literals_too=True)):
                     self.report(path, match.start(), "clock", f"{layer} is handed the time, it reads no clock")
         self.check_listed()
+        if not any(rule == "arrow" for rule, _ in self.findings):
+            self.check_picture()
         return self.findings
 
 
@@ -156,7 +180,8 @@ class SelfTest(unittest.TestCase):
         "src/math/pose.cpp": '// ::now() and #include <thread>\n/*\n#include <mutex>\n*/\nauto s = "x::now()";\n',
         "src/transport/fastdds/wire.cpp": '#include <fastdds/dds/core.hpp>\n#include "wire.h"\n',
         "src/transport/fastdds/entity.hpp": "#include <fastdds/dds/core.hpp>\n",
-        "src/client/client.cpp": '#include <yaml-cpp/yaml.h>\nauto t = Clock::now();\n#include <thread>\n',
+        "src/description/config.cpp": "#include <yaml-cpp/yaml.h>\n",
+        "src/runtime/loop.cpp": 'auto t = Clock::now();\n#include <thread>\n',
         "apps/tfdude/main.cpp": '#include <CLI/CLI.hpp>\n#include <nlohmann/json.hpp>\n#include "tool.hpp"\n',
         "apps/tfdude/tool.hpp": '#include "tfdude/tree/forest.hpp"\n',
     }
@@ -168,8 +193,11 @@ class SelfTest(unittest.TestCase):
         ("arrow", "src/tree/a.cpp", "#include <tfdude/partition/not_there.hpp>\n"),
         ("arrow", "src/partition/a.cpp", '#  include "tfdude/transport/port.hpp"\n'),
         ("arrow", "src/transport/a.cpp", '#include "tfdude/client/client.hpp"\n'),
+        ("arrow", "src/runtime/a.cpp", '#include "tfdude/client/client.hpp"\n'),
+        ("arrow", "src/types/a.cpp", '#include "tree/graph.hpp"\n'),
         ("arrow", "src/client/a.cpp", '#include "../../apps/tfdude/tool.hpp"\n'),
         ("arrow", "src/client/a.cpp", '#include "tfdude/unheard_of/a.hpp"\n'),
+        ("public", "apps/tfdude/a.cpp", '#include "tree/graph.hpp"\n'),
         ("public", "include/tfdude/tree/forest.hpp", '#include "tree/graph.hpp"\n'),
         ("confined", "src/tree/a.cpp", "#include <boost/graph/graph_traits.hpp>\n"),
         ("confined", "src/client/a.cpp", "#include <fastdds/dds/core.hpp>\n"),
@@ -179,6 +207,7 @@ class SelfTest(unittest.TestCase):
         ("confined", "src/client/a.cpp", "#include <generated/wire.hpp>\n"),
         ("confined", "apps/tfdude/a.cpp", '#include "transport/fastdds/entity.hpp"\n'),
         ("confined", "apps/tfdude/a.cpp", "#include <yaml-cpp/yaml.h>\n"),
+        ("confined", "src/client/a.cpp", "#include <yaml-cpp/yaml.h>\n"),
         ("confined", "src/client/a.cpp", "#include <CLI/CLI.hpp>\n"),
         ("confined", "apps/tfdude/a.cpp", "#include <urdf_parser/urdf_parser.h>\n"),
         ("confined", "src/store/a.cpp", "#include <tinyxml2.h>\n"),
@@ -198,6 +227,7 @@ class SelfTest(unittest.TestCase):
         ("place", "src/a.cpp", "int a;\n"),
         ("place", "src/unheard_of/a.cpp", "int a;\n"),
         ("listed", "include/tfdude/tree/unlisted.hpp", "\n"),
+        ("picture", "docs/architecture.md", "```mermaid\ngraph TD\n  tree --> base\n```\n"),
     ]
 
     def findings(self, changes):
@@ -226,11 +256,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--root", default=pathlib.Path(__file__).resolve().parent.parent)
     parser.add_argument("--self-test", action="store_true")
+    parser.add_argument("--picture", action="store_true")
     arguments = parser.parse_args()
     if arguments.self_test:
         unittest.main(argv=[sys.argv[0]])
     checker = Checker(arguments.root)
     findings = checker.run()
+    if arguments.picture:
+        print(checker.picture(), end="")
+        return
     for _, message in findings:
         print(message)
     if not checker.files:

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tfdude/partition/messages.hpp"
+#include "tfdude/types/joint_spec.hpp"
 
 // Joints as text for people, and as JSON for programs.
 namespace tfdude::cli {

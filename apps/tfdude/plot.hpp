@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tfdude/tree/forest.hpp"
+#include "tfdude/types/query.hpp"
 
 #include "plot_geometry.hpp"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
-#include "tfdude/client/urdf.hpp"
+#include "tfdude/description/urdf.hpp"
 
 namespace tfdude::daemon {
 

@@ -12,8 +12,9 @@
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
-#include "tfdude/client/config.hpp"
 #include "tfdude/client/config_preview.hpp"
+#include "tfdude/client/node.hpp"
+#include "tfdude/description/config.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
 #include "arguments.hpp"

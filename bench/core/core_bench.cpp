@@ -13,6 +13,7 @@
 #include "tfdude/transport/loopback.hpp"
 
 #include "core/trees.hpp"
+#include "transport/port.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
-#include "tfdude/client/config.hpp"
+#include "tfdude/description/config.hpp"
 
 #include "support/series.hpp"
 

@@ -15,7 +15,7 @@ using namespace tfdude;
 
 class Watcher final : public testing::Relay {
  public:
-  Watcher(std::unique_ptr<Transport> transport, AppliedListener& listener)
+  Watcher(TransportPtr transport, AppliedListener& listener)
       : Relay(std::move(transport)), listener_(listener) {}
 
  private:
@@ -46,7 +46,7 @@ StreamState& map_stream_state(const std::string& file) {
   return *static_cast<StreamState*>(mapped);
 }
 
-std::unique_ptr<Transport> watch(std::unique_ptr<Transport> transport, AppliedListener& listener) {
+TransportPtr watch(TransportPtr transport, AppliedListener& listener) {
   return std::make_unique<Watcher>(std::move(transport), listener);
 }
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "tfdude/transport/transport.hpp"
+#include "transport/port.hpp"
 
 // What the owner and the publisher of stream_bench share: a file that both map.
 namespace bench {

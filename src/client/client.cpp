@@ -5,7 +5,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
-#include "client/participant.hpp"
+#include "runtime/participant.hpp"
 
 namespace tfdude {
 namespace {
@@ -39,7 +39,7 @@ Result<Client> Client::open(const Options& options) {
   return open(*std::move(transport), options);
 }
 
-Result<Client> Client::open(std::unique_ptr<Transport> transport, const Options& options) {
+Result<Client> Client::open(TransportPtr transport, const Options& options) {
   auto participant = std::make_unique<Participant>(std::move(transport), std::string(), options);
   if (auto started = participant->start(); !started)
     return tl::unexpected(std::move(started.error()));
@@ -102,11 +102,13 @@ Result<void> Client::publish(const std::vector<EdgeUpdate>& edges, std::optional
 }
 
 Result<EdgeStream> Client::stream(const std::vector<std::string>& edges) {
-  return participant_->stream(edges);
+  return participant_->stream(edges).map(
+      [](std::shared_ptr<Sender<Update>> sender) { return EdgeStream(std::move(sender)); });
 }
 
 Result<JointStream> Client::stream_joints(const std::vector<std::string>& names) {
-  return participant_->stream_joints(names);
+  return participant_->stream_joints(names).map(
+      [](std::shared_ptr<Sender<JointUpdate>> sender) { return JointStream(std::move(sender)); });
 }
 
 Result<void> Client::flush(Milliseconds wait) { return participant_->flush(wait); }
@@ -267,30 +269,5 @@ Result<std::vector<PartitionInfo>> Client::partitions() { return participant_->p
 Subscription Client::on_change(std::function<void(const Change&)> listener) {
   return Subscription(participant_->on_change(std::move(listener)));
 }
-
-Result<Node> Node::open(const std::string& partition, const std::vector<FrameSpec>& frames,
-                        const Options& options) {
-  if (auto ok = check_partition_name(partition); !ok) return tl::unexpected(std::move(ok.error()));
-  auto transport = make_fastdds_transport(
-      {options.domain, options.profile, partition, nullptr, options.discovery_server});
-  if (!transport) return tl::unexpected(std::move(transport.error()));
-  return open(*std::move(transport), partition, frames, options);
-}
-
-Result<Node> Node::open(std::unique_ptr<Transport> transport, const std::string& partition,
-                        const std::vector<FrameSpec>& frames, const Options& options) {
-  if (auto ok = check_partition_name(partition); !ok) return tl::unexpected(std::move(ok.error()));
-  auto participant = std::make_unique<Participant>(std::move(transport), partition, options);
-  if (auto started = participant->start(); !started)
-    return tl::unexpected(std::move(started.error()));
-  if (auto serving = participant->serve(frames); !serving) {
-    return tl::unexpected(std::move(serving.error()));
-  }
-  return Node(std::move(participant));
-}
-
-std::size_t Node::own_frames() const { return participant_->own_frames(); }
-
-const std::string& Node::partition() const { return participant_->partition_name(); }
 
 }  // namespace tfdude

@@ -3,8 +3,9 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
-#include "tfdude/partition/partition.hpp"
 
+#include "partition/partition.hpp"
+#include "partition/reconfigure.hpp"
 #include "store/sqlite_store.hpp"
 #include "store/state_copy.hpp"
 

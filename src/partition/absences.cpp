@@ -1,4 +1,4 @@
-#include "tfdude/partition/absences.hpp"
+#include "partition/absences.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "tfdude/partition/claims.hpp"
+#include "partition/claims.hpp"
 
 #include <algorithm>
 #include <optional>

@@ -1,4 +1,4 @@
-#include "tfdude/partition/directory.hpp"
+#include "partition/directory.hpp"
 
 #include <algorithm>
 #include <iterator>

@@ -2,7 +2,8 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
-#include "tfdude/partition/directory.hpp"
+
+#include "partition/directory.hpp"
 
 // Who is not there, who has come back, and of whom nothing is to be kept.
 namespace tfdude {

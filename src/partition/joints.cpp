@@ -1,4 +1,4 @@
-#include "tfdude/partition/joints.hpp"
+#include "partition/joints.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -28,22 +28,6 @@ Error beyond_limits(const JointSpec& spec, double position) {
 }
 
 }  // namespace
-
-bool is_position(double position) {
-  return std::isfinite(position) && std::abs(position) <= kMaxTranslation;
-}
-
-bool is_variance(double variance) { return variance >= 0 && variance <= kMaxVariance; }
-
-Result<void> check_value(const JointValue& joint) {
-  const char* what = nullptr;
-  if (!is_position(joint.position))
-    what = ": position is not a number, or beyond 1e9";
-  else if (!is_variance(joint.variance))
-    what = ": variance is not a number within 0 to 1e18";
-  if (what == nullptr) return {};
-  return fail(Errc::kInvalidInput, "joint " + quote(joint.name) + what);
-}
 
 Result<void> check_joints(const std::vector<FrameSpec>& frames) {
   for (const FrameSpec& frame : frames) {

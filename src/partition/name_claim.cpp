@@ -1,4 +1,4 @@
-#include "tfdude/partition/name_claim.hpp"
+#include "partition/name_claim.hpp"
 
 #include <algorithm>
 

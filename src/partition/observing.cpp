@@ -1,4 +1,4 @@
-#include "tfdude/partition/observing.hpp"
+#include "partition/observing.hpp"
 
 #include <algorithm>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "tfdude/partition/pages.hpp"
+#include "partition/pages.hpp"
 
 #include <algorithm>
 

@@ -1,8 +1,9 @@
 #include <map>
 
 #include "tfdude/base/id.hpp"
-#include "tfdude/partition/partition.hpp"
-#include "tfdude/partition/reconfigure.hpp"
+
+#include "partition/partition.hpp"
+#include "partition/reconfigure.hpp"
 
 // How a partition outlives its process, and what it gives up where others have been faster.
 namespace tfdude {

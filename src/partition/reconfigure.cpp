@@ -1,4 +1,4 @@
-#include "tfdude/partition/reconfigure.hpp"
+#include "partition/reconfigure.hpp"
 
 #include <map>
 #include <optional>
@@ -6,7 +6,8 @@
 #include <string_view>
 
 #include "tfdude/base/id.hpp"
-#include "tfdude/partition/joints.hpp"
+
+#include "partition/joints.hpp"
 
 namespace tfdude {
 namespace {

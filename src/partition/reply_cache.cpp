@@ -1,4 +1,4 @@
-#include "tfdude/partition/reply_cache.hpp"
+#include "partition/reply_cache.hpp"
 
 namespace tfdude {
 namespace {

@@ -1,11 +1,11 @@
-#include "tfdude/partition/routing.hpp"
+#include "partition/routing.hpp"
 
 #include <algorithm>
 
 #include "tfdude/base/id.hpp"
-#include "tfdude/partition/joints.hpp"
 
 #include "math/finite.hpp"
+#include "partition/joints.hpp"
 
 namespace tfdude {
 namespace {

@@ -1,10 +1,10 @@
-#include "tfdude/partition/succession.hpp"
+#include "partition/succession.hpp"
 
 #include <algorithm>
 #include <tuple>
 #include <utility>
 
-#include "tfdude/partition/claims.hpp"
+#include "partition/claims.hpp"
 
 namespace tfdude {
 namespace {

@@ -1,4 +1,4 @@
-#include "tfdude/partition/watching.hpp"
+#include "partition/watching.hpp"
 
 #include <algorithm>
 #include <iterator>

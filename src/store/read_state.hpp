@@ -2,8 +2,7 @@
 
 #include <cstdint>
 
-#include "tfdude/partition/state_store.hpp"
-
+#include "partition/state_store.hpp"
 #include "store/sqlite.hpp"
 
 namespace tfdude {

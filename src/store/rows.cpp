@@ -1,8 +1,8 @@
 #include "store/rows.hpp"
 
 #include "tfdude/base/id.hpp"
-#include "tfdude/partition/joints.hpp"
 
+#include "partition/joints.hpp"
 #include "store/ties_blob.hpp"
 
 namespace tfdude {

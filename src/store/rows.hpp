@@ -3,8 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "tfdude/partition/state_store.hpp"
-
+#include "partition/state_store.hpp"
 #include "store/sqlite.hpp"
 
 // What the rows of a state say, and whether that can be. @return kState or kInvalidInput, where it cannot

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
-#include "tfdude/partition/incarnation.hpp"
-#include "tfdude/partition/joints.hpp"
 
+#include "partition/incarnation.hpp"
+#include "partition/joints.hpp"
 #include "store/read_state.hpp"
 #include "store/rows.hpp"
 #include "store/schema.hpp"

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "tfdude/partition/state_store.hpp"
+#include "partition/state_store.hpp"
 
 namespace tfdude {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "tfdude/partition/state_store.hpp"
+#include "partition/state_store.hpp"
 
 namespace tfdude {
 

@@ -3,7 +3,8 @@
 #include <string>
 
 #include "tfdude/base/result.hpp"
-#include "tfdude/tree/correlation.hpp"
+
+#include "tree/ties.hpp"
 
 namespace tfdude {
 

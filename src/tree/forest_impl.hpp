@@ -2,9 +2,8 @@
 
 #include <mutex>
 
-#include "tfdude/tree/forest.hpp"
-
 #include "tree/epoch.hpp"
+#include "tree/forest.hpp"
 #include "tree/graph.hpp"
 #include "tree/id_table.hpp"
 #include "tree/versions.hpp"

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "tfdude/tree/forest.hpp"
+#include "tree/forest.hpp"
 
 namespace tfdude {
 

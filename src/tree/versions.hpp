@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "tfdude/math/transform.hpp"
-#include "tfdude/tree/forest.hpp"
 
 #include "tree/epoch.hpp"
+#include "tree/forest.hpp"
 #include "tree/id_table.hpp"
 #include "tree/ring.hpp"
 

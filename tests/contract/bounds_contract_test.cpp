@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"

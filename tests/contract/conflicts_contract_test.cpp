@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 
 #include "support/catch.hpp"
 #include "support/late_pages.hpp"

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 
 #include "support/catch.hpp"
 #include "support/networks.hpp"

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 
 #include "support/catch.hpp"
 #include "support/lossy_requests.hpp"

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 
+#include "partition/messages.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/joint_frames.hpp"

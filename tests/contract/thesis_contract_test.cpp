@@ -8,13 +8,16 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
-#include "tfdude/client/config.hpp"
+#include "tfdude/client/node.hpp"
+#include "tfdude/description/config.hpp"
 
+#include "partition/messages.hpp"
 #include "support/catch.hpp"
 #include "support/networks.hpp"
 #include "support/pose_diff.hpp"
 #include "support/process.hpp"
 #include "support/random.hpp"
+#include "tree/forest.hpp"
 
 namespace tfdude {
 namespace {

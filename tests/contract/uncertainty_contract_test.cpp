@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 #include "tfdude/math/fusion.hpp"
 
 #include "math/semidefinite.hpp"

@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 
+#include "partition/messages.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/networks.hpp"
@@ -64,7 +66,7 @@ WatchOptions one_more() {
 // DDS over the loopback interface, whose writers are counted of one partition.
 class CountedDomain {
  public:
-  std::unique_ptr<Transport> join(const std::string& partition, bool counted = false) {
+  TransportPtr join(const std::string& partition, bool counted = false) {
     const auto counters = counted ? counters_ : nullptr;
     return *make_fastdds_transport({lease_.number(), TFDUDE_LOOPBACK_PROFILE, partition, counters});
   }

@@ -3,10 +3,10 @@
 #include <set>
 #include <string>
 
-#include "tfdude/client/config.hpp"
-#include "tfdude/partition/partition.hpp"
+#include "tfdude/description/config.hpp"
 
 #include "fuzz/demand.hpp"
+#include "partition/partition.hpp"
 #include "support/replica.hpp"
 
 namespace tfdude::fuzz {

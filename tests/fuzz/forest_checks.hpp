@@ -6,9 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "tfdude/tree/forest.hpp"
-
 #include "fuzz/demand.hpp"
+#include "tree/forest.hpp"
 
 namespace tfdude::fuzz {
 

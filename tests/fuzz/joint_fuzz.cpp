@@ -3,9 +3,8 @@
 #include <string_view>
 #include <vector>
 
-#include "tfdude/partition/partition.hpp"
-
 #include "fuzz/wire.hpp"
+#include "partition/partition.hpp"
 #include "support/joint_frames.hpp"
 #include "support/replica.hpp"
 

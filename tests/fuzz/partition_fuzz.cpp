@@ -12,13 +12,12 @@
 
 #include <fuzzer/FuzzedDataProvider.h>
 
-#include "tfdude/partition/partition.hpp"
-#include "tfdude/partition/routing.hpp"
-
 #include "fuzz/demand.hpp"
 #include "fuzz/forest_checks.hpp"
 #include "fuzz/plain_claims.hpp"
 #include "fuzz/plain_owner.hpp"
+#include "partition/partition.hpp"
+#include "partition/routing.hpp"
 #include "support/memory_store.hpp"
 #include "support/replica.hpp"
 

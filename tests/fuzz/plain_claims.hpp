@@ -9,10 +9,9 @@
 #include <tuple>
 #include <vector>
 
-#include "tfdude/partition/directory.hpp"
-
 #include "fuzz/demand.hpp"
 #include "fuzz/forest_checks.hpp"
+#include "partition/directory.hpp"
 
 // What must come of what partitions say, in the plainest way: everything is kept, and worked out anew each time.
 namespace tfdude::fuzz {

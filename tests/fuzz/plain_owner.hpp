@@ -9,9 +9,8 @@
 #include <variant>
 #include <vector>
 
-#include "tfdude/partition/messages.hpp"
-
 #include "fuzz/plain_claims.hpp"
+#include "partition/messages.hpp"
 
 // What an owner must make of requests and of what others claim, in the plainest way.
 namespace tfdude::fuzz {

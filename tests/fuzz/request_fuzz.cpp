@@ -5,9 +5,8 @@
 #include <variant>
 #include <vector>
 
-#include "tfdude/partition/partition.hpp"
-
 #include "fuzz/wire.hpp"
+#include "partition/partition.hpp"
 #include "support/replica.hpp"
 
 namespace tfdude::fuzz {

@@ -14,13 +14,12 @@
 
 #include <fuzzer/FuzzedDataProvider.h>
 
-#include "tfdude/partition/partition.hpp"
-
 #include "fuzz/demand.hpp"
 #include "fuzz/forest_checks.hpp"
 #include "fuzz/state_rows.hpp"
 #include "fuzz/wire.hpp"
 #include "math/flat.hpp"
+#include "partition/partition.hpp"
 #include "store/sqlite_store.hpp"
 #include "store/ties_blob.hpp"
 #include "support/replica.hpp"

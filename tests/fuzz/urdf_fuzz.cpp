@@ -2,10 +2,10 @@
 
 #include <string>
 
-#include "tfdude/client/urdf.hpp"
-#include "tfdude/partition/partition.hpp"
+#include "tfdude/description/urdf.hpp"
 
 #include "fuzz/demand.hpp"
+#include "partition/partition.hpp"
 #include "support/replica.hpp"
 
 namespace tfdude::fuzz {

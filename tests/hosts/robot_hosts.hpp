@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
-#include "tfdude/client/config.hpp"
+#include "tfdude/description/config.hpp"
 
 #include "support/agreement.hpp"
 #include "support/catch.hpp"

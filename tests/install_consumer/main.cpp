@@ -1,7 +1,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include <tfdude/client/client.hpp>
+#include <tfdude/client/node.hpp>
 #include <tfdude/transport/loopback.hpp>
 
 // A node that owns two frames and a client that asks for them, in one process: everything that is installed is

@@ -10,6 +10,13 @@ endfunction()
 run(${CMAKE_COMMAND} --install ${BUILD_DIR} --config ${CONFIG} --prefix ${work}/prefix)
 # Moved after the install, so that a path of the build or of the prefix left in the package shows.
 file(RENAME ${work}/prefix ${work}/moved)
+# What is installed for users is decided, header by header.
+file(STRINGS ${CMAKE_CURRENT_LIST_DIR}/headers.txt expected)
+file(GLOB_RECURSE installed RELATIVE ${work}/moved/include ${work}/moved/include/*)
+list(SORT installed)
+if(NOT installed STREQUAL expected)
+  message(FATAL_ERROR "installed headers are not those of headers.txt:\n  ${installed}")
+endif()
 run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${work}/build -G Ninja
   -D CMAKE_BUILD_TYPE=${CONFIG}
   -D CMAKE_CXX_COMPILER=${CXX}

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 
 #include "support/catch.hpp"
 #include "support/domain_lease.hpp"

@@ -19,7 +19,8 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
-#include "tfdude/client/config.hpp"
+#include "tfdude/client/node.hpp"
+#include "tfdude/description/config.hpp"
 
 #include "support/process.hpp"
 #include "support/random.hpp"

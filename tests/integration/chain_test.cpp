@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 
 #include "support/agreement.hpp"
 #include "support/catch.hpp"

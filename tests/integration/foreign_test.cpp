@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
 #include "support/catch.hpp"
@@ -14,6 +14,7 @@
 #include "support/joint_frames.hpp"
 #include "support/process.hpp"
 #include "support/random.hpp"
+#include "transport/port.hpp"
 
 namespace tfdude {
 namespace {

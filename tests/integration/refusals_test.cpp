@@ -9,6 +9,7 @@
 
 #include "support/catch.hpp"
 #include "support/thesis.hpp"
+#include "transport/port.hpp"
 
 namespace tfdude {
 namespace {
@@ -45,7 +46,7 @@ class MutePartition final : public TransportHandler {
   [[nodiscard]] bool owns_joint(std::string_view) const override { return true; }
 
  private:
-  std::unique_ptr<Transport> transport_;
+  TransportPtr transport_;
 };
 
 struct Refusal {

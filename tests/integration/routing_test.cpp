@@ -4,6 +4,7 @@
 #include <string>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
 #include "support/catch.hpp"

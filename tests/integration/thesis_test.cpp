@@ -10,7 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "tfdude/client/client.hpp"
-#include "tfdude/client/config.hpp"
+#include "tfdude/client/node.hpp"
+#include "tfdude/description/config.hpp"
 
 #include "support/agreement.hpp"
 #include "support/catch.hpp"

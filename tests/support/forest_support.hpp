@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tfdude/tree/forest.hpp"
+#include "tree/forest.hpp"
 
 namespace tfdude::testing {
 

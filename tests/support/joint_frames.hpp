@@ -4,8 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "tfdude/partition/state_store.hpp"
-
+#include "partition/state_store.hpp"
 #include "support/forest_support.hpp"
 
 // Frames that joints move.

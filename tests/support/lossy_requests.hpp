@@ -16,7 +16,7 @@ class LossyRequests final : public Relay {
   /// Called one after the other. @return whether this sending is lost
   using Loses = std::function<bool(const Request& request)>;
 
-  LossyRequests(std::unique_ptr<Transport> real, Loses loses)
+  LossyRequests(TransportPtr real, Loses loses)
       : Relay(std::move(real)), loses_(std::move(loses)) {}
 
   using Relay::send;

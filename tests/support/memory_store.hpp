@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "tfdude/partition/state_store.hpp"
+#include "partition/state_store.hpp"
 
 namespace tfdude::testing {
 

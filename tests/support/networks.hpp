@@ -14,7 +14,7 @@
 namespace tfdude::testing {
 
 /// Gives each participant of one test a transport of the same network.
-using Join = std::function<std::unique_ptr<Transport>(const std::string& partition)>;
+using Join = std::function<TransportPtr(const std::string& partition)>;
 
 [[nodiscard]] inline Join join_loopback() {
   auto network = std::make_shared<LoopbackNetwork>();

@@ -5,8 +5,7 @@
 #include <map>
 #include <string>
 
-#include "tfdude/partition/partition.hpp"
-
+#include "partition/partition.hpp"
 #include "support/forest_support.hpp"
 #include "support/random.hpp"
 #include "support/replica.hpp"

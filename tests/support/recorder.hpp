@@ -11,10 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "tfdude/transport/transport.hpp"
-
 #include "support/catch.hpp"
 #include "support/networks.hpp"
+#include "transport/port.hpp"
 
 namespace tfdude::testing {
 
@@ -165,7 +164,7 @@ struct Listener {
   }
 
   Recorder recorder;  // outlives the transport
-  std::unique_ptr<Transport> transport;
+  TransportPtr transport;
 
  protected:
   Listener(const Join& join, const std::string& partition) : transport(join(partition)) {}

@@ -4,14 +4,14 @@
 #include <string>
 #include <utility>
 
-#include "tfdude/transport/transport.hpp"
+#include "transport/port.hpp"
 
 namespace tfdude::testing {
 
 /// A transport that hands on all that goes to another, and comes from there: what is to be otherwise is overridden.
 class Relay : public Transport, protected TransportHandler {
  public:
-  explicit Relay(std::unique_ptr<Transport> real) : real_(std::move(real)) {}
+  explicit Relay(TransportPtr real) : real_(std::move(real)) {}
 
   Result<void> start(TransportHandler& handler) override {
     handler_ = &handler;
@@ -71,7 +71,7 @@ class Relay : public Transport, protected TransportHandler {
   Transport& real() { return *real_; }
 
  private:
-  const std::unique_ptr<Transport> real_;
+  const TransportPtr real_;
   TransportHandler* handler_ = nullptr;
 };
 

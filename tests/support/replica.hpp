@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tfdude/partition/directory.hpp"
+#include "partition/directory.hpp"
 
 namespace tfdude::testing {
 

@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tfdude/partition/messages.hpp"
-
+#include "partition/messages.hpp"
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"
 

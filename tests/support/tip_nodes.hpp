@@ -3,6 +3,7 @@
 #include <string>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 
 #include "support/networks.hpp"
 

@@ -3,8 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "tfdude/partition/partition.hpp"
-
+#include "partition/partition.hpp"
 #include "support/random.hpp"
 
 namespace tfdude::testing {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "tfdude/client/urdf.hpp"
+#include "tfdude/description/urdf.hpp"
 
 #include "support/catch.hpp"
 

@@ -13,114 +13,23 @@
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
 #include "tfdude/client/stream.hpp"
+#include "tfdude/client/subscription.hpp"
 #include "tfdude/client/watch.hpp"
 #include "tfdude/math/observation.hpp"
-#include "tfdude/partition/change.hpp"
-#include "tfdude/partition/directory.hpp"
-#include "tfdude/partition/partition.hpp"
+#include "tfdude/math/transform.hpp"
 #include "tfdude/transport/transport.hpp"
-#include "tfdude/tree/forest.hpp"
+#include "tfdude/types/change.hpp"
+#include "tfdude/types/correlation.hpp"
+#include "tfdude/types/edge.hpp"
+#include "tfdude/types/frame.hpp"
+#include "tfdude/types/joint_spec.hpp"
+#include "tfdude/types/options.hpp"
+#include "tfdude/types/partition_info.hpp"
+#include "tfdude/types/query.hpp"
 
 namespace tfdude {
 
-/// How a participant joins.
-struct Options {
-  std::uint32_t domain =
-      0;                ///< DDS domain: participants of different domains do not meet; 0 to 232
-  std::string profile;  ///< XML file of DDS profiles; empty: the built-in ones
-  /// HOST:PORT of a Fast DDS discovery server with id 0; empty: participants meet by multicast
-  std::string discovery_server;
-  Milliseconds timeout{1000};  ///< how long a call may take, see Client
-  /// How long a new participant looks round at most before it says that a frame is not there. It waits this long only where
-  /// it meets nobody. Of others that it has met or heard of, and that are slow to tell what they own, calls say kTimeout,
-  /// until three time-outs later.
-  Milliseconds discovery{1000};
-  /// Directory in which a Node keeps its partition's frames, so that its next process has them back; empty:
-  /// it keeps nothing. What others change by request is stored before they are answered.
-  std::string state;
-  /// How often at most values that were streamed, or set by the Node's own process, are stored.
-  Milliseconds save_every{1000};
-  /// How much is kept of the past of a Node's edges, where a frame says nothing else.
-  EdgeTiming history{};
-  /// How long the end of a client waits until what it has streamed (publish, publish_joints) is acknowledged, as flush();
-  /// no longer than `timeout`.
-  Milliseconds linger{100};
-};
-
-/// A frame and where it stands.
-struct Frame {
-  std::string id;
-  std::string parent;     ///< empty: a root
-  std::string partition;  ///< the owner
-  bool attached = false;  ///< its parent is there
-};
-
-/// One partition's share of a path.
-struct PathSegment {
-  std::string partition;
-  std::string from;
-  std::string to;
-};
-
-/// What came of a measurement.
-struct Observed {
-  double distance_squared = 0;  ///< of it from what was believed: squared Mahalanobis distance
-  int dimensions = 0;           ///< in which it has one
-  double limit = 0;             ///< of the gate
-  bool accepted = false;
-  std::vector<std::string> corrected;  ///< edges whose values have changed
-  std::optional<Time> stamp;           ///< of moving edges
-};
-
 class Participant;
-
-/// Keeps a listener listening; ends that when destroyed, or when another is assigned to it.
-///
-/// @par Attach and detach  The listener may be called as soon as on_change() is, before that has returned. After
-///   ~Subscription has returned, and after ~Client has, whichever is first, the listener is not running and will not run:
-///   both wait for a call of it under way. Where the listener itself destroys its Subscription, another's, or the Client,
-///   that returns at once, and the listener is not called again. So a listener may use what lives longer than its
-///   Subscription, and the Client, and must not wait for a thread that destroys one of these. A Subscription that outlives
-///   its Client does nothing any more.
-/// @par Thread safety  Each Subscription is of one thread at a time.
-class Subscription {
- public:
-  Subscription() = default;
-  explicit Subscription(std::shared_ptr<void> token) : token_(std::move(token)) {}
-  Subscription(const Subscription&) = delete;
-  Subscription& operator=(const Subscription&) = delete;
-  Subscription(Subscription&&) = default;
-  Subscription& operator=(Subscription&&) = default;
-  ~Subscription() = default;
-
- private:
-  std::shared_ptr<void> token_;
-};
-
-/// A lookup that waits for its data; cancelled when destroyed.
-///
-/// @par Attach and detach  After cancel(), ~PendingLookup or ~Client has returned, the callback is not running and will
-///   not run: they wait for it where it runs, and return at once (20 ms at most) where it does not. Where the callback
-///   itself does one of these, that returns at once, too. A callback must not wait for a thread that does one of these.
-/// @par Thread safety  Each PendingLookup is of one thread at a time.
-class PendingLookup {
- public:
-  using Callback = std::function<void(Result<StampedTransform>)>;
-
-  PendingLookup() = default;
-  explicit PendingLookup(std::shared_ptr<void> task) : task_(std::move(task)) {}
-  PendingLookup(const PendingLookup&) = delete;
-  PendingLookup& operator=(const PendingLookup&) = delete;
-  PendingLookup(PendingLookup&&) = default;
-  PendingLookup& operator=(PendingLookup&&) = default;
-  ~PendingLookup() = default;
-
-  /// As destroying it.
-  void cancel() { task_.reset(); }
-
- private:
-  std::shared_ptr<void> task_;
-};
 
 /// A process's access to all frames of a domain. See Node for a process that owns frames.
 ///
@@ -143,8 +52,7 @@ class Client {
   [[nodiscard]] static Result<Client> open(const Options& options = {});
 
   /// Joins over any transport. At once.
-  [[nodiscard]] static Result<Client> open(std::unique_ptr<Transport> transport,
-                                           const Options& options = {});
+  [[nodiscard]] static Result<Client> open(TransportPtr transport, const Options& options = {});
 
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
@@ -369,40 +277,6 @@ class Client {
  protected:
   explicit Client(std::unique_ptr<Participant> participant);
   std::unique_ptr<Participant> participant_;
-};
-
-/// A process that owns a partition of the frames and serves it to others, from its own threads; the rest
-/// as for Client.
-class Node : public Client {
- public:
-  /// Joins a domain over DDS, makes sure that nobody serves the partition, takes the frames (in any order;
-  /// parents may be missing yet or belong to others) and serves them. With Options::state, what an
-  /// earlier process left of the partition is taken first; of the given frames those count that were not given,
-  /// or given differently, to the last process that was given any, and what was given then and is not now goes, but nothing
-  /// below it: that waits for it. No frames change nothing.
-  ///
-  /// Takes 0.4 s as a rule; 5 s and Options::discovery at most, where a predecessor still seems to be there.
-  ///
-  /// A Node learns, after a hang or a broken link, that another process has taken its partition since: it then
-  /// gives way, reports a conflict without a frame, and answers every call with kPartitionTaken.
-  /// @return kPartitionTaken (naming host and process), kState (naming the file), the first bad frame's error,
-  ///   as Client::open.
-  [[nodiscard]] static Result<Node> open(const std::string& partition,
-                                         const std::vector<FrameSpec>& frames = {},
-                                         const Options& options = {});
-
-  /// Joins over any transport.
-  [[nodiscard]] static Result<Node> open(std::unique_ptr<Transport> transport,
-                                         const std::string& partition,
-                                         const std::vector<FrameSpec>& frames = {},
-                                         const Options& options = {});
-
-  [[nodiscard]] const std::string& partition() const;
-  /// How many frames the partition has.
-  [[nodiscard]] std::size_t own_frames() const;
-
- private:
-  using Client::Client;
 };
 
 }  // namespace tfdude

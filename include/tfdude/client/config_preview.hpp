@@ -3,8 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "tfdude/client/client.hpp"
-#include "tfdude/partition/reconfigure.hpp"
+#include "tfdude/types/configured_change.hpp"
+#include "tfdude/types/frame.hpp"
+#include "tfdude/types/options.hpp"
 
 namespace tfdude {
 

@@ -9,6 +9,7 @@
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
 #include "tfdude/math/transform.hpp"
+#include "tfdude/types/not_sent.hpp"
 
 namespace tfdude {
 
@@ -16,18 +17,6 @@ struct Update;
 struct JointUpdate;
 template <class Message>
 class Sender;
-
-/// An edge or joint that try_publish() did not send, or not to all who have it.
-struct NotSent {
-  std::size_t index = 0;  ///< among those that the stream was opened with
-  /// kUnknownFrame, kUnknownJoint: nobody is known here to have it (yet). kUnreachable: its owner is known to be down.
-  /// kTimeout: the owner was not met yet, or cannot take it at once. kInvalidInput: not a number, out of range, or not as many
-  /// values as edges or joints. kPartitionTaken: this Node has lost its partition. kTransport: the Client has gone. Of what this
-  /// process owns itself also what update() and update_joints() refuse.
-  Errc why = Errc::kTimeout;
-  /// The owner; empty where there is none. Until the next call, and the end of the Client.
-  std::string_view partition;
-};
 
 /// Streams values of edges from a real-time thread, as Client::publish() does, but never waits: neither until participants
 /// have met, nor for an owner, nor for another thread of this process that plans, receives or changes the structure. Where the

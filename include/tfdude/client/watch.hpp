@@ -8,23 +8,10 @@
 
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
-#include "tfdude/tree/forest.hpp"
+#include "tfdude/types/options.hpp"
+#include "tfdude/types/query.hpp"
 
 namespace tfdude {
-
-/// How a path is watched.
-struct WatchOptions {
-  /// How often at most an owner sends what has changed [Hz]: from once an hour to 1e6; 0: every sample.
-  double rate = 0;
-  /// One composed transform for each partition on the path instead of all its edges: fewer bytes, but between samples the
-  /// segment is interpolated as a whole.
-  bool composed = false;
-  /// How much of the past is kept here. Process noise is that of the edge's owner, where it has one.
-  EdgeTiming timing{};
-  /// Called when the path has found another way, or why there is none for now: one call at a time, from a thread of
-  /// the library's that holds no lock, so that it may call anything, watch() as well. Must not throw.
-  std::function<void(const std::string& what)> on_route;
-};
 
 class WatchedPath;
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "tfdude/base/result.hpp"
 #include "tfdude/transport/transport.hpp"
 
 namespace tfdude {
@@ -42,7 +43,6 @@ void log_fastdds_to_standard_error();
 /// under the writer's locks, is not used whatever is set.
 /// @return kInvalidInput (domain, discovery server). start() may fail with kConfig (profile), kTransport, and
 ///   kInvalidInput where the discovery server's host has no IPv4 address.
-[[nodiscard]] Result<std::unique_ptr<Transport>> make_fastdds_transport(
-    const FastDdsOptions& options);
+[[nodiscard]] Result<TransportPtr> make_fastdds_transport(const FastDdsOptions& options);
 
 }  // namespace tfdude

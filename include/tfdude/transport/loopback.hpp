@@ -13,7 +13,7 @@ class LoopbackNetwork {
   LoopbackNetwork();
 
   /// A participant's access to this network, which it keeps alive.
-  [[nodiscard]] std::unique_ptr<Transport> join();
+  [[nodiscard]] TransportPtr join();
 
  private:
   friend class LoopbackTransport;

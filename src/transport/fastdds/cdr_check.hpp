@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "tfdude/partition/messages.hpp"
+#include "partition/messages.hpp"
 
 // Reads the bytes of samples without deserializing them: whether they are well formed (every length within
 // the bytes that are there and within the bounds of idl/tfdude.idl), and what a filter needs of them. The

@@ -6,8 +6,8 @@
 #include <string_view>
 
 #include "tfdude/base/result.hpp"
-#include "tfdude/partition/messages.hpp"
 
+#include "partition/messages.hpp"
 #include "transport/fastdds/compat.hpp"
 
 // Between the messages of the partition layer and what travels. What comes in is checked field by field: an

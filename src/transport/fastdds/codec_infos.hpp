@@ -1,7 +1,6 @@
 #pragma once
 
-#include "tfdude/partition/messages.hpp"
-
+#include "partition/messages.hpp"
 #include "transport/fastdds/compat.hpp"
 
 // What owners tell of their edges and joints, from what travels. Names are for people to read: whatever a sender has put

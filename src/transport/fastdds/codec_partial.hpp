@@ -1,8 +1,7 @@
 #pragma once
 
-#include "tfdude/tree/forest.hpp"
-
 #include "transport/fastdds/topics.hpp"
+#include "tree/forest.hpp"
 
 // Updates that give only parts of values.
 namespace tfdude::fastdds {

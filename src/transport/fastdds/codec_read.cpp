@@ -3,9 +3,9 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
-#include "tfdude/partition/watching.hpp"
 
 #include "math/flat.hpp"
+#include "partition/watching.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_infos.hpp"
 #include "transport/fastdds/codec_partial.hpp"

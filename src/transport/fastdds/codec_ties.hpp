@@ -3,8 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "tfdude/partition/messages.hpp"
-
+#include "partition/messages.hpp"
 #include "transport/fastdds/compat.hpp"
 
 // Pieces that several messages have, from what travels.

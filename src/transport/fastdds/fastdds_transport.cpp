@@ -388,7 +388,7 @@ void log_fastdds_to_standard_error() {
   Log::RegisterConsumer(std::make_unique<fastdds::edds::StdoutErrConsumer>());
 }
 
-Result<std::unique_ptr<Transport>> make_fastdds_transport(const FastDdsOptions& options) {
+Result<TransportPtr> make_fastdds_transport(const FastDdsOptions& options) {
   if (options.domain > fastdds::kMaxDomain) {
     return fail(Errc::kInvalidInput, "domain " + std::to_string(options.domain) +
                                          " is not within 0 to " +

@@ -16,6 +16,7 @@
 #include "transport/fastdds/peers.hpp"
 #include "transport/fastdds/state_channels.hpp"
 #include "transport/fastdds/worker.hpp"
+#include "transport/port.hpp"
 
 namespace tfdude::fastdds {
 

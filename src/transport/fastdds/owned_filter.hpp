@@ -3,9 +3,9 @@
 #include <string>
 
 #include "tfdude/transport/fastdds.hpp"
-#include "tfdude/transport/transport.hpp"
 
 #include "transport/fastdds/compat.hpp"
+#include "transport/port.hpp"
 
 // The library's interfaces have no virtual destructor; the classes here are final and never deleted through
 // them. NOLINTBEGIN(cppcoreguidelines-virtual-class-destructor)

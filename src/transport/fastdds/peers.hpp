@@ -10,8 +10,7 @@
 #include <string>
 #include <utility>
 
-#include "tfdude/partition/messages.hpp"
-
+#include "partition/messages.hpp"
 #include "transport/fastdds/compat.hpp"
 
 namespace tfdude::fastdds {

@@ -6,8 +6,7 @@
 #include <memory>
 #include <mutex>
 
-#include "tfdude/partition/messages.hpp"
-
+#include "partition/messages.hpp"
 #include "transport/fastdds/entities.hpp"
 
 namespace tfdude::fastdds {

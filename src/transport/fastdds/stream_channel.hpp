@@ -3,10 +3,9 @@
 #include <memory>
 #include <utility>
 
-#include "tfdude/transport/transport.hpp"
-
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/entities.hpp"
+#include "transport/port.hpp"
 
 namespace tfdude::fastdds {
 

@@ -11,6 +11,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "transport/port.hpp"
+
 namespace tfdude {
 
 /// Who is there, and what late joiners must be told.
@@ -276,8 +278,6 @@ class LoopbackTransport final : public Transport {
 
 LoopbackNetwork::LoopbackNetwork() : hub_(std::make_shared<Hub>()) {}
 
-std::unique_ptr<Transport> LoopbackNetwork::join() {
-  return std::make_unique<LoopbackTransport>(hub_);
-}
+TransportPtr LoopbackNetwork::join() { return std::make_unique<LoopbackTransport>(hub_); }
 
 }  // namespace tfdude

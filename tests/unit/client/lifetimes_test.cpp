@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 #include "tfdude/transport/loopback.hpp"
 
 #include "support/catch.hpp"

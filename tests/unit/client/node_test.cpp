@@ -1,3 +1,5 @@
+#include "tfdude/client/node.hpp"
+
 #include <atomic>
 #include <string>
 #include <thread>

@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
-#include "tfdude/client/config.hpp"
+#include "tfdude/client/node.hpp"
+#include "tfdude/description/config.hpp"
 #include "tfdude/transport/loopback.hpp"
 
 #include "store/sqlite_store.hpp"

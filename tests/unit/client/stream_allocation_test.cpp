@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
 #include "tfdude/transport/loopback.hpp"
 
 #include "support/allocation_guard.hpp"
@@ -12,6 +13,7 @@
 #include "support/forest_support.hpp"
 #include "support/joint_frames.hpp"
 #include "support/relay.hpp"
+#include "transport/port.hpp"
 
 namespace tfdude {
 namespace {
@@ -43,8 +45,7 @@ class PortChannel final : public Channel<Message> {
 
 class PortTransport final : public Relay {
  public:
-  PortTransport(std::unique_ptr<Transport> real, Port& port)
-      : Relay(std::move(real)), port_(port) {}
+  PortTransport(TransportPtr real, Port& port) : Relay(std::move(real)), port_(port) {}
   std::unique_ptr<Channel<Update>> update_channel(const std::string&) override {
     return std::make_unique<PortChannel<Update>>(port_);
   }

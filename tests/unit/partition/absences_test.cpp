@@ -1,12 +1,11 @@
 // Who is not there, what that means for frames that others claim, too, and what is kept of whom.
 
-#include "tfdude/partition/absences.hpp"
+#include "partition/absences.hpp"
 
 #include <string>
 #include <vector>
 
-#include "tfdude/partition/partition.hpp"
-
+#include "partition/partition.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/replica.hpp"

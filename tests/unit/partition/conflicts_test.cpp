@@ -1,8 +1,7 @@
 #include <string>
 #include <vector>
 
-#include "tfdude/partition/partition.hpp"
-
+#include "partition/partition.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/memory_store.hpp"

@@ -9,8 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "tfdude/partition/partition.hpp"
-
+#include "partition/partition.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/random.hpp"

@@ -1,4 +1,4 @@
-#include "tfdude/partition/directory.hpp"
+#include "partition/directory.hpp"
 
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "tfdude/partition/joint_spec.hpp"
+#include "tfdude/types/joint_spec.hpp"
 
 #include <cmath>
 #include <string>

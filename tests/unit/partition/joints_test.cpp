@@ -1,13 +1,12 @@
-#include "tfdude/partition/joints.hpp"
+#include "partition/joints.hpp"
 
 #include <cmath>
 #include <string>
 #include <vector>
 
-#include "tfdude/partition/partition.hpp"
-#include "tfdude/partition/reconfigure.hpp"
-#include "tfdude/partition/routing.hpp"
-
+#include "partition/partition.hpp"
+#include "partition/reconfigure.hpp"
+#include "partition/routing.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/joint_frames.hpp"

@@ -1,4 +1,4 @@
-#include "tfdude/partition/latest.hpp"
+#include "partition/latest.hpp"
 
 #include <chrono>
 #include <optional>

@@ -1,4 +1,4 @@
-#include "tfdude/partition/name_claim.hpp"
+#include "partition/name_claim.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,8 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "tfdude/partition/incarnation.hpp"
-
+#include "partition/incarnation.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

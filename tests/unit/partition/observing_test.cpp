@@ -1,11 +1,10 @@
-#include "tfdude/partition/observing.hpp"
+#include "partition/observing.hpp"
 
 #include <algorithm>
 #include <string>
 #include <vector>
 
-#include "tfdude/partition/partition.hpp"
-
+#include "partition/partition.hpp"
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"

@@ -1,4 +1,4 @@
-#include "tfdude/partition/partition.hpp"
+#include "partition/partition.hpp"
 
 #include <string>
 #include <vector>

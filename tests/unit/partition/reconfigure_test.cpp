@@ -1,10 +1,9 @@
-#include "tfdude/partition/reconfigure.hpp"
+#include "partition/reconfigure.hpp"
 
 #include <string>
 #include <vector>
 
-#include "tfdude/partition/partition.hpp"
-
+#include "partition/partition.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/memory_store.hpp"

@@ -1,4 +1,4 @@
-#include "tfdude/partition/routing.hpp"
+#include "partition/routing.hpp"
 
 #include <algorithm>
 #include <string>

@@ -10,9 +10,8 @@
 #include <unistd.h>
 #include <vector>
 
-#include "tfdude/partition/incarnation.hpp"
-
 #include "math/flat.hpp"
+#include "partition/incarnation.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/process.hpp"

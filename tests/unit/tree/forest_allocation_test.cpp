@@ -6,12 +6,11 @@
 #include <thread>
 #include <vector>
 
-#include "tfdude/tree/forest.hpp"
-
 #include "support/allocation_guard.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/random.hpp"
+#include "tree/forest.hpp"
 
 namespace tfdude {
 namespace {

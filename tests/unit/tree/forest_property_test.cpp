@@ -7,11 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "tfdude/tree/forest.hpp"
-
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/random.hpp"
+#include "tree/forest.hpp"
 #include "unit/tree/naive_forest.hpp"
 
 namespace tfdude {

@@ -1,4 +1,4 @@
-#include "tfdude/tree/forest.hpp"
+#include "tree/forest.hpp"
 
 #include <limits>
 #include <string>

@@ -9,11 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "tfdude/tree/forest.hpp"
-
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/random.hpp"
+#include "tree/forest.hpp"
 
 namespace tfdude {
 namespace {

@@ -4,12 +4,12 @@
 #include <vector>
 
 #include "tfdude/math/interpolate.hpp"
-#include "tfdude/tree/forest.hpp"
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
+#include "tree/forest.hpp"
 
 // The forest beside one that keeps everything in maps, looks for it anew each time, and knows no limits but by its own
 // arithmetic.

@@ -3,12 +3,12 @@
 #include <vector>
 
 #include "tfdude/math/interpolate.hpp"
-#include "tfdude/tree/forest.hpp"
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
+#include "tree/forest.hpp"
 
 namespace tfdude {
 namespace {

@@ -6,11 +6,10 @@
 #include <thread>
 #include <vector>
 
-#include "tfdude/tree/forest.hpp"
-
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/random.hpp"
+#include "tree/forest.hpp"
 
 // Readers of the past while it is written: rings grow, wrap round, are copied for late samples, and go.
 namespace tfdude {

@@ -5,12 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "tfdude/tree/forest.hpp"
-
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
+#include "tree/forest.hpp"
 
 namespace tfdude {
 namespace {

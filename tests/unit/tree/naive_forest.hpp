@@ -9,7 +9,7 @@
 
 #include <Eigen/Dense>
 
-#include "tfdude/tree/forest.hpp"
+#include "tree/forest.hpp"
 
 namespace tfdude::testing {
 

@@ -5,10 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "tfdude/tree/forest.hpp"
-
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "tree/forest.hpp"
 
 namespace tfdude {
 namespace {

@@ -1,10 +1,9 @@
 #include <chrono>
 
-#include "tfdude/tree/forest.hpp"
-
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
+#include "tree/forest.hpp"
 
 namespace tfdude {
 namespace {

@@ -4,9 +4,8 @@
 #include <thread>
 #include <vector>
 
-#include "tfdude/tree/forest.hpp"
-
 #include "support/catch.hpp"
+#include "tree/forest.hpp"
 
 // Readers of what edges are tied to, while that is said anew, revised and forgotten.
 namespace tfdude {

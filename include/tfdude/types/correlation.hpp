@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tfdude/math/belief.hpp"
+
+namespace tfdude {
+
+/// How an edge's error hangs together with those of other edges. Its covariance is that of its own part.
+struct Correlation {
+  bool unknown = false;       ///< that part may be correlated with anything
+  std::vector<Share> shares;  ///< beside that part
+  /// Edges that observations have left shares of a source in common with; see observe().
+  std::vector<std::string> observed_with;
+
+  [[nodiscard]] bool empty() const { return !unknown && shares.empty() && observed_with.empty(); }
+  friend bool operator==(const Correlation& a, const Correlation& b) {
+    return a.unknown == b.unknown && a.shares == b.shares && a.observed_with == b.observed_with;
+  }
+};
+
+}  // namespace tfdude

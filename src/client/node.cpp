@@ -1,0 +1,34 @@
+#include "tfdude/client/node.hpp"
+
+#include "tfdude/transport/fastdds.hpp"
+
+#include "runtime/participant.hpp"
+
+namespace tfdude {
+
+Result<Node> Node::open(const std::string& partition, const std::vector<FrameSpec>& frames,
+                        const Options& options) {
+  if (auto ok = check_partition_name(partition); !ok) return tl::unexpected(std::move(ok.error()));
+  auto transport = make_fastdds_transport(
+      {options.domain, options.profile, partition, nullptr, options.discovery_server});
+  if (!transport) return tl::unexpected(std::move(transport.error()));
+  return open(*std::move(transport), partition, frames, options);
+}
+
+Result<Node> Node::open(TransportPtr transport, const std::string& partition,
+                        const std::vector<FrameSpec>& frames, const Options& options) {
+  if (auto ok = check_partition_name(partition); !ok) return tl::unexpected(std::move(ok.error()));
+  auto participant = std::make_unique<Participant>(std::move(transport), partition, options);
+  if (auto started = participant->start(); !started)
+    return tl::unexpected(std::move(started.error()));
+  if (auto serving = participant->serve(frames); !serving) {
+    return tl::unexpected(std::move(serving.error()));
+  }
+  return Node(std::move(participant));
+}
+
+std::size_t Node::own_frames() const { return participant_->own_frames(); }
+
+const std::string& Node::partition() const { return participant_->partition_name(); }
+
+}  // namespace tfdude

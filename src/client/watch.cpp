@@ -1,0 +1,26 @@
+#include "tfdude/client/watch.hpp"
+
+#include "runtime/watched_path.hpp"
+
+namespace tfdude {
+
+Result<StampedTransform> PathWatch::lookup(const Query& query) const {
+  return path_->lookup(query);
+}
+
+Result<StampedTransform> PathWatch::at(Time t) const {
+  Query query;
+  query.at = t;
+  return path_->lookup(query);
+}
+
+Result<void> PathWatch::health() const { return path_->health(); }
+
+std::uint64_t PathWatch::messages() const { return path_->messages(); }
+
+bool PathWatch::wait_for_more(std::uint64_t messages,
+                              std::chrono::steady_clock::time_point deadline) const {
+  return path_->wait_for_more(messages, deadline);
+}
+
+}  // namespace tfdude

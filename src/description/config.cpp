@@ -1,0 +1,292 @@
+#include "tfdude/description/config.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "description/config_frames.hpp"
+#include "description/config_urdf.hpp"
+#include "description/file_text.hpp"
+#include "description/yaml_fields.hpp"
+#include "description/yaml_quirks.hpp"
+
+namespace tfdude {
+namespace {
+
+constexpr std::array<std::string_view, 4> kFileKeys = {"partition", "history", "frames", "urdf"};
+constexpr std::array<std::string_view, 10> kFrameKeys = {
+    "id", "parent", "xyz", "rpy", "quat", "stddev", "cov", "history", "correlation", "sources"};
+constexpr std::array<std::string_view, 6> kHistoryKeys = {"span",   "count",     "process_noise",
+                                                          "moving", "max_ahead", "restart_after"};
+
+// Reads what a daemon's file may hold.
+class Reader : public YamlFields {
+ public:
+  using YamlFields::YamlFields;
+
+  [[nodiscard]] Result<Config> config(const YAML::Node& root) const;
+
+ private:
+  [[nodiscard]] Result<void> max_ahead(const Fields& entries, const std::string& what,
+                                       std::chrono::nanoseconds& out) const;
+  [[nodiscard]] Result<EdgeTiming> history(const Field& field, const std::string& place,
+                                           EdgeTiming timing) const;
+  [[nodiscard]] Result<Correlation> correlation(const Fields& entries,
+                                                const std::string& place) const;
+  [[nodiscard]] Result<Share> share(const std::string& source, const Field& field,
+                                    const std::string& place) const;
+  [[nodiscard]] Result<FrameSpec> frame(const YAML::Node& node, std::size_t index,
+                                        const EdgeTiming& timing) const;
+  [[nodiscard]] Result<void> frames(const Field& field, Config& config) const;
+  [[nodiscard]] Result<void> urdfs(const Field& field, Config& config) const;
+};
+
+Result<void> Reader::max_ahead(const Fields& entries, const std::string& what,
+                               std::chrono::nanoseconds& out) const {
+  const auto found = entries.find("max_ahead");
+  if (found == entries.end()) return {};
+  const YAML::Node& value = found->second.value;
+  if (value.IsScalar() && value.Scalar() == "none") {
+    out = std::chrono::nanoseconds::max();
+    return {};
+  }
+  std::optional<double> seconds;
+  if (auto read = number(entries, "max_ahead", what, seconds); !read) return read;
+  constexpr double kLongest = 1e9;
+  if (!(*seconds >= 0 && *seconds <= kLongest)) {
+    return error(Errc::kInvalidInput, found->second.mark,
+                 what + ": max_ahead is not within 0 and 1e9 seconds, nor none");
+  }
+  out = std::chrono::nanoseconds(std::llround(*seconds * 1e9));
+  return {};
+}
+
+// What is left out is as in `timing`.
+Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
+                                   EdgeTiming timing) const {
+  const std::string what = place + ": history";
+  const auto entries = fields(field.value, kHistoryKeys, what);
+  if (!entries) return tl::unexpected(entries.error());
+  std::optional<double> span;
+  std::optional<double> count;
+  std::optional<double> restart;
+  std::optional<std::array<double, 6>> noise;
+  const auto read = number(*entries, "span", what, span)
+                        .and_then([&] { return number(*entries, "count", what, count); })
+                        .and_then([&] { return max_ahead(*entries, what, timing.max_ahead); })
+                        .and_then([&] { return number(*entries, "restart_after", what, restart); })
+                        .and_then([&] { return numbers(*entries, "process_noise", what, noise); })
+                        .and_then([&] { return flag(*entries, "moving", what, timing.moving); });
+  if (!read) return tl::unexpected(read.error());
+  const auto refuse = [&](const std::string& key, const std::string& why) {
+    return error(Errc::kInvalidInput, entries->find(key)->second.mark, what + ": " + key + why);
+  };
+  constexpr double kLongest = 1e6;
+  if (span && !(*span >= 1e-6 && *span <= kLongest)) {
+    return refuse("span", " is not within 1e-6 and 1e6 seconds");
+  }
+  constexpr double kMost = 1U << 24U;
+  if (count && !(*count >= 2 && *count <= kMost && *count == std::floor(*count))) {
+    return refuse("count", " is not a whole number within 2 and 16777216");
+  }
+  if (restart && !(*restart >= 0 && *restart <= kMost && *restart == std::floor(*restart))) {
+    return refuse("restart_after", " is not a whole number within 0 and 16777216");
+  }
+  if (restart) timing.restart_after = static_cast<std::size_t>(*restart);
+  if (span) timing.span = std::chrono::nanoseconds(std::llround(*span * 1e9));
+  if (count) timing.count = static_cast<std::size_t>(*count);
+  if (noise) {
+    const auto rate = Covariance::from_stddev(*noise);
+    if (!rate) return refuse("process_noise", ": " + rate.error().message);
+    timing.process_noise = *rate;
+  }
+  return timing;
+}
+
+// A list of columns, each the error for one standard deviation of one dimension of the source.
+Result<Share> Reader::share(const std::string& source, const Field& field,
+                            const std::string& place) const {
+  const std::string what = place + ": source " + tfdude::quote(source);
+  Share share{source, false, {}};
+  if (!field.value.IsSequence() || field.value.size() == 0) {
+    return error(Errc::kConfig, field.mark, what + " is not a list of columns of 6 numbers");
+  }
+  share.factor.resize(6, static_cast<Eigen::Index>(field.value.size()));
+  for (std::size_t j = 0; j < field.value.size(); ++j) {
+    const YAML::Node column = field.value[j];
+    const std::string nth = what + "[" + std::to_string(j) + "]";
+    if (!column.IsSequence() || column.size() != 6) {
+      return error(Errc::kConfig, column.Mark(), nth + " is not a list of 6 numbers");
+    }
+    for (std::size_t i = 0; i < 6; ++i) {
+      const auto value = number(column[i], nth + "[" + std::to_string(i) + "]");
+      if (!value) return tl::unexpected(value.error());
+      share.factor(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = *value;
+    }
+  }
+  if (auto ok = check_shares({share}); !ok) {
+    return error(Errc::kInvalidInput, field.mark, place + ": " + ok.error().message);
+  }
+  if (!is_observed(share)) return share;
+  return error(Errc::kInvalidInput, field.mark, what + ": such names are given to observations");
+}
+
+Result<Correlation> Reader::correlation(const Fields& entries, const std::string& place) const {
+  Correlation correlation;
+  if (const auto found = entries.find("correlation"); found != entries.end()) {
+    const auto said = text(found->second, place + ": correlation");
+    if (!said) return tl::unexpected(said.error());
+    if (*said != "unknown" && *said != "independent") {
+      return error(Errc::kInvalidInput, found->second.mark,
+                   place + ": correlation is neither unknown nor independent");
+    }
+    correlation.unknown = *said == "unknown";
+  }
+  if (const auto found = entries.find("sources"); found != entries.end()) {
+    const auto sources = fields(found->second.value, place + ": sources");
+    if (!sources) return tl::unexpected(sources.error());
+    for (const auto& [source, field] : *sources) {
+      auto one = share(source, field, place);
+      if (!one) return tl::unexpected(std::move(one.error()));
+      correlation.shares.push_back(*std::move(one));
+    }
+  }
+  return correlation;
+}
+
+Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index,
+                                const EdgeTiming& timing) const {
+  const std::string nth = "frames[" + std::to_string(index) + "]";
+  // The message of a bad key names the frame too, where the id can be made out.
+  const auto is_id = [](const auto& entry) {
+    return entry.first.IsScalar() && entry.first.Scalar() == "id";
+  };
+  std::string place = nth;
+  if (node.IsMap()) {
+    const auto found = std::find_if(node.begin(), node.end(), is_id);
+    if (found != node.end() && found->second.IsScalar() && check_id(found->second.Scalar(), "id")) {
+      place = "frame " + tfdude::quote(found->second.Scalar());
+    }
+  }
+  const auto entries = fields(node, kFrameKeys, place);
+  if (!entries) return tl::unexpected(entries.error());
+  if (entries->find("id") == entries->end()) {
+    return error(Errc::kConfig, node.Mark(), place + ": id is missing");
+  }
+  FrameSpec spec;
+  auto own_id = id(*entries, "id", place);
+  if (!own_id) return tl::unexpected(own_id.error());
+  spec.id = *std::move(own_id);
+  if (entries->find("parent") != entries->end()) {
+    auto parent = id(*entries, "parent", place);
+    if (!parent) return tl::unexpected(parent.error());
+    spec.parent = *std::move(parent);
+  }
+  auto X_PC = transform(node, *entries, place);
+  if (!X_PC) return tl::unexpected(X_PC.error());
+  spec.X_PC = *X_PC;
+  if (const auto found = entries->find("history"); found != entries->end()) {
+    auto own = history(found->second, place, timing);
+    if (!own) return tl::unexpected(own.error());
+    spec.timing = *own;
+  }
+  auto ties = correlation(*entries, place);
+  if (!ties) return tl::unexpected(std::move(ties.error()));
+  spec.correlation = *std::move(ties);
+  return spec;
+}
+
+Result<Config> Reader::config(const YAML::Node& root) const {
+  const auto entries = fields(root, kFileKeys, "the file");
+  if (!entries) return tl::unexpected(entries.error());
+  Config config;
+  if (const auto found = entries->find("partition"); found != entries->end()) {
+    auto name = text(found->second, "partition");
+    if (!name) return tl::unexpected(name.error());
+    if (const auto ok = check_partition_name(*name); !ok) {
+      return error(ok.error().code, found->second.mark, ok.error().message);
+    }
+    config.partition = *std::move(name);
+  }
+  if (const auto found = entries->find("history"); found != entries->end()) {
+    auto timing = history(found->second, "the file", config.history);
+    if (!timing) return tl::unexpected(timing.error());
+    config.history = *timing;
+  }
+  if (const auto found = entries->find("frames"); found != entries->end()) {
+    if (auto ok = frames(found->second, config); !ok) return tl::unexpected(ok.error());
+  }
+  if (const auto found = entries->find("urdf"); found != entries->end()) {
+    if (auto ok = urdfs(found->second, config); !ok) return tl::unexpected(ok.error());
+  }
+  return config;
+}
+
+Result<void> Reader::frames(const Field& field, Config& config) const {
+  const YAML::Node& list = field.value;
+  if (!list.IsSequence()) return error(Errc::kConfig, field.mark, "frames is not a list");
+  std::unordered_map<std::string, int> line_of;
+  for (const YAML::Node& node : list) {
+    auto spec = frame(node, config.frames.size(), config.history);
+    if (!spec) return tl::unexpected(spec.error());
+    const auto [known, fresh] = line_of.emplace(spec->id, node.Mark().line + 1);
+    if (!fresh) {
+      return error(Errc::kInvalidInput, node.Mark(),
+                   "frame " + tfdude::quote(spec->id) + ": id is taken by the frame in line " +
+                       std::to_string(known->second));
+    }
+    config.frames.push_back(*std::move(spec));
+    config.places.push_back(place(node.Mark()));
+  }
+  return check_no_cycle(config);
+}
+
+Result<void> Reader::urdfs(const Field& field, Config& config) const {
+  const YAML::Node& list = field.value;
+  if (!list.IsSequence()) return error(Errc::kConfig, field.mark, "urdf is not a list");
+  const UrdfFields reader(name(), std::filesystem::path(name()).parent_path().string());
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const YAML::Node node = list[i];
+    const std::string nth = "urdf[" + std::to_string(i) + "]";
+    const auto part = reader.part(node, nth);
+    if (!part) return tl::unexpected(part.error());
+    if (auto ok = add_urdf(config, *part); !ok) {
+      return error(ok.error().code, node.Mark(), nth + ": " + ok.error().message);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Config> parse_config(const std::string& text, const std::string& name) {
+  const Reader reader(name);
+  if (auto ok = check_bytes(name, text); !ok) return tl::unexpected(ok.error());
+  try {
+    const YAML::Node document = YAML::Load(text);
+    if (const auto second = second_document(text)) {
+      return reader.error(Errc::kConfig, *second, "holds more than one YAML document");
+    }
+    if (document.IsNull()) return fail(Errc::kConfig, name + ": is empty");
+    return reader.config(document);
+  } catch (const YAML::Exception& e) {
+    return reader.error(Errc::kConfig, e.mark, "not YAML: " + printable(e.msg));
+  } catch (const std::exception& e) {
+    return fail(Errc::kConfig, name + ": " + e.what());
+  }
+}
+
+Result<Config> load_config(const std::string& path) {
+  const auto text = read_text(path);
+  if (!text) return tl::unexpected(text.error());
+  return parse_config(*text, path);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,28 @@
+#pragma once
+
+#include "tfdude/description/urdf.hpp"
+
+#include "description/yaml_fields.hpp"
+
+namespace tfdude {
+
+/// Reads the entries of a configuration's key `urdf`.
+class UrdfFields : public YamlFields {
+ public:
+  /// @param folder  of the YAML file, which relative paths begin at
+  UrdfFields(std::string name, std::string folder)
+      : YamlFields(std::move(name)), folder_(std::move(folder)) {}
+
+  [[nodiscard]] Result<UrdfPart> part(const YAML::Node& node, const std::string& place) const;
+
+ private:
+  [[nodiscard]] Result<void> stand(const YAML::Node& node, const Fields& entries,
+                                   const std::string& place, UrdfPart& part) const;
+  [[nodiscard]] Result<void> links(const Fields& entries, const std::string& place,
+                                   UrdfPart& part) const;
+  [[nodiscard]] Result<UrdfJoint> joint(const YAML::Node& node, const std::string& place) const;
+
+  std::string folder_;
+};
+
+}  // namespace tfdude

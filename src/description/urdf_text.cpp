@@ -1,0 +1,213 @@
+#include "description/urdf_text.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstring>
+#include <string_view>
+#include <tinyxml2.h>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+namespace {
+
+using tinyxml2::XMLElement;
+
+// What urdfdom is shown of a joint's elements.
+struct Kept {
+  const char* element;
+  std::vector<const char*> attributes;
+};
+
+bool moves(std::string_view type) {
+  return type != "fixed" && type != "floating" && type != "planar";
+}
+
+std::vector<Kept> kept_of(std::string_view type) {
+  std::vector<Kept> kept = {{"origin", {"xyz", "rpy"}}, {"parent", {"link"}}, {"child", {"link"}}};
+  if (!moves(type)) return kept;
+  kept.push_back({"axis", {"xyz"}});
+  if (type != "continuous") kept.push_back({"limit", {"lower", "upper"}});
+  kept.push_back({"mimic", {"joint", "multiplier", "offset"}});
+  return kept;
+}
+
+// The first element of xacro, which is of another language.
+class XacroSearch final : public tinyxml2::XMLVisitor {
+ public:
+  [[nodiscard]] const XMLElement* found() const { return found_; }
+
+  bool VisitEnter(const XMLElement& element, const tinyxml2::XMLAttribute* /*first*/) override {
+    if (std::strncmp(element.Name(), "xacro:", 6) == 0) found_ = &element;
+    return found_ == nullptr;
+  }
+
+ private:
+  const XMLElement* found_ = nullptr;
+};
+
+// As XML has it: a tab or new line within an attribute is a space. Empty where there is none.
+std::string attribute(const XMLElement& element, const char* name) {
+  const char* value = element.Attribute(name);
+  std::string text = value == nullptr ? "" : value;
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '\t' || c == '\n' || c == '\r'; }, ' ');
+  return text;
+}
+
+std::string described(const char* kind, const std::string& name) {
+  return std::string(kind) + " " + quote(name);
+}
+
+// "XML_ERROR_MISMATCHED_ELEMENT" in the way of all messages.
+std::string reason(const tinyxml2::XMLDocument& document) {
+  std::string name = document.ErrorName();
+  constexpr std::string_view kStart = "XML_ERROR_";
+  if (name.rfind(kStart, 0) == 0) name.erase(0, kStart.size());
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) {
+    return c == '_' ? ' ' : static_cast<char>(std::tolower(c));
+  });
+  return name;
+}
+
+class TextReader {
+ public:
+  TextReader(UrdfText& text, const std::string& file) : text_(text), file_(file) {}
+
+  [[nodiscard]] Result<void> robot(const XMLElement& robot) {
+    printer_.OpenElement("robot");
+    printer_.PushAttribute("name", "robot");
+    for (const auto* element = robot.FirstChildElement(); element != nullptr;
+         element = element->NextSiblingElement()) {
+      const std::string_view kind = element->Name();
+      auto read = kind == "link"    ? link(*element)
+                  : kind == "joint" ? joint(*element)
+                                    : Result<void>();
+      if (!read) return read;
+    }
+    printer_.CloseElement();
+    text_.cleaned = printer_.CStr();
+    return {};
+  }
+
+ private:
+  [[nodiscard]] tl::unexpected<Error> error(const XMLElement& element,
+                                            const std::string& message) const {
+    return urdf_error(Errc::kInvalidInput, file_, element.GetLineNum(), message);
+  }
+
+  void push(const XMLElement& element, const char* name) {
+    if (element.Attribute(name) == nullptr) return;
+    printer_.PushAttribute(name, attribute(element, name).c_str());
+  }
+
+  [[nodiscard]] Result<void> link(const XMLElement& element) {
+    text_.links.push_back({attribute(element, "name"), element.GetLineNum()});
+    if (text_.links.back().name.empty()) return error(element, "a link has no name");
+    printer_.OpenElement("link");
+    push(element, "name");
+    printer_.CloseElement();
+    return {};
+  }
+
+  [[nodiscard]] Result<void> joint(const XMLElement& element) {
+    UrdfText::Joint joint{attribute(element, "name"), element.GetLineNum(), {}, {}};
+    if (joint.name.empty()) return error(element, "a joint has no name");
+    const std::string what = described("joint", joint.name);
+    printer_.OpenElement("joint");
+    push(element, "name");
+    push(element, "type");
+    for (const Kept& kept : kept_of(attribute(element, "type"))) {
+      const auto* part = element.FirstChildElement(kept.element);
+      if (part == nullptr) continue;
+      if (const auto* again = part->NextSiblingElement(kept.element)) {
+        return error(*again, what + ": <" + kept.element + "> is given twice");
+      }
+      // A later URDF's; to pass over it would turn the frame.
+      if (part->Attribute("quat_xyzw") != nullptr) {
+        return error(*part, what + ": quat_xyzw is not known; give rpy");
+      }
+      if (auto ok = push_part(*part, kept, what); !ok) return ok;
+      if (kept.element == std::string_view("parent")) joint.parent = attribute(*part, "link");
+      if (kept.element == std::string_view("child")) joint.child = attribute(*part, "link");
+    }
+    printer_.CloseElement();
+    if (joint.parent.empty()) return error(element, what + ": has no <parent link=\"...\">");
+    if (joint.child.empty()) return error(element, what + ": has no <child link=\"...\">");
+    text_.joints.push_back(std::move(joint));
+    return {};
+  }
+
+  [[nodiscard]] Result<void> push_part(const XMLElement& part, const Kept& kept,
+                                       const std::string& what) {
+    printer_.OpenElement(kept.element);
+    for (const char* name : kept.attributes) {
+      // urdfdom logs a bad number as a format for printf.
+      const std::string value = attribute(part, name);
+      const bool names = std::strcmp(name, "link") == 0 || std::strcmp(name, "joint") == 0;
+      if (!names && value.find('%') != std::string::npos) {
+        return error(part, what + ": " + name + " is " + quote(value) + ", which is no number");
+      }
+      push(part, name);
+    }
+    if (kept.element == std::string_view("limit")) {
+      // urdfdom insists on them.
+      printer_.PushAttribute("effort", "0");
+      printer_.PushAttribute("velocity", "0");
+    }
+    printer_.CloseElement();
+    return {};
+  }
+
+  UrdfText& text_;
+  const std::string& file_;
+  tinyxml2::XMLPrinter printer_;
+};
+
+}  // namespace
+
+tl::unexpected<Error> urdf_error(Errc code, const std::string& file, int line,
+                                 const std::string& message) {
+  const std::string place = line > 0 ? ":" + std::to_string(line) : "";
+  return fail(code, file + place + ": " + message);
+}
+
+Result<UrdfText> read_urdf_text(const std::string& text, const std::string& file) {
+  if (const auto zero = text.find('\0'); zero != std::string::npos) {
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<long>(zero), '\n');
+    return urdf_error(Errc::kConfig, file, static_cast<int>(line), "not XML: holds a zero byte");
+  }
+  tinyxml2::XMLDocument document;
+  if (document.Parse(text.data(), text.size()) == tinyxml2::XML_ERROR_EMPTY_DOCUMENT) {
+    return fail(Errc::kConfig, file + ": is empty");
+  }
+  if (document.Error()) {
+    return urdf_error(Errc::kConfig, file, document.ErrorLineNum(), "not XML: " + reason(document));
+  }
+  const XMLElement* robot = document.RootElement();
+  if (robot == nullptr) return fail(Errc::kConfig, file + ": has no element <robot>");
+  if (std::strcmp(robot->Name(), "robot") != 0) {
+    return urdf_error(Errc::kConfig, file, robot->GetLineNum(),
+                      "not a URDF: <" + printable(robot->Name()) + "> instead of <robot>");
+  }
+  if (const auto* second = robot->NextSiblingElement()) {
+    return urdf_error(Errc::kConfig, file, second->GetLineNum(),
+                      "not XML: <" + printable(second->Name()) + "> after the end of <robot>");
+  }
+  XacroSearch search;
+  robot->Accept(&search);
+  if (search.found() != nullptr) {
+    return urdf_error(Errc::kConfig, file, search.found()->GetLineNum(),
+                      "<" + printable(search.found()->Name()) +
+                          "> is of xacro: run xacro first, and give what it makes of this file");
+  }
+  UrdfText found;
+  if (auto ok = TextReader(found, file).robot(*robot); !ok) return tl::unexpected(ok.error());
+  if (found.links.empty()) {
+    return urdf_error(Errc::kInvalidInput, file, robot->GetLineNum(), "has no links");
+  }
+  return found;
+}
+
+}  // namespace tfdude

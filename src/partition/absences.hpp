@@ -1,0 +1,80 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tfdude/base/time.hpp"
+
+#include "partition/messages.hpp"
+
+namespace tfdude {
+
+/// Whom a participant misses: what it noticed itself, what others have told it, and what an earlier process of its
+/// partition has left. Short silences are told apart from absences, which have consequences. Not thread-safe.
+class Absences {
+ public:
+  using Steady = std::chrono::steady_clock::time_point;
+
+  /// A silence is an absence, and one that has stopped counts as outlived, once it has lasted for this long after it
+  /// was noticed. Else who has hung itself, and then hears at once how another stopped and started again, would seem to
+  /// have outlived that.
+  static constexpr std::chrono::milliseconds kGrace{500};
+
+  /// How many are kept. The oldest go first.
+  static constexpr std::size_t kMost = 256;
+
+  /// A partition that was there is not heard any more, or has said that it ends.
+  void went(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now);
+
+  /// Another one misses a partition that was not met here. What is only told counts once it has stood for kGrace: else
+  /// who has hung itself, and hears late what others said meanwhile, would take it for its own experience.
+  void told(const Absent& absent);
+  /// It was missed when this process's predecessor ended.
+  void resume(const Absent& absent);
+
+  /// It is there. @return whether it was missed
+  bool returned(const std::string& partition);
+
+  /// Of one that is back: nothing that it claims is this participant's any more.
+  void settled(const std::string& partition);
+
+  /// Nothing is to be kept of a partition that is not there.
+  void forget(const std::string& partition, std::uint64_t incarnation, Time now);
+
+  /// To be called at least twice in kGrace while any_silent(): time in which it was not does not count.
+  /// @return those who have been away for long enough now
+  std::vector<std::string> look(Steady now);
+
+  [[nodiscard]] bool any_silent() const;
+  [[nodiscard]] std::vector<std::string> back() const;
+  [[nodiscard]] std::optional<Absent> find(const std::string& partition) const;
+
+  /// Sorted by name; without what was told just now.
+  [[nodiscard]] std::vector<Absent> all() const;
+
+  /// Whether an absence of this kind gives who notices it the frames that both claim.
+  [[nodiscard]] static bool outlived(Absent::Kind kind) {
+    return kind == Absent::Kind::kLost || kind == Absent::Kind::kStopped ||
+           kind == Absent::Kind::kBack;
+  }
+
+ private:
+  struct Missed {
+    Absent absent;
+    Absent::Kind then;              // what a silence becomes
+    std::optional<Steady> noticed;  // of a silence
+    bool hearsay = false;           // is not told on
+  };
+  void put(const std::string& partition, std::uint64_t incarnation, Time now, Absent::Kind kind,
+           Absent::Kind then);
+  void limit();
+
+  std::map<std::string, Missed> missed_;
+  std::optional<Steady> looked_;
+};
+
+}  // namespace tfdude

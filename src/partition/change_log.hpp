@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "tfdude/base/time.hpp"
+#include "tfdude/types/change.hpp"
+
+#include "partition/messages.hpp"
+
+namespace tfdude {
+
+/// The conflict that a note tells of. @param partition  whose note it is
+[[nodiscard]] Change conflict_of(const Note& note, const std::string& partition);
+
+/// That the history of an edge has started again. @param partition  its owner
+[[nodiscard]] Change restarted(const HistoryRestart& restart, const std::string& partition);
+
+/// That a frame waits for its parent. @param partition  the frame's owner @param dropped_by  who had the parent
+[[nodiscard]] Change orphan_of(const FrameInfo& frame, const std::string& partition,
+                               const std::string& dropped_by);
+
+/// What happened, in the order in which it did, for those who want to know. Not thread-safe.
+class ChangeLog {
+ public:
+  /// Nothing is kept before somebody wants it.
+  void watch() { watched_ = true; }
+  [[nodiscard]] bool watched() const { return watched_; }
+
+  void partition_up(const std::string& partition, const std::string& host, std::uint32_t pid);
+  void partition_down(const std::string& partition, bool stopped);
+  void frame_added(std::string_view id, std::string_view parent, const std::string& partition);
+  void frame_moved(std::string_view id, std::string_view parent, const std::string& partition);
+  /// @param before  the partition that had it, and is not there
+  void frame_taken_over(std::string_view id, std::string_view parent, const std::string& partition,
+                        const std::string& before);
+  void frame_removed(std::string_view id, const std::string& partition);
+
+  /// A conflict, or an orphan, is kept always: whoever it concerns logs it.
+  void add(Change change) { changes_.push_back(std::move(change)); }
+
+  [[nodiscard]] std::vector<Change> take() { return std::exchange(changes_, {}); }
+
+ private:
+  bool watched_ = false;
+  std::vector<Change> changes_;
+};
+
+}  // namespace tfdude

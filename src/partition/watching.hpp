@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "partition/messages.hpp"
+#include "tree/forest.hpp"
+
+namespace tfdude {
+
+/// Whether that can be watched. @return kInvalidInput (the period).
+[[nodiscard]] Result<void> check_watch(const WatchRequest& request);
+
+/// An owner's side of one group of watchers: which of what they watch they have not been sent yet. Not thread-safe; the
+/// forest is.
+class WatchedGroup {
+ public:
+  WatchedGroup(std::uint64_t id, WatchRequest request);
+
+  [[nodiscard]] const WatchRequest& request() const { return request_; }
+
+  /// All that is watched, as it is now; does not change what news() tells.
+  /// @param from  as WatchRequest::from; of more samples than a message holds only the newest are told
+  /// @return kNotOwner (naming the frame) where an edge is not held, or hangs elsewhere.
+  [[nodiscard]] Result<State> snapshot(const Forest& forest, std::optional<Time> from) const;
+
+  /// What was written since the last call: all samples, or the newest of each edge where the watchers want them at a
+  /// lower rate. Edges that are not held, or hang elsewhere, are left out.
+  [[nodiscard]] State news(const Forest& forest);
+
+ private:
+  [[nodiscard]] std::vector<EdgeCursor> fresh_cursors() const;
+  [[nodiscard]] Result<State> composed(const Forest& forest, std::optional<Time> from) const;
+  [[nodiscard]] State composed_news(const Forest& forest);
+
+  std::uint64_t id_;
+  WatchRequest request_;
+  std::uint64_t told_ = 0;                 // the commit of the last news
+  std::vector<EdgeCursor> cursors_;        // by edge
+  std::vector<std::optional<News>> sent_;  // by composed segment
+};
+
+/// The state in pieces that each fit into a message.
+[[nodiscard]] std::vector<State> pieces_of(State&& state);
+
+/// Puts pieces together again, that come in order or not at all.
+class StatePieces {
+ public:
+  /// @return the state, once its last piece has come
+  [[nodiscard]] std::optional<State> add(const State& piece);
+
+ private:
+  State whole_;
+  std::uint32_t next_ = 0;
+};
+
+}  // namespace tfdude

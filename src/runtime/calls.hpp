@@ -1,0 +1,94 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "partition/messages.hpp"
+
+namespace tfdude {
+
+/// The requests that wait for their replies. A call asks several partitions at once and waits for all.
+/// @par Thread safety  All functions; a Call belongs to the thread that waits for it.
+class Calls {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  struct Entry {
+    std::string partition;
+    std::uint32_t sequence = 0;
+    std::optional<Reply> reply;
+  };
+
+  /// Registered with Calls from begin() until it is destroyed.
+  class Call {
+   public:
+    /// @param arrived  told once all replies have come, by the thread that brought the last, without a lock; maybe also
+    ///   when this has been destroyed meanwhile
+    Call(Calls& calls, const std::vector<std::string>& partitions,
+         std::function<void()> arrived = {});
+    ~Call();
+    Call(const Call&) = delete;
+    Call& operator=(const Call&) = delete;
+
+    [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
+
+    /// The lowest number of which anybody here awaited a reply as this call began.
+    [[nodiscard]] std::uint64_t awaits_from() const { return awaits_from_; }
+
+    /// Waits until all replies have come; false at the deadline.
+    [[nodiscard]] bool wait_until(Clock::time_point deadline);
+
+    /// Whether this entry still lacks its reply.
+    [[nodiscard]] bool waits(std::size_t entry) const;
+
+    /// Ends the wait for one entry without a reply from outside.
+    void give_up(std::size_t entry, Error error);
+
+   private:
+    friend class Calls;
+    [[nodiscard]] bool complete() const;
+
+    Calls& calls_;
+    std::vector<Entry> entries_;
+    std::uint64_t awaits_from_ = 0;
+    std::condition_variable* arrived_;
+    const std::function<void()> tell_;
+  };
+
+  /// A reply came; unknown and repeated ones are dropped.
+  void on_reply(const Reply& reply);
+
+  /// A partition has gone: what waits for it fails now.
+  void on_lost(const std::string& partition);
+
+ private:
+  struct Waiting {
+    Call* call;
+    std::size_t entry;
+  };
+  using Signal = std::condition_variable;
+
+  mutable std::mutex mutex_;
+  // Counted on where the number that travels begins anew, so that the lowest is the oldest.
+  using Number = std::uint64_t;
+  [[nodiscard]] Number number_of(std::uint32_t sequence) const {
+    return last_ - (static_cast<std::uint32_t>(last_) - sequence);
+  }
+
+  Number last_ = 0;
+  std::map<Number, Waiting> waiting_;
+  // Signals outlive their calls, so that they are given without the mutex: else whoever wakes meets it taken and
+  // sleeps once more, 2 us on one processor. A call may find another's signal: it looks again.
+  std::vector<std::unique_ptr<Signal>> signals_;
+  std::vector<Signal*> idle_signals_;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,175 @@
+#include "runtime/commit_loop.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/log.hpp"
+
+namespace tfdude {
+namespace {
+
+// What a requester is told of whose change, or of what its refusal rests on, nothing is stored.
+Error unsaved(const Reply& reply, const Error& why) {
+  const auto* error = std::get_if<Error>(&reply.body);
+  if (error != nullptr) return error->code == Errc::kState ? *error : why;
+  if (why.code != Errc::kState) return why;
+  return {why.code,
+          "changed, but not stored, and others are not told before it is: " + why.message};
+}
+
+}  // namespace
+
+CommitLoop::CommitLoop(std::unique_ptr<StateStore> store, Effects& effects, Periods periods)
+    : store_(std::move(store)), effects_(effects), periods_(periods) {}
+
+Result<void> CommitLoop::start(const std::vector<FrameSpec>& configured) {
+  if (auto stored = commit(); !stored) return stored;
+  // None says nothing: what the last one said is still what was taken.
+  if (store_ != nullptr && !configured.empty()) {
+    if (auto stored = store_->save_configured(configured); !stored) return stored;
+  }
+  next_values_ = Clock::now() + periods_.values;
+  thread_ = std::thread([this] { run(); });
+  return {};
+}
+
+void CommitLoop::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_one();
+  if (thread_.joinable()) thread_.join();
+}
+
+void CommitLoop::ask() {
+  if (asked_.exchange(true)) return;
+  // The lock keeps the notice from falling between the thread's look and its sleep.
+  { const std::lock_guard lock(mutex_); }
+  changed_.notify_one();
+}
+
+void CommitLoop::reply(PendingReply reply) {
+  {
+    const std::lock_guard lock(mutex_);
+    const auto key = std::make_pair(reply.to, reply.reply.sequence);
+    waiting_.emplace(key, std::move(reply));
+  }
+  changed_.notify_one();
+}
+
+Result<void> CommitLoop::flush(Clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  const std::uint64_t mine = ++wanted_;
+  changed_.notify_one();
+  const bool in_time =
+      done_.wait_until(lock, deadline, [&] { return ended_ || done_up_to_ >= mine; });
+  if (stored_up_to_ >= mine) return {};
+  if (!in_time) return fail(Errc::kTimeout, "changed, but not stored within the time for it");
+  if (failure_) return tl::unexpected(unsaved(Reply{}, *failure_));
+  return fail(Errc::kState, "changed, but not stored: this process leaves");
+}
+
+std::optional<Error> CommitLoop::failure() const {
+  if (!failing_.load(std::memory_order_relaxed)) return std::nullopt;
+  const std::lock_guard lock(mutex_);
+  return failure_;
+}
+
+void CommitLoop::run() {
+  std::unique_lock lock(mutex_);
+  while (!stopping_) {
+    const auto next = next_round();
+    if (next && *next <= Clock::now()) {
+      round(lock);
+    } else if (next) {
+      changed_.wait_until(lock, *next);
+    } else {
+      changed_.wait(lock);
+    }
+  }
+  next_values_ = {};
+  round(lock);
+  ended_ = true;
+  done_.notify_all();
+}
+
+// Under the lock. Nothing where there is nothing to do.
+std::optional<CommitLoop::Clock::time_point> CommitLoop::next_round() const {
+  if (!waiting_.empty() || wanted_ > done_up_to_) return Clock::time_point{};
+  std::optional<Clock::time_point> next;
+  if (asked_.load() || failure_) next = next_commit_;
+  if (store_ != nullptr) next = next ? std::min(*next, next_values_) : next_values_;
+  return next;
+}
+
+void CommitLoop::round(std::unique_lock<std::mutex>& lock) {
+  // Before anything is taken: what these wait for was changed before they came.
+  const Replies replies = std::exchange(waiting_, {});
+  const std::uint64_t wanted = wanted_;
+  const bool failed = failure_.has_value();
+  lock.unlock();
+  // Before the commit is taken, so that what changes meanwhile is not missed.
+  asked_.store(false);
+  Result<void> stored = commit();
+  if (!stored) note(stored);
+  for (const auto& [key, pending] : replies) {
+    PendingReply told = pending;
+    if (!stored) told.reply.body = unsaved(pending.reply, stored.error());
+    effects_.reply(told);
+  }
+  Result<void> values;
+  if (store_ != nullptr && (failed || Clock::now() >= next_values_)) {
+    values = save_values();
+    next_values_ = Clock::now() + periods_.values;
+  }
+  note(stored ? values : stored);
+  lock.lock();
+  next_commit_ = Clock::now() + (failure_ ? periods_.retry : periods_.publish);
+  done_up_to_ = wanted;
+  if (stored) stored_up_to_ = wanted;
+  done_.notify_all();
+}
+
+Result<void> CommitLoop::commit() {
+  const Commit commit = effects_.take();
+  Result<void> stored;
+  if (commit.refused) {
+    stored = tl::unexpected(*commit.refused);
+  } else if (store_ != nullptr && !commit.change.empty()) {
+    stored = store_->save(commit.change);
+  }
+  if (stored || commit.refused) {
+    effects_.publish(commit);
+  } else {
+    effects_.take_back(commit);
+  }
+  return stored;
+}
+
+Result<void> CommitLoop::save_values() {
+  const ChangedValues values = effects_.take_values();
+  if (values.edges.empty()) return {};
+  auto stored = store_->save_values(values.edges, values.joints);
+  if (!stored) effects_.take_back(values);
+  return stored;
+}
+
+// What stands in the log is the beginning and the end of it, not each attempt. A commit that was refused says nothing
+// of the store.
+void CommitLoop::note(const Result<void>& stored) {
+  if (!stored && stored.error().code != Errc::kState) return;
+  std::optional<Error> before;
+  {
+    const std::lock_guard lock(mutex_);
+    before = failure_;
+    failure_ = stored ? std::nullopt : std::optional<Error>(stored.error());
+    failing_.store(failure_.has_value());
+  }
+  if (!stored && (!before || before->message != stored.error().message)) {
+    log().error("{}", stored.error().message);
+  }
+  if (stored && before) log().warn("what could not be stored is stored now");
+}
+
+}  // namespace tfdude

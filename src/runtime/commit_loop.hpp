@@ -1,0 +1,136 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "partition/messages.hpp"
+#include "partition/state_store.hpp"
+
+namespace tfdude {
+
+/// What is stored, and then told, as one.
+struct Commit {
+  StateChange change{};                ///< stored before anything is told
+  std::vector<Page> pages{};           ///< published once that is done,
+  std::optional<Presence> presence{};  ///< and announced after them
+  /// Why none of it counts any more: nothing is stored, and whoever waits for a reply is told so.
+  std::optional<Error> refused{};
+};
+
+/// Values of edges and joints that nobody waits for.
+struct ChangedValues {
+  std::vector<ChangedEdge> edges{};
+  std::vector<StoredJoint> joints{};
+  std::uint64_t since = 0;  ///< the commit up to which the values before were taken
+};
+
+/// The reply to a request that may have changed something.
+struct PendingReply {
+  PeerId to{};
+  Reply reply{};
+  std::string what{};  ///< for the log; empty: nothing to log
+};
+
+/// Performs what changes of a partition bring about, in this order: stores them, publishes them, replies. All of it on
+/// one thread, the only one that waits for the disk; what has come together meanwhile is stored as one.
+///
+/// Where something could not be stored, nothing of it is published, and whoever asked for it gets kState. It is tried
+/// again until it succeeds; meanwhile failure() says why further changes should be refused.
+///
+/// @par Thread safety  All functions, but start(), which comes before stop().
+class CommitLoop {
+ public:
+  using Clock = std::chrono::steady_clock;
+  using Milliseconds = std::chrono::milliseconds;
+
+  /// Whose changes they are. Called on the loop's thread, which holds no lock; by start() on its caller's.
+  class Effects {
+   public:
+    virtual ~Effects() = default;
+    /// All that is to be stored or told since the last call. What follows it is publish() or take_back().
+    [[nodiscard]] virtual Commit take() = 0;
+    virtual void publish(const Commit& commit) = 0;
+    /// It could not be stored: the next take() gives it again.
+    virtual void take_back(const Commit& commit) = 0;
+    [[nodiscard]] virtual ChangedValues take_values() = 0;
+    virtual void take_back(const ChangedValues& values) = 0;
+    virtual void reply(const PendingReply& reply) = 0;
+  };
+
+  struct Periods {
+    Milliseconds publish{1};    ///< how often at most own changes are told
+    Milliseconds values{1000};  ///< how often values that nobody waits for are stored
+    Milliseconds retry{200};    ///< how often what could not be stored is tried again by itself
+  };
+
+  /// @param store  null: nothing is kept
+  CommitLoop(std::unique_ptr<StateStore> store, Effects& effects, Periods periods);
+  ~CommitLoop() { stop(); }
+  CommitLoop(const CommitLoop&) = delete;
+  CommitLoop& operator=(const CommitLoop&) = delete;
+
+  /// Stores and tells what there is, with the configuration that it came from, on the caller's thread; then begins.
+  /// @return kState; then it has not begun.
+  [[nodiscard]] Result<void> start(const std::vector<FrameSpec>& configured);
+
+  /// Stores and tells what there is, and ends. What comes later is not done.
+  void stop();
+
+  /// Has what was changed stored and told soon. Whoever asks a million times a second pays nanoseconds.
+  void ask();
+  /// Whether what was asked for has not begun yet.
+  [[nodiscard]] bool pending() const { return asked_.load(); }
+
+  /// Replies once all that was changed before this call is stored and told. A second reply to a request that waits for
+  /// its first is dropped.
+  void reply(PendingReply reply);
+
+  /// Waits until all that was changed before this call is stored and told. @return kState, kTimeout.
+  [[nodiscard]] Result<void> flush(Clock::time_point deadline);
+
+  [[nodiscard]] bool stores() const { return store_ != nullptr; }
+  /// Why nothing should be changed now; nothing where all is well.
+  [[nodiscard]] std::optional<Error> failure() const;
+
+ private:
+  using Replies = std::map<std::pair<PeerId, std::uint32_t>, PendingReply>;
+
+  void run();
+  [[nodiscard]] std::optional<Clock::time_point> next_round() const;
+  void round(std::unique_lock<std::mutex>& lock);
+  [[nodiscard]] Result<void> commit();
+  [[nodiscard]] Result<void> save_values();
+  void note(const Result<void>& stored);
+
+  const std::unique_ptr<StateStore> store_;
+  Effects& effects_;
+  const Periods periods_;
+  Clock::time_point next_commit_{};  // of own changes
+  Clock::time_point next_values_{};
+  std::atomic<bool> asked_{false};
+  std::atomic<bool> failing_{false};  // whether there is a failure_
+
+  mutable std::mutex mutex_;  // all below
+  std::condition_variable changed_;
+  std::condition_variable done_;
+  Replies waiting_;
+  std::uint64_t wanted_ = 0;  // calls of flush(),
+  std::uint64_t done_up_to_ = 0;
+  std::uint64_t stored_up_to_ = 0;
+  std::optional<Error> failure_;
+  bool stopping_ = false;
+  bool ended_ = false;
+  std::thread thread_;  // last: it uses the rest
+};
+
+}  // namespace tfdude

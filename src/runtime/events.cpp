@@ -1,0 +1,134 @@
+#include "runtime/events.hpp"
+
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace tfdude {
+namespace {
+
+/// A change, and the last of those who listened when it happened.
+struct Waiting {
+  Change change;
+  std::uint64_t last_subscriber = 0;
+};
+
+}  // namespace
+
+struct Events::State {
+  /// The next change to be told; nothing at the end.
+  [[nodiscard]] std::optional<Waiting> next(std::unique_lock<std::mutex>& lock);
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::map<std::uint64_t, std::shared_ptr<const Callback>> subscribers;
+  std::uint64_t last_subscriber = 0;
+  std::uint64_t running = 0;  // the subscriber that is being told
+  std::thread::id teller;
+  std::deque<Waiting> waiting;
+  std::size_t missed = 0;
+  bool stopping = false;
+};
+
+Events::Events() : state_(std::make_shared<State>()) {}
+
+Events::~Events() { stop(); }
+
+std::uint64_t Events::subscribe(Callback callback) {
+  const std::lock_guard lock(state_->mutex);
+  const std::uint64_t subscriber = ++state_->last_subscriber;
+  if (state_->stopping) return subscriber;
+  if (!thread_.joinable()) {
+    thread_ = std::thread([state = state_] { run(*state); });
+    state_->teller = thread_.get_id();
+  }
+  state_->subscribers.emplace(subscriber, std::make_shared<const Callback>(std::move(callback)));
+  return subscriber;
+}
+
+void Events::unsubscribe(std::uint64_t subscriber) {
+  std::shared_ptr<const Callback> dropped;  // without the lock
+  std::unique_lock lock(state_->mutex);
+  const auto found = state_->subscribers.find(subscriber);
+  if (found != state_->subscribers.end()) {
+    dropped = std::move(found->second);
+    state_->subscribers.erase(found);
+  }
+  if (state_->teller != std::this_thread::get_id()) {
+    state_->changed.wait(lock, [&] { return state_->running != subscriber; });
+  }
+  lock.unlock();
+}
+
+void Events::post(std::vector<Change> changes) {
+  {
+    const std::lock_guard lock(state_->mutex);
+    if (state_->subscribers.empty() || state_->stopping) return;
+    for (Change& change : changes) {
+      if (state_->waiting.size() < kMaxWaiting) {
+        state_->waiting.push_back({std::move(change), state_->last_subscriber});
+      } else {
+        ++state_->missed;
+      }
+    }
+  }
+  state_->changed.notify_all();
+}
+
+void Events::stop() {
+  std::map<std::uint64_t, std::shared_ptr<const Callback>> dropped;  // without the lock
+  std::thread thread;
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->stopping = true;
+    dropped.swap(state_->subscribers);
+    thread.swap(thread_);
+  }
+  state_->changed.notify_all();
+  if (!thread.joinable()) return;
+  if (thread.get_id() == std::this_thread::get_id()) {
+    thread.detach();  // the listener that calls this ends it
+  } else {
+    thread.join();
+  }
+}
+
+std::optional<Waiting> Events::State::next(std::unique_lock<std::mutex>& lock) {
+  changed.wait(lock, [this] { return stopping || !waiting.empty() || missed > 0; });
+  if (stopping) return std::nullopt;
+  if (waiting.empty()) {
+    Change change{ChangeKind::kMissed, {}, {}, {}, {}, {}, {}};
+    change.message = std::to_string(std::exchange(missed, 0)) +
+                     " changes were not told: the listeners take too long";
+    return Waiting{std::move(change), last_subscriber};
+  }
+  Waiting first = std::move(waiting.front());
+  waiting.pop_front();
+  return first;
+}
+
+void Events::run(State& state) {
+  std::unique_lock lock(state.mutex);
+  while (const auto waiting = state.next(lock)) {
+    for (std::uint64_t told = 0;;) {
+      const auto subscriber = state.subscribers.upper_bound(told);
+      if (subscriber == state.subscribers.end() || subscriber->first > waiting->last_subscriber) {
+        break;
+      }
+      told = state.running = subscriber->first;
+      auto callback = subscriber->second;
+      lock.unlock();
+      (*callback)(waiting->change);
+      callback.reset();  // what it holds goes before anybody hears that it is over
+      lock.lock();
+      state.running = 0;
+      state.changed.notify_all();
+    }
+  }
+}
+
+}  // namespace tfdude

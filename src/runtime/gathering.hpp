@@ -1,0 +1,56 @@
+#pragma once
+
+#include <chrono>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "partition/latest.hpp"
+#include "partition/routing.hpp"
+
+namespace tfdude {
+
+/// LatestHints for many threads.
+class SharedHints {
+ public:
+  [[nodiscard]] std::optional<Time> guess(std::string_view a, std::string_view b) const {
+    const std::lock_guard lock(mutex_);
+    return hints_.guess(a, b, std::chrono::steady_clock::now());
+  }
+  void note(std::string_view a, std::string_view b, const std::vector<SegmentValues>& answers) {
+    const std::lock_guard lock(mutex_);
+    hints_.note(a, b, std::chrono::steady_clock::now(), answers);
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  LatestHints hints_;
+};
+
+/// The values that owners have answered, in order, or the first error of one.
+[[nodiscard]] Result<std::vector<SegmentValues>> values_of(std::vector<Reply> replies);
+
+/// A lookup that others must be asked for: what they are asked, and what their answers come to.
+class Gathering {
+ public:
+  /// @param hint  the instant that was guessed when the plan was made
+  Gathering(LookupPlan plan, std::string a, std::string b, std::optional<Time> hint)
+      : plan_(std::move(plan)), a_(std::move(a)), b_(std::move(b)), hint_(hint) {}
+
+  [[nodiscard]] std::vector<Part>& parts() { return plan_.parts; }
+
+  /// Takes the replies to the parts.
+  /// @return X_AB; nothing where the parts are to be asked once more, as they now ask of an instant that all may have
+  [[nodiscard]] std::optional<Result<StampedTransform>> take(std::vector<Reply> replies,
+                                                             SharedHints& hints);
+
+ private:
+  LookupPlan plan_;
+  std::string a_;
+  std::string b_;
+  std::optional<Time> hint_;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,112 @@
+#include <tuple>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "base/log.hpp"
+#include "runtime/participant.hpp"
+
+// What is stored of this participant's partition, and told once it is.
+namespace tfdude {
+
+Commit Participant::take() {
+  const std::lock_guard lock(structure_mutex_);
+  if (partition_ == nullptr) return {};
+  Commit commit;
+  if (out_) {
+    commit.refused = Error{Errc::kNotOwner, given_up_};
+    return commit;
+  }
+  commit.pages = partition_->take_pages();
+  {
+    const std::lock_guard joints(joints_mutex_);
+    commit.change = partition_->take_unsaved();
+  }
+  Presence news = presence_;
+  news.pages = partition_->page_count();
+  news.absent = directory_.absent();
+  if (news == announced_) return commit;
+  commit.presence = std::move(news);
+  return commit;
+}
+
+void Participant::publish(const Commit& commit) {
+  std::optional<Presence> news;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (commit.refused) {
+      news = presence_;
+    } else if (commit.presence && !out_) {
+      presence_.pages = commit.presence->pages;
+      presence_.absent = commit.presence->absent;
+      news = presence_;
+    }
+    if (news) announced_ = *news;
+    if (!commit.refused) told_epoch_ = commit.change.epoch;
+  }
+  for (const Page& page : commit.pages) transport_->publish(page);
+  if (news) transport_->announce(*news);
+  structure_changed_.notify_all();
+}
+
+// Who is missed has nothing to do with what is stored.
+void Participant::take_back(const Commit& commit) {
+  std::optional<Presence> news;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard joints(joints_mutex_);
+    partition_->still_unsaved(commit.change, commit.pages);
+    if (commit.presence && commit.presence->absent != presence_.absent && !out_) {
+      presence_.absent = commit.presence->absent;
+      announced_.absent = presence_.absent;
+      news = presence_;
+    }
+  }
+  if (news) transport_->announce(*news);
+}
+
+ChangedValues Participant::take_values() {
+  ChangedValues values;
+  if (out_) return values;
+  values.since = saved_commit_;
+  std::tie(values.edges, saved_commit_) = forest_.changed_since(saved_commit_);
+  if (values.edges.empty()) return values;
+  const std::lock_guard lock(joints_mutex_);
+  values.joints = partition_->take_changed_joints();
+  return values;
+}
+
+void Participant::take_back(const ChangedValues& values) {
+  saved_commit_ = values.since;
+  const std::lock_guard lock(joints_mutex_);
+  partition_->still_unsaved(values.joints);
+}
+
+void Participant::reply(const PendingReply& pending) {
+  if (!pending.what.empty()) {
+    const auto* error = std::get_if<Error>(&pending.reply.body);
+    log().info("{}: {}", pending.what, error != nullptr ? "refused: " + error->message : "done");
+  }
+  transport_->reply(pending.to, pending.reply);
+}
+
+std::optional<Error> Participant::refusal() const {
+  auto failure = commits_ ? commits_->failure() : std::nullopt;
+  if (!failure) return std::nullopt;
+  return Error{failure->code,
+               "partition " + quote(partition_name_) +
+                   " changes nothing before it can store what it has changed: " + failure->message};
+}
+
+Error Participant::unless_unsaved(Error error, const std::string& id) {
+  if (error.code != Errc::kAlreadyExists && error.code != Errc::kUnknownFrame) return error;
+  auto why = refusal();
+  const std::lock_guard lock(structure_mutex_);
+  return why && partition_->is_unsaved(id) ? *std::move(why) : error;
+}
+
+Result<void> Participant::await_stored(const Deadline& deadline) {
+  return commits_->stores() ? commits_->flush(deadline.at()) : Result<void>();
+}
+
+}  // namespace tfdude

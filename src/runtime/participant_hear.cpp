@@ -1,0 +1,176 @@
+#include <tuple>
+
+#include "tfdude/base/id.hpp"
+
+#include "base/log.hpp"
+#include "runtime/participant.hpp"
+
+// What a participant makes of what others say of themselves, and whom it tells.
+namespace tfdude {
+namespace {
+
+// How often it is looked who has been silent for long enough to count as gone.
+constexpr Milliseconds kLookForGone{50};
+
+}  // namespace
+
+std::shared_ptr<void> Participant::on_change(Events::Callback listener) {
+  {
+    const std::lock_guard lock(structure_mutex_);
+    directory_.changes().watch();
+  }
+  const std::uint64_t subscriber = events_->subscribe(std::move(listener));
+  return {nullptr, [events = events_, subscriber](void*) { events->unsubscribe(subscriber); }};
+}
+
+// Under structure_mutex_, so that they are told in the order in which they happened.
+void Participant::tell_changes() {
+  for (const Directory::Outdated& one : directory_.take_outdated()) {
+    log().warn("what process {} of partition {} says is passed over, as process {} was later",
+               one.incarnation, quote(one.partition), one.latest);
+  }
+  auto changes = directory_.changes().take();
+  if (changes.empty()) return;
+  for (Change& change : changes) {
+    change.time = wall_clock();
+    const bool own = change.partition == partition_name_;
+    const bool by_own = change.rival == partition_name_;
+    if (change.kind == ChangeKind::kConflict && own) log().error("{}", change.message);
+    if (change.kind == ChangeKind::kFrameOrphaned && (own || by_own))
+      log().warn("{}", change.message);
+  }
+  events_->post(std::move(changes));
+}
+
+void Participant::on_page(const Page& page) {
+  bool contested = false;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    directory_.apply(page);
+    contested = partition_ != nullptr && directory_.contested();
+    tell_changes();
+  }
+  structure_changed_.notify_all();
+  look_at_routes();
+  if (contested) conceder_->ask();
+}
+
+void Participant::on_presence(const Presence& presence) {
+  bool appeared = false;
+  bool ended = false;
+  bool rivals = false;
+  bool silent = false;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (presence.partition == partition_name_) {
+      claim_.hear(presence);
+      incarnations_.saw(presence.incarnation);
+      rivals = presence_.serving && presence.serving;
+      const bool is_later = std::tie(presence.incarnation, presence.ticket) >
+                            std::tie(presence_.incarnation, presence_.ticket);
+      if (rivals && is_later) give_up_partition(presence);
+    } else {
+      const bool before = directory_.serving(presence.partition).has_value();
+      directory_.apply(presence, wall_clock());
+      const bool after = directory_.serving(presence.partition).has_value();
+      appeared = after && !before;
+      ended = before && !after;
+      overtake();
+      if (partition_ != nullptr) commits_->ask();
+      // It may be the last that was missing of the structure of one who has returned.
+      if (partition_ != nullptr && directory_.contested()) conceder_->ask();
+      silent = directory_.any_silent();
+    }
+    tell_changes();
+  }
+  structure_changed_.notify_all();
+  if (appeared || ended) {
+    look_at_routes();
+    lookups_.look_again();
+  }
+  const std::string who = quote(presence.partition) + " (host " + quote(presence.host) + ", pid " +
+                          std::to_string(presence.pid) + ")";
+  if (appeared) log().info("partition {} is there", who);
+  if (ended) log().info("partition {} was stopped", who);
+  if (ended) calls_.on_lost(presence.partition);
+  if (silent) start_to_look_for_gone();
+  if (rivals) log().error("partition {} is served by another process, too", who);
+}
+
+void Participant::on_lost(const std::string& partition, std::uint64_t incarnation) {
+  bool news = false;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (partition == partition_name_) claim_.lost(incarnation);
+    news = directory_.lost(partition, incarnation, wall_clock());
+    if (news && partition_ != nullptr) commits_->ask();
+    tell_changes();
+  }
+  structure_changed_.notify_all();
+  if (!news) return;
+  look_at_routes();
+  lookups_.look_again();
+  log().info("partition {} is lost: it is not heard any more", quote(partition));
+  calls_.on_lost(partition);
+  start_to_look_for_gone();
+}
+
+void Participant::start_to_look_for_gone() {
+  const std::lock_guard lock(pushing_mutex_);
+  if (leaving_) return;
+  if (!gone_look_) gone_look_.emplace(kLookForGone, [this] { look_for_gone(); });
+  gone_look_->ask();
+}
+
+void Participant::look_for_gone() {
+  bool gone = false;
+  bool more = false;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    gone = directory_.look_for_gone(Clock::now());
+    more = directory_.any_silent();
+    if (gone && partition_ != nullptr) commits_->ask();
+    tell_changes();
+  }
+  if (more) gone_look_->ask();
+  if (!gone) return;
+  structure_changed_.notify_all();
+  look_at_routes();
+  lookups_.look_again();
+}
+
+Result<void> Participant::forget(const std::string& partition) {
+  const Deadline deadline = call_deadline();
+  // All who are there are to be told.
+  if (auto all = settle(deadline); !all) return all;
+  auto parts = routed(deadline, [&]() -> Result<std::vector<Part>> {
+    if (!directory_.owner(partition)) {
+      return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+    }
+    if (auto ok = directory_.check_not_there(partition); !ok) {
+      return tl::unexpected(std::move(ok.error()));
+    }
+    const ForgetRequest body{partition, directory_.latest_incarnation(partition)};
+    std::vector<Part> all;
+    for (const Owner one : directory_.reachable_owners()) {
+      all.push_back({one, directory_.name(one), Request{0, directory_.name(one), body}});
+    }
+    if (partition_ != nullptr) {
+      all.push_back({kHeldHere, partition_name_, Request{0, partition_name_, body}});
+    }
+    return all;
+  });
+  if (!parts) return tl::unexpected(std::move(parts.error()));
+  if (auto told = change(*parts, deadline); !told) return told;
+  Result<void> forgotten;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    forgotten = directory_.forget(partition, 0, wall_clock());
+    tell_changes();
+  }
+  structure_changed_.notify_all();
+  look_at_routes();
+  return forgotten;
+}
+
+}  // namespace tfdude

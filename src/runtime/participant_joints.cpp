@@ -1,0 +1,96 @@
+#include "tfdude/base/id.hpp"
+
+#include "base/log.hpp"
+#include "runtime/participant.hpp"
+
+// Joints: their positions to who has them, and what is known of them.
+namespace tfdude {
+
+void Participant::on_joints(const JointUpdate& update) {
+  if (partition_ == nullptr) return;
+  const std::lock_guard lock(joints_mutex_);
+  const auto moved = partition_->apply(update);
+  // Nobody else hears of it; those that are late are counted, as of any edge. The 1st, 2nd, 4th, 8th... is told.
+  if (moved || moved.error().code != Errc::kInvalidInput) return;
+  const std::uint64_t before = refused_joints_++;
+  if ((refused_joints_ & before) == 0) {
+    log().warn("refused positions of joints ({} times so far): {}", refused_joints_,
+               moved.error().message);
+  }
+}
+
+// All who have a joint are told, so all must be known.
+Result<void> Participant::update_joints(const JointUpdate& update) {
+  if (update.joints.empty()) return {};
+  const Deadline deadline = call_deadline();
+  if (auto all = settle(deadline); !all) return all;
+  return healed(
+      deadline,
+      [&]() -> Result<std::vector<Part>> {
+        auto parts = route_joints(directory_, update);
+        if (!parts) return parts;
+        if (auto ok = check_reachable(directory_, *parts); !ok) return tl::unexpected(ok.error());
+        return parts;
+      },
+      [&](std::vector<Part>& parts) { return change(parts, deadline); });
+}
+
+// Whoever is there gets its share, and the error of who is not is told.
+Result<void> Participant::publish_joints(const JointUpdate& update) {
+  if (update.joints.empty()) return {};
+  const Deadline deadline = call_deadline();
+  if (auto all = settle(deadline); !all) return all;
+  if (auto ok = still_in(); !ok) return ok;
+  JointUpdate known{{}, update.stamp};
+  Result<void> outcome;
+  Result<std::vector<Part>> parts;
+  {
+    const std::lock_guard lock(structure_mutex_);
+    for (const JointValue& joint : update.joints) {
+      if (!directory_.joint_owners(joint.name).empty()) {
+        known.joints.push_back(joint);
+      } else if (outcome) {
+        outcome = fail(Errc::kUnknownJoint, "no joint " + quote(joint.name));
+      }
+    }
+    parts = route_joints(directory_, known);
+  }
+  if (!parts) return tl::unexpected(std::move(parts.error()));
+  for (const Part& part : *parts) {
+    const auto& share = std::get<JointUpdate>(part.request.body);
+    auto sent = publish_to(part, share, deadline);
+    if (!sent && outcome) outcome = std::move(sent);
+  }
+  return outcome;
+}
+
+Result<void> Participant::publish_to(const Part& part, const JointUpdate& share,
+                                     const Deadline& deadline) {
+  if (part.owner == kHeldHere) {
+    const std::lock_guard lock(joints_mutex_);
+    return partition_->apply(share).map([](std::size_t) {});
+  }
+  {
+    const std::lock_guard lock(structure_mutex_);
+    if (auto ok = check_reachable(directory_, {part}); !ok) return ok;
+  }
+  return transport_->send(part.partition, share, deadline.at());
+}
+
+Result<std::vector<JointInfo>> Participant::joints(const std::string& partition) {
+  std::vector<JointInfo> all;
+  while (true) {
+    const std::string last = all.empty() ? std::string() : all.back().name;
+    auto more = ask_all<JointInfo>(partition, JointsRequest{last});
+    if (!more) return more;
+    const bool end = more->size() < kMaxItems;
+    if (!more->empty() && more->back().name <= last) {
+      return fail(Errc::kInvalidInput,
+                  "partition " + quote(partition) + " tells the same joints again and again");
+    }
+    std::move(more->begin(), more->end(), std::back_inserter(all));
+    if (end) return all;
+  }
+}
+
+}  // namespace tfdude

@@ -1,0 +1,147 @@
+#include <algorithm>
+#include <iterator>
+#include <optional>
+#include <thread>
+#include <unistd.h>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "partition/observing.hpp"
+#include "runtime/participant.hpp"
+
+// Measurements of paths, and what they have said of covariances.
+namespace tfdude {
+namespace {
+
+// How often edges that were written meanwhile, or were observed with still others, are asked for again.
+constexpr int kObserveAttempts = 8;
+
+// How often, and for how long, is waited for somebody else's observation to reach all owners.
+constexpr int kTornAttempts = 5;
+constexpr Milliseconds kTornPause{1};
+
+bool is_conflict(const Reply& reply) {
+  const auto* error = std::get_if<Error>(&reply.body);
+  return error != nullptr && error->code == Errc::kChangedMeanwhile;
+}
+
+}  // namespace
+
+std::string Participant::new_source() {
+  return std::string(kObservedPrefix) + std::to_string(nanoseconds(wall_clock())) + "." +
+         std::to_string(getpid()) + "." + std::to_string(++observations_);
+}
+
+// The values of all edges that the plan names, of one instant.
+Result<ObservedPath> Participant::ask_observed(ObservePlan& plan, const Deadline& deadline) {
+  auto answers = ask_values(plan.parts, deadline);
+  if (!answers) return tl::unexpected(std::move(answers.error()));
+  OneInstant found = one_instant(*std::move(answers), std::nullopt);
+  if (found.ask_again) {
+    for (Part& part : plan.parts) {
+      std::get<LookupRequest>(part.request.body).query.at = found.ask_again;
+    }
+    answers = ask_values(plan.parts, deadline);
+    if (!answers) return tl::unexpected(std::move(answers.error()));
+    found.answers = *std::move(answers);
+  }
+  return observed_path(plan, found.answers);
+}
+
+// Nothing was applied (false), or all (true). One owner is asked before the others, the same for all who observe this path:
+// of two who have seen the same, one is refused there, and may try again before anything was applied.
+Result<bool> Participant::revise(std::vector<Part> parts, const Deadline& deadline) {
+  if (parts.empty()) return true;
+  const auto first = std::min_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
+    return a.partition < b.partition;
+  });
+  std::iter_swap(parts.begin(), first);
+  std::vector<Part> others(std::make_move_iterator(parts.begin() + 1),
+                           std::make_move_iterator(parts.end()));
+  parts.resize(1);
+  Reply reply = std::move(ask(parts, deadline).front());
+  if (is_conflict(reply)) return false;
+  if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
+  std::size_t done = 1;
+  std::optional<Error> refused;
+  for (Reply& other : ask(others, deadline)) {
+    auto* error = std::get_if<Error>(&other.body);
+    if (error == nullptr) {
+      ++done;
+    } else if (!refused) {
+      refused = std::move(*error);
+    }
+  }
+  if (!refused) return true;
+  refused->message += "; " + std::to_string(done) + " of " + std::to_string(others.size() + 1) +
+                      " partitions have applied their part of the observation";
+  return tl::unexpected(*std::move(refused));
+}
+
+Result<Observed> Participant::observe(const std::string& a, const std::string& b,
+                                      const Transform& X_AB, std::optional<Time> stamp,
+                                      const ObserveOptions& options, const Deadline& deadline) {
+  if (auto ok = check_finite(X_AB); !ok) return fail_at("the measurement", ok.error());
+  std::vector<std::string> beside;
+  int torn = 0;
+  for (int attempt = 0; attempt < kObserveAttempts; ++attempt) {
+    ObservePlan used;
+    auto path = healed(
+        deadline, [&] { return route_observe(forest_, directory_, a, b, beside, stamp); },
+        [&](ObservePlan& plan) {
+          auto found = ask_observed(plan, deadline);
+          used = std::move(plan);
+          return found;
+        });
+    if (!path) return tl::unexpected(std::move(path.error()));
+    const auto there = [this](const std::string& id) { return forest_.exists(id); };
+    if (std::any_of(path->missing.begin(), path->missing.end(), there)) {
+      beside.insert(beside.end(), path->missing.begin(), path->missing.end());
+      continue;
+    }
+    // What one owner has been told already the others will have soon, unless an edge was given another value since.
+    if (path->torn && torn < kTornAttempts && !deadline.over()) {
+      std::this_thread::sleep_for(kTornPause * (1 << torn++));
+      --attempt;
+      continue;
+    }
+    const auto found = tfdude::observe(path->edges, X_AB, new_source(), options);
+    if (!found) return fail_at("the path from " + quote(a) + " to " + quote(b), found.error());
+    auto applied = revise(revisions(used, *path, *found), deadline);
+    if (!applied) return tl::unexpected(std::move(applied.error()));
+    if (!*applied) continue;
+    Observed observed{
+        found->distance_squared, found->dimensions, found->limit, found->accepted, {}, path->stamp};
+    for (std::size_t k = 0; k < used.edges.size(); ++k) {
+      if (found->edges[k].corrected) observed.corrected.push_back(used.edges[k].info.id);
+    }
+    return observed;
+  }
+  return fail(Errc::kChangedMeanwhile, "edges between " + quote(a) + " and " + quote(b) +
+                                           " were written each time that they were observed");
+}
+
+Result<void> Participant::correlate(const std::string& id, const Correlation& correlation) {
+  const Deadline deadline = call_deadline();
+  return healed(
+      deadline,
+      [&]() -> Result<Part> {
+        const auto frame = forest_.info(id);
+        if (!frame) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+        if (auto ok = check_shares(correlation.shares); !ok) {
+          return fail_at("frame " + quote(id), ok.error());
+        }
+        return route_to(directory_, frame->owner, Request{0, id, CorrelateRequest{correlation}});
+      },
+      [&](Part& part) {
+        std::vector<Part> parts{std::move(part)};
+        return change(parts, deadline);
+      });
+}
+
+Result<std::vector<EdgeConsistency>> Participant::consistency(const std::string& partition) {
+  return ask_all<EdgeConsistency>(partition, ConsistencyRequest{true});
+}
+
+}  // namespace tfdude

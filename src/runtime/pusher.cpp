@@ -1,0 +1,131 @@
+#include "runtime/pusher.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tfdude {
+
+Pusher::Pusher(Forest& forest, Push push, End end)
+    : forest_(forest), push_(std::move(push)), end_(std::move(end)), thread_([this] { run(); }) {}
+
+void Pusher::stop() {
+  forest_.on_commit(nullptr);
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_one();
+  if (thread_.joinable()) thread_.join();
+}
+
+Result<State> Pusher::watch(std::uint64_t group, const WatchRequest& request) {
+  if (auto ok = check_watch(request); !ok) return tl::unexpected(ok.error());
+  Result<State> snapshot;
+  {
+    const std::lock_guard lock(groups_mutex_);
+    const bool first = groups_.empty();
+    auto known = groups_.find(group);
+    if (known == groups_.end()) {
+      known = groups_.emplace(group, Group{WatchedGroup(group, request), {}, Clock::now(), false})
+                  .first;
+    }
+    snapshot = known->second.watched.snapshot(forest_, request.from);
+    if (!snapshot) {
+      end(known);
+    } else {
+      known->second.lease = Clock::now() + kWatchLease;
+    }
+    if (first && !groups_.empty()) forest_.on_commit([this] { ask(); });
+  }
+  ask();
+  return snapshot;
+}
+
+void Pusher::tell_all(std::uint64_t group) {
+  {
+    const std::lock_guard lock(groups_mutex_);
+    const auto known = groups_.find(group);
+    if (known == groups_.end()) return;
+    known->second.all = true;
+  }
+  ask();
+}
+
+// Told by the thread, which may be pushing to the group still.
+void Pusher::end(std::map<std::uint64_t, Group>::iterator& group) {
+  ended_.push_back(group->first);
+  group = groups_.erase(group);
+}
+
+void Pusher::ask() {
+  if (asked_.exchange(true)) return;
+  // The lock keeps the notice from falling between the thread's look and its sleep.
+  { const std::lock_guard lock(mutex_); }
+  changed_.notify_one();
+}
+
+std::vector<State> Pusher::take_due(Clock::time_point now, std::vector<std::uint64_t>& ended,
+                                    std::optional<Clock::time_point>& next) {
+  std::vector<State> due;
+  const std::lock_guard lock(groups_mutex_);
+  for (auto group = groups_.begin(); group != groups_.end();) {
+    if (now >= group->second.lease) {
+      end(group);
+      continue;
+    }
+    Group& one = group->second;
+    const auto period = one.watched.request().period;
+    if (now >= one.due) {
+      State state = one.watched.news(forest_);
+      if (!state.entries.empty()) {
+        due.push_back(std::move(state));
+        // On the beat, as long as that can be kept.
+        one.due = std::max(one.due + period, now - period);
+      }
+    } else {
+      next = next ? std::min(*next, one.due) : one.due;
+    }
+    if (std::exchange(one.all, false)) {
+      if (auto state = one.watched.snapshot(forest_, {})) due.push_back(*std::move(state));
+    }
+    ++group;
+  }
+  // One that is watched again goes on.
+  for (const std::uint64_t group : std::exchange(ended_, {})) {
+    if (groups_.count(group) == 0) ended.push_back(group);
+  }
+  if (groups_.empty()) {
+    forest_.on_commit(nullptr);
+  } else {
+    // To end what is not renewed.
+    const auto look = now + std::chrono::seconds(1);
+    next = next ? std::min(*next, look) : look;
+  }
+  return due;
+}
+
+void Pusher::run() {
+  std::optional<Clock::time_point> next;
+  std::unique_lock lock(mutex_);
+  while (true) {
+    const auto woken = [this] { return stopping_ || asked_.load(); };
+    if (next) {
+      changed_.wait_until(lock, *next, woken);
+    } else {
+      changed_.wait(lock, woken);
+    }
+    if (stopping_) return;
+    lock.unlock();
+    // Before the look, so that what is written meanwhile is not missed.
+    asked_.store(false);
+    next.reset();
+    std::vector<std::uint64_t> ended;
+    for (State& state : take_due(Clock::now(), ended, next)) {
+      for (const State& piece : pieces_of(std::move(state))) push_(piece);
+    }
+    for (const std::uint64_t group : ended) end_(group);
+    lock.lock();
+  }
+}
+
+}  // namespace tfdude

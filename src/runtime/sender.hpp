@@ -1,0 +1,200 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tfdude/types/not_sent.hpp"
+
+#include "runtime/mailbox.hpp"
+#include "transport/port.hpp"
+
+namespace tfdude {
+
+/// To whom one edge or joint is to be sent.
+struct Destination {
+  Owner owner = kHeldHere;
+  std::string partition;
+  bool reachable = true;
+
+  friend bool operator==(const Destination& a, const Destination& b) {
+    return a.owner == b.owner && a.partition == b.partition && a.reachable == b.reachable;
+  }
+};
+
+/// What a sender needs of the participant.
+template <class Message>
+struct SenderLinks {
+  /// Where each of these is now; empty for one that nobody has.
+  std::function<std::vector<std::vector<Destination>>(const std::vector<std::string>& names)> find;
+  std::function<std::unique_ptr<Channel<Message>>(const std::string& partition)> connect;
+  /// Applies it to what this process owns. Must not wait or, if that succeeds, allocate.
+  std::function<Result<void>(const Message&)> apply_here;
+  /// Whether this process has lost its partition. Must not wait.
+  std::function<bool()> out;
+  Errc unknown = Errc::kUnknownFrame;
+};
+
+/// A sender of any kind, for the thread that plans for all.
+class PlannedSender {
+ public:
+  virtual ~PlannedSender() = default;
+  /// The structure has changed, or who is there.
+  virtual void plan() = 0;
+  /// Nothing is sent any more, and no link used, after this has returned.
+  virtual void close() = 0;
+};
+
+/// Behind a stream: messages that are made once, an owner each, and filled in anew for each sample. They are made elsewhere
+/// and taken over when they are ready (Mailbox), so that who sends neither waits nor allocates.
+/// @par Thread safety  send() is of one thread at a time; the rest may be called by any.
+template <class Message>
+class Sender final : public PlannedSender {
+ public:
+  /// @param names  each once
+  Sender(std::vector<std::string> names, SenderLinks<Message> links)
+      : names_(std::move(names)), links_(std::move(links)), listed_(names_.size(), 0) {
+    not_sent_.reserve(names_.size());
+  }
+
+  [[nodiscard]] std::size_t size() const { return names_.size(); }
+
+  void plan() override {
+    const std::lock_guard lock(planning_);
+    mailbox_.collect();
+    if (closed_) return;
+    auto found = links_.find(names_);
+    if (planned_ && found == found_) return;
+    mailbox_.put(plan_for(found));
+    found_ = std::move(found);
+    planned_ = true;
+  }
+
+  void close() override {
+    const std::lock_guard planning(planning_);
+    const std::lock_guard sending(sending_);
+    closed_ = true;
+    mailbox_.put(Plan{});
+    (void)mailbox_.newest();
+    mailbox_.collect();
+  }
+
+  /// @param valid  whether the value of this index may be sent
+  /// @param fill   writes it into an item of a message
+  template <class Valid, class Fill>
+  const std::vector<NotSent>& send(std::optional<Time> stamp, Valid valid, Fill fill) {
+    forget_list();
+    // Only close() takes it, too.
+    const std::unique_lock lock(sending_, std::try_to_lock);
+    if (!lock.owns_lock() || closed_) return list_all(Errc::kTransport);
+    if (links_.out()) return list_all(Errc::kPartitionTaken);
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      if (!valid(i)) list(i, Errc::kInvalidInput, {});
+    }
+    Plan* plan = mailbox_.newest();
+    if (!not_sent_.empty() || plan == nullptr) return not_sent_;
+    for (const std::size_t i : plan->unknown) list(i, links_.unknown, {});
+    for (Share& share : plan->shares) {
+      auto& items = items_of(share.message);
+      for (std::size_t k = 0; k < items.size(); ++k) fill(items[k], share.indices[k]);
+      share.message.stamp = stamp;
+      const auto refused = hand_over(share);
+      if (!refused) continue;
+      for (const std::size_t i : share.indices) list(i, *refused, share.partition);
+    }
+    return not_sent_;
+  }
+
+  /// Lists all as not sent.
+  const std::vector<NotSent>& refuse(Errc why) {
+    forget_list();
+    return list_all(why);
+  }
+
+ private:
+  struct Share {
+    Owner owner = kHeldHere;
+    std::string partition;
+    bool reachable = true;
+    std::unique_ptr<Channel<Message>> channel;  // null where it is held here
+    Message message;
+    std::vector<std::size_t> indices;  // of its items
+  };
+  struct Plan {
+    std::vector<Share> shares;
+    std::vector<std::size_t> unknown;
+  };
+
+  static std::vector<EdgeUpdate>& items_of(Update& update) { return update.edges; }
+  static std::vector<JointValue>& items_of(JointUpdate& update) { return update.joints; }
+
+  Share& share_of(Plan& plan, const Destination& to) const {
+    for (Share& share : plan.shares) {
+      if (share.owner == to.owner) return share;
+    }
+    plan.shares.push_back({to.owner, to.partition, to.reachable, nullptr, {}, {}});
+    Share& fresh = plan.shares.back();
+    if (to.owner != kHeldHere) fresh.channel = links_.connect(to.partition);
+    return fresh;
+  }
+
+  Plan plan_for(const std::vector<std::vector<Destination>>& found) const {
+    Plan plan;
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      if (found[i].empty()) plan.unknown.push_back(i);
+      for (const Destination& to : found[i]) {
+        Share& share = share_of(plan, to);
+        items_of(share.message).push_back({});
+        set_name(items_of(share.message).back(), names_[i]);
+        share.indices.push_back(i);
+      }
+    }
+    return plan;
+  }
+
+  static void set_name(EdgeUpdate& edge, const std::string& name) { edge.id = name; }
+  static void set_name(JointValue& joint, const std::string& name) { joint.name = name; }
+
+  std::optional<Errc> hand_over(Share& share) {
+    if (!share.reachable) return Errc::kUnreachable;
+    if (share.channel != nullptr) {
+      return share.channel->try_send(share.message) ? std::nullopt
+                                                    : std::optional<Errc>(Errc::kTimeout);
+    }
+    const auto applied = links_.apply_here(share.message);
+    return applied ? std::nullopt : std::optional<Errc>(applied.error().code);
+  }
+
+  void forget_list() {
+    for (const NotSent& one : not_sent_) listed_[one.index] = 0;
+    not_sent_.clear();
+  }
+
+  void list(std::size_t index, Errc why, std::string_view partition) {
+    if (std::exchange(listed_[index], 1) == 0) not_sent_.push_back({index, why, partition});
+  }
+
+  const std::vector<NotSent>& list_all(Errc why) {
+    for (std::size_t i = 0; i < names_.size(); ++i) list(i, why, {});
+    return not_sent_;
+  }
+
+  const std::vector<std::string> names_;
+  const SenderLinks<Message> links_;
+  std::mutex planning_;  // found_, planned_
+  std::vector<std::vector<Destination>> found_;
+  bool planned_ = false;
+  std::mutex sending_;
+  bool closed_ = false;  // under both
+  Mailbox<Plan> mailbox_;
+  // Of who sends.
+  std::vector<NotSent> not_sent_;
+  std::vector<char> listed_;
+};
+
+}  // namespace tfdude

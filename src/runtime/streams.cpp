@@ -1,0 +1,92 @@
+#include "runtime/streams.hpp"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "math/finite.hpp"
+#include "partition/joints.hpp"
+
+namespace tfdude {
+namespace {
+
+// How often at most it is looked where all are.
+constexpr Milliseconds kPlanEvery{1};
+
+Result<void> check_names(const std::vector<std::string>& names, const char* what) {
+  if (names.size() > kMaxItems) {
+    return fail(Errc::kInvalidInput, "a stream of " + std::to_string(names.size()) + " " + what +
+                                         "s, of at most " + std::to_string(kMaxItems));
+  }
+  std::set<std::string_view> known;
+  for (const std::string& name : names) {
+    if (auto ok = check_id(name, what); !ok) return ok;
+    if (!known.insert(name).second) {
+      return fail(Errc::kInvalidInput, std::string(what) + " " + quote(name) + " is named twice");
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Streams::Streams(SenderLinks<Update> of_edges, SenderLinks<JointUpdate> of_joints)
+    : of_edges_(std::move(of_edges)), of_joints_(std::move(of_joints)) {}
+
+void Streams::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+  }
+  if (Deferred* planner = planning_.load()) planner->stop();
+  for (const auto& sender : senders()) sender->close();
+}
+
+std::vector<std::shared_ptr<PlannedSender>> Streams::senders() {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::shared_ptr<PlannedSender>> there;
+  for (const auto& known : senders_) {
+    if (auto sender = known.lock()) there.push_back(std::move(sender));
+  }
+  senders_.assign(there.begin(), there.end());
+  return there;
+}
+
+void Streams::add(const std::shared_ptr<PlannedSender>& sender) {
+  const std::lock_guard lock(mutex_);
+  if (stopped_) {
+    sender->close();
+    return;
+  }
+  senders_.push_back(sender);
+  if (planner_ != nullptr) return;
+  planner_ = std::make_unique<Deferred>(kPlanEvery, [this] {
+    for (const auto& one : senders()) one->plan();
+  });
+  planning_.store(planner_.get());
+}
+
+template <class Message>
+std::shared_ptr<Sender<Message>> Streams::open(const std::vector<std::string>& names,
+                                               const SenderLinks<Message>& links) {
+  auto sender = std::make_shared<Sender<Message>>(names, links);
+  // First, so that no change is missed meanwhile.
+  add(sender);
+  sender->plan();
+  return sender;
+}
+
+Result<std::shared_ptr<Sender<Update>>> Streams::edges(const std::vector<std::string>& ids) {
+  if (auto ok = check_names(ids, "frame"); !ok) return tl::unexpected(std::move(ok.error()));
+  return open(ids, of_edges_);
+}
+
+Result<std::shared_ptr<Sender<JointUpdate>>> Streams::joints(
+    const std::vector<std::string>& names) {
+  if (auto ok = check_names(names, "joint"); !ok) return tl::unexpected(std::move(ok.error()));
+  return open(names, of_joints_);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "runtime/deferred.hpp"
+#include "runtime/sender.hpp"
+
+namespace tfdude {
+
+/// The streams that a participant has given away, and the thread that finds out where they go to when that changes.
+/// @par Thread safety  All functions.
+class Streams {
+ public:
+  Streams(SenderLinks<Update> of_edges, SenderLinks<JointUpdate> of_joints);
+  ~Streams() { stop(); }
+  Streams(const Streams&) = delete;
+  Streams& operator=(const Streams&) = delete;
+
+  /// All streams send nothing any more, and use nothing of the participant.
+  void stop();
+
+  /// @return kInvalidInput: one that is no id, or named twice; more than kMaxItems.
+  [[nodiscard]] Result<std::shared_ptr<Sender<Update>>> edges(const std::vector<std::string>& ids);
+  [[nodiscard]] Result<std::shared_ptr<Sender<JointUpdate>>> joints(
+      const std::vector<std::string>& names);
+
+  /// The structure has changed, or who is there.
+  void look_again() {
+    if (Deferred* planner = planning_.load()) planner->ask();
+  }
+
+ private:
+  template <class Message>
+  std::shared_ptr<Sender<Message>> open(const std::vector<std::string>& names,
+                                        const SenderLinks<Message>& links);
+  void add(const std::shared_ptr<PlannedSender>& sender);
+  [[nodiscard]] std::vector<std::shared_ptr<PlannedSender>> senders();
+
+  const SenderLinks<Update> of_edges_;
+  const SenderLinks<JointUpdate> of_joints_;
+  std::mutex mutex_;
+  std::vector<std::weak_ptr<PlannedSender>> senders_;
+  bool stopped_ = false;
+  std::unique_ptr<Deferred> planner_;  // once there is a stream
+  std::atomic<Deferred*> planning_{nullptr};
+};
+
+}  // namespace tfdude

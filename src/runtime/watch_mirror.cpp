@@ -1,0 +1,163 @@
+#include "runtime/watch_mirror.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tfdude {
+namespace {
+
+bool is_same_process(const WatchRoute::Source& a, const WatchRoute::Source& b) {
+  return a.partition == b.partition && a.incarnation == b.incarnation;
+}
+
+}  // namespace
+
+bool WatchRoute::is_same(const WatchRoute& other) const {
+  const auto same_edge = [](const FrameInfo& a, const FrameInfo& b) {
+    return a.id == b.id && a.parent == b.parent;
+  };
+  const auto same_source = [](const Source& a, const Source& b) { return a.group == b.group; };
+  return std::equal(edges.begin(), edges.end(), other.edges.begin(), other.edges.end(),
+                    same_edge) &&
+         std::equal(sources.begin(), sources.end(), other.sources.begin(), other.sources.end(),
+                    same_source);
+}
+
+WatchMirror::WatchMirror(const std::string& a, const std::string& b, WatchRoute route,
+                         const EdgeTiming& timing)
+    : route_(std::move(route)), edges_(route_.edges.size()), sources_(route_.sources.size()) {
+  // It is the owner who judges a source's clock.
+  EdgeTiming told = timing;
+  told.restart_after = 0;
+  told.max_ahead = std::chrono::nanoseconds::max();
+  (void)forest_.set_default_timing(told);
+  constexpr auto kAllow = Forest::MissingParent::kAllow;
+  for (const FrameInfo& edge : route_.edges) {
+    (void)forest_.add(edge.id, edge.parent, Transform(), kAllow);
+  }
+  // What is not the child of an edge is the root of the path.
+  for (const FrameInfo& edge : route_.edges) {
+    if (!forest_.exists(edge.parent)) (void)forest_.add(edge.parent, "", Transform());
+  }
+  if (!forest_.exists(a)) (void)forest_.add(a, "", Transform());
+  a_ = forest_.find(a).value_or(Handle());
+  b_ = forest_.find(b).value_or(Handle());
+  for (const FrameInfo& edge : route_.edges) {
+    handles_.push_back(forest_.find(edge.id).value_or(Handle()));
+  }
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    for (const std::string& frame : route_.sources[i].frames) {
+      const auto edge = std::find_if(route_.edges.begin(), route_.edges.end(),
+                                     [&](const FrameInfo& one) { return one.id == frame; });
+      const auto index = static_cast<std::size_t>(edge - route_.edges.begin());
+      sources_[i].edges.push_back(static_cast<std::uint32_t>(index));
+      if (edge != route_.edges.end()) edges_[index].source = i;
+    }
+  }
+}
+
+void WatchMirror::inherit(const WatchMirror& before) {
+  std::vector<News> values;
+  for (std::uint32_t i = 0; i < edges_.size(); ++i) {
+    const FrameInfo& own = route_.edges[i];
+    const auto known = std::find_if(
+        before.route_.edges.begin(), before.route_.edges.end(),
+        [&](const FrameInfo& edge) { return edge.id == own.id && edge.parent == own.parent; });
+    if (known == before.route_.edges.end()) continue;
+    const Edge& edge = before.edges_[static_cast<std::size_t>(known - before.route_.edges.begin())];
+    if (edge.history == 0 ||
+        !is_same_process(before.route_.sources[edge.source], route_.sources[edges_[i].source])) {
+      continue;
+    }
+    std::vector<EdgeCursor> nothing{{own.id, own.parent}};
+    for (News& value : before.forest_.news(nothing, {false, time_of(1)}).values) {
+      value.index = i;
+      values.push_back(std::move(value));
+    }
+    edges_[i].history = edge.history;
+    edges_[i].newest = edge.newest;
+  }
+  forest_.take(handles_, values);
+}
+
+std::optional<News> WatchMirror::admitted(const Source& source, News entry, bool follows_on) {
+  if (entry.index >= source.edges.size()) return std::nullopt;
+  entry.index = source.edges[entry.index];
+  if (entry.index >= edges_.size()) return std::nullopt;
+  Edge& edge = edges_[entry.index];
+  const bool begins = entry.history > edge.history;
+  if (entry.history < edge.history || (begins && !entry.process_noise)) return std::nullopt;
+  // A sample is where the edge was then; but what holds from now on may be half of what was written at once.
+  if (!follows_on && !entry.stamp) return std::nullopt;
+  if (begins) {
+    edge.newest.reset();
+  } else {
+    entry.process_noise.reset();
+  }
+  edge.history = entry.history;
+  if (entry.stamp && (!edge.newest || *entry.stamp > *edge.newest)) edge.newest = entry.stamp;
+  return entry;
+}
+
+bool WatchMirror::take(const State& state) {
+  const auto told =
+      std::find_if(route_.sources.begin(), route_.sources.end(),
+                   [&](const WatchRoute::Source& source) { return source.group == state.group; });
+  if (told == route_.sources.end()) return false;
+  Source& source = sources_[static_cast<std::size_t>(told - route_.sources.begin())];
+  auto whole = source.pieces.add(state);
+  if (!whole) return false;
+  // Of what is known in whole, samples may be missing that came between those that the whole has told.
+  const bool is_old = whole->commit <= source.commit;
+  const bool follows_on = !is_old && whole->after <= source.commit;
+  source.heard = std::max(source.heard, whole->commit);
+  // Before the first values there is nothing that a sample could belong to.
+  if (!follows_on && source.commit == 0) return false;
+  if (follows_on) source.commit = whole->commit;
+  std::vector<News> values;
+  for (News& entry : whole->entries) {
+    if (auto value = admitted(source, std::move(entry), follows_on)) {
+      values.push_back(*std::move(value));
+    }
+  }
+  forest_.take(handles_, values, !is_old);
+  return !is_old;
+}
+
+bool WatchMirror::complete() const {
+  return std::all_of(sources_.begin(), sources_.end(),
+                     [](const Source& source) { return source.commit != 0; });
+}
+
+bool WatchMirror::lacks() const {
+  return std::any_of(sources_.begin(), sources_.end(), [](const Source& source) {
+    return source.commit == 0 || source.heard > source.commit;
+  });
+}
+
+bool WatchMirror::is_behind(const WatchMirror& other) const {
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    const Source* like = other.source_like(route_.sources[i]);
+    if (like != nullptr && sources_[i].commit < std::max(like->commit, like->heard)) return true;
+  }
+  return false;
+}
+
+const WatchMirror::Source* WatchMirror::source_like(const WatchRoute::Source& source) const {
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    if (is_same_process(route_.sources[i], source)) return &sources_[i];
+  }
+  return nullptr;
+}
+
+std::optional<Time> WatchMirror::lacks_past() const {
+  const auto newest = lookup({});
+  if (newest || newest.error().code != Errc::kTooOld) return std::nullopt;
+  std::optional<Time> common;
+  for (const Edge& edge : edges_) {
+    if (edge.newest && (!common || *edge.newest < *common)) common = edge.newest;
+  }
+  return common;
+}
+
+}  // namespace tfdude

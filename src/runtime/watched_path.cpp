@@ -1,0 +1,186 @@
+#include "runtime/watched_path.hpp"
+
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+
+#include "tree/epoch.hpp"
+
+namespace tfdude {
+namespace {
+
+// How long a frame may hang under one that is not there before the path counts as gone: its parent's owner may be heard
+// later than its own.
+constexpr Milliseconds kNotConnectedFor{500};
+
+// How long a route whose edges have no instant in common waits for one while another is shown.
+constexpr Milliseconds kWaitForCommon{1000};
+
+// How often owners are asked for what was before.
+constexpr int kMostAskedForPast = 10;
+
+}  // namespace
+
+WatchedPath::WatchedPath(std::string a, std::string b, WatchOptions options)
+    : a_(std::move(a)),
+      b_(std::move(b)),
+      options_(std::move(options)),
+      why_not_{Errc::kNotYet,
+               "the path from " + quote(a_) + " to " + quote(b_) + " is being asked for"} {}
+
+WatchedPath::~WatchedPath() = default;
+
+Result<StampedTransform> WatchedPath::lookup(const Query& query) const {
+  {
+    const epoch::Guard guard;
+    // seq_cst: after the guard's announcement, see epoch.hpp.
+    const WatchMirror* mirror = shown_.load(std::memory_order_seq_cst);
+    if (mirror != nullptr) return mirror->lookup(query);
+  }
+  const std::lock_guard lock(mutex_);
+  return tl::unexpected(why_not_);
+}
+
+Result<void> WatchedPath::health() const {
+  const std::lock_guard lock(mutex_);
+  if (followed_ == nullptr) return tl::unexpected(why_not_);
+  return health_;
+}
+
+void WatchedPath::set_health(Result<void> health) {
+  const std::lock_guard lock(mutex_);
+  health_ = std::move(health);
+  if (health_) not_connected_since_.reset();
+}
+
+bool WatchedPath::is_gone(const Error& error, Clock::time_point now) {
+  if (error.code == Errc::kUnknownStart || error.code == Errc::kUnknownEnd) return true;
+  const std::lock_guard lock(mutex_);
+  if (error.code != Errc::kNotConnected) return false;
+  if (!not_connected_since_) not_connected_since_ = now;
+  return now - *not_connected_since_ >= kNotConnectedFor;
+}
+
+bool WatchedPath::follows(const WatchRoute& route) const {
+  const std::lock_guard lock(mutex_);
+  const auto& latest = next_ != nullptr ? next_ : followed_;
+  return latest != nullptr && latest->route().is_same(route);
+}
+
+bool WatchedPath::prepare(WatchRoute route) {
+  bool shown = false;
+  {
+    const std::lock_guard lock(mutex_);
+    next_.reset();
+    asked_for_past_ = 0;
+    // There and back again, before the other one was shown.
+    if (followed_ != nullptr && followed_->route().is_same(route)) return false;
+    next_ = std::make_unique<WatchMirror>(a_, b_, std::move(route), options_.timing);
+    next_since_ = Clock::now();
+    if (followed_ != nullptr) next_->inherit(*followed_);
+    shown = swap_if_ready();
+  }
+  changed_.notify_all();
+  return shown;
+}
+
+WatchedPath::Taken WatchedPath::take(const State& state) {
+  Taken taken;
+  bool news = false;
+  {
+    const std::lock_guard lock(mutex_);
+    if (followed_ != nullptr && followed_->take(state)) news = true;
+    if (next_ != nullptr && next_->take(state)) news = true;
+    taken.rerouted = swap_if_ready();
+    const auto& latest = next_ != nullptr ? next_ : followed_;
+    taken.lacks = latest != nullptr && latest->lacks();
+    if (news) messages_.fetch_add(1, std::memory_order_relaxed);
+  }
+  changed_.notify_all();  // samples of the past are no news, but waited for
+  return taken;
+}
+
+bool WatchedPath::has_common_instant() const {
+  const auto newest = next_->lookup({});
+  return newest || newest.error().code != Errc::kTooOld;
+}
+
+// Of what is shown, nothing may be older than what was shown before.
+bool WatchedPath::swap_if_ready() {
+  if (next_ == nullptr || !next_->complete()) return false;
+  if (followed_ != nullptr) {
+    if (next_->is_behind(*followed_)) return false;
+    if (!has_common_instant() && Clock::now() - next_since_ < kWaitForCommon) return false;
+  }
+  show(std::move(next_));
+  return std::exchange(was_shown_, true);
+}
+
+void WatchedPath::show(std::unique_ptr<WatchMirror> mirror) {
+  shown_.store(mirror.get(), std::memory_order_seq_cst);
+  if (followed_ != nullptr) retired_.push_back({epoch::retire_tag(), std::move(followed_)});
+  followed_ = std::move(mirror);
+}
+
+void WatchedPath::collect() {
+  const std::lock_guard lock(mutex_);
+  const std::uint64_t below = epoch::safe_below();
+  retired_.erase(std::remove_if(retired_.begin(), retired_.end(),
+                                [below](const Retired& retired) { return retired.tag < below; }),
+                 retired_.end());
+}
+
+void WatchedPath::interrupt(Error why) {
+  {
+    const std::lock_guard lock(mutex_);
+    why_not_ = std::move(why);
+    next_.reset();
+    show(nullptr);
+  }
+  changed_.notify_all();
+}
+
+bool WatchedPath::up_to_date() const {
+  const std::lock_guard lock(mutex_);
+  if (next_ != nullptr || followed_ == nullptr || followed_->lacks()) return false;
+  return asked_for_past_ >= kMostAskedForPast || !followed_->lacks_past();
+}
+
+std::optional<Time> WatchedPath::lacks_past() {
+  const std::lock_guard lock(mutex_);
+  const auto& latest = next_ != nullptr ? next_ : followed_;
+  if (latest == nullptr || !latest->complete() || asked_for_past_ >= kMostAskedForPast) return {};
+  const auto from = latest->lacks_past();
+  if (from) ++asked_for_past_;
+  return from;
+}
+
+std::size_t WatchedPath::edge_count() const {
+  const std::lock_guard lock(mutex_);
+  return followed_ != nullptr ? followed_->route().edges.size() : 0;
+}
+
+std::set<std::uint64_t> WatchedPath::groups() const {
+  const std::lock_guard lock(mutex_);
+  std::set<std::uint64_t> groups;
+  for (const auto* mirror : {followed_.get(), next_.get()}) {
+    if (mirror == nullptr) continue;
+    for (const WatchRoute::Source& source : mirror->route().sources) groups.insert(source.group);
+  }
+  return groups;
+}
+
+bool WatchedPath::wait_for_more(std::uint64_t messages, Clock::time_point deadline) const {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_until(lock, deadline, [&] { return this->messages() > messages; });
+}
+
+Result<void> WatchedPath::wait_until_live(Clock::time_point deadline) const {
+  std::unique_lock lock(mutex_);
+  changed_.wait_until(lock, deadline,
+                      [&] { return followed_ != nullptr && !followed_->lacks_past(); });
+  if (followed_ != nullptr) return {};
+  return tl::unexpected(why_not_);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,196 @@
+#include "runtime/watches.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+namespace {
+
+// How often owners are told that they are watched still; several times within kWatchLease.
+constexpr Milliseconds kRenewEvery{1000};
+
+// A path that could not be followed, or lacks something, is tried again after this.
+constexpr Milliseconds kRetryAfter{50};
+
+}  // namespace
+
+Watches::Watches(Links links) : links_(std::move(links)), thread_([this] { run(); }) {}
+
+void Watches::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_one();
+  if (thread_.joinable()) thread_.join();
+  notices_.stop();
+  const std::lock_guard lock(mutex_);
+  for (const Path& path : std::exchange(paths_, {})) {
+    path->interrupt({Errc::kTransport, "the client that watched the path has gone"});
+  }
+}
+
+std::shared_ptr<WatchedPath> Watches::watch(const std::string& a, const std::string& b,
+                                            const WatchOptions& options) {
+  auto path = std::make_shared<WatchedPath>(a, b, options);
+  {
+    const std::lock_guard lock(mutex_);
+    paths_.push_back(path);
+  }
+  look_again();
+  return path;
+}
+
+void Watches::look_again() {
+  {
+    const std::lock_guard lock(mutex_);
+    asked_ = true;
+  }
+  changed_.notify_one();
+}
+
+void Watches::on_state(const State& state) {
+  std::vector<Path> paths;
+  {
+    const std::lock_guard lock(mutex_);
+    paths = paths_;
+  }
+  bool lacks = false;
+  for (const Path& path : paths) {
+    const auto taken = path->take(state);
+    if (taken.rerouted) tell_rerouted(path);
+    lacks = lacks || taken.lacks;
+  }
+  if (!lacks) return;
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::exchange(lacking_, true)) return;
+  }
+  changed_.notify_one();
+}
+
+bool Watches::can_answer(const std::string& a, const std::string& b, const Query& query) const {
+  const std::lock_guard lock(mutex_);
+  return std::any_of(paths_.begin(), paths_.end(), [&](const Path& path) {
+    return path->a() == a && path->b() == b && path->lookup(query).has_value();
+  });
+}
+
+void Watches::wait(std::unique_lock<std::mutex>& lock, Clock::time_point renew_at) {
+  while (!stopping_ && !asked_) {
+    const auto wake_at = lacking_ ? std::min(renew_at, last_round_ + kRetryAfter) : renew_at;
+    if (Clock::now() >= wake_at) return;
+    changed_.wait_until(lock, wake_at);
+  }
+}
+
+void Watches::run() {
+  auto renew_at = Clock::now() + kRenewEvery;
+  std::unique_lock lock(mutex_);
+  while (true) {
+    wait(lock, renew_at);
+    if (stopping_) return;
+    asked_ = false;
+    lacking_ = false;
+    last_round_ = Clock::now();
+    // Whom nobody else has, nobody reads any more. They go without the lock, with what their users gave them.
+    const auto unused = std::stable_partition(
+        paths_.begin(), paths_.end(), [](const Path& path) { return path.use_count() > 1; });
+    std::vector<Path> gone(unused, paths_.end());
+    paths_.erase(unused, paths_.end());
+    auto paths = paths_;
+    lock.unlock();
+    gone.clear();
+    const bool renew = Clock::now() >= renew_at;
+    if (renew) renew_at = Clock::now() + kRenewEvery;
+    bool all_well = true;
+    for (const Path& path : paths) all_well = attend(path, renew) && all_well;
+    close_unused(paths);
+    paths.clear();
+    lock.lock();
+    lacking_ = lacking_ || !all_well;
+  }
+}
+
+bool Watches::attend(const Path& path, bool renew) {
+  path->collect();
+  auto route = links_.plan(*path);
+  if (!route) return cannot_be_planned(path, std::move(route.error()));
+  path->set_health({});
+  if (!path->follows(*route)) {
+    if (path->prepare(*route)) tell_rerouted(path);
+  } else if (!renew && path->up_to_date()) {
+    return true;
+  }
+  for (const WatchRoute::Source& source : route->sources) {
+    if (open_.count(source.group) == 0 && links_.open(source.group)) open_.insert(source.group);
+  }
+  if (!ask(path, *route, path->lacks_past())) return false;
+  // Only the first answers show that one edge is ahead of what another has.
+  if (const auto from = path->lacks_past()) {
+    if (!ask(path, *route, from)) return false;
+  }
+  return path->up_to_date();
+}
+
+bool Watches::cannot_be_planned(const Path& path, Error why) {
+  const bool was_live = path->live();
+  if (was_live && !path->is_gone(why, Clock::now())) {
+    // What is here goes on to be told, with its stamps; the owner may return.
+    const bool is_news_awaited = why.code == Errc::kUnreachable;
+    path->set_health(tl::unexpected(std::move(why)));
+    return is_news_awaited;
+  }
+  if (was_live) tell(path, why.message);
+  path->interrupt(std::move(why));
+  return false;
+}
+
+bool Watches::ask(const Path& path, WatchRoute& route, std::optional<Time> from) {
+  for (Part& part : route.parts) std::get<WatchRequest>(part.request.body).from = from;
+  const std::vector<Reply> replies = links_.ask(route.parts);
+  bool all = true;
+  for (std::size_t i = 0; i < replies.size(); ++i) {
+    const auto* state = std::get_if<State>(&replies[i].body);
+    // An owner that has started anew since it was heard has other groups.
+    if (state != nullptr && state->group == route.sources[i].group) {
+      if (path->take(*state).rerouted) tell_rerouted(path);
+      continue;
+    }
+    all = false;
+    if (path->live()) continue;
+    const auto* error = std::get_if<Error>(&replies[i].body);
+    path->interrupt(error != nullptr
+                        ? *error
+                        : Error{Errc::kNotOwner, "partition " + quote(route.sources[i].partition) +
+                                                     " has started anew, or cannot push"});
+  }
+  return all;
+}
+
+void Watches::tell(const Path& path, std::string what) {
+  if (!path->options().on_route) return;
+  notices_.post([path, what = std::move(what)] { path->options().on_route(what); });
+}
+
+void Watches::tell_rerouted(const Path& path) {
+  tell(path, "the path from " + quote(path->a()) + " to " + quote(path->b()) +
+                 " is followed anew, over " + std::to_string(path->edge_count()) + " edges");
+}
+
+void Watches::close_unused(const std::vector<Path>& paths) {
+  std::set<std::uint64_t> used;
+  for (const Path& path : paths) used.merge(path->groups());
+  for (auto group = open_.begin(); group != open_.end();) {
+    if (used.count(*group) > 0) {
+      ++group;
+      continue;
+    }
+    links_.close(*group);
+    group = open_.erase(group);
+  }
+}
+
+}  // namespace tfdude

@@ -1,0 +1,7 @@
+#include "transport/port.hpp"
+
+namespace tfdude {
+
+void TransportEnd::operator()(Transport* transport) const { delete transport; }
+
+}  // namespace tfdude

@@ -1,0 +1,75 @@
+#include "tfdude/types/joint_spec.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tfdude/base/id.hpp"
+
+#include "math/finite.hpp"
+
+namespace tfdude {
+
+const char* to_string(JointType type) {
+  switch (type) {
+    case JointType::kContinuous:
+      return "continuous";
+    case JointType::kPrismatic:
+      return "prismatic";
+    default:
+      return "revolute";
+  }
+}
+
+bool is_position(double position) {
+  return std::isfinite(position) && std::abs(position) <= kMaxTranslation;
+}
+
+bool is_variance(double variance) { return variance >= 0 && variance <= kMaxVariance; }
+
+Result<void> check_value(const JointValue& joint) {
+  const char* what = nullptr;
+  if (!is_position(joint.position))
+    what = ": position is not a number, or beyond 1e9";
+  else if (!is_variance(joint.variance))
+    what = ": variance is not a number within 0 to 1e18";
+  if (what == nullptr) return {};
+  return fail(Errc::kInvalidInput, "joint " + quote(joint.name) + what);
+}
+
+Result<void> check_joint(const JointSpec& joint) {
+  const std::string who = "joint " + quote(joint.name);
+  if (auto ok = check_id(joint.name, "joint"); !ok) return ok;
+  const auto bad = [&](const char* what) { return fail(Errc::kInvalidInput, who + ": " + what); };
+  if (joint.mimic && !joint.coupled) return bad("follows another, so it is coupled");
+  if (joint.coupled && !check_id(shared_source(leader_of(joint)), "source")) {
+    return bad("it is coupled, and its name, or that of the joint that it follows, is too long");
+  }
+  const bool unit = std::abs(joint.joint.S.norm() - 1.0) < 1e-9;
+  if (!unit) return bad("its twist is not of unit length");
+  if (joint.limits && !(joint.limits->lower <= joint.limits->upper)) {
+    return bad("its limits are upside down");
+  }
+  if (!is_finite(joint.joint.X_PJ)) return bad("its mount is not finite");
+  return check_value({joint.name, joint.position, joint.variance});
+}
+
+std::string shared_source(const std::string& leader) { return "joint " + leader; }
+
+Transform value_at(const JointSpec& joint, double position, double variance) {
+  return moved(joint.joint, position, joint.coupled ? 0.0 : variance);
+}
+
+double rest_position(const std::optional<JointLimits>& limits) {
+  return limits ? std::clamp(0.0, limits->lower, limits->upper) : 0.0;
+}
+
+double unmeasured_variance(JointType type, const std::optional<JointLimits>& limits,
+                           double position) {
+  constexpr double kPi = 3.14159265358979323846;
+  if (!limits) return type == JointType::kPrismatic ? 0.0 : kPi * kPi / 3.0;
+  const double range = limits->upper - limits->lower;
+  const double off = 0.5 * (limits->upper + limits->lower) - position;
+  return range * range / 12.0 + off * off;
+}
+
+}  // namespace tfdude

@@ -1,0 +1,123 @@
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <string>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/description/config.hpp"
+
+#include "support/catch.hpp"
+
+TEST_CASE("a configuration names URDFs") {
+  const auto config = tfdude::parse_config(
+      "frames: [{id: world}]\n"
+      "urdf:\n"
+      "  - file: robots/ur5e.urdf\n"
+      "    root: world\n"
+      "    xyz: [1, 2, 3]\n"
+      "    stddev: [0.1, 0, 0, 0, 0, 0]\n"
+      "    prefix: a_\n"
+      "    strict_limits: true\n"
+      "    joints:\n"
+      "      elbow_joint: {position: 0.5, stddev: 0.01, mount: {stddev: [0, 0, 0.2, 0, 0, 0]}}\n"
+      "  - {file: robots/ur5e.urdf, prefix: b_, links: [base_link..forearm_link, tool0]}\n",
+      TFDUDE_EXAMPLES "/robot.yaml");
+  INFO((config ? "" : config.error().message));
+  REQUIRE(config.has_value());
+  REQUIRE(config->frames.size() == 1 + 8 + 5);
+  CHECK(config->places.size() == config->frames.size());
+  const auto& base = config->frames[1];
+  CHECK(base.id == "a_base_link");
+  CHECK(base.parent == "world");
+  CHECK(base.X_PC.pose.translation() == Eigen::Vector3d(1, 2, 3));
+  CHECK(base.X_PC.covariance.stddev()[0] == tfdude::testing::Approx(0.1));
+  const auto& elbow = *config->frames[4].joint;
+  CHECK(elbow.name == "a_elbow_joint");
+  CHECK(elbow.position == 0.5);
+  CHECK(elbow.variance == tfdude::testing::Approx(1e-4));
+  CHECK(elbow.strict);
+  CHECK(elbow.joint.X_PJ.covariance.stddev()[2] == tfdude::testing::Approx(0.2));
+  CHECK(config->frames[9].id == "b_base_link");
+  CHECK(config->frames[9].parent.empty());
+  CHECK(config->frames[13].id == "b_tool0");
+  CHECK(config->frames[13].parent == "b_wrist_3_link");
+  CHECK_FALSE(config->frames[10].joint->strict);
+}
+
+TEST_CASE("what a bad configuration of URDFs has of control characters does not reach a terminal") {
+  for (const char* text : {"urdf:\n  - file: x\n    joints:\n      a\x96: {}\n      a\x96: {}\n",
+                           "urdf: [{file: \"a\\e[2J\"}]\n"}) {
+    const auto config = tfdude::parse_config(text, "f.yaml");
+    REQUIRE_FALSE(config.has_value());
+    const std::string& message = config.error().message;
+    CHECK(message == tfdude::printable(message));
+  }
+}
+
+TEST_CASE("a bad entry of a URDF is refused by name and line") {
+  const std::string folder = TFDUDE_EXAMPLES "/robots/";
+  const auto refused = [&](const std::string& text, const std::string& message) {
+    CAPTURE(text);
+    const auto config = tfdude::parse_config(text, folder + "f.yaml");
+    REQUIRE_FALSE(config.has_value());
+    CHECK(config.error().message == folder + "f.yaml:" + message);
+  };
+  const auto entry = [&](const std::string& keys, const std::string& message) {
+    refused("urdf:\n  - {file: ur5e.urdf, " + keys + "}\n", "2: urdf[0]" + message);
+  };
+  refused("urdf: ur5e.urdf\n", "1: urdf is not a list");
+  refused("urdf: [{root: a}]\n", "1: urdf[0]: file is missing");
+  refused("urdf: [{file: x.urdf}]\n",
+          "1: urdf[0]: " + folder + "x.urdf: cannot be opened: No such file or directory");
+  entry("spam: 1",
+        ": unknown key 'spam'; known are file, root, xyz, rpy, quat, stddev, cov, prefix, links, "
+        "strict_limits, joints");
+  entry("rpy: [0, 0, 0]", ": rpy is that of the root link in root, which is missing");
+  entry("root: ''", ": root is empty");
+  entry("root: w, xyz: [1, 2]", ": xyz has 2, not 3 numbers");
+  entry("prefix: [a]", ": prefix is not text");
+  entry("strict_limits: 1", ": strict_limits is neither true nor false");
+  entry("links: tool0", ": links is not a list of links");
+  entry("links: []", ": links is not a list of links");
+  entry("links: [[tool0]]", ": links[0] is not text");
+  entry("links: [x]", ": " + folder + "ur5e.urdf: links 'x': link 'x' is not there");
+  entry("joints: [a]", ": joints is not a mapping");
+  entry("joints: {x: {}}", ": " + folder + "ur5e.urdf: joint 'x' is not there");
+  entry("joints: {elbow_joint: {at: 1}}",
+        ": joint 'elbow_joint': unknown key 'at'; known are position, stddev, mount");
+  entry("joints: {elbow_joint: {position: up}}",
+        ": joint 'elbow_joint': position is 'up', which is not a number");
+  entry("joints: {elbow_joint: {mount: {xyz: [0, 0, 0]}}}",
+        ": joint 'elbow_joint': mount: unknown key 'xyz'; known are stddev, cov");
+  entry("joints: {elbow_joint: {mount: {stddev: [-1, 0, 0, 0, 0, 0]}}}",
+        ": joint 'elbow_joint': mount: stddev[0] is negative");
+  const std::string arm = folder + "ur5e.urdf";
+  refused(
+      "frames:\n  - id: tool0\nurdf:\n  - file: ur5e.urdf\n",
+      "4: urdf[0]: " + arm + ": frame 'tool0': id is taken by the frame in " + folder + "f.yaml:2");
+  refused("urdf:\n  - file: ur5e.urdf\n  - file: mobile_arm.urdf\n    links: [tool0]\n",
+          "3: urdf[1]: " + folder + "mobile_arm.urdf: frame 'tool0': id is taken by the frame in " +
+              arm);
+  refused("frames: [{id: w, parent: tool0}]\nurdf: [{file: ur5e.urdf, root: w}]\n",
+          "2: urdf[0]: " + folder +
+              "ur5e.urdf: frame 'base_link': parent 'w' is the frame itself or lies below it");
+}
+
+TEST_CASE("two joints of one name are refused") {
+  const std::string text =
+      "<robot><link name='X'/><link name='Y'/><joint name='elbow_joint' type='continuous'>"
+      "<parent link='X'/><child link='Y'/></joint></robot>";
+  const std::string other = (std::filesystem::temp_directory_path() /
+                             ("tfdude_config_" + std::to_string(std::random_device()()) + ".urdf"))
+                                .string();
+  std::ofstream(other) << text;
+  tfdude::Config config;
+  REQUIRE(tfdude::add_urdf(config, {TFDUDE_EXAMPLES "/robots/ur5e.urdf"}).has_value());
+  const auto again = tfdude::add_urdf(config, {other});
+  std::filesystem::remove(other);
+  REQUIRE_FALSE(again.has_value());
+  CHECK(again.error().message == other + ": joint 'elbow_joint': name is taken by the joint in " +
+                                     TFDUDE_EXAMPLES "/robots/ur5e.urdf");
+  CHECK(config.frames.size() == 8);
+  CHECK(config.places.size() == 8);
+}

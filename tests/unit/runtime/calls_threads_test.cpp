@@ -1,0 +1,67 @@
+#include <atomic>
+#include <thread>
+#include <vector>
+
+#include "runtime/calls.hpp"
+#include "support/catch.hpp"
+
+namespace tfdude {
+namespace {
+
+// Far enough that it is only reached where a reply got lost.
+Calls::Clock::time_point far() { return Calls::Clock::now() + std::chrono::seconds(60); }
+
+TEST_CASE("a waiting call is woken by its last reply") {
+  Calls calls;
+  Calls::Call call(calls, {"a", "b"});
+  std::thread replier([&calls, &entries = call.entries()] {
+    for (const Calls::Entry& entry : entries) calls.on_reply({entry.sequence, 0, Done{}});
+  });
+  CHECK(call.wait_until(far()));
+  replier.join();
+}
+
+TEST_CASE("a waiting call is woken by the loss of the last partition it waits for") {
+  Calls calls;
+  Calls::Call call(calls, {"a"});
+  std::thread loser([&calls] { calls.on_lost("a"); });
+  CHECK(call.wait_until(far()));
+  loser.join();
+}
+
+TEST_CASE("many calls at once each get their own replies") {
+  constexpr std::uint32_t kCalls = 2000;
+  constexpr std::uint32_t kCallers = 3;
+  Calls calls;
+  std::atomic<std::uint32_t> running{kCallers};
+  std::atomic<std::uint32_t> wrong{0};
+  std::vector<std::thread> threads;
+  for (std::uint32_t i = 0; i < kCallers; ++i) {
+    threads.emplace_back([&] {
+      for (std::uint32_t n = 0; n < kCalls; ++n) {
+        Calls::Call call(calls, {"a", "b"});
+        if (!call.wait_until(far())) ++wrong;
+        for (const Calls::Entry& entry : call.entries()) {
+          if (entry.reply->sequence != entry.sequence || entry.reply->epoch != entry.sequence) {
+            ++wrong;
+          }
+        }
+      }
+      --running;
+    });
+  }
+  // Answers everything over and over, so that replies come too early, twice, and too late.
+  std::thread replier([&] {
+    while (running > 0) {
+      for (std::uint32_t n = 1; n <= 2 * kCallers * kCalls && running > 0; ++n) {
+        calls.on_reply({n, n, Done{}});
+      }
+    }
+  });
+  for (std::thread& thread : threads) thread.join();
+  replier.join();
+  CHECK(wrong == 0);
+}
+
+}  // namespace
+}  // namespace tfdude

@@ -1,0 +1,149 @@
+#include "runtime/pusher.hpp"
+
+#include <chrono>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/process.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::along_x;
+using testing::eventually;
+using testing::outcome;
+
+Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
+
+const PathEnds kArm{"base", "arm"};
+const PathEnds kHand{"arm", "hand"};
+
+// An owner of two frames, and all that it pushed.
+struct PushingOwner {
+  PushingOwner() {
+    REQUIRE(forest.add("base", "", along_x(0)));
+    REQUIRE(forest.add("arm", "base", along_x(0)));
+    REQUIRE(forest.add("hand", "arm", along_x(0)));
+  }
+  void push(const State& state) {
+    const std::lock_guard lock(mutex);
+    open.insert(state.group);
+    for (const News& entry : state.entries) pushed[state.group].push_back(entry.stamp);
+  }
+  std::size_t count(std::uint64_t group) {
+    const std::lock_guard lock(mutex);
+    return pushed[group].size();
+  }
+
+  Forest forest;
+  std::mutex mutex;
+  std::map<std::uint64_t, std::vector<std::optional<Time>>> pushed;
+  std::set<std::uint64_t> open;  // for which the transport would have a writer
+  std::set<std::uint64_t> writers() {
+    const std::lock_guard lock(mutex);
+    return open;
+  }
+  Pusher pusher{forest, [this](const State& state) { push(state); },
+                [this](std::uint64_t group) {
+                  const std::lock_guard lock(mutex);
+                  open.erase(group);
+                }};
+};
+
+}  // namespace
+
+TEST_CASE("nothing is pushed that nobody watches, and every sample that somebody does") {
+  PushingOwner owner;
+  for (int t = 1; t <= 100; ++t) REQUIRE(owner.forest.update("hand", along_x(t), ms(t)));
+  REQUIRE(owner.pusher.watch(1, {{kHand}}));
+  // The newest, as those before were written for nobody.
+  REQUIRE(eventually([&] { return owner.count(1) == 1; }));
+  CHECK(owner.pushed[1].at(0) == ms(100));
+  for (int t = 101; t <= 200; ++t) REQUIRE(owner.forest.update("hand", along_x(t), ms(t)));
+  REQUIRE(owner.forest.update("arm", along_x(1), ms(1)));
+  REQUIRE(eventually([&] { return owner.count(1) == 101; }));
+  const auto stamps = owner.pushed[1];
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    CHECK(stamps[i] == ms(100 + static_cast<std::int64_t>(i)));
+  }
+  CHECK(owner.pushed.size() == 1);
+  REQUIRE(owner.pusher.watch(2, {{kArm}}));
+  REQUIRE(eventually([&] { return owner.count(2) == 1; }));
+  CHECK(owner.count(1) == 101);
+}
+
+TEST_CASE("a rate is kept, and the newest comes in the end") {
+  PushingOwner owner;
+  REQUIRE(owner.pusher.watch(1, {{kHand}, false, 50ms}));
+  REQUIRE(eventually([&] { return owner.count(1) == 1; }));
+  const auto start = std::chrono::steady_clock::now();
+  std::int64_t t = 0;
+  while (std::chrono::steady_clock::now() - start < 300ms) {
+    REQUIRE(owner.forest.update("hand", along_x(1), ms(++t)));
+    std::this_thread::sleep_for(1ms);
+  }
+  REQUIRE(eventually([&] {
+    const std::lock_guard lock(owner.mutex);
+    return owner.pushed[1].back() == ms(t);
+  }));
+  const auto over = std::chrono::steady_clock::now() - start;
+  CHECK(owner.count(1) <= static_cast<std::size_t>(over / 50ms) + 3);
+}
+
+TEST_CASE("who asks for a frame that is not owned is refused, and costs nothing") {
+  PushingOwner owner;
+  CHECK(outcome(owner.pusher.watch(1, {{{"arm", "nobody"}}})) == "not_owner");
+  REQUIRE(owner.forest.update("hand", along_x(1), ms(1)));
+  REQUIRE(owner.pusher.watch(2, {{kHand}}));
+  REQUIRE(eventually([&] { return owner.count(2) == 1; }));
+  CHECK(owner.count(1) == 0);
+}
+
+TEST_CASE("a group whose frame has gone is ended, also while it is pushed to") {
+  PushingOwner owner;
+  for (int i = 0; i < 100; ++i) {
+    REQUIRE(owner.pusher.watch(1, {{kHand}}));
+    if (i % 2 == 0) REQUIRE(eventually([&] { return owner.writers().count(1) == 1; }));
+    REQUIRE(owner.forest.remove("hand"));
+    CHECK(outcome(owner.pusher.watch(1, {{kHand}})) == "not_owner");
+    REQUIRE(eventually([&] { return owner.writers().empty(); }));
+    REQUIRE(owner.forest.add("hand", "arm", along_x(0)));
+  }
+}
+
+TEST_CASE("of a thousand groups that nobody renews no writer is left") {
+  PushingOwner owner;
+  for (std::uint64_t group = 1; group <= 1000; ++group) {
+    REQUIRE(owner.pusher.watch(group, {{kHand}}));
+  }
+  REQUIRE(eventually([&] { return owner.writers().size() > 500; }));
+  REQUIRE(eventually([&] { return owner.writers().empty(); }));
+}
+
+TEST_CASE("who begins to listen late is told all once more") {
+  PushingOwner owner;
+  REQUIRE(owner.pusher.watch(1, {{kArm, kHand}}));
+  REQUIRE(eventually([&] { return owner.count(1) == 2; }));
+  owner.pusher.tell_all(1);
+  owner.pusher.tell_all(2);  // of nobody
+  REQUIRE(eventually([&] { return owner.count(1) == 4; }));
+  CHECK(owner.count(2) == 0);
+}
+
+TEST_CASE("a period without an end is refused") {
+  PushingOwner owner;
+  CHECK(outcome(owner.pusher.watch(1, {{kHand}, false, std::chrono::nanoseconds::max()})) ==
+        "invalid_input");
+  REQUIRE(owner.pusher.watch(1, {{kHand}, false, kMaxWatchPeriod}));
+  REQUIRE(eventually([&] { return owner.count(1) == 1; }));
+}
+
+}  // namespace tfdude

@@ -1,0 +1,176 @@
+#include "runtime/watch_mirror.hpp"
+
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::Approx;
+using testing::outcome;
+
+Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
+
+Query at(std::int64_t milliseconds) {
+  Query query;
+  query.at = ms(milliseconds);
+  return query;
+}
+
+constexpr std::uint64_t kArms = 11;
+constexpr std::uint64_t kTools = 12;
+
+// world -> arm -> hand of "arms", -> tool of "tools".
+WatchRoute route() {
+  WatchRoute route;
+  route.edges = {{"arm", "world"}, {"hand", "arm"}, {"tool", "hand"}};
+  route.sources = {{"arms", 1, kArms, {"arm", "hand"}}, {"tools", 1, kTools, {"tool"}}};
+  return route;
+}
+
+News entry(std::uint32_t index, double x, std::uint64_t history, bool begins = true) {
+  News news{index, {}, along_x(x), {}, history, {}};
+  if (begins) news.process_noise = Covariance();
+  return news;
+}
+News sample(std::uint32_t index, std::int64_t t, double x, std::uint64_t history,
+            bool begins = false) {
+  News news = entry(index, x, history, begins);
+  news.stamp = ms(t);
+  return news;
+}
+
+struct Watched {
+  Watched() {
+    REQUIRE(mirror.take({kArms, {entry(0, 1, 1), entry(1, 10, 2)}, 0, 5}));
+    REQUIRE(mirror.take({kTools, {entry(0, 100, 1)}, 0, 3}));
+    REQUIRE(mirror.complete());
+  }
+  double x() const {
+    const auto found = mirror.lookup({});
+    return found ? found->pose.translation().x() : -1;
+  }
+  WatchMirror mirror{"world", "tool", route(), {}};
+};
+
+}  // namespace
+
+TEST_CASE("watch mirror: it is complete when all owners have told their values") {
+  WatchMirror mirror("world", "tool", route(), {});
+  CHECK(mirror.lacks());
+  CHECK(mirror.take({kArms, {entry(0, 1, 1), entry(1, 10, 2)}, 0, 5}));
+  CHECK_FALSE(mirror.complete());
+  CHECK_FALSE(mirror.take({99, {entry(0, 7, 1)}, 0, 9}));  // of another route
+  // News of what is not known are no values; what they build on must be asked for.
+  CHECK_FALSE(mirror.take({kTools, {entry(0, 200, 1, false)}, 3, 4}));
+  CHECK_FALSE(mirror.complete());
+  CHECK(mirror.take({kTools, {entry(0, 100, 1)}, 0, 3}));
+  CHECK(mirror.complete());
+  CHECK(mirror.lacks());
+  CHECK(mirror.take({kTools, {entry(0, 200, 1)}, 0, 4}));
+  CHECK_FALSE(mirror.lacks());
+  CHECK(mirror.lookup({})->pose.translation().x() == 211);
+}
+
+TEST_CASE("watch mirror: a value never regresses, whichever way it comes") {
+  Watched watched;
+  CHECK(watched.mirror.take({kArms, {entry(0, 2, 1, false)}, 5, 6}));
+  CHECK(watched.x() == 112);
+  CHECK_FALSE(
+      watched.mirror.take({kArms, {entry(0, 1, 1), entry(1, 10, 2)}, 0, 5}));  // a late reply
+  CHECK_FALSE(watched.mirror.take({kArms, {entry(0, 3, 1, false)}, 5, 6}));
+  CHECK(watched.x() == 112);
+  CHECK_FALSE(watched.mirror.lacks());
+  // Samples that the reply has left out come all the same.
+  CHECK(watched.mirror.take({kTools, {sample(0, 30, 3, 4, true)}, 0, 9}));
+  CHECK_FALSE(watched.mirror.take({kTools, {sample(0, 20, 2, 4), sample(0, 30, 7, 4)}, 3, 9}));
+  CHECK(watched.mirror.lookup(at(20))->pose.translation().x() == 14);
+  CHECK(watched.mirror.lookup(at(30))->pose.translation().x() == 15);
+}
+
+TEST_CASE("watch mirror: after a loss nothing is shown by half") {
+  Watched watched;
+  // A commit of both was lost, and one of them was written again.
+  CHECK(watched.mirror.take({kArms, {entry(1, 30, 2, false)}, 6, 7}));
+  CHECK(watched.x() == 111);
+  CHECK(watched.mirror.lacks());
+  CHECK_FALSE(watched.mirror.take({kArms, {entry(0, 1, 1), entry(1, 10, 2)}, 0, 5}));
+  CHECK(watched.mirror.lacks());
+  CHECK(watched.mirror.take({kArms, {entry(0, 2, 1), entry(1, 30, 2)}, 0, 8}));
+  CHECK(watched.x() == 132);
+  CHECK_FALSE(watched.mirror.lacks());
+  // A sample tells where the edge was, whatever else was lost.
+  CHECK(watched.mirror.take({kTools, {sample(0, 10, 100, 1)}, 3, 4}));
+  CHECK(watched.mirror.take({kTools, {sample(0, 30, 300, 1)}, 5, 6}));
+  CHECK(watched.x() == 332);
+  CHECK(watched.mirror.lacks());
+}
+
+TEST_CASE("watch mirror: a state in pieces is shown when the last of them has come") {
+  Watched watched;
+  CHECK_FALSE(watched.mirror.take({kArms, {entry(0, 2, 1, false)}, 5, 6, 0, 2}));
+  CHECK(watched.x() == 111);
+  CHECK(watched.mirror.take({kArms, {entry(1, 20, 2, false)}, 5, 6, 1, 2}));
+  CHECK(watched.x() == 122);
+}
+
+TEST_CASE("watch mirror: of an edge's histories the newest is shown") {
+  Watched watched;
+  CHECK(watched.mirror.take({kTools, {sample(0, 10, 100, 1), sample(0, 20, 200, 1)}, 3, 4}));
+  CHECK(watched.mirror.take({kTools, {entry(0, 500, 5)}, 4, 5}));
+  CHECK(watched.x() == 511);
+  CHECK_FALSE(watched.mirror.lookup({})->stamp);
+  CHECK(watched.mirror.take({kTools, {sample(0, 30, 300, 1)}, 5, 6}));  // of the one before
+  CHECK(watched.x() == 511);
+}
+
+TEST_CASE("watch mirror: another route takes over what it has in common with the one before") {
+  Watched watched;
+  for (int t = 1; t <= 9; ++t) {
+    const auto commit = static_cast<std::uint64_t>(t + 3);
+    REQUIRE(watched.mirror.take({kTools, {sample(0, 10 * t, 100 * t, 1)}, commit - 1, commit}));
+  }
+  WatchRoute other = route();
+  other.edges[0].parent = "track";
+  other.edges.insert(other.edges.begin(), FrameInfo{"track", "world"});
+  other.sources[0] = {"arms", 1, 77, {"track", "arm", "hand"}};
+  CHECK_FALSE(other.is_same(route()));
+  WatchMirror next("world", "tool", other, {});
+  next.inherit(watched.mirror);
+  CHECK_FALSE(next.complete());
+  CHECK(next.take({kTools, {sample(0, 90, 900, 1, true)}, 0, 11}));
+  CHECK(next.take({77, {entry(0, 1000, 6), entry(1, 1, 7), entry(2, 10, 2)}, 0, 9}));
+  CHECK(next.complete());
+  CHECK(next.lookup(at(45))->pose.translation().x() == Approx(1461));
+  // The tools were heard up to commit 12 there.
+  CHECK(next.is_behind(watched.mirror));
+  CHECK(next.take({kTools, {}, 11, 12}));
+  CHECK_FALSE(next.is_behind(watched.mirror));
+  // Of an owner that has started anew nothing is taken over.
+  other.sources[1] = {"tools", 2, 13, {"tool"}};
+  WatchMirror restarted("world", "tool", other, {});
+  restarted.inherit(watched.mirror);
+  CHECK(restarted.take({77, {entry(0, 1000, 6), entry(1, 1, 7), entry(2, 10, 2)}, 0, 9}));
+  CHECK(restarted.take({13, {sample(0, 5, 7, 1, true)}, 0, 1}));
+  CHECK_FALSE(restarted.is_behind(watched.mirror));
+  CHECK(outcome(restarted.lookup(at(45))) == "not_yet");
+}
+
+TEST_CASE("watch mirror: it knows from when on it lacks samples") {
+  Watched watched;
+  CHECK_FALSE(watched.mirror.lacks_past());
+  CHECK(watched.mirror.take({kTools, {sample(0, 30, 100, 1)}, 3, 4}));
+  CHECK_FALSE(watched.mirror.lacks_past());
+  CHECK(watched.mirror.take({kArms, {sample(0, 20, 2, 1)}, 5, 6}));
+  CHECK(outcome(watched.mirror.lookup({})) == "too_old");
+  CHECK(watched.mirror.lacks_past() == ms(20));
+  CHECK(watched.mirror.take({kTools, {sample(0, 10, 80, 1, true), sample(0, 30, 100, 1)}, 0, 5}));
+  CHECK_FALSE(watched.mirror.lacks_past());
+  CHECK(watched.mirror.lookup({})->stamp == ms(20));
+}
+
+}  // namespace tfdude
