@@ -221,7 +221,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   static constexpr int kAttempts = 3;
   static bool denies_plan(Errc code);
 
-  // Lookups that others must be asked for, and what is pushed (participant_time.cpp).
+  // Lookups that others must be asked for, and what is pushed (participant_watch.cpp).
   [[nodiscard]] Result<StampedTransform> lookup_elsewhere(std::string_view a, std::string_view b,
                                                           const Query& query,
                                                           const Deadline& deadline);

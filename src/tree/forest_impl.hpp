@@ -28,7 +28,7 @@ class Forest::Impl {
   explicit Impl(Clock clock) : clock_(std::move(clock)) {}
   ~Impl();
 
-  // --- reading, under an epoch::Guard (forest_read.cpp, forest_time.cpp) ---
+  // --- reading, under an epoch::Guard (forest_queries.cpp, forest_lookup.cpp) ---
 
   [[nodiscard]] std::uint64_t snapshot() const {
     return committed_.load(std::memory_order_seq_cst);
@@ -164,7 +164,7 @@ class Forest::Impl {
   [[nodiscard]] Result<std::vector<EdgeUpdate>> completed(
       const std::vector<PartialUpdate>& edges) const;
 
-  // Of the past (forest_past.cpp).
+  // Of the past (forest_history.cpp).
 
   /// Of what stamp an update is to be for all these edges: that given, or the clock's where it counts, later than all
   /// that these have.
