@@ -53,7 +53,7 @@ FrameSpec moved_frame(int number) {
   JointSpec spec;
   spec.name = slider(number);
   spec.type = number == 0 ? JointType::kPrismatic : JointType::kContinuous;
-  spec.joint = number == 0 ? tfdude::slider({}, {1, 0, 0}) : hinge({}, {0, 0.6, 0.8});
+  spec.joint = number == 0 ? prismatic_joint({}, {1, 0, 0}) : revolute_joint({}, {0, 0.6, 0.8});
   return {carriage(number), kRoot, {}, {}, {}, spec};
 }
 

@@ -130,7 +130,8 @@ Result<void> EdgeReader::read_motion(Index i, JointSpec& joint) const {
     return tree_.joint_error(i, "axis: has no direction");
   }
   const bool slides = joint.type == JointType::kPrismatic;
-  joint.joint = slides ? slider(edges_[i].X_PJ, axis) : hinge(edges_[i].X_PJ, axis);
+  joint.joint =
+      slides ? prismatic_joint(edges_[i].X_PJ, axis) : revolute_joint(edges_[i].X_PJ, axis);
   return {};
 }
 

@@ -18,15 +18,15 @@ bool is_exact(const Covariance& covariance) {
 
 }  // namespace
 
-Joint hinge(const Transform& X_PJ, const Eigen::Vector3d& axis) {
+Joint revolute_joint(const Transform& X_PJ, const Eigen::Vector3d& axis) {
   return along(X_PJ, Eigen::Vector3d::Zero(), axis);
 }
 
-Joint slider(const Transform& X_PJ, const Eigen::Vector3d& axis) {
+Joint prismatic_joint(const Transform& X_PJ, const Eigen::Vector3d& axis) {
   return along(X_PJ, axis, Eigen::Vector3d::Zero());
 }
 
-Transform moved(const Joint& joint, double position, double variance) {
+Transform joint_transform(const Joint& joint, double position, double variance) {
   const Pose X_JC = exp(joint.S * position);
   Covariance::Upper upper{};
   for (std::size_t row = 0; row < 6; ++row) {

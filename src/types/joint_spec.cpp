@@ -49,14 +49,14 @@ Result<void> check_joint(const JointSpec& joint) {
   if (joint.limits && !(joint.limits->lower <= joint.limits->upper)) {
     return bad("its limits are upside down");
   }
-  if (!is_finite(joint.joint.X_PJ)) return bad("its mount is not finite");
+  if (!is_finite(joint.joint.X_PJ)) return bad("its origin is not finite");
   return check_value({joint.name, joint.position, joint.variance});
 }
 
 std::string shared_source(const std::string& leader) { return "joint " + leader; }
 
 Transform value_at(const JointSpec& joint, double position, double variance) {
-  return moved(joint.joint, position, joint.coupled ? 0.0 : variance);
+  return joint_transform(joint.joint, position, joint.coupled ? 0.0 : variance);
 }
 
 double rest_position(const std::optional<JointLimits>& limits) {

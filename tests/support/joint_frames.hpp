@@ -22,7 +22,7 @@ namespace tfdude::testing {
   JointSpec spec;
   spec.name = name;
   spec.type = JointType::kRevolute;
-  spec.joint = hinge(along_x(1), {0, 0, 1});
+  spec.joint = revolute_joint(along_x(1), {0, 0, 1});
   spec.limits = JointLimits{-1, 2};
   spec.variance = 0.25;
   return spec;

@@ -125,7 +125,7 @@ class Client {
   [[nodiscard]] Result<void> flush(Milliseconds wait);
 
   /// Streams positions of joints to those who have the frames that they move, unacknowledged: about 40 bytes a joint instead
-  /// of 250 for its edge. The owners compute poses and covariances (moved()), of all joints of the call as one commit; those that
+  /// of 250 for its edge. The owners compute poses and covariances (joint_transform()), of all joints of the call as one commit; those that
   /// follow a joint move with it. All are of one stamp, as for update(). Whoever can be reached gets its share, also where
   /// another cannot.
   /// @param positions  one a name [rad or m]

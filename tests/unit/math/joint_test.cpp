@@ -40,11 +40,11 @@ TEST_CASE("joint: a hinge turns about its axis, a slider shifts along it") {
     const double q = random.uniform(-10, 10);
     Eigen::Matrix4d moved = Eigen::Matrix4d::Identity();
     moved.topLeftCorner<3, 3>() = turned(axis, q);
-    const auto X_turned = tfdude::moved(hinge(X_PJ, axis), q, 0).pose;
+    const auto X_turned = tfdude::joint_transform(revolute_joint(X_PJ, axis), q, 0).pose;
     REQUIRE((X_turned.matrix() - X_PJ.pose.matrix() * moved).cwiseAbs().maxCoeff() < 1e-14);
     moved.setIdentity();
     moved.topRightCorner<3, 1>() = q * axis;
-    const auto X_shifted = tfdude::moved(slider(X_PJ, axis), q, 0).pose;
+    const auto X_shifted = tfdude::joint_transform(prismatic_joint(X_PJ, axis), q, 0).pose;
     REQUIRE((X_shifted.matrix() - X_PJ.pose.matrix() * moved).cwiseAbs().maxCoeff() < 1e-13);
   }
 }
@@ -53,7 +53,7 @@ TEST_CASE("joint: at zero the child stands at the mount") {
   Random random(2);
   INFO("seed " << random.seed());
   const Transform X_PJ = random.transform();
-  const auto X = tfdude::moved(hinge(X_PJ, random.direction()), 0, 0);
+  const auto X = tfdude::joint_transform(revolute_joint(X_PJ, random.direction()), 0, 0);
   CHECK((X.pose.matrix() - X_PJ.pose.matrix()).cwiseAbs().maxCoeff() < 1e-15);
   CHECK(difference(X.covariance.matrix(), X_PJ.covariance.matrix()) < 1e-17);
 }
@@ -65,8 +65,8 @@ TEST_CASE("joint: the variance of the position is a covariance of rank one along
     const Eigen::Vector3d axis = random.direction();
     const double q = random.uniform(-4, 4);
     const Transform X_PJ = exact(random.transform());
-    for (const Joint& joint : {hinge(X_PJ, axis), slider(X_PJ, axis)}) {
-      const Matrix6d sigma = tfdude::moved(joint, q, 0.25).covariance.matrix();
+    for (const Joint& joint : {revolute_joint(X_PJ, axis), prismatic_joint(X_PJ, axis)}) {
+      const Matrix6d sigma = tfdude::joint_transform(joint, q, 0.25).covariance.matrix();
       REQUIRE(difference(sigma, 0.25 * joint.S * joint.S.transpose()) < 1e-16);
       const Twist eigen = Eigen::SelfAdjointEigenSolver<Matrix6d>(sigma).eigenvalues();
       REQUIRE(eigen[5] == tfdude::testing::Approx(0.25));
@@ -80,10 +80,11 @@ TEST_CASE("joint: the mount's error is seen from the child") {
   INFO("seed " << random.seed());
   for (int run = 0; run < 100; ++run) {
     const Transform X_PJ = random.transform();
-    const Joint joint = hinge(X_PJ, random.direction());
+    const Joint joint = revolute_joint(X_PJ, random.direction());
     const double q = random.uniform(-4, 4);
-    const Transform X = tfdude::moved(joint, q, 0.01);
-    const Transform X_JC = tfdude::moved(hinge(Transform(), joint.S.tail<3>()), q, 0.01);
+    const Transform X = tfdude::joint_transform(joint, q, 0.01);
+    const Transform X_JC =
+        tfdude::joint_transform(revolute_joint(Transform(), joint.S.tail<3>()), q, 0.01);
     const Transform composed = tfdude::compose(X_PJ, X_JC);
     REQUIRE(difference(X.covariance.matrix(), composed.covariance.matrix()) < 1e-15);
   }
@@ -97,14 +98,14 @@ TEST_CASE("joint: covariance is that of samples of position and mount") {
   for (int run = 0; run < 4; ++run) {
     const Transform X_PJ = random.transform(2.0, 1e-3, 1e-3);
     const Eigen::Vector3d axis = random.direction();
-    const Joint joint = run % 2 == 0 ? hinge(X_PJ, axis) : slider(X_PJ, axis);
+    const Joint joint = run % 2 == 0 ? revolute_joint(X_PJ, axis) : prismatic_joint(X_PJ, axis);
     const double q = random.uniform(-3, 3);
-    const Transform X = tfdude::moved(joint, q, kSigma * kSigma);
+    const Transform X = tfdude::joint_transform(joint, q, kSigma * kSigma);
     const tfdude::testing::Gaussian mount(X_PJ.covariance);
     const auto sample = [&] {
       Joint off = joint;
       off.X_PJ.pose = X_PJ.pose * tfdude::exp(Twist(mount(random)));
-      const auto X_off = tfdude::moved(off, q + kSigma * random.normal(), 0);
+      const auto X_off = tfdude::joint_transform(off, q + kSigma * random.normal(), 0);
       return tfdude::log(X.pose.inverse() * X_off.pose);
     };
     const Matrix6d sampled = tfdude::testing::second_moment(kSamples, sample);
@@ -115,7 +116,8 @@ TEST_CASE("joint: covariance is that of samples of position and mount") {
 
 TEST_CASE("joint: a position's error is exact however large it is") {
   const Eigen::Vector3d axis = Eigen::Vector3d(1, 2, 2) / 3;
-  const Joint joint = hinge(Transform(), axis);
-  const auto off = tfdude::moved(joint, 0.5, 0).pose.inverse() * tfdude::moved(joint, 3.0, 0).pose;
+  const Joint joint = revolute_joint(Transform(), axis);
+  const auto off = tfdude::joint_transform(joint, 0.5, 0).pose.inverse() *
+                   tfdude::joint_transform(joint, 3.0, 0).pose;
   CHECK((tfdude::log(off) - 2.5 * joint.S).norm() < 1e-14);
 }

@@ -54,8 +54,8 @@ TEST_CASE("joints: of an unmeasured position the mean square distance within the
 
 TEST_CASE("joints: a coupled joint's own covariance is its mount's alone") {
   JointSpec joint;
-  joint.joint = tfdude::hinge({{}, *tfdude::Covariance::from_stddev({1, 0, 0, 0, 0, 0})},
-                              Eigen::Vector3d::UnitX());
+  joint.joint = tfdude::revolute_joint({{}, *tfdude::Covariance::from_stddev({1, 0, 0, 0, 0, 0})},
+                                       Eigen::Vector3d::UnitX());
   CHECK(tfdude::value_at(joint, 0.3, 0.25).covariance.matrix()(3, 3) == 0.25);
   joint.coupled = true;
   CHECK(tfdude::value_at(joint, 0.3, 0.25).covariance.matrix()(3, 3) == 0);

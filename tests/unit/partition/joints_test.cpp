@@ -39,7 +39,7 @@ struct Arm : Replica {
     elbow.coupled = true;
     JointSpec rail = hinge_named("rail");
     rail.type = JointType::kPrismatic;
-    rail.joint = slider(along_x(0), {0, 1, 0});
+    rail.joint = prismatic_joint(along_x(0), {0, 1, 0});
     return {{"base", "", {}},
             moved_by("upper", "base", hinge_named("shoulder")),
             moved_by("fore", "upper", elbow),
@@ -273,17 +273,18 @@ TEST_CASE("a partition comes back with its joints where they were") {
     auto frames = arm.frames();
     // Seen at rest: a longer mount. Not seen at rest: an axis the other way round, and another multiplier.
     JointSpec longer = *frames[1].joint;
-    longer.joint = hinge(along_x(2), {0, 0, 1});
+    longer.joint = revolute_joint(along_x(2), {0, 0, 1});
     frames[1] = moved_by("upper", "base", longer);
     JointSpec reversed = *frames[2].joint;
-    reversed.joint = hinge(along_x(1), {0, 0, -1});
+    reversed.joint = revolute_joint(along_x(1), {0, 0, -1});
     frames[2] = moved_by("fore", "upper", reversed);
     frames[3].joint->mimic = Mimic{"elbow", 2, 0.125};
     REQUIRE(arm.partition.restore(*store.load(), frames, kNow));
     CHECK(arm.info("shoulder").position == 0.5);
-    CHECK(pose_diff(arm.edge("base", "upper").pose, moved(longer.joint, 0.5, 0).pose, 1e-15) == "");
-    CHECK(pose_diff(arm.edge("upper", "fore").pose, moved(reversed.joint, 0.75, 0).pose, 1e-15) ==
-          "");
+    CHECK(pose_diff(arm.edge("base", "upper").pose, joint_transform(longer.joint, 0.5, 0).pose,
+                    1e-15) == "");
+    CHECK(pose_diff(arm.edge("upper", "fore").pose, joint_transform(reversed.joint, 0.75, 0).pose,
+                    1e-15) == "");
     CHECK(arm.info("wrist").position == 2 * 0.75 + 0.125);
     CHECK(std::abs(arm.edge("upper", "hand").covariance.stddev()[5] - 0.2) < 1e-12);
   }
@@ -300,7 +301,7 @@ TEST_CASE("a partition comes back with its joints where they were") {
     auto frames = arm.frames();
     const FrameSpec before = frames[2];
     frames[2].joint->type = JointType::kPrismatic;
-    frames[2].joint->joint = slider(along_x(1), {0, 0, 1});
+    frames[2].joint->joint = prismatic_joint(along_x(1), {0, 0, 1});
     // Seen at rest or not.
     frames[2].joint->variance = GENERATE(0.25, 0.09);
     const auto changes = configured_changes(*store.load(), frames);
