@@ -69,7 +69,7 @@ class Update {
     Observation observation;
     judge(innovation, observation);
     for (const ObservedEdge& edge : all_) observation.edges.push_back({edge.X_PC, false, {}});
-    if (independent_) note_surprise(m, innovation, observation);
+    if (independent_) note_innovation(m, innovation, observation);
     if (!observation.accepted) return observation;
     if (!independent_ && !weigh(m)) return observation;
     if (auto ok = iterate(); !ok) return tl::unexpected(std::move(ok.error()));
@@ -134,14 +134,14 @@ class Update {
   }
 
   // Of the corrections that this observation alone would make.
-  void note_surprise(const Moments& m, const Innovation& innovation,
-                     Observation& observation) const {
+  void note_innovation(const Moments& m, const Innovation& innovation,
+                       Observation& observation) const {
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
       if (all_[prior_.edges()[i]].way == ObservedEdge::Way::kBeside) continue;
       const Matrix6d gain = m.with_edge[i] * innovation.inverse;
       const Matrix6d weight = gain.transpose() * pseudo_inverse(prior_.marginal(i)) * gain;
       const Matrix6d share = weight * innovation.S;
-      observation.edges[prior_.edges()[i]].surprise = {
+      observation.edges[prior_.edges()[i]].innovation = {
           linear_.h.dot(weight * linear_.h), share.trace(), 2.0 * (share * share).trace()};
     }
   }

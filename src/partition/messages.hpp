@@ -68,7 +68,7 @@ struct LookupRequest {
 struct ReviseRequest {
   struct Edge {
     std::string id;
-    Surprise surprise;
+    NormalizedInnovation innovation;
     bool refused = false;  ///< the measurement, by its gate
     std::optional<Revision> revision;
   };

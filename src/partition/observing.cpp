@@ -160,8 +160,8 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
     const ObservedResult& result = observation.edges[k];
     const auto [part, index] = places.next(plan.edges[k]);
-    if (!result.corrected && !(result.surprise.expected > 0)) continue;
-    ReviseRequest::Edge edge{plan.edges[k].info.id, result.surprise, !observation.accepted, {}};
+    if (!result.corrected && !(result.innovation.expected > 0)) continue;
+    ReviseRequest::Edge edge{plan.edges[k].info.id, result.innovation, !observation.accepted, {}};
     if (result.corrected) {
       const Belief& X = result.X_PC;
       edge.revision =

@@ -274,14 +274,14 @@ Result<void> Partition::revise(const ReviseRequest& request) {
   }
   for (const ReviseRequest::Edge& edge : request.edges) {
     if (edge.revision && saved_) updated_.insert(edge.id);
-    if (!(edge.surprise.expected > 0)) continue;
+    if (!(edge.innovation.expected > 0)) continue;
     EdgeConsistency& so_far = consistency_[edge.id];
     so_far.id = edge.id;
     ++so_far.observations;
     so_far.refused += edge.refused ? 1 : 0;
-    so_far.sum.squares += edge.surprise.squares;
-    so_far.sum.expected += edge.surprise.expected;
-    so_far.sum.variance += edge.surprise.variance;
+    so_far.sum.squares += edge.innovation.squares;
+    so_far.sum.expected += edge.innovation.expected;
+    so_far.sum.variance += edge.innovation.variance;
   }
   return {};
 }

@@ -34,7 +34,7 @@ inline void check_same(const std::vector<PathEnds>& actual, const std::vector<Pa
   }
 }
 
-inline void check_same(const Surprise& actual, const Surprise& expected) {
+inline void check_same(const NormalizedInnovation& actual, const NormalizedInnovation& expected) {
   CHECK(actual.squares == expected.squares);
   CHECK(actual.expected == expected.expected);
   CHECK(actual.variance == expected.variance);
@@ -50,7 +50,7 @@ inline void check_same(const ReviseRequest& actual, const ReviseRequest& expecte
     const ReviseRequest::Edge& sent = expected.edges[i];
     CHECK(came.id == sent.id);
     CHECK(came.refused == sent.refused);
-    check_same(came.surprise, sent.surprise);
+    check_same(came.innovation, sent.innovation);
     REQUIRE(came.revision.has_value() == sent.revision.has_value());
     if (!came.revision) continue;
     CHECK(came.revision->id == sent.revision->id);

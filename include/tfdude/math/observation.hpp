@@ -32,7 +32,7 @@ struct ObserveOptions {
 /// What an observation says of one edge's covariance. Over many observations the mean of `squares` is that of `expected` if
 /// the covariance is right, and more if it is too small: the estimate of a variance component, v'Σ⁻¹v over its redundancy
 /// (Förstner, "Ein Verfahren zur Schätzung von Varianz- und Kovarianzkomponenten", 1979).
-struct Surprise {
+struct NormalizedInnovation {
   double squares = 0;
   double expected = 0;
   double variance = 0;  ///< of squares, where all is as believed
@@ -42,7 +42,7 @@ struct Surprise {
 struct ObservedResult {
   Belief X_PC;
   bool corrected = false;  ///< false: it is what it was
-  Surprise surprise;
+  NormalizedInnovation innovation;
 };
 
 struct Observation {

@@ -80,7 +80,7 @@ struct EdgeConsistency {
   std::string id;
   std::uint64_t observations = 0;
   std::uint64_t refused = 0;  ///< of these, by the gate
-  Surprise sum;               ///< over all of them
+  NormalizedInnovation sum;   ///< over all of them
 };
 
 }  // namespace tfdude

@@ -134,11 +134,11 @@ Result<ReviseRequest> read_revise(const wire::ReviseBody& body) {
   if (!stamp) return tl::unexpected(stamp.error());
   ReviseRequest revise{{}, *stamp, body.seen(), body.incarnation()};
   for (const wire::RevisedEdge& in : body.edges()) {
-    const Surprise surprise{in.squares(), in.expected(), in.variance()};
-    ReviseRequest::Edge edge{string_of(in.id()), surprise, in.refused() != 0, {}};
-    if (!std::isfinite(surprise.squares + surprise.expected + surprise.variance)) {
+    const NormalizedInnovation innovation{in.squares(), in.expected(), in.variance()};
+    ReviseRequest::Edge edge{string_of(in.id()), innovation, in.refused() != 0, {}};
+    if (!std::isfinite(innovation.squares + innovation.expected + innovation.variance)) {
       return fail(Errc::kInvalidInput,
-                  "frame " + quote(edge.id) + ": its surprise is not a finite number");
+                  "frame " + quote(edge.id) + ": its normalized innovation is not a finite number");
     }
     if (in.revised() != 0) {
       auto X_PC = computed_from(in.x_pc());

@@ -66,9 +66,9 @@ std::vector<wire::Correlation> wire_ties(const std::vector<Ties>& all) {
 
 wire::RevisedEdge wire_revised(const ReviseRequest::Edge& edge) {
   wire::RevisedEdge body;
-  body.squares(edge.surprise.squares);
-  body.expected(edge.surprise.expected);
-  body.variance(edge.surprise.variance);
+  body.squares(edge.innovation.squares);
+  body.expected(edge.innovation.expected);
+  body.variance(edge.innovation.variance);
   body.id(edge.id);
   body.refused(edge.refused ? 1 : 0);
   body.revised(edge.revision ? 1 : 0);

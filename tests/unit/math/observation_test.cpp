@@ -189,7 +189,7 @@ TEST_CASE("The gate refuses what is too far, says how far, and changes nothing")
     CHECK_FALSE(wrong->edges[i].corrected);
     const Belief& before = chain.edges()[i].X_PC;
     CHECK(std::memcmp(&wrong->edges[i].X_PC.pose, &before.pose, sizeof(Pose)) == 0);
-    CHECK(wrong->edges[i].surprise.squares > 0);
+    CHECK(wrong->edges[i].innovation.squares > 0);
   }
   const auto ungated = observe(chain.path(0, 3), {Z, R}, kSource, {1.0, true});
   REQUIRE(ungated);
@@ -273,20 +273,21 @@ TEST_CASE(
 }
 
 TEST_CASE(
-    "Surprise is as expected where the covariance is right, and tells which edge's is too small") {
+    "NormalizedInnovation is as expected where the covariance is right, and tells which edge's is "
+    "too small") {
   Random random(639);
   INFO("seed " << random.seed());
   for (const double lie : {1.0, 3.0}) {
     INFO("the errors of edge 2 are " << lie << " times what it says");
-    std::vector<Surprise> sum(3);
+    std::vector<NormalizedInnovation> sum(3);
     for (int run = 0; run < kRuns; ++run) {
       ObservedChain chain(random, 3);
       chain.make_true(random, 2, lie);
       const auto observed = chain.observe(0, 3, random.covariance(0.001, 0.001), random);
       for (std::size_t i = 0; i < 3; ++i) {
-        sum[i].squares += observed.edges[i].surprise.squares;
-        sum[i].expected += observed.edges[i].surprise.expected;
-        sum[i].variance += observed.edges[i].surprise.variance;
+        sum[i].squares += observed.edges[i].innovation.squares;
+        sum[i].expected += observed.edges[i].innovation.expected;
+        sum[i].variance += observed.edges[i].innovation.variance;
       }
     }
     for (std::size_t i = 0; i < 3; ++i) {

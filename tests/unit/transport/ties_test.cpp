@@ -102,7 +102,7 @@ TEST_CASE(
   }
   CHECK_FALSE(from_wire(to_wire(Request{1, "hand", ReviseRequest{}}, "arm")));
   ReviseRequest bad{{{"hand", {0, 1, 2}, false, {}}}, {}, 0};
-  bad.edges[0].surprise.squares = std::numeric_limits<double>::quiet_NaN();
+  bad.edges[0].innovation.squares = std::numeric_limits<double>::quiet_NaN();
   const auto refused = from_wire(to_wire(Request{1, "hand", bad}, "arm"));
   REQUIRE_FALSE(refused);
   CHECK_THAT(refused.error().message, ContainsSubstring("'hand'"));
