@@ -11,14 +11,14 @@
 
 #include "support/catch.hpp"
 #include "support/domain_lease.hpp"
+#include "transport/fastdds/discovery_gate.hpp"
 #include "transport/fastdds/entities.hpp"
-#include "transport/fastdds/entrance.hpp"
 #include "transport/fastdds/topics.hpp"
 
 namespace tfdude::fastdds {
 namespace {
 
-using Beats = Inlet<wire::Presence>;
+using Beats = Reader<wire::Presence>;
 
 // A participant as ours, with one topic.
 class Member {
@@ -27,7 +27,7 @@ class Member {
     auto qos = profiles_.participant();
     // As of our participants: with a short one Fast DDS 2.9 may wait for itself as it ends.
     qos.wire_protocol().builtin.discovery_config.leaseDuration = {30, 0};
-    Entrance entrance(gate_);
+    DiscoveryGate entrance(gate_);
     entrance.prepare(qos, domain, false);
     participant_ = factory().create_participant(domain, qos);
     REQUIRE(participant_ != nullptr);
@@ -54,8 +54,8 @@ class Member {
             [on_sample](const wire::Presence&, const ertps::GuidPrefix_t&) { on_sample(); },
             [&matches](const ertps::GuidPrefix_t&, int) { ++matches; }});
   }
-  [[nodiscard]] std::unique_ptr<Outlet> write() {
-    return std::make_unique<Outlet>(Context{*participant_, profiles_, *gate_, counters_}, *topic_,
+  [[nodiscard]] std::unique_ptr<Writer> write() {
+    return std::make_unique<Writer>(Context{*participant_, profiles_, *gate_, counters_}, *topic_,
                                     "", "presence_writer");
   }
 
@@ -106,7 +106,7 @@ TEST_CASE("leaving: 5,000 readers go while writers come and go") {
   std::atomic<int> matches{0};
   std::thread others([&] {
     while (!over) {
-      std::vector<std::unique_ptr<Outlet>> writers;
+      std::vector<std::unique_ptr<Writer>> writers;
       for (int i = 0; i < 5; ++i) writers.push_back(newcomer.write());
     }
   });

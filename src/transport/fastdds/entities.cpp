@@ -4,7 +4,7 @@
 
 namespace tfdude::fastdds {
 
-Outlet::Outlet(const Context& context, edds::Topic& topic, const std::string& partition,
+Writer::Writer(const Context& context, edds::Topic& topic, const std::string& partition,
                const std::string& profile, std::function<void()> on_reader)
     : context_(context), on_reader_(std::move(on_reader)) {
   edds::PublisherQos qos = context.participant.get_default_publisher_qos();
@@ -16,18 +16,18 @@ Outlet::Outlet(const Context& context, edds::Topic& topic, const std::string& pa
   if (writer_ != nullptr) ++context_.counters.writers;
 }
 
-Outlet::~Outlet() {
+Writer::~Writer() {
   const Gate::Pause pause(context_.gate);
   if (writer_ != nullptr && ok(publisher_->delete_datawriter(writer_))) --context_.counters.writers;
   if (publisher_ != nullptr) context_.participant.delete_publisher(publisher_);
 }
 
-bool Outlet::wait_until_matched(Deadline deadline) {
+bool Writer::wait_until_matched(Deadline deadline) {
   std::unique_lock lock(mutex_);
   return matched_.wait_until(lock, deadline, [this] { return readers_ > 0; });
 }
 
-bool Outlet::write(void* sample) {
+bool Writer::write(void* sample) {
   unacknowledged_ = true;
   // Numbers and timestamps are given in one order.
   const std::lock_guard lock(writing_);
@@ -39,7 +39,7 @@ bool Outlet::write(void* sample) {
   return fastdds::write(*writer_, sample, params);
 }
 
-bool Outlet::flush(Deadline deadline) {
+bool Writer::flush(Deadline deadline) {
   if (!good() || !unacknowledged_.exchange(false)) return true;
   const bool anybody = wait_until_matched(Deadline());
   // No longer than what DDS can count.
@@ -55,7 +55,7 @@ bool Outlet::flush(Deadline deadline) {
   return acknowledged;
 }
 
-void Outlet::on_publication_matched(edds::DataWriter*,
+void Writer::on_publication_matched(edds::DataWriter*,
                                     const edds::PublicationMatchedStatus& status) {
   bool one_more = false;
   {

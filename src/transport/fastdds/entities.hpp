@@ -32,16 +32,16 @@ struct Context {
 };
 
 /// A writer with a publisher of its own, hence in a DDS partition of its own.
-class Outlet final : public edds::DataWriterListener {
+class Writer final : public edds::DataWriterListener {
  public:
   /// @param partition  DDS partition; empty: the default one
   /// @param on_reader  called when one more reader has been met: what is written from now on reaches it. From a thread of
   ///   the library, which may hold locks
-  Outlet(const Context& context, edds::Topic& topic, const std::string& partition,
+  Writer(const Context& context, edds::Topic& topic, const std::string& partition,
          const std::string& profile, std::function<void()> on_reader = nullptr);
-  ~Outlet() override;
-  Outlet(const Outlet&) = delete;
-  Outlet& operator=(const Outlet&) = delete;
+  ~Writer() override;
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
 
   [[nodiscard]] bool good() const { return writer_ != nullptr; }
 
@@ -77,7 +77,7 @@ class Outlet final : public edds::DataWriterListener {
 /// A reader with a subscriber of its own, hence in a DDS partition of its own. Samples are handed on one at a
 /// time, those of one writer in the order in which they were written.
 template <class Sample>
-class Inlet : public edds::DataReaderListener {
+class Reader : public edds::DataReaderListener {
  public:
   /// What to call. A writer is named by its participant; +1: matched; -1: no more.
   struct Calls {
@@ -85,8 +85,8 @@ class Inlet : public edds::DataReaderListener {
     std::function<void(const ertps::GuidPrefix_t& writer, int change)> on_matched;
   };
 
-  Inlet(const Context& context, edds::TopicDescription& topic, const std::string& partition,
-        const std::string& profile, Calls calls)
+  Reader(const Context& context, edds::TopicDescription& topic, const std::string& partition,
+         const std::string& profile, Calls calls)
       : context_(context), calls_(std::move(calls)) {
     edds::SubscriberQos qos = context.participant.get_default_subscriber_qos();
     if (!partition.empty()) qos.partition().push_back(partition.c_str());
@@ -96,9 +96,9 @@ class Inlet : public edds::DataReaderListener {
                                              this);
   }
 
-  ~Inlet() override { close(); }
-  Inlet(const Inlet&) = delete;
-  Inlet& operator=(const Inlet&) = delete;
+  ~Reader() override { close(); }
+  Reader(const Reader&) = delete;
+  Reader& operator=(const Reader&) = delete;
 
   [[nodiscard]] bool good() const { return reader_ != nullptr; }
 

@@ -6,13 +6,13 @@ namespace tfdude::fastdds {
 
 std::unique_ptr<Channel<Update>> FastDdsTransport::update_channel(const std::string& partition) {
   return std::make_unique<StreamChannel<Update, wire::Update>>(
-      outlet(update_outlets_, topics_.update, partition, "update_writer"));
+      writer(update_writers_, topics_.update, partition, "update_writer"));
 }
 
 std::unique_ptr<Channel<JointUpdate>> FastDdsTransport::joint_channel(
     const std::string& partition) {
   return std::make_unique<StreamChannel<JointUpdate, wire::Joints>>(
-      outlet(joint_outlets_, topics_.joint, partition, "update_writer"));
+      writer(joint_writers_, topics_.joint, partition, "update_writer"));
 }
 
 }  // namespace tfdude::fastdds

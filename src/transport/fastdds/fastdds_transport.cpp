@@ -7,8 +7,8 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "transport/fastdds/discovery_gate.hpp"
 #include "transport/fastdds/discovery_server.hpp"
-#include "transport/fastdds/entrance.hpp"
 #include "transport/fastdds/topics.hpp"
 
 namespace tfdude::fastdds {
@@ -63,7 +63,7 @@ Result<void> FastDdsTransport::create_participant() {
   if (!options_.discovery_server.empty()) {
     if (auto used = use_discovery_server(qos, options_.discovery_server); !used) return used;
   }
-  Entrance entrance(gate_);
+  DiscoveryGate entrance(gate_);
   entrance.prepare(qos, options_.domain, options_.partition.empty());
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
       options_.domain, qos, &participant_listener_, edds::StatusMask::none());
@@ -109,41 +109,41 @@ Result<void> FastDdsTransport::create_endpoints() {
       context(), *topics_.state,
       StateChannels::Calls{[this](const State& state) { handler_->on_state(state); },
                            [this](std::uint64_t group) { handler_->on_watcher(group); }});
-  presence_ = std::make_unique<Inlet<wire::Presence>>(
+  presence_ = std::make_unique<Reader<wire::Presence>>(
       context(), *topics_.presence, std::string(), "presence_reader",
-      Inlet<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
-                                     take_presence(sample, from, false);
-                                   },
-                                   nullptr});
-  beats_ = std::make_unique<Inlet<wire::Presence>>(
+      Reader<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
+                                      take_presence(sample, from, false);
+                                    },
+                                    nullptr});
+  beats_ = std::make_unique<Reader<wire::Presence>>(
       context(), *topics_.presence, kBeatPartition, "beat_reader",
-      Inlet<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
-                                     take_presence(sample, from, true);
-                                   },
-                                   nullptr});
-  pages_ = std::make_unique<Inlet<wire::Page>>(
+      Reader<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
+                                      take_presence(sample, from, true);
+                                    },
+                                    nullptr});
+  pages_ = std::make_unique<Reader<wire::Page>>(
       context(), *topics_.directory, std::string(), "directory_reader",
-      Inlet<wire::Page>::Calls{
+      Reader<wire::Page>::Calls{
           [this](const wire::Page& sample, const Prefix& from) { take_page(sample, from); },
           nullptr});
-  replies_ = std::make_unique<Inlet<wire::Reply>>(
+  replies_ = std::make_unique<Reader<wire::Reply>>(
       context(), *topics_.reply, reply_partition(self_), "call_reader",
-      Inlet<wire::Reply>::Calls{[this](const wire::Reply& sample, const Prefix& from) {
-                                  peers_.heard(from);
-                                  take_reply(sample);
-                                },
-                                nullptr});
+      Reader<wire::Reply>::Calls{[this](const wire::Reply& sample, const Prefix& from) {
+                                   peers_.heard(from);
+                                   take_reply(sample);
+                                 },
+                                 nullptr});
   if (!presence_->good() || !beats_->good() || !pages_->good() || !replies_->good()) {
     return not_created("the readers");
   }
   if (options_.partition.empty()) return {};
-  presence_outlet_ =
-      std::make_unique<Outlet>(context(), *topics_.presence, std::string(), "presence_writer");
-  beat_outlet_ =
-      std::make_unique<Outlet>(context(), *topics_.presence, kBeatPartition, "beat_writer");
-  directory_outlet_ =
-      std::make_unique<Outlet>(context(), *topics_.directory, std::string(), "directory_writer");
-  if (!presence_outlet_->good() || !beat_outlet_->good() || !directory_outlet_->good()) {
+  presence_writer_ =
+      std::make_unique<Writer>(context(), *topics_.presence, std::string(), "presence_writer");
+  beat_writer_ =
+      std::make_unique<Writer>(context(), *topics_.presence, kBeatPartition, "beat_writer");
+  directory_writer_ =
+      std::make_unique<Writer>(context(), *topics_.directory, std::string(), "directory_writer");
+  if (!presence_writer_->good() || !beat_writer_->good() || !directory_writer_->good()) {
     return not_created("the writers");
   }
   return {};
@@ -169,20 +169,20 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
     return not_created("the filtered topics");
   // A peer that meets our reader is going to ask: its reply's writer is made while its request travels.
   const auto asker_matched = [this](const Prefix& from, int change) {
-    if (change > 0) worker_->post([this, peer = peer_of(from)] { open_reply_outlet(peer); });
+    if (change > 0) worker_->post([this, peer = peer_of(from)] { open_reply_writer(peer); });
   };
-  requests_ = std::make_unique<Inlet<wire::Request>>(
+  requests_ = std::make_unique<Reader<wire::Request>>(
       context(), *requests, partition, "call_reader",
-      Inlet<wire::Request>::Calls{
+      Reader<wire::Request>::Calls{
           [this](const wire::Request& sample, const Prefix& from) { take_request(sample, from); },
           asker_matched});
-  updates_ = std::make_unique<Inlet<wire::Update>>(
+  updates_ = std::make_unique<Reader<wire::Update>>(
       context(), *updates, partition, "update_reader",
-      Inlet<wire::Update>::Calls{
+      Reader<wire::Update>::Calls{
           [this](const wire::Update& sample, const Prefix&) { take_update(sample); }, nullptr});
-  joints_ = std::make_unique<Inlet<wire::Joints>>(
+  joints_ = std::make_unique<Reader<wire::Joints>>(
       context(), *joints, partition, "update_reader",
-      Inlet<wire::Joints>::Calls{
+      Reader<wire::Joints>::Calls{
           [this](const wire::Joints& sample, const Prefix&) { take_joints(sample); }, nullptr});
   const bool good = requests_->good() && updates_->good() && joints_->good();
   return good ? Result<void>() : not_created("the readers");
@@ -195,8 +195,8 @@ Milliseconds FastDdsTransport::settle_time() const {
 
 void FastDdsTransport::stop() {
   if (participant_ == nullptr) return;
-  if (presence_outlet_ != nullptr) {
-    (void)presence_outlet_->flush(std::chrono::steady_clock::now() + kLastWord);
+  if (presence_writer_ != nullptr) {
+    (void)presence_writer_->flush(std::chrono::steady_clock::now() + kLastWord);
   }
   // From here on nothing is matched while endpoints go (see Gate); then whoever makes and deletes them, too.
   gate_->close();
@@ -210,13 +210,13 @@ void FastDdsTransport::stop() {
   beats_.reset();
   presence_.reset();
   states_.reset();
-  reply_outlets_.clear();
-  request_outlets_.clear();
-  update_outlets_.clear();
-  joint_outlets_.clear();
-  directory_outlet_.reset();
-  beat_outlet_.reset();
-  presence_outlet_.reset();
+  reply_writers_.clear();
+  request_writers_.clear();
+  update_writers_.clear();
+  joint_writers_.clear();
+  directory_writer_.reset();
+  beat_writer_.reset();
+  presence_writer_.reset();
   participant_->delete_contained_entities();
   edds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
   participant_ = nullptr;
@@ -228,7 +228,7 @@ void FastDdsTransport::announce(const Presence& presence) {
   const std::lock_guard lock(presence_mutex_);
   said_ = to_wire(presence);
   said_->peers(peers_.heard_count());
-  presence_outlet_->write(&*said_);
+  presence_writer_->write(&*said_);
 }
 
 // Each time it looks who has fallen silent; every second time it speaks, among many every third, since what all hear of
@@ -242,32 +242,32 @@ void FastDdsTransport::keep_in_touch() {
   looks_ = 0;
   if (!said_) return;
   said_->peers(heard);
-  beat_outlet_->write(&*said_);
+  beat_writer_->write(&*said_);
 }
 
 void FastDdsTransport::publish(const Page& page) {
   wire::Page sample = to_wire(page);
-  if (!directory_outlet_->write(&sample)) {
+  if (!directory_writer_->write(&sample)) {
     log().error("page {} of partition {} could not be published", page.number, page.partition);
   }
 }
 
-std::shared_ptr<Outlet> FastDdsTransport::outlet(Outlets& outlets, edds::Topic* topic,
+std::shared_ptr<Writer> FastDdsTransport::writer(Writers& writers, edds::Topic* topic,
                                                  const std::string& partition,
                                                  const char* profile) {
-  const std::lock_guard lock(outlets_mutex_);
-  auto& entry = outlets[partition];
-  if (entry == nullptr) entry = std::make_shared<Outlet>(context(), *topic, partition, profile);
+  const std::lock_guard lock(writers_mutex_);
+  auto& entry = writers[partition];
+  if (entry == nullptr) entry = std::make_shared<Writer>(context(), *topic, partition, profile);
   return entry;
 }
 
 void FastDdsTransport::prepare(const std::string& partition) {
-  (void)outlet(request_outlets_, topics_.request, partition, "call_writer");
+  (void)writer(request_writers_, topics_.request, partition, "call_writer");
 }
 
 Result<void> FastDdsTransport::send(const std::string& partition, const Request& request,
                                     Deadline deadline) {
-  const auto to = outlet(request_outlets_, topics_.request, partition, "call_writer");
+  const auto to = writer(request_writers_, topics_.request, partition, "call_writer");
   thread_local wire::Request sample;
   write_wire(request, partition, sample);
   return send(*to, partition, &sample, deadline);
@@ -275,22 +275,22 @@ Result<void> FastDdsTransport::send(const std::string& partition, const Request&
 
 Result<void> FastDdsTransport::send(const std::string& partition, const Update& update,
                                     Deadline deadline) {
-  const auto to = outlet(update_outlets_, topics_.update, partition, "update_writer");
+  const auto to = writer(update_writers_, topics_.update, partition, "update_writer");
   wire::Update sample = to_wire(update);
   return send(*to, partition, &sample, deadline);
 }
 
 Result<void> FastDdsTransport::send(const std::string& partition, const JointUpdate& update,
                                     Deadline deadline) {
-  const auto to = outlet(joint_outlets_, topics_.joint, partition, "update_writer");
+  const auto to = writer(joint_writers_, topics_.joint, partition, "update_writer");
   wire::Joints sample = to_wire(update);
   return send(*to, partition, &sample, deadline);
 }
 
-Result<void> FastDdsTransport::send(Outlet& outlet, const std::string& partition, void* sample,
+Result<void> FastDdsTransport::send(Writer& writer, const std::string& partition, void* sample,
                                     Deadline deadline) const {
-  if (!outlet.good()) return not_created("a writer");
-  while (!outlet.wait_until_matched(std::min(deadline, Peers::Clock::now() + Peers::kSpeakEvery))) {
+  if (!writer.good()) return not_created("a writer");
+  while (!writer.wait_until_matched(std::min(deadline, Peers::Clock::now() + Peers::kSpeakEvery))) {
     if (peers_.silent(partition)) {
       return fail(Errc::kUnreachable,
                   "partition " + quote(partition) + " went away before it was met");
@@ -300,7 +300,7 @@ Result<void> FastDdsTransport::send(Outlet& outlet, const std::string& partition
                                     " was not met in time in domain " +
                                     std::to_string(options_.domain));
   }
-  if (!outlet.write(sample)) {
+  if (!writer.write(sample)) {
     return fail(Errc::kTimeout,
                 "partition " + quote(partition) + " does not take what is sent to it");
   }
@@ -308,11 +308,11 @@ Result<void> FastDdsTransport::send(Outlet& outlet, const std::string& partition
 }
 
 Result<void> FastDdsTransport::flush(Deadline deadline) {
-  std::vector<std::pair<std::string, std::shared_ptr<Outlet>>> streams;
+  std::vector<std::pair<std::string, std::shared_ptr<Writer>>> streams;
   {
-    const std::lock_guard lock(outlets_mutex_);
-    streams.assign(update_outlets_.begin(), update_outlets_.end());
-    streams.insert(streams.end(), joint_outlets_.begin(), joint_outlets_.end());
+    const std::lock_guard lock(writers_mutex_);
+    streams.assign(update_writers_.begin(), update_writers_.end());
+    streams.insert(streams.end(), joint_writers_.begin(), joint_writers_.end());
   }
   Result<void> outcome;
   for (const auto& [partition, stream] : streams) {
@@ -328,31 +328,31 @@ Result<void> FastDdsTransport::flush(Deadline deadline) {
 
 // --- replying ---
 
-std::shared_ptr<Outlet> FastDdsTransport::reply_outlet(const PeerId& peer) {
+std::shared_ptr<Writer> FastDdsTransport::reply_writer(const PeerId& peer) {
   const std::shared_lock lock(reply_mutex_);
-  const auto known = reply_outlets_.find(peer);
-  return known != reply_outlets_.end() ? known->second : nullptr;
+  const auto known = reply_writers_.find(peer);
+  return known != reply_writers_.end() ? known->second : nullptr;
 }
 
 // Of one that has left nothing is to be made: it would be kept for ever.
-void FastDdsTransport::open_reply_outlet(const PeerId& peer) {
-  if (there_.count(peer) == 0 || reply_outlet(peer) != nullptr) return;
+void FastDdsTransport::open_reply_writer(const PeerId& peer) {
+  if (there_.count(peer) == 0 || reply_writer(peer) != nullptr) return;
   auto opened =
-      std::make_shared<Outlet>(context(), *topics_.reply, reply_partition(peer), "call_writer");
+      std::make_shared<Writer>(context(), *topics_.reply, reply_partition(peer), "call_writer");
   const std::unique_lock lock(reply_mutex_);
-  reply_outlets_.emplace(peer, std::move(opened));
+  reply_writers_.emplace(peer, std::move(opened));
 }
 
 void FastDdsTransport::reply(const PeerId& to, const Reply& reply) {
   wire::Reply sample = to_wire(reply);
-  if (const auto outlet = reply_outlet(to)) {
-    if (outlet->good()) outlet->write(&sample);
+  if (const auto writer = reply_writer(to)) {
+    if (writer->good()) writer->write(&sample);
     return;
   }
   worker_->post([this, to, late = std::move(sample)]() mutable {
-    open_reply_outlet(to);
-    const auto outlet = reply_outlet(to);
-    if (outlet != nullptr && outlet->good()) outlet->write(&late);
+    open_reply_writer(to);
+    const auto writer = reply_writer(to);
+    if (writer != nullptr && writer->good()) writer->write(&late);
   });
 }
 
@@ -361,20 +361,20 @@ void FastDdsTransport::met(const ertps::GuidPrefix_t& prefix, const std::string&
   worker_->post([this, peer = peer_of(prefix)] { there_.insert(peer); });
 }
 
-// A callback may hold the outlet still; the worker then waits for it, so as to be the one who deletes it.
+// A callback may hold the writer still; the worker then waits for it, so as to be the one who deletes it.
 void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
   peers_.left(prefix);
   worker_->post([this, peer = peer_of(prefix)] {
     there_.erase(peer);
-    std::shared_ptr<Outlet> outlet;
+    std::shared_ptr<Writer> writer;
     {
       const std::unique_lock lock(reply_mutex_);
-      const auto known = reply_outlets_.find(peer);
-      if (known == reply_outlets_.end()) return;
-      outlet = std::move(known->second);
-      reply_outlets_.erase(known);
+      const auto known = reply_writers_.find(peer);
+      if (known == reply_writers_.end()) return;
+      writer = std::move(known->second);
+      reply_writers_.erase(known);
     }
-    while (outlet.use_count() > 1) std::this_thread::yield();
+    while (writer.use_count() > 1) std::this_thread::yield();
   });
 }
 

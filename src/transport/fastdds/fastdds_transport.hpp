@@ -67,7 +67,7 @@ class FastDdsTransport final : public Transport {
     edds::Topic* directory = nullptr;
     edds::Topic* presence = nullptr;
   };
-  using Outlets = std::map<std::string, std::shared_ptr<Outlet>>;
+  using Writers = std::map<std::string, std::shared_ptr<Writer>>;
 
   Result<void> create_participant();
   Result<void> create_endpoints();
@@ -77,11 +77,11 @@ class FastDdsTransport final : public Transport {
 
   void keep_in_touch();
   [[nodiscard]] Context context() const { return {*participant_, *profiles_, *gate_, *counters_}; }
-  std::shared_ptr<Outlet> outlet(Outlets& outlets, edds::Topic* topic, const std::string& partition,
+  std::shared_ptr<Writer> writer(Writers& writers, edds::Topic* topic, const std::string& partition,
                                  const char* profile);
-  std::shared_ptr<Outlet> reply_outlet(const PeerId& peer);
-  void open_reply_outlet(const PeerId& peer);
-  Result<void> send(Outlet& outlet, const std::string& partition, void* sample,
+  std::shared_ptr<Writer> reply_writer(const PeerId& peer);
+  void open_reply_writer(const PeerId& peer);
+  Result<void> send(Writer& writer, const std::string& partition, void* sample,
                     Deadline deadline) const;
 
   void take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from);
@@ -110,25 +110,25 @@ class FastDdsTransport final : public Transport {
   int looks_ = 0;                       // since it last spoke
   std::optional<wire::Presence> said_;  // what this participant serves, as last announced
 
-  std::mutex outlets_mutex_;
-  Outlets request_outlets_;
-  Outlets update_outlets_;
-  Outlets joint_outlets_;
+  std::mutex writers_mutex_;
+  Writers request_writers_;
+  Writers update_writers_;
+  Writers joint_writers_;
   std::shared_mutex reply_mutex_;
-  std::map<PeerId, std::shared_ptr<Outlet>> reply_outlets_;
+  std::map<PeerId, std::shared_ptr<Writer>> reply_writers_;
   std::set<PeerId> there_;  // who was met and has not left; only the worker's
 
   std::unique_ptr<OwnedFilters> filters_;
-  std::unique_ptr<Outlet> presence_outlet_;
-  std::unique_ptr<Outlet> beat_outlet_;
-  std::unique_ptr<Outlet> directory_outlet_;
-  std::unique_ptr<Inlet<wire::Request>> requests_;
-  std::unique_ptr<Inlet<wire::Update>> updates_;
-  std::unique_ptr<Inlet<wire::Joints>> joints_;
-  std::unique_ptr<Inlet<wire::Reply>> replies_;
-  std::unique_ptr<Inlet<wire::Page>> pages_;
-  std::unique_ptr<Inlet<wire::Presence>> presence_;
-  std::unique_ptr<Inlet<wire::Presence>> beats_;
+  std::unique_ptr<Writer> presence_writer_;
+  std::unique_ptr<Writer> beat_writer_;
+  std::unique_ptr<Writer> directory_writer_;
+  std::unique_ptr<Reader<wire::Request>> requests_;
+  std::unique_ptr<Reader<wire::Update>> updates_;
+  std::unique_ptr<Reader<wire::Joints>> joints_;
+  std::unique_ptr<Reader<wire::Reply>> replies_;
+  std::unique_ptr<Reader<wire::Page>> pages_;
+  std::unique_ptr<Reader<wire::Presence>> presence_;
+  std::unique_ptr<Reader<wire::Presence>> beats_;
   std::optional<StateChannels> states_;
   std::optional<Worker> worker_;
 };

@@ -33,8 +33,8 @@ class StateChannels {
   edds::Topic& topic_;
   const Calls calls_;
   std::mutex mutex_;
-  std::map<std::uint64_t, std::unique_ptr<Inlet<wire::State>>> inlets_;
-  std::map<std::uint64_t, std::shared_ptr<Outlet>> outlets_;
+  std::map<std::uint64_t, std::unique_ptr<Reader<wire::State>>> readers_;
+  std::map<std::uint64_t, std::shared_ptr<Writer>> writers_;
 };
 
 }  // namespace tfdude::fastdds

@@ -13,16 +13,16 @@ namespace tfdude::fastdds {
 template <class Message, class Sample>
 class StreamChannel final : public Channel<Message> {
  public:
-  explicit StreamChannel(std::shared_ptr<Outlet> outlet) : outlet_(std::move(outlet)) {}
+  explicit StreamChannel(std::shared_ptr<Writer> writer) : writer_(std::move(writer)) {}
 
   bool try_send(const Message& message) override {
-    if (!outlet_->good() || !outlet_->matched()) return false;
+    if (!writer_->good() || !writer_->matched()) return false;
     write_wire(message, sample_);
-    return outlet_->write(&sample_);
+    return writer_->write(&sample_);
   }
 
  private:
-  const std::shared_ptr<Outlet> outlet_;
+  const std::shared_ptr<Writer> writer_;
   Sample sample_;
 };
 

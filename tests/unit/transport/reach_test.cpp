@@ -1,8 +1,7 @@
-#include "transport/fastdds/reach.hpp"
-
 #include <memory>
 
 #include "support/catch.hpp"
+#include "transport/fastdds/send_throttle.hpp"
 
 namespace tfdude::fastdds {
 namespace {
@@ -16,8 +15,8 @@ constexpr std::uint32_t kOther = 0x0A4D0002;
 }  // namespace
 
 TEST_CASE("reach: who is silent is sent one datagram at a time, until heard again") {
-  const auto reach = std::make_unique<Reach>();
-  const auto start = Reach::Clock::now();
+  const auto reach = std::make_unique<SendThrottle>();
+  const auto start = SendThrottle::Clock::now();
   const auto after = [start](int ms) { return start + milliseconds(ms); };
   reach->heard(kHost, start);
   reach->heard(kOther, after(900));
@@ -33,16 +32,16 @@ TEST_CASE("reach: who is silent is sent one datagram at a time, until heard agai
 }
 
 TEST_CASE("reach: a host that was never heard has its time to answer") {
-  const auto reach = std::make_unique<Reach>();
-  const auto start = Reach::Clock::now();
+  const auto reach = std::make_unique<SendThrottle>();
+  const auto start = SendThrottle::Clock::now();
   for (int i = 0; i < 3; ++i) CHECK(reach->may_send(kHost, kPort, start + milliseconds(i)));
   CHECK(reach->may_send(kHost, kPort, start + milliseconds(600)));
   CHECK_FALSE(reach->may_send(kHost, kPort, start + milliseconds(601)));
 }
 
 TEST_CASE("reach: hosts beyond those it has room for are sent everything") {
-  const auto reach = std::make_unique<Reach>();
-  const auto start = Reach::Clock::now();
+  const auto reach = std::make_unique<SendThrottle>();
+  const auto start = SendThrottle::Clock::now();
   for (std::uint32_t i = 0; i < 512; ++i) reach->heard(kHost + i, start);
   const auto late = start + milliseconds(1000);
   for (std::uint32_t i = 0; i < 512; ++i) {

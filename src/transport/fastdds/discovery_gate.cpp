@@ -1,10 +1,10 @@
-#include "transport/fastdds/entrance.hpp"
+#include "transport/fastdds/discovery_gate.hpp"
 
 #include <algorithm>
 #include <cstdint>
 #include <utility>
 
-#include "transport/fastdds/reach.hpp"
+#include "transport/fastdds/send_throttle.hpp"
 
 namespace tfdude::fastdds {
 namespace {
@@ -22,7 +22,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
 
   Flag open;
   std::shared_ptr<Gate> gate;
-  std::shared_ptr<Reach> reach = std::make_shared<Reach>();
+  std::shared_ptr<SendThrottle> reach = std::make_shared<SendThrottle>();
 };
 
 // Of another computer; else 0: groups have no neighbours to wait for, and this computer is always there.
@@ -52,12 +52,12 @@ class GatedTransport final : public SendFilter {
   [[nodiscard]] bool may_send(const ertps::Locator_t& to) const override {
     if (!descriptor_.open->load(std::memory_order_relaxed)) return false;
     const std::uint32_t host = host_of(to);
-    return host == 0 || descriptor_.reach->may_send(host, to.port, Reach::Clock::now());
+    return host == 0 || descriptor_.reach->may_send(host, to.port, SendThrottle::Clock::now());
   }
 
   void heard(const ertps::Locator_t& from) const override {
     const std::uint32_t host = host_of(from);
-    if (host != 0) descriptor_.reach->heard(host, Reach::Clock::now());
+    if (host != 0) descriptor_.reach->heard(host, SendThrottle::Clock::now());
   }
 
   GatedDescriptor descriptor_;
@@ -94,7 +94,8 @@ void announce_eagerly(edds::DomainParticipantQos& qos) {
 
 }  // namespace
 
-void Entrance::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) const {
+void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain,
+                            bool client) const {
   const auto is_udp = [](const auto& transport) {
     return std::dynamic_pointer_cast<etransport::UDPv4TransportDescriptor>(transport) != nullptr;
   };

@@ -1,9 +1,9 @@
-#include "transport/fastdds/reach.hpp"
+#include "transport/fastdds/send_throttle.hpp"
 
 namespace tfdude::fastdds {
 namespace {
 
-std::int64_t ticks(Reach::Clock::duration duration) { return duration.count(); }
+std::int64_t ticks(SendThrottle::Clock::duration duration) { return duration.count(); }
 
 // Ports begin at one: zero stands for the host.
 std::uint64_t key_of(std::uint32_t host, std::uint32_t port) {
@@ -12,7 +12,7 @@ std::uint64_t key_of(std::uint32_t host, std::uint32_t port) {
 
 }  // namespace
 
-std::atomic<std::int64_t>* Reach::find(std::uint64_t key, std::int64_t first) {
+std::atomic<std::int64_t>* SendThrottle::find(std::uint64_t key, std::int64_t first) {
   // Neighbours in the net are far apart in the table.
   const std::uint64_t wish = (key * 0x9E3779B97F4A7C15U) >> 32U;
   for (std::size_t i = 0; i < entries_.size(); ++i) {
@@ -29,12 +29,12 @@ std::atomic<std::int64_t>* Reach::find(std::uint64_t key, std::int64_t first) {
   return nullptr;
 }
 
-void Reach::heard(std::uint32_t host, Clock::time_point now) {
+void SendThrottle::heard(std::uint32_t host, Clock::time_point now) {
   const std::int64_t at = ticks(now.time_since_epoch());
   if (auto* known = find(key_of(host, 0), at)) known->store(at, std::memory_order_relaxed);
 }
 
-bool Reach::may_send(std::uint32_t host, std::uint32_t port, Clock::time_point now) {
+bool SendThrottle::may_send(std::uint32_t host, std::uint32_t port, Clock::time_point now) {
   const std::int64_t at = ticks(now.time_since_epoch());
   // Nobody is silent who had no time to speak.
   const auto* known = find(key_of(host, 0), at);

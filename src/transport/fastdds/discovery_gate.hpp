@@ -21,10 +21,10 @@ namespace tfdude::fastdds {
 ///   may be faster. So a client does not listen to multicast: all comes to one socket, in order. It
 ///   then meets later participants by its own announcements, and other clients not at all.
 /// - A client announces itself every 2 ms at first, later every 100 ms; servers as the profile says.
-class Entrance {
+class DiscoveryGate {
  public:
   /// @param gate  what is received over UDP passes it
-  explicit Entrance(std::shared_ptr<Gate> gate) : gate_(std::move(gate)) {}
+  explicit DiscoveryGate(std::shared_ptr<Gate> gate) : gate_(std::move(gate)) {}
 
   /// Prepares a participant that is going to be created. Of transports other than UDP, and of discovery that
   /// the profile has arranged otherwise, all stays as it is.

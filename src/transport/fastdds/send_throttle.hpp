@@ -12,7 +12,7 @@ namespace tfdude::fastdds {
 /// not answer to ARP, three seconds and more, and counts it against the one socket through which Fast DDS
 /// sends: were that full, nothing would go to anybody.
 /// @par Thread safety  All functions; without a lock, as every datagram passes here.
-class Reach {
+class SendThrottle {
  public:
   using Clock = std::chrono::steady_clock;
 
