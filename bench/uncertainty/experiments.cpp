@@ -212,7 +212,7 @@ Json correlation() {
   testing::Random random(kSeed + 3);
   const auto poses = testing::two_poses(kCorrelatedAlpha);
   const auto product = [](const testing::SharedPair& pair, Order order) {
-    return left_covariance(settle(compose(pair.first, pair.second, order))).matrix();
+    return left_covariance(collapse(compose(pair.first, pair.second, order))).matrix();
   };
   const Matrix6d independent = testing::composed(poses, Order::kFourth);
   const Matrix6d bounded = product(testing::unknown_pair(poses), Order::kSecond);
@@ -232,9 +232,11 @@ Json correlation() {
 Json way_after(int steps, testing::Random& random) {
   const testing::Trajectory t = testing::trajectory(steps);
   const auto way = [](const Belief& X_WA, const Belief& X_WB, Order order) {
-    return settle(compose(inverse(X_WA), X_WB, order)).covariance.matrix();
+    return collapse(compose(inverse(X_WA), X_WB, order)).covariance.matrix();
   };
-  const auto unknown = [](const Belief& X) { return Belief{X.pose, {}, settle(X).covariance, {}}; };
+  const auto unknown = [](const Belief& X) {
+    return Belief{X.pose, {}, collapse(X).covariance, {}};
+  };
   const Belief A = t.A();
   const Belief B = t.B();
   // As it is where B was made of A and of the way: to fourth order by an error of B that has both.
@@ -244,11 +246,11 @@ Json way_after(int steps, testing::Random& random) {
   const Matrix6d joint = testing::sampled_way(t, random, kCorrelated);
   const Matrix6d driven = t.X_AB.covariance.matrix();
   return {{"steps", steps},
-          {"metres_A", metres(settle(A).covariance.matrix())},
-          {"radians_A", radians(settle(A).covariance.matrix())},
+          {"metres_A", metres(collapse(A).covariance.matrix())},
+          {"radians_A", radians(collapse(A).covariance.matrix())},
           {"joint", beside(joint, joint)},
           {"driven", beside(driven, driven)},
-          {"independent", beside(between(settle(A), settle(B)).covariance.matrix(), joint)},
+          {"independent", beside(between(collapse(A), collapse(B)).covariance.matrix(), joint)},
           {"second", beside(way(A, B, Order::kSecond), joint)},
           {"fourth", beside(way(A, B, Order::kFourth), joint)},
           {"second_driven", beside(second, driven)},

@@ -227,7 +227,7 @@ Result<Pose> Client::lookup_pose(std::string_view a, std::string_view b) {
 Result<Pose> Client::lookup_pose(Handle a, Handle b) { return participant_->lookup_pose(a, b); }
 
 Result<Handle> Client::find(std::string_view id) {
-  return participant_->when_known(participant_->call_deadline(), [&]() -> Result<Handle> {
+  return participant_->after_discovery(participant_->call_deadline(), [&]() -> Result<Handle> {
     const auto handle = participant_->forest().find(id);
     if (!handle) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
     return *handle;
@@ -245,14 +245,14 @@ Result<std::string> Client::parent(const std::string& id) {
 }
 
 Result<std::vector<std::string>> Client::children(const std::string& id) {
-  if (auto all = participant_->settle(participant_->call_deadline()); !all) {
+  if (auto all = participant_->await_discovery(participant_->call_deadline()); !all) {
     return tl::unexpected(std::move(all.error()));
   }
   return participant_->forest().children(id);
 }
 
 Result<std::vector<std::string>> Client::roots() {
-  if (auto all = participant_->settle(participant_->call_deadline()); !all) {
+  if (auto all = participant_->await_discovery(participant_->call_deadline()); !all) {
     return tl::unexpected(std::move(all.error()));
   }
   return participant_->forest().roots();

@@ -128,7 +128,7 @@ Belief compose(const Belief& X_AB, const Belief& X_BC, Order order) {
   return X_AC;
 }
 
-Transform settle(const Belief& X_AB) {
+Transform collapse(const Belief& X_AB) {
   Covariance known = X_AB.own;
   if (!X_AB.shares.empty()) {
     known =

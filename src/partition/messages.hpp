@@ -143,7 +143,7 @@ struct Request {
 };
 
 /// Whether a request changes nothing, so that a repeated one may be answered anew.
-[[nodiscard]] bool is_question(const Request& request);
+[[nodiscard]] bool is_read_only(const Request& request);
 
 /// What was written to watched edges, to be taken over as one commit: a watcher that knows all up to `after` then knows
 /// all up to `commit`.

@@ -22,7 +22,7 @@ bool are_too_many(const std::vector<Ties>& all) {
 
 }  // namespace
 
-bool is_question(const Request& request) {
+bool is_read_only(const Request& request) {
   const auto* remove = std::get_if<RemoveRequest>(&request.body);
   if (remove != nullptr) return remove->tops.empty();
   return std::holds_alternative<LookupRequest>(request.body) ||
@@ -89,7 +89,7 @@ void Partition::let_go(const std::string& id) {
 }
 
 Reply Partition::answer(const PeerId& peer, const Request& request, Time now) {
-  if (is_question(request)) return answer(request, now);
+  if (is_read_only(request)) return answer(request, now);
   if (auto before = replies_.find(peer, request, now)) return *std::move(before);
   Reply reply = answer(request, now);
   replies_.put(peer, request, reply);

@@ -294,7 +294,7 @@ StampedTransform composed(const LookupPlan& plan, const std::vector<SegmentValue
       const Ties& ties = k < answers[i].ties.size() ? answers[i].ties[k] : none;
       X_AB = compose(X_AB, belief_of(answers[i].values[k], ties), order);
     });
-    return settled(X_AB, order, stamp);
+    return collapsed(X_AB, order, stamp);
   }
   StampedTransform X_AB{{}, stamp, {}};
   bool first = true;

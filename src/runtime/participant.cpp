@@ -24,9 +24,9 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       directory_(forest_, partition_name_),
       lookups_(forest_, calls_, hints_, links_of_lookups()),
       streams_(links_of_edge_streams(), links_of_joint_streams()),
-      settle_deadline_(Deadline(options.discovery).at()),
-      settled_at_last_(Deadline::sum(
-          settle_deadline_,
+      discovery_deadline_(Deadline(options.discovery).at()),
+      discovery_end_(Deadline::sum(
+          discovery_deadline_,
           Deadline::sum(options.timeout, Deadline::sum(options.timeout, options.timeout)))),
       transport_(std::move(transport)) {}
 
@@ -93,25 +93,25 @@ bool Participant::denies_plan(Errc code) {
   return code == Errc::kAlreadyExists || code == Errc::kUnknownParent || code == Errc::kCycle;
 }
 
-bool Participant::settled() {
-  if (settled_.load(std::memory_order_relaxed)) return true;
+bool Participant::discovered() {
+  if (discovered_.load(std::memory_order_relaxed)) return true;
   const auto now = Clock::now();
-  bool known = now >= settled_at_last_;
+  bool known = now >= discovery_end_;
   if (!known) {
-    const bool met_all = transport_->settled();
-    const bool met_none = now >= settle_deadline_ && !transport_->awaits_presence();
+    const bool met_all = transport_->discovered();
+    const bool met_none = now >= discovery_deadline_ && !transport_->awaits_presence();
     const std::lock_guard lock(structure_mutex_);
     known = met_all ? directory_.complete() : met_none && directory_.reachable_owners().empty();
   }
-  if (known) settled_.store(true, std::memory_order_relaxed);
+  if (known) discovered_.store(true, std::memory_order_relaxed);
   return known;
 }
 
 Deadline Participant::call_deadline() const {
   const auto now = Clock::now();
-  const auto meeting = settled_.load(std::memory_order_relaxed)
+  const auto meeting = discovered_.load(std::memory_order_relaxed)
                            ? Milliseconds(0)
-                           : std::chrono::ceil<Milliseconds>(settle_deadline_ - now);
+                           : std::chrono::ceil<Milliseconds>(discovery_deadline_ - now);
   return Deadline(Deadline::sum(options_.timeout, std::max(meeting, Milliseconds(0))), now);
 }
 
@@ -136,8 +136,8 @@ void Participant::wait_for_news(const Deadline& deadline) {
   structure_changed_.wait_until(lock, deadline.within(kLookAround).at());
 }
 
-Result<void> Participant::settle(const Deadline& deadline) {
-  while (!settled()) {
+Result<void> Participant::await_discovery(const Deadline& deadline) {
+  while (!discovered()) {
     if (deadline.over()) return undecided("not all frames are known", deadline);
     wait_for_news(deadline);
   }
@@ -161,7 +161,7 @@ void Participant::await_epoch(const Part& part, std::uint64_t epoch, const Deadl
 std::vector<Reply> Participant::ask(std::vector<Part>& parts, const Deadline& deadline) {
   // What this process has changed itself comes before what it asks for: others build on that.
   const bool builds = std::any_of(parts.begin(), parts.end(), [](const Part& part) {
-    return part.owner != kHeldHere && !is_question(part.request);
+    return part.owner != kHeldHere && !is_read_only(part.request);
   });
   if (builds && commits_ && commits_->pending()) (void)commits_->flush(deadline.at());
   for (const Part& part : parts) {
@@ -205,7 +205,7 @@ Result<void> Participant::change(std::vector<Part>& parts, const Deadline& deadl
 Result<void> Participant::add(const std::string& id, const AddRequest& request,
                               const std::string& partition) {
   const Deadline deadline = call_deadline();
-  auto added = healed(
+  auto added = retry_on_stale_route(
       deadline, [&] { return route_add(forest_, directory_, id, request, partition); },
       [&](Part& part) {
         std::vector<Part> parts{std::move(part)};
@@ -218,9 +218,9 @@ Result<void> Participant::add(const std::string& id, const AddRequest& request,
 Result<void> Participant::remove(const std::string& id) {
   const Deadline deadline = call_deadline();
   // All below it are told by name, so all must be known.
-  if (auto all = settle(deadline); !all) return all;
+  if (auto all = await_discovery(deadline); !all) return all;
   bool asked = false;
-  auto removed = healed(
+  auto removed = retry_on_stale_route(
       deadline, [&] { return route_remove(forest_, directory_, id); },
       [&](std::vector<Part>& parts) {
         asked = true;
@@ -235,7 +235,7 @@ Result<void> Participant::remove(const std::string& id) {
 
 Result<void> Participant::move(const std::string& id, const MoveRequest& request) {
   const Deadline deadline = call_deadline();
-  return healed(
+  return retry_on_stale_route(
       deadline, [&] { return route_move(forest_, directory_, id, request); },
       [&](Part& part) {
         std::vector<Part> parts{std::move(part)};
@@ -248,7 +248,7 @@ Result<void> Participant::update(const std::vector<EdgeUpdate>& edges, std::opti
   auto updated = forest_.update(edges, stamp);
   if (updated || !is_elsewhere(updated.error())) return updated;
   const Deadline deadline = call_deadline();
-  return healed(
+  return retry_on_stale_route(
       deadline, [&] { return route_update(forest_, directory_, edges, stamp); },
       [&](std::vector<Part>& parts) { return change(parts, deadline); });
 }
@@ -257,7 +257,7 @@ Result<void> Participant::update_partial(const std::vector<PartialUpdate>& edges
                                          std::optional<Time> stamp) {
   if (edges.empty()) return {};
   const Deadline deadline = call_deadline();
-  return healed(
+  return retry_on_stale_route(
       deadline, [&] { return route_update(forest_, directory_, edges, stamp); },
       [&](std::vector<Part>& parts) { return change(parts, deadline); });
 }
@@ -307,7 +307,7 @@ Result<std::vector<PathSegment>> Participant::path(std::string_view a, std::stri
 }
 
 Result<FrameInfo> Participant::info(const std::string& id, const Deadline& deadline) {
-  return when_known(deadline, [&]() -> Result<FrameInfo> {
+  return after_discovery(deadline, [&]() -> Result<FrameInfo> {
     auto info = forest_.info(id);
     if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
     return *std::move(info);
@@ -315,7 +315,8 @@ Result<FrameInfo> Participant::info(const std::string& id, const Deadline& deadl
 }
 
 Result<std::vector<Frame>> Participant::frames() {
-  if (auto all = settle(call_deadline()); !all) return tl::unexpected(std::move(all.error()));
+  if (auto all = await_discovery(call_deadline()); !all)
+    return tl::unexpected(std::move(all.error()));
   std::vector<FrameInfo> infos = forest_.frames();
   std::vector<Frame> frames;
   frames.reserve(infos.size());
@@ -335,7 +336,8 @@ std::size_t Participant::own_frames() {
 }
 
 Result<std::vector<PartitionInfo>> Participant::partitions() {
-  if (auto all = settle(call_deadline()); !all) return tl::unexpected(std::move(all.error()));
+  if (auto all = await_discovery(call_deadline()); !all)
+    return tl::unexpected(std::move(all.error()));
   const std::lock_guard lock(structure_mutex_);
   auto all = directory_.partitions();
   if (partition_ == nullptr) return all;

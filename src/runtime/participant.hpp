@@ -130,15 +130,15 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Deadline call_deadline() const;
 
   /// Waits until all that was there at the start is known. @return kTimeout, naming what was missing.
-  [[nodiscard]] Result<void> settle(const Deadline& deadline);
+  [[nodiscard]] Result<void> await_discovery(const Deadline& deadline);
 
   /// Runs an operation that may fail for what is not known yet; repeats it until it is known for sure.
   /// @return also kTimeout, where it was not known by then
   template <class Operation>
-  auto when_known(const Deadline& deadline, Operation operation) -> decltype(operation()) {
+  auto after_discovery(const Deadline& deadline, Operation operation) -> decltype(operation()) {
     while (true) {
       if (auto ok = still_in(); !ok) return tl::unexpected(std::move(ok.error()));
-      const bool certain = settled();
+      const bool certain = discovered();
       auto result = operation();
       if (result || !may_appear(result.error().code)) return result;
       if (certain) return tl::unexpected(explained(std::move(result.error())));
@@ -182,7 +182,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Error explained(Error error);
   /// @return kPartitionTaken once this participant has given its partition up.
   [[nodiscard]] Result<void> still_in();
-  [[nodiscard]] bool settled();
+  [[nodiscard]] bool discovered();
   /// Why it is not known yet. @return kTimeout
   [[nodiscard]] tl::unexpected<Error> undecided(const std::string& what, const Deadline& deadline);
   void wait_for_news(const Deadline& deadline = Deadline(Milliseconds::max()));
@@ -190,7 +190,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   // Plans under structure_mutex_.
   template <class Route>
   auto routed(const Deadline& deadline, Route route) -> decltype(route()) {
-    return when_known(deadline, [&] {
+    return after_discovery(deadline, [&] {
       const std::lock_guard lock(structure_mutex_);
       return route();
     });
@@ -199,7 +199,8 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   /// Plans, asks, and plans again where the structure has changed meanwhile: the owner asked knows something
   /// newer than this process, or has not heard yet of a change that this process knows of.
   template <class Route, class Ask, class Plan = typename std::invoke_result_t<Route>::value_type>
-  std::invoke_result_t<Ask, Plan&> healed(const Deadline& deadline, Route route, Ask ask) {
+  std::invoke_result_t<Ask, Plan&> retry_on_stale_route(const Deadline& deadline, Route route,
+                                                        Ask ask) {
     int attempts = 0;
     Milliseconds pause{5};
     while (true) {
@@ -246,7 +247,7 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   template <class Item, class Body>
   [[nodiscard]] Result<std::vector<Item>> ask_all(const std::string& partition, const Body& body) {
     const Deadline deadline = call_deadline();
-    return healed(
+    return retry_on_stale_route(
         deadline,
         [&]() -> Result<Part> {
           const auto owner = directory_.owner(partition);
@@ -333,10 +334,10 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   Lookups lookups_;  // that wait
   Streams streams_;  // that do not
   std::atomic<std::uint64_t> observations_{0};
-  std::atomic<bool> settled_{false};
-  const Clock::time_point settle_deadline_;
+  std::atomic<bool> discovered_{false};
+  const Clock::time_point discovery_deadline_;
   const Clock::time_point
-      settled_at_last_;     // who has not told by then what it owns is not waited for
+      discovery_end_;       // who has not told by then what it owns is not waited for
   TransportPtr transport_;  // stops before the rest goes
   // Both use the transport, and stop before it.
   std::optional<CommitLoop> commits_;  // set once, before partition_

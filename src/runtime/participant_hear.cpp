@@ -142,7 +142,7 @@ void Participant::look_for_gone() {
 Result<void> Participant::forget(const std::string& partition) {
   const Deadline deadline = call_deadline();
   // All who are there are to be told.
-  if (auto all = settle(deadline); !all) return all;
+  if (auto all = await_discovery(deadline); !all) return all;
   auto parts = routed(deadline, [&]() -> Result<std::vector<Part>> {
     if (!directory_.owner(partition)) {
       return fail(Errc::kUnknownPartition, "no partition " + quote(partition));

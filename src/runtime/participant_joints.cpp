@@ -23,8 +23,8 @@ void Participant::on_joints(const JointUpdate& update) {
 Result<void> Participant::update_joints(const JointUpdate& update) {
   if (update.joints.empty()) return {};
   const Deadline deadline = call_deadline();
-  if (auto all = settle(deadline); !all) return all;
-  return healed(
+  if (auto all = await_discovery(deadline); !all) return all;
+  return retry_on_stale_route(
       deadline,
       [&]() -> Result<std::vector<Part>> {
         auto parts = route_joints(directory_, update);
@@ -39,7 +39,7 @@ Result<void> Participant::update_joints(const JointUpdate& update) {
 Result<void> Participant::publish_joints(const JointUpdate& update) {
   if (update.joints.empty()) return {};
   const Deadline deadline = call_deadline();
-  if (auto all = settle(deadline); !all) return all;
+  if (auto all = await_discovery(deadline); !all) return all;
   if (auto ok = still_in(); !ok) return ok;
   JointUpdate known{{}, update.stamp};
   Result<void> outcome;

@@ -23,7 +23,7 @@ Result<StampedTransform> Participant::lookup_elsewhere(std::string_view a, std::
   const std::string start(a);
   const std::string end(b);
   const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
-  return healed(
+  return retry_on_stale_route(
       deadline, [&] { return route_lookup(forest_, directory_, start, end, query, hint); },
       [&](LookupPlan& plan) {
         Gathering gathering(std::move(plan), start, end, hint);
@@ -97,8 +97,8 @@ Lookups::Links Participant::links_of_lookups() {
           },
           [this](Error last, const Deadline& deadline) {
             if (!may_appear(last.code)) return last;
-            return settled() ? explained(std::move(last))
-                             : undecided(last.message, deadline).value();
+            return discovered() ? explained(std::move(last))
+                                : undecided(last.message, deadline).value();
           },
           wall_clock,
           options_.timeout};
@@ -106,7 +106,7 @@ Lookups::Links Participant::links_of_lookups() {
 
 Result<std::vector<PastInfo>> Participant::past(const std::string& id) {
   const Deadline deadline = call_deadline();
-  return healed(
+  return retry_on_stale_route(
       deadline,
       [&]() -> Result<Part> {
         const auto info = forest_.info(id);

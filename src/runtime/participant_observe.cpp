@@ -87,7 +87,7 @@ Result<Observed> Participant::observe(const std::string& a, const std::string& b
   int torn = 0;
   for (int attempt = 0; attempt < kObserveAttempts; ++attempt) {
     ObservePlan used;
-    auto path = healed(
+    auto path = retry_on_stale_route(
         deadline, [&] { return route_observe(forest_, directory_, a, b, beside, stamp); },
         [&](ObservePlan& plan) {
           auto found = ask_observed(plan, deadline);
@@ -124,7 +124,7 @@ Result<Observed> Participant::observe(const std::string& a, const std::string& b
 
 Result<void> Participant::correlate(const std::string& id, const Correlation& correlation) {
   const Deadline deadline = call_deadline();
-  return healed(
+  return retry_on_stale_route(
       deadline,
       [&]() -> Result<Part> {
         const auto frame = forest_.info(id);

@@ -154,7 +154,7 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
     return !directory_.complete();
   };
   const bool any = !state.frames.empty() || !frames.empty();
-  while (any && Clock::now() < settle_deadline_ && incomplete()) wait_for_news();
+  while (any && Clock::now() < discovery_deadline_ && incomplete()) wait_for_news();
   if (any) await_gone();
   const std::lock_guard lock(structure_mutex_);
   const std::lock_guard joints(joints_mutex_);
@@ -194,7 +194,7 @@ void Participant::await_gone() {
 // (NameClaim); one who was killed may still seem to serve for a moment.
 Result<void> Participant::claim_name() {
   announce_own();
-  const auto met = Clock::now() + transport_->settle_time();
+  const auto met = Clock::now() + transport_->discovery_time();
   {
     std::unique_lock lock(structure_mutex_);
     structure_changed_.wait_until(lock, met, [this] { return claim_.served(); });
@@ -328,7 +328,7 @@ Reply Participant::answer_here(const Request& request) {
     tell_changes();
   }
   // This process sees the change already; the others are told without making it wait.
-  if (!is_of_values(request) && !is_question(request)) commits_->ask();
+  if (!is_of_values(request) && !is_read_only(request)) commits_->ask();
   look_at_routes();
   return reply;
 }
@@ -353,7 +353,7 @@ void Participant::on_request(const PeerId& from, const Request& request) {
     transport_->reply(from, answer_watch(request));
     return;
   }
-  const bool changes = !is_question(request);
+  const bool changes = !is_read_only(request);
   const auto refused = changes ? refusal() : std::nullopt;
   Reply reply;
   {

@@ -111,13 +111,13 @@ class Transport {
   virtual void end_pushing(std::uint64_t group) = 0;
 
   /// Whether the presence of all who were there when this participant started should have come by now.
-  [[nodiscard]] virtual bool settled() const = 0;
+  [[nodiscard]] virtual bool discovered() const = 0;
 
   /// Whether somebody was met who has not said yet which partition it serves.
   [[nodiscard]] virtual bool awaits_presence() const = 0;
 
   /// How long a new participant needs to meet all others, by experience.
-  [[nodiscard]] virtual Milliseconds settle_time() const = 0;
+  [[nodiscard]] virtual Milliseconds discovery_time() const = 0;
 };
 
 }  // namespace tfdude

@@ -42,7 +42,7 @@ struct HistoryRestart {
 };
 
 /// The one transform that a belief comes to, and what that rests on.
-[[nodiscard]] StampedTransform settled(const Belief& X, Order order, std::optional<Time> stamp);
+[[nodiscard]] StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> stamp);
 
 /// What of a held edge outlives its process.
 struct ChangedEdge {

@@ -266,7 +266,7 @@ Result<Value> Forest::Impl::look_up(Name a, Name b) const {
     // Into the same place, which then is not copied where all is independent.
     if (newest && met.tied) {
       met = {};
-      newest = walk_newest<Belief>(*found, Absent::kEnds, Order::kSecond, met).map(settle);
+      newest = walk_newest<Belief>(*found, Absent::kEnds, Order::kSecond, met).map(collapse);
     }
   }
   return newest;
@@ -291,7 +291,7 @@ Result<StampedTransform> Forest::Impl::look_up(Name a, Name b, const Query& quer
   if (!X_AB) return tl::unexpected(std::move(X_AB.error()));
   if (!met.moving) at.reset();
   if (X_AB->ties.empty()) return StampedTransform{X_AB->X, at, {query.order, false, {}}};
-  return settled(belief_of(X_AB->X, X_AB->ties), query.order, at);
+  return collapsed(belief_of(X_AB->X, X_AB->ties), query.order, at);
 }
 
 Result<Transform> Forest::lookup(std::string_view a, std::string_view b) const {

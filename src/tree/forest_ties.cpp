@@ -13,8 +13,8 @@ Belief belief_of(const Transform& X, const Ties& ties) {
   return {X.pose, X.covariance, ties.unknown, ties.shares};
 }
 
-StampedTransform settled(const Belief& X, Order order, std::optional<Time> stamp) {
-  StampedTransform found{settle(X), stamp, {order, X.unknown.has_value(), {}}};
+StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> stamp) {
+  StampedTransform found{collapse(X), stamp, {order, X.unknown.has_value(), {}}};
   std::vector<std::string>& sources = found.basis.sources;
   for (const Share& share : X.shares) sources.push_back(share.source);
   std::sort(sources.begin(), sources.end());
@@ -151,7 +151,7 @@ Transform Forest::Impl::whole(const Transform& X_PC, const Correlation& correlat
   Belief observed{X_PC.pose, X_PC.covariance, std::nullopt, {}};
   std::copy_if(correlation.shares.begin(), correlation.shares.end(),
                std::back_inserter(observed.shares), is_observed);
-  return settle(observed);
+  return collapse(observed);
 }
 
 Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Time> stamp,

@@ -87,16 +87,16 @@ TEST_CASE("who comes late hears the last state of each page and presence, not th
   CHECK(late.heard().presences.back().pages == 2);
 }
 
-TEST_CASE("once a newcomer is settled it has heard of those who were there") {
+TEST_CASE("once a newcomer has met all it has heard of those who were there") {
   const Join join = joined_by(GENERATE(0, 1));
   const Server arms(join, "arms");
   const Listener late(join);
-  CHECK(late.transport->settle_time() >= Milliseconds(0));
+  CHECK(late.transport->discovery_time() >= Milliseconds(0));
   const auto end = Listener::soon(testing::Recorder::kLong);
-  while (!late.transport->settled() && std::chrono::steady_clock::now() < end) {
+  while (!late.transport->discovered() && std::chrono::steady_clock::now() < end) {
     std::this_thread::yield();
   }
-  CHECK(late.transport->settled());
+  CHECK(late.transport->discovered());
   CHECK(late.heard().presence("arms", 1));
 }
 

@@ -85,18 +85,18 @@ TEST_CASE("uncertainty: a source that edges of several owners share is counted o
   for (Client* who : {&*robot.client, static_cast<Client*>(&*robot.arm)}) {
     const auto X = who->lookup("world", "tool", Query{});
     REQUIRE(X);
-    CHECK(transform_diff(*X, settle(expected), 1e-9) == "");
+    CHECK(transform_diff(*X, collapse(expected), 1e-9) == "");
     CHECK(X->basis.sources == std::vector<std::string>{"calibration"});
     const auto back = who->lookup("tool", "world");
     REQUIRE(back);
-    CHECK(transform_diff(*back, inverse(settle(expected)), 1e-9) == "");
+    CHECK(transform_diff(*back, inverse(collapse(expected)), 1e-9) == "");
   }
   // Independence would be another answer.
   const auto X = robot.client->lookup("world", "tool");
   REQUIRE(X);
   const Transform independent =
-      compose(compose(settle(with(robot.X_world_base, {a})), robot.X_base_arm),
-              compose(robot.X_arm_hand, settle(with(robot.X_hand_tool, {b}))));
+      compose(compose(collapse(with(robot.X_world_base, {a})), robot.X_base_arm),
+              compose(robot.X_arm_hand, collapse(with(robot.X_hand_tool, {b}))));
   CHECK(covariance_diff(X->covariance, independent.covariance, 1e-3) != "");
 }
 
@@ -157,9 +157,9 @@ TEST_CASE("uncertainty: the order of a lookup counts with all owners") {
   REQUIRE(second);
   CHECK(fourth->basis.order == Order::kFourth);
   CHECK(second->basis.order == Order::kSecond);
-  const Transform expected = settle(composed({with(robot.X_world_base), with(robot.X_base_arm),
-                                              with(robot.X_arm_hand), with(robot.X_hand_tool)},
-                                             Order::kFourth));
+  const Transform expected = collapse(composed({with(robot.X_world_base), with(robot.X_base_arm),
+                                                with(robot.X_arm_hand), with(robot.X_hand_tool)},
+                                               Order::kFourth));
   // Owners compose their segments first, which differs in sixth order.
   const Matrix6d exact = expected.covariance.matrix();
   const double of_fourth = (fourth->covariance.matrix() - exact).norm();

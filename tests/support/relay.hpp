@@ -46,9 +46,9 @@ class Relay : public Transport, protected TransportHandler {
   void unwatch(std::uint64_t group) override { real_->unwatch(group); }
   void push(const State& state) override { real_->push(state); }
   void end_pushing(std::uint64_t group) override { real_->end_pushing(group); }
-  bool settled() const override { return real_->settled(); }
+  bool discovered() const override { return real_->discovered(); }
   bool awaits_presence() const override { return real_->awaits_presence(); }
-  Milliseconds settle_time() const override { return real_->settle_time(); }
+  Milliseconds discovery_time() const override { return real_->discovery_time(); }
 
  protected:
   void on_request(const PeerId& from, const Request& request) override {

@@ -71,7 +71,7 @@ struct Belief {
 [[nodiscard]] Belief compose(const Belief& X_AB, const Belief& X_BC, Order order);
 
 /// The transform with one covariance that stands for all of the belief: a bound, where parts are unknown.
-[[nodiscard]] Transform settle(const Belief& X_AB);
+[[nodiscard]] Transform collapse(const Belief& X_AB);
 
 /// No sum of two errors of these covariances has more than this, whatever their correlation (the product of two poses has,
 /// by terms of fourth order): (1 + 1/ε) A + (1 + ε) B, with the ε that makes the sum of both traces, of translation and

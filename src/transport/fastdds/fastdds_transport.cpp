@@ -189,7 +189,7 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
 }
 
 // A server passes on what it hears several times a second, one step of the discovery at a time.
-Milliseconds FastDdsTransport::settle_time() const {
+Milliseconds FastDdsTransport::discovery_time() const {
   return Milliseconds(options_.discovery_server.empty() ? 400 : 1500);
 }
 

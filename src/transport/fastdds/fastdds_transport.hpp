@@ -49,9 +49,9 @@ class FastDdsTransport final : public Transport {
   void unwatch(std::uint64_t group) override { states_->unwatch(group); }
   void push(const State& state) override { states_->push(state); }
   void end_pushing(std::uint64_t group) override { states_->end_pushing(group); }
-  bool settled() const override { return peers_.settled(); }
+  bool discovered() const override { return peers_.discovered(); }
   bool awaits_presence() const override { return peers_.awaits_presence(); }
-  Milliseconds settle_time() const override;
+  Milliseconds discovery_time() const override;
 
   // Of ParticipantListener, from a thread of the library.
   void met(const ertps::GuidPrefix_t& prefix, const std::string& name);

@@ -93,7 +93,7 @@ void Peers::look_for_silent(Clock::time_point now) {
   }
 }
 
-bool Peers::settled() const {
+bool Peers::discovered() const {
   const std::lock_guard lock(mutex_);
   return !servers_.empty() && Clock::now() - last_met_ >= kQuiet && all_present() &&
          nobody_hears_more();

@@ -84,7 +84,7 @@ class Peers {
 
   /// Whether some server was met, nobody new for a while, all servers have said what they serve, and none hears
   /// more others than this participant knows.
-  [[nodiscard]] bool settled() const;
+  [[nodiscard]] bool discovered() const;
 
   /// Whether some server was met that has not said yet what it serves. One that has sent a page, and then nothing more for
   /// as long as a first beat may take, is not waited for.

@@ -247,9 +247,9 @@ class LoopbackTransport final : public Transport {
 
   void end_pushing(std::uint64_t) override {}
 
-  [[nodiscard]] bool settled() const override { return true; }
+  [[nodiscard]] bool discovered() const override { return true; }
   [[nodiscard]] bool awaits_presence() const override { return false; }
-  [[nodiscard]] Milliseconds settle_time() const override { return Milliseconds(0); }
+  [[nodiscard]] Milliseconds discovery_time() const override { return Milliseconds(0); }
 
  private:
   using Member = LoopbackNetwork::Hub::Member;

@@ -39,9 +39,9 @@ TEST_CASE("Beliefs with nothing in common compose as transforms do") {
   for (int i = 0; i < 200; ++i) {
     const Transform X_AB = random.transform();
     const Transform X_BC = random.transform();
-    const Transform sum = settle(compose(belief(X_AB), belief(X_BC), Order::kSecond));
+    const Transform sum = collapse(compose(belief(X_AB), belief(X_BC), Order::kSecond));
     CHECK(transform_diff(sum, compose(X_AB, X_BC), 1e-12) == "");
-    CHECK(transform_diff(settle(inverse(belief(X_AB))), inverse(X_AB), 1e-12) == "");
+    CHECK(transform_diff(collapse(inverse(belief(X_AB))), inverse(X_AB), 1e-12) == "");
   }
 }
 
@@ -53,11 +53,11 @@ TEST_CASE(
     const Share share{"calibration", false, random_factor(random, 2, 0.1, 0.1)};
     const Transform exact{random.pose(), {}};
     const Belief X_AB = belief(exact, {share});
-    const Transform there_and_back = settle(compose(X_AB, inverse(X_AB), order));
+    const Transform there_and_back = collapse(compose(X_AB, inverse(X_AB), order));
     CHECK(testing::pose_diff(there_and_back.pose, {}, 1e-12) == "");
     CHECK(there_and_back.covariance.matrix().cwiseAbs().maxCoeff() < 1e-18);
     const Belief still{Pose(), {}, std::nullopt, {share}};
-    const Transform twice = settle(compose(still, still, Order::kSecond));
+    const Transform twice = collapse(compose(still, still, Order::kSecond));
     const Matrix6d expected = 4.0 * share.factor * share.factor.transpose();
     CHECK(covariance_diff(twice.covariance, Covariance::trusted(expected), 1e-12) == "");
   }
@@ -67,7 +67,7 @@ TEST_CASE("A source of fewer columns on one edge is as if the others were zero")
   Random random(613);
   Share two{"s", false, random_factor(random, 2, 0.1, 0.1)};
   Share one{"s", false, two.factor.leftCols(1)};
-  const Transform sum = settle(compose(belief({}, {one}), belief({}, {two}), Order::kSecond));
+  const Transform sum = collapse(compose(belief({}, {one}), belief({}, {two}), Order::kSecond));
   Factor total = two.factor;
   total.leftCols(1) *= 2.0;
   CHECK(covariance_diff(sum.covariance, Covariance::trusted(Matrix6d(total * total.transpose())),
@@ -99,9 +99,9 @@ TEST_CASE("Shares of a source propagate as samples show, and independence would 
     const Belief X_BC = belief(random.transform(2.0, 0.003, 0.003),
                                {{"s", false, random_factor(random, 2, 0.01, 0.01)}});
     const Matrix6d sampled = sampled_product(X_AB, X_BC, random, kSamples);
-    const Transform shared = settle(compose(X_AB, X_BC, Order::kSecond));
+    const Transform shared = collapse(compose(X_AB, X_BC, Order::kSecond));
     CHECK(testing::moment_diff(sampled, shared.covariance.matrix(), kSamples, 5e-3) == "");
-    const Transform as_if = compose(settle(X_AB), settle(X_BC));
+    const Transform as_if = compose(collapse(X_AB), collapse(X_BC));
     CHECK(testing::moment_diff(sampled, as_if.covariance.matrix(), kSamples, 5e-3) != "");
   }
 }
@@ -122,7 +122,7 @@ TEST_CASE("Fourth order is nearer to samples than second, for independent and fo
       }
       const Matrix6d sampled = sampled_product(X_AB, X_BC, random, 400'000);
       const auto error = [&](Order order) {
-        return (settle(compose(X_AB, X_BC, order)).covariance.matrix() - sampled).norm() /
+        return (collapse(compose(X_AB, X_BC, order)).covariance.matrix() - sampled).norm() /
                sampled.norm();
       };
       second += error(Order::kSecond);
@@ -177,7 +177,7 @@ TEST_CASE(
       const Twist e_2 = root_2 * (correlation * s + std::sqrt(1 - correlation * correlation) * t);
       return log(mean_inverse * (X_AB.pose * exp(root_1 * s)) * (X_BC.pose * exp(e_2)));
     });
-    const Transform bounded = settle(compose(X_AB, X_BC, Order::kSecond));
+    const Transform bounded = collapse(compose(X_AB, X_BC, Order::kSecond));
     CHECK(testing::domination(bounded.covariance.matrix(), sampled) > -0.01);
     const Transform independent =
         compose(Transform{X_AB.pose, *X_AB.unknown}, Transform{X_BC.pose, *X_BC.unknown});
@@ -196,7 +196,7 @@ TEST_CASE(
       for (int k = 0; k < 10; ++k) {
         X = compose(X, belief(random.transform(1.0, size, size)), Order::kFourth);
       }
-      CHECK(is_semidefinite(settle(X).covariance.matrix()));
+      CHECK(is_semidefinite(collapse(X).covariance.matrix()));
     }
   }
 }

@@ -109,13 +109,13 @@ TEST_CASE("numerics: a chain of 10,000 edges keeps its covariance") {
   const Transform looked_up = climbed(edges);
   report("chain of 10,000: pose [m]", exact.error_of(looked_up.pose));
   report("chain of 10,000: lookup's covariance", exact.error_of(looked_up.covariance));
-  report("chain of 10,000: composed covariance", exact.error_of(settle(second).covariance));
+  report("chain of 10,000: composed covariance", exact.error_of(collapse(second).covariance));
   CHECK(exact.error_of(looked_up.pose) < 1e-9);
   CHECK(exact.error_of(looked_up.covariance) < 1e-11);
-  CHECK(exact.error_of(settle(second).covariance) < 1e-11);
+  CHECK(exact.error_of(collapse(second).covariance) < 1e-11);
   double smallest = 1;
   for (const Covariance& one :
-       {looked_up.covariance, settle(second).covariance, settle(fourth).covariance}) {
+       {looked_up.covariance, collapse(second).covariance, collapse(fourth).covariance}) {
     smallest = std::min(smallest, smallest_eigenvalue(one));
   }
   report("chain of 10,000: smallest eigenvalue", smallest);
@@ -197,7 +197,7 @@ TEST_CASE("numerics: near half turns poses and covariances are kept") {
       const auto fused = fuse({X_AB, Z});
       REQUIRE(observed);
       REQUIRE(fused);
-      const Transform corrected = settle(observed->edges[0].X_PC);
+      const Transform corrected = collapse(observed->edges[0].X_PC);
       CHECK(pose_diff(corrected.pose, fused->X.pose, 1e-9) == "");
       worst_fused = std::max(
           worst_fused, (corrected.pose.matrix() - fused->X.pose.matrix()).cwiseAbs().maxCoeff());
@@ -236,12 +236,12 @@ TEST_CASE("numerics: what observations leave is positive semi-definite, however 
         for (std::size_t i = 0; i < edges.size(); ++i) {
           edges[i].X_PC = observed->edges[i].X_PC;
           whole = compose(whole, edges[i].X_PC, Order::kSecond);
-          smallest = std::min(smallest, smallest_eigenvalue(settle(edges[i].X_PC).covariance));
-          smallest = std::min(smallest, smallest_eigenvalue(settle(whole).covariance));
+          smallest = std::min(smallest, smallest_eigenvalue(collapse(edges[i].X_PC).covariance));
+          smallest = std::min(smallest, smallest_eigenvalue(collapse(whole).covariance));
         }
       }
       // Three of one measurement: a third of its covariance.
-      const Matrix6d left = settle(whole).covariance.matrix() - R.matrix() / 3.0;
+      const Matrix6d left = collapse(whole).covariance.matrix() - R.matrix() / 3.0;
       const double rest = left.cwiseAbs().maxCoeff() / R.matrix().cwiseAbs().maxCoeff();
       worst = std::max(worst, rest);
     }

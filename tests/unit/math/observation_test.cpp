@@ -31,7 +31,7 @@ class Consistency {
   void add(const Belief& X, const Pose& truth) {
     const Twist e = log(X.pose.inverse() * truth);
     int rank = 0;
-    const Matrix6d inverse = pseudo_inverse(settle(X).covariance.matrix(), &rank);
+    const Matrix6d inverse = pseudo_inverse(collapse(X).covariance.matrix(), &rank);
     sum_ += e.dot(inverse * e);
     dimensions_ += rank;
     ++runs_;
@@ -163,7 +163,7 @@ TEST_CASE("A measurement of one uncertain edge is fused with it") {
     const auto fused = fuse({X, Z});
     REQUIRE(observed);
     REQUIRE(fused);
-    CHECK(testing::transform_diff(settle(observed->edges[0].X_PC), fused->X, 1e-8) == "");
+    CHECK(testing::transform_diff(collapse(observed->edges[0].X_PC), fused->X, 1e-8) == "");
     CHECK(observed->edges[0].X_PC.shares.empty());
   }
 }

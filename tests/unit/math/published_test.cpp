@@ -66,7 +66,7 @@ Matrix6d brackets(const Matrix6d& sigma_1, const Matrix6d& sigma_2) {
 }
 
 Matrix6d left_of_product(const testing::SharedPair& pair, Order order) {
-  return left_covariance(settle(compose(pair.first, pair.second, order))).matrix();
+  return left_covariance(collapse(compose(pair.first, pair.second, order))).matrix();
 }
 
 // Of the left perturbation of X1 X2, to fourth order.
@@ -242,13 +242,13 @@ TEST_CASE("Correlated poses: a shared source agrees with what is drawn, independ
 
 TEST_CASE("Two poses of one trajectory: what they have in common cancels, where it is known") {
   const testing::Trajectory t = testing::trajectory(100);
-  const Transform way = settle(compose(inverse(t.A()), t.B(), Order::kSecond));
+  const Transform way = collapse(compose(inverse(t.A()), t.B(), Order::kSecond));
   const Matrix6d right = t.X_AB.covariance.matrix();
   CHECK((way.covariance.matrix() - right).norm() < 1e-9 * right.norm());
   const auto position = [](const Covariance& sigma) {
     return std::sqrt(sigma.matrix().topLeftCorner<3, 3>().trace());
   };
-  const Transform independent = between(settle(t.A()), settle(t.B()));
+  const Transform independent = between(collapse(t.A()), collapse(t.B()));
   CHECK(position(independent.covariance) > 30 * position(t.X_AB.covariance));
 }
 
@@ -258,7 +258,7 @@ TEST_CASE("Two poses jointly Gaussian in their tangent spaces need fourth order"
   const testing::Trajectory t = testing::trajectory(100);
   const Matrix6d sampled = testing::sampled_way(t, random, kSamples);
   const auto error = [&](Order order) {
-    const Covariance sigma = settle(compose(inverse(t.A()), t.B(), order)).covariance;
+    const Covariance sigma = collapse(compose(inverse(t.A()), t.B(), order)).covariance;
     return (sigma.matrix() - sampled).norm() / sampled.norm();
   };
   const double second = error(Order::kSecond);

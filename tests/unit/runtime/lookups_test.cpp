@@ -70,7 +70,7 @@ class Deaf final : public testing::Relay {
     ++requests;
     return deaf ? Result<void>() : Relay::send(partition, request, deadline);
   }
-  bool settled() const override { return met_all; }
+  bool discovered() const override { return met_all; }
 
   std::atomic<bool> deaf{false};
   std::atomic<bool> met_all{true};

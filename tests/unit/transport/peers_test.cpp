@@ -30,18 +30,18 @@ TEST_CASE("who was met counts as all there are only once its beats say how many 
   peers.present(prefix_of(1), presence_of("arms"), 0, false);
   std::this_thread::sleep_for(Peers::kQuiet);
   REQUIRE_FALSE(peers.awaits_presence());
-  CHECK_FALSE(peers.settled());
+  CHECK_FALSE(peers.discovered());
   SECTION("none") {
     peers.present(prefix_of(1), presence_of("arms"), 0, true);
-    CHECK(peers.settled());
+    CHECK(peers.discovered());
   }
   SECTION("another, who is to be met first") {
     peers.present(prefix_of(1), presence_of("arms"), 1, true);
-    CHECK_FALSE(peers.settled());
+    CHECK_FALSE(peers.discovered());
     peers.met(prefix_of(2), participant_name("head"));
     peers.present(prefix_of(2), presence_of("head"), 1, true);
     std::this_thread::sleep_for(Peers::kQuiet);
-    CHECK(peers.settled());
+    CHECK(peers.discovered());
   }
 }
 

@@ -60,7 +60,7 @@ TEST_CASE("Lookups count a source once, whichever way they go") {
       compose(inverse(with(robot.X_WA, {s})), with(robot.X_WC, {t}), Order::kSecond);
   const auto X_AC = robot.forest.lookup("a", "c");
   REQUIRE(X_AC);
-  CHECK(transform_diff(*X_AC, settle(expected), 1e-12) == "");
+  CHECK(transform_diff(*X_AC, collapse(expected), 1e-12) == "");
   const auto with_basis = robot.forest.lookup("a", "c", Query{});
   REQUIRE(with_basis);
   CHECK(transform_diff(*with_basis, *X_AC, 1e-12) == "");
@@ -114,7 +114,7 @@ TEST_CASE("A lookup to fourth order says so, and is that of the composed beliefs
   REQUIRE(X_AB);
   CHECK(X_AB->basis.order == Order::kFourth);
   const Belief expected = compose(inverse(with(X_WA, {})), with(X_WB, {}), Order::kFourth);
-  CHECK(transform_diff(*X_AB, settle(expected), 1e-12) == "");
+  CHECK(transform_diff(*X_AB, collapse(expected), 1e-12) == "");
   const auto second = forest.lookup("a", "b", Query{});
   REQUIRE(second);
   CHECK(covariance_diff(X_AB->covariance, second->covariance, 0.01) != "");
@@ -135,7 +135,7 @@ TEST_CASE("A source is counted at an instant between samples, too") {
   query.at = at(3ms);
   const auto then = robot.forest.lookup("world", "b", query);
   const auto newest = robot.forest.lookup("world", "b");
-  const Transform expected = settle(compose(with(still, {s}), with(still, {s}), Order::kSecond));
+  const Transform expected = collapse(compose(with(still, {s}), with(still, {s}), Order::kSecond));
   REQUIRE(then);
   REQUIRE(newest);
   CHECK(transform_diff(*then, expected, 1e-9) == "");
@@ -158,7 +158,7 @@ TEST_CASE("Segments tell their ties, by which the caller composes the path as on
   }
   const auto whole = robot.forest.lookup("c", "b");
   REQUIRE(whole);
-  CHECK(transform_diff(settle(X), *whole, 1e-9) == "");
+  CHECK(transform_diff(collapse(X), *whole, 1e-9) == "");
   const auto untied = robot.forest.lookup_segments({{"c", "world"}});
   REQUIRE(untied);
   CHECK(untied->ties.empty());
