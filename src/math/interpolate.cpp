@@ -64,7 +64,7 @@ Matrix6d carried(const Covariance& sigma, const Twist& xi, double s, double weig
   return weight * (B * sigma.matrix() * B.transpose());
 }
 
-// What the kernel takes a pose or a transform for; climb.cpp asserts it.
+// What the kernel takes a pose or a transform for; path_accumulation.cpp asserts it.
 template <class Value>
 const double* numbers(const Value& X) {
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only

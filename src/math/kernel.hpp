@@ -38,9 +38,10 @@ struct Blend {
 /// Compiled for one instruction set.
 struct Functions {
   /// X_SH := X_SC · X_PC⁻¹ for each edge in turn, C the frame reached so far.
-  void (*climb)(Columns& X_SH, const Edge* edges, std::size_t count);
+  void (*accumulate)(Columns& X_SH, const Edge* edges, std::size_t count);
   /// The same, and before each step sum += Ad(X_SC) Σ_C Ad(X_SC)ᵀ.
-  void (*climb_with_covariance)(Columns& X_SH, Blocks& sum, const Edge* edges, std::size_t count);
+  void (*accumulate_with_covariance)(Columns& X_SH, Blocks& sum, const Edge* edges,
+                                     std::size_t count);
   /// X · Y⁻¹.
   Columns (*quotient)(const Columns& X, const Columns& Y);
   /// sum += Ad(X) Σ Ad(X)ᵀ, Σ an upper triangle row by row.

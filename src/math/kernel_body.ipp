@@ -80,11 +80,11 @@ inline void climb(Columns& X_SH, Blocks* sum, const Edge* edges, std::size_t cou
   store(X_SH.t, t);
 }
 
-void climb_pose(Columns& X_SH, const Edge* edges, std::size_t count) {
+void accumulate_pose(Columns& X_SH, const Edge* edges, std::size_t count) {
   climb<false>(X_SH, nullptr, edges, count);
 }
 
-void climb_both(Columns& X_SH, Blocks& sum, const Edge* edges, std::size_t count) {
+void accumulate_both(Columns& X_SH, Blocks& sum, const Edge* edges, std::size_t count) {
   climb<true>(X_SH, &sum, edges, count);
 }
 

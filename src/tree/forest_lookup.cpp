@@ -7,7 +7,7 @@
 #include "tfdude/math/interpolate.hpp"
 
 #include "base/saturating.hpp"
-#include "math/climb.hpp"
+#include "math/path_accumulation.hpp"
 #include "tree/forest_impl.hpp"
 
 // Lookups: the walk along a path, and where its edges were at an instant.
@@ -89,14 +89,14 @@ struct Moment {
 
 // A moving edge, up which the climb goes.
 template <class Value>
-Result<void> climb_at(Climb<Value>& climb, const HeldVersion& edge, Moment& moment) {
+Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edge, Moment& moment) {
   const std::int64_t t = moment.t;
   if (t > edge.stamp) {
-    OfEdge<Value>& X = climb.place();
+    OfEdge<Value>& X = path.place();
     auto computed = compute_beyond<Value>(edge, t, moment.query, X);
     if (!computed) return computed;
     if (moment.age != 0) add_noise(X, edge, seconds(moment.age));
-    climb.up(X);
+    path.up(X);
     return {};
   }
   const HeldVersion* before = &edge;
@@ -111,33 +111,33 @@ Result<void> climb_at(Climb<Value>& climb, const HeldVersion& edge, Moment& mome
   const double s = after == before ? 0 : static_cast<double>(t - before->stamp) / span;
   const double noise = seconds(moment.age) + s * (1.0 - s) * span * 1e-9;
   if (edge.ring->has_noise() && noise > 0) {
-    OfEdge<Value>& X = climb.place();
+    OfEdge<Value>& X = path.place();
     X = value_of<Value>(*before);
     if (after != before) interpolate(value_of<Value>(*before), value_of<Value>(*after), s, X);
     add_noise(X, edge, noise);
-    climb.up(X);
+    path.up(X);
   } else if (after == before) {
-    climb.up(value_of<Value>(*before));
+    path.up(value_of<Value>(*before));
   } else {
-    climb.up_between(value_of<Value>(*before), value_of<Value>(*after), s);
+    path.up_between(value_of<Value>(*before), value_of<Value>(*after), s);
   }
   return {};
 }
 
-void tie(Climb<Belief>& climb, const HeldVersion& edge) {
+void tie(PathAccumulation<Belief>& path, const HeldVersion& edge) {
   if (edge.ties == nullptr) {
-    climb.tie(false, nullptr);
+    path.tie(false, nullptr);
   } else {
-    climb.tie(edge.ties->now.unknown, &edge.ties->now.shares);
+    path.tie(edge.ties->now.unknown, &edge.ties->now.shares);
   }
 }
 
 template <class Value>
-Climb<Value> begin_climb(Order order) {
+PathAccumulation<Value> begin_path(Order order) {
   if constexpr (std::is_same_v<Value, Belief>) {
-    return Climb<Belief>(order);
+    return PathAccumulation<Belief>(order);
   } else {
-    return Climb<Value>();
+    return PathAccumulation<Value>();
   }
 }
 
@@ -147,8 +147,8 @@ template <class Value, class Take>
 Result<Value> Forest::Impl::walk(const Ends& ends, Absent absent, Order order, Take take) const {
   const Version* a = ends.a;
   const Version* b = ends.b;
-  Climb<Value> climb_a = begin_climb<Value>(order);
-  Climb<Value> climb_b = begin_climb<Value>(order);
+  PathAccumulation<Value> path_a = begin_path<Value>(order);
+  PathAccumulation<Value> path_b = begin_path<Value>(order);
   // What went wrong first; from there on only the errors matter, and kNotConnected goes first.
   std::optional<Error> error;
   while (a != b) {
@@ -161,15 +161,15 @@ Result<Value> Forest::Impl::walk(const Ends& ends, Absent absent, Order order, T
                     "the edge of " + quote(here->name->text) + " is held by another partition"};
     } else if (!error) {
       const auto& edge = static_cast<const HeldVersion&>(*here);
-      Climb<Value>& climb = from_a ? climb_a : climb_b;
-      if constexpr (std::is_same_v<Value, Belief>) tie(climb, edge);
-      Result<void> taken = take(climb, edge);
+      PathAccumulation<Value>& path = from_a ? path_a : path_b;
+      if constexpr (std::is_same_v<Value, Belief>) tie(path, edge);
+      Result<void> taken = take(path, edge);
       if (!taken) error = std::move(taken.error());
     }
     here = at(*here->above, ends.commit);
   }
   if (error) return tl::unexpected(*std::move(error));
-  return join(std::move(climb_a), std::move(climb_b));
+  return join(std::move(path_a), std::move(path_b));
 }
 
 // Only a Belief has room for what an edge is tied to.
@@ -186,7 +186,7 @@ Result<Value> Forest::Impl::walk_newest(const Ends& ends, Absent absent, Order o
   const HeldVersion* limiting = nullptr;
   bool mixed = false;
   bool tied = false;
-  auto newest = walk<Value>(ends, absent, order, [&](auto& climb, const HeldVersion& edge) {
+  auto newest = walk<Value>(ends, absent, order, [&](auto& path, const HeldVersion& edge) {
     if (edge.moving()) {
       if (limiting == nullptr) limiting = &edge;
       if (edge.stamp != limiting->stamp) {
@@ -195,7 +195,7 @@ Result<Value> Forest::Impl::walk_newest(const Ends& ends, Absent absent, Order o
       }
     }
     if (leaves_out_ties<Value>(edge)) tied = true;
-    if (!mixed && !tied) climb.up(value_of<Value>(edge));
+    if (!mixed && !tied) path.up(value_of<Value>(edge));
     return Result<void>();
   });
   met = {limiting, limiting != nullptr, tied};
@@ -214,13 +214,13 @@ Result<Value> Forest::Impl::walk_at(const Ends& ends, Absent absent, std::int64_
           : 0;
   Moment moment{t, age, query};
   return walk<Value>(ends, absent, query.order,
-                     [&](auto& climb, const HeldVersion& edge) -> Result<void> {
+                     [&](auto& path, const HeldVersion& edge) -> Result<void> {
                        if (leaves_out_ties<Value>(edge)) met.tied = true;
                        if (edge.moving()) {
                          met.moving = true;
-                         return climb_at<Value>(climb, edge, moment);
+                         return accumulate_at<Value>(path, edge, moment);
                        }
-                       if (!met.tied) climb.up(value_of<Value>(edge));
+                       if (!met.tied) path.up(value_of<Value>(edge));
                        return {};
                      });
 }

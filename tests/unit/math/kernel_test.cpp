@@ -27,7 +27,7 @@ TEST_CASE("the portable kernel and that of this processor agree") {
   const auto climbed = [&](const kernel::Functions& functions) {
     kernel::Columns X_SH;
     kernel::Blocks sum;
-    functions.climb_with_covariance(X_SH, sum, edges.data(), edges.size());
+    functions.accumulate_with_covariance(X_SH, sum, edges.data(), edges.size());
     functions.add_transported(functions.quotient(X_SH, kernel::Columns()),
                               path[0].covariance.upper().data(), sum);
     return Transform{kernel::pose_of(X_SH), Covariance::trusted(kernel::upper_of(sum))};

@@ -7,7 +7,7 @@
 
 #include "tfdude/math/transform.hpp"
 
-#include "math/climb.hpp"
+#include "math/path_accumulation.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -156,10 +156,10 @@ TEST_CASE("sampled climbs have the joined covariance") {
   const Transform X_HP = random.transform(1.0, 1e-4, 1e-4);
   const Transform X_PA = random.transform(1.0, 1e-4, 1e-4);
   const Transform X_HB = random.transform(1.0, 1e-4, 1e-4);
-  Climb<Transform> from_a;
+  PathAccumulation<Transform> from_a;
   from_a.up(X_PA);
   from_a.up(X_HP);
-  Climb<Transform> from_b;
+  PathAccumulation<Transform> from_b;
   from_b.up(X_HB);
   const Transform X_AB = join(std::move(from_a), std::move(from_b));
   const Sampler sample_HP(X_HP);

@@ -11,7 +11,7 @@
 #include "tfdude/math/fusion.hpp"
 #include "tfdude/math/observation.hpp"
 
-#include "math/climb.hpp"
+#include "math/path_accumulation.hpp"
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
@@ -87,9 +87,9 @@ void report(const char* what, double value) {
 }
 
 Transform climbed(const std::vector<Transform>& edges) {
-  Climb<Transform> down;
+  PathAccumulation<Transform> down;
   for (auto edge = edges.rbegin(); edge != edges.rend(); ++edge) down.up(*edge);
-  return join(Climb<Transform>(), std::move(down));
+  return join(PathAccumulation<Transform>(), std::move(down));
 }
 
 TEST_CASE("numerics: a chain of 10,000 edges keeps its covariance") {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "math/climb.hpp"
+#include "math/path_accumulation.hpp"
 #include "support/catch.hpp"
 #include "support/jacobian.hpp"
 #include "support/pose_diff.hpp"
@@ -172,7 +172,7 @@ TEST_CASE("between a transform and itself is the identity with twice the error")
   }
 }
 
-// ---- Climb and join
+// ---- PathAccumulation and join
 
 struct Path {
   std::vector<Transform> edges;  // from the start upwards, each X_PC
@@ -184,9 +184,9 @@ Path random_path(Random& random, std::size_t depth) {
   return path;
 }
 
-Climb<Transform> climbed(const Path& path) {
-  Climb<Transform> climb;
-  for (const Transform& X_PC : path.edges) climb.up(X_PC);
+PathAccumulation<Transform> climbed(const Path& path) {
+  PathAccumulation<Transform> climb;
+  for (const Transform& X_PC : path.edges) path.up(X_PC);
   return climb;
 }
 
@@ -221,16 +221,17 @@ TEST_CASE("a climb of poses joins to the pose of the climb of transforms") {
   const Path a = random_path(random, 20);
   const Path b = random_path(random, 40);
   const auto poses = [](const Path& path) {
-    Climb<Pose> climb;
-    for (const Transform& X_PC : path.edges) climb.up(X_PC.pose);
+    PathAccumulation<Pose> climb;
+    for (const Transform& X_PC : path.edges) path.up(X_PC.pose);
     return climb;
   };
   CHECK(pose_diff(join(poses(a), poses(b)), join(climbed(a), climbed(b)).pose, 0.0) == "");
-  CHECK(pose_diff(join(Climb<Pose>(), Climb<Pose>()), Pose(), 0.0) == "");
+  CHECK(pose_diff(join(PathAccumulation<Pose>(), PathAccumulation<Pose>()), Pose(), 0.0) == "");
 }
 
 TEST_CASE("a join without a climb is the identity known exactly") {
-  CHECK(transform_diff(join(Climb<Transform>(), Climb<Transform>()), Transform(), 0.0) == "");
+  CHECK(transform_diff(join(PathAccumulation<Transform>(), PathAccumulation<Transform>()),
+                       Transform(), 0.0) == "");
 }
 
 // ---- long chains
@@ -256,13 +257,14 @@ TEST_CASE("a chain of 1000 edges stays symmetric and positive semi-definite") {
   }
   Transform X_RS;
   for (const Transform& X_PC : path.edges) X_RS = compose(X_PC, X_RS);
-  const Transform X_SR = join(climbed(path), Climb<Transform>());
+  const Transform X_SR = join(climbed(path), PathAccumulation<Transform>());
   for (const Transform& X : {X_RS, X_SR}) {
     CHECK(X.covariance.matrix() == X.covariance.matrix().transpose());
     CHECK(relative_smallest_eigenvalue(X.covariance) >= -1e-12);
     CHECK(std::abs(X.pose.rotation().norm() - 1.0) < 1e-15);
   }
-  CHECK(transform_diff(join(Climb<Transform>(), climbed(path)), X_RS, 1e-10, 1e-9) == "");
+  CHECK(transform_diff(join(PathAccumulation<Transform>(), climbed(path)), X_RS, 1e-10, 1e-9) ==
+        "");
 }
 
 // ---- back in again

@@ -17,14 +17,14 @@ namespace tfdude {
 ///
 /// @tparam Value  Transform, or Pose where the covariance is not asked for
 template <class Value>
-class Climb {
+class PathAccumulation {
  public:
-  Climb() {
+  PathAccumulation() {
   }  // NOLINT(*-member-init,*-use-equals-default): what is pending is written before it is read
 
   /// Goes up one edge: X_PC is its value, C the frame reached so far, P the frame reached then.
   void up(const Value& X_PC) {
-    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only, see climb.cpp
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only, see path_accumulation.cpp
     pending_[count_++] = reinterpret_cast<kernel::Edge>(&X_PC);
     if (count_ == pending_.size()) compute();
   }
@@ -37,7 +37,7 @@ class Climb {
 
   /// X_AB where A and B climbed to the same frame. Independent edges, first order.
   template <class V>
-  friend V join(Climb<V>&& from_a, Climb<V>&& from_b);
+  friend V join(PathAccumulation<V>&& from_a, PathAccumulation<V>&& from_b);
 
  private:
   void compute();
@@ -58,13 +58,13 @@ class Climb {
 };
 
 template <class Value>
-[[nodiscard]] Value join(Climb<Value>&& from_a, Climb<Value>&& from_b);
+[[nodiscard]] Value join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b);
 
 /// The same with all that is known of errors, edge by edge: some ten times slower.
 template <>
-class Climb<Belief> {
+class PathAccumulation<Belief> {
  public:
-  explicit Climb(Order order) : order_(order) {}
+  explicit PathAccumulation(Order order) : order_(order) {}
 
   /// What the error of the next edge has to do with others'; shares: may be null.
   void tie(bool unknown, const std::vector<Share>* shares) {
@@ -76,7 +76,7 @@ class Climb<Belief> {
   void up_between(const Transform& X0, const Transform& X1, double s);
   [[nodiscard]] Transform& place() { return computed_; }
 
-  friend Belief join(Climb<Belief>&& from_a, Climb<Belief>&& from_b);
+  friend Belief join(PathAccumulation<Belief>&& from_a, PathAccumulation<Belief>&& from_b);
 
  private:
   Order order_;

@@ -1,4 +1,4 @@
-#include "math/climb.hpp"
+#include "math/path_accumulation.hpp"
 
 #include <type_traits>
 
@@ -14,7 +14,7 @@ static_assert(std::is_standard_layout_v<Pose> && sizeof(Pose) == 7 * sizeof(doub
 static_assert(std::is_standard_layout_v<Transform> && sizeof(Transform) == 28 * sizeof(double));
 
 template <class Value>
-void Climb<Value>::up_between(const Value& X0, const Value& X1, double s) {
+void PathAccumulation<Value>::up_between(const Value& X0, const Value& X1, double s) {
   // NOLINTBEGIN(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
   blends_[blend_count_++] = {reinterpret_cast<kernel::Edge>(&X0),
                              reinterpret_cast<kernel::Edge>(&X1), s,
@@ -24,7 +24,7 @@ void Climb<Value>::up_between(const Value& X0, const Value& X1, double s) {
 }
 
 template <class Value>
-void Climb<Value>::blend() {
+void PathAccumulation<Value>::blend() {
   const kernel::Functions& functions = kernel::functions();
   if constexpr (std::is_same_v<Value, Transform>) {
     functions.blend_with_covariance(blends_.data(), blend_count_);
@@ -44,18 +44,18 @@ void Climb<Value>::blend() {
 }
 
 template <class Value>
-void Climb<Value>::compute() {
+void PathAccumulation<Value>::compute() {
   if (blend_count_ > 0) blend();
   if constexpr (std::is_same_v<Value, Transform>) {
-    kernel::functions().climb_with_covariance(X_SH_, left_, pending_.data(), count_);
+    kernel::functions().accumulate_with_covariance(X_SH_, left_, pending_.data(), count_);
   } else {
-    kernel::functions().climb(X_SH_, pending_.data(), count_);
+    kernel::functions().accumulate(X_SH_, pending_.data(), count_);
   }
   count_ = 0;
 }
 
 template <class Value>
-Value join(Climb<Value>&& from_a, Climb<Value>&& from_b) {
+Value join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b) {
   // Of both at once, as four take hardly longer than one.
   const bool together = from_a.blend_count_ + from_b.blend_count_ <= from_a.blends_.size();
   for (std::size_t i = 0; together && i < from_b.blend_count_; ++i) {
@@ -75,7 +75,7 @@ Value join(Climb<Value>&& from_a, Climb<Value>&& from_b) {
   }
 }
 
-void Climb<Belief>::up(const Transform& X_PC) {
+void PathAccumulation<Belief>::up(const Transform& X_PC) {
   Belief edge;
   edge.pose = X_PC.pose;
   (unknown_ ? edge.unknown.emplace() : edge.own) = X_PC.covariance;
@@ -83,17 +83,17 @@ void Climb<Belief>::up(const Transform& X_PC) {
   X_HS_ = compose(edge, X_HS_, order_);
 }
 
-void Climb<Belief>::up_between(const Transform& X0, const Transform& X1, double s) {
+void PathAccumulation<Belief>::up_between(const Transform& X0, const Transform& X1, double s) {
   up(interpolate(X0, X1, s));
 }
 
-Belief join(Climb<Belief>&& from_a, Climb<Belief>&& from_b) {
+Belief join(PathAccumulation<Belief>&& from_a, PathAccumulation<Belief>&& from_b) {
   return compose(inverse(from_a.X_HS_), from_b.X_HS_, from_a.order_);
 }
 
-template class Climb<Transform>;
-template class Climb<Pose>;
-template Transform join(Climb<Transform>&&, Climb<Transform>&&);
-template Pose join(Climb<Pose>&&, Climb<Pose>&&);
+template class PathAccumulation<Transform>;
+template class PathAccumulation<Pose>;
+template Transform join(PathAccumulation<Transform>&&, PathAccumulation<Transform>&&);
+template Pose join(PathAccumulation<Pose>&&, PathAccumulation<Pose>&&);
 
 }  // namespace tfdude
