@@ -8,7 +8,7 @@ file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/precompiled.cpp "")
 add_library(tfdude_tests_precompiled OBJECT ${CMAKE_CURRENT_BINARY_DIR}/precompiled.cpp)
 set_target_properties(tfdude_tests_precompiled PROPERTIES POSITION_INDEPENDENT_CODE ON)
 target_include_directories(tfdude_tests_precompiled PRIVATE ${CMAKE_SOURCE_DIR}/tests)
-target_link_libraries(tfdude_tests_precompiled PRIVATE tfdude Catch2::Catch2 tfdude_options)
+target_link_libraries(tfdude_tests_precompiled PRIVATE tfdude_open Catch2::Catch2 tfdude_options)
 target_precompile_headers(tfdude_tests_precompiled PRIVATE ${CMAKE_SOURCE_DIR}/tests/support/precompiled.hpp)
 
 # What Catch2 2 and 3 say where a filter matches no test case; 2 ends with success all the same.
@@ -23,9 +23,8 @@ function(tfdude_add_tests target)
     set(ARG_TIMEOUT 60)
   endif()
   add_executable(${target} ${ARG_SOURCES})
-  # Private headers too: the library hides no symbols.
-  target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests ${CMAKE_SOURCE_DIR}/src)
-  target_link_libraries(${target} PRIVATE tfdude Catch2::Catch2WithMain tfdude_options ${ARG_LIBRARIES})
+  target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests)
+  target_link_libraries(${target} PRIVATE tfdude_open Catch2::Catch2WithMain tfdude_options ${ARG_LIBRARIES})
   # As the shared headers are compiled: an executable's objects would be -fPIE.
   target_compile_options(${target} PRIVATE -fPIC)
   target_precompile_headers(${target} REUSE_FROM tfdude_tests_precompiled)

@@ -44,6 +44,7 @@ function(tfdude_generate_idl target idl)
   add_library(${target} OBJECT ${sources} ${headers})
   target_include_directories(${target} SYSTEM PUBLIC ${dir})
   target_link_libraries(${target} PUBLIC tfdude_fastdds)
+  set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
   # Fast CDR 1 calls a member of the null array of an empty sequence, which does no harm.
   target_compile_options(${target} PRIVATE -w -fno-sanitize=null)
 endfunction()

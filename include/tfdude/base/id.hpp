@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 
 namespace tfdude {
@@ -14,17 +15,17 @@ inline constexpr std::size_t kMaxIdBytes = 255;
 /// Checks an id: 1 to 255 bytes of valid UTF-8 without control characters.
 /// @param what  the field's name for the message, such as "parent"
 /// @return kInvalidInput naming `what` and the reason.
-[[nodiscard]] Result<void> check_id(std::string_view id, std::string_view what);
+[[nodiscard]] TFDUDE_EXPORT Result<void> check_id(std::string_view id, std::string_view what);
 
 /// Checks a partition name: an id without the wildcards `*?[]` and without a comma, since the name
 /// is also the name of a DDS partition, where those mean something else.
-[[nodiscard]] Result<void> check_partition_name(std::string_view name);
+[[nodiscard]] TFDUDE_EXPORT Result<void> check_partition_name(std::string_view name);
 
 /// The text with every control character, and every byte that is not valid UTF-8, written as "\x07": fit for a
 /// terminal, where it comes from somebody else.
-[[nodiscard]] std::string printable(std::string_view text);
+[[nodiscard]] TFDUDE_EXPORT std::string printable(std::string_view text);
 
 /// The same in single quotes, fit for a message or a log line.
-[[nodiscard]] std::string quote(std::string_view text);
+[[nodiscard]] TFDUDE_EXPORT std::string quote(std::string_view text);
 
 }  // namespace tfdude

@@ -7,6 +7,8 @@
 
 #include <tl/expected.hpp>
 
+#include "tfdude/base/export.hpp"
+
 namespace tfdude {
 
 /// What went wrong, by what a caller can do about it. The numbers travel on the wire: never reuse
@@ -36,7 +38,7 @@ enum class Errc : std::uint8_t {
 };
 
 /// The stable snake_case name of a code, as the command line prints it in JSON.
-[[nodiscard]] std::string_view to_string(Errc code);
+[[nodiscard]] TFDUDE_EXPORT std::string_view to_string(Errc code);
 
 /// An error for people: the message names the frame, the partition and the value concerned.
 struct Error {

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string>
 
+#include "tfdude/base/export.hpp"
+
 namespace tfdude {
 
 /// Wall-clock instant in nanoseconds since the UNIX epoch. Logic is handed one; only `client` and
@@ -19,9 +21,9 @@ using Milliseconds = std::chrono::milliseconds;
 }
 
 /// For people: "12.3 ms", "0.004 ms".
-[[nodiscard]] std::string in_milliseconds(std::chrono::nanoseconds duration);
+[[nodiscard]] TFDUDE_EXPORT std::string in_milliseconds(std::chrono::nanoseconds duration);
 
 /// For people: "2026-11-21 14:03:59.125 UTC".
-[[nodiscard]] std::string to_string(Time time);
+[[nodiscard]] TFDUDE_EXPORT std::string to_string(Time time);
 
 }  // namespace tfdude

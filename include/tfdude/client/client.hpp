@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
 #include "tfdude/client/stream.hpp"
@@ -45,7 +46,7 @@ class Participant;
 ///   participant, what is left of that later. A call returns 20 ms after its deadline at the latest, as far as the
 ///   machine lets it run; it then fails with kTimeout, which says who or what was missing. Before everybody who is there
 ///   was met, that is said instead of kUnknown... and kNotConnected.
-class Client {
+class TFDUDE_EXPORT Client {
  public:
   /// Joins a domain over DDS; does not wait for anybody. At once (some milliseconds).
   /// @return kConfig (profile), kTransport, kInvalidInput (domain).

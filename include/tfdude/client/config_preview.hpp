@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/types/configured_change.hpp"
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/options.hpp"
@@ -20,8 +21,7 @@ struct ConfigPreview {
 /// copy of the state, which may be in use meanwhile and stays as it is. Of frames of other partitions that would
 /// wait for one that is removed it knows nothing.
 /// @return kState (naming the file), the first bad frame's error, as Node::open(). Thread-safe.
-[[nodiscard]] Result<ConfigPreview> preview_config(const std::string& partition,
-                                                   const std::vector<FrameSpec>& frames,
-                                                   const Options& options);
+[[nodiscard]] TFDUDE_EXPORT Result<ConfigPreview> preview_config(
+    const std::string& partition, const std::vector<FrameSpec>& frames, const Options& options);
 
 }  // namespace tfdude

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/client/client.hpp"
 #include "tfdude/types/frame.hpp"
@@ -12,7 +13,7 @@ namespace tfdude {
 
 /// A process that owns a partition of the frames and serves it to others, from its own threads; the rest
 /// as for Client.
-class Node : public Client {
+class TFDUDE_EXPORT Node : public Client {
  public:
   /// Joins a domain over DDS, makes sure that nobody serves the partition, takes the frames (in any order;
   /// parents may be missing yet or belong to others) and serves them. With Options::state, what an

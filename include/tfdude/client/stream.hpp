@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
 #include "tfdude/math/transform.hpp"
@@ -30,7 +31,7 @@ class Sender;
 ///   its forest. The loopback transport calls the owner.
 /// @par Thread safety  Each stream is of one thread at a time; a thread may have many, and several streams may have the same
 ///   edges.
-class EdgeStream {
+class TFDUDE_EXPORT EdgeStream {
  public:
   explicit EdgeStream(std::shared_ptr<Sender<Update>> sender);
   EdgeStream(EdgeStream&&) noexcept;
@@ -54,7 +55,7 @@ class EdgeStream {
 /// The same for positions of joints, as Client::publish_joints() does. A joint that several partitions have is listed where one of
 /// them was not sent it. Joints of this process's own partition are applied under the lock that those share with the
 /// threads that receive: where it is taken, that share fails with kTimeout instead of waiting.
-class JointStream {
+class TFDUDE_EXPORT JointStream {
  public:
   explicit JointStream(std::shared_ptr<Sender<JointUpdate>> sender);
   JointStream(JointStream&&) noexcept;

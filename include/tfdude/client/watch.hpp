@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
 #include "tfdude/types/options.hpp"
@@ -18,7 +19,7 @@ class WatchedPath;
 /// A path whose owners push what changes on it, so that it is read from this process's memory. Watched as long as a copy of
 /// this lives; it may outlive the Client, and then gets nothing new.
 /// @par Thread safety  All functions.
-class PathWatch {
+class TFDUDE_EXPORT PathWatch {
  public:
   explicit PathWatch(std::shared_ptr<WatchedPath> path) : path_(std::move(path)) {}
 

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/description/urdf.hpp"
 #include "tfdude/types/frame.hpp"
@@ -20,14 +21,15 @@ struct Config {
 /// Reads a YAML file, and the URDFs that it names.
 /// @return kConfig naming the file and line: missing, not YAML, an unknown key, a wrong type, or what load_urdf() says;
 ///   kInvalidInput naming the file, frame and field: a value that breaks its rule.
-[[nodiscard]] Result<Config> load_config(const std::string& path);
+[[nodiscard]] TFDUDE_EXPORT Result<Config> load_config(const std::string& path);
 
 /// The same from text; `name` stands for the path in messages, and its folder is that of relative URDFs.
-[[nodiscard]] Result<Config> parse_config(const std::string& text, const std::string& name);
+[[nodiscard]] TFDUDE_EXPORT Result<Config> parse_config(const std::string& text,
+                                                        const std::string& name);
 
 /// Appends the frames of a URDF. The configuration is as it was where there is an error.
 /// @return what load_urdf() says; kInvalidInput naming the places of both: the id of a frame or the name of a joint that is
 ///   taken; a cycle.
-[[nodiscard]] Result<void> add_urdf(Config& config, const UrdfPart& part);
+[[nodiscard]] TFDUDE_EXPORT Result<void> add_urdf(Config& config, const UrdfPart& part);
 
 }  // namespace tfdude

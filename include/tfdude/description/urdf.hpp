@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/types/frame.hpp"
 
@@ -38,10 +39,10 @@ struct UrdfPart {
 /// without a joint. What a URDF says beside frames may be broken.
 /// @return kConfig naming the file and line: not there, not a URDF; kInvalidInput naming the file, line and element: unknown
 ///   parent link, two roots, a zero axis, limits upside down, a name that is taken, what a joint mimics is not there...
-[[nodiscard]] Result<std::vector<FrameSpec>> load_urdf(const UrdfPart& part);
+[[nodiscard]] TFDUDE_EXPORT Result<std::vector<FrameSpec>> load_urdf(const UrdfPart& part);
 
 /// The same from text; part.file stands for it in messages.
-[[nodiscard]] Result<std::vector<FrameSpec>> parse_urdf(const std::string& text,
-                                                        const UrdfPart& part);
+[[nodiscard]] TFDUDE_EXPORT Result<std::vector<FrameSpec>> parse_urdf(const std::string& text,
+                                                                      const UrdfPart& part);
 
 }  // namespace tfdude

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/math/transform.hpp"
 
 namespace tfdude {
@@ -42,7 +43,7 @@ struct Share {
 inline constexpr std::string_view kObservedPrefix = "observed:";
 
 /// Whether an observation has made the share's source.
-[[nodiscard]] bool is_observed(const Share& share);
+[[nodiscard]] TFDUDE_EXPORT bool is_observed(const Share& share);
 
 /// X_AB with all that is known of its error e = η + Σ F s + u, X = X̄ · Exp(e): what a path's segments must tell each
 /// other, so that what they have in common is counted once.
@@ -55,7 +56,7 @@ struct Belief {
 };
 
 /// X_BA. Exact: Exp(e)⁻¹ = Exp(-e), seen from the other side.
-[[nodiscard]] Belief inverse(const Belief& X_AB);
+[[nodiscard]] TFDUDE_EXPORT Belief inverse(const Belief& X_AB);
 
 /// X_AC. Own parts add up independently, shares of one source column by column, and unknown parts by bound().
 ///
@@ -68,18 +69,18 @@ struct Belief {
 /// a radian it is no nearer to the truth than second order; docs/uncertainty.md has figures.
 /// Of X_WA⁻¹ X_WB where B's error was composed from A's, what is quadratic in A's shares counts twice as own and does not
 /// cancel: there second order is right, and fourth is too large.
-[[nodiscard]] Belief compose(const Belief& X_AB, const Belief& X_BC, Order order);
+[[nodiscard]] TFDUDE_EXPORT Belief compose(const Belief& X_AB, const Belief& X_BC, Order order);
 
 /// The transform with one covariance that stands for all of the belief: a bound, where parts are unknown.
-[[nodiscard]] Transform collapse(const Belief& X_AB);
+[[nodiscard]] TFDUDE_EXPORT Transform collapse(const Belief& X_AB);
 
 /// No sum of two errors of these covariances has more than this, whatever their correlation (the product of two poses has,
 /// by terms of fourth order): (1 + 1/ε) A + (1 + ε) B, with the ε that makes the sum of both traces, of translation and
 /// of rotation, each in units of A + B, the smallest.
-[[nodiscard]] Covariance bound(const Covariance& A, const Covariance& B);
+[[nodiscard]] TFDUDE_EXPORT Covariance bound(const Covariance& A, const Covariance& B);
 
 /// @return kInvalidInput: more than kMaxShares; naming the source: an empty name, one longer than an id, no column, more than
 ///   kMaxFactorColumns, a number that is not finite or beyond the root of kMaxVariance, one source twice.
-[[nodiscard]] Result<void> check_shares(const std::vector<Share>& shares);
+[[nodiscard]] TFDUDE_EXPORT Result<void> check_shares(const std::vector<Share>& shares);
 
 }  // namespace tfdude

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/math/pose.hpp"
 
@@ -17,7 +18,7 @@ inline constexpr double kMaxVariance = 1e18;
 /// m·rad, rad²], expressed in the child frame. Symmetric by construction (the upper triangle is
 /// what is kept) and positive semi-definite to rounding at all times: what comes from outside
 /// enters through the from_...() functions.
-class Covariance {
+class TFDUDE_EXPORT Covariance {
  public:
   static constexpr std::size_t kSize = 21;
   /// Upper triangle row by row: (0,0), (0,1) ... (0,5), (1,1) ... (5,5).
@@ -60,7 +61,7 @@ class Covariance {
   Upper upper_{};
 };
 
-[[nodiscard]] Covariance operator+(Covariance a, const Covariance& b);
+[[nodiscard]] TFDUDE_EXPORT Covariance operator+(Covariance a, const Covariance& b);
 
 /// Index of element (row, column) in Covariance::Upper, row <= column.
 [[nodiscard]] constexpr std::size_t upper_index(std::size_t row, std::size_t column) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/math/transform.hpp"
 
 namespace tfdude {
@@ -15,11 +16,12 @@ namespace tfdude {
 /// Where the two are less than 0.1 rad apart and have the same covariance, that is given as it is, as long as
 /// what it lacks is below a millionth: s (1-s)/4 ad(ξ) Σ ad(ξ)ᵀ.
 /// @note Of two rotations that are a half turn apart the way between them is one of two.
-[[nodiscard]] Transform interpolate(const Transform& X0, const Transform& X1, double s);
+[[nodiscard]] TFDUDE_EXPORT Transform interpolate(const Transform& X0, const Transform& X1,
+                                                  double s);
 
 /// The same into a place of the caller's, which must be another than X0 and X1; and without the covariance.
-void interpolate(const Transform& X0, const Transform& X1, double s, Transform& X);
-void interpolate(const Pose& X0, const Pose& X1, double s, Pose& X);
+TFDUDE_EXPORT void interpolate(const Transform& X0, const Transform& X1, double s, Transform& X);
+TFDUDE_EXPORT void interpolate(const Pose& X0, const Pose& X1, double s, Pose& X);
 
 /// X_AB beyond the second of two samples, with their twist.
 ///
@@ -27,9 +29,10 @@ void interpolate(const Pose& X0, const Pose& X1, double s, Pose& X);
 /// gives more than s (2s-1) B1 Σ1 B1ᵀ + (s-1) (2s-1) B0 Σ0 B0ᵀ, which is given (e eᵀ ≤ (1 + 1/c) x xᵀ + (1 + c) y yᵀ
 /// with c = s / (s-1)).
 /// @param s  1 gives X1, 2 as far beyond it as it is from X0; no less than 1
-[[nodiscard]] Transform extrapolate(const Transform& X0, const Transform& X1, double s);
+[[nodiscard]] TFDUDE_EXPORT Transform extrapolate(const Transform& X0, const Transform& X1,
+                                                  double s);
 
 /// The same without the covariance.
-[[nodiscard]] Pose extrapolate(const Pose& X0, const Pose& X1, double s);
+[[nodiscard]] TFDUDE_EXPORT Pose extrapolate(const Pose& X0, const Pose& X1, double s);
 
 }  // namespace tfdude

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/math/transform.hpp"
 
 namespace tfdude {
@@ -15,15 +16,18 @@ struct Joint {
 };
 
 /// Turns about a unit axis of J. @param axis  of length one
-[[nodiscard]] Joint revolute_joint(const Transform& X_PJ, const Eigen::Vector3d& axis);
+[[nodiscard]] TFDUDE_EXPORT Joint revolute_joint(const Transform& X_PJ,
+                                                 const Eigen::Vector3d& axis);
 
 /// Shifts along a unit axis of J. @param axis  of length one
-[[nodiscard]] Joint prismatic_joint(const Transform& X_PJ, const Eigen::Vector3d& axis);
+[[nodiscard]] TFDUDE_EXPORT Joint prismatic_joint(const Transform& X_PJ,
+                                                  const Eigen::Vector3d& axis);
 
 /// X_PC(q). An error of q moves C along S, wherever q is, as Exp(S (q + δ)) = Exp(S q) Exp(S δ): so q's variance is the
 /// covariance S Sᵀ σ² of rank one, without approximation; the origin's is seen from C and added to it.
 /// @param position  q [rad or m]
 /// @param variance  of q [rad² or m²]
-[[nodiscard]] Transform joint_transform(const Joint& joint, double position, double variance);
+[[nodiscard]] TFDUDE_EXPORT Transform joint_transform(const Joint& joint, double position,
+                                                      double variance);
 
 }  // namespace tfdude

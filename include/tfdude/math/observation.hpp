@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/math/belief.hpp"
 
 // A measurement of where one end of a path is seen from the other, and what it tells of the path's edges.
@@ -72,8 +73,9 @@ struct Observation {
 /// @param source  the name of the new source: kObservedPrefix and something that no other observation has
 /// @return kInvalidInput: no edge has any uncertainty, several are of unknown correlation and no other is uncertain,
 ///   a gate that is not within (0, 1], nothing that converges.
-[[nodiscard]] Result<Observation> observe(const std::vector<ObservedEdge>& edges,
-                                          const Transform& Z_AB, const std::string& source,
-                                          const ObserveOptions& options = {});
+[[nodiscard]] TFDUDE_EXPORT Result<Observation> observe(const std::vector<ObservedEdge>& edges,
+                                                        const Transform& Z_AB,
+                                                        const std::string& source,
+                                                        const ObserveOptions& options = {});
 
 }  // namespace tfdude

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/math/transform.hpp"
 
 // The same uncertainty in other conventions. The library's own is the right perturbation X = X̄ · Exp(ξ), ξ = (ρ, θ),
@@ -8,25 +9,25 @@ namespace tfdude {
 
 /// Covariance of the left perturbation X = Exp(ξ) · X̄, expressed in the parent frame: Ad(X̄) Σ Ad(X̄)ᵀ. Exact, as
 /// X̄ · Exp(ξ) = Exp(Ad(X̄) ξ) · X̄. That of Barfoot & Furgale 2014.
-[[nodiscard]] Covariance left_covariance(const Transform& X);
+[[nodiscard]] TFDUDE_EXPORT Covariance left_covariance(const Transform& X);
 
 /// The inverse of left_covariance().
-[[nodiscard]] Transform from_left_covariance(const Pose& X, const Covariance& left);
+[[nodiscard]] TFDUDE_EXPORT Transform from_left_covariance(const Pose& X, const Covariance& left);
 
 /// Covariance as in ROS's geometry_msgs/PoseWithCovariance: of the child's origin p = p̄ + δp along the parent's axes
 /// [m], and of a rotation R = Exp(δθ) · R̄ about axes parallel to the parent's, fixed in the child's origin [rad]. First
 /// order, as p = p̄ + R̄ V(θ) ρ with V(θ) = 1 + θ×/2 + ...: δp = R̄ ρ, δθ = R̄ θ.
 /// @note Not the covariance of roll, pitch and yaw as numbers, which is the same only near the identity.
-[[nodiscard]] Covariance ros_covariance(const Transform& X);
+[[nodiscard]] TFDUDE_EXPORT Covariance ros_covariance(const Transform& X);
 
 /// The inverse of ros_covariance().
-[[nodiscard]] Transform from_ros_covariance(const Pose& X, const Covariance& ros);
+[[nodiscard]] TFDUDE_EXPORT Transform from_ros_covariance(const Pose& X, const Covariance& ros);
 
 /// Jr(ξ), with Exp(ξ + δ) = Exp(ξ) · Exp(Jr(ξ) δ) for small δ, of any angle. Its power series, Solà et al.,
 /// arXiv:1812.01537, Eqs. 67 and 179. Jl(ξ) = Jr(-ξ).
-[[nodiscard]] Matrix6d right_jacobian(const Twist& xi);
+[[nodiscard]] TFDUDE_EXPORT Matrix6d right_jacobian(const Twist& xi);
 
 /// ad(ξ), with ad(ξ) η = [ξ, η]: the bracket of se(3). Barfoot & Furgale 2014, Eq. 5.
-[[nodiscard]] Matrix6d small_adjoint(const Twist& xi);
+[[nodiscard]] TFDUDE_EXPORT Matrix6d small_adjoint(const Twist& xi);
 
 }  // namespace tfdude

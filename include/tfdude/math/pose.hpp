@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 
 namespace tfdude {
@@ -18,7 +19,7 @@ inline constexpr double kMaxTranslation = 1e9;
 /// X_AB, the pose of frame B in frame A: p_A = X_AB · p_B. A rigid transform whose rotation is a
 /// unit quaternion at all times: what comes from outside enters through create().
 /// Trivially copyable, without alignment demands, so that it may be shared between builds.
-class Pose {
+class TFDUDE_EXPORT Pose {
  public:
   /// The identity.
   Pose() = default;
@@ -53,26 +54,26 @@ class Pose {
 };
 
 /// X_AC = X_AB · X_BC; the rotation is normalized again, so that chains do not drift.
-[[nodiscard]] Pose operator*(const Pose& X_AB, const Pose& X_BC);
+[[nodiscard]] TFDUDE_EXPORT Pose operator*(const Pose& X_AB, const Pose& X_BC);
 
 /// Exponential map, ξ = (ρ, θ) to SE(3). Solà et al., arXiv:1812.01537, Eqs. 172 and 174.
-[[nodiscard]] Pose exp(const Twist& xi);
+[[nodiscard]] TFDUDE_EXPORT Pose exp(const Twist& xi);
 
 /// Logarithm with |θ| ≤ π; exact at identity and at π. Solà et al., arXiv:1812.01537, Eqs. 173,
 /// 174.
-[[nodiscard]] Twist log(const Pose& X);
+[[nodiscard]] TFDUDE_EXPORT Twist log(const Pose& X);
 
 /// Ad(X), with X · Exp(ξ) · X⁻¹ = Exp(Ad(X) ξ); for (ρ, θ) it is [R, [t]×R; 0, R].
 /// Solà et al., arXiv:1812.01537, Eq. 175.
-[[nodiscard]] Matrix6d adjoint(const Pose& X);
+[[nodiscard]] TFDUDE_EXPORT Matrix6d adjoint(const Pose& X);
 
 /// The matrix of the cross product: skew(a) b = a × b.
-[[nodiscard]] Eigen::Matrix3d skew(const Eigen::Vector3d& a);
+[[nodiscard]] TFDUDE_EXPORT Eigen::Matrix3d skew(const Eigen::Vector3d& a);
 
 /// Rotation of fixed-axis angles as in URDF: R = Rz(yaw) · Ry(pitch) · Rx(roll) [rad].
-[[nodiscard]] Eigen::Quaterniond from_rpy(double roll, double pitch, double yaw);
+[[nodiscard]] TFDUDE_EXPORT Eigen::Quaterniond from_rpy(double roll, double pitch, double yaw);
 
 /// Inverse of from_rpy: (roll, pitch, yaw) [rad], pitch in [-π/2, π/2]; at ±π/2 roll is taken as 0.
-[[nodiscard]] Eigen::Vector3d to_rpy(const Eigen::Quaterniond& rotation);
+[[nodiscard]] TFDUDE_EXPORT Eigen::Vector3d to_rpy(const Eigen::Quaterniond& rotation);
 
 }  // namespace tfdude

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/math/covariance.hpp"
 #include "tfdude/math/pose.hpp"
 
@@ -16,17 +17,17 @@ struct Transform {
 /// For what did not come through the checked constructors of its parts, as the result of a computation may not
 /// be a number. Some nanoseconds.
 /// @return kInvalidInput naming the field: NaN, infinity.
-[[nodiscard]] Result<void> check_finite(const Transform& X);
+[[nodiscard]] TFDUDE_EXPORT Result<void> check_finite(const Transform& X);
 
 /// X_AC of X_AB and X_BC with independent errors, first order: Σ_AC = Ad(X_BC⁻¹) Σ_AB Ad(X_BC⁻¹)ᵀ +
 /// Σ_BC. Barfoot & Furgale 2014, Eq. 40 to second order, written for the right perturbation.
-[[nodiscard]] Transform compose(const Transform& X_AB, const Transform& X_BC);
+[[nodiscard]] TFDUDE_EXPORT Transform compose(const Transform& X_AB, const Transform& X_BC);
 
 /// X_BA of X_AB, first order (and exact for the perturbation's distribution): Σ_BA = Ad(X_AB) Σ_AB
 /// Ad(X_AB)ᵀ.
-[[nodiscard]] Transform inverse(const Transform& X_AB);
+[[nodiscard]] TFDUDE_EXPORT Transform inverse(const Transform& X_AB);
 
 /// X_AB of X_WA and X_WB with independent errors: compose(inverse(X_WA), X_WB).
-[[nodiscard]] Transform between(const Transform& X_WA, const Transform& X_WB);
+[[nodiscard]] TFDUDE_EXPORT Transform between(const Transform& X_WA, const Transform& X_WB);
 
 }  // namespace tfdude

@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/math/transform.hpp"
 
@@ -10,7 +11,7 @@ namespace tfdude {
 
 /// A transform as people write it, in a configuration file or on the command line. What is left out
 /// is identity or zero.
-struct TransformSpec {
+struct TFDUDE_EXPORT TransformSpec {
   std::optional<std::array<double, 3>> xyz;     ///< translation [m]
   std::optional<std::array<double, 3>> rpy;     ///< fixed axes X, Y, Z as in URDF [rad]
   std::optional<std::array<double, 4>> quat;    ///< x, y, z, w

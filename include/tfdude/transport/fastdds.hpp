@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/transport/transport.hpp"
 
@@ -32,17 +33,18 @@ struct FastDdsOptions {
 
 /// Whether this is the address of a discovery server, HOST:PORT with a name or an IPv4 address. Looks nothing up.
 /// @return kInvalidInput naming it.
-[[nodiscard]] Result<void> check_discovery_server(const std::string& address);
+[[nodiscard]] TFDUDE_EXPORT Result<void> check_discovery_server(const std::string& address);
 
 /// Sends what Fast DDS logs in this process to standard error alone: warnings go to standard output else. For programs
 /// whose output is read; a library leaves the log to its host.
-void log_fastdds_to_standard_error();
+TFDUDE_EXPORT void log_fastdds_to_standard_error();
 
 /// A participant's access to a DDS domain by Fast DDS. It may live beside others of the process, ours or not, and changes
 /// none of Fast DDS's settings that they share; its profile is its own. Delivery inside the process, which calls handlers
 /// under the writer's locks, is not used whatever is set.
 /// @return kInvalidInput (domain, discovery server). start() may fail with kConfig (profile), kTransport, and
 ///   kInvalidInput where the discovery server's host has no IPv4 address.
-[[nodiscard]] Result<TransportPtr> make_fastdds_transport(const FastDdsOptions& options);
+[[nodiscard]] TFDUDE_EXPORT Result<TransportPtr> make_fastdds_transport(
+    const FastDdsOptions& options);
 
 }  // namespace tfdude

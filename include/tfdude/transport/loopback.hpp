@@ -2,13 +2,14 @@
 
 #include <memory>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/transport/transport.hpp"
 
 namespace tfdude {
 
 /// A network inside one process: for tests, examples and programs that are one process. Whatever is sent
 /// is delivered before the call returns, in the caller's thread.
-class LoopbackNetwork {
+class TFDUDE_EXPORT LoopbackNetwork {
  public:
   LoopbackNetwork();
 

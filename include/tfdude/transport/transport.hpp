@@ -2,6 +2,8 @@
 
 #include <memory>
 
+#include "tfdude/base/export.hpp"
+
 namespace tfdude {
 
 /// A participant's way to the others; made by LoopbackNetwork::join() or make_fastdds_transport(), and handed to
@@ -9,7 +11,7 @@ namespace tfdude {
 class Transport;
 
 /// Ends a transport.
-struct TransportEnd {
+struct TFDUDE_EXPORT TransportEnd {
   TransportEnd() = default;
   template <class Implementation>
   TransportEnd(std::default_delete<Implementation>) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/time.hpp"
 
 namespace tfdude {
@@ -22,7 +23,7 @@ enum class ChangeKind : std::uint8_t {
 };
 
 /// The stable snake_case name of a kind, as the command line prints it in JSON.
-[[nodiscard]] std::string_view to_string(ChangeKind kind);
+[[nodiscard]] TFDUDE_EXPORT std::string_view to_string(ChangeKind kind);
 
 /// Something that happened to the structure, as seen by one participant.
 struct Change {

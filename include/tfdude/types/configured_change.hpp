@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <string>
 
+#include "tfdude/base/export.hpp"
+
 namespace tfdude {
 
 /// What a configuration changes of a frame as it was left.
@@ -26,6 +28,6 @@ struct ConfiguredChange {
 };
 
 /// One line for people.
-[[nodiscard]] std::string describe(const ConfiguredChange& change);
+[[nodiscard]] TFDUDE_EXPORT std::string describe(const ConfiguredChange& change);
 
 }  // namespace tfdude

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/math/joint.hpp"
 
@@ -14,7 +15,7 @@ namespace tfdude {
 enum class JointType : std::uint8_t { kRevolute = 1, kContinuous = 2, kPrismatic = 3 };
 
 /// revolute, continuous or prismatic.
-[[nodiscard]] const char* to_string(JointType type);
+[[nodiscard]] TFDUDE_EXPORT const char* to_string(JointType type);
 
 struct JointLimits {
   double lower = 0;  ///< [rad or m]
@@ -80,30 +81,32 @@ struct JointValue {
 };
 
 /// @return kInvalidInput naming the joint and the field: not a number, too large, a negative variance.
-[[nodiscard]] Result<void> check_value(const JointValue& joint);
+[[nodiscard]] TFDUDE_EXPORT Result<void> check_value(const JointValue& joint);
 
 /// What check_value() takes.
-[[nodiscard]] bool is_position(double position);
-[[nodiscard]] bool is_variance(double variance);
+[[nodiscard]] TFDUDE_EXPORT bool is_position(double position);
+[[nodiscard]] TFDUDE_EXPORT bool is_variance(double variance);
 
 /// Whether that can be: for descriptions that code has made.
 /// @return kInvalidInput naming the joint: a name that is none, or, of one that others follow, longer than 249 bytes;
 ///   limits upside down; a twist of no unit length; a mimic that is not coupled; what check_value() refuses
-[[nodiscard]] Result<void> check_joint(const JointSpec& joint);
+[[nodiscard]] TFDUDE_EXPORT Result<void> check_joint(const JointSpec& joint);
 
 /// The edge's value at a joint's position. A coupled joint's error is not in its covariance but in a share.
-[[nodiscard]] Transform value_at(const JointSpec& joint, double position, double variance);
+[[nodiscard]] TFDUDE_EXPORT Transform value_at(const JointSpec& joint, double position,
+                                               double variance);
 
 /// The source of the error that a joint shares with those that follow it.
-[[nodiscard]] std::string shared_source(const std::string& leader);
+[[nodiscard]] TFDUDE_EXPORT std::string shared_source(const std::string& leader);
 
 /// The position that is taken before the first sample: the one within the limits that is nearest to zero.
-[[nodiscard]] double rest_position(const std::optional<JointLimits>& limits);
+[[nodiscard]] TFDUDE_EXPORT double rest_position(const std::optional<JointLimits>& limits);
 
 /// What is known of a position of which nothing is known: the mean square distance of all that are within the limits, each
 /// as likely; of a hinge without limits, those of one turn. @return 0 for a slider without limits, of which nothing can be
 ///   said
-[[nodiscard]] double unmeasured_variance(JointType type, const std::optional<JointLimits>& limits,
-                                         double position);
+[[nodiscard]] TFDUDE_EXPORT double unmeasured_variance(JointType type,
+                                                       const std::optional<JointLimits>& limits,
+                                                       double position);
 
 }  // namespace tfdude
