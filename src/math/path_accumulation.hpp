@@ -13,7 +13,7 @@ namespace tfdude {
 /// The way from a frame S up towards its root, added up in S itself: the sum Σ Ad(X_SC) Σ_C Ad(X_SC)ᵀ over the
 /// edges climbed (C the child of each) needs one adjoint an edge, whatever follows. Edges are computed some at
 /// a time, as the arithmetic then stays in registers: a value given to up() must stay where it is until the
-/// climb is joined.
+/// accumulation is joined.
 ///
 /// @tparam Value  Transform, or Pose where the covariance is not asked for
 template <class Value>

@@ -72,7 +72,7 @@ class Forest::Impl {
   /// Both ends climb to where they meet. Frames that are not there end the climb, or may be passed.
   enum class Absent { kEnds, kMayPass };
 
-  /// The walk that all lookups share. `take` is handed the climb that an edge belongs to and the edge, whose value it
+  /// The walk that all lookups share. `take` is handed the accumulation that an edge belongs to, and the edge, whose value it
   /// adds to that; the walk ends in an error of its.
   template <class Value, class Take>
   [[nodiscard]] Result<Value> walk(const Ends& ends, Absent absent, Order order, Take take) const;

@@ -87,7 +87,7 @@ struct Moment {
   std::uint64_t back = 0;  // see Ring::around()
 };
 
-// A moving edge, up which the climb goes.
+// A moving edge on the path.
 template <class Value>
 Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edge, Moment& moment) {
   const std::int64_t t = moment.t;

@@ -99,7 +99,7 @@ class ObservedChain {
   /// As if edges knew nothing of each other.
   void forget_shares() {
     for (ObservedEdge& edge : edges_) {
-      edge.X_PC.own = settle(edge.X_PC).covariance;
+      edge.X_PC.own = collapse(edge.X_PC).covariance;
       edge.X_PC.shares.clear();
     }
     for (std::size_t i = 0; i < edges_.size(); ++i) cluster_[i] = i;

@@ -83,7 +83,7 @@ struct TwoPoses {
 
 /// The covariance of the left perturbation of both poses' product, their errors being independent.
 [[nodiscard]] inline Matrix6d composed(const TwoPoses& poses, Order order) {
-  return left_covariance(settle(compose(poses.first.belief(), poses.second.belief(), order)))
+  return left_covariance(collapse(compose(poses.first.belief(), poses.second.belief(), order)))
       .matrix();
 }
 
@@ -101,7 +101,7 @@ inline constexpr double kChainYaw = 0.03;  // rad, standard deviation of a step
   const Belief step = chain_step().belief();
   Belief X = step;
   for (int k = 1; k < steps; ++k) X = compose(X, step, order);
-  return settle(X);
+  return collapse(X);
 }
 
 [[nodiscard]] inline Pose sampled_chain(int steps, Random& random) {

@@ -24,7 +24,7 @@ TEST_CASE("the portable kernel and that of this processor agree") {
   for (int i = 0; i < 50; ++i) {
     edges.push_back(reinterpret_cast<kernel::Edge>(&path.emplace_back(random.transform())));
   }
-  const auto climbed = [&](const kernel::Functions& functions) {
+  const auto accumulated = [&](const kernel::Functions& functions) {
     kernel::Columns X_SH;
     kernel::Blocks sum;
     functions.accumulate_with_covariance(X_SH, sum, edges.data(), edges.size());
@@ -32,8 +32,8 @@ TEST_CASE("the portable kernel and that of this processor agree") {
                               path[0].covariance.upper().data(), sum);
     return Transform{kernel::pose_of(X_SH), Covariance::trusted(kernel::upper_of(sum))};
   };
-  const Transform here = climbed(kernel::functions());
-  const Transform portable = climbed(kernel::kPortable);
+  const Transform here = accumulated(kernel::functions());
+  const Transform portable = accumulated(kernel::kPortable);
   CHECK(pose_diff(here.pose, portable.pose, 1e-12) == "");
   CHECK(covariance_diff(here.covariance, portable.covariance, 1e-12) == "");
 }

@@ -149,7 +149,7 @@ TEST_CASE("sampled differences have the covariance of between") {
   CHECK(disagreement(S, sigma - 2.0 * from_WB, second_order) != "");
 }
 
-TEST_CASE("sampled climbs have the joined covariance") {
+TEST_CASE("sampled paths have the joined covariance") {
   // A and B are two and one edges below H: X_AB = (X_HP X_PA)⁻¹ X_HB, all three edges independent.
   Random random(304);
   INFO("seed " << random.seed());

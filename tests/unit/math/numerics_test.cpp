@@ -86,7 +86,7 @@ void report(const char* what, double value) {
   if (std::getenv("TFDUDE_REPORT") != nullptr) std::cout << what << ": " << value << '\n';
 }
 
-Transform climbed(const std::vector<Transform>& edges) {
+Transform accumulated(const std::vector<Transform>& edges) {
   PathAccumulation<Transform> down;
   for (auto edge = edges.rbegin(); edge != edges.rend(); ++edge) down.up(*edge);
   return join(PathAccumulation<Transform>(), std::move(down));
@@ -106,7 +106,7 @@ TEST_CASE("numerics: a chain of 10,000 edges keeps its covariance") {
     second = compose(second, X, Order::kSecond);
     fourth = compose(fourth, X, Order::kFourth);
   }
-  const Transform looked_up = climbed(edges);
+  const Transform looked_up = accumulated(edges);
   report("chain of 10,000: pose [m]", exact.error_of(looked_up.pose));
   report("chain of 10,000: lookup's covariance", exact.error_of(looked_up.covariance));
   report("chain of 10,000: composed covariance", exact.error_of(collapse(second).covariance));
@@ -136,7 +136,7 @@ TEST_CASE("numerics: millimetres at coordinates of a million metres") {
     Exact exact;
     exact.append(X_WA);
     exact.append(X_AB);
-    const Transform X_WB = climbed({X_WA, X_AB});
+    const Transform X_WB = accumulated({X_WA, X_AB});
     worst_pose = std::max(worst_pose, exact.error_of(X_WB.pose));
     worst = std::max(worst, exact.error_of(X_WB.covariance));
     for (const Transform& X : {X_WB, inverse(X_WB), between(X_WB, X_WA)}) {
@@ -189,7 +189,7 @@ TEST_CASE("numerics: near half turns poses and covariances are kept") {
       Exact exact;
       exact.append(X_AB);
       exact.append(X_BC);
-      CHECK(exact.error_of(climbed({X_AB, X_BC}).covariance) < 1e-12);
+      CHECK(exact.error_of(accumulated({X_AB, X_BC}).covariance) < 1e-12);
       // A path that is itself half a turn, observed where it is thought to be and a little beside.
       const Transform Z{X * exp(0.005 * random.twist(1.0, 1.0)), random.covariance(0.01, 0.01)};
       const auto observed =

@@ -184,10 +184,10 @@ Path random_path(Random& random, std::size_t depth) {
   return path;
 }
 
-PathAccumulation<Transform> climbed(const Path& path) {
-  PathAccumulation<Transform> climb;
-  for (const Transform& X_PC : path.edges) path.up(X_PC);
-  return climb;
+PathAccumulation<Transform> accumulated(const Path& path) {
+  PathAccumulation<Transform> sum;
+  for (const Transform& X_PC : path.edges) sum.up(X_PC);
+  return sum;
 }
 
 // Up from A edge by edge and down to B, with compose and inverse only.
@@ -207,29 +207,30 @@ TEST_CASE("join equals compose over every path up and down") {
       CAPTURE(up, down);
       const Path a = random_path(random, up);
       const Path b = random_path(random, down);
-      const Transform X_AB = join(climbed(a), climbed(b));
+      const Transform X_AB = join(accumulated(a), accumulated(b));
       CHECK(transform_diff(X_AB, walked(a, b), 1e-13, 1e-11) == "");
       // Asked the other way round the answer is the inverse.
-      CHECK(transform_diff(join(climbed(b), climbed(a)), inverse(X_AB), 1e-13, 1e-11) == "");
+      CHECK(transform_diff(join(accumulated(b), accumulated(a)), inverse(X_AB), 1e-13, 1e-11) ==
+            "");
     }
   }
 }
 
-TEST_CASE("a climb of poses joins to the pose of the climb of transforms") {
+TEST_CASE("poses accumulate to the pose of the accumulated transforms") {
   Random random(232);
   INFO("seed " << random.seed());
   const Path a = random_path(random, 20);
   const Path b = random_path(random, 40);
   const auto poses = [](const Path& path) {
-    PathAccumulation<Pose> climb;
-    for (const Transform& X_PC : path.edges) path.up(X_PC.pose);
-    return climb;
+    PathAccumulation<Pose> sum;
+    for (const Transform& X_PC : path.edges) sum.up(X_PC.pose);
+    return sum;
   };
-  CHECK(pose_diff(join(poses(a), poses(b)), join(climbed(a), climbed(b)).pose, 0.0) == "");
+  CHECK(pose_diff(join(poses(a), poses(b)), join(accumulated(a), accumulated(b)).pose, 0.0) == "");
   CHECK(pose_diff(join(PathAccumulation<Pose>(), PathAccumulation<Pose>()), Pose(), 0.0) == "");
 }
 
-TEST_CASE("a join without a climb is the identity known exactly") {
+TEST_CASE("a join of empty paths is the identity known exactly") {
   CHECK(transform_diff(join(PathAccumulation<Transform>(), PathAccumulation<Transform>()),
                        Transform(), 0.0) == "");
 }
@@ -257,13 +258,13 @@ TEST_CASE("a chain of 1000 edges stays symmetric and positive semi-definite") {
   }
   Transform X_RS;
   for (const Transform& X_PC : path.edges) X_RS = compose(X_PC, X_RS);
-  const Transform X_SR = join(climbed(path), PathAccumulation<Transform>());
+  const Transform X_SR = join(accumulated(path), PathAccumulation<Transform>());
   for (const Transform& X : {X_RS, X_SR}) {
     CHECK(X.covariance.matrix() == X.covariance.matrix().transpose());
     CHECK(relative_smallest_eigenvalue(X.covariance) >= -1e-12);
     CHECK(std::abs(X.pose.rotation().norm() - 1.0) < 1e-15);
   }
-  CHECK(transform_diff(join(PathAccumulation<Transform>(), climbed(path)), X_RS, 1e-10, 1e-9) ==
+  CHECK(transform_diff(join(PathAccumulation<Transform>(), accumulated(path)), X_RS, 1e-10, 1e-9) ==
         "");
 }
 
