@@ -98,7 +98,13 @@ TEST_CASE("joints of a plain writer move the edges of who has them") {
   wire::Joints of_others = sample("knee", 1, 0);
   wire::Joints bad = sample("elbow", std::nan(""), 0);
   wire::Joints good = sample("elbow", 0.5, 1'700'000'000'000'000'000);
-  for (wire::Joints* joints : {&of_others, &bad, &good}) writer.write(joints);
+  std::uint64_t written = 0;
+  for (wire::Joints* joints : {&of_others, &bad, &good}) {
+    writer.write(joints);
+    // It keeps one sample only, which the next one replaces before it has come.
+    ++written;
+    CHECK(eventually([&] { return counters->updates_arrived == written; }));
+  }
   CHECK(eventually([&] { return arm.joints("arm")->at(0).position == 0.5; }));
   const auto X = arm.lookup("base", "fore", Query{});
   REQUIRE(X);
