@@ -226,13 +226,7 @@ Result<Pose> Client::lookup_pose(std::string_view a, std::string_view b) {
 
 Result<Pose> Client::lookup_pose(Handle a, Handle b) { return participant_->lookup_pose(a, b); }
 
-Result<Handle> Client::find(std::string_view id) {
-  return participant_->after_discovery(participant_->call_deadline(), [&]() -> Result<Handle> {
-    const auto handle = participant_->forest().find(id);
-    if (!handle) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
-    return *handle;
-  });
-}
+Result<Handle> Client::find(std::string_view id) { return participant_->find(id); }
 
 Result<std::vector<PathSegment>> Client::path(std::string_view a, std::string_view b) {
   return participant_->path(a, b);

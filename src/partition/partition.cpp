@@ -22,6 +22,13 @@ bool are_too_many(const std::vector<Ties>& all) {
 
 }  // namespace
 
+bool is_of_structure(const Request& request) {
+  return std::holds_alternative<AddRequest>(request.body) ||
+         std::holds_alternative<RemoveRequest>(request.body) ||
+         std::holds_alternative<ForgetRequest>(request.body) ||
+         std::holds_alternative<MoveRequest>(request.body);
+}
+
 bool is_read_only(const Request& request) {
   const auto* remove = std::get_if<RemoveRequest>(&request.body);
   if (remove != nullptr) return remove->tops.empty();

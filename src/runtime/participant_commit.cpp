@@ -10,7 +10,7 @@
 namespace tfdude {
 
 Commit Participant::take() {
-  const std::lock_guard lock(structure_mutex_);
+  const std::lock_guard lock(structure_.mutex);
   if (partition_ == nullptr) return {};
   Commit commit;
   if (out_) {
@@ -24,7 +24,7 @@ Commit Participant::take() {
   }
   Presence news = presence_;
   news.pages = partition_->page_count();
-  news.absent = directory_.absent();
+  news.absent = structure_.directory.absent();
   if (news == announced_) return commit;
   commit.presence = std::move(news);
   return commit;
@@ -33,7 +33,7 @@ Commit Participant::take() {
 void Participant::publish(const Commit& commit) {
   std::optional<Presence> news;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     if (commit.refused) {
       news = presence_;
     } else if (commit.presence && !out_) {
@@ -46,14 +46,14 @@ void Participant::publish(const Commit& commit) {
   }
   for (const Page& page : commit.pages) transport_->publish(page);
   if (news) transport_->announce(*news);
-  structure_changed_.notify_all();
+  structure_.changed.notify_all();
 }
 
 // Who is missed has nothing to do with what is stored.
 void Participant::take_back(const Commit& commit) {
   std::optional<Presence> news;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     const std::lock_guard joints(joints_mutex_);
     partition_->still_unsaved(commit.change, commit.pages);
     if (commit.presence && commit.presence->absent != presence_.absent && !out_) {
@@ -69,7 +69,7 @@ ChangedValues Participant::take_values() {
   ChangedValues values;
   if (out_) return values;
   values.since = saved_commit_;
-  std::tie(values.edges, saved_commit_) = forest_.changed_since(saved_commit_);
+  std::tie(values.edges, saved_commit_) = structure_.forest.changed_since(saved_commit_);
   if (values.edges.empty()) return values;
   const std::lock_guard lock(joints_mutex_);
   values.joints = partition_->take_changed_joints();
@@ -101,12 +101,13 @@ std::optional<Error> Participant::refusal() const {
 Error Participant::unless_unsaved(Error error, const std::string& id) {
   if (error.code != Errc::kAlreadyExists && error.code != Errc::kUnknownFrame) return error;
   auto why = refusal();
-  const std::lock_guard lock(structure_mutex_);
+  const std::lock_guard lock(structure_.mutex);
   return why && partition_->is_unsaved(id) ? *std::move(why) : error;
 }
 
-Result<void> Participant::await_stored(const Deadline& deadline) {
-  return commits_->stores() ? commits_->flush(deadline.at()) : Result<void>();
+Result<void> Participant::await_stored(const Request& request, const Deadline& deadline) {
+  return is_of_structure(request) && commits_->stores() ? commits_->flush(deadline.at())
+                                                        : Result<void>();
 }
 
 }  // namespace tfdude

@@ -16,20 +16,20 @@ constexpr Milliseconds kLookForGone{50};
 
 std::shared_ptr<void> Participant::on_change(Events::Callback listener) {
   {
-    const std::lock_guard lock(structure_mutex_);
-    directory_.changes().watch();
+    const std::lock_guard lock(structure_.mutex);
+    structure_.directory.changes().watch();
   }
   const std::uint64_t subscriber = events_->subscribe(std::move(listener));
   return {nullptr, [events = events_, subscriber](void*) { events->unsubscribe(subscriber); }};
 }
 
-// Under structure_mutex_, so that they are told in the order in which they happened.
+// Under structure_.mutex, so that they are told in the order in which they happened.
 void Participant::tell_changes() {
-  for (const Directory::Outdated& one : directory_.take_outdated()) {
+  for (const Directory::Outdated& one : structure_.directory.take_outdated()) {
     log().warn("what process {} of partition {} says is passed over, as process {} was later",
                one.incarnation, quote(one.partition), one.latest);
   }
-  auto changes = directory_.changes().take();
+  auto changes = structure_.directory.changes().take();
   if (changes.empty()) return;
   for (Change& change : changes) {
     change.time = wall_clock();
@@ -45,12 +45,12 @@ void Participant::tell_changes() {
 void Participant::on_page(const Page& page) {
   bool contested = false;
   {
-    const std::lock_guard lock(structure_mutex_);
-    directory_.apply(page);
-    contested = partition_ != nullptr && directory_.contested();
+    const std::lock_guard lock(structure_.mutex);
+    structure_.directory.apply(page);
+    contested = partition_ != nullptr && structure_.directory.contested();
     tell_changes();
   }
-  structure_changed_.notify_all();
+  structure_.changed.notify_all();
   look_at_routes();
   if (contested) conceder_->ask();
 }
@@ -61,7 +61,7 @@ void Participant::on_presence(const Presence& presence) {
   bool rivals = false;
   bool silent = false;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     if (presence.partition == partition_name_) {
       claim_.hear(presence);
       incarnations_.saw(presence.incarnation);
@@ -70,20 +70,20 @@ void Participant::on_presence(const Presence& presence) {
                             std::tie(presence_.incarnation, presence_.ticket);
       if (rivals && is_later) give_up_partition(presence);
     } else {
-      const bool before = directory_.serving(presence.partition).has_value();
-      directory_.apply(presence, wall_clock());
-      const bool after = directory_.serving(presence.partition).has_value();
+      const bool before = structure_.directory.serving(presence.partition).has_value();
+      structure_.directory.apply(presence, wall_clock());
+      const bool after = structure_.directory.serving(presence.partition).has_value();
       appeared = after && !before;
       ended = before && !after;
       overtake();
       if (partition_ != nullptr) commits_->ask();
       // It may be the last that was missing of the structure of one who has returned.
-      if (partition_ != nullptr && directory_.contested()) conceder_->ask();
-      silent = directory_.any_silent();
+      if (partition_ != nullptr && structure_.directory.contested()) conceder_->ask();
+      silent = structure_.directory.any_silent();
     }
     tell_changes();
   }
-  structure_changed_.notify_all();
+  structure_.changed.notify_all();
   if (appeared || ended) {
     look_at_routes();
     lookups_.look_again();
@@ -92,7 +92,7 @@ void Participant::on_presence(const Presence& presence) {
                           std::to_string(presence.pid) + ")";
   if (appeared) log().info("partition {} is there", who);
   if (ended) log().info("partition {} was stopped", who);
-  if (ended) calls_.on_lost(presence.partition);
+  if (ended) requests_.calls().on_lost(presence.partition);
   if (silent) start_to_look_for_gone();
   if (rivals) log().error("partition {} is served by another process, too", who);
 }
@@ -100,18 +100,18 @@ void Participant::on_presence(const Presence& presence) {
 void Participant::on_lost(const std::string& partition, std::uint64_t incarnation) {
   bool news = false;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     if (partition == partition_name_) claim_.lost(incarnation);
-    news = directory_.lost(partition, incarnation, wall_clock());
+    news = structure_.directory.lost(partition, incarnation, wall_clock());
     if (news && partition_ != nullptr) commits_->ask();
     tell_changes();
   }
-  structure_changed_.notify_all();
+  structure_.changed.notify_all();
   if (!news) return;
   look_at_routes();
   lookups_.look_again();
   log().info("partition {} is lost: it is not heard any more", quote(partition));
-  calls_.on_lost(partition);
+  requests_.calls().on_lost(partition);
   start_to_look_for_gone();
 }
 
@@ -126,15 +126,15 @@ void Participant::look_for_gone() {
   bool gone = false;
   bool more = false;
   {
-    const std::lock_guard lock(structure_mutex_);
-    gone = directory_.look_for_gone(Clock::now());
-    more = directory_.any_silent();
+    const std::lock_guard lock(structure_.mutex);
+    gone = structure_.directory.look_for_gone(Clock::now());
+    more = structure_.directory.any_silent();
     if (gone && partition_ != nullptr) commits_->ask();
     tell_changes();
   }
   if (more) gone_look_->ask();
   if (!gone) return;
-  structure_changed_.notify_all();
+  structure_.changed.notify_all();
   look_at_routes();
   lookups_.look_again();
 }
@@ -143,17 +143,18 @@ Result<void> Participant::forget(const std::string& partition) {
   const Deadline deadline = call_deadline();
   // All who are there are to be told.
   if (auto all = await_discovery(deadline); !all) return all;
-  auto parts = routed(deadline, [&]() -> Result<std::vector<Part>> {
-    if (!directory_.owner(partition)) {
+  auto parts = requests_.planned(deadline, [&]() -> Result<std::vector<Part>> {
+    if (!structure_.directory.owner(partition)) {
       return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
     }
-    if (auto ok = directory_.check_not_there(partition); !ok) {
+    if (auto ok = structure_.directory.check_not_there(partition); !ok) {
       return tl::unexpected(std::move(ok.error()));
     }
-    const ForgetRequest body{partition, directory_.latest_incarnation(partition)};
+    const ForgetRequest body{partition, structure_.directory.latest_incarnation(partition)};
     std::vector<Part> all;
-    for (const Owner one : directory_.reachable_owners()) {
-      all.push_back({one, directory_.name(one), Request{0, directory_.name(one), body}});
+    for (const Owner one : structure_.directory.reachable_owners()) {
+      all.push_back(
+          {one, structure_.directory.name(one), Request{0, structure_.directory.name(one), body}});
     }
     if (partition_ != nullptr) {
       all.push_back({kHeldHere, partition_name_, Request{0, partition_name_, body}});
@@ -161,14 +162,14 @@ Result<void> Participant::forget(const std::string& partition) {
     return all;
   });
   if (!parts) return tl::unexpected(std::move(parts.error()));
-  if (auto told = change(*parts, deadline); !told) return told;
+  if (auto told = requests_.change(*parts, deadline); !told) return told;
   Result<void> forgotten;
   {
-    const std::lock_guard lock(structure_mutex_);
-    forgotten = directory_.forget(partition, 0, wall_clock());
+    const std::lock_guard lock(structure_.mutex);
+    forgotten = structure_.directory.forget(partition, 0, wall_clock());
     tell_changes();
   }
-  structure_changed_.notify_all();
+  structure_.changed.notify_all();
   look_at_routes();
   return forgotten;
 }

@@ -24,15 +24,16 @@ Result<void> Participant::update_joints(const JointUpdate& update) {
   if (update.joints.empty()) return {};
   const Deadline deadline = call_deadline();
   if (auto all = await_discovery(deadline); !all) return all;
-  return retry_on_stale_route(
+  return requests_.retry_on_stale_route(
       deadline,
       [&]() -> Result<std::vector<Part>> {
-        auto parts = route_joints(directory_, update);
+        auto parts = route_joints(structure_.directory, update);
         if (!parts) return parts;
-        if (auto ok = check_reachable(directory_, *parts); !ok) return tl::unexpected(ok.error());
+        if (auto ok = check_reachable(structure_.directory, *parts); !ok)
+          return tl::unexpected(ok.error());
         return parts;
       },
-      [&](std::vector<Part>& parts) { return change(parts, deadline); });
+      [&](std::vector<Part>& parts) { return requests_.change(parts, deadline); });
 }
 
 // Whoever is there gets its share, and the error of who is not is told.
@@ -45,15 +46,15 @@ Result<void> Participant::publish_joints(const JointUpdate& update) {
   Result<void> outcome;
   Result<std::vector<Part>> parts;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     for (const JointValue& joint : update.joints) {
-      if (!directory_.joint_owners(joint.name).empty()) {
+      if (!structure_.directory.joint_owners(joint.name).empty()) {
         known.joints.push_back(joint);
       } else if (outcome) {
         outcome = fail(Errc::kUnknownJoint, "no joint " + quote(joint.name));
       }
     }
-    parts = route_joints(directory_, known);
+    parts = route_joints(structure_.directory, known);
   }
   if (!parts) return tl::unexpected(std::move(parts.error()));
   for (const Part& part : *parts) {
@@ -71,8 +72,8 @@ Result<void> Participant::publish_to(const Part& part, const JointUpdate& share,
     return partition_->apply(share).map([](std::size_t) {});
   }
   {
-    const std::lock_guard lock(structure_mutex_);
-    if (auto ok = check_reachable(directory_, {part}); !ok) return ok;
+    const std::lock_guard lock(structure_.mutex);
+    if (auto ok = check_reachable(structure_.directory, {part}); !ok) return ok;
   }
   return transport_->send(part.partition, share, deadline.at());
 }
@@ -81,7 +82,7 @@ Result<std::vector<JointInfo>> Participant::joints(const std::string& partition)
   std::vector<JointInfo> all;
   while (true) {
     const std::string last = all.empty() ? std::string() : all.back().name;
-    auto more = ask_all<JointInfo>(partition, JointsRequest{last});
+    auto more = requests_.ask_all<JointInfo>(partition, JointsRequest{last}, call_deadline());
     if (!more) return more;
     const bool end = more->size() < kMaxItems;
     if (!more->empty() && more->back().name <= last) {

@@ -14,7 +14,7 @@ Error not_asked_yet(const std::string& a, const std::string& b) {
 
 Result<std::vector<SegmentValues>> Participant::ask_values(std::vector<Part>& parts,
                                                            const Deadline& deadline) {
-  return values_of(ask(parts, deadline));
+  return values_of(requests_.ask(parts, deadline));
 }
 
 Result<StampedTransform> Participant::lookup_elsewhere(std::string_view a, std::string_view b,
@@ -23,12 +23,15 @@ Result<StampedTransform> Participant::lookup_elsewhere(std::string_view a, std::
   const std::string start(a);
   const std::string end(b);
   const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
-  return retry_on_stale_route(
-      deadline, [&] { return route_lookup(forest_, directory_, start, end, query, hint); },
+  return requests_.retry_on_stale_route(
+      deadline,
+      [&] {
+        return route_lookup(structure_.forest, structure_.directory, start, end, query, hint);
+      },
       [&](LookupPlan& plan) {
         Gathering gathering(std::move(plan), start, end, hint);
         while (true) {
-          auto found = gathering.take(ask(gathering.parts(), deadline), hints_);
+          auto found = gathering.take(requests_.ask(gathering.parts(), deadline), hints_);
           if (found) return *std::move(found);
         }
       });
@@ -36,16 +39,16 @@ Result<StampedTransform> Participant::lookup_elsewhere(std::string_view a, std::
 
 Result<StampedTransform> Participant::lookup_elsewhere(Handle a, Handle b, const Query& query,
                                                        const Deadline& deadline) {
-  const auto start = forest_.info(a);
-  const auto end = forest_.info(b);
+  const auto start = structure_.forest.info(a);
+  const auto end = structure_.forest.info(b);
   // The forest's own error says which.
-  if (!start || !end) return forest_.lookup(a, b, query);
+  if (!start || !end) return structure_.forest.lookup(a, b, query);
   return lookup_elsewhere(start->id, end->id, query, deadline);
 }
 
 Result<StampedTransform> Participant::lookup_by(std::string_view a, std::string_view b,
                                                 const Query& query, const Deadline& deadline) {
-  auto local = forest_.lookup(a, b, query);
+  auto local = structure_.forest.lookup(a, b, query);
   if (local || is_of_time(local.error())) return local;
   return lookup_elsewhere(a, b, query, deadline);
 }
@@ -79,8 +82,8 @@ Lookups::Links Participant::links_of_lookups() {
             if (auto ok = still_in(); !ok) return tl::unexpected(std::move(ok.error()));
             const auto& [a, b, query] = wanted;
             const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
-            const std::lock_guard lock(structure_mutex_);
-            return route_lookup(forest_, directory_, a, b, query, hint)
+            const std::lock_guard lock(structure_.mutex);
+            return route_lookup(structure_.forest, structure_.directory, a, b, query, hint)
                 .map([&, &a = a, &b = b](LookupPlan plan) {
                   return Gathering(std::move(plan), a, b, hint);
                 });
@@ -96,9 +99,7 @@ Lookups::Links Participant::links_of_lookups() {
             return watches != nullptr && watches->can_answer(wanted.a, wanted.b, wanted.query);
           },
           [this](Error last, const Deadline& deadline) {
-            if (!may_appear(last.code)) return last;
-            return discovered() ? explained(std::move(last))
-                                : undecided(last.message, deadline).value();
+            return discovery_.last_word(std::move(last), deadline);
           },
           wall_clock,
           options_.timeout};
@@ -106,18 +107,18 @@ Lookups::Links Participant::links_of_lookups() {
 
 Result<std::vector<PastInfo>> Participant::past(const std::string& id) {
   const Deadline deadline = call_deadline();
-  return retry_on_stale_route(
+  return requests_.retry_on_stale_route(
       deadline,
       [&]() -> Result<Part> {
-        const auto info = forest_.info(id);
+        const auto info = structure_.forest.info(id);
         if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
-        return route_to(directory_, info->owner, Request{0, id, PastRequest{}});
+        return route_to(structure_.directory, info->owner, Request{0, id, PastRequest{}});
       },
-      [&](Part& part) { return ask_list<PastInfo>(std::move(part), deadline); });
+      [&](Part& part) { return requests_.ask_list<PastInfo>(std::move(part), deadline); });
 }
 
 Result<std::vector<PastInfo>> Participant::pasts(const std::string& partition) {
-  return ask_all<PastInfo>(partition, PastRequest{true});
+  return requests_.ask_all<PastInfo>(partition, PastRequest{true}, call_deadline());
 }
 
 }  // namespace tfdude

@@ -60,12 +60,12 @@ Result<bool> Participant::revise(std::vector<Part> parts, const Deadline& deadli
   std::vector<Part> others(std::make_move_iterator(parts.begin() + 1),
                            std::make_move_iterator(parts.end()));
   parts.resize(1);
-  Reply reply = std::move(ask(parts, deadline).front());
+  Reply reply = std::move(requests_.ask(parts, deadline).front());
   if (is_conflict(reply)) return false;
   if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
   std::size_t done = 1;
   std::optional<Error> refused;
-  for (Reply& other : ask(others, deadline)) {
+  for (Reply& other : requests_.ask(others, deadline)) {
     auto* error = std::get_if<Error>(&other.body);
     if (error == nullptr) {
       ++done;
@@ -87,15 +87,16 @@ Result<Observed> Participant::observe(const std::string& a, const std::string& b
   int torn = 0;
   for (int attempt = 0; attempt < kObserveAttempts; ++attempt) {
     ObservePlan used;
-    auto path = retry_on_stale_route(
-        deadline, [&] { return route_observe(forest_, directory_, a, b, beside, stamp); },
+    auto path = requests_.retry_on_stale_route(
+        deadline,
+        [&] { return route_observe(structure_.forest, structure_.directory, a, b, beside, stamp); },
         [&](ObservePlan& plan) {
           auto found = ask_observed(plan, deadline);
           used = std::move(plan);
           return found;
         });
     if (!path) return tl::unexpected(std::move(path.error()));
-    const auto there = [this](const std::string& id) { return forest_.exists(id); };
+    const auto there = [this](const std::string& id) { return structure_.forest.exists(id); };
     if (std::any_of(path->missing.begin(), path->missing.end(), there)) {
       beside.insert(beside.end(), path->missing.begin(), path->missing.end());
       continue;
@@ -124,24 +125,25 @@ Result<Observed> Participant::observe(const std::string& a, const std::string& b
 
 Result<void> Participant::correlate(const std::string& id, const Correlation& correlation) {
   const Deadline deadline = call_deadline();
-  return retry_on_stale_route(
+  return requests_.retry_on_stale_route(
       deadline,
       [&]() -> Result<Part> {
-        const auto frame = forest_.info(id);
+        const auto frame = structure_.forest.info(id);
         if (!frame) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
         if (auto ok = check_shares(correlation.shares); !ok) {
           return fail_at("frame " + quote(id), ok.error());
         }
-        return route_to(directory_, frame->owner, Request{0, id, CorrelateRequest{correlation}});
+        return route_to(structure_.directory, frame->owner,
+                        Request{0, id, CorrelateRequest{correlation}});
       },
       [&](Part& part) {
         std::vector<Part> parts{std::move(part)};
-        return change(parts, deadline);
+        return requests_.change(parts, deadline);
       });
 }
 
 Result<std::vector<EdgeConsistency>> Participant::consistency(const std::string& partition) {
-  return ask_all<EdgeConsistency>(partition, ConsistencyRequest{true});
+  return requests_.ask_all<EdgeConsistency>(partition, ConsistencyRequest{true}, call_deadline());
 }
 
 }  // namespace tfdude

@@ -55,13 +55,6 @@ std::string line_of(const Request& request) {
   return what;
 }
 
-bool is_of_structure(const Request& request) {
-  return std::holds_alternative<AddRequest>(request.body) ||
-         std::holds_alternative<RemoveRequest>(request.body) ||
-         std::holds_alternative<ForgetRequest>(request.body) ||
-         std::holds_alternative<MoveRequest>(request.body);
-}
-
 // What a configuration changes of what was kept; before the first one there is nothing. Orphans are told as events, with
 // those of other partitions.
 void log_configured(const StoredState& state, const std::vector<FrameSpec>& frames) {
@@ -79,7 +72,7 @@ void log_configured(const StoredState& state, const std::vector<FrameSpec>& fram
 
 Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     presence_ = {partition_name_, 0, host_name(), static_cast<std::uint32_t>(getpid()), 0, false};
     presence_.incarnation = next_incarnation();
     presence_.ticket = presence_.incarnation;
@@ -94,7 +87,7 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   return {};
 }
 
-// Under structure_mutex_.
+// Under structure_.mutex.
 std::uint64_t Participant::next_incarnation() const {
   std::random_device device;
   return incarnations_.next(wall_clock(), device());
@@ -103,7 +96,7 @@ std::uint64_t Participant::next_incarnation() const {
 void Participant::announce_own() {
   Presence said;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     said = announced_ = presence_;
   }
   transport_->announce(said);
@@ -112,7 +105,7 @@ void Participant::announce_own() {
 // The last word. Nothing is said where nothing was.
 void Participant::say_goodbye() {
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     if (presence_.partition.empty() || announced_.stopped) return;
     presence_.serving = presence_.taken = false;
     presence_.stopped = true;
@@ -129,8 +122,8 @@ Result<StoredState> Participant::open_store(std::unique_ptr<StateStore>& store) 
 }
 
 Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
-  if (auto set = forest_.set_default_timing(options_.history); !set) return set;
-  forest_.on_restart([this](const HistoryRestart& restart) {
+  if (auto set = structure_.forest.set_default_timing(options_.history); !set) return set;
+  structure_.forest.on_restart([this](const HistoryRestart& restart) {
     Change change = restarted(restart, partition_name_);
     change.time = wall_clock();
     log().warn("{}", change.message);
@@ -150,28 +143,28 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
   // What is left is judged by what the others own now.
   const auto incomplete = [this] {
     if (transport_->awaits_presence()) return true;
-    const std::lock_guard lock(structure_mutex_);
-    return !directory_.complete();
+    const std::lock_guard lock(structure_.mutex);
+    return !structure_.directory.complete();
   };
   const bool any = !state.frames.empty() || !frames.empty();
-  while (any && Clock::now() < discovery_deadline_ && incomplete()) wait_for_news();
+  while (any && Clock::now() < discovery_.met_by() && incomplete()) discovery_.wait_for_news();
   if (any) await_gone();
-  const std::lock_guard lock(structure_mutex_);
+  const std::lock_guard lock(structure_.mutex);
   const std::lock_guard joints(joints_mutex_);
   incarnations_.saw(state.epoch);
-  if (const auto latest = directory_.hidden_by(0)) incarnations_.saw(*latest);
+  if (const auto latest = structure_.directory.hidden_by(0)) incarnations_.saw(*latest);
   presence_.incarnation = next_incarnation();
-  auto partition =
-      std::make_unique<Partition>(partition_name_, presence_.incarnation, forest_, directory_);
+  auto partition = std::make_unique<Partition>(partition_name_, presence_.incarnation,
+                                               structure_.forest, structure_.directory);
   auto taken = kept ? partition->restore(state, frames, wall_clock())
                     : partition->load(frames, wall_clock());
   if (!taken) return taken;
   log_configured(state, frames);
   for (const FrameSpec& frame : frames) {
     // One that was removed by request has no edge of which to say anything.
-    if (!forest_.holds(frame.id)) continue;
+    if (!structure_.forest.holds(frame.id)) continue;
     if (!frame.timing) continue;
-    if (auto set = forest_.set_timing(frame.id, *frame.timing); !set) return set;
+    if (auto set = structure_.forest.set_timing(frame.id, *frame.timing); !set) return set;
   }
   partition_ = std::move(partition);
   presence_.pages = partition_->page_count();
@@ -184,10 +177,10 @@ Result<void> Participant::take_frames(const std::vector<FrameSpec>& frames) {
 void Participant::await_gone() {
   const auto patience = Clock::now() + 2 * Absences::kGrace;
   const auto undecided = [this] {
-    const std::lock_guard lock(structure_mutex_);
-    return directory_.awaits_silent();
+    const std::lock_guard lock(structure_.mutex);
+    return structure_.directory.awaits_silent();
   };
-  while (Clock::now() < patience && undecided()) wait_for_news();
+  while (Clock::now() < patience && undecided()) discovery_.wait_for_news();
 }
 
 // Says that the name is to be taken, looks round for as long as participants need to meet, and takes it if it may
@@ -196,29 +189,30 @@ Result<void> Participant::claim_name() {
   announce_own();
   const auto met = Clock::now() + transport_->discovery_time();
   {
-    std::unique_lock lock(structure_mutex_);
-    structure_changed_.wait_until(lock, met, [this] { return claim_.served(); });
+    std::unique_lock lock(structure_.mutex);
+    structure_.changed.wait_until(lock, met, [this] { return claim_.served(); });
   }
-  while (transport_->awaits_presence() && Clock::now() < met + kSlowPresence) wait_for_news();
+  while (transport_->awaits_presence() && Clock::now() < met + kSlowPresence)
+    discovery_.wait_for_news();
   using Turn = NameClaim::Turn;
   Turn turn = Turn::kOthers;
   {
-    std::unique_lock lock(structure_mutex_);
-    structure_changed_.wait_until(lock, Clock::now() + kPredecessorGone,
+    std::unique_lock lock(structure_.mutex);
+    structure_.changed.wait_until(lock, Clock::now() + kPredecessorGone,
                                   [this] { return !claim_.served(); });
     turn = claim_.to_take();
     presence_.taken = turn == Turn::kMine;
   }
   if (turn == Turn::kMine) {
     announce_own();
-    std::unique_lock lock(structure_mutex_);
-    structure_changed_.wait_until(lock, Clock::now() + kDecision,
+    std::unique_lock lock(structure_.mutex);
+    structure_.changed.wait_until(lock, Clock::now() + kDecision,
                                   [&] { return (turn = claim_.to_serve()) != Turn::kWait; });
     if (turn != Turn::kOthers) return {};
   }
   std::optional<Presence> rival;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     rival = claim_.rival();
   }
   say_goodbye();
@@ -233,7 +227,7 @@ Result<void> Participant::claim_name() {
 void Participant::concede() {
   std::set<Concession> due;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     if (partition_ == nullptr || out_) return;
     due = partition_->concessions();
   }
@@ -242,7 +236,7 @@ void Participant::concede() {
   bool changed = false;
   bool more = false;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     if (out_) return;
     const std::lock_guard joints(joints_mutex_);
     if (current) changed = partition_->concede(due, wall_clock());
@@ -260,26 +254,26 @@ bool Participant::catch_up() {
   const Deadline deadline(options_.timeout);
   std::vector<Part> parts;
   {
-    const std::lock_guard lock(structure_mutex_);
-    for (const Owner owner : directory_.reachable_owners()) {
-      const std::string& name = directory_.name(owner);
+    const std::lock_guard lock(structure_.mutex);
+    for (const Owner owner : structure_.directory.reachable_owners()) {
+      const std::string& name = structure_.directory.name(owner);
       parts.push_back({owner, name, Request{0, name, RemoveRequest{}}});
     }
   }
-  const std::vector<Reply> replies = ask(parts, deadline);
+  const std::vector<Reply> replies = requests_.ask(parts, deadline);
   bool current = true;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const bool answered = std::holds_alternative<Done>(replies[i].body);
-    if (answered) await_epoch(parts[i], replies[i].epoch, deadline);
-    const std::lock_guard lock(structure_mutex_);
+    if (answered) requests_.await_epoch(parts[i], replies[i].epoch, deadline);
+    const std::lock_guard lock(structure_.mutex);
     const Owner owner = parts[i].owner;
-    const bool is_here = answered && directory_.epoch(owner) >= replies[i].epoch;
-    current = current && (is_here || !directory_.reachable(owner));
+    const bool is_here = answered && structure_.directory.epoch(owner) >= replies[i].epoch;
+    current = current && (is_here || !structure_.directory.reachable(owner));
   }
   return current;
 }
 
-// Under structure_mutex_. Lookups find no value of this process's any more: none is better than an old one.
+// Under structure_.mutex. Lookups find no value of this process's any more: none is better than an old one.
 void Participant::give_up_partition(const Presence& rival) {
   given_up_ = "partition " + quote(rival.partition) + " was taken over by process " +
               std::to_string(rival.pid) + " on host " + rival.host + " while process " +
@@ -288,18 +282,18 @@ void Participant::give_up_partition(const Presence& rival) {
   presence_.serving = false;
   presence_.stopped = true;
   out_ = true;
-  for (const FrameInfo& frame : forest_.frames()) {
-    if (frame.owner == kHeldHere) (void)forest_.release(frame.id);
+  for (const FrameInfo& frame : structure_.forest.frames()) {
+    if (frame.owner == kHeldHere) (void)structure_.forest.release(frame.id);
   }
   Change change{ChangeKind::kConflict, rival.partition, {}, {}, rival.partition, given_up_, {}};
-  directory_.changes().add(std::move(change));
+  structure_.directory.changes().add(std::move(change));
   commits_->ask();
 }
 
-// Under structure_mutex_. Others know of a later incarnation of this partition, so that they do not hear this one: a
+// Under structure_.mutex. Others know of a later incarnation of this partition, so that they do not hear this one: a
 // predecessor that had another clock, or this very process, which they have forgotten.
 void Participant::overtake() {
-  const auto latest = directory_.hidden_by(presence_.incarnation);
+  const auto latest = structure_.directory.hidden_by(presence_.incarnation);
   if (partition_ == nullptr || out_ || !latest || claim_.served()) return;
   incarnations_.saw(*latest);
   presence_.incarnation = next_incarnation();
@@ -321,22 +315,16 @@ Reply Participant::answer_here(const Request& request) {
   if (refused) return {request.sequence, 0, *refused};
   Reply reply;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     const std::lock_guard joints(joints_mutex_);
     reply = partition_->answer(request, wall_clock());
-    if (directory_.contested()) conceder_->ask();
+    if (structure_.directory.contested()) conceder_->ask();
     tell_changes();
   }
   // This process sees the change already; the others are told without making it wait.
   if (!is_of_values(request) && !is_read_only(request)) commits_->ask();
   look_at_routes();
   return reply;
-}
-
-Result<void> Participant::change_here(const Request& request, const Deadline& deadline) {
-  Reply reply = answer_here(request);
-  if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
-  return is_of_structure(request) ? await_stored(deadline) : Result<void>();
 }
 
 void Participant::on_request(const PeerId& from, const Request& request) {
@@ -357,7 +345,7 @@ void Participant::on_request(const PeerId& from, const Request& request) {
   const auto refused = changes ? refusal() : std::nullopt;
   Reply reply;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     const std::lock_guard joints(joints_mutex_);
     if (out_) {
       reply = {request.sequence, 0, Error{Errc::kNotOwner, given_up_}};
@@ -366,7 +354,7 @@ void Participant::on_request(const PeerId& from, const Request& request) {
     } else {
       reply = partition_->answer(from, request, wall_clock());
       // A frame that was moved has the younger claim now.
-      if (directory_.contested()) conceder_->ask();
+      if (structure_.directory.contested()) conceder_->ask();
     }
     // What is not stored is not told, for as long as that may take.
     if (!changes && commits_->failure()) reply.epoch = std::min(reply.epoch, told_epoch_);

@@ -10,11 +10,11 @@ template <class OwnersOf>
 std::vector<std::vector<Destination>> Participant::destinations(
     const std::vector<std::string>& names, OwnersOf owners_of) {
   std::vector<std::vector<Destination>> found(names.size());
-  const std::lock_guard lock(structure_mutex_);
+  const std::lock_guard lock(structure_.mutex);
   for (std::size_t i = 0; i < names.size(); ++i) {
     for (const Owner owner : owners_of(names[i])) {
-      const bool there = owner == kHeldHere || directory_.reachable(owner);
-      found[i].push_back({owner, directory_.name(owner), there});
+      const bool there = owner == kHeldHere || structure_.directory.reachable(owner);
+      found[i].push_back({owner, structure_.directory.name(owner), there});
     }
   }
   return found;
@@ -24,13 +24,13 @@ SenderLinks<Update> Participant::links_of_edge_streams() {
   SenderLinks<Update> links;
   links.find = [this](const std::vector<std::string>& ids) {
     return destinations(ids, [this](const std::string& id) {
-      const auto frame = forest_.info(id);
+      const auto frame = structure_.forest.info(id);
       return frame ? std::vector<Owner>{frame->owner} : std::vector<Owner>{};
     });
   };
   links.connect = [this](const std::string& to) { return transport_->update_channel(to); };
   links.apply_here = [this](const Update& update) {
-    return forest_.update(update.edges, update.stamp);
+    return structure_.forest.update(update.edges, update.stamp);
   };
   links.out = [this] { return out_.load(std::memory_order_relaxed); };
   links.unknown = Errc::kUnknownFrame;
@@ -40,8 +40,8 @@ SenderLinks<Update> Participant::links_of_edge_streams() {
 SenderLinks<JointUpdate> Participant::links_of_joint_streams() {
   SenderLinks<JointUpdate> links;
   links.find = [this](const std::vector<std::string>& names) {
-    return destinations(names,
-                        [this](const std::string& name) { return directory_.joint_owners(name); });
+    return destinations(
+        names, [this](const std::string& name) { return structure_.directory.joint_owners(name); });
   };
   links.connect = [this](const std::string& to) { return transport_->joint_channel(to); };
   links.apply_here = [this](const JointUpdate& update) -> Result<void> {

@@ -12,13 +12,14 @@ Result<WatchRoute> Participant::plan_watch(const WatchedPath& path) {
   const WatchOptions& options = path.options();
   std::chrono::nanoseconds period{0};
   if (options.rate > 0) period = std::chrono::nanoseconds(std::llround(1e9 / options.rate));
-  const std::lock_guard lock(structure_mutex_);
-  auto plan = route_watch(forest_, directory_, path.a(), path.b(), options.composed, period);
+  const std::lock_guard lock(structure_.mutex);
+  auto plan = route_watch(structure_.forest, structure_.directory, path.a(), path.b(),
+                          options.composed, period);
   if (!plan) return tl::unexpected(std::move(plan.error()));
   WatchRoute route{std::move(plan->edges), {}, std::move(plan->parts)};
   for (const Part& part : route.parts) {
     const auto& request = std::get<WatchRequest>(part.request.body);
-    const auto serving = directory_.serving(part.partition);
+    const auto serving = structure_.directory.serving(part.partition);
     const std::uint64_t incarnation = part.owner == kHeldHere ? presence_.incarnation
                                       : serving               ? serving->incarnation
                                                               : 0;
@@ -41,17 +42,19 @@ Result<std::shared_ptr<WatchedPath>> Participant::watch(const std::string& a, co
                 "the rate of a watch must be 0, or from one an hour to 1e6 Hz, not " + rate.str());
   }
   const Deadline deadline = call_deadline();
-  auto known = routed(deadline, [&] { return forest_.segments(a, b); });
+  auto known = requests_.planned(deadline, [&] { return structure_.forest.segments(a, b); });
   if (!known) return tl::unexpected(std::move(known.error()));
   Watches* watches = nullptr;
   {
     const std::lock_guard lock(pushing_mutex_);
     if (watches_ == nullptr) {
-      watches_ = std::make_unique<Watches>(Watches::Links{
-          [this](const WatchedPath& path) { return plan_watch(path); },
-          [this](std::vector<Part>& parts) { return ask(parts, Deadline(options_.timeout)); },
-          [this](std::uint64_t group) { return transport_->watch(group); },
-          [this](std::uint64_t group) { transport_->unwatch(group); }});
+      watches_ = std::make_unique<Watches>(
+          Watches::Links{[this](const WatchedPath& path) { return plan_watch(path); },
+                         [this](std::vector<Part>& parts) {
+                           return requests_.ask(parts, Deadline(options_.timeout));
+                         },
+                         [this](std::uint64_t group) { return transport_->watch(group); },
+                         [this](std::uint64_t group) { transport_->unwatch(group); }});
       watching_.store(watches_.get());
     }
     watches = watches_.get();
@@ -74,7 +77,7 @@ Reply Participant::answer_watch(const Request& request) {
     }
     if (pusher_ == nullptr) {
       pusher_ = std::make_unique<Pusher>(
-          forest_,
+          structure_.forest,
           [this](const State& state) {
             transport_->push(state);
             if (Watches* watches = watching_.load()) watches->on_state(state);
@@ -85,7 +88,7 @@ Reply Participant::answer_watch(const Request& request) {
   }
   std::uint64_t incarnation = 0;
   {
-    const std::lock_guard lock(structure_mutex_);
+    const std::lock_guard lock(structure_.mutex);
     incarnation = presence_.incarnation;
   }
   auto state = pusher->watch(watch_group(partition_name_, incarnation, watch), watch);

@@ -1,0 +1,104 @@
+#include "runtime/discovery.hpp"
+
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/base/time.hpp"
+
+namespace tfdude {
+namespace {
+
+// How often a new participant asks itself whether it has met everybody.
+constexpr Milliseconds kLookAround{2};
+
+}  // namespace
+
+Discovery::Discovery(Structure& structure, const Transport& transport, Milliseconds look_round,
+                     Milliseconds timeout)
+    : structure_(structure),
+      transport_(transport),
+      timeout_(timeout),
+      met_by_(Deadline(look_round).at()),
+      told_by_(Deadline::sum(met_by_, Deadline::sum(timeout, Deadline::sum(timeout, timeout)))) {}
+
+bool Discovery::may_appear(Errc code) {
+  switch (code) {
+    case Errc::kUnknownFrame:
+    case Errc::kUnknownStart:
+    case Errc::kUnknownEnd:
+    case Errc::kUnknownParent:
+    case Errc::kUnknownPartition:
+    case Errc::kUnknownJoint:
+    case Errc::kNotConnected:
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool Discovery::complete() {
+  if (complete_.load(std::memory_order_relaxed)) return true;
+  const auto now = Clock::now();
+  bool known = now >= told_by_;
+  if (!known) {
+    const bool met_all = transport_.discovered();
+    const bool met_none = now >= met_by_ && !transport_.awaits_presence();
+    const std::lock_guard lock(structure_.mutex);
+    const Directory& directory = structure_.directory;
+    known = met_all ? directory.complete() : met_none && directory.reachable_owners().empty();
+  }
+  if (known) complete_.store(true, std::memory_order_relaxed);
+  return known;
+}
+
+Deadline Discovery::call_deadline() const {
+  const auto now = Clock::now();
+  const auto meeting = complete_.load(std::memory_order_relaxed)
+                           ? Milliseconds(0)
+                           : std::chrono::ceil<Milliseconds>(met_by_ - now);
+  return Deadline(Deadline::sum(timeout_, std::max(meeting, Milliseconds(0))), now);
+}
+
+Result<void> Discovery::await(const Deadline& deadline) {
+  while (!complete()) {
+    if (deadline.over()) return tl::unexpected(undecided("not all frames are known", deadline));
+    wait_for_news(deadline);
+  }
+  return {};
+}
+
+Error Discovery::last_word(Error error, const Deadline& deadline) {
+  if (!may_appear(error.code)) return error;
+  return complete() ? explained(std::move(error)) : undecided(error.message, deadline);
+}
+
+void Discovery::wait_for_news(const Deadline& deadline) {
+  std::unique_lock lock(structure_.mutex);
+  structure_.changed.wait_until(lock, deadline.within(kLookAround).at());
+}
+
+Error Discovery::explained(Error error) {
+  const std::lock_guard lock(structure_.mutex);
+  const auto missed = structure_.directory.only_heard_of();
+  if (!missed || error.code == Errc::kUnknownPartition) return error;
+  return {Errc::kUnreachable, error.message + ", unless it is of partition " + quote(missed->name) +
+                                  ", which is not reachable since " + to_string(missed->since) +
+                                  ", before this process came: it " + why_absent(*missed)};
+}
+
+Error Discovery::undecided(const std::string& what, const Deadline& deadline) {
+  std::string missing = "nobody was met yet";
+  {
+    const std::lock_guard lock(structure_.mutex);
+    if (const std::string* partition = structure_.directory.incomplete()) {
+      missing = "partition " + quote(*partition) + " has not told all of its frames yet";
+    } else if (transport_.awaits_presence()) {
+      missing = "somebody was met who has not told yet what it owns";
+    } else if (!structure_.directory.reachable_owners().empty()) {
+      missing = "there may be others who were not met yet";
+    }
+  }
+  return {Errc::kTimeout, what + ", as far as is known after " + deadline.text() + ": " + missing};
+}
+
+}  // namespace tfdude

@@ -1,0 +1,80 @@
+#include "runtime/requests.hpp"
+
+#include <algorithm>
+
+#include "runtime/asking.hpp"
+
+namespace tfdude {
+namespace {
+
+// How long the structure may take to reach us where a reply says that ours is old.
+constexpr Milliseconds kStructureDelay{100};
+
+}  // namespace
+
+bool Requests::denies_plan(Errc code) {
+  return code == Errc::kAlreadyExists || code == Errc::kUnknownParent || code == Errc::kCycle;
+}
+
+void Requests::await_structure_change(std::uint64_t version, const Deadline& deadline) {
+  std::unique_lock lock(structure_.mutex);
+  structure_.changed.wait_until(lock, deadline.within(kStructureDelay).at(),
+                                [&] { return structure_.forest.structure_version() != version; });
+}
+
+void Requests::await_epoch(const Part& part, std::uint64_t epoch, const Deadline& deadline) {
+  std::unique_lock lock(structure_.mutex);
+  structure_.changed.wait_until(lock, deadline.at(), [&] {
+    return structure_.directory.epoch(part.owner) >= epoch ||
+           !structure_.directory.reachable(part.owner);
+  });
+}
+
+std::vector<Reply> Requests::ask(std::vector<Part>& parts, const Deadline& deadline) {
+  // What this process has changed itself comes before what it asks for: others build on that.
+  const bool builds = std::any_of(parts.begin(), parts.end(), [](const Part& part) {
+    return part.owner != kHeldHere && !is_read_only(part.request);
+  });
+  if (builds) own_.tell(deadline);
+  for (const Part& part : parts) {
+    if (part.owner != kHeldHere) transport_.prepare(part.partition);
+  }
+  const auto send = [&](const std::string& partition, const Request& request) {
+    return transport_.send(partition, request, deadline.at());
+  };
+  Asking asking(calls_, parts);
+  auto due = asking.send_due(Clock::now(), send);
+  asking.answer(own_.answer);
+  while (!asking.wait_until(std::min(due, deadline.at()))) {
+    const auto now = Clock::now();
+    if (deadline.over(now)) {
+      asking.give_up(deadline);
+      break;
+    }
+    due = asking.send_due(now, send);
+  }
+  return asking.take_replies();
+}
+
+Result<void> Requests::change(std::vector<Part>& parts, const Deadline& deadline) {
+  if (parts.size() == 1 && parts[0].owner == kHeldHere) {
+    Reply reply = own_.answer(parts[0].request);
+    if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
+    return own_.await_stored(parts[0].request, deadline);
+  }
+  const std::vector<Reply> replies = ask(parts, deadline);
+  Result<void> outcome;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (const auto* error = std::get_if<Error>(&replies[i].body)) {
+      // What is not stored is told, whatever else may be healed by another attempt.
+      if (outcome || error->code == Errc::kState) outcome = tl::unexpected(*error);
+    } else if (parts[i].owner != kHeldHere) {
+      await_epoch(parts[i], replies[i].epoch, deadline);
+    } else if (auto stored = own_.await_stored(parts[i].request, deadline); !stored && outcome) {
+      outcome = std::move(stored);
+    }
+  }
+  return outcome;
+}
+
+}  // namespace tfdude
