@@ -1,18 +1,14 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
-#include "tfdude/base/id.hpp"
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/options.hpp"
 
@@ -168,7 +164,8 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   /// @return kPartitionTaken once this participant has given its partition up.
   [[nodiscard]] Result<void> still_in();
 
-  // Lookups that others must be asked for, and what is pushed (participant_watch.cpp).
+  // Lookups that others must be asked for (participant_lookup.cpp, participant_observe.cpp), and what is pushed
+  // (participant_watch.cpp).
   [[nodiscard]] Result<StampedTransform> lookup_elsewhere(std::string_view a, std::string_view b,
                                                           const Query& query,
                                                           const Deadline& deadline);
