@@ -112,8 +112,10 @@ class Directory {
   /// or seen before (Lamport 1978, rule IR1 and IR2), so that whoever knew of a change has the greater one.
   [[nodiscard]] std::uint64_t next_stamp(Time now);
 
-  /// Takes note of a stamp that was given by an earlier process of this partition.
+  /// Takes note of a stamp that was given by an earlier process of this partition, or that a sender knows of.
   void saw_stamp(std::uint64_t stamp);
+  /// The latest that was given or seen.
+  [[nodiscard]] std::uint64_t latest_stamp() const { return latest_stamp_; }
 
   /// What happened to the frames of others, and of this process as far as it is reported.
   [[nodiscard]] ChangeLog& changes() { return changes_; }

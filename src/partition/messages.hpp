@@ -28,15 +28,21 @@ inline constexpr std::size_t kMaxItems = 4096;
 /// The most edges of one owner that are observed at once or tied to others on one path, and shares of each.
 inline constexpr std::uint32_t kMaxTies = kMaxShares;
 
+/// The latest stamp of a change of the structure that a sender knows of (Directory::next_stamp). Its own change gets a
+/// later one, whatever the owner's clock says, so that what one client does in turn counts in that order.
+using SeenStamp = std::uint64_t;
+
 struct AddRequest {
   std::string parent;  ///< empty: a root
   Transform X_PC;
+  SeenStamp seen = 0;
 };
 
 /// Removes frames with all that the asked partition owns below them. None: the reply only says how far the partition's
 /// structure is; the request's id is the partition's name then.
 struct RemoveRequest {
   std::vector<std::string> tops;
+  SeenStamp seen = 0;
 };
 
 struct UpdateRequest {
@@ -53,6 +59,7 @@ struct PartialUpdateRequest {
 struct MoveRequest {
   std::string parent;             ///< empty: becomes a root
   std::optional<Transform> X_PC;  ///< kept where absent
+  SeenStamp seen = 0;
 };
 
 struct LookupRequest {

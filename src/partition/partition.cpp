@@ -184,6 +184,7 @@ Result<void> Partition::apply(const Request& request, Time now) {
 }
 
 Result<void> Partition::add(const std::string& id, const AddRequest& request, Time now) {
+  directory_.saw_stamp(request.seen);
   const std::uint64_t since = directory_.next_stamp(now);
   auto added = forest_.add(id, request.parent, request.X_PC, Forest::MissingParent::kRefuse, since);
   if (!added) return added;
@@ -203,11 +204,13 @@ Result<void> Partition::remove(const RemoveRequest& request, Time now) {
       outcome = tl::unexpected(at_home(std::move(gone.error()), top));
     }
   }
+  directory_.saw_stamp(request.seen);
   forget(removed, now);
   return outcome;
 }
 
 Result<void> Partition::move(const std::string& id, const MoveRequest& request, Time now) {
+  directory_.saw_stamp(request.seen);
   const std::uint64_t since = directory_.next_stamp(now);
   if (auto moved = forest_.move(id, request.parent, request.X_PC, since); !moved) {
     return tl::unexpected(at_home(std::move(moved.error()), id));

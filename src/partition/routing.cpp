@@ -82,7 +82,9 @@ Result<Part> route_add(const Forest& forest, const Directory& directory, const s
                 "frame " + quote(id) + " needs a parent or a partition to belong to");
   }
   if (auto ok = check_reachable(directory, owner); !ok) return tl::unexpected(ok.error());
-  return Part{owner, directory.name(owner), Request{0, id, request}};
+  AddRequest body = request;
+  body.seen = directory.latest_stamp();
+  return Part{owner, directory.name(owner), Request{0, id, std::move(body)}};
 }
 
 Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& directory,
@@ -94,7 +96,9 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
     const auto parent = forest.info(frame.parent);
     const bool top = frame.id == id || !parent || parent->owner != frame.owner;
     if (!top) continue;
-    body_for<RemoveRequest>(parts, directory, frame.owner, frame.id).tops.push_back(frame.id);
+    auto& body = body_for<RemoveRequest>(parts, directory, frame.owner, frame.id);
+    body.tops.push_back(frame.id);
+    body.seen = directory.latest_stamp();
   }
   if (auto ok = check_reachable(directory, parts.front().owner); !ok)
     return tl::unexpected(ok.error());
@@ -204,7 +208,9 @@ Result<Part> route_move(const Forest& forest, const Directory& directory, const 
     }
   }
   if (auto ok = check_reachable(directory, frame->owner); !ok) return tl::unexpected(ok.error());
-  return Part{frame->owner, directory.name(frame->owner), Request{0, id, request}};
+  MoveRequest body = request;
+  body.seen = directory.latest_stamp();
+  return Part{frame->owner, directory.name(frame->owner), Request{0, id, std::move(body)}};
 }
 
 Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory,

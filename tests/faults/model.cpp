@@ -70,6 +70,7 @@ void Model::update(const std::string& id, const Transform& X_PC, bool done) {
     if (place) insert(after, Place{place->parent, X_PC});
   }
   if (frame.doomed) insert(after, std::nullopt);
+  if (done) frame.may_move_late = false;
   frame.possible = std::move(after);
 }
 
@@ -81,6 +82,7 @@ void Model::move(const std::string& id, const std::string& parent,
   for (const auto& place : frame.possible) {
     if (place) insert(after, Place{parent, X_PC ? *X_PC : place->X_PC});
   }
+  frame.may_move_late = !done;
   frame.possible = std::move(after);
 }
 
@@ -156,6 +158,7 @@ bool Model::goes_with(const std::string& id, const std::string& ancestor) const 
     if (found == frames_.end() || found->second.may_be_gone() || steps > frames_.size()) {
       return false;
     }
+    if (found->second.may_move_late) return false;
     const auto& possible = found->second.possible;
     const std::string& parent = possible.front()->parent;
     if (std::any_of(possible.begin(), possible.end(),

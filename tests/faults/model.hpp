@@ -29,6 +29,8 @@ class Model {
     std::vector<std::optional<Place>> possible;
     /// What it hangs below was removed, perhaps: it may go as soon as its owner learns of that.
     bool doomed = false;
+    /// A move had no answer: its owner may still make it, even after what it names was removed.
+    bool may_move_late = false;
     std::deque<std::string> history;
 
     [[nodiscard]] bool may_be_there() const;

@@ -61,16 +61,16 @@ class Choices {
     Request request{0, id(), {}};
     switch (upto<std::uint8_t>(4)) {
       case 0:
-        request.body = AddRequest{parent(), transform()};
+        request.body = AddRequest{parent(), transform(), since()};
         break;
       case 1:
-        request.body = RemoveRequest{several<std::string>(3, [this] { return id(); })};
+        request.body = RemoveRequest{several<std::string>(3, [this] { return id(); }), since()};
         break;
       case 2:
         request.body = UpdateRequest{edges()};
         break;
       case 3:
-        request.body = MoveRequest{parent(), transform()};
+        request.body = MoveRequest{parent(), transform(), since()};
         break;
       default:
         request.body = LookupRequest{several<PathEnds>(3, [this] { return PathEnds{id(), id()}; })};

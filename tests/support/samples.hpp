@@ -97,13 +97,13 @@ bool take(const Bytes& bytes) {
 [[nodiscard]] inline std::vector<Request> requests(Random& random) {
   const auto edge = [&](const std::string& id) { return EdgeUpdate{id, random.transform()}; };
   return {
-      {1, "hand", AddRequest{"arm", random.transform()}},
+      {1, "hand", AddRequest{"arm", random.transform(), 4102444800000000001U}},
       {2, "hand", AddRequest{"", random.transform()}},
-      {3, "hand", RemoveRequest{{"hand", "arm_1", "\xc3\xa4rmel"}}},
+      {3, "hand", RemoveRequest{{"hand", "arm_1", "\xc3\xa4rmel"}, 1U << 20U}},
       {4, "hand", UpdateRequest{{edge("hand")}}},
       {5, "hand", UpdateRequest{{edge("hand"), edge("arm"), edge("x")}}},
-      {6, "hand", MoveRequest{"arm", std::nullopt}},
-      {7, "hand", MoveRequest{"", random.transform()}},
+      {6, "hand", MoveRequest{"arm", std::nullopt, 7}},
+      {7, "hand", MoveRequest{"", random.transform(), 1ULL << 63U}},
       {8, "hand", LookupRequest{{{"hand", "arm"}, {"camera", "world"}}}},
       {9, "hand", UpdateRequest{{edge("hand"), edge("arm")}, time_of(1)}},
       {10, "hand",

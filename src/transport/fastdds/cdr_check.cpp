@@ -133,9 +133,11 @@ void request_body(CdrWalk& walk) {
     case 5:  // move and update
       walk.id();
       walk.transform();
+      walk.skip(8, 8);
       break;
     case 2:  // remove
       walk.sequence([&] { walk.id(); });
+      walk.skip(8, 8);
       break;
     case 3:  // update
       walk.transform();
@@ -144,6 +146,7 @@ void request_body(CdrWalk& walk) {
       break;
     case 4:  // move
       walk.id();
+      walk.skip(8, 8);
       break;
     case 6:  // lookup
       walk.sequence([&] { walk.path_ends(); });

@@ -161,19 +161,20 @@ Result<CorrelateRequest> read_correlate(std::string_view id, const wire::Correla
 
 Result<AddRequest> read_add(std::string_view id, const wire::AddBody& body) {
   return from_wire(body.x_pc(), id).map([&](const Transform& X_PC) {
-    return AddRequest{string_of(body.parent()), X_PC};
+    return AddRequest{string_of(body.parent()), X_PC, body.seen()};
   });
 }
 
 Result<MoveRequest> read_move(std::string_view id, const wire::MoveAndUpdate& body) {
   return from_wire(body.x_pc(), id).map([&](const Transform& X_PC) {
-    return MoveRequest{string_of(body.parent()), X_PC};
+    return MoveRequest{string_of(body.parent()), X_PC, body.seen()};
   });
 }
 
 RemoveRequest read_remove(const wire::RemoveBody& body) {
   RemoveRequest remove;
   for (const wire::Identifier& top : body.tops()) remove.tops.push_back(string_of(top));
+  remove.seen = body.seen();
   return remove;
 }
 
@@ -206,7 +207,7 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
     case kUpdate:
       return take(request, update_from_wire(request.id, body.update()));
     case kMove:
-      return as(MoveRequest{string_of(body.move().parent()), std::nullopt});
+      return as(MoveRequest{string_of(body.move().parent()), std::nullopt, body.move().seen()});
     case kMoveAndUpdate:
       return take(request, read_move(request.id, body.move_and_update()));
     case kLookup:

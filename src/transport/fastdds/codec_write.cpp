@@ -84,11 +84,13 @@ struct BodyWriter {
     wire::AddBody body;
     body.parent(add.parent);
     body.x_pc(to_flat(add.X_PC));
+    body.seen(add.seen);
     out.add(std::move(body));
   }
   void operator()(const RemoveRequest& remove) {
     wire::RemoveBody body;
     for (const std::string& top : remove.tops) body.tops().emplace_back(top);
+    body.seen(remove.seen);
     out.remove(std::move(body));
   }
   void operator()(const UpdateRequest& update) {
@@ -111,10 +113,12 @@ struct BodyWriter {
       wire::MoveAndUpdate body;
       body.parent(move.parent);
       body.x_pc(to_flat(*move.X_PC));
+      body.seen(move.seen);
       out.move_and_update(std::move(body));
     } else {
       wire::MoveBody body;
       body.parent(move.parent);
+      body.seen(move.seen);
       out.move(std::move(body));
     }
   }

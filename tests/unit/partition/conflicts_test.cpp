@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "partition/partition.hpp"
+#include "partition/routing.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/memory_store.hpp"
@@ -275,6 +276,34 @@ TEST_CASE("a frame whose parent was removed while its owner was away goes when i
     tools.start();
     CHECK(tools.structure().size() == 2);
   }
+}
+
+TEST_CASE("a removal comes after all that its client knew of, whatever the owners' clocks say") {
+  const Time ahead = kNow + std::chrono::seconds(3);
+  MemoryStore store;
+  Replica client;
+  client.directory.apply(presence_of("arms", 1, 1), kNow);
+  Owning arms("arms");
+  REQUIRE(arms.ask("flange", AddRequest{"", along_x(1)}) == "ok");
+  client.apply(arms.partition.take_pages());
+  {
+    Owning tools("tools", &store);
+    tools.directory.apply(page_of("arms", {{"flange", "", 10}}));
+    tools.start();
+    REQUIRE(tools.ask("gripper", AddRequest{"flange", along_x(1)}, ahead) == "ok");
+    client.apply(tools.partition.take_pages());
+  }
+  REQUIRE(client.directory.lost("tools", 1, kNow));
+  // The owner of the flange has not heard of the gripper yet.
+  const auto parts = route_remove(client.forest, client.directory, "flange");
+  REQUIRE(parts);
+  REQUIRE(parts->size() == 1);
+  const Reply removed = arms.partition.answer(parts->front().request, kNow);
+  REQUIRE(std::holds_alternative<Done>(removed.body));
+  Owning tools("tools", &store);
+  tools.apply(arms.partition.take_pages());
+  tools.start();
+  CHECK(tools.structure().empty());
 }
 
 // Counts as gone from now on.

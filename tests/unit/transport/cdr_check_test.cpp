@@ -134,7 +134,7 @@ TEST_CASE("only plain CDR passes, of either byte order") {
 TEST_CASE("an id has at most 255 bytes, its closing zero, and no other") {
   const auto move = [](const Cdr& id) {
     Cdr cdr(id);
-    return request(cdr.octet(4).string("arm").ulong(0).ulong(0).ulonglong(0));
+    return request(cdr.octet(4).string("arm").ulonglong(0).ulong(0).ulong(0).ulonglong(0));
   };
   CHECK(move(Cdr().string("hand")));
   CHECK(move(Cdr().string("")));
@@ -182,7 +182,7 @@ Cdr tops(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("hand").octet(2).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.string("t");
-  return cdr.ulong(0).ulong(0).ulonglong(0);
+  return cdr.ulonglong(0).ulong(0).ulong(0).ulonglong(0);
 }
 Cdr more_edges(std::size_t count, std::uint64_t length) {
   Cdr cdr;
