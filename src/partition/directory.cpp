@@ -324,6 +324,19 @@ const std::string* Directory::incomplete() const {
   return found != partitions_.end() ? &found->info.name : nullptr;
 }
 
+void Directory::told_of(Owner owner, std::uint64_t epoch) {
+  std::uint64_t& told = partitions_[owner].told_epoch;
+  told = std::max(told, epoch);
+}
+
+const std::string* Directory::behind() const {
+  const auto found =
+      std::find_if(partitions_.begin() + 1, partitions_.end(), [](const Known& partition) {
+        return partition.info.reachable && partition.epoch < partition.told_epoch;
+      });
+  return found != partitions_.end() ? &found->info.name : nullptr;
+}
+
 std::vector<PartitionInfo> Directory::partitions() const {
   std::vector<PartitionInfo> all;
   if (!partitions_.front().info.name.empty()) all.push_back(partitions_.front().info);

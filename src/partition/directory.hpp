@@ -134,6 +134,11 @@ class Directory {
   /// The name of one of which they have not; null: there is none.
   [[nodiscard]] const std::string* incomplete() const;
 
+  /// An owner has told of a change that its structure shows in this epoch.
+  void told_of(Owner owner, std::uint64_t epoch);
+  /// The name of a reachable one whose structure is older here than what it has told of; null: there is none.
+  [[nodiscard]] const std::string* behind() const;
+
   /// Whom this participant misses: what to tell others.
   [[nodiscard]] std::vector<Absent> absent() const { return absences_.all(); }
 
@@ -175,6 +180,7 @@ class Directory {
     std::uint64_t incarnation = 0;    // that of the pages
     std::uint64_t epoch = 0;          // up to which all has come,
     std::uint64_t awaited_epoch = 0;  // will have once these have, too
+    std::uint64_t told_epoch = 0;     // of a change that it has told of
     std::vector<PageEpoch> awaited;
     std::uint32_t page_count = 0;
     std::map<std::uint32_t, KeptPage> pages;

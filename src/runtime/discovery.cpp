@@ -39,14 +39,14 @@ bool Discovery::may_appear(Errc code) {
 bool Discovery::complete() {
   if (complete_.load(std::memory_order_relaxed)) return true;
   const auto now = Clock::now();
-  bool known = now >= told_by_;
-  if (!known) {
-    const bool met_all = transport_.discovered();
-    const bool met_none = now >= met_by_ && !transport_.awaits_presence();
-    const std::lock_guard lock(structure_.mutex);
-    const Directory& directory = structure_.directory;
-    known = met_all ? directory.complete() : met_none && directory.reachable_owners().empty();
-  }
+  const bool told = now >= told_by_;
+  const bool met_all = told || transport_.discovered();
+  const bool met_none = now >= met_by_ && !transport_.awaits_presence();
+  const std::lock_guard lock(structure_.mutex);
+  const Directory& directory = structure_.directory;
+  if (directory.behind() != nullptr) return false;
+  const bool known =
+      met_all ? told || directory.complete() : met_none && directory.reachable_owners().empty();
   if (known) complete_.store(true, std::memory_order_relaxed);
   return known;
 }
@@ -92,6 +92,8 @@ Error Discovery::undecided(const std::string& what, const Deadline& deadline) {
     const std::lock_guard lock(structure_.mutex);
     if (const std::string* partition = structure_.directory.incomplete()) {
       missing = "partition " + quote(*partition) + " has not told all of its frames yet";
+    } else if (const std::string* late = structure_.directory.behind()) {
+      missing = "partition " + quote(*late) + " has made a change that has not come here yet";
     } else if (transport_.awaits_presence()) {
       missing = "somebody was met who has not told yet what it owns";
     } else if (!structure_.directory.reachable_owners().empty()) {

@@ -23,8 +23,12 @@ class Discovery {
   Discovery(Structure& structure, const Transport& transport, Milliseconds look_round,
             Milliseconds timeout);
 
-  /// Whether all that was there at the start is known.
+  /// Whether all that was there at the start is known, and all that owners have told of since.
   [[nodiscard]] bool complete();
+
+  /// What an owner has told of did not come in time: what is not known here may be there until it has. By callers that
+  /// hold the structure's lock.
+  void fell_behind() { complete_.store(false, std::memory_order_relaxed); }
 
   /// Until when somebody is looked for where nobody is met.
   [[nodiscard]] Clock::time_point met_by() const { return met_by_; }

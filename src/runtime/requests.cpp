@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/log.hpp"
 #include "runtime/asking.hpp"
 
 namespace tfdude {
@@ -24,10 +25,15 @@ void Requests::await_structure_change(std::uint64_t version, const Deadline& dea
 
 void Requests::await_epoch(const Part& part, std::uint64_t epoch, const Deadline& deadline) {
   std::unique_lock lock(structure_.mutex);
-  structure_.changed.wait_until(lock, deadline.at(), [&] {
+  const bool settled = structure_.changed.wait_until(lock, deadline.at(), [&] {
     return structure_.directory.epoch(part.owner) >= epoch ||
            !structure_.directory.reachable(part.owner);
   });
+  structure_.directory.told_of(part.owner, epoch);
+  if (settled) return;
+  discovery_.fell_behind();
+  log().warn("partition {} has made a change that has not come here within {}",
+             quote(part.partition), deadline.text());
 }
 
 std::vector<Reply> Requests::ask(std::vector<Part>& parts, const Deadline& deadline) {

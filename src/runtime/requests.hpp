@@ -117,7 +117,7 @@ class Requests {
   }
 
   /// Waits until the structure of who has answered is here up to that epoch, so that whoever changed something finds it
-  /// changed; no longer than the deadline.
+  /// changed; no longer than the deadline. Nothing is denied after that before it has come.
   void await_epoch(const Part& part, std::uint64_t epoch, const Deadline& deadline);
 
  private:

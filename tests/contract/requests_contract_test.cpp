@@ -10,6 +10,7 @@
 #include "tfdude/client/node.hpp"
 
 #include "support/catch.hpp"
+#include "support/late_pages.hpp"
 #include "support/lossy_requests.hpp"
 #include "support/networks.hpp"
 #include "support/pose_diff.hpp"
@@ -66,6 +67,28 @@ TEST_CASE("a change of which many sendings are lost is made once, while other th
   CHECK(updated.has_value());
   CHECK(others > 256);
   CHECK(owner.lookup("arm", "slow")->pose.translation().x() == 5);
+}
+
+TEST_CASE("what an owner has added is not denied while its structure has not come") {
+  const Join join = joined_by(GENERATE(0, 1));
+  const Node arms = *Node::open(join("arms"), "arms", {{"arm", "", {}}});
+  auto late_transport = std::make_unique<testing::LatePages>(join(""));
+  testing::LatePages& late = *late_transport;
+  Options options;
+  options.timeout = Milliseconds(200);
+  Client client = *Client::open(std::move(late_transport), options);
+  REQUIRE(client.exists("arm"));
+  REQUIRE_FALSE(client.exists("hand"));
+  late.hold("arms");
+  REQUIRE(client.add("hand", "arm", ahead(1)));
+  const auto early = client.lookup("arm", "hand");
+  REQUIRE_FALSE(early);
+  CHECK(early.error().code == Errc::kTimeout);
+  CHECK_THAT(early.error().message, testing::ContainsSubstring("'arms'"));
+  CHECK_THAT(early.error().message, testing::ContainsSubstring("'hand'"));
+  late.let_through();
+  CHECK(client.lookup("arm", "hand"));
+  CHECK(client.lookup("arm", "tool").error().code == Errc::kUnknownEnd);
 }
 
 TEST_CASE("parts of a value are changed at its owner, the rest stays") {

@@ -230,6 +230,26 @@ TEST_CASE("what a restart does not change is there all the time") {
   CHECK(replica.structure() == Lines{"hand <  @ arms"});
 }
 
+TEST_CASE("a directory is behind while a change that an owner has told of has not come") {
+  Replica replica;
+  replica.directory.apply(presence_of("arms", 1, 1), kNow);
+  replica.directory.apply(Page{"arms", 0, 1, 2, {}});
+  const Owner arms = *replica.directory.owner("arms");
+  replica.directory.told_of(arms, 2);
+  CHECK(replica.directory.behind() == nullptr);
+  replica.directory.told_of(arms, 4);
+  replica.directory.told_of(arms, 3);
+  REQUIRE(replica.directory.behind() != nullptr);
+  CHECK(*replica.directory.behind() == "arms");
+  SECTION("until it has") {
+    replica.directory.apply(Page{"arms", 0, 1, 3, {}});
+    CHECK(replica.directory.behind() != nullptr);
+    replica.directory.apply(Page{"arms", 0, 1, 4, {}});
+  }
+  SECTION("until the owner has gone") { replica.directory.lost("arms", 1, kNow); }
+  CHECK(replica.directory.behind() == nullptr);
+}
+
 TEST_CASE("a directory is complete when all pages of all reachable partitions have come") {
   Replica replica;
   replica.directory.apply(presence_of("arms", 1, 2), kNow);
