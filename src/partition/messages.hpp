@@ -149,12 +149,6 @@ struct Request {
   std::uint64_t awaits_from = 0;
 };
 
-/// Whether a request changes nothing, so that a repeated one may be answered anew.
-[[nodiscard]] bool is_read_only(const Request& request);
-
-/// Whether a request changes which frames there are, or where they hang.
-[[nodiscard]] bool is_of_structure(const Request& request);
-
 /// What was written to watched edges, to be taken over as one commit: a watcher that knows all up to `after` then knows
 /// all up to `commit`.
 struct State {

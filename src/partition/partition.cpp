@@ -4,6 +4,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "partition/requests.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -21,22 +23,6 @@ bool are_too_many(const std::vector<Ties>& all) {
 }
 
 }  // namespace
-
-bool is_of_structure(const Request& request) {
-  return std::holds_alternative<AddRequest>(request.body) ||
-         std::holds_alternative<RemoveRequest>(request.body) ||
-         std::holds_alternative<ForgetRequest>(request.body) ||
-         std::holds_alternative<MoveRequest>(request.body);
-}
-
-bool is_read_only(const Request& request) {
-  const auto* remove = std::get_if<RemoveRequest>(&request.body);
-  if (remove != nullptr) return remove->tops.empty();
-  return std::holds_alternative<LookupRequest>(request.body) ||
-         std::holds_alternative<PastRequest>(request.body) ||
-         std::holds_alternative<JointsRequest>(request.body) ||
-         std::holds_alternative<ConsistencyRequest>(request.body);
-}
 
 Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest,
                      Directory& directory)

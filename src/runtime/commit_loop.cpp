@@ -23,10 +23,13 @@ CommitLoop::CommitLoop(std::unique_ptr<StateStore> store, Effects& effects, Peri
     : store_(std::move(store)), effects_(effects), periods_(periods) {}
 
 Result<void> CommitLoop::start(const std::vector<FrameSpec>& configured) {
-  if (auto stored = commit(); !stored) return stored;
+  const Ready ready = effects_.take();
+  const Result<void> stored = store(ready);
+  tell(ready, stored);
+  if (!stored) return stored;
   // None says nothing: what the last one said is still what was taken.
   if (store_ != nullptr && !configured.empty()) {
-    if (auto stored = store_->save_configured(configured); !stored) return stored;
+    if (auto saved = store_->save_configured(configured); !saved) return saved;
   }
   next_values_ = Clock::now() + periods_.values;
   thread_ = std::thread([this] { run(); });
@@ -49,11 +52,10 @@ void CommitLoop::ask() {
   changed_.notify_one();
 }
 
-void CommitLoop::reply(PendingReply reply) {
+void CommitLoop::hurry() {
   {
     const std::lock_guard lock(mutex_);
-    const auto key = std::make_pair(reply.to, reply.reply.sequence);
-    waiting_.emplace(key, std::move(reply));
+    hurried_ = true;
   }
   changed_.notify_one();
 }
@@ -96,7 +98,7 @@ void CommitLoop::run() {
 
 // Under the lock. Nothing where there is nothing to do.
 std::optional<CommitLoop::Clock::time_point> CommitLoop::next_round() const {
-  if (!waiting_.empty() || wanted_ > done_up_to_) return Clock::time_point{};
+  if (hurried_ || wanted_ > done_up_to_) return Clock::time_point{};
   std::optional<Clock::time_point> next;
   if (asked_.load() || failure_) next = next_commit_;
   if (store_ != nullptr) next = next ? std::min(*next, next_values_) : next_values_;
@@ -105,19 +107,15 @@ std::optional<CommitLoop::Clock::time_point> CommitLoop::next_round() const {
 
 void CommitLoop::round(std::unique_lock<std::mutex>& lock) {
   // Before anything is taken: what these wait for was changed before they came.
-  const Replies replies = std::exchange(waiting_, {});
+  hurried_ = false;
   const std::uint64_t wanted = wanted_;
   const bool failed = failure_.has_value();
   lock.unlock();
-  // Before the commit is taken, so that what changes meanwhile is not missed.
   asked_.store(false);
-  Result<void> stored = commit();
+  const Ready ready = effects_.take();
+  const Result<void> stored = store(ready);
   if (!stored) note(stored);
-  for (const auto& [key, pending] : replies) {
-    PendingReply told = pending;
-    if (!stored) told.reply.body = unsaved(pending.reply, stored.error());
-    effects_.reply(told);
-  }
+  tell(ready, stored);
   Result<void> values;
   if (store_ != nullptr && (failed || Clock::now() >= next_values_)) {
     values = save_values();
@@ -131,20 +129,23 @@ void CommitLoop::round(std::unique_lock<std::mutex>& lock) {
   done_.notify_all();
 }
 
-Result<void> CommitLoop::commit() {
-  const Commit commit = effects_.take();
-  Result<void> stored;
-  if (commit.refused) {
-    stored = tl::unexpected(*commit.refused);
-  } else if (store_ != nullptr && !commit.change.empty()) {
-    stored = store_->save(commit.change);
-  }
-  if (stored || commit.refused) {
-    effects_.publish(commit);
+Result<void> CommitLoop::store(const Ready& ready) {
+  if (ready.refused) return tl::unexpected(*ready.refused);
+  if (store_ == nullptr || ready.rows.empty()) return {};
+  return store_->save(ready.rows);
+}
+
+// Nobody hears of what could be lost.
+void CommitLoop::tell(const Ready& ready, const Result<void>& stored) {
+  if (stored || ready.refused) {
+    effects_.publish(ready);
   } else {
-    effects_.take_back(commit);
+    effects_.take_back(ready);
   }
-  return stored;
+  for (PendingReply reply : ready.replies) {
+    if (!stored) reply.reply.body = unsaved(reply.reply, stored.error());
+    effects_.reply(reply);
+  }
 }
 
 Result<void> CommitLoop::save_values() {

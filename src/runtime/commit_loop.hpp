@@ -4,28 +4,17 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
-#include "partition/messages.hpp"
+#include "partition/ready.hpp"
 #include "partition/state_store.hpp"
 
 namespace tfdude {
-
-/// What is stored, and then told, as one.
-struct Commit {
-  StateChange change{};                ///< stored before anything is told
-  std::vector<Page> pages{};           ///< published once that is done,
-  std::optional<Presence> presence{};  ///< and announced after them
-  /// Why none of it counts any more: nothing is stored, and whoever waits for a reply is told so.
-  std::optional<Error> refused{};
-};
 
 /// Values of edges and joints that nobody waits for.
 struct ChangedValues {
@@ -34,15 +23,8 @@ struct ChangedValues {
   std::uint64_t since = 0;  ///< the commit up to which the values before were taken
 };
 
-/// The reply to a request that may have changed something.
-struct PendingReply {
-  PeerId to{};
-  Reply reply{};
-  std::string what{};  ///< for the log; empty: nothing to log
-};
-
-/// Performs what changes of a partition bring about, in this order: stores them, publishes them, replies. All of it on
-/// one thread, the only one that waits for the disk; what has come together meanwhile is stored as one.
+/// Performs what a member has Ready, in its order: stores it, publishes it, replies. All of it on one thread, the only one
+/// that waits for the disk; what has come together meanwhile is stored as one.
 ///
 /// Where something could not be stored, nothing of it is published, and whoever asked for it gets kState. It is tried
 /// again until it succeeds; meanwhile failure() says why further changes should be refused.
@@ -58,10 +40,11 @@ class CommitLoop {
    public:
     virtual ~Effects() = default;
     /// All that is to be stored or told since the last call. What follows it is publish() or take_back().
-    [[nodiscard]] virtual Commit take() = 0;
-    virtual void publish(const Commit& commit) = 0;
-    /// It could not be stored: the next take() gives it again.
-    virtual void take_back(const Commit& commit) = 0;
+    [[nodiscard]] virtual Ready take() = 0;
+    /// Its pages and its presence.
+    virtual void publish(const Ready& ready) = 0;
+    /// It could not be stored: the next take() gives it again, but for the replies.
+    virtual void take_back(const Ready& ready) = 0;
     [[nodiscard]] virtual ChangedValues take_values() = 0;
     virtual void take_back(const ChangedValues& values) = 0;
     virtual void reply(const PendingReply& reply) = 0;
@@ -91,9 +74,8 @@ class CommitLoop {
   /// Whether what was asked for has not begun yet.
   [[nodiscard]] bool pending() const { return asked_.load(); }
 
-  /// Replies once all that was changed before this call is stored and told. A second reply to a request that waits for
-  /// its first is dropped.
-  void reply(PendingReply reply);
+  /// The same at once, as somebody waits for a reply.
+  void hurry();
 
   /// Waits until all that was changed before this call is stored and told. @return kState, kTimeout.
   [[nodiscard]] Result<void> flush(Clock::time_point deadline);
@@ -103,12 +85,11 @@ class CommitLoop {
   [[nodiscard]] std::optional<Error> failure() const;
 
  private:
-  using Replies = std::map<std::pair<PeerId, std::uint32_t>, PendingReply>;
-
   void run();
   [[nodiscard]] std::optional<Clock::time_point> next_round() const;
   void round(std::unique_lock<std::mutex>& lock);
-  [[nodiscard]] Result<void> commit();
+  [[nodiscard]] Result<void> store(const Ready& ready);
+  void tell(const Ready& ready, const Result<void>& stored);
   [[nodiscard]] Result<void> save_values();
   void note(const Result<void>& stored);
 
@@ -123,7 +104,7 @@ class CommitLoop {
   mutable std::mutex mutex_;  // all below
   std::condition_variable changed_;
   std::condition_variable done_;
-  Replies waiting_;
+  bool hurried_ = false;
   std::uint64_t wanted_ = 0;  // calls of flush(),
   std::uint64_t done_up_to_ = 0;
   std::uint64_t stored_up_to_ = 0;

@@ -11,6 +11,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
     : options_(options),
       partition_name_(std::move(partition)),
       structure_(wall_clock, partition_name_),
+      member_(structure_.forest, structure_.directory, partition_name_),
       transport_(std::move(transport)),
       discovery_(structure_, *transport_, options.discovery, options.timeout),
       requests_(structure_, discovery_, *transport_, links_of_requests()),
@@ -57,7 +58,7 @@ Time Participant::wall_clock() {
 Result<void> Participant::still_in() {
   if (!out_.load(std::memory_order_relaxed)) return {};
   const std::lock_guard lock(structure_.mutex);
-  return fail(Errc::kPartitionTaken, given_up_);
+  return fail(Errc::kPartitionTaken, member_.given_up());
 }
 
 Result<void> Participant::start() { return transport_->start(*this); }
@@ -214,8 +215,8 @@ Result<std::vector<PartitionInfo>> Participant::partitions() {
   if (partition_ == nullptr) return all;
   for (PartitionInfo& info : all) {
     if (info.name != partition_->name()) continue;
-    info.host = presence_.host;
-    info.pid = presence_.pid;
+    info.host = member_.presence().host;
+    info.pid = member_.presence().pid;
     info.frames = partition_->frame_count();
   }
   return all;

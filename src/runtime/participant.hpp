@@ -12,10 +12,8 @@
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/options.hpp"
 
-#include "partition/incarnation.hpp"
-#include "partition/name_claim.hpp"
+#include "partition/member.hpp"
 #include "partition/observing.hpp"
-#include "partition/partition.hpp"
 #include "partition/routing.hpp"
 #include "runtime/commit_loop.hpp"
 #include "runtime/deadline.hpp"
@@ -193,9 +191,9 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
                                         const Deadline& deadline);
   [[nodiscard]] Reply answer_here(const Request& request);
   // What commits_ does (participant_commit.cpp).
-  [[nodiscard]] Commit take() override;
-  void publish(const Commit& commit) override;
-  void take_back(const Commit& commit) override;
+  [[nodiscard]] Ready take() override;
+  void publish(const Ready& ready) override;
+  void take_back(const Ready& ready) override;
   [[nodiscard]] ChangedValues take_values() override;
   void take_back(const ChangedValues& values) override;
   void reply(const PendingReply& reply) override;
@@ -209,37 +207,46 @@ class Participant final : public TransportHandler, private CommitLoop::Effects {
   [[nodiscard]] Result<void> claim_name();
   [[nodiscard]] Result<StoredState> open_store(std::unique_ptr<StateStore>& store);
   [[nodiscard]] Result<void> take_frames(const std::vector<FrameSpec>& frames);
-  [[nodiscard]] std::uint64_t next_incarnation() const;
+  [[nodiscard]] Result<void> set_timings(const std::vector<FrameSpec>& frames);
+  void introduce();
   void say_goodbye();
-  void announce_own();
-  void overtake();
-  void give_up_partition(const Presence& rival);
   void start_to_look_for_gone();
-  void look_for_gone();
   void await_gone();
   void concede();
   [[nodiscard]] bool catch_up();
-  void tell_changes();
+
+  /// Hands the member an input; under the lock of the structure,
+  template <class Input>
+  [[nodiscard]] Outcome input(Input input) {
+    const std::lock_guard lock(structure_.mutex);
+    input();
+    return take_outcome();
+  }
+  /// and that of joints, too.
+  template <class Input>
+  [[nodiscard]] Outcome input_of_joints(Input input) {
+    const std::lock_guard lock(structure_.mutex);
+    const std::lock_guard joints(joints_mutex_);
+    input();
+    return take_outcome();
+  }
+  [[nodiscard]] Outcome take_outcome();
+  /// Has the parts of this process look at what has changed. By callers that hold no lock.
+  void react(const Outcome& outcome);
 
   const Options options_;
   // The directory's copy moves as others appear.
   const std::string partition_name_;
-  Structure
-      structure_;  // its lock guards partition_, claim_, incarnations_, given_up_ and presence_, too
+  Structure structure_;
+  Member member_;  // under the structure's lock
   TransportPtr transport_;
   Discovery discovery_;
   Requests requests_;
-  std::unique_ptr<Partition> partition_;  // set once, before the transport serves
-  Presence presence_;
-  Presence announced_;  // as it was said last
-  NameClaim claim_;
-  IncarnationSource incarnations_;
-  std::atomic<bool> out_{false};  // another process has the partition now,
-  std::string given_up_;          // and this is why
+  Partition* partition_ = nullptr;  // the member's; set once, before the transport serves
+  std::atomic<bool> out_{false};    // another process has the partition now
   const std::shared_ptr<Events> events_ = std::make_shared<Events>();
   std::mutex joints_mutex_;           // what partition_ knows of joints, refused_joints_
   std::uint64_t refused_joints_ = 0;  // updates
-  std::uint64_t told_epoch_ = 0;      // of what was published; under structure_mutex_
   std::uint64_t saved_commit_ = 0;    // of values; of the thread of commits_
   SharedHints hints_;
   std::mutex pushing_mutex_;  // pusher_, watches_ and gone_look_, as they are made, and leaving_

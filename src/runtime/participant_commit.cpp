@@ -4,65 +4,37 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "partition/requests.hpp"
 #include "runtime/participant.hpp"
 
 // What is stored of this participant's partition, and told once it is.
 namespace tfdude {
 
-Commit Participant::take() {
+Ready Participant::take() {
   const std::lock_guard lock(structure_.mutex);
-  if (partition_ == nullptr) return {};
-  Commit commit;
-  if (out_) {
-    commit.refused = Error{Errc::kNotOwner, given_up_};
-    return commit;
-  }
-  commit.pages = partition_->take_pages();
-  {
-    const std::lock_guard joints(joints_mutex_);
-    commit.change = partition_->take_unsaved();
-  }
-  Presence news = presence_;
-  news.pages = partition_->page_count();
-  news.absent = structure_.directory.absent();
-  if (news == announced_) return commit;
-  commit.presence = std::move(news);
-  return commit;
+  const std::lock_guard joints(joints_mutex_);
+  return member_.take_ready();
 }
 
-void Participant::publish(const Commit& commit) {
-  std::optional<Presence> news;
+void Participant::publish(const Ready& ready) {
+  std::optional<Presence> said;
   {
     const std::lock_guard lock(structure_.mutex);
-    if (commit.refused) {
-      news = presence_;
-    } else if (commit.presence && !out_) {
-      presence_.pages = commit.presence->pages;
-      presence_.absent = commit.presence->absent;
-      news = presence_;
-    }
-    if (news) announced_ = *news;
-    if (!commit.refused) told_epoch_ = commit.change.epoch;
+    said = member_.stored(ready);
   }
-  for (const Page& page : commit.pages) transport_->publish(page);
-  if (news) transport_->announce(*news);
+  for (const Page& page : ready.pages) transport_->publish(page);
+  if (said) transport_->announce(*said);
   structure_.changed.notify_all();
 }
 
-// Who is missed has nothing to do with what is stored.
-void Participant::take_back(const Commit& commit) {
-  std::optional<Presence> news;
+void Participant::take_back(const Ready& ready) {
+  std::optional<Presence> said;
   {
     const std::lock_guard lock(structure_.mutex);
     const std::lock_guard joints(joints_mutex_);
-    partition_->still_unsaved(commit.change, commit.pages);
-    if (commit.presence && commit.presence->absent != presence_.absent && !out_) {
-      presence_.absent = commit.presence->absent;
-      announced_.absent = presence_.absent;
-      news = presence_;
-    }
+    said = member_.not_stored(ready);
   }
-  if (news) transport_->announce(*news);
+  if (said) transport_->announce(*said);
 }
 
 ChangedValues Participant::take_values() {

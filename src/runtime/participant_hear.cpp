@@ -1,5 +1,3 @@
-#include <tuple>
-
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
@@ -12,6 +10,30 @@ namespace {
 // How often it is looked who has been silent for long enough to count as gone.
 constexpr Milliseconds kLookForGone{50};
 
+std::string who(const Presence& one) {
+  return quote(one.partition) + " (host " + quote(one.host) + ", pid " + std::to_string(one.pid) +
+         ")";
+}
+
+void log_outcome(const Outcome& outcome, const std::string& own) {
+  for (const Directory::Outdated& one : outcome.outdated) {
+    log().warn("what process {} of partition {} says is passed over, as process {} was later",
+               one.incarnation, quote(one.partition), one.latest);
+  }
+  if (outcome.appeared) log().info("partition {} is there", who(*outcome.appeared));
+  if (outcome.stopped) log().info("partition {} was stopped", who(*outcome.stopped));
+  if (outcome.lost)
+    log().info("partition {} is lost: it is not heard any more", quote(*outcome.lost));
+  if (outcome.rival)
+    log().error("partition {} is served by another process, too", who(*outcome.rival));
+  if (!outcome.overtook) return;
+  log().warn(
+      "others have known a later process of partition {}, whose clock was ahead: this one takes "
+      "its "
+      "place",
+      quote(own));
+}
+
 }  // namespace
 
 std::shared_ptr<void> Participant::on_change(Events::Callback listener) {
@@ -23,15 +45,10 @@ std::shared_ptr<void> Participant::on_change(Events::Callback listener) {
   return {nullptr, [events = events_, subscriber](void*) { events->unsubscribe(subscriber); }};
 }
 
-// Under structure_.mutex, so that they are told in the order in which they happened.
-void Participant::tell_changes() {
-  for (const Directory::Outdated& one : structure_.directory.take_outdated()) {
-    log().warn("what process {} of partition {} says is passed over, as process {} was later",
-               one.incarnation, quote(one.partition), one.latest);
-  }
-  auto changes = structure_.directory.changes().take();
-  if (changes.empty()) return;
-  for (Change& change : changes) {
+Outcome Participant::take_outcome() {
+  Outcome outcome = member_.take_outcome();
+  if (outcome.gave_up) out_ = true;
+  for (Change& change : outcome.events) {
     change.time = wall_clock();
     const bool own = change.partition == partition_name_;
     const bool by_own = change.rival == partition_name_;
@@ -39,104 +56,44 @@ void Participant::tell_changes() {
     if (change.kind == ChangeKind::kFrameOrphaned && (own || by_own))
       log().warn("{}", change.message);
   }
-  events_->post(std::move(changes));
+  // Here, so that they are told in the order in which they happened.
+  if (!outcome.events.empty()) events_->post(std::move(outcome.events));
+  return outcome;
+}
+
+void Participant::react(const Outcome& outcome) {
+  if (outcome.heard) structure_.changed.notify_all();
+  if (outcome.routes) look_at_routes();
+  if (outcome.to_commit) commits_->ask();
+  if (outcome.to_reply) commits_->hurry();
+  if (outcome.to_concede) conceder_->ask();
+  if (outcome.look_for_gone) start_to_look_for_gone();
+  if (outcome.others) lookups_.look_again();
+  if (outcome.stopped) requests_.calls().on_lost(outcome.stopped->partition);
+  if (outcome.lost) requests_.calls().on_lost(*outcome.lost);
+  log_outcome(outcome, partition_name_);
 }
 
 void Participant::on_page(const Page& page) {
-  bool contested = false;
-  {
-    const std::lock_guard lock(structure_.mutex);
-    structure_.directory.apply(page);
-    contested = partition_ != nullptr && structure_.directory.contested();
-    tell_changes();
-  }
-  structure_.changed.notify_all();
-  look_at_routes();
-  if (contested) conceder_->ask();
+  react(input([&] { member_.on_page(page); }));
 }
 
 void Participant::on_presence(const Presence& presence) {
-  bool appeared = false;
-  bool ended = false;
-  bool rivals = false;
-  bool silent = false;
-  {
-    const std::lock_guard lock(structure_.mutex);
-    if (presence.partition == partition_name_) {
-      claim_.hear(presence);
-      incarnations_.saw(presence.incarnation);
-      rivals = presence_.serving && presence.serving;
-      const bool is_later = std::tie(presence.incarnation, presence.ticket) >
-                            std::tie(presence_.incarnation, presence_.ticket);
-      if (rivals && is_later) give_up_partition(presence);
-    } else {
-      const bool before = structure_.directory.serving(presence.partition).has_value();
-      structure_.directory.apply(presence, wall_clock());
-      const bool after = structure_.directory.serving(presence.partition).has_value();
-      appeared = after && !before;
-      ended = before && !after;
-      overtake();
-      if (partition_ != nullptr) commits_->ask();
-      // It may be the last that was missing of the structure of one who has returned.
-      if (partition_ != nullptr && structure_.directory.contested()) conceder_->ask();
-      silent = structure_.directory.any_silent();
-    }
-    tell_changes();
-  }
-  structure_.changed.notify_all();
-  if (appeared || ended) {
-    look_at_routes();
-    lookups_.look_again();
-  }
-  const std::string who = quote(presence.partition) + " (host " + quote(presence.host) + ", pid " +
-                          std::to_string(presence.pid) + ")";
-  if (appeared) log().info("partition {} is there", who);
-  if (ended) log().info("partition {} was stopped", who);
-  if (ended) requests_.calls().on_lost(presence.partition);
-  if (silent) start_to_look_for_gone();
-  if (rivals) log().error("partition {} is served by another process, too", who);
+  react(input([&] { member_.on_presence(presence, wall_clock()); }));
 }
 
 void Participant::on_lost(const std::string& partition, std::uint64_t incarnation) {
-  bool news = false;
-  {
-    const std::lock_guard lock(structure_.mutex);
-    if (partition == partition_name_) claim_.lost(incarnation);
-    news = structure_.directory.lost(partition, incarnation, wall_clock());
-    if (news && partition_ != nullptr) commits_->ask();
-    tell_changes();
-  }
-  structure_.changed.notify_all();
-  if (!news) return;
-  look_at_routes();
-  lookups_.look_again();
-  log().info("partition {} is lost: it is not heard any more", quote(partition));
-  requests_.calls().on_lost(partition);
-  start_to_look_for_gone();
+  react(input([&] { member_.on_lost(partition, incarnation, wall_clock()); }));
 }
 
 void Participant::start_to_look_for_gone() {
   const std::lock_guard lock(pushing_mutex_);
   if (leaving_) return;
-  if (!gone_look_) gone_look_.emplace(kLookForGone, [this] { look_for_gone(); });
-  gone_look_->ask();
-}
-
-void Participant::look_for_gone() {
-  bool gone = false;
-  bool more = false;
-  {
-    const std::lock_guard lock(structure_.mutex);
-    gone = structure_.directory.look_for_gone(Clock::now());
-    more = structure_.directory.any_silent();
-    if (gone && partition_ != nullptr) commits_->ask();
-    tell_changes();
+  if (!gone_look_) {
+    gone_look_.emplace(kLookForGone,
+                       [this] { react(input([this] { member_.on_time(Clock::now()); })); });
   }
-  if (more) gone_look_->ask();
-  if (!gone) return;
-  structure_.changed.notify_all();
-  look_at_routes();
-  lookups_.look_again();
+  gone_look_->ask();
 }
 
 Result<void> Participant::forget(const std::string& partition) {
@@ -164,13 +121,7 @@ Result<void> Participant::forget(const std::string& partition) {
   if (!parts) return tl::unexpected(std::move(parts.error()));
   if (auto told = requests_.change(*parts, deadline); !told) return told;
   Result<void> forgotten;
-  {
-    const std::lock_guard lock(structure_.mutex);
-    forgotten = structure_.directory.forget(partition, 0, wall_clock());
-    tell_changes();
-  }
-  structure_.changed.notify_all();
-  look_at_routes();
+  react(input([&] { forgotten = member_.forget(partition, wall_clock()); }));
   return forgotten;
 }
 

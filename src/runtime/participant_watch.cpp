@@ -20,7 +20,7 @@ Result<WatchRoute> Participant::plan_watch(const WatchedPath& path) {
   for (const Part& part : route.parts) {
     const auto& request = std::get<WatchRequest>(part.request.body);
     const auto serving = structure_.directory.serving(part.partition);
-    const std::uint64_t incarnation = part.owner == kHeldHere ? presence_.incarnation
+    const std::uint64_t incarnation = part.owner == kHeldHere ? member_.presence().incarnation
                                       : serving               ? serving->incarnation
                                                               : 0;
     WatchRoute::Source source{
@@ -89,7 +89,7 @@ Reply Participant::answer_watch(const Request& request) {
   std::uint64_t incarnation = 0;
   {
     const std::lock_guard lock(structure_.mutex);
-    incarnation = presence_.incarnation;
+    incarnation = member_.presence().incarnation;
   }
   auto state = pusher->watch(watch_group(partition_name_, incarnation, watch), watch);
   if (!state) return {request.sequence, 0, std::move(state.error())};

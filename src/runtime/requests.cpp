@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/log.hpp"
+#include "partition/requests.hpp"
 #include "runtime/asking.hpp"
 
 namespace tfdude {

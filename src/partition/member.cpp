@@ -1,0 +1,228 @@
+#include "partition/member.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+#include "tfdude/base/id.hpp"
+
+#include "partition/requests.hpp"
+
+namespace tfdude {
+
+// ---- what it hears
+
+// A frame that was moved has the younger claim now, and what was missing of a conflict may have come.
+void Member::look_for_contests() {
+  if (partition_ != nullptr && directory_.contested()) outcome_.to_concede = true;
+}
+
+void Member::on_page(const Page& page) {
+  directory_.apply(page);
+  outcome_.heard = outcome_.routes = true;
+  look_for_contests();
+}
+
+void Member::on_presence(const Presence& presence, Time now) {
+  outcome_.heard = true;
+  if (presence.partition == name_) {
+    on_own_presence(presence);
+    return;
+  }
+  const bool before = directory_.serving(presence.partition).has_value();
+  directory_.apply(presence, now);
+  const bool after = directory_.serving(presence.partition).has_value();
+  if (after && !before) outcome_.appeared = presence;
+  if (before && !after) outcome_.stopped = presence;
+  if (before != after) outcome_.others = outcome_.routes = true;
+  outcome_.look_for_gone = directory_.any_silent();
+  overtake(now);
+  if (partition_ != nullptr) outcome_.to_commit = true;
+  look_for_contests();
+}
+
+void Member::on_own_presence(const Presence& presence) {
+  claim_.hear(presence);
+  incarnations_.saw(presence.incarnation);
+  if (!presence_.serving || !presence.serving) return;
+  outcome_.rival = presence;
+  const bool is_later = std::tie(presence.incarnation, presence.ticket) >
+                        std::tie(presence_.incarnation, presence_.ticket);
+  if (is_later) give_up(presence);
+}
+
+void Member::on_lost(const std::string& partition, std::uint64_t incarnation, Time now) {
+  outcome_.heard = true;
+  if (partition == name_) claim_.lost(incarnation);
+  if (!directory_.lost(partition, incarnation, now)) return;
+  outcome_.lost = partition;
+  outcome_.others = outcome_.routes = outcome_.look_for_gone = true;
+  if (partition_ != nullptr) outcome_.to_commit = true;
+}
+
+void Member::on_time(Steady now) {
+  const bool gone = directory_.look_for_gone(now);
+  outcome_.look_for_gone = directory_.any_silent();
+  if (!gone) return;
+  outcome_.heard = outcome_.others = outcome_.routes = true;
+  if (partition_ != nullptr) outcome_.to_commit = true;
+}
+
+std::optional<Reply> Member::on_request(const PeerId& from, const Request& request,
+                                        const std::optional<Error>& refusal, Time now) {
+  const bool changes = !is_read_only(request);
+  Reply reply;
+  if (!given_up_.empty()) {
+    reply = {request.sequence, 0, Error{Errc::kNotOwner, given_up_}};
+  } else if (changes && refusal) {
+    reply = partition_->refuse(from, request, *refusal, now);
+  } else {
+    reply = partition_->answer(from, request, now);
+    outcome_.routes = is_of_structure(request);
+    look_for_contests();
+  }
+  // What is not stored is not told, for as long as that may take.
+  if (!changes && refusal) reply.epoch = std::min(reply.epoch, told_epoch_);
+  if (!changes || (!stores_ && is_of_values(request))) return reply;
+  outcome_.to_reply = true;
+  // A second one to a request that waits for its first is dropped.
+  replies_.try_emplace({from, request.sequence},
+                       PendingReply{from, std::move(reply), describe(request)});
+  return std::nullopt;
+}
+
+// ---- what its own process asks for
+
+Reply Member::answer(const Request& request, const std::optional<Error>& refusal, Time now) {
+  if (refusal && is_of_structure(request)) return {request.sequence, 0, *refusal};
+  Reply reply = partition_->answer(request, now);
+  look_for_contests();
+  outcome_.routes = is_of_structure(request);
+  // This process sees the change already; the others are told without making it wait.
+  outcome_.to_commit = !is_of_values(request) && !is_read_only(request);
+  return reply;
+}
+
+Result<void> Member::forget(const std::string& partition, Time now) {
+  auto forgotten = directory_.forget(partition, 0, now);
+  if (forgotten) outcome_.heard = outcome_.routes = true;
+  return forgotten;
+}
+
+std::set<Concession> Member::concessions() const {
+  if (partition_ == nullptr || !given_up_.empty()) return {};
+  return partition_->concessions();
+}
+
+void Member::concede(const std::set<Concession>& due, bool current, Time now) {
+  if (partition_ == nullptr || !given_up_.empty()) return;
+  if (current && partition_->concede(due, now)) outcome_.to_commit = outcome_.routes = true;
+  if (!partition_->concessions().empty()) outcome_.to_concede = true;
+}
+
+// Lookups find no value of this process's any more: none is better than an old one.
+void Member::give_up(const Presence& rival) {
+  given_up_ = "partition " + quote(rival.partition) + " was taken over by process " +
+              std::to_string(rival.pid) + " on host " + rival.host + " while process " +
+              std::to_string(presence_.pid) + " on host " + presence_.host +
+              " was not heard, which has given it up";
+  presence_.serving = false;
+  presence_.stopped = true;
+  for (const FrameInfo& frame : forest_.frames()) {
+    if (frame.owner == kHeldHere) (void)forest_.release(frame.id);
+  }
+  directory_.changes().add(
+      {ChangeKind::kConflict, rival.partition, {}, {}, rival.partition, given_up_, {}});
+  outcome_.gave_up = outcome_.to_commit = true;
+}
+
+// Others know of a later incarnation of this partition, so that they do not hear this one: a predecessor that had another
+// clock, or this very process, which they have forgotten.
+void Member::overtake(Time now) {
+  const auto latest = directory_.hidden_by(presence_.incarnation);
+  if (partition_ == nullptr || !given_up_.empty() || !latest || claim_.served()) return;
+  incarnations_.saw(*latest);
+  presence_.incarnation = incarnations_.next(now, presence_.ticket);
+  partition_->overtake(presence_.incarnation);
+  outcome_.overtook = presence_.incarnation;
+  outcome_.to_commit = true;
+}
+
+// ---- how it becomes an owner
+
+void Member::claim(const std::string& host, std::uint32_t pid, Time now, std::uint64_t random) {
+  presence_ = {name_, incarnations_.next(now, random), host, pid, 0, false};
+  presence_.ticket = presence_.incarnation;
+  claim_.claim(presence_);
+}
+
+Result<void> Member::serve(const StoredState* left, const std::vector<FrameSpec>& configured,
+                           Time now) {
+  if (left != nullptr) incarnations_.saw(left->epoch);
+  if (const auto latest = directory_.hidden_by(0)) incarnations_.saw(*latest);
+  presence_.incarnation = incarnations_.next(now, presence_.ticket);
+  auto partition = std::make_unique<Partition>(name_, presence_.incarnation, forest_, directory_);
+  auto taken = left != nullptr ? partition->restore(*left, configured, now)
+                               : partition->load(configured, now);
+  if (!taken) return taken;
+  partition_ = std::move(partition);
+  stores_ = left != nullptr;
+  presence_.pages = partition_->page_count();
+  presence_.serving = true;
+  return {};
+}
+
+std::optional<Presence> Member::leave() {
+  if (presence_.partition.empty() || announced_.stopped) return std::nullopt;
+  presence_.serving = presence_.taken = false;
+  presence_.stopped = true;
+  return introduce();
+}
+
+// ---- what is to be done
+
+Ready Member::take_ready() {
+  Ready ready;
+  for (auto& [key, reply] : std::exchange(replies_, {})) ready.replies.push_back(std::move(reply));
+  if (!given_up_.empty()) {
+    ready.refused = Error{Errc::kNotOwner, given_up_};
+    return ready;
+  }
+  Presence news = presence_;
+  if (partition_ != nullptr) {
+    ready.pages = partition_->take_pages();
+    ready.rows = partition_->take_unsaved();
+    news.pages = partition_->page_count();
+    news.absent = directory_.absent();
+  }
+  if (!(news == announced_)) ready.presence = std::move(news);
+  return ready;
+}
+
+std::optional<Presence> Member::stored(const Ready& ready) {
+  if (!ready.refused) told_epoch_ = ready.rows.epoch;
+  // A partition that was given up meanwhile is not said to be served once more.
+  const bool stands = ready.presence && given_up_.empty();
+  if (stands) {
+    presence_.pages = ready.presence->pages;
+    presence_.absent = ready.presence->absent;
+  }
+  if (!stands && !ready.refused) return std::nullopt;
+  announced_ = presence_;
+  return presence_;
+}
+
+std::optional<Presence> Member::not_stored(const Ready& ready) {
+  partition_->still_unsaved(ready.rows, ready.pages);
+  if (!ready.presence || !given_up_.empty()) return std::nullopt;
+  if (ready.presence->absent == presence_.absent) return std::nullopt;
+  presence_.absent = announced_.absent = ready.presence->absent;
+  return presence_;
+}
+
+Outcome Member::take_outcome() {
+  outcome_.outdated = directory_.take_outdated();
+  outcome_.events = directory_.changes().take();
+  return std::exchange(outcome_, {});
+}
+
+}  // namespace tfdude

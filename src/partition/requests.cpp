@@ -1,0 +1,44 @@
+#include "partition/requests.hpp"
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+namespace {
+
+template <class... Bodies>
+bool is_one_of(const Request& request) {
+  return (std::holds_alternative<Bodies>(request.body) || ...);
+}
+
+}  // namespace
+
+bool is_read_only(const Request& request) {
+  const auto* remove = std::get_if<RemoveRequest>(&request.body);
+  if (remove != nullptr) return remove->tops.empty();
+  return is_one_of<LookupRequest, PastRequest, JointsRequest, ConsistencyRequest>(request);
+}
+
+bool is_of_structure(const Request& request) {
+  return is_one_of<AddRequest, RemoveRequest, ForgetRequest, MoveRequest>(request);
+}
+
+bool is_of_values(const Request& request) {
+  return is_one_of<UpdateRequest, PartialUpdateRequest, JointUpdate, ReviseRequest>(request);
+}
+
+std::string describe(const Request& request) {
+  std::string what;
+  if (const auto* add = std::get_if<AddRequest>(&request.body)) {
+    what = "add frame " + quote(request.id) + " under " + quote(add->parent);
+  } else if (const auto* remove = std::get_if<RemoveRequest>(&request.body)) {
+    what = "remove, with all below,";
+    for (const std::string& top : remove->tops) what += " " + quote(top);
+  } else if (const auto* forget = std::get_if<ForgetRequest>(&request.body)) {
+    what = "forget partition " + quote(forget->partition);
+  } else if (const auto* move = std::get_if<MoveRequest>(&request.body)) {
+    what = "move frame " + quote(request.id) + " under " + quote(move->parent);
+  }
+  return what;
+}
+
+}  // namespace tfdude
