@@ -12,6 +12,13 @@ using Standing = Succession::Standing;
 
 bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
   if (!partition.outdated(incarnation)) return false;
+  // An owner tells it, and it goes on as a later one; whoever owns nothing is not heard.
+  const bool voiceless = partitions_.front().info.name.empty();
+  if (voiceless && !partition.info.reachable && !partition.forgotten) {
+    partition.live = partition.heard_of = 0;
+    partition.successor.reset();
+    return false;
+  }
   if (partition.reported != incarnation) {
     partition.reported = incarnation;
     outdated_.push_back(

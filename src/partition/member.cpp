@@ -213,10 +213,17 @@ std::optional<Presence> Member::stored(const Ready& ready) {
 
 std::optional<Presence> Member::not_stored(const Ready& ready) {
   partition_->still_unsaved(ready.rows, ready.pages);
-  if (!ready.presence || !given_up_.empty()) return std::nullopt;
+  // Of one that does not serve yet nothing is said that it could not store.
+  if (!ready.presence || !announced_.serving || !given_up_.empty()) return std::nullopt;
   if (ready.presence->absent == presence_.absent) return std::nullopt;
   presence_.absent = announced_.absent = ready.presence->absent;
   return presence_;
+}
+
+std::vector<ChangedEdge> Member::storable(std::vector<ChangedEdge> edges) const {
+  const auto unsaved = [this](const ChangedEdge& edge) { return partition_->is_unsaved(edge.id); };
+  edges.erase(std::remove_if(edges.begin(), edges.end(), unsaved), edges.end());
+  return edges;
 }
 
 Outcome Member::take_outcome() {

@@ -87,6 +87,9 @@ class Member {
   /// The next take_ready() gives it again, but for the replies. [joints]
   /// @return what to announce all the same: who is missed has nothing to do with what is stored
   [[nodiscard]] std::optional<Presence> not_stored(const Ready& ready);
+  /// Of values that nobody waits for, those that may be stored alone. Where a frame hangs elsewhere and that is not stored
+  /// yet, its value goes with that: else it would be kept where the frame was before.
+  [[nodiscard]] std::vector<ChangedEdge> storable(std::vector<ChangedEdge> edges) const;
   [[nodiscard]] Outcome take_outcome();
 
   // ---- what it is

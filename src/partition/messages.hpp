@@ -173,6 +173,8 @@ struct Reply {
   std::variant<Done, Error, SegmentValues, State, std::vector<PastInfo>,
                std::vector<EdgeConsistency>, std::vector<JointInfo>>
       body;
+  /// Of a change: the latest stamp that the owner knows of, for the next change of who has asked.
+  SeenStamp stamp = 0;
 };
 
 /// Which watchers share what an owner sends: a number of the owner, this time that it runs, and of what they ask for

@@ -113,6 +113,7 @@ Reply Partition::answer(const Request& request, Time now) {
   }
   if (auto done = apply(request, now); !done) reply.body = std::move(done.error());
   reply.epoch = pages_.epoch();
+  reply.stamp = directory_.latest_stamp();
   return reply;
 }
 

@@ -43,7 +43,9 @@ ChangedValues Participant::take_values() {
   values.since = saved_commit_;
   std::tie(values.edges, saved_commit_) = structure_.forest.changed_since(saved_commit_);
   if (values.edges.empty()) return values;
-  const std::lock_guard lock(joints_mutex_);
+  const std::lock_guard lock(structure_.mutex);
+  values.edges = member_.storable(std::move(values.edges));
+  const std::lock_guard joints(joints_mutex_);
   values.joints = partition_->take_changed_joints();
   return values;
 }

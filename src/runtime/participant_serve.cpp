@@ -191,7 +191,7 @@ bool Participant::catch_up() {
   bool current = true;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const bool answered = std::holds_alternative<Done>(replies[i].body);
-    if (answered) requests_.await_epoch(parts[i], replies[i].epoch, deadline);
+    if (answered) requests_.await_change(parts[i], replies[i], deadline);
     const std::lock_guard lock(structure_.mutex);
     const Owner owner = parts[i].owner;
     const bool is_here = answered && structure_.directory.epoch(owner) >= replies[i].epoch;

@@ -24,8 +24,10 @@ void Requests::await_structure_change(std::uint64_t version, const Deadline& dea
                                 [&] { return structure_.forest.structure_version() != version; });
 }
 
-void Requests::await_epoch(const Part& part, std::uint64_t epoch, const Deadline& deadline) {
+void Requests::await_change(const Part& part, const Reply& reply, const Deadline& deadline) {
+  const std::uint64_t epoch = reply.epoch;
   std::unique_lock lock(structure_.mutex);
+  structure_.directory.saw_stamp(reply.stamp);
   const bool settled = structure_.changed.wait_until(lock, deadline.at(), [&] {
     return structure_.directory.epoch(part.owner) >= epoch ||
            !structure_.directory.reachable(part.owner);
@@ -76,7 +78,7 @@ Result<void> Requests::change(std::vector<Part>& parts, const Deadline& deadline
       // What is not stored is told, whatever else may be healed by another attempt.
       if (outcome || error->code == Errc::kState) outcome = tl::unexpected(*error);
     } else if (parts[i].owner != kHeldHere) {
-      await_epoch(parts[i], replies[i].epoch, deadline);
+      await_change(parts[i], replies[i], deadline);
     } else if (auto stored = own_.await_stored(parts[i].request, deadline); !stored && outcome) {
       outcome = std::move(stored);
     }

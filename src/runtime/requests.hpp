@@ -116,9 +116,9 @@ class Requests {
         [&](Part& part) { return ask_list<Item>(std::move(part), deadline); });
   }
 
-  /// Waits until the structure of who has answered is here up to that epoch, so that whoever changed something finds it
+  /// Waits until the structure of who has answered is here up to the reply's epoch, so that whoever changed something finds it
   /// changed; no longer than the deadline. Nothing is denied after that before it has come.
-  void await_epoch(const Part& part, std::uint64_t epoch, const Deadline& deadline);
+  void await_change(const Part& part, const Reply& reply, const Deadline& deadline);
 
  private:
   static constexpr int kAttempts = 3;

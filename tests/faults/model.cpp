@@ -70,7 +70,7 @@ void Model::update(const std::string& id, const Transform& X_PC, bool done) {
     if (place) insert(after, Place{place->parent, X_PC});
   }
   if (frame.doomed) insert(after, std::nullopt);
-  if (done) frame.may_move_late = false;
+  if (done) frame.may_move_late = frame.unsaved = false;
   frame.possible = std::move(after);
 }
 
@@ -83,6 +83,7 @@ void Model::move(const std::string& id, const std::string& parent,
     if (place) insert(after, Place{parent, X_PC ? *X_PC : place->X_PC});
   }
   frame.may_move_late = !done;
+  if (done) frame.unsaved = false;
   frame.possible = std::move(after);
 }
 
@@ -100,6 +101,12 @@ void Model::remove(const std::string& id, bool done) {
   for (const std::string& below : unsure) {
     insert(frames_.at(below).possible, std::nullopt);
     frames_.at(below).doomed = true;
+  }
+}
+
+void Model::doubt(const std::string& id) {
+  for (auto& [below, frame] : frames_) {
+    if (frame.may_be_there() && may_be_below(below, id)) frame.unsaved = true;
   }
 }
 
@@ -237,6 +244,7 @@ std::string Model::judge(const std::string& a, const std::string& b,
   if (X_AB) {
     for (auto& [id, places] : left) {
       Frame& frame = frames_.at(id);
+      if (frame.unsaved) continue;
       frame.possible = std::move(places);
       if (quiet) frame.doomed = false;
       if (frame.doomed) insert(frame.possible, std::nullopt);

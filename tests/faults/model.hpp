@@ -31,6 +31,8 @@ class Model {
     bool doomed = false;
     /// A move had no answer: its owner may still make it, even after what it names was removed.
     bool may_move_late = false;
+    /// What its owner shows may not be stored: it is undone where the owner is killed.
+    bool unsaved = false;
     std::deque<std::string> history;
 
     [[nodiscard]] bool may_be_there() const;
@@ -47,6 +49,9 @@ class Model {
   void move(const std::string& id, const std::string& parent, const std::optional<Transform>& X_PC,
             bool done);
   void remove(const std::string& id, bool done);
+
+  /// A change was made, perhaps, but could not be stored.
+  void doubt(const std::string& id);
 
   /// It has turned out that a frame is not there, if that is possible.
   void gone(const std::string& id);

@@ -187,7 +187,7 @@ bool take(const Bytes& bytes) {
 }
 
 [[nodiscard]] inline std::vector<Reply> replies(Random& random) {
-  return {{1, 10, Done{}},
+  return {{1, 10, Done{}, 1ULL << 62U},
           {2, 18446744073709551615ULL, Error{Errc::kCycle, "no, \xc3\xa4 \x07 \xff"}},
           {3, 0, Error{Errc::kTransport, ""}},
           {4, 30, SegmentValues{}},

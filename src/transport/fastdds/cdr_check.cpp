@@ -216,7 +216,7 @@ bool well_formed_request(const std::uint8_t* data, std::size_t size) {
 
 bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
   CdrWalk walk(data, size);
-  walk.skip(8, 8);
+  walk.skip(2 * 8, 8);
   walk.ulong();
   switch (walk.octet()) {
     case 1:

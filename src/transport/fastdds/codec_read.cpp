@@ -353,6 +353,7 @@ Result<Reply> from_wire(const wire::Reply& sample) {
   Reply reply;
   reply.sequence = sample.sequence_number();
   reply.epoch = sample.epoch();
+  reply.stamp = sample.stamp();
   if (auto ok = read_body(sample.body(), reply); !ok) return tl::unexpected(std::move(ok.error()));
   return reply;
 }

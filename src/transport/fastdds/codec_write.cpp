@@ -302,6 +302,7 @@ struct ReplyWriter {
 wire::Reply to_wire(const Reply& reply) {
   wire::Reply sample;
   sample.epoch(reply.epoch);
+  sample.stamp(reply.stamp);
   sample.sequence_number(reply.sequence);
   std::visit(ReplyWriter{sample.body()}, reply.body);
   return sample;

@@ -51,7 +51,7 @@ void Peers::sent_page(const ertps::GuidPrefix_t& prefix, const Page& page) {
     const auto known = servers_.find(peer_of(prefix));
     if (known == servers_.end()) return;
     Server& server = known->second;
-    if (!server.presence) {
+    if (!server.presence || server.presence->incarnation < page.incarnation) {
       server.by_page.emplace();
       server.by_page->partition = page.partition;
       server.by_page->incarnation = page.incarnation;

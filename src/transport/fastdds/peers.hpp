@@ -96,14 +96,15 @@ class Peers {
 
   struct Server {
     std::optional<Presence> presence;
-    std::optional<Presence> by_page;  // what its pages say, before there is a presence
+    std::optional<Presence> by_page;  // what its pages say, before there is a presence as late
     std::size_t peers = 0;
     Clock::time_point last_heard;
     bool beats = false;
     bool silent = false;
 
     [[nodiscard]] const Presence* said() const {
-      if (presence) return &*presence;
+      const bool later = by_page && presence && by_page->incarnation > presence->incarnation;
+      if (presence && !later) return &*presence;
       return by_page ? &*by_page : nullptr;
     }
   };

@@ -250,6 +250,26 @@ TEST_CASE("a directory is behind while a change that an owner has told of has no
   CHECK(replica.directory.behind() == nullptr);
 }
 
+TEST_CASE("who owns nothing hears an older process of a partition whose later one is gone") {
+  // A daemon that keeps nothing was started again after its clock had been set back.
+  const bool owns = GENERATE(false, true);
+  Replica replica(owns ? "head" : "");
+  replica.directory.apply(presence_of("arms", 9, 1), kNow);
+  replica.directory.apply(Page{"arms", 0, 9, 9, {{"arm", "", 1}}});
+  // Half of one that came between.
+  replica.directory.apply(presence_of("arms", 10, 2), kNow);
+  replica.directory.apply(Page{"arms", 0, 10, 11, {{"arm", "", 1}}});
+  replica.directory.apply(presence_of("arms", 5, 1), kNow);
+  CHECK(replica.directory.serving("arms")->incarnation == 10);
+  replica.directory.lost("arms", 10, kNow);
+  replica.directory.apply(presence_of("arms", 5, 1), kNow);
+  replica.directory.apply(Page{"arms", 0, 5, 6, {{"arm", "", 1}, {"hand", "arm", 2}}});
+  // Whoever owns something says that it knows a later one, which goes on as one that is later still.
+  CHECK(replica.directory.serving("arms").has_value() == !owns);
+  CHECK(replica.forest.exists("hand") == !owns);
+  CHECK(replica.directory.complete());
+}
+
 TEST_CASE("a directory is complete when all pages of all reachable partitions have come") {
   Replica replica;
   replica.directory.apply(presence_of("arms", 1, 2), kNow);

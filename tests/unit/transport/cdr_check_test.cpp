@@ -148,7 +148,7 @@ TEST_CASE("an id has at most 255 bytes, its closing zero, and no other") {
 
 TEST_CASE("the message of an error has at most 4096 bytes") {
   const auto error = [](const std::string& message) {
-    return reply(Cdr().ulonglong(0).ulong(0).octet(1).octet(9).string(message));
+    return reply(Cdr().ulonglong(0).ulonglong(0).ulong(0).octet(1).octet(9).string(message));
   };
   CHECK(error(std::string(4096, 'm')));
   CHECK_FALSE(error(std::string(4097, 'm')));
@@ -210,13 +210,13 @@ Cdr watched(std::size_t count, std::uint64_t length) {
 }
 Cdr stamped(std::size_t count, std::uint64_t length) {
   Cdr cdr;
-  cdr.ulonglong(0).ulong(0).octet(4).ulonglong(1).ulonglong(2).ulong(length);
+  cdr.ulonglong(0).ulonglong(0).ulong(0).octet(4).ulonglong(1).ulonglong(2).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.transform();
   return cdr.ulong(0);
 }
 Cdr at_hint(std::size_t count, std::uint64_t length) {
   Cdr cdr;
-  cdr.ulonglong(0).ulong(0).octet(4).ulonglong(1).ulonglong(2).ulong(0).ulong(length);
+  cdr.ulonglong(0).ulonglong(0).ulong(0).octet(4).ulonglong(1).ulonglong(2).ulong(0).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.transform();
   return cdr;
 }
@@ -228,14 +228,14 @@ Cdr state_entries(std::size_t count, std::uint64_t length) {
 }
 Cdr replied_entries(std::size_t count, std::uint64_t length) {
   Cdr cdr;
-  cdr.ulonglong(0).ulong(0).octet(5);
+  cdr.ulonglong(0).ulonglong(0).ulong(0).octet(5);
   cdr.ulonglong(0).ulonglong(0).ulonglong(0).ulong(0).ulong(1).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(1).ulonglong(2).transform().ulong(3);
   return cdr.ulong(0).ulong(0);
 }
 Cdr pasts(std::size_t count, std::uint64_t length) {
   Cdr cdr;
-  cdr.ulonglong(0).ulong(0).octet(6).ulong(length);
+  cdr.ulonglong(0).ulonglong(0).ulong(0).octet(6).ulong(length);
   for (std::size_t i = 0; i < count; ++i) {
     for (int field = 0; field < 12; ++field) cdr.ulonglong(1);
     cdr.string("a");
@@ -244,7 +244,7 @@ Cdr pasts(std::size_t count, std::uint64_t length) {
 }
 Cdr transforms(std::size_t count, std::uint64_t length) {
   Cdr cdr;
-  cdr.ulonglong(0).ulong(0).octet(2).ulong(length);
+  cdr.ulonglong(0).ulonglong(0).ulong(0).octet(2).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.transform();
   return cdr;
 }
@@ -286,7 +286,7 @@ Cdr asked_positions(std::size_t count, std::uint64_t length) {
 }
 Cdr joint_states(std::size_t count, std::uint64_t length) {
   Cdr cdr;
-  cdr.ulonglong(0).ulong(0).octet(9).ulong(length);
+  cdr.ulonglong(0).ulonglong(0).ulong(0).octet(9).ulong(length);
   for (std::size_t i = 0; i < count; ++i) {
     for (int field = 0; field < 8; ++field) cdr.ulonglong(1);
     cdr.octet(1).octet(0).octet(1).string("elbow").string("forearm").string("");
@@ -348,7 +348,7 @@ TEST_CASE("bodies of kinds that there are not are refused") {
   }
   for (unsigned kind = 0; kind < 256; ++kind) {
     if (kind >= 1 && kind <= 9) continue;
-    CHECK_FALSE(reply(Cdr().ulonglong(0).ulong(0).octet(kind).octet(0)));
+    CHECK_FALSE(reply(Cdr().ulonglong(0).ulonglong(0).ulong(0).octet(kind).octet(0)));
   }
 }
 

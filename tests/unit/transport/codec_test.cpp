@@ -63,6 +63,7 @@ TEST_CASE("replies arrive as they were sent") {
     REQUIRE(arrived);
     CHECK(arrived->sequence == one.sequence);
     CHECK(arrived->epoch == one.epoch);
+    CHECK(arrived->stamp == one.stamp);
     REQUIRE(arrived->body.index() == one.body.index());
     if (const auto* error = std::get_if<Error>(&one.body)) {
       CHECK(std::get<Error>(arrived->body).code == error->code);

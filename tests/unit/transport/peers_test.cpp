@@ -65,14 +65,32 @@ TEST_CASE("who sends a page and then nothing is gone, and not waited for") {
   CHECK_FALSE(peers.awaits_presence());
   CHECK(gone == std::vector<std::uint64_t>{7});
   SECTION("it has only been slow") {
-    peers.present(prefix_of(1), presence_of("arms"), 0, true);
+    Presence late = presence_of("arms");
+    late.incarnation = 8;
+    peers.present(prefix_of(1), late, 0, true);
     peers.left(prefix_of(1));
-    CHECK(gone == std::vector<std::uint64_t>{7, 1});
+    CHECK(gone == std::vector<std::uint64_t>{7, 8});
   }
   SECTION("it is told of once") {
     peers.left(prefix_of(1));
     CHECK(gone.size() == 1);
   }
+}
+
+TEST_CASE("who sends a page of a later process than it has said, and then leaves, is gone as that") {
+  std::vector<std::uint64_t> gone;
+  Peers peers([](const Presence&) {},
+              [&](const Presence& one) { gone.push_back(one.incarnation); });
+  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), false);
+  peers.met(prefix_of(1), participant_name("arms"));
+  // While it claims its name; it serves under another number.
+  peers.present(prefix_of(1), presence_of("arms"), 0, false);
+  Page page;
+  page.partition = "arms";
+  page.incarnation = 7;
+  peers.sent_page(prefix_of(1), page);
+  peers.left(prefix_of(1));
+  CHECK(gone == std::vector<std::uint64_t>{7});
 }
 
 TEST_CASE("who was met and has told nothing yet is waited for") {

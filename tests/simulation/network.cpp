@@ -1,0 +1,140 @@
+#include "simulation/network.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "simulation/process.hpp"
+
+namespace tfdude::simulation {
+namespace {
+
+// When what was lost is sent again.
+constexpr milliseconds kRepeat{100};
+
+bool same_key(const Sample& a, const Sample& b) {
+  const auto* page = std::get_if<Page>(&a);
+  const auto* other = std::get_if<Page>(&b);
+  if (page == nullptr || other == nullptr) return page == nullptr && other == nullptr;
+  return page->number == other->number;
+}
+
+}  // namespace
+
+std::shared_ptr<Process> Network::find(std::uint64_t process) const {
+  const auto known = processes_.find(process);
+  return known == processes_.end() ? nullptr : known->second.lock();
+}
+
+bool Network::reaches(std::size_t from, std::size_t to) const {
+  if (from == to) return true;
+  const auto parted = parted_.find(std::minmax(from, to));
+  return hosts_[from].mute == 0 && hosts_[to].deaf == 0 &&
+         (parted == parted_.end() || parted->second == 0);
+}
+
+Instant Network::delay() {
+  const double mean = static_cast<double>(plan_.delay.count());
+  return Instant(static_cast<std::int64_t>(-mean * std::log(random_.uniform(1e-6, 1))));
+}
+
+void Network::join(const std::shared_ptr<Process>& process) {
+  for (const auto& [id, other] : processes_) {
+    if (!other.lock()) continue;
+    const auto wait = std::chrono::microseconds(5'000 + random_.index(150'000));
+    timeline_.after(wait, [this, a = process->id(), b = id] { meet(a, b); });
+  }
+  processes_[process->id()] = process;
+}
+
+void Network::meet(std::uint64_t a, std::uint64_t b) {
+  const auto one = find(a);
+  const auto other = find(b);
+  if (!one || !other) return;
+  if (!reaches(one->host(), other->host()) || !reaches(other->host(), one->host())) {
+    timeline_.after(kRepeat, [this, a, b] { meet(a, b); });
+    return;
+  }
+  open(*one, b);
+  open(*other, a);
+}
+
+void Network::open(const Process& from, std::uint64_t to) {
+  const Way way{from.id(), to};
+  if (!channels_.try_emplace(way).second) return;
+  if (from.serves_or_claims()) find(to)->met(from.id());
+  for (const Sample& sample : from.published()) put(channels_[way], sample);
+  move(way);
+}
+
+std::vector<std::uint64_t> Network::met_by(const Process& one) const {
+  std::vector<std::uint64_t> all;
+  for (const auto& [way, channel] : channels_) {
+    if (way.second == one.id() && find(way.first)) all.push_back(way.first);
+  }
+  return all;
+}
+
+// One that was replaced before it was sent is not sent, as a rule.
+void Network::put(Channel& channel, const Sample& sample) {
+  const auto same = std::find_if(channel.waiting.begin(), channel.waiting.end(),
+                                 [&](const Sample& other) { return same_key(other, sample); });
+  const bool replaces = random_.index(2) == 0;
+  if (same != channel.waiting.end() && replaces) channel.waiting.erase(same);
+  channel.waiting.push_back(sample);
+}
+
+void Network::publish(const Process& from, const Sample& sample) {
+  for (auto& [way, channel] : channels_) {
+    if (way.first != from.id()) continue;
+    put(channel, sample);
+    move(way);
+  }
+}
+
+void Network::move(const Way& way) {
+  Channel& channel = channels_[way];
+  if (channel.moving || channel.waiting.empty()) return;
+  channel.moving = true;
+  const bool lost = random_.uniform(0, 1) < loss_;
+  timeline_.after(delay() + (lost ? kRepeat : milliseconds(0)), [this, way] { arrive(way); });
+}
+
+void Network::arrive(const Way& way) {
+  const auto from = find(way.first);
+  const auto to = find(way.second);
+  if (!from || !to) {
+    channels_.erase(way);
+    return;
+  }
+  Channel& channel = channels_[way];
+  channel.moving = false;
+  if (!reaches(from->host(), to->host()) || from->paused()) {
+    channel.moving = true;
+    timeline_.after(kRepeat, [this, way] { arrive(way); });
+    return;
+  }
+  Sample sample = std::move(channel.waiting.front());
+  channel.waiting.pop_front();
+  to->run([to = to.get(), id = way.first, sample = std::move(sample)] { to->hear(id, sample); });
+  move(way);
+}
+
+void Network::send(const Process& from, std::uint64_t to, std::function<void(Process&)> arrival) {
+  const int copies = random_.uniform(0, 1) < plan_.repeats ? 2 : 1;
+  for (int i = 0; i < copies; ++i) {
+    if (random_.uniform(0, 1) < loss_) continue;
+    timeline_.after(delay(), [this, host = from.host(), to, arrival] {
+      const auto there = find(to);
+      if (!there || !reaches(host, there->host())) return;
+      there->run([there = there.get(), arrival] { arrival(*there); });
+    });
+  }
+}
+
+bool Network::beats(std::uint64_t from, const Process& to) {
+  const auto there = find(from);
+  return there && !there->paused() && reaches(there->host(), to.host()) &&
+         random_.uniform(0, 1) >= loss_;
+}
+
+}  // namespace tfdude::simulation

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "partition/messages.hpp"
+#include "simulation/plan.hpp"
+#include "simulation/timeline.hpp"
+
+namespace tfdude::simulation {
+
+class Process;
+
+/// What is told reliably, the newest of each key; who is met later hears it, too.
+using Sample = std::variant<Presence, Page>;
+
+/// The computers and what lies between them.
+class Network {
+ public:
+  Network(Timeline& timeline, const Plan& plan)
+      : timeline_(timeline),
+        plan_(plan),
+        loss_(plan.loss),
+        random_(plan.seed ^ 0x6e657477U),
+        hosts_(kMostHosts) {}
+
+  void join(const std::shared_ptr<Process>& process);
+
+  /// A datagram, which may be lost, come twice, or be overtaken.
+  void send(const Process& from, std::uint64_t to, std::function<void(Process&)> arrival);
+  /// To all who are met.
+  void publish(const Process& from, const Sample& sample);
+
+  /// Whether a beat of that process is heard now.
+  [[nodiscard]] bool beats(std::uint64_t from, const Process& to);
+  /// Who is said to serve a partition by somebody who was met.
+  [[nodiscard]] std::vector<std::uint64_t> met_by(const Process& one) const;
+
+  // Faults; counted, as several may concern one link.
+  void cut_in(std::size_t host, int change) { hosts_[host].deaf += change; }
+  void cut_out(std::size_t host, int change) { hosts_[host].mute += change; }
+  void part(std::size_t a, std::size_t b, int change) { parted_[std::minmax(a, b)] += change; }
+
+  /// From now on so much is lost on its way.
+  void set_loss(double loss) { loss_ = loss; }
+
+  static constexpr std::size_t kMostHosts = 64;
+
+ private:
+  struct Host {
+    int deaf = 0;
+    int mute = 0;
+  };
+  struct Channel {
+    std::deque<Sample> waiting;
+    bool moving = false;
+  };
+  using Way = std::pair<std::uint64_t, std::uint64_t>;
+
+  [[nodiscard]] bool reaches(std::size_t from, std::size_t to) const;
+  [[nodiscard]] Instant delay();
+  [[nodiscard]] std::shared_ptr<Process> find(std::uint64_t process) const;
+  void meet(std::uint64_t a, std::uint64_t b);
+  void open(const Process& from, std::uint64_t to);
+  void put(Channel& channel, const Sample& sample);
+  void move(const Way& way);
+  void arrive(const Way& way);
+
+  Timeline& timeline_;
+  const Plan& plan_;
+  double loss_;
+  testing::Random random_;
+  std::vector<Host> hosts_;
+  std::map<std::pair<std::size_t, std::size_t>, int> parted_;
+  std::map<std::uint64_t, std::weak_ptr<Process>> processes_;
+  std::map<Way, Channel> channels_;
+};
+
+}  // namespace tfdude::simulation

@@ -1,0 +1,189 @@
+#include "simulation/operation.hpp"
+
+#include <algorithm>
+
+#include "partition/requests.hpp"
+#include "simulation/process.hpp"
+
+namespace tfdude::simulation {
+namespace {
+
+constexpr Instant kPoll = milliseconds(10);
+constexpr Instant kStructureDelay = milliseconds(100);
+constexpr int kAttempts = 3;
+
+bool may_appear(Errc code) {
+  return code == Errc::kUnknownFrame || code == Errc::kUnknownStart || code == Errc::kUnknownEnd ||
+         code == Errc::kUnknownParent || code == Errc::kUnknownPartition ||
+         code == Errc::kNotConnected;
+}
+
+bool denies_plan(Errc code) {
+  return code == Errc::kAlreadyExists || code == Errc::kUnknownParent || code == Errc::kCycle;
+}
+
+}  // namespace
+
+Operation::Operation(Process& caller, Route route, Then then)
+    : caller_(caller), route_(std::move(route)), then_(std::move(then)) {}
+
+Instant Operation::now() const { return caller_.world().timeline.now(); }
+
+void Operation::start() {
+  deadline_ = now() + kTimeout;
+  caller_.later(kTimeout, [self = shared_from_this()] {
+    if (self->over_) return;
+    if (self->phase_ == Phase::kPlan) {
+      self->finish(fail(Errc::kTimeout, "not all is known"));
+    } else if (self->phase_ == Phase::kAsk) {
+      for (auto& reply : self->replies_) {
+        if (!reply) reply = Reply{0, 0, Error{Errc::kTimeout, "no answer"}};
+      }
+      self->take_if_answered();
+    } else {
+      self->look_again();
+    }
+  });
+  plan();
+}
+
+std::uint32_t Operation::first_sequence() const {
+  std::uint32_t first = ~0U;
+  for (const Part& part : parts_) {
+    if (part.owner != kHeldHere) first = std::min(first, part.request.sequence);
+  }
+  return phase_ == Phase::kAsk ? first : ~0U;
+}
+
+void Operation::plan() {
+  phase_ = Phase::kPlan;
+  version_ = caller_.forest().structure_version();
+  const bool certain = caller_.discovered();
+  auto parts = route_();
+  if (parts) return ask(*std::move(parts));
+  if (certain || !may_appear(parts.error().code)) return finish(tl::unexpected(parts.error()));
+  caller_.later(kPoll, [self = shared_from_this()] {
+    if (!self->over_ && self->phase_ == Phase::kPlan) self->plan();
+  });
+}
+
+void Operation::ask(std::vector<Part> parts) {
+  phase_ = Phase::kAsk;
+  parts_ = std::move(parts);
+  replies_.assign(parts_.size(), std::nullopt);
+  stored_ = true;
+  ++round_;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    if (parts_[i].owner == kHeldHere) {
+      replies_[i] = caller_.answer(parts_[i].request);
+    } else {
+      parts_[i].request.sequence = caller_.next_sequence();
+    }
+  }
+  send(milliseconds(2), round_);
+  take_if_answered();
+}
+
+void Operation::send(Instant pause, int round) {
+  if (over_ || phase_ != Phase::kAsk || round != round_) return;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    if (!replies_[i]) caller_.send(parts_[i].partition, parts_[i].request);
+  }
+  caller_.later(pause, [self = shared_from_this(), pause, round] {
+    self->send(std::min<Instant>(2 * pause, milliseconds(160)), round);
+  });
+}
+
+void Operation::on_reply(const Reply& reply) {
+  if (over_ || phase_ != Phase::kAsk) return;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const bool mine = parts_[i].owner != kHeldHere && parts_[i].request.sequence == reply.sequence;
+    if (mine && !replies_[i]) replies_[i] = reply;
+  }
+  take_if_answered();
+}
+
+void Operation::on_lost(const std::string& partition) {
+  if (over_ || phase_ != Phase::kAsk) return;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    if (replies_[i] || parts_[i].partition != partition) continue;
+    replies_[i] = Reply{0, 0, Error{Errc::kUnreachable, "it went away while it was asked"}};
+  }
+  take_if_answered();
+}
+
+void Operation::take_if_answered() {
+  const bool all = std::all_of(replies_.begin(), replies_.end(),
+                               [](const auto& reply) { return reply.has_value(); });
+  if (!over_ && phase_ == Phase::kAsk && all) answered();
+}
+
+void Operation::answered() {
+  phase_ = Phase::kSettle;
+  outcome_ = {};
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const auto* error = std::get_if<Error>(&replies_[i]->body);
+    if (error != nullptr && (outcome_ || error->code == Errc::kState)) {
+      outcome_ = tl::unexpected(*error);
+    }
+    if (error != nullptr || parts_[i].owner != kHeldHere) continue;
+    if (!is_of_structure(parts_[i].request)) continue;
+    stored_ = false;
+    caller_.when_stored([self = shared_from_this()](const Result<void>& stored) {
+      if (!stored && self->outcome_) self->outcome_ = stored;
+      self->stored_ = true;
+      self->look_again();
+    });
+  }
+  look_again();
+}
+
+void Operation::look_again() {
+  if (over_ || phase_ != Phase::kSettle) return;
+  Directory& directory = caller_.directory();
+  bool settled = stored_;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const bool done = !std::holds_alternative<Error>(replies_[i]->body);
+    const Owner owner = parts_[i].owner;
+    if (done && owner != kHeldHere) directory.saw_stamp(replies_[i]->stamp);
+    const bool reads = std::holds_alternative<LookupRequest>(parts_[i].request.body);
+    if (!done || owner == kHeldHere || reads) continue;
+    const bool here = directory.epoch(owner) >= replies_[i]->epoch || !directory.reachable(owner);
+    settled = settled && here;
+    if (now() >= deadline_) directory.told_of(owner, replies_[i]->epoch);
+  }
+  if (!settled && now() < deadline_) return;
+  if (!stored_ && outcome_) outcome_ = fail(Errc::kTimeout, "changed, but not stored in time");
+  const auto code = outcome_ ? std::optional<Errc>() : outcome_.error().code;
+  if (code == Errc::kNotOwner && ++attempts_ < kAttempts && now() < deadline_) {
+    retry(kStructureDelay);
+  } else if (code && denies_plan(*code) && now() + pause_ < deadline_) {
+    retry(pause_);
+    pause_ *= 2;
+  } else {
+    finish(outcome_);
+  }
+}
+
+// After a while, or as soon as the structure has changed where the route was stale.
+void Operation::retry(Instant pause) {
+  phase_ = Phase::kPlan;
+  await_change(std::min(now() + pause, deadline_), pause == kStructureDelay);
+}
+
+void Operation::await_change(Instant until, bool stale) {
+  if (over_ || phase_ != Phase::kPlan) return;
+  const bool changed = stale && caller_.forest().structure_version() != version_;
+  if (changed || now() >= until) return plan();
+  caller_.later(milliseconds(1),
+                [self = shared_from_this(), until, stale] { self->await_change(until, stale); });
+}
+
+void Operation::finish(Result<void> outcome) {
+  over_ = true;
+  std::vector<Reply> replies;
+  for (auto& reply : replies_) replies.push_back(reply ? *reply : Reply{});
+  then_(outcome, std::move(replies));
+}
+
+}  // namespace tfdude::simulation

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "partition/routing.hpp"
+#include "simulation/timeline.hpp"
+
+namespace tfdude::simulation {
+
+class Process;
+
+/// One call of a client, as Requests makes it, in steps: planned, sent until it is answered, planned again where the
+/// structure has changed meanwhile, and over by its deadline.
+class Operation : public std::enable_shared_from_this<Operation> {
+ public:
+  using Route = std::function<Result<std::vector<Part>>()>;
+  using Then = std::function<void(const Result<void>&, std::vector<Reply>)>;
+
+  static constexpr milliseconds kTimeout{1000};
+
+  /// @param then  told once
+  Operation(Process& caller, Route route, Then then);
+
+  void start();
+  void on_reply(const Reply& reply);
+  void on_lost(const std::string& partition);
+  /// Something has changed that it may wait for.
+  void look_again();
+  [[nodiscard]] bool over() const { return over_; }
+  /// Requests from here on are awaited.
+  [[nodiscard]] std::uint32_t first_sequence() const;
+
+ private:
+  enum class Phase { kPlan, kAsk, kSettle };
+
+  void plan();
+  void ask(std::vector<Part> parts);
+  void send(Instant pause, int round);
+  void take_if_answered();
+  void answered();
+  void retry(Instant pause);
+  void await_change(Instant until, bool stale);
+  void finish(Result<void> outcome);
+  [[nodiscard]] Instant now() const;
+
+  Process& caller_;
+  const Route route_;
+  const Then then_;
+  Instant deadline_{};
+  Phase phase_ = Phase::kPlan;
+  std::vector<Part> parts_;
+  std::vector<std::optional<Reply>> replies_;
+  Result<void> outcome_;
+  int attempts_ = 0;
+  int round_ = 0;  // of asking
+  std::uint64_t version_ = 0;
+  Instant pause_{milliseconds(5)};
+  bool stored_ = true;
+  bool over_ = false;
+};
+
+}  // namespace tfdude::simulation

@@ -1,0 +1,399 @@
+#include "simulation/process.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "partition/requests.hpp"
+
+namespace tfdude::simulation {
+namespace {
+
+constexpr Instant kMeeting = milliseconds(300);  // how long participants need to meet
+constexpr Instant kLookRound = milliseconds(1000);
+constexpr Instant kSilence = milliseconds(450);
+constexpr Instant kBeat = milliseconds(60);
+constexpr Instant kLookForGone = milliseconds(50);
+constexpr Instant kConcedeEvery = milliseconds(100);
+constexpr Instant kPublishEvery = milliseconds(1);
+constexpr Instant kRetryStoring = milliseconds(200);
+constexpr Instant kSaveValuesEvery = milliseconds(1000);
+
+}  // namespace
+
+Process::Process(Surroundings& world, Setting setting)
+    : world_(world),
+      setting_(std::move(setting)),
+      forest_([this] { return wall(); }),
+      directory_(forest_, setting_.partition),
+      member_(forest_, directory_, setting_.partition) {
+  directory_.changes().watch();
+}
+
+Time Process::wall() const {
+  // Such a day that a clock may be behind by hours.
+  constexpr std::chrono::seconds kBeginning{1'700'000'000};
+  return Time(kBeginning + world_.timeline.now() +
+              (setting_.clock_offset != nullptr ? *setting_.clock_offset : milliseconds(0)));
+}
+
+PeerId Process::peer_id(std::uint64_t process) const {
+  PeerId peer{};
+  for (std::size_t i = 0; i < 8; ++i) peer[i] = static_cast<std::uint8_t>(process >> (8 * i));
+  return peer;
+}
+
+void Process::start() {
+  born_ = ticked_ = world_.timeline.now();
+  tick();
+  if (!serves_or_claims()) return;
+  member_.claim("host" + std::to_string(host()), static_cast<std::uint32_t>(id()), wall(),
+                world_.random.engine()());
+  announce(member_.introduce());
+  Claiming::Patience patience;
+  patience.meeting = std::chrono::duration_cast<milliseconds>(kMeeting);
+  claiming_.emplace(member_.name_claim(), patience, world_.timeline.steady());
+  step_claim();
+}
+
+// ---- how it becomes an owner
+
+bool Process::awaits_presence() const {
+  return std::any_of(peers_.begin(), peers_.end(),
+                     [](const auto& known) { return !known.second.said && !known.second.silent; });
+}
+
+void Process::step_claim() {
+  using Step = Claiming::Step;
+  const Step step = claiming_->next(world_.timeline.steady(), awaits_presence());
+  if (step == Step::kServe) return take_frames();
+  if (step == Step::kLeave) return leave();
+  if (step == Step::kTake) {
+    member_.take_name();
+    announce(member_.introduce());
+  }
+  later(milliseconds(5), [this] { step_claim(); });
+}
+
+// What is left is judged by what the others own now, and by whether those who are silent are gone.
+void Process::take_frames() {
+  const Instant now = world_.timeline.now();
+  const bool incomplete = now < born_ + kLookRound && (awaits_presence() || !directory_.complete());
+  const bool undecided =
+      now < born_ + kLookRound + milliseconds(2 * Absences::kGrace) && directory_.awaits_silent();
+  if (incomplete || undecided) return later(milliseconds(5), [this] { take_frames(); });
+  serve();
+}
+
+void Process::serve() {
+  std::optional<StoredState> left;
+  if (setting_.disk != nullptr) left = *setting_.disk->store.load();
+  const auto taken = member_.serve(left ? &*left : nullptr, setting_.configured, wall());
+  if (!taken) {
+    world_.violation("partition " + partition() + " does not serve: " + taken.error().message);
+    return leave();
+  }
+  serving_ = true;
+  perform(member_.take_ready());
+  // A daemon that starts needs room, and says so by ending.
+  if (failure_) return leave();
+  if (setting_.disk != nullptr) (void)setting_.disk->store.save_configured(setting_.configured);
+  announce(member_.introduce());
+  if (setting_.disk != nullptr) later(kSaveValuesEvery, [this] { save_values(); });
+  react();
+}
+
+void Process::leave() {
+  announce(member_.leave());
+  ended_ = true;
+}
+
+// ---- faults
+
+void Process::resume() {
+  if (--pauses_ > 0) return;
+  for (const auto& what : std::exchange(backlog_, {})) run(what);
+}
+
+void Process::run(std::function<void()> what) {
+  if (paused()) {
+    backlog_.push_back(std::move(what));
+  } else if (!ended_) {
+    what();
+  }
+}
+
+void Process::later(Instant wait, std::function<void()> what) {
+  world_.timeline.after(wait, [weak = weak_from_this(), what = std::move(what)] {
+    if (const auto self = weak.lock()) self->run(what);
+  });
+}
+
+// ---- what it hears
+
+void Process::tick() {
+  look_for_silent();
+  later(kBeat, [this] { tick(); });
+}
+
+// As Peers does.
+void Process::look_for_silent() {
+  const Instant now = world_.timeline.now();
+  const Instant late = std::max(Instant(0), now - std::exchange(ticked_, now) - kBeat);
+  for (auto& [peer, known] : peers_) {
+    known.heard += late;
+    const Presence* said = known.known();
+    if (world_.network.beats(peer, *this)) {
+      known.heard = now;
+      if (known.silent && known.said) {
+        known.silent = false;
+        member_.on_presence(*known.said, wall());
+        react();
+      }
+      continue;
+    }
+    if (said == nullptr || known.silent || now - known.heard < kSilence) continue;
+    known.silent = true;
+    member_.on_lost(said->partition, said->incarnation, wall());
+    react();
+  }
+}
+
+void Process::hear(std::uint64_t from, const Sample& sample) {
+  Peer& peer = peers_[from];
+  const bool was_silent = std::exchange(peer.silent, false);
+  peer.heard = world_.timeline.now();
+  if (const auto* page = std::get_if<Page>(&sample)) {
+    member_.on_page(*page);
+    if (!peer.said || peer.said->incarnation < page->incarnation) {
+      peer.by_page.emplace();
+      peer.by_page->partition = page->partition;
+      peer.by_page->incarnation = page->incarnation;
+    }
+    if (was_silent && peer.said) {
+      member_.on_presence(*peer.said, wall());
+    }
+  } else {
+    const auto& presence = std::get<Presence>(sample);
+    if (was_silent || !peer.said || !(*peer.said == presence)) {
+      peer.said = presence;
+      member_.on_presence(presence, wall());
+    }
+  }
+  react();
+}
+
+void Process::react() {
+  const Outcome outcome = member_.take_outcome();
+  if (outcome.to_commit && serving_) ask_commit(kPublishEvery);
+  if (outcome.to_reply && serving_) ask_commit(Instant(0));
+  if (outcome.to_concede && !std::exchange(conceding_, true)) {
+    later(kConcedeEvery, [this] { concede(); });
+  }
+  if (outcome.look_for_gone && !std::exchange(looking_for_gone_, true)) {
+    later(kLookForGone, [this] {
+      looking_for_gone_ = false;
+      member_.on_time(world_.timeline.steady());
+      react();
+    });
+  }
+  const auto operations = operations_;
+  for (const auto& one : operations) {
+    if (outcome.stopped) one->on_lost(outcome.stopped->partition);
+    if (outcome.lost) one->on_lost(*outcome.lost);
+    one->look_again();
+  }
+  operations_.erase(std::remove_if(operations_.begin(), operations_.end(),
+                                   [](const auto& one) { return one->over(); }),
+                    operations_.end());
+  if (outcome.gave_up) ended_ = true;
+  count(outcome);
+}
+
+void Process::count(const Outcome& outcome) {
+  if (outcome.gave_up) world_.count("a process gave its partition up");
+  if (outcome.overtook) world_.count("a process overtook its predecessor");
+  if (!outcome.outdated.empty()) world_.count("an older process was passed over");
+  for (const Change& event : outcome.events) {
+    if (event.kind == ChangeKind::kFrameTakenOver) world_.count("a frame was taken over");
+    if (event.kind == ChangeKind::kFrameOrphaned) world_.count("a frame was orphaned");
+    if (event.kind == ChangeKind::kConflict) world_.count("a conflict was told");
+  }
+}
+
+// ---- what it answers and asks for
+
+void Process::on_request(std::uint64_t from, const Request& request) {
+  if (!serving_) return;
+  const PeerId peer = peer_id(from);
+  const auto reply_now = [&](const Reply& reply) {
+    world_.network.send(*this, from, [reply](Process& there) { there.on_reply(reply); });
+  };
+  if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
+    return reply_now(member_.partition()->answer_lookup(request.sequence, *lookup));
+  }
+  const auto reply = member_.on_request(peer, request, failure_, wall());
+  if (reply) reply_now(*reply);
+  react();
+}
+
+void Process::on_reply(const Reply& reply) {
+  const auto operations = operations_;
+  for (const auto& one : operations) one->on_reply(reply);
+}
+
+void Process::begin(std::shared_ptr<Operation> operation) {
+  operations_.push_back(operation);
+  operation->start();
+}
+
+Reply Process::answer(const Request& request) {
+  if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
+    return member_.partition()->answer_lookup(request.sequence, *lookup);
+  }
+  Reply reply = member_.answer(request, failure_, wall());
+  react();
+  return reply;
+}
+
+void Process::send(const std::string& partition, const Request& request) {
+  Request sent = request;
+  std::uint32_t first = request.sequence;
+  for (const auto& one : operations_) first = std::min(first, one->first_sequence());
+  sent.awaits_from = first;
+  for (const std::uint64_t peer : world_.network.met_by(*this)) {
+    const auto known = peers_.find(peer);
+    const bool serves = known != peers_.end() && known->second.said &&
+                        known->second.said->partition == partition && known->second.said->serving;
+    if (!serves) continue;
+    world_.network.send(*this, peer,
+                        [from = id(), sent](Process& there) { there.on_request(from, sent); });
+  }
+}
+
+bool Process::discovered() const {
+  const bool met = world_.timeline.now() >= born_ + kLookRound;
+  return met && !awaits_presence() && directory_.behind() == nullptr;
+}
+
+// ---- the loop
+
+void Process::when_stored(std::function<void(const Result<void>&)> then) {
+  if (setting_.disk == nullptr) return then({});
+  waiting_.push_back(std::move(then));
+  ask_commit(Instant(0));
+}
+
+void Process::ask_commit(Instant wait) {
+  if (committing_) {
+    commit_asked_ = true;
+    return;
+  }
+  committing_ = true;
+  later(wait, [this] { commit(); });
+}
+
+// Taken now, on the disk a moment later; who is killed meanwhile has stored it or not.
+void Process::commit() {
+  commit_asked_ = false;
+  const auto waiting = std::make_shared<decltype(waiting_)>(std::exchange(waiting_, {}));
+  const auto ready = std::make_shared<Ready>(member_.take_ready());
+  const auto longest = static_cast<std::size_t>(world_.plan.disk.count());
+  const Instant disk(setting_.disk != nullptr ? world_.random.index(longest + 1) : 0);
+  later(disk, [this, ready, waiting] {
+    perform(*ready);
+    const Result<void> stored = failure_ ? tl::unexpected(*failure_) : Result<void>();
+    for (const auto& then : *waiting) then(stored);
+    committing_ = false;
+    if (commit_asked_ || failure_) ask_commit(failure_ ? kRetryStoring : kPublishEvery);
+  });
+}
+
+void Process::perform(const Ready& ready) {
+  Result<void> stored;
+  if (ready.refused) {
+    stored = tl::unexpected(*ready.refused);
+  } else if (setting_.disk != nullptr) {
+    stored = setting_.disk->save(ready.rows);
+    failure_ = stored ? std::nullopt : std::optional<Error>(stored.error());
+  }
+  if (stored || ready.refused) {
+    const auto said = member_.stored(ready);
+    for (const Page& page : ready.pages) {
+      pages_[page.number] = page;
+      world_.network.publish(*this, page);
+    }
+    announce(said);
+  } else {
+    announce(member_.not_stored(ready));
+  }
+  for (const PendingReply& pending : ready.replies) {
+    Reply reply = pending.reply;
+    if (!stored) reply.body = stored.error();
+    std::uint64_t to = 0;
+    for (std::size_t i = 8; i-- > 0;) to = to << 8U | pending.to[i];
+    world_.network.send(*this, to, [reply](Process& there) { there.on_reply(reply); });
+  }
+  react();
+}
+
+void Process::save_values() {
+  later(kSaveValuesEvery, [this] { save_values(); });
+  // One thread does both.
+  if (committing_ || setting_.disk->full) return;
+  auto [edges, commit] = forest_.changed_since(saved_commit_);
+  saved_commit_ = commit;
+  (void)setting_.disk->store.save_values(member_.storable(std::move(edges)), {});
+}
+
+void Process::announce(const std::optional<Presence>& presence) {
+  if (!presence) return;
+  presence_ = *presence;
+  world_.network.publish(*this, *presence);
+}
+
+std::vector<Sample> Process::published() const {
+  std::vector<Sample> all;
+  if (presence_) all.emplace_back(*presence_);
+  for (const auto& [number, page] : pages_) all.emplace_back(page);
+  return all;
+}
+
+// What is given up must stand after all of the others have told how far they are.
+void Process::concede() {
+  const auto due = member_.concessions();
+  conceding_ = false;
+  if (due.empty()) return;
+  conceding_ = true;
+  const auto ask_all = [this]() -> Result<std::vector<Part>> {
+    std::vector<Part> parts;
+    for (const Owner owner : directory_.reachable_owners()) {
+      const std::string& name = directory_.name(owner);
+      parts.push_back({owner, name, Request{0, name, RemoveRequest{}}});
+    }
+    return parts;
+  };
+  const auto asked = ask_all();
+  begin(std::make_shared<Operation>(
+      *this, ask_all, [this, due, asked](const Result<void>& outcome, const auto& replies) {
+        bool current = outcome.has_value() && replies.size() == asked->size();
+        for (std::size_t i = 0; current && i < replies.size(); ++i) {
+          const Owner owner = (*asked)[i].owner;
+          current = directory_.epoch(owner) >= replies[i].epoch || !directory_.reachable(owner);
+        }
+        conceding_ = false;
+        member_.concede(due, current, wall());
+        react();
+      }));
+}
+
+std::vector<std::string> Process::structure() const {
+  std::vector<std::string> lines;
+  for (const FrameInfo& frame : forest_.frames()) {
+    if (!directory_.reachable(frame.owner)) continue;
+    lines.push_back(frame.id + " < " + frame.parent + " @ " + directory_.name(frame.owner));
+  }
+  std::sort(lines.begin(), lines.end());
+  return lines;
+}
+
+}  // namespace tfdude::simulation

@@ -1,0 +1,146 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "partition/claiming.hpp"
+#include "partition/member.hpp"
+#include "simulation/disk.hpp"
+#include "simulation/network.hpp"
+#include "simulation/operation.hpp"
+#include "tree/forest.hpp"
+
+namespace tfdude::simulation {
+
+/// What all processes of a run share.
+struct Surroundings {
+  Timeline& timeline;
+  Network& network;
+  const Plan& plan;
+  testing::Random& random;
+  std::function<void(const std::string&)> trace;  ///< each step, so that two runs can be compared
+  std::function<void(const std::string&)> violation;  ///< of what must never be
+  std::function<void(const std::string&)> count;      ///< of what should happen now and then
+};
+
+/// One life of a participant: the loops that a process has around its Member, in simulated time.
+class Process : public std::enable_shared_from_this<Process> {
+ public:
+  /// How long its own daemon may be: the clock of its computer is ahead by `clock_offset`.
+  struct Setting {
+    std::size_t host = 0;
+    std::uint64_t id = 0;   ///< unique in a run
+    std::string partition;  ///< empty: a client
+    std::vector<FrameSpec> configured;
+    Disk* disk = nullptr;  ///< null: nothing is kept
+    const milliseconds* clock_offset = nullptr;
+  };
+
+  Process(Surroundings& world, Setting setting);
+  /// Begins, once it is in the network.
+  void start();
+
+  // ---- faults
+  void pause() { ++pauses_; }
+  void resume();
+  [[nodiscard]] bool paused() const { return pauses_ > 0; }
+  /// It says its last word.
+  void leave();
+
+  // ---- what the network hands over
+  /// Runs now, or when the process is resumed.
+  void run(std::function<void()> what);
+  void met(std::uint64_t peer) { peers_.try_emplace(peer); }
+  void hear(std::uint64_t from, const Sample& sample);
+  void on_request(std::uint64_t from, const Request& request);
+  void on_reply(const Reply& reply);
+
+  // ---- what callers ask for
+  void begin(std::shared_ptr<Operation> operation);
+  [[nodiscard]] Reply answer(const Request& request);
+  /// Once all that was changed before is stored; whether it could be.
+  void when_stored(std::function<void(const Result<void>&)> then);
+  [[nodiscard]] std::uint32_t next_sequence() { return ++sequence_; }
+  void send(const std::string& partition, const Request& request);
+  /// Whether what it does not know does not exist.
+  [[nodiscard]] bool discovered() const;
+
+  void later(Instant wait, std::function<void()> what);
+
+  [[nodiscard]] std::uint64_t id() const { return setting_.id; }
+  [[nodiscard]] std::size_t host() const { return setting_.host; }
+  [[nodiscard]] const std::string& partition() const { return setting_.partition; }
+  [[nodiscard]] bool serves_or_claims() const { return !setting_.partition.empty(); }
+  [[nodiscard]] bool serves() const { return serving_; }
+  [[nodiscard]] bool ended() const { return ended_; }
+  [[nodiscard]] std::vector<Sample> published() const;
+  [[nodiscard]] Forest& forest() { return forest_; }
+  [[nodiscard]] Directory& directory() { return directory_; }
+  [[nodiscard]] Member& member() { return member_; }
+  [[nodiscard]] Surroundings& world() { return world_; }
+  /// id, parent and partition of each frame whose owner is there; sorted.
+  [[nodiscard]] std::vector<std::string> structure() const;
+
+ private:
+  struct Peer {
+    std::optional<Presence> said;
+    std::optional<Presence> by_page;
+    Instant heard{};
+    bool silent = false;
+    [[nodiscard]] const Presence* known() const {
+      const bool later = by_page && said && by_page->incarnation > said->incarnation;
+      if (said && !later) return &*said;
+      return by_page ? &*by_page : nullptr;
+    }
+  };
+
+  [[nodiscard]] Time wall() const;
+  [[nodiscard]] PeerId peer_id(std::uint64_t process) const;
+  void tick();
+  void look_for_silent();
+  void react();
+  void count(const Outcome& outcome);
+  void step_claim();
+  void take_frames();
+  void serve();
+  void ask_commit(Instant wait);
+  void commit();
+  void perform(const Ready& ready);
+  void save_values();
+  void announce(const std::optional<Presence>& presence);
+  void concede();
+  [[nodiscard]] bool awaits_presence() const;
+
+  Surroundings& world_;
+  const Setting setting_;
+  Forest forest_;
+  Directory directory_;
+  Member member_;
+  std::optional<Claiming> claiming_;
+  std::map<std::uint64_t, Peer> peers_;
+  std::map<std::uint32_t, Page> pages_;  // as published last
+  std::optional<Presence> presence_;
+  std::vector<std::shared_ptr<Operation>> operations_;
+  std::vector<std::function<void()>> backlog_;
+  std::vector<std::function<void(const Result<void>&)>> waiting_;
+  std::optional<Error> failure_;
+  std::uint64_t saved_commit_ = 0;
+  std::uint32_t sequence_ = 0;
+  Instant born_{};
+  Instant ticked_{};
+  int pauses_ = 0;
+  bool serving_ = false;
+  bool ended_ = false;
+  bool committing_ = false;
+  bool commit_asked_ = false;
+  bool conceding_ = false;
+  bool looking_for_gone_ = false;
+};
+
+}  // namespace tfdude::simulation

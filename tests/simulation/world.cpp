@@ -1,0 +1,322 @@
+#include "simulation/world.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+namespace tfdude::simulation {
+namespace {
+
+constexpr Instant kLook = milliseconds(20);
+// Longer than anything takes: that somebody counts as gone, is met again, has claimed its name and has conceded.
+constexpr Instant kRest = milliseconds(12000);
+
+class World {
+ public:
+  World(const Plan& plan, bool trace)
+      : plan_(plan),
+        trace_(trace),
+        timeline_(plan.seed),
+        network_(timeline_, plan),
+        random_(plan.seed ^ 0x776f726cU),
+        surroundings_{timeline_,
+                      network_,
+                      plan_,
+                      random_,
+                      [this](const std::string& step) { note(step); },
+                      [this](const std::string& what) { violation(what); },
+                      [this](const std::string& what) { ++run_.counts[what]; }},
+        daemons_(plan.owners),
+        disks_(plan.owners + 1),
+        offsets_(plan.owners),
+        down_(plan.owners, 0) {
+    renames_ = std::any_of(plan.faults.begin(), plan.faults.end(),
+                           [](const Fault& fault) { return fault.kind == FaultKind::kRename; });
+  }
+
+  Run run() {
+    for (std::size_t i = 0; i < plan_.owners; ++i) start_daemon(i);
+    for (std::size_t i = 0; i < plan_.clients; ++i) start_author(i);
+    for (const Fault& fault : plan_.faults) {
+      timeline_.at(fault.begin, [this, &fault] { begin(fault); });
+      timeline_.at(fault.end, [this, &fault] { end(fault); });
+    }
+    look_after();
+    advance(plan_.storm);
+    for (const auto& author : authors_) author->stop();
+    network_.set_loss(plan_.loss_after);
+    if (plan_.lost < plan_.owners) take_down(plan_.lost, false);
+    advance(plan_.storm + kRest);
+    check();
+    for (const auto& author : authors_) {
+      for (const auto& [what, count] : author->outcomes()) run_.counts[what] += count;
+    }
+    run_.duration = timeline_.now();
+    return std::move(run_);
+  }
+
+ private:
+  void advance(Instant until) {
+    while (timeline_.step(until)) {
+    }
+  }
+
+  void note(const std::string& step) {
+    std::uint64_t hash = run_.hashes.empty() ? 14695981039346656037ULL : run_.hashes.back();
+    const std::string line = std::to_string(timeline_.now().count()) + " " + step;
+    for (const char c : line) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
+    run_.hashes.push_back(hash);
+    if (trace_)
+      std::printf("%12.3f ms  %s\n",
+                  std::chrono::duration<double, std::milli>(timeline_.now()).count(), step.c_str());
+  }
+
+  void violation(const std::string& what) {
+    note("VIOLATION " + what);
+    if (run_.violations.size() < 10) {
+      run_.violations.push_back(std::to_string(timeline_.now().count() / 1'000'000) +
+                                " ms: " + what);
+    }
+  }
+
+  // The last owner's partition is the one that may be renamed.
+  [[nodiscard]] std::string name_of_daemon(std::size_t owner) const {
+    return owner + 1 == plan_.owners && renamed_ % 2 == 1 ? "renamed" : partition_name(owner);
+  }
+  [[nodiscard]] Disk* disk_of(std::size_t owner) {
+    if (!plan_.stores) return nullptr;
+    return &disks_[name_of_daemon(owner) == "renamed" ? plan_.owners : owner];
+  }
+
+  void start_daemon(std::size_t owner) {
+    Process::Setting setting;
+    setting.host = owner;
+    setting.id = ++processes_;
+    setting.partition = name_of_daemon(owner);
+    if (owner == 0) setting.configured.push_back({"world", "", {}});
+    setting.configured.push_back({base_of(owner), "world", base_edge(owner)});
+    setting.disk = disk_of(owner);
+    setting.clock_offset = &offsets_[owner];
+    daemons_[owner] = std::make_shared<Process>(surroundings_, setting);
+    network_.join(daemons_[owner]);
+    note("start of " + setting.partition);
+    daemons_[owner]->start();
+  }
+
+  void start_author(std::size_t number) {
+    Process::Setting setting;
+    setting.host = plan_.owners + number;
+    setting.id = ++processes_;
+    auto process = std::make_shared<Process>(surroundings_, setting);
+    network_.join(process);
+    process->start();
+    const std::size_t owners = plan_.owners - (renames_ ? 1 : 0);
+    authors_.push_back(std::make_shared<Author>(process, number, owners, plan_.seed * 31 + number));
+    authors_.back()->start();
+  }
+
+  // Daemons that have ended, as another had their name, are started again.
+  void look_after() {
+    for (std::size_t i = 0; i < plan_.owners; ++i) {
+      if (!daemons_[i] || !daemons_[i]->ended() || down_[i] > 0) continue;
+      ++run_.counts["daemon ended by itself"];
+      daemons_[i].reset();
+      start_daemon(i);
+    }
+    timeline_.after(kLook, [this] { look_after(); });
+  }
+
+  void begin(const Fault& fault) {
+    note(std::string("begin of ") + name_of(fault.kind) + " " + std::to_string(fault.target));
+    ++run_.counts[std::string("fault ") + name_of(fault.kind)];
+    switch (fault.kind) {
+      case FaultKind::kStop:
+        if (daemons_[fault.target] && !daemons_[fault.target]->paused()) {
+          daemons_[fault.target]->leave();
+        }
+        [[fallthrough]];
+      case FaultKind::kKill:
+      case FaultKind::kRename:
+        take_down(fault.kind == FaultKind::kRename ? plan_.owners - 1 : fault.target,
+                  fault.kind == FaultKind::kStop);
+        break;
+      case FaultKind::kPause:
+        if (daemons_[fault.target]) {
+          daemons_[fault.target]->pause();
+          hung_[&fault] = daemons_[fault.target];
+        }
+        break;
+      case FaultKind::kCut:
+        network_.cut_in(fault.target, 1);
+        [[fallthrough]];
+      case FaultKind::kCutOneWay:
+        network_.cut_out(fault.target, 1);
+        break;
+      case FaultKind::kPart:
+        network_.part(fault.target, fault.other, 1);
+        break;
+      case FaultKind::kStepClock:
+        offsets_[fault.target] += fault.step;
+        break;
+      case FaultKind::kFillDisk:
+        disks_[fault.target].full = true;
+        break;
+    }
+  }
+
+  void end(const Fault& fault) {
+    note(std::string("end of ") + name_of(fault.kind) + " " + std::to_string(fault.target));
+    switch (fault.kind) {
+      case FaultKind::kRename:
+        ++renamed_;
+        bring_up(plan_.owners - 1);
+        break;
+      case FaultKind::kStop:
+      case FaultKind::kKill:
+        bring_up(fault.target);
+        break;
+      case FaultKind::kPause:
+        if (const auto hung = hung_[&fault].lock()) hung->resume();
+        break;
+      case FaultKind::kCut:
+        network_.cut_in(fault.target, -1);
+        [[fallthrough]];
+      case FaultKind::kCutOneWay:
+        network_.cut_out(fault.target, -1);
+        break;
+      case FaultKind::kPart:
+        network_.part(fault.target, fault.other, -1);
+        break;
+      case FaultKind::kStepClock:
+        break;
+      case FaultKind::kFillDisk:
+        disks_[fault.target].full = false;
+        break;
+    }
+  }
+
+  // The last word of one who stops is still sent.
+  void take_down(std::size_t owner, bool gently) {
+    ++down_[owner];
+    if (!daemons_[owner]) return;
+    auto dying = std::exchange(daemons_[owner], nullptr);
+    if (gently) timeline_.after(milliseconds(5), [dying] {});
+  }
+
+  void bring_up(std::size_t owner) {
+    if (--down_[owner] == 0 && !daemons_[owner]) start_daemon(owner);
+  }
+
+  // ---- what must be true
+
+  [[nodiscard]] bool serves(const std::string& partition) const {
+    return std::any_of(daemons_.begin(), daemons_.end(), [&](const auto& daemon) {
+      return daemon && daemon->partition() == partition;
+    });
+  }
+
+  void check() {
+    std::vector<Process*> all;
+    for (const auto& daemon : daemons_) {
+      if (daemon) all.push_back(daemon.get());
+    }
+    for (const auto& author : authors_) all.push_back(&author->process());
+    const auto expected = all.back()->structure();
+    for (Process* one : all) {
+      const std::string who = one->partition().empty() ? "a client" : one->partition();
+      if (!one->partition().empty() && !one->serves()) violation(who + " does not serve");
+      if (one->structure() != expected) {
+        violation(who + " sees " + difference(one->structure(), expected));
+      }
+      if (!one->member().concessions().empty()) violation(who + " has something to concede");
+      for (const PartitionInfo& partition : one->directory().partitions()) {
+        if (partition.reachable != serves(partition.name)) {
+          violation(who + (partition.reachable ? " still hears " : " misses ") + partition.name);
+        }
+      }
+    }
+    check_owners(*all.back());
+    for (const auto& author : authors_) check_author(*author);
+  }
+
+  // Of a frame that one serves who is there, it is the owner; who is not there has none of the configured frames.
+  void check_owners(Process& one) {
+    for (std::size_t i = 0; i < plan_.owners; ++i) {
+      if (i == plan_.lost) continue;
+      const auto frame = one.forest().info(base_of(i));
+      const std::string owner = frame ? one.directory().name(frame->owner) : "nobody";
+      if (owner != name_of_daemon(i)) violation(base_of(i) + " is of " + owner);
+    }
+  }
+
+  void check_author(Author& author) {
+    Process& process = author.process();
+    for (const auto* models : {&author.model().frames(), &author.model().removed()}) {
+      for (const auto& [id, model] : *models) {
+        if (!serves(model.partition)) continue;
+        const auto frame = process.forest().info(id);
+        if (!frame) {
+          if (!model.may_be_gone()) violation(id + " is missing");
+          continue;
+        }
+        const std::string where =
+            "under '" + frame->parent + "' in " + process.directory().name(frame->owner);
+        const bool allowed =
+            std::any_of(model.possible.begin(), model.possible.end(),
+                        [&](const auto& place) { return place && place->parent == frame->parent; });
+        if (!model.may_be_there()) {
+          violation(id + ", which was removed, is " + where);
+        } else if (!allowed || process.directory().name(frame->owner) != model.partition) {
+          violation(id + " is " + where);
+        }
+      }
+    }
+    if (!run_.violations.empty()) return;
+    // Before the lookups, which change the model.
+    std::vector<std::pair<std::string, std::string>> edges;
+    for (const auto& [id, model] : author.model().frames()) {
+      const auto frame = process.forest().info(id);
+      if (frame && serves(model.partition) && process.forest().exists(frame->parent))
+        edges.emplace_back(frame->parent, id);
+    }
+    for (const auto& [parent, id] : edges) author.look_up(parent, id, true);
+    advance(timeline_.now() + 2 * Operation::kTimeout);
+    run_.counts["values checked"] += edges.size();
+  }
+
+  static std::string difference(const std::vector<std::string>& a,
+                                const std::vector<std::string>& b) {
+    std::string text;
+    for (const std::string& line : a) {
+      if (!std::binary_search(b.begin(), b.end(), line)) text += " [" + line + "]";
+    }
+    text += ", and others";
+    for (const std::string& line : b) {
+      if (!std::binary_search(a.begin(), a.end(), line)) text += " [" + line + "]";
+    }
+    return text;
+  }
+
+  const Plan& plan_;
+  const bool trace_;
+  Timeline timeline_;
+  Network network_;
+  testing::Random random_;
+  Surroundings surroundings_;
+  std::vector<std::shared_ptr<Process>> daemons_;
+  std::vector<Disk> disks_;  // the last is the renamed one's
+  std::vector<milliseconds> offsets_;
+  std::vector<int> down_;
+  std::vector<std::shared_ptr<Author>> authors_;
+  std::map<const Fault*, std::weak_ptr<Process>> hung_;
+  std::uint64_t processes_ = 0;
+  int renamed_ = 0;
+  bool renames_ = false;
+  Run run_;
+};
+
+}  // namespace
+
+Run run(const Plan& plan, bool trace) { return World(plan, trace).run(); }
+
+}  // namespace tfdude::simulation

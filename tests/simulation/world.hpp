@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "simulation/author.hpp"
+
+namespace tfdude::simulation {
+
+/// What a run has come to.
+struct Run {
+  std::vector<std::string> violations;
+  std::vector<std::uint64_t> hashes;          ///< of the steps so far, after each
+  std::map<std::string, std::size_t> counts;  ///< of outcomes, faults, and rare states
+  Instant duration{};
+};
+
+/// Runs a plan: the storm, then what must be true when those who are left have had time to agree.
+/// @param trace  prints each step
+[[nodiscard]] Run run(const Plan& plan, bool trace = false);
+
+}  // namespace tfdude::simulation

@@ -1,0 +1,217 @@
+// What a participant has to store, publish, reply and tell because of what it hears and is asked for.
+
+#include "partition/member.hpp"
+
+#include <string>
+#include <vector>
+
+#include "partition/claiming.hpp"
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/replica.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::presence_of;
+using testing::Replica;
+
+constexpr Time kNow{std::chrono::nanoseconds(1000)};
+constexpr PeerId kPeer{7};
+
+// One that serves "arms" with a frame "arm", and has told that.
+struct Serving : Replica {
+  explicit Serving(bool stores = true) : Replica("arms"), member(forest, directory, "arms") {
+    member.claim("here", 42, kNow, 5);
+    (void)member.introduce();
+    const StoredState nothing;
+    REQUIRE(member.serve(stores ? &nothing : nullptr, {{"arm", "", along_x(1)}}, kNow));
+    const Ready first = member.take_ready();
+    CHECK(first.pages.size() == 1);
+    CHECK(first.rows.frames.size() == (stores ? 1 : 0));
+    const auto said = member.stored(first);
+    REQUIRE(said);
+    CHECK(said->serving);
+    CHECK(said->pages == 1);
+    (void)member.take_outcome();
+  }
+
+  std::optional<Reply> ask(std::uint32_t sequence, const std::string& id,
+                           decltype(Request::body) body,
+                           const std::optional<Error>& refusal = std::nullopt) {
+    return member.on_request(kPeer, Request{sequence, id, std::move(body), 1}, refusal, kNow);
+  }
+
+  Member member;
+};
+
+const Error kFull{Errc::kState, "the disk is full"};
+
+}  // namespace
+
+TEST_CASE("member: one that owns nothing hears of others and has nothing to store or tell") {
+  Replica replica;
+  Member member(replica.forest, replica.directory, "");
+  member.on_presence(presence_of("head", 1, 1), kNow);
+  member.on_page(Page{"head", 0, 1, 1, {{"neck", "", 1}}});
+  const Outcome outcome = member.take_outcome();
+  REQUIRE(outcome.appeared);
+  CHECK(outcome.appeared->partition == "head");
+  CHECK(outcome.routes);
+  CHECK_FALSE(outcome.to_commit);
+  const Ready ready = member.take_ready();
+  CHECK(ready.rows.empty());
+  CHECK(ready.pages.empty());
+  CHECK_FALSE(ready.presence);
+}
+
+TEST_CASE("member: the reply to a change follows with what it rests on, once") {
+  Serving arms;
+  CHECK_FALSE(arms.ask(1, "hand", AddRequest{"arm", along_x(1)}));
+  CHECK(arms.member.take_outcome().to_reply);
+  // The same request once more, whose reply waits.
+  CHECK_FALSE(arms.ask(1, "hand", AddRequest{"arm", along_x(1)}));
+  const Ready ready = arms.member.take_ready();
+  REQUIRE(ready.replies.size() == 1);
+  CHECK(std::holds_alternative<Done>(ready.replies.front().reply.body));
+  CHECK(ready.replies.front().to == kPeer);
+  CHECK(ready.replies.front().what == "add frame 'hand' under 'arm'");
+  REQUIRE(ready.rows.frames.size() == 1);
+  CHECK(ready.rows.frames.front().id == "hand");
+  CHECK(ready.pages.size() == 1);
+  CHECK(arms.member.take_ready().replies.empty());
+}
+
+TEST_CASE("member: an update of values is answered at once where nothing is stored") {
+  Serving kept;
+  CHECK_FALSE(kept.ask(1, "arm", UpdateRequest{{{"arm", along_x(2)}}}));
+  Serving volatile_one(false);
+  CHECK(volatile_one.ask(1, "arm", UpdateRequest{{{"arm", along_x(2)}}}));
+}
+
+TEST_CASE("member: what could not be stored is ready again, but for the replies") {
+  Serving arms;
+  const auto epoch = arms.ask(1, "arms", RemoveRequest{})->epoch;
+  CHECK_FALSE(arms.ask(2, "hand", AddRequest{"arm", along_x(1)}));
+  const Ready ready = arms.member.take_ready();
+  CHECK_FALSE(arms.member.not_stored(ready));
+  // Meanwhile changes are refused, and of those that are not stored nothing is told.
+  CHECK_FALSE(arms.ask(3, "foot", AddRequest{"", along_x(1)}, kFull));
+  CHECK(arms.ask(4, "arms", RemoveRequest{}, kFull)->epoch == epoch);
+  const Ready again = arms.member.take_ready();
+  REQUIRE(again.replies.size() == 1);
+  CHECK(std::get<Error>(again.replies.front().reply.body).code == Errc::kState);
+  REQUIRE(again.rows.frames.size() == 1);
+  CHECK(again.rows.frames.front().id == "hand");
+  CHECK(again.pages.size() == 1);
+}
+
+TEST_CASE("member: one that serves nothing yet says nothing that it could not store") {
+  Replica replica("arms");
+  Member member(replica.forest, replica.directory, "arms");
+  member.claim("here", 42, kNow, 5);
+  (void)member.introduce();
+  member.on_presence(presence_of("head", 1, 1), kNow);
+  const StoredState nothing;
+  REQUIRE(member.serve(&nothing, {{"arm", "", {}}}, kNow));
+  REQUIRE(replica.directory.lost("head", 1, kNow));
+  CHECK_FALSE(member.not_stored(member.take_ready()));
+}
+
+TEST_CASE("member: a value is not stored where its frame was before") {
+  Serving arms;
+  CHECK_FALSE(arms.ask(1, "hand", AddRequest{"arm", along_x(1)}));
+  CHECK_FALSE(arms.ask(2, "foot", AddRequest{"", along_x(1)}));
+  (void)arms.member.stored(arms.member.take_ready());
+  CHECK_FALSE(arms.ask(3, "hand", MoveRequest{"foot", along_x(2)}));
+  const auto storable = arms.member.storable({{"arm", along_x(3)}, {"hand", along_x(2)}});
+  REQUIRE(storable.size() == 1);
+  CHECK(storable.front().id == "arm");
+  (void)arms.member.stored(arms.member.take_ready());
+  CHECK(arms.member.storable({{"hand", along_x(2)}}).size() == 1);
+}
+
+TEST_CASE("member: who hears a later process of its partition gives it up, and says why") {
+  Serving arms;
+  CHECK_FALSE(arms.ask(1, "hand", AddRequest{"arm", along_x(1)}));
+  Presence later = presence_of("arms", arms.member.presence().incarnation + 1, 1);
+  arms.member.on_presence(later, kNow);
+  const Outcome outcome = arms.member.take_outcome();
+  CHECK(outcome.gave_up);
+  REQUIRE(outcome.rival);
+  CHECK(arms.structure().empty());
+  const Ready ready = arms.member.take_ready();
+  REQUIRE(ready.refused);
+  CHECK(ready.rows.empty());
+  CHECK(ready.pages.empty());
+  CHECK(ready.replies.size() == 1);
+  const auto last = arms.member.stored(ready);
+  REQUIRE(last);
+  CHECK(last->stopped);
+  CHECK_FALSE(last->serving);
+  CHECK(std::get<Error>(arms.ask(2, "arm", RemoveRequest{})->body).code == Errc::kNotOwner);
+}
+
+TEST_CASE("member: others that know a later process are told of one that is later still") {
+  Serving arms;
+  const std::uint64_t own = arms.member.presence().incarnation;
+  Presence head = presence_of("head", 1, 0);
+  head.absent = {{"arms", 1, Absent::Kind::kLost, own + 50}};
+  arms.member.on_presence(head, kNow);
+  const Outcome outcome = arms.member.take_outcome();
+  REQUIRE(outcome.overtook);
+  CHECK(*outcome.overtook > own + 50);
+  CHECK(outcome.to_commit);
+  const Ready ready = arms.member.take_ready();
+  REQUIRE(ready.presence);
+  CHECK(ready.presence->incarnation == *outcome.overtook);
+  CHECK(ready.pages.size() == 1);
+}
+
+// ---- when a name is taken
+
+TEST_CASE("claiming: a name that nobody has is taken after the time to meet, then served") {
+  Presence own = presence_of("arms", 5, 0);
+  own.ticket = 5;
+  NameClaim claim(own);
+  Claiming::Patience patience;
+  patience.meeting = std::chrono::milliseconds(100);
+  const Claiming::Clock::time_point begin{};
+  const auto at = [&](int ms) { return begin + std::chrono::milliseconds(ms); };
+  Claiming claiming(claim, patience, begin);
+  using Step = Claiming::Step;
+  CHECK(claiming.next(at(99), false) == Step::kWait);
+  SECTION("at once") {
+    CHECK(claiming.next(at(100), false) == Step::kTake);
+    CHECK(claiming.next(at(101), false) == Step::kServe);
+  }
+  SECTION("later where somebody has not said yet what it serves, and not for ever") {
+    CHECK(claiming.next(at(100), true) == Step::kWait);
+    CHECK(claiming.next(at(3101), true) == Step::kTake);
+  }
+  SECTION("not while another one serves, who may have died just now") {
+    Presence other = presence_of("arms", 3, 1);
+    other.ticket = 3;
+    claim.hear(other);
+    CHECK(claiming.next(at(100), false) == Step::kWait);
+    SECTION("who has") {
+      claim.lost(3);
+      CHECK(claiming.next(at(500), false) == Step::kTake);
+    }
+    SECTION("who has not") { CHECK(claiming.next(at(1601), false) == Step::kLeave); }
+  }
+  SECTION("by the one of two who came first") {
+    CHECK(claiming.next(at(100), false) == Step::kTake);
+    Presence earlier = presence_of("arms", 3, 0);
+    earlier.ticket = 3;
+    earlier.serving = false;
+    claim.hear(earlier);
+    CHECK(claiming.next(at(101), false) == Step::kWait);
+    earlier.taken = true;
+    claim.hear(earlier);
+    CHECK(claiming.next(at(102), false) == Step::kLeave);
+  }
+}
+
+}  // namespace tfdude
