@@ -48,7 +48,8 @@ FaultKind draw_kind(Random& random, const std::array<std::size_t, kFaultKinds>& 
 
 const char* name_of(FaultKind kind) {
   static constexpr std::array<const char*, kFaultKinds> kNames{
-      "kill", "stop", "pause", "cut", "cut one way", "part", "step clock", "fill disk", "rename"};
+      "kill", "stop",       "pause",     "cut",     "cut one way",
+      "part", "step clock", "fill disk", "replace", "rename"};
   return kNames.at(static_cast<std::size_t>(kind));
 }
 
@@ -68,6 +69,7 @@ Plan draw_plan(std::uint64_t seed) {
       random.index(4) == 0 ? between(random, milliseconds(5), milliseconds(200)) : milliseconds(1);
   plan.contest = random.index(3) == 0 ? 0 : random.uniform(0, 0.5);
   plan.stores = random.index(8) != 0;
+  plan.wild_stores = plan.stores && random.index(2) == 0;
   const auto weights = draw_weights(random, plan.stores);
   plan.lost = plan.owners > 2 && random.index(4) == 0 ? random.index(plan.owners) : plan.owners;
   plan.loss_after = random.index(2) == 0 ? 0 : random.uniform(0, 0.02);
@@ -122,7 +124,7 @@ std::string Plan::text() const {
   out << "seed " << seed << ": " << owners << " owners, " << clients << " clients, storm "
       << ms(storm) << " ms, loss " << loss << ", repeats " << repeats << ", delay " << ms(delay)
       << " ms, disk " << ms(disk) << " ms, contest " << contest
-      << (stores ? ", stored" : ", not stored");
+      << (stores ? ", stored" : ", not stored") << (wild_stores ? "" : " (the last is not)");
   if (lost < owners) out << ", owner " << lost << " lost for good";
   for (std::size_t i = 0; i < faults.size(); ++i) {
     const Fault& fault = faults[i];

@@ -19,9 +19,10 @@ enum class FaultKind {
   kPart,       ///< two computers from each other
   kStepClock,  ///< of a daemon; for good
   kFillDisk,   ///< of a daemon
+  kReplace,    ///< a daemon hangs, and another is started in its place; then it goes on
   kRename,     ///< a daemon is killed, and another partition is started with its configuration
 };
-inline constexpr std::size_t kFaultKinds = 9;
+inline constexpr std::size_t kFaultKinds = 10;
 [[nodiscard]] const char* name_of(FaultKind kind);
 
 struct Fault {
@@ -45,6 +46,8 @@ struct Plan {
   Instant disk{};           ///< how long storing takes, at most
   double contest = 0;       ///< share of changes of frames that all fight over
   bool stores = true;       ///< daemons keep their frames
+  bool wild_stores =
+      true;  ///< and so does the last, which may be renamed and replaced, and nobody relies on
   /// Killed as the storm ends, for good: the others have to agree without it. The number of owners: nobody.
   std::size_t lost = 0;
   double loss_after = 0;      ///< of datagrams, when the storm is over

@@ -27,12 +27,10 @@ class World {
                       [this](const std::string& what) { violation(what); },
                       [this](const std::string& what) { ++run_.counts[what]; }},
         daemons_(plan.owners),
+        wild_(plan.owners - 1),
         disks_(plan.owners + 1),
         offsets_(plan.owners),
-        down_(plan.owners, 0) {
-    renames_ = std::any_of(plan.faults.begin(), plan.faults.end(),
-                           [](const Fault& fault) { return fault.kind == FaultKind::kRename; });
-  }
+        down_(plan.owners, 0) {}
 
   Run run() {
     for (std::size_t i = 0; i < plan_.owners; ++i) start_daemon(i);
@@ -79,23 +77,24 @@ class World {
     }
   }
 
-  // The last owner's partition is the one that may be renamed.
   [[nodiscard]] std::string name_of_daemon(std::size_t owner) const {
-    return owner + 1 == plan_.owners && renamed_ % 2 == 1 ? "renamed" : partition_name(owner);
+    return owner == wild_ && renamed_ % 2 == 1 ? "renamed" : partition_name(owner);
   }
   [[nodiscard]] Disk* disk_of(std::size_t owner) {
-    if (!plan_.stores) return nullptr;
+    if (!(owner == wild_ ? plan_.wild_stores : plan_.stores)) return nullptr;
     return &disks_[name_of_daemon(owner) == "renamed" ? plan_.owners : owner];
   }
 
-  void start_daemon(std::size_t owner) {
+  void start_daemon(std::size_t owner) { start_daemon(owner, disk_of(owner)); }
+
+  void start_daemon(std::size_t owner, Disk* disk) {
     Process::Setting setting;
     setting.host = owner;
     setting.id = ++processes_;
     setting.partition = name_of_daemon(owner);
     if (owner == 0) setting.configured.push_back({"world", "", {}});
     setting.configured.push_back({base_of(owner), "world", base_edge(owner)});
-    setting.disk = disk_of(owner);
+    setting.disk = disk;
     setting.clock_offset = &offsets_[owner];
     daemons_[owner] = std::make_shared<Process>(surroundings_, setting);
     network_.join(daemons_[owner]);
@@ -110,15 +109,19 @@ class World {
     auto process = std::make_shared<Process>(surroundings_, setting);
     network_.join(process);
     process->start();
-    const std::size_t owners = plan_.owners - (renames_ ? 1 : 0);
-    authors_.push_back(std::make_shared<Author>(process, number, owners, plan_.seed * 31 + number));
+    authors_.push_back(std::make_shared<Author>(process, number, wild_, plan_.seed * 31 + number));
     authors_.back()->start();
   }
 
-  // Daemons that have ended, as another had their name, are started again.
+  // Of one that hung and the one in its place, one goes on. Other daemons that have ended are started again.
   void look_after() {
+    if (replaced_ && replaced_->ended()) replaced_.reset();
+    if (replaced_ && !replaced_->paused() && daemons_[wild_] && daemons_[wild_]->ended()) {
+      daemons_[wild_] = std::exchange(replaced_, nullptr);
+    }
     for (std::size_t i = 0; i < plan_.owners; ++i) {
-      if (!daemons_[i] || !daemons_[i]->ended() || down_[i] > 0) continue;
+      const bool awaits = i == wild_ && replaced_;
+      if (!daemons_[i] || !daemons_[i]->ended() || down_[i] > 0 || awaits) continue;
       ++run_.counts["daemon ended by itself"];
       daemons_[i].reset();
       start_daemon(i);
@@ -137,8 +140,16 @@ class World {
         [[fallthrough]];
       case FaultKind::kKill:
       case FaultKind::kRename:
-        take_down(fault.kind == FaultKind::kRename ? plan_.owners - 1 : fault.target,
+        take_down(fault.kind == FaultKind::kRename ? wild_ : fault.target,
                   fault.kind == FaultKind::kStop);
+        break;
+      case FaultKind::kReplace:
+        if (!daemons_[wild_] || daemons_[wild_]->paused() || replaced_) break;
+        daemons_[wild_]->pause();
+        // On another computer, which has nothing of it.
+        replaced_ = std::exchange(daemons_[wild_], nullptr);
+        replaced_by_ = &fault;
+        start_daemon(wild_, nullptr);
         break;
       case FaultKind::kPause:
         if (daemons_[fault.target]) {
@@ -169,11 +180,14 @@ class World {
     switch (fault.kind) {
       case FaultKind::kRename:
         ++renamed_;
-        bring_up(plan_.owners - 1);
+        bring_up(wild_);
         break;
       case FaultKind::kStop:
       case FaultKind::kKill:
         bring_up(fault.target);
+        break;
+      case FaultKind::kReplace:
+        if (replaced_ && replaced_by_ == &fault) replaced_->resume();
         break;
       case FaultKind::kPause:
         if (const auto hung = hung_[&fault].lock()) hung->resume();
@@ -198,6 +212,7 @@ class World {
   // The last word of one who stops is still sent.
   void take_down(std::size_t owner, bool gently) {
     ++down_[owner];
+    if (owner == wild_) replaced_.reset();
     if (!daemons_[owner]) return;
     auto dying = std::exchange(daemons_[owner], nullptr);
     if (gently) timeline_.after(milliseconds(5), [dying] {});
@@ -236,6 +251,7 @@ class World {
       }
     }
     check_owners(*all.back());
+    if (replaced_) violation("one that was replaced serves on");
     for (const auto& author : authors_) check_author(*author);
   }
 
@@ -276,7 +292,7 @@ class World {
     std::vector<std::pair<std::string, std::string>> edges;
     for (const auto& [id, model] : author.model().frames()) {
       const auto frame = process.forest().info(id);
-      if (frame && serves(model.partition) && process.forest().exists(frame->parent))
+      if (frame && serves(model.partition) && frame->attached)
         edges.emplace_back(frame->parent, id);
     }
     for (const auto& [parent, id] : edges) author.look_up(parent, id, true);
@@ -304,14 +320,16 @@ class World {
   testing::Random random_;
   Surroundings surroundings_;
   std::vector<std::shared_ptr<Process>> daemons_;
+  const std::size_t wild_;   // the last owner, which may be renamed and replaced
   std::vector<Disk> disks_;  // the last is the renamed one's
   std::vector<milliseconds> offsets_;
   std::vector<int> down_;
   std::vector<std::shared_ptr<Author>> authors_;
   std::map<const Fault*, std::weak_ptr<Process>> hung_;
+  std::shared_ptr<Process> replaced_;  // the wild one, while it hangs
+  const Fault* replaced_by_ = nullptr;
   std::uint64_t processes_ = 0;
   int renamed_ = 0;
-  bool renames_ = false;
   Run run_;
 };
 

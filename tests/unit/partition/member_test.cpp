@@ -119,6 +119,16 @@ TEST_CASE("member: one that serves nothing yet says nothing that it could not st
   CHECK_FALSE(member.not_stored(member.take_ready()));
 }
 
+TEST_CASE(
+    "member: it serves as a later process than it has claimed its name as, whatever its clock") {
+  Replica replica("arms");
+  Member member(replica.forest, replica.directory, "arms");
+  member.claim("here", 42, kNow + std::chrono::hours(2), 5);
+  const std::uint64_t claimed = member.introduce().incarnation;
+  REQUIRE(member.serve(nullptr, {}, kNow));
+  CHECK(member.introduce().incarnation > claimed);
+}
+
 TEST_CASE("member: a value is not stored where its frame was before") {
   Serving arms;
   CHECK_FALSE(arms.ask(1, "hand", AddRequest{"arm", along_x(1)}));
