@@ -113,6 +113,8 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
                                "(default: $XDG_STATE_HOME/tfdude or ~/.local/state/tfdude)");
   app.add_flag("--no-state", no_state, "keep nothing: begin with --config each time")
       ->excludes(state);
+  app.add_flag("--sync", arguments.options.sync,
+               "what is stored survives a loss of power, too: each change waits for the disk");
   app.add_option("--save-every", save_every_ms, "how often at most streamed values are stored [ms]")
       ->check(CLI::Range(1, 86'400'000));
   app.add_option("--discovery-server", arguments.options.discovery_server,

@@ -72,8 +72,9 @@ void Participant::say_goodbye() {
 }
 
 Result<StoredState> Participant::open_store(std::unique_ptr<StateStore>& store) {
-  auto opened = open_sqlite_store(state_file(options_.state, options_.domain, partition_name_),
-                                  partition_name_);
+  auto opened = open_sqlite_store(
+      state_file(options_.state, options_.domain, partition_name_), partition_name_,
+      options_.sync ? StoreSync::kEachChange : StoreSync::kAtCheckpoints);
   if (!opened) return tl::unexpected(std::move(opened.error()));
   store = *std::move(opened);
   return store->load();

@@ -36,7 +36,7 @@ std::string without_spaces(std::string_view text) {
 
 class SqliteStore final : public StateStore {
  public:
-  explicit SqliteStore(std::string file) : file_(std::move(file)) {}
+  SqliteStore(std::string file, StoreSync sync) : file_(std::move(file)), sync_(sync) {}
 
   Result<void> open(const std::string& partition);
 
@@ -65,6 +65,7 @@ class SqliteStore final : public StateStore {
   Result<void> transaction(Write write);
 
   const std::string file_;
+  const StoreSync sync_;
   std::optional<Database> database_;
   bool written_ = false;           // by this process
   std::int64_t format_ = kFormat;  // of the file as it is
@@ -251,7 +252,11 @@ Result<StoredState> SqliteStore::load() {
 
 Result<void> SqliteStore::make_ready() {
   if (written_) return {};
-  auto done = database_->run("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;");
+  auto done = database_->run("PRAGMA journal_mode = WAL;");
+  if (done) {
+    done = database_->run(sync_ == StoreSync::kEachChange ? "PRAGMA synchronous = FULL;"
+                                                          : "PRAGMA synchronous = NORMAL;");
+  }
   if (done) database_->tidy_up_at_close();
   if (done && format_ != kFormat) done = bring_up_to_date();
   written_ = done.has_value();
@@ -344,8 +349,9 @@ Result<void> SqliteStore::save_configured(const std::vector<FrameSpec>& frames) 
 }  // namespace
 
 Result<std::unique_ptr<StateStore>> open_sqlite_store(const std::string& file,
-                                                      const std::string& partition) {
-  auto store = std::make_unique<SqliteStore>(file);
+                                                      const std::string& partition,
+                                                      StoreSync sync) {
+  auto store = std::make_unique<SqliteStore>(file, sync);
   if (auto opened = store->open(partition); !opened) return tl::unexpected(opened.error());
   return store;
 }

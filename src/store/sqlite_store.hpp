@@ -13,12 +13,18 @@ namespace tfdude {
 [[nodiscard]] std::string state_file(const std::string& directory, std::uint32_t domain,
                                      const std::string& partition);
 
-/// Opens a partition's state, or makes an empty one, and keeps others from opening it. An SQLite file in WAL mode,
-/// synced at checkpoints only: what was saved survives the end of the process at any instant, and the
-/// file stays whole also where the computer stops, which may cost the last changes.
+/// When what is written must have reached the disk (SQLite's "PRAGMA synchronous").
+enum class StoreSync {
+  kAtCheckpoints,  ///< NORMAL: where the computer stops, the last changes may be lost; the file stays whole
+  kEachChange,  ///< FULL: none is lost; each change waits for the disk
+};
+
+/// Opens a partition's state, or makes an empty one, and keeps others from opening it. An SQLite file in WAL mode: what
+/// was saved survives the end of the process at any instant.
 /// @return kState naming the file and what to do: in use, damaged, of another program, of a newer format, of
 ///   another partition, not to be created. A file that cannot be read is not changed.
-[[nodiscard]] Result<std::unique_ptr<StateStore>> open_sqlite_store(const std::string& file,
-                                                                    const std::string& partition);
+[[nodiscard]] Result<std::unique_ptr<StateStore>> open_sqlite_store(
+    const std::string& file, const std::string& partition,
+    StoreSync sync = StoreSync::kAtCheckpoints);
 
 }  // namespace tfdude

@@ -162,17 +162,53 @@ TEST_CASE("storing: a removal that was refused has not happened after a kill") {
   CHECK(fresh.exists("hand") == (last == "hand"));
 }
 
+#ifdef TFDUDE_SLOW_SYNC
+Process start_on_slow_disk(const TestDomain& domain, const TemporaryDirectory& files,
+                           const std::string& sync_ms, const std::vector<std::string>& more) {
+  std::vector<std::string> command{"/usr/bin/env",
+                                   "LD_PRELOAD=" TFDUDE_SLOW_SYNC,
+                                   "TFDUDE_SYNC_MS=" + sync_ms,
+                                   TFDUDE_DAEMON,
+                                   "--config",
+                                   files.write("arms.yaml", kArms),
+                                   "--state",
+                                   files.path(),
+                                   "--domain",
+                                   std::to_string(domain.number()),
+                                   "--profile",
+                                   TFDUDE_LOOPBACK_PROFILE};
+  command.insert(command.end(), more.begin(), more.end());
+  Process daemon(command);
+  await_ready(daemon);
+  return daemon;
+}
+#endif
+
+TEST_CASE("storing: with --sync a change is acknowledged when the disk has it") {
+#ifndef TFDUDE_SLOW_SYNC
+  WARN("SKIPPED: a library cannot be preloaded into a program with sanitizers");
+#else
+  const TestDomain domain;
+  const TemporaryDirectory files;
+  Process daemon = start_on_slow_disk(domain, files, "300", {"--sync"});
+  Options patient = domain.options();
+  patient.timeout = Milliseconds(20000);
+  auto client = *Client::open(patient);
+  for (const std::string id : {"a", "b"}) {
+    const auto start = Clock::now();
+    REQUIRE(client.add(id, "hand", {}));
+    CHECK(Clock::now() - start >= std::chrono::milliseconds(300));
+  }
+#endif
+}
+
 TEST_CASE("storing: lookups and streams go on while the disk takes a second for a sync") {
 #ifndef TFDUDE_SLOW_SYNC
   WARN("SKIPPED: a library cannot be preloaded into a program with sanitizers");
 #else
   const TestDomain domain;
   const TemporaryDirectory files;
-  Process daemon({"/usr/bin/env", "LD_PRELOAD=" TFDUDE_SLOW_SYNC, "TFDUDE_SYNC_MS=1000",
-                  TFDUDE_DAEMON, "--config", files.write("arms.yaml", kArms), "--state",
-                  files.path(), "--domain", std::to_string(domain.number()), "--profile",
-                  TFDUDE_LOOPBACK_PROFILE});
-  await_ready(daemon);
+  Process daemon = start_on_slow_disk(domain, files, "1000", {});
   auto client = *Client::open(domain.options());
   auto other = *Client::open(domain.options());
   REQUIRE(other.exists("hand"));

@@ -265,6 +265,16 @@ class World {
     }
   }
 
+  // Whether it hangs below a root, and not below a frame that was removed: such trees the model does not know.
+  static bool stands(Process& process, FrameInfo frame) {
+    while (!frame.parent.empty()) {
+      const auto parent = process.forest().info(frame.parent);
+      if (!parent) return false;
+      frame = *parent;
+    }
+    return true;
+  }
+
   void check_author(Author& author) {
     Process& process = author.process();
     for (const auto* models : {&author.model().frames(), &author.model().removed()}) {
@@ -292,7 +302,7 @@ class World {
     std::vector<std::pair<std::string, std::string>> edges;
     for (const auto& [id, model] : author.model().frames()) {
       const auto frame = process.forest().info(id);
-      if (frame && serves(model.partition) && frame->attached)
+      if (frame && serves(model.partition) && stands(process, *frame))
         edges.emplace_back(frame->parent, id);
     }
     for (const auto& [parent, id] : edges) author.look_up(parent, id, true);

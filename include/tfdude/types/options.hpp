@@ -24,6 +24,9 @@ struct Options {
   /// Directory in which a Node keeps its partition's frames, so that its next process has them back; empty:
   /// it keeps nothing. What others change by request is stored before they are answered.
   std::string state;
+  /// Whether what is stored survives a loss of power, too: each change then waits until the disk has it. Else such a loss may
+  /// cost the last changes, though they were acknowledged; the end of the process costs none.
+  bool sync = false;
   /// How often at most values that were streamed, or set by the Node's own process, are stored.
   Milliseconds save_every{1000};
   /// How much is kept of the past of a Node's edges, where a frame says nothing else.

@@ -77,7 +77,8 @@ TEST_CASE("who sends a page and then nothing is gone, and not waited for") {
   }
 }
 
-TEST_CASE("who sends a page of a later process than it has said, and then leaves, is gone as that") {
+TEST_CASE(
+    "who sends a page of a later process than it has said, and then leaves, is gone as that") {
   std::vector<std::uint64_t> gone;
   Peers peers([](const Presence&) {},
               [&](const Presence& one) { gone.push_back(one.incarnation); });
