@@ -1,7 +1,10 @@
 // Runs whole systems in simulated time: simulate [--seed N] [--count N] [--trace].
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
+#include <string>
 
 #include <CLI/CLI.hpp>
 
