@@ -12,6 +12,7 @@
 #include <pthread.h>
 #include <thread>
 
+#include "tfdude/client/node.hpp"
 #include "tfdude/transport/loopback.hpp"
 
 #include "core/trees.hpp"

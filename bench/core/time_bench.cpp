@@ -19,6 +19,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "tfdude/client/node.hpp"
 #include "tfdude/transport/loopback.hpp"
 
 #include "core/trees.hpp"

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "tfdude/client/node.hpp"
+
 #include "net/floor_dds.hpp"
 #include "net/harness.hpp"
 

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "tfdude/client/node.hpp"
+
 #include "net/harness.hpp"
 
 namespace {

@@ -26,6 +26,7 @@
 #include <utility>
 #include <vector>
 
+#include "tfdude/client/node.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
 #include "net/harness.hpp"

@@ -3,7 +3,6 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <memory>
 #include <string>
 
 #include "transport/port.hpp"
@@ -35,7 +34,6 @@ class AppliedListener {
 
 /// Counts what comes to an owner without changing how it gets there: a transport between the real one and
 /// the participant.
-std::unique_ptr<tfdude::Transport> watch(std::unique_ptr<tfdude::Transport> transport,
-                                         AppliedListener& listener);
+tfdude::TransportPtr watch(tfdude::TransportPtr transport, AppliedListener& listener);
 
 }  // namespace bench

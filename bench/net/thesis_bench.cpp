@@ -29,6 +29,8 @@
 #include <string>
 #include <utility>
 
+#include "tfdude/client/node.hpp"
+
 #include "net/harness.hpp"
 
 namespace {
