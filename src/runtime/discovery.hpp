@@ -37,6 +37,9 @@ class Discovery {
   /// later.
   [[nodiscard]] Deadline call_deadline() const;
 
+  /// Whether what an error says to be missing may be met yet.
+  [[nodiscard]] static bool may_appear(Errc code);
+
   /// Waits until it is complete. @return kTimeout, naming what was missing.
   [[nodiscard]] Result<void> await(const Deadline& deadline);
 
@@ -61,8 +64,6 @@ class Discovery {
   void wait_for_news(const Deadline& deadline = Deadline(Milliseconds::max()));
 
  private:
-  /// Whether what an error says to be missing may be met yet.
-  [[nodiscard]] static bool may_appear(Errc code);
   /// Of what seems not to be there, as others know more.
   [[nodiscard]] Error explained(Error error);
   /// Why it is not known yet: kTimeout.

@@ -7,12 +7,6 @@
 #include "runtime/asking.hpp"
 
 namespace tfdude {
-namespace {
-
-// How long the structure may take to reach us where a reply says that ours is old.
-constexpr Milliseconds kStructureDelay{100};
-
-}  // namespace
 
 bool Requests::denies_plan(Errc code) {
   return code == Errc::kAlreadyExists || code == Errc::kUnknownParent || code == Errc::kCycle;

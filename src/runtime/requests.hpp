@@ -26,6 +26,13 @@ class Requests {
  public:
   using Clock = Deadline::Clock;
 
+  /// How often an owner is asked that may not be the owner any more.
+  static constexpr int kAttempts = 3;
+  /// How long the structure may take to reach us where a reply says that ours is old.
+  static constexpr Milliseconds kStructureDelay{100};
+  /// Whether an owner denies what the plan has checked before it was asked.
+  [[nodiscard]] static bool denies_plan(Errc code);
+
   /// What this process does as an owner.
   struct Own {
     std::function<Reply(const Request&)> answer;
@@ -121,9 +128,6 @@ class Requests {
   void await_change(const Part& part, const Reply& reply, const Deadline& deadline);
 
  private:
-  static constexpr int kAttempts = 3;
-  /// Whether an owner denies what the plan has checked before it was asked.
-  static bool denies_plan(Errc code);
   void await_structure_change(std::uint64_t version, const Deadline& deadline);
 
   Structure& structure_;

@@ -36,11 +36,13 @@ Frames frames_by_cli(const Cluster& cluster) {
   return frames;
 }
 
-std::string describe(const Frames& frames, const std::string& id) {
+const Frame* find(const Frames& frames, const std::string& id) {
   const auto found = frames.find(id);
-  if (found == frames.end()) return "none";
-  const Frame& frame = found->second;
-  return "under '" + frame.parent + "' in " + frame.partition + (frame.attached ? "" : ", loose");
+  return found != frames.end() ? &found->second : nullptr;
+}
+
+std::string describe(const Frames& frames, const std::string& id) {
+  return faults::describe(find(frames, id));
 }
 
 // Empty where both are the same; else the first frame that differs.
@@ -57,19 +59,6 @@ std::string difference(const Frames& a, const Frames& b) {
   return "";
 }
 
-// Empty where a frame is as its model says; else how it is.
-std::string misplaced(const Frames& frames, const std::string& id, const Model::Frame& model) {
-  const auto found = frames.find(id);
-  if (found == frames.end()) return model.may_be_gone() ? "" : id + " is missing";
-  const Frame& frame = found->second;
-  const bool allowed =
-      std::any_of(model.possible.begin(), model.possible.end(),
-                  [&](const auto& place) { return place && place->parent == frame.parent; });
-  if (!model.may_be_there()) return id + ", which was removed, is " + describe(frames, id);
-  if (!allowed || frame.partition != model.partition) return id + " is " + describe(frames, id);
-  return "";
-}
-
 struct Misplaced {
   std::string what;
   std::deque<std::string> history;
@@ -80,7 +69,7 @@ std::vector<Misplaced> all_misplaced(const Frames& frames, const Workers& worker
   for (const auto& worker : workers) {
     for (const auto* models : {&worker->model().frames(), &worker->model().removed()}) {
       for (const auto& [id, model] : *models) {
-        const std::string what = misplaced(frames, id, model);
+        const std::string what = misplaced(id, model, find(frames, id));
         if (!what.empty()) all.push_back({what, model.history});
       }
     }

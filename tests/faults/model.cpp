@@ -129,6 +129,15 @@ void Model::note(const std::string& id, const std::string& line) {
   if (history.size() > kHistoryKept) history.pop_front();
 }
 
+std::vector<std::string> Model::ids(const std::string& prefix, bool anchored) const {
+  std::vector<std::string> ids;
+  for (const auto& [id, frame] : frames_) {
+    if (id.compare(0, prefix.size(), prefix) != 0) continue;
+    if (anchored ? this->anchored(id) : frame.may_be_there()) ids.push_back(id);
+  }
+  return ids;
+}
+
 bool Model::anchored(const std::string& id) const {
   std::size_t steps = 0;
   for (std::string at = id; !at.empty(); ++steps) {

@@ -66,6 +66,9 @@ class Model {
   /// One of either.
   [[nodiscard]] const Frame& frame(const std::string& id) const;
 
+  /// Of those whose names begin so: the ones that may be there, or that are anchored.
+  [[nodiscard]] std::vector<std::string> ids(const std::string& prefix, bool anchored) const;
+
   /// Whether a frame is there for sure, and all above it too, each where it is known to be.
   [[nodiscard]] bool anchored(const std::string& id) const;
   /// Whether a frame hangs below another, or may do so, or is that.

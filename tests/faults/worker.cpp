@@ -14,29 +14,6 @@ constexpr std::size_t kFrames = 40;
 constexpr std::size_t kJoints = 3;
 constexpr std::size_t kRemovedKept = 10;
 
-// Denied by a replica or an owner that is behind, or rightly.
-bool denies(Errc code) {
-  switch (code) {
-    case Errc::kUnknownFrame:
-    case Errc::kUnknownStart:
-    case Errc::kUnknownEnd:
-    case Errc::kUnknownParent:
-    case Errc::kUnknownPartition:
-    case Errc::kNotConnected:
-    case Errc::kAlreadyExists:
-    case Errc::kCycle:
-    case Errc::kInvalidInput:
-      return true;
-    default:
-      return false;
-  }
-}
-
-// Known to be away, and not asked therefore: said of a call to a single owner.
-bool never_asked(const Error& error) {
-  return error.code == Errc::kUnreachable && error.message.find(" since ") != std::string::npos;
-}
-
 std::string translation(const Transform& X) {
   const Eigen::Vector3d t = X.pose.translation();
   char text[64];
@@ -51,15 +28,6 @@ Transform joint_value(std::uint32_t serial, std::size_t owner) {
 
 }  // namespace
 
-std::string partition_name(std::size_t partition) { return "p" + std::to_string(partition); }
-std::string base_of(std::size_t partition) { return "base_" + std::to_string(partition); }
-std::string contested_frame(std::size_t number) { return "shared_" + std::to_string(number); }
-
-Transform base_edge(std::size_t partition) {
-  const double x = static_cast<double>(partition) + 1.0;
-  return {Pose::trusted(Eigen::Quaterniond::Identity(), {x, -x, 0.25}), {}};
-}
-
 Worker::Worker(Client client, std::size_t number, std::size_t partitions, std::uint64_t seed,
                Journal& journal)
     : client_(std::move(client)),
@@ -68,10 +36,7 @@ Worker::Worker(Client client, std::size_t number, std::size_t partitions, std::u
       partitions_(partitions),
       random_(seed),
       journal_(journal) {
-  model_.fix("world", partition_name(0), {});
-  for (std::size_t i = 0; i < partitions; ++i) {
-    model_.fix(base_of(i), partition_name(i), {"world", base_edge(i)});
-  }
+  fix_bases(model_, partitions);
 }
 
 void Worker::start() {
@@ -160,14 +125,7 @@ void Worker::denied(const std::string& what, const std::string& frame) {
   journal_.count("denied amid faults", what.substr(0, what.find(' ')));
 }
 
-std::vector<std::string> Worker::own(bool anchored) const {
-  std::vector<std::string> ids;
-  for (const auto& [id, frame] : model_.frames()) {
-    if (id.compare(0, prefix_.size(), prefix_) != 0) continue;
-    if (anchored ? model_.anchored(id) : frame.may_be_there()) ids.push_back(id);
-  }
-  return ids;
-}
+std::vector<std::string> Worker::own(bool anchored) const { return model_.ids(prefix_, anchored); }
 
 bool Worker::quiet() {
   if (calm_ <= kGrace) return false;

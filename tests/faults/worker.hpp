@@ -11,19 +11,14 @@
 
 #include "tfdude/client/client.hpp"
 
+#include "faults/frames.hpp"
 #include "faults/journal.hpp"
 #include "faults/model.hpp"
 #include "support/random.hpp"
 
 namespace tfdude::faults {
 
-/// The frame that each partition is configured with, below the world of the first.
-[[nodiscard]] std::string base_of(std::size_t partition);
-[[nodiscard]] std::string partition_name(std::size_t partition);
-/// Of the edge from the world to a base.
-[[nodiscard]] Transform base_edge(std::size_t partition);
-/// Frames that all clients change, so that nobody knows what becomes of them.
-[[nodiscard]] std::string contested_frame(std::size_t number);
+/// How many frames all clients change.
 inline constexpr std::size_t kContested = 12;
 
 /// A client in a thread of its own that changes frames and asks for them, and holds each answer against its model.

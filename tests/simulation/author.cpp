@@ -6,42 +6,17 @@
 namespace tfdude::simulation {
 namespace {
 
+using faults::base_edge;
+using faults::base_of;
+using faults::contested_frame;
+using faults::denies;
+using faults::never_asked;
+using faults::partition_name;
 using faults::Place;
 
 constexpr std::size_t kFrames = 12;  // of one author at a time
 
-bool denies(Errc code) {
-  switch (code) {
-    case Errc::kUnknownFrame:
-    case Errc::kUnknownStart:
-    case Errc::kUnknownEnd:
-    case Errc::kUnknownParent:
-    case Errc::kUnknownPartition:
-    case Errc::kNotConnected:
-    case Errc::kAlreadyExists:
-    case Errc::kCycle:
-    case Errc::kInvalidInput:
-      return true;
-    default:
-      return false;
-  }
-}
-
-// Known to be away, and not asked therefore.
-bool never_asked(const Error& error) {
-  return error.code == Errc::kUnreachable && error.message.find(" since ") != std::string::npos;
-}
-
 }  // namespace
-
-std::string partition_name(std::size_t owner) { return "p" + std::to_string(owner); }
-std::string base_of(std::size_t owner) { return "base_" + std::to_string(owner); }
-std::string contested_frame(std::size_t number) { return "shared_" + std::to_string(number); }
-
-Transform base_edge(std::size_t owner) {
-  const double x = static_cast<double>(owner) + 1.0;
-  return {Pose::trusted(Eigen::Quaterniond::Identity(), {x, -x, 0.25}), {}};
-}
 
 Author::Author(std::shared_ptr<Process> process, std::size_t number, std::size_t owners,
                std::uint64_t seed)
@@ -49,10 +24,7 @@ Author::Author(std::shared_ptr<Process> process, std::size_t number, std::size_t
       prefix_("c" + std::to_string(number) + "_"),
       owners_(owners),
       random_(seed) {
-  model_.fix("world", partition_name(0), {});
-  for (std::size_t i = 0; i < owners; ++i) {
-    model_.fix(base_of(i), partition_name(i), {"world", base_edge(i)});
-  }
+  faults::fix_bases(model_, owners);
 }
 
 void Author::start() { next(); }
@@ -100,14 +72,7 @@ void Author::begin(const std::string& what, Operation::Route route,
       }));
 }
 
-std::vector<std::string> Author::own(bool anchored) const {
-  std::vector<std::string> ids;
-  for (const auto& [id, frame] : model_.frames()) {
-    if (id.compare(0, prefix_.size(), prefix_) != 0) continue;
-    if (anchored ? model_.anchored(id) : frame.may_be_there()) ids.push_back(id);
-  }
-  return ids;
-}
+std::vector<std::string> Author::own(bool anchored) const { return model_.ids(prefix_, anchored); }
 
 std::string Author::any(const std::vector<std::string>& ids) {
   return ids[random_.index(ids.size())];

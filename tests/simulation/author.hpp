@@ -6,17 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "faults/frames.hpp"
 #include "faults/model.hpp"
 #include "simulation/process.hpp"
 
 namespace tfdude::simulation {
 
-[[nodiscard]] std::string partition_name(std::size_t owner);
-[[nodiscard]] std::string base_of(std::size_t owner);
-[[nodiscard]] Transform base_edge(std::size_t owner);
-/// Frames that all fight over.
+/// How many frames all fight over.
 inline constexpr std::size_t kContested = 4;
-[[nodiscard]] std::string contested_frame(std::size_t number);
 
 /// A client that does one thing after the other and knows what may have come of it: of its own frames all, as nobody else
 /// changes them.

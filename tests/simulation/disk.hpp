@@ -1,9 +1,5 @@
 #pragma once
 
-#include <memory>
-#include <string>
-#include <vector>
-
 #include "support/memory_store.hpp"
 
 namespace tfdude::simulation {

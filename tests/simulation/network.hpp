@@ -39,7 +39,7 @@ class Network {
 
   /// Whether a beat of that process is heard now.
   [[nodiscard]] bool beats(std::uint64_t from, const Process& to);
-  /// Who is said to serve a partition by somebody who was met.
+  /// Whose samples reach that process.
   [[nodiscard]] std::vector<std::uint64_t> met_by(const Process& one) const;
 
   // Faults; counted, as several may concern one link.

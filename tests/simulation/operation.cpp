@@ -3,24 +3,13 @@
 #include <algorithm>
 
 #include "partition/requests.hpp"
+#include "runtime/requests.hpp"
 #include "simulation/process.hpp"
 
 namespace tfdude::simulation {
 namespace {
 
 constexpr Instant kPoll = milliseconds(10);
-constexpr Instant kStructureDelay = milliseconds(100);
-constexpr int kAttempts = 3;
-
-bool may_appear(Errc code) {
-  return code == Errc::kUnknownFrame || code == Errc::kUnknownStart || code == Errc::kUnknownEnd ||
-         code == Errc::kUnknownParent || code == Errc::kUnknownPartition ||
-         code == Errc::kNotConnected;
-}
-
-bool denies_plan(Errc code) {
-  return code == Errc::kAlreadyExists || code == Errc::kUnknownParent || code == Errc::kCycle;
-}
 
 }  // namespace
 
@@ -61,7 +50,8 @@ void Operation::plan() {
   const bool certain = caller_.discovered();
   auto parts = route_();
   if (parts) return ask(*std::move(parts));
-  if (certain || !may_appear(parts.error().code)) return finish(tl::unexpected(parts.error()));
+  if (certain || !Discovery::may_appear(parts.error().code))
+    return finish(tl::unexpected(parts.error()));
   caller_.later(kPoll, [self = shared_from_this()] {
     if (!self->over_ && self->phase_ == Phase::kPlan) self->plan();
   });
@@ -155,9 +145,9 @@ void Operation::look_again() {
   if (!settled && now() < deadline_) return;
   if (!stored_ && outcome_) outcome_ = fail(Errc::kTimeout, "changed, but not stored in time");
   const auto code = outcome_ ? std::optional<Errc>() : outcome_.error().code;
-  if (code == Errc::kNotOwner && ++attempts_ < kAttempts && now() < deadline_) {
-    retry(kStructureDelay);
-  } else if (code && denies_plan(*code) && now() + pause_ < deadline_) {
+  if (code == Errc::kNotOwner && ++attempts_ < Requests::kAttempts && now() < deadline_) {
+    retry(Requests::kStructureDelay);
+  } else if (code && Requests::denies_plan(*code) && now() + pause_ < deadline_) {
     retry(pause_);
     pause_ *= 2;
   } else {
@@ -168,7 +158,7 @@ void Operation::look_again() {
 // After a while, or as soon as the structure has changed where the route was stale.
 void Operation::retry(Instant pause) {
   phase_ = Phase::kPlan;
-  await_change(std::min(now() + pause, deadline_), pause == kStructureDelay);
+  await_change(std::min(now() + pause, deadline_), pause == Requests::kStructureDelay);
 }
 
 void Operation::await_change(Instant until, bool stale) {

@@ -1,6 +1,7 @@
 #include "simulation/process.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 #include "partition/requests.hpp"
@@ -18,6 +19,19 @@ constexpr Instant kPublishEvery = milliseconds(1);
 constexpr Instant kRetryStoring = milliseconds(200);
 constexpr Instant kSaveValuesEvery = milliseconds(1000);
 
+// Who speaks, as its number in its first eight bytes.
+PeerId peer_of(std::uint64_t process) {
+  PeerId peer{};
+  std::memcpy(peer.data(), &process, sizeof process);
+  return peer;
+}
+
+std::uint64_t process_of(const PeerId& peer) {
+  std::uint64_t process = 0;
+  std::memcpy(&process, peer.data(), sizeof process);
+  return process;
+}
+
 }  // namespace
 
 Process::Process(Surroundings& world, Setting setting)
@@ -34,12 +48,6 @@ Time Process::wall() const {
   constexpr std::chrono::seconds kBeginning{1'700'000'000};
   return Time(kBeginning + world_.timeline.now() +
               (setting_.clock_offset != nullptr ? *setting_.clock_offset : milliseconds(0)));
-}
-
-PeerId Process::peer_id(std::uint64_t process) const {
-  PeerId peer{};
-  for (std::size_t i = 0; i < 8; ++i) peer[i] = static_cast<std::uint8_t>(process >> (8 * i));
-  return peer;
 }
 
 void Process::start() {
@@ -224,7 +232,7 @@ void Process::count(const Outcome& outcome) {
 
 void Process::on_request(std::uint64_t from, const Request& request) {
   if (!serving_) return;
-  const PeerId peer = peer_id(from);
+  const PeerId peer = peer_of(from);
   const auto reply_now = [&](const Reply& reply) {
     world_.network.send(*this, from, [reply](Process& there) { there.on_reply(reply); });
   };
@@ -329,9 +337,8 @@ void Process::perform(const Ready& ready) {
   for (const PendingReply& pending : ready.replies) {
     Reply reply = pending.reply;
     if (!stored) reply.body = stored.error();
-    std::uint64_t to = 0;
-    for (std::size_t i = 8; i-- > 0;) to = to << 8U | pending.to[i];
-    world_.network.send(*this, to, [reply](Process& there) { there.on_reply(reply); });
+    world_.network.send(*this, process_of(pending.to),
+                        [reply](Process& there) { there.on_reply(reply); });
   }
   react();
 }

@@ -32,14 +32,14 @@ struct Surroundings {
 /// One life of a participant: the loops that a process has around its Member, in simulated time.
 class Process : public std::enable_shared_from_this<Process> {
  public:
-  /// How long its own daemon may be: the clock of its computer is ahead by `clock_offset`.
+  /// What a life begins with.
   struct Setting {
     std::size_t host = 0;
     std::uint64_t id = 0;   ///< unique in a run
     std::string partition;  ///< empty: a client
     std::vector<FrameSpec> configured;
-    Disk* disk = nullptr;  ///< null: nothing is kept
-    const milliseconds* clock_offset = nullptr;
+    Disk* disk = nullptr;                        ///< null: nothing is kept
+    const milliseconds* clock_offset = nullptr;  ///< by which the clock of its computer is ahead
   };
 
   Process(Surroundings& world, Setting setting);
@@ -101,7 +101,6 @@ class Process : public std::enable_shared_from_this<Process> {
   };
 
   [[nodiscard]] Time wall() const;
-  [[nodiscard]] PeerId peer_id(std::uint64_t process) const;
   void tick();
   void look_for_silent();
   void react();

@@ -7,6 +7,10 @@
 namespace tfdude::simulation {
 namespace {
 
+using faults::base_edge;
+using faults::base_of;
+using faults::partition_name;
+
 constexpr Instant kLook = milliseconds(20);
 // Longer than anything takes: that somebody counts as gone, is met again, has claimed its name and has conceded.
 constexpr Instant kRest = milliseconds(12000);
@@ -280,21 +284,13 @@ class World {
     for (const auto* models : {&author.model().frames(), &author.model().removed()}) {
       for (const auto& [id, model] : *models) {
         if (!serves(model.partition)) continue;
-        const auto frame = process.forest().info(id);
-        if (!frame) {
-          if (!model.may_be_gone()) violation(id + " is missing");
-          continue;
+        const auto there = process.forest().info(id);
+        Frame seen;
+        if (there) {
+          seen = {id, there->parent, process.directory().name(there->owner), there->attached};
         }
-        const std::string where =
-            "under '" + frame->parent + "' in " + process.directory().name(frame->owner);
-        const bool allowed =
-            std::any_of(model.possible.begin(), model.possible.end(),
-                        [&](const auto& place) { return place && place->parent == frame->parent; });
-        if (!model.may_be_there()) {
-          violation(id + ", which was removed, is " + where);
-        } else if (!allowed || process.directory().name(frame->owner) != model.partition) {
-          violation(id + " is " + where);
-        }
+        const std::string wrong = faults::misplaced(id, model, there ? &seen : nullptr);
+        if (!wrong.empty()) violation(wrong);
       }
     }
     if (!run_.violations.empty()) return;
