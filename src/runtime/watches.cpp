@@ -125,7 +125,9 @@ bool Watches::attend(const Path& path, bool renew) {
     return true;
   }
   for (const WatchRoute::Source& source : route->sources) {
-    if (open_.count(source.group) == 0 && links_.open(source.group)) open_.insert(source.group);
+    if (!open_.contains(source.group) && links_.open(source.group)) {
+      open_.insert(source.group, Clock::now());
+    }
   }
   if (!ask(path, *route, path->lacks_past())) return false;
   // Only the first answers show that one edge is ahead of what another has.
@@ -183,14 +185,7 @@ void Watches::tell_rerouted(const Path& path) {
 void Watches::close_unused(const std::vector<Path>& paths) {
   std::set<std::uint64_t> used;
   for (const Path& path : paths) used.merge(path->groups());
-  for (auto group = open_.begin(); group != open_.end();) {
-    if (used.count(*group) > 0) {
-      ++group;
-      continue;
-    }
-    links_.close(*group);
-    group = open_.erase(group);
-  }
+  for (const std::uint64_t group : open_.take_unused(used, Clock::now())) links_.close(group);
 }
 
 }  // namespace tfdude

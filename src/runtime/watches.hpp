@@ -6,12 +6,12 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "runtime/notices.hpp"
+#include "runtime/open_groups.hpp"
 #include "runtime/watched_path.hpp"
 
 namespace tfdude {
@@ -68,8 +68,8 @@ class Watches {
 
   const Links links_;
   Notices notices_;
-  std::set<std::uint64_t> open_;  // groups; only the thread's
-  mutable std::mutex mutex_;      // of the rest
+  OpenGroups open_;           // only the thread's
+  mutable std::mutex mutex_;  // of the rest
   std::condition_variable changed_;
   std::vector<Path> paths_;
   bool asked_ = false;
