@@ -14,10 +14,13 @@
 #include "support/joint_frames.hpp"
 #include "support/process.hpp"
 #include "support/random.hpp"
+#include "support/recorder.hpp"
 #include "transport/port.hpp"
 
 namespace tfdude {
 namespace {
+
+using namespace std::chrono_literals;
 
 using testing::Bytes;
 using testing::eventually;
@@ -70,6 +73,47 @@ TEST_CASE("a plain writer in partition * reaches the owner, and the others only 
   CHECK(other.counters->updates_passed == 0);
   CHECK(owner.counters->updates_passed == 1);
   CHECK_FALSE(moved(other.node, "b"));
+}
+
+// What stays of a killed process: a page that cannot be read before an earlier one, of a clock that was ahead.
+TEST_CASE("a page that waits for a lost one keeps out no page of another process") {
+  const testing::DomainLease domain;
+  const auto transport =
+      *make_fastdds_transport({domain.number(), TFDUDE_LOOPBACK_PROFILE, "", {}});
+  testing::Recorder reader;
+  REQUIRE(transport->start(reader));
+  const auto page = [](std::uint32_t number, std::uint64_t process, const char* frame) {
+    wire::PageEntry entry;
+    entry.since(1);
+    entry.id(frame);
+    wire::Page made;
+    made.partition("arm");
+    made.number(number);
+    made.incarnation(process);
+    made.epoch(process);
+    made.entries({entry});
+    return made;
+  };
+  const auto type = [] { return fastdds::edds::TypeSupport(new wire::PagePubSubType); };
+  ForeignWriter killed(domain.number(), "tfdude/directory", type(), "", true, "a_lost_frame");
+  ForeignWriter successor(domain.number(), "tfdude/directory", type(), "", true);
+  killed.await_readers(1);
+  successor.await_readers(1);
+  const auto hears = [&](std::uint32_t number) {
+    return reader.hears([&](const auto& heard) { return heard.page("arm", number, 2); });
+  };
+  wire::Page lost = page(0, 1, "a_lost_frame");
+  wire::Page waiting = page(1, 1, "a_frame");
+  killed.write(&lost, 1h);
+  killed.write(&waiting, 1h);
+  wire::Page next = page(2, 2, "a_frame");
+  successor.write(&next);
+  REQUIRE(hears(2));  // and so the two before have come, or are lost
+  wire::Page same = page(1, 2, "a_frame");
+  successor.write(&same);
+  CHECK(hears(1));
+  CHECK_FALSE(reader.heard().page("arm", 1, 1));
+  transport->stop();
 }
 
 TEST_CASE("joints of a plain writer move the edges of who has them") {

@@ -2,8 +2,16 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
+
+#if TFDUDE_FASTDDS_MAJOR == 2
+#include <fastdds/rtps/transport/test_UDPv4TransportDescriptor.h>
+#else
+#include <fastdds/rtps/transport/test_UDPv4TransportDescriptor.hpp>
+#endif
 
 namespace tfdude::testing {
 namespace {
@@ -12,6 +20,17 @@ namespace edds = fastdds::edds;
 
 edds::DomainParticipantFactory& factory() {
   return *edds::DomainParticipantFactory::get_instance();
+}
+
+// UDP over 127.0.0.1 that loses packets which contain a text.
+auto losing(const std::string& text) {
+  auto transport = std::make_shared<eprosima::fastdds::rtps::test_UDPv4TransportDescriptor>();
+  transport->interfaceWhiteList = {"127.0.0.1"};
+  transport->messages_filter_ = [text](const auto& message) {
+    const std::string_view bytes(reinterpret_cast<const char*>(message.buffer), message.length);
+    return bytes.find(text) != std::string_view::npos;
+  };
+  return transport;
 }
 
 }  // namespace
@@ -36,10 +55,11 @@ bool RawType::fill(const Bytes& bytes, fastdds::ertps::SerializedPayload_t& payl
 }
 
 ForeignWriter::ForeignWriter(std::uint32_t domain, const char* topic_name, edds::TypeSupport type,
-                             const std::string& partition, bool durable) {
+                             const std::string& partition, bool durable, const std::string& lost) {
   edds::DomainParticipantQos participant_qos;
   factory().load_XML_profiles_file(TFDUDE_LOOPBACK_PROFILE);  // once is enough, twice does no harm
   factory().get_participant_qos_from_profile("tfdude_participant", participant_qos);
+  if (!lost.empty()) participant_qos.transport().user_transports = {losing(lost)};
   participant_ = factory().create_participant(domain, participant_qos);
   if (participant_ == nullptr) throw std::runtime_error("no participant for a foreign writer");
   type.register_type(participant_);
@@ -74,8 +94,15 @@ void ForeignWriter::await_readers(int count) {
   }
 }
 
-void ForeignWriter::write(void* sample) {
-  if (!fastdds::write(*writer_, sample)) throw std::runtime_error("a foreign write failed");
+void ForeignWriter::write(void* sample, std::chrono::nanoseconds ahead) {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  fastdds::ertps::Time_t stamp;
+  stamp.from_ns(std::chrono::nanoseconds(now + ahead).count());
+  fastdds::ertps::WriteParams params;
+  params.source_timestamp(stamp);
+  if (!fastdds::write(*writer_, sample, params)) {
+    throw std::runtime_error("a foreign write failed");
+  }
 }
 
 }  // namespace tfdude::testing

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -75,9 +76,10 @@ Bytes bytes_of(Sample sample) {
 class ForeignWriter {
  public:
   /// @param partition  of DDS; empty: the default one
+  /// @param lost  packets that contain this text are lost, each time they are sent; empty: none
   /// @throws std::runtime_error where it cannot be made.
   ForeignWriter(std::uint32_t domain, const char* topic, fastdds::edds::TypeSupport type,
-                const std::string& partition, bool durable = false);
+                const std::string& partition, bool durable = false, const std::string& lost = "");
   ~ForeignWriter();
   ForeignWriter(const ForeignWriter&) = delete;
   ForeignWriter& operator=(const ForeignWriter&) = delete;
@@ -85,8 +87,9 @@ class ForeignWriter {
   /// Waits until so many readers were met. @throws std::runtime_error where they are not.
   void await_readers(int count);
 
-  /// A sample of the writer's type. @throws std::runtime_error where it is not taken.
-  void write(void* sample);
+  /// A sample of the writer's type. @param ahead  by how much the writer's clock is
+  /// @throws std::runtime_error where it is not taken.
+  void write(void* sample, std::chrono::nanoseconds ahead = {});
 
  private:
   fastdds::edds::DomainParticipant* participant_ = nullptr;
