@@ -48,40 +48,40 @@ Result<Client> Client::open(TransportPtr transport, const Options& options) {
 
 Result<void> Client::add(const std::string& id, const std::string& parent, const Transform& X_PC,
                          const std::string& partition) {
-  return participant_->add(id, {parent, X_PC}, partition);
+  return participant_->writes().add(id, {parent, X_PC}, partition);
 }
 
-Result<void> Client::remove(const std::string& id) { return participant_->remove(id); }
+Result<void> Client::remove(const std::string& id) { return participant_->writes().remove(id); }
 Result<void> Client::forget(const std::string& partition) {
-  return participant_->forget(partition);
+  return participant_->writes().forget(partition);
 }
 
 Result<void> Client::update(const std::string& id, const Transform& X_PC,
                             std::optional<Time> stamp) {
   auto updated = participant_->forest().update(id, X_PC, stamp);
-  if (updated || !Participant::is_elsewhere(updated.error())) return updated;
-  return participant_->update({{id, X_PC}}, stamp);
+  if (updated || !Writes::is_elsewhere(updated.error())) return updated;
+  return participant_->writes().update({{id, X_PC}}, stamp);
 }
 
 Result<void> Client::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
   if (auto updated = participant_->forest().update(frame, X_PC, stamp);
-      updated || !Participant::is_elsewhere(updated.error())) {
+      updated || !Writes::is_elsewhere(updated.error())) {
     return updated;
   }
   const auto info = participant_->forest().info(frame);
   if (!info)
     return fail(Errc::kUnknownFrame,
                 "the frame of this handle was removed, or is another client's");
-  return participant_->update({{info->id, X_PC}}, stamp);
+  return participant_->writes().update({{info->id, X_PC}}, stamp);
 }
 
 Result<void> Client::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
-  return participant_->update(edges, stamp);
+  return participant_->writes().update(edges, stamp);
 }
 
 Result<void> Client::update(const std::vector<HandleUpdate>& edges, std::optional<Time> stamp) {
   auto updated = participant_->forest().update(edges, stamp);
-  if (updated || !Participant::is_elsewhere(updated.error())) return updated;
+  if (updated || !Writes::is_elsewhere(updated.error())) return updated;
   std::vector<EdgeUpdate> named;
   for (const HandleUpdate& edge : edges) {
     const auto info = participant_->forest().info(edge.frame);
@@ -89,25 +89,25 @@ Result<void> Client::update(const std::vector<HandleUpdate>& edges, std::optiona
       return fail(Errc::kUnknownFrame, "the frame of a handle was removed, or is another client's");
     named.push_back({info->id, edge.X_PC});
   }
-  return participant_->update(named, stamp);
+  return participant_->writes().update(named, stamp);
 }
 
 Result<void> Client::update_partial(const std::vector<PartialUpdate>& edges,
                                     std::optional<Time> stamp) {
-  return participant_->update_partial(edges, stamp);
+  return participant_->writes().update(edges, stamp);
 }
 
 Result<void> Client::publish(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
-  return participant_->publish(edges, stamp);
+  return participant_->writes().publish(edges, stamp);
 }
 
 Result<EdgeStream> Client::stream(const std::vector<std::string>& edges) {
-  return participant_->stream(edges).map(
+  return participant_->streams().edges(edges).map(
       [](std::shared_ptr<Sender<Update>> sender) { return EdgeStream(std::move(sender)); });
 }
 
 Result<JointStream> Client::stream_joints(const std::vector<std::string>& names) {
-  return participant_->stream_joints(names).map(
+  return participant_->streams().joints(names).map(
       [](std::shared_ptr<Sender<JointUpdate>> sender) { return JointStream(std::move(sender)); });
 }
 
@@ -119,7 +119,7 @@ Result<void> Client::publish_joints(const std::vector<std::string>& names,
                                     std::optional<Time> stamp) {
   auto update = joint_update(names, positions, variances, stamp);
   if (!update) return tl::unexpected(std::move(update.error()));
-  return participant_->publish_joints(*update);
+  return participant_->joints().publish(*update);
 }
 
 Result<void> Client::update_joints(const std::vector<std::string>& names,
@@ -128,140 +128,139 @@ Result<void> Client::update_joints(const std::vector<std::string>& names,
                                    std::optional<Time> stamp) {
   auto update = joint_update(names, positions, variances, stamp);
   if (!update) return tl::unexpected(std::move(update.error()));
-  return participant_->update_joints(*update);
+  return participant_->joints().update(*update);
 }
 
 Result<std::vector<JointInfo>> Client::joints(const std::string& partition) {
-  return participant_->joints(partition);
+  return participant_->joints().list(partition);
 }
 
 Result<void> Client::move(const std::string& id, const std::string& parent,
                           const std::optional<Transform>& X_PC) {
-  return participant_->move(id, {parent, X_PC});
+  return participant_->writes().move(id, {parent, X_PC});
 }
 
 Result<Transform> Client::lookup(std::string_view a, std::string_view b) {
-  return participant_->lookup(a, b);
+  return participant_->lookups().lookup(a, b);
 }
 
-Result<Transform> Client::lookup(Handle a, Handle b) { return participant_->lookup(a, b); }
+Result<Transform> Client::lookup(Handle a, Handle b) {
+  return participant_->lookups().lookup(a, b);
+}
 
 Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b,
                                         const Query& query) {
-  return participant_->lookup(a, b, query);
+  return participant_->lookups().lookup(a, b, query);
 }
 
 Result<StampedTransform> Client::lookup(Handle a, Handle b, const Query& query) {
-  return participant_->lookup(a, b, query);
+  return participant_->lookups().lookup(a, b, query);
 }
 
 Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b, const Query& query,
                                         Milliseconds wait) {
-  return participant_->lookup_waiting(a, b, query, wait);
+  return participant_->lookups().wait(a, b, query, wait);
 }
 
 Result<StampedTransform> Client::lookup(std::string_view a, const Query& at_a, std::string_view b,
                                         const Query& at_b, std::string_view fixed) {
-  const Deadline deadline = participant_->call_deadline();
-  const auto X_FA = participant_->lookup_by(fixed, a, at_a, deadline);
+  const Deadline deadline = participant_->discovery().call_deadline();
+  const auto X_FA = participant_->lookups().lookup(fixed, a, at_a, deadline);
   if (!X_FA) return tl::unexpected(X_FA.error());
-  const auto X_FB = participant_->lookup_by(fixed, b, at_b, deadline);
+  const auto X_FB = participant_->lookups().lookup(fixed, b, at_b, deadline);
   if (!X_FB) return tl::unexpected(X_FB.error());
   return StampedTransform{between(*X_FA, *X_FB), X_FB->stamp};
 }
 
 PendingLookup Client::lookup_async(const std::string& a, const std::string& b, const Query& query,
                                    Milliseconds wait, PendingLookup::Callback callback) {
-  return PendingLookup(participant_->lookup_async(a, b, query, wait, std::move(callback)));
+  return PendingLookup(participant_->lookups().start(a, b, query, wait, std::move(callback)));
 }
 
 std::future<Result<StampedTransform>> Client::lookup_async(const std::string& a,
                                                            const std::string& b, const Query& query,
                                                            Milliseconds wait) {
-  return participant_->lookup_async(a, b, query, wait);
+  return participant_->lookups().start(a, b, query, wait);
 }
 
 Result<void> Client::can_lookup(std::string_view a, std::string_view b, const Query& query) {
-  return participant_->lookup(a, b, query).map([](const StampedTransform&) {});
+  return participant_->lookups().lookup(a, b, query).map([](const StampedTransform&) {});
 }
 
 Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
                                 const WatchOptions& options) {
-  return participant_->watch(a, b, options).map([](auto path) { return PathWatch(path); });
+  return participant_->watcher().watch(a, b, options).map([](auto path) {
+    return PathWatch(path);
+  });
 }
 
 Result<Observed> Client::observe(const std::string& a, const std::string& b, const Transform& X_AB,
                                  std::optional<Time> stamp, const ObserveOptions& options) {
-  return participant_->observe(a, b, X_AB, stamp, options, participant_->call_deadline());
+  return participant_->observations().observe(a, b, X_AB, stamp, options,
+                                              participant_->discovery().call_deadline());
 }
 
 Result<Observed> Client::fuse(const std::string& id, const Transform& X_PC,
                               std::optional<Time> stamp, const ObserveOptions& options) {
-  const Deadline deadline = participant_->call_deadline();
-  const auto edge = participant_->info(id, deadline);
+  const Deadline deadline = participant_->discovery().call_deadline();
+  const auto edge = participant_->queries().info(id, deadline);
   if (!edge) return tl::unexpected(edge.error());
   if (edge->parent.empty()) {
     return fail(Errc::kInvalidInput, "frame " + quote(id) + " is a root: it has no edge");
   }
-  return participant_->observe(edge->parent, id, X_PC, stamp, options, deadline);
+  return participant_->observations().observe(edge->parent, id, X_PC, stamp, options, deadline);
 }
 
 Result<void> Client::correlate(const std::string& id, const Correlation& correlation) {
-  return participant_->correlate(id, correlation);
+  return participant_->writes().correlate(id, correlation);
 }
 
 Result<std::vector<EdgeConsistency>> Client::consistency(const std::string& partition) {
-  return participant_->consistency(partition);
+  return participant_->observations().consistency(partition);
 }
 
-Result<std::vector<PastInfo>> Client::past(const std::string& id) { return participant_->past(id); }
+Result<std::vector<PastInfo>> Client::past(const std::string& id) {
+  return participant_->queries().past(id);
+}
 
 Result<std::vector<PastInfo>> Client::pasts(const std::string& partition) {
-  return participant_->pasts(partition);
+  return participant_->queries().pasts(partition);
 }
 
 Result<Pose> Client::lookup_pose(std::string_view a, std::string_view b) {
-  return participant_->lookup_pose(a, b);
+  return participant_->lookups().lookup_pose(a, b);
 }
 
-Result<Pose> Client::lookup_pose(Handle a, Handle b) { return participant_->lookup_pose(a, b); }
+Result<Pose> Client::lookup_pose(Handle a, Handle b) {
+  return participant_->lookups().lookup_pose(a, b);
+}
 
-Result<Handle> Client::find(std::string_view id) { return participant_->find(id); }
+Result<Handle> Client::find(std::string_view id) { return participant_->queries().find(id); }
 
 Result<std::vector<PathSegment>> Client::path(std::string_view a, std::string_view b) {
-  return participant_->path(a, b);
+  return participant_->queries().path(a, b);
 }
 
 Result<std::string> Client::parent(const std::string& id) {
-  return participant_->info(id, participant_->call_deadline()).map([](const FrameInfo& info) {
-    return info.parent;
-  });
+  return participant_->queries().info(id).map([](const FrameInfo& info) { return info.parent; });
 }
 
 Result<std::vector<std::string>> Client::children(const std::string& id) {
-  if (auto all = participant_->await_discovery(participant_->call_deadline()); !all) {
-    return tl::unexpected(std::move(all.error()));
-  }
-  return participant_->forest().children(id);
+  return participant_->queries().children(id);
 }
 
-Result<std::vector<std::string>> Client::roots() {
-  if (auto all = participant_->await_discovery(participant_->call_deadline()); !all) {
-    return tl::unexpected(std::move(all.error()));
-  }
-  return participant_->forest().roots();
+Result<std::vector<std::string>> Client::roots() { return participant_->queries().roots(); }
+
+bool Client::exists(const std::string& id) { return participant_->queries().info(id).has_value(); }
+
+Result<std::vector<Frame>> Client::frames() { return participant_->queries().frames(); }
+
+Result<std::vector<PartitionInfo>> Client::partitions() {
+  return participant_->queries().partitions();
 }
-
-bool Client::exists(const std::string& id) {
-  return participant_->info(id, participant_->call_deadline()).has_value();
-}
-
-Result<std::vector<Frame>> Client::frames() { return participant_->frames(); }
-
-Result<std::vector<PartitionInfo>> Client::partitions() { return participant_->partitions(); }
 
 Subscription Client::on_change(std::function<void(const Change&)> listener) {
-  return Subscription(participant_->on_change(std::move(listener)));
+  return Subscription(participant_->member().on_change(std::move(listener)));
 }
 
 }  // namespace tfdude

@@ -27,8 +27,8 @@ Result<Node> Node::open(TransportPtr transport, const std::string& partition,
   return Node(std::move(participant));
 }
 
-std::size_t Node::own_frames() const { return participant_->own_frames(); }
+std::size_t Node::own_frames() const { return participant_->queries().own_frames(); }
 
-const std::string& Node::partition() const { return participant_->partition_name(); }
+const std::string& Node::partition() const { return participant_->member().name(); }
 
 }  // namespace tfdude

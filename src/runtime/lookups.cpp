@@ -1,268 +1,100 @@
 #include "runtime/lookups.hpp"
 
-#include <algorithm>
-#include <iterator>
-#include <utility>
+#include "tfdude/base/id.hpp"
+
+#include "runtime/wall_clock.hpp"
 
 namespace tfdude {
 namespace {
 
-// Owners are asked again after a quarter of the time that was waited for them so far, within these bounds,
-constexpr std::chrono::nanoseconds kAskSoonest = Milliseconds(1);
-constexpr std::chrono::nanoseconds kAskLatest = Milliseconds(50);
-// and on behalf of all lookups that wait no more often than this.
-constexpr std::chrono::microseconds kAskEvery{250};
-
-// Whoever writes without a pause has all that waits looked at no more often than this, and so that it takes a quarter of a
-// processor at most: who writes wakes the thread, which costs it some microseconds.
-constexpr int kRest = 3;
-constexpr std::chrono::nanoseconds kShortestRest = std::chrono::microseconds(100);
-constexpr std::chrono::nanoseconds kLongestRest = Milliseconds(10);
-
-bool is_structural(Errc code) {
-  return code == Errc::kUnknownStart || code == Errc::kUnknownEnd || code == Errc::kNotConnected ||
-         code == Errc::kUnreachable;
+Error not_asked_yet(const std::string& a, const std::string& b) {
+  return {Errc::kTimeout, "no time to look " + quote(b) + " up in " + quote(a)};
 }
 
 }  // namespace
 
-bool is_worth_waiting(const Error& error, const Query& query) {
-  switch (error.code) {
-    case Errc::kNotYet:
-    case Errc::kTimeout:
-    case Errc::kNotOwner:
-      return true;
-    case Errc::kTooOld:
-      // Of the newest common instant: where one edge is ahead of what another has.
-      return !query.at;
-    default:
-      return is_structural(error.code);
-  }
+Lookups::Lookups(Structure& structure, Discovery& discovery, Requests& requests,
+                 Transport& transport, const Watcher& watcher, Milliseconds timeout)
+    : structure_(structure),
+      discovery_(discovery),
+      requests_(requests),
+      timeout_(timeout),
+      pending_(structure.forest, requests.calls(), hints_, links(transport, watcher)) {}
+
+PendingLookups::Links Lookups::links(Transport& transport, const Watcher& watcher) {
+  return {[this](const PendingLookups::Wanted& wanted) { return plan(wanted); },
+          [&transport](const std::string& partition, const Request& request) -> Result<void> {
+            auto sent = transport.send(partition, request, Deadline::Clock::now());
+            if (!sent && sent.error().code == Errc::kTimeout) sent.error().code = Errc::kNotYet;
+            return sent;
+          },
+          [this](const Request& request) { return requests_.answer_here(request); },
+          [&watcher](const PendingLookups::Wanted& wanted) {
+            return watcher.can_answer(wanted.a, wanted.b, wanted.query);
+          },
+          [this](Error last, const Deadline& deadline) {
+            return discovery_.last_word(std::move(last), deadline);
+          },
+          wall_clock,
+          timeout_};
 }
 
-Lookups::Lookups(Forest& forest, Calls& calls, SharedHints& hints, Links links)
-    : forest_(forest), calls_(calls), hints_(hints), links_(std::move(links)) {}
-
-void Lookups::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  changed_.notify_one();
-  if (thread_.joinable()) thread_.join();
-  // Here, as what callbacks hold goes with them.
-  for (const auto& lookup : std::exchange(added_, {})) give_up(*lookup);
-  callbacks_.stop();
+Result<Gathering> Lookups::plan(const PendingLookups::Wanted& wanted) {
+  if (auto ok = requests_.still_in(); !ok) return tl::unexpected(std::move(ok.error()));
+  const auto& [a, b, query] = wanted;
+  const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
+  const std::lock_guard lock(structure_.mutex);
+  return route_lookup(structure_.forest, structure_.directory, a, b, query, hint)
+      .map([&, &a = a, &b = b](LookupPlan plan) { return Gathering(std::move(plan), a, b, hint); });
 }
 
-void Lookups::give_up(Lookup& lookup) {
-  if (lookup.callback != nullptr) {
-    lookup.callback->cancel();
-  } else {
-    lookup.promise.set_value(
-        fail(Errc::kTimeout,
-             "the lookup was cancelled, as its client is closed: " + lookup.last.message));
-  }
+Result<StampedTransform> Lookups::elsewhere(std::string_view a, std::string_view b,
+                                            const Query& query, const Deadline& deadline) {
+  const std::string start(a);
+  const std::string end(b);
+  const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
+  return requests_.retry_on_stale_route(
+      deadline,
+      [&] {
+        return route_lookup(structure_.forest, structure_.directory, start, end, query, hint);
+      },
+      [&](LookupPlan& plan) {
+        Gathering gathering(std::move(plan), start, end, hint);
+        while (true) {
+          auto found = gathering.take(requests_.ask(gathering.parts(), deadline), hints_);
+          if (found) return *std::move(found);
+        }
+      });
 }
 
-std::future<Lookups::Found> Lookups::add(Wanted wanted, const Deadline& deadline, Error last) {
-  auto lookup = std::make_unique<Lookup>(std::move(wanted), deadline, std::move(last));
-  auto future = lookup->promise.get_future();
-  add(std::move(lookup));
-  return future;
+Result<StampedTransform> Lookups::elsewhere(Handle a, Handle b, const Query& query,
+                                            const Deadline& deadline) {
+  const auto start = structure_.forest.info(a);
+  const auto end = structure_.forest.info(b);
+  // The forest's own error says which.
+  if (!start || !end) return structure_.forest.lookup(a, b, query);
+  return elsewhere(start->id, end->id, query, deadline);
 }
 
-std::shared_ptr<OneCall<Lookups::Found>> Lookups::add(Wanted wanted, const Deadline& deadline,
-                                                      Error last,
-                                                      OneCall<Found>::Function callback) {
-  auto lookup = std::make_unique<Lookup>(std::move(wanted), deadline, std::move(last));
-  auto call = lookup->callback = std::make_shared<OneCall<Found>>(std::move(callback));
-  add(std::move(lookup));
-  return call;
+Result<StampedTransform> Lookups::wait(std::string_view a, std::string_view b, const Query& query,
+                                       Milliseconds wait) {
+  const Deadline deadline(wait);
+  // Without another thread, as what is wanted is there as a rule.
+  auto found = lookup(a, b, query, deadline.within(timeout_));
+  if (found || deadline.over() || !is_worth_waiting(found.error(), query)) return found;
+  return pending_.add({std::string(a), std::string(b), query}, deadline, std::move(found.error()))
+      .get();
 }
 
-void Lookups::add(std::unique_ptr<Lookup> lookup) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!stopping_) {
-      if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
-      added_.push_back(std::move(lookup));
-    }
-  }
-  if (lookup != nullptr) {
-    give_up(*lookup);
-  } else {
-    wake(urgent_);
-  }
+std::shared_ptr<void> Lookups::start(const std::string& a, const std::string& b, const Query& query,
+                                     Milliseconds wait, PendingLookups::Callback callback) {
+  auto call = pending_.add({a, b, query}, Deadline(wait), not_asked_yet(a, b), std::move(callback));
+  return {nullptr, [call](void*) { call->cancel(); }};
 }
 
-// May be called with the forest's lock held.
-void Lookups::wake(std::atomic<bool>& why) {
-  if (why.exchange(true)) return;
-  // The lock keeps the notice from falling between the thread's look and its sleep.
-  { const std::lock_guard lock(mutex_); }
-  changed_.notify_one();
-}
-
-void Lookups::look_again() {
-  ++others_;
-  wake(written_);
-}
-
-std::uint64_t Lookups::version() const { return forest_.structure_version() + others_.load(); }
-
-void Lookups::run() {
-  All all;
-  bool listens = false;
-  std::unique_lock lock(mutex_);
-  while (!stopping_) {
-    // Before the look, so that what comes meanwhile is not missed.
-    urgent_.store(false);
-    const bool written = written_.exchange(false);
-    std::move(added_.begin(), added_.end(), std::back_inserter(all));
-    added_.clear();
-    lock.unlock();
-    if (listens != !all.empty()) {
-      listens = !all.empty();
-      forest_.on_commit(listens ? [this] { wake(written_); } : std::function<void()>(), this);
-    }
-    const auto begin = Clock::now();
-    const auto next = attend(all, written);
-    const auto end = Clock::now();
-    const auto rested = end + std::clamp<std::chrono::nanoseconds>(kRest * (end - begin),
-                                                                   kShortestRest, kLongestRest);
-    lock.lock();
-    const auto must = [this] { return stopping_ || urgent_.load(); };
-    changed_.wait_until(lock, std::min(next, rested), must);
-    changed_.wait_until(lock, next, [&] { return must() || written_.load(); });
-  }
-  std::move(all.begin(), all.end(), std::back_inserter(added_));
-  lock.unlock();
-  forest_.on_commit(nullptr, this);
-}
-
-/// @return when there is more to do
-Lookups::Clock::time_point Lookups::attend(All& all, bool written) {
-  count_ = all.size();
-  auto next = Clock::time_point::max();
-  const auto over = [&](const std::unique_ptr<Lookup>& lookup) {
-    if (attend(*lookup, written)) return true;
-    next = std::min({next, lookup->next, lookup->deadline.at()});
-    return false;
-  };
-  all.erase(std::remove_if(all.begin(), all.end(), over), all.end());
-  if (const auto look = callbacks_.look_after(Clock::now())) next = std::min(next, *look);
-  return next;
-}
-
-/// Each of the following is true where the lookup is over.
-bool Lookups::attend(Lookup& lookup, bool written) {
-  if (lookup.callback != nullptr && !lookup.callback->waits()) return true;
-  if (lookup.asking) return go_on_asking(lookup);
-  if (written && lookup.far) hurry(lookup);
-  const auto now = Clock::now();
-  const bool may_be_here = lookup.version != version() || (written && !lookup.far);
-  if (now < lookup.next && !may_be_here && !lookup.deadline.over(now)) return false;
-  return attempt(lookup);
-}
-
-bool Lookups::attempt(Lookup& lookup) {
-  lookup.version = version();
-  const Wanted& wanted = lookup.wanted;
-  auto here = forest_.lookup(wanted.a, wanted.b, wanted.query);
-  const bool all_held =
-      here || here.error().code == Errc::kNotYet || here.error().code == Errc::kTooOld;
-  if (all_held) return judge(lookup, std::move(here), false);
-  auto plan = links_.plan(wanted);
-  if (!plan) return judge(lookup, tl::unexpected(std::move(plan.error())), false);
-  if (lookup.deadline.over()) return judge(lookup, tl::unexpected(lookup.last), true);
-  lookup.gathering = *std::move(plan);
-  lookup.until = lookup.deadline.within(links_.timeout);
-  return ask(lookup);
-}
-
-bool Lookups::ask(Lookup& lookup) {
-  lookup.asking.emplace(calls_, lookup.gathering->parts(), [this] { wake(urgent_); });
-  if (const Error* lacking = lookup.asking->answer(links_.answer_here)) {
-    // Nobody else is asked in vain.
-    Error error = *lacking;
-    lookup.asking.reset();
-    return judge(lookup, tl::unexpected(std::move(error)), false);
-  }
-  return go_on_asking(lookup);
-}
-
-bool Lookups::go_on_asking(Lookup& lookup) {
-  const auto now = Clock::now();
-  if (!lookup.asking->complete() && !lookup.until->over(now)) {
-    lookup.next = std::min(lookup.asking->send_due(now, links_.send), lookup.until->at());
-  }
-  if (!lookup.asking->complete()) {
-    if (!lookup.until->over(now)) return false;
-    lookup.asking->give_up(*lookup.until);
-    // What they said before they were asked for the last time tells more than that they had no time to say it again.
-    if (lookup.deadline.over(now) && lookup.last.code != Errc::kTimeout) {
-      lookup.asking.reset();
-      return judge(lookup, tl::unexpected(lookup.last), true);
-    }
-  }
-  auto found = lookup.gathering->take(lookup.asking->take_replies(), hints_);
-  lookup.asking.reset();
-  return found ? judge(lookup, *std::move(found), true) : ask(lookup);
-}
-
-bool Lookups::judge(Lookup& lookup, Found found, bool far) {
-  if (found || !is_worth_waiting(found.error(), lookup.wanted.query)) {
-    finish(lookup, std::move(found));
-    return true;
-  }
-  lookup.last = std::move(found.error());
-  if (lookup.deadline.over()) {
-    finish(lookup, tl::unexpected(links_.last_word(lookup.last, lookup.deadline)));
-    return true;
-  }
-  lookup.far = far;
-  lookup.next = next_attempt(lookup, far);
-  // It may have come while they were asked.
-  if (far) hurry(lookup);
-  return false;
-}
-
-/// Those who push what is wanted are asked once more, out of turn.
-void Lookups::hurry(Lookup& lookup) {
-  if (lookup.hurried || !links_.was_pushed(lookup.wanted)) return;
-  lookup.hurried = true;
-  lookup.next = Clock::now();
-}
-
-// What is lacking here wakes the thread when it comes.
-Lookups::Clock::time_point Lookups::next_attempt(const Lookup& lookup, bool far) const {
-  if (!far) return lookup.deadline.at();
-  const auto now = Clock::now();
-  const std::chrono::nanoseconds waited = now - lookup.began;
-  std::chrono::nanoseconds pause = waited / 4;
-  if (const auto at = lookup.wanted.query.at) {
-    // Most sources stamp by a clock that runs as the wall clock does.
-    const Time today = links_.clock();
-    if (*at > today) {
-      pause = *at - today;
-    } else if (*at > today - waited) {
-      pause = (today - *at) / 4;
-    }
-  }
-  pause = std::clamp(pause, kAskSoonest, kAskLatest);
-  return now + std::max<std::chrono::nanoseconds>(pause, count_ * kAskEvery);
-}
-
-void Lookups::finish(Lookup& lookup, Found found) {
-  if (lookup.callback == nullptr) {
-    lookup.promise.set_value(std::move(found));
-    return;
-  }
-  // Where it is dropped instead, what its function holds goes, too.
-  const std::shared_ptr<OneCall<Found>> call(lookup.callback.get(),
-                                             [owner = lookup.callback](auto*) { owner->cancel(); });
-  callbacks_.post([call, found = std::move(found)]() mutable { call->run(std::move(found)); });
+std::future<Result<StampedTransform>> Lookups::start(const std::string& a, const std::string& b,
+                                                     const Query& query, Milliseconds wait) {
+  return pending_.add({a, b, query}, Deadline(wait), not_asked_yet(a, b));
 }
 
 }  // namespace tfdude

@@ -1,137 +1,93 @@
 #pragma once
 
-#include <atomic>
-#include <condition_variable>
 #include <functional>
 #include <future>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <string>
-#include <thread>
-#include <vector>
+#include <string_view>
 
+#include "tfdude/math/transform.hpp"
 #include "tfdude/types/query.hpp"
 
-#include "runtime/asking.hpp"
-#include "runtime/callbacks.hpp"
-#include "runtime/deadline.hpp"
+#include "runtime/discovery.hpp"
 #include "runtime/gathering.hpp"
-#include "runtime/one_call.hpp"
-#include "tree/forest.hpp"
+#include "runtime/pending_lookups.hpp"
+#include "runtime/requests.hpp"
+#include "runtime/structure.hpp"
+#include "runtime/watcher.hpp"
+#include "transport/port.hpp"
 
 namespace tfdude {
 
-/// Whether what a lookup lacks may come yet.
-[[nodiscard]] bool is_worth_waiting(const Error& error, const Query& query);
-
-/// The lookups of a participant that wait for their data. One thread attends to all of them: it sleeps until something is
-/// written to the forest here, or the structure changes; who owns what is lacking is asked again, ever less often, and once
-/// more as soon as it has pushed here what does. It
-/// never waits for anybody else, and runs nothing of the user's.
-/// @par Thread safety  All functions.
+/// Where one frame is seen from another: by what is known here, else by what the owners answer. What each function returns is
+/// said at Client.
+/// @par Thread safety  All functions; what is known here is read without a lock.
 class Lookups {
  public:
-  using Clock = Deadline::Clock;
-  using Found = Result<StampedTransform>;
-  using Callback = std::function<void(Found)>;
+  /// @param watcher  of what others push here
+  /// @param timeout  of one attempt of a lookup that waits
+  Lookups(Structure& structure, Discovery& discovery, Requests& requests, Transport& transport,
+          const Watcher& watcher, Milliseconds timeout);
 
-  struct Wanted {
-    std::string a;
-    std::string b;
-    Query query;
-  };
+  /// Nobody waits any more, and no callback runs: as PendingLookups::stop.
+  void stop() { pending_.stop(); }
 
-  /// What it needs of the participant. None of them may wait.
-  struct Links {
-    /// Whom to ask, with what is known of the structure now. @return as Client::lookup
-    std::function<Result<Gathering>(const Wanted&)> plan;
-    /// Sends a request once. @return kNotYet where its partition cannot be reached yet.
-    Asking::Send send;
-    std::function<Reply(const Request&)> answer_here;
-    /// Whether what others have pushed here would do: then they have it, too.
-    std::function<bool(const Wanted&)> was_pushed;
-    /// What is to be said where the time is over: the error of the last attempt, or that it was too early to know.
-    std::function<Error(Error last, const Deadline&)> last_word;
-    /// Of the sources that stamp samples.
-    std::function<Time()> clock;
-    /// How long the owners are waited for at most, each time that they are asked.
-    Milliseconds timeout;
-  };
-
-  Lookups(Forest& forest, Calls& calls, SharedHints& hints, Links links);
-  ~Lookups() { stop(); }
-  Lookups(const Lookups&) = delete;
-  Lookups& operator=(const Lookups&) = delete;
-
-  /// Those that wait are answered kTimeout; their callbacks are not called. Once this returns none runs, but for one that
-  /// calls this.
-  void stop();
-
-  /// @param last  why there was no answer up to now
-  [[nodiscard]] std::future<Found> add(Wanted wanted, const Deadline& deadline, Error last);
-  [[nodiscard]] std::shared_ptr<OneCall<Found>> add(Wanted wanted, const Deadline& deadline,
-                                                    Error last, OneCall<Found>::Function callback);
+  template <class Name>
+  [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
+    auto local = structure_.forest.lookup(a, b);
+    if (local || is_of_time(local.error())) return local;
+    return elsewhere(a, b, {}, discovery_.call_deadline())
+        .map([](const StampedTransform& X_AB) -> Transform { return X_AB; });
+  }
+  template <class Name>
+  [[nodiscard]] Result<Pose> lookup_pose(Name a, Name b) {
+    if (auto local = structure_.forest.lookup_pose(a, b)) return local;
+    return lookup(a, b).map([](const Transform& X_AB) { return X_AB.pose; });
+  }
+  template <class Name>
+  [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Query& query) {
+    return lookup(a, b, query, discovery_.call_deadline());
+  }
+  template <class Name>
+  [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Query& query,
+                                                const Deadline& deadline) {
+    auto local = structure_.forest.lookup(a, b, query);
+    if (local || is_of_time(local.error())) return local;
+    return elsewhere(a, b, query, deadline);
+  }
+  [[nodiscard]] Result<StampedTransform> wait(std::string_view a, std::string_view b,
+                                              const Query& query, Milliseconds wait);
+  /// @return what cancels it when its last copy goes
+  [[nodiscard]] std::shared_ptr<void> start(const std::string& a, const std::string& b,
+                                            const Query& query, Milliseconds wait,
+                                            PendingLookups::Callback callback);
+  [[nodiscard]] std::future<Result<StampedTransform>> start(const std::string& a,
+                                                            const std::string& b,
+                                                            const Query& query, Milliseconds wait);
 
   /// Another partition came or went.
-  void look_again();
-
-  /// Others have pushed something. At once, where nobody waits.
-  void pushed() { wake(written_); }
+  void look_again() { pending_.look_again(); }
+  /// Others have pushed something here.
+  void pushed() { pending_.pushed(); }
 
  private:
-  struct Lookup {
-    Lookup(Wanted what, const Deadline& by, Error why)
-        : wanted(std::move(what)), deadline(by), last(std::move(why)) {}
+  static bool is_of_time(const Error& error) {
+    return error.code == Errc::kNotYet || error.code == Errc::kTooOld;
+  }
 
-    const Wanted wanted;
-    const Deadline deadline;
-    Error last;
-    // Who is to be told: one of both.
-    std::promise<Found> promise;
-    std::shared_ptr<OneCall<Found>> callback;
+  [[nodiscard]] Result<StampedTransform> elsewhere(std::string_view a, std::string_view b,
+                                                   const Query& query, const Deadline& deadline);
+  [[nodiscard]] PendingLookups::Links links(Transport& transport, const Watcher& watcher);
+  [[nodiscard]] Result<Gathering> plan(const PendingLookups::Wanted& wanted);
+  [[nodiscard]] Result<StampedTransform> elsewhere(Handle a, Handle b, const Query& query,
+                                                   const Deadline& deadline);
 
-    // The thread's.
-    const Clock::time_point began = Clock::now();
-    Clock::time_point next = Clock::time_point::min();  // attempt, or look at what is under way
-    std::uint64_t version = 0;                          // of the structure at the last attempt
-    bool far = false;                                   // others lacked something then
-    bool hurried = false;                               // was asked anew for what they have pushed
-    std::optional<Gathering> gathering;                 // under way,
-    std::optional<Deadline> until;                      // as long as this
-    std::optional<Asking> asking;
-  };
-  using All = std::vector<std::unique_ptr<Lookup>>;
-
-  void add(std::unique_ptr<Lookup> lookup);
-  void wake(std::atomic<bool>& why);
-  void run();
-  [[nodiscard]] Clock::time_point attend(All& all, bool written);
-  [[nodiscard]] bool attend(Lookup& lookup, bool written);
-  [[nodiscard]] bool attempt(Lookup& lookup);
-  [[nodiscard]] bool ask(Lookup& lookup);
-  [[nodiscard]] bool go_on_asking(Lookup& lookup);
-  [[nodiscard]] bool judge(Lookup& lookup, Found found, bool far);
-  void hurry(Lookup& lookup);
-  [[nodiscard]] Clock::time_point next_attempt(const Lookup& lookup, bool far) const;
-  void finish(Lookup& lookup, Found found);
-  static void give_up(Lookup& lookup);
-  [[nodiscard]] std::uint64_t version() const;
-
-  Forest& forest_;
-  Calls& calls_;
-  SharedHints& hints_;
-  const Links links_;
-  Callbacks callbacks_;
-  std::size_t count_ = 0;                 // that wait; the thread's
-  std::atomic<std::uint64_t> others_{0};  // how often others came or went
-  std::atomic<bool> written_{false};      // something may be here now,
-  std::atomic<bool> urgent_{false};       // or is: a new lookup, a reply
-  std::mutex mutex_;                      // of the rest, and of the wait
-  std::condition_variable changed_;
-  All added_;  // not taken by the thread yet; once it has ended, what it had
-  bool stopping_ = false;
-  std::thread thread_;  // from the first lookup on
+  Structure& structure_;
+  Discovery& discovery_;
+  Requests& requests_;
+  const Milliseconds timeout_;
+  SharedHints hints_;
+  PendingLookups pending_;  // last: it uses the rest
 };
 
 }  // namespace tfdude

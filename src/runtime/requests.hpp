@@ -49,6 +49,10 @@ class Requests {
 
   /// Those that wait for replies: for who gets these, and for lookups that wait.
   [[nodiscard]] Calls& calls() { return calls_; }
+  /// The reply of this process itself.
+  [[nodiscard]] Reply answer_here(const Request& request) const { return own_.answer(request); }
+  /// @return kPartitionTaken once this process has given its partition up.
+  [[nodiscard]] Result<void> still_in() const { return own_.still_in(); }
 
   /// Runs an operation that may fail for what is not known yet; repeats it until it is known for sure.
   /// @return also kTimeout, where it was not known by then

@@ -1,29 +1,31 @@
+#include "runtime/joint_calls.hpp"
+
+#include <iterator>
+#include <utility>
+
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
-#include "runtime/participant.hpp"
 
-// Joints: their positions to who has them, and what is known of them.
 namespace tfdude {
 
-void Participant::on_joints(const JointUpdate& update) {
-  if (partition_ == nullptr) return;
-  const std::lock_guard lock(joints_mutex_);
-  const auto moved = partition_->apply(update);
+void JointCalls::on_joints(const JointUpdate& update) {
+  if (member_.partition() == nullptr) return;
+  const auto moved = member_.apply(update);
   // Nobody else hears of it; those that are late are counted, as of any edge. The 1st, 2nd, 4th, 8th... is told.
   if (moved || moved.error().code != Errc::kInvalidInput) return;
-  const std::uint64_t before = refused_joints_++;
-  if ((refused_joints_ & before) == 0) {
-    log().warn("refused positions of joints ({} times so far): {}", refused_joints_,
+  const std::uint64_t before = refused_++;
+  if (((before + 1) & before) == 0) {
+    log().warn("refused positions of joints ({} times so far): {}", before + 1,
                moved.error().message);
   }
 }
 
 // All who have a joint are told, so all must be known.
-Result<void> Participant::update_joints(const JointUpdate& update) {
+Result<void> JointCalls::update(const JointUpdate& update) {
   if (update.joints.empty()) return {};
-  const Deadline deadline = call_deadline();
-  if (auto all = await_discovery(deadline); !all) return all;
+  const Deadline deadline = discovery_.call_deadline();
+  if (auto all = discovery_.await(deadline); !all) return all;
   return requests_.retry_on_stale_route(
       deadline,
       [&]() -> Result<std::vector<Part>> {
@@ -36,12 +38,11 @@ Result<void> Participant::update_joints(const JointUpdate& update) {
       [&](std::vector<Part>& parts) { return requests_.change(parts, deadline); });
 }
 
-// Whoever is there gets its share, and the error of who is not is told.
-Result<void> Participant::publish_joints(const JointUpdate& update) {
+Result<void> JointCalls::publish(const JointUpdate& update) {
   if (update.joints.empty()) return {};
-  const Deadline deadline = call_deadline();
-  if (auto all = await_discovery(deadline); !all) return all;
-  if (auto ok = still_in(); !ok) return ok;
+  const Deadline deadline = discovery_.call_deadline();
+  if (auto all = discovery_.await(deadline); !all) return all;
+  if (auto ok = member_.still_in(); !ok) return ok;
   JointUpdate known{{}, update.stamp};
   Result<void> outcome;
   Result<std::vector<Part>> parts;
@@ -58,31 +59,29 @@ Result<void> Participant::publish_joints(const JointUpdate& update) {
   }
   if (!parts) return tl::unexpected(std::move(parts.error()));
   for (const Part& part : *parts) {
-    const auto& share = std::get<JointUpdate>(part.request.body);
-    auto sent = publish_to(part, share, deadline);
+    auto sent = publish_to(part, deadline);
     if (!sent && outcome) outcome = std::move(sent);
   }
   return outcome;
 }
 
-Result<void> Participant::publish_to(const Part& part, const JointUpdate& share,
-                                     const Deadline& deadline) {
-  if (part.owner == kHeldHere) {
-    const std::lock_guard lock(joints_mutex_);
-    return partition_->apply(share).map([](std::size_t) {});
-  }
+// Whoever is there gets its share, and the error of who is not is told.
+Result<void> JointCalls::publish_to(const Part& part, const Deadline& deadline) {
+  const auto& share = std::get<JointUpdate>(part.request.body);
+  if (part.owner == kHeldHere) return member_.apply(share).map([](std::size_t) {});
   {
     const std::lock_guard lock(structure_.mutex);
     if (auto ok = check_reachable(structure_.directory, {part}); !ok) return ok;
   }
-  return transport_->send(part.partition, share, deadline.at());
+  return transport_.send(part.partition, share, deadline.at());
 }
 
-Result<std::vector<JointInfo>> Participant::joints(const std::string& partition) {
+Result<std::vector<JointInfo>> JointCalls::list(const std::string& partition) {
   std::vector<JointInfo> all;
   while (true) {
     const std::string last = all.empty() ? std::string() : all.back().name;
-    auto more = requests_.ask_all<JointInfo>(partition, JointsRequest{last}, call_deadline());
+    auto more =
+        requests_.ask_all<JointInfo>(partition, JointsRequest{last}, discovery_.call_deadline());
     if (!more) return more;
     const bool end = more->size() < kMaxItems;
     if (!more->empty() && more->back().name <= last) {

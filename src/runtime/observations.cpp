@@ -1,3 +1,5 @@
+#include "runtime/observations.hpp"
+
 #include <algorithm>
 #include <iterator>
 #include <optional>
@@ -7,10 +9,9 @@
 
 #include "tfdude/base/id.hpp"
 
-#include "partition/observing.hpp"
-#include "runtime/participant.hpp"
+#include "runtime/gathering.hpp"
+#include "runtime/wall_clock.hpp"
 
-// Measurements of paths, and what they have said of covariances.
 namespace tfdude {
 namespace {
 
@@ -28,21 +29,26 @@ bool is_conflict(const Reply& reply) {
 
 }  // namespace
 
-std::string Participant::new_source() {
+std::string Observations::new_source() {
   return std::string(kObservedPrefix) + std::to_string(nanoseconds(wall_clock())) + "." +
-         std::to_string(getpid()) + "." + std::to_string(++observations_);
+         std::to_string(getpid()) + "." + std::to_string(++count_);
+}
+
+Result<std::vector<SegmentValues>> Observations::values(std::vector<Part>& parts,
+                                                        const Deadline& deadline) {
+  return values_of(requests_.ask(parts, deadline));
 }
 
 // The values of all edges that the plan names, of one instant.
-Result<ObservedPath> Participant::ask_observed(ObservePlan& plan, const Deadline& deadline) {
-  auto answers = ask_values(plan.parts, deadline);
+Result<ObservedPath> Observations::path(ObservePlan& plan, const Deadline& deadline) {
+  auto answers = values(plan.parts, deadline);
   if (!answers) return tl::unexpected(std::move(answers.error()));
   OneInstant found = one_instant(*std::move(answers), std::nullopt);
   if (found.ask_again) {
     for (Part& part : plan.parts) {
       std::get<LookupRequest>(part.request.body).query.at = found.ask_again;
     }
-    answers = ask_values(plan.parts, deadline);
+    answers = values(plan.parts, deadline);
     if (!answers) return tl::unexpected(std::move(answers.error()));
     found.answers = *std::move(answers);
   }
@@ -51,7 +57,7 @@ Result<ObservedPath> Participant::ask_observed(ObservePlan& plan, const Deadline
 
 // Nothing was applied (false), or all (true). One owner is asked before the others, the same for all who observe this path:
 // of two who have seen the same, one is refused there, and may try again before anything was applied.
-Result<bool> Participant::revise(std::vector<Part> parts, const Deadline& deadline) {
+Result<bool> Observations::revise(std::vector<Part> parts, const Deadline& deadline) {
   if (parts.empty()) return true;
   const auto first = std::min_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
     return a.partition < b.partition;
@@ -79,9 +85,9 @@ Result<bool> Participant::revise(std::vector<Part> parts, const Deadline& deadli
   return tl::unexpected(*std::move(refused));
 }
 
-Result<Observed> Participant::observe(const std::string& a, const std::string& b,
-                                      const Transform& X_AB, std::optional<Time> stamp,
-                                      const ObserveOptions& options, const Deadline& deadline) {
+Result<Observed> Observations::observe(const std::string& a, const std::string& b,
+                                       const Transform& X_AB, std::optional<Time> stamp,
+                                       const ObserveOptions& options, const Deadline& deadline) {
   if (auto ok = check_finite(X_AB); !ok) return fail_at("the measurement", ok.error());
   std::vector<std::string> beside;
   int torn = 0;
@@ -91,7 +97,7 @@ Result<Observed> Participant::observe(const std::string& a, const std::string& b
         deadline,
         [&] { return route_observe(structure_.forest, structure_.directory, a, b, beside, stamp); },
         [&](ObservePlan& plan) {
-          auto found = ask_observed(plan, deadline);
+          auto found = this->path(plan, deadline);
           used = std::move(plan);
           return found;
         });
@@ -123,27 +129,9 @@ Result<Observed> Participant::observe(const std::string& a, const std::string& b
                                            " were written each time that they were observed");
 }
 
-Result<void> Participant::correlate(const std::string& id, const Correlation& correlation) {
-  const Deadline deadline = call_deadline();
-  return requests_.retry_on_stale_route(
-      deadline,
-      [&]() -> Result<Part> {
-        const auto frame = structure_.forest.info(id);
-        if (!frame) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
-        if (auto ok = check_shares(correlation.shares); !ok) {
-          return fail_at("frame " + quote(id), ok.error());
-        }
-        return route_to(structure_.directory, frame->owner,
-                        Request{0, id, CorrelateRequest{correlation}});
-      },
-      [&](Part& part) {
-        std::vector<Part> parts{std::move(part)};
-        return requests_.change(parts, deadline);
-      });
-}
-
-Result<std::vector<EdgeConsistency>> Participant::consistency(const std::string& partition) {
-  return requests_.ask_all<EdgeConsistency>(partition, ConsistencyRequest{true}, call_deadline());
+Result<std::vector<EdgeConsistency>> Observations::consistency(const std::string& partition) {
+  return requests_.ask_all<EdgeConsistency>(partition, ConsistencyRequest{true},
+                                            discovery_.call_deadline());
 }
 
 }  // namespace tfdude

@@ -1,0 +1,293 @@
+#include "runtime/member_runner.hpp"
+
+#include <tuple>
+
+#include "tfdude/base/id.hpp"
+
+#include "base/log.hpp"
+#include "partition/requests.hpp"
+#include "runtime/wall_clock.hpp"
+
+namespace tfdude {
+namespace {
+
+// How often it is looked who has been silent for long enough to count as gone.
+constexpr Milliseconds kLookForGone{50};
+
+std::string who(const Presence& one) {
+  return quote(one.partition) + " (host " + quote(one.host) + ", pid " + std::to_string(one.pid) +
+         ")";
+}
+
+void log_outcome(const Outcome& outcome, const std::string& own) {
+  for (const Directory::Outdated& one : outcome.outdated) {
+    log().warn("what process {} of partition {} says is passed over, as process {} was later",
+               one.incarnation, quote(one.partition), one.latest);
+  }
+  if (outcome.appeared) log().info("partition {} is there", who(*outcome.appeared));
+  if (outcome.stopped) log().info("partition {} was stopped", who(*outcome.stopped));
+  if (outcome.lost)
+    log().info("partition {} is lost: it is not heard any more", quote(*outcome.lost));
+  if (outcome.rival)
+    log().error("partition {} is served by another process, too", who(*outcome.rival));
+  if (!outcome.overtook) return;
+  log().warn(
+      "others have known a later process of partition {}, whose clock was ahead: this one takes "
+      "its place",
+      quote(own));
+}
+
+}  // namespace
+
+MemberRunner::MemberRunner(Structure& structure, Transport& transport, std::string partition,
+                           Parts parts)
+    : structure_(structure),
+      transport_(transport),
+      name_(std::move(partition)),
+      parts_(std::move(parts)),
+      member_(structure.forest, structure.directory, name_) {}
+
+void MemberRunner::stop() {
+  {
+    const std::lock_guard lock(gone_mutex_);
+    stopped_ = true;
+  }
+  if (gone_look_) gone_look_->stop();
+  if (commits_) commits_->stop();
+}
+
+// ---- what happens
+
+template <class Input>
+void MemberRunner::input(Input input) {
+  Outcome outcome;
+  {
+    const std::lock_guard lock(structure_.mutex);
+    input();
+    outcome = take_outcome();
+  }
+  react(outcome);
+}
+
+template <class Input>
+void MemberRunner::input_of_joints(Input input) {
+  this->input([&] {
+    const std::lock_guard joints(joints_mutex_);
+    input();
+  });
+}
+
+Outcome MemberRunner::take_outcome() {
+  Outcome outcome = member_.take_outcome();
+  if (outcome.gave_up) out_ = true;
+  for (Change& change : outcome.events) {
+    change.time = wall_clock();
+    const bool own = change.partition == name_;
+    const bool by_own = change.rival == name_;
+    if (change.kind == ChangeKind::kConflict && own) log().error("{}", change.message);
+    if (change.kind == ChangeKind::kFrameOrphaned && (own || by_own))
+      log().warn("{}", change.message);
+  }
+  // Here, so that they are told in the order in which they happened.
+  if (!outcome.events.empty()) events_->post(std::move(outcome.events));
+  return outcome;
+}
+
+void MemberRunner::react(const Outcome& outcome) {
+  if (outcome.heard) structure_.changed.notify_all();
+  if (outcome.routes) parts_.on_routes();
+  if (outcome.to_commit) commits_->ask();
+  if (outcome.to_reply) commits_->hurry();
+  if (outcome.to_concede) parts_.on_contest();
+  if (outcome.look_for_gone) look_for_gone();
+  if (outcome.others) parts_.on_others();
+  if (outcome.stopped) parts_.on_gone(outcome.stopped->partition);
+  if (outcome.lost) parts_.on_gone(*outcome.lost);
+  log_outcome(outcome, name_);
+}
+
+void MemberRunner::look_for_gone() {
+  const std::lock_guard lock(gone_mutex_);
+  if (stopped_) return;
+  if (!gone_look_) {
+    gone_look_.emplace(kLookForGone, [this] { input([this] { member_.on_time(Clock::now()); }); });
+  }
+  gone_look_->ask();
+}
+
+void MemberRunner::on_page(const Page& page) {
+  input([&] { member_.on_page(page); });
+}
+
+void MemberRunner::on_presence(const Presence& presence) {
+  input([&] { member_.on_presence(presence, wall_clock()); });
+}
+
+void MemberRunner::on_lost(const std::string& partition, std::uint64_t incarnation) {
+  input([&] { member_.on_lost(partition, incarnation, wall_clock()); });
+}
+
+std::optional<Reply> MemberRunner::on_request(const PeerId& from, const Request& request) {
+  const auto refused = refusal();
+  std::optional<Reply> reply;
+  input_of_joints([&] { reply = member_.on_request(from, request, refused, wall_clock()); });
+  return reply;
+}
+
+Reply MemberRunner::answer(const Request& request) {
+  const auto refused = refusal();
+  Reply reply;
+  input_of_joints([&] { reply = member_.answer(request, refused, wall_clock()); });
+  return reply;
+}
+
+Result<void> MemberRunner::forget(const std::string& partition) {
+  Result<void> forgotten;
+  input([&] { forgotten = member_.forget(partition, wall_clock()); });
+  return forgotten;
+}
+
+void MemberRunner::concede(const std::set<Concession>& due, bool current) {
+  input_of_joints([&] { member_.concede(due, current, wall_clock()); });
+}
+
+Result<std::size_t> MemberRunner::apply(const JointUpdate& update) {
+  const std::lock_guard lock(joints_mutex_);
+  return partition_->apply(update);
+}
+
+Result<std::size_t> MemberRunner::try_apply(const JointUpdate& update) {
+  const std::unique_lock lock(joints_mutex_, std::try_to_lock);
+  if (!lock.owns_lock()) return fail(Errc::kTimeout, "busy");
+  return partition_->apply(update);
+}
+
+// ---- how it becomes an owner
+
+void MemberRunner::open(std::unique_ptr<StateStore> store, Milliseconds save_every) {
+  structure_.forest.on_restart([this](const HistoryRestart& restart) {
+    Change change = restarted(restart, name_);
+    change.time = wall_clock();
+    log().warn("{}", change.message);
+    events_->post({std::move(change)});
+  });
+  CommitLoop::Periods periods;
+  periods.values = save_every;
+  commits_.emplace(std::move(store), static_cast<CommitLoop::Effects&>(*this), periods);
+}
+
+Result<void> MemberRunner::serve(const StoredState* left,
+                                 const std::vector<FrameSpec>& configured) {
+  Result<void> served;
+  input_of_joints([&] {
+    served = member_.serve(left, configured, wall_clock());
+    partition_ = member_.partition();
+  });
+  return served;
+}
+
+Result<void> MemberRunner::publish_all(const std::vector<FrameSpec>& configured) {
+  return commits_->start(configured);
+}
+
+void MemberRunner::introduce() {
+  transport_.announce(with_rules([](Member& member) { return member.introduce(); }));
+}
+
+void MemberRunner::say_goodbye() {
+  const auto last = with_rules([](Member& member) { return member.leave(); });
+  if (last) transport_.announce(*last);
+}
+
+Result<void> MemberRunner::still_in() {
+  if (!out()) return {};
+  return fail(Errc::kPartitionTaken,
+              with_rules([](const Member& member) { return member.given_up(); }));
+}
+
+// ---- what was changed
+
+void MemberRunner::tell(const Deadline& deadline) {
+  if (commits_ && commits_->pending()) (void)commits_->flush(deadline.at());
+}
+
+Result<void> MemberRunner::await_stored(const Request& request, const Deadline& deadline) {
+  return is_of_structure(request) && commits_->stores() ? commits_->flush(deadline.at())
+                                                        : Result<void>();
+}
+
+std::optional<Error> MemberRunner::refusal() const {
+  auto failure = commits_ ? commits_->failure() : std::nullopt;
+  if (!failure) return std::nullopt;
+  return Error{failure->code,
+               "partition " + quote(name_) +
+                   " changes nothing before it can store what it has changed: " + failure->message};
+}
+
+Error MemberRunner::unless_unsaved(Error error, const std::string& id) {
+  if (error.code != Errc::kAlreadyExists && error.code != Errc::kUnknownFrame) return error;
+  auto why = refusal();
+  const std::lock_guard lock(structure_.mutex);
+  return why && partition_->is_unsaved(id) ? *std::move(why) : error;
+}
+
+std::shared_ptr<void> MemberRunner::on_change(Events::Callback listener) {
+  {
+    const std::lock_guard lock(structure_.mutex);
+    structure_.directory.changes().watch();
+  }
+  const std::uint64_t subscriber = events_->subscribe(std::move(listener));
+  return {nullptr, [events = events_, subscriber](void*) { events->unsubscribe(subscriber); }};
+}
+
+// ---- what the commit loop does
+
+Ready MemberRunner::take() {
+  const std::lock_guard lock(structure_.mutex);
+  const std::lock_guard joints(joints_mutex_);
+  return member_.take_ready();
+}
+
+void MemberRunner::publish(const Ready& ready) {
+  const auto said = with_rules([&](Member& member) { return member.stored(ready); });
+  for (const Page& page : ready.pages) transport_.publish(page);
+  if (said) transport_.announce(*said);
+  structure_.changed.notify_all();
+}
+
+void MemberRunner::take_back(const Ready& ready) {
+  const auto said = with_rules([&](Member& member) {
+    const std::lock_guard joints(joints_mutex_);
+    return member.not_stored(ready);
+  });
+  if (said) transport_.announce(*said);
+}
+
+ChangedValues MemberRunner::take_values() {
+  ChangedValues values;
+  if (out_) return values;
+  values.since = saved_commit_;
+  std::tie(values.edges, saved_commit_) = structure_.forest.changed_since(saved_commit_);
+  if (values.edges.empty()) return values;
+  const std::lock_guard lock(structure_.mutex);
+  values.edges = member_.storable(std::move(values.edges));
+  const std::lock_guard joints(joints_mutex_);
+  values.joints = partition_->take_changed_joints();
+  return values;
+}
+
+void MemberRunner::take_back(const ChangedValues& values) {
+  saved_commit_ = values.since;
+  const std::lock_guard lock(joints_mutex_);
+  partition_->still_unsaved(values.joints);
+}
+
+void MemberRunner::reply(const PendingReply& pending) {
+  if (!pending.what.empty()) {
+    const auto* error = std::get_if<Error>(&pending.reply.body);
+    log().info("{}: {}", pending.what, error != nullptr ? "refused: " + error->message : "done");
+  }
+  transport_.reply(pending.to, pending.reply);
+}
+
+}  // namespace tfdude

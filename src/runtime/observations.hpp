@@ -1,0 +1,41 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "partition/observing.hpp"
+#include "runtime/discovery.hpp"
+#include "runtime/requests.hpp"
+#include "runtime/structure.hpp"
+
+namespace tfdude {
+
+/// Measurements of paths, and what they have said of covariances. What each function returns is said at Client.
+/// @par Thread safety  All functions.
+class Observations {
+ public:
+  Observations(Structure& structure, Discovery& discovery, Requests& requests)
+      : structure_(structure), discovery_(discovery), requests_(requests) {}
+
+  [[nodiscard]] Result<Observed> observe(const std::string& a, const std::string& b,
+                                         const Transform& X_AB, std::optional<Time> stamp,
+                                         const ObserveOptions& options, const Deadline& deadline);
+  [[nodiscard]] Result<std::vector<EdgeConsistency>> consistency(const std::string& partition);
+
+ private:
+  [[nodiscard]] std::string new_source();
+  [[nodiscard]] Result<std::vector<SegmentValues>> values(std::vector<Part>& parts,
+                                                          const Deadline& deadline);
+  [[nodiscard]] Result<ObservedPath> path(ObservePlan& plan, const Deadline& deadline);
+  [[nodiscard]] Result<bool> revise(std::vector<Part> parts, const Deadline& deadline);
+
+  Structure& structure_;
+  Discovery& discovery_;
+  Requests& requests_;
+  std::atomic<std::uint64_t> count_{0};
+};
+
+}  // namespace tfdude

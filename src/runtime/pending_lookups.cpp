@@ -1,0 +1,271 @@
+#include "runtime/pending_lookups.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+namespace tfdude {
+namespace {
+
+// Owners are asked again after a quarter of the time that was waited for them so far, within these bounds,
+constexpr std::chrono::nanoseconds kAskSoonest = Milliseconds(1);
+constexpr std::chrono::nanoseconds kAskLatest = Milliseconds(50);
+// and on behalf of all lookups that wait no more often than this.
+constexpr std::chrono::microseconds kAskEvery{250};
+
+// Whoever writes without a pause has all that waits looked at no more often than this, and so that it takes a quarter of a
+// processor at most: who writes wakes the thread, which costs it some microseconds.
+constexpr int kRest = 3;
+constexpr std::chrono::nanoseconds kShortestRest = std::chrono::microseconds(100);
+constexpr std::chrono::nanoseconds kLongestRest = Milliseconds(10);
+
+bool is_structural(Errc code) {
+  return code == Errc::kUnknownStart || code == Errc::kUnknownEnd || code == Errc::kNotConnected ||
+         code == Errc::kUnreachable;
+}
+
+}  // namespace
+
+bool is_worth_waiting(const Error& error, const Query& query) {
+  switch (error.code) {
+    case Errc::kNotYet:
+    case Errc::kTimeout:
+    case Errc::kNotOwner:
+      return true;
+    case Errc::kTooOld:
+      // Of the newest common instant: where one edge is ahead of what another has.
+      return !query.at;
+    default:
+      return is_structural(error.code);
+  }
+}
+
+PendingLookups::PendingLookups(Forest& forest, Calls& calls, SharedHints& hints, Links links)
+    : forest_(forest), calls_(calls), hints_(hints), links_(std::move(links)) {}
+
+void PendingLookups::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_one();
+  if (thread_.joinable()) thread_.join();
+  // Here, as what callbacks hold goes with them.
+  for (const auto& lookup : std::exchange(added_, {})) give_up(*lookup);
+  callbacks_.stop();
+}
+
+void PendingLookups::give_up(Lookup& lookup) {
+  if (lookup.callback != nullptr) {
+    lookup.callback->cancel();
+  } else {
+    lookup.promise.set_value(
+        fail(Errc::kTimeout,
+             "the lookup was cancelled, as its client is closed: " + lookup.last.message));
+  }
+}
+
+std::future<PendingLookups::Found> PendingLookups::add(Wanted wanted, const Deadline& deadline,
+                                                       Error last) {
+  auto lookup = std::make_unique<Lookup>(std::move(wanted), deadline, std::move(last));
+  auto future = lookup->promise.get_future();
+  add(std::move(lookup));
+  return future;
+}
+
+std::shared_ptr<OneCall<PendingLookups::Found>> PendingLookups::add(
+    Wanted wanted, const Deadline& deadline, Error last, OneCall<Found>::Function callback) {
+  auto lookup = std::make_unique<Lookup>(std::move(wanted), deadline, std::move(last));
+  auto call = lookup->callback = std::make_shared<OneCall<Found>>(std::move(callback));
+  add(std::move(lookup));
+  return call;
+}
+
+void PendingLookups::add(std::unique_ptr<Lookup> lookup) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!stopping_) {
+      if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
+      added_.push_back(std::move(lookup));
+    }
+  }
+  if (lookup != nullptr) {
+    give_up(*lookup);
+  } else {
+    wake(urgent_);
+  }
+}
+
+// May be called with the forest's lock held.
+void PendingLookups::wake(std::atomic<bool>& why) {
+  if (why.exchange(true)) return;
+  // The lock keeps the notice from falling between the thread's look and its sleep.
+  { const std::lock_guard lock(mutex_); }
+  changed_.notify_one();
+}
+
+void PendingLookups::look_again() {
+  ++others_;
+  wake(written_);
+}
+
+std::uint64_t PendingLookups::version() const {
+  return forest_.structure_version() + others_.load();
+}
+
+void PendingLookups::run() {
+  All all;
+  bool listens = false;
+  std::unique_lock lock(mutex_);
+  while (!stopping_) {
+    // Before the look, so that what comes meanwhile is not missed.
+    urgent_.store(false);
+    const bool written = written_.exchange(false);
+    std::move(added_.begin(), added_.end(), std::back_inserter(all));
+    added_.clear();
+    lock.unlock();
+    if (listens != !all.empty()) {
+      listens = !all.empty();
+      forest_.on_commit(listens ? [this] { wake(written_); } : std::function<void()>(), this);
+    }
+    const auto begin = Clock::now();
+    const auto next = attend(all, written);
+    const auto end = Clock::now();
+    const auto rested = end + std::clamp<std::chrono::nanoseconds>(kRest * (end - begin),
+                                                                   kShortestRest, kLongestRest);
+    lock.lock();
+    const auto must = [this] { return stopping_ || urgent_.load(); };
+    changed_.wait_until(lock, std::min(next, rested), must);
+    changed_.wait_until(lock, next, [&] { return must() || written_.load(); });
+  }
+  std::move(all.begin(), all.end(), std::back_inserter(added_));
+  lock.unlock();
+  forest_.on_commit(nullptr, this);
+}
+
+/// @return when there is more to do
+PendingLookups::Clock::time_point PendingLookups::attend(All& all, bool written) {
+  count_ = all.size();
+  auto next = Clock::time_point::max();
+  const auto over = [&](const std::unique_ptr<Lookup>& lookup) {
+    if (attend(*lookup, written)) return true;
+    next = std::min({next, lookup->next, lookup->deadline.at()});
+    return false;
+  };
+  all.erase(std::remove_if(all.begin(), all.end(), over), all.end());
+  if (const auto look = callbacks_.look_after(Clock::now())) next = std::min(next, *look);
+  return next;
+}
+
+/// Each of the following is true where the lookup is over.
+bool PendingLookups::attend(Lookup& lookup, bool written) {
+  if (lookup.callback != nullptr && !lookup.callback->waits()) return true;
+  if (lookup.asking) return go_on_asking(lookup);
+  if (written && lookup.far) hurry(lookup);
+  const auto now = Clock::now();
+  const bool may_be_here = lookup.version != version() || (written && !lookup.far);
+  if (now < lookup.next && !may_be_here && !lookup.deadline.over(now)) return false;
+  return attempt(lookup);
+}
+
+bool PendingLookups::attempt(Lookup& lookup) {
+  lookup.version = version();
+  const Wanted& wanted = lookup.wanted;
+  auto here = forest_.lookup(wanted.a, wanted.b, wanted.query);
+  const bool all_held =
+      here || here.error().code == Errc::kNotYet || here.error().code == Errc::kTooOld;
+  if (all_held) return judge(lookup, std::move(here), false);
+  auto plan = links_.plan(wanted);
+  if (!plan) return judge(lookup, tl::unexpected(std::move(plan.error())), false);
+  if (lookup.deadline.over()) return judge(lookup, tl::unexpected(lookup.last), true);
+  lookup.gathering = *std::move(plan);
+  lookup.until = lookup.deadline.within(links_.timeout);
+  return ask(lookup);
+}
+
+bool PendingLookups::ask(Lookup& lookup) {
+  lookup.asking.emplace(calls_, lookup.gathering->parts(), [this] { wake(urgent_); });
+  if (const Error* lacking = lookup.asking->answer(links_.answer_here)) {
+    // Nobody else is asked in vain.
+    Error error = *lacking;
+    lookup.asking.reset();
+    return judge(lookup, tl::unexpected(std::move(error)), false);
+  }
+  return go_on_asking(lookup);
+}
+
+bool PendingLookups::go_on_asking(Lookup& lookup) {
+  const auto now = Clock::now();
+  if (!lookup.asking->complete() && !lookup.until->over(now)) {
+    lookup.next = std::min(lookup.asking->send_due(now, links_.send), lookup.until->at());
+  }
+  if (!lookup.asking->complete()) {
+    if (!lookup.until->over(now)) return false;
+    lookup.asking->give_up(*lookup.until);
+    // What they said before they were asked for the last time tells more than that they had no time to say it again.
+    if (lookup.deadline.over(now) && lookup.last.code != Errc::kTimeout) {
+      lookup.asking.reset();
+      return judge(lookup, tl::unexpected(lookup.last), true);
+    }
+  }
+  auto found = lookup.gathering->take(lookup.asking->take_replies(), hints_);
+  lookup.asking.reset();
+  return found ? judge(lookup, *std::move(found), true) : ask(lookup);
+}
+
+bool PendingLookups::judge(Lookup& lookup, Found found, bool far) {
+  if (found || !is_worth_waiting(found.error(), lookup.wanted.query)) {
+    finish(lookup, std::move(found));
+    return true;
+  }
+  lookup.last = std::move(found.error());
+  if (lookup.deadline.over()) {
+    finish(lookup, tl::unexpected(links_.last_word(lookup.last, lookup.deadline)));
+    return true;
+  }
+  lookup.far = far;
+  lookup.next = next_attempt(lookup, far);
+  // It may have come while they were asked.
+  if (far) hurry(lookup);
+  return false;
+}
+
+/// Those who push what is wanted are asked once more, out of turn.
+void PendingLookups::hurry(Lookup& lookup) {
+  if (lookup.hurried || !links_.was_pushed(lookup.wanted)) return;
+  lookup.hurried = true;
+  lookup.next = Clock::now();
+}
+
+// What is lacking here wakes the thread when it comes.
+PendingLookups::Clock::time_point PendingLookups::next_attempt(const Lookup& lookup,
+                                                               bool far) const {
+  if (!far) return lookup.deadline.at();
+  const auto now = Clock::now();
+  const std::chrono::nanoseconds waited = now - lookup.began;
+  std::chrono::nanoseconds pause = waited / 4;
+  if (const auto at = lookup.wanted.query.at) {
+    // Most sources stamp by a clock that runs as the wall clock does.
+    const Time today = links_.clock();
+    if (*at > today) {
+      pause = *at - today;
+    } else if (*at > today - waited) {
+      pause = (today - *at) / 4;
+    }
+  }
+  pause = std::clamp(pause, kAskSoonest, kAskLatest);
+  return now + std::max<std::chrono::nanoseconds>(pause, count_ * kAskEvery);
+}
+
+void PendingLookups::finish(Lookup& lookup, Found found) {
+  if (lookup.callback == nullptr) {
+    lookup.promise.set_value(std::move(found));
+    return;
+  }
+  // Where it is dropped instead, what its function holds goes, too.
+  const std::shared_ptr<OneCall<Found>> call(lookup.callback.get(),
+                                             [owner = lookup.callback](auto*) { owner->cancel(); });
+  callbacks_.post([call, found = std::move(found)]() mutable { call->run(std::move(found)); });
+}
+
+}  // namespace tfdude

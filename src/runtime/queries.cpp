@@ -1,0 +1,102 @@
+#include "runtime/queries.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+
+Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_view b) {
+  return requests_.planned(discovery_.call_deadline(), [&]() -> Result<std::vector<PathSegment>> {
+    auto segments = structure_.forest.segments(a, b);
+    if (!segments) return tl::unexpected(std::move(segments.error()));
+    std::vector<PathSegment> path;
+    for (Segment& segment : *segments) {
+      path.push_back({structure_.directory.name(segment.owner), std::move(segment.from),
+                      std::move(segment.to)});
+    }
+    return path;
+  });
+}
+
+Result<Handle> Queries::find(std::string_view id) {
+  return requests_.after_discovery(discovery_.call_deadline(), [&]() -> Result<Handle> {
+    const auto handle = structure_.forest.find(id);
+    if (!handle) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+    return *handle;
+  });
+}
+
+Result<FrameInfo> Queries::info(const std::string& id, const Deadline& deadline) {
+  return requests_.after_discovery(deadline, [&]() -> Result<FrameInfo> {
+    auto info = structure_.forest.info(id);
+    if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+    return *std::move(info);
+  });
+}
+
+Result<std::vector<Frame>> Queries::frames() {
+  if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
+  std::vector<FrameInfo> infos = structure_.forest.frames();
+  std::vector<Frame> frames;
+  frames.reserve(infos.size());
+  const std::lock_guard lock(structure_.mutex);
+  for (FrameInfo& info : infos) {
+    frames.push_back({std::move(info.id), std::move(info.parent),
+                      structure_.directory.name(info.owner), info.attached});
+  }
+  std::sort(frames.begin(), frames.end(),
+            [](const Frame& a, const Frame& b) { return a.id < b.id; });
+  return frames;
+}
+
+Result<std::vector<std::string>> Queries::children(std::string_view id) {
+  if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
+  return structure_.forest.children(id);
+}
+
+Result<std::vector<std::string>> Queries::roots() {
+  if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
+  return structure_.forest.roots();
+}
+
+Result<std::vector<PartitionInfo>> Queries::partitions() {
+  if (auto known = all_known(); !known) return tl::unexpected(std::move(known.error()));
+  return member_.with_rules([&](Member& member) {
+    auto all = structure_.directory.partitions();
+    const Partition* own = member.partition();
+    if (own == nullptr) return all;
+    for (PartitionInfo& info : all) {
+      if (info.name != own->name()) continue;
+      info.host = member.presence().host;
+      info.pid = member.presence().pid;
+      info.frames = own->frame_count();
+    }
+    return all;
+  });
+}
+
+std::size_t Queries::own_frames() {
+  return member_.with_rules([](Member& member) {
+    return member.partition() != nullptr ? member.partition()->frame_count() : 0;
+  });
+}
+
+Result<std::vector<PastInfo>> Queries::past(const std::string& id) {
+  const Deadline deadline = discovery_.call_deadline();
+  return requests_.retry_on_stale_route(
+      deadline,
+      [&]() -> Result<Part> {
+        const auto info = structure_.forest.info(id);
+        if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+        return route_to(structure_.directory, info->owner, Request{0, id, PastRequest{}});
+      },
+      [&](Part& part) { return requests_.ask_list<PastInfo>(std::move(part), deadline); });
+}
+
+Result<std::vector<PastInfo>> Queries::pasts(const std::string& partition) {
+  return requests_.ask_all<PastInfo>(partition, PastRequest{true}, discovery_.call_deadline());
+}
+
+}  // namespace tfdude

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tfdude/types/frame.hpp"
+#include "tfdude/types/partition_info.hpp"
+
+#include "runtime/discovery.hpp"
+#include "runtime/member_runner.hpp"
+#include "runtime/requests.hpp"
+#include "runtime/structure.hpp"
+
+namespace tfdude {
+
+/// What is known of frames and partitions besides their values. What each function returns is said at Client.
+/// @par Thread safety  All functions.
+class Queries {
+ public:
+  Queries(Structure& structure, Discovery& discovery, Requests& requests, MemberRunner& member)
+      : structure_(structure), discovery_(discovery), requests_(requests), member_(member) {}
+
+  [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b);
+  [[nodiscard]] Result<Handle> find(std::string_view id);
+  [[nodiscard]] Result<FrameInfo> info(const std::string& id, const Deadline& deadline);
+  [[nodiscard]] Result<FrameInfo> info(const std::string& id) {
+    return info(id, discovery_.call_deadline());
+  }
+  [[nodiscard]] Result<std::vector<Frame>> frames();
+  [[nodiscard]] Result<std::vector<std::string>> children(std::string_view id);
+  [[nodiscard]] Result<std::vector<std::string>> roots();
+  [[nodiscard]] Result<std::vector<PartitionInfo>> partitions();
+  [[nodiscard]] std::size_t own_frames();
+  /// What is kept of the past of a frame's edge, and of all edges of a partition.
+  [[nodiscard]] Result<std::vector<PastInfo>> past(const std::string& id);
+  [[nodiscard]] Result<std::vector<PastInfo>> pasts(const std::string& partition);
+
+ private:
+  [[nodiscard]] Result<void> all_known() { return discovery_.await(discovery_.call_deadline()); }
+
+  Structure& structure_;
+  Discovery& discovery_;
+  Requests& requests_;
+  MemberRunner& member_;
+};
+
+}  // namespace tfdude

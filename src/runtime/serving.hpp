@@ -1,0 +1,46 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tfdude/types/frame.hpp"
+#include "tfdude/types/options.hpp"
+
+#include "runtime/discovery.hpp"
+#include "runtime/member_runner.hpp"
+#include "runtime/structure.hpp"
+#include "transport/port.hpp"
+
+namespace tfdude {
+
+/// How a participant becomes the owner of its partition: it claims the name, takes what an earlier process has left and what
+/// the configuration says, and tells the others. Not thread-safe.
+class Serving {
+ public:
+  Serving(Structure& structure, Discovery& discovery, Transport& transport, MemberRunner& member,
+          const Options& options)
+      : structure_(structure),
+        discovery_(discovery),
+        transport_(transport),
+        member_(member),
+        options_(options) {}
+
+  /// @return kPartitionTaken, kState; the error of the first frame that cannot be taken
+  [[nodiscard]] Result<void> serve(const std::vector<FrameSpec>& frames);
+
+ private:
+  [[nodiscard]] Result<void> claim_name();
+  [[nodiscard]] Result<StoredState> open_store(std::unique_ptr<StateStore>& store);
+  [[nodiscard]] Result<void> take_frames(const std::vector<FrameSpec>& frames);
+  [[nodiscard]] Result<void> set_timings(const std::vector<FrameSpec>& frames);
+  void await_gone();
+
+  Structure& structure_;
+  Discovery& discovery_;
+  Transport& transport_;
+  MemberRunner& member_;
+  const Options& options_;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,96 @@
+#include "runtime/watcher.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "partition/routing.hpp"
+
+namespace tfdude {
+namespace {
+
+Result<void> check_rate(double rate) {
+  constexpr double kLeast = 1.0 / std::chrono::duration<double>(kMaxWatchPeriod).count();
+  if (rate == 0 || (rate >= kLeast && rate <= 1e6)) return {};
+  std::ostringstream text;
+  text << rate;
+  return fail(Errc::kInvalidInput,
+              "the rate of a watch must be 0, or from one an hour to 1e6 Hz, not " + text.str());
+}
+
+std::chrono::nanoseconds period_of(double rate) {
+  return std::chrono::nanoseconds(rate > 0 ? std::llround(1e9 / rate) : 0);
+}
+
+}  // namespace
+
+void Watcher::stop() {
+  if (watches_ != nullptr) watches_->stop();
+}
+
+Result<std::shared_ptr<WatchedPath>> Watcher::watch(const std::string& a, const std::string& b,
+                                                    const WatchOptions& options) {
+  if (auto ok = check_rate(options.rate); !ok) return tl::unexpected(std::move(ok.error()));
+  const Deadline deadline = discovery_.call_deadline();
+  auto known = requests_.planned(deadline, [&] { return structure_.forest.segments(a, b); });
+  if (!known) return tl::unexpected(std::move(known.error()));
+  auto path = watches().watch(a, b, options);
+  if (auto live = path->wait_until_live(deadline.at()); !live) {
+    return tl::unexpected(std::move(live.error()));
+  }
+  return path;
+}
+
+Watches& Watcher::watches() {
+  const std::lock_guard lock(mutex_);
+  if (watches_ == nullptr) {
+    watches_ = std::make_unique<Watches>(Watches::Links{
+        [this](const WatchedPath& path) { return plan(path); },
+        [this](std::vector<Part>& parts) { return requests_.ask(parts, Deadline(timeout_)); },
+        [this](std::uint64_t group) { return transport_.watch(group); },
+        [this](std::uint64_t group) { transport_.unwatch(group); }});
+    watching_.store(watches_.get());
+  }
+  return *watches_;
+}
+
+Result<WatchRoute> Watcher::plan(const WatchedPath& path) {
+  const WatchOptions& options = path.options();
+  const std::uint64_t own_incarnation = incarnation_();
+  const std::lock_guard lock(structure_.mutex);
+  auto plan = route_watch(structure_.forest, structure_.directory, path.a(), path.b(),
+                          options.composed, period_of(options.rate));
+  if (!plan) return tl::unexpected(std::move(plan.error()));
+  WatchRoute route{std::move(plan->edges), {}, std::move(plan->parts)};
+  for (const Part& part : route.parts) {
+    const auto& request = std::get<WatchRequest>(part.request.body);
+    const auto serving = structure_.directory.serving(part.partition);
+    const std::uint64_t incarnation = part.owner == kHeldHere ? own_incarnation
+                                      : serving               ? serving->incarnation
+                                                              : 0;
+    WatchRoute::Source source{
+        part.partition, incarnation, watch_group(part.partition, incarnation, request), {}};
+    for (const PathEnds& segment : request.segments) source.frames.push_back(segment.to);
+    route.sources.push_back(std::move(source));
+  }
+  return route;
+}
+
+bool Watcher::on_state(const State& state) {
+  Watches* watches = watching_.load();
+  if (watches == nullptr) return false;
+  watches->on_state(state);
+  return true;
+}
+
+bool Watcher::can_answer(const std::string& a, const std::string& b, const Query& query) const {
+  const Watches* watches = watching_.load();
+  return watches != nullptr && watches->can_answer(a, b, query);
+}
+
+void Watcher::look_again() {
+  if (Watches* watches = watching_.load()) watches->look_again();
+}
+
+}  // namespace tfdude

@@ -1,0 +1,141 @@
+#include "runtime/writes.hpp"
+
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+
+Result<void> Writes::change(Part part, const Deadline& deadline) {
+  std::vector<Part> parts{std::move(part)};
+  return requests_.change(parts, deadline);
+}
+
+Result<void> Writes::add(const std::string& id, const AddRequest& request,
+                         const std::string& partition) {
+  const Deadline deadline = discovery_.call_deadline();
+  auto added = requests_.retry_on_stale_route(
+      deadline,
+      [&] { return route_add(structure_.forest, structure_.directory, id, request, partition); },
+      [&](Part& part) { return change(std::move(part), deadline); });
+  if (added) return added;
+  return tl::unexpected(member_.unless_unsaved(std::move(added.error()), id));
+}
+
+Result<void> Writes::remove(const std::string& id) {
+  const Deadline deadline = discovery_.call_deadline();
+  // All below it are told by name, so all must be known.
+  if (auto all = discovery_.await(deadline); !all) return all;
+  bool asked = false;
+  auto removed = requests_.retry_on_stale_route(
+      deadline, [&] { return route_remove(structure_.forest, structure_.directory, id); },
+      [&](std::vector<Part>& parts) {
+        asked = true;
+        return requests_.change(parts, deadline);
+      });
+  // Gone by the time of a second attempt: what was asked for has come to be.
+  if (removed) return removed;
+  const bool is_missing = is_elsewhere(removed.error());
+  if (is_missing && asked && !structure_.forest.exists(id)) return {};
+  return tl::unexpected(member_.unless_unsaved(std::move(removed.error()), id));
+}
+
+Result<void> Writes::move(const std::string& id, const MoveRequest& request) {
+  const Deadline deadline = discovery_.call_deadline();
+  return requests_.retry_on_stale_route(
+      deadline, [&] { return route_move(structure_.forest, structure_.directory, id, request); },
+      [&](Part& part) { return change(std::move(part), deadline); });
+}
+
+Result<void> Writes::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
+  if (edges.empty()) return {};
+  auto updated = structure_.forest.update(edges, stamp);
+  if (updated || !is_elsewhere(updated.error())) return updated;
+  const Deadline deadline = discovery_.call_deadline();
+  return requests_.retry_on_stale_route(
+      deadline, [&] { return route_update(structure_.forest, structure_.directory, edges, stamp); },
+      [&](std::vector<Part>& parts) { return requests_.change(parts, deadline); });
+}
+
+Result<void> Writes::update(const std::vector<PartialUpdate>& edges, std::optional<Time> stamp) {
+  if (edges.empty()) return {};
+  const Deadline deadline = discovery_.call_deadline();
+  return requests_.retry_on_stale_route(
+      deadline, [&] { return route_update(structure_.forest, structure_.directory, edges, stamp); },
+      [&](std::vector<Part>& parts) { return requests_.change(parts, deadline); });
+}
+
+Result<void> Writes::publish(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
+  if (edges.empty()) return {};
+  auto updated = structure_.forest.update(edges, stamp);
+  if (updated || !is_elsewhere(updated.error())) return updated;
+  const Deadline deadline = discovery_.call_deadline();
+  auto parts = requests_.planned(deadline, [&] {
+    return route_publish(structure_.forest, structure_.directory, edges, stamp);
+  });
+  if (!parts) return tl::unexpected(std::move(parts.error()));
+  Result<void> outcome;
+  for (Part& part : *parts) {
+    const Update share{std::move(std::get<UpdateRequest>(part.request.body).edges), stamp};
+    auto sent = publish_to(part, share, deadline);
+    if (!sent && outcome) outcome = std::move(sent);
+  }
+  return outcome;
+}
+
+// Whoever is there gets its share, and the error of who is not is told.
+Result<void> Writes::publish_to(const Part& part, const Update& share, const Deadline& deadline) {
+  if (part.owner == kHeldHere) return structure_.forest.update(share.edges, share.stamp);
+  {
+    const std::lock_guard lock(structure_.mutex);
+    if (auto ok = check_reachable(structure_.directory, {part}); !ok) return ok;
+  }
+  return transport_.send(part.partition, share, deadline.at());
+}
+
+Result<void> Writes::correlate(const std::string& id, const Correlation& correlation) {
+  const Deadline deadline = discovery_.call_deadline();
+  return requests_.retry_on_stale_route(
+      deadline,
+      [&]() -> Result<Part> {
+        const auto frame = structure_.forest.info(id);
+        if (!frame) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+        if (auto ok = check_shares(correlation.shares); !ok) {
+          return fail_at("frame " + quote(id), ok.error());
+        }
+        return route_to(structure_.directory, frame->owner,
+                        Request{0, id, CorrelateRequest{correlation}});
+      },
+      [&](Part& part) { return change(std::move(part), deadline); });
+}
+
+Result<void> Writes::forget(const std::string& partition) {
+  const Deadline deadline = discovery_.call_deadline();
+  // All who are there are to be told.
+  if (auto all = discovery_.await(deadline); !all) return all;
+  auto parts = requests_.planned(deadline, [&] { return route_forget(partition); });
+  if (!parts) return tl::unexpected(std::move(parts.error()));
+  if (auto told = requests_.change(*parts, deadline); !told) return told;
+  return member_.forget(partition);
+}
+
+Result<std::vector<Part>> Writes::route_forget(const std::string& partition) {
+  const Directory& directory = structure_.directory;
+  if (!directory.owner(partition)) {
+    return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+  }
+  if (auto ok = directory.check_not_there(partition); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  const ForgetRequest body{partition, directory.latest_incarnation(partition)};
+  std::vector<Part> all;
+  for (const Owner one : directory.reachable_owners()) {
+    all.push_back({one, directory.name(one), Request{0, directory.name(one), body}});
+  }
+  if (member_.partition() != nullptr) {
+    all.push_back({kHeldHere, member_.name(), Request{0, member_.name(), body}});
+  }
+  return all;
+}
+
+}  // namespace tfdude
