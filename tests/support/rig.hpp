@@ -1,0 +1,147 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tfdude/client/node.hpp"
+#include "tfdude/transport/loopback.hpp"
+
+#include "runtime/discovery.hpp"
+#include "runtime/member_runner.hpp"
+#include "runtime/requests.hpp"
+#include "runtime/structure.hpp"
+#include "runtime/wall_clock.hpp"
+#include "support/catch.hpp"
+#include "support/relay.hpp"
+
+// For tests of one part of a participant: what the parts build on, and owners whose replies a test may decide.
+namespace tfdude::testing {
+
+[[nodiscard]] inline Options quick() {
+  Options options;
+  options.timeout = Milliseconds(300);
+  options.discovery = Milliseconds(50);
+  return options;
+}
+
+/// What most parts of a participant build on, wired as Participant does it.
+class Rig : public TransportHandler {
+ public:
+  explicit Rig(TransportPtr to, const std::string& partition = "", const Options& with = quick())
+      : options(with),
+        structure(wall_clock, partition),
+        transport(std::move(to)),
+        discovery(structure, *transport, options.discovery, options.timeout),
+        member(structure, *transport, partition,
+               {[this] { ++routes; }, [this] { ++others; },
+                [this](const std::string& name) {
+                  {
+                    const std::lock_guard lock(mutex);
+                    gone.push_back(name);
+                  }
+                  requests.calls().on_lost(name);
+                },
+                [this] {
+                  if (on_contest) on_contest();
+                }}),
+        requests(structure, discovery, *transport,
+                 {[this](const Request& request) {
+                    ++asked_here;
+                    return member.answer(request);
+                  },
+                  [this](const tfdude::Deadline& deadline) { member.tell(deadline); },
+                  [this](const Request& request, const tfdude::Deadline& deadline) {
+                    return member.await_stored(request, deadline);
+                  },
+                  [this] { return still_in ? still_in() : member.still_in(); }}) {
+    REQUIRE(transport->start(*this));
+  }
+  ~Rig() override {
+    member.stop_events();
+    member.stop();
+    transport->stop();
+  }
+  Rig(const Rig&) = delete;
+  Rig& operator=(const Rig&) = delete;
+
+  [[nodiscard]] tfdude::Deadline deadline() const { return discovery.call_deadline(); }
+
+  void on_request(const PeerId& from, const Request& request) override {
+    if (auto reply = member.on_request(from, request)) transport->reply(from, *reply);
+  }
+  void on_reply(const Reply& reply) override { requests.calls().on_reply(reply); }
+  void on_update(const Update&) override {}
+  void on_joints(const JointUpdate& update) override {
+    if (joints) joints(update);
+  }
+  void on_state(const State& state) override {
+    if (states) states(state);
+  }
+  void on_page(const Page& page) override { member.on_page(page); }
+  void on_presence(const Presence& presence) override { member.on_presence(presence); }
+  void on_lost(const std::string& partition, std::uint64_t incarnation) override {
+    member.on_lost(partition, incarnation);
+  }
+  [[nodiscard]] bool owns(std::string_view id) const override { return structure.forest.holds(id); }
+  [[nodiscard]] bool owns_joint(std::string_view) const override { return true; }
+
+  const Options options;
+  std::function<void()> on_contest;
+  std::function<void(const JointUpdate&)> joints;
+  std::function<void(const State&)> states;
+  std::function<Result<void>()> still_in;  // else the member's
+  std::atomic<int> routes{0};
+  std::atomic<int> others{0};
+  std::atomic<int> asked_here{0};
+  std::mutex mutex;
+  std::vector<std::string> gone;  // partitions; under mutex
+  Structure structure;
+  TransportPtr transport;
+  Discovery discovery;
+  MemberRunner member;
+  Requests requests;
+};
+
+/// An owner, some of whose requests a test answers, or loses.
+class ScriptedOwner {
+ public:
+  /// @return whether the request goes no further
+  using Script = std::function<bool(Transport& transport, const PeerId& from, const Request&)>;
+
+  ScriptedOwner(LoopbackNetwork& network, const std::string& name,
+                const std::vector<FrameSpec>& frames, Script script = {}) {
+    auto ear = std::make_unique<Ear>(network.join(), std::move(script));
+    ear_ = ear.get();
+    node_.emplace(*Node::open(std::move(ear), name, frames));
+  }
+
+  Node& node() { return *node_; }
+  [[nodiscard]] int asked() const { return ear_->asked; }
+  /// It ends, and says so.
+  void leave() { node_.reset(); }
+
+ private:
+  class Ear final : public Relay {
+   public:
+    Ear(TransportPtr real, Script script) : Relay(std::move(real)), script_(std::move(script)) {}
+    std::atomic<int> asked{0};
+
+   private:
+    void on_request(const PeerId& from, const Request& request) override {
+      ++asked;
+      if (!script_ || !script_(real(), from, request)) Relay::on_request(from, request);
+    }
+    const Script script_;
+  };
+
+  Ear* ear_ = nullptr;
+  std::optional<Node> node_;
+};
+
+}  // namespace tfdude::testing

@@ -1,0 +1,136 @@
+// Whether what a new participant does not know is known not to exist.
+
+#include "runtime/discovery.hpp"
+
+#include <atomic>
+#include <thread>
+
+#include "support/catch.hpp"
+#include "support/replica.hpp"
+#include "support/rig.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ContainsSubstring;
+using testing::quick;
+
+/// Somebody may still be met.
+class Meeting final : public testing::Relay {
+ public:
+  using Relay::Relay;
+  bool discovered() const override { return met_all; }
+  bool awaits_presence() const override { return met_somebody; }
+
+  std::atomic<bool> met_all{false};
+  std::atomic<bool> met_somebody{false};
+};
+
+struct Newcomer {
+  explicit Newcomer(const Options& options = quick())
+      : own(std::make_unique<Meeting>(network.join())),
+        network_of(*own),
+        rig(std::move(own), "", options) {}
+
+  LoopbackNetwork network;
+  std::unique_ptr<Meeting> own;
+  Meeting& network_of;
+  testing::Rig rig;
+};
+
+Result<int> missing() { return fail(Errc::kUnknownFrame, "no frame 'hand'"); }
+
+}  // namespace
+
+TEST_CASE("discovery: where nobody is met all is known after the look round") {
+  Newcomer newcomer;
+  const auto before = Deadline::Clock::now();
+  CHECK_FALSE(newcomer.rig.discovery.complete());
+  REQUIRE(newcomer.rig.discovery.await(newcomer.rig.deadline()));
+  CHECK(Deadline::Clock::now() - before >= 40ms);
+  const auto found =
+      newcomer.rig.discovery.retry_until_known(newcomer.rig.deadline(), [] { return missing(); });
+  REQUIRE_FALSE(found);
+  CHECK(found.error().code == Errc::kUnknownFrame);
+}
+
+TEST_CASE("discovery: before all are met nothing is said to be missing") {
+  Options options = quick();
+  options.discovery = 10s;
+  Newcomer newcomer(options);
+  const Deadline soon(20ms);
+  const auto found = newcomer.rig.discovery.retry_until_known(soon, [] { return missing(); });
+  REQUIRE_FALSE(found);
+  CHECK(found.error().code == Errc::kTimeout);
+  CHECK_THAT(found.error().message,
+             ContainsSubstring("no frame 'hand'") && ContainsSubstring("nobody was met yet"));
+  newcomer.network_of.met_somebody = true;
+  CHECK_THAT(newcomer.rig.discovery.await(soon).error().message,
+             ContainsSubstring("somebody was met who has not told yet what it owns"));
+  newcomer.network_of.met_all = true;
+  CHECK(newcomer.rig.discovery.await(soon));
+}
+
+TEST_CASE("discovery: an operation is repeated until what it lacks has come") {
+  Options options = quick();
+  options.discovery = 10s;
+  options.timeout = 20s;
+  Newcomer newcomer(options);
+  std::atomic<int> tries{0};
+  std::thread other([&] {
+    while (tries == 0) std::this_thread::yield();
+    newcomer.rig.on_presence(testing::presence_of("arm", 1, 1));
+    newcomer.rig.on_page(Page{"arm", 0, 1, 1, {{"hand", "", 1}}});
+  });
+  const auto found =
+      newcomer.rig.discovery.retry_until_known(newcomer.rig.deadline(), [&]() -> Result<int> {
+        ++tries;
+        return newcomer.rig.structure.forest.exists("hand") ? Result<int>(1) : missing();
+      });
+  other.join();
+  CHECK(found);
+  CHECK(tries > 1);
+}
+
+TEST_CASE("discovery: an error that is not of what is unknown is returned at once") {
+  Newcomer newcomer;
+  int tries = 0;
+  const auto found =
+      newcomer.rig.discovery.retry_until_known(newcomer.rig.deadline(), [&]() -> Result<int> {
+        ++tries;
+        return fail(Errc::kCycle, "a cycle");
+      });
+  CHECK(found.error().code == Errc::kCycle);
+  CHECK(tries == 1);
+}
+
+TEST_CASE("discovery: a change that an owner has told of and has not come is waited for") {
+  Newcomer newcomer;
+  newcomer.network_of.met_all = true;
+  newcomer.rig.on_presence(testing::presence_of("arm", 1, 1));
+  newcomer.rig.on_page(Page{"arm", 0, 1, 1, {{"hand", "", 1}}});
+  REQUIRE(newcomer.rig.discovery.complete());
+  {
+    const std::lock_guard lock(newcomer.rig.structure.mutex);
+    newcomer.rig.structure.directory.told_of(*newcomer.rig.structure.directory.owner("arm"), 2);
+    newcomer.rig.discovery.fell_behind();
+  }
+  CHECK_THAT(newcomer.rig.discovery.await(Deadline(10ms)).error().message,
+             ContainsSubstring("partition 'arm' has made a change that has not come here yet"));
+  newcomer.rig.on_page(Page{"arm", 0, 1, 2, {{"hand", "", 1}, {"finger", "hand", 2}}});
+  CHECK(newcomer.rig.discovery.await(Deadline(10s)));
+}
+
+TEST_CASE("discovery: a call has the rest of the look round besides its time-out") {
+  Options options = quick();
+  options.discovery = 10s;
+  Newcomer newcomer(options);
+  CHECK(newcomer.rig.deadline().at() > Deadline::Clock::now() + 9s);
+  newcomer.network_of.met_all = true;
+  REQUIRE(newcomer.rig.discovery.complete());
+  const auto until = newcomer.rig.deadline().at();
+  CHECK(until <= Deadline::Clock::now() + options.timeout);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,96 @@
+// Positions of joints, to who has them and from others.
+
+#include "runtime/joint_calls.hpp"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/joint_frames.hpp"
+#include "support/rig.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ContainsSubstring;
+using testing::hinge_named;
+using testing::moved_by;
+using testing::outcome;
+using testing::Rig;
+using testing::ScriptedOwner;
+
+struct Mover : Rig {
+  explicit Mover(LoopbackNetwork& network, const std::string& partition = "")
+      : Rig(network.join(), partition), calls(structure, discovery, requests, *transport, member) {}
+  JointCalls calls;
+};
+
+std::vector<FrameSpec> arm() {
+  return {{"base", "", {}}, moved_by("fore", "base", hinge_named("elbow"))};
+}
+
+}  // namespace
+
+TEST_CASE("joints: an update and a sample reach who has the joint") {
+  LoopbackNetwork network;
+  ScriptedOwner owner(network, "arm", arm());
+  Mover mover(network);
+  REQUIRE(mover.calls.update({{{"elbow", 0.5}}, {}}));
+  CHECK(owner.node().joints("arm")->at(0).position == 0.5);
+  REQUIRE(mover.calls.publish({{{"elbow", 0.25}}, {}}));
+  CHECK(owner.node().joints("arm")->at(0).position == 0.25);
+  const auto listed = mover.calls.list("arm");
+  REQUIRE(listed);
+  REQUIRE(listed->size() == 1);
+  CHECK(listed->front().position == 0.25);
+}
+
+TEST_CASE("joints: of one that nobody has that is said, and the others are sent") {
+  LoopbackNetwork network;
+  ScriptedOwner owner(network, "arm", arm());
+  Mover mover(network);
+  const auto sent = mover.calls.publish({{{"knee", 1}, {"elbow", 0.25}}, {}});
+  CHECK(outcome(sent) == "unknown_joint");
+  CHECK(owner.node().joints("arm")->at(0).position == 0.25);
+  CHECK(outcome(mover.calls.update({{{"knee", 1}, {"elbow", 0.75}}, {}})) == "unknown_joint");
+  CHECK(owner.node().joints("arm")->at(0).position == 0.25);
+}
+
+TEST_CASE("joints: an owner that is gone gets nothing, and is named") {
+  LoopbackNetwork network;
+  ScriptedOwner owner(network, "arm", arm());
+  Mover mover(network);
+  REQUIRE(mover.discovery.await(Deadline(10s)));
+  owner.leave();
+  const auto sent = mover.calls.publish({{{"elbow", 0.25}}, {}});
+  CHECK(outcome(sent) == "unreachable");
+  CHECK_THAT(sent.error().message, ContainsSubstring("'arm'"));
+  CHECK(outcome(mover.calls.update({{{"elbow", 0.25}}, {}})) == "unreachable");
+}
+
+TEST_CASE("joints: a list that does not go on is not asked for without end") {
+  LoopbackNetwork network;
+  ScriptedOwner owner(network, "arm", arm(),
+                      [](Transport& transport, const PeerId& from, const Request& request) {
+                        if (!std::holds_alternative<JointsRequest>(request.body)) return false;
+                        const std::vector<JointInfo> same(kMaxItems);
+                        transport.reply(from, {request.sequence, 0, same});
+                        return true;
+                      });
+  Mover mover(network);
+  const auto listed = mover.calls.list("arm");
+  CHECK(outcome(listed) == "invalid_input");
+  CHECK(owner.asked() <= 2);
+}
+
+TEST_CASE("joints: what comes to a participant without a partition is passed over") {
+  LoopbackNetwork network;
+  Mover mover(network);
+  mover.calls.on_joints({{{"elbow", std::nan("")}}, {}});
+  CHECK(outcome(mover.calls.publish({{}, {}})) == "ok");
+}
+
+}  // namespace tfdude

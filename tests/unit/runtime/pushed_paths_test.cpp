@@ -1,0 +1,141 @@
+// Watched paths: the watcher's side and the owner's.
+
+#include <atomic>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "runtime/pushing.hpp"
+#include "runtime/watcher.hpp"
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/memory_store.hpp"
+#include "support/process.hpp"
+#include "support/rig.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::along_x;
+using testing::ContainsSubstring;
+using testing::eventually;
+using testing::outcome;
+using testing::Rig;
+using testing::ScriptedOwner;
+using testing::x_of;
+
+struct WatchingRig : Rig {
+  explicit WatchingRig(LoopbackNetwork& network)
+      : Rig(network.join()),
+        watcher(
+            structure, discovery, requests, *transport, [] { return std::uint64_t{0}; },
+            options.timeout) {
+    states = [this](const State& state) { watcher.on_state(state); };
+  }
+  ~WatchingRig() override { watcher.stop(); }
+  Watcher watcher;
+};
+
+const std::vector<FrameSpec> kArm{{"arm", "", {}}, {"hand", "arm", along_x(4)}};
+
+double seen(const WatchedPath& path) {
+  const auto X = path.lookup(Query{});
+  return X ? X->pose.translation().x() : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// To watch the edge of the hand.
+Request watch_hand() {
+  WatchRequest body;
+  body.segments.push_back({"arm", "hand"});
+  return {1, "hand", body};
+}
+
+}  // namespace
+
+TEST_CASE("watcher: a watched path follows what its owner writes, without another request") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(network, "arm", kArm);
+  WatchingRig rig(network);
+  CHECK_FALSE(rig.watcher.on_state({}));
+  CHECK_FALSE(rig.watcher.can_answer("arm", "hand", Query{}));
+  const auto path = rig.watcher.watch("arm", "hand", {});
+  REQUIRE(path);
+  CHECK(seen(**path) == 4);
+  CHECK(rig.watcher.can_answer("arm", "hand", Query{}));
+  REQUIRE(arm.node().update("hand", along_x(5)));
+  CHECK(eventually([&] { return seen(**path) == 5; }));
+  CHECK(rig.watcher.on_state({}));
+}
+
+TEST_CASE("watcher: rates that no owner could keep are refused") {
+  LoopbackNetwork network;
+  const ScriptedOwner arm(network, "arm", kArm);
+  WatchingRig rig(network);
+  for (const double rate : {-1.0, 1e-9, 1e7, std::numeric_limits<double>::quiet_NaN()}) {
+    WatchOptions options;
+    options.rate = rate;
+    CHECK(outcome(rig.watcher.watch("arm", "hand", options)) == "invalid_input");
+  }
+  CHECK(arm.asked() == 0);
+}
+
+TEST_CASE("watcher: a path of which an owner pushes nothing is not live by the deadline") {
+  LoopbackNetwork network;
+  const ScriptedOwner arm(network, "arm", kArm,
+                          [](Transport&, const PeerId&, const Request&) { return true; });
+  WatchingRig rig(network);
+  CHECK(outcome(rig.watcher.watch("arm", "hand", {})) == "timeout");
+  CHECK(outcome(rig.watcher.watch("arm", "foot", {})) == "unknown_end");
+}
+
+TEST_CASE("watcher: a path is followed where its frame has moved to") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(network, "arm", kArm);
+  WatchingRig rig(network);
+  const auto path = rig.watcher.watch("arm", "hand", {});
+  REQUIRE(path);
+  REQUIRE(arm.node().add("wrist", "arm", along_x(1)));
+  REQUIRE(arm.node().move("hand", "wrist", along_x(1)));
+  rig.watcher.look_again();
+  CHECK(eventually([&] { return seen(**path) == 2; }));
+}
+
+TEST_CASE("pushing: who watches is answered with all values, and told what is written") {
+  LoopbackNetwork network;
+  std::atomic<double> pushed{0};
+  testing::ScriptedOwner nobody(network, "nobody", {{"nobody", "", {}}});
+  Rig owner(network.join(), "arm");
+  Watcher own(
+      owner.structure, owner.discovery, owner.requests, *owner.transport,
+      [] { return std::uint64_t{0}; }, 1s);
+  Pushing pushing(owner.structure, *owner.transport, owner.member, own);
+  owner.member.with_rules([](Member& member) { member.claim("here", 1, Time(1s), 1); });
+  owner.member.open(nullptr, 1s);
+  REQUIRE(owner.member.serve(nullptr, kArm));
+  REQUIRE(owner.member.publish_all(kArm));
+
+  const Reply reply = pushing.answer(watch_hand());
+  const auto* state = std::get_if<State>(&reply.body);
+  REQUIRE(state != nullptr);
+  CHECK(state->entries.size() == 1);
+
+  Rig listener(network.join());
+  listener.states = [&](const State& news) {
+    for (const News& one : news.entries) pushed = one.X.pose.translation().x();
+  };
+  REQUIRE(listener.transport->watch(state->group));
+  pushing.on_watcher(state->group);
+  CHECK(eventually([&] { return pushed == 4; }));
+  REQUIRE(owner.structure.forest.update("hand", along_x(6), std::nullopt));
+  CHECK(eventually([&] { return pushed == 6; }));
+
+  pushing.stop();
+  const Reply refused = pushing.answer(watch_hand());
+  const auto* error = std::get_if<Error>(&refused.body);
+  REQUIRE(error != nullptr);
+  CHECK(error->code == Errc::kNotOwner);
+  CHECK_THAT(error->message, ContainsSubstring("'arm' is leaving"));
+}
+
+}  // namespace tfdude

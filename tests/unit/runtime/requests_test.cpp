@@ -1,0 +1,149 @@
+// Requests to owners, sent and planned again under one deadline.
+
+#include "runtime/requests.hpp"
+
+#include <chrono>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "partition/routing.hpp"
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/rig.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::along_x;
+using testing::ContainsSubstring;
+using testing::outcome;
+using testing::Rig;
+using testing::ScriptedOwner;
+
+const std::vector<FrameSpec> kArm{{"arm", "", {}}, {"hand", "arm", {}}};
+constexpr std::uint64_t kFarEpoch = std::uint64_t{1} << 62U;  // that is never reached
+
+/// To add "finger" below the hand.
+Result<void> add_finger(Rig& rig, const Deadline& deadline) {
+  return rig.requests.retry_on_stale_route(
+      deadline,
+      [&] {
+        return route_add(rig.structure.forest, rig.structure.directory, "finger",
+                         AddRequest{"hand", along_x(1)}, "");
+      },
+      [&](Part& part) {
+        std::vector<Part> parts{std::move(part)};
+        return rig.requests.change(parts, deadline);
+      });
+}
+
+}  // namespace
+
+TEST_CASE("requests: one is sent again until its reply comes, and applied once") {
+  LoopbackNetwork network;
+  int lost = 0;
+  ScriptedOwner arm(network, "arm", kArm,
+                    [&](Transport&, const PeerId&, const Request&) { return lost++ < 3; });
+  Rig rig(network.join());
+  REQUIRE(add_finger(rig, rig.deadline()));
+  CHECK(arm.asked() >= 4);
+  // Known here as soon as it is acknowledged.
+  CHECK(rig.structure.forest.exists("finger"));
+  CHECK(arm.node().own_frames() == 3);
+}
+
+TEST_CASE("requests: who does not answer is named with how often it was asked") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(network, "arm", kArm,
+                    [](Transport&, const PeerId&, const Request&) { return true; });
+  Rig rig(network.join());
+  const auto start = Deadline::Clock::now();
+  const auto added = add_finger(rig, Deadline(50ms));
+  CHECK(Deadline::Clock::now() - start >= 50ms);
+  REQUIRE(outcome(added) == "timeout");
+  CHECK_THAT(added.error().message, ContainsSubstring("'arm'") &&
+                                        ContainsSubstring("asked " + std::to_string(arm.asked())));
+}
+
+TEST_CASE("requests: an owner that dies meanwhile is not waited for") {
+  LoopbackNetwork network;
+  ScriptedOwner* owner = nullptr;
+  std::thread leaving;
+  ScriptedOwner arm(network, "arm", kArm, [&](Transport&, const PeerId&, const Request&) {
+    if (!leaving.joinable()) leaving = std::thread([&] { owner->leave(); });
+    return true;
+  });
+  owner = &arm;
+  Rig rig(network.join());
+  const auto added = add_finger(rig, Deadline(30s));
+  leaving.join();
+  CHECK(outcome(added) == "unreachable");
+}
+
+TEST_CASE("requests: who is not the owner any more is asked so often, and then that is said") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(
+      network, "arm", kArm, [](Transport& transport, const PeerId& from, const Request& request) {
+        transport.reply(from, {request.sequence, 0, Error{Errc::kNotOwner, "not mine"}});
+        return true;
+      });
+  Rig rig(network.join());
+  CHECK(outcome(add_finger(rig, Deadline(30s))) == "not_owner");
+  CHECK(arm.asked() == Requests::kAttempts);
+}
+
+TEST_CASE("requests: an owner that has not heard of a change yet is asked until it has") {
+  LoopbackNetwork network;
+  int denied = 0;
+  ScriptedOwner arm(
+      network, "arm", kArm, [&](Transport& transport, const PeerId& from, const Request& request) {
+        if (denied++ == 4) return false;
+        transport.reply(from, {request.sequence, 0, Error{Errc::kUnknownParent, "no 'hand'"}});
+        return true;
+      });
+  Rig rig(network.join());
+  CHECK(outcome(add_finger(rig, Deadline(30s))) == "ok");
+  CHECK(denied == 5);
+}
+
+TEST_CASE("requests: what is acknowledged and does not come is a warning, and is not denied") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(network, "arm", kArm,
+                    [](Transport& transport, const PeerId& from, const Request& request) {
+                      transport.reply(from, {request.sequence, kFarEpoch, Done{}});
+                      return true;
+                    });
+  Rig rig(network.join());
+  REQUIRE(rig.discovery.await(Deadline(10s)));
+  CHECK(outcome(add_finger(rig, Deadline(20ms))) == "ok");
+  CHECK_FALSE(rig.discovery.complete());
+  CHECK(outcome(rig.requests.after_discovery(Deadline(10ms), []() -> Result<int> {
+          return fail(Errc::kUnknownFrame, "no frame 'finger'");
+        })) == "timeout");
+}
+
+TEST_CASE("requests: a process that has given its partition up plans nothing") {
+  LoopbackNetwork network;
+  const ScriptedOwner arm(network, "arm", kArm);
+  Rig rig(network.join());
+  rig.still_in = [] { return fail(Errc::kPartitionTaken, "served by another process"); };
+  CHECK(outcome(add_finger(rig, Deadline(10s))) == "partition_taken");
+  CHECK(arm.asked() == 0);
+}
+
+TEST_CASE("requests: what an owner lists is handed on, and so is why it does not") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(network, "arm", kArm);
+  REQUIRE(arm.node().update("hand", along_x(1), Time(1s)));
+  Rig rig(network.join());
+  const auto all = rig.requests.ask_all<PastInfo>("arm", PastRequest{true}, rig.deadline());
+  REQUIRE(all);
+  REQUIRE(all->size() == 1);
+  CHECK(all->front().id == "hand");
+  CHECK(outcome(rig.requests.ask_all<PastInfo>("leg", PastRequest{true}, rig.deadline())) ==
+        "unknown_partition");
+}
+
+}  // namespace tfdude

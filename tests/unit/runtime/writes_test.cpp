@@ -1,0 +1,130 @@
+// What a participant changes of frames, its own and those of others.
+
+#include "runtime/writes.hpp"
+
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/rig.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::along_x;
+using testing::ContainsSubstring;
+using testing::outcome;
+using testing::Rig;
+using testing::ScriptedOwner;
+using testing::x_of;
+
+struct Writer : Rig {
+  explicit Writer(LoopbackNetwork& network)
+      : Rig(network.join()), writes(structure, discovery, requests, *transport, member) {}
+  Writes writes;
+};
+
+const std::vector<FrameSpec> kArm{{"arm", "", {}}, {"hand", "arm", {}}};
+const std::vector<FrameSpec> kLeg{{"leg", "", {}}, {"foot", "leg", {}}};
+
+}  // namespace
+
+TEST_CASE("writes: frames of others are added, moved and removed where they are owned") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(network, "arm", kArm);
+  Writer writer(network);
+  REQUIRE(writer.writes.add("finger", {"hand", along_x(1)}, ""));
+  CHECK(x_of(arm.node().lookup("hand", "finger")) == 1);
+  REQUIRE(writer.writes.move("finger", {"arm", along_x(2)}));
+  CHECK(x_of(arm.node().lookup("arm", "finger")) == 2);
+  CHECK(writer.structure.forest.info("finger")->parent == "arm");
+  REQUIRE(writer.writes.remove("finger"));
+  CHECK_FALSE(arm.node().exists("finger"));
+  CHECK(outcome(writer.writes.remove("finger")) == "unknown_frame");
+  CHECK(outcome(writer.writes.add("toe", {"foot", {}}, "")) == "unknown_parent");
+}
+
+TEST_CASE("writes: a removal that somebody else has made meanwhile is done") {
+  LoopbackNetwork network;
+  ScriptedOwner* owner = nullptr;
+  std::thread other;
+  bool removed = false;
+  ScriptedOwner arm(
+      network, "arm", kArm, [&](Transport& transport, const PeerId& from, const Request& request) {
+        other = std::thread([&] { removed = owner->node().remove("hand").has_value(); });
+        transport.reply(from, {request.sequence, 0, Error{Errc::kNotOwner, "not mine"}});
+        return true;
+      });
+  owner = &arm;
+  Writer writer(network);
+  CHECK(outcome(writer.writes.remove("hand")) == "ok");
+  other.join();
+  CHECK(removed);
+  CHECK(arm.asked() == 1);
+}
+
+TEST_CASE("writes: of an update of several owners each applies its part") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(network, "arm", kArm);
+  ScriptedOwner leg(network, "leg", kLeg);
+  Writer writer(network);
+  REQUIRE(writer.writes.update(std::vector<EdgeUpdate>{{"hand", along_x(1)}, {"foot", along_x(2)}},
+                               std::nullopt));
+  CHECK(x_of(arm.node().lookup("arm", "hand")) == 1);
+  CHECK(x_of(leg.node().lookup("leg", "foot")) == 2);
+  PartialUpdate rest;
+  rest.id = "foot";
+  rest.covariance = Covariance::trusted(Matrix6d(0.01 * Matrix6d::Identity()));
+  REQUIRE(writer.writes.update(std::vector<PartialUpdate>{rest}, std::nullopt));
+  CHECK(x_of(leg.node().lookup("leg", "foot")) == 2);
+}
+
+TEST_CASE("writes: of what is published the living get theirs, and the error names the dead") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(network, "arm", kArm);
+  ScriptedOwner leg(network, "leg", kLeg);
+  Writer writer(network);
+  const std::vector<EdgeUpdate> both{{"hand", along_x(1)}, {"foot", along_x(2)}};
+  REQUIRE(writer.writes.publish(both, std::nullopt));
+  CHECK(x_of(leg.node().lookup("leg", "foot")) == 2);
+  leg.leave();
+  const auto sent = writer.writes.publish(
+      std::vector<EdgeUpdate>{{"hand", along_x(3)}, {"foot", along_x(3)}}, std::nullopt);
+  CHECK(outcome(sent) == "unreachable");
+  CHECK_THAT(sent.error().message, ContainsSubstring("'leg'"));
+  CHECK(x_of(arm.node().lookup("arm", "hand")) == 3);
+}
+
+TEST_CASE("writes: correlation is set at the owner, once it is known to be sound") {
+  LoopbackNetwork network;
+  const ScriptedOwner arm(network, "arm", kArm);
+  Writer writer(network);
+  Correlation correlation;
+  correlation.shares.push_back({"camera", false, Matrix6d(1e-3 * Matrix6d::Identity())});
+  const int before = arm.asked();
+  CHECK(writer.writes.correlate("hand", correlation));
+  CHECK(arm.asked() == before + 1);
+  correlation.shares.push_back(correlation.shares.front());
+  CHECK(outcome(writer.writes.correlate("hand", correlation)) == "invalid_input");
+  CHECK(outcome(writer.writes.correlate("foot", {})) == "unknown_frame");
+  CHECK(arm.asked() == before + 1);
+}
+
+TEST_CASE("writes: a partition is forgotten once it is not there, at all who are") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(network, "arm", kArm);
+  ScriptedOwner leg(network, "leg", kLeg);
+  Writer writer(network);
+  REQUIRE(writer.discovery.await(Deadline(10s)));
+  CHECK(outcome(writer.writes.forget("leg")) == "partition_taken");
+  CHECK(outcome(writer.writes.forget("tail")) == "unknown_partition");
+  leg.leave();
+  REQUIRE(writer.writes.forget("leg"));
+  CHECK_FALSE(writer.structure.forest.exists("foot"));
+  CHECK_FALSE(arm.node().exists("foot"));
+}
+
+}  // namespace tfdude
