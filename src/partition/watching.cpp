@@ -108,7 +108,7 @@ Result<State> WatchedGroup::snapshot(const Forest& forest, std::optional<Time> f
 State WatchedGroup::news(const Forest& forest) {
   if (request_.composed) return composed_news(forest);
   const bool newest_only = request_.period > std::chrono::nanoseconds(0);
-  auto found = forest.news(cursors_, {newest_only, {}});
+  auto found = forest.news(cursors_, {newest_only, {}, true});
   State state{id_, std::move(found.values), told_, found.commit};
   if (!state.entries.empty()) told_ = state.commit;
   return state;

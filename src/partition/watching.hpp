@@ -28,7 +28,7 @@ class WatchedGroup {
   [[nodiscard]] Result<State> snapshot(const Forest& forest, std::optional<Time> from) const;
 
   /// What was written since the last call: all samples, or the newest of each edge where the watchers want them at a
-  /// lower rate. Edges that are not held, or hang elsewhere, are left out.
+  /// lower rate. Nothing while an edge is not held, or hangs elsewhere: the watchers go another way then.
   [[nodiscard]] State news(const Forest& forest);
 
  private:

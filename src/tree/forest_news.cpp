@@ -108,18 +108,22 @@ NewsOfCommit Forest::news(std::vector<EdgeCursor>& cursors, const NewsQuery& que
   const epoch::Guard guard;
   const std::uint64_t commit = impl_->snapshot();
   NewsOfCommit all{{}, commit};
-  for (std::uint32_t index = 0; index < cursors.size(); ++index) {
-    EdgeCursor& cursor = cursors[index];
+  // Null where it is not held, or hangs elsewhere: that is another history.
+  const auto followed = [&](const EdgeCursor& cursor) -> const HeldVersion* {
     const Version* version = impl_->of(cursor.frame, commit);
     if (version == nullptr) version = impl_->present(cursor.id, commit);
-    if (version == nullptr || !version->held()) continue;
+    if (version == nullptr || !version->held()) return nullptr;
     const auto& edge = static_cast<const HeldVersion&>(*version);
-    // Where it hangs elsewhere, that is another history.
-    if (edge.history != cursor.history && impl_->info_of(edge, commit).parent != cursor.parent) {
-      continue;
-    }
-    cursor.frame = {version->slot, version->generation};
-    add_news(edge, index, query, commit, cursor, all.values);
+    const bool same = edge.history == cursor.history;
+    return same || impl_->info_of(edge, commit).parent == cursor.parent ? &edge : nullptr;
+  };
+  if (query.whole && !std::all_of(cursors.begin(), cursors.end(), followed)) return all;
+  for (std::uint32_t index = 0; index < cursors.size(); ++index) {
+    EdgeCursor& cursor = cursors[index];
+    const HeldVersion* edge = followed(cursor);
+    if (edge == nullptr) continue;
+    cursor.frame = {edge->slot, edge->generation};
+    add_news(*edge, index, query, commit, cursor, all.values);
   }
   std::stable_sort(all.values.begin(), all.values.end(),
                    [](const News& a, const News& b) { return a.stamp < b.stamp; });

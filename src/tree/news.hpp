@@ -45,6 +45,9 @@ struct NewsQuery {
   bool newest_only = false;
   /// Where nothing was seen yet: those since the last that is not younger than this, instead of the newest.
   std::optional<Time> from{};
+  /// Nothing is told as long as one of the edges is not held, or hangs elsewhere: without it, what the others tell may be half
+  /// of what was written.
+  bool whole = false;
 };
 
 }  // namespace tfdude
