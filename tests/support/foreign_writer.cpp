@@ -2,16 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <memory>
 #include <stdexcept>
-#include <string_view>
 #include <thread>
-
-#if TFDUDE_FASTDDS_MAJOR == 2
-#include <fastdds/rtps/transport/test_UDPv4TransportDescriptor.h>
-#else
-#include <fastdds/rtps/transport/test_UDPv4TransportDescriptor.hpp>
-#endif
+#include <utility>
 
 namespace tfdude::testing {
 namespace {
@@ -22,15 +15,36 @@ edds::DomainParticipantFactory& factory() {
   return *edds::DomainParticipantFactory::get_instance();
 }
 
-// UDP over 127.0.0.1 that loses packets which contain a text.
-auto losing(const std::string& text) {
-  auto transport = std::make_shared<eprosima::fastdds::rtps::test_UDPv4TransportDescriptor>();
-  transport->interfaceWhiteList = {"127.0.0.1"};
-  transport->messages_filter_ = [text](const auto& message) {
-    const std::string_view bytes(reinterpret_cast<const char*>(message.buffer), message.length);
-    return bytes.find(text) != std::string_view::npos;
-  };
-  return transport;
+/// Another transport that may be muted.
+class MutedDescriptor final : public fastdds::etransport::ChainingTransportDescriptor {
+ public:
+  MutedDescriptor(std::shared_ptr<fastdds::etransport::TransportDescriptorInterface> real,
+                  std::shared_ptr<const std::atomic<bool>> muted)
+      : ChainingTransportDescriptor(std::move(real)), muted(std::move(muted)) {}
+  [[nodiscard]] fastdds::etransport::TransportInterface* create_transport() const override;
+
+  std::shared_ptr<const std::atomic<bool>> muted;
+};
+
+class MutedTransport final : public fastdds::SendFilter {
+ public:
+  explicit MutedTransport(const MutedDescriptor& descriptor)
+      : SendFilter(descriptor), descriptor_(descriptor) {}
+  fastdds::etransport::TransportDescriptorInterface* get_configuration() override {
+    return &descriptor_;
+  }
+
+ private:
+  [[nodiscard]] bool may_send(const fastdds::ertps::Locator_t&) const override {
+    return !*descriptor_.muted;
+  }
+  void heard(const fastdds::ertps::Locator_t&) const override {}
+
+  MutedDescriptor descriptor_;
+};
+
+fastdds::etransport::TransportInterface* MutedDescriptor::create_transport() const {
+  return new MutedTransport(*this);
 }
 
 }  // namespace
@@ -55,11 +69,13 @@ bool RawType::fill(const Bytes& bytes, fastdds::ertps::SerializedPayload_t& payl
 }
 
 ForeignWriter::ForeignWriter(std::uint32_t domain, const char* topic_name, edds::TypeSupport type,
-                             const std::string& partition, bool durable, const std::string& lost) {
+                             const std::string& partition, bool durable) {
   edds::DomainParticipantQos participant_qos;
   factory().load_XML_profiles_file(TFDUDE_LOOPBACK_PROFILE);  // once is enough, twice does no harm
   factory().get_participant_qos_from_profile("tfdude_participant", participant_qos);
-  if (!lost.empty()) participant_qos.transport().user_transports = {losing(lost)};
+  for (auto& transport : participant_qos.transport().user_transports) {
+    transport = std::make_shared<MutedDescriptor>(transport, muted_);
+  }
   participant_ = factory().create_participant(domain, participant_qos);
   if (participant_ == nullptr) throw std::runtime_error("no participant for a foreign writer");
   type.register_type(participant_);

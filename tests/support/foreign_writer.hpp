@@ -1,7 +1,9 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -76,10 +78,9 @@ Bytes bytes_of(Sample sample) {
 class ForeignWriter {
  public:
   /// @param partition  of DDS; empty: the default one
-  /// @param lost  packets that contain this text are lost, each time they are sent; empty: none
   /// @throws std::runtime_error where it cannot be made.
   ForeignWriter(std::uint32_t domain, const char* topic, fastdds::edds::TypeSupport type,
-                const std::string& partition, bool durable = false, const std::string& lost = "");
+                const std::string& partition, bool durable = false);
   ~ForeignWriter();
   ForeignWriter(const ForeignWriter&) = delete;
   ForeignWriter& operator=(const ForeignWriter&) = delete;
@@ -87,11 +88,15 @@ class ForeignWriter {
   /// Waits until so many readers were met. @throws std::runtime_error where they are not.
   void await_readers(int count);
 
+  /// From now on nothing that is sent arrives, or all of it again.
+  void mute(bool muted) { *muted_ = muted; }
+
   /// A sample of the writer's type. @param ahead  by how much the writer's clock is
   /// @throws std::runtime_error where it is not taken.
   void write(void* sample, std::chrono::nanoseconds ahead = {});
 
  private:
+  const std::shared_ptr<std::atomic<bool>> muted_ = std::make_shared<std::atomic<bool>>(false);
   fastdds::edds::DomainParticipant* participant_ = nullptr;
   fastdds::edds::DataWriter* writer_ = nullptr;
 };
