@@ -23,6 +23,26 @@ bool WatchRoute::is_same(const WatchRoute& other) const {
                     same_source);
 }
 
+Result<WatchRoute> watch_route(const Forest& forest, const Directory& directory,
+                               const std::string& a, const std::string& b, bool composed,
+                               std::chrono::nanoseconds period, std::uint64_t own_incarnation) {
+  auto plan = route_watch(forest, directory, a, b, composed, period);
+  if (!plan) return tl::unexpected(std::move(plan.error()));
+  WatchRoute route{std::move(plan->edges), {}, std::move(plan->parts)};
+  for (const Part& part : route.parts) {
+    const auto& request = std::get<WatchRequest>(part.request.body);
+    const auto serving = directory.serving(part.partition);
+    const std::uint64_t incarnation = part.owner == kHeldHere ? own_incarnation
+                                      : serving               ? serving->incarnation
+                                                              : 0;
+    WatchRoute::Source source{
+        part.partition, incarnation, watch_group(part.partition, incarnation, request), {}};
+    for (const PathEnds& segment : request.segments) source.frames.push_back(segment.to);
+    route.sources.push_back(std::move(source));
+  }
+  return route;
+}
+
 WatchMirror::WatchMirror(const std::string& a, const std::string& b, WatchRoute route,
                          const EdgeTiming& timing)
     : route_(std::move(route)), edges_(route_.edges.size()), sources_(route_.sources.size()) {

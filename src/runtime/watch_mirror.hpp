@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -28,6 +29,14 @@ struct WatchRoute {
   /// Whether it has the same edges of the same owners.
   [[nodiscard]] bool is_same(const WatchRoute& other) const;
 };
+
+/// The route of the path from a to b as the structure is now, each edge alone or `composed`.
+/// @param own_incarnation  of the partition's process that asks
+/// @return as route_watch
+[[nodiscard]] Result<WatchRoute> watch_route(const Forest& forest, const Directory& directory,
+                                             const std::string& a, const std::string& b,
+                                             bool composed, std::chrono::nanoseconds period,
+                                             std::uint64_t own_incarnation);
 
 /// What owners have told of one route: a forest of its edges, written as they push them. A value belongs to its edge by
 /// its group, which is of this route; of an edge's histories the newest is shown; what an owner wrote as one commit is

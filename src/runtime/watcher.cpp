@@ -5,8 +5,6 @@
 #include <sstream>
 #include <utility>
 
-#include "partition/routing.hpp"
-
 namespace tfdude {
 namespace {
 
@@ -59,22 +57,8 @@ Result<WatchRoute> Watcher::plan(const WatchedPath& path) {
   const WatchOptions& options = path.options();
   const std::uint64_t own_incarnation = incarnation_();
   const std::lock_guard lock(structure_.mutex);
-  auto plan = route_watch(structure_.forest, structure_.directory, path.a(), path.b(),
-                          options.composed, period_of(options.rate));
-  if (!plan) return tl::unexpected(std::move(plan.error()));
-  WatchRoute route{std::move(plan->edges), {}, std::move(plan->parts)};
-  for (const Part& part : route.parts) {
-    const auto& request = std::get<WatchRequest>(part.request.body);
-    const auto serving = structure_.directory.serving(part.partition);
-    const std::uint64_t incarnation = part.owner == kHeldHere ? own_incarnation
-                                      : serving               ? serving->incarnation
-                                                              : 0;
-    WatchRoute::Source source{
-        part.partition, incarnation, watch_group(part.partition, incarnation, request), {}};
-    for (const PathEnds& segment : request.segments) source.frames.push_back(segment.to);
-    route.sources.push_back(std::move(source));
-  }
-  return route;
+  return watch_route(structure_.forest, structure_.directory, path.a(), path.b(), options.composed,
+                     period_of(options.rate), own_incarnation);
 }
 
 bool Watcher::on_state(const State& state) {

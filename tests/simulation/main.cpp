@@ -34,7 +34,10 @@ constexpr const char* kRare[] = {"a process gave its partition up",
                                  "add timeout",
                                  "remove done",
                                  "move done",
-                                 "update unreachable"};
+                                 "update unreachable",
+                                 "a watched path took another route",
+                                 "the owner of a watched path was started again",
+                                 "watched paths checked"};
 
 }  // namespace
 

@@ -86,6 +86,7 @@ Plan draw_plan(std::uint64_t seed) {
     fault.step = milliseconds(static_cast<int>(random.uniform(-reach, reach)));
     plan.faults.push_back(fault);
   }
+  plan.followers = random.index(2);
   return plan;
 }
 
@@ -107,6 +108,7 @@ Plan shrink(Plan plan, const std::function<bool(const Plan&)>& fails) {
       [](Plan& one) { one.disk = milliseconds(1); },
       [](Plan& one) { one.contest = 0; },
       [](Plan& one) { one.clients = 1; },
+      [](Plan& one) { one.followers = 0; },
       [](Plan& one) { one.lost = one.owners; }};
   for (const auto& change : milder) {
     Plan one = plan;
@@ -121,9 +123,9 @@ std::string Plan::text() const {
   const auto ms = [](Instant instant) {
     return std::chrono::duration<double, std::milli>(instant).count();
   };
-  out << "seed " << seed << ": " << owners << " owners, " << clients << " clients, storm "
-      << ms(storm) << " ms, loss " << loss << ", repeats " << repeats << ", delay " << ms(delay)
-      << " ms, disk " << ms(disk) << " ms, contest " << contest
+  out << "seed " << seed << ": " << owners << " owners, " << clients << " clients, " << followers
+      << " followers, storm " << ms(storm) << " ms, loss " << loss << ", repeats " << repeats
+      << ", delay " << ms(delay) << " ms, disk " << ms(disk) << " ms, contest " << contest
       << (stores ? ", stored" : ", not stored") << (wild_stores ? "" : " (the last is not)");
   if (lost < owners) out << ", owner " << lost << " lost for good";
   for (std::size_t i = 0; i < faults.size(); ++i) {

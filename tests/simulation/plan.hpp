@@ -38,14 +38,15 @@ struct Fault {
 struct Plan {
   std::uint64_t seed = 0;
   std::size_t owners = 2;
-  std::size_t clients = 1;  ///< that own nothing
-  Instant storm{};          ///< how long there are faults
-  double loss = 0;          ///< of datagrams, and of samples that are repeated then
-  double repeats = 0;       ///< of datagrams that come twice
-  Instant delay{};          ///< at the mean
-  Instant disk{};           ///< how long storing takes, at most
-  double contest = 0;       ///< share of changes of frames that all fight over
-  bool stores = true;       ///< daemons keep their frames
+  std::size_t clients = 1;    ///< that own nothing
+  std::size_t followers = 0;  ///< clients that read watched paths
+  Instant storm{};            ///< how long there are faults
+  double loss = 0;            ///< of datagrams, and of samples that are repeated then
+  double repeats = 0;         ///< of datagrams that come twice
+  Instant delay{};            ///< at the mean
+  Instant disk{};             ///< how long storing takes, at most
+  double contest = 0;         ///< share of changes of frames that all fight over
+  bool stores = true;         ///< daemons keep their frames
   bool wild_stores =
       true;  ///< and so does the last, which may be renamed and replaced, and nobody relies on
   /// Killed as the storm ends, for good: the others have to agree without it. The number of owners: nobody.

@@ -15,6 +15,7 @@ constexpr Instant kSilence = milliseconds(450);
 constexpr Instant kBeat = milliseconds(60);
 constexpr Instant kLookForGone = milliseconds(50);
 constexpr Instant kConcedeEvery = milliseconds(100);
+constexpr Instant kPushAfter = std::chrono::microseconds(20);
 constexpr Instant kPublishEvery = milliseconds(1);
 constexpr Instant kRetryStoring = milliseconds(200);
 constexpr Instant kSaveValuesEvery = milliseconds(1000);
@@ -39,7 +40,11 @@ Process::Process(Surroundings& world, Setting setting)
       setting_(std::move(setting)),
       forest_([this] { return wall(); }),
       directory_(forest_, setting_.partition),
-      member_(forest_, directory_, setting_.partition) {
+      member_(forest_, directory_, setting_.partition),
+      pushes_(
+          forest_,
+          [this] { later(kPushAfter, [this] { pushes_.push_due(world_.timeline.now()); }); },
+          [this](const State& state) { push(state); }) {
   directory_.changes().watch();
 }
 
@@ -239,6 +244,7 @@ void Process::on_request(std::uint64_t from, const Request& request) {
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
     return reply_now(member_.partition()->answer_lookup(request.sequence, *lookup));
   }
+  if (std::holds_alternative<WatchRequest>(request.body)) return answer_watch(from, request);
   const auto reply = member_.on_request(peer, request, failure_, wall());
   if (reply) reply_now(*reply);
   react();
@@ -247,6 +253,46 @@ void Process::on_request(std::uint64_t from, const Request& request) {
 void Process::on_reply(const Reply& reply) {
   const auto operations = operations_;
   for (const auto& one : operations) one->on_reply(reply);
+  for (const auto& one : watches_) {
+    if (const auto watch = one.lock()) watch->on_reply(reply);
+  }
+}
+
+void Process::answer_watch(std::uint64_t from, const Request& request) {
+  const auto& body = std::get<WatchRequest>(request.body);
+  const std::uint64_t group = watch_group(partition(), member_.presence().incarnation, body);
+  auto state = pushes_.watch(group, body, world_.timeline.now());
+  Reply reply{request.sequence, 0, Done{}};
+  if (state) {
+    reply.body = *std::move(state);
+  } else {
+    reply.body = std::move(state.error());
+  }
+  world_.network.send(*this, from, [reply](Process& there) { there.on_reply(reply); });
+}
+
+void Process::push(const State& state) {
+  const std::uint64_t number = ++pushed_;
+  for (const std::uint64_t peer : world_.network.met_by(*this)) {
+    if (peers_.count(peer) > 0) continue;  // an owner, none of which watches
+    world_.network.send(*this, peer, [from = id(), number, state](Process& there) {
+      there.on_state(from, number, state);
+    });
+  }
+}
+
+void Process::on_state(std::uint64_t from, std::uint64_t number, const State& state) {
+  for (const auto& one : watches_) {
+    if (const auto watch = one.lock()) watch->on_state(from, number, state);
+  }
+}
+
+void Process::on_watcher(std::uint64_t group) { pushes_.tell_all(group); }
+
+void Process::listen(const std::string& partition, std::uint64_t group) {
+  each_server(partition, [this, group](std::uint64_t peer) {
+    world_.network.send(*this, peer, [group](Process& there) { there.on_watcher(group); });
+  });
 }
 
 void Process::begin(std::shared_ptr<Operation> operation) {
@@ -268,13 +314,19 @@ void Process::send(const std::string& partition, const Request& request) {
   std::uint32_t first = request.sequence;
   for (const auto& one : operations_) first = std::min(first, one->first_sequence());
   sent.awaits_from = first;
+  each_server(partition, [&](std::uint64_t peer) {
+    world_.network.send(*this, peer,
+                        [from = id(), sent](Process& there) { there.on_request(from, sent); });
+  });
+}
+
+void Process::each_server(const std::string& partition,
+                          const std::function<void(std::uint64_t)>& tell) {
   for (const std::uint64_t peer : world_.network.met_by(*this)) {
     const auto known = peers_.find(peer);
     const bool serves = known != peers_.end() && known->second.said &&
                         known->second.said->partition == partition && known->second.said->serving;
-    if (!serves) continue;
-    world_.network.send(*this, peer,
-                        [from = id(), sent](Process& there) { there.on_request(from, sent); });
+    if (serves) tell(peer);
   }
 }
 

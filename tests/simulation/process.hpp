@@ -14,6 +14,8 @@
 #include "simulation/disk.hpp"
 #include "simulation/network.hpp"
 #include "simulation/operation.hpp"
+#include "simulation/pushes.hpp"
+#include "simulation/watch.hpp"
 #include "tree/forest.hpp"
 
 namespace tfdude::simulation {
@@ -60,6 +62,10 @@ class Process : public std::enable_shared_from_this<Process> {
   void hear(std::uint64_t from, const Sample& sample);
   void on_request(std::uint64_t from, const Request& request);
   void on_reply(const Reply& reply);
+  /// @param number  the sender counts what it pushes
+  void on_state(std::uint64_t from, std::uint64_t number, const State& state);
+  /// Somebody listens to a group of watchers.
+  void on_watcher(std::uint64_t group);
 
   // ---- what callers ask for
   void begin(std::shared_ptr<Operation> operation);
@@ -68,6 +74,10 @@ class Process : public std::enable_shared_from_this<Process> {
   void when_stored(std::function<void(const Result<void>&)> then);
   [[nodiscard]] std::uint32_t next_sequence() { return ++sequence_; }
   void send(const std::string& partition, const Request& request);
+  /// From now on it is handed what concerns watched paths.
+  void watch(const std::shared_ptr<Watch>& watch) { watches_.push_back(watch); }
+  /// Tells who serves a partition that a group of watchers has one more.
+  void listen(const std::string& partition, std::uint64_t group);
   /// Whether what it does not know does not exist.
   [[nodiscard]] bool discovered() const;
 
@@ -101,6 +111,9 @@ class Process : public std::enable_shared_from_this<Process> {
   };
 
   [[nodiscard]] Time wall() const;
+  void answer_watch(std::uint64_t from, const Request& request);
+  void push(const State& state);
+  void each_server(const std::string& partition, const std::function<void(std::uint64_t)>& tell);
   void tick();
   void look_for_silent();
   void react();
@@ -126,6 +139,9 @@ class Process : public std::enable_shared_from_this<Process> {
   std::map<std::uint32_t, Page> pages_;  // as published last
   std::optional<Presence> presence_;
   std::vector<std::shared_ptr<Operation>> operations_;
+  std::vector<std::weak_ptr<Watch>> watches_;
+  Pushes pushes_;
+  std::uint64_t pushed_ = 0;
   std::vector<std::function<void()>> backlog_;
   std::vector<std::function<void(const Result<void>&)>> waiting_;
   std::optional<Error> failure_;

@@ -39,6 +39,7 @@ class World {
   Run run() {
     for (std::size_t i = 0; i < plan_.owners; ++i) start_daemon(i);
     for (std::size_t i = 0; i < plan_.clients; ++i) start_author(i);
+    for (std::size_t i = 0; i < plan_.followers; ++i) start_follower(i);
     for (const Fault& fault : plan_.faults) {
       timeline_.at(fault.begin, [this, &fault] { begin(fault); });
       timeline_.at(fault.end, [this, &fault] { end(fault); });
@@ -46,12 +47,16 @@ class World {
     look_after();
     advance(plan_.storm);
     for (const auto& author : authors_) author->stop();
+    for (const auto& follower : followers_) follower->stop();
     network_.set_loss(plan_.loss_after);
     if (plan_.lost < plan_.owners) take_down(plan_.lost, false);
     advance(plan_.storm + kRest);
     check();
     for (const auto& author : authors_) {
       for (const auto& [what, count] : author->outcomes()) run_.counts[what] += count;
+    }
+    for (const auto& follower : followers_) {
+      for (const auto& [what, count] : follower->outcomes()) run_.counts[what] += count;
     }
     run_.duration = timeline_.now();
     return std::move(run_);
@@ -115,6 +120,18 @@ class World {
     process->start();
     authors_.push_back(std::make_shared<Author>(process, number, wild_, plan_.seed * 31 + number));
     authors_.back()->start();
+  }
+
+  void start_follower(std::size_t number) {
+    Process::Setting setting;
+    setting.host = plan_.owners + plan_.clients + number;
+    setting.id = ++processes_;
+    auto process = std::make_shared<Process>(surroundings_, setting);
+    network_.join(process);
+    process->start();
+    followers_.push_back(
+        std::make_shared<Follower>(process, number, wild_, plan_.seed * 37 + number));
+    followers_.back()->start();
   }
 
   // Of one that hung and the one in its place, one goes on. Other daemons that have ended are started again.
@@ -257,6 +274,35 @@ class World {
     check_owners(*all.back());
     if (replaced_) violation("one that was replaced serves on");
     for (const auto& author : authors_) check_author(*author);
+    for (const auto& follower : followers_) check_follower(*follower);
+  }
+
+  // Long after the last write it shows what the owners have.
+  void check_follower(Follower& follower) {
+    Process* const owner = find_daemon(follower.partition());
+    const auto arm = owner ? owner->forest().info(follower.arm()) : std::nullopt;
+    if (!follower.watches() || !arm) return;
+    Process& process = follower.process();
+    const auto base = process.forest().info(arm->parent);
+    Process* const below = base ? find_daemon(process.directory().name(base->owner)) : nullptr;
+    if (below == nullptr || base->parent != "world") return;
+    const auto X_WB = below->forest().lookup("world", base->id);
+    const auto X_BT = owner->forest().lookup(base->id, follower.tip());
+    if (!X_WB || !X_BT) return;
+    ++run_.counts["watched paths checked"];
+    const auto seen = follower.read();
+    if (!seen) {
+      violation(follower.tip() + " is not seen: " + seen.error().message);
+    } else if (((X_WB->pose * X_BT->pose).translation() - seen->pose.translation()).norm() > 1e-9) {
+      violation(follower.tip() + " is not seen where it is");
+    }
+  }
+
+  [[nodiscard]] Process* find_daemon(const std::string& partition) const {
+    for (const auto& daemon : daemons_) {
+      if (daemon && daemon->partition() == partition) return daemon.get();
+    }
+    return nullptr;
   }
 
   // Of a frame that one serves who is there, it is the owner; who is not there has none of the configured frames.
@@ -331,6 +377,7 @@ class World {
   std::vector<milliseconds> offsets_;
   std::vector<int> down_;
   std::vector<std::shared_ptr<Author>> authors_;
+  std::vector<std::shared_ptr<Follower>> followers_;
   std::map<const Fault*, std::weak_ptr<Process>> hung_;
   std::shared_ptr<Process> replaced_;  // the wild one, while it hangs
   const Fault* replaced_by_ = nullptr;

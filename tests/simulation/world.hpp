@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "simulation/author.hpp"
+#include "simulation/follower.hpp"
 
 namespace tfdude::simulation {
 

@@ -1,0 +1,199 @@
+#include "simulation/follower.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "faults/frames.hpp"
+
+namespace tfdude::simulation {
+namespace {
+
+using faults::base_edge;
+using faults::base_of;
+using faults::denies;
+using faults::partition_name;
+
+Transform at(double y, double z) {
+  return {Pose::trusted(Eigen::Quaterniond::Identity(), {0, y, z}), {}};
+}
+
+// The number of a value is how far its first edge leads along y; along z the two edges cancel each other.
+Transform first_edge(std::size_t value) {
+  return at(static_cast<double>(value), static_cast<double>(value));
+}
+Transform second_edge(std::size_t value) { return at(0, -static_cast<double>(value)); }
+
+}  // namespace
+
+Follower::Follower(std::shared_ptr<Process> process, std::size_t number, std::size_t owners,
+                   std::uint64_t seed)
+    : process_(std::move(process)), number_(number), owners_(owners), random_(seed) {}
+
+std::string Follower::id(const char* which) const {
+  return "w" + std::to_string(number_) + "_" + std::to_string(generation_) + "_" + which;
+}
+
+void Follower::start() { next(); }
+
+void Follower::next() {
+  if (stopped_) return;
+  const Instant pause = std::chrono::microseconds(random_.index(60'000));
+  process_->later(pause, [self = shared_from_this()] {
+    if (!self->stopped_) self->step();
+  });
+}
+
+void Follower::step() {
+  if (watch_ == nullptr) return arm_added_ ? add_tip() : begin_anew();
+  if (random_.index(3) == 0) return move();
+  write();
+}
+
+void Follower::begin(const std::string& what, Operation::Route route,
+                     std::function<void(const Result<void>&)> then) {
+  process_->world().trace(tip() + ": begins to " + what);
+  process_->begin(std::make_shared<Operation>(
+      *process_, std::move(route),
+      [self = shared_from_this(), what, then](const Result<void>& outcome, const auto&) {
+        const std::string code = outcome ? "done" : std::string(to_string(outcome.error().code));
+        self->process_->world().trace(self->tip() + ": " + what + ": " + code);
+        ++self->outcomes_["follower: " + what.substr(0, what.find(' ')) + " " + code];
+        then(outcome);
+        self->next();
+      }));
+}
+
+// With frames of other names: what has become of those before is not known.
+void Follower::begin_anew() {
+  ++generation_;
+  watch_.reset();
+  const std::size_t base = random_.index(owners_);
+  partition_ = partition_name(random_.index(owners_));
+  bases_ = {base};
+  written_ = {{bases_}};
+  newest_read_ = 0;
+  incarnation_ = 0;
+  may_go_back_ = false;
+  begin(
+      "add the arm",
+      [this, base, id = arm()] {
+        return route_add(process_->forest(), process_->directory(), id,
+                         AddRequest{base_of(base), first_edge(0)}, partition_)
+            .map([](Part part) { return std::vector<Part>{std::move(part)}; });
+      },
+      [this](const Result<void>& added) { arm_added_ = added.has_value(); });
+}
+
+void Follower::add_tip() {
+  begin(
+      "add the tip",
+      [this, arm = arm(), tip = tip()] {
+        return route_add(process_->forest(), process_->directory(), tip,
+                         AddRequest{arm, second_edge(0)}, partition_)
+            .map([](Part part) { return std::vector<Part>{std::move(part)}; });
+      },
+      [this](const Result<void>& added) {
+        arm_added_ = false;
+        if (!added) return;
+        watch_ = std::make_shared<Watch>(*process_, "world", tip(), [this] { look(); });
+        process_->watch(watch_);
+        watch_->start();
+      });
+}
+
+void Follower::write() {
+  const std::size_t value = written_.size();
+  written_.push_back({bases_});
+  const std::vector<EdgeUpdate> both{{arm(), first_edge(value)}, {tip(), second_edge(value)}};
+  begin(
+      "write " + std::to_string(value),
+      [this, both] {
+        return route_update(process_->forest(), process_->directory(), both, std::nullopt);
+      },
+      [this, value](const Result<void>& updated) {
+        if (updated) {
+          for (std::size_t i = 0; i < value; ++i) written_[i].replaced = true;
+        } else if (denies(updated.error().code)) {
+          watch_.reset();
+        }
+      });
+}
+
+void Follower::moving_to(std::size_t base) {
+  bases_.insert(base);
+  for (Written& one : written_) {
+    if (!one.replaced) one.bases.insert(base);
+  }
+}
+
+void Follower::move() {
+  const std::size_t base = random_.index(owners_);
+  moving_to(base);
+  begin(
+      "move below " + base_of(base),
+      [this, base, id = arm()] {
+        return route_move(process_->forest(), process_->directory(), id,
+                          MoveRequest{base_of(base), std::nullopt})
+            .map([](Part part) { return std::vector<Part>{std::move(part)}; });
+      },
+      [this, base](const Result<void>& moved) {
+        if (moved) bases_ = {base};
+      });
+}
+
+Result<StampedTransform> Follower::read() const {
+  if (watch_ == nullptr) return fail(Errc::kUnknownEnd, "nothing is watched");
+  return watch_->read();
+}
+
+void Follower::look() {
+  if (watch_ == nullptr) return;
+  if (const auto X = watch_->read()) judge(*X);
+}
+
+// Values that were not stored yet are lost with their owner's process: the next may have older ones.
+void Follower::forget_order_after_restart() {
+  const auto serving = process_->directory().serving(partition_);
+  if (!serving || serving->incarnation == incarnation_) return;
+  if (std::exchange(incarnation_, serving->incarnation) == 0) return;
+  process_->world().count("the owner of a watched path was started again");
+  may_go_back_ = true;
+  for (Written& one : written_) {
+    one.replaced = false;
+    one.bases.insert(bases_.begin(), bases_.end());
+  }
+}
+
+void Follower::judge(const StampedTransform& X) {
+  forget_order_after_restart();
+  Surroundings& world = process_->world();
+  const Eigen::Vector3d at = X.pose.translation();
+  const auto base = static_cast<std::size_t>(std::lround(at.x()) - 1);
+  const Eigen::Vector3d of_base = base_edge(base).pose.translation();
+  const std::string what = tip() + " was seen at (" + std::to_string(at.x()) + ", " +
+                           std::to_string(at.y()) + ", " + std::to_string(at.z()) + ")";
+  const double value = at.y() - of_base.y();
+  if (std::abs(at.x() - of_base.x()) > 1e-9 || std::abs(at.z() - of_base.z()) > 1e-9) {
+    return world.violation(what + ", half of what was written");
+  }
+  const auto number = static_cast<std::size_t>(std::lround(value));
+  if (value < -1e-9 || number >= written_.size()) {
+    return world.violation(what + ", which nobody has written");
+  }
+  // What the owner's last process has told may be shown until all of the next one's is here.
+  if (number < newest_read_ && !std::exchange(may_go_back_, false)) {
+    return world.violation(what + ": value " + std::to_string(number) + " after " +
+                           std::to_string(newest_read_));
+  }
+  if (written_[number].bases.count(base) == 0) {
+    return world.violation(what + ": value " + std::to_string(number) + " never was below " +
+                           base_of(base));
+  }
+  if (number > newest_read_) {
+    world.count("a watched path showed something newer");
+    world.trace(tip() + ": sees value " + std::to_string(number) + " below " + base_of(base));
+  }
+  newest_read_ = number;
+}
+
+}  // namespace tfdude::simulation

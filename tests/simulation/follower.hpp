@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "simulation/process.hpp"
+#include "simulation/watch.hpp"
+
+namespace tfdude::simulation {
+
+/// A client that writes two edges of its own in one commit, moves them from base to base, and reads them all the while by a
+/// watched path. What it reads must be something that was written, whole, in a place where it was, and never older than what
+/// it has read before, as long as their owner lives.
+class Follower : public std::enable_shared_from_this<Follower> {
+ public:
+  /// @param owners  whose partitions it uses; none of them is renamed
+  Follower(std::shared_ptr<Process> process, std::size_t number, std::size_t owners,
+           std::uint64_t seed);
+
+  /// Goes on until stop(); looks at what comes after that, too.
+  void start();
+  void stop() { stopped_ = true; }
+
+  [[nodiscard]] Process& process() { return *process_; }
+  [[nodiscard]] const std::map<std::string, std::size_t>& outcomes() const { return outcomes_; }
+  /// The owner of both edges; empty: it has none.
+  [[nodiscard]] const std::string& partition() const { return partition_; }
+  [[nodiscard]] std::string arm() const { return id("arm"); }
+  [[nodiscard]] std::string tip() const { return id("tip"); }
+  [[nodiscard]] bool watches() const { return watch_ != nullptr; }
+  [[nodiscard]] Result<StampedTransform> read() const;
+
+ private:
+  /// One value of both edges.
+  struct Written {
+    std::set<std::size_t> bases;  // below which it may have been
+    bool replaced = false;        // for sure
+  };
+
+  void next();
+  void step();
+  void begin_anew();
+  void add_tip();
+  void write();
+  void move();
+  void begin(const std::string& what, Operation::Route route,
+             std::function<void(const Result<void>&)> then);
+  void look();
+  void judge(const StampedTransform& X);
+  void forget_order_after_restart();
+  void moving_to(std::size_t base);
+  [[nodiscard]] std::string id(const char* which) const;
+
+  std::shared_ptr<Process> process_;
+  const std::size_t number_;
+  const std::size_t owners_;
+  testing::Random random_;
+  std::shared_ptr<Watch> watch_;
+  std::string partition_;
+  bool arm_added_ = false;        // and not the tip yet
+  int generation_ = 0;            // of the two frames
+  std::set<std::size_t> bases_;   // below which they may be now
+  std::vector<Written> written_;  // by the number of the value
+  std::size_t newest_read_ = 0;
+  std::uint64_t incarnation_ = 0;  // of the owner
+  bool may_go_back_ = false;       // once, since the owner was started again
+  std::map<std::string, std::size_t> outcomes_;
+  bool stopped_ = false;
+};
+
+}  // namespace tfdude::simulation

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+
+#include "partition/watching.hpp"
+#include "simulation/timeline.hpp"
+#include "tree/forest.hpp"
+
+namespace tfdude::simulation {
+
+/// The owner's side of watched paths, as Pusher does it, in steps.
+class Pushes {
+ public:
+  using Push = std::function<void(const State&)>;
+
+  /// @param later  calls push_due() a moment later
+  Pushes(Forest& forest, std::function<void()> later, Push push)
+      : forest_(forest), later_(std::move(later)), push_(std::move(push)) {}
+
+  /// Begins to push to a group, or goes on for another lease.
+  [[nodiscard]] Result<State> watch(std::uint64_t group, const WatchRequest& request, Instant now);
+
+  /// Somebody listens to the group only now.
+  void tell_all(std::uint64_t group);
+
+  /// What was written since is pushed.
+  void push_due(Instant now);
+
+ private:
+  struct Group {
+    WatchedGroup watched;
+    Instant lease{};
+  };
+
+  void push(State&& state);
+
+  Forest& forest_;
+  const std::function<void()> later_;
+  const Push push_;
+  std::map<std::uint64_t, Group> groups_;
+};
+
+}  // namespace tfdude::simulation

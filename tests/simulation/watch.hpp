@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "runtime/watched_path.hpp"
+#include "simulation/timeline.hpp"
+
+namespace tfdude::simulation {
+
+class Process;
+
+/// A watched path of a client, attended to as Watches does, in steps.
+class Watch : public std::enable_shared_from_this<Watch> {
+ public:
+  /// @param shown  called when it may show something else
+  Watch(Process& process, const std::string& a, const std::string& b, std::function<void()> shown)
+      : process_(process), path_(a, b, {}), shown_(std::move(shown)) {}
+
+  /// Goes on as long as somebody has it.
+  void start() { attend(); }
+
+  /// By what was pushed; no answer where the path was never live.
+  [[nodiscard]] Result<StampedTransform> read() const { return path_.lookup({}); }
+
+  // ---- what the process hands over
+  void on_reply(const Reply& reply);
+  /// @param from  the process that has pushed it; @param number  it counts what it pushes
+  void on_state(std::uint64_t from, std::uint64_t number, const State& state);
+
+ private:
+  void attend();
+  void look();
+  void ask(WatchRoute& route);
+  void open(const WatchRoute::Source& source);
+  void take(const State& state);
+
+  Process& process_;
+  WatchedPath path_;
+  const std::function<void()> shown_;
+  std::set<std::uint64_t> opened_;                 // groups; some listen only a moment later
+  std::set<std::uint64_t> heard_;                  // that listen
+  std::map<std::uint32_t, std::uint64_t> asked_;   // groups, by the numbers of requests
+  std::map<std::uint64_t, std::uint64_t> newest_;  // numbers of what was pushed, by process
+  Instant renew_at_{};
+};
+
+}  // namespace tfdude::simulation
