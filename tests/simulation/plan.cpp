@@ -48,8 +48,8 @@ FaultKind draw_kind(Random& random, const std::array<std::size_t, kFaultKinds>& 
 
 const char* name_of(FaultKind kind) {
   static constexpr std::array<const char*, kFaultKinds> kNames{
-      "kill", "stop",       "pause",     "cut",     "cut one way",
-      "part", "step clock", "fill disk", "replace", "rename"};
+      "kill",       "stop",      "pause",   "cut",    "cut one way", "part",
+      "step clock", "fill disk", "replace", "rename", "reconfigure"};
   return kNames.at(static_cast<std::size_t>(kind));
 }
 

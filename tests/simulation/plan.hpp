@@ -11,18 +11,19 @@
 namespace tfdude::simulation {
 
 enum class FaultKind {
-  kKill,       ///< a daemon; it is started again at the end, from what it stored
-  kStop,       ///< the same after a last word
-  kPause,      ///< a daemon
-  kCut,        ///< a computer from all others
-  kCutOneWay,  ///< nobody hears it, but it hears the others
-  kPart,       ///< two computers from each other
-  kStepClock,  ///< of a daemon; for good
-  kFillDisk,   ///< of a daemon
-  kReplace,    ///< a daemon hangs, and another is started in its place; then it goes on
-  kRename,     ///< a daemon is killed, and another partition is started with its configuration
+  kKill,         ///< a daemon; it is started again at the end, from what it stored
+  kStop,         ///< the same after a last word
+  kPause,        ///< a daemon
+  kCut,          ///< a computer from all others
+  kCutOneWay,    ///< nobody hears it, but it hears the others
+  kPart,         ///< two computers from each other
+  kStepClock,    ///< of a daemon; for good
+  kFillDisk,     ///< of a daemon
+  kReplace,      ///< a daemon hangs, and another is started in its place; then it goes on
+  kRename,       ///< a daemon is killed, and another partition is started with its configuration
+  kReconfigure,  ///< a daemon is killed, and started again with a frame more, or without that one
 };
-inline constexpr std::size_t kFaultKinds = 10;
+inline constexpr std::size_t kFaultKinds = 11;
 [[nodiscard]] const char* name_of(FaultKind kind);
 
 struct Fault {

@@ -11,6 +11,9 @@ using faults::base_edge;
 using faults::base_of;
 using faults::partition_name;
 
+// The frame that a configuration may have besides the base.
+std::string extra_of(std::size_t owner) { return "extra_" + std::to_string(owner); }
+
 constexpr Instant kLook = milliseconds(20);
 // Longer than anything takes: that somebody counts as gone, is met again, has claimed its name and has conceded.
 constexpr Instant kRest = milliseconds(12000);
@@ -34,6 +37,7 @@ class World {
         wild_(plan.owners - 1),
         disks_(plan.owners + 1),
         offsets_(plan.owners),
+        has_extra_(plan.owners, false),
         down_(plan.owners, 0) {}
 
   Run run() {
@@ -103,6 +107,7 @@ class World {
     setting.partition = name_of_daemon(owner);
     if (owner == 0) setting.configured.push_back({"world", "", {}});
     setting.configured.push_back({base_of(owner), "world", base_edge(owner)});
+    if (has_extra_[owner]) setting.configured.push_back({extra_of(owner), base_of(owner), {}});
     setting.disk = disk;
     setting.clock_offset = &offsets_[owner];
     daemons_[owner] = std::make_shared<Process>(surroundings_, setting);
@@ -160,6 +165,7 @@ class World {
         }
         [[fallthrough]];
       case FaultKind::kKill:
+      case FaultKind::kReconfigure:
       case FaultKind::kRename:
         take_down(fault.kind == FaultKind::kRename ? wild_ : fault.target,
                   fault.kind == FaultKind::kStop);
@@ -203,6 +209,9 @@ class World {
         ++renamed_;
         bring_up(wild_);
         break;
+      case FaultKind::kReconfigure:
+        has_extra_[fault.target] = !has_extra_[fault.target];
+        [[fallthrough]];
       case FaultKind::kStop:
       case FaultKind::kKill:
         bring_up(fault.target);
@@ -312,6 +321,12 @@ class World {
       const auto frame = one.forest().info(base_of(i));
       const std::string owner = frame ? one.directory().name(frame->owner) : "nobody";
       if (owner != name_of_daemon(i)) violation(base_of(i) + " is of " + owner);
+      const auto extra = one.forest().info(extra_of(i));
+      if (extra.has_value() != has_extra_[i]) {
+        violation(extra_of(i) + (extra ? " is there" : " is missing"));
+      } else if (extra && one.directory().name(extra->owner) != name_of_daemon(i)) {
+        violation(extra_of(i) + " is of " + one.directory().name(extra->owner));
+      }
     }
   }
 
@@ -375,6 +390,7 @@ class World {
   const std::size_t wild_;   // the last owner, which may be renamed and replaced
   std::vector<Disk> disks_;  // the last is the renamed one's
   std::vector<milliseconds> offsets_;
+  std::vector<bool> has_extra_;  // by owner, whether its configuration has one frame more
   std::vector<int> down_;
   std::vector<std::shared_ptr<Author>> authors_;
   std::vector<std::shared_ptr<Follower>> followers_;
