@@ -86,6 +86,11 @@ bool Absences::any_silent() const {
   });
 }
 
+bool Absences::any_hearsay() const {
+  return std::any_of(missed_.begin(), missed_.end(),
+                     [](const auto& known) { return known.second.hearsay; });
+}
+
 std::vector<std::string> Absences::back() const {
   std::vector<std::string> names;
   for (const auto& [name, missed] : missed_) {

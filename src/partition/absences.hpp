@@ -50,6 +50,8 @@ class Absences {
   std::vector<std::string> look(Steady now);
 
   [[nodiscard]] bool any_silent() const;
+  /// Whether something that others have told does not count yet.
+  [[nodiscard]] bool any_hearsay() const;
   [[nodiscard]] std::vector<std::string> back() const;
   [[nodiscard]] std::optional<Absent> find(const std::string& partition) const;
 

@@ -49,7 +49,8 @@ class Directory {
   bool look_for_gone(Absences::Steady now);
   [[nodiscard]] bool any_silent() const { return absences_.any_silent(); }
 
-  /// Whether somebody whom this process has not met is said to be silent: it may be there again in a moment.
+  /// Whether somebody whom this process has not met is said to be silent, so that it may be there again in a moment, or to be
+  /// gone since so short a time that it would not give way to this process.
   [[nodiscard]] bool awaits_silent() const;
 
   /// Whether a partition may be forgotten. @return kPartitionTaken where it is there

@@ -143,7 +143,7 @@ void Directory::restore(const std::vector<Absent>& absent) {
 }
 
 bool Directory::awaits_silent() const {
-  return std::any_of(partitions_.begin() + 1, partitions_.end(), [](const Known& partition) {
+  return absences_.any_hearsay() || std::any_of(partitions_.begin() + 1, partitions_.end(), [](const Known& partition) {
     return partition.said_silent && partition.live == 0;
   });
 }

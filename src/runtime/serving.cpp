@@ -122,9 +122,10 @@ Result<void> Serving::set_timings(const std::vector<FrameSpec>& frames) {
   return {};
 }
 
-// Who is said to be silent may be there again in a moment, or gone: that decides whose a frame is.
+// Who is said to be silent may be there again in a moment, or gone: that decides whose a frame is. And who returns gives way
+// only to those that count it as gone: else what this process acknowledges in its first moments could be lost.
 void Serving::await_gone() {
-  const auto patience = Clock::now() + 2 * Absences::kGrace;
+  const auto patience = Clock::now() + 3 * Absences::kGrace;
   const auto undecided = [this] {
     const std::lock_guard lock(structure_.mutex);
     return structure_.directory.awaits_silent();

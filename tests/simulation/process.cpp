@@ -92,7 +92,7 @@ void Process::take_frames() {
   const Instant now = world_.timeline.now();
   const bool incomplete = now < born_ + kLookRound && (awaits_presence() || !directory_.complete());
   const bool undecided =
-      now < born_ + kLookRound + milliseconds(2 * Absences::kGrace) && directory_.awaits_silent();
+      now < born_ + kLookRound + milliseconds(3 * Absences::kGrace) && directory_.awaits_silent();
   if (incomplete || undecided) return later(milliseconds(5), [this] { take_frames(); });
   serve();
 }

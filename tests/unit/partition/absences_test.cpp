@@ -243,7 +243,14 @@ TEST_CASE("who is told of a silence waits for its end") {
   base.absent = {{"arm", 0, Kind::kSilent, 7}};
   replica.directory.apply(base, kNow);
   CHECK(replica.directory.awaits_silent());
-  SECTION("it is gone") { base.absent[0].kind = Kind::kLost; }
+  SECTION("it is gone, and has been for long enough that it gives way to this process") {
+    base.absent[0].kind = Kind::kLost;
+    replica.directory.apply(base, kNow);
+    for (int quarter = 0; quarter <= 4; ++quarter) {
+      CHECK(replica.directory.awaits_silent());
+      (void)replica.directory.look_for_gone(kStart + quarter * Absences::kGrace / 4);
+    }
+  }
   SECTION("it is there") { replica.directory.apply(presence_of("arm", 7, 1), kNow); }
   replica.directory.apply(base, kNow);
   CHECK_FALSE(replica.directory.awaits_silent());
