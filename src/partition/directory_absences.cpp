@@ -143,9 +143,10 @@ void Directory::restore(const std::vector<Absent>& absent) {
 }
 
 bool Directory::awaits_silent() const {
-  return absences_.any_hearsay() || std::any_of(partitions_.begin() + 1, partitions_.end(), [](const Known& partition) {
-    return partition.said_silent && partition.live == 0;
-  });
+  return absences_.any_hearsay() ||
+         std::any_of(partitions_.begin() + 1, partitions_.end(), [](const Known& partition) {
+           return partition.said_silent && partition.live == 0;
+         });
 }
 
 Result<void> Directory::check_not_there(const std::string& partition) const {

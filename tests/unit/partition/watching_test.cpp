@@ -149,7 +149,7 @@ TEST_CASE("a segment may be told as one transform") {
   CHECK(after.entries.at(0).process_noise);
 }
 
-TEST_CASE("who watches what is not owned here is told so, and nothing is told while an edge is gone") {
+TEST_CASE("who watches what is not owned here is told so, and of half a path nothing") {
   Arm arm;
   for (const char* id : {"far", "nobody", "world"}) {
     WatchedGroup group(7, {{kArm, {"", id}}});

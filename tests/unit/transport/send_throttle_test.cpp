@@ -1,7 +1,8 @@
+#include "transport/fastdds/send_throttle.hpp"
+
 #include <memory>
 
 #include "support/catch.hpp"
-#include "transport/fastdds/send_throttle.hpp"
 
 namespace tfdude::fastdds {
 namespace {
