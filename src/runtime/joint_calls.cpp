@@ -59,21 +59,14 @@ Result<void> JointCalls::publish(const JointUpdate& update) {
   }
   if (!parts) return tl::unexpected(std::move(parts.error()));
   for (const Part& part : *parts) {
-    auto sent = publish_to(part, deadline);
+    // Whoever is there gets its share, and the error of who is not is told.
+    const auto& share = std::get<JointUpdate>(part.request.body);
+    auto sent = requests_.publish(part, share, deadline, [this](const JointUpdate& own) {
+      return member_.apply(own).map([](std::size_t) {});
+    });
     if (!sent && outcome) outcome = std::move(sent);
   }
   return outcome;
-}
-
-// Whoever is there gets its share, and the error of who is not is told.
-Result<void> JointCalls::publish_to(const Part& part, const Deadline& deadline) {
-  const auto& share = std::get<JointUpdate>(part.request.body);
-  if (part.owner == kHeldHere) return member_.apply(share).map([](std::size_t) {});
-  {
-    const std::lock_guard lock(structure_.mutex);
-    if (auto ok = check_reachable(structure_.directory, {part}); !ok) return ok;
-  }
-  return transport_.send(part.partition, share, deadline.at());
 }
 
 Result<std::vector<JointInfo>> JointCalls::list(const std::string& partition) {

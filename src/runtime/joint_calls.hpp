@@ -8,7 +8,6 @@
 #include "runtime/member_runner.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/structure.hpp"
-#include "transport/port.hpp"
 
 namespace tfdude {
 
@@ -16,13 +15,8 @@ namespace tfdude {
 /// @par Thread safety  All functions.
 class JointCalls {
  public:
-  JointCalls(Structure& structure, Discovery& discovery, Requests& requests, Transport& transport,
-             MemberRunner& member)
-      : structure_(structure),
-        discovery_(discovery),
-        requests_(requests),
-        transport_(transport),
-        member_(member) {}
+  JointCalls(Structure& structure, Discovery& discovery, Requests& requests, MemberRunner& member)
+      : structure_(structure), discovery_(discovery), requests_(requests), member_(member) {}
 
   [[nodiscard]] Result<void> update(const JointUpdate& update);
   [[nodiscard]] Result<void> publish(const JointUpdate& update);
@@ -32,12 +26,9 @@ class JointCalls {
   void on_joints(const JointUpdate& update);
 
  private:
-  [[nodiscard]] Result<void> publish_to(const Part& part, const Deadline& deadline);
-
   Structure& structure_;
   Discovery& discovery_;
   Requests& requests_;
-  Transport& transport_;
   MemberRunner& member_;
   std::atomic<std::uint64_t> refused_{0};  // updates
 };

@@ -19,8 +19,8 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       conceding_(structure_, requests_, member_, options.timeout),
       serving_(structure_, discovery_, *transport_, member_, options_),
       queries_(structure_, discovery_, requests_, member_),
-      writes_(structure_, discovery_, requests_, *transport_, member_),
-      joints_(structure_, discovery_, requests_, *transport_, member_),
+      writes_(structure_, discovery_, requests_, member_),
+      joints_(structure_, discovery_, requests_, member_),
       observations_(structure_, discovery_, requests_),
       watcher_(
           structure_, discovery_, requests_, *transport_,

@@ -103,6 +103,20 @@ class Requests {
   /// Asks for changes, and waits until they are known here, and stored where this process has made them.
   [[nodiscard]] Result<void> change(std::vector<Part>& parts, const Deadline& deadline);
 
+  /// Hands an owner its share of what is streamed, for which there is no reply.
+  /// @param apply_here  takes what is this process's own
+  /// @return kUnreachable where the owner is not there; as Transport::send
+  template <class Message, class Apply>
+  [[nodiscard]] Result<void> publish(const Part& part, const Message& share,
+                                     const Deadline& deadline, Apply apply_here) {
+    if (part.owner == kHeldHere) return apply_here(share);
+    {
+      const std::lock_guard lock(structure_.mutex);
+      if (auto ok = check_reachable(structure_.directory, {part}); !ok) return ok;
+    }
+    return transport_.send(part.partition, share, deadline.at());
+  }
+
   /// The list that is a partition's answer.
   template <class Item>
   [[nodiscard]] Result<std::vector<Item>> ask_list(Part part, const Deadline& deadline) {

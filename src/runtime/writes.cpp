@@ -47,22 +47,23 @@ Result<void> Writes::move(const std::string& id, const MoveRequest& request) {
       [&](Part& part) { return change(std::move(part), deadline); });
 }
 
-Result<void> Writes::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
-  if (edges.empty()) return {};
-  auto updated = structure_.forest.update(edges, stamp);
-  if (updated || !is_elsewhere(updated.error())) return updated;
+template <class Edge>
+Result<void> Writes::ask_to_update(const std::vector<Edge>& edges, std::optional<Time> stamp) {
   const Deadline deadline = discovery_.call_deadline();
   return requests_.retry_on_stale_route(
       deadline, [&] { return route_update(structure_.forest, structure_.directory, edges, stamp); },
       [&](std::vector<Part>& parts) { return requests_.change(parts, deadline); });
 }
 
-Result<void> Writes::update(const std::vector<PartialUpdate>& edges, std::optional<Time> stamp) {
+Result<void> Writes::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
   if (edges.empty()) return {};
-  const Deadline deadline = discovery_.call_deadline();
-  return requests_.retry_on_stale_route(
-      deadline, [&] { return route_update(structure_.forest, structure_.directory, edges, stamp); },
-      [&](std::vector<Part>& parts) { return requests_.change(parts, deadline); });
+  auto updated = structure_.forest.update(edges, stamp);
+  if (updated || !is_elsewhere(updated.error())) return updated;
+  return ask_to_update(edges, stamp);
+}
+
+Result<void> Writes::update(const std::vector<PartialUpdate>& edges, std::optional<Time> stamp) {
+  return edges.empty() ? Result<void>() : ask_to_update(edges, stamp);
 }
 
 Result<void> Writes::publish(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
@@ -77,20 +78,13 @@ Result<void> Writes::publish(const std::vector<EdgeUpdate>& edges, std::optional
   Result<void> outcome;
   for (Part& part : *parts) {
     const Update share{std::move(std::get<UpdateRequest>(part.request.body).edges), stamp};
-    auto sent = publish_to(part, share, deadline);
+    // Whoever is there gets its share, and the error of who is not is told.
+    auto sent = requests_.publish(part, share, deadline, [this](const Update& own) {
+      return structure_.forest.update(own.edges, own.stamp);
+    });
     if (!sent && outcome) outcome = std::move(sent);
   }
   return outcome;
-}
-
-// Whoever is there gets its share, and the error of who is not is told.
-Result<void> Writes::publish_to(const Part& part, const Update& share, const Deadline& deadline) {
-  if (part.owner == kHeldHere) return structure_.forest.update(share.edges, share.stamp);
-  {
-    const std::lock_guard lock(structure_.mutex);
-    if (auto ok = check_reachable(structure_.directory, {part}); !ok) return ok;
-  }
-  return transport_.send(part.partition, share, deadline.at());
 }
 
 Result<void> Writes::correlate(const std::string& id, const Correlation& correlation) {

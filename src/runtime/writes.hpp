@@ -7,7 +7,6 @@
 #include "runtime/member_runner.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/structure.hpp"
-#include "transport/port.hpp"
 
 namespace tfdude {
 
@@ -16,13 +15,8 @@ namespace tfdude {
 /// @par Thread safety  All functions.
 class Writes {
  public:
-  Writes(Structure& structure, Discovery& discovery, Requests& requests, Transport& transport,
-         MemberRunner& member)
-      : structure_(structure),
-        discovery_(discovery),
-        requests_(requests),
-        transport_(transport),
-        member_(member) {}
+  Writes(Structure& structure, Discovery& discovery, Requests& requests, MemberRunner& member)
+      : structure_(structure), discovery_(discovery), requests_(requests), member_(member) {}
 
   [[nodiscard]] Result<void> add(const std::string& id, const AddRequest& request,
                                  const std::string& partition);
@@ -44,14 +38,14 @@ class Writes {
 
  private:
   [[nodiscard]] Result<void> change(Part part, const Deadline& deadline);
-  [[nodiscard]] Result<void> publish_to(const Part& part, const Update& share,
-                                        const Deadline& deadline);
+  template <class Edge>
+  [[nodiscard]] Result<void> ask_to_update(const std::vector<Edge>& edges,
+                                           std::optional<Time> stamp);
   [[nodiscard]] Result<std::vector<Part>> route_forget(const std::string& partition);
 
   Structure& structure_;
   Discovery& discovery_;
   Requests& requests_;
-  Transport& transport_;
   MemberRunner& member_;
 };
 

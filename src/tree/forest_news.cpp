@@ -117,11 +117,13 @@ NewsOfCommit Forest::news(std::vector<EdgeCursor>& cursors, const NewsQuery& que
     const bool same = edge.history == cursor.history;
     return same || impl_->info_of(edge, commit).parent == cursor.parent ? &edge : nullptr;
   };
-  if (query.whole && !std::all_of(cursors.begin(), cursors.end(), followed)) return all;
+  std::vector<const HeldVersion*> edges(cursors.size());
+  std::transform(cursors.begin(), cursors.end(), edges.begin(), followed);
+  if (query.whole && std::count(edges.begin(), edges.end(), nullptr) > 0) return all;
   for (std::uint32_t index = 0; index < cursors.size(); ++index) {
-    EdgeCursor& cursor = cursors[index];
-    const HeldVersion* edge = followed(cursor);
+    const HeldVersion* edge = edges[index];
     if (edge == nullptr) continue;
+    EdgeCursor& cursor = cursors[index];
     cursor.frame = {edge->slot, edge->generation};
     add_news(*edge, index, query, commit, cursor, all.values);
   }

@@ -51,10 +51,7 @@ class Rig : public TransportHandler {
                   if (on_contest) on_contest();
                 }}),
         requests(structure, discovery, *transport,
-                 {[this](const Request& request) {
-                    ++asked_here;
-                    return member.answer(request);
-                  },
+                 {[this](const Request& request) { return member.answer(request); },
                   [this](const tfdude::Deadline& deadline) { member.tell(deadline); },
                   [this](const Request& request, const tfdude::Deadline& deadline) {
                     return member.await_stored(request, deadline);
@@ -77,9 +74,7 @@ class Rig : public TransportHandler {
   }
   void on_reply(const Reply& reply) override { requests.calls().on_reply(reply); }
   void on_update(const Update&) override {}
-  void on_joints(const JointUpdate& update) override {
-    if (joints) joints(update);
-  }
+  void on_joints(const JointUpdate&) override {}
   void on_state(const State& state) override {
     if (states) states(state);
   }
@@ -93,12 +88,10 @@ class Rig : public TransportHandler {
 
   const Options options;
   std::function<void()> on_contest;
-  std::function<void(const JointUpdate&)> joints;
   std::function<void(const State&)> states;
   std::function<Result<void>()> still_in;  // else the member's
   std::atomic<int> routes{0};
   std::atomic<int> others{0};
-  std::atomic<int> asked_here{0};
   std::mutex mutex;
   std::vector<std::string> gone;  // partitions; under mutex
   Structure structure;

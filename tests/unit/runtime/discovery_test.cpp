@@ -30,12 +30,12 @@ class Meeting final : public testing::Relay {
 struct Newcomer {
   explicit Newcomer(const Options& options = quick())
       : own(std::make_unique<Meeting>(network.join())),
-        network_of(*own),
+        meeting(*own),
         rig(std::move(own), "", options) {}
 
   LoopbackNetwork network;
   std::unique_ptr<Meeting> own;
-  Meeting& network_of;
+  Meeting& meeting;
   testing::Rig rig;
 };
 
@@ -65,10 +65,10 @@ TEST_CASE("discovery: before all are met nothing is said to be missing") {
   CHECK(found.error().code == Errc::kTimeout);
   CHECK_THAT(found.error().message,
              ContainsSubstring("no frame 'hand'") && ContainsSubstring("nobody was met yet"));
-  newcomer.network_of.met_somebody = true;
+  newcomer.meeting.met_somebody = true;
   CHECK_THAT(newcomer.rig.discovery.await(soon).error().message,
              ContainsSubstring("somebody was met who has not told yet what it owns"));
-  newcomer.network_of.met_all = true;
+  newcomer.meeting.met_all = true;
   CHECK(newcomer.rig.discovery.await(soon));
 }
 
@@ -107,7 +107,7 @@ TEST_CASE("discovery: an error that is not of what is unknown is returned at onc
 
 TEST_CASE("discovery: a change that an owner has told of and has not come is waited for") {
   Newcomer newcomer;
-  newcomer.network_of.met_all = true;
+  newcomer.meeting.met_all = true;
   newcomer.rig.on_presence(testing::presence_of("arm", 1, 1));
   newcomer.rig.on_page(Page{"arm", 0, 1, 1, {{"hand", "", 1}}});
   REQUIRE(newcomer.rig.discovery.complete());
@@ -127,7 +127,7 @@ TEST_CASE("discovery: a call has the rest of the look round besides its time-out
   options.discovery = 10s;
   Newcomer newcomer(options);
   CHECK(newcomer.rig.deadline().at() > Deadline::Clock::now() + 9s);
-  newcomer.network_of.met_all = true;
+  newcomer.meeting.met_all = true;
   REQUIRE(newcomer.rig.discovery.complete());
   const auto until = newcomer.rig.deadline().at();
   CHECK(until <= Deadline::Clock::now() + options.timeout);

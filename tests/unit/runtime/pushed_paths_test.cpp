@@ -9,7 +9,6 @@
 #include "runtime/watcher.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
-#include "support/memory_store.hpp"
 #include "support/process.hpp"
 #include "support/rig.hpp"
 
@@ -104,7 +103,6 @@ TEST_CASE("watcher: a path is followed where its frame has moved to") {
 TEST_CASE("pushing: who watches is answered with all values, and told what is written") {
   LoopbackNetwork network;
   std::atomic<double> pushed{0};
-  testing::ScriptedOwner nobody(network, "nobody", {{"nobody", "", {}}});
   Rig owner(network.join(), "arm");
   Watcher own(
       owner.structure, owner.discovery, owner.requests, *owner.transport,

@@ -23,7 +23,7 @@ using testing::x_of;
 
 struct Writer : Rig {
   explicit Writer(LoopbackNetwork& network)
-      : Rig(network.join()), writes(structure, discovery, requests, *transport, member) {}
+      : Rig(network.join()), writes(structure, discovery, requests, member) {}
   Writes writes;
 };
 
