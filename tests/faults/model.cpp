@@ -88,12 +88,16 @@ void Model::move(const std::string& id, const std::string& parent,
 }
 
 void Model::remove(const std::string& id, bool done) {
+  std::map<std::string, std::set<std::string>> removers;
   std::vector<std::string> sure;
   std::vector<std::string> unsure;
   for (const auto& [below, frame] : frames_) {
-    if (!may_be_below(below, id)) continue;
+    const auto ways = ways_up(below, id);
+    if (ways.count(id) == 0) continue;
     (done && goes_with(below, id) ? sure : unsure).push_back(below);
+    for (const std::string& at : ways) removers[below].insert(frames_.at(at).partition);
   }
+  for (auto& [below, by] : removers) frames_.at(below).removed_by.merge(by);
   for (const std::string& below : sure) {
     insert(frames_.at(below).possible, std::nullopt);
     gone(below);
@@ -151,19 +155,22 @@ bool Model::anchored(const std::string& id) const {
 }
 
 bool Model::may_be_below(const std::string& id, const std::string& ancestor) const {
+  return ways_up(id, ancestor).count(ancestor) != 0;
+}
+
+std::set<std::string> Model::ways_up(const std::string& id, const std::string& ancestor) const {
   std::vector<std::string> look{id};
   std::set<std::string> seen;
   while (!look.empty()) {
     const std::string at = look.back();
     look.pop_back();
-    if (at == ancestor) return true;
     const auto found = frames_.find(at);
-    if (found == frames_.end() || !seen.insert(at).second) continue;
+    if (found == frames_.end() || !seen.insert(at).second || at == ancestor) continue;
     for (const auto& place : found->second.possible) {
       if (place) look.push_back(place->parent);
     }
   }
-  return false;
+  return seen;
 }
 
 // An add or move without an answer may be made after the removal of what it names: that frame stays, without its parent.

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,8 @@ class Model {
     std::vector<std::optional<Place>> possible;
     /// What it hangs below was removed, perhaps: it may go as soon as its owner learns of that.
     bool doomed = false;
+    /// The owners of that, and of what was between: one that was away learns of the removal from them.
+    std::set<std::string> removed_by;
     /// A move had no answer: its owner may still make it, even after what it names was removed.
     bool may_move_late = false;
     /// What its owner shows may not be stored: it is undone where the owner is killed.
@@ -83,6 +86,9 @@ class Model {
 
  private:
   [[nodiscard]] bool goes_with(const std::string& id, const std::string& ancestor) const;
+  /// The frames on all ways that the frame may have up to another one, with these two.
+  [[nodiscard]] std::set<std::string> ways_up(const std::string& id,
+                                              const std::string& ancestor) const;
   using State = std::map<std::string, std::optional<Place>>;
 
   [[nodiscard]] std::vector<std::string> closure(const std::string& a, const std::string& b) const;

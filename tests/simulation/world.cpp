@@ -322,12 +322,18 @@ class World {
       const std::string owner = frame ? one.directory().name(frame->owner) : "nobody";
       if (owner != name_of_daemon(i)) violation(base_of(i) + " is of " + owner);
       const auto extra = one.forest().info(extra_of(i));
+      if (extra && !has_extra_[i] && is_left_over(*extra, one)) continue;
       if (extra.has_value() != has_extra_[i]) {
         violation(extra_of(i) + (extra ? " is there" : " is missing"));
       } else if (extra && one.directory().name(extra->owner) != name_of_daemon(i)) {
         violation(extra_of(i) + " is of " + one.directory().name(extra->owner));
       }
     }
+  }
+
+  // Who goes on under another name knows nothing of what it had under the former, by which nobody is there.
+  [[nodiscard]] bool is_left_over(const FrameInfo& frame, Process& seen_by) const {
+    return !serves(seen_by.directory().name(frame.owner));
   }
 
   // Whether it hangs below a root, and not below a frame that was removed: such trees the model does not know.
@@ -346,6 +352,10 @@ class World {
       for (const auto& [id, model] : *models) {
         if (!serves(model.partition)) continue;
         const auto there = process.forest().info(id);
+        // Nobody is left who could tell its owner that it is removed.
+        const bool untold = std::any_of(model.removed_by.begin(), model.removed_by.end(),
+                                        [&](const auto& one) { return !serves(one); });
+        if (there && untold && !model.may_be_there()) continue;
         Frame seen;
         if (there) {
           seen = {id, there->parent, process.directory().name(there->owner), there->attached};
