@@ -6,7 +6,8 @@ namespace tfdude {
 
 void Absences::put(const std::string& partition, std::uint64_t incarnation, Time now,
                    Absent::Kind kind, Absent::Kind then) {
-  missed_[partition] = {{partition, now.time_since_epoch().count(), kind, incarnation}, then, {}};
+  const Absent absent{partition, now.time_since_epoch().count(), kind, incarnation};
+  missed_[partition] = {absent, then, {}, {}, kind == Absent::Kind::kSilent};
   limit();
 }
 
@@ -26,11 +27,24 @@ void Absences::went(const std::string& partition, std::uint64_t incarnation, boo
   put(partition, incarnation, now, again ? then : Absent::Kind::kSilent, then);
 }
 
-void Absences::told(const Absent& absent) {
-  if (absent.kind == Absent::Kind::kSilent || absent.kind == Absent::Kind::kBack) return;
+void Absences::told(const Absent& absent, const std::string& teller) {
+  if (absent.kind == Absent::Kind::kBack) return;
   Absent silent = absent;
   silent.kind = Absent::Kind::kSilent;
-  if (missed_.emplace(absent.partition, Missed{silent, absent.kind, {}, true}).second) limit();
+  Missed hearsay{silent, absent.kind, {}, teller, true};
+  const auto [there, is_new] = missed_.emplace(absent.partition, std::move(hearsay));
+  if (!is_new && there->second.then == Absent::Kind::kSilent) there->second.then = absent.kind;
+  if (is_new) limit();
+}
+
+void Absences::told_all(const std::vector<Absent>& absent, const std::string& teller) {
+  for (auto it = missed_.begin(); it != missed_.end();) {
+    const auto& [name, missed] = *it;
+    const bool retracted = missed.teller == teller && missed.then == Absent::Kind::kSilent &&
+                           std::none_of(absent.begin(), absent.end(),
+                                        [&](const Absent& one) { return one.partition == name; });
+    it = retracted ? missed_.erase(it) : std::next(it);
+  }
 }
 
 void Absences::resume(const Absent& absent) {
@@ -40,9 +54,10 @@ void Absences::resume(const Absent& absent) {
 bool Absences::returned(const std::string& partition) {
   const auto there = missed_.find(partition);
   if (there == missed_.end()) return false;
-  Absent& absent = there->second.absent;
-  if (outlived(absent.kind)) {
-    absent.kind = Absent::Kind::kBack;
+  Missed& missed = there->second;
+  if (outlived(missed.absent.kind)) {
+    missed.absent.kind = Absent::Kind::kBack;
+    missed.pending = false;
   } else {
     missed_.erase(there);
   }
@@ -64,31 +79,36 @@ void Absences::forget(const std::string& partition, std::uint64_t incarnation, T
   put(partition, incarnation, now, Absent::Kind::kForgotten, Absent::Kind::kForgotten);
 }
 
-std::vector<std::string> Absences::look(Steady now) {
+Absences::Looked Absences::look(Steady now) {
   // Who has not looked for so long has hung itself: it cannot say who was there meanwhile.
   const bool hung = looked_ && now - *looked_ > kGrace / 2;
   looked_ = now;
-  std::vector<std::string> gone;
+  Looked looked;
   for (auto& [name, missed] : missed_) {
-    if (missed.absent.kind != Absent::Kind::kSilent) continue;
-    if (!missed.noticed || hung) missed.noticed = now;
-    if (now - *missed.noticed < kGrace) continue;
-    missed.absent.kind = missed.then;
-    missed.hearsay = false;
-    gone.push_back(name);
+    if (!missed.pending) continue;
+    const bool silent = missed.absent.kind == Absent::Kind::kSilent;
+    if (!missed.noticed) missed.noticed = now;
+    if (hung) missed.noticed = silent ? now : std::max(*missed.noticed, now - kGrace);
+    if (silent && missed.then != Absent::Kind::kSilent && now - *missed.noticed >= kGrace) {
+      missed.absent.kind = missed.then;
+      missed.teller.clear();
+      looked.counts = true;
+    }
+    if (missed.absent.kind == Absent::Kind::kSilent || now - *missed.noticed < kTakeover) continue;
+    missed.pending = false;
+    looked.gone.push_back(name);
   }
-  return gone;
+  return looked;
 }
 
-bool Absences::any_silent() const {
-  return std::any_of(missed_.begin(), missed_.end(), [](const auto& known) {
-    return known.second.absent.kind == Absent::Kind::kSilent;
-  });
+bool Absences::any_pending() const {
+  return std::any_of(missed_.begin(), missed_.end(),
+                     [](const auto& known) { return known.second.pending; });
 }
 
 bool Absences::any_hearsay() const {
   return std::any_of(missed_.begin(), missed_.end(),
-                     [](const auto& known) { return known.second.hearsay; });
+                     [](const auto& known) { return !known.second.teller.empty(); });
 }
 
 std::vector<std::string> Absences::back() const {
@@ -108,7 +128,7 @@ std::optional<Absent> Absences::find(const std::string& partition) const {
 std::vector<Absent> Absences::all() const {
   std::vector<Absent> all;
   for (const auto& [name, missed] : missed_) {
-    if (!missed.hearsay) all.push_back(missed.absent);
+    if (missed.teller.empty()) all.push_back(missed.absent);
   }
   return all;
 }

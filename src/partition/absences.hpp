@@ -24,15 +24,22 @@ class Absences {
   /// have outlived that.
   static constexpr std::chrono::milliseconds kGrace{500};
 
+  /// After so long its frames are those of who claims them as well. That is later, so that all know the absence by then: what
+  /// the other acknowledges as their owner is not lost to one that returns in between.
+  static constexpr std::chrono::milliseconds kTakeover{700};
+
   /// How many are kept. The oldest go first.
   static constexpr std::size_t kMost = 256;
 
   /// A partition that was there is not heard any more, or has said that it ends.
   void went(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now);
 
-  /// Another one misses a partition that was not met here. What is only told counts once it has stood for kGrace: else
-  /// who has hung itself, and hears late what others said meanwhile, would take it for its own experience.
-  void told(const Absent& absent);
+  /// Another one, `teller`, misses a partition that was not met here. What is only told counts once it has stood for kGrace:
+  /// else who has hung itself, and hears late what others said meanwhile, would take it for its own experience. It stands
+  /// from the first word of a silence on, so that it counts here when it does at the others.
+  void told(const Absent& absent, const std::string& teller);
+  /// These are all whom the teller misses now. A silence that it has told, and does not tell any more, is over.
+  void told_all(const std::vector<Absent>& absent, const std::string& teller);
   /// It was missed when this process's predecessor ended.
   void resume(const Absent& absent);
 
@@ -45,11 +52,15 @@ class Absences {
   /// Nothing is to be kept of a partition that is not there.
   void forget(const std::string& partition, std::uint64_t incarnation, Time now);
 
-  /// To be called at least twice in kGrace while any_silent(): time in which it was not does not count.
-  /// @return those who have been away for long enough now
-  std::vector<std::string> look(Steady now);
+  struct Looked {
+    bool counts = false;            ///< an absence counts that did not before
+    std::vector<std::string> gone;  ///< have been away for kTakeover now
+  };
+  /// To be called at least twice in kGrace while any_pending(): time in which it was not does not count.
+  Looked look(Steady now);
 
-  [[nodiscard]] bool any_silent() const;
+  /// Whether the time is to be watched.
+  [[nodiscard]] bool any_pending() const;
   /// Whether something that others have told does not count yet.
   [[nodiscard]] bool any_hearsay() const;
   [[nodiscard]] std::vector<std::string> back() const;
@@ -67,9 +78,10 @@ class Absences {
  private:
   struct Missed {
     Absent absent;
-    Absent::Kind then;              // what a silence becomes
+    Absent::Kind then;  // what a silence becomes; a silence: the teller does not know yet
     std::optional<Steady> noticed;  // of a silence
-    bool hearsay = false;           // is not told on
+    std::string teller{};           // of hearsay, which is not told on
+    bool pending = false;           // until it counts as gone
   };
   void put(const std::string& partition, std::uint64_t incarnation, Time now, Absent::Kind kind,
            Absent::Kind then);

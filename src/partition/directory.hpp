@@ -44,14 +44,14 @@ class Directory {
   /// @return false where this is not news
   bool lost(std::string_view partition, std::uint64_t incarnation, Time now);
 
-  /// Those who have been silent for Absences::kGrace now count as gone: frames that others claim, too, are theirs.
-  /// To be called again while any_silent(). @return whether there are such
+  /// Who has been silent for Absences::kGrace has been absent; who has been for kTakeover is gone: frames that others claim,
+  /// too, are theirs. To be called again while any_pending(). @return whether there are such
   bool look_for_gone(Absences::Steady now);
-  [[nodiscard]] bool any_silent() const { return absences_.any_silent(); }
+  [[nodiscard]] bool any_pending() const { return absences_.any_pending(); }
 
   /// Whether somebody whom this process has not met is said to be silent, so that it may be there again in a moment, or to be
   /// gone since so short a time that it would not give way to this process.
-  [[nodiscard]] bool awaits_silent() const;
+  [[nodiscard]] bool awaits_silent() const { return absences_.any_hearsay(); }
 
   /// Whether a partition may be forgotten. @return kPartitionTaken where it is there
   [[nodiscard]] Result<void> check_not_there(const std::string& partition) const;
@@ -190,7 +190,6 @@ class Directory {
     bool forgotten = false;       // up to that one
     std::uint64_t to_forget = 0;  // up to that one, once it is not heard here, either
     bool missed_by_others = false;
-    bool said_silent = false;  // by others
     [[nodiscard]] bool listed() const { return !forgotten && (live != 0 || missed_by_others); }
     std::uint64_t reported = 0;  // the last that was dropped for its age
 
@@ -203,7 +202,7 @@ class Directory {
   Known& known(const std::string& partition, Owner& owner);
   [[nodiscard]] std::optional<Owner> number_of(std::string_view partition) const;
   void hear_absent(Owner from, const std::vector<Absent>& absent, Time now);
-  void hear_of(const Absent& one, Time now);
+  void hear_of(const Absent& one, const std::string& teller, Time now);
   bool drop_outdated(Known& partition, std::uint64_t incarnation);
   void came_back(Known& partition, Owner owner);
   void went(Known& partition, Owner owner, bool stopped, Time now);

@@ -31,7 +31,6 @@ void Directory::came_back(Known& partition, Owner owner) {
   partition.info.reachable = true;
   partition.info.stopped = false;
   partition.forgotten = false;
-  partition.said_silent = false;
   const bool missed = absences_.returned(partition.info.name);
   claims_.set_standing(owner, Standing::kThere);
   if (missed) tell_claims();
@@ -42,6 +41,7 @@ void Directory::went(Known& partition, Owner owner, bool stopped, Time now) {
   partition.info.stopped = stopped;
   partition.info.since = now;
   absences_.went(partition.info.name, partition.live, stopped, now);
+  absences_.told_all({}, partition.info.name);
   changes_.partition_down(partition.info.name, stopped);
   const auto missed = absences_.find(partition.info.name);
   const bool silent = !stopped && missed && missed->kind == Absent::Kind::kSilent;
@@ -62,12 +62,13 @@ bool Directory::lost(std::string_view partition, std::uint64_t incarnation, Time
 }
 
 bool Directory::look_for_gone(Absences::Steady now) {
-  const auto gone = absences_.look(now);
-  for (const std::string& name : gone) {
+  const Absences::Looked looked = absences_.look(now);
+  for (const std::string& name : looked.gone) {
     if (const auto number = number_of(name)) claims_.set_standing(*number, Standing::kGone);
   }
-  if (!gone.empty()) tell_claims();
-  return !gone.empty();
+  const bool news = looked.counts || !looked.gone.empty();
+  if (news) tell_claims();
+  return news;
 }
 
 // Whom this participant has outlived itself.
@@ -82,6 +83,8 @@ void Directory::tell_claims() {
 
 void Directory::hear_absent(Owner from, const std::vector<Absent>& absent, Time now) {
   std::set<Owner> outlived;
+  const std::string teller = partitions_[from].info.name;
+  absences_.told_all(absent, teller);
   for (const Absent& one : absent) {
     Owner number = kHeldHere;
     (void)known(one.partition, number);
@@ -89,7 +92,7 @@ void Directory::hear_absent(Owner from, const std::vector<Absent>& absent, Time 
     if (number == from) continue;
     if (Absences::outlived(one.kind)) outlived.insert(number);
     if (number != kHeldHere) {
-      hear_of(one, now);
+      hear_of(one, teller, now);
     } else if (one.incarnation < IncarnationSource::kEnd) {
       std::uint64_t& latest = one.kind == Absent::Kind::kForgotten ? own_forgotten_ : own_heard_of_;
       latest = std::max(latest, one.incarnation);
@@ -98,7 +101,7 @@ void Directory::hear_absent(Owner from, const std::vector<Absent>& absent, Time 
   claims_.set_outlived(from, std::move(outlived));
 }
 
-void Directory::hear_of(const Absent& one, Time now) {
+void Directory::hear_of(const Absent& one, const std::string& teller, Time now) {
   Owner number = kHeldHere;
   Known& partition = known(one.partition, number);
   if (partition.info.reachable) {
@@ -124,12 +127,12 @@ void Directory::hear_of(const Absent& one, Time now) {
   partition.missed_by_others = true;
   partition.info.since = Time(std::chrono::nanoseconds(one.since));
   partition.info.stopped = one.kind == Absent::Kind::kStopped;
-  partition.said_silent = one.kind == Absent::Kind::kSilent;
-  absences_.told(one);
+  absences_.told(one, teller);
   tell_claims();
 }
 
 void Directory::restore(const std::vector<Absent>& absent) {
+  const std::string own = partitions_.front().info.name;
   for (const Absent& one : absent) {
     if (one.kind == Absent::Kind::kSilent) continue;
     Absent told = one;
@@ -138,15 +141,8 @@ void Directory::restore(const std::vector<Absent>& absent) {
     const auto number = number_of(one.partition);
     const bool met = number && partitions_[*number].info.reachable;
     if (!met && told.kind != Absent::Kind::kForgotten) absences_.resume(told);
-    hear_of(told, Time(std::chrono::nanoseconds(one.since)));
+    hear_of(told, own, Time(std::chrono::nanoseconds(one.since)));
   }
-}
-
-bool Directory::awaits_silent() const {
-  return absences_.any_hearsay() ||
-         std::any_of(partitions_.begin() + 1, partitions_.end(), [](const Known& partition) {
-           return partition.said_silent && partition.live == 0;
-         });
 }
 
 Result<void> Directory::check_not_there(const std::string& partition) const {
@@ -164,7 +160,6 @@ Result<void> Directory::forget(const std::string& partition, std::uint64_t incar
   const std::uint64_t sound = incarnation < IncarnationSource::kEnd ? incarnation : 0;
   gone.heard_of = std::max({gone.heard_of, gone.live, sound});
   gone.forgotten = true;
-  gone.said_silent = false;
   drop_structure(gone, number);
   absences_.forget(partition, gone.heard_of, now);
   claims_.set_standing(number, Standing::kGone);

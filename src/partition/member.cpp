@@ -34,7 +34,7 @@ void Member::on_presence(const Presence& presence, Time now) {
   if (after && !before) outcome_.appeared = presence;
   if (before && !after) outcome_.stopped = presence;
   if (before != after) outcome_.others = outcome_.routes = true;
-  outcome_.look_for_gone = directory_.any_silent();
+  outcome_.look_for_gone = directory_.any_pending();
   overtake(now);
   if (partition_ != nullptr) outcome_.to_commit = true;
   look_for_contests();
@@ -61,7 +61,7 @@ void Member::on_lost(const std::string& partition, std::uint64_t incarnation, Ti
 
 void Member::on_time(Steady now) {
   const bool gone = directory_.look_for_gone(now);
-  outcome_.look_for_gone = directory_.any_silent();
+  outcome_.look_for_gone = directory_.any_pending();
   if (!gone) return;
   outcome_.heard = outcome_.others = outcome_.routes = true;
   if (partition_ != nullptr) outcome_.to_commit = true;

@@ -395,7 +395,7 @@ class World {
   }
 
   void grow_late() {
-    for (int part = 0; part < 3; ++part) {
+    for (int part = 0; part < 4; ++part) {
       if (part > 0) steady_ += Absences::kGrace / 2;
       for (std::size_t who = 0; who <= kOwners; ++who) {
         if (deaf(who)) continue;

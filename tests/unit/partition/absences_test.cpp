@@ -48,6 +48,7 @@ struct Witness : Replica {
   void wait() {
     CHECK_FALSE(directory.look_for_gone(kStart + Absences::kGrace / 2));
     CHECK(directory.look_for_gone(kStart + Absences::kGrace));
+    CHECK(directory.look_for_gone(kStart + Absences::kTakeover));
   }
   std::string owner_of(const std::string& id) const {
     const auto frame = forest.info(id);
@@ -96,6 +97,34 @@ TEST_CASE(
   CHECK(
       base.told(ChangeKind::kFrameTakenOver) ==
       Lines{"frame 'hand' of partition 'arm', which is not there, is now of 'left_arm' as a root"});
+}
+
+TEST_CASE("who returns gives way before what it had is routed to another") {
+  Witness base;
+  base.hear("left_arm", 1, 20);
+  base.lose("arm", 1);
+  CHECK_FALSE(base.directory.look_for_gone(kStart + Absences::kGrace / 2));
+  CHECK(base.directory.look_for_gone(kStart + Absences::kGrace));
+  CHECK(base.directory.absent()[0].kind == Kind::kLost);
+  CHECK(base.directory.any_pending());
+  CHECK(base.owner_of("hand") == "arm");
+  SECTION("it hears so as it returns") {
+    base.directory.apply(presence_of("arm", 1, 2), kNow);
+    CHECK(base.directory.absent()[0].kind == Kind::kBack);
+    CHECK_FALSE(base.directory.any_pending());
+    CHECK_FALSE(base.directory.look_for_gone(kStart + Absences::kTakeover));
+    CHECK(base.owner_of("hand") == "arm");
+  }
+  SECTION("it does not return") {
+    CHECK_FALSE(base.directory.look_for_gone(kStart + Absences::kTakeover - milliseconds(1)));
+    CHECK(base.directory.look_for_gone(kStart + Absences::kTakeover));
+    CHECK(base.owner_of("hand") == "left_arm");
+    CHECK_FALSE(base.directory.any_pending());
+  }
+  SECTION("who hung meanwhile cannot say") {
+    CHECK_FALSE(base.directory.look_for_gone(kStart + 3 * Absences::kGrace));
+    CHECK(base.owner_of("hand") == "arm");
+  }
 }
 
 TEST_CASE("one that comes later has the frame at once") {
@@ -215,6 +244,36 @@ TEST_CASE("who holds what one claims who is away keeps it when that returns") {
   CHECK(replica.forest.holds("hand"));
 }
 
+TEST_CASE("a silence that others tell of counts from their first word") {
+  Replica replica("left_arm");
+  Presence base = presence_of("base", 1, 0);
+  const auto told = [&](std::vector<Absent> absent) {
+    base.absent = std::move(absent);
+    replica.directory.apply(base, kNow);
+  };
+  told({{"arm", 0, Kind::kSilent, 7}});
+  CHECK_FALSE(replica.directory.look_for_gone(kStart));
+  CHECK_FALSE(replica.directory.look_for_gone(kStart + Absences::kGrace / 2));
+  SECTION("once they say that it has lasted") {
+    CHECK_FALSE(replica.directory.look_for_gone(kStart + Absences::kGrace));
+    told({{"arm", 0, Kind::kLost, 7}});
+    CHECK(replica.directory.absent().empty());
+    CHECK(replica.directory.look_for_gone(kStart + Absences::kGrace));
+    REQUIRE(replica.directory.absent().size() == 1);
+    CHECK(replica.directory.absent()[0].kind == Kind::kLost);
+  }
+  SECTION("until they say that it is over") {
+    told({});
+    CHECK_FALSE(replica.directory.any_pending());
+    CHECK_FALSE(replica.directory.awaits_silent());
+    CHECK_FALSE(replica.directory.look_for_gone(kStart + Absences::kGrace));
+  }
+  SECTION("until they fall silent themselves") {
+    CHECK(replica.directory.lost("base", 1, kNow));
+    CHECK_FALSE(replica.directory.awaits_silent());
+  }
+}
+
 TEST_CASE("nothing is given up for one who is silent") {
   Replica replica("left_arm");
   Partition partition("left_arm", 1, replica.forest, replica.directory);
@@ -232,6 +291,7 @@ TEST_CASE("nothing is given up for one who is silent") {
     (void)replica.directory.look_for_gone(kStart);
     (void)replica.directory.look_for_gone(kStart + Absences::kGrace / 2);
     CHECK(replica.directory.look_for_gone(kStart + Absences::kGrace));
+    CHECK(partition.concessions().empty());
     replica.directory.apply(presence_of("arm", 7, 1), kNow);
     CHECK(partition.concessions().empty());
   }
@@ -295,11 +355,11 @@ TEST_CASE("who has hung itself has outlived nobody of whose absence it is told l
   Presence head = presence_of("head", 1, 0);
   head.absent = {{"leg", 0, Kind::kStopped, 4}};
   arms.directory.apply(head, kNow);
-  CHECK(arms.directory.any_silent());
+  CHECK(arms.directory.any_pending());
   // All of this it hears at once.
   arms.directory.apply(presence_of("leg", 5, 0), kNow);
   CHECK(arms.directory.absent().empty());
-  CHECK_FALSE(arms.directory.any_silent());
+  CHECK_FALSE(arms.directory.any_pending());
 }
 
 TEST_CASE("what was forgotten while it still seemed to be there is forgotten as that ends") {

@@ -312,6 +312,7 @@ void bury(Directory& directory, const std::string& partition) {
   (void)directory.look_for_gone({});
   (void)directory.look_for_gone(Absences::Steady{} + Absences::kGrace / 2);
   REQUIRE(directory.look_for_gone(Absences::Steady{} + Absences::kGrace));
+  REQUIRE(directory.look_for_gone(Absences::Steady{} + Absences::kTakeover));
 }
 
 TEST_CASE(
