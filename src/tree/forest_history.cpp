@@ -9,17 +9,6 @@
 namespace tfdude {
 namespace {
 
-// Both are stamps, and so positive.
-std::chrono::nanoseconds apart(std::int64_t earlier, std::int64_t later) {
-  return std::chrono::nanoseconds(later - earlier);
-}
-
-// Whether a sample is one more of a row that is older than all that is kept. Samples are told before they are applied, with
-// others that may refuse: so one of the same stamp is the same row again.
-bool goes_on(const Refused::Behind& row, std::int64_t newest, std::int64_t stamp) {
-  return row.count > 0 && row.newest == newest && row.last <= stamp;
-}
-
 Result<void> check_timing(const EdgeTiming& timing) {
   if (timing.span <= std::chrono::nanoseconds(0)) {
     return fail(Errc::kInvalidInput,
@@ -41,15 +30,15 @@ Result<void> check_timing(const EdgeTiming& timing) {
 }  // namespace
 
 Forest::Impl::~Impl() {
-  for (std::uint32_t slot = 0; slot < slots_.size(); ++slot) {
-    if (!newest(slot).held()) continue;
-    delete newest_value(slot).ring;
-    delete newest_value(slot).ties;
+  for (std::uint32_t slot = 0; slot < frames_.size(); ++slot) {
+    if (!frames_.newest(slot).held()) continue;
+    delete frames_.newest_value(slot).ring;
+    delete frames_.newest_value(slot).ties;
   }
 }
 
 Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::size_t count,
-                                             std::optional<Time> given) const {
+                                             std::optional<Time> given) {
   if (given) {
     const std::int64_t stamp = nanoseconds(*given);
     // Zero is how "no stamp" travels.
@@ -58,7 +47,7 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
                   "the stamp must be after 1970-01-01, not " + std::to_string(stamp) + " ns");
     }
     for (std::size_t i = 0; i < count; ++i) {
-      auto ok = check_ahead(newest_value(slots[i]), stamp);
+      auto ok = check_ahead(frames_.newest_value(slots[i]), stamp);
       if (!ok) return tl::unexpected(std::move(ok.error()));
     }
     return stamp;
@@ -66,76 +55,35 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
   bool moving = false;
   std::int64_t newest = kAlways;
   for (std::size_t i = 0; i < count; ++i) {
-    const HeldVersion& edge = newest_value(slots[i]);
+    const HeldVersion& edge = frames_.newest_value(slots[i]);
     moving = moving || edge.moving() || timing_of(edge).moving;
     newest = std::max(newest, edge.stamp);
   }
   if (!moving) return kAlways;
-  if (!clock_) {
-    return fail(Errc::kInvalidInput, "frame " + quote(newest_value(slots[0]).name->text) +
+  if (!clock_.is_there()) {
+    return fail(Errc::kInvalidInput, "frame " + quote(frames_.newest_value(slots[0]).name->text) +
                                          " is moving: its update needs a stamp");
   }
   // Where the clock was set back, time goes on as little as it can.
-  return newest == kAlways ? nanoseconds(clock_())
-                           : std::max(nanoseconds(clock_()), saturating_add(newest, 1));
+  return newest == kAlways ? clock_.now() : std::max(clock_.now(), saturating_add(newest, 1));
 }
 
-Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t stamp) const {
+Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t stamp) {
   const std::int64_t limit = timing_of(edge).max_ahead.count();
-  if (!clock_ || limit == std::chrono::nanoseconds::max().count()) return {};
-  if (++clock_asked_ago_ < kClockGoesFor && saturating_subtract(stamp, clock_said_) <= limit) {
-    return {};
-  }
-  clock_said_ = nanoseconds(clock_());
-  clock_asked_ago_ = 0;
-  const std::int64_t ahead = saturating_subtract(stamp, clock_said_);
-  if (ahead <= limit) return {};
+  if (!clock_.is_there() || limit == std::chrono::nanoseconds::max().count()) return {};
+  const auto said = clock_.refuses(stamp, limit);
+  if (!said) return {};
   edge.name->refused.ahead.fetch_add(1, std::memory_order_relaxed);
   return fail(Errc::kInvalidInput,
               "frame " + quote(edge.name->text) + ": the stamp, " + to_string(time_of(stamp)) +
-                  ", is " + in_milliseconds(std::chrono::nanoseconds(ahead)) +
-                  " ahead of the owner's clock, " + to_string(time_of(clock_said_)) +
-                  ", more than the " + in_milliseconds(timing_of(edge).max_ahead) + " allowed");
-}
-
-bool Forest::Impl::starts_again(const HeldVersion& newest, std::int64_t stamp) const {
-  const std::size_t needed = newest.ring->timing().restart_after;
-  Refused::Behind& row = newest.name->refused.behind;
-  if (!goes_on(row, newest.stamp, stamp)) {
-    row = {1, newest.stamp, stamp};
-  } else if (stamp > row.last) {
-    row = {row.count + 1, newest.stamp, stamp};
-  }
-  return needed > 0 && row.count >= needed;
-}
-
-Result<void> Forest::Impl::check_sample(const HeldVersion& newest, std::int64_t stamp) const {
-  if (!newest.moving() || stamp > newest.stamp || stamp == kAlways) return {};
-  const Ring& ring = *newest.ring;
-  const std::uint64_t place = ring.place_of(stamp);
-  if (place < ring.next() && ring.stamp(place) == stamp) {
-    newest.name->refused.equal.fetch_add(1, std::memory_order_relaxed);
-    return fail(Errc::kStampTaken, "frame " + quote(newest.name->text) +
-                                       " has a sample of that stamp, " + to_string(time_of(stamp)));
-  }
-  const bool full = ring.count() >= ring.timing().count;
-  const std::int64_t limit = newest.stamp - ring.timing().span.count();
-  if (stamp >= limit && (!full || place > ring.oldest())) return {};
-  if (stamp < limit && starts_again(newest, stamp)) return {};
-  newest.name->refused.old.fetch_add(1, std::memory_order_relaxed);
-  const std::string what = "frame " + quote(newest.name->text) + ": the sample is ";
-  if (stamp < limit) {
-    return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, newest.stamp)) +
-                                   " older than the newest, more than the " +
-                                   in_milliseconds(ring.timing().span) + " that are kept");
-  }
-  return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, ring.stamp(ring.oldest()))) +
-                                 " older than the oldest of the " +
-                                 std::to_string(ring.timing().count) + " that are kept");
+                  ", is " +
+                  in_milliseconds(std::chrono::nanoseconds(saturating_subtract(stamp, *said))) +
+                  " ahead of the owner's clock, " + to_string(time_of(*said)) + ", more than the " +
+                  in_milliseconds(timing_of(edge).max_ahead) + " allowed");
 }
 
 void Forest::Impl::push_value(std::uint32_t slot, const Transform& X_PC, std::int64_t stamp) {
-  const HeldVersion& old = newest_value(slot);
+  const HeldVersion& old = frames_.newest_value(slot);
   if (stamp == kAlways) {
     end_revision(push_held(slot, X_PC));
   } else if (!old.moving() || stamp > old.stamp) {
@@ -157,7 +105,7 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_P
     if (ring->count() >= ring->timing().count) drop_oldest(*ring);
     if (ring->full()) {
       ring = ring->grown().release();
-      replace(newest.ring);
+      reclaimer_.supersede(newest.ring);
     }
   }
   HeldVersion& fresh = push_held(newest.slot, X_PC);
@@ -193,16 +141,16 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_P
     if (newest.stamp == stamp) const_cast<HeldVersion&>(newest).X_PC = X_PC;
     return;
   }
-  HeldVersion* sample = held_pool_.take();
+  HeldVersion* sample = reclaimer_.take<HeldVersion>();
   *sample = HeldVersion{};
-  sample->commit = commit_being_made();
+  sample->commit = frames_.commit_being_made();
   sample->depth = 0;  // so that it counts as held
   sample->X_PC = X_PC;
   sample->stamp = stamp;
   sample->kept = true;
   Ring* ring = newest.ring->with(sample, stamp, place).release();
   ring->rewritten = sample->commit;
-  replace(newest.ring);
+  reclaimer_.supersede(newest.ring);
   HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
   fresh.ring = ring;
   fresh.number = ring->next() - 1;
@@ -212,7 +160,7 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_P
 void Forest::Impl::drop_oldest(Ring& ring) {
   HeldVersion* dropped = ring.drop_oldest();
   dropped->kept = false;
-  superseded_.push_back(dropped);
+  reclaimer_.supersede(dropped);
 }
 
 void Forest::Impl::drop_samples(Ring& ring) {
@@ -222,17 +170,15 @@ void Forest::Impl::drop_samples(Ring& ring) {
   }
 }
 
-void Forest::Impl::replace(Ring* ring) { superseded_rings_.emplace_back(ring); }
-
 void Forest::Impl::give_back(Ring* ring, std::uint32_t slot) {
   if (ring == nullptr) return;
-  const Version* head = &newest(slot);
+  const Version* head = &frames_.newest(slot);
   for (std::uint64_t number = ring->oldest(); number < ring->next(); ++number) {
     HeldVersion* sample = ring->sample(number);
     sample->kept = false;
-    if (sample != head) superseded_.push_back(sample);
+    if (sample != head) reclaimer_.supersede(sample);
   }
-  replace(ring);
+  reclaimer_.supersede(ring);
 }
 
 void Forest::Impl::forget_past(HeldVersion& fresh) {
@@ -247,9 +193,9 @@ void Forest::Impl::forget_past(HeldVersion& fresh) {
 Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   if (auto ok = check_timing(timing); !ok) return fail_at("frame " + quote(id), ok.error());
   const std::lock_guard lock(impl_->mutex_);
-  const auto slot = impl_->held_slot(id);
+  const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
-  HeldVersion& fresh = impl_->push_held(*slot, impl_->newest_value(*slot).X_PC);
+  HeldVersion& fresh = impl_->push_held(*slot, impl_->frames_.newest_value(*slot).X_PC);
   impl_->forget_past(fresh);
   delete fresh.ring;  // nobody has seen it
   fresh.ring = new Ring(timing);

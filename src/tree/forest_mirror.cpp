@@ -44,7 +44,7 @@ bool Forest::Impl::push_told(const HeldVersion& edge, const News& value, bool re
   if (value.process_noise) begin_told_history(slot, value);
   if (value.stamp) {
     const bool taken =
-        push_told_sample(newest_value(slot), value.X, nanoseconds(*value.stamp), replace);
+        push_told_sample(frames_.newest_value(slot), value.X, nanoseconds(*value.stamp), replace);
     return taken || value.process_noise;
   }
   if (value.process_noise) return true;
@@ -58,7 +58,7 @@ void Forest::take(const std::vector<Handle>& edges, const std::vector<News>& val
   const std::lock_guard lock(impl_->mutex_);
   const auto edge_of = [&](const News& value) {
     const Version* edge =
-        value.index < edges.size() ? impl_->newest_held(edges[value.index]) : nullptr;
+        value.index < edges.size() ? impl_->frames_.newest_held(edges[value.index]) : nullptr;
     return static_cast<const HeldVersion*>(edge);
   };
   bool changed = false;

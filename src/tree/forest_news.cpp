@@ -106,16 +106,16 @@ void add_news(const HeldVersion& edge, std::uint32_t index, const NewsQuery& que
 
 NewsOfCommit Forest::news(std::vector<EdgeCursor>& cursors, const NewsQuery& query) const {
   const epoch::Guard guard;
-  const std::uint64_t commit = impl_->snapshot();
+  const std::uint64_t commit = impl_->frames_.snapshot();
   NewsOfCommit all{{}, commit};
   // Null where it is not held, or hangs elsewhere: that is another history.
   const auto followed = [&](const EdgeCursor& cursor) -> const HeldVersion* {
-    const Version* version = impl_->of(cursor.frame, commit);
-    if (version == nullptr) version = impl_->present(cursor.id, commit);
+    const Version* version = impl_->frames_.of(cursor.frame, commit);
+    if (version == nullptr) version = impl_->frames_.present(cursor.id, commit);
     if (version == nullptr || !version->held()) return nullptr;
     const auto& edge = static_cast<const HeldVersion&>(*version);
     const bool same = edge.history == cursor.history;
-    return same || impl_->info_of(edge, commit).parent == cursor.parent ? &edge : nullptr;
+    return same || impl_->frames_.info_of(edge, commit).parent == cursor.parent ? &edge : nullptr;
   };
   std::vector<const HeldVersion*> edges(cursors.size());
   std::transform(cursors.begin(), cursors.end(), edges.begin(), followed);
@@ -134,7 +134,7 @@ NewsOfCommit Forest::news(std::vector<EdgeCursor>& cursors, const NewsQuery& que
 
 std::vector<PastInfo> Forest::pasts(std::string_view id) const {
   const epoch::Guard guard;
-  const std::uint64_t commit = impl_->snapshot();
+  const std::uint64_t commit = impl_->frames_.snapshot();
   std::vector<PastInfo> all;
   const auto add = [&all](const Version* version) {
     if (version == nullptr || !version->held()) return;
@@ -143,10 +143,11 @@ std::vector<PastInfo> Forest::pasts(std::string_view id) const {
     if (edge.ring != nullptr || refused) all.push_back(past_of(edge));
   };
   if (!id.empty()) {
-    add(impl_->present(id, commit));
+    add(impl_->frames_.present(id, commit));
     return all;
   }
-  for (std::uint32_t slot = 0; slot < impl_->slots_.size(); ++slot) add(impl_->at(slot, commit));
+  for (std::uint32_t slot = 0; slot < impl_->frames_.size(); ++slot)
+    add(impl_->frames_.at(slot, commit));
   return all;
 }
 

@@ -27,9 +27,9 @@ Result<std::vector<EdgeUpdate>> Forest::Impl::completed(
   all.reserve(edges.size());
   std::unordered_map<std::uint32_t, Transform> values;  // a frame may be given twice
   for (const PartialUpdate& edge : edges) {
-    const auto slot = held_slot(edge.id);
+    const auto slot = frames_.held_slot(edge.id);
     if (!slot) return tl::unexpected(slot.error());
-    Transform& X_PC = values.try_emplace(*slot, whole(newest_value(*slot))).first->second;
+    Transform& X_PC = values.try_emplace(*slot, whole(frames_.newest_value(*slot))).first->second;
     auto given = with_parts(X_PC, edge);
     if (!given) return tl::unexpected(std::move(given.error()));
     X_PC = *given;

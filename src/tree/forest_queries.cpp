@@ -7,72 +7,15 @@
 #include "tree/forest_impl.hpp"
 
 namespace tfdude {
-const Version* Forest::Impl::named(std::string_view id, std::uint64_t commit) const {
-  const Name* name = ids_.find(id);
-  if (name == nullptr) return nullptr;
-  const Version* version = at(name->slot, commit);
-  return version->name == name ? version : nullptr;
-}
-
-const Version* Forest::Impl::of(Handle frame, std::uint64_t commit) const {
-  if (frame.slot >= slots_.size()) return nullptr;
-  const Version* version = at(frame.slot, commit);
-  return version->present() && version->generation == frame.generation ? version : nullptr;
-}
-
-Result<Forest::Impl::Ends> Forest::Impl::ends(std::string_view a, std::string_view b) const {
-  const std::uint64_t commit = snapshot();
-  const Version* start = present(a, commit);
-  if (start == nullptr) return unknown_start(a);
-  const Version* end = present(b, commit);
-  if (end == nullptr) return unknown_end(b);
-  return Ends{start, end, commit};
-}
-
-Result<Forest::Impl::Ends> Forest::Impl::ends(Handle a, Handle b) const {
-  const std::uint64_t commit = snapshot();
-  const Version* start = of(a, commit);
-  if (start == nullptr)
-    return fail(Errc::kUnknownStart,
-                "the first frame was removed, or its handle is another client's");
-  const Version* end = of(b, commit);
-  if (end == nullptr)
-    return fail(Errc::kUnknownEnd,
-                "the second frame was removed, or its handle is another client's");
-  return Ends{start, end, commit};
-}
-
-tl::unexpected<Error> Forest::Impl::unknown_start(std::string_view id) {
-  return fail(Errc::kUnknownStart, "no frame " + quote(id) + " to start from");
-}
-
-tl::unexpected<Error> Forest::Impl::unknown_end(std::string_view id) {
-  return fail(Errc::kUnknownEnd, "no frame " + quote(id) + " to end at");
-}
-
-tl::unexpected<Error> Forest::Impl::not_connected(const Version& a, const Version& b) {
-  return fail(Errc::kNotConnected, "frames " + quote(a.name->text) + " and " + quote(b.name->text) +
-                                       " have no common root");
-}
-
-FrameInfo Forest::Impl::info_of(const Version& version, std::uint64_t commit) const {
-  FrameInfo info;
-  info.id = version.name->text;
-  info.owner = version.owner;
-  info.since = version.name->since.load(std::memory_order_relaxed);
-  if (version.parent != kNoSlot) {
-    const Version* parent = at(version.parent, commit);
-    info.parent = parent->name->text;
-    info.attached = parent->present();
-  }
-  return info;
-}
 
 Forest::Forest(Clock clock) : impl_(std::make_unique<Impl>(std::move(clock))) {}
 Forest::~Forest() = default;
 
+namespace {
+
+// Calls visit(edge, from, to) for the edges from a to b, in order; an edge's version is that of its child.
 template <class Visit>
-Result<void> Forest::Impl::for_each_edge(const Ends& ends, Visit visit) {
+Result<void> for_each_edge(const Ends& ends, Visit visit) {
   const Version* up = ends.a;
   const Version* down = ends.b;
   std::vector<const Version*> descent;  // the edges below the common ancestor towards b, from b
@@ -80,7 +23,7 @@ Result<void> Forest::Impl::for_each_edge(const Ends& ends, Visit visit) {
     const bool from_a = up->depth >= down->depth;
     const Version*& here = from_a ? up : down;
     if (here->depth == 0) return not_connected(*ends.a, *ends.b);
-    const Version* parent = at(*here->above, ends.commit);
+    const Version* parent = Frames::at(*here->above, ends.commit);
     if (from_a) {
       visit(*here, *here, *parent);
     } else {
@@ -95,9 +38,31 @@ Result<void> Forest::Impl::for_each_edge(const Ends& ends, Visit visit) {
   return {};
 }
 
+}  // namespace
+
+Result<Transform> Forest::lookup(std::string_view a, std::string_view b) const {
+  return impl_->paths().look_up<Transform>(a, b);
+}
+Result<Transform> Forest::lookup(Handle a, Handle b) const {
+  return impl_->paths().look_up<Transform>(a, b);
+}
+Result<Pose> Forest::lookup_pose(std::string_view a, std::string_view b) const {
+  return impl_->paths().look_up<Pose>(a, b);
+}
+Result<Pose> Forest::lookup_pose(Handle a, Handle b) const {
+  return impl_->paths().look_up<Pose>(a, b);
+}
+Result<StampedTransform> Forest::lookup(std::string_view a, std::string_view b,
+                                        const Query& query) const {
+  return impl_->paths().look_up(a, b, query);
+}
+Result<StampedTransform> Forest::lookup(Handle a, Handle b, const Query& query) const {
+  return impl_->paths().look_up(a, b, query);
+}
+
 Result<std::vector<Segment>> Forest::segments(std::string_view a, std::string_view b) const {
   const epoch::Guard guard;
-  const auto ends = impl_->ends(a, b);
+  const auto ends = impl_->frames_.ends(a, b);
   if (!ends) return tl::unexpected(ends.error());
   std::vector<Segment> runs;
   const auto append = [&runs](const Version& edge, const Version& from, const Version& to) {
@@ -106,72 +71,64 @@ Result<std::vector<Segment>> Forest::segments(std::string_view a, std::string_vi
     }
     runs.back().to = to.name->text;
   };
-  if (auto ok = Impl::for_each_edge(*ends, append); !ok) return tl::unexpected(ok.error());
+  if (auto ok = for_each_edge(*ends, append); !ok) return tl::unexpected(ok.error());
   return runs;
 }
 
 Result<std::vector<FrameInfo>> Forest::edges(std::string_view a, std::string_view b) const {
   const epoch::Guard guard;
-  const auto ends = impl_->ends(a, b);
+  const auto ends = impl_->frames_.ends(a, b);
   if (!ends) return tl::unexpected(ends.error());
   std::vector<FrameInfo> all;
   const auto append = [&](const Version& edge, const Version&, const Version&) {
-    all.push_back(impl_->info_of(edge, ends->commit));
+    all.push_back(impl_->frames_.info_of(edge, ends->commit));
   };
-  if (auto ok = Impl::for_each_edge(*ends, append); !ok) return tl::unexpected(ok.error());
+  if (auto ok = for_each_edge(*ends, append); !ok) return tl::unexpected(ok.error());
   return all;
 }
 
 std::optional<Handle> Forest::find(std::string_view id) const {
   const epoch::Guard guard;
-  const Version* version = impl_->present(id, impl_->snapshot());
+  const Version* version = impl_->frames_.present(id, impl_->frames_.snapshot());
   if (version == nullptr) return std::nullopt;
   return Handle{version->slot, version->generation};
 }
 
 bool Forest::holds(std::string_view id) const {
   const epoch::Guard guard;
-  const Version* version = impl_->named(id, impl_->snapshot());
+  const Version* version = impl_->frames_.named(id, impl_->frames_.snapshot());
   return version != nullptr && version->held();
 }
 
 std::optional<FrameInfo> Forest::info(std::string_view id) const {
   const epoch::Guard guard;
-  const std::uint64_t commit = impl_->snapshot();
-  const Version* version = impl_->present(id, commit);
+  const std::uint64_t commit = impl_->frames_.snapshot();
+  const Version* version = impl_->frames_.present(id, commit);
   if (version == nullptr) return std::nullopt;
-  return impl_->info_of(*version, commit);
+  return impl_->frames_.info_of(*version, commit);
 }
 
 std::optional<FrameInfo> Forest::info(Handle frame) const {
   const epoch::Guard guard;
-  const std::uint64_t commit = impl_->snapshot();
-  const Version* version = impl_->of(frame, commit);
+  const std::uint64_t commit = impl_->frames_.snapshot();
+  const Version* version = impl_->frames_.of(frame, commit);
   if (version == nullptr) return std::nullopt;
-  return impl_->info_of(*version, commit);
-}
-
-Result<const HeldVersion*> Forest::Impl::held_value(std::string_view id) const {
-  const Version* version = present(id, snapshot());
-  if (version == nullptr) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
-  if (!version->held()) {
-    return fail(Errc::kNotOwner, "frame " + quote(id) + " is held by another partition");
-  }
-  return static_cast<const HeldVersion*>(version);
+  return impl_->frames_.info_of(*version, commit);
 }
 
 Result<Transform> Forest::value(std::string_view id) const {
   const epoch::Guard guard;
-  return impl_->held_value(id).map([](const HeldVersion* edge) { return Impl::whole(*edge); });
+  return impl_->frames_.held_value(id).map(
+      [](const HeldVersion* edge) { return Impl::whole(*edge); });
 }
 
 std::vector<FrameInfo> Forest::frames() const {
   const epoch::Guard guard;
-  const std::uint64_t commit = impl_->snapshot();
+  const std::uint64_t commit = impl_->frames_.snapshot();
   std::vector<FrameInfo> all;
-  for (std::uint32_t slot = 0; slot < impl_->slots_.size(); ++slot) {
-    const Version* version = impl_->at(slot, commit);
-    if (version->present()) all.push_back(impl_->info_of(*version, commit));
+  for (std::uint32_t slot = 0; slot < impl_->frames_.size(); ++slot) {
+    const Version* version = impl_->frames_.at(slot, commit);
+    if (version->present()) all.push_back(impl_->frames_.info_of(*version, commit));
   }
   return all;
 }
@@ -179,25 +136,26 @@ std::vector<FrameInfo> Forest::frames() const {
 std::vector<FrameInfo> Forest::subtree(std::string_view id) const {
   const std::lock_guard lock(impl_->mutex_);
   const epoch::Guard guard;
-  const std::uint64_t commit = impl_->snapshot();
-  const Version* top = impl_->present(id, commit);
+  const std::uint64_t commit = impl_->frames_.snapshot();
+  const Version* top = impl_->frames_.present(id, commit);
   std::vector<FrameInfo> all;
   if (top == nullptr) return all;
   for (const std::uint32_t slot : impl_->graph_.subtree(top->slot, [](auto) { return true; })) {
-    all.push_back(impl_->info_of(impl_->newest(slot), commit));
+    all.push_back(impl_->frames_.info_of(impl_->frames_.newest(slot), commit));
   }
   return all;
 }
 
 Result<std::vector<std::string>> Forest::children(std::string_view id) const {
   const std::lock_guard lock(impl_->mutex_);
-  const Version* version = impl_->newest_named(id);
+  const Version* version = impl_->frames_.newest_named(id);
   if (version == nullptr || !version->present()) {
     return fail(Errc::kUnknownFrame, "no frame " + quote(id));
   }
   std::vector<std::string> ids;
-  impl_->graph_.for_each_child(
-      version->slot, [&](std::uint32_t child) { ids.push_back(impl_->newest(child).name->text); });
+  impl_->graph_.for_each_child(version->slot, [&](std::uint32_t child) {
+    ids.push_back(impl_->frames_.newest(child).name->text);
+  });
   std::sort(ids.begin(), ids.end());
   return ids;
 }
@@ -215,10 +173,10 @@ std::vector<FrameInfo> Forest::waiting_for(std::string_view id) const {
   const std::lock_guard lock(impl_->mutex_);
   const epoch::Guard guard;
   std::vector<FrameInfo> all;
-  const Version* absent = impl_->newest_named(id);
+  const Version* absent = impl_->frames_.newest_named(id);
   if (absent == nullptr || absent->present()) return all;
   impl_->graph_.for_each_child(absent->slot, [&](std::uint32_t child) {
-    all.push_back(impl_->info_of(impl_->newest(child), impl_->snapshot()));
+    all.push_back(impl_->frames_.info_of(impl_->frames_.newest(child), impl_->frames_.snapshot()));
   });
   return all;
 }
@@ -226,10 +184,10 @@ std::vector<FrameInfo> Forest::waiting_for(std::string_view id) const {
 std::pair<std::vector<ChangedEdge>, std::uint64_t> Forest::changed_since(
     std::uint64_t commit) const {
   const epoch::Guard guard;
-  const std::uint64_t now = impl_->snapshot();
+  const std::uint64_t now = impl_->frames_.snapshot();
   std::vector<ChangedEdge> changed;
-  for (std::uint32_t slot = 0; slot < impl_->slots_.size(); ++slot) {
-    const Version* version = impl_->at(slot, now);
+  for (std::uint32_t slot = 0; slot < impl_->frames_.size(); ++slot) {
+    const Version* version = impl_->frames_.at(slot, now);
     if (!version->held() || version->commit <= commit) continue;
     changed.push_back(Impl::kept(*static_cast<const HeldVersion*>(version)));
   }

@@ -20,7 +20,7 @@ Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Ow
   const Name* name = pair.frame != nullptr ? pair.frame->name : impl_->intern(id);
   const std::uint32_t parent_slot = acyclic ? impl_->parent_slot(pair) : kNoSlot;
   name->hung(since);
-  const Version& old = impl_->newest(name->slot);
+  const Version& old = impl_->frames_.newest(name->slot);
   if (!old.present() || old.owner != owner || old.parent != parent_slot) {
     Version& fresh = impl_->push_remote(name->slot);
     fresh.name = name;
@@ -33,7 +33,7 @@ Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Ow
 
 void Forest::drop_remote(std::string_view id, Owner owner) {
   const std::lock_guard lock(impl_->mutex_);
-  const Version* there = impl_->newest_named(id);
+  const Version* there = impl_->frames_.newest_named(id);
   if (there == nullptr || !there->present() || there->owner != owner || owner == kHeldHere) return;
   impl_->make_absent(there->slot);
   impl_->commit_structure();

@@ -1,34 +1,34 @@
 #include <algorithm>
 #include <utility>
 
+#include "tree/epoch.hpp"
 #include "tree/forest_impl.hpp"
 
 // Lookups of segments that somebody else's path needs.
 namespace tfdude {
+namespace {
 
-Result<std::vector<Forest::Impl::Ends>> Forest::Impl::all_ends(
-    const std::vector<PathEnds>& segments) const {
-  const std::uint64_t commit = snapshot();
+Result<std::vector<Ends>> all_ends(const Frames& frames, const std::vector<PathEnds>& segments) {
+  const std::uint64_t commit = frames.snapshot();
   std::vector<Ends> all;
   all.reserve(segments.size());
   for (const PathEnds& segment : segments) {
-    const Version* start = named(segment.from, commit);
+    const Version* start = frames.named(segment.from, commit);
     if (start == nullptr) return unknown_start(segment.from);
-    const Version* end = named(segment.to, commit);
+    const Version* end = frames.named(segment.to, commit);
     if (end == nullptr) return unknown_end(segment.to);
     all.push_back({start, end, commit});
   }
   return all;
 }
 
-Result<std::vector<Reached>> Forest::Impl::values_at(const std::vector<Ends>& segments,
-                                                     std::int64_t t, const Query& query,
-                                                     Met& met) const {
+Result<std::vector<Reached>> values_at(const std::vector<Ends>& segments, std::int64_t t,
+                                       const Query& query, PathLookup::Met& met) {
   std::vector<Reached> values;
   values.reserve(segments.size());
   for (const Ends& ends : segments) {
-    Met of_this;
-    auto X = reach_at(ends, Absent::kMayPass, t, query, of_this);
+    PathLookup::Met of_this;
+    auto X = PathLookup::reach_at(ends, PathLookup::Absent::kMayPass, t, query, of_this);
     if (!X) return tl::unexpected(X.error());
     values.push_back(*std::move(X));
     met.moving = met.moving || of_this.moving;
@@ -37,14 +37,14 @@ Result<std::vector<Reached>> Forest::Impl::values_at(const std::vector<Ends>& se
 }
 
 // Each segment's newest, and of those with moving edges that whose newest is the oldest.
-Result<std::vector<Reached>> Forest::Impl::newest_values(const std::vector<Ends>& segments,
-                                                         Order order, Met& met) const {
+Result<std::vector<Reached>> newest_values(const std::vector<Ends>& segments, Order order,
+                                           PathLookup::Met& met) {
   std::vector<Reached> values;
   values.reserve(segments.size());
   bool mixed = false;
   for (const Ends& ends : segments) {
-    Met of_this;
-    auto X = reach_newest(ends, Absent::kMayPass, order, of_this);
+    PathLookup::Met of_this;
+    auto X = PathLookup::reach_newest(ends, PathLookup::Absent::kMayPass, order, of_this);
     if (!X) return tl::unexpected(X.error());
     values.push_back(*std::move(X));
     const HeldVersion* limiting = of_this.limiting;
@@ -59,7 +59,8 @@ Result<std::vector<Reached>> Forest::Impl::newest_values(const std::vector<Ends>
   return values_at(segments, met.limiting->stamp, query, met);
 }
 
-std::uint64_t Forest::Impl::newest_history(const std::vector<Ends>& segments) {
+// Of the edges on these segments.
+std::uint64_t newest_history(const std::vector<Ends>& segments) {
   std::uint64_t newest = 0;
   for (const Ends& ends : segments) {
     const Version* a = ends.a;
@@ -68,13 +69,11 @@ std::uint64_t Forest::Impl::newest_history(const std::vector<Ends>& segments) {
       const Version*& here = a->depth >= b->depth ? a : b;
       if (here->above == nullptr) break;
       if (here->held()) newest = std::max(newest, static_cast<const HeldVersion*>(here)->history);
-      here = at(*here->above, ends.commit);
+      here = Frames::at(*here->above, ends.commit);
     }
   }
   return newest;
 }
-
-namespace {
 
 // Ties are told where any segment has some.
 void tell(std::vector<Reached>&& from, std::vector<Transform>& values, std::vector<Ties>& ties) {
@@ -85,21 +84,35 @@ void tell(std::vector<Reached>&& from, std::vector<Transform>& values, std::vect
   for (auto& one : from) ties.push_back(std::move(one.ties));
 }
 
+// Adds what each single edge was observed with.
+void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
+  const auto edge_of = [](const Ends& ends) -> const HeldVersion* {
+    const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;
+    return child->held() ? static_cast<const HeldVersion*>(child) : nullptr;
+  };
+  found.ties.resize(edges.size());
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const HeldVersion* edge = edge_of(edges[i]);
+    if (edge == nullptr || edge->ties == nullptr) continue;
+    found.ties[i].observed_with = edge->ties->now.observed_with;
+  }
+}
+
 }  // namespace
 
 Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
                                               const Query& query, std::optional<Time> hint,
                                               bool edges) const {
   const epoch::Guard guard;
-  const auto ends = impl_->all_ends(segments);
+  const auto ends = all_ends(impl_->frames_, segments);
   if (!ends) return tl::unexpected(ends.error());
   SegmentValues found;
   if (!ends->empty()) found.commit = ends->front().commit;
-  found.history = Impl::newest_history(*ends);
-  Impl::Met met;
+  found.history = newest_history(*ends);
+  PathLookup::Met met;
   auto t = query.at;
   if (!t) {
-    auto newest = impl_->newest_values(*ends, query.order, met);
+    auto newest = newest_values(*ends, query.order, met);
     if (!newest) return tl::unexpected(std::move(newest.error()));
     tell(*std::move(newest), found.values, found.ties);
     if (const HeldVersion* limiting = met.limiting) {
@@ -111,15 +124,15 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
     }
   }
   if (t) {
-    auto values = impl_->values_at(*ends, nanoseconds(*t), query, met);
+    auto values = values_at(*ends, nanoseconds(*t), query, met);
     if (!values) return tl::unexpected(std::move(values.error()));
     found.ties.clear();
     tell(*std::move(values), found.values, found.ties);
     if (met.moving) found.stamp = t;
   }
-  if (edges) impl_->tell_observed_with(*ends, found);
+  if (edges) tell_observed_with(*ends, found);
   if (hint && found.stamp && hint != found.stamp) {
-    auto values = impl_->values_at(*ends, nanoseconds(*hint), query, met);
+    auto values = values_at(*ends, nanoseconds(*hint), query, met);
     if (values) tell(*std::move(values), found.at_hint, found.ties_at_hint);
   }
   return found;

@@ -23,7 +23,7 @@ StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> sta
 }
 
 void Forest::Impl::set_ties(HeldVersion& fresh, std::unique_ptr<EdgeTies> ties) {
-  superseded_ties_.emplace_back(fresh.ties);
+  reclaimer_.supersede(fresh.ties);
   fresh.ties = ties.release();
 }
 
@@ -35,7 +35,7 @@ void Forest::Impl::tie_as_said(HeldVersion& fresh) {
 }
 
 void Forest::Impl::say_ties(std::uint32_t slot, const Correlation& correlation) {
-  HeldVersion& fresh = push_held(slot, whole(newest_value(slot)));
+  HeldVersion& fresh = push_held(slot, whole(frames_.newest_value(slot)));
   std::unique_ptr<EdgeTies> ties;
   if (!correlation.empty()) ties.reset(new EdgeTies{correlation, correlation, false, 0});
   set_ties(fresh, std::move(ties));
@@ -46,7 +46,7 @@ Result<void> Forest::correlate(std::string_view id, const Correlation& correlati
     return fail_at("frame " + quote(id), ok.error());
   }
   const std::lock_guard lock(impl_->mutex_);
-  const auto slot = impl_->held_slot(id);
+  const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   impl_->say_ties(*slot, correlation);
   impl_->commit();
@@ -58,9 +58,9 @@ Result<void> Forest::resume(std::string_view id, const KeptTies& ties) {
   if (ok && ties.observed) ok = check_shares(ties.observed->shares);
   if (!ok) return fail_at("frame " + quote(id), ok.error());
   const std::lock_guard lock(impl_->mutex_);
-  const auto slot = impl_->held_slot(id);
+  const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
-  HeldVersion& fresh = impl_->push_held(*slot, impl_->newest_value(*slot).X_PC);
+  HeldVersion& fresh = impl_->push_held(*slot, impl_->frames_.newest_value(*slot).X_PC);
   std::unique_ptr<EdgeTies> resumed;
   if (!ties.empty()) {
     resumed.reset(
@@ -81,26 +81,13 @@ ChangedEdge Forest::Impl::kept(const HeldVersion& edge) {
 
 Result<ChangedEdge> Forest::kept(std::string_view id) const {
   const epoch::Guard guard;
-  auto edge = impl_->held_value(id);
+  auto edge = impl_->frames_.held_value(id);
   if (!edge) return tl::unexpected(std::move(edge.error()));
   return Impl::kept(**edge);
 }
 
-void Forest::Impl::tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) const {
-  const auto edge_of = [](const Ends& ends) -> const HeldVersion* {
-    const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;
-    return child->held() ? static_cast<const HeldVersion*>(child) : nullptr;
-  };
-  found.ties.resize(edges.size());
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    const HeldVersion* edge = edge_of(edges[i]);
-    if (edge == nullptr || edge->ties == nullptr) continue;
-    found.ties[i].observed_with = edge->ties->now.observed_with;
-  }
-}
-
 Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revision& revision,
-                                          std::optional<Time> stamp, std::uint64_t seen) const {
+                                          std::optional<Time> stamp, std::uint64_t seen) {
   const std::string who = "frame " + quote(revision.id);
   if (!is_finite(revision.X_PC)) return check_value(revision.id, revision.X_PC);
   if (auto ok = check_shares(revision.correlation.shares); !ok) return fail_at(who, ok.error());
@@ -131,7 +118,7 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_
     sample = &fresh;
     fresh.X_PC = X_PC;
   } else {
-    sample = held_pool_.take();
+    sample = reclaimer_.take<HeldVersion>();
     *sample = HeldVersion{};
     sample->commit = fresh.commit;
     sample->depth = 0;  // so that it counts as held
@@ -142,9 +129,9 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_
   fresh.ring = superseded->replaced(sample, place).release();
   fresh.ring->rewritten = fresh.commit;
   fresh.number = fresh.ring->next() - 1;
-  replace(superseded);
+  reclaimer_.supersede(superseded);
   before->kept = false;
-  superseded_.push_back(before);
+  reclaimer_.supersede(before);
 }
 
 Transform Forest::Impl::whole(const Transform& X_PC, const Correlation& correlation) {
@@ -159,14 +146,14 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
   const std::lock_guard lock(impl_->mutex_);
   std::vector<std::uint32_t> slots;
   for (const Revision& edge : edges) {
-    const auto slot = impl_->held_slot(edge.id);
+    const auto slot = impl_->frames_.held_slot(edge.id);
     if (!slot) return tl::unexpected(slot.error());
-    auto ok = impl_->check_revision(impl_->newest_value(*slot), edge, stamp, seen);
+    auto ok = impl_->check_revision(impl_->frames_.newest_value(*slot), edge, stamp, seen);
     if (!ok) return ok;
     slots.push_back(*slot);
   }
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    const HeldVersion& newest = impl_->newest_value(slots[i]);
+    const HeldVersion& newest = impl_->frames_.newest_value(slots[i]);
     if (newest.moving()) {
       const Transform X_PC = Impl::whole(edges[i].X_PC, edges[i].correlation);
       impl_->replace_sample(newest, X_PC, nanoseconds(*stamp));

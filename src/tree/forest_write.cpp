@@ -15,10 +15,6 @@ std::uint32_t next_generation() {
   return last.fetch_add(1, std::memory_order_relaxed) + 1;
 }
 
-tl::unexpected<Error> unknown_frame(std::string_view id) {
-  return fail(Errc::kUnknownFrame, "no frame " + quote(id));
-}
-
 const Correlation* correlation_of(const EdgeUpdate&) { return nullptr; }
 const Correlation* correlation_of(const HandleUpdate&) { return nullptr; }
 const Correlation* correlation_of(const TiedUpdate& update) { return update.correlation; }
@@ -31,35 +27,9 @@ Result<void> check_said(const Update& update) {
 
 }  // namespace
 
-const Version* Forest::Impl::newest_named(std::string_view id) const {
-  const Name* name = ids_.find(id);
-  return name != nullptr ? &newest(name->slot) : nullptr;
-}
-
-Result<std::uint32_t> Forest::Impl::held_slot(std::string_view id) const {
-  const Version* version = newest_named(id);
-  if (version == nullptr || !version->present()) return unknown_frame(id);
-  if (!version->held()) {
-    return fail(Errc::kNotOwner, "frame " + quote(id) + " is held by another partition");
-  }
-  return version->slot;
-}
-
-Result<std::uint32_t> Forest::Impl::held_slot(Handle frame) const {
-  const Version* version = frame.slot < slots_.size() ? &newest(frame.slot) : nullptr;
-  if (version == nullptr || !version->present() || version->generation != frame.generation) {
-    return fail(Errc::kUnknownFrame,
-                "the frame of this handle was removed, or is another client's");
-  }
-  if (!version->held()) {
-    return fail(Errc::kNotOwner,
-                "frame " + quote(version->name->text) + " is held by another partition");
-  }
-  return frame.slot;
-}
-
 Forest::Impl::Pair Forest::Impl::newest_pair(std::string_view id, std::string_view parent) const {
-  return {id, parent, newest_named(id), parent.empty() ? nullptr : newest_named(parent)};
+  return {id, parent, frames_.newest_named(id),
+          parent.empty() ? nullptr : frames_.newest_named(parent)};
 }
 
 Result<void> Forest::Impl::check_no_cycle(const Pair& pair) const {
@@ -68,7 +38,7 @@ Result<void> Forest::Impl::check_no_cycle(const Pair& pair) const {
   }
   const Version* above = pair.above;
   while (pair.frame != nullptr && above != nullptr && above != pair.frame) {
-    above = above->parent == kNoSlot ? nullptr : &newest(above->parent);
+    above = above->parent == kNoSlot ? nullptr : &frames_.newest(above->parent);
   }
   if (pair.frame != nullptr && above == pair.frame) {
     return fail(Errc::kCycle, "frame " + quote(pair.id) + " cannot hang under " +
@@ -79,13 +49,13 @@ Result<void> Forest::Impl::check_no_cycle(const Pair& pair) const {
 
 const Name* Forest::Impl::intern(std::string_view id) {
   if (free_slots_.empty()) {
-    Version* nobody = remote_pool_.take();
+    Version* nobody = reclaimer_.take<Version>();
     *nobody = Version{};
-    free_slots_.push_back(slots_.append(nobody));
+    free_slots_.push_back(frames_.add_slot(nobody));
   }
   const std::uint32_t slot = free_slots_.back();
   free_slots_.pop_back();
-  return ids_.insert(id, slot);
+  return frames_.add_name(id, slot);
 }
 
 std::uint32_t Forest::Impl::parent_slot(const Pair& pair) {
@@ -97,11 +67,11 @@ std::uint32_t Forest::Impl::parent_slot(const Pair& pair) {
 }
 
 template <class T>
-T& Forest::Impl::push(VersionPool<T>& pool, std::uint32_t slot) {
-  auto& head = slots_[slot];
+T& Forest::Impl::push(std::uint32_t slot) {
+  Head& head = frames_.head(slot);
   Version* old = head.load(std::memory_order_relaxed);
-  T* fresh = pool.take();
-  fresh->commit = commit_being_made();
+  T* fresh = reclaimer_.take<T>();
+  fresh->commit = frames_.commit_being_made();
   fresh->older = old;
   fresh->name = old->name;
   fresh->above = old->above;
@@ -112,15 +82,15 @@ T& Forest::Impl::push(VersionPool<T>& pool, std::uint32_t slot) {
   fresh->generation = old->generation;
   fresh->kept = false;
   // A sample stays until its ring drops it.
-  if (!old->kept) superseded_.push_back(old);
+  if (!old->kept) reclaimer_.supersede(old);
   // Readers skip the fresh version by its number until commit(), so the rest may be filled in later.
   head.store(fresh, std::memory_order_release);
   return *fresh;
 }
 
 HeldVersion& Forest::Impl::push_held(std::uint32_t slot, const Transform& X_PC) {
-  const Version& old = newest(slot);
-  HeldVersion& fresh = push(held_pool_, slot);
+  const Version& old = frames_.newest(slot);
+  HeldVersion& fresh = push<HeldVersion>(slot);
   fresh.owner = kHeldHere;
   fresh.X_PC = X_PC;
   if (old.held()) {
@@ -139,12 +109,12 @@ HeldVersion& Forest::Impl::push_held(std::uint32_t slot, const Transform& X_PC) 
   return fresh;
 }
 
-Version& Forest::Impl::push_remote(std::uint32_t slot) { return push(remote_pool_, slot); }
+Version& Forest::Impl::push_remote(std::uint32_t slot) { return push<Version>(slot); }
 
 void Forest::Impl::hang(Version& fresh, std::uint32_t parent) const {
   fresh.parent = parent;
-  fresh.above = parent == kNoSlot ? nullptr : &slots_[parent];
-  fresh.depth = parent == kNoSlot ? 0 : newest(parent).depth + 1;
+  fresh.above = parent == kNoSlot ? nullptr : &frames_.head(parent);
+  fresh.depth = parent == kNoSlot ? 0 : frames_.newest(parent).depth + 1;
 }
 
 void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
@@ -162,9 +132,9 @@ void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
 }
 
 void Forest::Impl::make_absent(std::uint32_t slot) {
-  if (newest(slot).held()) {
-    give_back(newest_value(slot).ring, slot);
-    superseded_ties_.emplace_back(newest_value(slot).ties);
+  if (frames_.newest(slot).held()) {
+    give_back(frames_.newest_value(slot).ring, slot);
+    reclaimer_.supersede(frames_.newest_value(slot).ties);
   }
   Version& fresh = push_remote(slot);
   const std::uint32_t parent = fresh.parent;
@@ -179,12 +149,12 @@ void Forest::Impl::make_absent(std::uint32_t slot) {
 void Forest::Impl::renew_depths(std::uint32_t top) {
   if (graph_.is_leaf(top)) return;
   const auto stale = [this](std::uint32_t child) {
-    const Version& version = newest(child);
-    if (version.depth == newest(version.parent).depth + 1) return false;
+    const Version& version = frames_.newest(child);
+    if (version.depth == frames_.newest(version.parent).depth + 1) return false;
     Version& fresh = version.held()
                          ? push_held(child, static_cast<const HeldVersion&>(version).X_PC)
                          : push_remote(child);
-    fresh.depth = newest(version.parent).depth + 1;
+    fresh.depth = frames_.newest(version.parent).depth + 1;
     return true;
   };
   (void)graph_.subtree(top, stale);
@@ -197,7 +167,7 @@ void Forest::Impl::release(Version& fresh) {
 }
 
 void Forest::Impl::release_if_unused(std::uint32_t slot) {
-  const Version& version = newest(slot);
+  const Version& version = frames_.newest(slot);
   if (!version.present() && version.name != nullptr && graph_.is_leaf(slot)) {
     release(push_remote(slot));
   }
@@ -215,14 +185,14 @@ void Forest::Impl::commit_structure() {
 }
 
 void Forest::Impl::show_commit() {
-  committed_.store(committed_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  frames_.show_commit();
   // Only now: a reader of the commit before may still reach a name through the version it sees.
   for (const Name* name : released_names_) {
     free_slots_.push_back(name->slot);
-    ids_.erase(name);
+    frames_.drop_name(name);
   }
   released_names_.clear();
-  if (superseded_.size() > kCollectAt) collect();
+  if (reclaimer_.is_due()) reclaimer_.collect(frames_);
 }
 
 Result<void> Forest::add(std::string_view id, std::string_view parent, const Transform& X_PC,
@@ -253,13 +223,13 @@ Result<void> Forest::add(std::string_view id, std::string_view parent, const Tra
 
 Result<std::vector<std::string>> Forest::remove(std::string_view id) {
   const std::lock_guard lock(impl_->mutex_);
-  const auto top = impl_->held_slot(id);
+  const auto top = impl_->frames_.held_slot(id);
   if (!top) return tl::unexpected(top.error());
-  const auto slots =
-      impl_->graph_.subtree(*top, [&](std::uint32_t child) { return impl_->newest(child).held(); });
+  const auto slots = impl_->graph_.subtree(
+      *top, [&](std::uint32_t child) { return impl_->frames_.newest(child).held(); });
   std::vector<std::string> removed;
   removed.reserve(slots.size());
-  for (const std::uint32_t slot : slots) removed.push_back(impl_->newest(slot).name->text);
+  for (const std::uint32_t slot : slots) removed.push_back(impl_->frames_.newest(slot).name->text);
   for (auto slot = slots.rbegin(); slot != slots.rend(); ++slot) impl_->make_absent(*slot);
   impl_->commit_structure();
   return removed;
@@ -267,7 +237,7 @@ Result<std::vector<std::string>> Forest::remove(std::string_view id) {
 
 Result<void> Forest::release(std::string_view id) {
   const std::lock_guard lock(impl_->mutex_);
-  const auto slot = impl_->held_slot(id);
+  const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   impl_->make_absent(*slot);
   impl_->commit_structure();
@@ -292,15 +262,15 @@ Result<void> Forest::Impl::update_one(const HeldVersion& edge, const Transform& 
 
 Result<void> Forest::update(std::string_view id, const Transform& X_PC, std::optional<Time> stamp) {
   const std::lock_guard lock(impl_->mutex_);
-  const auto slot = impl_->held_slot(id);
+  const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
-  return impl_->update_one(impl_->newest_value(*slot), X_PC, stamp);
+  return impl_->update_one(impl_->frames_.newest_value(*slot), X_PC, stamp);
 }
 
 Result<void> Forest::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
   const std::lock_guard lock(impl_->mutex_);
-  const Version* version = impl_->newest_held(frame);
-  if (version == nullptr) return tl::unexpected(impl_->held_slot(frame).error());
+  const Version* version = impl_->frames_.newest_held(frame);
+  if (version == nullptr) return tl::unexpected(impl_->frames_.held_slot(frame).error());
   return impl_->update_one(static_cast<const HeldVersion&>(*version), X_PC, stamp);
 }
 
@@ -309,11 +279,11 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
                                       std::optional<Time> stamp) {
   to_update_.clear();
   for (const Update& edge : edges) {
-    const auto slot = held_slot(edge.*frame);
+    const auto slot = frames_.held_slot(edge.*frame);
     if (!slot) return tl::unexpected(slot.error());
-    if (!is_finite(edge.X_PC)) return check_value(newest(*slot).name->text, edge.X_PC);
+    if (!is_finite(edge.X_PC)) return check_value(frames_.newest(*slot).name->text, edge.X_PC);
     if (auto ok = check_said(edge); !ok) {
-      return fail_at("frame " + quote(newest(*slot).name->text), ok.error());
+      return fail_at("frame " + quote(frames_.newest(*slot).name->text), ok.error());
     }
     to_update_.push_back(*slot);
   }
@@ -322,7 +292,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   // All of them, as each counts what it refuses.
   Result<void> fits;
   for (const std::uint32_t slot : to_update_) {
-    auto ok = check_sample(newest_value(slot), *at);
+    auto ok = check_sample(frames_.newest_value(slot), *at);
     if (!ok && fits) fits = std::move(ok);
   }
   if (!fits) return fits;
@@ -362,7 +332,7 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   const std::lock_guard lock(impl_->mutex_);
   if (X_PC && !is_finite(*X_PC)) return check_value(id, *X_PC);
-  const auto slot = impl_->held_slot(id);
+  const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   const Impl::Pair pair = impl_->newest_pair(id, parent);
   if (!parent.empty() && (pair.above == nullptr || !pair.above->present())) {

@@ -1,3 +1,5 @@
+#include "tree/path_lookup.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <type_traits>
@@ -8,9 +10,8 @@
 
 #include "base/saturating.hpp"
 #include "math/path_accumulation.hpp"
-#include "tree/forest_impl.hpp"
+#include "tree/epoch.hpp"
 
-// Lookups: the walk along a path, and where its edges were at an instant.
 namespace tfdude {
 namespace {
 
@@ -144,7 +145,7 @@ PathAccumulation<Value> begin_path(Order order) {
 }  // namespace
 
 template <class Value, class Take>
-Result<Value> Forest::Impl::walk(const Ends& ends, Absent absent, Order order, Take take) const {
+Result<Value> PathLookup::walk(const Ends& ends, Absent absent, Order order, Take take) {
   const Version* a = ends.a;
   const Version* b = ends.b;
   PathAccumulation<Value> path_a = begin_path<Value>(order);
@@ -166,7 +167,7 @@ Result<Value> Forest::Impl::walk(const Ends& ends, Absent absent, Order order, T
       Result<void> taken = take(path, edge);
       if (!taken) error = std::move(taken.error());
     }
-    here = at(*here->above, ends.commit);
+    here = Frames::at(*here->above, ends.commit);
   }
   if (error) return tl::unexpected(*std::move(error));
   return join(std::move(path_a), std::move(path_b));
@@ -179,8 +180,7 @@ bool leaves_out_ties(const HeldVersion& edge) {
 }
 
 template <class Value>
-Result<Value> Forest::Impl::walk_newest(const Ends& ends, Absent absent, Order order,
-                                        Met& met) const {
+Result<Value> PathLookup::walk_newest(const Ends& ends, Absent absent, Order order, Met& met) {
   // Mostly all moving edges have their newest sample of the same instant, or none is moving: then all values are as
   // they lie there.
   const HeldVersion* limiting = nullptr;
@@ -206,8 +206,8 @@ Result<Value> Forest::Impl::walk_newest(const Ends& ends, Absent absent, Order o
 }
 
 template <class Value>
-Result<Value> Forest::Impl::walk_at(const Ends& ends, Absent absent, std::int64_t t,
-                                    const Query& query, Met& met) const {
+Result<Value> PathLookup::walk_at(const Ends& ends, Absent absent, std::int64_t t,
+                                  const Query& query, Met& met) {
   const std::int64_t age =
       query.age_noise_until
           ? std::max(saturating_subtract(nanoseconds(*query.age_noise_until), t), std::int64_t{0})
@@ -233,8 +233,7 @@ Reached reached_of(Belief&& X) {
 
 }  // namespace
 
-Result<Reached> Forest::Impl::reach_newest(const Ends& ends, Absent absent, Order order,
-                                           Met& met) const {
+Result<Reached> PathLookup::reach_newest(const Ends& ends, Absent absent, Order order, Met& met) {
   if (order == Order::kSecond) {
     const auto plain = walk_newest<Transform>(ends, absent, order, met);
     if (!plain) return tl::unexpected(plain.error());
@@ -244,8 +243,8 @@ Result<Reached> Forest::Impl::reach_newest(const Ends& ends, Absent absent, Orde
   return walk_newest<Belief>(ends, absent, order, met).map(reached_of);
 }
 
-Result<Reached> Forest::Impl::reach_at(const Ends& ends, Absent absent, std::int64_t t,
-                                       const Query& query, Met& met) const {
+Result<Reached> PathLookup::reach_at(const Ends& ends, Absent absent, std::int64_t t,
+                                     const Query& query, Met& met) {
   if (query.order == Order::kSecond) {
     const auto plain = walk_at<Transform>(ends, absent, t, query, met);
     if (!plain) return tl::unexpected(plain.error());
@@ -256,9 +255,9 @@ Result<Reached> Forest::Impl::reach_at(const Ends& ends, Absent absent, std::int
 }
 
 template <class Value, class Name>
-Result<Value> Forest::Impl::look_up(Name a, Name b) const {
+Result<Value> PathLookup::look_up(Name a, Name b) const {
   const epoch::Guard guard;
-  const auto found = ends(a, b);
+  const auto found = frames_.ends(a, b);
   if (!found) return tl::unexpected(found.error());
   Met met;
   auto newest = walk_newest<Value>(*found, Absent::kEnds, Order::kSecond, met);
@@ -273,9 +272,9 @@ Result<Value> Forest::Impl::look_up(Name a, Name b) const {
 }
 
 template <class Name>
-Result<StampedTransform> Forest::Impl::look_up(Name a, Name b, const Query& query) const {
+Result<StampedTransform> PathLookup::look_up(Name a, Name b, const Query& query) const {
   const epoch::Guard guard;
-  const auto found = ends(a, b);
+  const auto found = frames_.ends(a, b);
   if (!found) return tl::unexpected(found.error());
   Met met;
   std::optional<Time> at = query.at;
@@ -294,22 +293,14 @@ Result<StampedTransform> Forest::Impl::look_up(Name a, Name b, const Query& quer
   return collapsed(belief_of(X_AB->X, X_AB->ties), query.order, at);
 }
 
-Result<Transform> Forest::lookup(std::string_view a, std::string_view b) const {
-  return impl_->look_up<Transform>(a, b);
-}
-Result<Transform> Forest::lookup(Handle a, Handle b) const {
-  return impl_->look_up<Transform>(a, b);
-}
-Result<Pose> Forest::lookup_pose(std::string_view a, std::string_view b) const {
-  return impl_->look_up<Pose>(a, b);
-}
-Result<Pose> Forest::lookup_pose(Handle a, Handle b) const { return impl_->look_up<Pose>(a, b); }
-Result<StampedTransform> Forest::lookup(std::string_view a, std::string_view b,
-                                        const Query& query) const {
-  return impl_->look_up(a, b, query);
-}
-Result<StampedTransform> Forest::lookup(Handle a, Handle b, const Query& query) const {
-  return impl_->look_up(a, b, query);
-}
+// For the one name of a frame and the other.
+template Result<Transform> PathLookup::look_up<Transform>(std::string_view a,
+                                                          std::string_view b) const;
+template Result<Pose> PathLookup::look_up<Pose>(std::string_view a, std::string_view b) const;
+template Result<StampedTransform> PathLookup::look_up(std::string_view a, std::string_view b,
+                                                      const Query& query) const;
+template Result<Transform> PathLookup::look_up<Transform>(Handle a, Handle b) const;
+template Result<Pose> PathLookup::look_up<Pose>(Handle a, Handle b) const;
+template Result<StampedTransform> PathLookup::look_up(Handle a, Handle b, const Query& query) const;
 
 }  // namespace tfdude

@@ -1,0 +1,40 @@
+#include "tree/reclaimer.hpp"
+
+#include <algorithm>
+
+#include "tree/epoch.hpp"
+
+namespace tfdude {
+
+template <class T>
+void Reclaimer::Waiting<T>::collect(std::uint64_t tag, std::uint64_t safe_below) {
+  for (std::unique_ptr<T>& one : superseded) {
+    if (one == nullptr) continue;
+    one->retire_tag = tag;
+    retired.push_back(std::move(one));
+  }
+  superseded.clear();
+  const auto is_unseen = [safe_below](const auto& one) { return one->retire_tag < safe_below; };
+  retired.erase(std::remove_if(retired.begin(), retired.end(), is_unseen), retired.end());
+}
+
+void Reclaimer::collect(Frames& frames) {
+  frames.order_commit();
+  const std::uint64_t tag = epoch::retire_tag();
+  for (Version* version : versions_) {
+    if (version->held()) {
+      held_pool_.retire(version, tag);
+    } else {
+      remote_pool_.retire(version, tag);
+    }
+  }
+  versions_.clear();
+  const std::uint64_t below = epoch::safe_below();
+  held_pool_.collect(below);
+  remote_pool_.collect(below);
+  rings_.collect(tag, below);
+  ties_.collect(tag, below);
+  frames.collect_names(tag, below);
+}
+
+}  // namespace tfdude

@@ -1,0 +1,63 @@
+#include "tree/sample_rules.hpp"
+
+#include <chrono>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/base/time.hpp"
+
+#include "tree/ring.hpp"
+
+namespace tfdude {
+namespace {
+
+// Both are stamps, and so positive.
+std::chrono::nanoseconds apart(std::int64_t earlier, std::int64_t later) {
+  return std::chrono::nanoseconds(later - earlier);
+}
+
+// Whether a sample is one more of a row that is older than all that is kept. Samples are told before they are applied, with
+// others that may refuse: so one of the same stamp is the same row again.
+bool goes_on(const Refused::Behind& row, std::int64_t newest, std::int64_t stamp) {
+  return row.count > 0 && row.newest == newest && row.last <= stamp;
+}
+
+// Whether a sample that is older than the span is the one after which the history starts again; counts it.
+bool starts_again(const HeldVersion& newest, std::int64_t stamp) {
+  const std::size_t needed = newest.ring->timing().restart_after;
+  Refused::Behind& row = newest.name->refused.behind;
+  if (!goes_on(row, newest.stamp, stamp)) {
+    row = {1, newest.stamp, stamp};
+  } else if (stamp > row.last) {
+    row = {row.count + 1, newest.stamp, stamp};
+  }
+  return needed > 0 && row.count >= needed;
+}
+
+}  // namespace
+
+Result<void> check_sample(const HeldVersion& newest, std::int64_t stamp) {
+  if (!newest.moving() || stamp > newest.stamp || stamp == kAlways) return {};
+  const Ring& ring = *newest.ring;
+  const std::uint64_t place = ring.place_of(stamp);
+  if (place < ring.next() && ring.stamp(place) == stamp) {
+    newest.name->refused.equal.fetch_add(1, std::memory_order_relaxed);
+    return fail(Errc::kStampTaken, "frame " + quote(newest.name->text) +
+                                       " has a sample of that stamp, " + to_string(time_of(stamp)));
+  }
+  const bool full = ring.count() >= ring.timing().count;
+  const std::int64_t limit = newest.stamp - ring.timing().span.count();
+  if (stamp >= limit && (!full || place > ring.oldest())) return {};
+  if (stamp < limit && starts_again(newest, stamp)) return {};
+  newest.name->refused.old.fetch_add(1, std::memory_order_relaxed);
+  const std::string what = "frame " + quote(newest.name->text) + ": the sample is ";
+  if (stamp < limit) {
+    return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, newest.stamp)) +
+                                   " older than the newest, more than the " +
+                                   in_milliseconds(ring.timing().span) + " that are kept");
+  }
+  return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, ring.stamp(ring.oldest()))) +
+                                 " older than the oldest of the " +
+                                 std::to_string(ring.timing().count) + " that are kept");
+}
+
+}  // namespace tfdude
