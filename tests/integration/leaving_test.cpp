@@ -47,16 +47,17 @@ class Member {
   Member& operator=(const Member&) = delete;
 
   [[nodiscard]] std::unique_ptr<Beats> read(
-      std::atomic<int>& matches, std::function<void()> on_sample = [] {}) {
+      std::atomic<int>& matches, std::function<void()> on_sample = [] {},
+      const std::string& profile = "presence_reader") {
     return std::make_unique<Beats>(
-        Context{*participant_, profiles_, *gate_, counters_}, *topic_, "", "presence_reader",
+        Context{*participant_, profiles_, *gate_, counters_}, *topic_, "", profile,
         Beats::Calls{
             [on_sample](const wire::Presence&, const ertps::GuidPrefix_t&) { on_sample(); },
             [&matches](const ertps::GuidPrefix_t&, int) { ++matches; }});
   }
-  [[nodiscard]] std::unique_ptr<Writer> write() {
+  [[nodiscard]] std::unique_ptr<Writer> write(const std::string& profile = "presence_writer") {
     return std::make_unique<Writer>(Context{*participant_, profiles_, *gate_, counters_}, *topic_,
-                                    "", "presence_writer");
+                                    "", profile);
   }
 
  private:
@@ -98,6 +99,8 @@ TEST_CASE("leaving: nothing is handled while an endpoint is deleted") {
   CHECK(deleted.wait_for(std::chrono::seconds(20)) == std::future_status::ready);
 }
 
+// Best effort: where a reliable writer goes as its first sample is being acknowledged, and the participant is to announce
+// itself just then, Fast DDS (2.9 and 3.1) waits for itself for ever. Here that would happen within seconds.
 TEST_CASE("leaving: 5,000 readers go while writers come and go") {
   const testing::DomainLease lease;
   Member leaver(lease.number());
@@ -107,13 +110,15 @@ TEST_CASE("leaving: 5,000 readers go while writers come and go") {
   std::thread others([&] {
     while (!over) {
       std::vector<std::unique_ptr<Writer>> writers;
-      for (int i = 0; i < 5; ++i) writers.push_back(newcomer.write());
+      for (int i = 0; i < 5; ++i) writers.push_back(newcomer.write("call_writer"));
     }
   });
   // Several at a time: then one of them goes whenever a writer is matched with them.
   for (int round = 0; round < 1000; ++round) {
     std::vector<std::unique_ptr<Beats>> readers;
-    for (int i = 0; i < 5; ++i) readers.push_back(leaver.read(matches));
+    for (int i = 0; i < 5; ++i)
+      readers.push_back(leaver.read(
+          matches, [] {}, "call_reader"));
   }
   over = true;
   others.join();
