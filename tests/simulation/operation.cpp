@@ -1,6 +1,7 @@
 #include "simulation/operation.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "partition/requests.hpp"
 #include "runtime/requests.hpp"
@@ -173,7 +174,8 @@ void Operation::finish(Result<void> outcome) {
   over_ = true;
   std::vector<Reply> replies;
   for (auto& reply : replies_) replies.push_back(reply ? *reply : Reply{});
-  then_(outcome, std::move(replies));
+  // What is called may own the process that owns this.
+  std::exchange(then_, nullptr)(outcome, std::move(replies));
 }
 
 }  // namespace tfdude::simulation

@@ -50,7 +50,7 @@ class Operation : public std::enable_shared_from_this<Operation> {
 
   Process& caller_;
   const Route route_;
-  const Then then_;
+  Then then_;
   Instant deadline_{};
   Phase phase_ = Phase::kPlan;
   std::vector<Part> parts_;
