@@ -12,9 +12,10 @@ using Standing = Succession::Standing;
 
 bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
   if (!partition.outdated(incarnation)) return false;
-  // An owner tells it, and it goes on as a later one; whoever owns nothing is not heard.
-  const bool voiceless = partitions_.front().info.name.empty();
-  if (voiceless && !partition.info.reachable && !partition.forgotten) {
+  // Who misses it tells it so, and it goes on as a later one; but whoever owns nothing is not heard.
+  const bool has_voice = !partitions_.front().info.name.empty();
+  const bool is_told = has_voice && absences_.find(partition.info.name);
+  if (!is_told && !partition.info.reachable && !partition.forgotten) {
     partition.live = partition.heard_of = 0;
     partition.successor.reset();
     return false;

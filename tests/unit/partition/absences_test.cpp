@@ -438,6 +438,20 @@ TEST_CASE("what is dropped for its age is reported, once an incarnation") {
   CHECK(base.owner_of("hand") == "arm");
 }
 
+TEST_CASE("a number of which nobody can tell a partition any more hides it from nobody") {
+  Replica head("head");
+  Presence base = presence_of("base", 1, 0);
+  base.absent = {{"arm", 0, Kind::kSilent, 9}};
+  head.directory.apply(base, kNow);
+  head.directory.apply(presence_of("arm", 5, 1), kNow);
+  CHECK_FALSE(head.directory.serving("arm"));
+  CHECK(head.directory.lost("base", 1, kNow));
+  head.directory.apply(presence_of("arm", 5, 1), kNow);
+  head.directory.apply(page_of("arm", {{"hand", "", 10}}, 5));
+  CHECK(head.directory.serving("arm"));
+  CHECK(head.structure() == Lines{"hand <  @ arm"});
+}
+
 TEST_CASE("a process that goes on as a later one is heard again") {
   Witness base;
   base.hear("arm", 9, 10);
