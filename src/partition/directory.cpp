@@ -330,11 +330,10 @@ void Directory::told_of(Owner owner, std::uint64_t epoch) {
 }
 
 const std::string* Directory::behind() const {
-  const auto found =
-      std::find_if(partitions_.begin() + 1, partitions_.end(), [](const Known& partition) {
-        return partition.info.reachable && partition.epoch < partition.told_epoch;
-      });
-  return found != partitions_.end() ? &found->info.name : nullptr;
+  for (Owner owner = 1; owner < partitions_.size(); ++owner) {
+    if (reachable(owner) && owes_change(owner)) return &partitions_[owner].info.name;
+  }
+  return nullptr;
 }
 
 std::vector<PartitionInfo> Directory::partitions() const {

@@ -137,6 +137,10 @@ class Directory {
 
   /// An owner has told of a change that its structure shows in this epoch.
   void told_of(Owner owner, std::uint64_t epoch);
+  /// Whether that change has not come yet.
+  [[nodiscard]] bool owes_change(Owner owner) const {
+    return partitions_[owner].epoch < partitions_[owner].told_epoch;
+  }
   /// The name of a reachable one whose structure is older here than what it has told of; null: there is none.
   [[nodiscard]] const std::string* behind() const;
 

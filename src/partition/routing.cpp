@@ -47,6 +47,21 @@ const std::string& owned_end(const Forest& forest, const Segment& segment) {
   return from && from->owner == segment.owner ? segment.from : segment.to;
 }
 
+// Who has moved a frame away would else lose what hangs below it, if its owner goes before all know of the move.
+Result<void> check_subtree(const Directory& directory, const std::vector<FrameInfo>& frames,
+                           const std::string& top) {
+  for (const FrameInfo& frame : frames) {
+    if (frame.owner == kHeldHere || !directory.owes_change(frame.owner)) continue;
+    auto ok = check_reachable(directory, frame.owner);
+    if (ok)
+      ok = fail(Errc::kTimeout, "partition " + quote(directory.name(frame.owner)) + " is there");
+    ok.error().message += ", and what it has changed last has not come here: what hangs below " +
+                          quote(top) + " is not certain";
+    return ok;
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<void> check_reachable(const Directory& directory, const std::vector<Part>& parts) {
@@ -91,6 +106,7 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
                                        const std::string& id) {
   const auto frames = forest.subtree(id);
   if (frames.empty()) return unknown_frame(id);
+  if (auto ok = check_subtree(directory, frames, id); !ok) return tl::unexpected(ok.error());
   std::vector<Part> parts;
   for (const FrameInfo& frame : frames) {
     const auto parent = forest.info(frame.parent);

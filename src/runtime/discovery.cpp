@@ -60,6 +60,11 @@ Deadline Discovery::call_deadline() const {
 }
 
 Result<void> Discovery::await(const Deadline& deadline) {
+  {
+    // One that has told of a change, and went before that came, may be there again.
+    const std::lock_guard lock(structure_.mutex);
+    if (structure_.directory.behind() != nullptr) fell_behind();
+  }
   while (!complete()) {
     if (deadline.over()) return tl::unexpected(undecided("not all frames are known", deadline));
     wait_for_news(deadline);

@@ -182,7 +182,8 @@ void Author::remove() {
   auto asked_before = std::make_shared<bool>(false);
   begin(
       "remove " + id,
-      [this, id, asked_before] {
+      [this, id, asked_before]() -> Result<std::vector<Part>> {
+        if (!process_->discovered()) return fail(Errc::kUnknownFrame, "not all is known");
         auto parts = route_remove(process_->forest(), process_->directory(), id);
         *asked_before = *asked_before || parts.has_value();
         return parts;

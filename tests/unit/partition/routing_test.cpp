@@ -162,6 +162,15 @@ TEST_CASE("a removal is refused where a frame or an owner is not there") {
   CHECK(std::none_of(rest->begin(), rest->end(),
                      [](const Part& part) { return part.partition == "legs"; }));
   CHECK(outcome(route_remove(known.forest, known.directory, "gem")) == "ok");
+  // It may have been moved away.
+  known.directory.told_of(*known.directory.owner("legs"), 5);
+  CHECK(message_of(route_remove(known.forest, known.directory, "hand")) ==
+        kLegsLost +
+            std::string(", and what it has changed last has not come here: what hangs below "
+                        "'hand' is not certain"));
+  CHECK(outcome(route_remove(known.forest, known.directory, "gem")) == "ok");
+  known.directory.told_of(*known.directory.owner("arms"), 5);
+  CHECK(outcome(route_remove(known.forest, known.directory, "gem")) == "timeout");
 }
 
 // ---- update
