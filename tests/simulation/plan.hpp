@@ -55,6 +55,10 @@ struct Plan {
   double loss_after = 0;      ///< of datagrams, when the storm is over
   std::vector<Fault> faults;  ///< in the order in which they begin
 
+  [[nodiscard]] bool stores_of(std::size_t owner) const {
+    return owner + 1 == owners ? wild_stores : stores;
+  }
+
   [[nodiscard]] std::string text() const;
 };
 

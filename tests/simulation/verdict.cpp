@@ -1,0 +1,169 @@
+#include "simulation/verdict.hpp"
+
+#include <algorithm>
+
+namespace tfdude::simulation {
+namespace {
+
+using faults::base_of;
+using faults::partition_name;
+
+std::string difference(const std::vector<std::string>& a, const std::vector<std::string>& b) {
+  std::string text;
+  for (const std::string& line : a) {
+    if (!std::binary_search(b.begin(), b.end(), line)) text += " [" + line + "]";
+  }
+  text += ", and others";
+  for (const std::string& line : b) {
+    if (!std::binary_search(a.begin(), a.end(), line)) text += " [" + line + "]";
+  }
+  return text;
+}
+
+// Whether it hangs below a root, and not below a frame that was removed: such trees the model does not know.
+bool stands(Process& process, FrameInfo frame) {
+  while (!frame.parent.empty()) {
+    const auto parent = process.forest().info(frame.parent);
+    if (!parent) return false;
+    frame = *parent;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::string extra_of(std::size_t owner) { return "extra_" + std::to_string(owner); }
+
+std::string Cast::name_of_daemon(std::size_t owner) const {
+  return owner == wild && renamed % 2 == 1 ? "renamed" : partition_name(owner);
+}
+
+Process* Cast::find_daemon(const std::string& partition) const {
+  for (const auto& daemon : daemons) {
+    if (daemon && daemon->partition() == partition) return daemon.get();
+  }
+  return nullptr;
+}
+
+void Verdict::violation(const std::string& what) {
+  agreed_ = false;
+  calls_.violation(what);
+}
+
+void Verdict::check() {
+  std::vector<Process*> all;
+  for (const auto& daemon : cast_.daemons) {
+    if (daemon) all.push_back(daemon.get());
+  }
+  std::vector<Author*> authors;
+  for (const auto& author : cast_.authors) {
+    if (!passes_over_one(author->process())) authors.push_back(author.get());
+  }
+  for (Author* author : authors) all.push_back(&author->process());
+  const auto expected = all.back()->structure();
+  for (Process* one : all) check_replica(*one, expected);
+  check_owners(*all.back());
+  for (Author* author : authors) check_author(*author);
+  for (const auto& follower : cast_.followers) check_follower(*follower);
+}
+
+void Verdict::check_replica(Process& one, const std::vector<std::string>& expected) {
+  const std::string who = one.partition().empty() ? "a client" : one.partition();
+  if (!one.partition().empty() && !one.serves()) violation(who + " does not serve");
+  if (one.structure() != expected) {
+    violation(who + " sees " + difference(one.structure(), expected));
+  }
+  if (!one.member().concessions().empty()) violation(who + " has something to concede");
+  for (const PartitionInfo& partition : one.directory().partitions()) {
+    if (partition.reachable != cast_.serves(partition.name)) {
+      violation(who + (partition.reachable ? " still hears " : " misses ") + partition.name);
+    }
+  }
+}
+
+// A process without a file whose clock is behind that of its predecessor is not heard by a client that has met that one: a
+// client cannot tell it, and no daemon may be left that could.
+bool Verdict::passes_over_one(Process& client) const {
+  for (std::size_t i = 0; i < plan_.owners; ++i) {
+    if (plan_.stores_of(i) || !cast_.daemons[i]) continue;
+    const std::uint64_t met = client.directory().latest_incarnation(cast_.daemons[i]->partition());
+    if (met > cast_.daemons[i]->member().presence().incarnation) return true;
+  }
+  return false;
+}
+
+// Long after the last write it shows what the owners have.
+void Verdict::check_follower(Follower& follower) {
+  Process* const owner = cast_.find_daemon(follower.partition());
+  const auto arm = owner ? owner->forest().info(follower.arm()) : std::nullopt;
+  if (!follower.watches() || !arm) return;
+  Process& process = follower.process();
+  const auto base = process.forest().info(arm->parent);
+  Process* const below = base ? cast_.find_daemon(process.directory().name(base->owner)) : nullptr;
+  if (below == nullptr || base->parent != "world") return;
+  const auto X_WB = below->forest().lookup("world", base->id);
+  const auto X_BT = owner->forest().lookup(base->id, follower.tip());
+  if (!X_WB || !X_BT) return;
+  calls_.count("watched paths checked", 1);
+  const auto seen = follower.read();
+  if (!seen) {
+    violation(follower.tip() + " is not seen: " + seen.error().message);
+  } else if (((X_WB->pose * X_BT->pose).translation() - seen->pose.translation()).norm() > 1e-9) {
+    violation(follower.tip() + " is not seen where it is");
+  }
+}
+
+// Of a frame that one serves who is there, it is the owner; who is not there has none of the configured frames.
+void Verdict::check_owners(Process& one) {
+  for (std::size_t i = 0; i < plan_.owners; ++i) {
+    if (i == plan_.lost) continue;
+    const auto frame = one.forest().info(base_of(i));
+    const std::string owner = frame ? one.directory().name(frame->owner) : "nobody";
+    if (owner != cast_.name_of_daemon(i)) violation(base_of(i) + " is of " + owner);
+    const auto extra = one.forest().info(extra_of(i));
+    if (extra && !cast_.has_extra[i] && is_left_over(*extra, one)) continue;
+    if (extra.has_value() != cast_.has_extra[i]) {
+      violation(extra_of(i) + (extra ? " is there" : " is missing"));
+    } else if (extra && one.directory().name(extra->owner) != cast_.name_of_daemon(i)) {
+      violation(extra_of(i) + " is of " + one.directory().name(extra->owner));
+    }
+  }
+}
+
+// Who goes on under another name knows nothing of what it had under the former, by which nobody is there.
+bool Verdict::is_left_over(const FrameInfo& frame, Process& seen_by) const {
+  return !cast_.serves(seen_by.directory().name(frame.owner));
+}
+
+void Verdict::check_author(Author& author) {
+  Process& process = author.process();
+  for (const auto* models : {&author.model().frames(), &author.model().removed()}) {
+    for (const auto& [id, model] : *models) {
+      if (!cast_.serves(model.partition)) continue;
+      const auto there = process.forest().info(id);
+      // Nobody is left who could tell its owner that it is removed.
+      const bool untold = std::any_of(model.removed_by.begin(), model.removed_by.end(),
+                                      [&](const auto& one) { return !cast_.serves(one); });
+      if (there && untold && !model.may_be_there()) continue;
+      Frame seen;
+      if (there) {
+        seen = {id, there->parent, process.directory().name(there->owner), there->attached};
+      }
+      const std::string wrong = faults::misplaced(id, model, there ? &seen : nullptr);
+      if (!wrong.empty()) violation(wrong);
+    }
+  }
+  if (!agreed_) return;
+  // Before the lookups, which change the model.
+  std::vector<std::pair<std::string, std::string>> edges;
+  for (const auto& [id, model] : author.model().frames()) {
+    const auto frame = process.forest().info(id);
+    if (frame && cast_.serves(model.partition) && stands(process, *frame))
+      edges.emplace_back(frame->parent, id);
+  }
+  for (const auto& [parent, id] : edges) author.look_up(parent, id, true);
+  calls_.wait(2 * Operation::kTimeout);
+  calls_.count("values checked", edges.size());
+}
+
+}  // namespace tfdude::simulation
