@@ -141,7 +141,7 @@ void Operation::look_again() {
     if (!done || owner == kHeldHere || reads) continue;
     const bool here = directory.epoch(owner) >= replies_[i]->epoch || !directory.reachable(owner);
     settled = settled && here;
-    if (now() >= deadline_) directory.told_of(owner, replies_[i]->epoch);
+    if (here || now() >= deadline_) directory.told_of(owner, replies_[i]->epoch);
   }
   if (!settled && now() < deadline_) return;
   if (!stored_ && outcome_) outcome_ = fail(Errc::kTimeout, "changed, but not stored in time");
