@@ -47,6 +47,13 @@ void Absences::told_all(const std::vector<Absent>& absent, const std::string& te
   }
 }
 
+void Absences::heard_of(const std::string& partition, std::uint64_t incarnation) {
+  const auto there = missed_.find(partition);
+  if (there == missed_.end() || there->second.absent.kind == Absent::Kind::kForgotten) return;
+  std::uint64_t& latest = there->second.absent.incarnation;
+  latest = std::max(latest, incarnation);
+}
+
 void Absences::resume(const Absent& absent) {
   if (missed_.emplace(absent.partition, Missed{absent, absent.kind, {}}).second) limit();
 }

@@ -40,6 +40,8 @@ class Absences {
   void told(const Absent& absent, const std::string& teller);
   /// These are all whom the teller misses now. A silence that it has told, and does not tell any more, is over.
   void told_all(const std::vector<Absent>& absent, const std::string& teller);
+  /// Of one that is missed a later incarnation was heard of.
+  void heard_of(const std::string& partition, std::uint64_t incarnation);
   /// It was missed when this process's predecessor ended.
   void resume(const Absent& absent);
 

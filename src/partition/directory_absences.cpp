@@ -122,6 +122,8 @@ void Directory::hear_of(const Absent& one, const std::string& teller, Time now) 
   if (partition.forgotten && one.incarnation <= partition.heard_of) return;
   if (one.incarnation < IncarnationSource::kEnd) {
     partition.heard_of = std::max(partition.heard_of, one.incarnation);
+    // What is hidden by that number has to hear it.
+    absences_.heard_of(one.partition, partition.heard_of);
   }
   partition.forgotten = false;
   if (partition.live != 0 || one.kind == Absent::Kind::kBack) return;

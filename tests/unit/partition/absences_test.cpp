@@ -452,6 +452,18 @@ TEST_CASE("a number of which nobody can tell a partition any more hides it from 
   CHECK(head.structure() == Lines{"hand <  @ arm"});
 }
 
+TEST_CASE("a partition is told the highest number that hides it") {
+  Witness base;
+  base.lose("arm", 1);
+  Presence head = presence_of("head", 1, 0);
+  head.absent = {{"arm", 0, Kind::kLost, 9}};
+  base.directory.apply(head, kNow);
+  base.hear("arm", 5, 10);
+  CHECK_FALSE(base.directory.serving("arm"));
+  REQUIRE(base.directory.absent().size() == 1);
+  CHECK(base.directory.absent()[0].incarnation == 9);
+}
+
 TEST_CASE("a process that goes on as a later one is heard again") {
   Witness base;
   base.hear("arm", 9, 10);
