@@ -185,7 +185,7 @@ void add_measuring_commands(CLI::App& app, Arguments& arguments, Command& chosen
 
 void add_correlate_command(CLI::App& app, Arguments& arguments, Command& chosen) {
   auto* correlate =
-      add_command(app, "correlate", "say how an edge's error hangs together with those of others",
+      add_command(app, "correlate", "say how an edge's error is correlated with those of others",
                   "correlate elbow --source supply 0 0 0 0 0 0.002", cli::run_correlate, chosen);
   add_id(correlate, arguments);
   correlate->add_flag("--unknown", arguments.unknown,

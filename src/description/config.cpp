@@ -197,9 +197,9 @@ Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index,
     if (!own) return tl::unexpected(own.error());
     spec.timing = *own;
   }
-  auto ties = correlation(*entries, place);
-  if (!ties) return tl::unexpected(std::move(ties.error()));
-  spec.correlation = *std::move(ties);
+  auto said = correlation(*entries, place);
+  if (!said) return tl::unexpected(std::move(said.error()));
+  spec.correlation = *std::move(said);
   return spec;
 }
 

@@ -67,7 +67,7 @@ class PathAccumulation<Belief> {
   explicit PathAccumulation(Order order) : order_(order) {}
 
   /// What the error of the next edge has to do with others'; shares: may be null.
-  void tie(bool unknown, const std::vector<Share>* shares) {
+  void correlate_next(bool unknown, const std::vector<Share>* shares) {
     unknown_ = unknown;
     shares_ = shares;
   }

@@ -75,7 +75,7 @@ void Joints::put(const std::string& frame, const JointSpec& joint,
     mover.said_variance = mover.variance;
     // To say it anew would be the end of what observations have left, which an earlier process may have kept.
     const auto kept = forest_.kept(frame);
-    if (kept && !(kept->ties.said == mover.said)) (void)forest_.correlate(frame, mover.said);
+    if (kept && !(kept->correlation.said == mover.said)) (void)forest_.correlate(frame, mover.said);
   }
   by_name_[joint.name];
   by_name_[leader_of(joint)].push_back(movers_.size());
@@ -165,7 +165,7 @@ Result<std::size_t> Joints::apply(const JointUpdate& update) {
   if (steps_.empty()) return 0;
   for (const Step& step : steps_) {
     Mover& mover = movers_[step.mover];
-    TiedUpdate one{mover.handle, value_at(mover.spec, step.position, step.variance)};
+    CorrelatedUpdate one{mover.handle, value_at(mover.spec, step.position, step.variance)};
     const bool resay = mover.spec.coupled && mover.said_variance != step.variance;
     if (resay && is_news(mover, update.stamp)) {
       mover.said = shared_error(mover.spec, step.variance);
@@ -173,7 +173,7 @@ Result<std::size_t> Joints::apply(const JointUpdate& update) {
     }
     updates_.push_back(one);
   }
-  auto updated = forest_.update_tied(updates_, update.stamp);
+  auto updated = forest_.update_correlated(updates_, update.stamp);
   if (!updated && updated.error().code == Errc::kUnknownFrame) {
     forget_removed();
     return apply(update);

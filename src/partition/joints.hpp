@@ -99,9 +99,9 @@ class Joints {
   std::vector<Mover> movers_;
   // Which movers a joint has: its own and those that follow it. Of one that follows, none.
   std::map<std::string, std::vector<std::size_t>, std::less<>> by_name_;
-  std::uint64_t plans_ = 0;          // updates so far
-  std::vector<Step> steps_;          // of the update being made, as
-  std::vector<TiedUpdate> updates_;  // these; both kept for their memory
+  std::uint64_t plans_ = 0;                // updates so far
+  std::vector<Step> steps_;                // of the update being made, as
+  std::vector<CorrelatedUpdate> updates_;  // these; both kept for their memory
 };
 
 }  // namespace tfdude

@@ -34,7 +34,7 @@ bool take_hint(std::vector<SegmentValues>& answers, Time hint) {
   for (SegmentValues& answer : answers) {
     if (!answer.stamp || *answer.stamp == hint) continue;
     answer.values = std::move(answer.at_hint);
-    answer.ties = std::move(answer.ties_at_hint);
+    answer.correlations = std::move(answer.correlations_at_hint);
     answer.stamp = hint;
   }
   return true;

@@ -25,8 +25,8 @@ using PeerId = std::array<std::uint8_t, 12>;
 /// The most edges, subtrees, segments or entries that one message holds.
 inline constexpr std::size_t kMaxItems = 4096;
 
-/// The most edges of one owner that are observed at once or tied to others on one path, and shares of each.
-inline constexpr std::uint32_t kMaxTies = kMaxShares;
+/// The most edges of one owner that are observed at once or correlated with others on one path, and shares of each.
+inline constexpr std::uint32_t kMaxCorrelated = kMaxShares;
 
 /// The latest stamp of a change of the structure that a sender knows of (Directory::next_stamp). Its own change gets a
 /// later one, whatever the owner's clock says, so that what one client does in turn counts in that order.
@@ -68,7 +68,7 @@ struct LookupRequest {
   /// Of what other instant the answer may be of use; see LatestHints.
   std::optional<Time> hint{};
   bool edges =
-      false;  ///< each segment is an edge, to be observed: all that its error is tied to is wanted
+      false;  ///< each segment is an edge, to be observed: all of its correlation is wanted
 };
 
 /// What an observation has come to for edges of one owner.
@@ -85,7 +85,7 @@ struct ReviseRequest {
   std::uint64_t incarnation = 0;  ///< SegmentValues::incarnation, whose commit that is
 };
 
-/// Says how the error of the edge that the request's id names hangs together with those of others.
+/// Says how the error of the edge that the request's id names is correlated with those of others.
 struct CorrelateRequest {
   Correlation correlation;
 };
@@ -160,8 +160,8 @@ struct State {
   std::uint32_t pieces = 1;
 };
 
-/// How many entries are tied to others; a message holds no more than kMaxTies of them.
-[[nodiscard]] std::size_t tied_entries(const State& state);
+/// How many entries are correlated with others; a message holds no more than kMaxCorrelated of them.
+[[nodiscard]] std::size_t correlated_entries(const State& state);
 
 struct Done {};
 

@@ -104,11 +104,12 @@ Result<ObservePlan> route_observe(const Forest& forest, const Directory& directo
     }
     std::get<LookupRequest>(part->request.body).segments.push_back({info.parent, info.id});
   }
-  if (plan.edges.size() <= kMaxTies) return plan;
+  if (plan.edges.size() <= kMaxCorrelated) return plan;
   return fail(Errc::kInvalidInput, "the path from " + quote(a) + " to " + quote(b) +
                                        ", with what was observed with it, has " +
                                        std::to_string(plan.edges.size()) + " edges, of at most " +
-                                       std::to_string(kMaxTies) + " that are observed at once");
+                                       std::to_string(kMaxCorrelated) +
+                                       " that are observed at once");
 }
 
 Result<ObservedPath> observed_path(const ObservePlan& plan,
@@ -117,7 +118,7 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
   for (std::size_t i = 0; i < plan.parts.size(); ++i) {
     const auto& asked = std::get<LookupRequest>(plan.parts[i].request.body).segments;
     const bool all = i < answers.size() && answers[i].values.size() == asked.size() &&
-                     answers[i].ties.size() == asked.size();
+                     answers[i].correlations.size() == asked.size();
     if (!all) {
       return fail(Errc::kNotOwner, "partition " + quote(plan.parts[i].partition) +
                                        " did not answer of all edges that it was asked for");
@@ -129,9 +130,9 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
   std::vector<Places::Place> placed;
   for (const Edge& edge : plan.edges) {
     const auto [part, index] = placed.emplace_back(places.next(edge));
-    const Ties& ties = answers[part].ties[index];
-    path.edges.push_back({belief_of(answers[part].values[index], ties), edge.way});
-    for (const std::string& id : ties.observed_with) {
+    const PathCorrelation& correlation = answers[part].correlations[index];
+    path.edges.push_back({belief_of(answers[part].values[index], correlation), edge.way});
+    for (const std::string& id : correlation.observed_with) {
       const bool known =
           has(plan.edges, id) || std::count(path.missing.begin(), path.missing.end(), id) != 0;
       if (!known) path.missing.push_back(id);
@@ -139,8 +140,8 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
   }
   for (std::size_t k = 0; k < plan.edges.size() && !path.torn; ++k) {
     const auto& [part, index] = placed[k];
-    path.torn =
-        lacks_source(plan, path, path.edges[k].X_PC, answers[part].ties[index].observed_with);
+    path.torn = lacks_source(plan, path, path.edges[k].X_PC,
+                             answers[part].correlations[index].observed_with);
   }
   return path;
 }

@@ -16,9 +16,10 @@ struct Overloaded : Visitors... {
 template <class... Visitors>
 Overloaded(Visitors...) -> Overloaded<Visitors...>;
 
-bool are_too_many(const std::vector<Ties>& all) {
-  return all.size() > kMaxTies || std::any_of(all.begin(), all.end(), [](const Ties& ties) {
-           return ties.shares.size() > kMaxTies;
+bool are_too_many(const std::vector<PathCorrelation>& all) {
+  return all.size() > kMaxCorrelated ||
+         std::any_of(all.begin(), all.end(), [](const PathCorrelation& correlation) {
+           return correlation.shares.size() > kMaxCorrelated;
          });
 }
 
@@ -121,9 +122,9 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
   Reply reply;
   reply.sequence = sequence;
   auto values = forest_.lookup_segments(lookup.segments, lookup.query, lookup.hint, lookup.edges);
-  if (values && are_too_many(values->ties)) {
+  if (values && are_too_many(values->correlations)) {
     reply.body = Error{Errc::kInvalidInput, "partition " + quote(name_) + " has more than " +
-                                                std::to_string(kMaxTies) +
+                                                std::to_string(kMaxCorrelated) +
                                                 " segments of the path, or sources in one of them"};
   } else if (values) {
     values->incarnation = pages_.incarnation();

@@ -37,7 +37,7 @@ std::vector<StoredFrame> frames_of(const StoredState& state, const std::vector<S
     if (known->second->parent != frame.parent) continue;
     if (!left_of(*known->second->joint, state.joints)) continue;
     frame.X_PC = value_of(as_left(*known->second, joints));
-    frame.ties.observed.reset();
+    frame.correlation.observed.reset();
   }
   return frames;
 }
@@ -93,7 +93,7 @@ bool Partition::hang_again(const StoredFrame& frame) {
     added = add();
   }
   if (!added) return false;
-  if (!frame.ties.empty()) (void)forest_.resume(frame.id, frame.ties);
+  if (!frame.correlation.empty()) (void)forest_.resume(frame.id, frame.correlation);
   put(frame.id, frame.parent, frame.since);
   return true;
 }
@@ -101,7 +101,7 @@ bool Partition::hang_again(const StoredFrame& frame) {
 void Partition::make_root(const StoredFrame& frame, Time now) {
   const std::uint64_t since = directory_.next_stamp(now);
   if (!forest_.add(frame.id, {}, frame.X_PC, Forest::MissingParent::kAllow, since)) return;
-  if (!frame.ties.empty()) (void)forest_.resume(frame.id, frame.ties);
+  if (!frame.correlation.empty()) (void)forest_.resume(frame.id, frame.correlation);
   put(frame.id, {}, since);
   tell_conflict({frame.id, since, Note::Kind::kUnhung, name_});
 }
@@ -228,7 +228,8 @@ StateChange Partition::take_unsaved() {
     const auto place = pages_.place(id);
     auto edge = forest_.kept(id);
     if (!place || !edge) continue;
-    change.frames.push_back({id, place->parent, edge->X_PC, place->since, std::move(edge->ties)});
+    change.frames.push_back(
+        {id, place->parent, edge->X_PC, place->since, std::move(edge->correlation)});
   }
   // With the first of a process its incarnation is stored, too: the epoch is above that.
   auto absent = directory_.absent();

@@ -301,20 +301,21 @@ void each_segment(const LookupPlan& plan, Take take) {
 
 StampedTransform composed(const LookupPlan& plan, const std::vector<SegmentValues>& answers) {
   std::optional<Time> stamp;
-  bool tied = false;
+  bool correlated = false;
   for (const SegmentValues& answer : answers) {
     if (answer.stamp) stamp = answer.stamp;
-    tied = tied || !answer.ties.empty();
+    correlated = correlated || !answer.correlations.empty();
   }
   const Order order = plan.parts.empty()
                           ? Order::kSecond
                           : std::get<LookupRequest>(plan.parts[0].request.body).query.order;
-  if (tied || order == Order::kFourth) {
+  if (correlated || order == Order::kFourth) {
     Belief X_AB;
     each_segment(plan, [&](std::size_t i, std::size_t k) {
-      const Ties none;
-      const Ties& ties = k < answers[i].ties.size() ? answers[i].ties[k] : none;
-      X_AB = compose(X_AB, belief_of(answers[i].values[k], ties), order);
+      const PathCorrelation none;
+      const PathCorrelation& correlation =
+          k < answers[i].correlations.size() ? answers[i].correlations[k] : none;
+      X_AB = compose(X_AB, belief_of(answers[i].values[k], correlation), order);
     });
     return collapsed(X_AB, order, stamp);
   }

@@ -15,9 +15,9 @@ namespace tfdude {
 struct StoredFrame {
   std::string id;
   std::string parent;  ///< empty: a root
-  Transform X_PC;      ///< its covariance is that of the edge's own part where it has ties
+  Transform X_PC;      ///< its covariance is that of the edge's own part where it is correlated
   std::uint64_t since = 0;
-  KeptTies ties{};
+  StoredCorrelation correlation{};
 };
 
 /// Where a joint was, by its last sample.

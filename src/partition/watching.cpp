@@ -27,18 +27,18 @@ class Fingerprint {
 };
 
 // As an edge: what a segment has of its own counts as unknown, too, where a part of it is.
-void tie(News& entry, const Ties& ties) {
-  entry.correlation.shares = ties.shares;
-  if (!ties.unknown) return;
+void set_correlation(News& entry, const PathCorrelation& correlation) {
+  entry.correlation.shares = correlation.shares;
+  if (!correlation.unknown) return;
   entry.correlation.unknown = true;
-  entry.X.covariance = bound(entry.X.covariance, *ties.unknown);
+  entry.X.covariance = bound(entry.X.covariance, *correlation.unknown);
 }
 
 std::vector<News> entries_of(const SegmentValues& found) {
   std::vector<News> entries;
   for (std::uint32_t i = 0; i < found.values.size(); ++i) {
     entries.push_back({i, found.stamp, found.values[i], {}, found.history, {}});
-    if (!found.ties.empty()) tie(entries.back(), found.ties[i]);
+    if (!found.correlations.empty()) set_correlation(entries.back(), found.correlations[i]);
   }
   return entries;
 }
@@ -49,7 +49,7 @@ bool same(const Transform& a, const Transform& b) {
 
 }  // namespace
 
-std::size_t tied_entries(const State& state) {
+std::size_t correlated_entries(const State& state) {
   return static_cast<std::size_t>(
       std::count_if(state.entries.begin(), state.entries.end(),
                     [](const News& entry) { return !entry.correlation.empty(); }));
@@ -155,7 +155,7 @@ State WatchedGroup::composed_news(const Forest& forest) {
 }
 
 std::vector<State> pieces_of(State&& state) {
-  const std::size_t most = tied_entries(state) > kMaxTies ? kMaxTies : kMaxItems;
+  const std::size_t most = correlated_entries(state) > kMaxCorrelated ? kMaxCorrelated : kMaxItems;
   const std::size_t count = std::max<std::size_t>((state.entries.size() + most - 1) / most, 1);
   std::vector<State> pieces;
   for (std::size_t i = 0; i < count; ++i) {

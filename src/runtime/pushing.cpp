@@ -40,10 +40,10 @@ Reply Pushing::answer(const Request& request) {
       member_.with_rules([](const Member& member) { return member.presence().incarnation; });
   auto state = pusher->watch(watch_group(member_.name(), incarnation, watch), watch);
   if (!state) return {request.sequence, 0, std::move(state.error())};
-  if (tied_entries(*state) > kMaxTies) {
+  if (correlated_entries(*state) > kMaxCorrelated) {
     return {request.sequence, 0,
-            Error{Errc::kInvalidInput, who + " has more than " + std::to_string(kMaxTies) +
-                                           " edges of the path that are tied to others"}};
+            Error{Errc::kInvalidInput, who + " has more than " + std::to_string(kMaxCorrelated) +
+                                           " edges of the path that are correlated with others"}};
   }
   return {request.sequence, 0, *std::move(state)};
 }

@@ -80,7 +80,7 @@ Result<void> load_configured(const Database& database, std::int64_t /*format*/,
 
 Result<void> load_joints(const Database& database, std::int64_t format, StoredState& state) {
   if (format < kJointsFormat) return {};
-  const char* sql = format < kTiesFormat
+  const char* sql = format < kCorrelationFormat
                         ? "SELECT name, position, variance, 0 FROM joints ORDER BY name"
                         : "SELECT name, position, variance, coalesce(type, 0) FROM joints "
                           "LEFT JOIN joint_types USING(name) ORDER BY name";
@@ -104,17 +104,17 @@ Result<void> load_absent(const Database& database, std::int64_t format, StoredSt
 }
 
 // Each is of a frame, or an entry, that is there.
-Result<void> load_ties(const Database& database, std::int64_t format, StoredState& state) {
-  if (format < kTiesFormat) return {};
+Result<void> load_correlations(const Database& database, std::int64_t format, StoredState& state) {
+  if (format < kCorrelationFormat) return {};
   const auto nobody = [](const Statement& row) {
-    return fail(Errc::kState, "ties of " + quote(row.text(0)) + ", which is not there");
+    return fail(Errc::kState, "correlation of " + quote(row.text(0)) + ", which is not there");
   };
   const auto of_frame = [&](const Statement& row) -> Result<void> {
-    auto ties = read_ties(row);
-    if (!ties) return tl::unexpected(std::move(ties.error()));
+    auto correlation = read_stored_correlation(row);
+    if (!correlation) return tl::unexpected(std::move(correlation.error()));
     StoredFrame* frame = find_frame(state.frames, row.text(0));
     if (frame == nullptr) return nobody(row);
-    frame->ties = *std::move(ties);
+    frame->correlation = *std::move(correlation);
     return {};
   };
   auto loaded = each_row(database, "SELECT id, said, observed FROM ties", of_frame);
@@ -134,8 +134,8 @@ Result<void> load_ties(const Database& database, std::int64_t format, StoredStat
 
 Result<StoredState> read_state(const Database& database, std::int64_t format) {
   StoredState state;
-  for (auto part : {load_about, load_frames, load_notes, load_configured, load_joints, load_ties,
-                    load_absent}) {
+  for (auto part : {load_about, load_frames, load_notes, load_configured, load_joints,
+                    load_correlations, load_absent}) {
     if (auto loaded = part(database, format, state); !loaded) {
       return tl::unexpected(std::move(loaded.error()));
     }

@@ -3,7 +3,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "partition/joints.hpp"
-#include "store/ties_blob.hpp"
+#include "store/correlation_blob.hpp"
 
 namespace tfdude {
 namespace {
@@ -55,23 +55,23 @@ Result<Correlation> read_said(const sqlite::Statement& row) {
   if (ok) ok = check_id(row.text(0), "id");
   if (!ok) return tl::unexpected(std::move(ok.error()));
   auto said = correlation_from(row.bytes(1));
-  if (!said) return fail_at("ties of " + quote(row.text(0)), said.error());
+  if (!said) return fail_at("correlation of " + quote(row.text(0)), said.error());
   return said;
 }
 
-Result<KeptTies> read_ties(const sqlite::Statement& row) {
+Result<StoredCorrelation> read_stored_correlation(const sqlite::Statement& row) {
   if (auto ok = row.check_types({SQLITE_TEXT, SQLITE_BLOB, SQLITE_BLOB}); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
   auto said = read_said(row);
   if (!said) return tl::unexpected(std::move(said.error()));
-  KeptTies ties{*std::move(said), {}};
+  StoredCorrelation correlation{*std::move(said), {}};
   if (const std::string bytes = row.bytes(2); !bytes.empty()) {
     auto observed = correlation_from(bytes);
-    if (!observed) return fail_at("ties of " + quote(row.text(0)), observed.error());
-    ties.observed = *std::move(observed);
+    if (!observed) return fail_at("correlation of " + quote(row.text(0)), observed.error());
+    correlation.observed = *std::move(observed);
   }
-  return ties;
+  return correlation;
 }
 
 Result<StoredJoint> read_joint(const sqlite::Statement& row) {

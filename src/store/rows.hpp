@@ -13,7 +13,7 @@ namespace tfdude {
 /// Rows come in the order of their ids. @param before  the id of the row before
 [[nodiscard]] Result<FrameSpec> read_frame(const sqlite::Statement& row, const std::string& before);
 [[nodiscard]] Result<Note> read_note(const sqlite::Statement& row, const std::string& before);
-[[nodiscard]] Result<KeptTies> read_ties(const sqlite::Statement& row);
+[[nodiscard]] Result<StoredCorrelation> read_stored_correlation(const sqlite::Statement& row);
 /// Of an entry of the configuration.
 [[nodiscard]] Result<Correlation> read_said(const sqlite::Statement& row);
 /// Of a joint whose type is not known.

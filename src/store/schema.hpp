@@ -9,7 +9,7 @@ namespace tfdude {
 inline constexpr std::int64_t kApplication = 0x74666475;  // "tfdu"
 
 inline constexpr std::int64_t kJointsFormat = 2;  ///< the first that has joints,
-inline constexpr std::int64_t kTiesFormat =
+inline constexpr std::int64_t kCorrelationFormat =
     3;  ///< and the types of these, and what edges' errors have to do with each other,
 inline constexpr std::int64_t kAbsentFormat = 3;  ///< and whom the partition misses
 inline constexpr std::int64_t kFormat = 3;

@@ -9,11 +9,11 @@
 
 #include "partition/incarnation.hpp"
 #include "partition/joints.hpp"
+#include "store/correlation_blob.hpp"
 #include "store/read_state.hpp"
 #include "store/rows.hpp"
 #include "store/schema.hpp"
 #include "store/sqlite.hpp"
-#include "store/ties_blob.hpp"
 
 namespace tfdude {
 namespace {
@@ -60,7 +60,7 @@ class SqliteStore final : public StateStore {
   Result<void> make_ready();
   Result<void> save_joints(const std::vector<StoredJoint>& joints);
   Result<void> save_absent(const std::vector<Absent>& absent);
-  Result<void> save_ties(const std::string& id, const KeptTies& ties);
+  Result<void> save_correlation(const std::string& id, const StoredCorrelation& correlation);
   template <class Write>
   Result<void> transaction(Write write);
 
@@ -79,9 +79,9 @@ class SqliteStore final : public StateStore {
   // Of tables that an older format has not got.
   Statement put_joint_;
   Statement put_joint_type_;
-  Statement erase_ties_;
-  Statement put_ties_;
-  Statement put_configured_ties_;
+  Statement erase_correlation_;
+  Statement put_correlation_;
+  Statement put_configured_correlation_;
   Statement clear_absent_;
   Statement put_absent_;
 };
@@ -224,10 +224,10 @@ Result<void> SqliteStore::prepare_newer() {
   const std::pair<Statement*, const char*> all[] = {
       {&put_joint_, "INSERT OR REPLACE INTO joints VALUES(?1, ?2, ?3)"},
       {&put_joint_type_, "INSERT OR REPLACE INTO joint_types VALUES(?1, ?2)"},
-      {&erase_ties_, "DELETE FROM ties WHERE id = ?1"},
-      {&put_ties_,
+      {&erase_correlation_, "DELETE FROM ties WHERE id = ?1"},
+      {&put_correlation_,
        "INSERT INTO ties SELECT ?1, ?2, ?3 WHERE EXISTS(SELECT 1 FROM frames WHERE id = ?1)"},
-      {&put_configured_ties_, "INSERT INTO configured_ties VALUES(?1, ?2)"},
+      {&put_configured_correlation_, "INSERT INTO configured_ties VALUES(?1, ?2)"},
       {&clear_absent_, "DELETE FROM absent"},
       {&put_absent_, "INSERT INTO absent VALUES(?1, ?2, ?3, ?4)"},
   };
@@ -277,12 +277,12 @@ Result<void> SqliteStore::save(const StateChange& change) {
     Result<void> done = set_epoch_.run(change.epoch);
     for (const std::string& id : change.erased) {
       if (done) done = erase_frame_.run(id);
-      if (done) done = erase_ties_.run(id);
+      if (done) done = erase_correlation_.run(id);
       if (done) done = erase_note_.run(id);
     }
     for (const StoredFrame& frame : change.frames) {
       if (done) done = put_frame_.run(frame.id, frame.parent, to_flat(frame.X_PC), frame.since);
-      if (done) done = save_ties(frame.id, frame.ties);
+      if (done) done = save_correlation(frame.id, frame.correlation);
     }
     for (const Note& note : change.notes) {
       const auto kind = static_cast<std::uint64_t>(note.kind);
@@ -315,11 +315,12 @@ Result<void> SqliteStore::save_joints(const std::vector<StoredJoint>& joints) {
   return done;
 }
 
-Result<void> SqliteStore::save_ties(const std::string& id, const KeptTies& ties) {
-  auto done = erase_ties_.run(id);
-  if (!done || ties.empty()) return done;
-  const Blob observed{ties.observed ? to_blob(*ties.observed) : std::string()};
-  return put_ties_.run(id, Blob{to_blob(ties.said)}, observed);
+Result<void> SqliteStore::save_correlation(const std::string& id,
+                                           const StoredCorrelation& correlation) {
+  auto done = erase_correlation_.run(id);
+  if (!done || correlation.empty()) return done;
+  const Blob observed{correlation.observed ? to_blob(*correlation.observed) : std::string()};
+  return put_correlation_.run(id, Blob{to_blob(correlation.said)}, observed);
 }
 
 Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges,
@@ -328,7 +329,7 @@ Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges,
     Result<void> done;
     for (const ChangedEdge& edge : edges) {
       if (done) done = set_value_.run(edge.id, to_flat(edge.X_PC));
-      if (done) done = save_ties(edge.id, edge.ties);
+      if (done) done = save_correlation(edge.id, edge.correlation);
     }
     return done ? save_joints(joints) : done;
   });
@@ -340,7 +341,7 @@ Result<void> SqliteStore::save_configured(const std::vector<FrameSpec>& frames) 
     for (const FrameSpec& frame : frames) {
       if (done) done = put_configured_.run(frame.id, frame.parent, to_flat(value_of(frame)));
       if (!done || frame.correlation.empty()) continue;
-      done = put_configured_ties_.run(frame.id, Blob{to_blob(frame.correlation)});
+      done = put_configured_correlation_.run(frame.id, Blob{to_blob(frame.correlation)});
     }
     return done;
   });

@@ -19,13 +19,13 @@
 #include "tfdude/types/query.hpp"
 
 #include "tree/news.hpp"
+#include "tree/path_correlation.hpp"
 #include "tree/segments.hpp"
-#include "tree/ties.hpp"
 
 namespace tfdude {
 
-/// A new value X_PC for an edge, with how the edge's error hangs together with those of others, in the same commit.
-struct TiedUpdate {
+/// A new value X_PC for an edge, with how the edge's error is correlated with those of others, in the same commit.
+struct CorrelatedUpdate {
   Handle frame;
   Transform X_PC;
   const Correlation* correlation = nullptr;  ///< null: as before
@@ -47,8 +47,8 @@ struct HistoryRestart {
 /// What of a held edge outlives its process.
 struct ChangedEdge {
   std::string id;
-  Transform X_PC;  ///< its covariance is that of the edge's own part where it has ties
-  KeptTies ties{};
+  Transform X_PC;  ///< its covariance is that of the edge's own part where it is correlated
+  StoredCorrelation correlation{};
 };
 
 /// The coordinate frames that one process knows: a forest whose edges carry either a value (held here) or
@@ -108,8 +108,8 @@ class Forest {
   [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges,
                                     std::optional<Time> stamp = std::nullopt);
   /// The same with correlations. @return as update(); kInvalidInput also where a correlation is none, naming the source.
-  [[nodiscard]] Result<void> update_tied(const std::vector<TiedUpdate>& edges,
-                                         std::optional<Time> stamp = std::nullopt);
+  [[nodiscard]] Result<void> update_correlated(const std::vector<CorrelatedUpdate>& edges,
+                                               std::optional<Time> stamp = std::nullopt);
 
   /// Gives parts of edges new values, as one commit: what is absent stays as it is in the newest value of then.
   /// @return as update(); kInvalidInput also where a part is none (naming it).
@@ -123,14 +123,14 @@ class Forest {
   /// That of all edges for which nothing else is said, from their first sample on.
   [[nodiscard]] Result<void> set_default_timing(const EdgeTiming& timing);
 
-  /// Says how an edge's error hangs together with those of others, from now on and for all its past. Updates leave that as
+  /// Says how an edge's error is correlated with those of others, from now on and for all its past. Updates leave that as
   /// it is.
   /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the source).
   [[nodiscard]] Result<void> correlate(std::string_view id, const Correlation& correlation);
 
   /// Takes up what an earlier process has kept of a held edge's correlation.
   /// @return as correlate().
-  [[nodiscard]] Result<void> resume(std::string_view id, const KeptTies& ties);
+  [[nodiscard]] Result<void> resume(std::string_view id, const StoredCorrelation& correlation);
 
   /// Gives edges the values that an observation makes of them, as one commit: all, or on an error none. What it says of
   /// correlation holds until the edge's next update; on a moving edge, whose next sample comes anyway, it is only added to

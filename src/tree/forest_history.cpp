@@ -33,7 +33,7 @@ Forest::Impl::~Impl() {
   for (std::uint32_t slot = 0; slot < frames_.size(); ++slot) {
     if (!frames_.newest(slot).held()) continue;
     delete frames_.newest_value(slot).ring;
-    delete frames_.newest_value(slot).ties;
+    delete frames_.newest_value(slot).correlation;
   }
 }
 

@@ -101,25 +101,25 @@ class Forest::Impl {
                         bool replace);
   void begin_told_history(std::uint32_t slot, const News& value);
 
-  // Of what errors have to do with each other (forest_ties.cpp).
+  // Of what errors have to do with each other (forest_correlation.cpp).
 
-  /// Gives the fresh version other ties; null for none.
-  void set_ties(HeldVersion& fresh, std::unique_ptr<EdgeTies> ties);
+  /// Gives the fresh version another correlation; null for none.
+  void set_correlation(HeldVersion& fresh, std::unique_ptr<EdgeCorrelation> correlation);
   /// What an observation has said of the edge goes with its value.
   void end_revision(HeldVersion& fresh) {
-    if (fresh.ties != nullptr && fresh.ties->revised) tie_as_said(fresh);
+    if (fresh.correlation != nullptr && fresh.correlation->revised) correlate_as_said(fresh);
   }
-  void tie_as_said(HeldVersion& fresh);
-  /// Pushes the newest value once more, with other ties.
-  void say_ties(std::uint32_t slot, const Correlation& correlation);
+  void correlate_as_said(HeldVersion& fresh);
+  /// Pushes the newest value once more, with another correlation.
+  void say_correlation(std::uint32_t slot, const Correlation& said);
   [[nodiscard]] Result<void> check_revision(const HeldVersion& edge, const Revision& revision,
                                             std::optional<Time> stamp, std::uint64_t seen);
   /// With the whole covariance that an edge has but for shares of declared sources: what is kept of an observed one where
   /// shares of observations are not.
   [[nodiscard]] static Transform whole(const Transform& X_PC, const Correlation& correlation);
   [[nodiscard]] static Transform whole(const HeldVersion& edge) {
-    const bool observed = edge.ties != nullptr && edge.ties->revised;
-    return observed ? whole(edge.X_PC, edge.ties->now) : edge.X_PC;
+    const bool observed = edge.correlation != nullptr && edge.correlation->revised;
+    return observed ? whole(edge.X_PC, edge.correlation->now) : edge.X_PC;
   }
   [[nodiscard]] static ChangedEdge kept(const HeldVersion& edge);
   /// The moving edge's sample of that stamp, where there is one, becomes another.

@@ -66,14 +66,15 @@ void Forest::take(const std::vector<Handle>& edges, const std::vector<News>& val
     const HeldVersion* edge = edge_of(value);
     if (edge != nullptr && impl_->push_told(*edge, value, replace)) changed = true;
   }
-  std::vector<bool> tied(edges.size(), false);
+  std::vector<bool> correlated(edges.size(), false);
   for (auto value = values.rbegin(); value != values.rend(); ++value) {
     const HeldVersion* edge = edge_of(*value);
-    if (edge == nullptr || tied[value->index]) continue;
-    tied[value->index] = true;
-    const Correlation before = edge->ties != nullptr ? edge->ties->now : Correlation();
+    if (edge == nullptr || correlated[value->index]) continue;
+    correlated[value->index] = true;
+    const Correlation before =
+        edge->correlation != nullptr ? edge->correlation->now : Correlation();
     if (before == value->correlation || !check_shares(value->correlation.shares)) continue;
-    impl_->say_ties(edge->slot, value->correlation);
+    impl_->say_correlation(edge->slot, value->correlation);
     changed = true;
   }
   if (changed) impl_->commit();

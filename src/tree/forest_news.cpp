@@ -49,7 +49,7 @@ PastInfo past_of(const HeldVersion& edge) {
 }
 
 Correlation correlation_of(const HeldVersion& edge) {
-  return edge.ties != nullptr ? edge.ties->now : Correlation();
+  return edge.correlation != nullptr ? edge.correlation->now : Correlation();
 }
 
 // The number of the first sample that may be told, of those up to the edge's newest.

@@ -75,13 +75,14 @@ std::uint64_t newest_history(const std::vector<Ends>& segments) {
   return newest;
 }
 
-// Ties are told where any segment has some.
-void tell(std::vector<Reached>&& from, std::vector<Transform>& values, std::vector<Ties>& ties) {
+// Correlation is told where any segment has some.
+void tell(std::vector<Reached>&& from, std::vector<Transform>& values,
+          std::vector<PathCorrelation>& correlations) {
   values.clear();
   for (const auto& one : from) values.push_back(one.X);
-  const auto none = [](const auto& one) { return one.ties.empty(); };
+  const auto none = [](const auto& one) { return one.correlation.empty(); };
   if (std::all_of(from.begin(), from.end(), none)) return;
-  for (auto& one : from) ties.push_back(std::move(one.ties));
+  for (auto& one : from) correlations.push_back(std::move(one.correlation));
 }
 
 // Adds what each single edge was observed with.
@@ -90,11 +91,11 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
     const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;
     return child->held() ? static_cast<const HeldVersion*>(child) : nullptr;
   };
-  found.ties.resize(edges.size());
+  found.correlations.resize(edges.size());
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const HeldVersion* edge = edge_of(edges[i]);
-    if (edge == nullptr || edge->ties == nullptr) continue;
-    found.ties[i].observed_with = edge->ties->now.observed_with;
+    if (edge == nullptr || edge->correlation == nullptr) continue;
+    found.correlations[i].observed_with = edge->correlation->now.observed_with;
   }
 }
 
@@ -114,7 +115,7 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
   if (!t) {
     auto newest = newest_values(*ends, query.order, met);
     if (!newest) return tl::unexpected(std::move(newest.error()));
-    tell(*std::move(newest), found.values, found.ties);
+    tell(*std::move(newest), found.values, found.correlations);
     if (const HeldVersion* limiting = met.limiting) {
       found.stamp = time_of(limiting->stamp);
       const std::int64_t before =
@@ -126,14 +127,14 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
   if (t) {
     auto values = values_at(*ends, nanoseconds(*t), query, met);
     if (!values) return tl::unexpected(std::move(values.error()));
-    found.ties.clear();
-    tell(*std::move(values), found.values, found.ties);
+    found.correlations.clear();
+    tell(*std::move(values), found.values, found.correlations);
     if (met.moving) found.stamp = t;
   }
   if (edges) tell_observed_with(*ends, found);
   if (hint && found.stamp && hint != found.stamp) {
     auto values = values_at(*ends, nanoseconds(*hint), query, met);
-    if (values) tell(*std::move(values), found.at_hint, found.ties_at_hint);
+    if (values) tell(*std::move(values), found.at_hint, found.correlations_at_hint);
   }
   return found;
 }

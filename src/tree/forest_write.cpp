@@ -17,7 +17,7 @@ std::uint32_t next_generation() {
 
 const Correlation* correlation_of(const EdgeUpdate&) { return nullptr; }
 const Correlation* correlation_of(const HandleUpdate&) { return nullptr; }
-const Correlation* correlation_of(const TiedUpdate& update) { return update.correlation; }
+const Correlation* correlation_of(const CorrelatedUpdate& update) { return update.correlation; }
 
 template <class Update>
 Result<void> check_said(const Update& update) {
@@ -98,12 +98,12 @@ HeldVersion& Forest::Impl::push_held(std::uint32_t slot, const Transform& X_PC) 
     fresh.stamp = before.stamp;
     fresh.number = before.number;
     fresh.ring = before.ring;
-    fresh.ties = before.ties;
+    fresh.correlation = before.correlation;
     fresh.history = before.history;
   } else {
     fresh.stamp = kAlways;
     fresh.ring = nullptr;
-    fresh.ties = nullptr;
+    fresh.correlation = nullptr;
     fresh.history = fresh.commit;
   }
   return fresh;
@@ -134,7 +134,7 @@ void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
 void Forest::Impl::make_absent(std::uint32_t slot) {
   if (frames_.newest(slot).held()) {
     give_back(frames_.newest_value(slot).ring, slot);
-    reclaimer_.supersede(frames_.newest_value(slot).ties);
+    reclaimer_.supersede(frames_.newest_value(slot).correlation);
   }
   Version& fresh = push_remote(slot);
   const std::uint32_t parent = fresh.parent;
@@ -298,7 +298,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   if (!fits) return fits;
   for (std::size_t i = 0; i < edges.size(); ++i) {
     push_value(to_update_[i], edges[i].X_PC, *at);
-    if (const Correlation* said = correlation_of(edges[i])) say_ties(to_update_[i], *said);
+    if (const Correlation* said = correlation_of(edges[i])) say_correlation(to_update_[i], *said);
   }
   commit();
   return {};
@@ -322,9 +322,10 @@ Result<void> Forest::update_partial(const std::vector<PartialUpdate>& edges,
   return impl_->update_all(*whole, &EdgeUpdate::id, stamp);
 }
 
-Result<void> Forest::update_tied(const std::vector<TiedUpdate>& edges, std::optional<Time> stamp) {
+Result<void> Forest::update_correlated(const std::vector<CorrelatedUpdate>& edges,
+                                       std::optional<Time> stamp) {
   const std::lock_guard lock(impl_->mutex_);
-  return impl_->update_all(edges, &TiedUpdate::frame, stamp);
+  return impl_->update_all(edges, &CorrelatedUpdate::frame, stamp);
 }
 
 Result<void> Forest::move(std::string_view id, std::string_view parent,

@@ -126,10 +126,10 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edg
 }
 
 void tie(PathAccumulation<Belief>& path, const HeldVersion& edge) {
-  if (edge.ties == nullptr) {
-    path.tie(false, nullptr);
+  if (edge.correlation == nullptr) {
+    path.correlate_next(false, nullptr);
   } else {
-    path.tie(edge.ties->now.unknown, &edge.ties->now.shares);
+    path.correlate_next(edge.correlation->now.unknown, &edge.correlation->now.shares);
   }
 }
 
@@ -173,10 +173,10 @@ Result<Value> PathLookup::walk(const Ends& ends, Absent absent, Order order, Tak
   return join(std::move(path_a), std::move(path_b));
 }
 
-// Only a Belief has room for what an edge is tied to.
+// Only a Belief has room for correlation.
 template <class Value>
-bool leaves_out_ties(const HeldVersion& edge) {
-  return std::is_same_v<Value, Transform> && edge.ties != nullptr;
+bool leaves_out_correlation(const HeldVersion& edge) {
+  return std::is_same_v<Value, Transform> && edge.correlation != nullptr;
 }
 
 template <class Value>
@@ -185,7 +185,7 @@ Result<Value> PathLookup::walk_newest(const Ends& ends, Absent absent, Order ord
   // they lie there.
   const HeldVersion* limiting = nullptr;
   bool mixed = false;
-  bool tied = false;
+  bool correlated = false;
   auto newest = walk<Value>(ends, absent, order, [&](auto& path, const HeldVersion& edge) {
     if (edge.moving()) {
       if (limiting == nullptr) limiting = &edge;
@@ -194,12 +194,12 @@ Result<Value> PathLookup::walk_newest(const Ends& ends, Absent absent, Order ord
         if (edge.stamp < limiting->stamp) limiting = &edge;
       }
     }
-    if (leaves_out_ties<Value>(edge)) tied = true;
-    if (!mixed && !tied) path.up(value_of<Value>(edge));
+    if (leaves_out_correlation<Value>(edge)) correlated = true;
+    if (!mixed && !correlated) path.up(value_of<Value>(edge));
     return Result<void>();
   });
-  met = {limiting, limiting != nullptr, tied};
-  if (!newest || !mixed || tied) return newest;
+  met = {limiting, limiting != nullptr, correlated};
+  if (!newest || !mixed || correlated) return newest;
   Query query;
   query.order = order;
   return walk_at<Value>(ends, absent, met.limiting->stamp, query, met);
@@ -215,12 +215,12 @@ Result<Value> PathLookup::walk_at(const Ends& ends, Absent absent, std::int64_t 
   Moment moment{t, age, query};
   return walk<Value>(ends, absent, query.order,
                      [&](auto& path, const HeldVersion& edge) -> Result<void> {
-                       if (leaves_out_ties<Value>(edge)) met.tied = true;
+                       if (leaves_out_correlation<Value>(edge)) met.correlated = true;
                        if (edge.moving()) {
                          met.moving = true;
                          return accumulate_at<Value>(path, edge, moment);
                        }
-                       if (!met.tied) path.up(value_of<Value>(edge));
+                       if (!met.correlated) path.up(value_of<Value>(edge));
                        return {};
                      });
 }
@@ -237,7 +237,7 @@ Result<Reached> PathLookup::reach_newest(const Ends& ends, Absent absent, Order 
   if (order == Order::kSecond) {
     const auto plain = walk_newest<Transform>(ends, absent, order, met);
     if (!plain) return tl::unexpected(plain.error());
-    if (!met.tied) return Reached{*plain, {}};
+    if (!met.correlated) return Reached{*plain, {}};
   }
   met = {};
   return walk_newest<Belief>(ends, absent, order, met).map(reached_of);
@@ -248,7 +248,7 @@ Result<Reached> PathLookup::reach_at(const Ends& ends, Absent absent, std::int64
   if (query.order == Order::kSecond) {
     const auto plain = walk_at<Transform>(ends, absent, t, query, met);
     if (!plain) return tl::unexpected(plain.error());
-    if (!met.tied) return Reached{*plain, {}};
+    if (!met.correlated) return Reached{*plain, {}};
   }
   met = {};
   return walk_at<Belief>(ends, absent, t, query, met).map(reached_of);
@@ -263,7 +263,7 @@ Result<Value> PathLookup::look_up(Name a, Name b) const {
   auto newest = walk_newest<Value>(*found, Absent::kEnds, Order::kSecond, met);
   if constexpr (std::is_same_v<Value, Transform>) {
     // Into the same place, which then is not copied where all is independent.
-    if (newest && met.tied) {
+    if (newest && met.correlated) {
       met = {};
       newest = walk_newest<Belief>(*found, Absent::kEnds, Order::kSecond, met).map(collapse);
     }
@@ -289,8 +289,8 @@ Result<StampedTransform> PathLookup::look_up(Name a, Name b, const Query& query)
   }
   if (!X_AB) return tl::unexpected(std::move(X_AB.error()));
   if (!met.moving) at.reset();
-  if (X_AB->ties.empty()) return StampedTransform{X_AB->X, at, {query.order, false, {}}};
-  return collapsed(belief_of(X_AB->X, X_AB->ties), query.order, at);
+  if (X_AB->correlation.empty()) return StampedTransform{X_AB->X, at, {query.order, false, {}}};
+  return collapsed(belief_of(X_AB->X, X_AB->correlation), query.order, at);
 }
 
 // For the one name of a frame and the other.

@@ -6,10 +6,10 @@
 
 namespace tfdude {
 
-/// What a walk comes to, with the ties of what has any.
+/// What a walk comes to, with the correlation of what has any.
 struct Reached {
   Transform X;
-  Ties ties;
+  PathCorrelation correlation;
 };
 
 /// Where the frames at the two ends of a path are to each other, by a walk from both to where these meet. Stateless: under
@@ -26,7 +26,7 @@ class PathLookup {
     const HeldVersion* limiting =
         nullptr;  ///< whose newest sample is the oldest; null where none is moving
     bool moving = false;
-    bool tied = false;  ///< an edge has ties: a Transform is not enough, and none is given
+    bool correlated = false;  ///< an edge is: a Transform is not enough, and none is given
   };
 
   /// X_AB at the newest instant that all moving edges have: that of the newest sample of Met::limiting.

@@ -26,7 +26,7 @@ class Reclaimer {
   // Of the commit that is being made, or of one before. Null is nothing.
   void supersede(Version* version) { versions_.push_back(version); }
   void supersede(Ring* ring) { rings_.superseded.emplace_back(ring); }
-  void supersede(EdgeTies* ties) { ties_.superseded.emplace_back(ties); }
+  void supersede(EdgeCorrelation* correlation) { ties_.superseded.emplace_back(correlation); }
 
   /// Whether it is time for collect().
   [[nodiscard]] bool is_due() const { return versions_.size() > kCollectAt; }
@@ -51,7 +51,7 @@ class Reclaimer {
   VersionPool<Version> remote_pool_;
   std::vector<Version*> versions_;  // superseded since the readers were last asked
   Waiting<Ring> rings_;
-  Waiting<EdgeTies> ties_;
+  Waiting<EdgeCorrelation> ties_;
 };
 
 }  // namespace tfdude

@@ -9,7 +9,7 @@
 #include "tfdude/base/time.hpp"
 #include "tfdude/math/transform.hpp"
 
-#include "tree/ties.hpp"
+#include "tree/path_correlation.hpp"
 
 namespace tfdude {
 
@@ -39,9 +39,9 @@ struct SegmentValues {
   /// Since the sample before the newest, of the edge whose newest sample is the oldest.
   std::chrono::nanoseconds period{0};
   std::vector<Transform> at_hint;  ///< the same at another instant; empty if that is not to be had
-  /// By segment, whose values' covariances are of own parts then; empty if no edge is tied to any other.
-  std::vector<Ties> ties{};
-  std::vector<Ties> ties_at_hint{};
+  /// By segment, whose values' covariances are of own parts then; empty if no edge is correlated with any other.
+  std::vector<PathCorrelation> correlations{};
+  std::vector<PathCorrelation> correlations_at_hint{};
   std::uint64_t commit = 0;       ///< of which the values are; see revise()
   std::uint64_t history = 0;      ///< the newest of their edges': see News
   std::uint64_t incarnation = 0;  ///< of the owner that counts the commits; see Partition

@@ -48,7 +48,7 @@ struct Version {
 };
 
 /// What an edge's error has to do with others'. Immutable, shared by the edge's versions.
-struct EdgeTies {
+struct EdgeCorrelation {
   Correlation said;
   Correlation now;       ///< after observations, until the next update
   bool revised = false;  ///< the two differ
@@ -59,8 +59,8 @@ struct EdgeTies {
 struct HeldVersion : Version {
   std::int64_t stamp = kAlways;  // of the newest sample
   std::uint64_t number = 0;      // its number in the ring
-  Ring* ring = nullptr;       // null: there is no past, nor anything said of how it is to be kept
-  EdgeTies* ties = nullptr;   // null: independent of all else
+  Ring* ring = nullptr;  // null: there is no past, nor anything said of how it is to be kept
+  EdgeCorrelation* correlation = nullptr;  // null: independent of all else
   std::uint64_t history = 0;  // the commit with which its values began: none before is of this edge
   Transform X_PC;
 

@@ -20,8 +20,8 @@
 #include "fuzz/wire.hpp"
 #include "math/flat.hpp"
 #include "partition/partition.hpp"
+#include "store/correlation_blob.hpp"
 #include "store/sqlite_store.hpp"
-#include "store/ties_blob.hpp"
 #include "support/replica.hpp"
 
 namespace tfdude::fuzz {
@@ -69,12 +69,13 @@ std::vector<std::string> lines_of(const StoredState& state) {
     const Flat flat = to_flat(X);
     return std::string(reinterpret_cast<const char*>(flat.data()), sizeof flat);
   };
-  const auto ties = [](const KeptTies& kept) {
+  const auto correlation = [](const StoredCorrelation& kept) {
     return to_blob(kept.said) + (kept.observed ? to_blob(*kept.observed) : std::string());
   };
   for (const StoredFrame& frame : state.frames) {
     lines.push_back("frame " + frame.id + " < " + frame.parent + ", " +
-                    std::to_string(frame.since) + ", " + bits(frame.X_PC) + ties(frame.ties));
+                    std::to_string(frame.since) + ", " + bits(frame.X_PC) +
+                    correlation(frame.correlation));
   }
   for (const Note& note : state.notes) {
     lines.push_back("note " + note.id + ", " + std::to_string(note.since) + ", " +

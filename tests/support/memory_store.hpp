@@ -39,7 +39,7 @@ class MemoryStore final : public StateStore {
       const auto there = frames_.find(edge.id);
       if (there == frames_.end()) continue;
       there->second.X_PC = edge.X_PC;
-      there->second.ties = edge.ties;
+      there->second.correlation = edge.correlation;
     }
     return {};
   }

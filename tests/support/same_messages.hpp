@@ -59,7 +59,8 @@ inline void check_same(const ReviseRequest& actual, const ReviseRequest& expecte
   }
 }
 
-inline void check_same(const std::vector<Ties>& actual, const std::vector<Ties>& expected) {
+inline void check_same(const std::vector<PathCorrelation>& actual,
+                       const std::vector<PathCorrelation>& expected) {
   REQUIRE(actual.size() == expected.size());
   for (std::size_t i = 0; i < actual.size(); ++i) {
     CHECK(actual[i].shares == expected[i].shares);

@@ -135,15 +135,15 @@ bool take(const Bytes& bytes) {
        18446744073709551610ULL}};
 }
 
-[[nodiscard]] inline SegmentValues tied_values(Random& random) {
+[[nodiscard]] inline SegmentValues correlated_values(Random& random) {
   SegmentValues found;
   found.values = {random.transform(), random.transform()};
   found.stamp = time_of(5);
   found.period = std::chrono::nanoseconds(6);
   found.at_hint = {random.transform(), random.transform()};
   const Correlation some = correlation(random);
-  found.ties = {{}, {random.covariance(), some.shares, some.observed_with}};
-  found.ties_at_hint = {{random.covariance(), {}, {}}, {}};
+  found.correlations = {{}, {random.covariance(), some.shares, some.observed_with}};
+  found.correlations_at_hint = {{random.covariance(), {}, {}}, {}};
   found.commit = 77;
   found.incarnation = 78;
   return found;
@@ -202,7 +202,7 @@ bool take(const Bytes& bytes) {
            State{18446744073709551615ULL,
                  {{0, std::nullopt, random.transform()}, {7, time_of(5), Transform()}}}},
           {9, 1, std::vector<PastInfo>{}},
-          {11, 1, tied_values(random)},
+          {11, 1, correlated_values(random)},
           {12, 1, std::vector<EdgeConsistency>{{"hand", 7, 3, {1.5, 2.5, 3.5}}, {}}},
           {13, 1, joint_infos()},
           {10, 1, std::vector<PastInfo>{past_info("hand"), PastInfo{}}}};

@@ -228,7 +228,7 @@ class TFDUDE_EXPORT Client {
                                       std::optional<Time> stamp = std::nullopt,
                                       const ObserveOptions& options = {});
 
-  /// Says how the error of an edge hangs together with those of others: for all its values, also those of the past, until it
+  /// Says how the error of an edge is correlated with those of others: for all its values, also those of the past, until it
   /// is said anew; an empty one makes it independent. Its covariance is that of its own part from now on. Acknowledged by
   /// its owner, and stored like a value. What observations have left of correlation goes.
   /// @return kUnknownFrame, kInvalidInput (naming the source; the names of observations' are not to be given; a joint that

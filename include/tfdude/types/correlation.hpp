@@ -7,7 +7,7 @@
 
 namespace tfdude {
 
-/// How an edge's error hangs together with those of other edges. Its covariance is that of its own part.
+/// How an edge's error is correlated with those of other edges. Its covariance is that of its own part.
 struct Correlation {
   bool unknown = false;       ///< that part may be correlated with anything
   std::vector<Share> shares;  ///< beside that part

@@ -63,7 +63,7 @@ void CdrWalk::transforms() {
   sequence([&] { transform(); });
 }
 
-void CdrWalk::ties() {
+void CdrWalk::correlation() {
   constexpr std::uint32_t kMaxFactor = 216;
   octet();
   sequence([&] { skip(8, 8); }, Covariance::kSize);
@@ -73,8 +73,8 @@ void CdrWalk::ties() {
         sequence([&] { skip(8, 8); }, kMaxFactor);
         id();
       },
-      kMaxTies);
-  sequence([&] { id(); }, kMaxTies);
+      kMaxCorrelated);
+  sequence([&] { id(); }, kMaxCorrelated);
 }
 
 void CdrWalk::revised_edge() {
@@ -83,7 +83,7 @@ void CdrWalk::revised_edge() {
   octet();
   octet();
   transform();
-  ties();
+  correlation();
 }
 
 void CdrWalk::state() {
@@ -98,9 +98,9 @@ void CdrWalk::state() {
   sequence(
       [&] {
         ulong();
-        ties();
+        correlation();
       },
-      kMaxTies);
+      kMaxCorrelated);
   sequence([&] {
     ulong();
     sequence([&] { skip(8, 8); }, Covariance::kSize);
@@ -187,10 +187,10 @@ void request_body(CdrWalk& walk) {
       break;
     case 10:  // revise
       walk.skip(3 * 8, 8);
-      walk.sequence([&] { walk.revised_edge(); }, kMaxTies);
+      walk.sequence([&] { walk.revised_edge(); }, kMaxCorrelated);
       break;
     case 14:  // correlate
-      walk.ties();
+      walk.correlation();
       break;
     default:
       walk.skip(static_cast<std::size_t>(-1), 1);  // no such request
@@ -247,8 +247,8 @@ bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
       walk.skip(4 * 8, 8);
       walk.transforms();
       walk.transforms();
-      walk.sequence([&] { walk.ties(); }, kMaxTies);
-      walk.sequence([&] { walk.ties(); }, kMaxTies);
+      walk.sequence([&] { walk.correlation(); }, kMaxCorrelated);
+      walk.sequence([&] { walk.correlation(); }, kMaxCorrelated);
       break;
     case 8:
       walk.sequence([&] {

@@ -69,7 +69,7 @@ class CdrWalk {
   void transform() { skip(28 * sizeof(double), 8); }
   void path_ends();
   void transforms();
-  void ties();
+  void correlation();
   void revised_edge();
   void state();
   std::string_view edge();

@@ -2,7 +2,7 @@
 
 #include "tfdude/base/id.hpp"
 
-#include "transport/fastdds/codec_ties.hpp"
+#include "transport/fastdds/codec_correlation.hpp"
 
 namespace tfdude::fastdds {
 

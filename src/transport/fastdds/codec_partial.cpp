@@ -6,7 +6,7 @@
 
 #include "math/flat.hpp"
 #include "transport/fastdds/codec.hpp"
-#include "transport/fastdds/codec_ties.hpp"
+#include "transport/fastdds/codec_correlation.hpp"
 
 namespace tfdude::fastdds {
 namespace {

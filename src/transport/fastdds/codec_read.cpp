@@ -7,9 +7,9 @@
 #include "math/flat.hpp"
 #include "partition/watching.hpp"
 #include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/codec_correlation.hpp"
 #include "transport/fastdds/codec_infos.hpp"
 #include "transport/fastdds/codec_partial.hpp"
-#include "transport/fastdds/codec_ties.hpp"
 #include "transport/fastdds/kinds.hpp"
 
 // From what travels.
@@ -143,7 +143,7 @@ Result<ReviseRequest> read_revise(const wire::ReviseBody& body) {
     if (in.revised() != 0) {
       auto X_PC = computed_from(in.x_pc());
       if (!X_PC) return fail_at("frame " + quote(edge.id), X_PC.error());
-      auto correlation = read_correlation(in.ties());
+      auto correlation = read_correlation(in.edge_correlation());
       if (!correlation) return fail_at("frame " + quote(edge.id), correlation.error());
       edge.revision = Revision{edge.id, *X_PC, *std::move(correlation)};
     }
@@ -277,7 +277,7 @@ Result<SegmentValues> read_stamped(const wire::StampedTransforms& body) {
   return found;
 }
 
-Result<SegmentValues> read_tied(const wire::TiedTransforms& body) {
+Result<SegmentValues> read_correlated(const wire::CorrelatedTransforms& body) {
   wire::StampedTransforms plain;
   plain.stamp(body.stamp());
   plain.period(body.period());
@@ -287,12 +287,13 @@ Result<SegmentValues> read_tied(const wire::TiedTransforms& body) {
   if (!found) return found;
   found->commit = body.seen();
   found->incarnation = body.incarnation();
-  for (const auto& [in, out] : {std::pair{&body.ties(), &found->ties},
-                                std::pair{&body.ties_at_hint(), &found->ties_at_hint}}) {
+  for (const auto& [in, out] :
+       {std::pair{&body.correlations(), &found->correlations},
+        std::pair{&body.correlations_at_hint(), &found->correlations_at_hint}}) {
     for (const wire::Correlation& one : *in) {
-      auto ties = read_ties(one);
-      if (!ties) return fail_at("a reply", ties.error());
-      out->push_back(*std::move(ties));
+      auto correlation = read_path_correlation(one);
+      if (!correlation) return fail_at("a reply", correlation.error());
+      out->push_back(*std::move(correlation));
     }
   }
   return found;
@@ -328,7 +329,7 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
       return {};
     }
     case kTied:
-      return put<SegmentValues>(reply, read_tied(body.tied()));
+      return put<SegmentValues>(reply, read_correlated(body.correlated()));
     case kConsistencies: {
       std::vector<EdgeConsistency> all;
       for (const wire::EdgeConsistency& one : body.consistency())
@@ -373,12 +374,13 @@ Result<State> from_wire(const wire::State& sample) {
     if (!X) return fail_at("a state", X.error());
     state.entries.push_back({entry.index(), *stamp, *X, {}, entry.history(), {}});
   }
-  for (const wire::StateTies& one : sample.ties()) {
+  for (const wire::StateCorrelation& one : sample.correlations()) {
     if (one.entry() >= state.entries.size()) {
-      return fail(Errc::kInvalidInput, "a state: ties of entry " + std::to_string(one.entry()) +
-                                           ", of " + std::to_string(state.entries.size()));
+      return fail(Errc::kInvalidInput, "a state: correlation of entry " +
+                                           std::to_string(one.entry()) + ", of " +
+                                           std::to_string(state.entries.size()));
     }
-    auto correlation = read_correlation(one.ties());
+    auto correlation = read_correlation(one.edge_correlation());
     if (!correlation) return fail_at("a state", correlation.error());
     state.entries[one.entry()].correlation = *std::move(correlation);
   }

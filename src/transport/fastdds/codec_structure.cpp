@@ -3,7 +3,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "transport/fastdds/codec.hpp"
-#include "transport/fastdds/codec_ties.hpp"
+#include "transport/fastdds/codec_correlation.hpp"
 
 // The structure, from what travels.
 namespace tfdude::fastdds {

@@ -39,28 +39,28 @@ std::vector<wire::Share> wire_shares(const std::vector<Share>& shares) {
   return body;
 }
 
-wire::Correlation wire_ties(const Ties& ties) {
+wire::Correlation wire_correlation(const PathCorrelation& correlation) {
   wire::Correlation body;
-  if (ties.unknown) {
-    const Covariance::Upper& upper = ties.unknown->upper();
+  if (correlation.unknown) {
+    const Covariance::Upper& upper = correlation.unknown->upper();
     body.unknown_part().assign(upper.begin(), upper.end());
   }
-  body.shares(wire_shares(ties.shares));
-  for (const std::string& id : ties.observed_with) body.observed_with().emplace_back(id);
+  body.shares(wire_shares(correlation.shares));
+  for (const std::string& id : correlation.observed_with) body.observed_with().emplace_back(id);
   return body;
 }
 
-wire::Correlation wire_ties(const Correlation& correlation) {
-  wire::Correlation body =
-      wire_ties(Ties{std::nullopt, correlation.shares, correlation.observed_with});
+wire::Correlation wire_correlation(const Correlation& correlation) {
+  wire::Correlation body = wire_correlation(
+      PathCorrelation{std::nullopt, correlation.shares, correlation.observed_with});
   body.unknown(correlation.unknown ? 1 : 0);
   return body;
 }
 
-std::vector<wire::Correlation> wire_ties(const std::vector<Ties>& all) {
+std::vector<wire::Correlation> wire_correlation(const std::vector<PathCorrelation>& all) {
   std::vector<wire::Correlation> body;
   body.reserve(all.size());
-  for (const Ties& ties : all) body.push_back(wire_ties(ties));
+  for (const PathCorrelation& correlation : all) body.push_back(wire_correlation(correlation));
   return body;
 }
 
@@ -73,7 +73,7 @@ wire::RevisedEdge wire_revised(const ReviseRequest::Edge& edge) {
   body.refused(edge.refused ? 1 : 0);
   body.revised(edge.revision ? 1 : 0);
   body.x_pc(to_flat(edge.revision ? edge.revision->X_PC : Transform()));
-  if (edge.revision) body.ties(wire_ties(edge.revision->correlation));
+  if (edge.revision) body.edge_correlation(wire_correlation(edge.revision->correlation));
   return body;
 }
 
@@ -159,7 +159,9 @@ struct BodyWriter {
     for (const ReviseRequest::Edge& edge : revise.edges) body.edges().push_back(wire_revised(edge));
     out.revise(std::move(body));
   }
-  void operator()(const CorrelateRequest& said) { out.correlate(wire_ties(said.correlation)); }
+  void operator()(const CorrelateRequest& said) {
+    out.correlate(wire_correlation(said.correlation));
+  }
   void operator()(const JointUpdate& update) { out.joint_update(to_wire(update)); }
   void operator()(const JointsRequest& asked) { out.joint_states(asked.after); }
   void operator()(const ForgetRequest& asked) {
@@ -246,17 +248,17 @@ struct ReplyWriter {
     out.error(std::move(body));
   }
   void operator()(const SegmentValues& found) {
-    if (!found.ties.empty() || !found.ties_at_hint.empty()) {
-      wire::TiedTransforms body;
+    if (!found.correlations.empty() || !found.correlations_at_hint.empty()) {
+      wire::CorrelatedTransforms body;
       body.stamp(wire_stamp(found.stamp));
       body.period(found.period.count());
       body.seen(found.commit);
       body.incarnation(found.incarnation);
       body.values(wire_values(found.values));
       body.at_hint(wire_values(found.at_hint));
-      body.ties(wire_ties(found.ties));
-      body.ties_at_hint(wire_ties(found.ties_at_hint));
-      out.tied(std::move(body));
+      body.correlations(wire_correlation(found.correlations));
+      body.correlations_at_hint(wire_correlation(found.correlations_at_hint));
+      out.correlated(std::move(body));
       return;
     }
     if (!found.stamp && found.at_hint.empty()) {
@@ -331,9 +333,9 @@ wire::State to_wire(const State& state) {
     }
     const Correlation& correlation = state.entries[i].correlation;
     if (correlation.empty()) continue;
-    sample.ties().emplace_back();
-    sample.ties().back().entry(static_cast<std::uint32_t>(i));
-    sample.ties().back().ties(wire_ties(correlation));
+    sample.correlations().emplace_back();
+    sample.correlations().back().entry(static_cast<std::uint32_t>(i));
+    sample.correlations().back().edge_correlation(wire_correlation(correlation));
   }
   return sample;
 }

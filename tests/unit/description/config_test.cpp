@@ -106,7 +106,7 @@ TEST_CASE("what a configuration may leave out") {
   CHECK(tfdude::parse_config("frames: [{id: größe ✓}]", "f")->frames[0].id == "größe ✓");
 }
 
-TEST_CASE("a frame says how its error hangs together with others'") {
+TEST_CASE("a frame says how its error is correlated with others'") {
   const auto config = tfdude::parse_config(
       "frames:\n"
       "  - {id: a}\n"

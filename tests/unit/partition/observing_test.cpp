@@ -53,7 +53,7 @@ std::vector<SegmentValues> answers_to(const ObservePlan& plan, Random& random) {
     const auto& asked = std::get<LookupRequest>(part.request.body).segments;
     SegmentValues answer;
     for (std::size_t i = 0; i < asked.size(); ++i) answer.values.push_back(random.transform());
-    answer.ties.resize(asked.size());
+    answer.correlations.resize(asked.size());
     answer.commit = 7 + answers.size();
     answer.incarnation = 77;
     answers.push_back(std::move(answer));
@@ -104,7 +104,7 @@ TEST_CASE("answers are put together in the order of the edges, and name who is m
   const auto plan = route_observe(known.forest, known.directory, "tool", "world", {}, {});
   REQUIRE(plan);
   auto answers = answers_to(*plan, random);
-  answers[0].ties[0].observed_with = {"tool", "leg", "hand"};
+  answers[0].correlations[0].observed_with = {"tool", "leg", "hand"};
   const auto path = observed_path(*plan, answers);
   REQUIRE(path);
   REQUIRE(path->edges.size() == 3);
@@ -120,9 +120,9 @@ TEST_CASE("answers are put together in the order of the edges, and name who is m
   CHECK_FALSE(path->torn);
   // An observation that has reached one of its owners only.
   const Share share{"observed:other", true, Factor::Ones(6, 1)};
-  answers[0].ties[0].shares = {share};
+  answers[0].correlations[0].shares = {share};
   CHECK(observed_path(*plan, answers)->torn);
-  answers[1].ties[0].shares = {share};
+  answers[1].correlations[0].shares = {share};
   CHECK_FALSE(observed_path(*plan, answers)->torn);
   answers[1].values.pop_back();
   const auto short_of_one = observed_path(*plan, answers);

@@ -165,15 +165,15 @@ TEST_CASE("of an entry of which only the correlation is edited the value stays")
     Life second(store, {kArm, hand}, 2);
     CHECK(second.described() == Lines{"frame 'hand': its correlation is as its entry says now"});
     CHECK(x_of(second.forest.lookup("arm", "tool")) == 120);
-    CHECK(second.forest.kept("hand")->ties.said == kSupply);
+    CHECK(second.forest.kept("hand")->correlation.said == kSupply);
   }
   SECTION("and is kept") {
     Life third(store, {}, 3);
-    CHECK(third.forest.kept("hand")->ties.said == kSupply);
+    CHECK(third.forest.kept("hand")->correlation.said == kSupply);
   }
   SECTION("and goes again") {
     Life third(store, {kArm, kHand}, 3);
-    CHECK(third.forest.kept("hand")->ties.empty());
+    CHECK(third.forest.kept("hand")->correlation.empty());
     CHECK(x_of(third.forest.lookup("arm", "tool")) == 120);
   }
 }

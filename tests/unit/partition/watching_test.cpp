@@ -99,11 +99,11 @@ TEST_CASE("a state in pieces is one again, if all of them come") {
   CHECK(whole->after == 3);
   CHECK(whole->commit == 5);
   CHECK_FALSE(together.add(pieces[2]));
-  State tied{7, {}, 0, 5};
-  for (std::uint32_t i = 0; i <= kMaxTies; ++i) {
-    tied.entries.push_back({i, {}, along_x(i), {true, {}, {}}, 1, {}});
+  State correlated{7, {}, 0, 5};
+  for (std::uint32_t i = 0; i <= kMaxCorrelated; ++i) {
+    correlated.entries.push_back({i, {}, along_x(i), {true, {}, {}}, 1, {}});
   }
-  CHECK(pieces_of(std::move(tied)).size() == 2);
+  CHECK(pieces_of(std::move(correlated)).size() == 2);
   CHECK(pieces_of({7, {}, 0, 5}).size() == 1);
 }
 

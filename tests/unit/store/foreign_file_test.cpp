@@ -106,7 +106,7 @@ TEST_CASE(
                  "DROP TABLE absent; DROP TABLE ties; DROP TABLE configured_ties; DROP TABLE "
                  "joint_types; PRAGMA user_version = 2; "
                  "PRAGMA journal_mode = DELETE");
-  const KeptTies unknown{{true, {}, {}}, {}};
+  const StoredCorrelation unknown{{true, {}, {}}, {}};
   {
     const auto store = open_sqlite_store(file, "arms");
     REQUIRE(store);
@@ -118,7 +118,7 @@ TEST_CASE(
   const auto state = (*store)->load();
   REQUIRE(state);
   REQUIRE(state->frames.size() == 1);
-  CHECK(state->frames[0].ties == unknown);
+  CHECK(state->frames[0].correlation == unknown);
 }
 
 TEST_CASE("a file with rows that no state has is refused as it is") {
@@ -146,7 +146,7 @@ TEST_CASE("a file with rows that no state has is refused as it is") {
        "another type in column"},
       {"INSERT INTO notes VALUES('eye', 1, 5, '')", "a note of kind 5"},
       {"INSERT INTO ties VALUES('nobody', zeroblob(9), x'')",
-       "ties of 'nobody', which is not there"},
+       "correlation of 'nobody', which is not there"},
       {"INSERT INTO ties VALUES('hand', 'text', x'')", "another type in column said"},
       {"INSERT INTO ties VALUES('hand', zeroblob(8), x'')", "a correlation of 8 bytes"},
       {"INSERT INTO ties VALUES('hand', zeroblob(9), x'02')", "a correlation of 1 bytes"},

@@ -162,10 +162,10 @@ TEST_CASE("what edges have to do with each other is kept with their values, and 
     const auto state = store->load();
     REQUIRE(state);
     REQUIRE(state->frames.size() == 4);
-    CHECK(state->frames[0].ties == KeptTies{supply, seen});
-    CHECK(state->frames[1].ties == KeptTies{{}, seen});
-    CHECK(state->frames[2].ties == KeptTies{most, most});
-    CHECK(state->frames[3].ties.empty());
+    CHECK(state->frames[0].correlation == StoredCorrelation{supply, seen});
+    CHECK(state->frames[1].correlation == StoredCorrelation{{}, seen});
+    CHECK(state->frames[2].correlation == StoredCorrelation{most, most});
+    CHECK(state->frames[3].correlation.empty());
     CHECK(state->configured[0].correlation == supply);
     CHECK(state->configured[1].correlation.empty());
     REQUIRE(store->save({2, {"a", "b"}, {{"b", "", X, 2}}, {}}));
@@ -173,7 +173,7 @@ TEST_CASE("what edges have to do with each other is kept with their values, and 
   const auto state = opened(file)->load();
   REQUIRE(state);
   REQUIRE(state->frames.size() == 3);
-  CHECK(state->frames[0].ties.empty());
+  CHECK(state->frames[0].correlation.empty());
 }
 
 TEST_CASE("what was erased is not there") {

@@ -74,8 +74,8 @@ TEST_CASE("replies arrive as they were sent") {
       CHECK(came.period == values->period);
       check_same(came.values, values->values);
       check_same(came.at_hint, values->at_hint);
-      check_same(came.ties, values->ties);
-      check_same(came.ties_at_hint, values->ties_at_hint);
+      check_same(came.correlations, values->correlations);
+      check_same(came.correlations_at_hint, values->correlations_at_hint);
       CHECK(came.commit == values->commit);
     } else if (const auto* state = std::get_if<State>(&one.body)) {
       check_same(std::get<State>(arrived->body), *state);

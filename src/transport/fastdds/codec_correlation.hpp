@@ -17,7 +17,7 @@ namespace tfdude::fastdds {
 }
 
 /// @return kInvalidInput naming the source, or the part of unknown correlation.
-[[nodiscard]] Result<Ties> read_ties(const wire::Correlation& body);
+[[nodiscard]] Result<PathCorrelation> read_path_correlation(const wire::Correlation& body);
 [[nodiscard]] Result<Correlation> read_correlation(const wire::Correlation& body);
 
 }  // namespace tfdude::fastdds

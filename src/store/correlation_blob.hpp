@@ -4,7 +4,7 @@
 
 #include "tfdude/base/result.hpp"
 
-#include "tree/ties.hpp"
+#include "tree/path_correlation.hpp"
 
 namespace tfdude {
 

@@ -7,7 +7,7 @@
 #include "support/catch.hpp"
 #include "tree/forest.hpp"
 
-// Readers of what edges are tied to, while that is said anew, revised and forgotten.
+// Readers of edges' correlation, while that is said anew, revised and forgotten.
 namespace tfdude {
 namespace {
 
@@ -35,7 +35,7 @@ struct Reader {
         return;
       }
       const auto size = [&](std::size_t i) {
-        const auto& shares = parts->ties.at(i).shares;
+        const auto& shares = parts->correlations.at(i).shares;
         return shares.empty() ? 0.0 : shares.front().factor(0, 0);
       };
       if (size(0) != size(1)) finding = "the edges of one commit differ";
@@ -53,7 +53,7 @@ struct Reader {
   }
 };
 
-TEST_CASE("readers see the ties of edges as one commit left them") {
+TEST_CASE("readers see the correlation of edges as one commit left it") {
   Forest forest;
   REQUIRE(forest.add("world", "", {}));
   REQUIRE(forest.add("a", "world", {}));

@@ -9,8 +9,8 @@
 // What the errors of edges have to do with each other.
 namespace tfdude {
 
-Belief belief_of(const Transform& X, const Ties& ties) {
-  return {X.pose, X.covariance, ties.unknown, ties.shares};
+Belief belief_of(const Transform& X, const PathCorrelation& correlation) {
+  return {X.pose, X.covariance, correlation.unknown, correlation.shares};
 }
 
 StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> stamp) {
@@ -22,23 +22,24 @@ StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> sta
   return found;
 }
 
-void Forest::Impl::set_ties(HeldVersion& fresh, std::unique_ptr<EdgeTies> ties) {
-  reclaimer_.supersede(fresh.ties);
-  fresh.ties = ties.release();
+void Forest::Impl::set_correlation(HeldVersion& fresh,
+                                   std::unique_ptr<EdgeCorrelation> correlation) {
+  reclaimer_.supersede(fresh.correlation);
+  fresh.correlation = correlation.release();
 }
 
-void Forest::Impl::tie_as_said(HeldVersion& fresh) {
-  const Correlation& said = fresh.ties->said;
-  std::unique_ptr<EdgeTies> ties;
-  if (!said.empty()) ties.reset(new EdgeTies{said, said, false, 0});
-  set_ties(fresh, std::move(ties));
+void Forest::Impl::correlate_as_said(HeldVersion& fresh) {
+  const Correlation& said = fresh.correlation->said;
+  std::unique_ptr<EdgeCorrelation> correlation;
+  if (!said.empty()) correlation.reset(new EdgeCorrelation{said, said, false, 0});
+  set_correlation(fresh, std::move(correlation));
 }
 
-void Forest::Impl::say_ties(std::uint32_t slot, const Correlation& correlation) {
+void Forest::Impl::say_correlation(std::uint32_t slot, const Correlation& said) {
   HeldVersion& fresh = push_held(slot, whole(frames_.newest_value(slot)));
-  std::unique_ptr<EdgeTies> ties;
-  if (!correlation.empty()) ties.reset(new EdgeTies{correlation, correlation, false, 0});
-  set_ties(fresh, std::move(ties));
+  std::unique_ptr<EdgeCorrelation> correlation;
+  if (!said.empty()) correlation.reset(new EdgeCorrelation{said, said, false, 0});
+  set_correlation(fresh, std::move(correlation));
 }
 
 Result<void> Forest::correlate(std::string_view id, const Correlation& correlation) {
@@ -48,34 +49,35 @@ Result<void> Forest::correlate(std::string_view id, const Correlation& correlati
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
-  impl_->say_ties(*slot, correlation);
+  impl_->say_correlation(*slot, correlation);
   impl_->commit();
   return {};
 }
 
-Result<void> Forest::resume(std::string_view id, const KeptTies& ties) {
-  auto ok = check_shares(ties.said.shares);
-  if (ok && ties.observed) ok = check_shares(ties.observed->shares);
+Result<void> Forest::resume(std::string_view id, const StoredCorrelation& correlation) {
+  auto ok = check_shares(correlation.said.shares);
+  if (ok && correlation.observed) ok = check_shares(correlation.observed->shares);
   if (!ok) return fail_at("frame " + quote(id), ok.error());
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   HeldVersion& fresh = impl_->push_held(*slot, impl_->frames_.newest_value(*slot).X_PC);
-  std::unique_ptr<EdgeTies> resumed;
-  if (!ties.empty()) {
-    resumed.reset(
-        new EdgeTies{ties.said, ties.observed.value_or(ties.said), ties.observed.has_value(), 0});
+  std::unique_ptr<EdgeCorrelation> resumed;
+  if (!correlation.empty()) {
+    resumed.reset(new EdgeCorrelation{correlation.said,
+                                      correlation.observed.value_or(correlation.said),
+                                      correlation.observed.has_value(), 0});
   }
-  impl_->set_ties(fresh, std::move(resumed));
+  impl_->set_correlation(fresh, std::move(resumed));
   impl_->commit();
   return {};
 }
 
 ChangedEdge Forest::Impl::kept(const HeldVersion& edge) {
   ChangedEdge kept{edge.name->text, edge.X_PC, {}};
-  if (edge.ties == nullptr) return kept;
-  kept.ties.said = edge.ties->said;
-  if (edge.ties->revised) kept.ties.observed = edge.ties->now;
+  if (edge.correlation == nullptr) return kept;
+  kept.correlation.said = edge.correlation->said;
+  if (edge.correlation->revised) kept.correlation.observed = edge.correlation->now;
   return kept;
 }
 
@@ -159,10 +161,11 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
       impl_->replace_sample(newest, X_PC, nanoseconds(*stamp));
       continue;
     }
-    const Correlation said = newest.ties != nullptr ? newest.ties->said : Correlation();
+    const Correlation said =
+        newest.correlation != nullptr ? newest.correlation->said : Correlation();
     HeldVersion& fresh = impl_->push_held(slots[i], edges[i].X_PC);
-    impl_->set_ties(fresh,
-                    std::unique_ptr<EdgeTies>(new EdgeTies{said, edges[i].correlation, true, 0}));
+    impl_->set_correlation(fresh, std::unique_ptr<EdgeCorrelation>(
+                                      new EdgeCorrelation{said, edges[i].correlation, true, 0}));
   }
   impl_->commit();
   return {};

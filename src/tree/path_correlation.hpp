@@ -10,19 +10,19 @@
 namespace tfdude {
 
 /// What of an edge's correlation outlives its process.
-struct KeptTies {
+struct StoredCorrelation {
   Correlation said{};
   /// What observations have left, in place of that, until the edge's next value.
   std::optional<Correlation> observed{};
 
   [[nodiscard]] bool empty() const { return said.empty() && !observed; }
-  friend bool operator==(const KeptTies& a, const KeptTies& b) {
+  friend bool operator==(const StoredCorrelation& a, const StoredCorrelation& b) {
     return a.said == b.said && a.observed == b.observed;
   }
 };
 
 /// What a Belief has beside its pose and own part.
-struct Ties {
+struct PathCorrelation {
   std::optional<Covariance> unknown;
   std::vector<Share> shares;
   std::vector<std::string> observed_with;  ///< of a single edge, as in Correlation; else empty
@@ -30,7 +30,7 @@ struct Ties {
   [[nodiscard]] bool empty() const { return !unknown && shares.empty() && observed_with.empty(); }
 };
 
-[[nodiscard]] Belief belief_of(const Transform& X, const Ties& ties);
+[[nodiscard]] Belief belief_of(const Transform& X, const PathCorrelation& correlation);
 
 /// An edge's new value by an observation.
 struct Revision {

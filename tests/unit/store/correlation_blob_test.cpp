@@ -1,4 +1,4 @@
-#include "store/ties_blob.hpp"
+#include "store/correlation_blob.hpp"
 
 #include <cmath>
 #include <string>

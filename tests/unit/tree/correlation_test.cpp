@@ -142,7 +142,8 @@ TEST_CASE("A source is counted at an instant between samples, too") {
   CHECK(transform_diff(*newest, expected, 1e-9) == "");
 }
 
-TEST_CASE("Segments tell their ties, by which the caller composes the path as one forest would") {
+TEST_CASE(
+    "Segments tell their correlation, by which the caller composes the path as one forest would") {
   Random random(655);
   INFO("seed " << random.seed());
   Robot robot(random);
@@ -150,18 +151,18 @@ TEST_CASE("Segments tell their ties, by which the caller composes the path as on
   REQUIRE(robot.forest.correlate("b", {true, {share(random, "s"), share(random, "t")}, {}}));
   const auto parts = robot.forest.lookup_segments({{"c", "world"}, {"world", "a"}, {"a", "b"}});
   REQUIRE(parts);
-  REQUIRE(parts->ties.size() == 3);
-  CHECK(parts->ties[0].empty());
+  REQUIRE(parts->correlations.size() == 3);
+  CHECK(parts->correlations[0].empty());
   Belief X;
   for (std::size_t i = 0; i < 3; ++i) {
-    X = compose(X, belief_of(parts->values[i], parts->ties[i]), Order::kSecond);
+    X = compose(X, belief_of(parts->values[i], parts->correlations[i]), Order::kSecond);
   }
   const auto whole = robot.forest.lookup("c", "b");
   REQUIRE(whole);
   CHECK(transform_diff(collapse(X), *whole, 1e-9) == "");
-  const auto untied = robot.forest.lookup_segments({{"c", "world"}});
-  REQUIRE(untied);
-  CHECK(untied->ties.empty());
+  const auto uncorrelated = robot.forest.lookup_segments({{"c", "world"}});
+  REQUIRE(uncorrelated);
+  CHECK(uncorrelated->correlations.empty());
 }
 
 TEST_CASE("A revision of static edges holds until their next update") {
@@ -181,8 +182,8 @@ TEST_CASE("A revision of static edges holds until their next update") {
                               seen->commit));
   const auto after = robot.forest.lookup_segments(edges, {}, std::nullopt, true);
   REQUIRE(after);
-  CHECK(after->ties[0].shares.size() == 2);
-  CHECK(after->ties[1].observed_with == std::vector<std::string>{"a", "b"});
+  CHECK(after->correlations[0].shares.size() == 2);
+  CHECK(after->correlations[1].observed_with == std::vector<std::string>{"a", "b"});
   // What was seen is old now.
   const auto again = robot.forest.revise({{"a", robot.X_WA, now}}, std::nullopt, seen->commit);
   REQUIRE_FALSE(again);
@@ -190,9 +191,9 @@ TEST_CASE("A revision of static edges holds until their next update") {
   REQUIRE(robot.forest.update("a", robot.X_WA));
   const auto updated = robot.forest.lookup_segments(edges, {}, std::nullopt, true);
   REQUIRE(updated);
-  CHECK(updated->ties[0].shares.size() == 1);
-  CHECK(updated->ties[0].observed_with.empty());
-  CHECK(updated->ties[1].shares.size() == 2);
+  CHECK(updated->correlations[0].shares.size() == 1);
+  CHECK(updated->correlations[0].observed_with.empty());
+  CHECK(updated->correlations[1].shares.size() == 2);
 }
 
 TEST_CASE("A revision of a moving edge is a sample, or replaces that of its stamp") {
@@ -236,7 +237,7 @@ TEST_CASE("What cannot be meant is refused, and changes nothing") {
   CHECK(transform_diff(*X_WA, robot.X_WA, 0) == "");
 }
 
-TEST_CASE("News of an edge tell what it is tied to") {
+TEST_CASE("News of an edge tell its correlation") {
   Random random(659);
   Robot robot(random);
   std::vector<EdgeCursor> cursors{{"a", robot.forest.info("a")->parent}};
