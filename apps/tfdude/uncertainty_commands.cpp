@@ -31,9 +31,9 @@ int measure(Client& client, const Arguments& arguments, Measure take) {
 
 constexpr std::size_t kRows = 6;
 
-// Columns of one source are one factor, in the order in which they are said.
-Result<std::vector<Share>> read_shares(const std::vector<std::string>& said) {
-  std::vector<Share> shares;
+// Columns of one source are one loading, in the order in which they are said.
+Result<std::vector<CommonError>> read_common_errors(const std::vector<std::string>& said) {
+  std::vector<CommonError> common_errors;
   for (std::size_t at = 0; at + kRows < said.size(); at += kRows + 1) {
     const std::string& source = said[at];
     Twist column;
@@ -46,24 +46,24 @@ Result<std::vector<Share>> read_shares(const std::vector<std::string>& said) {
                     "--source " + quote(source) + ": " + quote(text) + " is not a number");
       }
     }
-    auto share = std::find_if(shares.begin(), shares.end(),
-                              [&](const Share& one) { return one.source == source; });
-    if (share == shares.end()) {
-      shares.push_back({source, false, Factor(kRows, 0)});
-      share = std::prev(shares.end());
+    auto common_error = std::find_if(common_errors.begin(), common_errors.end(),
+                                     [&](const CommonError& one) { return one.source == source; });
+    if (common_error == common_errors.end()) {
+      common_errors.push_back({source, false, Loading(kRows, 0)});
+      common_error = std::prev(common_errors.end());
     }
-    share->factor.conservativeResize(Eigen::NoChange, share->factor.cols() + 1);
-    share->factor.rightCols<1>() = column;
+    common_error->loading.conservativeResize(Eigen::NoChange, common_error->loading.cols() + 1);
+    common_error->loading.rightCols<1>() = column;
   }
-  return shares;
+  return common_errors;
 }
 
 }  // namespace
 
 int run_correlate(Client& client, const Arguments& arguments) {
-  auto shares = read_shares(arguments.sources);
-  if (!shares) return report(shares.error(), arguments);
-  const Correlation said{arguments.unknown, *std::move(shares), {}};
+  auto common_errors = read_common_errors(arguments.sources);
+  if (!common_errors) return report(common_errors.error(), arguments);
+  const Correlation said{arguments.unknown, *std::move(common_errors), {}};
   return finish(client, client.correlate(arguments.id, said), arguments, "correlated");
 }
 

@@ -40,8 +40,8 @@ class Reader : public YamlFields {
                                            EdgeTiming timing) const;
   [[nodiscard]] Result<Correlation> correlation(const Fields& entries,
                                                 const std::string& place) const;
-  [[nodiscard]] Result<Share> share(const std::string& source, const Field& field,
-                                    const std::string& place) const;
+  [[nodiscard]] Result<CommonError> common_error(const std::string& source, const Field& field,
+                                                 const std::string& place) const;
   [[nodiscard]] Result<FrameSpec> frame(const YAML::Node& node, std::size_t index,
                                         const EdgeTiming& timing) const;
   [[nodiscard]] Result<void> frames(const Field& field, Config& config) const;
@@ -111,14 +111,14 @@ Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
 }
 
 // A list of columns, each the error for one standard deviation of one dimension of the source.
-Result<Share> Reader::share(const std::string& source, const Field& field,
-                            const std::string& place) const {
+Result<CommonError> Reader::common_error(const std::string& source, const Field& field,
+                                         const std::string& place) const {
   const std::string what = place + ": source " + tfdude::quote(source);
-  Share share{source, false, {}};
+  CommonError common_error{source, false, {}};
   if (!field.value.IsSequence() || field.value.size() == 0) {
     return error(Errc::kConfig, field.mark, what + " is not a list of columns of 6 numbers");
   }
-  share.factor.resize(6, static_cast<Eigen::Index>(field.value.size()));
+  common_error.loading.resize(6, static_cast<Eigen::Index>(field.value.size()));
   for (std::size_t j = 0; j < field.value.size(); ++j) {
     const YAML::Node column = field.value[j];
     const std::string nth = what + "[" + std::to_string(j) + "]";
@@ -128,13 +128,13 @@ Result<Share> Reader::share(const std::string& source, const Field& field,
     for (std::size_t i = 0; i < 6; ++i) {
       const auto value = number(column[i], nth + "[" + std::to_string(i) + "]");
       if (!value) return tl::unexpected(value.error());
-      share.factor(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = *value;
+      common_error.loading(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = *value;
     }
   }
-  if (auto ok = check_shares({share}); !ok) {
+  if (auto ok = check_common_errors({common_error}); !ok) {
     return error(Errc::kInvalidInput, field.mark, place + ": " + ok.error().message);
   }
-  if (!is_observed(share)) return share;
+  if (!is_observed(common_error)) return common_error;
   return error(Errc::kInvalidInput, field.mark, what + ": such names are given to observations");
 }
 
@@ -153,9 +153,9 @@ Result<Correlation> Reader::correlation(const Fields& entries, const std::string
     const auto sources = fields(found->second.value, place + ": sources");
     if (!sources) return tl::unexpected(sources.error());
     for (const auto& [source, field] : *sources) {
-      auto one = share(source, field, place);
+      auto one = common_error(source, field, place);
       if (!one) return tl::unexpected(std::move(one.error()));
-      correlation.shares.push_back(*std::move(one));
+      correlation.common_errors.push_back(*std::move(one));
     }
   }
   return correlation;

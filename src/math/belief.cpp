@@ -5,63 +5,67 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "math/common_errors.hpp"
 #include "math/moments.hpp"
 #include "math/semidefinite.hpp"
-#include "math/shares.hpp"
 
 namespace tfdude {
 namespace {
 
-using Shares = std::vector<Share>;
+using CommonErrors = std::vector<CommonError>;
 
-Eigen::Index columns(const Share& share) { return share.factor.cols(); }
+Eigen::Index columns(const CommonError& common_error) { return common_error.loading.cols(); }
 
-void add_padded(Factor& sum, const Factor& more) {
+void add_padded(Loading& sum, const Loading& more) {
   widen(sum, more.cols());
   sum.leftCols(more.cols()) += more;
 }
 
 template <class List>
-auto of_same_source(List& shares, const Share& share) -> decltype(shares.data()) {
-  const auto found = std::find_if(shares.begin(), shares.end(),
-                                  [&](const Share& other) { return same_source(other, share); });
-  return found == shares.end() ? nullptr : &*found;
+auto of_same_source(List& common_errors, const CommonError& common_error)
+    -> decltype(common_errors.data()) {
+  const auto found =
+      std::find_if(common_errors.begin(), common_errors.end(),
+                   [&](const CommonError& other) { return same_source(other, common_error); });
+  return found == common_errors.end() ? nullptr : &*found;
 }
 
-Shares sum_of(Shares sum, const Shares& more) {
-  for (const Share& share : more) {
-    if (Share* same = of_same_source(sum, share)) {
-      add_padded(same->factor, share.factor);
+CommonErrors sum_of(CommonErrors sum, const CommonErrors& more) {
+  for (const CommonError& common_error : more) {
+    if (CommonError* same = of_same_source(sum, common_error)) {
+      add_padded(same->loading, common_error.loading);
     } else {
-      sum.push_back(share);
+      sum.push_back(common_error);
     }
   }
   return sum;
 }
 
-Shares product(const Matrix6d& matrix, Shares shares) {
-  for (Share& share : shares) share.factor = (matrix * share.factor).eval();
-  return shares;
+CommonErrors product(const Matrix6d& matrix, CommonErrors common_errors) {
+  for (CommonError& common_error : common_errors)
+    common_error.loading = (matrix * common_error.loading).eval();
+  return common_errors;
 }
 
 // Σ ± F Fᵀ.
-Matrix6d second_moment(const Shares& shares) {
+Matrix6d second_moment(const CommonErrors& common_errors) {
   Matrix6d sum = Matrix6d::Zero();
-  for (const Share& share : shares) {
-    const Matrix6d one = share.factor * share.factor.transpose();
-    sum += share.subtracts ? Matrix6d(-one) : one;
+  for (const CommonError& common_error : common_errors) {
+    const Matrix6d one = common_error.loading * common_error.loading.transpose();
+    sum += common_error.subtracts ? Matrix6d(-one) : one;
   }
   return sum;
 }
 
 // Σ ± F1 F2ᵀ over the sources of both.
-Matrix6d joint_moment(const Shares& first, const Shares& second) {
+Matrix6d joint_moment(const CommonErrors& first, const CommonErrors& second) {
   Matrix6d sum = Matrix6d::Zero();
-  for (const Share& one : first) {
-    const Share* other = of_same_source(second, one);
+  for (const CommonError& one : first) {
+    const CommonError* other = of_same_source(second, one);
     if (other == nullptr) continue;
     const Eigen::Index common = std::min(columns(one), columns(*other));
-    const Matrix6d both = one.factor.leftCols(common) * other->factor.leftCols(common).transpose();
+    const Matrix6d both =
+        one.loading.leftCols(common) * other->loading.leftCols(common).transpose();
     sum += one.subtracts ? Matrix6d(-both) : both;
   }
   return sum;
@@ -70,15 +74,15 @@ Matrix6d joint_moment(const Shares& first, const Shares& second) {
 // What both have in the frame of the last: X_AC as if known exactly, and the two errors there.
 struct Errors {
   Covariance own[2];
-  Shares shares[2];
+  CommonErrors common_errors[2];
 };
 
-Covariance add_fourth(const Errors& e, Shares& shares) {
+Covariance add_fourth(const Errors& e, CommonErrors& common_errors) {
   const Matrix6d own_1 = e.own[0].matrix();
   const Matrix6d own_2 = e.own[1].matrix();
-  const Matrix6d J_11 = own_1 + second_moment(e.shares[0]);
-  const Matrix6d J_22 = own_2 + second_moment(e.shares[1]);
-  const Matrix6d J_12 = joint_moment(e.shares[0], e.shares[1]);
+  const Matrix6d J_11 = own_1 + second_moment(e.common_errors[0]);
+  const Matrix6d J_22 = own_2 + second_moment(e.common_errors[1]);
+  const Matrix6d J_12 = joint_moment(e.common_errors[0], e.common_errors[1]);
   // The terms of third order, ([ξ1, [ξ1, ξ2]] + [ξ2, [ξ2, ξ1]]) / 12, have with any z the moment D1 E[ξ1 zᵀ] + D2 E[ξ2 zᵀ],
   // D the mean of their derivatives (Stein's lemma).
   const Matrix6d P_12 = product_of_adjoints(J_12);
@@ -86,9 +90,9 @@ Covariance add_fourth(const Errors& e, Shares& shares) {
   const Matrix6d D_1 = (product_of_adjoints(J_22) + P_21 - 2.0 * P_12) / 12.0;
   const Matrix6d D_2 = (product_of_adjoints(J_11) + P_12 - 2.0 * P_21) / 12.0;
   const Matrix6d brackets = bracket_second_moment(J_11, J_22, J_12) / 4.0;
-  shares = sum_of(product(Matrix6d::Identity() + D_1, e.shares[0]),
-                  product(Matrix6d::Identity() + D_2, e.shares[1]));
-  // Of what the shares have of it, their product has all but terms of sixth order.
+  common_errors = sum_of(product(Matrix6d::Identity() + D_1, e.common_errors[0]),
+                         product(Matrix6d::Identity() + D_2, e.common_errors[1]));
+  // Of what the common errors have of it, their product has all but terms of sixth order.
   const Matrix6d cubic = D_1 * own_1 + D_2 * own_2;
   const Matrix6d series = own_1 + own_2 + brackets + cubic + cubic.transpose();
   if (is_semidefinite(series)) return Covariance::trusted(series);
@@ -98,14 +102,17 @@ Covariance add_fourth(const Errors& e, Shares& shares) {
 
 }  // namespace
 
-bool is_observed(const Share& share) { return share.source.rfind(kObservedPrefix, 0) == 0; }
+bool is_observed(const CommonError& common_error) {
+  return common_error.source.rfind(kObservedPrefix, 0) == 0;
+}
 
 Belief inverse(const Belief& X_AB) {
   Belief X_BA;
   X_BA.pose = X_AB.pose.inverse();
   X_BA.own = X_AB.own.transported(X_AB.pose);
   if (X_AB.unknown) X_BA.unknown = X_AB.unknown->transported(X_AB.pose);
-  if (!X_AB.shares.empty()) X_BA.shares = product(-adjoint(X_AB.pose), X_AB.shares);
+  if (!X_AB.common_errors.empty())
+    X_BA.common_errors = product(-adjoint(X_AB.pose), X_AB.common_errors);
   return X_BA;
 }
 
@@ -113,13 +120,13 @@ Belief compose(const Belief& X_AB, const Belief& X_BC, Order order) {
   const Pose X_CB = X_BC.pose.inverse();
   Belief X_AC;
   X_AC.pose = X_AB.pose * X_BC.pose;
-  Errors e{{X_AB.own.transported(X_CB), X_BC.own}, {{}, X_BC.shares}};
-  if (!X_AB.shares.empty()) e.shares[0] = product(adjoint(X_CB), X_AB.shares);
+  Errors e{{X_AB.own.transported(X_CB), X_BC.own}, {{}, X_BC.common_errors}};
+  if (!X_AB.common_errors.empty()) e.common_errors[0] = product(adjoint(X_CB), X_AB.common_errors);
   if (order == Order::kFourth) {
-    X_AC.own = add_fourth(e, X_AC.shares);
+    X_AC.own = add_fourth(e, X_AC.common_errors);
   } else {
     X_AC.own = e.own[0] + e.own[1];
-    X_AC.shares = sum_of(std::move(e.shares[0]), e.shares[1]);
+    X_AC.common_errors = sum_of(std::move(e.common_errors[0]), e.common_errors[1]);
   }
   if (X_AB.unknown) X_AC.unknown = X_AB.unknown->transported(X_CB);
   if (X_BC.unknown) {
@@ -130,9 +137,9 @@ Belief compose(const Belief& X_AB, const Belief& X_BC, Order order) {
 
 Transform collapse(const Belief& X_AB) {
   Covariance known = X_AB.own;
-  if (!X_AB.shares.empty()) {
-    known =
-        Covariance::trusted(nearest_semidefinite(X_AB.own.matrix() + second_moment(X_AB.shares)));
+  if (!X_AB.common_errors.empty()) {
+    known = Covariance::trusted(
+        nearest_semidefinite(X_AB.own.matrix() + second_moment(X_AB.common_errors)));
   }
   return {X_AB.pose, X_AB.unknown ? bound(known, *X_AB.unknown) : known};
 }
@@ -161,25 +168,27 @@ Covariance bound(const Covariance& A, const Covariance& B) {
   return Covariance::trusted(sum);
 }
 
-Result<void> check_shares(const std::vector<Share>& shares) {
-  if (shares.size() > kMaxShares) {
-    return fail(Errc::kInvalidInput, std::to_string(shares.size()) + " sources, of at most " +
-                                         std::to_string(kMaxShares));
+Result<void> check_common_errors(const std::vector<CommonError>& common_errors) {
+  if (common_errors.size() > kMaxCommonErrors) {
+    return fail(Errc::kInvalidInput, std::to_string(common_errors.size()) +
+                                         " sources, of at most " +
+                                         std::to_string(kMaxCommonErrors));
   }
-  for (const Share& share : shares) {
-    if (auto ok = check_id(share.source, "source"); !ok) return ok;
-    const std::string who = "source " + quote(share.source) + ": ";
-    if (columns(share) < 1 || columns(share) > kMaxFactorColumns) {
-      return fail(Errc::kInvalidInput, who + "a factor has 1 to " +
-                                           std::to_string(kMaxFactorColumns) + " columns, not " +
-                                           std::to_string(columns(share)));
+  for (const CommonError& common_error : common_errors) {
+    if (auto ok = check_id(common_error.source, "source"); !ok) return ok;
+    const std::string who = "source " + quote(common_error.source) + ": ";
+    if (columns(common_error) < 1 || columns(common_error) > kMaxLoadingColumns) {
+      return fail(Errc::kInvalidInput, who + "a loading has 1 to " +
+                                           std::to_string(kMaxLoadingColumns) + " columns, not " +
+                                           std::to_string(columns(common_error)));
     }
-    if (!share.factor.allFinite() || share.factor.cwiseAbs().maxCoeff() > std::sqrt(kMaxVariance)) {
+    if (!common_error.loading.allFinite() ||
+        common_error.loading.cwiseAbs().maxCoeff() > std::sqrt(kMaxVariance)) {
       return fail(Errc::kInvalidInput,
-                  who + "an element of its factor is not a number, or beyond 1e9");
+                  who + "an element of its loading is not a number, or beyond 1e9");
     }
-    const auto same = [&](const Share& other) { return same_source(other, share); };
-    if (std::count_if(shares.begin(), shares.end(), same) > 1) {
+    const auto same = [&](const CommonError& other) { return same_source(other, common_error); };
+    if (std::count_if(common_errors.begin(), common_errors.end(), same) > 1) {
       return fail(Errc::kInvalidInput, who + "named twice");
     }
   }

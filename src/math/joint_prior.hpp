@@ -16,18 +16,18 @@ struct Moments {
 /// The joint covariance P of the uncertain ones of some edges: P_ij = δ_ij own_i + Σ ± F_i F_jᵀ over the sources.
 class JointPrior {
  public:
-  /// What the edges have from one source; a factor for each uncertain edge, all of the same columns.
+  /// What the edges have from one source; a loading for each uncertain edge, all of the same columns.
   struct Source {
     std::string name;
     bool subtracts = false;
-    std::vector<Factor> factors;
+    std::vector<Loading> loadings;
 
     [[nodiscard]] double sign() const { return subtracts ? -1.0 : 1.0; }
     /// Σ H_i F_i.
-    [[nodiscard]] Factor on_path(const JointPrior& prior, const std::vector<Matrix6d>& H) const;
+    [[nodiscard]] Loading on_path(const JointPrior& prior, const std::vector<Matrix6d>& H) const;
   };
 
-  /// The own parts and shares of the edges; those that have neither are not of them.
+  /// The own parts and common errors of the edges; those that have neither are not of them.
   explicit JointPrior(const std::vector<ObservedEdge>& all);
 
   /// Takes the edge's unknown part for its own; there must be no uncertain edge else.

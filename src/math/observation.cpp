@@ -9,9 +9,9 @@
 #include "tfdude/math/fusion.hpp"
 #include "tfdude/math/perturbation.hpp"
 
+#include "math/corrected_errors.hpp"
 #include "math/joint_prior.hpp"
 #include "math/minimum.hpp"
-#include "math/observed_shares.hpp"
 #include "math/semidefinite.hpp"
 
 namespace tfdude {
@@ -212,8 +212,9 @@ class Update {
           Covariance::trusted(nearest_semidefinite(J * corrected[i].own * J.transpose()));
       (prior_.is_of_unknown() ? result.X_PC.unknown.emplace() : result.X_PC.own) = own;
       result.X_PC.pose = result.X_PC.pose * exp(xi_[k]);
-      result.X_PC.shares = corrected[i].shares;
-      for (Share& share : result.X_PC.shares) share.factor = (J * share.factor).eval();
+      result.X_PC.common_errors = corrected[i].common_errors;
+      for (CommonError& error : result.X_PC.common_errors)
+        error.loading = (J * error.loading).eval();
       result.corrected = true;
     }
   }

@@ -79,7 +79,7 @@ void PathAccumulation<Belief>::up(const Transform& X_PC) {
   Belief edge;
   edge.pose = X_PC.pose;
   (unknown_ ? edge.unknown.emplace() : edge.own) = X_PC.covariance;
-  if (shares_ != nullptr) edge.shares = *shares_;
+  if (common_errors_ != nullptr) edge.common_errors = *common_errors_;
   X_HS_ = compose(edge, X_HS_, order_);
 }
 

@@ -66,10 +66,10 @@ class PathAccumulation<Belief> {
  public:
   explicit PathAccumulation(Order order) : order_(order) {}
 
-  /// What the error of the next edge has to do with others'; shares: may be null.
-  void correlate_next(bool unknown, const std::vector<Share>* shares) {
+  /// What the error of the next edge has to do with others'; common_errors: may be null.
+  void correlate_next(bool unknown, const std::vector<CommonError>* common_errors) {
     unknown_ = unknown;
-    shares_ = shares;
+    common_errors_ = common_errors;
   }
 
   void up(const Transform& X_PC);
@@ -83,7 +83,7 @@ class PathAccumulation<Belief> {
   Belief X_HS_;  // errors in the start's frame, in which they are needed
   Transform computed_;
   bool unknown_ = false;
-  const std::vector<Share>* shares_ = nullptr;
+  const std::vector<CommonError>* common_errors_ = nullptr;
 };
 
 }  // namespace tfdude

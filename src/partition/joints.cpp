@@ -13,10 +13,10 @@ namespace {
 // What the edge shares with those of the joints that are coupled with its own: the error of one number.
 Correlation shared_error(const JointSpec& spec, double variance) {
   if (variance == 0) return {};
-  Factor factor = spec.joint.S * std::sqrt(variance);
-  // A share's sign is that of the leader's error.
-  if (spec.mimic && spec.mimic->multiplier < 0) factor = -factor;
-  return {false, {{shared_source(leader_of(spec)), false, std::move(factor)}}, {}};
+  Loading loading = spec.joint.S * std::sqrt(variance);
+  // The sign is that of the leader's error.
+  if (spec.mimic && spec.mimic->multiplier < 0) loading = -loading;
+  return {false, {{shared_source(leader_of(spec)), false, std::move(loading)}}, {}};
 }
 
 Error beyond_limits(const JointSpec& spec, double position) {

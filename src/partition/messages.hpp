@@ -25,8 +25,8 @@ using PeerId = std::array<std::uint8_t, 12>;
 /// The most edges, subtrees, segments or entries that one message holds.
 inline constexpr std::size_t kMaxItems = 4096;
 
-/// The most edges of one owner that are observed at once or correlated with others on one path, and shares of each.
-inline constexpr std::uint32_t kMaxCorrelated = kMaxShares;
+/// The most edges of one owner that are observed at once or correlated with others on one path, and common errors of each.
+inline constexpr std::uint32_t kMaxCorrelated = kMaxCommonErrors;
 
 /// The latest stamp of a change of the structure that a sender knows of (Directory::next_stamp). Its own change gets a
 /// later one, whatever the owner's clock says, so that what one client does in turn counts in that order.

@@ -48,17 +48,19 @@ class Places {
   std::vector<std::size_t> taken_;
 };
 
-// Whether one of those that an edge was observed with has no share of the source.
+// Whether one of those that an edge was observed with does not depend on the source.
 bool lacks_source(const ObservePlan& plan, const ObservedPath& path, const Belief& X,
                   const std::vector<std::string>& observed_with) {
-  const auto source = std::find_if(X.shares.begin(), X.shares.end(), is_observed);
-  if (source == X.shares.end()) return false;
+  const auto source = std::find_if(X.common_errors.begin(), X.common_errors.end(), is_observed);
+  if (source == X.common_errors.end()) return false;
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
     const std::string& id = plan.edges[k].info.id;
     if (std::count(observed_with.begin(), observed_with.end(), id) == 0) continue;
-    const auto& shares = path.edges[k].X_PC.shares;
-    const auto same = [&](const Share& share) { return share.source == source->source; };
-    if (std::none_of(shares.begin(), shares.end(), same)) return true;
+    const auto& common_errors = path.edges[k].X_PC.common_errors;
+    const auto same = [&](const CommonError& common_error) {
+      return common_error.source == source->source;
+    };
+    if (std::none_of(common_errors.begin(), common_errors.end(), same)) return true;
   }
   return false;
 }
@@ -67,8 +69,8 @@ bool lacks_source(const ObservePlan& plan, const ObservedPath& path, const Belie
 Correlation correlation_of(const Belief& X, const std::vector<std::string>& together) {
   Correlation correlation;
   correlation.unknown = X.unknown.has_value();
-  correlation.shares = X.shares;
-  const bool observed = std::any_of(X.shares.begin(), X.shares.end(), is_observed);
+  correlation.common_errors = X.common_errors;
+  const bool observed = std::any_of(X.common_errors.begin(), X.common_errors.end(), is_observed);
   if (observed) correlation.observed_with = together;
   return correlation;
 }

@@ -19,7 +19,7 @@ Overloaded(Visitors...) -> Overloaded<Visitors...>;
 bool are_too_many(const std::vector<PathCorrelation>& all) {
   return all.size() > kMaxCorrelated ||
          std::any_of(all.begin(), all.end(), [](const PathCorrelation& correlation) {
-           return correlation.shares.size() > kMaxCorrelated;
+           return correlation.common_errors.size() > kMaxCorrelated;
          });
 }
 
@@ -287,8 +287,8 @@ Result<void> Partition::revise(const ReviseRequest& request) {
 Result<void> Partition::correlate(const std::string& id, const Correlation& correlation) {
   const std::string who = "frame " + quote(id);
   const auto observed =
-      std::find_if(correlation.shares.begin(), correlation.shares.end(), is_observed);
-  if (observed != correlation.shares.end()) {
+      std::find_if(correlation.common_errors.begin(), correlation.common_errors.end(), is_observed);
+  if (observed != correlation.common_errors.end()) {
     return fail(Errc::kInvalidInput, who + ": source " + quote(observed->source) +
                                          ": names of this kind are given to observations");
   }

@@ -28,7 +28,7 @@ class Fingerprint {
 
 // As an edge: what a segment has of its own counts as unknown, too, where a part of it is.
 void set_correlation(News& entry, const PathCorrelation& correlation) {
-  entry.correlation.shares = correlation.shares;
+  entry.correlation.common_errors = correlation.common_errors;
   if (!correlation.unknown) return;
   entry.correlation.unknown = true;
   entry.X.covariance = bound(entry.X.covariance, *correlation.unknown);

@@ -94,7 +94,7 @@ Result<void> Writes::correlate(const std::string& id, const Correlation& correla
       [&]() -> Result<Part> {
         const auto frame = structure_.forest.info(id);
         if (!frame) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
-        if (auto ok = check_shares(correlation.shares); !ok) {
+        if (auto ok = check_common_errors(correlation.common_errors); !ok) {
           return fail_at("frame " + quote(id), ok.error());
         }
         return route_to(structure_.directory, frame->owner,

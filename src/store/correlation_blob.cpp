@@ -23,7 +23,7 @@ class Writer {
     count(value.size());
     blob_ += value;
   }
-  void factor(const Factor& value) {
+  void loading(const Loading& value) {
     count(static_cast<std::size_t>(value.cols()));
     raw(value.data(), static_cast<std::size_t>(value.size()) * sizeof(double));
   }
@@ -60,8 +60,8 @@ class Reader {
     raw(value.data(), value.size());
     return value;
   }
-  Factor factor() {
-    Factor value = Factor::Zero(kRows, count(static_cast<std::size_t>(kMaxFactorColumns)));
+  Loading loading() {
+    Loading value = Loading::Zero(kRows, count(static_cast<std::size_t>(kMaxLoadingColumns)));
     raw(value.data(), static_cast<std::size_t>(value.size()) * sizeof(double));
     return value;
   }
@@ -84,11 +84,11 @@ class Reader {
 std::string to_blob(const Correlation& correlation) {
   Writer writer;
   writer.byte(correlation.unknown);
-  writer.count(correlation.shares.size());
-  for (const Share& share : correlation.shares) {
-    writer.text(share.source);
-    writer.byte(share.subtracts);
-    writer.factor(share.factor);
+  writer.count(correlation.common_errors.size());
+  for (const CommonError& common_error : correlation.common_errors) {
+    writer.text(common_error.source);
+    writer.byte(common_error.subtracts);
+    writer.loading(common_error.loading);
   }
   writer.count(correlation.observed_with.size());
   for (const std::string& id : correlation.observed_with) writer.text(id);
@@ -99,18 +99,19 @@ Result<Correlation> correlation_from(const std::string& blob) {
   Reader reader(blob);
   Correlation correlation;
   correlation.unknown = reader.byte();
-  const std::uint32_t shares = reader.count(kMaxShares);
-  for (std::uint32_t i = 0; i < shares; ++i) {
+  const std::uint32_t common_errors = reader.count(kMaxCommonErrors);
+  for (std::uint32_t i = 0; i < common_errors; ++i) {
     std::string source = reader.text();
     const bool subtracts = reader.byte();
-    correlation.shares.push_back({std::move(source), subtracts, reader.factor()});
+    correlation.common_errors.push_back({std::move(source), subtracts, reader.loading()});
   }
-  const std::uint32_t others = reader.count(kMaxShares);
+  const std::uint32_t others = reader.count(kMaxCommonErrors);
   for (std::uint32_t i = 0; i < others; ++i) correlation.observed_with.push_back(reader.text());
   if (!reader.ended_well()) {
     return fail(Errc::kState, "a correlation of " + std::to_string(blob.size()) + " bytes");
   }
-  if (auto ok = check_shares(correlation.shares); !ok) return tl::unexpected(std::move(ok.error()));
+  if (auto ok = check_common_errors(correlation.common_errors); !ok)
+    return tl::unexpected(std::move(ok.error()));
   for (const std::string& id : correlation.observed_with) {
     if (auto ok = check_id(id, "an edge observed with it"); !ok) return tl::unexpected(ok.error());
   }

@@ -8,7 +8,7 @@
 namespace tfdude::sqlite {
 namespace {
 
-// Longer than any row that is ever written: the correlation of an edge may have 128 shares of 36 columns, twice.
+// Longer than any row that is ever written: the correlation of an edge may have 128 common errors of 36 columns, twice.
 constexpr int kLongestRow = 1024 * 1024;
 
 // What SQLite says, with the code by which its documentation tells more, and what the system says where that is why.

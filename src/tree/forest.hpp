@@ -200,7 +200,7 @@ class Forest {
   [[nodiscard]] bool holds(std::string_view id) const;
   [[nodiscard]] std::optional<FrameInfo> info(std::string_view id) const;
   [[nodiscard]] std::optional<FrameInfo> info(Handle frame) const;
-  /// The value of a held edge: what observations have left of shares is added to its covariance.
+  /// The value of a held edge: what observations have left of common errors is added to its covariance.
   /// @return kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<Transform> value(std::string_view id) const;
   /// What of a held edge outlives its process. @return as value().

@@ -10,13 +10,13 @@
 namespace tfdude {
 
 Belief belief_of(const Transform& X, const PathCorrelation& correlation) {
-  return {X.pose, X.covariance, correlation.unknown, correlation.shares};
+  return {X.pose, X.covariance, correlation.unknown, correlation.common_errors};
 }
 
 StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> stamp) {
   StampedTransform found{collapse(X), stamp, {order, X.unknown.has_value(), {}}};
   std::vector<std::string>& sources = found.basis.sources;
-  for (const Share& share : X.shares) sources.push_back(share.source);
+  for (const CommonError& common_error : X.common_errors) sources.push_back(common_error.source);
   std::sort(sources.begin(), sources.end());
   sources.erase(std::unique(sources.begin(), sources.end()), sources.end());
   return found;
@@ -43,7 +43,7 @@ void Forest::Impl::say_correlation(std::uint32_t slot, const Correlation& said) 
 }
 
 Result<void> Forest::correlate(std::string_view id, const Correlation& correlation) {
-  if (auto ok = check_shares(correlation.shares); !ok) {
+  if (auto ok = check_common_errors(correlation.common_errors); !ok) {
     return fail_at("frame " + quote(id), ok.error());
   }
   const std::lock_guard lock(impl_->mutex_);
@@ -55,8 +55,8 @@ Result<void> Forest::correlate(std::string_view id, const Correlation& correlati
 }
 
 Result<void> Forest::resume(std::string_view id, const StoredCorrelation& correlation) {
-  auto ok = check_shares(correlation.said.shares);
-  if (ok && correlation.observed) ok = check_shares(correlation.observed->shares);
+  auto ok = check_common_errors(correlation.said.common_errors);
+  if (ok && correlation.observed) ok = check_common_errors(correlation.observed->common_errors);
   if (!ok) return fail_at("frame " + quote(id), ok.error());
   const std::lock_guard lock(impl_->mutex_);
   const auto slot = impl_->frames_.held_slot(id);
@@ -92,7 +92,8 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
                                           std::optional<Time> stamp, std::uint64_t seen) {
   const std::string who = "frame " + quote(revision.id);
   if (!is_finite(revision.X_PC)) return check_value(revision.id, revision.X_PC);
-  if (auto ok = check_shares(revision.correlation.shares); !ok) return fail_at(who, ok.error());
+  if (auto ok = check_common_errors(revision.correlation.common_errors); !ok)
+    return fail_at(who, ok.error());
   if (!edge.moving()) {
     if (edge.commit <= seen) return {};
     return fail(Errc::kChangedMeanwhile, who + " was written while it was observed");
@@ -138,8 +139,8 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_
 
 Transform Forest::Impl::whole(const Transform& X_PC, const Correlation& correlation) {
   Belief observed{X_PC.pose, X_PC.covariance, std::nullopt, {}};
-  std::copy_if(correlation.shares.begin(), correlation.shares.end(),
-               std::back_inserter(observed.shares), is_observed);
+  std::copy_if(correlation.common_errors.begin(), correlation.common_errors.end(),
+               std::back_inserter(observed.common_errors), is_observed);
   return collapse(observed);
 }
 

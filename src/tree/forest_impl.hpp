@@ -114,8 +114,8 @@ class Forest::Impl {
   void say_correlation(std::uint32_t slot, const Correlation& said);
   [[nodiscard]] Result<void> check_revision(const HeldVersion& edge, const Revision& revision,
                                             std::optional<Time> stamp, std::uint64_t seen);
-  /// With the whole covariance that an edge has but for shares of declared sources: what is kept of an observed one where
-  /// shares of observations are not.
+  /// With the whole covariance that an edge has but for common errors of declared sources: what is kept of an observed one
+  /// where those of observations are not.
   [[nodiscard]] static Transform whole(const Transform& X_PC, const Correlation& correlation);
   [[nodiscard]] static Transform whole(const HeldVersion& edge) {
     const bool observed = edge.correlation != nullptr && edge.correlation->revised;

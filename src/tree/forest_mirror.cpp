@@ -73,7 +73,8 @@ void Forest::take(const std::vector<Handle>& edges, const std::vector<News>& val
     correlated[value->index] = true;
     const Correlation before =
         edge->correlation != nullptr ? edge->correlation->now : Correlation();
-    if (before == value->correlation || !check_shares(value->correlation.shares)) continue;
+    if (before == value->correlation || !check_common_errors(value->correlation.common_errors))
+      continue;
     impl_->say_correlation(edge->slot, value->correlation);
     changed = true;
   }

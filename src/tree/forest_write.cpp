@@ -22,7 +22,7 @@ const Correlation* correlation_of(const CorrelatedUpdate& update) { return updat
 template <class Update>
 Result<void> check_said(const Update& update) {
   const Correlation* said = correlation_of(update);
-  return said != nullptr ? check_shares(said->shares) : Result<void>();
+  return said != nullptr ? check_common_errors(said->common_errors) : Result<void>();
 }
 
 }  // namespace

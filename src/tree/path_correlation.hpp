@@ -24,10 +24,12 @@ struct StoredCorrelation {
 /// What a Belief has beside its pose and own part.
 struct PathCorrelation {
   std::optional<Covariance> unknown;
-  std::vector<Share> shares;
+  std::vector<CommonError> common_errors;
   std::vector<std::string> observed_with;  ///< of a single edge, as in Correlation; else empty
 
-  [[nodiscard]] bool empty() const { return !unknown && shares.empty() && observed_with.empty(); }
+  [[nodiscard]] bool empty() const {
+    return !unknown && common_errors.empty() && observed_with.empty();
+  }
 };
 
 [[nodiscard]] Belief belief_of(const Transform& X, const PathCorrelation& correlation);

@@ -129,7 +129,7 @@ void tie(PathAccumulation<Belief>& path, const HeldVersion& edge) {
   if (edge.correlation == nullptr) {
     path.correlate_next(false, nullptr);
   } else {
-    path.correlate_next(edge.correlation->now.unknown, &edge.correlation->now.shares);
+    path.correlate_next(edge.correlation->now.unknown, &edge.correlation->now.common_errors);
   }
 }
 
@@ -228,7 +228,7 @@ Result<Value> PathLookup::walk_at(const Ends& ends, Absent absent, std::int64_t 
 namespace {
 
 Reached reached_of(Belief&& X) {
-  return {{X.pose, X.own}, {std::move(X.unknown), std::move(X.shares), {}}};
+  return {{X.pose, X.own}, {std::move(X.unknown), std::move(X.common_errors), {}}};
 }
 
 }  // namespace

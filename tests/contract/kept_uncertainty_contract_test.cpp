@@ -60,7 +60,7 @@ class Kept {
   static FrameSpec entry(const ObservedChain& chain, std::size_t edge) {
     const Belief& X = chain.edges()[edge].X_PC;
     FrameSpec spec{frame(edge + 1), frame(edge), {X.pose, X.own}};
-    if (edge == 0) spec.correlation.shares = X.shares;
+    if (edge == 0) spec.correlation.common_errors = X.common_errors;
     return spec;
   }
   void start(const std::string& name, const std::vector<FrameSpec>& frames) {
@@ -113,7 +113,8 @@ TEST_CASE("kept: owners that restart between observations know what one dense fi
   Kept robot(join, chain);
   // One says it in its configuration, of the other it is said by request.
   REQUIRE(eventually([&] {
-    return robot.client->correlate(frame(4), {false, chain.edges()[3].X_PC.shares, {}}).has_value();
+    return robot.client->correlate(frame(4), {false, chain.edges()[3].X_PC.common_errors, {}})
+        .has_value();
   }));
   Eigen::MatrixXd P = chain.dense();
   robot.restart_all(true);
@@ -172,14 +173,15 @@ TEST_CASE("kept: what nobody may say of correlation is refused, whoever owns the
     const auto said = robot.client->correlate(id, correlation);
     return said ? std::string("ok") : std::string(to_string(said.error().code));
   };
-  const Share share{"supply", false, Factor::Ones(6, 1)};
+  const CommonError common_error{"supply", false, Loading::Ones(6, 1)};
   CHECK(refused("nobody", {}) == "unknown_frame");
-  CHECK(refused(frame(5), {false, {share, share}, {}}) == "invalid_input");
-  CHECK(refused(frame(5), {false, {{"observed:1", true, share.factor}}, {}}) == "invalid_input");
-  CHECK(refused(frame(5), {false, {}, {frame(4)}}) == "invalid_input");
-  CHECK(refused(frame(5), {false, {{"supply", false, Factor::Constant(6, 1, NAN)}}, {}}) ==
+  CHECK(refused(frame(5), {false, {common_error, common_error}, {}}) == "invalid_input");
+  CHECK(refused(frame(5), {false, {{"observed:1", true, common_error.loading}}, {}}) ==
         "invalid_input");
-  CHECK(refused(frame(5), {false, {share}, {}}) == "ok");
+  CHECK(refused(frame(5), {false, {}, {frame(4)}}) == "invalid_input");
+  CHECK(refused(frame(5), {false, {{"supply", false, Loading::Constant(6, 1, NAN)}}, {}}) ==
+        "invalid_input");
+  CHECK(refused(frame(5), {false, {common_error}, {}}) == "ok");
 }
 
 }  // namespace tfdude

@@ -54,13 +54,13 @@ struct Robot {
   std::optional<Client> client;
 };
 
-Belief with(const Transform& X, std::vector<Share> shares = {}) {
-  return {X.pose, X.covariance, std::nullopt, std::move(shares)};
+Belief with(const Transform& X, std::vector<CommonError> common_errors = {}) {
+  return {X.pose, X.covariance, std::nullopt, std::move(common_errors)};
 }
 
-Share share(Random& random, const std::string& source) {
+CommonError common_error(Random& random, const std::string& source) {
   return {source, false,
-          Factor::NullaryExpr(6, 2, [&](auto, auto) { return 0.01 * random.normal(); })};
+          Loading::NullaryExpr(6, 2, [&](auto, auto) { return 0.01 * random.normal(); })};
 }
 
 Belief composed(const std::vector<Belief>& edges, Order order = Order::kSecond) {
@@ -76,8 +76,8 @@ TEST_CASE("uncertainty: a source that edges of several owners share is counted o
   Random random(661);
   INFO("seed " << random.seed());
   Robot robot(join, random);
-  const Share a = share(random, "calibration");
-  const Share b = share(random, "calibration");
+  const CommonError a = common_error(random, "calibration");
+  const CommonError b = common_error(random, "calibration");
   REQUIRE(robot.base->correlate("base", {false, {a}, {}}));
   REQUIRE(robot.tool->correlate("tool", {false, {b}, {}}));
   const Belief expected = composed({with(robot.X_world_base, {a}), with(robot.X_base_arm),
@@ -106,10 +106,10 @@ TEST_CASE("uncertainty: a source cancels exactly over owners") {
   INFO("seed " << random.seed());
   Robot robot(join, random, 0.0);
   // One encoder error that turns the base and, by the same, the arm back: about the same axis in the same place.
-  Share forth{"encoder", false, Factor::Zero(6, 1)};
-  forth.factor(5, 0) = 0.05;
-  Share back = forth;
-  back.factor = -(adjoint(robot.X_base_arm.pose.inverse()) * forth.factor);
+  CommonError forth{"encoder", false, Loading::Zero(6, 1)};
+  forth.loading(5, 0) = 0.05;
+  CommonError back = forth;
+  back.loading = -(adjoint(robot.X_base_arm.pose.inverse()) * forth.loading);
   REQUIRE(robot.base->correlate("base", {false, {forth}, {}}));
   REQUIRE(robot.arm->correlate("arm", {false, {back}, {}}));
   const auto to_arm = robot.client->lookup("world", "arm");
@@ -174,8 +174,8 @@ TEST_CASE("uncertainty: a watched path knows what its edges share") {
   Random random(665);
   INFO("seed " << random.seed());
   Robot robot(join, random);
-  REQUIRE(robot.base->correlate("base", {false, {share(random, "s")}, {}}));
-  REQUIRE(robot.tool->correlate("tool", {false, {share(random, "s")}, {}}));
+  REQUIRE(robot.base->correlate("base", {false, {common_error(random, "s")}, {}}));
+  REQUIRE(robot.tool->correlate("tool", {false, {common_error(random, "s")}, {}}));
   WatchOptions options;
   options.composed = composed_by_owners;
   const auto path = robot.client->watch("world", "tool", options);

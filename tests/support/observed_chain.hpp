@@ -28,14 +28,14 @@ class ObservedChain {
 
   void set_exact(std::size_t edge) {
     edges_[edge].X_PC.own = {};
-    edges_[edge].X_PC.shares.clear();
+    edges_[edge].X_PC.common_errors.clear();
   }
 
   void add_source(const std::string& name, const std::vector<std::size_t>& edges, Random& random) {
     for (const std::size_t edge : edges) {
-      Factor factor =
-          Factor::NullaryExpr(6, 3, [&](auto, auto) { return 0.003 * random.normal(); });
-      edges_[edge].X_PC.shares.push_back({name, false, factor});
+      Loading loading =
+          Loading::NullaryExpr(6, 3, [&](auto, auto) { return 0.003 * random.normal(); });
+      edges_[edge].X_PC.common_errors.push_back({name, false, loading});
     }
     sources_.push_back(name);
   }
@@ -50,9 +50,10 @@ class ObservedChain {
     }
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       Twist e = Gaussian(edges_[i].X_PC.own)(random);
-      for (const Share& share : edges_[i].X_PC.shares) {
-        const auto k = std::find(sources_.begin(), sources_.end(), share.source) - sources_.begin();
-        e += share.factor * drawn[static_cast<std::size_t>(k)];
+      for (const CommonError& common_error : edges_[i].X_PC.common_errors) {
+        const auto k =
+            std::find(sources_.begin(), sources_.end(), common_error.source) - sources_.begin();
+        e += common_error.loading * drawn[static_cast<std::size_t>(k)];
       }
       truth_[i] = edges_[i].X_PC.pose * exp(i == lies ? Twist(by * e) : e);
     }
@@ -97,10 +98,10 @@ class ObservedChain {
   }
 
   /// As if edges knew nothing of each other.
-  void forget_shares() {
+  void forget_common_errors() {
     for (ObservedEdge& edge : edges_) {
       edge.X_PC.own = collapse(edge.X_PC).covariance;
-      edge.X_PC.shares.clear();
+      edge.X_PC.common_errors.clear();
     }
     for (std::size_t i = 0; i < edges_.size(); ++i) cluster_[i] = i;
   }
@@ -114,10 +115,10 @@ class ObservedChain {
         auto block =
             P.block<6, 6>(static_cast<Eigen::Index>(6 * i), static_cast<Eigen::Index>(6 * j));
         if (i == j) block = edges_[i].X_PC.own.matrix();
-        for (const Share& a : edges_[i].X_PC.shares) {
-          for (const Share& b : edges_[j].X_PC.shares) {
+        for (const CommonError& a : edges_[i].X_PC.common_errors) {
+          for (const CommonError& b : edges_[j].X_PC.common_errors) {
             if (a.source != b.source || a.subtracts != b.subtracts) continue;
-            block += (a.subtracts ? -1.0 : 1.0) * a.factor * b.factor.transpose();
+            block += (a.subtracts ? -1.0 : 1.0) * a.loading * b.loading.transpose();
           }
         }
       }

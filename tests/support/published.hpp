@@ -153,9 +153,9 @@ struct SharedPair {
   const auto part = [&](const LeftGaussian& pose, double sign) {
     const Twist size = pose.covariance.matrix().diagonal().cwiseSqrt();
     const Matrix6d to_right = adjoint(pose.mean.inverse());
-    const Factor factor = sign * std::sqrt(common) * to_right * Matrix6d(size.asDiagonal());
+    const Loading loading = sign * std::sqrt(common) * to_right * Matrix6d(size.asDiagonal());
     const Matrix6d own = (1.0 - common) * pose.belief().own.matrix();
-    return Belief{pose.mean, Covariance::trusted(own), std::nullopt, {{"common", false, factor}}};
+    return Belief{pose.mean, Covariance::trusted(own), std::nullopt, {{"common", false, loading}}};
   };
   return {part(poses.first, 1.0), part(poses.second, correlation < 0 ? -1.0 : 1.0)};
 }
@@ -177,13 +177,13 @@ struct Trajectory {
 
   [[nodiscard]] Matrix6d seen_from_B() const { return adjoint(X_AB.pose.inverse()); }
   [[nodiscard]] Belief A() const {
-    return {X_WA.pose, {}, std::nullopt, {{"up to A", false, Factor(root_A)}}};
+    return {X_WA.pose, {}, std::nullopt, {{"up to A", false, Loading(root_A)}}};
   }
   [[nodiscard]] Belief B() const {
     return {X_WA.pose * X_AB.pose,
             X_AB.covariance,
             std::nullopt,
-            {{"up to A", false, Factor(seen_from_B() * root_A)}}};
+            {{"up to A", false, Loading(seen_from_B() * root_A)}}};
   }
 };
 

@@ -63,7 +63,7 @@ inline void check_same(const std::vector<PathCorrelation>& actual,
                        const std::vector<PathCorrelation>& expected) {
   REQUIRE(actual.size() == expected.size());
   for (std::size_t i = 0; i < actual.size(); ++i) {
-    CHECK(actual[i].shares == expected[i].shares);
+    CHECK(actual[i].common_errors == expected[i].common_errors);
     CHECK(actual[i].observed_with == expected[i].observed_with);
     REQUIRE(actual[i].unknown.has_value() == expected[i].unknown.has_value());
     if (actual[i].unknown) CHECK(actual[i].unknown->upper() == expected[i].unknown->upper());

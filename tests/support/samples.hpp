@@ -77,12 +77,13 @@ bool take(const Bytes& bytes) {
 }
 
 [[nodiscard]] inline Correlation correlation(Random& random) {
-  const auto factor = [&](Eigen::Index columns) -> Factor {
-    return Factor::NullaryExpr(6, columns, [&](auto, auto) { return random.normal(); });
+  const auto loading = [&](Eigen::Index columns) -> Loading {
+    return Loading::NullaryExpr(6, columns, [&](auto, auto) { return random.normal(); });
   };
-  return {true,
-          {{"calibration", false, factor(1)}, {"observed:1.2.3", true, factor(kMaxFactorColumns)}},
-          {"hand", std::string(255, 'o')}};
+  return {
+      true,
+      {{"calibration", false, loading(1)}, {"observed:1.2.3", true, loading(kMaxLoadingColumns)}},
+      {"hand", std::string(255, 'o')}};
 }
 
 [[nodiscard]] inline PartialUpdateRequest partial_updates(Random& random) {
@@ -142,7 +143,7 @@ bool take(const Bytes& bytes) {
   found.period = std::chrono::nanoseconds(6);
   found.at_hint = {random.transform(), random.transform()};
   const Correlation some = correlation(random);
-  found.correlations = {{}, {random.covariance(), some.shares, some.observed_with}};
+  found.correlations = {{}, {random.covariance(), some.common_errors, some.observed_with}};
   found.correlations_at_hint = {{random.covariance(), {}, {}}, {}};
   found.commit = 77;
   found.incarnation = 78;

@@ -58,16 +58,16 @@ struct Observation {
 /// edges at once, of which Σ ξᵀ P⁻¹ ξ + eᵀ R⁻¹ e with e = Log(Z⁻¹ X_AB(ξ)) is least, by Gauss-Newton (an iterated
 /// Kalman update); P is the joint covariance that the edges' beliefs make. Edges without uncertainty stay as they are.
 ///
-/// What the edges know of each other afterwards is kept in shares of a new source, which takes the place of those that
-/// earlier observations have left: so it is exact to first order for every path, and a second observation is not counted as
-/// if it were of edges with independent errors. Shares of other sources are kept as a Schmidt-Kalman filter keeps them:
-/// what others hold of such a source need not change. An uncertain edge that is alone takes all of the correction, and
-/// needs no share. More columns than a factor may have are left out so that no covariance becomes too small.
+/// What the edges know of each other afterwards is kept in common errors of a new source, which takes the place of those
+/// that earlier observations have left: so it is exact to first order for every path, and a second observation is not
+/// counted as if it were of edges with independent errors. Common errors of other sources are kept as a Schmidt-Kalman
+/// filter keeps them: what others hold of such a source need not change. An uncertain edge that is alone takes all of the
+/// correction, and needs none. More columns than a loading may have are left out so that no covariance becomes too small.
 ///
 /// Parts of unknown correlation count to the measurement's error: it is then not independent of the rest. An edge that is
 /// alone with such a part is corrected by covariance intersection.
 /// O(edges · columns²).
-/// @param edges  those of the path in its order, and among them, anywhere, all others that have a share of a source that an
+/// @param edges  those of the path in its order, and among them, anywhere, all others that depend on a source that an
 ///   observation has made in common with them
 /// @param Z_AB  the measurement
 /// @param source  the name of the new source: kObservedPrefix and something that no other observation has

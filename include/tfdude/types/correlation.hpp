@@ -9,14 +9,17 @@ namespace tfdude {
 
 /// How an edge's error is correlated with those of other edges. Its covariance is that of its own part.
 struct Correlation {
-  bool unknown = false;       ///< that part may be correlated with anything
-  std::vector<Share> shares;  ///< beside that part
-  /// Edges that observations have left shares of a source in common with; see observe().
+  bool unknown = false;                    ///< that part may be correlated with anything
+  std::vector<CommonError> common_errors;  ///< beside that part
+  /// Edges that depend on a source that an observation has made, as this one does; see observe().
   std::vector<std::string> observed_with;
 
-  [[nodiscard]] bool empty() const { return !unknown && shares.empty() && observed_with.empty(); }
+  [[nodiscard]] bool empty() const {
+    return !unknown && common_errors.empty() && observed_with.empty();
+  }
   friend bool operator==(const Correlation& a, const Correlation& b) {
-    return a.unknown == b.unknown && a.shares == b.shares && a.observed_with == b.observed_with;
+    return a.unknown == b.unknown && a.common_errors == b.common_errors &&
+           a.observed_with == b.observed_with;
   }
 };
 

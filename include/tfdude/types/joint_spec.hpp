@@ -92,7 +92,7 @@ struct JointValue {
 ///   limits upside down; a twist of no unit length; a mimic that is not coupled; what check_value() refuses
 [[nodiscard]] TFDUDE_EXPORT Result<void> check_joint(const JointSpec& joint);
 
-/// The edge's value at a joint's position. A coupled joint's error is not in its covariance but in a share.
+/// The edge's value at a joint's position. A coupled joint's error is not in its covariance but a common error.
 [[nodiscard]] TFDUDE_EXPORT Transform value_at(const JointSpec& joint, double position,
                                                double variance);
 

@@ -64,13 +64,13 @@ void CdrWalk::transforms() {
 }
 
 void CdrWalk::correlation() {
-  constexpr std::uint32_t kMaxFactor = 216;
+  constexpr std::uint32_t kMaxLoading = 216;
   octet();
   sequence([&] { skip(8, 8); }, Covariance::kSize);
   sequence(
       [&] {
         octet();
-        sequence([&] { skip(8, 8); }, kMaxFactor);
+        sequence([&] { skip(8, 8); }, kMaxLoading);
         id();
       },
       kMaxCorrelated);

@@ -19,17 +19,18 @@ Result<PathCorrelation> read_path_correlation(const wire::Correlation& body) {
     if (auto ok = check_finite({Pose(), *correlation.unknown}); !ok)
       return tl::unexpected(ok.error());
   }
-  for (const wire::Share& in : body.shares()) {
-    const std::vector<double>& numbers = in.factor();
+  for (const wire::CommonError& in : body.common_errors()) {
+    const std::vector<double>& numbers = in.loading();
     if (numbers.size() % 6 != 0) {
       return fail(Errc::kInvalidInput,
-                  "a factor of " + std::to_string(numbers.size()) + " numbers");
+                  "a loading of " + std::to_string(numbers.size()) + " numbers");
     }
     const auto columns = static_cast<Eigen::Index>(numbers.size() / 6);
-    correlation.shares.push_back({string_of(in.source()), in.subtracts() != 0,
-                                  Eigen::Map<const Factor>(numbers.data(), 6, columns)});
+    correlation.common_errors.push_back({string_of(in.source()), in.subtracts() != 0,
+                                         Eigen::Map<const Loading>(numbers.data(), 6, columns)});
   }
-  if (auto ok = check_shares(correlation.shares); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_common_errors(correlation.common_errors); !ok)
+    return tl::unexpected(ok.error());
   for (const wire::Identifier& id : body.observed_with())
     correlation.observed_with.push_back(string_of(id));
   return correlation;
@@ -38,7 +39,7 @@ Result<PathCorrelation> read_path_correlation(const wire::Correlation& body) {
 Result<Correlation> read_correlation(const wire::Correlation& body) {
   auto correlation = read_path_correlation(body);
   if (!correlation) return tl::unexpected(std::move(correlation.error()));
-  return Correlation{body.unknown() != 0, std::move(correlation->shares),
+  return Correlation{body.unknown() != 0, std::move(correlation->common_errors),
                      std::move(correlation->observed_with)};
 }
 

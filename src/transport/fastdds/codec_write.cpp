@@ -28,13 +28,13 @@ std::vector<wire::PathEnds> wire_segments(const std::vector<PathEnds>& segments)
   return body;
 }
 
-std::vector<wire::Share> wire_shares(const std::vector<Share>& shares) {
-  std::vector<wire::Share> body(shares.size());
+std::vector<wire::CommonError> wire_common_errors(const std::vector<CommonError>& common_errors) {
+  std::vector<wire::CommonError> body(common_errors.size());
   for (std::size_t i = 0; i < body.size(); ++i) {
-    const Factor& factor = shares[i].factor;
-    body[i].subtracts(shares[i].subtracts ? 1 : 0);
-    body[i].factor().assign(factor.data(), factor.data() + factor.size());
-    body[i].source(shares[i].source);
+    const Loading& loading = common_errors[i].loading;
+    body[i].subtracts(common_errors[i].subtracts ? 1 : 0);
+    body[i].loading().assign(loading.data(), loading.data() + loading.size());
+    body[i].source(common_errors[i].source);
   }
   return body;
 }
@@ -45,14 +45,14 @@ wire::Correlation wire_correlation(const PathCorrelation& correlation) {
     const Covariance::Upper& upper = correlation.unknown->upper();
     body.unknown_part().assign(upper.begin(), upper.end());
   }
-  body.shares(wire_shares(correlation.shares));
+  body.common_errors(wire_common_errors(correlation.common_errors));
   for (const std::string& id : correlation.observed_with) body.observed_with().emplace_back(id);
   return body;
 }
 
 wire::Correlation wire_correlation(const Correlation& correlation) {
   wire::Correlation body = wire_correlation(
-      PathCorrelation{std::nullopt, correlation.shares, correlation.observed_with});
+      PathCorrelation{std::nullopt, correlation.common_errors, correlation.observed_with});
   body.unknown(correlation.unknown ? 1 : 0);
   return body;
 }

@@ -119,11 +119,11 @@ TEST_CASE("a frame says how its error is correlated with others'") {
   CHECK(config->frames[1].correlation.unknown);
   const auto& said = config->frames[2].correlation;
   CHECK_FALSE(said.unknown);
-  REQUIRE(said.shares.size() == 2);
-  CHECK(said.shares[0].source == "belt");
-  CHECK(said.shares[0].factor.cols() == 2);
-  CHECK(said.shares[0].factor(5, 0) == 6);
-  CHECK(said.shares[0].factor(5, 1) == 7);
+  REQUIRE(said.common_errors.size() == 2);
+  CHECK(said.common_errors[0].source == "belt");
+  CHECK(said.common_errors[0].loading.cols() == 2);
+  CHECK(said.common_errors[0].loading(5, 0) == 6);
+  CHECK(said.common_errors[0].loading(5, 1) == 7);
   const auto refused = [](const std::string& what, const std::string& why) {
     const auto bad = tfdude::parse_config("frames:\n  - {id: a, " + what + "}\n", "robot.yaml");
     REQUIRE_FALSE(bad.has_value());
@@ -138,7 +138,7 @@ TEST_CASE("a frame says how its error is correlated with others'") {
   refused("sources: {s: [1, 2, 3, 4, 5, 6]}", "source 's'[0] is not a list of 6 numbers");
   refused("sources: {s: [[1, 2, 3, 4, 5]]}", "source 's'[0] is not a list of 6 numbers");
   refused("sources: {s: [[1, 2, 3, 4, 5, x]]}", "source 's'[0][5] is 'x', which is not a number");
-  refused("sources: {s: [[1, 2, 3, 4, 5, 1e10]]}", "source 's': an element of its factor");
+  refused("sources: {s: [[1, 2, 3, 4, 5, 1e10]]}", "source 's': an element of its loading");
   refused("sources: {'': [[1, 2, 3, 4, 5, 6]]}", "source");
   refused("sources: {s: [[1, 2, 3, 4, 5, 6]], s: [[1, 2, 3, 4, 5, 6]]}",
           "sources: s is given twice");

@@ -53,7 +53,7 @@ TEST_CASE("urdf: joints that mimic follow the last of their chain") {
   CHECK(third.mimic->offset == Approx(3 * 0.5 + 0.25));
   CHECK(third.position == Approx(-6 * 0.25 + 1.75));
   CHECK(third.variance == Approx(36 * 0.01));
-  // The errors of coupled joints are shares, and no part of the edges' own covariance.
+  // The errors of coupled joints are common errors, and no part of the edges' own covariance.
   CHECK(named(frames, "p_l3").X_PC.covariance.upper() == tfdude::Covariance().upper());
   CHECK(named(frames, "p_l4").X_PC.covariance.upper()[0] > 0);
   CHECK(named(frames, "p_l3").correlation.empty());

@@ -19,18 +19,18 @@ using testing::transform_diff;
 
 constexpr int kSamples = 100'000;
 
-Belief belief(const Transform& X, std::vector<Share> shares = {}) {
-  return {X.pose, X.covariance, std::nullopt, std::move(shares)};
+Belief belief(const Transform& X, std::vector<CommonError> common_errors = {}) {
+  return {X.pose, X.covariance, std::nullopt, std::move(common_errors)};
 }
 
-Factor random_factor(Random& random, Eigen::Index columns, double metres, double radians) {
-  Factor factor(6, columns);
+Loading random_loading(Random& random, Eigen::Index columns, double metres, double radians) {
+  Loading loading(6, columns);
   for (Eigen::Index j = 0; j < columns; ++j) {
     for (Eigen::Index i = 0; i < 6; ++i) {
-      factor(i, j) = random.normal() * (i < 3 ? metres : radians);
+      loading(i, j) = random.normal() * (i < 3 ? metres : radians);
     }
   }
-  return factor;
+  return loading;
 }
 
 TEST_CASE("Beliefs with nothing in common compose as transforms do") {
@@ -50,31 +50,31 @@ TEST_CASE(
   Random random(612);
   INFO("seed " << random.seed());
   for (const Order order : {Order::kSecond, Order::kFourth}) {
-    const Share share{"calibration", false, random_factor(random, 2, 0.1, 0.1)};
+    const CommonError common_error{"calibration", false, random_loading(random, 2, 0.1, 0.1)};
     const Transform exact{random.pose(), {}};
-    const Belief X_AB = belief(exact, {share});
+    const Belief X_AB = belief(exact, {common_error});
     const Transform there_and_back = collapse(compose(X_AB, inverse(X_AB), order));
     CHECK(testing::pose_diff(there_and_back.pose, {}, 1e-12) == "");
     CHECK(there_and_back.covariance.matrix().cwiseAbs().maxCoeff() < 1e-18);
-    const Belief still{Pose(), {}, std::nullopt, {share}};
+    const Belief still{Pose(), {}, std::nullopt, {common_error}};
     const Transform twice = collapse(compose(still, still, Order::kSecond));
-    const Matrix6d expected = 4.0 * share.factor * share.factor.transpose();
+    const Matrix6d expected = 4.0 * common_error.loading * common_error.loading.transpose();
     CHECK(covariance_diff(twice.covariance, Covariance::trusted(expected), 1e-12) == "");
   }
 }
 
 TEST_CASE("A source of fewer columns on one edge is as if the others were zero") {
   Random random(613);
-  Share two{"s", false, random_factor(random, 2, 0.1, 0.1)};
-  Share one{"s", false, two.factor.leftCols(1)};
+  CommonError two{"s", false, random_loading(random, 2, 0.1, 0.1)};
+  CommonError one{"s", false, two.loading.leftCols(1)};
   const Transform sum = collapse(compose(belief({}, {one}), belief({}, {two}), Order::kSecond));
-  Factor total = two.factor;
+  Loading total = two.loading;
   total.leftCols(1) *= 2.0;
   CHECK(covariance_diff(sum.covariance, Covariance::trusted(Matrix6d(total * total.transpose())),
                         1e-12) == "");
 }
 
-// The second moment of the errors of X_AB X_BC, where both have own errors and shares of a source.
+// The second moment of the errors of X_AB X_BC, where both have own errors and common errors of a source.
 Matrix6d sampled_product(const Belief& X_AB, const Belief& X_BC, Random& random, int samples) {
   const Gaussian own_1(X_AB.own);
   const Gaussian own_2(X_BC.own);
@@ -84,20 +84,22 @@ Matrix6d sampled_product(const Belief& X_AB, const Belief& X_BC, Random& random,
     Twist e_2 = own_2(random);
     Eigen::VectorXd s(6);
     for (Eigen::Index i = 0; i < 6; ++i) s[i] = random.normal();
-    for (const Share& share : X_AB.shares) e_1 += share.factor * s.head(share.factor.cols());
-    for (const Share& share : X_BC.shares) e_2 += share.factor * s.head(share.factor.cols());
+    for (const CommonError& common_error : X_AB.common_errors)
+      e_1 += common_error.loading * s.head(common_error.loading.cols());
+    for (const CommonError& common_error : X_BC.common_errors)
+      e_2 += common_error.loading * s.head(common_error.loading.cols());
     return log(mean_inverse * (X_AB.pose * exp(e_1)) * (X_BC.pose * exp(e_2)));
   });
 }
 
-TEST_CASE("Shares of a source propagate as samples show, and independence would not do") {
+TEST_CASE("Common errors propagate as samples show, and independence would not do") {
   Random random(614);
   INFO("seed " << random.seed());
   for (int i = 0; i < 3; ++i) {
     const Belief X_AB = belief(random.transform(2.0, 0.003, 0.003),
-                               {{"s", false, random_factor(random, 3, 0.01, 0.01)}});
+                               {{"s", false, random_loading(random, 3, 0.01, 0.01)}});
     const Belief X_BC = belief(random.transform(2.0, 0.003, 0.003),
-                               {{"s", false, random_factor(random, 2, 0.01, 0.01)}});
+                               {{"s", false, random_loading(random, 2, 0.01, 0.01)}});
     const Matrix6d sampled = sampled_product(X_AB, X_BC, random, kSamples);
     const Transform shared = collapse(compose(X_AB, X_BC, Order::kSecond));
     CHECK(testing::moment_diff(sampled, shared.covariance.matrix(), kSamples, 5e-3) == "");
@@ -106,7 +108,7 @@ TEST_CASE("Shares of a source propagate as samples show, and independence would 
   }
 }
 
-TEST_CASE("Fourth order is nearer to samples than second, for independent and for shared errors") {
+TEST_CASE("Fourth order is nearer to samples than second, for independent and for common errors") {
   Random random(615);
   INFO("seed " << random.seed());
   for (const double shared : {0.0, 0.15}) {
@@ -117,8 +119,8 @@ TEST_CASE("Fourth order is nearer to samples than second, for independent and fo
       Belief X_AB = belief(random.transform(0.5, 0.15, 0.15));
       Belief X_BC = belief(random.transform(0.5, 0.15, 0.15));
       if (shared > 0) {
-        X_AB.shares = {{"s", false, random_factor(random, 3, shared, shared)}};
-        X_BC.shares = {{"s", false, random_factor(random, 3, shared, shared)}};
+        X_AB.common_errors = {{"s", false, random_loading(random, 3, shared, shared)}};
+        X_BC.common_errors = {{"s", false, random_loading(random, 3, shared, shared)}};
       }
       const Matrix6d sampled = sampled_product(X_AB, X_BC, random, 400'000);
       const auto error = [&](Order order) {
@@ -201,21 +203,21 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("Shares that make no sense are refused by name") {
+TEST_CASE("Common errors that make no sense are refused by name") {
   Random random(619);
-  const Share good{"s", false, random_factor(random, 2, 1, 1)};
-  CHECK(check_shares({good}));
-  const auto refusal = [](const std::vector<Share>& shares) {
-    const auto ok = check_shares(shares);
+  const CommonError good{"s", false, random_loading(random, 2, 1, 1)};
+  CHECK(check_common_errors({good}));
+  const auto refusal = [](const std::vector<CommonError>& common_errors) {
+    const auto ok = check_common_errors(common_errors);
     REQUIRE_FALSE(ok);
     CHECK(ok.error().code == Errc::kInvalidInput);
     return ok.error().message;
   };
   CHECK_THAT(refusal({good, good}), ContainsSubstring("'s'") && ContainsSubstring("twice"));
-  CHECK_THAT(refusal({{"", false, good.factor}}), ContainsSubstring("source"));
-  CHECK_THAT(refusal({{"s", false, Factor(6, 0)}}), ContainsSubstring("columns"));
-  CHECK_THAT(refusal({{"s", false, Factor::Zero(6, 37)}}), ContainsSubstring("37"));
-  Factor bad = good.factor;
+  CHECK_THAT(refusal({{"", false, good.loading}}), ContainsSubstring("source"));
+  CHECK_THAT(refusal({{"s", false, Loading(6, 0)}}), ContainsSubstring("columns"));
+  CHECK_THAT(refusal({{"s", false, Loading::Zero(6, 37)}}), ContainsSubstring("37"));
+  Loading bad = good.loading;
   bad(3, 1) = std::nan("");
   CHECK_THAT(refusal({{"s", false, bad}}), ContainsSubstring("not a number"));
 }

@@ -59,7 +59,7 @@ struct Ends {
 
 // Each run a new robot of the same uncertainties, whose paths are observed one after the other.
 std::vector<Consistency> simulate(Random& random, const std::vector<Ends>& observed,
-                                  const std::vector<Ends>& asked, bool keep_shares) {
+                                  const std::vector<Ends>& asked, bool keep_common_errors) {
   std::vector<Consistency> found(asked.size());
   for (int run = 0; run < kRuns; ++run) {
     ObservedChain chain(random, 5);
@@ -68,7 +68,7 @@ std::vector<Consistency> simulate(Random& random, const std::vector<Ends>& obser
     chain.make_true(random);
     for (const Ends& ends : observed) {
       chain.observe(ends.from, ends.to, random.covariance(0.001, 0.001), random);
-      if (!keep_shares) chain.forget_shares();
+      if (!keep_common_errors) chain.forget_common_errors();
     }
     for (std::size_t i = 0; i < asked.size(); ++i) {
       found[i].add(chain.believed(asked[i].from, asked[i].to),
@@ -125,8 +125,9 @@ TEST_CASE(
     // However often all was observed.
     for (std::size_t i = 0; i < 5; ++i) {
       Eigen::Index columns = 0;
-      for (const Share& share : chain.edges()[i].X_PC.shares) columns += share.factor.cols();
-      CHECK(columns <= 3 + 3 + 2 * kMaxFactorColumns);
+      for (const CommonError& common_error : chain.edges()[i].X_PC.common_errors)
+        columns += common_error.loading.cols();
+      CHECK(columns <= 3 + 3 + 2 * kMaxLoadingColumns);
     }
   }
 }
@@ -142,7 +143,8 @@ TEST_CASE("What there is no room for makes the joint covariance larger, not smal
     P = chain.dense_update(P, ends.from, ends.to, R);
     chain.observe_exactly(ends.from, ends.to, R);
     for (const ObservedEdge& edge : chain.edges()) {
-      for (const Share& share : edge.X_PC.shares) CHECK(share.factor.cols() <= kMaxFactorColumns);
+      for (const CommonError& common_error : edge.X_PC.common_errors)
+        CHECK(common_error.loading.cols() <= kMaxLoadingColumns);
     }
     const Eigen::VectorXd values =
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(chain.dense() - P).eigenvalues();
@@ -164,7 +166,7 @@ TEST_CASE("A measurement of one uncertain edge is fused with it") {
     REQUIRE(observed);
     REQUIRE(fused);
     CHECK(testing::transform_diff(collapse(observed->edges[0].X_PC), fused->X, 1e-8) == "");
-    CHECK(observed->edges[0].X_PC.shares.empty());
+    CHECK(observed->edges[0].X_PC.common_errors.empty());
   }
 }
 
@@ -209,7 +211,7 @@ TEST_CASE("Edges that are known exactly stay as they are to the last bit") {
   for (const std::size_t i : {std::size_t{1}, std::size_t{2}}) {
     CHECK(std::memcmp(&chain.edges()[i].X_PC.pose, &before[i].X_PC.pose, sizeof(Pose)) == 0);
     CHECK(chain.edges()[i].X_PC.own.upper() == Covariance::Upper{});
-    CHECK(chain.edges()[i].X_PC.shares.empty());
+    CHECK(chain.edges()[i].X_PC.common_errors.empty());
   }
   CHECK(testing::pose_diff(chain.edges()[0].X_PC.pose, before[0].X_PC.pose, 1e-9) != "");
   ObservedChain exact(random, 2);

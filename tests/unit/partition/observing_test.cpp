@@ -119,10 +119,10 @@ TEST_CASE("answers are put together in the order of the edges, and name who is m
   CHECK(path->seen[1].incarnation == 77);
   CHECK_FALSE(path->torn);
   // An observation that has reached one of its owners only.
-  const Share share{"observed:other", true, Factor::Ones(6, 1)};
-  answers[0].correlations[0].shares = {share};
+  const CommonError common_error{"observed:other", true, Loading::Ones(6, 1)};
+  answers[0].correlations[0].common_errors = {common_error};
   CHECK(observed_path(*plan, answers)->torn);
-  answers[1].correlations[0].shares = {share};
+  answers[1].correlations[0].common_errors = {common_error};
   CHECK_FALSE(observed_path(*plan, answers)->torn);
   answers[1].values.pop_back();
   const auto short_of_one = observed_path(*plan, answers);

@@ -22,7 +22,7 @@ using Specs = std::vector<FrameSpec>;
 
 constexpr Time kNow{std::chrono::nanoseconds(1000)};
 
-const Correlation kSupply{false, {{"supply", false, Factor::Ones(6, 1)}}, {}};
+const Correlation kSupply{false, {{"supply", false, Loading::Ones(6, 1)}}, {}};
 
 // A life of the partition "arms", which ends with the object.
 struct Life : Replica {

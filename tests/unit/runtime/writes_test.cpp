@@ -103,11 +103,11 @@ TEST_CASE("writes: correlation is set at the owner, once it is known to be sound
   const ScriptedOwner arm(network, "arm", kArm);
   Writer writer(network);
   Correlation correlation;
-  correlation.shares.push_back({"camera", false, Matrix6d(1e-3 * Matrix6d::Identity())});
+  correlation.common_errors.push_back({"camera", false, Matrix6d(1e-3 * Matrix6d::Identity())});
   const int before = arm.asked();
   CHECK(writer.writes.correlate("hand", correlation));
   CHECK(arm.asked() == before + 1);
-  correlation.shares.push_back(correlation.shares.front());
+  correlation.common_errors.push_back(correlation.common_errors.front());
   CHECK(outcome(writer.writes.correlate("hand", correlation)) == "invalid_input");
   CHECK(outcome(writer.writes.correlate("foot", {})) == "unknown_frame");
   CHECK(arm.asked() == before + 1);

@@ -12,12 +12,13 @@ namespace {
 using testing::Random;
 
 Correlation any_correlation(Random& random) {
-  const auto factor = [&](Eigen::Index columns) -> Factor {
-    return Factor::NullaryExpr(6, columns, [&](auto, auto) { return random.normal(); });
+  const auto loading = [&](Eigen::Index columns) -> Loading {
+    return Loading::NullaryExpr(6, columns, [&](auto, auto) { return random.normal(); });
   };
-  return {true,
-          {{"calibration", false, factor(1)}, {"observed:1.2.3", true, factor(kMaxFactorColumns)}},
-          {"hand", std::string(255, 'o')}};
+  return {
+      true,
+      {{"calibration", false, loading(1)}, {"observed:1.2.3", true, loading(kMaxLoadingColumns)}},
+      {"hand", std::string(255, 'o')}};
 }
 
 TEST_CASE("a correlation comes back as it was stored, to the last bit") {
@@ -47,10 +48,12 @@ TEST_CASE("a stored correlation that was cut short, or went on, is refused") {
 
 TEST_CASE("a stored correlation that nobody can have said is refused") {
   Correlation bad;
-  SECTION("a factor that is not a number") {
-    bad.shares.push_back({"supply", false, Factor::Constant(6, 1, std::nan(""))});
+  SECTION("a loading that is not a number") {
+    bad.common_errors.push_back({"supply", false, Loading::Constant(6, 1, std::nan(""))});
   }
-  SECTION("a source named twice") { bad.shares.assign(2, {"supply", false, Factor::Ones(6, 1)}); }
+  SECTION("a source named twice") {
+    bad.common_errors.assign(2, {"supply", false, Loading::Ones(6, 1)});
+  }
   SECTION("an edge without a name") { bad.observed_with.emplace_back(); }
   CHECK_FALSE(correlation_from(to_blob(bad)));
 }

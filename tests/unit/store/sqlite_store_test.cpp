@@ -133,15 +133,15 @@ TEST_CASE("whom a partition misses is kept as it was said last, by itself") {
 TEST_CASE("what edges have to do with each other is kept with their values, and goes with them") {
   Random random(0x57a7f);
   INFO("seed " << random.seed());
-  const Correlation supply{true, {{"supply", false, Factor::Ones(6, 2)}}, {}};
-  const Correlation seen{false, {{"observed:1", true, Factor::Ones(6, 36)}}, {"arm", "tool"}};
+  const Correlation supply{true, {{"supply", false, Loading::Ones(6, 2)}}, {}};
+  const Correlation seen{false, {{"observed:1", true, Loading::Ones(6, 36)}}, {"arm", "tool"}};
   const Transform X = random.transform();
   const TemporaryDirectory directory;
   // As large as can be.
-  Correlation most{false, {}, std::vector<std::string>(kMaxShares, std::string(255, 'o'))};
-  for (std::size_t i = 0; i < kMaxShares; ++i) {
-    most.shares.push_back(
-        {std::string(250, 's') + std::to_string(i), false, Factor::Ones(6, kMaxFactorColumns)});
+  Correlation most{false, {}, std::vector<std::string>(kMaxCommonErrors, std::string(255, 'o'))};
+  for (std::size_t i = 0; i < kMaxCommonErrors; ++i) {
+    most.common_errors.push_back(
+        {std::string(250, 's') + std::to_string(i), false, Loading::Ones(6, kMaxLoadingColumns)});
   }
   const std::string file = state_file(directory.path(), 7, "arms");
   {

@@ -26,11 +26,11 @@ wire::State state_of(const wire::Correlation& correlation, std::size_t count = 1
   return state;
 }
 
-wire::Share share(std::size_t numbers, const std::string& source = "s") {
-  wire::Share share;
-  share.factor().assign(numbers, 0.5);
-  share.source(source);
-  return share;
+wire::CommonError common_error(std::size_t numbers, const std::string& source = "s") {
+  wire::CommonError common_error;
+  common_error.loading().assign(numbers, 0.5);
+  common_error.source(source);
+  return common_error;
 }
 
 TEST_CASE("correlation: what is longer than its bound is not well formed") {
@@ -38,15 +38,15 @@ TEST_CASE("correlation: what is longer than its bound is not well formed") {
   CHECK(well_formed(state_of(correlation)));
   CHECK(well_formed(state_of(correlation, kMaxCorrelated)));
   CHECK_FALSE(well_formed(state_of(correlation, kMaxCorrelated + 1)));
-  correlation.shares().assign(kMaxCorrelated, share(6));
+  correlation.common_errors().assign(kMaxCorrelated, common_error(6));
   CHECK(well_formed(state_of(correlation)));
-  correlation.shares().assign(kMaxCorrelated + 1, share(6));
+  correlation.common_errors().assign(kMaxCorrelated + 1, common_error(6));
   CHECK_FALSE(well_formed(state_of(correlation)));
-  correlation.shares().assign(1, share(216));
+  correlation.common_errors().assign(1, common_error(216));
   CHECK(well_formed(state_of(correlation)));
-  correlation.shares().assign(1, share(217));
+  correlation.common_errors().assign(1, common_error(217));
   CHECK_FALSE(well_formed(state_of(correlation)));
-  correlation.shares().clear();
+  correlation.common_errors().clear();
   correlation.observed_with().assign(kMaxCorrelated, "arm");
   CHECK(well_formed(state_of(correlation)));
   correlation.observed_with().assign(kMaxCorrelated + 1, "arm");
@@ -66,18 +66,18 @@ TEST_CASE("correlation: what cannot be meant is refused when it is read") {
     return read.error().message;
   };
   wire::Correlation correlation;
-  correlation.shares().assign(1, share(7));
+  correlation.common_errors().assign(1, common_error(7));
   CHECK_THAT(refusal(correlation), ContainsSubstring("7 numbers"));
-  correlation.shares().assign(1, share(0));
+  correlation.common_errors().assign(1, common_error(0));
   CHECK_THAT(refusal(correlation), ContainsSubstring("'s'"));
-  correlation.shares().assign(2, share(6));
+  correlation.common_errors().assign(2, common_error(6));
   CHECK_THAT(refusal(correlation), ContainsSubstring("twice"));
-  correlation.shares().assign(1, share(6, ""));
+  correlation.common_errors().assign(1, common_error(6, ""));
   CHECK_THAT(refusal(correlation), ContainsSubstring("source"));
-  correlation.shares().assign(1, share(6));
-  correlation.shares()[0].factor()[3] = std::numeric_limits<double>::quiet_NaN();
+  correlation.common_errors().assign(1, common_error(6));
+  correlation.common_errors()[0].loading()[3] = std::numeric_limits<double>::quiet_NaN();
   CHECK_THAT(refusal(correlation), ContainsSubstring("not a number"));
-  correlation.shares().clear();
+  correlation.common_errors().clear();
   correlation.unknown_part().assign(20, 1.0);
   CHECK_THAT(refusal(correlation), ContainsSubstring("20 numbers"));
   correlation.unknown_part().assign(21, std::numeric_limits<double>::infinity());

@@ -16,13 +16,13 @@ using testing::transform_diff;
 
 Time at(std::chrono::milliseconds since) { return Time(1'000'000s + since); }
 
-Share share(Random& random, const std::string& source) {
-  const Factor factor =
-      Factor::NullaryExpr(6, 2, [&](auto, auto) { return 0.01 * random.normal(); });
-  return {source, false, factor};
+CommonError common_error(Random& random, const std::string& source) {
+  const Loading loading =
+      Loading::NullaryExpr(6, 2, [&](auto, auto) { return 0.01 * random.normal(); });
+  return {source, false, loading};
 }
 
-Correlation shared(const Share& share) { return {false, {share}, {}}; }
+Correlation shared(const CommonError& common_error) { return {false, {common_error}, {}}; }
 
 // world ─ a ─ b, and world ─ c.
 class Robot {
@@ -44,16 +44,16 @@ class Robot {
   Transform X_WC;
 };
 
-Belief with(const Transform& X, std::vector<Share> shares) {
-  return {X.pose, X.covariance, std::nullopt, std::move(shares)};
+Belief with(const Transform& X, std::vector<CommonError> common_errors) {
+  return {X.pose, X.covariance, std::nullopt, std::move(common_errors)};
 }
 
 TEST_CASE("Lookups count a source once, whichever way they go") {
   Random random(651);
   INFO("seed " << random.seed());
   Robot robot(random);
-  const Share s = share(random, "s");
-  const Share t = share(random, "s");
+  const CommonError s = common_error(random, "s");
+  const CommonError t = common_error(random, "s");
   REQUIRE(robot.forest.correlate("a", shared(s)));
   REQUIRE(robot.forest.correlate("c", shared(t)));
   const Belief expected =
@@ -124,7 +124,7 @@ TEST_CASE("A source is counted at an instant between samples, too") {
   Random random(654);
   INFO("seed " << random.seed());
   Robot robot(random);
-  const Share s = share(random, "s");
+  const CommonError s = common_error(random, "s");
   REQUIRE(robot.forest.correlate("a", shared(s)));
   REQUIRE(robot.forest.correlate("b", shared(s)));
   const Transform still{robot.X_WA.pose, {}};
@@ -147,8 +147,9 @@ TEST_CASE(
   Random random(655);
   INFO("seed " << random.seed());
   Robot robot(random);
-  REQUIRE(robot.forest.correlate("a", shared(share(random, "s"))));
-  REQUIRE(robot.forest.correlate("b", {true, {share(random, "s"), share(random, "t")}, {}}));
+  REQUIRE(robot.forest.correlate("a", shared(common_error(random, "s"))));
+  REQUIRE(robot.forest.correlate(
+      "b", {true, {common_error(random, "s"), common_error(random, "t")}, {}}));
   const auto parts = robot.forest.lookup_segments({{"c", "world"}, {"world", "a"}, {"a", "b"}});
   REQUIRE(parts);
   REQUIRE(parts->correlations.size() == 3);
@@ -169,20 +170,20 @@ TEST_CASE("A revision of static edges holds until their next update") {
   Random random(656);
   INFO("seed " << random.seed());
   Robot robot(random);
-  const Share said = share(random, "s");
+  const CommonError said = common_error(random, "s");
   REQUIRE(robot.forest.correlate("a", shared(said)));
   const auto edges = std::vector<PathEnds>{{"world", "a"}, {"a", "b"}};
   const auto seen = robot.forest.lookup_segments(edges, {}, std::nullopt, true);
   REQUIRE(seen);
-  Share observed = share(random, "observed:1");
+  CommonError observed = common_error(random, "observed:1");
   observed.subtracts = true;
-  observed.factor *= 0.01;
+  observed.loading *= 0.01;
   const Correlation now{false, {said, observed}, {"a", "b"}};
   REQUIRE(robot.forest.revise({{"a", robot.X_WA, now}, {"b", robot.X_AB, now}}, std::nullopt,
                               seen->commit));
   const auto after = robot.forest.lookup_segments(edges, {}, std::nullopt, true);
   REQUIRE(after);
-  CHECK(after->correlations[0].shares.size() == 2);
+  CHECK(after->correlations[0].common_errors.size() == 2);
   CHECK(after->correlations[1].observed_with == std::vector<std::string>{"a", "b"});
   // What was seen is old now.
   const auto again = robot.forest.revise({{"a", robot.X_WA, now}}, std::nullopt, seen->commit);
@@ -191,9 +192,9 @@ TEST_CASE("A revision of static edges holds until their next update") {
   REQUIRE(robot.forest.update("a", robot.X_WA));
   const auto updated = robot.forest.lookup_segments(edges, {}, std::nullopt, true);
   REQUIRE(updated);
-  CHECK(updated->correlations[0].shares.size() == 1);
+  CHECK(updated->correlations[0].common_errors.size() == 1);
   CHECK(updated->correlations[0].observed_with.empty());
-  CHECK(updated->correlations[1].shares.size() == 2);
+  CHECK(updated->correlations[1].common_errors.size() == 2);
 }
 
 TEST_CASE("A revision of a moving edge is a sample, or replaces that of its stamp") {
@@ -224,8 +225,8 @@ TEST_CASE("A revision of a moving edge is a sample, or replaces that of its stam
 TEST_CASE("What cannot be meant is refused, and changes nothing") {
   Random random(658);
   Robot robot(random);
-  Share bad = share(random, "s");
-  bad.factor(0, 0) = std::nan("");
+  CommonError bad = common_error(random, "s");
+  bad.loading(0, 0) = std::nan("");
   const auto refused = robot.forest.correlate("a", shared(bad));
   REQUIRE_FALSE(refused);
   CHECK_THAT(refused.error().message, ContainsSubstring("'a'") && ContainsSubstring("'s'"));

@@ -15,10 +15,10 @@ constexpr int kReaders = 3;
 constexpr int kAnswers = 2000;  // each, or a reader has proved nothing
 constexpr int kMostRounds = 2'000'000;
 
-Share share(double size) {
-  Factor factor = Factor::Zero(6, 1);
-  factor(0, 0) = size;
-  return {"s", false, factor};
+CommonError common_error(double size) {
+  Loading loading = Loading::Zero(6, 1);
+  loading(0, 0) = size;
+  return {"s", false, loading};
 }
 
 // Both edges have the same size of the source, or are exact: along x the chain has twice of that, and never once.
@@ -35,8 +35,8 @@ struct Reader {
         return;
       }
       const auto size = [&](std::size_t i) {
-        const auto& shares = parts->correlations.at(i).shares;
-        return shares.empty() ? 0.0 : shares.front().factor(0, 0);
+        const auto& common_errors = parts->correlations.at(i).common_errors;
+        return common_errors.empty() ? 0.0 : common_errors.front().loading(0, 0);
       };
       if (size(0) != size(1)) finding = "the edges of one commit differ";
       const auto whole = forest.lookup("world", "b", Query{});
@@ -71,7 +71,7 @@ TEST_CASE("readers see the correlation of edges as one commit left it") {
   };
   std::string failed;
   for (int round = 0; round < kMostRounds && !done() && failed.empty(); ++round) {
-    const Correlation now{false, {share(round % 7)}, {"a", "b"}};
+    const Correlation now{false, {common_error(round % 7)}, {"a", "b"}};
     const auto seen = forest.lookup_segments({{"world", "a"}}, {}, std::nullopt, true);
     const auto revised =
         forest.revise({{"a", {}, now}, {"b", {}, now}}, std::nullopt, seen->commit);

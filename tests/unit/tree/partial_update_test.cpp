@@ -93,7 +93,7 @@ TEST_CASE("an edge that was observed keeps its whole covariance when only its pl
   Random random(0x9a74);
   Arm arm(random);
   Correlation observed;
-  observed.shares.push_back({"observed:1.2.3", false, 0.1 * Factor::Ones(6, 1)});
+  observed.common_errors.push_back({"observed:1.2.3", false, 0.1 * Loading::Ones(6, 1)});
   REQUIRE(arm.forest.revise({{"arm", arm.given, observed}}, std::nullopt, UINT64_MAX));
   const Transform whole = *arm.forest.value("arm");
   REQUIRE(arm.forest.update_partial({{"arm", Eigen::Vector3d(1, 2, 3)}}));

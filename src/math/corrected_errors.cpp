@@ -1,4 +1,4 @@
-#include "math/observed_shares.hpp"
+#include "math/corrected_errors.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -27,19 +27,19 @@ class SignedColumns {
  public:
   explicit SignedColumns(std::size_t edges) : columns_(6 * static_cast<Eigen::Index>(edges), 0) {}
 
-  void append(const std::vector<Factor>& factors, bool subtracts) {
+  void append(const std::vector<Loading>& loadings, bool subtracts) {
     const Eigen::Index first = columns_.cols();
-    const Eigen::Index more = factors.front().cols();
+    const Eigen::Index more = loadings.front().cols();
     columns_.conservativeResize(Eigen::NoChange, first + more);
-    for (std::size_t i = 0; i < factors.size(); ++i) {
-      columns_.block(6 * static_cast<Eigen::Index>(i), first, 6, more) = factors[i];
+    for (std::size_t i = 0; i < loadings.size(); ++i) {
+      columns_.block(6 * static_cast<Eigen::Index>(i), first, 6, more) = loadings[i];
     }
     signs_.conservativeResize(first + more);
     signs_.tail(more).setConstant(subtracts ? -1.0 : 1.0);
   }
 
-  // The same sum of the fewest columns, as shares of one source. All who have it are here: so what there is no room for may
-  // be left out where it subtracts, and what adds goes to the own parts, as no correlation of n parts is more than n
+  // The same sum of the fewest columns, as common errors of one source. All who have it are here: so what there is no room
+  // for may be left out where it subtracts, and what adds goes to the own parts, as no correlation of n parts is more than n
   // times their sum.
   void give(std::vector<CorrectedError>& edges, const std::string& name) const {
     const Eigen::HouseholderQR<Matrix> qr(columns_);
@@ -57,12 +57,12 @@ class SignedColumns {
       to.conservativeResize(Eigen::NoChange, to.cols() + 1);
       to.rightCols(1) = vectors.col(k) * std::sqrt(std::abs(values[k]));
     };
-    for (Eigen::Index k = 0; k < rank && values[k] < -least && less.cols() < kMaxFactorColumns;
+    for (Eigen::Index k = 0; k < rank && values[k] < -least && less.cols() < kMaxLoadingColumns;
          ++k) {
       put(less, k);
     }
     for (Eigen::Index k = rank; k-- > 0 && values[k] > least;) {
-      if (more.cols() < kMaxFactorColumns) {
+      if (more.cols() < kMaxLoadingColumns) {
         put(more, k);
         continue;
       }
@@ -71,17 +71,17 @@ class SignedColumns {
         edges[i].own += static_cast<double>(edges.size()) * values[k] * part * part.transpose();
       }
     }
-    share(edges, name, less, true);
-    share(edges, name, more, false);
+    add_common(edges, name, less, true);
+    add_common(edges, name, more, false);
   }
 
  private:
-  static void share(std::vector<CorrectedError>& edges, const std::string& name, const Matrix& all,
-                    bool subtracts) {
+  static void add_common(std::vector<CorrectedError>& edges, const std::string& name,
+                         const Matrix& all, bool subtracts) {
     if (all.cols() == 0) return;
     for (std::size_t i = 0; i < edges.size(); ++i) {
-      const Factor part = all.middleRows(6 * static_cast<Eigen::Index>(i), 6);
-      edges[i].shares.push_back({name, subtracts, part});
+      const Loading part = all.middleRows(6 * static_cast<Eigen::Index>(i), 6);
+      edges[i].common_errors.push_back({name, subtracts, part});
     }
   }
 
@@ -107,30 +107,30 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
   }
   const bool alone = edges.size() == 1;
   if (alone) {
-    // What others know of it, they know by shares: the rest is its own.
+    // What others know of it, they know by common errors: the rest is its own.
     const Matrix6d rest = Matrix6d::Identity() - gains[0] * H[edges[0]];
     corrected[0].own =
         rest * prior.own()[0] * rest.transpose() + gains[0] * R * gains[0].transpose();
   }
   SignedColumns observed(edges.size());
   for (const JointPrior::Source& source : prior.sources()) {
-    const Factor on_path = source.on_path(prior, H);
-    std::vector<Factor> factors = source.factors;
-    for (std::size_t i = 0; i < edges.size(); ++i) factors[i] -= gains[i] * on_path;
+    const Loading on_path = source.on_path(prior, H);
+    std::vector<Loading> loadings = source.loadings;
+    for (std::size_t i = 0; i < edges.size(); ++i) loadings[i] -= gains[i] * on_path;
     if (!alone && is_observed({source.name, source.subtracts, {}})) {
-      observed.append(factors, source.subtracts);
+      observed.append(loadings, source.subtracts);
       continue;
     }
     for (std::size_t i = 0; i < edges.size(); ++i) {
-      if (!factors[i].isZero(0)) {
-        corrected[i].shares.push_back({source.name, source.subtracts, factors[i]});
+      if (!loadings[i].isZero(0)) {
+        corrected[i].common_errors.push_back({source.name, source.subtracts, loadings[i]});
       }
     }
   }
   if (alone) return corrected;
   const Matrix6d root = inverse_root(S_0);
-  std::vector<Factor> less;
-  std::vector<Factor> more;
+  std::vector<Loading> less;
+  std::vector<Loading> more;
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const Matrix6d N = prior.own()[i] * H[edges[i]].transpose();
     less.emplace_back(N * root);
