@@ -112,7 +112,7 @@ std::string arrow(const Frame& frame, const std::string& beside, bool dashed) {
 
 }  // namespace
 
-std::string edge_text(const EdgeNote& edge, Time now) {
+std::string edge_text(const EdgeLabel& edge, Time now) {
   constexpr double kMetres = 1e-3;
   constexpr double kTurn = 0.1;  // [°]
   std::string text = edge.newest ? age_text(now - *edge.newest) : "";

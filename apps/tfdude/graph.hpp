@@ -12,7 +12,7 @@
 namespace tfdude::cli {
 
 /// What is known of the edge from a frame's parent to the frame.
-struct EdgeNote {
+struct EdgeLabel {
   std::optional<Covariance> covariance;
   std::optional<Time> newest;  ///< of its samples
 };
@@ -20,13 +20,13 @@ struct EdgeNote {
 struct Graph {
   std::vector<Frame> frames;
   std::vector<PartitionInfo> partitions;
-  std::map<std::string, EdgeNote> edges;  ///< by the child's id
+  std::map<std::string, EdgeLabel> edges;  ///< by the child's id
   Time now;
 };
 
 /// What stands beside an edge: the age of its newest sample, and its largest standard deviations from a millimetre or a tenth
 /// of a degree on.
-[[nodiscard]] std::string edge_text(const EdgeNote& edge, Time now);
+[[nodiscard]] std::string edge_text(const EdgeLabel& edge, Time now);
 
 /// A name in quotes, as DOT reads it.
 [[nodiscard]] std::string dot_id(std::string_view id);

@@ -37,15 +37,15 @@ std::string_view to_string(ChangeKind kind) {
   return "unknown";
 }
 
-Change conflict_of(const Note& note, const std::string& partition) {
-  Change change{ChangeKind::kConflict, partition, note.id, {}, note.rival, {}, {}};
-  change.message = "frame " + quote(note.id) + ": ";
-  if (note.kind == Note::Kind::kGaveWay) {
-    change.message += "claimed by partition " + quote(note.rival) + ", which keeps it, and by " +
-                      quote(partition) + ", which gives way";
+Change conflict_of(const Tombstone& tombstone, const std::string& partition) {
+  Change change{ChangeKind::kConflict, partition, tombstone.id, {}, tombstone.rival, {}, {}};
+  change.message = "frame " + quote(tombstone.id) + ": ";
+  if (tombstone.kind == Tombstone::Kind::kGaveWay) {
+    change.message += "claimed by partition " + quote(tombstone.rival) +
+                      ", which keeps it, and by " + quote(partition) + ", which gives way";
   } else {
     change.message += "moved by partition " + quote(partition) + " so that with a move by " +
-                      quote(note.rival) + " it makes a cycle; it is made a root";
+                      quote(tombstone.rival) + " it makes a cycle; it is made a root";
   }
   return change;
 }

@@ -13,8 +13,8 @@
 
 namespace tfdude {
 
-/// The conflict that a note tells of. @param partition  whose note it is
-[[nodiscard]] Change conflict_of(const Note& note, const std::string& partition);
+/// The conflict that a tombstone tells of. @param partition  whose tombstone it is
+[[nodiscard]] Change conflict_of(const Tombstone& tombstone, const std::string& partition);
 
 /// That the history of an edge has started again. @param partition  its owner
 [[nodiscard]] Change restarted(const HistoryRestart& restart, const std::string& partition);

@@ -101,12 +101,12 @@ void Directory::apply(const Page& page) {
     successor->pages.insert_or_assign(page.number, page);
     replace_if_complete(partition, owner);
   } else {
-    const std::vector<Note> news = news_of(partition, page.notes);
+    const std::vector<Tombstone> fresh = new_tombstones(partition, page.tombstones);
     Ids outdated;
     put_page(partition, owner, page, outdated);
     claims_.mend();
-    report(news, owner);
-    find_orphans(page.notes, owner);
+    report(fresh, owner);
+    find_orphans(page.tombstones, owner);
   }
   settle_returns();
 }
@@ -115,9 +115,10 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
   Successor& successor = *partition.successor;
   if (!successor.page_count || successor.pages.size() < *successor.page_count) return;
   PageMap pages = std::move(successor.pages);
-  std::vector<Note> news;
+  std::vector<Tombstone> fresh;
   for (const auto& [number, page] : pages) {
-    for (Note& note : news_of(partition, page.notes)) news.push_back(std::move(note));
+    for (Tombstone& tombstone : new_tombstones(partition, page.tombstones))
+      fresh.push_back(std::move(tombstone));
   }
   partition.incarnation = successor.incarnation;
   partition.page_count = *successor.page_count;
@@ -135,8 +136,8 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
   // Of each frame the first claim that comes now replaces that of the life before, whichever is the younger.
   for (const auto& [number, page] : pages) put_page(partition, owner, page, stays);
   claims_.mend();
-  report(news, owner);
-  for (const auto& [number, page] : pages) find_orphans(page.notes, owner);
+  report(fresh, owner);
+  for (const auto& [number, page] : pages) find_orphans(page.tombstones, owner);
 }
 
 // @param outdated  frames whose claims here are of an earlier incarnation; those that the page has are taken out
@@ -157,7 +158,7 @@ void Directory::put_page(Known& partition, Owner owner, const Page& page, Ids& o
     kept.ids += entry.id;
   }
   kept.ids.shrink_to_fit();
-  kept.notes = page.notes;
+  kept.tombstones = page.tombstones;
   replace_joints(kept, page.joints, owner);
   kept.epoch = page.epoch;
   note_epoch(partition, page);
@@ -222,28 +223,29 @@ void Directory::unclaim_all_but(const Ids& stays, Known& partition, Owner owner,
   }
 }
 
-// The notes that are to be reported and were not known; a newcomer does not hear of what was before it came.
-std::vector<Note> Directory::news_of(const Known& partition, const std::vector<Note>& notes) {
-  std::vector<Note> news;
-  if (partition.page_count == 0 || partition.pages.size() < partition.page_count) return news;
-  for (const Note& note : notes) {
-    if (note.kind == Note::Kind::kRemoved) continue;
+// The tombstones that are to be reported and were not known; a newcomer does not hear of what was before it came.
+std::vector<Tombstone> Directory::new_tombstones(const Known& partition,
+                                                 const std::vector<Tombstone>& tombstones) {
+  std::vector<Tombstone> fresh;
+  if (partition.page_count == 0 || partition.pages.size() < partition.page_count) return fresh;
+  for (const Tombstone& tombstone : tombstones) {
+    if (tombstone.kind == Tombstone::Kind::kRemoved) continue;
     const bool known =
         std::any_of(partition.pages.begin(), partition.pages.end(), [&](const auto& page) {
-          const std::vector<Note>& there = page.second.notes;
-          return std::find(there.begin(), there.end(), note) != there.end();
+          const std::vector<Tombstone>& there = page.second.tombstones;
+          return std::find(there.begin(), there.end(), tombstone) != there.end();
         });
-    if (!known) news.push_back(note);
+    if (!known) fresh.push_back(tombstone);
   }
-  return news;
+  return fresh;
 }
 
-void Directory::report(const std::vector<Note>& news, Owner owner) {
-  for (const Note& note : news) {
-    if (note.kind == Note::Kind::kDropped) {
-      report_orphans(note.id, owner);
+void Directory::report(const std::vector<Tombstone>& fresh, Owner owner) {
+  for (const Tombstone& tombstone : fresh) {
+    if (tombstone.kind == Tombstone::Kind::kDropped) {
+      report_orphans(tombstone.id, owner);
     } else if (changes_.watched()) {
-      changes_.add(conflict_of(note, name(owner)));
+      changes_.add(conflict_of(tombstone, name(owner)));
     }
   }
 }
@@ -256,12 +258,12 @@ void Directory::report_orphans(const std::string& dropped, Owner by) {
   }
 }
 
-void Directory::find_orphans(const std::vector<Note>& notes, Owner owner) {
-  for (const Note& note : notes) {
-    saw_stamp(note.since);
-    if (note.kind != Note::Kind::kRemoved) continue;
-    for (const FrameInfo& frame : forest_.waiting_for(note.id)) {
-      if (frame.owner != kHeldHere || frame.since >= note.since) continue;
+void Directory::find_orphans(const std::vector<Tombstone>& tombstones, Owner owner) {
+  for (const Tombstone& tombstone : tombstones) {
+    saw_stamp(tombstone.since);
+    if (tombstone.kind != Tombstone::Kind::kRemoved) continue;
+    for (const FrameInfo& frame : forest_.waiting_for(tombstone.id)) {
+      if (frame.owner != kHeldHere || frame.since >= tombstone.since) continue;
       orphans_.insert({Concession::Kind::kRemove, frame.id, owner, frame.since});
     }
   }
@@ -269,7 +271,8 @@ void Directory::find_orphans(const std::vector<Note>& notes, Owner owner) {
 
 void Directory::find_orphans() {
   for (Owner owner = 1; owner < partitions_.size(); ++owner) {
-    for (const auto& [number, page] : partitions_[owner].pages) find_orphans(page.notes, owner);
+    for (const auto& [number, page] : partitions_[owner].pages)
+      find_orphans(page.tombstones, owner);
   }
 }
 

@@ -164,11 +164,11 @@ class Directory {
   using Ids = std::unordered_set<std::string_view>;
 
   /// What of a page is needed later: its ids, each after its length in one byte, since most of the memory of a
-  /// large structure would else go into strings; and its notes.
+  /// large structure would else go into strings; and its tombstones.
   struct KeptPage {
     std::uint64_t epoch = 0;
     std::string ids;
-    std::vector<Note> notes;
+    std::vector<Tombstone> tombstones;
     std::vector<PageJoint> joints;
   };
 
@@ -221,10 +221,10 @@ class Directory {
   void add_joint(const PageJoint& joint, Owner owner);
   void forget_joint(const PageJoint& joint, Owner owner);
   void replace_joints(KeptPage& kept, const std::vector<PageJoint>& joints, Owner owner);
-  [[nodiscard]] static std::vector<Note> news_of(const Known& partition,
-                                                 const std::vector<Note>& notes);
-  void report(const std::vector<Note>& news, Owner owner);
-  void find_orphans(const std::vector<Note>& notes, Owner owner);
+  [[nodiscard]] static std::vector<Tombstone> new_tombstones(
+      const Known& partition, const std::vector<Tombstone>& tombstones);
+  void report(const std::vector<Tombstone>& fresh, Owner owner);
+  void find_orphans(const std::vector<Tombstone>& tombstones, Owner owner);
 
   Forest& forest_;
   ChangeLog changes_;

@@ -206,9 +206,9 @@ struct PageJoint {
   }
 };
 
-/// What became of a frame that is not where it was: for those who were away meanwhile, and for those who
+/// What became of a frame that is not where it was, in place of it: for those who were away meanwhile, and for those who
 /// want to know of conflicts.
-struct Note {
+struct Tombstone {
   enum class Kind : std::uint8_t {
     kRemoved = 1,  ///< by request; whatever hung below it since before goes, too
     kGaveWay = 2,  ///< `rival` has claimed the same id earlier
@@ -221,7 +221,7 @@ struct Note {
   Kind kind = Kind::kRemoved;
   std::string rival;  ///< a partition; empty where removed or dropped
 
-  friend bool operator==(const Note& a, const Note& b) {
+  friend bool operator==(const Tombstone& a, const Tombstone& b) {
     return a.id == b.id && a.since == b.since && a.kind == b.kind && a.rival == b.rival;
   }
 };
@@ -241,7 +241,7 @@ struct Page {
   /// What it shows.
   std::uint64_t epoch = 0;
   std::vector<PageEntry> entries;
-  std::vector<Note> notes{};
+  std::vector<Tombstone> tombstones{};
   /// The other pages that were changed last: once these have come, too, all of the structure up to the page's epoch has.
   std::vector<PageEpoch> others{};
   std::vector<PageJoint> joints{};

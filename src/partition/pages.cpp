@@ -23,7 +23,7 @@ void Pages::changed(std::uint32_t number, const std::string& id) {
 }
 
 void Pages::put(const std::string& id, const std::string& parent, std::uint64_t since) {
-  forget_note(id);
+  forget_tombstone(id);
   const auto known = page_of_.find(id);
   const std::uint32_t number = known != page_of_.end() ? known->second : page_with_room();
   if (known == page_of_.end()) page_of_.emplace(id, number);
@@ -54,27 +54,28 @@ std::optional<PageJoint> Pages::erase_joint(const std::string& id) {
   return joint;
 }
 
-void Pages::leave(const Note& note) {
-  forget_note(note.id);
+void Pages::leave(const Tombstone& tombstone) {
+  forget_tombstone(tombstone.id);
   const std::uint32_t number = page_with_room();
-  page_of_note_.emplace(note.id, number);
-  pages_[number].notes[note.id] = note;
-  changed(number, note.id);
-  oldest_notes_.emplace_back(note.id, note.since);
-  while (page_of_note_.size() > kMaxNotes || oldest_notes_.size() > 2 * kMaxNotes) {
-    const auto [id, since] = std::move(oldest_notes_.front());
-    oldest_notes_.pop_front();
-    const auto there = this->note(id);
-    if (there && there->since == since) forget_note(id);
+  page_of_tombstone_.emplace(tombstone.id, number);
+  pages_[number].tombstones[tombstone.id] = tombstone;
+  changed(number, tombstone.id);
+  oldest_tombstones_.emplace_back(tombstone.id, tombstone.since);
+  while (page_of_tombstone_.size() > kMaxTombstones ||
+         oldest_tombstones_.size() > 2 * kMaxTombstones) {
+    const auto [id, since] = std::move(oldest_tombstones_.front());
+    oldest_tombstones_.pop_front();
+    const auto there = this->tombstone(id);
+    if (there && there->since == since) forget_tombstone(id);
   }
 }
 
-void Pages::forget_note(const std::string& id) {
-  const auto known = page_of_note_.find(id);
-  if (known == page_of_note_.end()) return;
+void Pages::forget_tombstone(const std::string& id) {
+  const auto known = page_of_tombstone_.find(id);
+  if (known == page_of_tombstone_.end()) return;
   const std::uint32_t number = known->second;
-  page_of_note_.erase(known);
-  pages_[number].notes.erase(id);
+  page_of_tombstone_.erase(known);
+  pages_[number].tombstones.erase(id);
   changed(number, id);
 }
 
@@ -84,10 +85,10 @@ std::optional<Pages::Place> Pages::place(const std::string& id) const {
   return pages_[known->second].frames.at(id);
 }
 
-std::optional<Note> Pages::note(const std::string& id) const {
-  const auto known = page_of_note_.find(id);
-  if (known == page_of_note_.end()) return std::nullopt;
-  return pages_[known->second].notes.at(id);
+std::optional<Tombstone> Pages::tombstone(const std::string& id) const {
+  const auto known = page_of_tombstone_.find(id);
+  if (known == page_of_tombstone_.end()) return std::nullopt;
+  return pages_[known->second].tombstones.at(id);
 }
 
 void Pages::overtake(std::uint64_t incarnation) {
@@ -124,7 +125,7 @@ std::vector<Page> Pages::take_changed() {
         page.joints.push_back(joint->second);
       }
     }
-    for (const auto& [id, note] : sheet.notes) page.notes.push_back(note);
+    for (const auto& [id, tombstone] : sheet.tombstones) page.tombstones.push_back(tombstone);
     for (const PageEpoch& one : changed_last_) {
       if (one.number != number && page.others.size() < kOthers) page.others.push_back(one);
     }

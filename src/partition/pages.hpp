@@ -18,11 +18,11 @@ namespace tfdude {
 /// An owner's structure, split into the pages that it publishes. Not thread-safe.
 class Pages {
  public:
-  /// Frames and notes a page: a page of long ids stays below 64 KiB, and of usual ones is about 2 KiB.
+  /// Frames and tombstones a page: a page of long ids stays below 64 KiB, and of usual ones is about 2 KiB.
   static constexpr std::size_t kPageSize = 60;
 
-  /// Notes kept; the oldest go first.
-  static constexpr std::size_t kMaxNotes = 1024;
+  /// Tombstones kept; the oldest go first.
+  static constexpr std::size_t kMaxTombstones = 1024;
 
   /// Of how many that were changed before it a page tells. A page that a later one has replaced on its way is late; if
   /// more than these were changed meanwhile, nobody knows.
@@ -38,22 +38,22 @@ class Pages {
 
   [[nodiscard]] std::uint64_t incarnation() const { return incarnation_; }
 
-  /// Notes where a frame hangs, in place of what a note says of it. O(log frames).
+  /// Where a frame hangs, in place of its tombstone, if it has one. O(log frames).
   void put(const std::string& id, const std::string& parent, std::uint64_t since);
 
   /// Its joint was let go before.
   void erase(const std::string& id);
 
-  /// Notes which joint moves a frame that was put.
+  /// Which joint moves a frame that was put.
   void put_joint(const std::string& id, const PageJoint& joint);
   /// @return the one that there was
   std::optional<PageJoint> erase_joint(const std::string& id);
 
-  /// Leaves word of a frame, in place of an earlier one.
-  void leave(const Note& note);
+  /// Leaves the tombstone of a frame, in place of an earlier one.
+  void leave(const Tombstone& tombstone);
 
   [[nodiscard]] std::optional<Place> place(const std::string& id) const;
-  [[nodiscard]] std::optional<Note> note(const std::string& id) const;
+  [[nodiscard]] std::optional<Tombstone> tombstone(const std::string& id) const;
 
   /// Goes on counting from here, if that is ahead.
   void resume(std::uint64_t epoch) { epoch_ = epoch > epoch_ ? epoch : epoch_; }
@@ -73,7 +73,7 @@ class Pages {
     for (const Page& page : pages) changed_.insert(page.number);
   }
 
-  /// The ids whose place or note has changed since the last call; none before watch_ids().
+  /// The ids whose place or tombstone has changed since the last call; none before watch_ids().
   [[nodiscard]] std::set<std::string> take_touched() { return std::exchange(touched_, {}); }
   void watch_ids() { watching_ = true; }
   [[nodiscard]] bool is_touched(const std::string& id) const { return touched_.count(id) != 0; }
@@ -84,25 +84,25 @@ class Pages {
  private:
   struct Sheet {
     std::map<std::string, Place> frames;
-    std::map<std::string, Note> notes;
-    [[nodiscard]] std::size_t size() const { return frames.size() + notes.size(); }
+    std::map<std::string, Tombstone> tombstones;
+    [[nodiscard]] std::size_t size() const { return frames.size() + tombstones.size(); }
   };
   using PageOf = std::unordered_map<std::string, std::uint32_t>;
 
   std::uint32_t page_with_room();
   void changed(std::uint32_t number, const std::string& id);
   void note_epochs();
-  void forget_note(const std::string& id);
+  void forget_tombstone(const std::string& id);
 
   std::string partition_;
   std::uint64_t incarnation_;
   std::uint64_t epoch_;
   std::vector<Sheet> pages_;
   PageOf page_of_;
-  PageOf page_of_note_;
+  PageOf page_of_tombstone_;
   std::map<std::string, PageJoint> joints_;  // by frame
   // In the order in which they were left; what stands here no longer was replaced since.
-  std::deque<std::pair<std::string, std::uint64_t>> oldest_notes_;
+  std::deque<std::pair<std::string, std::uint64_t>> oldest_tombstones_;
   std::set<std::uint32_t> with_room_;
   std::set<std::uint32_t> changed_;
   std::deque<PageEpoch> changed_last_;  // the latest first

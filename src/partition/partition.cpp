@@ -217,7 +217,7 @@ void Partition::put(const std::string& id, const std::string& parent, std::uint6
   directory_.changes().frame_added(id, parent, name_);
 }
 
-// From the leaves up, so that of the notes, which are not kept for ever, those about the tops last longest.
+// From the leaves up, so that of the tombstones, which are not kept for ever, those about the tops last longest.
 void Partition::forget(const std::vector<std::string>& removed, Time now) {
   if (removed.empty()) return;
   const std::uint64_t since = directory_.next_stamp(now);
@@ -225,7 +225,7 @@ void Partition::forget(const std::vector<std::string>& removed, Time now) {
     consistency_.erase(*id);
     let_go(*id);
     pages_.erase(*id);
-    pages_.leave({*id, since, Note::Kind::kRemoved, {}});
+    pages_.leave({*id, since, Tombstone::Kind::kRemoved, {}});
     directory_.changes().frame_removed(*id, name_);
     directory_.released(*id);
   }

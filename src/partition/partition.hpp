@@ -134,7 +134,7 @@ class Partition {
   void give_way(const std::string& id, Owner rival, Time now);
   [[nodiscard]] Result<void> forget_partition(const ForgetRequest& request, Time now);
   void unhang(const std::string& id, Owner rival, Time now);
-  void tell_conflict(const Note& note);
+  void tell_conflict(const Tombstone& tombstone);
   [[nodiscard]] Error at_home(Error error, std::string_view id) const;
 
   std::string name_;

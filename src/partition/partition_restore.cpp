@@ -51,7 +51,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   const std::vector<StoredFrame> frames = frames_of(state, joints, configured);
   directory_.restore(state.absent);
   for (const StoredFrame& frame : frames) directory_.saw_stamp(frame.since);
-  for (const Note& note : state.notes) directory_.saw_stamp(note.since);
+  for (const Tombstone& tombstone : state.tombstones) directory_.saw_stamp(tombstone.since);
   // All that nobody has who is there is taken before any of it is hung, so that it does not matter in which order that
   // is done.
   std::vector<const StoredFrame*> kept;
@@ -63,7 +63,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   for (const StoredFrame* frame : kept) {
     if (!hang_again(*frame)) circular.push_back(frame);
   }
-  for (const Note& note : state.notes) pages_.leave(note);
+  for (const Tombstone& tombstone : state.tombstones) pages_.leave(tombstone);
   pages_.resume(state.epoch);
   // Only what changes from here on is not in the store.
   saved_ = true;
@@ -103,7 +103,7 @@ void Partition::make_root(const StoredFrame& frame, Time now) {
   if (!forest_.add(frame.id, {}, frame.X_PC, Forest::MissingParent::kAllow, since)) return;
   if (!frame.correlation.empty()) (void)forest_.resume(frame.id, frame.correlation);
   put(frame.id, {}, since);
-  tell_conflict({frame.id, since, Note::Kind::kUnhung, name_});
+  tell_conflict({frame.id, since, Tombstone::Kind::kUnhung, name_});
 }
 
 Result<void> Partition::reconfigure(const StoredState& state,
@@ -149,9 +149,9 @@ bool Partition::release(const std::string& id) {
   return true;
 }
 
-// Others are not to remove what hung below, as they do with what a note says is removed.
+// Others are not to remove what hung below, as they do with what a tombstone says is removed.
 void Partition::tell_dropped(const std::string& id, Time now) {
-  pages_.leave({id, directory_.next_stamp(now), Note::Kind::kDropped, {}});
+  pages_.leave({id, directory_.next_stamp(now), Tombstone::Kind::kDropped, {}});
   directory_.changes().frame_removed(id, name_);
   directory_.report_orphans(id, kHeldHere);
 }
@@ -193,7 +193,8 @@ bool Partition::concede(const Concession& concession, Time now) {
 }
 
 void Partition::give_way(const std::string& id, Owner rival, Time now) {
-  tell_conflict({id, directory_.next_stamp(now), Note::Kind::kGaveWay, directory_.name(rival)});
+  tell_conflict(
+      {id, directory_.next_stamp(now), Tombstone::Kind::kGaveWay, directory_.name(rival)});
 }
 
 Result<void> Partition::forget_partition(const ForgetRequest& request, Time now) {
@@ -207,13 +208,13 @@ void Partition::unhang(const std::string& id, Owner rival, Time now) {
   let_go(id);
   pages_.put(id, {}, since);
   directory_.changes().frame_moved(id, {}, name_);
-  tell_conflict({id, since, Note::Kind::kUnhung, directory_.name(rival)});
+  tell_conflict({id, since, Tombstone::Kind::kUnhung, directory_.name(rival)});
   directory_.moved();
 }
 
-void Partition::tell_conflict(const Note& note) {
-  pages_.leave(note);
-  directory_.changes().add(conflict_of(note, name_));
+void Partition::tell_conflict(const Tombstone& tombstone) {
+  pages_.leave(tombstone);
+  directory_.changes().add(conflict_of(tombstone, name_));
 }
 
 StateChange Partition::take_unsaved() {
@@ -224,7 +225,7 @@ StateChange Partition::take_unsaved() {
   updated_.clear();
   for (const std::string& id : ids) {
     change.erased.push_back(id);
-    if (auto note = pages_.note(id)) change.notes.push_back(*std::move(note));
+    if (auto tombstone = pages_.tombstone(id)) change.tombstones.push_back(*std::move(tombstone));
     const auto place = pages_.place(id);
     auto edge = forest_.kept(id);
     if (!place || !edge) continue;

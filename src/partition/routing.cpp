@@ -118,7 +118,7 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
   }
   if (auto ok = check_reachable(directory, parts.front().owner); !ok)
     return tl::unexpected(ok.error());
-  // Those that cannot be told now find out when they return, by a note of the first part's owner.
+  // Those that cannot be told now find out when they return, by a tombstone of the first part's owner.
   parts.erase(std::remove_if(parts.begin(), parts.end(),
                              [&](const Part& part) {
                                return part.owner != kHeldHere && !directory.reachable(part.owner);

@@ -32,7 +32,7 @@ struct StoredJoint {
 struct StoredState {
   std::uint64_t epoch = 0;
   std::vector<StoredFrame> frames;
-  std::vector<Note> notes;
+  std::vector<Tombstone> tombstones;
   /// What the configuration said when it was last taken: what it says since differs where somebody
   /// has changed it.
   std::vector<FrameSpec> configured;
@@ -43,9 +43,9 @@ struct StoredState {
 /// What to change in a stored state.
 struct StateChange {
   std::uint64_t epoch = 0;
-  std::vector<std::string> erased;  ///< frames and notes; before the rest
+  std::vector<std::string> erased;  ///< frames and tombstones; before the rest
   std::vector<StoredFrame> frames;
-  std::vector<Note> notes;
+  std::vector<Tombstone> tombstones;
   std::vector<StoredJoint> joints{};  ///< new positions
   std::optional<std::vector<Absent>>
       absent{};  ///< all whom the partition misses, where that has changed

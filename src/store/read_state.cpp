@@ -49,19 +49,21 @@ Result<void> load_frames(const Database& database, std::int64_t /*format*/, Stor
   });
 }
 
-Result<void> load_notes(const Database& database, std::int64_t /*format*/, StoredState& state) {
+Result<void> load_tombstones(const Database& database, std::int64_t /*format*/,
+                             StoredState& state) {
   const char* sql = "SELECT id, since, kind, rival FROM notes ORDER BY id";
   auto loaded = each_row(database, sql, [&](const Statement& row) -> Result<void> {
     auto ok = row.check_types({SQLITE_TEXT, SQLITE_INTEGER, SQLITE_INTEGER, SQLITE_TEXT});
     if (!ok) return ok;
-    auto note = read_note(row, state.notes.empty() ? "" : state.notes.back().id);
-    if (!note) return tl::unexpected(std::move(note.error()));
-    state.notes.push_back(*std::move(note));
+    auto tombstone =
+        read_tombstone(row, state.tombstones.empty() ? "" : state.tombstones.back().id);
+    if (!tombstone) return tl::unexpected(std::move(tombstone.error()));
+    state.tombstones.push_back(*std::move(tombstone));
     return {};
   });
   // The oldest are the first to go.
-  std::stable_sort(state.notes.begin(), state.notes.end(),
-                   [](const Note& a, const Note& b) { return a.since < b.since; });
+  std::stable_sort(state.tombstones.begin(), state.tombstones.end(),
+                   [](const Tombstone& a, const Tombstone& b) { return a.since < b.since; });
   return loaded;
 }
 
@@ -134,7 +136,7 @@ Result<void> load_correlations(const Database& database, std::int64_t format, St
 
 Result<StoredState> read_state(const Database& database, std::int64_t format) {
   StoredState state;
-  for (auto part : {load_about, load_frames, load_notes, load_configured, load_joints,
+  for (auto part : {load_about, load_frames, load_tombstones, load_configured, load_joints,
                     load_correlations, load_absent}) {
     if (auto loaded = part(database, format, state); !loaded) {
       return tl::unexpected(std::move(loaded.error()));

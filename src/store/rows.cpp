@@ -34,20 +34,21 @@ Result<FrameSpec> read_frame(const sqlite::Statement& row, const std::string& be
   return frame;
 }
 
-Result<Note> read_note(const sqlite::Statement& row, const std::string& before) {
+Result<Tombstone> read_tombstone(const sqlite::Statement& row, const std::string& before) {
   const std::uint64_t kind = row.number(2);
   const auto since = read_count(row, 1);
   if (!since) return tl::unexpected(since.error());
-  Note note{row.text(0), *since, static_cast<Note::Kind>(kind), row.text(3)};
-  if (auto ok = check_id(note.id, "id"); !ok) return tl::unexpected(ok.error());
-  if (note.id <= before) return fail(Errc::kState, "note of " + quote(note.id) + " out of order");
-  if (kind < 1 || kind > static_cast<std::uint64_t>(Note::Kind::kDropped)) {
-    return fail(Errc::kState, "a note of kind " + std::to_string(kind));
+  Tombstone tombstone{row.text(0), *since, static_cast<Tombstone::Kind>(kind), row.text(3)};
+  if (auto ok = check_id(tombstone.id, "id"); !ok) return tl::unexpected(ok.error());
+  if (tombstone.id <= before)
+    return fail(Errc::kState, "tombstone of " + quote(tombstone.id) + " out of order");
+  if (kind < 1 || kind > static_cast<std::uint64_t>(Tombstone::Kind::kDropped)) {
+    return fail(Errc::kState, "a tombstone of kind " + std::to_string(kind));
   }
-  if (!note.rival.empty()) {
-    if (auto ok = check_partition_name(note.rival); !ok) return tl::unexpected(ok.error());
+  if (!tombstone.rival.empty()) {
+    if (auto ok = check_partition_name(tombstone.rival); !ok) return tl::unexpected(ok.error());
   }
-  return note;
+  return tombstone;
 }
 
 Result<Correlation> read_said(const sqlite::Statement& row) {

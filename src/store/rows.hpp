@@ -12,7 +12,8 @@ namespace tfdude {
 [[nodiscard]] Result<std::uint64_t> read_count(const sqlite::Statement& row, int column);
 /// Rows come in the order of their ids. @param before  the id of the row before
 [[nodiscard]] Result<FrameSpec> read_frame(const sqlite::Statement& row, const std::string& before);
-[[nodiscard]] Result<Note> read_note(const sqlite::Statement& row, const std::string& before);
+[[nodiscard]] Result<Tombstone> read_tombstone(const sqlite::Statement& row,
+                                               const std::string& before);
 [[nodiscard]] Result<StoredCorrelation> read_stored_correlation(const sqlite::Statement& row);
 /// Of an entry of the configuration.
 [[nodiscard]] Result<Correlation> read_said(const sqlite::Statement& row);

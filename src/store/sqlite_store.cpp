@@ -71,9 +71,9 @@ class SqliteStore final : public StateStore {
   std::int64_t format_ = kFormat;  // of the file as it is
   Statement set_epoch_;
   Statement erase_frame_;
-  Statement erase_note_;
+  Statement erase_tombstone_;
   Statement put_frame_;
-  Statement put_note_;
+  Statement put_tombstone_;
   Statement set_value_;
   Statement put_configured_;
   // Of tables that an older format has not got.
@@ -207,9 +207,9 @@ Result<void> SqliteStore::prepare() {
   const std::pair<Statement*, const char*> all[] = {
       {&set_epoch_, "UPDATE about SET epoch = ?1"},
       {&erase_frame_, "DELETE FROM frames WHERE id = ?1"},
-      {&erase_note_, "DELETE FROM notes WHERE id = ?1"},
+      {&erase_tombstone_, "DELETE FROM notes WHERE id = ?1"},
       {&put_frame_, "INSERT OR REPLACE INTO frames VALUES(?1, ?2, ?3, ?4)"},
-      {&put_note_, "INSERT OR REPLACE INTO notes VALUES(?1, ?2, ?3, ?4)"},
+      {&put_tombstone_, "INSERT OR REPLACE INTO notes VALUES(?1, ?2, ?3, ?4)"},
       {&set_value_, "UPDATE frames SET x_pc = ?2 WHERE id = ?1"},
       {&put_configured_, "INSERT INTO configured VALUES(?1, ?2, ?3)"},
   };
@@ -278,15 +278,15 @@ Result<void> SqliteStore::save(const StateChange& change) {
     for (const std::string& id : change.erased) {
       if (done) done = erase_frame_.run(id);
       if (done) done = erase_correlation_.run(id);
-      if (done) done = erase_note_.run(id);
+      if (done) done = erase_tombstone_.run(id);
     }
     for (const StoredFrame& frame : change.frames) {
       if (done) done = put_frame_.run(frame.id, frame.parent, to_flat(frame.X_PC), frame.since);
       if (done) done = save_correlation(frame.id, frame.correlation);
     }
-    for (const Note& note : change.notes) {
-      const auto kind = static_cast<std::uint64_t>(note.kind);
-      if (done) done = put_note_.run(note.id, note.since, kind, note.rival);
+    for (const Tombstone& tombstone : change.tombstones) {
+      const auto kind = static_cast<std::uint64_t>(tombstone.kind);
+      if (done) done = put_tombstone_.run(tombstone.id, tombstone.since, kind, tombstone.rival);
     }
     if (done && change.absent) done = save_absent(*change.absent);
     return done ? save_joints(change.joints) : done;

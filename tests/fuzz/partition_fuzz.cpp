@@ -79,15 +79,15 @@ class Choices {
   }
   [[nodiscard]] std::uint64_t since() { return upto<std::uint64_t>(20); }
   [[nodiscard]] Time time() { return Time(std::chrono::nanoseconds(since())); }
-  [[nodiscard]] Note note() {
-    const auto kind = static_cast<Note::Kind>(1 + upto<std::uint8_t>(3));
+  [[nodiscard]] Tombstone tombstone() {
+    const auto kind = static_cast<Tombstone::Kind>(1 + upto<std::uint8_t>(3));
     return {id(), since(), kind,
-            kind == Note::Kind::kRemoved || kind == Note::Kind::kDropped ? "" : other()};
+            kind == Tombstone::Kind::kRemoved || kind == Tombstone::Kind::kDropped ? "" : other()};
   }
   [[nodiscard]] Page page() {
     Page page{other(), upto<std::uint32_t>(2), upto<std::uint64_t>(3), upto<std::uint64_t>(9), {}};
     page.entries = several<PageEntry>(5, [this] { return PageEntry{id(), parent(), since()}; });
-    page.notes = several<Note>(2, [this] { return note(); });
+    page.tombstones = several<Tombstone>(2, [this] { return tombstone(); });
     return page;
   }
   [[nodiscard]] Presence presence() {
@@ -212,8 +212,8 @@ class World {
     const auto owner = own_->replica.directory.owner(said.partition);
     if (owner && own_->replica.directory.reachable(*owner)) owner_.hears(said.partition);
     concede(now);
-    const std::vector<Note> notes = own_->others.apply(said);
-    owner_.concede(own_->others.oldest(), notes);
+    const std::vector<Tombstone> tombstones = own_->others.apply(said);
+    owner_.concede(own_->others.oldest(), tombstones);
     owner_.demand_held(own_->replica.forest, latest);
     apply(hearer_, said);
     (void)all_.apply(said);
@@ -254,17 +254,17 @@ class World {
   void start(Time now, const std::vector<Page>& said) {
     own_ = std::make_unique<Serving>(++lives_);
     owner_.hears_all();
-    std::vector<Note> notes;
+    std::vector<Tombstone> tombstones;
     answered_.clear();
     for (const Page& page : said) {
       own_->replica.directory.apply(page);
       const auto heard = own_->others.apply(page);
-      notes.insert(notes.end(), heard.begin(), heard.end());
+      tombstones.insert(tombstones.end(), heard.begin(), heard.end());
     }
     const std::uint64_t latest = latest_known();
     const auto left = store_.load();
     demand(own_->partition.restore(*left, {}, now).has_value(), "what was left is taken");
-    owner_.concede(own_->others.oldest(), notes);
+    owner_.concede(own_->others.oldest(), tombstones);
     owner_.demand_held(own_->replica.forest, latest);
     publish();
   }

@@ -83,7 +83,7 @@ struct PlainLife {
       const bool gone = claim->second.page == page.number && !listed;
       claim = gone ? claims.erase(claim) : std::next(claim);
     }
-    for (const Note& note : page.notes) latest = std::max(latest, note.since);
+    for (const Tombstone& tombstone : page.tombstones) latest = std::max(latest, tombstone.since);
     for (const PageEntry& entry : page.entries) {
       latest = std::max(latest, entry.since);
       const auto there = claims.find(entry.id);
@@ -104,21 +104,21 @@ class PlainPartition {
  public:
   [[nodiscard]] const PlainLife& life() const { return life_; }
 
-  /// @return the notes that are news by it
-  std::vector<Note> apply(const Page& page) {
+  /// @return the tombstones that are new by it
+  std::vector<Tombstone> apply(const Page& page) {
     if (page.incarnation < life_.incarnation) return {};
     PlainLife* said = life_of(page.incarnation);
     if (said == nullptr) return {};
     said->apply(page);
-    return said == &life_ ? page.notes : replace_if_complete();
+    return said == &life_ ? page.tombstones : replace_if_complete();
   }
 
-  std::vector<Note> apply(const Presence& presence) {
+  std::vector<Tombstone> apply(const Presence& presence) {
     if (!presence.serving || presence.incarnation < latest_) return {};
     PlainLife* said = life_of(presence.incarnation);
     if (said == nullptr) return {};
     said->page_count = presence.pages;
-    return said == &life_ ? std::vector<Note>() : replace_if_complete();
+    return said == &life_ ? std::vector<Tombstone>() : replace_if_complete();
   }
 
  private:
@@ -139,18 +139,18 @@ class PlainPartition {
     return &*next_;
   }
 
-  std::vector<Note> replace_if_complete() {
+  std::vector<Tombstone> replace_if_complete() {
     if (!next_->complete()) return {};
     life_ = PlainLife{};
     life_.incarnation = next_->incarnation;
     life_.page_count = next_->page_count;
-    std::vector<Note> notes;
+    std::vector<Tombstone> tombstones;
     for (const auto& [number, page] : next_->pages) {
       life_.apply(page);
-      notes.insert(notes.end(), page.notes.begin(), page.notes.end());
+      tombstones.insert(tombstones.end(), page.tombstones.begin(), page.tombstones.end());
     }
     next_.reset();
-    return notes;
+    return tombstones;
   }
 
   PlainLife life_;
@@ -161,9 +161,9 @@ class PlainPartition {
 /// What all partitions have said to one who hears them.
 class PlainClaims {
  public:
-  /// A page or a presence. @return the notes that are news by it
+  /// A page or a presence. @return the tombstones that are new by it
   template <class Said>
-  std::vector<Note> apply(const Said& said) {
+  std::vector<Tombstone> apply(const Said& said) {
     return partitions_[said.partition].apply(said);
   }
 

@@ -31,7 +31,7 @@ class PlainOwner {
 
   /// What is said of a frame that is not where it was.
   struct Word {
-    Note::Kind kind = Note::Kind::kRemoved;
+    Tombstone::Kind kind = Tombstone::Kind::kRemoved;
     std::string rival;
   };
 
@@ -75,10 +75,10 @@ class PlainOwner {
   void hears_all() { silent_.clear(); }
 
   /// Gives up what others claim with more right.
-  /// @param notes  what is new of what others removed
-  void concede(const Picture& others, const std::vector<Note>& notes) {
+  /// @param tombstones  what is new of what others removed
+  void concede(const Picture& others, const std::vector<Tombstone>& tombstones) {
     give_way(others);
-    for (const std::string& id : orphans(others, notes)) (void)remove(id);
+    for (const std::string& id : orphans(others, tombstones)) (void)remove(id);
     // What was made a root is claimed later than by all others, which may bring the next cycle.
     while (unhang(others)) give_way(others);
   }
@@ -111,17 +111,18 @@ class PlainOwner {
       demand(claim->second.parent == place.parent && claim->second.since == place.since,
              "what is held is published as it is");
     }
-    std::size_t notes = 0;
+    std::size_t tombstones = 0;
     for (const auto& [number, page] : life.pages) {
-      for (const Note& note : page.notes) {
-        ++notes;
-        const auto word = words_.find(note.id);
-        demand(word != words_.end() && word->second.kind == note.kind, "a note says what happened");
-        demand(note.kind != Note::Kind::kGaveWay || note.rival == word->second.rival,
+      for (const Tombstone& tombstone : page.tombstones) {
+        ++tombstones;
+        const auto word = words_.find(tombstone.id);
+        demand(word != words_.end() && word->second.kind == tombstone.kind,
+               "a tombstone says what happened");
+        demand(tombstone.kind != Tombstone::Kind::kGaveWay || tombstone.rival == word->second.rival,
                "it names who was faster");
       }
     }
-    demand(notes == words_.size(), "whatever goes leaves a note");
+    demand(tombstones == words_.size(), "whatever goes leaves a tombstone");
   }
 
  private:
@@ -141,7 +142,7 @@ class PlainOwner {
       if (silent_.count(theirs.owner) != 0) continue;
       if (!older(theirs, {name_, mine->second.parent, mine->second.since})) continue;
       places_.erase(mine);
-      words_[id] = {Note::Kind::kGaveWay, theirs.owner};
+      words_[id] = {Tombstone::Kind::kGaveWay, theirs.owner};
     }
   }
 
@@ -153,19 +154,19 @@ class PlainOwner {
       if (picture.at(youngest).owner != name_) continue;
       any = true;
       put(youngest, "");
-      words_[youngest] = {Note::Kind::kUnhung, ""};
+      words_[youngest] = {Tombstone::Kind::kUnhung, ""};
     }
     return any;
   }
 
   [[nodiscard]] std::set<std::string> orphans(const Picture& others,
-                                              const std::vector<Note>& notes) const {
+                                              const std::vector<Tombstone>& tombstones) const {
     std::set<std::string> ids;
-    for (const Note& note : notes) {
-      const bool there = holds(note.id) || others.count(note.id) != 0;
-      if (note.kind != Note::Kind::kRemoved || there) continue;
+    for (const Tombstone& tombstone : tombstones) {
+      const bool there = holds(tombstone.id) || others.count(tombstone.id) != 0;
+      if (tombstone.kind != Tombstone::Kind::kRemoved || there) continue;
       for (const auto& [id, place] : places_) {
-        if (place.parent == note.id && place.since < note.since) ids.insert(id);
+        if (place.parent == tombstone.id && place.since < tombstone.since) ids.insert(id);
       }
     }
     return ids;
@@ -178,7 +179,7 @@ class PlainOwner {
 
   bool remove(const std::string& top) {
     if (places_.erase(top) == 0) return false;
-    words_[top] = {Note::Kind::kRemoved, ""};
+    words_[top] = {Tombstone::Kind::kRemoved, ""};
     std::set<std::string> below;
     for (const auto& [id, place] : places_) {
       if (place.parent == top) below.insert(id);

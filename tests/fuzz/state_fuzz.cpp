@@ -77,9 +77,9 @@ std::vector<std::string> lines_of(const StoredState& state) {
                     std::to_string(frame.since) + ", " + bits(frame.X_PC) +
                     correlation(frame.correlation));
   }
-  for (const Note& note : state.notes) {
-    lines.push_back("note " + note.id + ", " + std::to_string(note.since) + ", " +
-                    std::to_string(static_cast<int>(note.kind)) + ", " + note.rival);
+  for (const Tombstone& tombstone : state.tombstones) {
+    lines.push_back("tombstone " + tombstone.id + ", " + std::to_string(tombstone.since) + ", " +
+                    std::to_string(static_cast<int>(tombstone.kind)) + ", " + tombstone.rival);
   }
   for (const FrameSpec& frame : state.configured) {
     lines.push_back("configured " + frame.id + " < " + frame.parent + ", " + bits(frame.X_PC) +
@@ -94,9 +94,9 @@ std::vector<std::string> lines_of(const StoredState& state) {
 }
 
 StateChange all_of(const StoredState& state) {
-  StateChange change{state.epoch, {}, state.frames, state.notes, state.joints};
+  StateChange change{state.epoch, {}, state.frames, state.tombstones, state.joints};
   for (const StoredFrame& frame : state.frames) change.erased.push_back(frame.id);
-  for (const Note& note : state.notes) change.erased.push_back(note.id);
+  for (const Tombstone& tombstone : state.tombstones) change.erased.push_back(tombstone.id);
   return change;
 }
 

@@ -17,7 +17,7 @@ class MemoryStore final : public StateStore {
     for (const auto& [name, joint] : joints_) state.joints.push_back(joint);
     state.absent = absent_;
     for (const auto& [id, frame] : frames_) state.frames.push_back(frame);
-    for (const auto& [id, note] : notes_) state.notes.push_back(note);
+    for (const auto& [id, tombstone] : tombstones_) state.tombstones.push_back(tombstone);
     return state;
   }
   Result<void> save(const StateChange& change) override {
@@ -25,10 +25,10 @@ class MemoryStore final : public StateStore {
     if (change.absent) absent_ = *change.absent;
     for (const std::string& id : change.erased) {
       frames_.erase(id);
-      notes_.erase(id);
+      tombstones_.erase(id);
     }
     for (const StoredFrame& frame : change.frames) frames_[frame.id] = frame;
-    for (const Note& note : change.notes) notes_[note.id] = note;
+    for (const Tombstone& tombstone : change.tombstones) tombstones_[tombstone.id] = tombstone;
     for (const StoredJoint& joint : change.joints) joints_[joint.name] = joint;
     return {};
   }
@@ -51,7 +51,7 @@ class MemoryStore final : public StateStore {
  private:
   std::uint64_t epoch_ = 0;
   std::map<std::string, StoredFrame> frames_;
-  std::map<std::string, Note> notes_;
+  std::map<std::string, Tombstone> tombstones_;
   std::map<std::string, StoredJoint> joints_;
   std::vector<Absent> absent_;
   std::vector<FrameSpec> configured_;

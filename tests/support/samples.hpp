@@ -240,9 +240,9 @@ bool take(const Bytes& bytes) {
            1,
            9,
            {{"base", "", 18446744073709551615ULL}},
-           {{"hand", 5, Note::Kind::kRemoved, ""},
-            {"base", 6, Note::Kind::kUnhung, "arms"},
-            {"eye", 7, Note::Kind::kDropped, ""}},
+           {{"hand", 5, Tombstone::Kind::kRemoved, ""},
+            {"base", 6, Tombstone::Kind::kUnhung, "arms"},
+            {"eye", 7, Tombstone::Kind::kDropped, ""}},
            {{0, 8}, {4294967295U, 18446744073709551615ULL}},
            {{"turn", ""}, {std::string(255, 'j'), "turn"}}}};
 }

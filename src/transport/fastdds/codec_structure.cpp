@@ -9,18 +9,18 @@
 namespace tfdude::fastdds {
 namespace {
 
-Result<Note> read_note(const wire::Note& sample) {
-  constexpr auto kLast = static_cast<std::uint8_t>(Note::Kind::kDropped);
+Result<Tombstone> read_tombstone(const wire::Tombstone& sample) {
+  constexpr auto kLast = static_cast<std::uint8_t>(Tombstone::Kind::kDropped);
   if (sample.kind() < 1 || sample.kind() > kLast) {
-    return fail(Errc::kInvalidInput, "kind " + std::to_string(sample.kind()) + " of a note");
+    return fail(Errc::kInvalidInput, "kind " + std::to_string(sample.kind()) + " of a tombstone");
   }
-  Note note{string_of(sample.id()), sample.since(), static_cast<Note::Kind>(sample.kind()),
-            string_of(sample.rival())};
-  if (auto ok = check_id(note.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
-  if (!note.rival.empty()) {
-    if (auto ok = check_partition_name(note.rival); !ok) return tl::unexpected(ok.error());
+  Tombstone tombstone{string_of(sample.id()), sample.since(),
+                      static_cast<Tombstone::Kind>(sample.kind()), string_of(sample.rival())};
+  if (auto ok = check_id(tombstone.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
+  if (!tombstone.rival.empty()) {
+    if (auto ok = check_partition_name(tombstone.rival); !ok) return tl::unexpected(ok.error());
   }
-  return note;
+  return tombstone;
 }
 
 }  // namespace
@@ -47,11 +47,11 @@ Result<Page> from_wire(const wire::Page& sample) {
     }
     page.entries.push_back(std::move(read));
   }
-  page.notes.reserve(sample.notes().size());
-  for (const wire::Note& note : sample.notes()) {
-    auto read = read_note(note);
+  page.tombstones.reserve(sample.tombstones().size());
+  for (const wire::Tombstone& tombstone : sample.tombstones()) {
+    auto read = read_tombstone(tombstone);
     if (!read) return tl::unexpected(std::move(read.error()));
-    page.notes.push_back(*std::move(read));
+    page.tombstones.push_back(*std::move(read));
   }
   for (const wire::PageEpoch& one : sample.others()) {
     page.others.push_back({one.number(), one.epoch()});

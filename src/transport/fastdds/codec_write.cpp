@@ -352,12 +352,12 @@ wire::Page to_wire(const Page& page) {
     sample.entries()[i].parent(page.entries[i].parent);
     sample.entries()[i].since(page.entries[i].since);
   }
-  sample.notes().resize(page.notes.size());
-  for (std::size_t i = 0; i < page.notes.size(); ++i) {
-    sample.notes()[i].id(page.notes[i].id);
-    sample.notes()[i].since(page.notes[i].since);
-    sample.notes()[i].kind(static_cast<std::uint8_t>(page.notes[i].kind));
-    sample.notes()[i].rival(page.notes[i].rival);
+  sample.tombstones().resize(page.tombstones.size());
+  for (std::size_t i = 0; i < page.tombstones.size(); ++i) {
+    sample.tombstones()[i].id(page.tombstones[i].id);
+    sample.tombstones()[i].since(page.tombstones[i].since);
+    sample.tombstones()[i].kind(static_cast<std::uint8_t>(page.tombstones[i].kind));
+    sample.tombstones()[i].rival(page.tombstones[i].rival);
   }
   sample.others().resize(page.others.size());
   for (std::size_t i = 0; i < page.others.size(); ++i) {

@@ -25,7 +25,7 @@ PartitionInfo partition(const std::string& name, bool reachable) {
   return info;
 }
 
-EdgeNote note(double metres, double degrees) {
+EdgeLabel label(double metres, double degrees) {
   return {*Covariance::from_stddev({0, metres, 0, 0, 0, degrees * kDegree}), std::nullopt};
 }
 
@@ -36,7 +36,7 @@ Graph example() {
                   {"lost", "gone", "robot", false},
                   {"world", "", "robot", false}};
   graph.partitions = {partition("arms", true), partition("robot", true)};
-  graph.edges["arm"] = note(0.003, 0.4);
+  graph.edges["arm"] = label(0.003, 0.4);
   graph.edges["arm"].newest = kNow - std::chrono::milliseconds(12);
   graph.now = kNow;
   return graph;
@@ -56,18 +56,18 @@ std::string fill(const std::string& node) {
 }
 
 TEST_CASE("beside an edge stand its age and what is large of its deviations") {
-  EdgeNote edge = note(0.003, 0.4);
+  EdgeLabel edge = label(0.003, 0.4);
   CHECK(edge_text(edge, kNow) == "±3 mm ±0.4°");
   edge.newest = kNow - std::chrono::milliseconds(12);
   CHECK(edge_text(edge, kNow) == "12 ms  ±3 mm ±0.4°");
-  CHECK(edge_text(note(0.001, 0), kNow) == "±1 mm ±0°");
-  CHECK(edge_text(note(0, 0.1), kNow) == "±0 mm ±0.1°");
+  CHECK(edge_text(label(0.001, 0), kNow) == "±1 mm ±0°");
+  CHECK(edge_text(label(0, 0.1), kNow) == "±0 mm ±0.1°");
   // Of joints that nobody has measured.
-  CHECK(edge_text(note(0, 103.923), kNow) == "±0 mm ±104°");
-  CHECK(edge_text(note(0, 99.7), kNow) == "±0 mm ±100°");
-  CHECK(edge_text(note(0.0009, 0.09), kNow).empty());
+  CHECK(edge_text(label(0, 103.923), kNow) == "±0 mm ±104°");
+  CHECK(edge_text(label(0, 99.7), kNow) == "±0 mm ±100°");
+  CHECK(edge_text(label(0.0009, 0.09), kNow).empty());
   CHECK(edge_text({}, kNow).empty());
-  edge = note(0, 0);
+  edge = label(0, 0);
   for (const auto& [seconds, text] : {std::pair(-0.5, "-500 ms"),
                                       {3.44, "3.4 s"},
                                       {600.0, "10 min"},

@@ -53,9 +53,9 @@ TEST_CASE("a state of format 2 has all that was stored in it") {
                                            "hand<arm", "r_base<arm", "r_hand<r_lower",
                                            "r_lower<r_upper", "r_tip<r_hand", "r_upper<r_base",
                                            "tool<hand"});
-  std::vector<std::string> notes;
-  for (const Note& note : state->notes) notes.push_back(note.id);
-  CHECK(testing::sorted(notes) == std::vector<std::string>{"gone", "lamp", "shade"});
+  std::vector<std::string> tombstones;
+  for (const Tombstone& tombstone : state->tombstones) tombstones.push_back(tombstone.id);
+  CHECK(testing::sorted(tombstones) == std::vector<std::string>{"gone", "lamp", "shade"});
   CHECK(state->configured.size() == 11);
   REQUIRE(state->joints.size() == 1);
   CHECK(state->joints[0].name == "r_hinge_2");

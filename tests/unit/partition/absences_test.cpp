@@ -487,7 +487,8 @@ TEST_CASE("a conflict that a returning partition settles is reported to who has 
   base.hear("left_arm", 1, 20);
   (void)base.directory.changes().take();
   base.directory.apply(presence_of("arm", 2, 1), kNow);
-  base.directory.apply(Page{"arm", 0, 2, 3, {}, {{"hand", 30, Note::Kind::kGaveWay, "left_arm"}}});
+  base.directory.apply(
+      Page{"arm", 0, 2, 3, {}, {{"hand", 30, Tombstone::Kind::kGaveWay, "left_arm"}}});
   CHECK(base.told(ChangeKind::kConflict).size() == 1);
 }
 

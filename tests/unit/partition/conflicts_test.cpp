@@ -52,8 +52,8 @@ struct Owning : Replica {
 };
 
 Page page_of(const std::string& partition, std::vector<PageEntry> entries,
-             std::vector<Note> notes = {}) {
-  return {partition, 0, 1, 1, std::move(entries), std::move(notes)};
+             std::vector<Tombstone> tombstones = {}) {
+  return {partition, 0, 1, 1, std::move(entries), std::move(tombstones)};
 }
 
 // A life of "arms" that ended after a root was added.
@@ -77,8 +77,8 @@ TEST_CASE("of two partitions that add one id the later gives way, and says so") 
                                     "and by 'arms', which gives way"});
     const auto pages = arms.partition.take_pages();
     REQUIRE(pages.size() == 1);
-    REQUIRE(pages[0].notes.size() == 1);
-    CHECK(pages[0].notes[0].rival == "head");
+    REQUIRE(pages[0].tombstones.size() == 1);
+    CHECK(pages[0].tombstones[0].rival == "head");
     CHECK(pages[0].entries.size() == 1);
   }
   SECTION("where the other was later") {
@@ -109,12 +109,12 @@ TEST_CASE("a claim that is taken back costs nobody a frame") {
   CHECK(arms.forest.holds("camera"));
 }
 
-TEST_CASE("who watches hears of a conflict from the note of who gave way, once") {
+TEST_CASE("who watches hears of a conflict from the tombstone of who gave way, once") {
   Replica watcher;
   watcher.directory.changes().watch();
   watcher.directory.apply(presence_of("arms", 1, 1), kNow);
-  const Note old{"lamp", 5, Note::Kind::kGaveWay, "head"};
-  const Note fresh{"camera", 7, Note::Kind::kUnhung, "head"};
+  const Tombstone old{"lamp", 5, Tombstone::Kind::kGaveWay, "head"};
+  const Tombstone fresh{"camera", 7, Tombstone::Kind::kUnhung, "head"};
   watcher.directory.apply(page_of("arms", {}, {old}));
   (void)watcher.directory.changes().take();
   watcher.directory.apply(page_of("arms", {}, {old, fresh}));
@@ -252,7 +252,7 @@ TEST_CASE("a frame whose parent was removed while its owner was away goes when i
     REQUIRE(tools.ask("gripper", AddRequest{"flange", along_x(1)}) == "ok");
     REQUIRE(tools.ask("finger", AddRequest{"gripper", along_x(1)}) == "ok");
   }
-  const Page removed = page_of("arms", {}, {{"flange", 2000, Note::Kind::kRemoved, {}}});
+  const Page removed = page_of("arms", {}, {{"flange", 2000, Tombstone::Kind::kRemoved, {}}});
   Owning tools("tools", &store);
   SECTION("heard before the return") {
     tools.directory.apply(removed);
@@ -272,7 +272,7 @@ TEST_CASE("a frame whose parent was removed while its owner was away goes when i
     CHECK(tools.structure().size() == 3);
   }
   SECTION("not where it was hung there later") {
-    tools.directory.apply(page_of("arms", {}, {{"flange", 900, Note::Kind::kRemoved, {}}}));
+    tools.directory.apply(page_of("arms", {}, {{"flange", 900, Tombstone::Kind::kRemoved, {}}}));
     tools.start();
     CHECK(tools.structure().size() == 2);
   }

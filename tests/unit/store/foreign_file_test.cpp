@@ -144,7 +144,7 @@ TEST_CASE("a file with rows that no state has is refused as it is") {
        "joint 'elbow' of type 4"},
       {"INSERT INTO joints VALUES('elbow', 0, 0); INSERT INTO joint_types VALUES('elbow', 'hinge')",
        "another type in column"},
-      {"INSERT INTO notes VALUES('eye', 1, 5, '')", "a note of kind 5"},
+      {"INSERT INTO notes VALUES('eye', 1, 5, '')", "a tombstone of kind 5"},
       {"INSERT INTO ties VALUES('nobody', zeroblob(9), x'')",
        "correlation of 'nobody', which is not there"},
       {"INSERT INTO ties VALUES('hand', 'text', x'')", "another type in column said"},
@@ -174,7 +174,7 @@ TEST_CASE("a refused file keeps its log, too") {
   const std::string before = content(copy);
   const std::string log = content(copy + "-wal");
   REQUIRE_FALSE(log.empty());
-  CHECK_THAT(refused(copy), ContainsSubstring("a note of kind 9"));
+  CHECK_THAT(refused(copy), ContainsSubstring("a tombstone of kind 9"));
   CHECK(content(copy) == before);
   CHECK(content(copy + "-wal") == log);
 }

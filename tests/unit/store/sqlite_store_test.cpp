@@ -69,8 +69,8 @@ TEST_CASE("what was saved is there for the next process, to the last bit") {
   const std::string file = state_file(directory.path(), 7, "arms");
   const StoredFrame hand{"hand", "arm", random.transform(), 5};
   const StoredFrame tool{"tool \xc3\xa4'\"", "", random.transform(), 1ULL << 62U};
-  const Note gone{"lamp", 6, Note::Kind::kRemoved, ""};
-  const Note lost{"eye", 4, Note::Kind::kGaveWay, "head"};
+  const Tombstone gone{"lamp", 6, Tombstone::Kind::kRemoved, ""};
+  const Tombstone lost{"eye", 4, Tombstone::Kind::kGaveWay, "head"};
   const Transform later = random.transform();
   {
     const auto store = opened(file);
@@ -93,7 +93,7 @@ TEST_CASE("what was saved is there for the next process, to the last bit") {
   CHECK(state->frames[1].id == tool.id);
   CHECK(state->frames[1].since == tool.since);
   // The oldest first.
-  CHECK(state->notes == std::vector<Note>{lost, gone});
+  CHECK(state->tombstones == std::vector<Tombstone>{lost, gone});
   REQUIRE(state->joints.size() == 2);
   CHECK(state->joints[0].name == "elbow");
   CHECK(state->joints[0].position == 0.5);
@@ -182,12 +182,12 @@ TEST_CASE("what was erased is not there") {
   {
     const auto store = opened(file);
     REQUIRE(store->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
-    REQUIRE(store->save({2, {"hand"}, {}, {{"hand", 2, Note::Kind::kRemoved, ""}}}));
+    REQUIRE(store->save({2, {"hand"}, {}, {{"hand", 2, Tombstone::Kind::kRemoved, ""}}}));
     REQUIRE(store->save({3, {"hand"}, {}, {}}));
   }
   const auto state = opened(file)->load();
   CHECK(state->frames.empty());
-  CHECK(state->notes.empty());
+  CHECK(state->tombstones.empty());
 }
 
 TEST_CASE("what was saved survives a process that is killed right after") {

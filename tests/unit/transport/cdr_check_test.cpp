@@ -254,7 +254,7 @@ Cdr entries(std::size_t count, std::uint64_t length) {
   for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(7).string("a").string("b");
   return cdr.ulong(0).ulong(0).ulong(0);
 }
-Cdr notes(std::size_t count, std::uint64_t length) {
+Cdr tombstones(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.string("robot").ulong(0).ulonglong(0).ulonglong(0).ulong(0).ulong(length);
   for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(7).octet(1).string("a").string("b");
@@ -320,7 +320,7 @@ TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
                                   {"entries of a replied state", replied_entries, reply},
                                   {"pasts", pasts, reply},
                                   {"entries of a page", entries, page},
-                                  {"notes of a page", notes, page},
+                                  {"tombstones of a page", tombstones, page},
                                   {"other pages of a page", others, page},
                                   {"joints of a page", page_joints, page},
                                   {"joints of an update", positions, joints},

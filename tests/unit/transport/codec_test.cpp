@@ -159,17 +159,17 @@ TEST_CASE("a presence that misses what can be no partition is refused") {
   CHECK(read.error().message.find("'a,b'") != std::string::npos);
 }
 
-TEST_CASE("a page with a note that means nothing is refused") {
-  const auto read = [](const Note& note) {
-    const auto page = from_wire(to_wire(Page{"robot", 0, 1, 1, {}, {note}}));
+TEST_CASE("a page with a tombstone that means nothing is refused") {
+  const auto read = [](const Tombstone& tombstone) {
+    const auto page = from_wire(to_wire(Page{"robot", 0, 1, 1, {}, {tombstone}}));
     return page ? "ok" : page.error().message;
   };
-  CHECK(read({"hand", 1, Note::Kind::kGaveWay, "arms"}) == "ok");
-  CHECK(read({"hand", 1, static_cast<Note::Kind>(0), ""}) == "kind 0 of a note");
-  CHECK(read({"hand", 1, static_cast<Note::Kind>(5), ""}) == "kind 5 of a note");
-  CHECK(read({"hand", 1, Note::Kind::kDropped, ""}) == "ok");
-  CHECK(read({"", 1, Note::Kind::kRemoved, ""}) != "ok");
-  CHECK(read({"hand", 1, Note::Kind::kGaveWay, "arms,head"}) != "ok");
+  CHECK(read({"hand", 1, Tombstone::Kind::kGaveWay, "arms"}) == "ok");
+  CHECK(read({"hand", 1, static_cast<Tombstone::Kind>(0), ""}) == "kind 0 of a tombstone");
+  CHECK(read({"hand", 1, static_cast<Tombstone::Kind>(5), ""}) == "kind 5 of a tombstone");
+  CHECK(read({"hand", 1, Tombstone::Kind::kDropped, ""}) == "ok");
+  CHECK(read({"", 1, Tombstone::Kind::kRemoved, ""}) != "ok");
+  CHECK(read({"hand", 1, Tombstone::Kind::kGaveWay, "arms,head"}) != "ok");
 }
 
 TEST_CASE("pages and presences arrive as they were sent") {
@@ -186,7 +186,7 @@ TEST_CASE("pages and presences arrive as they were sent") {
       CHECK(arrived->entries[i].parent == one.entries[i].parent);
       CHECK(arrived->entries[i].since == one.entries[i].since);
     }
-    CHECK(arrived->notes == one.notes);
+    CHECK(arrived->tombstones == one.tombstones);
     CHECK(arrived->joints == one.joints);
     REQUIRE(arrived->others.size() == one.others.size());
     for (std::size_t i = 0; i < one.others.size(); ++i) {
