@@ -27,7 +27,7 @@ std::vector<const Claim*> all_of(const std::vector<Claim>& claims, const Claim& 
 bool Claims::gives_way(const FrameInfo& a, const FrameInfo& b) const {
   const bool a_gone = succession_.standing(a.owner) == Succession::Standing::kGone;
   const bool b_gone = succession_.standing(b.owner) == Succession::Standing::kGone;
-  return std::tie(a_gone, a.since, a.id) > std::tie(b_gone, b.since, b.id);
+  return std::tie(a_gone, a.lamport_time, a.id) > std::tie(b_gone, b.lamport_time, b.id);
 }
 
 std::uint32_t Claims::page_of(std::string_view id) const {
@@ -38,7 +38,7 @@ std::uint32_t Claims::page_of(std::string_view id) const {
 Claim Claims::in_force(const FrameInfo& there) const {
   const auto cut = cut_.find(there.id);
   if (cut != cut_.end()) return cut->second;
-  return {there.owner, there.parent, there.since, page_of(there.id)};
+  return {there.owner, there.parent, there.lamport_time, page_of(there.id)};
 }
 
 Claim* Claims::shadowed(const std::string& id, Owner owner) {
@@ -55,7 +55,8 @@ bool Claims::claim(const std::string& id, Claim claim, Counts counts) {
   if (there && there->owner == claim.owner) before = in_force(*there);
   if (const Claim* mine = shadowed(id, claim.owner)) before = *mine;
   // A page that came late: the frame has left it since.
-  const bool late = before && before->page != claim.page && before->since > claim.since;
+  const bool late =
+      before && before->page != claim.page && before->lamport_time > claim.lamport_time;
   if (late && counts == Counts::kTheYounger) return false;
   const bool contested =
       (there && there->owner != claim.owner) || shadowed_.find(id) != shadowed_.end();
@@ -181,13 +182,13 @@ std::set<Concession> Claims::concessions() const {
     // Nothing is given up for one who is not there: it may never return.
     if (heir.owner == kHeldHere || succession_.standing(heir.owner) != Succession::Standing::kThere)
       continue;
-    all.insert({Concession::Kind::kGiveWay, id, heir.owner, there->since});
+    all.insert({Concession::Kind::kGiveWay, id, heir.owner, there->lamport_time});
   }
   for (const auto& [id, claim] : cut_) {
     const Cycle cycle = cycle_of(id, claim);
     if (cycle.held && gives_way(*cycle.held, cycle.youngest)) {
-      all.insert(
-          {Concession::Kind::kUnhang, cycle.held->id, cycle.youngest.owner, cycle.held->since});
+      all.insert({Concession::Kind::kUnhang, cycle.held->id, cycle.youngest.owner,
+                  cycle.held->lamport_time});
     }
   }
   return all;
@@ -207,7 +208,7 @@ void Claims::shadow(const std::string& id, Claim claim) {
 void Claims::put(const std::string& id, const Claim& claim) {
   std::optional<FrameInfo> before;
   if (changes_.watched()) before = forest_.info(id);
-  const auto done = forest_.put_remote(id, claim.parent, claim.owner, claim.since);
+  const auto done = forest_.put_remote(id, claim.parent, claim.owner, claim.lamport_time);
   if (const auto frame = forest_.find(id)) {
     if (frame->slot >= page_of_slot_.size()) page_of_slot_.resize(frame->slot + 1);
     page_of_slot_[frame->slot] = claim.page;
@@ -233,7 +234,7 @@ void Claims::put(const std::string& id, const Claim& claim) {
 }
 
 Claims::Cycle Claims::cycle_of(const std::string& id, const Claim& claim) const {
-  Cycle cycle{{id, claim.parent, claim.owner, false, claim.since}, std::nullopt};
+  Cycle cycle{{id, claim.parent, claim.owner, false, claim.lamport_time}, std::nullopt};
   for (auto edge = forest_.info(claim.parent); edge && edge->id != id;
        edge = forest_.info(edge->parent)) {
     if (edge->owner == kHeldHere) {
@@ -246,8 +247,8 @@ Claims::Cycle Claims::cycle_of(const std::string& id, const Claim& claim) const 
 }
 
 void Claims::cut(const FrameInfo& frame) {
-  cut_[frame.id] = {frame.owner, frame.parent, frame.since, page_of(frame.id)};
-  (void)forest_.put_remote(frame.id, {}, frame.owner, frame.since);
+  cut_[frame.id] = {frame.owner, frame.parent, frame.lamport_time, page_of(frame.id)};
+  (void)forest_.put_remote(frame.id, {}, frame.owner, frame.lamport_time);
   changes_.frame_moved(frame.id, {}, name(frame.owner));
 }
 
@@ -270,7 +271,7 @@ void Claims::break_cycle(const std::string& id, const Claim& claim) {
     return;
   }
   cut(youngest);
-  (void)forest_.put_remote(id, claim.parent, claim.owner, claim.since);
+  (void)forest_.put_remote(id, claim.parent, claim.owner, claim.lamport_time);
   cut_.erase(id);
 }
 

@@ -20,7 +20,7 @@ namespace tfdude {
 struct Claim {
   Owner owner = kHeldHere;
   std::string parent;
-  std::uint64_t since = 0;
+  std::uint64_t lamport_time = 0;
   std::uint32_t page = 0;  ///< of its owner's, where it says so
 };
 
@@ -35,12 +35,12 @@ struct Concession {
   Kind kind = Kind::kGiveWay;
   std::string frame;
   Owner rival = kHeldHere;
-  /// Since when the frame hangs where it hangs: another of its name, or a move, is another matter.
-  std::uint64_t since = 0;
+  /// When the frame was hung where it hangs: another of its name, or a move, is another matter.
+  std::uint64_t lamport_time = 0;
 
   friend bool operator<(const Concession& a, const Concession& b) {
-    return std::tie(a.kind, a.frame, a.rival, a.since) <
-           std::tie(b.kind, b.frame, b.rival, b.since);
+    return std::tie(a.kind, a.frame, a.rival, a.lamport_time) <
+           std::tie(b.kind, b.frame, b.rival, b.lamport_time);
   }
 };
 

@@ -8,7 +8,7 @@ namespace tfdude {
 namespace {
 
 // No clock comes so far, and one more can always be added.
-constexpr std::uint64_t kLastStamp = 1ULL << 63U;
+constexpr std::uint64_t kLastLamportTime = 1ULL << 63U;
 
 }  // namespace
 
@@ -148,11 +148,11 @@ void Directory::put_page(Known& partition, Owner owner, const Page& page, Ids& o
   KeptPage& kept = partition.pages[page.number];
   kept.ids.clear();
   for (const PageEntry& entry : page.entries) {
-    saw_stamp(entry.since);
+    saw_lamport_time(entry.lamport_time);
     const auto counts =
         outdated.erase(entry.id) != 0 ? Claims::Counts::kThis : Claims::Counts::kTheYounger;
     const bool fresh =
-        claims_.claim(entry.id, {owner, entry.parent, entry.since, page.number}, counts);
+        claims_.claim(entry.id, {owner, entry.parent, entry.lamport_time, page.number}, counts);
     partition.info.frames += fresh ? 1 : 0;
     kept.ids += static_cast<char>(entry.id.size());
     kept.ids += entry.id;
@@ -260,11 +260,11 @@ void Directory::report_orphans(const std::string& dropped, Owner by) {
 
 void Directory::find_orphans(const std::vector<Tombstone>& tombstones, Owner owner) {
   for (const Tombstone& tombstone : tombstones) {
-    saw_stamp(tombstone.since);
+    saw_lamport_time(tombstone.lamport_time);
     if (tombstone.kind != Tombstone::Kind::kRemoved) continue;
     for (const FrameInfo& frame : forest_.waiting_for(tombstone.id)) {
-      if (frame.owner != kHeldHere || frame.since >= tombstone.since) continue;
-      orphans_.insert({Concession::Kind::kRemove, frame.id, owner, frame.since});
+      if (frame.owner != kHeldHere || frame.lamport_time >= tombstone.lamport_time) continue;
+      orphans_.insert({Concession::Kind::kRemove, frame.id, owner, frame.lamport_time});
     }
   }
 }
@@ -280,7 +280,8 @@ std::set<Concession> Directory::concessions() {
   // Those that were removed or moved are settled, and those whose parent is there again.
   for (auto orphan = orphans_.begin(); orphan != orphans_.end();) {
     const auto frame = forest_.info(orphan->frame);
-    const bool stands = frame && frame->owner == kHeldHere && frame->since == orphan->since &&
+    const bool stands = frame && frame->owner == kHeldHere &&
+                        frame->lamport_time == orphan->lamport_time &&
                         !forest_.exists(frame->parent);
     orphan = stands ? std::next(orphan) : orphans_.erase(orphan);
   }
@@ -289,15 +290,15 @@ std::set<Concession> Directory::concessions() {
   return all;
 }
 
-void Directory::saw_stamp(std::uint64_t stamp) {
-  latest_stamp_ = std::max(latest_stamp_, std::min(stamp, kLastStamp));
+void Directory::saw_lamport_time(std::uint64_t time) {
+  latest_lamport_time_ = std::max(latest_lamport_time_, std::min(time, kLastLamportTime));
 }
 
-std::uint64_t Directory::next_stamp(Time now) {
+std::uint64_t Directory::next_lamport_time(Time now) {
   const auto nanoseconds = now.time_since_epoch().count();
   const auto clock = nanoseconds > 0 ? static_cast<std::uint64_t>(nanoseconds) : 0;
-  latest_stamp_ = std::max(clock, latest_stamp_ + 1);
-  return latest_stamp_;
+  latest_lamport_time_ = std::max(clock, latest_lamport_time_ + 1);
+  return latest_lamport_time_;
 }
 
 std::optional<Owner> Directory::owner(std::string_view partition) const {

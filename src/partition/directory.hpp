@@ -109,14 +109,15 @@ class Directory {
   /// This process has taken frames whose parents others may have removed before.
   void find_orphans();
 
-  /// A stamp for a change of the structure: the time [ns since the UNIX epoch], but later than all stamps given
+  /// The Lamport time of a change of the structure: the time [ns since the UNIX epoch], but later than all that were given
   /// or seen before (Lamport 1978, rule IR1 and IR2), so that whoever knew of a change has the greater one.
-  [[nodiscard]] std::uint64_t next_stamp(Time now);
+  [[nodiscard]] std::uint64_t next_lamport_time(Time now);
 
-  /// Takes note of a stamp that was given by an earlier process of this partition, or that a sender knows of.
-  void saw_stamp(std::uint64_t stamp);
+  /// A Lamport time was given by an earlier process of this partition, or is known to a sender: those that are given from
+  /// now on are later.
+  void saw_lamport_time(std::uint64_t time);
   /// The latest that was given or seen.
-  [[nodiscard]] std::uint64_t latest_stamp() const { return latest_stamp_; }
+  [[nodiscard]] std::uint64_t latest_lamport_time() const { return latest_lamport_time_; }
 
   /// What happened to the frames of others, and of this process as far as it is reported.
   [[nodiscard]] ChangeLog& changes() { return changes_; }
@@ -233,7 +234,7 @@ class Directory {
   std::unordered_map<std::string, Owner> owners_;
   std::set<Concession> orphans_;  // held frames that hung below one that another removed
   std::map<std::string, std::multiset<Owner>> joint_owners_;  // once a joint and page
-  std::uint64_t latest_stamp_ = 0;
+  std::uint64_t latest_lamport_time_ = 0;
   Absences absences_;
   std::uint64_t own_heard_of_ =
       0;  // the latest incarnation of the own partition that others have spoken of,

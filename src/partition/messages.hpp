@@ -28,21 +28,21 @@ inline constexpr std::size_t kMaxItems = 4096;
 /// The most edges of one owner that are observed at once or correlated with others on one path, and common errors of each.
 inline constexpr std::uint32_t kMaxCorrelated = kMaxCommonErrors;
 
-/// The latest stamp of a change of the structure that a sender knows of (Directory::next_stamp). Its own change gets a
-/// later one, whatever the owner's clock says, so that what one client does in turn counts in that order.
-using SeenStamp = std::uint64_t;
+/// The latest stamp of a change of the structure that a sender knows of (Directory::next_lamport_time). Its own change gets
+/// a later one, whatever the owner's clock says, so that what one client does in turn counts in that order.
+using LamportTime = std::uint64_t;
 
 struct AddRequest {
   std::string parent;  ///< empty: a root
   Transform X_PC;
-  SeenStamp seen = 0;
+  LamportTime lamport_time = 0;
 };
 
 /// Removes frames with all that the asked partition owns below them. None: the reply only says how far the partition's
 /// structure is; the request's id is the partition's name then.
 struct RemoveRequest {
   std::vector<std::string> tops;
-  SeenStamp seen = 0;
+  LamportTime lamport_time = 0;
 };
 
 struct UpdateRequest {
@@ -59,7 +59,7 @@ struct PartialUpdateRequest {
 struct MoveRequest {
   std::string parent;             ///< empty: becomes a root
   std::optional<Transform> X_PC;  ///< kept where absent
-  SeenStamp seen = 0;
+  LamportTime lamport_time = 0;
 };
 
 struct LookupRequest {
@@ -173,8 +173,8 @@ struct Reply {
   std::variant<Done, Error, SegmentValues, State, std::vector<PastInfo>,
                std::vector<EdgeConsistency>, std::vector<JointInfo>>
       body;
-  /// Of a change: the latest stamp that the owner knows of, for the next change of who has asked.
-  SeenStamp stamp = 0;
+  /// Of a change: the latest that the owner knows of, for the next change of who has asked.
+  LamportTime lamport_time = 0;
 };
 
 /// Which watchers share what an owner sends: a number of the owner, this time that it runs, and of what they ask for
@@ -191,9 +191,9 @@ struct Update {
 struct PageEntry {
   std::string id;
   std::string parent;  ///< empty: a root
-  /// When the frame was hung there, by its owner's count (Directory::next_stamp): of two claims that
+  /// When the frame was hung there, by its owner's count (Directory::next_lamport_time): of two claims that
   /// cannot both hold, the older does.
-  std::uint64_t since = 0;
+  std::uint64_t lamport_time = 0;
 };
 
 /// That a joint moves a frame of a page.
@@ -217,12 +217,13 @@ struct Tombstone {
         4,  ///< its partition's configuration names it no more; what hung below it waits for it
   };
   std::string id;
-  std::uint64_t since = 0;
+  std::uint64_t lamport_time = 0;
   Kind kind = Kind::kRemoved;
   std::string rival;  ///< a partition; empty where removed or dropped
 
   friend bool operator==(const Tombstone& a, const Tombstone& b) {
-    return a.id == b.id && a.since == b.since && a.kind == b.kind && a.rival == b.rival;
+    return a.id == b.id && a.lamport_time == b.lamport_time && a.kind == b.kind &&
+           a.rival == b.rival;
   }
 };
 

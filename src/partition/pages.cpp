@@ -22,12 +22,12 @@ void Pages::changed(std::uint32_t number, const std::string& id) {
   if (watching_) touched_.insert(id);
 }
 
-void Pages::put(const std::string& id, const std::string& parent, std::uint64_t since) {
+void Pages::put(const std::string& id, const std::string& parent, std::uint64_t lamport_time) {
   forget_tombstone(id);
   const auto known = page_of_.find(id);
   const std::uint32_t number = known != page_of_.end() ? known->second : page_with_room();
   if (known == page_of_.end()) page_of_.emplace(id, number);
-  pages_[number].frames[id] = {parent, since};
+  pages_[number].frames[id] = {parent, lamport_time};
   changed(number, id);
 }
 
@@ -60,13 +60,13 @@ void Pages::leave(const Tombstone& tombstone) {
   page_of_tombstone_.emplace(tombstone.id, number);
   pages_[number].tombstones[tombstone.id] = tombstone;
   changed(number, tombstone.id);
-  oldest_tombstones_.emplace_back(tombstone.id, tombstone.since);
+  oldest_tombstones_.emplace_back(tombstone.id, tombstone.lamport_time);
   while (page_of_tombstone_.size() > kMaxTombstones ||
          oldest_tombstones_.size() > 2 * kMaxTombstones) {
-    const auto [id, since] = std::move(oldest_tombstones_.front());
+    const auto [id, lamport_time] = std::move(oldest_tombstones_.front());
     oldest_tombstones_.pop_front();
     const auto there = this->tombstone(id);
-    if (there && there->since == since) forget_tombstone(id);
+    if (there && there->lamport_time == lamport_time) forget_tombstone(id);
   }
 }
 
@@ -120,7 +120,7 @@ std::vector<Page> Pages::take_changed() {
     const Sheet& sheet = pages_[number];
     page.entries.reserve(sheet.frames.size());
     for (const auto& [id, place] : sheet.frames) {
-      page.entries.push_back({id, place.parent, place.since});
+      page.entries.push_back({id, place.parent, place.lamport_time});
       if (const auto joint = joints_.find(id); joint != joints_.end()) {
         page.joints.push_back(joint->second);
       }

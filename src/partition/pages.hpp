@@ -30,7 +30,7 @@ class Pages {
 
   struct Place {
     std::string parent;
-    std::uint64_t since = 0;
+    std::uint64_t lamport_time = 0;
   };
 
   Pages(std::string partition, std::uint64_t incarnation)
@@ -39,7 +39,7 @@ class Pages {
   [[nodiscard]] std::uint64_t incarnation() const { return incarnation_; }
 
   /// Where a frame hangs, in place of its tombstone, if it has one. O(log frames).
-  void put(const std::string& id, const std::string& parent, std::uint64_t since);
+  void put(const std::string& id, const std::string& parent, std::uint64_t lamport_time);
 
   /// Its joint was let go before.
   void erase(const std::string& id);

@@ -35,20 +35,20 @@ Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest
 
 Result<void> Partition::load(const std::vector<FrameSpec>& frames, Time now) {
   if (auto ok = check_joints(frames); !ok) return ok;
-  if (auto taken = take(frames, directory_.next_stamp(now)); !taken) return taken;
+  if (auto taken = take(frames, directory_.next_lamport_time(now)); !taken) return taken;
   hang_on_joints(frames, {});
   pages_.close_epoch();
   return {};
 }
 
 // All of them or none.
-Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t since) {
+Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t lamport_time) {
   std::vector<std::string> loaded;
   for (const FrameSpec& frame : frames) {
     // What a partition has that is gone is there for the taking.
     (void)directory_.take(frame.id);
-    auto added =
-        forest_.add(frame.id, frame.parent, value_of(frame), Forest::MissingParent::kAllow, since);
+    auto added = forest_.add(frame.id, frame.parent, value_of(frame), Forest::MissingParent::kAllow,
+                             lamport_time);
     if (added) loaded.push_back(frame.id);
     if (added && !frame.correlation.empty()) added = forest_.correlate(frame.id, frame.correlation);
     if (!added) {
@@ -59,7 +59,7 @@ Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t
       return added;
     }
   }
-  for (const FrameSpec& frame : frames) put(frame.id, frame.parent, since);
+  for (const FrameSpec& frame : frames) put(frame.id, frame.parent, lamport_time);
   return {};
 }
 
@@ -114,7 +114,7 @@ Reply Partition::answer(const Request& request, Time now) {
   }
   if (auto done = apply(request, now); !done) reply.body = std::move(done.error());
   reply.epoch = pages_.epoch();
-  reply.stamp = directory_.latest_stamp();
+  reply.lamport_time = directory_.latest_lamport_time();
   return reply;
 }
 
@@ -172,11 +172,12 @@ Result<void> Partition::apply(const Request& request, Time now) {
 }
 
 Result<void> Partition::add(const std::string& id, const AddRequest& request, Time now) {
-  directory_.saw_stamp(request.seen);
-  const std::uint64_t since = directory_.next_stamp(now);
-  auto added = forest_.add(id, request.parent, request.X_PC, Forest::MissingParent::kRefuse, since);
+  directory_.saw_lamport_time(request.lamport_time);
+  const std::uint64_t lamport_time = directory_.next_lamport_time(now);
+  auto added =
+      forest_.add(id, request.parent, request.X_PC, Forest::MissingParent::kRefuse, lamport_time);
   if (!added) return added;
-  put(id, request.parent, since);
+  put(id, request.parent, lamport_time);
   pages_.close_epoch();
   return {};
 }
@@ -192,40 +193,40 @@ Result<void> Partition::remove(const RemoveRequest& request, Time now) {
       outcome = tl::unexpected(at_home(std::move(gone.error()), top));
     }
   }
-  directory_.saw_stamp(request.seen);
+  directory_.saw_lamport_time(request.lamport_time);
   forget(removed, now);
   return outcome;
 }
 
 Result<void> Partition::move(const std::string& id, const MoveRequest& request, Time now) {
-  directory_.saw_stamp(request.seen);
-  const std::uint64_t since = directory_.next_stamp(now);
-  if (auto moved = forest_.move(id, request.parent, request.X_PC, since); !moved) {
+  directory_.saw_lamport_time(request.lamport_time);
+  const std::uint64_t lamport_time = directory_.next_lamport_time(now);
+  if (auto moved = forest_.move(id, request.parent, request.X_PC, lamport_time); !moved) {
     return tl::unexpected(at_home(std::move(moved.error()), id));
   }
   consistency_.erase(id);
   let_go(id);
-  pages_.put(id, request.parent, since);
+  pages_.put(id, request.parent, lamport_time);
   pages_.close_epoch();
   directory_.changes().frame_moved(id, request.parent, name_);
   directory_.moved();
   return {};
 }
 
-void Partition::put(const std::string& id, const std::string& parent, std::uint64_t since) {
-  pages_.put(id, parent, since);
+void Partition::put(const std::string& id, const std::string& parent, std::uint64_t lamport_time) {
+  pages_.put(id, parent, lamport_time);
   directory_.changes().frame_added(id, parent, name_);
 }
 
 // From the leaves up, so that of the tombstones, which are not kept for ever, those about the tops last longest.
 void Partition::forget(const std::vector<std::string>& removed, Time now) {
   if (removed.empty()) return;
-  const std::uint64_t since = directory_.next_stamp(now);
+  const std::uint64_t lamport_time = directory_.next_lamport_time(now);
   for (auto id = removed.rbegin(); id != removed.rend(); ++id) {
     consistency_.erase(*id);
     let_go(*id);
     pages_.erase(*id);
-    pages_.leave({*id, since, Tombstone::Kind::kRemoved, {}});
+    pages_.leave({*id, lamport_time, Tombstone::Kind::kRemoved, {}});
     directory_.changes().frame_removed(*id, name_);
     directory_.released(*id);
   }

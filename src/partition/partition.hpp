@@ -117,7 +117,7 @@ class Partition {
   [[nodiscard]] Result<void> revise(const ReviseRequest& request);
   [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
   [[nodiscard]] Result<void> set_joints(const JointUpdate& update);
-  [[nodiscard]] Result<void> take(const std::vector<FrameSpec>& frames, std::uint64_t since);
+  [[nodiscard]] Result<void> take(const std::vector<FrameSpec>& frames, std::uint64_t lamport_time);
   void hang_on_joints(const std::vector<FrameSpec>& frames, const std::vector<StoredJoint>& left);
   void let_go(const std::string& id);
   [[nodiscard]] std::vector<EdgeConsistency> consistency(const std::string& id, bool all) const;
@@ -129,7 +129,7 @@ class Partition {
                                          const std::vector<FrameSpec>& configured, Time now);
   bool release(const std::string& id);
   void tell_dropped(const std::string& id, Time now);
-  void put(const std::string& id, const std::string& parent, std::uint64_t since);
+  void put(const std::string& id, const std::string& parent, std::uint64_t lamport_time);
   void forget(const std::vector<std::string>& removed, Time now);
   void give_way(const std::string& id, Owner rival, Time now);
   [[nodiscard]] Result<void> forget_partition(const ForgetRequest& request, Time now);

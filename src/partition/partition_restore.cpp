@@ -50,8 +50,9 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   const std::vector<StoredJoint> joints = still_meant(state.joints, configured);
   const std::vector<StoredFrame> frames = frames_of(state, joints, configured);
   directory_.restore(state.absent);
-  for (const StoredFrame& frame : frames) directory_.saw_stamp(frame.since);
-  for (const Tombstone& tombstone : state.tombstones) directory_.saw_stamp(tombstone.since);
+  for (const StoredFrame& frame : frames) directory_.saw_lamport_time(frame.lamport_time);
+  for (const Tombstone& tombstone : state.tombstones)
+    directory_.saw_lamport_time(tombstone.lamport_time);
   // All that nobody has who is there is taken before any of it is hung, so that it does not matter in which order that
   // is done.
   std::vector<const StoredFrame*> kept;
@@ -86,7 +87,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
 bool Partition::hang_again(const StoredFrame& frame) {
   const auto add = [&] {
     return forest_.add(frame.id, frame.parent, frame.X_PC, Forest::MissingParent::kAllow,
-                       frame.since);
+                       frame.lamport_time);
   };
   auto added = add();
   if (!added && added.error().code == Errc::kCycle && directory_.make_way(frame.parent)) {
@@ -94,16 +95,16 @@ bool Partition::hang_again(const StoredFrame& frame) {
   }
   if (!added) return false;
   if (!frame.correlation.empty()) (void)forest_.resume(frame.id, frame.correlation);
-  put(frame.id, frame.parent, frame.since);
+  put(frame.id, frame.parent, frame.lamport_time);
   return true;
 }
 
 void Partition::make_root(const StoredFrame& frame, Time now) {
-  const std::uint64_t since = directory_.next_stamp(now);
-  if (!forest_.add(frame.id, {}, frame.X_PC, Forest::MissingParent::kAllow, since)) return;
+  const std::uint64_t lamport_time = directory_.next_lamport_time(now);
+  if (!forest_.add(frame.id, {}, frame.X_PC, Forest::MissingParent::kAllow, lamport_time)) return;
   if (!frame.correlation.empty()) (void)forest_.resume(frame.id, frame.correlation);
-  put(frame.id, {}, since);
-  tell_conflict({frame.id, since, Tombstone::Kind::kUnhung, name_});
+  put(frame.id, {}, lamport_time);
+  tell_conflict({frame.id, lamport_time, Tombstone::Kind::kUnhung, name_});
 }
 
 Result<void> Partition::reconfigure(const StoredState& state,
@@ -135,7 +136,7 @@ Result<void> Partition::reconfigure(const StoredState& state,
         break;
     }
   }
-  if (auto taken = take(fresh, directory_.next_stamp(now)); !taken) return taken;
+  if (auto taken = take(fresh, directory_.next_lamport_time(now)); !taken) return taken;
   for (const std::string& id : dropped) tell_dropped(id, now);
   return {};
 }
@@ -151,7 +152,7 @@ bool Partition::release(const std::string& id) {
 
 // Others are not to remove what hung below, as they do with what a tombstone says is removed.
 void Partition::tell_dropped(const std::string& id, Time now) {
-  pages_.leave({id, directory_.next_stamp(now), Tombstone::Kind::kDropped, {}});
+  pages_.leave({id, directory_.next_lamport_time(now), Tombstone::Kind::kDropped, {}});
   directory_.changes().frame_removed(id, name_);
   directory_.report_orphans(id, kHeldHere);
 }
@@ -194,7 +195,7 @@ bool Partition::concede(const Concession& concession, Time now) {
 
 void Partition::give_way(const std::string& id, Owner rival, Time now) {
   tell_conflict(
-      {id, directory_.next_stamp(now), Tombstone::Kind::kGaveWay, directory_.name(rival)});
+      {id, directory_.next_lamport_time(now), Tombstone::Kind::kGaveWay, directory_.name(rival)});
 }
 
 Result<void> Partition::forget_partition(const ForgetRequest& request, Time now) {
@@ -203,12 +204,12 @@ Result<void> Partition::forget_partition(const ForgetRequest& request, Time now)
 }
 
 void Partition::unhang(const std::string& id, Owner rival, Time now) {
-  const std::uint64_t since = directory_.next_stamp(now);
-  if (!forest_.move(id, {}, std::nullopt, since)) return;
+  const std::uint64_t lamport_time = directory_.next_lamport_time(now);
+  if (!forest_.move(id, {}, std::nullopt, lamport_time)) return;
   let_go(id);
-  pages_.put(id, {}, since);
+  pages_.put(id, {}, lamport_time);
   directory_.changes().frame_moved(id, {}, name_);
-  tell_conflict({id, since, Tombstone::Kind::kUnhung, directory_.name(rival)});
+  tell_conflict({id, lamport_time, Tombstone::Kind::kUnhung, directory_.name(rival)});
   directory_.moved();
 }
 
@@ -230,7 +231,7 @@ StateChange Partition::take_unsaved() {
     auto edge = forest_.kept(id);
     if (!place || !edge) continue;
     change.frames.push_back(
-        {id, place->parent, edge->X_PC, place->since, std::move(edge->correlation)});
+        {id, place->parent, edge->X_PC, place->lamport_time, std::move(edge->correlation)});
   }
   // With the first of a process its incarnation is stored, too: the epoch is above that.
   auto absent = directory_.absent();

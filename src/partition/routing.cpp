@@ -98,7 +98,7 @@ Result<Part> route_add(const Forest& forest, const Directory& directory, const s
   }
   if (auto ok = check_reachable(directory, owner); !ok) return tl::unexpected(ok.error());
   AddRequest body = request;
-  body.seen = directory.latest_stamp();
+  body.lamport_time = directory.latest_lamport_time();
   return Part{owner, directory.name(owner), Request{0, id, std::move(body)}};
 }
 
@@ -114,7 +114,7 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
     if (!top) continue;
     auto& body = body_for<RemoveRequest>(parts, directory, frame.owner, frame.id);
     body.tops.push_back(frame.id);
-    body.seen = directory.latest_stamp();
+    body.lamport_time = directory.latest_lamport_time();
   }
   if (auto ok = check_reachable(directory, parts.front().owner); !ok)
     return tl::unexpected(ok.error());
@@ -225,7 +225,7 @@ Result<Part> route_move(const Forest& forest, const Directory& directory, const 
   }
   if (auto ok = check_reachable(directory, frame->owner); !ok) return tl::unexpected(ok.error());
   MoveRequest body = request;
-  body.seen = directory.latest_stamp();
+  body.lamport_time = directory.latest_lamport_time();
   return Part{frame->owner, directory.name(frame->owner), Request{0, id, std::move(body)}};
 }
 

@@ -16,7 +16,7 @@ struct StoredFrame {
   std::string id;
   std::string parent;  ///< empty: a root
   Transform X_PC;      ///< its covariance is that of the edge's own part where it is correlated
-  std::uint64_t since = 0;
+  std::uint64_t lamport_time = 0;
   StoredCorrelation correlation{};
 };
 

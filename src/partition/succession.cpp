@@ -41,7 +41,7 @@ bool Succession::outlived(Owner first, Owner second) const {
 }
 
 bool Succession::older(const Claim& a, const Claim& b) const {
-  return std::tie(a.since, name(a.owner)) < std::tie(b.since, name(b.owner));
+  return std::tie(a.lamport_time, name(a.owner)) < std::tie(b.lamport_time, name(b.owner));
 }
 
 const Claim& Succession::heir(const std::vector<const Claim*>& claims) const {

@@ -21,7 +21,7 @@ void Requests::await_structure_change(std::uint64_t version, const Deadline& dea
 void Requests::await_change(const Part& part, const Reply& reply, const Deadline& deadline) {
   const std::uint64_t epoch = reply.epoch;
   std::unique_lock lock(structure_.mutex);
-  structure_.directory.saw_stamp(reply.stamp);
+  structure_.directory.saw_lamport_time(reply.lamport_time);
   const bool settled = structure_.changed.wait_until(lock, deadline.at(), [&] {
     return structure_.directory.epoch(part.owner) >= epoch ||
            !structure_.directory.reachable(part.owner);

@@ -42,9 +42,9 @@ Result<void> load_frames(const Database& database, std::int64_t /*format*/, Stor
     if (!ok) return ok;
     auto frame = read_frame(row, state.frames.empty() ? "" : state.frames.back().id);
     if (!frame) return tl::unexpected(std::move(frame.error()));
-    const auto since = read_count(row, 3);
-    if (!since) return tl::unexpected(since.error());
-    state.frames.push_back({frame->id, frame->parent, frame->X_PC, *since});
+    const auto lamport_time = read_count(row, 3);
+    if (!lamport_time) return tl::unexpected(lamport_time.error());
+    state.frames.push_back({frame->id, frame->parent, frame->X_PC, *lamport_time});
     return {};
   });
 }
@@ -62,8 +62,9 @@ Result<void> load_tombstones(const Database& database, std::int64_t /*format*/,
     return {};
   });
   // The oldest are the first to go.
-  std::stable_sort(state.tombstones.begin(), state.tombstones.end(),
-                   [](const Tombstone& a, const Tombstone& b) { return a.since < b.since; });
+  std::stable_sort(
+      state.tombstones.begin(), state.tombstones.end(),
+      [](const Tombstone& a, const Tombstone& b) { return a.lamport_time < b.lamport_time; });
   return loaded;
 }
 

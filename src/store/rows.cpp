@@ -36,9 +36,9 @@ Result<FrameSpec> read_frame(const sqlite::Statement& row, const std::string& be
 
 Result<Tombstone> read_tombstone(const sqlite::Statement& row, const std::string& before) {
   const std::uint64_t kind = row.number(2);
-  const auto since = read_count(row, 1);
-  if (!since) return tl::unexpected(since.error());
-  Tombstone tombstone{row.text(0), *since, static_cast<Tombstone::Kind>(kind), row.text(3)};
+  const auto lamport_time = read_count(row, 1);
+  if (!lamport_time) return tl::unexpected(lamport_time.error());
+  Tombstone tombstone{row.text(0), *lamport_time, static_cast<Tombstone::Kind>(kind), row.text(3)};
   if (auto ok = check_id(tombstone.id, "id"); !ok) return tl::unexpected(ok.error());
   if (tombstone.id <= before)
     return fail(Errc::kState, "tombstone of " + quote(tombstone.id) + " out of order");

@@ -281,12 +281,14 @@ Result<void> SqliteStore::save(const StateChange& change) {
       if (done) done = erase_tombstone_.run(id);
     }
     for (const StoredFrame& frame : change.frames) {
-      if (done) done = put_frame_.run(frame.id, frame.parent, to_flat(frame.X_PC), frame.since);
+      if (done)
+        done = put_frame_.run(frame.id, frame.parent, to_flat(frame.X_PC), frame.lamport_time);
       if (done) done = save_correlation(frame.id, frame.correlation);
     }
     for (const Tombstone& tombstone : change.tombstones) {
       const auto kind = static_cast<std::uint64_t>(tombstone.kind);
-      if (done) done = put_tombstone_.run(tombstone.id, tombstone.since, kind, tombstone.rival);
+      if (done)
+        done = put_tombstone_.run(tombstone.id, tombstone.lamport_time, kind, tombstone.rival);
     }
     if (done && change.absent) done = save_absent(*change.absent);
     return done ? save_joints(change.joints) : done;

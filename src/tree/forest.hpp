@@ -82,7 +82,7 @@ class Forest {
   /// @return kAlreadyExists, kUnknownParent, kCycle, kInvalidInput (id, or a value that is not finite).
   [[nodiscard]] Result<void> add(std::string_view id, std::string_view parent,
                                  const Transform& X_PC, MissingParent rule = MissingParent::kRefuse,
-                                 std::uint64_t since = 0);
+                                 std::uint64_t lamport_time = 0);
 
   /// Removes a held frame and all held frames below it that are reached through held ones. O(removed).
   /// @return the removed ids; kUnknownFrame, kNotOwner.
@@ -147,14 +147,14 @@ class Forest {
   /// @return kUnknownFrame, kNotOwner, kUnknownParent, kCycle, kInvalidInput (not finite).
   [[nodiscard]] Result<void> move(std::string_view id, std::string_view parent,
                                   const std::optional<Transform>& X_PC = std::nullopt,
-                                  std::uint64_t since = 0);
+                                  std::uint64_t lamport_time = 0);
 
   // --- frames held elsewhere: structure only ---
 
   /// Notes that `owner` holds a frame, new or known. A held frame is not touched.
   /// @return kAlreadyExists (it is held here), kCycle (kept as a root), kInvalidInput (id, owner).
   [[nodiscard]] Result<void> put_remote(std::string_view id, std::string_view parent, Owner owner,
-                                        std::uint64_t since = 0);
+                                        std::uint64_t lamport_time = 0);
 
   /// Forgets a frame if `owner` holds it.
   void drop_remote(std::string_view id, Owner owner);

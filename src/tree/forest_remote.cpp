@@ -6,7 +6,7 @@
 namespace tfdude {
 
 Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Owner owner,
-                                std::uint64_t since) {
+                                std::uint64_t lamport_time) {
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   // A version that counts as held carries a value, which there is none of.
@@ -19,7 +19,7 @@ Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Ow
   auto acyclic = impl_->check_no_cycle(pair);
   const Name* name = pair.frame != nullptr ? pair.frame->name : impl_->intern(id);
   const std::uint32_t parent_slot = acyclic ? impl_->parent_slot(pair) : kNoSlot;
-  name->hung(since);
+  name->hung(lamport_time);
   const Version& old = impl_->frames_.newest(name->slot);
   if (!old.present() || old.owner != owner || old.parent != parent_slot) {
     Version& fresh = impl_->push_remote(name->slot);

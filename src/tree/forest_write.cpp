@@ -196,7 +196,7 @@ void Forest::Impl::show_commit() {
 }
 
 Result<void> Forest::add(std::string_view id, std::string_view parent, const Transform& X_PC,
-                         MissingParent rule, std::uint64_t since) {
+                         MissingParent rule, std::uint64_t lamport_time) {
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   if (!is_finite(X_PC)) return check_value(id, X_PC);
@@ -215,7 +215,7 @@ Result<void> Forest::add(std::string_view id, std::string_view parent, const Tra
   const std::uint32_t parent_slot = impl_->parent_slot(pair);
   HeldVersion& fresh = impl_->push_held(name->slot, X_PC);
   fresh.name = name;
-  name->hung(since);
+  name->hung(lamport_time);
   impl_->relink(fresh, parent_slot);
   impl_->commit_structure();
   return {};
@@ -329,7 +329,7 @@ Result<void> Forest::update_correlated(const std::vector<CorrelatedUpdate>& edge
 }
 
 Result<void> Forest::move(std::string_view id, std::string_view parent,
-                          const std::optional<Transform>& X_PC, std::uint64_t since) {
+                          const std::optional<Transform>& X_PC, std::uint64_t lamport_time) {
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   const std::lock_guard lock(impl_->mutex_);
   if (X_PC && !is_finite(*X_PC)) return check_value(id, *X_PC);
@@ -343,7 +343,7 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   if (auto ok = impl_->check_no_cycle(pair); !ok) return ok;
   const auto& old = static_cast<const HeldVersion&>(*pair.frame);
   const std::uint32_t parent_slot = impl_->parent_slot(pair);
-  old.name->hung(since);
+  old.name->hung(lamport_time);
   HeldVersion& fresh = impl_->push_held(*slot, X_PC.value_or(old.X_PC));
   impl_->forget_past(fresh);
   if (X_PC) impl_->end_revision(fresh);

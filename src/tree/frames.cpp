@@ -65,7 +65,7 @@ FrameInfo Frames::info_of(const Version& version, std::uint64_t commit) const {
   FrameInfo info;
   info.id = version.name->text;
   info.owner = version.owner;
-  info.since = version.name->since.load(std::memory_order_relaxed);
+  info.lamport_time = version.name->lamport_time.load(std::memory_order_relaxed);
   if (version.parent != kNoSlot) {
     const Version* parent = at(version.parent, commit);
     info.parent = parent->name->text;

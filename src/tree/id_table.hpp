@@ -23,16 +23,16 @@ struct Refused {
   } behind;
 };
 
-/// An interned id and the slot it stands for. Immutable once it is in the table, but for `since` and `refused`.
+/// An interned id and the slot it stands for. Immutable once it is in the table, but for `lamport_time` and `refused`.
 struct Name {
   std::string text;
   std::size_t hash = 0;
   std::uint32_t slot = 0;
   /// When its frame was hung where it hangs. Of the newest commit, whichever a reader sees.
-  mutable std::atomic<std::uint64_t> since{0};
+  mutable std::atomic<std::uint64_t> lamport_time{0};
   mutable Refused refused;
 
-  void hung(std::uint64_t when) const { since.store(when, std::memory_order_relaxed); }
+  void hung(std::uint64_t when) const { lamport_time.store(when, std::memory_order_relaxed); }
 };
 
 /// Id to Name: open addressing, found without a lock under an epoch::Guard, changed by one writer at a

@@ -52,8 +52,8 @@ struct FrameInfo {
   std::string id;
   std::string parent;  ///< empty: a root
   Owner owner = kHeldHere;
-  bool attached = false;    ///< its parent is there
-  std::uint64_t since = 0;  ///< when it was hung where it hangs, as whoever did it counts
+  bool attached = false;           ///< its parent is there
+  std::uint64_t lamport_time = 0;  ///< when it was hung where it hangs
 };
 
 }  // namespace tfdude

@@ -32,9 +32,10 @@ void demand_known(const Page& page) {
     demand(replica.forest.frames().size() == ids.size(), "all frames of a page are there");
   }
   demand_shows(replica.forest, replica.directory, without_cycles(plain.oldest()));
-  const std::uint64_t next = replica.directory.next_stamp(Time{});
+  const std::uint64_t next = replica.directory.next_lamport_time(Time{});
   for (const PageEntry& entry : page.entries) {
-    demand(next > entry.since || entry.since > 1ULL << 63U, "a stamp is later than all seen");
+    demand(next > entry.lamport_time || entry.lamport_time > 1ULL << 63U,
+           "a Lamport time is later than all seen");
   }
   Page later{page.partition, page.number, page.incarnation, page.epoch, {}};
   replica.directory.apply(later);

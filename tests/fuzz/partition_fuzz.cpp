@@ -61,32 +61,35 @@ class Choices {
     Request request{0, id(), {}};
     switch (upto<std::uint8_t>(4)) {
       case 0:
-        request.body = AddRequest{parent(), transform(), since()};
+        request.body = AddRequest{parent(), transform(), lamport_time()};
         break;
       case 1:
-        request.body = RemoveRequest{several<std::string>(3, [this] { return id(); }), since()};
+        request.body =
+            RemoveRequest{several<std::string>(3, [this] { return id(); }), lamport_time()};
         break;
       case 2:
         request.body = UpdateRequest{edges()};
         break;
       case 3:
-        request.body = MoveRequest{parent(), transform(), since()};
+        request.body = MoveRequest{parent(), transform(), lamport_time()};
         break;
       default:
         request.body = LookupRequest{several<PathEnds>(3, [this] { return PathEnds{id(), id()}; })};
     }
     return request;
   }
-  [[nodiscard]] std::uint64_t since() { return upto<std::uint64_t>(20); }
-  [[nodiscard]] Time time() { return Time(std::chrono::nanoseconds(since())); }
+  [[nodiscard]] std::uint64_t lamport_time() { return upto<std::uint64_t>(20); }
+  [[nodiscard]] Time time() { return Time(std::chrono::nanoseconds(upto<std::uint64_t>(20))); }
   [[nodiscard]] Tombstone tombstone() {
     const auto kind = static_cast<Tombstone::Kind>(1 + upto<std::uint8_t>(3));
-    return {id(), since(), kind,
+    return {id(), lamport_time(), kind,
             kind == Tombstone::Kind::kRemoved || kind == Tombstone::Kind::kDropped ? "" : other()};
   }
   [[nodiscard]] Page page() {
     Page page{other(), upto<std::uint32_t>(2), upto<std::uint64_t>(3), upto<std::uint64_t>(9), {}};
-    page.entries = several<PageEntry>(5, [this] { return PageEntry{id(), parent(), since()}; });
+    page.entries = several<PageEntry>(5, [this] {
+      return PageEntry{id(), parent(), lamport_time()};
+    });
     page.tombstones = several<Tombstone>(2, [this] { return tombstone(); });
     return page;
   }
@@ -236,10 +239,10 @@ class World {
     (void)all_.apply(presence);
   }
 
-  // The greatest stamp that the owner has seen, as far as it still knows it.
+  // The greatest Lamport time that the owner has seen, as far as it still knows it.
   [[nodiscard]] std::uint64_t latest_known() const {
     std::uint64_t latest = own_->others.latest();
-    for (const auto& [id, place] : owner_.places()) latest = std::max(latest, place.since);
+    for (const auto& [id, place] : owner_.places()) latest = std::max(latest, place.lamport_time);
     return latest;
   }
 
@@ -304,7 +307,7 @@ class World {
     for (const StoredFrame& frame : stored->frames) {
       const auto place = owner_.places().find(frame.id);
       demand(place != owner_.places().end() && place->second.parent == frame.parent &&
-                 place->second.since == frame.since,
+                 place->second.lamport_time == frame.lamport_time,
              "it is stored as it is held");
     }
   }

@@ -18,7 +18,7 @@ namespace tfdude::fuzz {
 
 struct PlainClaim {
   std::string parent;
-  std::uint64_t since = 0;
+  std::uint64_t lamport_time = 0;
   std::uint32_t page = 0;
 };
 
@@ -26,12 +26,12 @@ struct PlainClaim {
 struct PlainFrame {
   std::string owner;
   std::string parent;
-  std::uint64_t since = 0;
+  std::uint64_t lamport_time = 0;
 };
 using Picture = std::map<std::string, PlainFrame>;
 
 [[nodiscard]] inline bool older(const PlainFrame& a, const PlainFrame& b) {
-  return std::tie(a.since, a.owner) < std::tie(b.since, b.owner);
+  return std::tie(a.lamport_time, a.owner) < std::tie(b.lamport_time, b.owner);
 }
 
 /// The frames that hang in each cycle.
@@ -53,10 +53,11 @@ using Picture = std::map<std::string, PlainFrame>;
 
 [[nodiscard]] inline std::string youngest_of(const std::set<std::string>& cycle,
                                              const Picture& picture) {
-  return *std::max_element(
-      cycle.begin(), cycle.end(), [&](const std::string& a, const std::string& b) {
-        return std::make_pair(picture.at(a).since, a) < std::make_pair(picture.at(b).since, b);
-      });
+  return *std::max_element(cycle.begin(), cycle.end(),
+                           [&](const std::string& a, const std::string& b) {
+                             return std::make_pair(picture.at(a).lamport_time, a) <
+                                    std::make_pair(picture.at(b).lamport_time, b);
+                           });
 }
 
 [[nodiscard]] inline Picture without_cycles(const Picture& picture) {
@@ -83,16 +84,17 @@ struct PlainLife {
       const bool gone = claim->second.page == page.number && !listed;
       claim = gone ? claims.erase(claim) : std::next(claim);
     }
-    for (const Tombstone& tombstone : page.tombstones) latest = std::max(latest, tombstone.since);
+    for (const Tombstone& tombstone : page.tombstones)
+      latest = std::max(latest, tombstone.lamport_time);
     for (const PageEntry& entry : page.entries) {
-      latest = std::max(latest, entry.since);
+      latest = std::max(latest, entry.lamport_time);
       const auto there = claims.find(entry.id);
       // It has left this page for another since.
       if (there != claims.end() && there->second.page != page.number &&
-          there->second.since > entry.since) {
+          there->second.lamport_time > entry.lamport_time) {
         continue;
       }
-      claims[entry.id] = {entry.parent, entry.since, page.number};
+      claims[entry.id] = {entry.parent, entry.lamport_time, page.number};
     }
   }
 
@@ -175,7 +177,7 @@ class PlainClaims {
     return all;
   }
 
-  /// The greatest stamp that came with what holds.
+  /// The greatest Lamport time that came with what holds.
   [[nodiscard]] std::uint64_t latest() const {
     std::uint64_t latest = 0;
     for (const auto& [name, partition] : partitions_) {
@@ -189,7 +191,7 @@ class PlainClaims {
     Picture picture;
     for (const auto& [name, partition] : partitions_) {
       for (const auto& [id, claim] : partition.life().claims) {
-        const PlainFrame frame{name, claim.parent, claim.since};
+        const PlainFrame frame{name, claim.parent, claim.lamport_time};
         const auto [there, fresh] = picture.emplace(id, frame);
         if (!fresh && older(frame, there->second)) there->second = frame;
       }
@@ -229,7 +231,8 @@ inline void demand_shows(const Forest& forest, const Directory& directory, const
     demand(directory.name(frame.owner) == expected->second.owner, "the oldest claim holds");
     demand(frame.parent == expected->second.parent,
            "a frame hangs where it is claimed to, but for the youngest in a cycle");
-    demand(frame.since == expected->second.since, "a frame is as old as it is claimed to be");
+    demand(frame.lamport_time == expected->second.lamport_time,
+           "a frame is as old as it is claimed to be");
   }
 }
 

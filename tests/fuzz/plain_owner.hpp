@@ -15,7 +15,7 @@
 // What an owner must make of requests and of what others claim, in the plainest way.
 namespace tfdude::fuzz {
 
-/// The time of a change that is yet to be given a stamp: later than all others.
+/// Of a change that is yet to be given a Lamport time: later than all others.
 inline constexpr std::uint64_t kJustNow = std::numeric_limits<std::uint64_t>::max();
 
 /// The owner's frames.
@@ -23,7 +23,7 @@ class PlainOwner {
  public:
   struct Place {
     std::string parent;
-    std::uint64_t since = 0;
+    std::uint64_t lamport_time = 0;
   };
   using Places = std::map<std::string, Place>;
 
@@ -41,7 +41,7 @@ class PlainOwner {
   /// What is in force for this process, as long as it has nothing to concede.
   [[nodiscard]] Picture with(const Picture& others) const {
     Picture picture = others;
-    for (const auto& [id, place] : places_) picture[id] = {name_, place.parent, place.since};
+    for (const auto& [id, place] : places_) picture[id] = {name_, place.parent, place.lamport_time};
     return picture;
   }
 
@@ -83,7 +83,7 @@ class PlainOwner {
     while (unhang(others)) give_way(others);
   }
 
-  /// Takes over the stamps of what was changed just now, later than all that were known; all else is to be as it
+  /// Takes over the Lamport times of what was changed just now, later than all that were known; all else is to be as it
   /// is here already.
   void demand_held(const Forest& forest, std::uint64_t latest) {
     std::size_t held = 0;
@@ -93,11 +93,12 @@ class PlainOwner {
       const auto mine = places_.find(frame.id);
       demand(mine != places_.end(), "what was given up is not held");
       demand(frame.parent == mine->second.parent, "what is held hangs where it was hung");
-      if (mine->second.since == kJustNow) {
-        demand(frame.since > latest, "a stamp is later than all that were known");
-        mine->second.since = frame.since;
+      if (mine->second.lamport_time == kJustNow) {
+        demand(frame.lamport_time > latest, "a Lamport time is later than all that were known");
+        mine->second.lamport_time = frame.lamport_time;
       }
-      demand(frame.since == mine->second.since, "what did not change is as old as it was");
+      demand(frame.lamport_time == mine->second.lamport_time,
+             "what did not change is as old as it was");
     }
     demand(held == places_.size(), "what was not given up is held");
   }
@@ -108,8 +109,9 @@ class PlainOwner {
     for (const auto& [id, place] : places_) {
       const auto claim = life.claims.find(id);
       demand(claim != life.claims.end(), "what is held is published");
-      demand(claim->second.parent == place.parent && claim->second.since == place.since,
-             "what is held is published as it is");
+      demand(
+          claim->second.parent == place.parent && claim->second.lamport_time == place.lamport_time,
+          "what is held is published as it is");
     }
     std::size_t tombstones = 0;
     for (const auto& [number, page] : life.pages) {
@@ -140,7 +142,7 @@ class PlainOwner {
       const auto mine = places_.find(id);
       if (mine == places_.end()) continue;
       if (silent_.count(theirs.owner) != 0) continue;
-      if (!older(theirs, {name_, mine->second.parent, mine->second.since})) continue;
+      if (!older(theirs, {name_, mine->second.parent, mine->second.lamport_time})) continue;
       places_.erase(mine);
       words_[id] = {Tombstone::Kind::kGaveWay, theirs.owner};
     }
@@ -166,7 +168,8 @@ class PlainOwner {
       const bool there = holds(tombstone.id) || others.count(tombstone.id) != 0;
       if (tombstone.kind != Tombstone::Kind::kRemoved || there) continue;
       for (const auto& [id, place] : places_) {
-        if (place.parent == tombstone.id && place.since < tombstone.since) ids.insert(id);
+        if (place.parent == tombstone.id && place.lamport_time < tombstone.lamport_time)
+          ids.insert(id);
       }
     }
     return ids;

@@ -62,7 +62,7 @@ void write(const std::string& file, std::string_view bytes) {
   std::ofstream(file, std::ios::binary) << bytes;
 }
 
-// "id < parent, since, value" of all that a state holds.
+// "id < parent, Lamport time, value" of all that a state holds.
 std::vector<std::string> lines_of(const StoredState& state) {
   std::vector<std::string> lines{"epoch " + std::to_string(state.epoch)};
   const auto bits = [](const Transform& X) {
@@ -74,12 +74,13 @@ std::vector<std::string> lines_of(const StoredState& state) {
   };
   for (const StoredFrame& frame : state.frames) {
     lines.push_back("frame " + frame.id + " < " + frame.parent + ", " +
-                    std::to_string(frame.since) + ", " + bits(frame.X_PC) +
+                    std::to_string(frame.lamport_time) + ", " + bits(frame.X_PC) +
                     correlation(frame.correlation));
   }
   for (const Tombstone& tombstone : state.tombstones) {
-    lines.push_back("tombstone " + tombstone.id + ", " + std::to_string(tombstone.since) + ", " +
-                    std::to_string(static_cast<int>(tombstone.kind)) + ", " + tombstone.rival);
+    lines.push_back("tombstone " + tombstone.id + ", " + std::to_string(tombstone.lamport_time) +
+                    ", " + std::to_string(static_cast<int>(tombstone.kind)) + ", " +
+                    tombstone.rival);
   }
   for (const FrameSpec& frame : state.configured) {
     lines.push_back("configured " + frame.id + " < " + frame.parent + ", " + bits(frame.X_PC) +

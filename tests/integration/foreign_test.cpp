@@ -84,7 +84,7 @@ TEST_CASE("a page that waits for a lost one keeps out no page of another process
   REQUIRE(transport->start(reader));
   const auto page = [](std::uint32_t number, std::uint64_t process, const char* frame) {
     wire::PageEntry entry;
-    entry.since(1);
+    entry.lamport_time(1);
     entry.id(frame);
     wire::Page made;
     made.partition("arm");

@@ -136,7 +136,7 @@ void Operation::look_again() {
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const bool done = !std::holds_alternative<Error>(replies_[i]->body);
     const Owner owner = parts_[i].owner;
-    if (done && owner != kHeldHere) directory.saw_stamp(replies_[i]->stamp);
+    if (done && owner != kHeldHere) directory.saw_lamport_time(replies_[i]->lamport_time);
     const bool reads = std::holds_alternative<LookupRequest>(parts_[i].request.body);
     if (!done || owner == kHeldHere || reads) continue;
     const bool here = directory.epoch(owner) >= replies_[i]->epoch || !directory.reachable(owner);

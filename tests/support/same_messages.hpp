@@ -118,17 +118,17 @@ inline void check_same(const Request& actual, const Request& expected) {
   REQUIRE(actual.body.index() == expected.body.index());
   if (const auto* add = std::get_if<AddRequest>(&expected.body)) {
     CHECK(std::get<AddRequest>(actual.body).parent == add->parent);
-    CHECK(std::get<AddRequest>(actual.body).seen == add->seen);
+    CHECK(std::get<AddRequest>(actual.body).lamport_time == add->lamport_time);
     check_same(std::get<AddRequest>(actual.body).X_PC, add->X_PC);
   } else if (const auto* remove = std::get_if<RemoveRequest>(&expected.body)) {
     CHECK(std::get<RemoveRequest>(actual.body).tops == remove->tops);
-    CHECK(std::get<RemoveRequest>(actual.body).seen == remove->seen);
+    CHECK(std::get<RemoveRequest>(actual.body).lamport_time == remove->lamport_time);
   } else if (const auto* update = std::get_if<UpdateRequest>(&expected.body)) {
     check_same(std::get<UpdateRequest>(actual.body).edges, update->edges);
     CHECK(std::get<UpdateRequest>(actual.body).stamp == update->stamp);
   } else if (const auto* move = std::get_if<MoveRequest>(&expected.body)) {
     CHECK(std::get<MoveRequest>(actual.body).parent == move->parent);
-    CHECK(std::get<MoveRequest>(actual.body).seen == move->seen);
+    CHECK(std::get<MoveRequest>(actual.body).lamport_time == move->lamport_time);
     const auto& X_PC = std::get<MoveRequest>(actual.body).X_PC;
     REQUIRE(X_PC.has_value() == move->X_PC.has_value());
     if (X_PC) check_same(*X_PC, *move->X_PC);

@@ -161,20 +161,20 @@ Result<CorrelateRequest> read_correlate(std::string_view id, const wire::Correla
 
 Result<AddRequest> read_add(std::string_view id, const wire::AddBody& body) {
   return from_wire(body.x_pc(), id).map([&](const Transform& X_PC) {
-    return AddRequest{string_of(body.parent()), X_PC, body.seen()};
+    return AddRequest{string_of(body.parent()), X_PC, body.lamport_time()};
   });
 }
 
 Result<MoveRequest> read_move(std::string_view id, const wire::MoveAndUpdate& body) {
   return from_wire(body.x_pc(), id).map([&](const Transform& X_PC) {
-    return MoveRequest{string_of(body.parent()), X_PC, body.seen()};
+    return MoveRequest{string_of(body.parent()), X_PC, body.lamport_time()};
   });
 }
 
 RemoveRequest read_remove(const wire::RemoveBody& body) {
   RemoveRequest remove;
   for (const wire::Identifier& top : body.tops()) remove.tops.push_back(string_of(top));
-  remove.seen = body.seen();
+  remove.lamport_time = body.lamport_time();
   return remove;
 }
 
@@ -207,7 +207,8 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
     case kUpdate:
       return take(request, update_from_wire(request.id, body.update()));
     case kMove:
-      return as(MoveRequest{string_of(body.move().parent()), std::nullopt, body.move().seen()});
+      return as(
+          MoveRequest{string_of(body.move().parent()), std::nullopt, body.move().lamport_time()});
     case kMoveAndUpdate:
       return take(request, read_move(request.id, body.move_and_update()));
     case kLookup:
@@ -354,7 +355,7 @@ Result<Reply> from_wire(const wire::Reply& sample) {
   Reply reply;
   reply.sequence = sample.sequence_number();
   reply.epoch = sample.epoch();
-  reply.stamp = sample.stamp();
+  reply.lamport_time = sample.lamport_time();
   if (auto ok = read_body(sample.body(), reply); !ok) return tl::unexpected(std::move(ok.error()));
   return reply;
 }

@@ -14,7 +14,7 @@ Result<Tombstone> read_tombstone(const wire::Tombstone& sample) {
   if (sample.kind() < 1 || sample.kind() > kLast) {
     return fail(Errc::kInvalidInput, "kind " + std::to_string(sample.kind()) + " of a tombstone");
   }
-  Tombstone tombstone{string_of(sample.id()), sample.since(),
+  Tombstone tombstone{string_of(sample.id()), sample.lamport_time(),
                       static_cast<Tombstone::Kind>(sample.kind()), string_of(sample.rival())};
   if (auto ok = check_id(tombstone.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
   if (!tombstone.rival.empty()) {
@@ -39,7 +39,7 @@ Result<Page> from_wire(const wire::Page& sample) {
   }
   page.entries.reserve(sample.entries().size());
   for (const wire::PageEntry& entry : sample.entries()) {
-    PageEntry read{string_of(entry.id()), string_of(entry.parent()), entry.since()};
+    PageEntry read{string_of(entry.id()), string_of(entry.parent()), entry.lamport_time()};
     if (auto ok = check_id(read.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
     if (!read.parent.empty()) {
       if (auto ok = check_id(read.parent, "parent"); !ok)

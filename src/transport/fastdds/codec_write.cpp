@@ -84,13 +84,13 @@ struct BodyWriter {
     wire::AddBody body;
     body.parent(add.parent);
     body.x_pc(to_flat(add.X_PC));
-    body.seen(add.seen);
+    body.lamport_time(add.lamport_time);
     out.add(std::move(body));
   }
   void operator()(const RemoveRequest& remove) {
     wire::RemoveBody body;
     for (const std::string& top : remove.tops) body.tops().emplace_back(top);
-    body.seen(remove.seen);
+    body.lamport_time(remove.lamport_time);
     out.remove(std::move(body));
   }
   void operator()(const UpdateRequest& update) {
@@ -113,12 +113,12 @@ struct BodyWriter {
       wire::MoveAndUpdate body;
       body.parent(move.parent);
       body.x_pc(to_flat(*move.X_PC));
-      body.seen(move.seen);
+      body.lamport_time(move.lamport_time);
       out.move_and_update(std::move(body));
     } else {
       wire::MoveBody body;
       body.parent(move.parent);
-      body.seen(move.seen);
+      body.lamport_time(move.lamport_time);
       out.move(std::move(body));
     }
   }
@@ -304,7 +304,7 @@ struct ReplyWriter {
 wire::Reply to_wire(const Reply& reply) {
   wire::Reply sample;
   sample.epoch(reply.epoch);
-  sample.stamp(reply.stamp);
+  sample.lamport_time(reply.lamport_time);
   sample.sequence_number(reply.sequence);
   std::visit(ReplyWriter{sample.body()}, reply.body);
   return sample;
@@ -350,12 +350,12 @@ wire::Page to_wire(const Page& page) {
   for (std::size_t i = 0; i < page.entries.size(); ++i) {
     sample.entries()[i].id(page.entries[i].id);
     sample.entries()[i].parent(page.entries[i].parent);
-    sample.entries()[i].since(page.entries[i].since);
+    sample.entries()[i].lamport_time(page.entries[i].lamport_time);
   }
   sample.tombstones().resize(page.tombstones.size());
   for (std::size_t i = 0; i < page.tombstones.size(); ++i) {
     sample.tombstones()[i].id(page.tombstones[i].id);
-    sample.tombstones()[i].since(page.tombstones[i].since);
+    sample.tombstones()[i].lamport_time(page.tombstones[i].lamport_time);
     sample.tombstones()[i].kind(static_cast<std::uint8_t>(page.tombstones[i].kind));
     sample.tombstones()[i].rival(page.tombstones[i].rival);
   }

@@ -34,12 +34,12 @@ struct Witness : Replica {
     directory.changes().watch();
     hear("arm", 1, 10);
   }
-  void hear(const std::string& partition, std::uint64_t incarnation, std::uint64_t since,
+  void hear(const std::string& partition, std::uint64_t incarnation, std::uint64_t lamport_time,
             std::vector<Absent> absent = {}) {
     Presence presence = presence_of(partition, incarnation, 1);
     presence.absent = std::move(absent);
     directory.apply(presence, kNow);
-    directory.apply(page_of(partition, {{"hand", "", since}}, incarnation));
+    directory.apply(page_of(partition, {{"hand", "", lamport_time}}, incarnation));
   }
   void lose(const std::string& partition, std::uint64_t incarnation) {
     CHECK(directory.lost(partition, incarnation, kNow));

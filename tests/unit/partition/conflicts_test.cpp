@@ -191,7 +191,7 @@ TEST_CASE("who moves a frame that another claims, too, has the later claim to it
   CHECK(arms.conflicts().size() == 1);
 }
 
-TEST_CASE("a stamp is later than all that were stored") {
+TEST_CASE("a Lamport time is later than all that were stored") {
   MemoryStore store;
   {
     Owning arms("arms", &store);
@@ -201,16 +201,16 @@ TEST_CASE("a stamp is later than all that were stored") {
   }
   Owning arms("arms", &store);
   arms.start();
-  CHECK(arms.directory.next_stamp(kNow) > 9000);
+  CHECK(arms.directory.next_lamport_time(kNow) > 9000);
 }
 
-TEST_CASE("a stamp is later than all that were seen, however wrong a clock is") {
+TEST_CASE("a Lamport time is later than all that were seen, however wrong a clock is") {
   Replica replica;
-  const std::uint64_t first = replica.directory.next_stamp(kNow);
+  const std::uint64_t first = replica.directory.next_lamport_time(kNow);
   CHECK(first == 1000);
-  CHECK(replica.directory.next_stamp(kNow) > first);
+  CHECK(replica.directory.next_lamport_time(kNow) > first);
   replica.directory.apply(page_of("head", {{"neck", "", 5000}}));
-  CHECK(replica.directory.next_stamp(kNow) > 5000);
+  CHECK(replica.directory.next_lamport_time(kNow) > 5000);
 }
 
 TEST_CASE("a partition has back what it stored") {

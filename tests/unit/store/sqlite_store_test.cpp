@@ -88,10 +88,10 @@ TEST_CASE("what was saved is there for the next process, to the last bit") {
   REQUIRE(state->frames.size() == 2);
   CHECK(state->frames[0].id == "hand");
   CHECK(state->frames[0].parent == "arm");
-  CHECK(state->frames[0].since == 5);
+  CHECK(state->frames[0].lamport_time == 5);
   CHECK(to_flat(state->frames[0].X_PC) == to_flat(later));
   CHECK(state->frames[1].id == tool.id);
-  CHECK(state->frames[1].since == tool.since);
+  CHECK(state->frames[1].lamport_time == tool.lamport_time);
   // The oldest first.
   CHECK(state->tombstones == std::vector<Tombstone>{lost, gone});
   REQUIRE(state->joints.size() == 2);

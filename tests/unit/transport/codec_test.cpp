@@ -63,7 +63,7 @@ TEST_CASE("replies arrive as they were sent") {
     REQUIRE(arrived);
     CHECK(arrived->sequence == one.sequence);
     CHECK(arrived->epoch == one.epoch);
-    CHECK(arrived->stamp == one.stamp);
+    CHECK(arrived->lamport_time == one.lamport_time);
     REQUIRE(arrived->body.index() == one.body.index());
     if (const auto* error = std::get_if<Error>(&one.body)) {
       CHECK(std::get<Error>(arrived->body).code == error->code);
@@ -184,7 +184,7 @@ TEST_CASE("pages and presences arrive as they were sent") {
     for (std::size_t i = 0; i < one.entries.size(); ++i) {
       CHECK(arrived->entries[i].id == one.entries[i].id);
       CHECK(arrived->entries[i].parent == one.entries[i].parent);
-      CHECK(arrived->entries[i].since == one.entries[i].since);
+      CHECK(arrived->entries[i].lamport_time == one.entries[i].lamport_time);
     }
     CHECK(arrived->tombstones == one.tombstones);
     CHECK(arrived->joints == one.joints);
