@@ -41,11 +41,11 @@ payload.
 CORE = """\
 Nanoseconds. Ours carries a covariance unless it says pose only; tf2 has none.
 """
-PAST = """\
+HISTORY = """\
 In lookups of a while ago all edges move, turning at 1 rad/s, and both sides are asked for the same
 instant between the same samples, again and again. Ours keeps 2,048 samples of an edge by default,
-tf2 those of ten seconds. A sample of an edge with a full past takes {ours} bytes by
-what `past()` says and {heap} by how the heap grows; {tf2} in tf2, without a covariance.
+tf2 those of ten seconds. A sample of an edge with a full history takes {ours} bytes by
+what `history()` says and {heap} by how the heap grows; {tf2} in tf2, without a covariance.
 """
 CONTENTION = """\
 A writer of 100 joints at 1 kHz, and a reader that looks up a path of 30 of them again and again.
@@ -226,7 +226,7 @@ def core_rows(figures):
                   ("lookup_at_100hz", found,
                    "look up {who} 18.5 samples ago at 100 Hz, depth {depth:,}"),
                   ("set", found[:2], "set an edge {who}, {frames:,} frames"),
-                  ("set_past", found, "set an edge {who} whose past is full"),
+                  ("set_history", found, "set an edge {who} whose history is full"),
                   ("add_remove", (("ours", "node"), ("ours_forest", "forest")),
                    "add and remove a leaf, {who}, {frames:,} frames"))
     for operation, all_of_ours, name in operations:
@@ -245,9 +245,9 @@ def core_rows(figures):
 def core_section(figures, drawn, home):
     """Beside tf2."""
     def bytes_of(who):
-        return value(figures, f"core/past_bytes/{who}/2/100", convert=as_measured)
+        return value(figures, f"core/history_bytes/{who}/2/100", convert=as_measured)
 
-    memory = PAST.format(ours=bytes_of("ours"), heap=bytes_of("ours_heap"),
+    memory = HISTORY.format(ours=bytes_of("ours"), heap=bytes_of("ours_heap"),
                          tf2=bytes_of("tf2_heap"))
     return [CORE, table(("operation", "ours", "tf2", "ours / tf2"), core_rows(figures)), memory,
             picture(drawn, "core", home)]

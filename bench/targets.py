@@ -118,11 +118,11 @@ def _core():
                      unit="µs")
 
 
-def _past():
+def _history():
     for operation, what in (("lookup_at", "1 kHz"), ("lookup_at_100hz", "100 Hz")):
         for depth in (2, 8, 30):
             ours, tf2 = (f"core/{operation}/{who}/{depth}/100" for who in ("ours_by_handle", "tf2"))
-            yield Target("The past", f"lookup between samples of {what}, depth {depth}: "
+            yield Target("History", f"lookup between samples of {what}, depth {depth}: "
                          "by handle, with covariance / tf2", ratio_of(ours, tf2), 0.5)
 
 
@@ -150,7 +150,7 @@ ALL = (
     Target("Across partitions",
            "lookup over 2 to 16 partitions, the worst: decentralized / centralized",
            _worst_over_partitions, 1.3),
-    *_wire(), *_floor(), *_stream(), *_core(), *_past(), *_contention(), *_pushed(),
+    *_wire(), *_floor(), *_stream(), *_core(), *_history(), *_contention(), *_pushed(),
 )
 # Why a target is not reached, by the start of "GROUP: NAME"; said only where it is not.
 WHY = {
@@ -164,7 +164,7 @@ WHY = {
     "Core: set an edge":
         "Two fifths of it are the one locked instruction of the writers' lock, which waits until "
         "the former update's 290 bytes have left the store buffer.",
-    "The past: lookup between samples":
+    "History: lookup between samples":
         "Each edge is interpolated on its geodesic, where tf2 goes straight from one translation to "
         "the other, and the covariances of both samples are carried to the instant: two products of "
         "6x6 matrices for each, which tf2 has not.",

@@ -167,8 +167,8 @@ int run_partitions(Client& client, const Arguments& arguments) {
               to_string(partition.since) + "\n";
       continue;
     }
-    if (const auto pasts = client.pasts(partition.name)) {
-      const PastSum sum = sum_of(*pasts);
+    if (const auto histories = client.histories(partition.name)) {
+      const HistorySum sum = sum_of(*histories);
       json.back()["moving"] = sum.edges;
       json.back()["samples"] = sum.samples;
       json.back()["history_bytes"] = sum.bytes;

@@ -134,7 +134,7 @@ void add_following_commands(CLI::App& app, Arguments& arguments, Command& chosen
                               "monitor --once", cli::run_monitor, chosen);
   add_rate(monitor, arguments.rate, "how often a second [Hz]");
   monitor->add_flag("--once", arguments.once, "print it once");
-  add_id(add_command(app, "history", "what is kept of an edge's past", "history hand_left",
+  add_id(add_command(app, "history", "what is kept of an edge's history", "history hand_left",
                      cli::run_history, chosen),
          arguments);
 }

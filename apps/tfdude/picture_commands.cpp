@@ -212,10 +212,10 @@ Result<Graph> graph_of(Client& client) {
   for (PartitionInfo& partition : graph.partitions) {
     by_name[partition.name] = &partition;
     if (!partition.reachable) continue;
-    const auto pasts = client.pasts(partition.name);
-    partition.reachable = pasts.has_value();
-    if (!pasts) continue;
-    for (const PastInfo& past : *pasts) graph.edges[past.id].newest = past.newest;
+    const auto histories = client.histories(partition.name);
+    partition.reachable = histories.has_value();
+    if (!histories) continue;
+    for (const HistoryInfo& history : *histories) graph.edges[history.id].newest = history.newest;
   }
   for (const Frame& frame : graph.frames) {
     const auto owner = by_name.find(frame.partition);

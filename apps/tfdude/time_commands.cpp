@@ -188,14 +188,15 @@ int run_echo(Client& client, const Arguments& arguments) {
 }
 
 int run_history(Client& client, const Arguments& arguments) {
-  const auto pasts = client.past(arguments.id);
-  if (!pasts) return refuse(client, pasts.error(), arguments);
+  const auto histories = client.history(arguments.id);
+  if (!histories) return refuse(client, histories.error(), arguments);
   const Time now = wall_clock();
-  if (pasts->empty() || !pasts->front().newest) {
+  if (histories->empty() || !histories->front().newest) {
     return answer(arguments, {{"id", arguments.id}, {"moving", false}, {"samples", 0}},
                   arguments.id + " is static: it holds for all times\n");
   }
-  return answer(arguments, past_json(pasts->front(), now), describe(pasts->front(), now));
+  return answer(arguments, history_json(histories->front(), now),
+                describe(histories->front(), now));
 }
 
 int run_monitor(Client& client, const Arguments& arguments) {
@@ -209,13 +210,14 @@ int run_monitor(Client& client, const Arguments& arguments) {
       return refuse(client, {Errc::kUnknownPartition, "no partition"}, arguments);
     }
     for (const PartitionInfo& partition : *partitions) {
-      const auto pasts = client.pasts(partition.name);
+      const auto histories = client.histories(partition.name);
       const Time now = wall_clock();
-      nlohmann::json one{{"partition", partition.name}, {"reachable", pasts.has_value()}};
-      if (pasts) {
+      nlohmann::json one{{"partition", partition.name}, {"reachable", histories.has_value()}};
+      if (histories) {
         one["edges"] = nlohmann::json::array();
-        for (const PastInfo& past : *pasts) one["edges"].push_back(past_json(past, now));
-        text += monitor_table(partition.name, *pasts, now);
+        for (const HistoryInfo& history : *histories)
+          one["edges"].push_back(history_json(history, now));
+        text += monitor_table(partition.name, *histories, now);
         if (const auto observed = client.consistency(partition.name)) {
           one["observed"] = nlohmann::json::array();
           for (const auto& edge : *observed) one["observed"].push_back(consistency_json(edge));
@@ -227,7 +229,7 @@ int run_monitor(Client& client, const Arguments& arguments) {
           text += outside_table(*joints);
         }
       } else {
-        text += "partition " + partition.name + ": " + pasts.error().message + "\n";
+        text += "partition " + partition.name + ": " + histories.error().message + "\n";
       }
       json.push_back(std::move(one));
     }

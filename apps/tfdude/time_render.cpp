@@ -10,8 +10,8 @@ double seconds(std::chrono::nanoseconds duration) {
 }
 double milliseconds(std::chrono::nanoseconds duration) { return seconds(duration) * 1e3; }
 
-double rate_of(const PastInfo& past) {
-  return past.mean_gap.count() > 0 ? 1.0 / seconds(past.mean_gap) : 0.0;
+double rate_of(const HistoryInfo& history) {
+  return history.mean_gap.count() > 0 ? 1.0 / seconds(history.mean_gap) : 0.0;
 }
 
 std::string ago(Time stamp, Time now) {
@@ -39,55 +39,58 @@ void add_stamp(nlohmann::json& json, const std::optional<Time>& stamp) {
   json["stamp_ns"] = stamp ? nlohmann::json(nanoseconds(*stamp)) : nlohmann::json();
 }
 
-std::string describe(const PastInfo& past, Time now) {
-  std::string text = format(
-      "samples      %zu of at most %zu, %.3f s of at most %.3f s\n", past.samples, past.count_limit,
-      past.newest ? seconds(*past.newest - *past.oldest) : 0.0, seconds(past.span_limit));
-  if (past.newest) {
-    text += "oldest       " + seconds_of(*past.oldest) + "  (" + ago(*past.oldest, now) + ")\n";
-    text += "newest       " + seconds_of(*past.newest) + "  (" + ago(*past.newest, now) + ")\n";
+std::string describe(const HistoryInfo& history, Time now) {
+  std::string text =
+      format("samples      %zu of at most %zu, %.3f s of at most %.3f s\n", history.samples,
+             history.count_limit, history.newest ? seconds(*history.newest - *history.oldest) : 0.0,
+             seconds(history.span_limit));
+  if (history.newest) {
+    text +=
+        "oldest       " + seconds_of(*history.oldest) + "  (" + ago(*history.oldest, now) + ")\n";
+    text +=
+        "newest       " + seconds_of(*history.newest) + "  (" + ago(*history.newest, now) + ")\n";
     text += format("rate         %.3f Hz, gaps %.3f ms on average, %.3f at most, jitter %.3f ms\n",
-                   rate_of(past), milliseconds(past.mean_gap), milliseconds(past.max_gap),
-                   milliseconds(past.jitter));
+                   rate_of(history), milliseconds(history.mean_gap), milliseconds(history.max_gap),
+                   milliseconds(history.jitter));
   }
   text += format("refused      %llu too old, %llu of a stamp that was taken\n",
-                 static_cast<unsigned long long>(past.refused_old),
-                 static_cast<unsigned long long>(past.refused_equal));
-  return text + format("memory       %zu bytes\n", past.bytes);
+                 static_cast<unsigned long long>(history.refused_old),
+                 static_cast<unsigned long long>(history.refused_equal));
+  return text + format("memory       %zu bytes\n", history.bytes);
 }
 
-nlohmann::json past_json(const PastInfo& past, Time now) {
-  nlohmann::json json{{"id", past.id},
-                      {"moving", past.newest.has_value()},
-                      {"samples", past.samples},
-                      {"bytes", past.bytes},
-                      {"span_limit", seconds(past.span_limit)},
-                      {"count_limit", past.count_limit},
-                      {"rate", rate_of(past)},
-                      {"mean_gap", seconds(past.mean_gap)},
-                      {"max_gap", seconds(past.max_gap)},
-                      {"jitter", seconds(past.jitter)},
-                      {"refused_old", past.refused_old},
-                      {"refused_equal", past.refused_equal}};
-  if (!past.newest) return json;
-  json["oldest_ns"] = nanoseconds(*past.oldest);
-  json["newest_ns"] = nanoseconds(*past.newest);
-  json["span"] = seconds(*past.newest - *past.oldest);
-  json["age"] = seconds(now - *past.newest);
+nlohmann::json history_json(const HistoryInfo& history, Time now) {
+  nlohmann::json json{{"id", history.id},
+                      {"moving", history.newest.has_value()},
+                      {"samples", history.samples},
+                      {"bytes", history.bytes},
+                      {"span_limit", seconds(history.span_limit)},
+                      {"count_limit", history.count_limit},
+                      {"rate", rate_of(history)},
+                      {"mean_gap", seconds(history.mean_gap)},
+                      {"max_gap", seconds(history.max_gap)},
+                      {"jitter", seconds(history.jitter)},
+                      {"refused_old", history.refused_old},
+                      {"refused_equal", history.refused_equal}};
+  if (!history.newest) return json;
+  json["oldest_ns"] = nanoseconds(*history.oldest);
+  json["newest_ns"] = nanoseconds(*history.newest);
+  json["span"] = seconds(*history.newest - *history.oldest);
+  json["age"] = seconds(now - *history.newest);
   return json;
 }
 
-PastSum sum_of(const std::vector<PastInfo>& pasts) {
-  PastSum sum;
-  for (const PastInfo& past : pasts) {
-    if (past.newest) ++sum.edges;
-    sum.samples += past.samples;
-    sum.bytes += past.bytes;
+HistorySum sum_of(const std::vector<HistoryInfo>& histories) {
+  HistorySum sum;
+  for (const HistoryInfo& history : histories) {
+    if (history.newest) ++sum.edges;
+    sum.samples += history.samples;
+    sum.bytes += history.bytes;
   }
   return sum;
 }
 
-std::string describe(const PastSum& sum) {
+std::string describe(const HistorySum& sum) {
   return format("%zu samples of %zu edges, %.1f KiB", sum.samples, sum.edges,
                 static_cast<double>(sum.bytes) / 1024.0);
 }
@@ -107,18 +110,19 @@ std::string echo_lines(const std::string& a, const std::string& b, const Stamped
          "\n";
 }
 
-std::string monitor_table(const std::string& partition, const std::vector<PastInfo>& pasts,
+std::string monitor_table(const std::string& partition, const std::vector<HistoryInfo>& histories,
                           Time now) {
-  std::string text = "partition " + partition + ": " + describe(sum_of(pasts)) + "\n";
-  if (pasts.empty()) return text;
+  std::string text = "partition " + partition + ": " + describe(sum_of(histories)) + "\n";
+  if (histories.empty()) return text;
   text += format("  %-24s %10s %10s %10s %10s %10s\n", "edge", "rate [Hz]", "age [ms]",
                  "jitter[ms]", "gap [ms]", "refused");
-  for (const PastInfo& past : pasts) {
+  for (const HistoryInfo& history : histories) {
     const std::string age =
-        past.newest ? format("%.1f", milliseconds(now - *past.newest)) : std::string("-");
-    text += format("  %-24s %10.1f %10s %10.3f %10.3f %10llu\n", past.id.c_str(), rate_of(past),
-                   age.c_str(), milliseconds(past.jitter), milliseconds(past.max_gap),
-                   static_cast<unsigned long long>(past.refused_old + past.refused_equal));
+        history.newest ? format("%.1f", milliseconds(now - *history.newest)) : std::string("-");
+    text +=
+        format("  %-24s %10.1f %10s %10.3f %10.3f %10llu\n", history.id.c_str(), rate_of(history),
+               age.c_str(), milliseconds(history.jitter), milliseconds(history.max_gap),
+               static_cast<unsigned long long>(history.refused_old + history.refused_equal));
   }
   return text;
 }

@@ -20,18 +20,18 @@ namespace tfdude::cli {
 /// Of a transform's JSON: `stamp` in seconds and `stamp_ns`, both null where it holds for all times.
 void add_stamp(nlohmann::json& json, const std::optional<Time>& stamp);
 
-/// The past of one edge, or that it has none.
-[[nodiscard]] std::string describe(const PastInfo& past, Time now);
-[[nodiscard]] nlohmann::json past_json(const PastInfo& past, Time now);
+/// The history of one edge, or that it has none.
+[[nodiscard]] std::string describe(const HistoryInfo& history, Time now);
+[[nodiscard]] nlohmann::json history_json(const HistoryInfo& history, Time now);
 
-/// What a partition keeps of the past.
-struct PastSum {
+/// What a partition keeps of histories.
+struct HistorySum {
   std::size_t edges = 0;
   std::size_t samples = 0;
   std::size_t bytes = 0;
 };
-[[nodiscard]] PastSum sum_of(const std::vector<PastInfo>& pasts);
-[[nodiscard]] std::string describe(const PastSum& sum);
+[[nodiscard]] HistorySum sum_of(const std::vector<HistoryInfo>& histories);
+[[nodiscard]] std::string describe(const HistorySum& sum);
 
 /// A transform in few lines that are always as many: position, angles, standard deviations, age.
 [[nodiscard]] std::string echo_lines(const std::string& a, const std::string& b,
@@ -39,6 +39,6 @@ struct PastSum {
 
 /// One partition's moving edges as a table.
 [[nodiscard]] std::string monitor_table(const std::string& partition,
-                                        const std::vector<PastInfo>& pasts, Time now);
+                                        const std::vector<HistoryInfo>& histories, Time now);
 
 }  // namespace tfdude::cli

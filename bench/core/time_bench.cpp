@@ -1,12 +1,12 @@
-// What the past costs a process with frames of its own, beside tf2's BufferCore on the same tree with the same
-// samples: set an edge whose past is full, look up between two samples, and memory.
+// What history costs a process with frames of its own, beside tf2's BufferCore on the same tree with the same
+// samples: set an edge whose history is full, look up between two samples, and memory.
 //
 // Keys: core/OPERATION/WHO/DEPTH/FRAMES, where the operation is one of
-//   set_past          a sample a millisecond: ours keeps 2,048, tf2 ten seconds, both by default
+//   set_history       a sample a millisecond: ours keeps 2,048, tf2 ten seconds, both by default
 //   lookup_at         18.5 samples of 1 kHz before the newest
 //   lookup_at_far     200.5 of them
 //   lookup_at_100hz   18.5 samples of 100 Hz
-//   past_bytes        bytes a sample, of an edge's full past; WHO is then ours, as Node::past() counts them, or
+//   history_bytes     bytes a sample, of an edge's full history; WHO is then ours, as Node::history() counts them, or
 //                     ours_heap and tf2_heap, by which the heap grew
 // Lookups are of trees of which all edges move: each turns at 1 rad/s, and has samples of 2 s, at the same instants.
 
@@ -91,7 +91,7 @@ class Moving {
   Time newest_;
 };
 
-/// A lookup: along how many edges, of how far a past.
+/// A lookup: along how many edges, of how long a history.
 struct Case {
   std::size_t depth;
   nanoseconds period;
@@ -178,7 +178,7 @@ class Tf2 {
 };
 
 template <class Who>
-void set_with_past(benchmark::State& state) {
+void set_with_history(benchmark::State& state) {
   // From the child of the root, which is what the message of tf2 says, too.
   Who who(bench::up_down_tree(2, kFrames));
   for (int i = 0; i < kFull; ++i) {
@@ -187,13 +187,14 @@ void set_with_past(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(who.set());
 }
 
-void count_past(benchmark::State& state) {
+void count_history(benchmark::State& state) {
   const bench::Tree tree = bench::up_down_tree(2, kFrames);
   Ours ours(tree);
   for (int i = 0; i < kFull; ++i) (void)ours.set();
   for (auto _ : state) {
-    const PastInfo past = ours.node().past(tree.from)->front();
-    state.counters["bytes"] = static_cast<double>(past.bytes) / static_cast<double>(past.samples);
+    const HistoryInfo history = ours.node().history(tree.from)->front();
+    state.counters["bytes"] =
+        static_cast<double>(history.bytes) / static_cast<double>(history.samples);
   }
 }
 
@@ -204,7 +205,7 @@ double heap_bytes() {
 
 /// @param samples  as many as are kept; the heap grows by these alone
 template <class Who>
-void weigh_past(benchmark::State& state, int samples) {
+void weigh_history(benchmark::State& state, int samples) {
   const bench::Tree tree = bench::up_down_tree(2, kFrames);
   for (auto _ : state) {
     Who who(tree);
@@ -233,15 +234,17 @@ int main(int argc, char** argv) {
   enter_lookups("lookup_at", kMillisecond, 18.5);
   enter_lookups("lookup_at_far", kMillisecond, 200.5);
   enter_lookups("lookup_at_100hz", 10 * kMillisecond, 18.5);
-  benchmark::RegisterBenchmark(key("set_past/ours_by_handle", 2).c_str(), set_with_past<Ours>);
-  benchmark::RegisterBenchmark(key("set_past/tf2", 2).c_str(), set_with_past<Tf2>);
+  benchmark::RegisterBenchmark(key("set_history/ours_by_handle", 2).c_str(),
+                               set_with_history<Ours>);
+  benchmark::RegisterBenchmark(key("set_history/tf2", 2).c_str(), set_with_history<Tf2>);
   constexpr int kKeptByOurs = 2048;
   constexpr int kKeptByTf2 = 10000;
-  benchmark::RegisterBenchmark(key("past_bytes/ours", 2).c_str(), count_past)->Iterations(1);
-  benchmark::RegisterBenchmark(key("past_bytes/ours_heap", 2).c_str(), weigh_past<Ours>,
+  benchmark::RegisterBenchmark(key("history_bytes/ours", 2).c_str(), count_history)->Iterations(1);
+  benchmark::RegisterBenchmark(key("history_bytes/ours_heap", 2).c_str(), weigh_history<Ours>,
                                kKeptByOurs)
       ->Iterations(1);
-  benchmark::RegisterBenchmark(key("past_bytes/tf2_heap", 2).c_str(), weigh_past<Tf2>, kKeptByTf2)
+  benchmark::RegisterBenchmark(key("history_bytes/tf2_heap", 2).c_str(), weigh_history<Tf2>,
+                               kKeptByTf2)
       ->Iterations(1);
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();

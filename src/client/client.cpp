@@ -219,12 +219,12 @@ Result<std::vector<EdgeConsistency>> Client::consistency(const std::string& part
   return participant_->observations().consistency(partition);
 }
 
-Result<std::vector<PastInfo>> Client::past(const std::string& id) {
-  return participant_->queries().past(id);
+Result<std::vector<HistoryInfo>> Client::history(const std::string& id) {
+  return participant_->queries().history(id);
 }
 
-Result<std::vector<PastInfo>> Client::pasts(const std::string& partition) {
-  return participant_->queries().pasts(partition);
+Result<std::vector<HistoryInfo>> Client::histories(const std::string& partition) {
+  return participant_->queries().histories(partition);
 }
 
 Result<Pose> Client::lookup_pose(std::string_view a, std::string_view b) {

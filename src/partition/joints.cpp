@@ -139,8 +139,8 @@ bool Joints::is_news(const Mover& mover, std::optional<Time> stamp) const {
 
 // Whether the edge's history has started again, so that an older sample is its newest.
 bool Joints::starts_again(const Mover& mover, Time stamp) const {
-  const auto past = forest_.pasts(mover.frame);
-  return !past.empty() && past.front().newest == stamp;
+  const auto history = forest_.histories(mover.frame);
+  return !history.empty() && history.front().newest == stamp;
 }
 
 void Joints::take(const Step& step, std::optional<Time> stamp) {

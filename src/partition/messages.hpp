@@ -129,8 +129,8 @@ inline constexpr std::chrono::hours kMaxWatchPeriod{1};
 /// How long an owner pushes to watchers of whom it hears nothing.
 inline constexpr Milliseconds kWatchLease{5000};
 
-/// What is kept of the past of the edge that the request's id names or, instead, of all that the partition has.
-struct PastRequest {
+/// What is kept of the history of the edge that the request's id names or, instead, of all that the partition has.
+struct HistoryRequest {
   bool all = false;
 };
 
@@ -141,7 +141,7 @@ struct Request {
   /// The frame concerned, by which a reader filters: one that the partition owns, or the new one of an add.
   std::string id;
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
-               PastRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
+               HistoryRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
                PartialUpdateRequest, CorrelateRequest, ForgetRequest>
       body;
   /// Of requests with a lower number, in whatever order they come, the sender awaits no reply. Not above `sequence`, which has
@@ -170,7 +170,7 @@ struct Reply {
   /// The partition's structure after the request; a directory that has this epoch shows its effect.
   std::uint64_t epoch = 0;
   /// Done, or why not; or what was asked for.
-  std::variant<Done, Error, SegmentValues, State, std::vector<PastInfo>,
+  std::variant<Done, Error, SegmentValues, State, std::vector<HistoryInfo>,
                std::vector<EdgeConsistency>, std::vector<JointInfo>>
       body;
   /// Of a change: the latest that the owner knows of, for the next change of who has asked.

@@ -146,13 +146,13 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
   return reply;
 }
 
-Reply Partition::answer_past(const Request& request) const {
-  const bool all = std::get<PastRequest>(request.body).all;
+Reply Partition::answer_history(const Request& request) const {
+  const bool all = std::get<HistoryRequest>(request.body).all;
   if (!all && !forest_.holds(request.id)) {
     return {request.sequence, 0,
             at_home(Error{Errc::kNotOwner, "no frame " + quote(request.id)}, request.id)};
   }
-  return {request.sequence, 0, forest_.pasts(all ? std::string_view() : request.id)};
+  return {request.sequence, 0, forest_.histories(all ? std::string_view() : request.id)};
 }
 
 Result<void> Partition::apply(const Request& request, Time now) {

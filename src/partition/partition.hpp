@@ -22,7 +22,7 @@ namespace tfdude {
 /// The rules of an owner: what it answers to each request, and what it publishes of its structure.
 ///
 /// @par Thread safety  The caller serializes all functions that change the structure, answer() among
-///   them, with those of the directory; answer_lookup(), answer_past(), moves() and apply() of edges may run beside
+///   them, with those of the directory; answer_lookup(), answer_history(), moves() and apply() of edges may run beside
 ///   anything. What has to do with joints, answer() among it, is serialized, too, and need not be with the directory.
 class Partition {
  public:
@@ -54,8 +54,8 @@ class Partition {
   /// Answers a request that reads.
   [[nodiscard]] Reply answer_lookup(std::uint32_t sequence, const LookupRequest& lookup) const;
 
-  /// What is kept of the past of the edges that a request asks for; kMaxItems edges at most.
-  [[nodiscard]] Reply answer_past(const Request& request) const;
+  /// What is kept of the histories of the edges that a request asks for; kMaxItems edges at most.
+  [[nodiscard]] Reply answer_history(const Request& request) const;
 
   /// Applies those edges of a stream that are owned here, as one commit.
   /// @return how many

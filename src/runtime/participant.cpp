@@ -82,8 +82,8 @@ std::optional<Reply> Participant::answer_query(const Request& request) {
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
     return member_.partition()->answer_lookup(request.sequence, *lookup);
   }
-  if (std::holds_alternative<PastRequest>(request.body)) {
-    return member_.partition()->answer_past(request);
+  if (std::holds_alternative<HistoryRequest>(request.body)) {
+    return member_.partition()->answer_history(request);
   }
   if (std::holds_alternative<WatchRequest>(request.body)) return pushing_.answer(request);
   return std::nullopt;

@@ -83,20 +83,21 @@ std::size_t Queries::own_frames() {
   });
 }
 
-Result<std::vector<PastInfo>> Queries::past(const std::string& id) {
+Result<std::vector<HistoryInfo>> Queries::history(const std::string& id) {
   const Deadline deadline = discovery_.call_deadline();
   return requests_.retry_on_stale_route(
       deadline,
       [&]() -> Result<Part> {
         const auto info = structure_.forest.info(id);
         if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
-        return route_to(structure_.directory, info->owner, Request{0, id, PastRequest{}});
+        return route_to(structure_.directory, info->owner, Request{0, id, HistoryRequest{}});
       },
-      [&](Part& part) { return requests_.ask_list<PastInfo>(std::move(part), deadline); });
+      [&](Part& part) { return requests_.ask_list<HistoryInfo>(std::move(part), deadline); });
 }
 
-Result<std::vector<PastInfo>> Queries::pasts(const std::string& partition) {
-  return requests_.ask_all<PastInfo>(partition, PastRequest{true}, discovery_.call_deadline());
+Result<std::vector<HistoryInfo>> Queries::histories(const std::string& partition) {
+  return requests_.ask_all<HistoryInfo>(partition, HistoryRequest{true},
+                                        discovery_.call_deadline());
 }
 
 }  // namespace tfdude

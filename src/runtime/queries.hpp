@@ -32,9 +32,9 @@ class Queries {
   [[nodiscard]] Result<std::vector<std::string>> roots();
   [[nodiscard]] Result<std::vector<PartitionInfo>> partitions();
   [[nodiscard]] std::size_t own_frames();
-  /// What is kept of the past of a frame's edge, and of all edges of a partition.
-  [[nodiscard]] Result<std::vector<PastInfo>> past(const std::string& id);
-  [[nodiscard]] Result<std::vector<PastInfo>> pasts(const std::string& partition);
+  /// What is kept of the history of a frame's edge, and of all edges of a partition.
+  [[nodiscard]] Result<std::vector<HistoryInfo>> history(const std::string& id);
+  [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition);
 
  private:
   [[nodiscard]] Result<void> all_known() { return discovery_.await(discovery_.call_deadline()); }

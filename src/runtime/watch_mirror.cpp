@@ -170,7 +170,7 @@ const WatchMirror::Source* WatchMirror::source_like(const WatchRoute::Source& so
   return nullptr;
 }
 
-std::optional<Time> WatchMirror::lacks_past() const {
+std::optional<Time> WatchMirror::lacks_history() const {
   const auto newest = lookup({});
   if (newest || newest.error().code != Errc::kTooOld) return std::nullopt;
   std::optional<Time> common;

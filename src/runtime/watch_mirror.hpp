@@ -44,7 +44,7 @@ struct WatchRoute {
 /// @par Thread safety  lookup(), without a lock; of the rest one function at a time.
 class WatchMirror {
  public:
-  /// @param timing  how much of the past is kept
+  /// @param timing  how long a history is kept
   WatchMirror(const std::string& a, const std::string& b, WatchRoute route,
               const EdgeTiming& timing);
   WatchMirror(const WatchMirror&) = delete;
@@ -57,7 +57,7 @@ class WatchMirror {
 
   [[nodiscard]] const WatchRoute& route() const { return route_; }
 
-  /// What another mirror knows of edges that are here, too: so their past goes on. To be called before anything is taken.
+  /// What another mirror knows of edges that are here, too: so their history goes on. To be called before anything is taken.
   void inherit(const WatchMirror& before);
 
   /// What an owner told. @return whether something of it is new here
@@ -74,7 +74,7 @@ class WatchMirror {
 
   /// The newest instant that all moving edges have reached, where one of them has no sample that is not younger: its
   /// owner may know where it was then.
-  [[nodiscard]] std::optional<Time> lacks_past() const;
+  [[nodiscard]] std::optional<Time> lacks_history() const;
 
  private:
   struct Edge {

@@ -17,7 +17,7 @@ constexpr Milliseconds kNotConnectedFor{500};
 constexpr Milliseconds kWaitForCommon{1000};
 
 // How often owners are asked for what was before.
-constexpr int kMostAskedForPast = 10;
+constexpr int kMostAskedForHistory = 10;
 
 }  // namespace
 
@@ -72,7 +72,7 @@ bool WatchedPath::prepare(WatchRoute route) {
   {
     const std::lock_guard lock(mutex_);
     next_.reset();
-    asked_for_past_ = 0;
+    asked_for_history_ = 0;
     // There and back again, before the other one was shown.
     if (followed_ != nullptr && followed_->route().is_same(route)) return false;
     next_ = std::make_unique<WatchMirror>(a_, b_, std::move(route), options_.timing);
@@ -96,7 +96,7 @@ WatchedPath::Taken WatchedPath::take(const State& state) {
     taken.lacks = latest != nullptr && latest->lacks();
     if (news) messages_.fetch_add(1, std::memory_order_relaxed);
   }
-  changed_.notify_all();  // samples of the past are no news, but waited for
+  changed_.notify_all();  // late samples are nothing new to show, but waited for
   return taken;
 }
 
@@ -143,15 +143,16 @@ void WatchedPath::interrupt(Error why) {
 bool WatchedPath::up_to_date() const {
   const std::lock_guard lock(mutex_);
   if (next_ != nullptr || followed_ == nullptr || followed_->lacks()) return false;
-  return asked_for_past_ >= kMostAskedForPast || !followed_->lacks_past();
+  return asked_for_history_ >= kMostAskedForHistory || !followed_->lacks_history();
 }
 
-std::optional<Time> WatchedPath::lacks_past() {
+std::optional<Time> WatchedPath::lacks_history() {
   const std::lock_guard lock(mutex_);
   const auto& latest = next_ != nullptr ? next_ : followed_;
-  if (latest == nullptr || !latest->complete() || asked_for_past_ >= kMostAskedForPast) return {};
-  const auto from = latest->lacks_past();
-  if (from) ++asked_for_past_;
+  if (latest == nullptr || !latest->complete() || asked_for_history_ >= kMostAskedForHistory)
+    return {};
+  const auto from = latest->lacks_history();
+  if (from) ++asked_for_history_;
   return from;
 }
 
@@ -178,7 +179,7 @@ bool WatchedPath::wait_for_more(std::uint64_t messages, Clock::time_point deadli
 Result<void> WatchedPath::wait_until_live(Clock::time_point deadline) const {
   std::unique_lock lock(mutex_);
   changed_.wait_until(lock, deadline,
-                      [&] { return followed_ != nullptr && !followed_->lacks_past(); });
+                      [&] { return followed_ != nullptr && !followed_->lacks_history(); });
   if (followed_ != nullptr) return {};
   return tl::unexpected(why_not_);
 }

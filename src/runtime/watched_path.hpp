@@ -62,8 +62,8 @@ class WatchedPath {
   bool prepare(WatchRoute route);
   /// Whether the route is shown with all that its owners have told, as far as that can be had.
   [[nodiscard]] bool up_to_date() const;
-  /// See WatchMirror::lacks_past(); asked for a few times only, as nobody may know.
-  [[nodiscard]] std::optional<Time> lacks_past();
+  /// See WatchMirror::lacks_history(); asked for a few times only, as nobody may know.
+  [[nodiscard]] std::optional<Time> lacks_history();
   /// Why there is no answer for now.
   void interrupt(Error why);
   /// Whether this says that the path does not exist any more. News of a move may come before those of where to.
@@ -96,7 +96,7 @@ class WatchedPath {
   std::unique_ptr<WatchMirror> followed_;
   std::unique_ptr<WatchMirror> next_;  // to be shown once it has all values
   Clock::time_point next_since_;
-  int asked_for_past_ = 0;
+  int asked_for_history_ = 0;
   bool was_shown_ = false;
   std::vector<Retired> retired_;
   std::optional<Clock::time_point> not_connected_since_;

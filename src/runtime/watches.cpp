@@ -129,9 +129,9 @@ bool Watches::attend(const Path& path, bool renew) {
       open_.insert(source.group, Clock::now());
     }
   }
-  if (!ask(path, *route, path->lacks_past())) return false;
+  if (!ask(path, *route, path->lacks_history())) return false;
   // Only the first answers show that one edge is ahead of what another has.
-  if (const auto from = path->lacks_past()) {
+  if (const auto from = path->lacks_history()) {
     if (!ask(path, *route, from)) return false;
   }
   return path->up_to_date();

@@ -93,7 +93,7 @@ class Forest {
   [[nodiscard]] Result<void> release(std::string_view id);
 
   /// Gives an edge a new value; with a stamp, a sample of it. Without one the clock's time is taken for a moving edge,
-  /// while a static edge has its value replaced. Allocation-free, but while an edge's past grows to its limits and
+  /// while a static edge has its value replaced. Allocation-free, but while an edge's history grows to its limits and
   /// where a sample is older than another: then O(samples).
   /// @return kUnknownFrame, kNotOwner, kInvalidInput (not finite; a stamp before 1970, or further ahead of the clock than
   ///   EdgeTiming::max_ahead), kTooOld (older than what is kept), kStampTaken (equal in stamp to another sample).
@@ -116,14 +116,14 @@ class Forest {
   [[nodiscard]] Result<void> update_partial(const std::vector<PartialUpdate>& edges,
                                             std::optional<Time> stamp = std::nullopt);
 
-  /// Says how an edge behaves in time; what was kept of its past goes.
+  /// Says how an edge behaves in time; what was kept of its history goes.
   /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the field).
   [[nodiscard]] Result<void> set_timing(std::string_view id, const EdgeTiming& timing);
 
   /// That of all edges for which nothing else is said, from their first sample on.
   [[nodiscard]] Result<void> set_default_timing(const EdgeTiming& timing);
 
-  /// Says how an edge's error is correlated with those of others, from now on and for all its past. Updates leave that as
+  /// Says how an edge's error is correlated with those of others, from now on and for all its history. Updates leave that as
   /// it is.
   /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the source).
   [[nodiscard]] Result<void> correlate(std::string_view id, const Correlation& correlation);
@@ -142,7 +142,7 @@ class Forest {
                                     std::uint64_t seen);
 
   /// Hangs a held frame, with all below it, under a new parent; empty makes it a root. Keeps the edge's
-  /// value where X_PC is not given, but nothing of its past, which was that of another edge: it is static until its next
+  /// value where X_PC is not given, but nothing of its history, which was that of another edge: it is static until its next
   /// sample. O(subtree).
   /// @return kUnknownFrame, kNotOwner, kUnknownParent, kCycle, kInvalidInput (not finite).
   [[nodiscard]] Result<void> move(std::string_view id, std::string_view parent,
@@ -228,7 +228,7 @@ class Forest {
   [[nodiscard]] NewsOfCommit news(std::vector<EdgeCursor>& cursors, const NewsQuery& query) const;
 
   /// Takes over what news() of another forest told, as one commit. What is here already, or older than what is kept, is
-  /// passed over; where process noise is told, the edge's past goes.
+  /// passed over; where process noise is told, the edge's history goes.
   /// @param edges  held here, by the values' indices
   /// @param replace  samples of which there is another with that stamp; else they are passed over
   void take(const std::vector<Handle>& edges, const std::vector<News>& values, bool replace = true);
@@ -241,9 +241,9 @@ class Forest {
   /// The same for histories that have started again, before the commit that does it is visible.
   void on_restart(std::function<void(const HistoryRestart&)> listener);
 
-  /// What is kept of the past of held edges, those that are moving; of one where an id is given. Takes no lock. O(slots
+  /// The histories of held edges, of those that are moving; of one where an id is given. Takes no lock. O(slots
   /// and samples).
-  [[nodiscard]] std::vector<PastInfo> pasts(std::string_view id = {}) const;
+  [[nodiscard]] std::vector<HistoryInfo> histories(std::string_view id = {}) const;
 
   /// Grows with every change of the structure (not of values).
   [[nodiscard]] std::uint64_t structure_version() const;

@@ -101,20 +101,20 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
   if (!stamp) return fail(Errc::kChangedMeanwhile, who + " is moving since it was observed");
   const std::int64_t at = nanoseconds(*stamp);
   if (auto ok = check_ahead(edge, at); !ok) return ok;
-  const std::uint64_t place = edge.ring->place_of(at);
-  const bool there = place < edge.ring->next() && edge.ring->stamp(place) == at;
+  const std::uint64_t place = edge.samples->place_of(at);
+  const bool there = place < edge.samples->next() && edge.samples->stamp(place) == at;
   return there ? Result<void>() : check_sample(edge, at);
 }
 
 void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_PC,
                                   std::int64_t stamp) {
-  const std::uint64_t place = newest.ring->place_of(stamp);
-  if (place == newest.ring->next() || newest.ring->stamp(place) != stamp) {
+  const std::uint64_t place = newest.samples->place_of(stamp);
+  if (place == newest.samples->next() || newest.samples->stamp(place) != stamp) {
     push_value(newest.slot, X_PC, stamp);
     return;
   }
-  HeldVersion* before = newest.ring->sample(place);
-  Ring* superseded = newest.ring;
+  HeldVersion* before = newest.samples->sample(place);
+  SampleHistory* superseded = newest.samples;
   HeldVersion* sample = nullptr;
   HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
   if (before->stamp == fresh.stamp) {
@@ -129,9 +129,9 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_
     sample->stamp = stamp;
   }
   sample->kept = true;
-  fresh.ring = superseded->replaced(sample, place).release();
-  fresh.ring->rewritten = fresh.commit;
-  fresh.number = fresh.ring->next() - 1;
+  fresh.samples = superseded->replaced(sample, place).release();
+  fresh.samples->rewritten = fresh.commit;
+  fresh.number = fresh.samples->next() - 1;
   reclaimer_.supersede(superseded);
   before->kept = false;
   reclaimer_.supersede(before);

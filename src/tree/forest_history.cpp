@@ -5,7 +5,7 @@
 #include "base/saturating.hpp"
 #include "tree/forest_impl.hpp"
 
-// What an update does to the past of its edge.
+// What an update does to the history of its edge.
 namespace tfdude {
 namespace {
 
@@ -32,7 +32,7 @@ Result<void> check_timing(const EdgeTiming& timing) {
 Forest::Impl::~Impl() {
   for (std::uint32_t slot = 0; slot < frames_.size(); ++slot) {
     if (!frames_.newest(slot).held()) continue;
-    delete frames_.newest_value(slot).ring;
+    delete frames_.newest_value(slot).samples;
     delete frames_.newest_value(slot).correlation;
   }
 }
@@ -88,7 +88,7 @@ void Forest::Impl::push_value(std::uint32_t slot, const Transform& X_PC, std::in
     end_revision(push_held(slot, X_PC));
   } else if (!old.moving() || stamp > old.stamp) {
     append_sample(old, X_PC, stamp);
-  } else if (stamp < old.stamp - old.ring->timing().span.count()) {
+  } else if (stamp < old.stamp - old.samples->timing().span.count()) {
     restart_history(old, X_PC, stamp);
   } else {
     insert_sample(old, X_PC, stamp);
@@ -97,47 +97,47 @@ void Forest::Impl::push_value(std::uint32_t slot, const Transform& X_PC, std::in
 
 void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_PC,
                                  std::int64_t stamp) {
-  Ring* ring = newest.ring;
-  if (ring == nullptr) {
-    ring = new Ring(default_timing_);
+  SampleHistory* samples = newest.samples;
+  if (samples == nullptr) {
+    samples = new SampleHistory(default_timing_);
   } else {
-    // First, so that a ring of as many slots as samples will do. At least two are kept: this is not the newest.
-    if (ring->count() >= ring->timing().count) drop_oldest(*ring);
-    if (ring->full()) {
-      ring = ring->grown().release();
-      reclaimer_.supersede(newest.ring);
+    // First, so that a ring buffer of as many slots as samples will do. At least two are kept: this is not the newest.
+    if (samples->count() >= samples->timing().count) drop_oldest(*samples);
+    if (samples->full()) {
+      samples = samples->grown().release();
+      reclaimer_.supersede(newest.samples);
     }
   }
   HeldVersion& fresh = push_held(newest.slot, X_PC);
-  fresh.ring = ring;
+  fresh.samples = samples;
   fresh.stamp = stamp;
-  fresh.number = ring->next();
+  fresh.number = samples->next();
   fresh.kept = true;
-  ring->append(&fresh, stamp);
-  drop_samples(*ring);
+  samples->append(&fresh, stamp);
+  drop_samples(*samples);
 }
 
 void Forest::Impl::restart_history(const HeldVersion& newest, const Transform& X_PC,
                                    std::int64_t stamp) {
   const HistoryRestart restart{newest.name->text, time_of(newest.stamp), time_of(stamp)};
   HeldVersion& fresh = push_held(newest.slot, X_PC);
-  forget_past(fresh);
+  forget_history(fresh);
   fresh.stamp = stamp;
-  fresh.number = fresh.ring->next();
+  fresh.number = fresh.samples->next();
   fresh.kept = true;
-  fresh.ring->append(&fresh, stamp);
+  fresh.samples->append(&fresh, stamp);
   newest.name->refused.behind = {};
   if (restart_listener_) restart_listener_(restart);
 }
 
-// The newest stays what it is, in a version that knows of the ring with the sample.
+// The newest stays what it is, in a version that knows of the history with the sample.
 void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_PC,
                                  std::int64_t stamp) {
   newest.name->refused.behind = {};
-  const std::uint64_t place = newest.ring->place_of(stamp);
-  if (place < newest.ring->next() && newest.ring->stamp(place) == stamp) {
+  const std::uint64_t place = newest.samples->place_of(stamp);
+  if (place < newest.samples->next() && newest.samples->stamp(place) == stamp) {
     // Twice in one update: the later counts, and nobody has seen the earlier.
-    newest.ring->sample(place)->X_PC = X_PC;
+    newest.samples->sample(place)->X_PC = X_PC;
     if (newest.stamp == stamp) const_cast<HeldVersion&>(newest).X_PC = X_PC;
     return;
   }
@@ -148,44 +148,44 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_P
   sample->X_PC = X_PC;
   sample->stamp = stamp;
   sample->kept = true;
-  Ring* ring = newest.ring->with(sample, stamp, place).release();
-  ring->rewritten = sample->commit;
-  reclaimer_.supersede(newest.ring);
+  SampleHistory* samples = newest.samples->with(sample, stamp, place).release();
+  samples->rewritten = sample->commit;
+  reclaimer_.supersede(newest.samples);
   HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
-  fresh.ring = ring;
-  fresh.number = ring->next() - 1;
-  drop_samples(*ring);
+  fresh.samples = samples;
+  fresh.number = samples->next() - 1;
+  drop_samples(*samples);
 }
 
-void Forest::Impl::drop_oldest(Ring& ring) {
-  HeldVersion* dropped = ring.drop_oldest();
+void Forest::Impl::drop_oldest(SampleHistory& samples) {
+  HeldVersion* dropped = samples.drop_oldest();
   dropped->kept = false;
   reclaimer_.supersede(dropped);
 }
 
-void Forest::Impl::drop_samples(Ring& ring) {
-  const std::int64_t limit = ring.stamp(ring.next() - 1) - ring.timing().span.count();
-  while (ring.count() > ring.timing().count || ring.stamp(ring.oldest()) < limit) {
-    drop_oldest(ring);
+void Forest::Impl::drop_samples(SampleHistory& samples) {
+  const std::int64_t limit = samples.stamp(samples.next() - 1) - samples.timing().span.count();
+  while (samples.count() > samples.timing().count || samples.stamp(samples.oldest()) < limit) {
+    drop_oldest(samples);
   }
 }
 
-void Forest::Impl::give_back(Ring* ring, std::uint32_t slot) {
-  if (ring == nullptr) return;
+void Forest::Impl::give_back(SampleHistory* samples, std::uint32_t slot) {
+  if (samples == nullptr) return;
   const Version* head = &frames_.newest(slot);
-  for (std::uint64_t number = ring->oldest(); number < ring->next(); ++number) {
-    HeldVersion* sample = ring->sample(number);
+  for (std::uint64_t number = samples->oldest(); number < samples->next(); ++number) {
+    HeldVersion* sample = samples->sample(number);
     sample->kept = false;
     if (sample != head) reclaimer_.supersede(sample);
   }
-  reclaimer_.supersede(ring);
+  reclaimer_.supersede(samples);
 }
 
-void Forest::Impl::forget_past(HeldVersion& fresh) {
+void Forest::Impl::forget_history(HeldVersion& fresh) {
   fresh.history = fresh.commit;
-  Ring* before = fresh.ring;
+  SampleHistory* before = fresh.samples;
   if (before == nullptr) return;
-  fresh.ring = new Ring(before->timing());
+  fresh.samples = new SampleHistory(before->timing());
   fresh.stamp = kAlways;
   give_back(before, fresh.slot);
 }
@@ -196,9 +196,9 @@ Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   HeldVersion& fresh = impl_->push_held(*slot, impl_->frames_.newest_value(*slot).X_PC);
-  impl_->forget_past(fresh);
-  delete fresh.ring;  // nobody has seen it
-  fresh.ring = new Ring(timing);
+  impl_->forget_history(fresh);
+  delete fresh.samples;  // nobody has seen it
+  fresh.samples = new SampleHistory(timing);
   impl_->commit();
   return {};
 }

@@ -64,7 +64,7 @@ class Forest::Impl {
   [[nodiscard]] Result<void> update_one(const HeldVersion& edge, const Transform& X_PC,
                                         std::optional<Time> stamp);
   [[nodiscard]] bool may_be_moving(const HeldVersion& edge) const {
-    return edge.ring != nullptr || default_timing_.moving;
+    return edge.samples != nullptr || default_timing_.moving;
   }
 
   /// All of them as one commit, or none; `frame` gives the id or the handle of an update. Under mutex_, as all here.
@@ -75,23 +75,23 @@ class Forest::Impl {
   [[nodiscard]] Result<std::vector<EdgeUpdate>> completed(
       const std::vector<PartialUpdate>& edges) const;
 
-  // Of the past (forest_history.cpp).
+  // Of history (forest_history.cpp).
 
   /// Of what stamp an update is to be for all these edges: that given, or the clock's where it counts, later than all
   /// that these have.
   [[nodiscard]] Result<std::int64_t> stamp_for(const std::uint32_t* slots, std::size_t count,
                                                std::optional<Time> given);
   [[nodiscard]] const EdgeTiming& timing_of(const HeldVersion& edge) const {
-    return edge.ring != nullptr ? edge.ring->timing() : default_timing_;
+    return edge.samples != nullptr ? edge.samples->timing() : default_timing_;
   }
   /// @return kInvalidInput (naming both times) where the stamp is too far ahead of the clock, which is counted
   [[nodiscard]] Result<void> check_ahead(const HeldVersion& edge, std::int64_t stamp);
   /// Pushes a checked update: a sample where the edge is moving or is to be, else the value for all times.
   void push_value(std::uint32_t slot, const Transform& X_PC, std::int64_t stamp);
-  /// Makes the fresh version static, with nothing of the past that its predecessor has, but as much to be kept.
-  void forget_past(HeldVersion& fresh);
-  /// A ring with all its samples, of which the newest may still be the newest version: that one is superseded next.
-  void give_back(Ring* ring, std::uint32_t slot);
+  /// Makes the fresh version static, with nothing of the history that its predecessor has, but as much to be kept.
+  void forget_history(HeldVersion& fresh);
+  /// A history with all its samples, of which the newest may still be the newest version: that one is superseded next.
+  void give_back(SampleHistory* samples, std::uint32_t slot);
 
   // Of what another forest tells (forest_mirror.cpp).
 
@@ -144,8 +144,8 @@ class Forest::Impl {
   void tell_commit() const {
     for (const auto& [whose, listener] : commit_listeners_) listener();
   }
-  void drop_oldest(Ring& ring);
-  void drop_samples(Ring& ring);
+  void drop_oldest(SampleHistory& samples);
+  void drop_samples(SampleHistory& samples);
   void hang(Version& fresh, std::uint32_t parent) const;
   void renew_depths(std::uint32_t top);
   void release(Version& fresh);

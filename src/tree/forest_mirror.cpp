@@ -14,21 +14,21 @@ bool same(const Transform& a, const Transform& b) {
 // Static, until a sample of it follows.
 void Forest::Impl::begin_told_history(std::uint32_t slot, const News& value) {
   HeldVersion& fresh = push_held(slot, value.X);
-  forget_past(fresh);
+  forget_history(fresh);
   if (value.process_noise->upper() == Covariance::Upper{}) return;
   EdgeTiming timing = default_timing_;
   timing.process_noise = *value.process_noise;
-  delete fresh.ring;  // nobody has seen it
-  fresh.ring = new Ring(timing);
+  delete fresh.samples;  // nobody has seen it
+  fresh.samples = new SampleHistory(timing);
 }
 
 bool Forest::Impl::push_told_sample(const HeldVersion& edge, const Transform& X_PC,
                                     std::int64_t stamp, bool replace) {
   if (stamp <= 0) return false;
   if (edge.moving() && stamp <= edge.stamp) {
-    const std::uint64_t place = edge.ring->place_of(stamp);
-    if (place < edge.ring->next() && edge.ring->stamp(place) == stamp) {
-      if (!replace || same(edge.ring->sample(place)->X_PC, X_PC)) return false;
+    const std::uint64_t place = edge.samples->place_of(stamp);
+    if (place < edge.samples->next() && edge.samples->stamp(place) == stamp) {
+      if (!replace || same(edge.samples->sample(place)->X_PC, X_PC)) return false;
       replace_sample(edge, X_PC, stamp);
       return true;
     }

@@ -7,24 +7,24 @@
 namespace tfdude {
 namespace {
 
-PastInfo past_of(const HeldVersion& edge) {
-  PastInfo info;
+HistoryInfo history_of(const HeldVersion& edge) {
+  HistoryInfo info;
   info.id = edge.name->text;
   const Refused& refused = edge.name->refused;
   info.refused_old = refused.old.load(std::memory_order_relaxed);
   info.refused_equal = refused.equal.load(std::memory_order_relaxed);
   info.refused_ahead = refused.ahead.load(std::memory_order_relaxed);
-  if (edge.ring == nullptr) return info;
-  const Ring& ring = *edge.ring;
-  info.span_limit = ring.timing().span;
-  info.count_limit = ring.timing().count;
-  info.bytes = ring.bytes();
+  if (edge.samples == nullptr) return info;
+  const SampleHistory& samples = *edge.samples;
+  info.span_limit = samples.timing().span;
+  info.count_limit = samples.timing().count;
+  info.bytes = samples.bytes();
   if (!edge.moving()) return info;
   double sum = 0;
   double squares = 0;
   std::int64_t before = kAlways;
-  for (std::uint64_t number = ring.oldest(); number <= edge.number; ++number) {
-    const std::int64_t stamp = ring.stamp(number);
+  for (std::uint64_t number = samples.oldest(); number <= edge.number; ++number) {
+    const std::int64_t stamp = samples.stamp(number);
     if (stamp == kAlways) continue;  // dropped meanwhile
     ++info.samples;
     if (before == kAlways) {
@@ -55,21 +55,21 @@ Correlation correlation_of(const HeldVersion& edge) {
 // The number of the first sample that may be told, of those up to the edge's newest.
 std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, std::uint64_t seen,
                             const NewsQuery& query) {
-  const Ring& ring = *edge.ring;
+  const SampleHistory& samples = *edge.samples;
   std::uint64_t first = edge.number;
   if (query.newest_only) return first;
   if (cursor.history == 0) {
     const std::int64_t from = query.from ? nanoseconds(*query.from) : edge.stamp;
-    while (first > ring.oldest() && ring.stamp(first) > from) --first;
+    while (first > samples.oldest() && samples.stamp(first) > from) --first;
     return first;
   }
   // Those that came late lie anywhere.
-  if (ring.rewritten > seen) return ring.oldest();
+  if (samples.rewritten > seen) return samples.oldest();
   const auto is_new = [&](std::uint64_t number) {
-    const HeldVersion* sample = ring.sample(number);
+    const HeldVersion* sample = samples.sample(number);
     return sample != nullptr && sample->commit > seen;
   };
-  while (first > ring.oldest() && is_new(first - 1)) --first;
+  while (first > samples.oldest() && is_new(first - 1)) --first;
   return first;
 }
 
@@ -84,13 +84,13 @@ void add_news(const HeldVersion& edge, std::uint32_t index, const NewsQuery& que
   if (!edge.moving()) {
     if (edge.commit > seen) tell(std::nullopt, edge.X_PC);
   } else {
-    const Ring& ring = *edge.ring;
+    const SampleHistory& samples = *edge.samples;
     for (auto number = first_to_tell(edge, cursor, seen, query); number < edge.number; ++number) {
-      const HeldVersion* sample = ring.sample(number);
+      const HeldVersion* sample = samples.sample(number);
       if (sample != nullptr && sample->commit > seen) tell(time_of(sample->stamp), sample->X_PC);
     }
     // The edge's version may be younger than the sample that it shows.
-    const HeldVersion* newest = ring.sample(edge.number);
+    const HeldVersion* newest = samples.sample(edge.number);
     if (newest == nullptr || newest->commit > seen) tell(time_of(edge.stamp), edge.X_PC);
   }
   cursor.commit = commit;
@@ -99,7 +99,7 @@ void add_news(const HeldVersion& edge, std::uint32_t index, const NewsQuery& que
   news.back().correlation = correlation_of(edge);
   if (!begins) return;
   news[before].process_noise =
-      edge.ring != nullptr ? edge.ring->timing().process_noise : Covariance();
+      edge.samples != nullptr ? edge.samples->timing().process_noise : Covariance();
 }
 
 }  // namespace
@@ -132,15 +132,15 @@ NewsOfCommit Forest::news(std::vector<EdgeCursor>& cursors, const NewsQuery& que
   return all;
 }
 
-std::vector<PastInfo> Forest::pasts(std::string_view id) const {
+std::vector<HistoryInfo> Forest::histories(std::string_view id) const {
   const epoch::Guard guard;
   const std::uint64_t commit = impl_->frames_.snapshot();
-  std::vector<PastInfo> all;
+  std::vector<HistoryInfo> all;
   const auto add = [&all](const Version* version) {
     if (version == nullptr || !version->held()) return;
     const auto& edge = static_cast<const HeldVersion&>(*version);
     const bool refused = edge.name->refused.ahead.load(std::memory_order_relaxed) > 0;
-    if (edge.ring != nullptr || refused) all.push_back(past_of(edge));
+    if (edge.samples != nullptr || refused) all.push_back(history_of(edge));
   };
   if (!id.empty()) {
     add(impl_->frames_.present(id, commit));

@@ -119,7 +119,7 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
     if (const HeldVersion* limiting = met.limiting) {
       found.stamp = time_of(limiting->stamp);
       const std::int64_t before =
-          limiting->number > 0 ? limiting->ring->stamp(limiting->number - 1) : kAlways;
+          limiting->number > 0 ? limiting->samples->stamp(limiting->number - 1) : kAlways;
       if (before != kAlways) found.period = std::chrono::nanoseconds(limiting->stamp - before);
       if (query.age_noise_until) t = found.stamp;
     }

@@ -81,7 +81,7 @@ T& Forest::Impl::push(std::uint32_t slot) {
   fresh->slot = slot;
   fresh->generation = old->generation;
   fresh->kept = false;
-  // A sample stays until its ring drops it.
+  // A sample stays until its history drops it.
   if (!old->kept) reclaimer_.supersede(old);
   // Readers skip the fresh version by its number until commit(), so the rest may be filled in later.
   head.store(fresh, std::memory_order_release);
@@ -97,12 +97,12 @@ HeldVersion& Forest::Impl::push_held(std::uint32_t slot, const Transform& X_PC) 
     const auto& before = static_cast<const HeldVersion&>(old);
     fresh.stamp = before.stamp;
     fresh.number = before.number;
-    fresh.ring = before.ring;
+    fresh.samples = before.samples;
     fresh.correlation = before.correlation;
     fresh.history = before.history;
   } else {
     fresh.stamp = kAlways;
-    fresh.ring = nullptr;
+    fresh.samples = nullptr;
     fresh.correlation = nullptr;
     fresh.history = fresh.commit;
   }
@@ -133,7 +133,7 @@ void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
 
 void Forest::Impl::make_absent(std::uint32_t slot) {
   if (frames_.newest(slot).held()) {
-    give_back(frames_.newest_value(slot).ring, slot);
+    give_back(frames_.newest_value(slot).samples, slot);
     reclaimer_.supersede(frames_.newest_value(slot).correlation);
   }
   Version& fresh = push_remote(slot);
@@ -345,7 +345,7 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   const std::uint32_t parent_slot = impl_->parent_slot(pair);
   old.name->hung(lamport_time);
   HeldVersion& fresh = impl_->push_held(*slot, X_PC.value_or(old.X_PC));
-  impl_->forget_past(fresh);
+  impl_->forget_history(fresh);
   if (X_PC) impl_->end_revision(fresh);
   impl_->relink(fresh, parent_slot);
   impl_->commit_structure();

@@ -27,7 +27,7 @@ struct News {
   std::optional<Time> stamp;
   Transform X;
   Correlation correlation{};  ///< of the edge, with the last of its values only
-  /// Of values that have to do with each other. Where an edge is moved, or added again, or forgets its past, another one
+  /// Of values that have to do with each other. Where an edge is moved, or added again, or forgets its samples, another one
   /// begins, of a higher number.
   std::uint64_t history = 0;
   /// That of the edge, with the first of its values that is told of a history only.

@@ -32,7 +32,7 @@ double seconds(std::int64_t nanoseconds) { return static_cast<double>(nanosecond
 
 void add_noise(Pose&, const HeldVersion&, double) {}
 void add_noise(Transform& X, const HeldVersion& edge, double seconds) {
-  const Covariance::Upper& rate = edge.ring->timing().process_noise.upper();
+  const Covariance::Upper& rate = edge.samples->timing().process_noise.upper();
   Covariance::Upper sum = X.covariance.upper();
   for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += seconds * rate[i];
   X.covariance = Covariance::trusted(sum);
@@ -45,7 +45,7 @@ tl::unexpected<Error> no_data(Errc code, const HeldVersion& edge, std::int64_t t
 }
 
 tl::unexpected<Error> too_old(const HeldVersion& edge, std::int64_t t) {
-  const std::int64_t oldest = edge.ring->stamp(edge.ring->oldest());
+  const std::int64_t oldest = edge.samples->stamp(edge.samples->oldest());
   // It may be dropped while it is looked at.
   if (oldest == kAlways) return no_data(Errc::kTooOld, edge, t, "it is not kept any more");
   const std::chrono::nanoseconds gap(saturating_subtract(oldest, t));
@@ -72,7 +72,7 @@ Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Query
         ", and no more than " + in_milliseconds(query.extrapolate) + " is to be extrapolated");
   }
   const HeldVersion* before =
-      edge.number > edge.ring->oldest() ? edge.ring->sample(edge.number - 1) : nullptr;
+      edge.number > edge.samples->oldest() ? edge.samples->sample(edge.number - 1) : nullptr;
   if (before == nullptr) return not_yet(edge, t, ", and the only one: its motion is not known");
   const double s = seconds(t - before->stamp) / seconds(edge.stamp - before->stamp);
   X = extrapolate(value_of<Value>(*before), value_of<Value>(edge), s);
@@ -85,7 +85,7 @@ struct Moment {
   std::int64_t t;
   std::int64_t age;  // until when it is to hold, where noise is added for that
   const Query& query;
-  std::uint64_t back = 0;  // see Ring::around()
+  std::uint64_t back = 0;  // see SampleHistory::around()
 };
 
 // A moving edge on the path.
@@ -103,7 +103,7 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edg
   const HeldVersion* before = &edge;
   const HeldVersion* after = &edge;
   if (t < edge.stamp) {
-    const auto found = edge.ring->around(t, edge.number, moment.back);
+    const auto found = edge.samples->around(t, edge.number, moment.back);
     if (found.before == nullptr) return too_old(edge, t);
     before = found.before;
     after = before->stamp == t ? before : found.after;
@@ -111,7 +111,7 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edg
   const auto span = static_cast<double>(after->stamp - before->stamp);
   const double s = after == before ? 0 : static_cast<double>(t - before->stamp) / span;
   const double noise = seconds(moment.age) + s * (1.0 - s) * span * 1e-9;
-  if (edge.ring->has_noise() && noise > 0) {
+  if (edge.samples->has_noise() && noise > 0) {
     OfEdge<Value>& X = path.place();
     X = value_of<Value>(*before);
     if (after != before) interpolate(value_of<Value>(*before), value_of<Value>(*after), s, X);

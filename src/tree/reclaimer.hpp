@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "tree/frames.hpp"
-#include "tree/ring.hpp"
+#include "tree/sample_history.hpp"
 #include "tree/versions.hpp"
 
 namespace tfdude {
@@ -25,7 +25,7 @@ class Reclaimer {
 
   // Of the commit that is being made, or of one before. Null is nothing.
   void supersede(Version* version) { versions_.push_back(version); }
-  void supersede(Ring* ring) { rings_.superseded.emplace_back(ring); }
+  void supersede(SampleHistory* samples) { rings_.superseded.emplace_back(samples); }
   void supersede(EdgeCorrelation* correlation) { ties_.superseded.emplace_back(correlation); }
 
   /// Whether it is time for collect().
@@ -50,7 +50,7 @@ class Reclaimer {
   VersionPool<HeldVersion> held_pool_;
   VersionPool<Version> remote_pool_;
   std::vector<Version*> versions_;  // superseded since the readers were last asked
-  Waiting<Ring> rings_;
+  Waiting<SampleHistory> rings_;
   Waiting<EdgeCorrelation> ties_;
 };
 

@@ -5,7 +5,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/base/time.hpp"
 
-#include "tree/ring.hpp"
+#include "tree/sample_history.hpp"
 
 namespace tfdude {
 namespace {
@@ -23,7 +23,7 @@ bool goes_on(const Refused::Behind& row, std::int64_t newest, std::int64_t stamp
 
 // Whether a sample that is older than the span is the one after which the history starts again; counts it.
 bool starts_again(const HeldVersion& newest, std::int64_t stamp) {
-  const std::size_t needed = newest.ring->timing().restart_after;
+  const std::size_t needed = newest.samples->timing().restart_after;
   Refused::Behind& row = newest.name->refused.behind;
   if (!goes_on(row, newest.stamp, stamp)) {
     row = {1, newest.stamp, stamp};
@@ -37,27 +37,27 @@ bool starts_again(const HeldVersion& newest, std::int64_t stamp) {
 
 Result<void> check_sample(const HeldVersion& newest, std::int64_t stamp) {
   if (!newest.moving() || stamp > newest.stamp || stamp == kAlways) return {};
-  const Ring& ring = *newest.ring;
-  const std::uint64_t place = ring.place_of(stamp);
-  if (place < ring.next() && ring.stamp(place) == stamp) {
+  const SampleHistory& samples = *newest.samples;
+  const std::uint64_t place = samples.place_of(stamp);
+  if (place < samples.next() && samples.stamp(place) == stamp) {
     newest.name->refused.equal.fetch_add(1, std::memory_order_relaxed);
     return fail(Errc::kStampTaken, "frame " + quote(newest.name->text) +
                                        " has a sample of that stamp, " + to_string(time_of(stamp)));
   }
-  const bool full = ring.count() >= ring.timing().count;
-  const std::int64_t limit = newest.stamp - ring.timing().span.count();
-  if (stamp >= limit && (!full || place > ring.oldest())) return {};
+  const bool full = samples.count() >= samples.timing().count;
+  const std::int64_t limit = newest.stamp - samples.timing().span.count();
+  if (stamp >= limit && (!full || place > samples.oldest())) return {};
   if (stamp < limit && starts_again(newest, stamp)) return {};
   newest.name->refused.old.fetch_add(1, std::memory_order_relaxed);
   const std::string what = "frame " + quote(newest.name->text) + ": the sample is ";
   if (stamp < limit) {
     return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, newest.stamp)) +
                                    " older than the newest, more than the " +
-                                   in_milliseconds(ring.timing().span) + " that are kept");
+                                   in_milliseconds(samples.timing().span) + " that are kept");
   }
-  return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, ring.stamp(ring.oldest()))) +
+  return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, samples.stamp(samples.oldest()))) +
                                  " older than the oldest of the " +
-                                 std::to_string(ring.timing().count) + " that are kept");
+                                 std::to_string(samples.timing().count) + " that are kept");
 }
 
 }  // namespace tfdude

@@ -11,7 +11,7 @@
 #include "tree/epoch.hpp"
 #include "tree/forest.hpp"
 #include "tree/id_table.hpp"
-#include "tree/ring.hpp"
+#include "tree/sample_history.hpp"
 
 namespace tfdude {
 
@@ -34,7 +34,7 @@ struct Version {
   std::uint32_t slot = kNoSlot;
   // Which frame it is; new whenever one appears, even under a kept name.
   std::uint32_t generation = 0;
-  bool kept = false;  // by a ring, as a sample; only the writer looks
+  bool kept = false;  // by a history, as a sample; only the writer looks
   // Bookkeeping of the pool, not for readers.
   std::uint64_t retire_tag = 0;
   Version* next = nullptr;
@@ -57,9 +57,9 @@ struct EdgeCorrelation {
 
 /// A version of an edge whose value is held here.
 struct HeldVersion : Version {
-  std::int64_t stamp = kAlways;  // of the newest sample
-  std::uint64_t number = 0;      // its number in the ring
-  Ring* ring = nullptr;  // null: there is no past, nor anything said of how it is to be kept
+  std::int64_t stamp = kAlways;            // of the newest sample
+  std::uint64_t number = 0;                // its number in the history
+  SampleHistory* samples = nullptr;        // null: no history, nor is said how to keep one
   EdgeCorrelation* correlation = nullptr;  // null: independent of all else
   std::uint64_t history = 0;  // the commit with which its values began: none before is of this edge
   Transform X_PC;

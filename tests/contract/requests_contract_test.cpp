@@ -122,8 +122,8 @@ TEST_CASE("a sample of the future is refused by its owner, who counts it") {
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == Errc::kInvalidInput);
   CHECK_THAT(refused.error().message, testing::ContainsSubstring("2255-03-14"));
-  REQUIRE(client.past("hand")->size() == 1);
-  CHECK(client.past("hand")->at(0).refused_ahead == 1);
+  REQUIRE(client.history("hand")->size() == 1);
+  CHECK(client.history("hand")->at(0).refused_ahead == 1);
   REQUIRE(client.update(
       "hand", ahead(2),
       std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now())));

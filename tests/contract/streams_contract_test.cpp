@@ -113,10 +113,10 @@ TEST_CASE("streams: stamps are those of the source, of all edges the same") {
   }));
   CHECK(is_at(b, "b_base", "b_tip", 8));
   CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", 7); }));
-  const auto past = a.past("a_tip");
-  REQUIRE(past);
-  REQUIRE(past->size() == 1);
-  CHECK(past->front().newest == stamp);
+  const auto history = a.history("a_tip");
+  REQUIRE(history);
+  REQUIRE(history->size() == 1);
+  CHECK(history->front().newest == stamp);
   // The one that it owns says at once what it makes of it.
   CHECK(text(stream.try_publish({along_x(7), along_x(8)}, stamp)) == "1 stamp_taken b");
 }

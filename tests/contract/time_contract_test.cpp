@@ -140,14 +140,14 @@ TEST_CASE("all partitions answer for the same instant") {
     // The tool at one instant, seen from the hand at another: over the world.
     const auto travelled = caller->lookup("hand", at(ms(1500)), "tool", at(ms(2500)), "world");
     CHECK(x_of(travelled) == Approx((2500 + 5 * 3000 + 5) - (1500 + 5 * 2000)));
-    CHECK(caller->past("arm")->at(0).samples == 3);
-    CHECK(caller->past("tool")->empty());
-    CHECK(caller->pasts("arm")->size() == 2);
-    CHECK(outcome(caller->past("nobody")) == "unknown_frame");
-    CHECK(outcome(caller->pasts("nobody")) == "unknown_partition");
+    CHECK(caller->history("arm")->at(0).samples == 3);
+    CHECK(caller->history("tool")->empty());
+    CHECK(caller->histories("arm")->size() == 2);
+    CHECK(outcome(caller->history("nobody")) == "unknown_frame");
+    CHECK(outcome(caller->histories("nobody")) == "unknown_partition");
   }
   CHECK(outcome(chain.client->update("arm", {}, ms(500))) == "stamp_taken");
-  CHECK(chain.client->past("arm")->at(0).refused_equal == 1);
+  CHECK(chain.client->history("arm")->at(0).refused_equal == 1);
 }
 
 TEST_CASE(
@@ -160,7 +160,7 @@ TEST_CASE(
   const Source arm(*chain.arm, motion, {1, 2}, motion.seed() + 2);
   const Source tool(*chain.tool, motion, {3}, motion.seed() + 3);
   for (const char* id : {"base", "arm", "hand", "tool"}) {
-    REQUIRE(testing::eventually([&] { return !chain.client->past(id)->empty(); }));
+    REQUIRE(testing::eventually([&] { return !chain.client->history(id)->empty(); }));
   }
   // The first sample of one may be younger than the newest of another.
   REQUIRE(chain.client->lookup("world", "tool", Query{}, 5000ms));

@@ -138,8 +138,8 @@ inline void check_same(const Request& actual, const Request& expected) {
     CHECK(arrived.from == watch->from);
     CHECK(arrived.period == watch->period);
     check_same(arrived.segments, watch->segments);
-  } else if (const auto* past = std::get_if<PastRequest>(&expected.body)) {
-    CHECK(std::get<PastRequest>(actual.body).all == past->all);
+  } else if (const auto* history = std::get_if<HistoryRequest>(&expected.body)) {
+    CHECK(std::get<HistoryRequest>(actual.body).all == history->all);
   } else if (const auto* lookup_at = std::get_if<LookupRequest>(&expected.body)) {
     const LookupRequest& lookup = *lookup_at;
     const auto& arrived = std::get<LookupRequest>(actual.body);
@@ -194,13 +194,14 @@ inline void check_same(const State& actual, const State& expected) {
 }
 
 // All fields in one text.
-inline std::string listed(const PastInfo& past) {
+inline std::string listed(const HistoryInfo& history) {
   std::ostringstream text;
   const auto stamp = [](const std::optional<Time>& time) { return time ? nanoseconds(*time) : 0; };
-  text << past.id << ' ' << past.samples << ' ' << past.bytes << ' ' << past.span_limit.count()
-       << ' ' << past.count_limit << ' ' << stamp(past.oldest) << ' ' << stamp(past.newest) << ' '
-       << past.mean_gap.count() << ' ' << past.max_gap.count() << ' ' << past.jitter.count() << ' '
-       << past.refused_old << ' ' << past.refused_equal << ' ' << past.refused_ahead;
+  text << history.id << ' ' << history.samples << ' ' << history.bytes << ' '
+       << history.span_limit.count() << ' ' << history.count_limit << ' ' << stamp(history.oldest)
+       << ' ' << stamp(history.newest) << ' ' << history.mean_gap.count() << ' '
+       << history.max_gap.count() << ' ' << history.jitter.count() << ' ' << history.refused_old
+       << ' ' << history.refused_equal << ' ' << history.refused_ahead;
   return text.str();
 }
 

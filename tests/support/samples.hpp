@@ -114,7 +114,7 @@ bool take(const Bytes& bytes) {
       {11, "hand", LookupRequest{{}, {}, time_of(INT64_MAX)}},
       {12, "hand", WatchRequest{{{"arm", "hand"}, {"base", "arm"}}, false, kMaxWatchPeriod}},
       {13, "hand", WatchRequest{{{"hand", "arm"}}, true, std::chrono::nanoseconds(1), time_of(5)}},
-      {14, "hand", PastRequest{}},
+      {14, "hand", HistoryRequest{}},
       {15, "hand", LookupRequest{{{"arm", "hand"}}, {{}, {}, {}, Order::kFourth}, {}, true}},
       {16, "hand",
        ReviseRequest{{{"hand", {1.5, 2.5, 3.5}, true, {}},
@@ -150,22 +150,22 @@ bool take(const Bytes& bytes) {
   return found;
 }
 
-[[nodiscard]] inline PastInfo past_info(const std::string& id) {
-  PastInfo past;
-  past.id = id;
-  past.samples = 2048;
-  past.bytes = 700'000;
-  past.span_limit = std::chrono::seconds(10);
-  past.count_limit = 4096;
-  past.oldest = time_of(1);
-  past.newest = time_of(1'700'000'000'000'000'000);
-  past.mean_gap = std::chrono::nanoseconds(3);
-  past.max_gap = std::chrono::nanoseconds(4);
-  past.jitter = std::chrono::nanoseconds(5);
-  past.refused_old = 6;
-  past.refused_equal = 7;
-  past.refused_ahead = 8;
-  return past;
+[[nodiscard]] inline HistoryInfo history_info(const std::string& id) {
+  HistoryInfo history;
+  history.id = id;
+  history.samples = 2048;
+  history.bytes = 700'000;
+  history.span_limit = std::chrono::seconds(10);
+  history.count_limit = 4096;
+  history.oldest = time_of(1);
+  history.newest = time_of(1'700'000'000'000'000'000);
+  history.mean_gap = std::chrono::nanoseconds(3);
+  history.max_gap = std::chrono::nanoseconds(4);
+  history.jitter = std::chrono::nanoseconds(5);
+  history.refused_old = 6;
+  history.refused_equal = 7;
+  history.refused_ahead = 8;
+  return history;
 }
 
 [[nodiscard]] inline std::vector<JointInfo> joint_infos() {
@@ -202,11 +202,11 @@ bool take(const Bytes& bytes) {
           {8, 1,
            State{18446744073709551615ULL,
                  {{0, std::nullopt, random.transform()}, {7, time_of(5), Transform()}}}},
-          {9, 1, std::vector<PastInfo>{}},
+          {9, 1, std::vector<HistoryInfo>{}},
           {11, 1, correlated_values(random)},
           {12, 1, std::vector<EdgeConsistency>{{"hand", 7, 3, {1.5, 2.5, 3.5}}, {}}},
           {13, 1, joint_infos()},
-          {10, 1, std::vector<PastInfo>{past_info("hand"), PastInfo{}}}};
+          {10, 1, std::vector<HistoryInfo>{history_info("hand"), HistoryInfo{}}}};
 }
 
 [[nodiscard]] inline std::vector<State> states(Random& random) {

@@ -109,7 +109,8 @@ class TFDUDE_EXPORT Client {
 
   /// Streams new edge values to their owners, unacknowledged: the path for joints at 1 kHz and more. Waits, within the bound
   /// of all calls, only until they can be reached. A share that an owner cannot take in time may be lost, never torn. Whoever
-  /// can be reached gets its share, also where another cannot. Stamps as for update(); refused samples are counted (pasts()).
+  /// can be reached gets its share, also where another cannot. Stamps as for update(); refused samples are counted
+  /// (histories()).
   /// @return kUnknownFrame.
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
                                      std::optional<Time> stamp = std::nullopt);
@@ -228,8 +229,8 @@ class TFDUDE_EXPORT Client {
                                       std::optional<Time> stamp = std::nullopt,
                                       const ObserveOptions& options = {});
 
-  /// Says how the error of an edge is correlated with those of others: for all its values, also those of the past, until it
-  /// is said anew; an empty one makes it independent. Its covariance is that of its own part from now on. Acknowledged by
+  /// Says how the error of an edge is correlated with those of others: for all its values, also those of its history, until
+  /// it is said anew; an empty one makes it independent. Its covariance is that of its own part from now on. Acknowledged by
   /// its owner, and stored like a value. What observations have left of correlation goes.
   /// @return kUnknownFrame, kInvalidInput (naming the source; the names of observations' are not to be given; a joint that
   ///   follows another, or is followed, says it itself).
@@ -239,10 +240,10 @@ class TFDUDE_EXPORT Client {
   /// began; of kMaxItems at most. @return kUnknownPartition.
   [[nodiscard]] Result<std::vector<EdgeConsistency>> consistency(const std::string& partition);
 
-  /// What is kept of the past of one edge; nothing for one that is static. @return kUnknownFrame.
-  [[nodiscard]] Result<std::vector<PastInfo>> past(const std::string& id);
+  /// What is kept of the history of one edge; nothing for one that is static. @return kUnknownFrame.
+  [[nodiscard]] Result<std::vector<HistoryInfo>> history(const std::string& id);
   /// That of a partition's moving edges, of kMaxItems at most. @return kUnknownPartition.
-  [[nodiscard]] Result<std::vector<PastInfo>> pasts(const std::string& partition);
+  [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition);
 
   /// Finds a frame once, for calls that then need no hashing. @return kUnknownFrame.
   /// @note This and all below asks nobody: they answer from this process's replica of the structure, and wait only while a

@@ -42,7 +42,7 @@ struct PartialUpdate {
 
 /// How an edge behaves in time.
 struct EdgeTiming {
-  /// How much of its past is kept: samples that are not older than this before the newest,
+  /// How much of its history is kept: samples that are not older than this before the newest,
   std::chrono::nanoseconds span = std::chrono::seconds(10);
   /// and no more than so many; at least 2.
   std::size_t count = 2048;
@@ -58,8 +58,8 @@ struct EdgeTiming {
   std::size_t restart_after = 5;
 };
 
-/// What is kept of one edge's past.
-struct PastInfo {
+/// What is kept of one edge's history.
+struct HistoryInfo {
   std::string id;
   std::size_t samples = 0;
   std::size_t bytes = 0;

@@ -29,7 +29,7 @@ struct Options {
   bool sync = false;
   /// How often at most values that were streamed, or set by the Node's own process, are stored.
   Milliseconds save_every{1000};
-  /// How much is kept of the past of a Node's edges, where a frame says nothing else.
+  /// How much is kept of the history of a Node's edges, where a frame says nothing else.
   EdgeTiming history{};
   /// How long the end of a client waits until what it has streamed (publish, publish_joints) is acknowledged, as flush();
   /// no longer than `timeout`.
@@ -43,7 +43,7 @@ struct WatchOptions {
   /// One composed transform for each partition on the path instead of all its edges: fewer bytes, but between samples the
   /// segment is interpolated as a whole.
   bool composed = false;
-  /// How much of the past is kept here. Process noise is that of the edge's owner, where it has one.
+  /// How much history is kept here. Process noise is that of the edge's owner, where it has one.
   EdgeTiming timing{};
   /// Called when the path has found another way, or why there is none for now: one call at a time, from a thread of
   /// the library's that holds no lock, so that it may call anything, watch() as well. Must not throw.

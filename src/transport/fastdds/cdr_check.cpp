@@ -162,7 +162,7 @@ void request_body(CdrWalk& walk) {
       walk.sequence([&] { walk.path_ends(); });
       walk.octet();
       break;
-    case 9:   // past
+    case 9:   // history
     case 11:  // consistency
       walk.octet();
       break;

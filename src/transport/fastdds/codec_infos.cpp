@@ -30,25 +30,25 @@ JointInfo read_joint(const wire::JointState& body) {
   return joint;
 }
 
-PastInfo read_past(const wire::Past& body) {
+HistoryInfo read_history(const wire::HistoryInfo& body) {
   const auto stamp = [](std::int64_t ns) {
     return ns > 0 ? std::optional<Time>(time_of(ns)) : std::nullopt;
   };
-  PastInfo past;
-  past.id = printable(text(body.id()));
-  past.samples = body.samples();
-  past.bytes = body.bytes();
-  past.span_limit = std::chrono::nanoseconds(body.span_limit());
-  past.count_limit = body.count_limit();
-  past.oldest = stamp(body.oldest());
-  past.newest = stamp(body.newest());
-  past.mean_gap = std::chrono::nanoseconds(body.mean_gap());
-  past.max_gap = std::chrono::nanoseconds(body.max_gap());
-  past.jitter = std::chrono::nanoseconds(body.jitter());
-  past.refused_old = body.refused_old();
-  past.refused_equal = body.refused_equal();
-  past.refused_ahead = body.refused_ahead();
-  return past;
+  HistoryInfo history;
+  history.id = printable(text(body.id()));
+  history.samples = body.samples();
+  history.bytes = body.bytes();
+  history.span_limit = std::chrono::nanoseconds(body.span_limit());
+  history.count_limit = body.count_limit();
+  history.oldest = stamp(body.oldest());
+  history.newest = stamp(body.newest());
+  history.mean_gap = std::chrono::nanoseconds(body.mean_gap());
+  history.max_gap = std::chrono::nanoseconds(body.max_gap());
+  history.jitter = std::chrono::nanoseconds(body.jitter());
+  history.refused_old = body.refused_old();
+  history.refused_equal = body.refused_equal();
+  history.refused_ahead = body.refused_ahead();
+  return history;
 }
 
 }  // namespace tfdude::fastdds

@@ -9,6 +9,6 @@ namespace tfdude::fastdds {
 
 [[nodiscard]] EdgeConsistency read_consistency(const wire::EdgeConsistency& body);
 [[nodiscard]] JointInfo read_joint(const wire::JointState& body);
-[[nodiscard]] PastInfo read_past(const wire::Past& body);
+[[nodiscard]] HistoryInfo read_history(const wire::HistoryInfo& body);
 
 }  // namespace tfdude::fastdds

@@ -218,7 +218,7 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
     case kWatch:
       return take(request, read_watch(body.watch()));
     case kPast:
-      return as(PastRequest{body.past() != 0});
+      return as(HistoryRequest{body.history() != 0});
     case kRevise:
       return take(request, read_revise(body.revise()));
     case kConsistency:
@@ -324,9 +324,10 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
     case kState:
       return put<State>(reply, tfdude::fastdds::from_wire(body.watched()));
     case kPasts: {
-      std::vector<PastInfo> pasts;
-      for (const wire::Past& past : body.pasts()) pasts.push_back(read_past(past));
-      reply.body = std::move(pasts);
+      std::vector<HistoryInfo> histories;
+      for (const wire::HistoryInfo& history : body.histories())
+        histories.push_back(read_history(history));
+      reply.body = std::move(histories);
       return {};
     }
     case kTied:

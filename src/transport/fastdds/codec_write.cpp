@@ -150,7 +150,7 @@ struct BodyWriter {
     body.composed(watch.composed ? 1 : 0);
     out.watch(std::move(body));
   }
-  void operator()(const PastRequest& past) { out.past(past.all ? 1 : 0); }
+  void operator()(const HistoryRequest& history) { out.history(history.all ? 1 : 0); }
   void operator()(const ReviseRequest& revise) {
     wire::ReviseBody body;
     body.stamp(wire_stamp(revise.stamp));
@@ -198,21 +198,21 @@ std::vector<wire::Transform> wire_values(const std::vector<Transform>& values) {
   return body;
 }
 
-wire::Past wire_past(const PastInfo& past) {
-  wire::Past body;
-  body.samples(past.samples);
-  body.bytes(past.bytes);
-  body.span_limit(past.span_limit.count());
-  body.count_limit(past.count_limit);
-  body.oldest(wire_stamp(past.oldest));
-  body.newest(wire_stamp(past.newest));
-  body.mean_gap(past.mean_gap.count());
-  body.max_gap(past.max_gap.count());
-  body.jitter(past.jitter.count());
-  body.refused_old(past.refused_old);
-  body.refused_equal(past.refused_equal);
-  body.refused_ahead(past.refused_ahead);
-  body.id(past.id);
+wire::HistoryInfo wire_history(const HistoryInfo& history) {
+  wire::HistoryInfo body;
+  body.samples(history.samples);
+  body.bytes(history.bytes);
+  body.span_limit(history.span_limit.count());
+  body.count_limit(history.count_limit);
+  body.oldest(wire_stamp(history.oldest));
+  body.newest(wire_stamp(history.newest));
+  body.mean_gap(history.mean_gap.count());
+  body.max_gap(history.max_gap.count());
+  body.jitter(history.jitter.count());
+  body.refused_old(history.refused_old);
+  body.refused_equal(history.refused_equal);
+  body.refused_ahead(history.refused_ahead);
+  body.id(history.id);
   return body;
 }
 
@@ -273,11 +273,11 @@ struct ReplyWriter {
     out.stamped(std::move(body));
   }
   void operator()(const State& state) { out.watched(to_wire(state)); }
-  void operator()(const std::vector<PastInfo>& pasts) {
-    std::vector<wire::Past> body;
-    for (std::size_t i = 0; i < pasts.size() && i < kMaxItems; ++i)
-      body.push_back(wire_past(pasts[i]));
-    out.pasts(std::move(body));
+  void operator()(const std::vector<HistoryInfo>& histories) {
+    std::vector<wire::HistoryInfo> body;
+    for (std::size_t i = 0; i < histories.size() && i < kMaxItems; ++i)
+      body.push_back(wire_history(histories[i]));
+    out.histories(std::move(body));
   }
   void operator()(const std::vector<EdgeConsistency>& all) {
     std::vector<wire::EdgeConsistency> body(all.size());

@@ -145,7 +145,7 @@ TEST_CASE("a frame says how its error is correlated with others'") {
   refused("sources: {'observed:1': [[1, 2, 3, 4, 5, 6]]}", "source 'observed:1': such names");
 }
 
-TEST_CASE("how much is kept of the past is said for the file and for each frame") {
+TEST_CASE("how much history is kept is said for the file and for each frame") {
   const auto config = tfdude::parse_config(
       "history: {span: 2.5, count: 100, max_ahead: none}\n"
       "frames:\n"

@@ -212,7 +212,7 @@ TEST_CASE("descriptions of joints that cannot be meant are refused by frame and 
              ContainsSubstring("too long"));
 }
 
-TEST_CASE("samples that come late count for the past, not for what is told now") {
+TEST_CASE("samples that come late count for history, not for what is told now") {
   Arm arm;
   arm.load();
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.04}}, at(1)}));

@@ -56,7 +56,7 @@ TEST_CASE("queries: what is not there is denied once all are known, and not befo
   CHECK(outcome(asker.queries.info("hand")) == "unknown_frame");
   CHECK(outcome(asker.queries.find("hand")) == "unknown_frame");
   CHECK(outcome(asker.queries.path("world", "hand")) == "unknown_end");
-  CHECK(outcome(asker.queries.past("hand")) == "unknown_frame");
+  CHECK(outcome(asker.queries.history("hand")) == "unknown_frame");
   // One that has said that it has two pages, of which none has come.
   asker.on_presence({"arm", 1, "host", 1, 2, true});
   Asker newcomer(network);
@@ -64,7 +64,7 @@ TEST_CASE("queries: what is not there is denied once all are known, and not befo
   CHECK(outcome(newcomer.queries.info("hand", Deadline(10ms))) == "timeout");
 }
 
-TEST_CASE("queries: partitions, and what is kept of the past") {
+TEST_CASE("queries: partitions, and what is kept of history") {
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", {{"arm", "", {}}, {"hand", "arm", {}}});
   REQUIRE(arm.node().update("hand", along_x(1), Time(1s)));
@@ -75,11 +75,11 @@ TEST_CASE("queries: partitions, and what is kept of the past") {
   REQUIRE(partitions->size() == 1);
   CHECK(partitions->front().name == "arm");
   CHECK(partitions->front().reachable);
-  const auto past = asker.queries.past("hand");
-  REQUIRE(past);
-  REQUIRE(past->size() == 1);
-  CHECK(past->front().samples == 2);
-  CHECK(asker.queries.pasts("arm")->size() == 1);
+  const auto history = asker.queries.history("hand");
+  REQUIRE(history);
+  REQUIRE(history->size() == 1);
+  CHECK(history->front().samples == 2);
+  CHECK(asker.queries.histories("arm")->size() == 1);
   arm.leave();
   CHECK_FALSE(asker.queries.partitions()->front().reachable);
 }

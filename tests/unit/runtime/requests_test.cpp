@@ -141,11 +141,11 @@ TEST_CASE("requests: what an owner lists is handed on, and so is why it does not
   ScriptedOwner arm(network, "arm", kArm);
   REQUIRE(arm.node().update("hand", along_x(1), Time(1s)));
   Rig rig(network.join());
-  const auto all = rig.requests.ask_all<PastInfo>("arm", PastRequest{true}, rig.deadline());
+  const auto all = rig.requests.ask_all<HistoryInfo>("arm", HistoryRequest{true}, rig.deadline());
   REQUIRE(all);
   REQUIRE(all->size() == 1);
   CHECK(all->front().id == "hand");
-  CHECK(outcome(rig.requests.ask_all<PastInfo>("leg", PastRequest{true}, rig.deadline())) ==
+  CHECK(outcome(rig.requests.ask_all<HistoryInfo>("leg", HistoryRequest{true}, rig.deadline())) ==
         "unknown_partition");
 }
 

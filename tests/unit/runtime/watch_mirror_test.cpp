@@ -162,14 +162,14 @@ TEST_CASE("watch mirror: another route takes over what it has in common with the
 
 TEST_CASE("watch mirror: it knows from when on it lacks samples") {
   Watched watched;
-  CHECK_FALSE(watched.mirror.lacks_past());
+  CHECK_FALSE(watched.mirror.lacks_history());
   CHECK(watched.mirror.take({kTools, {sample(0, 30, 100, 1)}, 3, 4}));
-  CHECK_FALSE(watched.mirror.lacks_past());
+  CHECK_FALSE(watched.mirror.lacks_history());
   CHECK(watched.mirror.take({kArms, {sample(0, 20, 2, 1)}, 5, 6}));
   CHECK(outcome(watched.mirror.lookup({})) == "too_old");
-  CHECK(watched.mirror.lacks_past() == ms(20));
+  CHECK(watched.mirror.lacks_history() == ms(20));
   CHECK(watched.mirror.take({kTools, {sample(0, 10, 80, 1, true), sample(0, 30, 100, 1)}, 0, 5}));
-  CHECK_FALSE(watched.mirror.lacks_past());
+  CHECK_FALSE(watched.mirror.lacks_history());
   CHECK(watched.mirror.lookup({})->stamp == ms(20));
 }
 

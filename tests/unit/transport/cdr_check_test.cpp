@@ -233,7 +233,7 @@ Cdr replied_entries(std::size_t count, std::uint64_t length) {
   for (std::size_t i = 0; i < count; ++i) cdr.ulonglong(1).ulonglong(2).transform().ulong(3);
   return cdr.ulong(0).ulong(0);
 }
-Cdr pasts(std::size_t count, std::uint64_t length) {
+Cdr histories(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.ulonglong(0).ulonglong(0).ulong(0).octet(6).ulong(length);
   for (std::size_t i = 0; i < count; ++i) {
@@ -318,7 +318,7 @@ TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
                                   {"transforms at a hint", at_hint, reply},
                                   {"entries of a state", state_entries, state},
                                   {"entries of a replied state", replied_entries, reply},
-                                  {"pasts", pasts, reply},
+                                  {"histories", histories, reply},
                                   {"entries of a page", entries, page},
                                   {"tombstones of a page", tombstones, page},
                                   {"other pages of a page", others, page},

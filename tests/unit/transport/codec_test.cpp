@@ -88,10 +88,11 @@ TEST_CASE("replies arrive as they were sent") {
         CHECK(came[i].refused == (*all)[i].refused);
         check_same(came[i].sum, (*all)[i].sum);
       }
-    } else if (const auto* pasts = std::get_if<std::vector<PastInfo>>(&one.body)) {
-      const auto& came = std::get<std::vector<PastInfo>>(arrived->body);
-      REQUIRE(came.size() == pasts->size());
-      for (std::size_t i = 0; i < came.size(); ++i) CHECK(listed(came[i]) == listed((*pasts)[i]));
+    } else if (const auto* histories = std::get_if<std::vector<HistoryInfo>>(&one.body)) {
+      const auto& came = std::get<std::vector<HistoryInfo>>(arrived->body);
+      REQUIRE(came.size() == histories->size());
+      for (std::size_t i = 0; i < came.size(); ++i)
+        CHECK(listed(came[i]) == listed((*histories)[i]));
     } else if (const auto* joints = std::get_if<std::vector<JointInfo>>(&one.body)) {
       const auto& came = std::get<std::vector<JointInfo>>(arrived->body);
       REQUIRE(came.size() == joints->size());

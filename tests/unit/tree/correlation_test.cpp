@@ -213,9 +213,9 @@ TEST_CASE("A revision of a moving edge is a sample, or replaces that of its stam
     REQUIRE(found);
     CHECK(transform_diff(*found, X, 1e-12) == "");
   }
-  const auto past = robot.forest.pasts("a");
-  REQUIRE(past.size() == 1);
-  CHECK(past[0].samples == 22);
+  const auto history = robot.forest.histories("a");
+  REQUIRE(history.size() == 1);
+  CHECK(history[0].samples == 22);
   const auto undated = robot.forest.revise({{"a", X, {}}}, std::nullopt, 1'000'000);
   REQUIRE_FALSE(undated);
   CHECK(undated.error().code == Errc::kChangedMeanwhile);

@@ -103,7 +103,7 @@ TEST_CASE("updates do not allocate") {
   CHECK(allocations_of([&] { return forest.update(batch_by_handle).has_value(); }) == 0);
 }
 
-TEST_CASE("with a past, too, neither updates nor lookups allocate") {
+TEST_CASE("with a history, too, neither updates nor lookups allocate") {
   Forest forest;
   plant_chain(forest);
   Random random(703);
@@ -124,7 +124,7 @@ TEST_CASE("with a past, too, neither updates nor lookups allocate") {
   CHECK(allocations_of([&] { return forest.lookup(a, b, query).has_value(); }) == 0);
 }
 
-// ---- memory does not grow with the past
+// ---- memory does not grow with history
 
 constexpr int kCycles = 200'000;
 constexpr std::int64_t kFewBytes = 256 * 1024;

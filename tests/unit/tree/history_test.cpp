@@ -130,11 +130,11 @@ TEST_CASE("a sample may come late, but not twice and not after what is kept") {
   CHECK(outcome(old) == "too_old");
   CHECK(says(old.error().message, {"'hand'", "10001.000 ms older", "10000.000 ms"}));
   REQUIRE(arm.forest.update("hand", along_x(3), at(2001)));
-  const auto past = arm.forest.pasts("hand").at(0);
-  CHECK(past.refused_old == 1);
-  CHECK(past.refused_equal == 2);
-  CHECK(past.samples == 3);
-  CHECK(past.oldest == at(2000));
+  const auto history = arm.forest.histories("hand").at(0);
+  CHECK(history.refused_old == 1);
+  CHECK(history.refused_equal == 2);
+  CHECK(history.samples == 3);
+  CHECK(history.oldest == at(2000));
 }
 
 TEST_CASE("a batch is of one stamp, and taken as a whole or not at all") {
@@ -149,7 +149,7 @@ TEST_CASE("a batch is of one stamp, and taken as a whole or not at all") {
     REQUIRE(arm.forest.update({{"arm", along_x(0)}, {"arm", along_x(50)}}, at(when)));
     CHECK(x_of(arm.forest.lookup("base", "arm", query(when))) == 50);
   }
-  CHECK(arm.forest.pasts("arm").at(0).samples == 5);
+  CHECK(arm.forest.histories("arm").at(0).samples == 5);
 }
 
 TEST_CASE("what is kept has limits of number and of time") {
@@ -160,14 +160,14 @@ TEST_CASE("what is kept has limits of number and of time") {
   REQUIRE(arm.forest.set_timing("arm", timing));
   CHECK_FALSE(arm.forest.lookup("world", "arm", Query{})->stamp.has_value());
   for (int i = 1; i <= 100; ++i) REQUIRE(arm.forest.update("arm", along_x(i), at(i)));
-  CHECK(arm.forest.pasts("arm").at(0).samples == 5);
+  CHECK(arm.forest.histories("arm").at(0).samples == 5);
   CHECK(x_of(arm.forest.lookup("base", "arm", query(96))) == 96);
   CHECK(outcome(arm.forest.lookup("base", "arm", query(95))) == "too_old");
   const auto before_all = arm.forest.update("arm", along_x(0), at(95));
   CHECK(outcome(before_all) == "too_old");
   CHECK(says(before_all.error().message, {"'arm'", "1.000 ms older", "the 5 that"}));
   REQUIRE(arm.forest.update("arm", along_x(0), at(250)));
-  CHECK(arm.forest.pasts("arm").at(0).samples == 1);
+  CHECK(arm.forest.histories("arm").at(0).samples == 1);
   timing.count = 1;
   CHECK(outcome(arm.forest.set_timing("arm", timing)) == "invalid_input");
   timing = {};
@@ -182,9 +182,9 @@ TEST_CASE("memory is bounded, however many samples come") {
   timing.count = 100;
   REQUIRE(arm.forest.set_timing("arm", timing));
   for (int i = 1; i <= 200; ++i) REQUIRE(arm.forest.update("arm", along_x(i), at(i)));
-  const std::size_t bytes = arm.forest.pasts("arm").at(0).bytes;
+  const std::size_t bytes = arm.forest.histories("arm").at(0).bytes;
   for (int i = 201; i <= 20'000; ++i) REQUIRE(arm.forest.update("arm", along_x(i), at(i)));
-  CHECK(arm.forest.pasts("arm").at(0).bytes == bytes);
+  CHECK(arm.forest.histories("arm").at(0).bytes == bytes);
   CHECK(bytes < 100 * 400);
 }
 
@@ -227,7 +227,7 @@ TEST_CASE(
   REQUIRE(arm.forest.update("arm", along_x(50)));
   CHECK(arm.forest.lookup("world", "arm", Query{})->stamp == at(5000));
   REQUIRE(arm.forest.update("base", along_x(3)));
-  CHECK(arm.forest.pasts("base").empty());
+  CHECK(arm.forest.histories("base").empty());
   // The clock is set back: time goes on none the less.
   arm.clock_ms = 3000;
   REQUIRE(arm.forest.update("arm", along_x(60)));
@@ -254,29 +254,29 @@ TEST_CASE("the partition's limits count where a frame has none of its own") {
   REQUIRE(forest.set_default_timing(timing));
   REQUIRE(forest.add("a", "", {}));
   for (int i = 0; i < 10; ++i) REQUIRE(forest.update("a", along_x(i)));
-  CHECK(forest.pasts("a").at(0).samples == 3);
-  CHECK(forest.pasts("a").at(0).count_limit == 3);
+  CHECK(forest.histories("a").at(0).samples == 3);
+  CHECK(forest.histories("a").at(0).count_limit == 3);
 }
 
-TEST_CASE("who is moved or removed loses its past, which was that of another edge") {
+TEST_CASE("who is moved or removed loses its history, which was that of another edge") {
   Arm arm;
   REQUIRE(arm.forest.move("hand", "base"));
   CHECK_FALSE(arm.forest.lookup("base", "hand", Query{})->stamp.has_value());
   CHECK(x_of(arm.forest.lookup("base", "hand", query(1))) == 200);
   REQUIRE(arm.forest.update("hand", along_x(1), at(10)));
-  CHECK(arm.forest.pasts("hand").at(0).samples == 1);
+  CHECK(arm.forest.histories("hand").at(0).samples == 1);
   REQUIRE(arm.forest.remove("arm"));
   REQUIRE(arm.forest.add("arm", "base", along_x(3)));
   CHECK(x_of(arm.forest.lookup("base", "arm", query(1))) == 3);
-  CHECK(arm.forest.pasts("arm").empty());
-  // What hangs elsewhere because a frame above it was moved keeps its past.
+  CHECK(arm.forest.histories("arm").empty());
+  // What hangs elsewhere because a frame above it was moved keeps its history.
   REQUIRE(arm.forest.add("tip", "hand", {}));
   REQUIRE(arm.forest.update("tip", along_x(1), at(1)));
   REQUIRE(arm.forest.update("tip", along_x(2), at(2)));
   REQUIRE(arm.forest.move("hand", "arm"));
   CHECK(x_of(arm.forest.lookup("hand", "tip", query(1))) == 1);
   REQUIRE(arm.forest.update("tip", along_x(3), at(3)));
-  CHECK(arm.forest.pasts("tip").at(0).samples == 3);
+  CHECK(arm.forest.histories("tip").at(0).samples == 3);
 }
 
 TEST_CASE("several segments are of one instant, and a hint is answered where it can be") {
@@ -302,17 +302,17 @@ TEST_CASE("several segments are of one instant, and a hint is answered where it 
 TEST_CASE("rate, gaps and jitter of what is kept") {
   Arm arm;
   for (const int ms : {2010, 2020, 2030, 2060}) REQUIRE(arm.forest.update("arm", {}, at(ms)));
-  const auto past = arm.forest.pasts("arm").at(0);
-  CHECK(past.id == "arm");
-  CHECK(past.samples == 6);
-  CHECK(past.oldest == at(1000));
-  CHECK(past.newest == at(2060));
-  CHECK(past.max_gap == 1000ms);
-  CHECK(past.mean_gap == 212ms);
-  CHECK(past.jitter > 390ms);
-  CHECK(past.jitter < 400ms);
-  CHECK(arm.forest.pasts().size() == 2);
-  CHECK(arm.forest.pasts("nobody").empty());
+  const auto history = arm.forest.histories("arm").at(0);
+  CHECK(history.id == "arm");
+  CHECK(history.samples == 6);
+  CHECK(history.oldest == at(1000));
+  CHECK(history.newest == at(2060));
+  CHECK(history.max_gap == 1000ms);
+  CHECK(history.mean_gap == 212ms);
+  CHECK(history.jitter > 390ms);
+  CHECK(history.jitter < 400ms);
+  CHECK(arm.forest.histories().size() == 2);
+  CHECK(arm.forest.histories("nobody").empty());
 }
 
 TEST_CASE("news are told once, those of one stamp together") {

@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "tree/forest.hpp"
 
-// Readers of the past while it is written: rings grow, wrap round, are copied for late samples, and go.
+// Readers of history while it is written: ring buffers grow, wrap round, are copied for late samples, and go.
 namespace tfdude {
 namespace {
 
@@ -30,7 +30,7 @@ std::string link_id(int i) { return i == 0 ? "world" : "link " + std::to_string(
 struct Reader {
   std::string finding;
   std::atomic<int> newest{0};
-  std::atomic<int> past{0};
+  std::atomic<int> earlier{0};
   std::atomic<int> too_old{0};
 
   void take(const Result<StampedTransform>& X, std::atomic<int>& kind) {
@@ -60,19 +60,19 @@ struct Reader {
       if (!found) continue;
       Query then;
       then.at = *found->stamp - std::chrono::nanoseconds(random.index(400));
-      take(forest.lookup(a, b, then), past);
-      (void)forest.pasts(link_id(1));
+      take(forest.lookup(a, b, then), earlier);
+      (void)forest.histories(link_id(1));
     }
   }
 
   bool done() const {
-    return !finding.empty() || (newest > kAnswers && past > kAnswers && too_old > kAnswers);
+    return !finding.empty() || (newest > kAnswers && earlier > kAnswers && too_old > kAnswers);
   }
 };
 
 }  // namespace
 
-TEST_CASE("every answer is of one instant while rings wrap round and late samples come") {
+TEST_CASE("every answer is of one instant while ring buffers wrap round and late samples come") {
   Forest forest;
   REQUIRE(forest.add("world", "", along_x(0)));
   EdgeTiming timing;
@@ -113,12 +113,12 @@ TEST_CASE("every answer is of one instant while rings wrap round and late sample
   for (const Reader& reader : readers) {
     CHECK(reader.finding.empty());
     CHECK(reader.newest > kAnswers);
-    CHECK(reader.past > kAnswers);
+    CHECK(reader.earlier > kAnswers);
     CHECK(reader.too_old > kAnswers);
   }
 }
 
-TEST_CASE("a past may go while it is read") {
+TEST_CASE("a history may go while it is read") {
   Forest forest;
   REQUIRE(forest.add("world", "", {}));
   REQUIRE(forest.add("arm", "world", {}));

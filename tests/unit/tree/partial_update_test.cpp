@@ -56,7 +56,7 @@ TEST_CASE("a moving edge keeps what its newest sample says") {
   REQUIRE(arm.forest.update_partial({{"arm", there}}, time_of(2000)));
   const Transform newest{*Pose::create(arm.given.pose.rotation(), there), arm.given.covariance};
   CHECK(transform_diff(arm.arm(), newest, 1e-12) == "");
-  CHECK(arm.forest.pasts("arm").front().samples == 2);
+  CHECK(arm.forest.histories("arm").front().samples == 2);
   CHECK(outcome(arm.forest.update_partial({{"arm", there}}, time_of(2000))) == "stamp_taken");
 }
 

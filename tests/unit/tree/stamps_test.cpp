@@ -32,9 +32,9 @@ struct Arm {
   Result<void> sample(double x, Time stamp) { return forest.update("arm", along_x(x), stamp); }
   /// Where the arm is, by its newest sample.
   double x() const { return testing::x_of(forest.lookup("world", "arm")); }
-  PastInfo past(const std::string& id = "arm") const {
-    const auto pasts = forest.pasts(id);
-    return pasts.empty() ? PastInfo() : pasts.front();
+  HistoryInfo history(const std::string& id = "arm") const {
+    const auto histories = forest.histories(id);
+    return histories.empty() ? HistoryInfo() : histories.front();
   }
 
   Time clock = kNow;
@@ -65,15 +65,15 @@ TEST_CASE("a stamp from the future is refused, naming both times, and harms noth
                                         ContainsSubstring("2023-11-14 22:13:20.000 UTC") &&
                                         ContainsSubstring("60000.000 ms"));
   CHECK(arm.x() == 7);
-  CHECK(arm.past().refused_ahead == 1);
+  CHECK(arm.history().refused_ahead == 1);
   REQUIRE(arm.sample(1, kNow));
   CHECK_FALSE(arm.sample(2, kNow + 60s + 1ns));
   REQUIRE(arm.sample(3, kNow + 60s));
-  CHECK(arm.past().refused_ahead == 2);
-  CHECK(arm.past().newest == kNow + 60s);
+  CHECK(arm.history().refused_ahead == 2);
+  CHECK(arm.history().newest == kNow + 60s);
   // All edges of an update, or none.
   CHECK_FALSE(arm.forest.update(std::vector<EdgeUpdate>{{"arm", {}}, {"hand", {}}}, kNow + 99s));
-  CHECK(arm.past("hand").samples == 0);
+  CHECK(arm.history("hand").samples == 0);
   arm.clock += 39s;
   REQUIRE(arm.sample(4, kNow + 99s));
   CHECK(arm.x() == 4);
@@ -125,7 +125,7 @@ TEST_CASE("stamps and instants at the ends of the type are answered without over
   for (const std::int64_t stamp : {kLast, std::int64_t{1}, kLast - 1, std::int64_t{2}}) {
     REQUIRE(arm.sample(static_cast<double>(stamp % 1000), time_of(stamp)));
   }
-  CHECK(arm.past().samples == 4);
+  CHECK(arm.history().samples == 4);
   for (const std::int64_t at : {kFirst, std::int64_t{-1}, std::int64_t{0}, std::int64_t{1},
                                 std::int64_t{3}, kLast - 1, kLast}) {
     for (const std::int64_t other : {kFirst, std::int64_t{0}, kLast}) {
@@ -149,7 +149,7 @@ TEST_CASE("a row of samples from a clock that has jumped back starts the history
     CHECK(outcome(arm.sample(1000 + i, back + i * 10ms)) == "too_old");
   }
   CHECK(arm.x() == 99);
-  CHECK(arm.past().refused_old == 4);
+  CHECK(arm.history().refused_old == 4);
   CHECK(arm.restarts.empty());
   REQUIRE(arm.sample(1004, back + 40ms));
   REQUIRE(arm.restarts.size() == 1);
@@ -157,10 +157,10 @@ TEST_CASE("a row of samples from a clock that has jumped back starts the history
   CHECK(arm.restarts[0].newest == kNow + 990ms);
   CHECK(arm.restarts[0].stamp == back + 40ms);
   CHECK(arm.x() == 1004);
-  CHECK(arm.past().samples == 1);
-  CHECK(arm.past().refused_old == 4);
+  CHECK(arm.history().samples == 1);
+  CHECK(arm.history().refused_old == 4);
   for (int i = 5; i < 50; ++i) REQUIRE(arm.sample(1000 + i, back + i * 10ms));
-  CHECK(arm.past().samples == 46);
+  CHECK(arm.history().samples == 46);
   CHECK(x_of(arm.forest.lookup("world", "arm", {back + 45ms, 0ns, {}})) == 1004.5);
   CHECK_FALSE(arm.forest.lookup("world", "arm", {kNow, 0ns, {}}));
   CHECK(arm.restarts.size() == 1);
@@ -215,7 +215,7 @@ TEST_CASE("edges that are updated together start again together") {
   CHECK(arm.restarts.empty());
   REQUIRE(arm.forest.update(both, back + 3ms));
   CHECK(arm.restarts.size() == 2);
-  CHECK(arm.past("hand").newest == back + 3ms);
+  CHECK(arm.history("hand").newest == back + 3ms);
   CHECK(testing::x_of(arm.forest.lookup("world", "hand")) == 3);
 }
 
@@ -224,7 +224,7 @@ TEST_CASE("a history starts again beside readers as often as its source does") {
   for (int round = 0; round < 200; ++round) {
     for (int i = 0; i < 20; ++i) REQUIRE(arm.sample(i, kNow - 1h + i * 200ms));
     CHECK(arm.x() == 19);
-    CHECK(arm.past().samples == 6);
+    CHECK(arm.history().samples == 6);
   }
   CHECK(arm.restarts.size() == 199);
 }

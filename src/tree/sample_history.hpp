@@ -13,13 +13,14 @@ struct HeldVersion;
 /// The stamp of a value that holds for all times.
 inline constexpr std::int64_t kAlways = INT64_MIN;
 
-/// The past of one edge: its samples in the order of their stamps, each the version that showed it first.
+/// The history of one edge: its samples in the order of their stamps, each the version that showed it first, in a ring
+/// buffer.
 ///
 /// Samples are numbered; the one with number n lies in slot n modulo the capacity. Appending changes nothing that a
 /// reader looks at: it begins at the version that it sees of the edge, which knows the number of its own sample,
 /// and goes back from there. Whatever else there is to do (to grow, to insert) is done in a copy, which the next
 /// version names. One writer at a time; readers under an epoch::Guard.
-class Ring {
+class SampleHistory {
  public:
   /// The two samples around an instant; null: there is none.
   struct Bracket {
@@ -27,7 +28,7 @@ class Ring {
     const HeldVersion* after = nullptr;
   };
 
-  explicit Ring(const EdgeTiming& timing) : Ring(timing, kFirstCapacity) {}
+  explicit SampleHistory(const EdgeTiming& timing) : SampleHistory(timing, kFirstCapacity) {}
 
   [[nodiscard]] const EdgeTiming& timing() const { return timing_; }
   [[nodiscard]] bool has_noise() const { return has_noise_; }
@@ -61,16 +62,19 @@ class Ring {
   [[nodiscard]] HeldVersion* drop_oldest();
 
   /// A copy with room for twice as many.
-  [[nodiscard]] std::unique_ptr<Ring> grown() const;
+  [[nodiscard]] std::unique_ptr<SampleHistory> grown() const;
 
   /// A copy with one more sample at its place.
-  [[nodiscard]] std::unique_ptr<Ring> with(HeldVersion* sample, std::int64_t stamp,
-                                           std::uint64_t place) const;
+  [[nodiscard]] std::unique_ptr<SampleHistory> with(HeldVersion* sample, std::int64_t stamp,
+                                                    std::uint64_t place) const;
 
   /// A copy with another sample, of the same stamp, at a place.
-  [[nodiscard]] std::unique_ptr<Ring> replaced(HeldVersion* sample, std::uint64_t place) const;
+  [[nodiscard]] std::unique_ptr<SampleHistory> replaced(HeldVersion* sample,
+                                                        std::uint64_t place) const;
 
-  [[nodiscard]] std::size_t bytes() const { return sizeof(Ring) + (mask_ + 1) * sizeof(Slot); }
+  [[nodiscard]] std::size_t bytes() const {
+    return sizeof(SampleHistory) + (mask_ + 1) * sizeof(Slot);
+  }
 
   /// The commit of the last sample that was not appended: inserted, or put in another's place. Set before readers see it.
   std::uint64_t rewritten = 0;
@@ -84,12 +88,12 @@ class Ring {
     std::atomic<HeldVersion*> sample{nullptr};
   };
 
-  Ring(const EdgeTiming& timing, std::uint64_t capacity)
+  SampleHistory(const EdgeTiming& timing, std::uint64_t capacity)
       : timing_(timing),
         has_noise_(timing.process_noise.upper() != Covariance::Upper{}),
         mask_(capacity - 1),
         slots_(new Slot[capacity]) {}
-  [[nodiscard]] std::unique_ptr<Ring> empty_copy(std::uint64_t capacity) const;
+  [[nodiscard]] std::unique_ptr<SampleHistory> empty_copy(std::uint64_t capacity) const;
   [[nodiscard]] Bracket pair(std::uint64_t before) const;
   [[nodiscard]] Slot& slot(std::uint64_t number) const { return slots_[number & mask_]; }
   [[nodiscard]] std::int64_t stamp_at(std::uint64_t number) const {

@@ -1,17 +1,18 @@
-#include "tree/ring.hpp"
+#include "tree/sample_history.hpp"
 
 #include <algorithm>
 
 namespace tfdude {
 
 // A slot is written anew only after the sample in it was dropped; so all that was read before holds.
-Ring::Bracket Ring::pair(std::uint64_t before) const {
+SampleHistory::Bracket SampleHistory::pair(std::uint64_t before) const {
   const Bracket found{slot(before).sample.load(std::memory_order_acquire),
                       slot(before + 1).sample.load(std::memory_order_acquire)};
   return oldest() <= before ? found : Bracket{};
 }
 
-Ring::Bracket Ring::around(std::int64_t t, std::uint64_t newest, std::uint64_t& back) const {
+SampleHistory::Bracket SampleHistory::around(std::int64_t t, std::uint64_t newest,
+                                             std::uint64_t& back) const {
   // How far a guess may be off until halving is quicker.
   constexpr int kSteps = 4;
   std::uint64_t low = oldest();
@@ -38,42 +39,42 @@ Ring::Bracket Ring::around(std::int64_t t, std::uint64_t newest, std::uint64_t& 
   return pair(low);
 }
 
-HeldVersion* Ring::sample(std::uint64_t number) const {
+HeldVersion* SampleHistory::sample(std::uint64_t number) const {
   HeldVersion* found = slot(number).sample.load(std::memory_order_acquire);
   return oldest() <= number ? found : nullptr;
 }
 
-std::int64_t Ring::stamp(std::uint64_t number) const {
+std::int64_t SampleHistory::stamp(std::uint64_t number) const {
   const std::int64_t found = stamp_at(number);
   return oldest() <= number ? found : kAlways;
 }
 
-std::uint64_t Ring::place_of(std::int64_t stamp) const {
+std::uint64_t SampleHistory::place_of(std::int64_t stamp) const {
   std::uint64_t place = next_;
   while (place > first_.load(std::memory_order_relaxed) && stamp_at(place - 1) >= stamp) --place;
   return place;
 }
 
-void Ring::append(HeldVersion* sample, std::int64_t stamp) {
+void SampleHistory::append(HeldVersion* sample, std::int64_t stamp) {
   Slot& free = slot(next_++);
   free.stamp.store(stamp, std::memory_order_release);
   free.sample.store(sample, std::memory_order_release);
 }
 
-HeldVersion* Ring::drop_oldest() {
+HeldVersion* SampleHistory::drop_oldest() {
   const std::uint64_t first = first_.load(std::memory_order_relaxed);
   HeldVersion* dropped = slot(first).sample.load(std::memory_order_relaxed);
   first_.store(first + 1, std::memory_order_release);
   return dropped;
 }
 
-std::unique_ptr<Ring> Ring::empty_copy(std::uint64_t capacity) const {
-  std::unique_ptr<Ring> copy(new Ring(timing_, capacity));
+std::unique_ptr<SampleHistory> SampleHistory::empty_copy(std::uint64_t capacity) const {
+  std::unique_ptr<SampleHistory> copy(new SampleHistory(timing_, capacity));
   copy->rewritten = rewritten;
   return copy;
 }
 
-std::unique_ptr<Ring> Ring::grown() const {
+std::unique_ptr<SampleHistory> SampleHistory::grown() const {
   auto copy = empty_copy(2 * (mask_ + 1));
   for (std::uint64_t number = oldest(); number < next_; ++number) {
     copy->append(slot(number).sample.load(std::memory_order_relaxed), stamp_at(number));
@@ -81,8 +82,8 @@ std::unique_ptr<Ring> Ring::grown() const {
   return copy;
 }
 
-std::unique_ptr<Ring> Ring::with(HeldVersion* sample, std::int64_t stamp,
-                                 std::uint64_t place) const {
+std::unique_ptr<SampleHistory> SampleHistory::with(HeldVersion* sample, std::int64_t stamp,
+                                                   std::uint64_t place) const {
   auto copy = empty_copy(full() ? 2 * (mask_ + 1) : mask_ + 1);
   for (std::uint64_t number = oldest(); number < next_; ++number) {
     if (number == place) copy->append(sample, stamp);
@@ -91,7 +92,8 @@ std::unique_ptr<Ring> Ring::with(HeldVersion* sample, std::int64_t stamp,
   return copy;
 }
 
-std::unique_ptr<Ring> Ring::replaced(HeldVersion* sample, std::uint64_t place) const {
+std::unique_ptr<SampleHistory> SampleHistory::replaced(HeldVersion* sample,
+                                                       std::uint64_t place) const {
   auto copy = empty_copy(mask_ + 1);
   for (std::uint64_t number = oldest(); number < next_; ++number) {
     HeldVersion* own = slot(number).sample.load(std::memory_order_relaxed);
