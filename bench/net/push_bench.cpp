@@ -38,9 +38,9 @@ std::int64_t turn_at(double moment) { return static_cast<std::int64_t>(moment / 
 
 /// CDR bytes of what is pushed with each update.
 std::uint32_t pushed_bytes() {
-  tfdude::State state;
-  for (std::uint32_t i = 0; i < kJoints; ++i) state.entries.push_back({i, tfdude::Time(), {}});
-  return bench::payload_size<tfdude::wire::StatePubSubType>(tfdude::fastdds::to_wire(state));
+  tfdude::PushedValues pushed;
+  for (std::uint32_t i = 0; i < kJoints; ++i) pushed.entries.push_back({i, tfdude::Time(), {}});
+  return bench::payload_size<tfdude::wire::StatePubSubType>(tfdude::fastdds::to_wire(pushed));
 }
 
 std::uint32_t domain_of(const bench::Arguments& arguments) {

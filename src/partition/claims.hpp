@@ -57,9 +57,9 @@ class Claims {
   Owner add_owner(std::string name) { return succession_.add_owner(std::move(name)); }
   [[nodiscard]] const std::string& name(Owner owner) const { return succession_.name(owner); }
 
-  /// Whether a partition is there; all are at first. O(contested frames) where that is news.
+  /// Whether a partition is there; all are at first. O(contested frames) where that is new.
   void set_standing(Owner owner, Succession::Standing standing);
-  /// Whom a partition says that it has outlived. O(contested frames) where that is news.
+  /// Whom a partition says that it has outlived. O(contested frames) where that is new.
   void set_outlived(Owner owner, std::set<Owner> outlived);
 
   /// Whether a frame that this process holds is claimed by that partition, too. O(contested frames).

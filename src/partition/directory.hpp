@@ -41,7 +41,7 @@ class Directory {
   void apply(const Page& page);
 
   /// The partition's participant has gone; its structure is kept.
-  /// @return false where this is not news
+  /// @return false where this is not new
   bool lost(std::string_view partition, std::uint64_t incarnation, Time now);
 
   /// Who has been silent for Absences::kGrace has been absent; who has been for kTakeover is gone: frames that others claim,

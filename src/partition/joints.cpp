@@ -133,7 +133,7 @@ Result<void> Joints::plan(const JointValue& value) {
   return {};
 }
 
-bool Joints::is_news(const Mover& mover, std::optional<Time> stamp) const {
+bool Joints::is_newer(const Mover& mover, std::optional<Time> stamp) const {
   return !stamp || !mover.stamp || *mover.stamp < *stamp;
 }
 
@@ -146,7 +146,7 @@ bool Joints::starts_again(const Mover& mover, Time stamp) const {
 void Joints::take(const Step& step, std::optional<Time> stamp) {
   Mover& mover = movers_[step.mover];
   mover.outside += step.outside ? 1 : 0;
-  if (!is_news(mover, stamp) && !starts_again(mover, *stamp)) return;
+  if (!is_newer(mover, stamp) && !starts_again(mover, *stamp)) return;
   mover.position = step.position;
   mover.variance = step.variance;
   if (mover.spec.coupled) mover.said_variance = step.variance;
@@ -167,7 +167,7 @@ Result<std::size_t> Joints::apply(const JointUpdate& update) {
     Mover& mover = movers_[step.mover];
     CorrelatedUpdate one{mover.handle, value_at(mover.spec, step.position, step.variance)};
     const bool resay = mover.spec.coupled && mover.said_variance != step.variance;
-    if (resay && is_news(mover, update.stamp)) {
+    if (resay && is_newer(mover, update.stamp)) {
       mover.said = shared_error(mover.spec, step.variance);
       one.correlation = &mover.said;
     }

@@ -189,14 +189,14 @@ Ready Member::take_ready() {
     ready.refused = Error{Errc::kNotOwner, given_up_};
     return ready;
   }
-  Presence news = presence_;
+  Presence current = presence_;
   if (partition_ != nullptr) {
     ready.pages = partition_->take_pages();
     ready.rows = partition_->take_unsaved();
-    news.pages = partition_->page_count();
-    news.absent = directory_.absent();
+    current.pages = partition_->page_count();
+    current.absent = directory_.absent();
   }
-  if (!(news == announced_)) ready.presence = std::move(news);
+  if (!(current == announced_)) ready.presence = std::move(current);
   return ready;
 }
 

@@ -151,17 +151,17 @@ struct Request {
 
 /// What was written to watched edges, to be taken over as one commit: a watcher that knows all up to `after` then knows
 /// all up to `commit`.
-struct State {
-  std::uint64_t group = 0;    ///< watch_group() of the owner and the request
-  std::vector<News> entries;  ///< by the index of the segment in the request
-  std::uint64_t after = 0;    ///< a commit of the owner's; 0: all is told
-  std::uint64_t commit = 0;   ///< a later one
-  std::uint32_t piece = 0;    ///< which one of so many that have the entries
+struct PushedValues {
+  std::uint64_t group = 0;           ///< watch_group() of the owner and the request
+  std::vector<PushedValue> entries;  ///< by the index of the segment in the request
+  std::uint64_t after = 0;           ///< a commit of the owner's; 0: all is told
+  std::uint64_t commit = 0;          ///< a later one
+  std::uint32_t piece = 0;           ///< which one of so many that have the entries
   std::uint32_t pieces = 1;
 };
 
 /// How many entries are correlated with others; a message holds no more than kMaxCorrelated of them.
-[[nodiscard]] std::size_t correlated_entries(const State& state);
+[[nodiscard]] std::size_t correlated_entries(const PushedValues& pushed);
 
 struct Done {};
 
@@ -170,7 +170,7 @@ struct Reply {
   /// The partition's structure after the request; a directory that has this epoch shows its effect.
   std::uint64_t epoch = 0;
   /// Done, or why not; or what was asked for.
-  std::variant<Done, Error, SegmentValues, State, std::vector<HistoryInfo>,
+  std::variant<Done, Error, SegmentValues, PushedValues, std::vector<HistoryInfo>,
                std::vector<EdgeConsistency>, std::vector<JointInfo>>
       body;
   /// Of a change: the latest that the owner knows of, for the next change of who has asked.

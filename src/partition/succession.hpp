@@ -30,11 +30,11 @@ class Succession {
   Owner add_owner(std::string name);
   [[nodiscard]] const std::string& name(Owner owner) const { return owners_[owner].name; }
 
-  /// @return whether that is news
+  /// @return whether that is new
   bool set_standing(Owner owner, Standing standing);
   [[nodiscard]] Standing standing(Owner owner) const { return owners_[owner].standing; }
 
-  /// Whom a partition says that it has outlived. @return whether that is news
+  /// Whom a partition says that it has outlived. @return whether that is new
   bool set_outlived(Owner owner, std::set<Owner> outlived);
 
   /// Whether the claims of the second do not count beside those of the first.

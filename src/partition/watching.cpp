@@ -27,15 +27,15 @@ class Fingerprint {
 };
 
 // As an edge: what a segment has of its own counts as unknown, too, where a part of it is.
-void set_correlation(News& entry, const PathCorrelation& correlation) {
+void set_correlation(PushedValue& entry, const PathCorrelation& correlation) {
   entry.correlation.common_errors = correlation.common_errors;
   if (!correlation.unknown) return;
   entry.correlation.unknown = true;
   entry.X.covariance = bound(entry.X.covariance, *correlation.unknown);
 }
 
-std::vector<News> entries_of(const SegmentValues& found) {
-  std::vector<News> entries;
+std::vector<PushedValue> entries_of(const SegmentValues& found) {
+  std::vector<PushedValue> entries;
   for (std::uint32_t i = 0; i < found.values.size(); ++i) {
     entries.push_back({i, found.stamp, found.values[i], {}, found.history, {}});
     if (!found.correlations.empty()) set_correlation(entries.back(), found.correlations[i]);
@@ -49,10 +49,10 @@ bool same(const Transform& a, const Transform& b) {
 
 }  // namespace
 
-std::size_t correlated_entries(const State& state) {
+std::size_t correlated_entries(const PushedValues& pushed) {
   return static_cast<std::size_t>(
-      std::count_if(state.entries.begin(), state.entries.end(),
-                    [](const News& entry) { return !entry.correlation.empty(); }));
+      std::count_if(pushed.entries.begin(), pushed.entries.end(),
+                    [](const PushedValue& entry) { return !entry.correlation.empty(); }));
 }
 
 std::uint64_t watch_group(std::string_view partition, std::uint64_t incarnation,
@@ -89,10 +89,10 @@ std::vector<EdgeCursor> WatchedGroup::fresh_cursors() const {
   return cursors;
 }
 
-Result<State> WatchedGroup::snapshot(const Forest& forest, std::optional<Time> from) const {
+Result<PushedValues> WatchedGroup::snapshot(const Forest& forest, std::optional<Time> from) const {
   if (request_.composed) return composed(forest, from);
   auto cursors = fresh_cursors();
-  auto found = forest.news(cursors, {!from, from});
+  auto found = forest.values_since(cursors, {!from, from});
   for (const EdgeCursor& edge : cursors) {
     if (edge.history != 0) continue;
     return fail(Errc::kNotOwner, "frame " + quote(edge.id) + " is not of this partition, or not " +
@@ -100,24 +100,24 @@ Result<State> WatchedGroup::snapshot(const Forest& forest, std::optional<Time> f
   }
   if (found.values.size() > kMaxItems) {
     cursors = fresh_cursors();
-    found = forest.news(cursors, {true, {}});
+    found = forest.values_since(cursors, {true, {}});
   }
-  return State{id_, std::move(found.values), 0, found.commit};
+  return PushedValues{id_, std::move(found.values), 0, found.commit};
 }
 
-State WatchedGroup::news(const Forest& forest) {
-  if (request_.composed) return composed_news(forest);
+PushedValues WatchedGroup::next_push(const Forest& forest) {
+  if (request_.composed) return next_composed_push(forest);
   const bool newest_only = request_.period > std::chrono::nanoseconds(0);
-  auto found = forest.news(cursors_, {newest_only, {}, true});
-  State state{id_, std::move(found.values), told_, found.commit};
-  if (!state.entries.empty()) told_ = state.commit;
-  return state;
+  auto found = forest.values_since(cursors_, {newest_only, {}, true});
+  PushedValues pushed{id_, std::move(found.values), told_, found.commit};
+  if (!pushed.entries.empty()) told_ = pushed.commit;
+  return pushed;
 }
 
-Result<State> WatchedGroup::composed(const Forest& forest, std::optional<Time> from) const {
+Result<PushedValues> WatchedGroup::composed(const Forest& forest, std::optional<Time> from) const {
   auto found = forest.lookup_segments(request_.segments);
   if (!found) return tl::unexpected(std::move(found.error()));
-  State state{id_, entries_of(*found), 0, found->commit};
+  PushedValues pushed{id_, entries_of(*found), 0, found->commit};
   if (from && found->stamp && *from < *found->stamp) {
     Query query;
     query.at = from;
@@ -125,21 +125,21 @@ Result<State> WatchedGroup::composed(const Forest& forest, std::optional<Time> f
     const auto then = forest.lookup_segments(request_.segments, query);
     if (then && then->history == found->history) {
       const auto entries = entries_of(*then);
-      state.entries.insert(state.entries.begin(), entries.begin(), entries.end());
+      pushed.entries.insert(pushed.entries.begin(), entries.begin(), entries.end());
     }
   }
   for (std::size_t i = 0; i < request_.segments.size(); ++i) {
-    state.entries[i].process_noise = Covariance();
+    pushed.entries[i].process_noise = Covariance();
   }
-  return state;
+  return pushed;
 }
 
-State WatchedGroup::composed_news(const Forest& forest) {
-  State state{id_, {}, told_, told_};
+PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
+  PushedValues pushed{id_, {}, told_, told_};
   const auto found = forest.lookup_segments(request_.segments);
-  if (!found) return state;
-  state.commit = found->commit;
-  for (News& entry : entries_of(*found)) {
+  if (!found) return pushed;
+  pushed.commit = found->commit;
+  for (PushedValue& entry : entries_of(*found)) {
     auto& sent = sent_[entry.index];
     const bool begins = !sent || entry.history != sent->history;
     const bool again = !begins && entry.stamp == sent->stamp &&
@@ -148,31 +148,31 @@ State WatchedGroup::composed_news(const Forest& forest) {
     if (again) continue;
     sent = entry;
     if (begins) entry.process_noise = Covariance();
-    state.entries.push_back(std::move(entry));
+    pushed.entries.push_back(std::move(entry));
   }
-  if (!state.entries.empty()) told_ = state.commit;
-  return state;
+  if (!pushed.entries.empty()) told_ = pushed.commit;
+  return pushed;
 }
 
-std::vector<State> pieces_of(State&& state) {
-  const std::size_t most = correlated_entries(state) > kMaxCorrelated ? kMaxCorrelated : kMaxItems;
-  const std::size_t count = std::max<std::size_t>((state.entries.size() + most - 1) / most, 1);
-  std::vector<State> pieces;
+std::vector<PushedValues> pieces_of(PushedValues&& pushed) {
+  const std::size_t most = correlated_entries(pushed) > kMaxCorrelated ? kMaxCorrelated : kMaxItems;
+  const std::size_t count = std::max<std::size_t>((pushed.entries.size() + most - 1) / most, 1);
+  std::vector<PushedValues> pieces;
   for (std::size_t i = 0; i < count; ++i) {
-    const auto begin = state.entries.begin() + static_cast<std::ptrdiff_t>(i * most);
-    const auto length = std::min(most, state.entries.size() - i * most);
+    const auto begin = pushed.entries.begin() + static_cast<std::ptrdiff_t>(i * most);
+    const auto length = std::min(most, pushed.entries.size() - i * most);
     const auto end = begin + static_cast<std::ptrdiff_t>(length);
-    pieces.push_back({state.group,
+    pieces.push_back({pushed.group,
                       {std::make_move_iterator(begin), std::make_move_iterator(end)},
-                      state.after,
-                      state.commit,
+                      pushed.after,
+                      pushed.commit,
                       static_cast<std::uint32_t>(i),
                       static_cast<std::uint32_t>(count)});
   }
   return pieces;
 }
 
-std::optional<State> StatePieces::add(const State& piece) {
+std::optional<PushedValues> PushedPieces::add(const PushedValues& piece) {
   // A reply may come between the pieces of what is pushed.
   if (piece.pieces <= 1) return piece;
   if (piece.piece == 0) {

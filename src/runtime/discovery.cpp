@@ -67,7 +67,7 @@ Result<void> Discovery::await(const Deadline& deadline) {
   }
   while (!complete()) {
     if (deadline.over()) return tl::unexpected(undecided("not all frames are known", deadline));
-    wait_for_news(deadline);
+    wait_for_change(deadline);
   }
   return {};
 }
@@ -77,7 +77,7 @@ Error Discovery::last_word(Error error, const Deadline& deadline) {
   return complete() ? explained(std::move(error)) : undecided(error.message, deadline);
 }
 
-void Discovery::wait_for_news(const Deadline& deadline) {
+void Discovery::wait_for_change(const Deadline& deadline) {
   std::unique_lock lock(structure_.mutex);
   structure_.changed.wait_until(lock, deadline.within(kLookAround).at());
 }

@@ -53,7 +53,7 @@ class Discovery {
       if (result || !may_appear(result.error().code)) return result;
       if (certain) return tl::unexpected(explained(std::move(result.error())));
       if (deadline.over()) return tl::unexpected(undecided(result.error().message, deadline));
-      wait_for_news(deadline);
+      wait_for_change(deadline);
     }
   }
 
@@ -61,7 +61,7 @@ class Discovery {
   [[nodiscard]] Error last_word(Error error, const Deadline& deadline);
 
   /// Until something has changed, or for a moment.
-  void wait_for_news(const Deadline& deadline = Deadline(Milliseconds::max()));
+  void wait_for_change(const Deadline& deadline = Deadline(Milliseconds::max()));
 
  private:
   /// Of what seems not to be there, as others know more.

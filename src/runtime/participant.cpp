@@ -100,8 +100,8 @@ void Participant::on_update(const Update& update) {
   if (Partition* own = member_.partition()) own->apply(update);
 }
 
-void Participant::on_state(const State& state) {
-  if (watcher_.on_state(state)) lookups_.pushed();
+void Participant::on_pushed(const PushedValues& pushed) {
+  if (watcher_.on_pushed(pushed)) lookups_.pushed();
 }
 
 bool Participant::owns_joint(std::string_view name) const {

@@ -62,7 +62,7 @@ class Participant final : public TransportHandler {
   void on_reply(const Reply& reply) override { requests_.calls().on_reply(reply); }
   void on_update(const Update& update) override;
   void on_joints(const JointUpdate& update) override { joints_.on_joints(update); }
-  void on_state(const State& state) override;
+  void on_pushed(const PushedValues& pushed) override;
   void on_watcher(std::uint64_t group) override { pushing_.on_watcher(group); }
   void on_page(const Page& page) override { member_.on_page(page); }
   void on_presence(const Presence& presence) override { member_.on_presence(presence); }

@@ -18,9 +18,9 @@ void Pusher::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-Result<State> Pusher::watch(std::uint64_t group, const WatchRequest& request) {
+Result<PushedValues> Pusher::watch(std::uint64_t group, const WatchRequest& request) {
   if (auto ok = check_watch(request); !ok) return tl::unexpected(ok.error());
-  Result<State> snapshot;
+  Result<PushedValues> snapshot;
   {
     const std::lock_guard lock(groups_mutex_);
     const bool first = groups_.empty();
@@ -64,9 +64,9 @@ void Pusher::ask() {
   changed_.notify_one();
 }
 
-std::vector<State> Pusher::take_due(Clock::time_point now, std::vector<std::uint64_t>& ended,
-                                    std::optional<Clock::time_point>& next) {
-  std::vector<State> due;
+std::vector<PushedValues> Pusher::take_due(Clock::time_point now, std::vector<std::uint64_t>& ended,
+                                           std::optional<Clock::time_point>& next) {
+  std::vector<PushedValues> due;
   const std::lock_guard lock(groups_mutex_);
   for (auto group = groups_.begin(); group != groups_.end();) {
     if (now >= group->second.lease) {
@@ -76,9 +76,9 @@ std::vector<State> Pusher::take_due(Clock::time_point now, std::vector<std::uint
     Group& one = group->second;
     const auto period = one.watched.request().period;
     if (now >= one.due) {
-      State state = one.watched.news(forest_);
-      if (!state.entries.empty()) {
-        due.push_back(std::move(state));
+      PushedValues pushed = one.watched.next_push(forest_);
+      if (!pushed.entries.empty()) {
+        due.push_back(std::move(pushed));
         // On the beat, as long as that can be kept.
         one.due = std::max(one.due + period, now - period);
       }
@@ -86,7 +86,7 @@ std::vector<State> Pusher::take_due(Clock::time_point now, std::vector<std::uint
       next = next ? std::min(*next, one.due) : one.due;
     }
     if (std::exchange(one.all, false)) {
-      if (auto state = one.watched.snapshot(forest_, {})) due.push_back(*std::move(state));
+      if (auto pushed = one.watched.snapshot(forest_, {})) due.push_back(*std::move(pushed));
     }
     ++group;
   }
@@ -120,8 +120,8 @@ void Pusher::run() {
     asked_.store(false);
     next.reset();
     std::vector<std::uint64_t> ended;
-    for (State& state : take_due(Clock::now(), ended, next)) {
-      for (const State& piece : pieces_of(std::move(state))) push_(piece);
+    for (PushedValues& pushed : take_due(Clock::now(), ended, next)) {
+      for (const PushedValues& piece : pieces_of(std::move(pushed))) push_(piece);
     }
     for (const std::uint64_t group : ended) end_(group);
     lock.lock();

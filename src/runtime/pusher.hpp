@@ -21,10 +21,10 @@ namespace tfdude {
 class Pusher {
  public:
   using Clock = std::chrono::steady_clock;
-  using Push = std::function<void(const State&)>;
+  using Push = std::function<void(const PushedValues&)>;
   using End = std::function<void(std::uint64_t group)>;
 
-  /// @param push  a state, or a piece of one
+  /// @param push  is handed values, or a piece of them
   /// @param end   gives back what pushing to a group has taken. Both are called from the thread, without a lock.
   Pusher(Forest& forest, Push push, End end);
   ~Pusher() { stop(); }
@@ -35,7 +35,7 @@ class Pusher {
   void stop();
 
   /// Begins to push to a group, or goes on for another lease. @return all values now; kNotOwner, kInvalidInput.
-  [[nodiscard]] Result<State> watch(std::uint64_t group, const WatchRequest& request);
+  [[nodiscard]] Result<PushedValues> watch(std::uint64_t group, const WatchRequest& request);
 
   /// Pushes all values to a group: somebody has only now begun to listen.
   void tell_all(std::uint64_t group);
@@ -52,9 +52,9 @@ class Pusher {
   void ask();
   void end(std::map<std::uint64_t, Group>::iterator& group);
   /// What is to be sent now, and when there may be more without another commit.
-  [[nodiscard]] std::vector<State> take_due(Clock::time_point now,
-                                            std::vector<std::uint64_t>& ended,
-                                            std::optional<Clock::time_point>& next);
+  [[nodiscard]] std::vector<PushedValues> take_due(Clock::time_point now,
+                                                   std::vector<std::uint64_t>& ended,
+                                                   std::optional<Clock::time_point>& next);
 
   Forest& forest_;
   const Push push_;

@@ -20,9 +20,9 @@ Pusher* Pushing::pusher() {
   if (pusher_ == nullptr) {
     pusher_ = std::make_unique<Pusher>(
         structure_.forest,
-        [this](const State& state) {
-          transport_.push(state);
-          watcher_.on_state(state);
+        [this](const PushedValues& pushed) {
+          transport_.push(pushed);
+          watcher_.on_pushed(pushed);
         },
         [this](std::uint64_t group) { transport_.end_pushing(group); });
   }
@@ -38,14 +38,14 @@ Reply Pushing::answer(const Request& request) {
   const auto& watch = std::get<WatchRequest>(request.body);
   const std::uint64_t incarnation =
       member_.with_rules([](const Member& member) { return member.presence().incarnation; });
-  auto state = pusher->watch(watch_group(member_.name(), incarnation, watch), watch);
-  if (!state) return {request.sequence, 0, std::move(state.error())};
-  if (correlated_entries(*state) > kMaxCorrelated) {
+  auto pushed = pusher->watch(watch_group(member_.name(), incarnation, watch), watch);
+  if (!pushed) return {request.sequence, 0, std::move(pushed.error())};
+  if (correlated_entries(*pushed) > kMaxCorrelated) {
     return {request.sequence, 0,
             Error{Errc::kInvalidInput, who + " has more than " + std::to_string(kMaxCorrelated) +
                                            " edges of the path that are correlated with others"}};
   }
-  return {request.sequence, 0, *std::move(state)};
+  return {request.sequence, 0, *std::move(pushed)};
 }
 
 void Pushing::on_watcher(std::uint64_t group) {

@@ -69,7 +69,7 @@ Result<void> Serving::claim_name() {
     });
     if (step == Claiming::Step::kServe) return {};
     if (step == Claiming::Step::kTake) member_.introduce();
-    if (step == Claiming::Step::kWait) discovery_.wait_for_news();
+    if (step == Claiming::Step::kWait) discovery_.wait_for_change();
     if (step != Claiming::Step::kLeave) continue;
     member_.say_goodbye();
     const std::string who =
@@ -106,7 +106,7 @@ Result<void> Serving::take_frames(const std::vector<FrameSpec>& frames) {
     return !structure_.directory.complete();
   };
   const bool any = !state.frames.empty() || !frames.empty();
-  while (any && Clock::now() < discovery_.met_by() && incomplete()) discovery_.wait_for_news();
+  while (any && Clock::now() < discovery_.met_by() && incomplete()) discovery_.wait_for_change();
   if (any) await_gone();
   if (auto taken = member_.serve(kept ? &state : nullptr, frames); !taken) return taken;
   log_configured(state, frames);
@@ -130,7 +130,7 @@ void Serving::await_gone() {
     const std::lock_guard lock(structure_.mutex);
     return structure_.directory.awaits_silent();
   };
-  while (Clock::now() < patience && undecided()) discovery_.wait_for_news();
+  while (Clock::now() < patience && undecided()) discovery_.wait_for_change();
 }
 
 }  // namespace tfdude

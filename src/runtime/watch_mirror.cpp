@@ -77,7 +77,7 @@ WatchMirror::WatchMirror(const std::string& a, const std::string& b, WatchRoute 
 }
 
 void WatchMirror::inherit(const WatchMirror& before) {
-  std::vector<News> values;
+  std::vector<PushedValue> values;
   for (std::uint32_t i = 0; i < edges_.size(); ++i) {
     const FrameInfo& own = route_.edges[i];
     const auto known = std::find_if(
@@ -90,7 +90,7 @@ void WatchMirror::inherit(const WatchMirror& before) {
       continue;
     }
     std::vector<EdgeCursor> nothing{{own.id, own.parent}};
-    for (News& value : before.forest_.news(nothing, {false, time_of(1)}).values) {
+    for (PushedValue& value : before.forest_.values_since(nothing, {false, time_of(1)}).values) {
       value.index = i;
       values.push_back(std::move(value));
     }
@@ -100,7 +100,8 @@ void WatchMirror::inherit(const WatchMirror& before) {
   forest_.take(handles_, values);
 }
 
-std::optional<News> WatchMirror::admitted(const Source& source, News entry, bool follows_on) {
+std::optional<PushedValue> WatchMirror::admitted(const Source& source, PushedValue entry,
+                                                 bool follows_on) {
   if (entry.index >= source.edges.size()) return std::nullopt;
   entry.index = source.edges[entry.index];
   if (entry.index >= edges_.size()) return std::nullopt;
@@ -119,13 +120,13 @@ std::optional<News> WatchMirror::admitted(const Source& source, News entry, bool
   return entry;
 }
 
-bool WatchMirror::take(const State& state) {
+bool WatchMirror::take(const PushedValues& pushed) {
   const auto told =
       std::find_if(route_.sources.begin(), route_.sources.end(),
-                   [&](const WatchRoute::Source& source) { return source.group == state.group; });
+                   [&](const WatchRoute::Source& source) { return source.group == pushed.group; });
   if (told == route_.sources.end()) return false;
   Source& source = sources_[static_cast<std::size_t>(told - route_.sources.begin())];
-  auto whole = source.pieces.add(state);
+  auto whole = source.pieces.add(pushed);
   if (!whole) return false;
   // Of what is known in whole, samples may be missing that came between those that the whole has told.
   const bool is_old = whole->commit <= source.commit;
@@ -134,8 +135,8 @@ bool WatchMirror::take(const State& state) {
   // Before the first values there is nothing that a sample could belong to.
   if (!follows_on && source.commit == 0) return false;
   if (follows_on) source.commit = whole->commit;
-  std::vector<News> values;
-  for (News& entry : whole->entries) {
+  std::vector<PushedValue> values;
+  for (PushedValue& entry : whole->entries) {
     if (auto value = admitted(source, std::move(entry), follows_on)) {
       values.push_back(*std::move(value));
     }

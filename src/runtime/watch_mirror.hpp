@@ -61,7 +61,7 @@ class WatchMirror {
   void inherit(const WatchMirror& before);
 
   /// What an owner told. @return whether something of it is new here
-  bool take(const State& state);
+  bool take(const PushedValues& pushed);
 
   /// Whether all edges have their values.
   [[nodiscard]] bool complete() const;
@@ -84,13 +84,14 @@ class WatchMirror {
   };
   struct Source {
     std::vector<std::uint32_t> edges;  // by the entries' indices
-    StatePieces pieces;
+    PushedPieces pieces;
     std::uint64_t commit = 0;  // of the owner's: all until then is here; 0: nothing yet
     std::uint64_t heard = 0;   // the newest commit of which something came
   };
 
   /// The entry as the mirror is to take it, unless it is old or must wait.
-  [[nodiscard]] std::optional<News> admitted(const Source& source, News entry, bool follows_on);
+  [[nodiscard]] std::optional<PushedValue> admitted(const Source& source, PushedValue entry,
+                                                    bool follows_on);
   [[nodiscard]] const Source* source_like(const WatchRoute::Source& source) const;
 
   WatchRoute route_;

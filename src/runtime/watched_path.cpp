@@ -84,17 +84,17 @@ bool WatchedPath::prepare(WatchRoute route) {
   return shown;
 }
 
-WatchedPath::Taken WatchedPath::take(const State& state) {
+WatchedPath::Taken WatchedPath::take(const PushedValues& pushed) {
   Taken taken;
-  bool news = false;
+  bool is_new = false;
   {
     const std::lock_guard lock(mutex_);
-    if (followed_ != nullptr && followed_->take(state)) news = true;
-    if (next_ != nullptr && next_->take(state)) news = true;
+    if (followed_ != nullptr && followed_->take(pushed)) is_new = true;
+    if (next_ != nullptr && next_->take(pushed)) is_new = true;
     taken.rerouted = swap_if_ready();
     const auto& latest = next_ != nullptr ? next_ : followed_;
     taken.lacks = latest != nullptr && latest->lacks();
-    if (news) messages_.fetch_add(1, std::memory_order_relaxed);
+    if (is_new) messages_.fetch_add(1, std::memory_order_relaxed);
   }
   changed_.notify_all();  // late samples are nothing new to show, but waited for
   return taken;

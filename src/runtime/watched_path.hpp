@@ -46,12 +46,12 @@ class WatchedPath {
   [[nodiscard]] const std::string& b() const { return b_; }
   [[nodiscard]] const WatchOptions& options() const { return options_; }
 
-  /// What has come of a state.
+  /// What has come of pushed values.
   struct Taken {
     bool rerouted = false;  ///< another route is shown from now on
     bool lacks = false;     ///< something is to be asked for
   };
-  Taken take(const State& state);
+  Taken take(const PushedValues& pushed);
 
   // --- for Watches, from one thread ---
 

@@ -61,10 +61,10 @@ Result<WatchRoute> Watcher::plan(const WatchedPath& path) {
                      period_of(options.rate), own_incarnation);
 }
 
-bool Watcher::on_state(const State& state) {
+bool Watcher::on_pushed(const PushedValues& pushed) {
   Watches* watches = watching_.load();
   if (watches == nullptr) return false;
-  watches->on_state(state);
+  watches->on_pushed(pushed);
   return true;
 }
 

@@ -38,7 +38,7 @@ class Watcher {
                                                            const WatchOptions& options);
 
   /// What was pushed. @return whether anybody here watches
-  bool on_state(const State& state);
+  bool on_pushed(const PushedValues& pushed);
 
   /// Whether a path that is watched could be looked up so from what has been pushed.
   [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,

@@ -51,7 +51,7 @@ void Watches::look_again() {
   changed_.notify_one();
 }
 
-void Watches::on_state(const State& state) {
+void Watches::on_pushed(const PushedValues& pushed) {
   std::vector<Path> paths;
   {
     const std::lock_guard lock(mutex_);
@@ -59,7 +59,7 @@ void Watches::on_state(const State& state) {
   }
   bool lacks = false;
   for (const Path& path : paths) {
-    const auto taken = path->take(state);
+    const auto taken = path->take(pushed);
     if (taken.rerouted) tell_rerouted(path);
     lacks = lacks || taken.lacks;
   }
@@ -141,9 +141,9 @@ bool Watches::cannot_be_planned(const Path& path, Error why) {
   const bool was_live = path->live();
   if (was_live && !path->is_gone(why, Clock::now())) {
     // What is here goes on to be told, with its stamps; the owner may return.
-    const bool is_news_awaited = why.code == Errc::kUnreachable;
+    const bool may_return = why.code == Errc::kUnreachable;
     path->set_health(tl::unexpected(std::move(why)));
-    return is_news_awaited;
+    return may_return;
   }
   if (was_live) tell(path, why.message);
   path->interrupt(std::move(why));
@@ -155,10 +155,10 @@ bool Watches::ask(const Path& path, WatchRoute& route, std::optional<Time> from)
   const std::vector<Reply> replies = links_.ask(route.parts);
   bool all = true;
   for (std::size_t i = 0; i < replies.size(); ++i) {
-    const auto* state = std::get_if<State>(&replies[i].body);
+    const auto* pushed = std::get_if<PushedValues>(&replies[i].body);
     // An owner that has started anew since it was heard has other groups.
-    if (state != nullptr && state->group == route.sources[i].group) {
-      if (path->take(*state).rerouted) tell_rerouted(path);
+    if (pushed != nullptr && pushed->group == route.sources[i].group) {
+      if (path->take(*pushed).rerouted) tell_rerouted(path);
       continue;
     }
     all = false;

@@ -42,7 +42,7 @@ class Watches {
                                                    const WatchOptions& options);
 
   /// What was pushed.
-  void on_state(const State& state);
+  void on_pushed(const PushedValues& pushed);
 
   /// Whether a path that is watched could be looked up so from what has been pushed.
   [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,

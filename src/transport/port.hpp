@@ -27,7 +27,7 @@ class TransportHandler {
   virtual void on_update(const Update& update) = 0;
   virtual void on_joints(const JointUpdate& update) = 0;
   /// Of a group that is watched.
-  virtual void on_state(const State& state) = 0;
+  virtual void on_pushed(const PushedValues& pushed) = 0;
   /// Somebody more can be reached who watches a group: from now on all that is pushed arrives there.
   virtual void on_watcher(std::uint64_t) {}
   virtual void on_page(const Page& page) = 0;
@@ -107,7 +107,7 @@ class Transport {
   virtual void unwatch(std::uint64_t group) = 0;
 
   /// Sends to those who watch the group, or gives back what was needed for that. May be lost.
-  virtual void push(const State& state) = 0;
+  virtual void push(const PushedValues& pushed) = 0;
   virtual void end_pushing(std::uint64_t group) = 0;
 
   /// Whether the presence of all who were there when this participant started should have come by now.

@@ -18,8 +18,8 @@
 #include "tfdude/types/edge.hpp"
 #include "tfdude/types/query.hpp"
 
-#include "tree/news.hpp"
 #include "tree/path_correlation.hpp"
+#include "tree/pushed_value.hpp"
 #include "tree/segments.hpp"
 
 namespace tfdude {
@@ -225,13 +225,15 @@ class Forest {
   /// What was written to held edges since the cursors, which are moved on to its commit: samples, also those that came
   /// late, after younger ones, or the value that holds for all times. An edge that is not held, or hangs under another
   /// parent, is left out, and its cursor stays. Takes no lock.
-  [[nodiscard]] NewsOfCommit news(std::vector<EdgeCursor>& cursors, const NewsQuery& query) const;
+  [[nodiscard]] PushedCommit values_since(std::vector<EdgeCursor>& cursors,
+                                          const PushedQuery& query) const;
 
-  /// Takes over what news() of another forest told, as one commit. What is here already, or older than what is kept, is
-  /// passed over; where process noise is told, the edge's history goes.
+  /// Takes over what values_since() of another forest told, as one commit. What is here already, or older than what is
+  /// kept, is passed over; where process noise is told, the edge's history goes.
   /// @param edges  held here, by the values' indices
   /// @param replace  samples of which there is another with that stamp; else they are passed over
-  void take(const std::vector<Handle>& edges, const std::vector<News>& values, bool replace = true);
+  void take(const std::vector<Handle>& edges, const std::vector<PushedValue>& values,
+            bool replace = true);
 
   /// Calls a function after each commit, from the thread that made it, which holds the forest's lock: it must be quick
   /// and not write to the forest. Null: none any more.

@@ -96,10 +96,10 @@ class Forest::Impl {
   // Of what another forest tells (forest_mirror.cpp).
 
   /// Pushes a value of one of its edges. @return whether that is new here
-  bool push_told(const HeldVersion& edge, const News& value, bool replace);
+  bool push_told(const HeldVersion& edge, const PushedValue& value, bool replace);
   bool push_told_sample(const HeldVersion& edge, const Transform& X_PC, std::int64_t stamp,
                         bool replace);
-  void begin_told_history(std::uint32_t slot, const News& value);
+  void begin_told_history(std::uint32_t slot, const PushedValue& value);
 
   // Of what errors have to do with each other (forest_correlation.cpp).
 

@@ -12,7 +12,7 @@ bool same(const Transform& a, const Transform& b) {
 }  // namespace
 
 // Static, until a sample of it follows.
-void Forest::Impl::begin_told_history(std::uint32_t slot, const News& value) {
+void Forest::Impl::begin_told_history(std::uint32_t slot, const PushedValue& value) {
   HeldVersion& fresh = push_held(slot, value.X);
   forget_history(fresh);
   if (value.process_noise->upper() == Covariance::Upper{}) return;
@@ -38,7 +38,7 @@ bool Forest::Impl::push_told_sample(const HeldVersion& edge, const Transform& X_
   return true;
 }
 
-bool Forest::Impl::push_told(const HeldVersion& edge, const News& value, bool replace) {
+bool Forest::Impl::push_told(const HeldVersion& edge, const PushedValue& value, bool replace) {
   if (!is_finite(value.X)) return false;
   const std::uint32_t slot = edge.slot;
   if (value.process_noise) begin_told_history(slot, value);
@@ -54,15 +54,16 @@ bool Forest::Impl::push_told(const HeldVersion& edge, const News& value, bool re
   return true;
 }
 
-void Forest::take(const std::vector<Handle>& edges, const std::vector<News>& values, bool replace) {
+void Forest::take(const std::vector<Handle>& edges, const std::vector<PushedValue>& values,
+                  bool replace) {
   const std::lock_guard lock(impl_->mutex_);
-  const auto edge_of = [&](const News& value) {
+  const auto edge_of = [&](const PushedValue& value) {
     const Version* edge =
         value.index < edges.size() ? impl_->frames_.newest_held(edges[value.index]) : nullptr;
     return static_cast<const HeldVersion*>(edge);
   };
   bool changed = false;
-  for (const News& value : values) {
+  for (const PushedValue& value : values) {
     const HeldVersion* edge = edge_of(value);
     if (edge != nullptr && impl_->push_told(*edge, value, replace)) changed = true;
   }

@@ -43,7 +43,7 @@ struct SegmentValues {
   std::vector<PathCorrelation> correlations{};
   std::vector<PathCorrelation> correlations_at_hint{};
   std::uint64_t commit = 0;       ///< of which the values are; see revise()
-  std::uint64_t history = 0;      ///< the newest of their edges': see News
+  std::uint64_t history = 0;      ///< the newest of their edges': see PushedValue
   std::uint64_t incarnation = 0;  ///< of the owner that counts the commits; see Partition
 };
 

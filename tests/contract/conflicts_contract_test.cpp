@@ -33,19 +33,19 @@ class Listener {
             const std::lock_guard lock(mutex_);
             heard_.push_back(change);
           }
-          news_.notify_all();
+          changed_.notify_all();
         })) {}
 
   template <class Condition>
   [[nodiscard]] bool hears(Condition condition) {
     std::unique_lock lock(mutex_);
-    return news_.wait_for(lock, kLong,
-                          [&] { return std::any_of(heard_.begin(), heard_.end(), condition); });
+    return changed_.wait_for(lock, kLong,
+                             [&] { return std::any_of(heard_.begin(), heard_.end(), condition); });
   }
 
  private:
   std::mutex mutex_;
-  std::condition_variable news_;
+  std::condition_variable changed_;
   std::vector<Change> heard_;
   Subscription subscription_;  // last: it ends before the rest does
 };
@@ -159,7 +159,7 @@ TEST_CASE("a listener may use the client, and ends with its subscription") {
   const int transport = GENERATE(0, 1);
   Pair p(joined_by(transport));
   std::mutex mutex;
-  std::condition_variable news;
+  std::condition_variable changed;
   std::vector<std::string> seen;
   Subscription subscription = p.client.on_change([&](const Change& change) {
     if (change.kind != ChangeKind::kFrameAdded) return;
@@ -169,12 +169,12 @@ TEST_CASE("a listener may use the client, and ends with its subscription") {
       const std::lock_guard lock(mutex);
       seen.push_back(change.frame + (X ? " found" : " not found"));
     }
-    news.notify_all();
+    changed.notify_all();
   });
   REQUIRE(p.arms.add("tool", "arm", {}));
   {
     std::unique_lock lock(mutex);
-    CHECK(news.wait_for(lock, kLong, [&] { return seen.size() == 2; }));
+    CHECK(changed.wait_for(lock, kLong, [&] { return seen.size() == 2; }));
     CHECK(seen == std::vector<std::string>{"tool found", "answer found"});
   }
   subscription = Subscription();

@@ -275,10 +275,10 @@ class World {
   void lose(const std::string& name, std::uint64_t incarnation) {
     for (testing::Replica* replica : {&own_->replica, &hearer_}) {
       const bool there = replica->directory.serving(name).has_value();
-      const bool news = replica->directory.lost(name, incarnation, Time{});
-      demand(there || !news, "nobody is lost who was not there");
-      demand(!news || !replica->directory.serving(name), "who is lost is not there");
-      if (news && replica == &own_->replica) owner_.misses(name);
+      const bool newly_lost = replica->directory.lost(name, incarnation, Time{});
+      demand(there || !newly_lost, "nobody is lost who was not there");
+      demand(!newly_lost || !replica->directory.serving(name), "who is lost is not there");
+      if (newly_lost && replica == &own_->replica) owner_.misses(name);
     }
   }
 

@@ -38,7 +38,7 @@ class MutePartition final : public TransportHandler {
   void on_reply(const Reply&) override {}
   void on_update(const Update&) override {}
   void on_joints(const JointUpdate&) override {}
-  void on_state(const State&) override {}
+  void on_pushed(const PushedValues&) override {}
   void on_page(const Page&) override {}
   void on_presence(const Presence&) override {}
   void on_lost(const std::string&, std::uint64_t) override {}

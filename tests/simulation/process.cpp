@@ -44,7 +44,7 @@ Process::Process(Surroundings& world, Setting setting)
       pushes_(
           forest_,
           [this] { later(kPushAfter, [this] { pushes_.push_due(world_.timeline.now()); }); },
-          [this](const State& state) { push(state); }) {
+          [this](const PushedValues& pushed) { push(pushed); }) {
   directory_.changes().watch();
 }
 
@@ -261,29 +261,29 @@ void Process::on_reply(const Reply& reply) {
 void Process::answer_watch(std::uint64_t from, const Request& request) {
   const auto& body = std::get<WatchRequest>(request.body);
   const std::uint64_t group = watch_group(partition(), member_.presence().incarnation, body);
-  auto state = pushes_.watch(group, body, world_.timeline.now());
+  auto pushed = pushes_.watch(group, body, world_.timeline.now());
   Reply reply{request.sequence, 0, Done{}};
-  if (state) {
-    reply.body = *std::move(state);
+  if (pushed) {
+    reply.body = *std::move(pushed);
   } else {
-    reply.body = std::move(state.error());
+    reply.body = std::move(pushed.error());
   }
   world_.network.send(*this, from, [reply](Process& there) { there.on_reply(reply); });
 }
 
-void Process::push(const State& state) {
+void Process::push(const PushedValues& pushed) {
   const std::uint64_t number = ++pushed_;
   for (const std::uint64_t peer : world_.network.met_by(*this)) {
     if (peers_.count(peer) > 0) continue;  // an owner, none of which watches
-    world_.network.send(*this, peer, [from = id(), number, state](Process& there) {
-      there.on_state(from, number, state);
+    world_.network.send(*this, peer, [from = id(), number, pushed](Process& there) {
+      there.on_pushed(from, number, pushed);
     });
   }
 }
 
-void Process::on_state(std::uint64_t from, std::uint64_t number, const State& state) {
+void Process::on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed) {
   for (const auto& one : watches_) {
-    if (const auto watch = one.lock()) watch->on_state(from, number, state);
+    if (const auto watch = one.lock()) watch->on_pushed(from, number, pushed);
   }
 }
 

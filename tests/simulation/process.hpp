@@ -63,7 +63,7 @@ class Process : public std::enable_shared_from_this<Process> {
   void on_request(std::uint64_t from, const Request& request);
   void on_reply(const Reply& reply);
   /// @param number  the sender counts what it pushes
-  void on_state(std::uint64_t from, std::uint64_t number, const State& state);
+  void on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed);
   /// Somebody listens to a group of watchers.
   void on_watcher(std::uint64_t group);
 
@@ -112,7 +112,7 @@ class Process : public std::enable_shared_from_this<Process> {
 
   [[nodiscard]] Time wall() const;
   void answer_watch(std::uint64_t from, const Request& request);
-  void push(const State& state);
+  void push(const PushedValues& pushed);
   void each_server(const std::string& partition, const std::function<void(std::uint64_t)>& tell);
   void tick();
   void look_for_silent();

@@ -4,7 +4,7 @@
 
 namespace tfdude::simulation {
 
-Result<State> Pushes::watch(std::uint64_t group, const WatchRequest& request, Instant now) {
+Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& request, Instant now) {
   if (auto ok = check_watch(request); !ok) return tl::unexpected(ok.error());
   if (groups_.empty()) forest_.on_commit(later_);
   const auto known = groups_.try_emplace(group, Group{WatchedGroup(group, request)}).first;
@@ -20,7 +20,7 @@ Result<State> Pushes::watch(std::uint64_t group, const WatchRequest& request, In
 void Pushes::tell_all(std::uint64_t group) {
   const auto known = groups_.find(group);
   if (known == groups_.end()) return;
-  if (auto state = known->second.watched.snapshot(forest_, {})) push(*std::move(state));
+  if (auto pushed = known->second.watched.snapshot(forest_, {})) push(*std::move(pushed));
 }
 
 void Pushes::push_due(Instant now) {
@@ -29,14 +29,14 @@ void Pushes::push_due(Instant now) {
       group = groups_.erase(group);
       continue;
     }
-    State state = group->second.watched.news(forest_);
-    if (!state.entries.empty()) push(std::move(state));
+    PushedValues pushed = group->second.watched.next_push(forest_);
+    if (!pushed.entries.empty()) push(std::move(pushed));
     ++group;
   }
 }
 
-void Pushes::push(State&& state) {
-  for (const State& piece : pieces_of(std::move(state))) push_(piece);
+void Pushes::push(PushedValues&& pushed) {
+  for (const PushedValues& piece : pieces_of(std::move(pushed))) push_(piece);
 }
 
 }  // namespace tfdude::simulation

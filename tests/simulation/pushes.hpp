@@ -13,14 +13,15 @@ namespace tfdude::simulation {
 /// The owner's side of watched paths, as Pusher does it, in steps.
 class Pushes {
  public:
-  using Push = std::function<void(const State&)>;
+  using Push = std::function<void(const PushedValues&)>;
 
   /// @param later  calls push_due() a moment later
   Pushes(Forest& forest, std::function<void()> later, Push push)
       : forest_(forest), later_(std::move(later)), push_(std::move(push)) {}
 
   /// Begins to push to a group, or goes on for another lease.
-  [[nodiscard]] Result<State> watch(std::uint64_t group, const WatchRequest& request, Instant now);
+  [[nodiscard]] Result<PushedValues> watch(std::uint64_t group, const WatchRequest& request,
+                                           Instant now);
 
   /// Somebody listens to the group only now.
   void tell_all(std::uint64_t group);
@@ -34,7 +35,7 @@ class Pushes {
     Instant lease{};
   };
 
-  void push(State&& state);
+  void push(PushedValues&& pushed);
 
   Forest& forest_;
   const std::function<void()> later_;

@@ -67,24 +67,24 @@ void Watch::open(const WatchRoute::Source& source) {
 void Watch::on_reply(const Reply& reply) {
   const auto asked = asked_.find(reply.sequence);
   if (asked == asked_.end()) return;
-  const auto* state = std::get_if<State>(&reply.body);
-  if (state != nullptr && state->group == asked->second) return take(*state);
+  const auto* pushed = std::get_if<PushedValues>(&reply.body);
+  if (pushed != nullptr && pushed->group == asked->second) return take(*pushed);
   const auto* error = std::get_if<Error>(&reply.body);
   if (!path_.live()) path_.interrupt(error ? *error : Error{Errc::kNotOwner, "another group"});
 }
 
 // A DDS reader drops what comes after something that the same writer has sent later.
-void Watch::on_state(std::uint64_t from, std::uint64_t number, const State& state) {
-  if (heard_.count(state.group) == 0) return;
+void Watch::on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed) {
+  if (heard_.count(pushed.group) == 0) return;
   std::uint64_t& newest = newest_[from];
   if (number <= newest) return;
   newest = number;
   process_.world().count("something was pushed");
-  take(state);
+  take(pushed);
 }
 
-void Watch::take(const State& state) {
-  (void)path_.take(state);
+void Watch::take(const PushedValues& pushed) {
+  (void)path_.take(pushed);
   shown_();
 }
 

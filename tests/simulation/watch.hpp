@@ -31,14 +31,14 @@ class Watch : public std::enable_shared_from_this<Watch> {
   // ---- what the process hands over
   void on_reply(const Reply& reply);
   /// @param from  the process that has pushed it; @param number  it counts what it pushes
-  void on_state(std::uint64_t from, std::uint64_t number, const State& state);
+  void on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed);
 
  private:
   void attend();
   void look();
   void ask(WatchRoute& route);
   void open(const WatchRoute::Source& source);
-  void take(const State& state);
+  void take(const PushedValues& pushed);
 
   Process& process_;
   WatchedPath path_;

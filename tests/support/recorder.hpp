@@ -23,7 +23,7 @@ struct Heard {
   std::vector<Reply> replies;
   std::vector<Update> updates;
   std::vector<JointUpdate> joints;
-  std::vector<State> states;
+  std::vector<PushedValues> pushed;
   std::vector<Page> pages;
   std::vector<Presence> presences;
   std::vector<std::pair<std::string, std::uint64_t>> lost;
@@ -103,8 +103,8 @@ class Recorder final : public TransportHandler {
   void on_joints(const JointUpdate& update) override {
     record([&] { heard_.joints.push_back(update); });
   }
-  void on_state(const State& state) override {
-    record([&] { heard_.states.push_back(state); });
+  void on_pushed(const PushedValues& pushed) override {
+    record([&] { heard_.pushed.push_back(pushed); });
   }
   void on_page(const Page& page) override {
     record([&] { heard_.pages.push_back(page); });

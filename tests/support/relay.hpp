@@ -44,7 +44,7 @@ class Relay : public Transport, protected TransportHandler {
   void reply(const PeerId& to, const Reply& reply) override { real_->reply(to, reply); }
   Result<void> watch(std::uint64_t group) override { return real_->watch(group); }
   void unwatch(std::uint64_t group) override { real_->unwatch(group); }
-  void push(const State& state) override { real_->push(state); }
+  void push(const PushedValues& pushed) override { real_->push(pushed); }
   void end_pushing(std::uint64_t group) override { real_->end_pushing(group); }
   bool discovered() const override { return real_->discovered(); }
   bool awaits_presence() const override { return real_->awaits_presence(); }
@@ -57,7 +57,7 @@ class Relay : public Transport, protected TransportHandler {
   void on_reply(const Reply& reply) override { handler_->on_reply(reply); }
   void on_update(const Update& update) override { handler_->on_update(update); }
   void on_joints(const JointUpdate& update) override { handler_->on_joints(update); }
-  void on_state(const State& state) override { handler_->on_state(state); }
+  void on_pushed(const PushedValues& pushed) override { handler_->on_pushed(pushed); }
   void on_watcher(std::uint64_t group) override { handler_->on_watcher(group); }
   void on_page(const Page& page) override { handler_->on_page(page); }
   void on_presence(const Presence& presence) override { handler_->on_presence(presence); }

@@ -75,8 +75,8 @@ class Rig : public TransportHandler {
   void on_reply(const Reply& reply) override { requests.calls().on_reply(reply); }
   void on_update(const Update&) override {}
   void on_joints(const JointUpdate&) override {}
-  void on_state(const State& state) override {
-    if (states) states(state);
+  void on_pushed(const PushedValues& values) override {
+    if (pushed) pushed(values);
   }
   void on_page(const Page& page) override { member.on_page(page); }
   void on_presence(const Presence& presence) override { member.on_presence(presence); }
@@ -88,7 +88,7 @@ class Rig : public TransportHandler {
 
   const Options options;
   std::function<void()> on_contest;
-  std::function<void(const State&)> states;
+  std::function<void(const PushedValues&)> pushed;
   std::function<Result<void>()> still_in;  // else the member's
   std::atomic<int> routes{0};
   std::atomic<int> others{0};

@@ -174,7 +174,7 @@ inline void check_same(const std::vector<Transform>& actual,
   for (std::size_t i = 0; i < actual.size(); ++i) check_same(actual[i], expected[i]);
 }
 
-inline void check_same(const State& actual, const State& expected) {
+inline void check_same(const PushedValues& actual, const PushedValues& expected) {
   CHECK(actual.group == expected.group);
   CHECK(actual.after == expected.after);
   CHECK(actual.commit == expected.commit);

@@ -198,10 +198,10 @@ bool take(const Bytes& bytes) {
                          time_of(1'700'000'000'000'000'001),
                          std::chrono::nanoseconds(5),
                          {random.transform()}}},
-          {7, 1, State{1, {}}},
+          {7, 1, PushedValues{1, {}}},
           {8, 1,
-           State{18446744073709551615ULL,
-                 {{0, std::nullopt, random.transform()}, {7, time_of(5), Transform()}}}},
+           PushedValues{18446744073709551615ULL,
+                        {{0, std::nullopt, random.transform()}, {7, time_of(5), Transform()}}}},
           {9, 1, std::vector<HistoryInfo>{}},
           {11, 1, correlated_values(random)},
           {12, 1, std::vector<EdgeConsistency>{{"hand", 7, 3, {1.5, 2.5, 3.5}}, {}}},
@@ -209,7 +209,7 @@ bool take(const Bytes& bytes) {
           {10, 1, std::vector<HistoryInfo>{history_info("hand"), HistoryInfo{}}}};
 }
 
-[[nodiscard]] inline std::vector<State> states(Random& random) {
+[[nodiscard]] inline std::vector<PushedValues> pushed_values(Random& random) {
   return {{},
           {1, {{4294967295U, time_of(INT64_MAX), random.transform()}}},
           {3, {{1, {}, random.transform(), correlation(random)}, {2, {}, random.transform()}}},
@@ -284,7 +284,7 @@ bool take(const Bytes& bytes) {
                      serialized<JointsType>(to_wire(one)), well_formed_joints,
                      take<JointsType, wire::Joints>});
   }
-  for (const State& one : states(random)) {
+  for (const PushedValues& one : pushed_values(random)) {
     kinds.push_back({"state of " + std::to_string(one.entries.size()),
                      serialized<StateType>(to_wire(one)), well_formed_state,
                      take<StateType, wire::State>});

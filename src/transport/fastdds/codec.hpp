@@ -29,7 +29,7 @@ void write_wire(const JointUpdate& update, wire::Joints& sample);
 [[nodiscard]] wire::Reply to_wire(const Reply& reply);
 [[nodiscard]] wire::Update to_wire(const Update& update);
 [[nodiscard]] wire::Joints to_wire(const JointUpdate& update);
-[[nodiscard]] wire::State to_wire(const State& state);
+[[nodiscard]] wire::State to_wire(const PushedValues& pushed);
 [[nodiscard]] wire::Page to_wire(const Page& page);
 [[nodiscard]] wire::Presence to_wire(const Presence& presence);
 
@@ -41,7 +41,7 @@ void write_wire(const JointUpdate& update, wire::Joints& sample);
 /// Likewise, by the name of the joint.
 [[nodiscard]] Result<JointUpdate> from_wire(const wire::Joints& sample,
                                             const std::function<bool(std::string_view)>& accept);
-[[nodiscard]] Result<State> from_wire(const wire::State& sample);
+[[nodiscard]] Result<PushedValues> from_wire(const wire::State& sample);
 [[nodiscard]] Result<Page> from_wire(const wire::Page& sample);
 [[nodiscard]] Result<Presence> from_wire(const wire::Presence& sample);
 

@@ -322,7 +322,7 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
     case kStamped:
       return put<SegmentValues>(reply, read_stamped(body.stamped()));
     case kState:
-      return put<State>(reply, tfdude::fastdds::from_wire(body.watched()));
+      return put<PushedValues>(reply, tfdude::fastdds::from_wire(body.watched()));
     case kPasts: {
       std::vector<HistoryInfo> histories;
       for (const wire::HistoryInfo& history : body.histories())
@@ -361,42 +361,42 @@ Result<Reply> from_wire(const wire::Reply& sample) {
   return reply;
 }
 
-Result<State> from_wire(const wire::State& sample) {
-  State state;
-  state.group = sample.group();
-  state.after = sample.after();
-  state.commit = sample.commit();
-  state.piece = sample.piece();
-  state.pieces = sample.pieces();
-  state.entries.reserve(sample.entries().size());
-  for (const wire::StateEntry& entry : sample.entries()) {
-    const auto stamp = stamp_from_wire(entry.stamp(), "the stamp of a state");
+Result<PushedValues> from_wire(const wire::State& sample) {
+  PushedValues pushed;
+  pushed.group = sample.group();
+  pushed.after = sample.after();
+  pushed.commit = sample.commit();
+  pushed.piece = sample.piece();
+  pushed.pieces = sample.pieces();
+  pushed.entries.reserve(sample.entries().size());
+  for (const wire::PushedEntry& entry : sample.entries()) {
+    const auto stamp = stamp_from_wire(entry.stamp(), "the stamp of a pushed value");
     if (!stamp) return tl::unexpected(stamp.error());
     auto X = computed_from(entry.x());
-    if (!X) return fail_at("a state", X.error());
-    state.entries.push_back({entry.index(), *stamp, *X, {}, entry.history(), {}});
+    if (!X) return fail_at("pushed values", X.error());
+    pushed.entries.push_back({entry.index(), *stamp, *X, {}, entry.history(), {}});
   }
-  for (const wire::StateCorrelation& one : sample.correlations()) {
-    if (one.entry() >= state.entries.size()) {
-      return fail(Errc::kInvalidInput, "a state: correlation of entry " +
+  for (const wire::PushedCorrelation& one : sample.correlations()) {
+    if (one.entry() >= pushed.entries.size()) {
+      return fail(Errc::kInvalidInput, "pushed values: correlation of entry " +
                                            std::to_string(one.entry()) + ", of " +
-                                           std::to_string(state.entries.size()));
+                                           std::to_string(pushed.entries.size()));
     }
     auto correlation = read_correlation(one.edge_correlation());
-    if (!correlation) return fail_at("a state", correlation.error());
-    state.entries[one.entry()].correlation = *std::move(correlation);
+    if (!correlation) return fail_at("pushed values", correlation.error());
+    pushed.entries[one.entry()].correlation = *std::move(correlation);
   }
-  for (const wire::StateBeginning& one : sample.beginnings()) {
-    if (one.entry() >= state.entries.size()) {
-      return fail(Errc::kInvalidInput, "a state: a history begins with entry " +
+  for (const wire::PushedBeginning& one : sample.beginnings()) {
+    if (one.entry() >= pushed.entries.size()) {
+      return fail(Errc::kInvalidInput, "pushed values: a history begins with entry " +
                                            std::to_string(one.entry()) + ", of " +
-                                           std::to_string(state.entries.size()));
+                                           std::to_string(pushed.entries.size()));
     }
     auto noise = read_process_noise(one.process_noise());
-    if (!noise) return fail_at("a state", noise.error());
-    state.entries[one.entry()].process_noise = *noise;
+    if (!noise) return fail_at("pushed values", noise.error());
+    pushed.entries[one.entry()].process_noise = *noise;
   }
-  return state;
+  return pushed;
 }
 
 Result<Update> from_wire(const wire::Update& sample,

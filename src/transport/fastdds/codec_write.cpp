@@ -272,7 +272,7 @@ struct ReplyWriter {
     body.at_hint(wire_values(found.at_hint));
     out.stamped(std::move(body));
   }
-  void operator()(const State& state) { out.watched(to_wire(state)); }
+  void operator()(const PushedValues& pushed) { out.watched(to_wire(pushed)); }
   void operator()(const std::vector<HistoryInfo>& histories) {
     std::vector<wire::HistoryInfo> body;
     for (std::size_t i = 0; i < histories.size() && i < kMaxItems; ++i)
@@ -310,20 +310,20 @@ wire::Reply to_wire(const Reply& reply) {
   return sample;
 }
 
-wire::State to_wire(const State& state) {
+wire::State to_wire(const PushedValues& pushed) {
   wire::State sample;
-  sample.group(state.group);
-  sample.after(state.after);
-  sample.commit(state.commit);
-  sample.piece(state.piece);
-  sample.pieces(state.pieces);
-  sample.entries().resize(state.entries.size());
-  for (std::size_t i = 0; i < state.entries.size(); ++i) {
-    sample.entries()[i].index(state.entries[i].index);
-    sample.entries()[i].stamp(wire_stamp(state.entries[i].stamp));
-    sample.entries()[i].history(state.entries[i].history);
-    sample.entries()[i].x(to_flat(state.entries[i].X));
-    if (const auto& noise = state.entries[i].process_noise) {
+  sample.group(pushed.group);
+  sample.after(pushed.after);
+  sample.commit(pushed.commit);
+  sample.piece(pushed.piece);
+  sample.pieces(pushed.pieces);
+  sample.entries().resize(pushed.entries.size());
+  for (std::size_t i = 0; i < pushed.entries.size(); ++i) {
+    sample.entries()[i].index(pushed.entries[i].index);
+    sample.entries()[i].stamp(wire_stamp(pushed.entries[i].stamp));
+    sample.entries()[i].history(pushed.entries[i].history);
+    sample.entries()[i].x(to_flat(pushed.entries[i].X));
+    if (const auto& noise = pushed.entries[i].process_noise) {
       sample.beginnings().emplace_back();
       sample.beginnings().back().entry(static_cast<std::uint32_t>(i));
       const Covariance::Upper& upper = noise->upper();
@@ -331,7 +331,7 @@ wire::State to_wire(const State& state) {
         sample.beginnings().back().process_noise().assign(upper.begin(), upper.end());
       }
     }
-    const Correlation& correlation = state.entries[i].correlation;
+    const Correlation& correlation = pushed.entries[i].correlation;
     if (correlation.empty()) continue;
     sample.correlations().emplace_back();
     sample.correlations().back().entry(static_cast<std::uint32_t>(i));

@@ -105,10 +105,10 @@ edds::Topic* FastDdsTransport::create_topic(const char* name, const edds::TypeSu
 
 Result<void> FastDdsTransport::create_endpoints() {
   using Prefix = ertps::GuidPrefix_t;
-  states_.emplace(
+  push_channels_.emplace(
       context(), *topics_.state,
-      StateChannels::Calls{[this](const State& state) { handler_->on_state(state); },
-                           [this](std::uint64_t group) { handler_->on_watcher(group); }});
+      PushChannels::Calls{[this](const PushedValues& pushed) { handler_->on_pushed(pushed); },
+                          [this](std::uint64_t group) { handler_->on_watcher(group); }});
   presence_ = std::make_unique<Reader<wire::Presence>>(
       context(), *topics_.presence, std::string(), "presence_reader",
       Reader<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
@@ -209,7 +209,7 @@ void FastDdsTransport::stop() {
   pages_.reset();
   beats_.reset();
   presence_.reset();
-  states_.reset();
+  push_channels_.reset();
   reply_writers_.clear();
   request_writers_.clear();
   update_writers_.clear();

@@ -14,7 +14,7 @@
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/owned_filter.hpp"
 #include "transport/fastdds/peers.hpp"
-#include "transport/fastdds/state_channels.hpp"
+#include "transport/fastdds/push_channels.hpp"
 #include "transport/fastdds/worker.hpp"
 #include "transport/port.hpp"
 
@@ -45,10 +45,10 @@ class FastDdsTransport final : public Transport {
   std::unique_ptr<Channel<JointUpdate>> joint_channel(const std::string& partition) override;
   Result<void> flush(Deadline deadline) override;
   void reply(const PeerId& to, const Reply& reply) override;
-  Result<void> watch(std::uint64_t group) override { return states_->watch(group); }
-  void unwatch(std::uint64_t group) override { states_->unwatch(group); }
-  void push(const State& state) override { states_->push(state); }
-  void end_pushing(std::uint64_t group) override { states_->end_pushing(group); }
+  Result<void> watch(std::uint64_t group) override { return push_channels_->watch(group); }
+  void unwatch(std::uint64_t group) override { push_channels_->unwatch(group); }
+  void push(const PushedValues& pushed) override { push_channels_->push(pushed); }
+  void end_pushing(std::uint64_t group) override { push_channels_->end_pushing(group); }
   bool discovered() const override { return peers_.discovered(); }
   bool awaits_presence() const override { return peers_.awaits_presence(); }
   Milliseconds discovery_time() const override;
@@ -129,7 +129,7 @@ class FastDdsTransport final : public Transport {
   std::unique_ptr<Reader<wire::Page>> pages_;
   std::unique_ptr<Reader<wire::Presence>> presence_;
   std::unique_ptr<Reader<wire::Presence>> beats_;
-  std::optional<StateChannels> states_;
+  std::optional<PushChannels> push_channels_;
   std::optional<Worker> worker_;
 };
 

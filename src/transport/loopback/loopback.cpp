@@ -240,9 +240,9 @@ class LoopbackTransport final : public Transport {
     self_->watches.erase(group);
   }
 
-  void push(const State& state) override {
-    hub_->deliver([&](const auto& member) { return member.watches.count(state.group) > 0; },
-                  [&](TransportHandler& handler) { handler.on_state(state); });
+  void push(const PushedValues& pushed) override {
+    hub_->deliver([&](const auto& member) { return member.watches.count(pushed.group) > 0; },
+                  [&](TransportHandler& handler) { handler.on_pushed(pushed); });
   }
 
   void end_pushing(std::uint64_t) override {}

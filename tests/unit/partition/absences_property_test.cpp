@@ -317,12 +317,12 @@ class World {
     presence.pages = owner.partition.page_count();
     presence.absent = owner.replica.directory.absent();
     last_life_[who] = presence.incarnation;
-    const bool news = !(presence == owner.presence) || !std::exchange(owner.announced, true);
+    const bool changed = !(presence == owner.presence) || !std::exchange(owner.announced, true);
     owner.presence = presence;
     for (std::size_t hearer = 0; hearer <= kOwners; ++hearer) {
       if (hearer == who || (hearer < kOwners && !there(hearer))) continue;
       for (const Page& page : pages) say({who, hearer}, page);
-      if (news) say({who, hearer}, presence);
+      if (changed) say({who, hearer}, presence);
     }
   }
 

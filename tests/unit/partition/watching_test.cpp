@@ -30,9 +30,9 @@ const PathEnds kArm{"base", "arm"};
 const PathEnds kHand{"arm", "hand"};
 
 // "index@stamp=x", in the order of the entries.
-std::string listed(const State& state) {
+std::string listed(const PushedValues& pushed) {
   std::string text;
-  for (const News& entry : state.entries) {
+  for (const PushedValue& entry : pushed.entries) {
     text += std::to_string(entry.index) + "@" +
             (entry.stamp ? std::to_string(nanoseconds(*entry.stamp) / 1'000'000) : "-") + "=" +
             std::to_string(std::lround(entry.X.pose.translation().x())) + " ";
@@ -47,47 +47,47 @@ TEST_CASE("a group is told all, then what changes, once") {
   WatchedGroup group(7, {{kArm, kHand}});
   CHECK(group.snapshot(arm.forest, {})->group == 7);
   CHECK(listed(*group.snapshot(arm.forest, {})) == "0@-=10 1@-=100 ");
-  CHECK(listed(group.news(arm.forest)) == "0@-=10 1@-=100 ");
-  CHECK(listed(group.news(arm.forest)).empty());
+  CHECK(listed(group.next_push(arm.forest)) == "0@-=10 1@-=100 ");
+  CHECK(listed(group.next_push(arm.forest)).empty());
   REQUIRE(arm.forest.update({{"arm", along_x(11)}, {"hand", along_x(101)}}, ms(1)));
   REQUIRE(arm.forest.update({{"arm", along_x(12)}, {"hand", along_x(102)}}, ms(2)));
   REQUIRE(arm.forest.update("base", along_x(5)));  // nobody watches that
-  CHECK(listed(group.news(arm.forest)) == "0@1=11 1@1=101 0@2=12 1@2=102 ");
+  CHECK(listed(group.next_push(arm.forest)) == "0@1=11 1@1=101 0@2=12 1@2=102 ");
   REQUIRE(arm.forest.update({{"arm", along_x(13)}, {"hand", along_x(103)}}, ms(3)));
   REQUIRE(arm.forest.update({{"arm", along_x(14)}, {"hand", along_x(104)}}, ms(4)));
-  CHECK(listed(group.news(arm.forest)) == "0@3=13 1@3=103 0@4=14 1@4=104 ");
-  CHECK(group.news(arm.forest).entries.empty());
+  CHECK(listed(group.next_push(arm.forest)) == "0@3=13 1@3=103 0@4=14 1@4=104 ");
+  CHECK(group.next_push(arm.forest).entries.empty());
   CHECK(listed(*group.snapshot(arm.forest, {})) == "0@4=14 1@4=104 ");
   CHECK(listed(*group.snapshot(arm.forest, ms(3))) == "0@3=13 1@3=103 0@4=14 1@4=104 ");
   // Late, and earlier than what was asked for.
   REQUIRE(arm.forest.update({{"arm", along_x(9)}, {"hand", along_x(99)}}, Time(2500us)));
-  CHECK(listed(group.news(arm.forest)) == "0@2=9 1@2=99 ");
+  CHECK(listed(group.next_push(arm.forest)) == "0@2=9 1@2=99 ");
 }
 
-TEST_CASE("news follow on from those before, and all that is told begins with nothing") {
+TEST_CASE("each push follows on from the one before, and the first begins with nothing") {
   Arm arm;
   WatchedGroup group(7, {{kArm, kHand}});
-  const State first = group.news(arm.forest);
+  const PushedValues first = group.next_push(arm.forest);
   CHECK(first.after == 0);
   REQUIRE(arm.forest.update("base", along_x(7)));  // nobody watches that
   REQUIRE(arm.forest.update("arm", along_x(11)));
-  const State second = group.news(arm.forest);
+  const PushedValues second = group.next_push(arm.forest);
   CHECK(second.after == first.commit);
   CHECK(second.commit == first.commit + 2);
   CHECK(group.snapshot(arm.forest, {})->after == 0);
   CHECK(group.snapshot(arm.forest, {})->commit == second.commit);
   REQUIRE(arm.forest.update("arm", along_x(12)));
-  CHECK(group.news(arm.forest).after == second.commit);
+  CHECK(group.next_push(arm.forest).after == second.commit);
 }
 
-TEST_CASE("a state in pieces is one again, if all of them come") {
-  State state{7, {}, 3, 5};
+TEST_CASE("pushed values in pieces are whole again, if all of them come") {
+  PushedValues pushed{7, {}, 3, 5};
   for (std::uint32_t i = 0; i < 2 * kMaxItems + 1; ++i) {
-    state.entries.push_back({i, ms(i + 1), along_x(i), {}, 1, {}});
+    pushed.entries.push_back({i, ms(i + 1), along_x(i), {}, 1, {}});
   }
-  const auto pieces = pieces_of(State(state));
+  const auto pieces = pieces_of(PushedValues(pushed));
   REQUIRE(pieces.size() == 3);
-  StatePieces together;
+  PushedPieces together;
   CHECK_FALSE(together.add(pieces[0]));
   CHECK_FALSE(together.add(pieces[2]));  // one is missing
   CHECK_FALSE(together.add(pieces[0]));
@@ -95,11 +95,11 @@ TEST_CASE("a state in pieces is one again, if all of them come") {
   CHECK(together.add({7, {}, 0, 4}));  // one for itself
   const auto whole = together.add(pieces[2]);
   REQUIRE(whole);
-  CHECK(listed(*whole) == listed(state));
+  CHECK(listed(*whole) == listed(pushed));
   CHECK(whole->after == 3);
   CHECK(whole->commit == 5);
   CHECK_FALSE(together.add(pieces[2]));
-  State correlated{7, {}, 0, 5};
+  PushedValues correlated{7, {}, 0, 5};
   for (std::uint32_t i = 0; i <= kMaxCorrelated; ++i) {
     correlated.entries.push_back({i, {}, along_x(i), {true, {}, {}}, 1, {}});
   }
@@ -107,7 +107,7 @@ TEST_CASE("a state in pieces is one again, if all of them come") {
   CHECK(pieces_of({7, {}, 0, 5}).size() == 1);
 }
 
-TEST_CASE("how often watchers may want news has an end") {
+TEST_CASE("how often watchers may want values has an end") {
   CHECK(check_watch({{kArm}, false, kMaxWatchPeriod}));
   CHECK(check_watch({{kArm}}));
   CHECK(outcome(check_watch({{kArm}, false, kMaxWatchPeriod + 1ns})) == "invalid_input");
@@ -122,7 +122,7 @@ TEST_CASE("at a lower rate only the newest is told") {
   for (int t = 1; t < 10; ++t) {
     REQUIRE(arm.forest.update("arm", along_x(t), ms(2 * t)));
     REQUIRE(arm.forest.update("arm", along_x(t), ms(2 * t + 1)));
-    CHECK(listed(group.news(arm.forest)) ==
+    CHECK(listed(group.next_push(arm.forest)) ==
           "0@" + std::to_string(2 * t + 1) + "=" + std::to_string(t) + " ");
   }
 }
@@ -131,19 +131,19 @@ TEST_CASE("a segment may be told as one transform") {
   Arm arm;
   WatchedGroup group(7, {{{"world", "hand"}, {"base", "base"}}, true});
   CHECK(listed(*group.snapshot(arm.forest, {})) == "0@-=111 1@-=0 ");
-  CHECK(listed(group.news(arm.forest)) == "0@-=111 1@-=0 ");
-  CHECK(listed(group.news(arm.forest)).empty());
+  CHECK(listed(group.next_push(arm.forest)) == "0@-=111 1@-=0 ");
+  CHECK(listed(group.next_push(arm.forest)).empty());
   REQUIRE(arm.forest.update("base", along_x(2)));
-  CHECK(listed(group.news(arm.forest)) == "0@-=112 ");
+  CHECK(listed(group.next_push(arm.forest)) == "0@-=112 ");
   REQUIRE(arm.forest.update("arm", along_x(20), ms(5)));
-  CHECK(listed(group.news(arm.forest)).find("0@5=122") == 0);
-  CHECK(listed(group.news(arm.forest)).empty());
+  CHECK(listed(group.next_push(arm.forest)).find("0@5=122") == 0);
+  CHECK(listed(group.next_push(arm.forest)).empty());
   REQUIRE(arm.forest.update("arm", along_x(30), ms(7)));
   CHECK(listed(*group.snapshot(arm.forest, ms(6))) == "0@6=127 1@6=0 0@7=132 1@7=0 ");
   // What lies between the ends hangs elsewhere now.
-  const std::uint64_t before = group.news(arm.forest).entries.at(0).history;
+  const std::uint64_t before = group.next_push(arm.forest).entries.at(0).history;
   REQUIRE(arm.forest.move("hand", "base", along_x(1)));
-  const State after = group.news(arm.forest);
+  const PushedValues after = group.next_push(arm.forest);
   CHECK(listed(after) == "0@-=3 1@-=0 ");
   CHECK(after.entries.at(0).history > before);
   CHECK(after.entries.at(0).process_noise);
@@ -159,21 +159,21 @@ TEST_CASE("who watches what is not owned here is told so, and of half a path not
   }
   WatchedGroup elsewhere(7, {{{"base", "hand"}}});
   CHECK(outcome(elsewhere.snapshot(arm.forest, {})) == "not_owner");
-  CHECK(elsewhere.news(arm.forest).entries.empty());
+  CHECK(elsewhere.next_push(arm.forest).entries.empty());
   WatchedGroup segments(7, {{{"far", "hand"}}, true});
   CHECK_FALSE(segments.snapshot(arm.forest, {}));
-  CHECK(segments.news(arm.forest).entries.empty());
+  CHECK(segments.next_push(arm.forest).entries.empty());
   WatchedGroup group(7, {{kArm, kHand}});
   REQUIRE(group.snapshot(arm.forest, {}));
-  (void)group.news(arm.forest);
+  (void)group.next_push(arm.forest);
   REQUIRE(arm.forest.remove("hand"));
   REQUIRE(arm.forest.update("arm", along_x(3)));
   // It could be half of what was written: of the hand's new place these watchers would not hear.
-  CHECK(listed(group.news(arm.forest)).empty());
+  CHECK(listed(group.next_push(arm.forest)).empty());
   REQUIRE(arm.forest.add("hand", "base", along_x(4)));
-  CHECK(listed(group.news(arm.forest)).empty());
+  CHECK(listed(group.next_push(arm.forest)).empty());
   REQUIRE(arm.forest.move("hand", "arm", along_x(5)));
-  CHECK(listed(group.news(arm.forest)) == "0@-=3 1@-=5 ");
+  CHECK(listed(group.next_push(arm.forest)) == "0@-=3 1@-=5 ");
 }
 
 TEST_CASE("only who asks for the same of the same owner is in one group") {

@@ -23,18 +23,19 @@ class Heard {
     return [this](const Change& one) {
       std::unique_lock lock(mutex_);
       frames_.push_back(one.kind == ChangeKind::kMissed ? one.message : one.frame);
-      news_.notify_all();
-      news_.wait(lock, [this] { return !held_; });
+      changed_.notify_all();
+      changed_.wait(lock, [this] { return !held_; });
     };
   }
   [[nodiscard]] bool hears(std::size_t count) {
     std::unique_lock lock(mutex_);
-    return news_.wait_for(lock, std::chrono::seconds(20), [&] { return frames_.size() >= count; });
+    return changed_.wait_for(lock, std::chrono::seconds(20),
+                             [&] { return frames_.size() >= count; });
   }
   void hold(bool held) {
     const std::lock_guard lock(mutex_);
     held_ = held;
-    news_.notify_all();
+    changed_.notify_all();
   }
   [[nodiscard]] std::vector<std::string> frames() {
     const std::lock_guard lock(mutex_);
@@ -43,7 +44,7 @@ class Heard {
 
  private:
   std::mutex mutex_;
-  std::condition_variable news_;
+  std::condition_variable changed_;
   std::vector<std::string> frames_;
   bool held_ = false;
 };

@@ -30,7 +30,7 @@ struct WatchingRig : Rig {
         watcher(
             structure, discovery, requests, *transport, [] { return std::uint64_t{0}; },
             options.timeout) {
-    states = [this](const State& state) { watcher.on_state(state); };
+    pushed = [this](const PushedValues& values) { watcher.on_pushed(values); };
   }
   ~WatchingRig() override { watcher.stop(); }
   Watcher watcher;
@@ -56,7 +56,7 @@ TEST_CASE("watcher: a watched path follows what its owner writes, without anothe
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", kArm);
   WatchingRig rig(network);
-  CHECK_FALSE(rig.watcher.on_state({}));
+  CHECK_FALSE(rig.watcher.on_pushed({}));
   CHECK_FALSE(rig.watcher.can_answer("arm", "hand", Query{}));
   const auto path = rig.watcher.watch("arm", "hand", {});
   REQUIRE(path);
@@ -64,7 +64,7 @@ TEST_CASE("watcher: a watched path follows what its owner writes, without anothe
   CHECK(rig.watcher.can_answer("arm", "hand", Query{}));
   REQUIRE(arm.node().update("hand", along_x(5)));
   CHECK(eventually([&] { return seen(**path) == 5; }));
-  CHECK(rig.watcher.on_state({}));
+  CHECK(rig.watcher.on_pushed({}));
 }
 
 TEST_CASE("watcher: rates that no owner could keep are refused") {
@@ -114,16 +114,16 @@ TEST_CASE("pushing: who watches is answered with all values, and told what is wr
   REQUIRE(owner.member.publish_all(kArm));
 
   const Reply reply = pushing.answer(watch_hand());
-  const auto* state = std::get_if<State>(&reply.body);
-  REQUIRE(state != nullptr);
-  CHECK(state->entries.size() == 1);
+  const auto* values = std::get_if<PushedValues>(&reply.body);
+  REQUIRE(values != nullptr);
+  CHECK(values->entries.size() == 1);
 
   Rig listener(network.join());
-  listener.states = [&](const State& news) {
-    for (const News& one : news.entries) pushed = one.X.pose.translation().x();
+  listener.pushed = [&](const PushedValues& told) {
+    for (const PushedValue& one : told.entries) pushed = one.X.pose.translation().x();
   };
-  REQUIRE(listener.transport->watch(state->group));
-  pushing.on_watcher(state->group);
+  REQUIRE(listener.transport->watch(values->group));
+  pushing.on_watcher(values->group);
   CHECK(eventually([&] { return pushed == 4; }));
   REQUIRE(owner.structure.forest.update("hand", along_x(6), std::nullopt));
   CHECK(eventually([&] { return pushed == 6; }));

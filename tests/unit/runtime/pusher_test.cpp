@@ -33,10 +33,10 @@ struct PushingOwner {
     REQUIRE(forest.add("arm", "base", along_x(0)));
     REQUIRE(forest.add("hand", "arm", along_x(0)));
   }
-  void push(const State& state) {
+  void push(const PushedValues& values) {
     const std::lock_guard lock(mutex);
-    open.insert(state.group);
-    for (const News& entry : state.entries) pushed[state.group].push_back(entry.stamp);
+    open.insert(values.group);
+    for (const PushedValue& entry : values.entries) pushed[values.group].push_back(entry.stamp);
   }
   std::size_t count(std::uint64_t group) {
     const std::lock_guard lock(mutex);
@@ -51,7 +51,7 @@ struct PushingOwner {
     const std::lock_guard lock(mutex);
     return open;
   }
-  Pusher pusher{forest, [this](const State& state) { push(state); },
+  Pusher pusher{forest, [this](const PushedValues& values) { push(values); },
                 [this](std::uint64_t group) {
                   const std::lock_guard lock(mutex);
                   open.erase(group);

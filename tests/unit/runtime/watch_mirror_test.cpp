@@ -32,16 +32,16 @@ WatchRoute route() {
   return route;
 }
 
-News entry(std::uint32_t index, double x, std::uint64_t history, bool begins = true) {
-  News news{index, {}, along_x(x), {}, history, {}};
-  if (begins) news.process_noise = Covariance();
-  return news;
+PushedValue entry(std::uint32_t index, double x, std::uint64_t history, bool begins = true) {
+  PushedValue value{index, {}, along_x(x), {}, history, {}};
+  if (begins) value.process_noise = Covariance();
+  return value;
 }
-News sample(std::uint32_t index, std::int64_t t, double x, std::uint64_t history,
-            bool begins = false) {
-  News news = entry(index, x, history, begins);
-  news.stamp = ms(t);
-  return news;
+PushedValue sample(std::uint32_t index, std::int64_t t, double x, std::uint64_t history,
+                   bool begins = false) {
+  PushedValue value = entry(index, x, history, begins);
+  value.stamp = ms(t);
+  return value;
 }
 
 struct Watched {
@@ -65,7 +65,7 @@ TEST_CASE("watch mirror: it is complete when all owners have told their values")
   CHECK(mirror.take({kArms, {entry(0, 1, 1), entry(1, 10, 2)}, 0, 5}));
   CHECK_FALSE(mirror.complete());
   CHECK_FALSE(mirror.take({99, {entry(0, 7, 1)}, 0, 9}));  // of another route
-  // News of what is not known are no values; what they build on must be asked for.
+  // What is told of unknown edges is no value; what it builds on must be asked for.
   CHECK_FALSE(mirror.take({kTools, {entry(0, 200, 1, false)}, 3, 4}));
   CHECK_FALSE(mirror.complete());
   CHECK(mirror.take({kTools, {entry(0, 100, 1)}, 0, 3}));
@@ -110,7 +110,7 @@ TEST_CASE("watch mirror: after a loss nothing is shown by half") {
   CHECK(watched.mirror.lacks());
 }
 
-TEST_CASE("watch mirror: a state in pieces is shown when the last of them has come") {
+TEST_CASE("watch mirror: values in pieces are shown when the last of them has come") {
   Watched watched;
   CHECK_FALSE(watched.mirror.take({kArms, {entry(0, 2, 1, false)}, 5, 6, 0, 2}));
   CHECK(watched.x() == 111);

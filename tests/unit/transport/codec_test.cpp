@@ -33,10 +33,10 @@ Sample travelled(const Sample& sample) {
   return arrived;
 }
 
-TEST_CASE("states arrive as they were sent") {
+TEST_CASE("pushed values arrive as they were sent") {
   Random random(0xc0de7);
   INFO("seed " << random.seed());
-  for (const State& one : testing::states(random)) {
+  for (const PushedValues& one : testing::pushed_values(random)) {
     const auto arrived = from_wire(travelled<StateType>(to_wire(one)));
     REQUIRE(arrived);
     check_same(*arrived, one);
@@ -77,8 +77,8 @@ TEST_CASE("replies arrive as they were sent") {
       check_same(came.correlations, values->correlations);
       check_same(came.correlations_at_hint, values->correlations_at_hint);
       CHECK(came.commit == values->commit);
-    } else if (const auto* state = std::get_if<State>(&one.body)) {
-      check_same(std::get<State>(arrived->body), *state);
+    } else if (const auto* pushed = std::get_if<PushedValues>(&one.body)) {
+      check_same(std::get<PushedValues>(arrived->body), *pushed);
     } else if (const auto* all = std::get_if<std::vector<EdgeConsistency>>(&one.body)) {
       const auto& came = std::get<std::vector<EdgeConsistency>>(arrived->body);
       REQUIRE(came.size() == all->size());

@@ -238,15 +238,15 @@ TEST_CASE("What cannot be meant is refused, and changes nothing") {
   CHECK(transform_diff(*X_WA, robot.X_WA, 0) == "");
 }
 
-TEST_CASE("News of an edge tell its correlation") {
+TEST_CASE("Values of an edge tell its correlation") {
   Random random(659);
   Robot robot(random);
   std::vector<EdgeCursor> cursors{{"a", robot.forest.info("a")->parent}};
-  CHECK(robot.forest.news(cursors, {true}).values.at(0).correlation.empty());
+  CHECK(robot.forest.values_since(cursors, {true}).values.at(0).correlation.empty());
   REQUIRE(robot.forest.correlate("a", {true, {}, {}}));
-  const auto news = robot.forest.news(cursors, {true}).values;
-  REQUIRE(news.size() == 1);
-  CHECK(news[0].correlation.unknown);
+  const auto values = robot.forest.values_since(cursors, {true}).values;
+  REQUIRE(values.size() == 1);
+  CHECK(values[0].correlation.unknown);
 }
 
 }  // namespace

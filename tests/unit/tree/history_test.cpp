@@ -315,7 +315,7 @@ TEST_CASE("rate, gaps and jitter of what is kept") {
   CHECK(arm.forest.histories("nobody").empty());
 }
 
-TEST_CASE("news are told once, those of one stamp together") {
+TEST_CASE("values are told once, those of one stamp together") {
   Arm arm;
   std::vector<EdgeCursor> cursors;
   for (const char* id : {"base", "arm", "hand"}) {
@@ -323,7 +323,7 @@ TEST_CASE("news are told once, those of one stamp together") {
   }
   const auto told = [&](bool newest_only = false) {
     std::string text;
-    for (const News& one : arm.forest.news(cursors, {newest_only}).values) {
+    for (const PushedValue& one : arm.forest.values_since(cursors, {newest_only}).values) {
       text += std::to_string(one.index) + "@" +
               (one.stamp ? std::to_string(nanoseconds(*one.stamp) / 1'000'000) : "-") + " ";
     }

@@ -33,10 +33,12 @@ struct Followed {
     }
     for (const char* id : {"arm", "hand"}) edges.push_back(*mirror.find(id));
   }
-  NewsOfCommit news(const NewsQuery& query = {}) { return owner.news(cursors, query); }
+  PushedCommit values_since(const PushedQuery& query = {}) {
+    return owner.values_since(cursors, query);
+  }
   // @return how many values that were
-  std::size_t follow(const NewsQuery& query = {}) {
-    const NewsOfCommit told = news(query);
+  std::size_t follow(const PushedQuery& query = {}) {
+    const PushedCommit told = values_since(query);
     mirror.take(edges, told.values);
     return told.values.size();
   }
@@ -83,20 +85,21 @@ TEST_CASE("who has seen nothing is told the newest, or all since an instant") {
   Followed robot;
   for (int t = 1; t <= 9; ++t) REQUIRE(robot.owner.update("arm", along_x(t), at(10 * t)));
   auto cursors = robot.cursors;
-  CHECK(robot.owner.news(cursors, {}).values.size() == 2);
+  CHECK(robot.owner.values_since(cursors, {}).values.size() == 2);
   cursors = robot.cursors;
-  CHECK(robot.owner.news(cursors, {false, at(65)}).values.size() == 5);  // the hand; 60, 70, 80, 90
+  CHECK(robot.owner.values_since(cursors, {false, at(65)}).values.size() ==
+        5);  // the hand; 60, 70, 80, 90
   cursors = robot.cursors;
-  CHECK(robot.owner.news(cursors, {false, at(1)}).values.size() == 10);
-  CHECK(robot.owner.news(cursors, {false, at(1)}).values.empty());
+  CHECK(robot.owner.values_since(cursors, {false, at(1)}).values.size() == 10);
+  CHECK(robot.owner.values_since(cursors, {false, at(1)}).values.empty());
 }
 
 TEST_CASE("a move, a removal and forgotten samples begin another history, whose number is higher") {
   Followed robot;
   const auto history = [&] {
     auto cursors = robot.cursors;
-    const auto values = robot.owner.news(cursors, {}).values;
-    for (const News& value : values) {
+    const auto values = robot.owner.values_since(cursors, {}).values;
+    for (const PushedValue& value : values) {
       if (value.index == 1) return value.history;
     }
     return std::uint64_t{0};
@@ -108,7 +111,7 @@ TEST_CASE("a move, a removal and forgotten samples begin another history, whose 
   REQUIRE(robot.owner.move("arm", "other"));  // its children stay what they are to it
   CHECK_FALSE(is_another());
   REQUIRE(robot.owner.move("hand", "other", along_x(2)));
-  CHECK(robot.news().values.empty());  // what hangs elsewhere is not told
+  CHECK(robot.values_since().values.empty());  // what hangs elsewhere is not told
   REQUIRE(robot.owner.move("hand", "arm", along_x(3)));
   CHECK(is_another());
   REQUIRE(robot.owner.remove("hand"));
@@ -147,7 +150,7 @@ TEST_CASE("what is told is one commit for all readers of the mirror") {
   // Twice the same says nothing new.
   auto cursors = robot.cursors;
   for (EdgeCursor& cursor : cursors) cursor.commit = 0;
-  auto again = robot.owner.news(cursors, {}).values;
+  auto again = robot.owner.values_since(cursors, {}).values;
   REQUIRE(again.size() == 2);
   robot.mirror.take(robot.edges, again);
   CHECK(commits == 1);

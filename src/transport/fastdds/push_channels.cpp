@@ -1,4 +1,4 @@
-#include "transport/fastdds/state_channels.hpp"
+#include "transport/fastdds/push_channels.hpp"
 
 #include <utility>
 
@@ -12,17 +12,17 @@ std::string partition_of(std::uint64_t group) { return "watch " + std::to_string
 
 }  // namespace
 
-Result<void> StateChannels::watch(std::uint64_t group) {
+Result<void> PushChannels::watch(std::uint64_t group) {
   const std::lock_guard lock(mutex_);
   auto& reader = readers_[group];
   if (reader != nullptr) return {};
   reader = std::make_unique<Reader<wire::State>>(
       context_, topic_, partition_of(group), "update_reader",
       Reader<wire::State>::Calls{[this](const wire::State& sample, const ertps::GuidPrefix_t&) {
-                                   if (const auto state = from_wire(sample)) {
-                                     calls_.on_state(*state);
+                                   if (const auto pushed = from_wire(sample)) {
+                                     calls_.on_pushed(*pushed);
                                    } else {
-                                     log_refused(kStateTopic, state.error());
+                                     log_refused(kStateTopic, pushed.error());
                                    }
                                  },
                                  nullptr});
@@ -32,7 +32,7 @@ Result<void> StateChannels::watch(std::uint64_t group) {
 }
 
 // Closed without the lock: a sample may be on its way to somebody who waits for it.
-void StateChannels::unwatch(std::uint64_t group) {
+void PushChannels::unwatch(std::uint64_t group) {
   std::unique_ptr<Reader<wire::State>> closed;  // outlives the lock
   const std::lock_guard lock(mutex_);
   const auto known = readers_.find(group);
@@ -41,23 +41,24 @@ void StateChannels::unwatch(std::uint64_t group) {
   readers_.erase(known);
 }
 
-void StateChannels::push(const State& state) {
+void PushChannels::push(const PushedValues& pushed) {
   std::shared_ptr<Writer> writer;
   {
     const std::lock_guard lock(mutex_);
-    auto& entry = writers_[state.group];
+    auto& entry = writers_[pushed.group];
     if (entry == nullptr) {
-      entry = std::make_shared<Writer>(context_, topic_, partition_of(state.group), "update_writer",
-                                       [this, group = state.group] { calls_.on_watcher(group); });
+      entry =
+          std::make_shared<Writer>(context_, topic_, partition_of(pushed.group), "update_writer",
+                                   [this, group = pushed.group] { calls_.on_watcher(group); });
     }
     writer = entry;
   }
   if (!writer->good()) return;
-  wire::State sample = to_wire(state);
+  wire::State sample = to_wire(pushed);
   writer->write(&sample);
 }
 
-void StateChannels::end_pushing(std::uint64_t group) {
+void PushChannels::end_pushing(std::uint64_t group) {
   std::shared_ptr<Writer> ended;  // outlives the lock
   const std::lock_guard lock(mutex_);
   const auto known = writers_.find(group);

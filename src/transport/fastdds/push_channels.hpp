@@ -13,19 +13,19 @@ namespace tfdude::fastdds {
 
 /// Values pushed to watchers: each group of them has a DDS partition, so that who does not watch is sent nothing,
 /// and who watches the same shares one writer. Thread-safe.
-class StateChannels {
+class PushChannels {
  public:
   struct Calls {
-    std::function<void(const State&)> on_state;
+    std::function<void(const PushedValues&)> on_pushed;
     std::function<void(std::uint64_t group)> on_watcher;
   };
 
-  StateChannels(const Context& context, edds::Topic& topic, Calls calls)
+  PushChannels(const Context& context, edds::Topic& topic, Calls calls)
       : context_(context), topic_(topic), calls_(std::move(calls)) {}
 
   [[nodiscard]] Result<void> watch(std::uint64_t group);
   void unwatch(std::uint64_t group);
-  void push(const State& state);
+  void push(const PushedValues& pushed);
   void end_pushing(std::uint64_t group);
 
  private:

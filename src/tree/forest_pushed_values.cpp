@@ -54,7 +54,7 @@ Correlation correlation_of(const HeldVersion& edge) {
 
 // The number of the first sample that may be told, of those up to the edge's newest.
 std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, std::uint64_t seen,
-                            const NewsQuery& query) {
+                            const PushedQuery& query) {
   const SampleHistory& samples = *edge.samples;
   std::uint64_t first = edge.number;
   if (query.newest_only) return first;
@@ -73,13 +73,13 @@ std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, s
   return first;
 }
 
-void add_news(const HeldVersion& edge, std::uint32_t index, const NewsQuery& query,
-              std::uint64_t commit, EdgeCursor& cursor, std::vector<News>& news) {
+void add_values(const HeldVersion& edge, std::uint32_t index, const PushedQuery& query,
+                std::uint64_t commit, EdgeCursor& cursor, std::vector<PushedValue>& values) {
   const bool begins = edge.history != cursor.history;
   const std::uint64_t seen = begins ? 0 : cursor.commit;
-  const std::size_t before = news.size();
+  const std::size_t before = values.size();
   const auto tell = [&](const std::optional<Time>& stamp, const Transform& X) {
-    news.push_back({index, stamp, X, {}, edge.history, {}});
+    values.push_back({index, stamp, X, {}, edge.history, {}});
   };
   if (!edge.moving()) {
     if (edge.commit > seen) tell(std::nullopt, edge.X_PC);
@@ -95,19 +95,20 @@ void add_news(const HeldVersion& edge, std::uint32_t index, const NewsQuery& que
   }
   cursor.commit = commit;
   cursor.history = edge.history;
-  if (news.size() == before) return;
-  news.back().correlation = correlation_of(edge);
+  if (values.size() == before) return;
+  values.back().correlation = correlation_of(edge);
   if (!begins) return;
-  news[before].process_noise =
+  values[before].process_noise =
       edge.samples != nullptr ? edge.samples->timing().process_noise : Covariance();
 }
 
 }  // namespace
 
-NewsOfCommit Forest::news(std::vector<EdgeCursor>& cursors, const NewsQuery& query) const {
+PushedCommit Forest::values_since(std::vector<EdgeCursor>& cursors,
+                                  const PushedQuery& query) const {
   const epoch::Guard guard;
   const std::uint64_t commit = impl_->frames_.snapshot();
-  NewsOfCommit all{{}, commit};
+  PushedCommit all{{}, commit};
   // Null where it is not held, or hangs elsewhere: that is another history.
   const auto followed = [&](const EdgeCursor& cursor) -> const HeldVersion* {
     const Version* version = impl_->frames_.of(cursor.frame, commit);
@@ -125,10 +126,10 @@ NewsOfCommit Forest::news(std::vector<EdgeCursor>& cursors, const NewsQuery& que
     if (edge == nullptr) continue;
     EdgeCursor& cursor = cursors[index];
     cursor.frame = {edge->slot, edge->generation};
-    add_news(*edge, index, query, commit, cursor, all.values);
+    add_values(*edge, index, query, commit, cursor, all.values);
   }
   std::stable_sort(all.values.begin(), all.values.end(),
-                   [](const News& a, const News& b) { return a.stamp < b.stamp; });
+                   [](const PushedValue& a, const PushedValue& b) { return a.stamp < b.stamp; });
   return all;
 }
 

@@ -21,8 +21,8 @@ struct EdgeCursor {
   Handle frame{};             ///< found by id where it is not there any more
 };
 
-/// A value of one of several edges, by its index among them.
-struct News {
+/// A value of one of several edges that somebody follows, by its index among them.
+struct PushedValue {
   std::uint32_t index = 0;
   std::optional<Time> stamp;
   Transform X;
@@ -35,13 +35,14 @@ struct News {
 };
 
 /// Values that were written to edges until a commit.
-struct NewsOfCommit {
-  std::vector<News> values;  ///< older stamps first, and before them those that hold for all times
+struct PushedCommit {
+  /// Older stamps first, and before them those that hold for all times.
+  std::vector<PushedValue> values;
   std::uint64_t commit = 0;
 };
 
 /// Which samples of a moving edge are told.
-struct NewsQuery {
+struct PushedQuery {
   bool newest_only = false;
   /// Where nothing was seen yet: those since the last that is not younger than this, instead of the newest.
   std::optional<Time> from{};
