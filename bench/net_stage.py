@@ -24,7 +24,7 @@ EXAMPLES = processes.ROOT / "examples" / "thesis"
 
 ALL_CPUS = ",".join(map(str, sorted(os.sched_getaffinity(0))))
 
-SETTLE = 1.0  # for many daemons to have met [s]
+MEETING_S = 1.0  # for many daemons to have met [s]
 
 
 def patient_profile(work: pathlib.Path) -> pathlib.Path:
@@ -212,7 +212,7 @@ def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
         daemons.append(stage.daemon("1", central_domain, central))
         echoes = [stage.command(ALL_CPUS, "floor_echo", [])] * count
         with stage.servers(daemons + echoes) as servers:
-            time.sleep(SETTLE)
+            time.sleep(MEETING_S)
             yield idle_cpu(f"scale/partitions/{count}/idle_cpu", servers[:count],
                            1 if quick else 2, repetitions)
             ports = ",".join(echo.udp_port() for echo in servers[-count:])

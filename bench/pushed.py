@@ -23,7 +23,7 @@ WATCHERS = (1, 10)
 OURS = {"tfdude/state", "tfdude/request", "tfdude/reply"}
 BARE = {"floor/ping"}
 SAMPLES = {"tfdude/state", "floor/ping"}
-SETTLE_S = 0.5  # after all have met
+QUIET_S = 0.5  # after all have met
 KEPT = 1500  # bytes of each packet in the capture; what tells of endpoints is shorter
 
 
@@ -98,7 +98,7 @@ def bytes_of(stage, who, rate, watchers, seconds):
     with wire.capturing(file, domain, KEPT):
         with stage.servers([stage.command("0", "push_load", [*source, "--rate", rate, *common])]):
             with stage.servers([stage.command("1", "push_load", [*sink, "--watchers", watchers, *common])]):
-                time.sleep(SETTLE_S)
+                time.sleep(QUIET_S)
                 begin = time.time_ns()
                 time.sleep(seconds)
                 end = time.time_ns()

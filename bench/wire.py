@@ -55,7 +55,7 @@ class WireClient:
             raise RuntimeError(f"{operation}: {answer}")
         return int(answer.split()[0])
 
-    def settle(self, lookup):
+    def wait_until_met(self, lookup):
         """Waits until it has met everybody, which takes longer where the machine is busy."""
         deadline = time.monotonic() + processes.PATIENCE_S
         while True:
@@ -170,7 +170,7 @@ def measure_operations(bin_dir, work, rounds):
     begins = {name: [] for name in OPERATIONS}
     with capturing(file, domain), processes.daemons(bin_dir, configs, domain, work):
         with client_of(bin_dir, domain, work) as client:
-            client.settle("lookup world hand_left")
+            client.wait_until_met("lookup world hand_left")
             client.perform(SETUP)
             for turn in range(rounds + 1):
                 for name, operation in OPERATIONS.items():
@@ -195,7 +195,7 @@ def measure_joint(bin_dir, work, rounds):
     begins = []
     with capturing(file, domain), processes.daemons(bin_dir, [joint_config(work)], domain, work):
         with client_of(bin_dir, domain, work) as client:
-            client.settle("lookup fixed_link moved_link")
+            client.wait_until_met("lookup fixed_link moved_link")
             for turn in range(rounds + 1):
                 begin = client.perform("joint tool_joint")
                 if turn > 0:
@@ -222,7 +222,7 @@ def measure_chain(bin_dir, work, rounds):
     configs = list(chain_configs(work))
     with capturing(file, domain), processes.daemons(bin_dir, configs, domain, work):
         with client_of(bin_dir, domain, work) as client:
-            client.settle(f"lookup link_1_a link_{PARTITIONS}_b")
+            client.wait_until_met(f"lookup link_1_a link_{PARTITIONS}_b")
             for turn in range(rounds + 1):
                 for over, when in begins.items():
                     begin = client.perform(f"lookup link_1_a link_{over}_b")

@@ -21,7 +21,7 @@ void Absences::limit() {
 void Absences::went(const std::string& partition, std::uint64_t incarnation, bool stopped,
                     Time now) {
   const Absent::Kind then = stopped ? Absent::Kind::kStopped : Absent::Kind::kLost;
-  // What is not settled yet of an absence before this one still is not.
+  // What is not resolved yet of an absence before this one still is not.
   const auto before = missed_.find(partition);
   const bool again = before != missed_.end() && before->second.absent.kind == Absent::Kind::kBack;
   put(partition, incarnation, now, again ? then : Absent::Kind::kSilent, then);
@@ -71,7 +71,7 @@ bool Absences::returned(const std::string& partition) {
   return true;
 }
 
-void Absences::settled(const std::string& partition) {
+void Absences::resolved(const std::string& partition) {
   const auto there = missed_.find(partition);
   if (there != missed_.end() && there->second.absent.kind == Absent::Kind::kBack) {
     missed_.erase(there);

@@ -49,7 +49,7 @@ class Absences {
   bool returned(const std::string& partition);
 
   /// Of one that is back: nothing that it claims is this participant's any more.
-  void settled(const std::string& partition);
+  void resolved(const std::string& partition);
 
   /// Nothing is to be kept of a partition that is not there.
   void forget(const std::string& partition, std::uint64_t incarnation, Time now);

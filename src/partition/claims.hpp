@@ -24,8 +24,8 @@ struct Claim {
   std::uint32_t page = 0;  ///< of its owner's, where it says so
 };
 
-/// What the partition of this process would have to give up because of what others claim. What is on its way may
-/// settle it, such as a claim that was taken back: so it is done once the others were asked how far they are.
+/// What the partition of this process would have to give up because of what others claim. What is on its way may resolve
+/// it, such as a claim that was taken back: so it is done once the others were asked how far they are.
 struct Concession {
   enum class Kind : std::uint8_t {
     kGiveWay,  ///< the id was claimed earlier by `rival`: release the frame

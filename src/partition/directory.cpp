@@ -79,7 +79,7 @@ void Directory::apply(const Presence& presence, Time now) {
   info.pid = presence.pid;
   if (!info.reachable || info.since == Time{}) info.since = now;
   came_back(partition, owner);
-  settle_returns();
+  resolve_returns();
 }
 
 void Directory::apply(const Page& page) {
@@ -108,7 +108,7 @@ void Directory::apply(const Page& page) {
     report(fresh, owner);
     find_orphans(page.tombstones, owner);
   }
-  settle_returns();
+  resolve_returns();
 }
 
 void Directory::replace_if_complete(Known& partition, Owner owner) {
@@ -277,7 +277,7 @@ void Directory::find_orphans() {
 }
 
 std::set<Concession> Directory::concessions() {
-  // Those that were removed or moved are settled, and those whose parent is there again.
+  // Those that were removed or moved are resolved, and those whose parent is there again.
   for (auto orphan = orphans_.begin(); orphan != orphans_.end();) {
     const auto frame = forest_.info(orphan->frame);
     const bool stands = frame && frame->owner == kHeldHere &&

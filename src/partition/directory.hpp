@@ -212,7 +212,7 @@ class Directory {
   void came_back(Known& partition, Owner owner);
   void went(Known& partition, Owner owner, bool stopped, Time now);
   void drop_structure(Known& partition, Owner owner);
-  void settle_returns();
+  void resolve_returns();
   void tell_claims();
   Successor* succeed(Known& partition, std::uint64_t incarnation);
   void replace_if_complete(Known& partition, Owner owner);

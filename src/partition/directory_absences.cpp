@@ -194,18 +194,18 @@ std::optional<std::uint64_t> Directory::hidden_by(std::uint64_t own) const {
 }
 
 // Once all that one who is back claims has come, and nothing of it is held here, too.
-void Directory::settle_returns() {
-  bool settled = false;
+void Directory::resolve_returns() {
+  bool resolved = false;
   for (const std::string& name : absences_.back()) {
     const auto number = number_of(name);
     if (!number) continue;
     const Known& partition = partitions_[*number];
     if (!partition.info.reachable || partition.announced != partition.live) continue;
     if (!partition.complete() || claims_.contests_held(*number)) continue;
-    absences_.settled(name);
-    settled = true;
+    absences_.resolved(name);
+    resolved = true;
   }
-  if (settled) tell_claims();
+  if (resolved) tell_claims();
 }
 
 std::optional<PartitionInfo> Directory::only_heard_of() const {

@@ -254,7 +254,7 @@ struct Absent {
     kSilent = 1,     ///< since a moment only: it may just be busy
     kLost = 2,       ///< it has fallen silent without a word
     kStopped = 3,    ///< it said that it ends
-    kBack = 4,       ///< it is there again, but what both claim is not settled yet
+    kBack = 4,       ///< it is there again, but what both claim is not resolved yet
     kForgotten = 5,  ///< somebody said that it is gone for good: nothing of it is kept
   };
   std::string partition;

@@ -74,8 +74,8 @@ class Partition {
   /// What would have to be given up as far as the directory knows now. O(contested frames).
   [[nodiscard]] std::set<Concession> concessions() const { return directory_.concessions(); }
 
-  /// Gives up what of these would still have to be given up: what was on its way when they were found may have
-  /// settled the rest. @return whether the structure changed; there may be other concessions then
+  /// Gives up what of these would still have to be given up: what was on its way when they were found may have resolved the
+  /// rest. @return whether the structure changed; there may be other concessions then
   bool concede(const std::set<Concession>& due, Time now);
 
   /// Goes on as a later incarnation, since others know of one that hides this.

@@ -171,7 +171,7 @@ bool Partition::concede(const std::set<Concession>& due, Time now) {
 }
 
 bool Partition::concede(const Concession& concession, Time now) {
-  // What was conceded just now may have settled this, too, or be the same.
+  // What was conceded just now may have resolved this, too, or be the same.
   const auto frame = forest_.info(concession.frame);
   if (!frame || frame->owner != kHeldHere) return false;
   switch (concession.kind) {

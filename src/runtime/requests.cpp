@@ -22,12 +22,12 @@ void Requests::await_change(const Part& part, const Reply& reply, const Deadline
   const std::uint64_t epoch = reply.epoch;
   std::unique_lock lock(structure_.mutex);
   structure_.directory.saw_lamport_time(reply.lamport_time);
-  const bool settled = structure_.changed.wait_until(lock, deadline.at(), [&] {
+  const bool arrived = structure_.changed.wait_until(lock, deadline.at(), [&] {
     return structure_.directory.epoch(part.owner) >= epoch ||
            !structure_.directory.reachable(part.owner);
   });
   structure_.directory.told_of(part.owner, epoch);
-  if (settled) return;
+  if (arrived) return;
   discovery_.fell_behind();
   log().warn("partition {} has made a change that has not come here within {}",
              quote(part.partition), deadline.text());

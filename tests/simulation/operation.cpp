@@ -110,7 +110,7 @@ void Operation::take_if_answered() {
 }
 
 void Operation::answered() {
-  phase_ = Phase::kSettle;
+  phase_ = Phase::kConfirm;
   outcome_ = {};
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const auto* error = std::get_if<Error>(&replies_[i]->body);
@@ -130,9 +130,9 @@ void Operation::answered() {
 }
 
 void Operation::look_again() {
-  if (over_ || phase_ != Phase::kSettle) return;
+  if (over_ || phase_ != Phase::kConfirm) return;
   Directory& directory = caller_.directory();
-  bool settled = stored_;
+  bool confirmed = stored_;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const bool done = !std::holds_alternative<Error>(replies_[i]->body);
     const Owner owner = parts_[i].owner;
@@ -140,10 +140,10 @@ void Operation::look_again() {
     const bool reads = std::holds_alternative<LookupRequest>(parts_[i].request.body);
     if (!done || owner == kHeldHere || reads) continue;
     const bool here = directory.epoch(owner) >= replies_[i]->epoch || !directory.reachable(owner);
-    settled = settled && here;
+    confirmed = confirmed && here;
     if (here || now() >= deadline_) directory.told_of(owner, replies_[i]->epoch);
   }
-  if (!settled && now() < deadline_) return;
+  if (!confirmed && now() < deadline_) return;
   if (!stored_ && outcome_) outcome_ = fail(Errc::kTimeout, "changed, but not stored in time");
   const auto code = outcome_ ? std::optional<Errc>() : outcome_.error().code;
   if (code == Errc::kNotOwner && ++attempts_ < Requests::kAttempts && now() < deadline_) {

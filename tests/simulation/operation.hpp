@@ -36,7 +36,7 @@ class Operation : public std::enable_shared_from_this<Operation> {
   [[nodiscard]] std::uint32_t first_sequence() const;
 
  private:
-  enum class Phase { kPlan, kAsk, kSettle };
+  enum class Phase { kPlan, kAsk, kConfirm };
 
   void plan();
   void ask(std::vector<Part> parts);

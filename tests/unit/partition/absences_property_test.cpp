@@ -79,7 +79,7 @@ class World {
   }
 
   /// All that was said is heard, and whoever is not there counts as gone.
-  void settle() {
+  void run_until_quiet() {
     drain();
     grow_late();
   }
@@ -104,7 +104,7 @@ class World {
 
   void return_all() {
     for (std::size_t who = 0; who < kOwners; ++who) come_back(who);
-    settle();
+    run_until_quiet();
   }
 
  private:
@@ -218,7 +218,7 @@ class World {
 
   void come_back(std::size_t who) {
     if (serves(who)) return;
-    settle();
+    run_until_quiet();
     const auto before = claims_of_others(who);
     const bool hung = there(who);
     if (hung) {
@@ -281,7 +281,7 @@ class World {
   }
 
   void forget(std::size_t who) {
-    settle();
+    run_until_quiet();
     std::size_t asked = 0;
     for (std::size_t other = 0; other < kOwners; ++other) {
       if (!serves(other) || random_.index(3) == 0) continue;
@@ -428,7 +428,7 @@ TEST_CASE("who is there has its frames, all agree on that, and it keeps them whe
     World world(random, counts);
     for (int part = 0; part < 3; ++part) {
       for (int step = 0; step < 100; ++step) world.step();
-      world.settle();
+      world.run_until_quiet();
       world.demand_agreement();
     }
     world.return_all();

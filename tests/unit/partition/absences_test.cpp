@@ -480,7 +480,7 @@ TEST_CASE("a process that goes on as a later one is heard again") {
   CHECK(base.structure() == Lines{"hand <  @ arm", "tool < hand @ arm, attached"});
 }
 
-TEST_CASE("a conflict that a returning partition settles is reported to who has known it") {
+TEST_CASE("a conflict that a returning partition resolves is reported to who has known it") {
   Witness base;
   base.lose("arm", 1);
   base.wait();

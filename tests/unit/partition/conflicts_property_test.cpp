@@ -56,7 +56,7 @@ class World {
     }
   }
 
-  void settle() {
+  void run_until_quiet() {
     for (std::size_t who = 0; who < kOwners; ++who) {
       if (!owners_[who]) start(who);
     }
@@ -179,7 +179,7 @@ TEST_CASE("after any history of changes, deaths and returns all replicas are equ
   for (int round = 0; round < 200; ++round) {
     World world(random);
     for (int step = 0; step < 300; ++step) world.step();
-    world.settle();
+    world.run_until_quiet();
     conflicts += world.conflicts();
     orphans += world.orphans();
     INFO("round " << round);
