@@ -40,9 +40,9 @@ std::string_view to_string(ChangeKind kind) {
 Change conflict_of(const Tombstone& tombstone, const std::string& partition) {
   Change change{ChangeKind::kConflict, partition, tombstone.id, {}, tombstone.rival, {}, {}};
   change.message = "frame " + quote(tombstone.id) + ": ";
-  if (tombstone.kind == Tombstone::Kind::kGaveWay) {
+  if (tombstone.kind == Tombstone::Kind::kYielded) {
     change.message += "claimed by partition " + quote(tombstone.rival) +
-                      ", which keeps it, and by " + quote(partition) + ", which gives way";
+                      ", which keeps it, and by " + quote(partition) + ", which yields";
   } else {
     change.message += "moved by partition " + quote(partition) + " so that with a move by " +
                       quote(tombstone.rival) + " it makes a cycle; it is made a root";

@@ -149,8 +149,8 @@ void Directory::put_page(Known& partition, Owner owner, const Page& page, Ids& o
   kept.ids.clear();
   for (const PageEntry& entry : page.entries) {
     saw_lamport_time(entry.lamport_time);
-    const auto counts =
-        outdated.erase(entry.id) != 0 ? Claims::Counts::kThis : Claims::Counts::kTheYounger;
+    const auto counts = outdated.erase(entry.id) != 0 ? FrameClaims::Counts::kThis
+                                                      : FrameClaims::Counts::kTheYounger;
     const bool fresh =
         claims_.claim(entry.id, {owner, entry.parent, entry.lamport_time, page.number}, counts);
     partition.info.frames += fresh ? 1 : 0;
@@ -264,7 +264,7 @@ void Directory::find_orphans(const std::vector<Tombstone>& tombstones, Owner own
     if (tombstone.kind != Tombstone::Kind::kRemoved) continue;
     for (const FrameInfo& frame : forest_.waiting_for(tombstone.id)) {
       if (frame.owner != kHeldHere || frame.lamport_time >= tombstone.lamport_time) continue;
-      orphans_.insert({Concession::Kind::kRemove, frame.id, owner, frame.lamport_time});
+      orphans_.insert({PendingYield::Kind::kRemove, frame.id, owner, frame.lamport_time});
     }
   }
 }
@@ -276,7 +276,7 @@ void Directory::find_orphans() {
   }
 }
 
-std::set<Concession> Directory::concessions() {
+std::set<PendingYield> Directory::pending_yields() {
   // Those that were removed or moved are resolved, and those whose parent is there again.
   for (auto orphan = orphans_.begin(); orphan != orphans_.end();) {
     const auto frame = forest_.info(orphan->frame);
@@ -285,7 +285,7 @@ std::set<Concession> Directory::concessions() {
                         !forest_.exists(frame->parent);
     orphan = stands ? std::next(orphan) : orphans_.erase(orphan);
   }
-  std::set<Concession> all = claims_.concessions();
+  std::set<PendingYield> all = claims_.pending_yields();
   all.insert(orphans_.begin(), orphans_.end());
   return all;
 }

@@ -16,7 +16,7 @@
 
 #include "partition/absences.hpp"
 #include "partition/change_log.hpp"
-#include "partition/claims.hpp"
+#include "partition/frame_claims.hpp"
 #include "partition/incarnation.hpp"
 #include "partition/messages.hpp"
 #include "tree/forest.hpp"
@@ -50,7 +50,7 @@ class Directory {
   [[nodiscard]] bool any_pending() const { return absences_.any_pending(); }
 
   /// Whether somebody whom this process has not met is said to be silent, so that it may be there again in a moment, or to be
-  /// gone since so short a time that it would not give way to this process.
+  /// gone since so short a time that it would not yield to this process.
   [[nodiscard]] bool awaits_silent() const { return absences_.any_hearsay(); }
 
   /// Whether a partition may be forgotten. @return kPartitionTaken where it is there
@@ -90,16 +90,16 @@ class Directory {
   /// This process moved a frame that it holds: another's frame may hang below it now.
   void moved() { claims_.mend(); }
 
-  /// As Claims::make_way().
+  /// As FrameClaims::make_way().
   [[nodiscard]] bool make_way(const std::string& parent) { return claims_.make_way(parent); }
 
-  /// As Claims::take() and Claims::holder().
+  /// As FrameClaims::take() and FrameClaims::holder().
   [[nodiscard]] bool take(const std::string& id) { return claims_.take(id); }
   [[nodiscard]] Owner holder(const std::string& id) const { return claims_.holder(id); }
 
   /// What this process's partition would have to give up, by what was applied so far.
   /// O(contested frames).
-  [[nodiscard]] std::set<Concession> concessions();
+  [[nodiscard]] std::set<PendingYield> pending_yields();
   /// Whether there may be any. O(1).
   [[nodiscard]] bool contested() const { return !orphans_.empty() || claims_.contested(); }
 
@@ -229,10 +229,10 @@ class Directory {
 
   Forest& forest_;
   ChangeLog changes_;
-  Claims claims_;
+  FrameClaims claims_;
   std::vector<Known> partitions_;  // by Owner; the first is the own
   std::unordered_map<std::string, Owner> owners_;
-  std::set<Concession> orphans_;  // held frames that hung below one that another removed
+  std::set<PendingYield> orphans_;  // held frames that hung below one that another removed
   std::map<std::string, std::multiset<Owner>> joint_owners_;  // once a joint and page
   std::uint64_t latest_lamport_time_ = 0;
   Absences absences_;

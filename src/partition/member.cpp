@@ -13,7 +13,7 @@ namespace tfdude {
 
 // A frame that was moved has the younger claim now, and what was missing of a conflict may have come.
 void Member::look_for_contests() {
-  if (partition_ != nullptr && directory_.contested()) outcome_.to_concede = true;
+  if (partition_ != nullptr && directory_.contested()) outcome_.to_yield = true;
 }
 
 void Member::on_page(const Page& page) {
@@ -108,15 +108,15 @@ Result<void> Member::forget(const std::string& partition, Time now) {
   return forgotten;
 }
 
-std::set<Concession> Member::concessions() const {
+std::set<PendingYield> Member::pending_yields() const {
   if (partition_ == nullptr || !given_up_.empty()) return {};
-  return partition_->concessions();
+  return partition_->pending_yields();
 }
 
-void Member::concede(const std::set<Concession>& due, bool current, Time now) {
+void Member::yield(const std::set<PendingYield>& due, bool current, Time now) {
   if (partition_ == nullptr || !given_up_.empty()) return;
-  if (current && partition_->concede(due, now)) outcome_.to_commit = outcome_.routes = true;
-  if (!partition_->concessions().empty()) outcome_.to_concede = true;
+  if (current && partition_->yield(due, now)) outcome_.to_commit = outcome_.routes = true;
+  if (!partition_->pending_yields().empty()) outcome_.to_yield = true;
 }
 
 // Lookups find no value of this process's any more: none is better than an old one.

@@ -53,11 +53,11 @@ class Member {
   /// Nothing is kept of a partition that is not there. @return kPartitionTaken where it is.
   [[nodiscard]] Result<void> forget(const std::string& partition, Time now);
 
-  /// What would have to be given up as far as is known now. O(contested frames).
-  [[nodiscard]] std::set<Concession> concessions() const;
+  /// What would have to be yielded as far as is known now. O(contested frames).
+  [[nodiscard]] std::set<PendingYield> pending_yields() const;
   /// Gives up what of these still stands. [joints]
   /// @param current  whether all has come that the others had changed when `due` was found
-  void concede(const std::set<Concession>& due, bool current, Time now);
+  void yield(const std::set<PendingYield>& due, bool current, Time now);
 
   // ---- how it becomes an owner
 

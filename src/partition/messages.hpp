@@ -211,7 +211,7 @@ struct PageJoint {
 struct Tombstone {
   enum class Kind : std::uint8_t {
     kRemoved = 1,  ///< by request; whatever hung below it since before goes, too
-    kGaveWay = 2,  ///< `rival` has claimed the same id earlier
+    kYielded = 2,  ///< `rival` has claimed the same id earlier
     kUnhung = 3,   ///< its move and an earlier one, of `rival`, make a cycle: it was made a root
     kDropped =
         4,  ///< its partition's configuration names it no more; what hung below it waits for it
@@ -278,7 +278,7 @@ struct Presence {
   std::uint32_t pages = 0;  ///< how many pages its structure has
   bool serving = false;     ///< false: the name is only being claimed yet, or not any more
   /// Whom the sender misses, for those who come only now and cannot, and for those who come back: whom it lists as
-  /// lost, stopped or back has to give way to it (Succession).
+  /// lost, stopped or back has to yield to it (Succession).
   std::vector<Absent> absent{};
   bool taken = false;        ///< the name is taken; it will be served once the frames are there
   bool stopped = false;      ///< it is the last word: the process ends, or has given the name up

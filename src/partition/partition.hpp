@@ -35,7 +35,7 @@ class Partition {
   [[nodiscard]] Result<void> load(const std::vector<FrameSpec>& frames, Time now);
 
   /// Takes what an earlier process of this partition left, with what the configuration changes of that:
-  /// see configured_changes(); all else is as it was left. Gives way where others have claimed a frame since. From now on what
+  /// see configured_changes(); all else is as it was left. Yields where others have claimed a frame since. From now on what
   /// changes is kept for take_unsaved().
   /// @return the error of the first new frame of the configuration: a bad or repeated id, a cycle.
   [[nodiscard]] Result<void> restore(const StoredState& state,
@@ -71,12 +71,14 @@ class Partition {
   /// The joints that have got positions since the last call.
   [[nodiscard]] std::vector<StoredJoint> take_changed_joints() { return joints_.take_changed(); }
 
-  /// What would have to be given up as far as the directory knows now. O(contested frames).
-  [[nodiscard]] std::set<Concession> concessions() const { return directory_.concessions(); }
+  /// What would have to be yielded as far as the directory knows now. O(contested frames).
+  [[nodiscard]] std::set<PendingYield> pending_yields() const {
+    return directory_.pending_yields();
+  }
 
-  /// Gives up what of these would still have to be given up: what was on its way when they were found may have resolved the
-  /// rest. @return whether the structure changed; there may be other concessions then
-  bool concede(const std::set<Concession>& due, Time now);
+  /// Yields what of these would still have to be yielded: what was on its way when they were found may have resolved the
+  /// rest. @return whether the structure changed; others may be pending then
+  bool yield(const std::set<PendingYield>& due, Time now);
 
   /// Goes on as a later incarnation, since others know of one that hides this.
   void overtake(std::uint64_t incarnation) {
@@ -121,7 +123,7 @@ class Partition {
   void hang_on_joints(const std::vector<FrameSpec>& frames, const std::vector<StoredJoint>& left);
   void let_go(const std::string& id);
   [[nodiscard]] std::vector<EdgeConsistency> consistency(const std::string& id, bool all) const;
-  bool concede(const Concession& concession, Time now);
+  bool yield(const PendingYield& pending, Time now);
   [[nodiscard]] bool hang_again(const StoredFrame& frame);
   void make_root(const StoredFrame& frame, Time now);
   [[nodiscard]] Result<void> reconfigure(const StoredState& state,
@@ -131,7 +133,7 @@ class Partition {
   void tell_dropped(const std::string& id, Time now);
   void put(const std::string& id, const std::string& parent, std::uint64_t lamport_time);
   void forget(const std::vector<std::string>& removed, Time now);
-  void give_way(const std::string& id, Owner rival, Time now);
+  void yield_to(const std::string& id, Owner rival, Time now);
   [[nodiscard]] Result<void> forget_partition(const ForgetRequest& request, Time now);
   void unhang(const std::string& id, Owner rival, Time now);
   void tell_conflict(const Tombstone& tombstone);

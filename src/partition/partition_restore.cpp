@@ -70,12 +70,12 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   saved_ = true;
   pages_.watch_ids();
   for (const StoredFrame* frame : contested) {
-    give_way(frame->id, directory_.holder(frame->id), now);
+    yield_to(frame->id, directory_.holder(frame->id), now);
   }
   for (const StoredFrame* frame : circular) make_root(*frame, now);
   directory_.moved();
   directory_.find_orphans();
-  while (concede(concessions(), now)) {
+  while (yield(pending_yields(), now)) {
   }
   auto taken = reconfigure(state, joints, configured, now);
   if (taken) hang_on_joints(configured, joints);
@@ -157,45 +157,45 @@ void Partition::tell_dropped(const std::string& id, Time now) {
   directory_.report_orphans(id, kHeldHere);
 }
 
-bool Partition::concede(const std::set<Concession>& due, Time now) {
-  using Kind = Concession::Kind;
+bool Partition::yield(const std::set<PendingYield>& due, Time now) {
+  using Kind = PendingYield::Kind;
   bool changed = false;
   // What is released or removed may open a cycle, but not the other way round.
-  for (const Kind kind : {Kind::kGiveWay, Kind::kRemove, Kind::kUnhang}) {
-    for (const Concession& one : directory_.concessions()) {
-      if (one.kind == kind && due.count(one) != 0) changed = concede(one, now) || changed;
+  for (const Kind kind : {Kind::kRelease, Kind::kRemove, Kind::kUnhang}) {
+    for (const PendingYield& one : directory_.pending_yields()) {
+      if (one.kind == kind && due.count(one) != 0) changed = yield(one, now) || changed;
     }
   }
   if (changed) pages_.close_epoch();
   return changed;
 }
 
-bool Partition::concede(const Concession& concession, Time now) {
-  // What was conceded just now may have resolved this, too, or be the same.
-  const auto frame = forest_.info(concession.frame);
+bool Partition::yield(const PendingYield& pending, Time now) {
+  // What was yielded just now may have resolved this, too, or be the same.
+  const auto frame = forest_.info(pending.frame);
   if (!frame || frame->owner != kHeldHere) return false;
-  switch (concession.kind) {
-    case Concession::Kind::kGiveWay:
-      (void)forest_.release(concession.frame);
-      let_go(concession.frame);
-      pages_.erase(concession.frame);
-      give_way(concession.frame, concession.rival, now);
-      directory_.released(concession.frame);
+  switch (pending.kind) {
+    case PendingYield::Kind::kRelease:
+      (void)forest_.release(pending.frame);
+      let_go(pending.frame);
+      pages_.erase(pending.frame);
+      yield_to(pending.frame, pending.rival, now);
+      directory_.released(pending.frame);
       return true;
-    case Concession::Kind::kUnhang:
+    case PendingYield::Kind::kUnhang:
       if (frame->parent.empty()) return false;
-      unhang(concession.frame, concession.rival, now);
+      unhang(pending.frame, pending.rival, now);
       return true;
-    case Concession::Kind::kRemove:
-      if (auto removed = forest_.remove(concession.frame)) forget(*removed, now);
+    case PendingYield::Kind::kRemove:
+      if (auto removed = forest_.remove(pending.frame)) forget(*removed, now);
       return true;
   }
   return false;
 }
 
-void Partition::give_way(const std::string& id, Owner rival, Time now) {
+void Partition::yield_to(const std::string& id, Owner rival, Time now) {
   tell_conflict(
-      {id, directory_.next_lamport_time(now), Tombstone::Kind::kGaveWay, directory_.name(rival)});
+      {id, directory_.next_lamport_time(now), Tombstone::Kind::kYielded, directory_.name(rival)});
 }
 
 Result<void> Partition::forget_partition(const ForgetRequest& request, Time now) {

@@ -45,7 +45,7 @@ struct Outcome {
   bool routes = false;                      ///< frames are elsewhere, or with others
   bool to_commit = false;      ///< there may be something to take by take_ready(), soon,
   bool to_reply = false;       ///< or at once, as somebody waits for a reply
-  bool to_concede = false;     ///< a concession may be due
+  bool to_yield = false;       ///< a yield may be pending
   bool look_for_gone = false;  ///< somebody is silent: on_time() is to be called
 };
 

@@ -4,12 +4,12 @@
 #include <tuple>
 #include <utility>
 
-#include "partition/claims.hpp"
+#include "partition/frame_claims.hpp"
 
 namespace tfdude {
 namespace {
 
-using List = std::vector<const Claim*>;
+using List = std::vector<const FrameClaim*>;
 
 // Those that meet the condition; all where none does.
 template <class Condition>
@@ -40,19 +40,21 @@ bool Succession::outlived(Owner first, Owner second) const {
   return owners_[first].outlived.count(second) != 0 && owners_[second].outlived.count(first) == 0;
 }
 
-bool Succession::older(const Claim& a, const Claim& b) const {
+bool Succession::older(const FrameClaim& a, const FrameClaim& b) const {
   return std::tie(a.lamport_time, name(a.owner)) < std::tie(b.lamport_time, name(b.owner));
 }
 
-const Claim& Succession::heir(const std::vector<const Claim*>& claims) const {
+const FrameClaim& Succession::heir(const std::vector<const FrameClaim*>& claims) const {
   const List there = preferred(
-      claims, [this](const Claim* one) { return standing(one->owner) != Standing::kGone; });
-  const List left = preferred(there, [&](const Claim* one) {
-    return std::none_of(there.begin(), there.end(),
-                        [&](const Claim* other) { return outlived(other->owner, one->owner); });
+      claims, [this](const FrameClaim* one) { return standing(one->owner) != Standing::kGone; });
+  const List left = preferred(there, [&](const FrameClaim* one) {
+    return std::none_of(there.begin(), there.end(), [&](const FrameClaim* other) {
+      return outlived(other->owner, one->owner);
+    });
   });
-  return **std::min_element(left.begin(), left.end(),
-                            [this](const Claim* a, const Claim* b) { return older(*a, *b); });
+  return **std::min_element(
+      left.begin(), left.end(),
+      [this](const FrameClaim* a, const FrameClaim* b) { return older(*a, *b); });
 }
 
 }  // namespace tfdude

@@ -9,7 +9,7 @@
 
 namespace tfdude {
 
-struct Claim;
+struct FrameClaim;
 
 /// Which of several partitions' claims to one frame holds, by who is there and who was there while another was not:
 ///
@@ -42,7 +42,7 @@ class Succession {
 
   /// @param claims  to one frame, by different owners; at least one
   /// @return the one that holds
-  [[nodiscard]] const Claim& heir(const std::vector<const Claim*>& claims) const;
+  [[nodiscard]] const FrameClaim& heir(const std::vector<const FrameClaim*>& claims) const;
 
  private:
   struct Known {
@@ -50,7 +50,7 @@ class Succession {
     Standing standing = Standing::kThere;
     std::set<Owner> outlived;
   };
-  [[nodiscard]] bool older(const Claim& a, const Claim& b) const;
+  [[nodiscard]] bool older(const FrameClaim& a, const FrameClaim& b) const;
 
   std::vector<Known> owners_;
 };

@@ -98,7 +98,7 @@ void MemberRunner::react(const Outcome& outcome) {
   if (outcome.routes) parts_.on_routes();
   if (outcome.to_commit) commits_->ask();
   if (outcome.to_reply) commits_->hurry();
-  if (outcome.to_concede) parts_.on_contest();
+  if (outcome.to_yield) parts_.on_contest();
   if (outcome.look_for_gone) look_for_gone();
   if (outcome.others) parts_.on_others();
   if (outcome.stopped) parts_.on_gone(outcome.stopped->partition);
@@ -147,8 +147,8 @@ Result<void> MemberRunner::forget(const std::string& partition) {
   return forgotten;
 }
 
-void MemberRunner::concede(const std::set<Concession>& due, bool current) {
-  input_of_joints([&] { member_.concede(due, current, wall_clock()); });
+void MemberRunner::yield(const std::set<PendingYield>& due, bool current) {
+  input_of_joints([&] { member_.yield(due, current, wall_clock()); });
 }
 
 Result<std::size_t> MemberRunner::apply(const JointUpdate& update) {

@@ -38,7 +38,7 @@ class MemberRunner final : private CommitLoop::Effects {
     std::function<void()> on_routes;  ///< frames are elsewhere, or with others
     std::function<void()> on_others;  ///< another partition came or went
     std::function<void(const std::string& partition)> on_gone;  ///< was stopped, or is lost
-    std::function<void()> on_contest;                           ///< a concession may be due
+    std::function<void()> on_contest;                           ///< a yield may be pending
   };
 
   /// @param partition  the one that it is to own; empty: none
@@ -68,8 +68,8 @@ class MemberRunner final : private CommitLoop::Effects {
   /// The same without waiting. @return kTimeout, too, where another thread does the same
   [[nodiscard]] Result<std::size_t> try_apply(const JointUpdate& update);
 
-  /// @return as Member::concede
-  void concede(const std::set<Concession>& due, bool current);
+  /// @return as Member::yield
+  void yield(const std::set<PendingYield>& due, bool current);
 
   // ---- how it becomes an owner
 

@@ -16,7 +16,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       discovery_(structure_, *transport_, options.discovery, options.timeout),
       member_(structure_, *transport_, std::move(partition), parts()),
       requests_(structure_, discovery_, *transport_, own()),
-      conceding_(structure_, requests_, member_, options.timeout),
+      yielding_(structure_, requests_, member_, options.timeout),
       serving_(structure_, discovery_, *transport_, member_, options_),
       queries_(structure_, discovery_, requests_, member_),
       writes_(structure_, discovery_, requests_, member_),
@@ -41,7 +41,7 @@ MemberRunner::Parts Participant::parts() {
           },
           [this] { lookups_.look_again(); },
           [this](const std::string& partition) { requests_.calls().on_lost(partition); },
-          [this] { conceding_.ask(); }};
+          [this] { yielding_.ask(); }};
 }
 
 Requests::Own Participant::own() {
@@ -64,7 +64,7 @@ Participant::~Participant() {
   // These are used by the transport's threads until that has stopped.
   watcher_.stop();
   pushing_.stop();
-  conceding_.stop();
+  yielding_.stop();
   member_.stop();
   if (auto flushed = flush(std::min(options_.linger, options_.timeout)); !flushed) {
     log().warn("leaving: {}", flushed.error().message);
@@ -74,7 +74,7 @@ Participant::~Participant() {
 }
 
 Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
-  conceding_.start();
+  yielding_.start();
   return serving_.serve(frames);
 }
 

@@ -7,7 +7,6 @@
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/options.hpp"
 
-#include "runtime/conceding.hpp"
 #include "runtime/discovery.hpp"
 #include "runtime/joint_calls.hpp"
 #include "runtime/lookups.hpp"
@@ -21,6 +20,7 @@
 #include "runtime/structure.hpp"
 #include "runtime/watcher.hpp"
 #include "runtime/writes.hpp"
+#include "runtime/yielding.hpp"
 #include "transport/port.hpp"
 
 namespace tfdude {
@@ -86,7 +86,7 @@ class Participant final : public TransportHandler {
   Discovery discovery_;
   MemberRunner member_;
   Requests requests_;
-  Conceding conceding_;
+  Yielding yielding_;
   Serving serving_;
   Queries queries_;
   Writes writes_;

@@ -122,7 +122,7 @@ Result<void> Serving::set_timings(const std::vector<FrameSpec>& frames) {
   return {};
 }
 
-// Who is said to be silent may be there again in a moment, or gone: that decides whose a frame is. And who returns gives way
+// Who is said to be silent may be there again in a moment, or gone: that decides whose a frame is. And who returns yields
 // only to those that count it as gone: else what this process acknowledges in its first moments could be lost.
 void Serving::await_gone() {
   const auto patience = Clock::now() + 3 * Absences::kGrace;

@@ -90,7 +90,7 @@ bool write_states(const std::filesystem::path& folder) {
   const StateChange change{7,
                            {"hand", "arm", "lamp"},
                            {{"arm", "", random.transform(), 5}, {"hand", "arm", {}, 6}},
-                           {{"lamp", 7, Tombstone::Kind::kGaveWay, "head"}},
+                           {{"lamp", 7, Tombstone::Kind::kYielded, "head"}},
                            {{"elbow", 0.5, 1e-4}}};
   {
     const auto store = opened(file);

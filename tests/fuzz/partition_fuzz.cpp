@@ -181,8 +181,8 @@ class World {
     } else {
       const Picture others = own_->others.oldest();
       demand(owner_.answer(request, others) == (error == nullptr), "what can be done is granted");
-      concede(now);
-      owner_.concede(others, {});
+      yield(now);
+      owner_.yield(others, {});
       answered_.push_back({peer, request, reply});
     }
     owner_.demand_held(own_->replica.forest, latest);
@@ -203,8 +203,8 @@ class World {
   }
 
   // Gives up what there is to give up, as the others have nothing more to say.
-  void concede(Time now) {
-    while (own_->partition.concede(own_->partition.concessions(), now)) {
+  void yield(Time now) {
+    while (own_->partition.yield(own_->partition.pending_yields(), now)) {
     }
   }
 
@@ -214,9 +214,9 @@ class World {
     apply(own_->replica, said);
     const auto owner = own_->replica.directory.owner(said.partition);
     if (owner && own_->replica.directory.reachable(*owner)) owner_.hears(said.partition);
-    concede(now);
+    yield(now);
     const std::vector<Tombstone> tombstones = own_->others.apply(said);
-    owner_.concede(own_->others.oldest(), tombstones);
+    owner_.yield(own_->others.oldest(), tombstones);
     owner_.demand_held(own_->replica.forest, latest);
     apply(hearer_, said);
     (void)all_.apply(said);
@@ -267,7 +267,7 @@ class World {
     const std::uint64_t latest = latest_known();
     const auto left = store_.load();
     demand(own_->partition.restore(*left, {}, now).has_value(), "what was left is taken");
-    owner_.concede(own_->others.oldest(), tombstones);
+    owner_.yield(own_->others.oldest(), tombstones);
     owner_.demand_held(own_->replica.forest, latest);
     publish();
   }

@@ -38,7 +38,7 @@ class PlainOwner {
   [[nodiscard]] const Places& places() const { return places_; }
   [[nodiscard]] bool holds(const std::string& id) const { return places_.count(id) != 0; }
 
-  /// What is in force for this process, as long as it has nothing to concede.
+  /// What is in force for this process, as long as it has nothing to yield.
   [[nodiscard]] Picture with(const Picture& others) const {
     Picture picture = others;
     for (const auto& [id, place] : places_) picture[id] = {name_, place.parent, place.lamport_time};
@@ -76,11 +76,11 @@ class PlainOwner {
 
   /// Gives up what others claim with more right.
   /// @param tombstones  what is new of what others removed
-  void concede(const Picture& others, const std::vector<Tombstone>& tombstones) {
-    give_way(others);
+  void yield(const Picture& others, const std::vector<Tombstone>& tombstones) {
+    yield_to(others);
     for (const std::string& id : orphans(others, tombstones)) (void)remove(id);
     // What was made a root is claimed later than by all others, which may bring the next cycle.
-    while (unhang(others)) give_way(others);
+    while (unhang(others)) yield_to(others);
   }
 
   /// Takes over the Lamport times of what was changed just now, later than all that were known; all else is to be as it
@@ -120,7 +120,7 @@ class PlainOwner {
         const auto word = words_.find(tombstone.id);
         demand(word != words_.end() && word->second.kind == tombstone.kind,
                "a tombstone says what happened");
-        demand(tombstone.kind != Tombstone::Kind::kGaveWay || tombstone.rival == word->second.rival,
+        demand(tombstone.kind != Tombstone::Kind::kYielded || tombstone.rival == word->second.rival,
                "it names who was faster");
       }
     }
@@ -137,14 +137,14 @@ class PlainOwner {
     return at != id;
   }
 
-  void give_way(const Picture& others) {
+  void yield_to(const Picture& others) {
     for (const auto& [id, theirs] : others) {
       const auto mine = places_.find(id);
       if (mine == places_.end()) continue;
       if (silent_.count(theirs.owner) != 0) continue;
       if (!older(theirs, {name_, mine->second.parent, mine->second.lamport_time})) continue;
       places_.erase(mine);
-      words_[id] = {Tombstone::Kind::kGaveWay, theirs.owner};
+      words_[id] = {Tombstone::Kind::kYielded, theirs.owner};
     }
   }
 

@@ -125,7 +125,7 @@ TEST_CASE("absences: frames of a dead daemon are those of one that serves them, 
   CHECK(owner_of(late, "hand") == "left_arm");
 }
 
-TEST_CASE("absences: a daemon that hung while another took its frames gives way to that") {
+TEST_CASE("absences: a daemon that hung while another took its frames yields to that") {
   Robot robot;
   auto client = *Client::open(robot.domain.options());
   REQUIRE(client.lookup("world", "hand"));

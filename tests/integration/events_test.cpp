@@ -1,4 +1,4 @@
-// What is told of changes, and who has to give way.
+// What is told of changes, and who has to yield.
 
 #include <csignal>
 #include <string>

@@ -14,7 +14,7 @@ constexpr Instant kLookRound = milliseconds(1000);
 constexpr Instant kSilence = milliseconds(450);
 constexpr Instant kBeat = milliseconds(60);
 constexpr Instant kLookForGone = milliseconds(50);
-constexpr Instant kConcedeEvery = milliseconds(100);
+constexpr Instant kYieldEvery = milliseconds(100);
 constexpr Instant kPushAfter = std::chrono::microseconds(20);
 constexpr Instant kPublishEvery = milliseconds(1);
 constexpr Instant kRetryStoring = milliseconds(200);
@@ -199,8 +199,8 @@ void Process::react() {
   const Outcome outcome = member_.take_outcome();
   if (outcome.to_commit && serving_) ask_commit(kPublishEvery);
   if (outcome.to_reply && serving_) ask_commit(Instant(0));
-  if (outcome.to_concede && !std::exchange(conceding_, true)) {
-    later(kConcedeEvery, [this] { concede(); });
+  if (outcome.to_yield && !std::exchange(yielding_, true)) {
+    later(kYieldEvery, [this] { yield(); });
   }
   if (outcome.look_for_gone && !std::exchange(looking_for_gone_, true)) {
     later(kLookForGone, [this] {
@@ -418,11 +418,11 @@ std::vector<Sample> Process::published() const {
 }
 
 // What is given up must stand after all of the others have told how far they are.
-void Process::concede() {
-  const auto due = member_.concessions();
-  conceding_ = false;
+void Process::yield() {
+  const auto due = member_.pending_yields();
+  yielding_ = false;
   if (due.empty()) return;
-  conceding_ = true;
+  yielding_ = true;
   const auto ask_all = [this]() -> Result<std::vector<Part>> {
     std::vector<Part> parts;
     for (const Owner owner : directory_.reachable_owners()) {
@@ -439,8 +439,8 @@ void Process::concede() {
           const Owner owner = (*asked)[i].owner;
           current = directory_.epoch(owner) >= replies[i].epoch || !directory_.reachable(owner);
         }
-        conceding_ = false;
-        member_.concede(due, current, wall());
+        yielding_ = false;
+        member_.yield(due, current, wall());
         react();
       }));
 }

@@ -126,7 +126,7 @@ class Process : public std::enable_shared_from_this<Process> {
   void perform(const Ready& ready);
   void save_values();
   void announce(const std::optional<Presence>& presence);
-  void concede();
+  void yield();
   [[nodiscard]] bool awaits_presence() const;
 
   Surroundings& world_;
@@ -154,7 +154,7 @@ class Process : public std::enable_shared_from_this<Process> {
   bool ended_ = false;
   bool committing_ = false;
   bool commit_asked_ = false;
-  bool conceding_ = false;
+  bool yielding_ = false;
   bool looking_for_gone_ = false;
 };
 

@@ -73,7 +73,7 @@ void Verdict::check_replica(Process& one, const std::vector<std::string>& expect
   if (one.structure() != expected) {
     violation(who + " sees " + difference(one.structure(), expected));
   }
-  if (!one.member().concessions().empty()) violation(who + " has something to concede");
+  if (!one.member().pending_yields().empty()) violation(who + " has something to yield");
   for (const PartitionInfo& partition : one.directory().partitions()) {
     if (partition.reachable != cast_.serves(partition.name)) {
       violation(who + (partition.reachable ? " still hears " : " misses ") + partition.name);

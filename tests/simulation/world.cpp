@@ -13,7 +13,7 @@ using faults::base_edge;
 using faults::base_of;
 
 constexpr Instant kLook = milliseconds(20);
-// Longer than anything takes: that somebody counts as gone, is met again, has claimed its name and has conceded.
+// Longer than anything takes: that somebody counts as gone, is met again, has claimed its name and has yielded.
 constexpr Instant kRest = milliseconds(12000);
 
 class World {

@@ -24,7 +24,7 @@ class TFDUDE_EXPORT Node : public Client {
   /// Takes 0.4 s as a rule; 5 s and Options::discovery at most, where a predecessor still seems to be there.
   ///
   /// A Node learns, after a hang or a broken link, that another process has taken its partition since: it then
-  /// gives way, reports a conflict without a frame, and answers every call with kPartitionTaken.
+  /// yields, reports a conflict without a frame, and answers every call with kPartitionTaken.
   /// @return kPartitionTaken (naming host and process), kState (naming the file), the first bad frame's error,
   ///   as Client::open.
   [[nodiscard]] static Result<Node> open(const std::string& partition,

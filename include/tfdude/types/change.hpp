@@ -15,7 +15,7 @@ enum class ChangeKind : std::uint8_t {
   kFrameAdded,
   kFrameRemoved,
   kFrameMoved,  ///< hangs elsewhere, or belongs to another partition
-  kConflict,    ///< one of two partitions, or of two processes that serve one, had to give way
+  kConflict,    ///< one of two partitions, or of two processes that serve one, had to yield
   kHistoryRestarted,  ///< of a frame's edge, whose source's clock has jumped back; told by its owner's process only
   kFrameOrphaned,   ///< waits for its parent, which that one's configuration names no more
   kFrameTakenOver,  ///< belongs to a partition that is there, since the one that had it is not
@@ -28,10 +28,10 @@ enum class ChangeKind : std::uint8_t {
 /// Something that happened to the structure, as seen by one participant.
 struct Change {
   ChangeKind kind = ChangeKind::kPartitionUp;
-  std::string partition;  ///< concerned: the frame's owner; of a conflict, who gave way
+  std::string partition;  ///< concerned: the frame's owner; of a conflict, who yielded
   std::string frame;      ///< empty where it is about a partition
   std::string parent;     ///< of an added, moved or orphaned frame; empty: a root
-  /// Of a conflict: the partition that was given way to; of an orphan: who had its parent; of a frame taken over: the
+  /// Of a conflict: the partition that was yielded to; of an orphan: who had its parent; of a frame taken over: the
   /// one that had it.
   std::string rival;
   std::string message;   ///< for people

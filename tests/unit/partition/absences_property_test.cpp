@@ -236,7 +236,7 @@ class World {
     }
     drain();
     for (const auto& [id, owner] : before) {
-      // One that has hung gives way to those who know that it was gone, or a witness has told them.
+      // One that has hung yields to those who know that it was gone, or a witness has told them.
       if (hung && knew_.count(owner) == 0) continue;
       INFO("frame " << id << " of " << name(owner) << ", and " << name(who)
                     << (hung ? " hung" : " was dead"));
@@ -378,7 +378,7 @@ class World {
       return queue.first.second == hearer;
     });
     Partition& partition = owners_[hearer]->partition;
-    while (all_heard && partition.concede(partition.concessions(), now())) {
+    while (all_heard && partition.yield(partition.pending_yields(), now())) {
     }
     publish(hearer);
   }

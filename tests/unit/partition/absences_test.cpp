@@ -99,7 +99,7 @@ TEST_CASE(
       Lines{"frame 'hand' of partition 'arm', which is not there, is now of 'left_arm' as a root"});
 }
 
-TEST_CASE("who returns gives way before what it had is routed to another") {
+TEST_CASE("who returns yields before what it had is routed to another") {
   Witness base;
   base.hear("left_arm", 1, 20);
   base.lose("arm", 1);
@@ -188,7 +188,7 @@ TEST_CASE("a stop is told apart from a death") {
   CHECK_FALSE(base.directory.partitions()[0].stopped);
 }
 
-TEST_CASE("who returns without having ended gives way to who says that it has outlived it") {
+TEST_CASE("who returns without having ended yields to who says that it has outlived it") {
   Witness base;
   base.lose("arm", 1);
   base.wait();
@@ -235,10 +235,10 @@ TEST_CASE("who holds what one claims who is away keeps it when that returns") {
   CHECK(replica.directory.absent()[0].incarnation == 7);
   replica.directory.apply(presence_of("arm", 7, 1), kNow);
   replica.directory.apply(page_of("arm", {{"hand", "", 10}}, 7));
-  CHECK(partition.concessions().empty());
+  CHECK(partition.pending_yields().empty());
   REQUIRE(replica.directory.absent().size() == 1);
   CHECK(replica.directory.absent()[0].kind == Kind::kBack);
-  // Until that has given way.
+  // Until that has yielded.
   replica.directory.apply(page_of("arm", {}, 7));
   CHECK(replica.directory.absent().empty());
   CHECK(replica.forest.holds("hand"));
@@ -280,20 +280,20 @@ TEST_CASE("nothing is given up for one who is silent") {
   REQUIRE(partition.load({{"hand", "", along_x(1)}}, kNow));
   replica.directory.apply(presence_of("arm", 7, 1), kNow);
   replica.directory.apply(page_of("arm", {{"hand", "", 10}}, 7));
-  CHECK(partition.concessions().size() == 1);
+  CHECK(partition.pending_yields().size() == 1);
   CHECK(replica.directory.lost("arm", 7, kNow));
-  CHECK(partition.concessions().empty());
+  CHECK(partition.pending_yields().empty());
   SECTION("it is there again") {
     replica.directory.apply(presence_of("arm", 7, 1), kNow);
-    CHECK(partition.concessions().size() == 1);
+    CHECK(partition.pending_yields().size() == 1);
   }
   SECTION("it is gone") {
     (void)replica.directory.look_for_gone(kStart);
     (void)replica.directory.look_for_gone(kStart + Absences::kGrace / 2);
     CHECK(replica.directory.look_for_gone(kStart + Absences::kGrace));
-    CHECK(partition.concessions().empty());
+    CHECK(partition.pending_yields().empty());
     replica.directory.apply(presence_of("arm", 7, 1), kNow);
-    CHECK(partition.concessions().empty());
+    CHECK(partition.pending_yields().empty());
   }
 }
 
@@ -303,7 +303,7 @@ TEST_CASE("who is told of a silence waits for its end") {
   base.absent = {{"arm", 0, Kind::kSilent, 7}};
   replica.directory.apply(base, kNow);
   CHECK(replica.directory.awaits_silent());
-  SECTION("it is gone, and has been for long enough that it gives way to this process") {
+  SECTION("it is gone, and has been for long enough that it yields to this process") {
     base.absent[0].kind = Kind::kLost;
     replica.directory.apply(base, kNow);
     for (int quarter = 0; quarter <= 4; ++quarter) {
@@ -488,7 +488,7 @@ TEST_CASE("a conflict that a returning partition resolves is reported to who has
   (void)base.directory.changes().take();
   base.directory.apply(presence_of("arm", 2, 1), kNow);
   base.directory.apply(
-      Page{"arm", 0, 2, 3, {}, {{"hand", 30, Tombstone::Kind::kGaveWay, "left_arm"}}});
+      Page{"arm", 0, 2, 3, {}, {{"hand", 30, Tombstone::Kind::kYielded, "left_arm"}}});
   CHECK(base.told(ChangeKind::kConflict).size() == 1);
 }
 

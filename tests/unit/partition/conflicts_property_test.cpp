@@ -152,10 +152,10 @@ class World {
     }
     if (hearer == kSpectator) return;
     const std::size_t before = owners_[hearer]->partition.frame_count();
-    bool conceded = false;
+    bool yielded = false;
     Partition& partition = owners_[hearer]->partition;
-    while (partition.concede(partition.concessions(), now(hearer))) conceded = true;
-    if (!conceded) return;
+    while (partition.yield(partition.pending_yields(), now(hearer))) yielded = true;
+    if (!yielded) return;
     if (owners_[hearer]->partition.frame_count() < before) ++orphans_;
     publish(hearer);
   }

@@ -38,7 +38,7 @@ struct Owning : Replica {
     REQUIRE(store->save(partition.take_unsaved()));
     REQUIRE(store->save_configured(configured));
   }
-  bool concede() { return partition.concede(partition.concessions(), kNow); }
+  bool yield() { return partition.yield(partition.pending_yields(), kNow); }
   std::vector<std::string> conflicts() {
     std::vector<std::string> messages;
     for (const Change& one : directory.changes().take()) {
@@ -63,7 +63,7 @@ void add_in_former_life(MemoryStore& store, const std::string& id) {
   REQUIRE(arms.ask(id, AddRequest{"", along_x(1)}) == "ok");
 }
 
-TEST_CASE("of two partitions that add one id the later gives way, and says so") {
+TEST_CASE("of two partitions that add one id the later yields, and says so") {
   Owning arms("arms");
   REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
   REQUIRE(arms.ask("lens", AddRequest{"camera", along_x(1)}) == "ok");
@@ -71,10 +71,10 @@ TEST_CASE("of two partitions that add one id the later gives way, and says so") 
   SECTION("where the other was earlier") {
     arms.directory.apply(page_of("head", {{"camera", "", 900}}));
     CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ arms, attached"});
-    CHECK(arms.concede());
+    CHECK(arms.yield());
     CHECK(arms.structure() == Lines{"camera <  @ head", "lens < camera @ arms, attached"});
     CHECK(arms.conflicts() == Lines{"frame 'camera': claimed by partition 'head', which keeps it, "
-                                    "and by 'arms', which gives way"});
+                                    "and by 'arms', which yields"});
     const auto pages = arms.partition.take_pages();
     REQUIRE(pages.size() == 1);
     REQUIRE(pages[0].tombstones.size() == 1);
@@ -83,7 +83,7 @@ TEST_CASE("of two partitions that add one id the later gives way, and says so") 
   }
   SECTION("where the other was later") {
     arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
-    CHECK_FALSE(arms.concede());
+    CHECK_FALSE(arms.yield());
     CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ arms, attached"});
     CHECK(arms.conflicts().empty());
   }
@@ -93,27 +93,27 @@ TEST_CASE("a claim that is taken back costs nobody a frame") {
   Owning arms("arms");
   REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
   arms.directory.apply(page_of("head", {{"camera", "", 900}}));
-  const std::set<Concession> found = arms.partition.concessions();
+  const std::set<PendingYield> found = arms.partition.pending_yields();
   REQUIRE(found.size() == 1);
   SECTION("at all") {
     arms.directory.apply(page_of("head", {}));
-    CHECK_FALSE(arms.partition.concede(found, kNow));
+    CHECK_FALSE(arms.partition.yield(found, kNow));
   }
   SECTION("and made again for another frame of that name") {
     REQUIRE(arms.ask("camera", RemoveRequest{{"camera"}}) == "ok");
     arms.directory.apply(page_of("head", {}));
     REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
     arms.directory.apply(page_of("head", {{"camera", "", 950}}));
-    CHECK_FALSE(arms.partition.concede(found, kNow));
+    CHECK_FALSE(arms.partition.yield(found, kNow));
   }
   CHECK(arms.forest.holds("camera"));
 }
 
-TEST_CASE("who watches hears of a conflict from the tombstone of who gave way, once") {
+TEST_CASE("who watches hears of a conflict from the tombstone of who yielded, once") {
   Replica watcher;
   watcher.directory.changes().watch();
   watcher.directory.apply(presence_of("arms", 1, 1), kNow);
-  const Tombstone old{"lamp", 5, Tombstone::Kind::kGaveWay, "head"};
+  const Tombstone old{"lamp", 5, Tombstone::Kind::kYielded, "head"};
   const Tombstone fresh{"camera", 7, Tombstone::Kind::kUnhung, "head"};
   watcher.directory.apply(page_of("arms", {}, {old}));
   (void)watcher.directory.changes().take();
@@ -133,13 +133,13 @@ TEST_CASE("of two moves that make a cycle the later is undone to a root") {
   REQUIRE(arms.ask("hand", MoveRequest{"neck", {}}, Time(std::chrono::nanoseconds(2000))) == "ok");
   SECTION("the own one") {
     arms.directory.apply(page_of("head", {{"neck", "hand", 1500}}));
-    CHECK(arms.concede());
+    CHECK(arms.yield());
     CHECK(arms.structure() == Lines{"hand <  @ arms", "neck < hand @ head, attached"});
     CHECK(arms.conflicts().size() == 1);
   }
   SECTION("the other's, who is to say so") {
     arms.directory.apply(page_of("head", {{"neck", "hand", 2500}}));
-    CHECK_FALSE(arms.concede());
+    CHECK_FALSE(arms.yield());
     CHECK(arms.structure() == Lines{"hand < neck @ arms, attached", "neck <  @ head"});
   }
 }
@@ -149,19 +149,19 @@ TEST_CASE("a cycle that is there only while a page is read undoes nothing") {
   arms.directory.apply(page_of("head", {{"a", "", 10}, {"b", "a", 20}}));
   REQUIRE(arms.ask("hand", AddRequest{"b", along_x(1)}) == "ok");
   arms.directory.apply(page_of("head", {{"a", "hand", 30}, {"b", "", 40}}));
-  CHECK_FALSE(arms.concede());
+  CHECK_FALSE(arms.yield());
   CHECK(arms.structure() ==
         Lines{"a < hand @ head, attached", "b <  @ head", "hand < b @ arms, attached"});
 }
 
-TEST_CASE("what was conceded may bring the next cycle, of which the youngest is undone") {
+TEST_CASE("what was yielded may bring the next cycle, of which the youngest is undone") {
   Owning arms("arms");
   arms.directory.apply(page_of("head", {{"a", "", 10}}));
   REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
   REQUIRE(arms.ask("hand", AddRequest{"camera", along_x(1)}) == "ok");
   arms.directory.apply(page_of("head", {{"camera", "a", 20}, {"a", "hand", 30}}));
-  CHECK(arms.concede());
-  CHECK(arms.concede());
+  CHECK(arms.yield());
+  CHECK(arms.yield());
   CHECK(arms.structure() ==
         Lines{"a < hand @ head, attached", "camera < a @ head, attached", "hand <  @ arms"});
 }
@@ -174,7 +174,7 @@ TEST_CASE("a move that makes a cycle with one that was undone is undone itself")
   REQUIRE(arms.structure() ==
           Lines{"a <  @ head", "c < a @ head, attached", "hand < a @ arms, attached"});
   REQUIRE(arms.ask("hand", MoveRequest{"c", {}}, Time(std::chrono::nanoseconds(3000))) == "ok");
-  CHECK(arms.concede());
+  CHECK(arms.yield());
   CHECK(arms.structure() ==
         Lines{"a < hand @ head, attached", "c < a @ head, attached", "hand <  @ arms"});
   CHECK(arms.conflicts().size() == 1);
@@ -184,9 +184,9 @@ TEST_CASE("who moves a frame that another claims, too, has the later claim to it
   Owning arms("arms");
   REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
   arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
-  REQUIRE_FALSE(arms.concede());
+  REQUIRE_FALSE(arms.yield());
   REQUIRE(arms.ask("camera", MoveRequest{"", {}}) == "ok");
-  CHECK(arms.concede());
+  CHECK(arms.yield());
   CHECK(arms.structure() == Lines{"camera <  @ head"});
   CHECK(arms.conflicts().size() == 1);
 }
@@ -263,7 +263,7 @@ TEST_CASE("a frame whose parent was removed while its owner was away goes when i
     tools.start();
     CHECK(tools.structure().size() == 2);
     tools.directory.apply(removed);
-    CHECK(tools.concede());
+    CHECK(tools.yield());
     CHECK(tools.structure().empty());
   }
   SECTION("not where the parent is there again") {
@@ -316,7 +316,7 @@ void bury(Directory& directory, const std::string& partition) {
 }
 
 TEST_CASE(
-    "who returns gives way to who is there, whichever claim is the older, but not to who is gone") {
+    "who returns yields to who is there, whichever claim is the older, but not to who is gone") {
   MemoryStore store;
   add_in_former_life(store, "camera");
   Owning arms("arms", &store);

@@ -193,7 +193,7 @@ TEST_CASE("others' frames below one that a configuration drops stay, and their o
   second.tell(tools, 3);
   CHECK(tools.structure() == Lines{"arm <  @ arms", "camera < hand @ tools",
                                    "gripper < tool @ tools, attached", "tool < hand @ arms"});
-  CHECK(tools.directory.concessions().empty());
+  CHECK(tools.directory.pending_yields().empty());
   std::vector<std::string> orphans;
   for (const Change& one : tools.directory.changes().take()) {
     CHECK(one.kind == ChangeKind::kFrameOrphaned);

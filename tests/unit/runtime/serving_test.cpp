@@ -7,7 +7,7 @@
 #include <unistd.h>
 #include <vector>
 
-#include "runtime/conceding.hpp"
+#include "runtime/yielding.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/process.hpp"
@@ -29,16 +29,16 @@ using testing::ScriptedOwner;
 struct OwnerRig : Rig {
   explicit OwnerRig(TransportPtr to, const std::string& partition = "arm")
       : Rig(std::move(to), partition),
-        conceding(structure, requests, member, options.timeout),
+        yielding(structure, requests, member, options.timeout),
         serving(structure, discovery, *transport, member, options) {
-    on_contest = [this] { conceding.ask(); };
+    on_contest = [this] { yielding.ask(); };
   }
-  ~OwnerRig() override { conceding.stop(); }
+  ~OwnerRig() override { yielding.stop(); }
   Result<void> serve(const std::vector<FrameSpec>& frames) {
-    conceding.start();
+    yielding.start();
     return serving.serve(frames);
   }
-  Conceding conceding;
+  Yielding yielding;
   Serving serving;
 };
 
@@ -126,7 +126,7 @@ TEST_CASE("member runner: a participant without a partition stores nothing and r
   CHECK(rig.member.unless_unsaved(error, "hand").message == error.message);
 }
 
-TEST_CASE("conceding: a frame is given up once its other owner has confirmed its older claim") {
+TEST_CASE("yielding: a frame is given up once its other owner has confirmed its older claim") {
   LoopbackNetwork network;
   std::atomic<bool> silent{true};
   // It has claimed the hand first, which the second owner has not heard of as it claims it.

@@ -70,7 +70,7 @@ TEST_CASE("what was saved is there for the next process, to the last bit") {
   const StoredFrame hand{"hand", "arm", random.transform(), 5};
   const StoredFrame tool{"tool \xc3\xa4'\"", "", random.transform(), 1ULL << 62U};
   const Tombstone gone{"lamp", 6, Tombstone::Kind::kRemoved, ""};
-  const Tombstone lost{"eye", 4, Tombstone::Kind::kGaveWay, "head"};
+  const Tombstone lost{"eye", 4, Tombstone::Kind::kYielded, "head"};
   const Transform later = random.transform();
   {
     const auto store = opened(file);

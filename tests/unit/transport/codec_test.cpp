@@ -165,12 +165,12 @@ TEST_CASE("a page with a tombstone that means nothing is refused") {
     const auto page = from_wire(to_wire(Page{"robot", 0, 1, 1, {}, {tombstone}}));
     return page ? "ok" : page.error().message;
   };
-  CHECK(read({"hand", 1, Tombstone::Kind::kGaveWay, "arms"}) == "ok");
+  CHECK(read({"hand", 1, Tombstone::Kind::kYielded, "arms"}) == "ok");
   CHECK(read({"hand", 1, static_cast<Tombstone::Kind>(0), ""}) == "kind 0 of a tombstone");
   CHECK(read({"hand", 1, static_cast<Tombstone::Kind>(5), ""}) == "kind 5 of a tombstone");
   CHECK(read({"hand", 1, Tombstone::Kind::kDropped, ""}) == "ok");
   CHECK(read({"", 1, Tombstone::Kind::kRemoved, ""}) != "ok");
-  CHECK(read({"hand", 1, Tombstone::Kind::kGaveWay, "arms,head"}) != "ok");
+  CHECK(read({"hand", 1, Tombstone::Kind::kYielded, "arms,head"}) != "ok");
 }
 
 TEST_CASE("pages and presences arrive as they were sent") {

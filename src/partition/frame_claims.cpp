@@ -1,4 +1,4 @@
-#include "partition/claims.hpp"
+#include "partition/frame_claims.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -9,14 +9,15 @@ namespace tfdude {
 
 namespace {
 
-std::vector<const Claim*> all_of(const std::vector<Claim>& claims) {
-  std::vector<const Claim*> all;
+std::vector<const FrameClaim*> all_of(const std::vector<FrameClaim>& claims) {
+  std::vector<const FrameClaim*> all;
   all.reserve(claims.size() + 1);
-  for (const Claim& claim : claims) all.push_back(&claim);
+  for (const FrameClaim& claim : claims) all.push_back(&claim);
   return all;
 }
 
-std::vector<const Claim*> all_of(const std::vector<Claim>& claims, const Claim& one) {
+std::vector<const FrameClaim*> all_of(const std::vector<FrameClaim>& claims,
+                                      const FrameClaim& one) {
   auto all = all_of(claims);
   all.push_back(&one);
   return all;
@@ -24,36 +25,36 @@ std::vector<const Claim*> all_of(const std::vector<Claim>& claims, const Claim& 
 
 }  // namespace
 
-bool Claims::gives_way(const FrameInfo& a, const FrameInfo& b) const {
+bool FrameClaims::yields_to(const FrameInfo& a, const FrameInfo& b) const {
   const bool a_gone = succession_.standing(a.owner) == Succession::Standing::kGone;
   const bool b_gone = succession_.standing(b.owner) == Succession::Standing::kGone;
   return std::tie(a_gone, a.lamport_time, a.id) > std::tie(b_gone, b.lamport_time, b.id);
 }
 
-std::uint32_t Claims::page_of(std::string_view id) const {
+std::uint32_t FrameClaims::page_of(std::string_view id) const {
   const auto frame = forest_.find(id);
   return frame && frame->slot < page_of_slot_.size() ? page_of_slot_[frame->slot] : 0;
 }
 
-Claim Claims::in_force(const FrameInfo& there) const {
+FrameClaim FrameClaims::in_force(const FrameInfo& there) const {
   const auto cut = cut_.find(there.id);
   if (cut != cut_.end()) return cut->second;
   return {there.owner, there.parent, there.lamport_time, page_of(there.id)};
 }
 
-Claim* Claims::shadowed(const std::string& id, Owner owner) {
+FrameClaim* FrameClaims::shadowed(const std::string& id, Owner owner) {
   const auto claims = shadowed_.find(id);
   if (claims == shadowed_.end()) return nullptr;
   const auto mine = std::find_if(claims->second.begin(), claims->second.end(),
-                                 [owner](const Claim& claim) { return claim.owner == owner; });
+                                 [owner](const FrameClaim& claim) { return claim.owner == owner; });
   return mine != claims->second.end() ? &*mine : nullptr;
 }
 
-bool Claims::claim(const std::string& id, Claim claim, Counts counts) {
+bool FrameClaims::claim(const std::string& id, FrameClaim claim, Counts counts) {
   const auto there = forest_.info(id);
-  std::optional<Claim> before;
+  std::optional<FrameClaim> before;
   if (there && there->owner == claim.owner) before = in_force(*there);
-  if (const Claim* mine = shadowed(id, claim.owner)) before = *mine;
+  if (const FrameClaim* mine = shadowed(id, claim.owner)) before = *mine;
   // A page that came late: the frame has left it since.
   const bool late =
       before && before->page != claim.page && before->lamport_time > claim.lamport_time;
@@ -72,8 +73,8 @@ bool Claims::claim(const std::string& id, Claim claim, Counts counts) {
   return !before;
 }
 
-bool Claims::unclaim(const std::string& id, Owner owner, std::uint32_t page) {
-  if (Claim* mine = shadowed(id, owner)) {
+bool FrameClaims::unclaim(const std::string& id, Owner owner, std::uint32_t page) {
+  if (FrameClaim* mine = shadowed(id, owner)) {
     if (mine->page != page) return false;
     auto& others = shadowed_[id];
     others.erase(others.begin() + (mine - others.data()));
@@ -92,17 +93,17 @@ bool Claims::unclaim(const std::string& id, Owner owner, std::uint32_t page) {
   return true;
 }
 
-void Claims::released(const std::string& id) {
+void FrameClaims::released(const std::string& id) {
   promote(id);
   mend();
 }
 
-bool Claims::may_take_from(Owner owner) const {
+bool FrameClaims::may_take_from(Owner owner) const {
   return succession_.standing(owner) == Succession::Standing::kGone ||
          succession_.outlived(kHeldHere, owner);
 }
 
-Owner Claims::holder(const std::string& id) const {
+Owner FrameClaims::holder(const std::string& id) const {
   const auto there = forest_.info(id);
   if (!there) return kHeldHere;
   if (!may_take_from(there->owner)) return there->owner;
@@ -110,35 +111,35 @@ Owner Claims::holder(const std::string& id) const {
   if (claims == shadowed_.end()) return kHeldHere;
   const auto other =
       std::find_if(claims->second.begin(), claims->second.end(),
-                   [this](const Claim& claim) { return !may_take_from(claim.owner); });
+                   [this](const FrameClaim& claim) { return !may_take_from(claim.owner); });
   return other != claims->second.end() ? other->owner : kHeldHere;
 }
 
-bool Claims::take(const std::string& id) {
+bool FrameClaims::take(const std::string& id) {
   const auto there = forest_.info(id);
   if (!there || there->owner == kHeldHere) return true;
   if (holder(id) != kHeldHere) return false;
-  Claim theirs = in_force(*there);
+  FrameClaim theirs = in_force(*there);
   forest_.drop_remote(id, theirs.owner);
   cut_.erase(id);
   shadow(id, std::move(theirs));
   return true;
 }
 
-// Puts the claim in force that holds, unless this process holds the frame: then it is for the owner to concede.
-void Claims::promote(const std::string& id) {
+// Puts the claim in force that holds, unless this process holds the frame: then it is for the owner to yield.
+void FrameClaims::promote(const std::string& id) {
   const auto claims = shadowed_.find(id);
   if (claims == shadowed_.end() || forest_.holds(id)) return;
-  const Claim heir = succession_.heir(all_of(claims->second));
+  const FrameClaim heir = succession_.heir(all_of(claims->second));
   auto& others = claims->second;
   others.erase(std::find_if(others.begin(), others.end(),
-                            [&](const Claim& claim) { return claim.owner == heir.owner; }));
+                            [&](const FrameClaim& claim) { return claim.owner == heir.owner; }));
   if (others.empty()) shadowed_.erase(claims);
   put(id, heir);
 }
 
-// Who is there, or who gives way to whom, has changed.
-void Claims::reconsider() {
+// Who is there, or who yields to whom, has changed.
+void FrameClaims::reconsider() {
   std::vector<std::string> contested;
   contested.reserve(shadowed_.size());
   for (const auto& [id, claims] : shadowed_) contested.push_back(id);
@@ -146,7 +147,7 @@ void Claims::reconsider() {
   for (const std::string& id : contested) {
     const auto there = forest_.info(id);
     if (!there || there->owner == kHeldHere) continue;
-    const Claim now = in_force(*there);
+    const FrameClaim now = in_force(*there);
     if (succession_.heir(all_of(shadowed_[id], now)).owner == now.owner) continue;
     shadow(id, now);
     cut_.erase(id);
@@ -155,49 +156,49 @@ void Claims::reconsider() {
   mend();
 }
 
-void Claims::set_standing(Owner owner, Succession::Standing standing) {
+void FrameClaims::set_standing(Owner owner, Succession::Standing standing) {
   if (succession_.set_standing(owner, standing)) reconsider();
 }
 
-void Claims::set_outlived(Owner owner, std::set<Owner> outlived) {
+void FrameClaims::set_outlived(Owner owner, std::set<Owner> outlived) {
   if (succession_.set_outlived(owner, std::move(outlived))) reconsider();
 }
 
-bool Claims::contests_held(Owner owner) const {
+bool FrameClaims::contests_held(Owner owner) const {
   return std::any_of(shadowed_.begin(), shadowed_.end(), [&](const auto& known) {
     const auto& [id, claims] = known;
     return forest_.holds(id) &&
            std::any_of(claims.begin(), claims.end(),
-                       [owner](const Claim& claim) { return claim.owner == owner; });
+                       [owner](const FrameClaim& claim) { return claim.owner == owner; });
   });
 }
 
-std::set<Concession> Claims::concessions() const {
-  std::set<Concession> all;
+std::set<PendingYield> FrameClaims::pending_yields() const {
+  std::set<PendingYield> all;
   for (const auto& [id, claims] : shadowed_) {
     const auto there = forest_.info(id);
     if (!there || there->owner != kHeldHere) continue;
-    const Claim own = in_force(*there);
-    const Claim& heir = succession_.heir(all_of(claims, own));
+    const FrameClaim own = in_force(*there);
+    const FrameClaim& heir = succession_.heir(all_of(claims, own));
     // Nothing is given up for one who is not there: it may never return.
     if (heir.owner == kHeldHere || succession_.standing(heir.owner) != Succession::Standing::kThere)
       continue;
-    all.insert({Concession::Kind::kGiveWay, id, heir.owner, there->lamport_time});
+    all.insert({PendingYield::Kind::kRelease, id, heir.owner, there->lamport_time});
   }
   for (const auto& [id, claim] : cut_) {
     const Cycle cycle = cycle_of(id, claim);
-    if (cycle.held && gives_way(*cycle.held, cycle.youngest)) {
-      all.insert({Concession::Kind::kUnhang, cycle.held->id, cycle.youngest.owner,
+    if (cycle.held && yields_to(*cycle.held, cycle.youngest)) {
+      all.insert({PendingYield::Kind::kUnhang, cycle.held->id, cycle.youngest.owner,
                   cycle.held->lamport_time});
     }
   }
   return all;
 }
 
-void Claims::shadow(const std::string& id, Claim claim) {
+void FrameClaims::shadow(const std::string& id, FrameClaim claim) {
   auto& claims = shadowed_[id];
   const auto mine = std::find_if(claims.begin(), claims.end(),
-                                 [&](const Claim& c) { return c.owner == claim.owner; });
+                                 [&](const FrameClaim& c) { return c.owner == claim.owner; });
   if (mine != claims.end()) {
     *mine = std::move(claim);
   } else {
@@ -205,7 +206,7 @@ void Claims::shadow(const std::string& id, Claim claim) {
   }
 }
 
-void Claims::put(const std::string& id, const Claim& claim) {
+void FrameClaims::put(const std::string& id, const FrameClaim& claim) {
   std::optional<FrameInfo> before;
   if (changes_.watched()) before = forest_.info(id);
   const auto done = forest_.put_remote(id, claim.parent, claim.owner, claim.lamport_time);
@@ -233,38 +234,38 @@ void Claims::put(const std::string& id, const Claim& claim) {
   }
 }
 
-Claims::Cycle Claims::cycle_of(const std::string& id, const Claim& claim) const {
+FrameClaims::Cycle FrameClaims::cycle_of(const std::string& id, const FrameClaim& claim) const {
   Cycle cycle{{id, claim.parent, claim.owner, false, claim.lamport_time}, std::nullopt};
   for (auto edge = forest_.info(claim.parent); edge && edge->id != id;
        edge = forest_.info(edge->parent)) {
     if (edge->owner == kHeldHere) {
-      if (!cycle.held || gives_way(*edge, *cycle.held)) cycle.held = edge;
-    } else if (gives_way(*edge, cycle.youngest)) {
+      if (!cycle.held || yields_to(*edge, *cycle.held)) cycle.held = edge;
+    } else if (yields_to(*edge, cycle.youngest)) {
       cycle.youngest = *edge;
     }
   }
   return cycle;
 }
 
-void Claims::cut(const FrameInfo& frame) {
+void FrameClaims::cut(const FrameInfo& frame) {
   cut_[frame.id] = {frame.owner, frame.parent, frame.lamport_time, page_of(frame.id)};
   (void)forest_.put_remote(frame.id, {}, frame.owner, frame.lamport_time);
   changes_.frame_moved(frame.id, {}, name(frame.owner));
 }
 
-bool Claims::make_way(const std::string& parent) {
+bool FrameClaims::make_way(const std::string& parent) {
   std::optional<FrameInfo> youngest;
   for (auto edge = forest_.info(parent); edge; edge = forest_.info(edge->parent)) {
     if (edge->owner == kHeldHere) continue;
-    if (!youngest || gives_way(*edge, *youngest)) youngest = edge;
+    if (!youngest || yields_to(*edge, *youngest)) youngest = edge;
   }
   if (youngest) cut(*youngest);
   return youngest.has_value();
 }
 
 // The frame's claimed parent lies below it, where the forest has made it a root. Of the cycle's edges that others
-// own that is cut which gives way to all; if a held one gives way to that still, its owner has to concede, which mends it.
-void Claims::break_cycle(const std::string& id, const Claim& claim) {
+// own that is cut which yields to all; if a held one yields to that still, its owner has to yield, which mends it.
+void FrameClaims::break_cycle(const std::string& id, const FrameClaim& claim) {
   const FrameInfo youngest = cycle_of(id, claim).youngest;
   if (youngest.id == id) {
     cut_[id] = claim;
@@ -275,7 +276,7 @@ void Claims::break_cycle(const std::string& id, const Claim& claim) {
   cut_.erase(id);
 }
 
-void Claims::mend() {
+void FrameClaims::mend() {
   for (const auto& [id, claim] : std::exchange(cut_, {})) put(id, claim);
 }
 

@@ -9,27 +9,27 @@
 
 namespace tfdude {
 
-/// Gives frames up that others have a better claim to, once it is sure that the claim still stands: a claim may have been
-/// taken back long ago by an owner whose pages are late. So what is given up must stand after all of the others have told how
+/// Yields frames that others have a better claim to, once it is sure that the claim still stands: a claim may have been
+/// taken back long ago by an owner whose pages are late. So what is yielded must stand after all of the others have told how
 /// far they are, and their structure up to there has come.
 /// @par Thread safety  ask() and stop(), after start().
-class Conceding {
+class Yielding {
  public:
-  Conceding(Structure& structure, Requests& requests, MemberRunner& member, Milliseconds timeout)
+  Yielding(Structure& structure, Requests& requests, MemberRunner& member, Milliseconds timeout)
       : structure_(structure), requests_(requests), member_(member), timeout_(timeout) {}
-  ~Conceding() { stop(); }
-  Conceding(const Conceding&) = delete;
-  Conceding& operator=(const Conceding&) = delete;
+  ~Yielding() { stop(); }
+  Yielding(const Yielding&) = delete;
+  Yielding& operator=(const Yielding&) = delete;
 
   /// Before the participant owns anything.
   void start();
   void stop();
 
-  /// A concession may be due.
+  /// A yield may be pending.
   void ask() { thread_->ask(); }
 
  private:
-  void concede();
+  void yield();
   [[nodiscard]] bool catch_up();
 
   Structure& structure_;

@@ -17,28 +17,29 @@
 namespace tfdude {
 
 /// That a partition has a frame, and where it hangs it.
-struct Claim {
+struct FrameClaim {
   Owner owner = kHeldHere;
   std::string parent;
   std::uint64_t lamport_time = 0;
   std::uint32_t page = 0;  ///< of its owner's, where it says so
 };
 
-/// What the partition of this process would have to give up because of what others claim. What is on its way may resolve
-/// it, such as a claim that was taken back: so it is done once the others were asked how far they are.
-struct Concession {
+/// A frame, or where it hangs, that the partition of this process would have to yield because of what others claim. What is
+/// on its way may resolve it, such as a claim that was taken back: so it is done once the others were asked how far they
+/// are.
+struct PendingYield {
   enum class Kind : std::uint8_t {
-    kGiveWay,  ///< the id was claimed earlier by `rival`: release the frame
+    kRelease,  ///< the id was claimed earlier by `rival`: release the frame
     kUnhang,   ///< it closes a cycle with an earlier move of `rival`: make it a root
     kRemove,   ///< the frame that it hung below was removed by `rival`: so is it
   };
-  Kind kind = Kind::kGiveWay;
+  Kind kind = Kind::kRelease;
   std::string frame;
   Owner rival = kHeldHere;
   /// When the frame was hung where it hangs: another of its name, or a move, is another matter.
   std::uint64_t lamport_time = 0;
 
-  friend bool operator<(const Concession& a, const Concession& b) {
+  friend bool operator<(const PendingYield& a, const PendingYield& b) {
     return std::tie(a.kind, a.frame, a.rival, a.lamport_time) <
            std::tie(b.kind, b.frame, b.rival, b.lamport_time);
   }
@@ -47,11 +48,11 @@ struct Concession {
 /// Which of all claims are in force: writes those into the forest. Of several partitions that claim a frame
 /// Succession says whose claim holds; in each cycle of claims the youngest does not, of those of partitions that are
 /// gone where there are such, and its frame is a root (of the same age: that of the greater id). So what is in force is a function of the claims and of who is there, not of
-/// the order in which they came. A held frame stays until its owner concedes; whoever does not own it sees the
+/// the order in which they came. A held frame stays until its owner yields; whoever does not own it sees the
 /// outcome at once. Not thread-safe.
-class Claims {
+class FrameClaims {
  public:
-  Claims(Forest& forest, ChangeLog& changes) : forest_(forest), changes_(changes) {}
+  FrameClaims(Forest& forest, ChangeLog& changes) : forest_(forest), changes_(changes) {}
 
   /// Numbers the partitions; the first is this process's own.
   Owner add_owner(std::string name) { return succession_.add_owner(std::move(name)); }
@@ -70,7 +71,7 @@ class Claims {
 
   /// A partition claims a frame, perhaps once more. O(1) where nobody else does.
   /// @return whether it had not claimed it before
-  bool claim(const std::string& id, Claim claim, Counts counts = Counts::kTheYounger);
+  bool claim(const std::string& id, FrameClaim claim, Counts counts = Counts::kTheYounger);
 
   /// A page of the partition's does not claim the frame any more. What another page has claimed since stays.
   /// @return whether the claim is gone
@@ -79,15 +80,15 @@ class Claims {
   /// This process released a frame that it held: another's claim to it may be in force now.
   void released(const std::string& id);
 
-  /// This process is going to hold a frame that may be another's now. Who comes gives way to who is there already,
+  /// This process is going to hold a frame that may be another's now. Who comes yields to who is there already,
   /// whichever claim is the older one, unless this process's partition has outlived that.
-  /// @return false where it has to give way
+  /// @return false where it has to yield
   [[nodiscard]] bool take(const std::string& id);
-  /// To whom it has to give way then.
+  /// To whom it has to yield then.
   [[nodiscard]] Owner holder(const std::string& id) const;
 
   /// This process is going to hang a frame below its own place. Cuts the way from there up to it at the youngest
-  /// claim of others, for mend() to find out who has to give way.
+  /// claim of others, for mend() to find out who has to yield.
   /// @return false where none of the way is others'
   [[nodiscard]] bool make_way(const std::string& parent);
 
@@ -97,37 +98,37 @@ class Claims {
   /// Whether any two claims cannot both hold.
   [[nodiscard]] bool contested() const { return !shadowed_.empty() || !cut_.empty(); }
 
-  /// What this process would have to concede now. O(contested frames).
-  [[nodiscard]] std::set<Concession> concessions() const;
+  /// What this process would have to yield now. O(contested frames).
+  [[nodiscard]] std::set<PendingYield> pending_yields() const;
 
  private:
   [[nodiscard]] bool may_take_from(Owner owner) const;
   /// Of two edges in a cycle: whether the first one is to be cut rather than the second.
-  [[nodiscard]] bool gives_way(const FrameInfo& a, const FrameInfo& b) const;
-  [[nodiscard]] Claim in_force(const FrameInfo& there) const;
-  [[nodiscard]] Claim* shadowed(const std::string& id, Owner owner);
+  [[nodiscard]] bool yields_to(const FrameInfo& a, const FrameInfo& b) const;
+  [[nodiscard]] FrameClaim in_force(const FrameInfo& there) const;
+  [[nodiscard]] FrameClaim* shadowed(const std::string& id, Owner owner);
   [[nodiscard]] std::uint32_t page_of(std::string_view id) const;
-  void shadow(const std::string& id, Claim claim);
+  void shadow(const std::string& id, FrameClaim claim);
   void promote(const std::string& id);
   void reconsider();
-  void put(const std::string& id, const Claim& claim);
-  void break_cycle(const std::string& id, const Claim& claim);
+  void put(const std::string& id, const FrameClaim& claim);
+  void break_cycle(const std::string& id, const FrameClaim& claim);
   void cut(const FrameInfo& frame);
   /// Of the cycle that a claim would close: the youngest edge that others own, and the youngest held one.
   struct Cycle {
     FrameInfo youngest;
     std::optional<FrameInfo> held;
   };
-  [[nodiscard]] Cycle cycle_of(const std::string& id, const Claim& claim) const;
+  [[nodiscard]] Cycle cycle_of(const std::string& id, const FrameClaim& claim) const;
 
   Forest& forest_;
   ChangeLog& changes_;
   Succession succession_;
   // Frames that several partitions claim: all claims but the one in force.
-  std::unordered_map<std::string, std::vector<Claim>> shadowed_;
+  std::unordered_map<std::string, std::vector<FrameClaim>> shadowed_;
   std::vector<std::uint32_t> page_of_slot_;  // of the claims in force
   // Claims of frames that are roots because they would close a cycle.
-  std::map<std::string, Claim> cut_;
+  std::map<std::string, FrameClaim> cut_;
 };
 
 }  // namespace tfdude

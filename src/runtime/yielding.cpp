@@ -1,4 +1,4 @@
-#include "runtime/conceding.hpp"
+#include "runtime/yielding.hpp"
 
 #include <set>
 #include <string>
@@ -8,28 +8,28 @@ namespace tfdude {
 namespace {
 
 // How often at most the others are asked whether what seems to be a conflict is one.
-constexpr Milliseconds kConcedeEvery{100};
+constexpr Milliseconds kYieldEvery{100};
 
 }  // namespace
 
-void Conceding::start() {
-  thread_.emplace(kConcedeEvery, [this] { concede(); });
+void Yielding::start() {
+  thread_.emplace(kYieldEvery, [this] { yield(); });
 }
 
-void Conceding::stop() {
+void Yielding::stop() {
   if (thread_) thread_->stop();
 }
 
-void Conceding::concede() {
-  const std::set<Concession> due =
-      member_.with_rules([](const Member& member) { return member.concessions(); });
+void Yielding::yield() {
+  const std::set<PendingYield> due =
+      member_.with_rules([](const Member& member) { return member.pending_yields(); });
   if (due.empty()) return;
   const bool current = catch_up();
-  member_.concede(due, current);
+  member_.yield(due, current);
 }
 
 // Whether all that those who are reachable had changed when this was called is known here now.
-bool Conceding::catch_up() {
+bool Yielding::catch_up() {
   const Deadline deadline(timeout_);
   std::vector<Part> parts;
   {
