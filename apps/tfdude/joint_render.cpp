@@ -7,11 +7,12 @@
 namespace tfdude::cli {
 namespace {
 
-bool is_slider(const JointInfo& joint) { return joint.type == JointType::kPrismatic; }
+bool is_prismatic(const JointInfo& joint) { return joint.type == JointType::kPrismatic; }
 
 // In degrees or millimetres, as people think of joints.
 std::string shown(const JointInfo& joint, double value) {
-  return is_slider(joint) ? format("%.3f mm", value * 1e3) : format("%.3f deg", value * kDegrees);
+  return is_prismatic(joint) ? format("%.3f mm", value * 1e3)
+                             : format("%.3f deg", value * kDegrees);
 }
 
 std::string limits_of(const JointInfo& joint) {

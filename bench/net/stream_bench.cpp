@@ -46,13 +46,13 @@ constexpr const char* kPartition = "joints";
 constexpr const char* kRoot = "base";
 
 std::string joint(int number) { return "joint_" + std::to_string(number); }
-std::string slider(int number) { return "slider_" + std::to_string(number); }
+std::string name_of_joint(int number) { return "joint_" + std::to_string(number); }
 std::string carriage(int number) { return "carriage_" + std::to_string(number); }
 
-// The first slides along x; the others are hinges, as most joints are.
+// The first is prismatic, along x; the others are revolute, as most joints are.
 FrameSpec moved_frame(int number) {
   JointSpec spec;
-  spec.name = slider(number);
+  spec.name = name_of_joint(number);
   spec.type = number == 0 ? JointType::kPrismatic : JointType::kContinuous;
   spec.joint = number == 0 ? prismatic_joint({}, {1, 0, 0}) : revolute_joint({}, {0, 0.6, 0.8});
   return {carriage(number), kRoot, {}, {}, {}, spec};
@@ -181,7 +181,7 @@ Publisher::Publish edges_to(Client& client) {
 
 Publisher::Publish joints_to(Client& client) {
   std::vector<std::string> names;
-  for (int i = 0; i < kJoints; ++i) names.push_back(slider(i));
+  for (int i = 0; i < kJoints; ++i) names.push_back(name_of_joint(i));
   std::vector<double> positions(kJoints, 0.5);
   const std::vector<double> variances(kJoints, 1e-6);
   return [&client, names, positions, variances]() mutable {

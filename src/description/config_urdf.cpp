@@ -12,8 +12,11 @@ constexpr std::array<std::string_view, 11> kUrdfKeys = {"file",  "root",        
                                                         "quat",  "stddev",        "cov",   "prefix",
                                                         "links", "strict_limits", "joints"};
 constexpr std::array<std::string_view, 5> kRootKeys = {"xyz", "rpy", "quat", "stddev", "cov"};
-constexpr std::array<std::string_view, 3> kJointKeys = {"position", "stddev", "mount"};
-constexpr std::array<std::string_view, 2> kMountKeys = {"stddev", "cov"};
+constexpr std::array<std::string_view, 3> kJointKeys = {"position", "stddev", "origin"};
+// As files of before have it.
+constexpr const char* kFormerOrigin = "mount";
+constexpr std::array<std::string_view, 3> kFormerJointKeys = {"position", "stddev", kFormerOrigin};
+constexpr std::array<std::string_view, 2> kOriginKeys = {"stddev", "cov"};
 
 }  // namespace
 
@@ -57,21 +60,23 @@ Result<void> UrdfFields::links(const Fields& entries, const std::string& place,
 }
 
 Result<UrdfJoint> UrdfFields::joint(const YAML::Node& node, const std::string& place) const {
-  const auto entries = fields(node, kJointKeys, place);
+  const bool former = node.IsMap() && node[kFormerOrigin].IsDefined();
+  const auto entries = fields(node, former ? kFormerJointKeys : kJointKeys, place);
   if (!entries) return tl::unexpected(entries.error());
   UrdfJoint joint;
   const auto read = number(*entries, "position", place, joint.position).and_then([&] {
     return number(*entries, "stddev", place, joint.stddev);
   });
   if (!read) return tl::unexpected(read.error());
-  const auto mount = entries->find("mount");
-  if (mount == entries->end()) return joint;
-  const std::string what = place + ": mount";
-  const auto said = fields(mount->second.value, kMountKeys, what);
+  const std::string key = former ? kFormerOrigin : "origin";
+  const auto origin = entries->find(key);
+  if (origin == entries->end()) return joint;
+  const std::string what = place + ": " + key;
+  const auto said = fields(origin->second.value, kOriginKeys, what);
   if (!said) return tl::unexpected(said.error());
-  const auto error_of = transform(mount->second.value, *said, what);
+  const auto error_of = transform(origin->second.value, *said, what);
   if (!error_of) return tl::unexpected(error_of.error());
-  joint.mount = error_of->covariance;
+  joint.origin = error_of->covariance;
   return joint;
 }
 

@@ -21,11 +21,11 @@ namespace {
 
 using testing::ContainsSubstring;
 using testing::following;
-using testing::hinge_named;
 using testing::Join;
 using testing::joined_by;
 using testing::moved_by;
 using testing::outcome;
+using testing::revolute_named;
 using testing::yaw;
 using Names = std::vector<std::string>;
 using Numbers = std::vector<double>;
@@ -52,12 +52,12 @@ struct Robot {
   explicit Robot(const Join& join) {
     base.emplace(
         *Node::open(join("base"), "base",
-                    {{"world", "", {}}, moved_by("turret", "world", hinge_named("turn"))}));
-    JointSpec elbow = hinge_named("elbow");
+                    {{"world", "", {}}, moved_by("turret", "world", revolute_named("turn"))}));
+    JointSpec elbow = revolute_named("elbow");
     elbow.coupled = true;
-    arm.emplace(*Node::open(
-        join("arm"), "arm",
-        {moved_by("upper", "turret", hinge_named("shoulder")), moved_by("fore", "upper", elbow)}));
+    arm.emplace(*Node::open(join("arm"), "arm",
+                            {moved_by("upper", "turret", revolute_named("shoulder")),
+                             moved_by("fore", "upper", elbow)}));
     tool.emplace(*Node::open(join("tool"), "tool",
                              {moved_by("hand", "fore", following("wrist", "elbow", -1, 0))}));
     client.emplace(*Client::open(join("")));
@@ -184,7 +184,7 @@ TEST_CASE("joints: a node that is opened again has its joints where they were") 
   Options options;
   options.state = directory.path();
   const std::vector<FrameSpec> frames{{"world", "", {}},
-                                      moved_by("turret", "world", hinge_named("turn"))};
+                                      moved_by("turret", "world", revolute_named("turn"))};
   auto client = Client::open(join(""));
   REQUIRE(client);
   {

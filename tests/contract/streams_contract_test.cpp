@@ -25,13 +25,13 @@ namespace {
 using testing::along_x;
 using testing::eventually;
 using testing::following;
-using testing::hinge_named;
 using testing::is_at;
 using testing::Join;
 using testing::joined_by;
 using testing::moved_by;
 using testing::open_with_tip;
 using testing::outcome;
+using testing::revolute_named;
 using testing::yaw;
 using Clock = std::chrono::steady_clock;
 
@@ -143,11 +143,11 @@ TEST_CASE("streams: of what is invalid nothing is sent") {
 
 TEST_CASE("streams: positions of joints reach all who have them, and who is missing is named") {
   const Join join = joined_by(GENERATE(0, 1));
-  JointSpec elbow = hinge_named("elbow");
+  JointSpec elbow = revolute_named("elbow");
   elbow.coupled = true;
   Node arm = *Node::open(join("arm"), "arm",
                          {{"world", "", {}},
-                          moved_by("upper", "world", hinge_named("shoulder")),
+                          moved_by("upper", "world", revolute_named("shoulder")),
                           moved_by("fore", "upper", elbow)});
   std::optional<Node> tool = *Node::open(
       join("tool"), "tool", {moved_by("hand", "fore", following("wrist", "elbow", -1, 0))});

@@ -24,7 +24,7 @@ void demand_same_names(const Bytes& bytes, const wire::Joints& sample) {
 /// An arm whose elbow a hand follows.
 struct Arm : testing::Replica {
   Arm() : Replica("arm"), partition("arm", 1, forest, directory) {
-    JointSpec elbow = testing::hinge_named("elbow");
+    JointSpec elbow = testing::revolute_named("elbow");
     elbow.coupled = true;
     demand(partition
                .load({{"base", "", {}},

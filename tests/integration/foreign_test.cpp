@@ -25,9 +25,9 @@ using namespace std::chrono_literals;
 using testing::Bytes;
 using testing::eventually;
 using testing::ForeignWriter;
-using testing::hinge_named;
 using testing::moved_by;
 using testing::RawType;
+using testing::revolute_named;
 
 struct Counted {
   Counted(std::uint32_t domain, const std::string& partition, const std::string& frame)
@@ -126,7 +126,7 @@ TEST_CASE("joints of a plain writer move the edges of who has them") {
     return *make_fastdds_transport({domain.number(), TFDUDE_LOOPBACK_PROFILE, partition, counters});
   };
   auto arm = *Node::open(transport("arm"), "arm",
-                         {{"base", "", {}}, moved_by("fore", "base", hinge_named("elbow"))});
+                         {{"base", "", {}}, moved_by("fore", "base", revolute_named("elbow"))});
   const auto to_all = GENERATE(true, false);
   ForeignWriter writer(domain.number(), "tfdude/joint",
                        fastdds::edds::TypeSupport(new wire::JointsPubSubType),

@@ -18,7 +18,7 @@ namespace tfdude::testing {
 }
 
 /// About the z axis, a metre along x, within -1 to 2 rad; at rest uncertain by half a radian.
-[[nodiscard]] inline JointSpec hinge_named(const std::string& name) {
+[[nodiscard]] inline JointSpec revolute_named(const std::string& name) {
   JointSpec spec;
   spec.name = name;
   spec.type = JointType::kRevolute;
@@ -31,7 +31,7 @@ namespace tfdude::testing {
 /// The same, following another.
 [[nodiscard]] inline JointSpec following(const std::string& name, const std::string& leader,
                                          double multiplier, double offset) {
-  JointSpec spec = hinge_named(name);
+  JointSpec spec = revolute_named(name);
   spec.mimic = Mimic{leader, multiplier, offset};
   spec.coupled = true;
   return spec;

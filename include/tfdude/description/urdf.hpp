@@ -16,7 +16,7 @@ struct UrdfJoint {
   /// Before the first sample [rad or m]; absent: rest_position(). A joint that mimics another has none of its own.
   std::optional<double> position{};
   std::optional<double> stddev{};  ///< of that; absent: unmeasured_variance()
-  Covariance mount{};              ///< of its origin; of a fixed joint, too
+  Covariance origin{};             ///< of its origin; of a fixed joint, too
 };
 
 /// A URDF file, or a part of it, and how it stands among the other frames.

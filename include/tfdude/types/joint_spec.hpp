@@ -103,8 +103,8 @@ struct JointValue {
 [[nodiscard]] TFDUDE_EXPORT double rest_position(const std::optional<JointLimits>& limits);
 
 /// What is known of a position of which nothing is known: the mean square distance of all that are within the limits, each
-/// as likely; of a hinge without limits, those of one turn. @return 0 for a slider without limits, of which nothing can be
-///   said
+/// as likely; of a revolute joint without limits, those of one turn. @return 0 for a prismatic one without limits, of which
+///   nothing can be said
 [[nodiscard]] TFDUDE_EXPORT double unmeasured_variance(JointType type,
                                                        const std::optional<JointLimits>& limits,
                                                        double position);

@@ -20,9 +20,9 @@ namespace {
 
 using testing::AllocationGuard;
 using testing::along_x;
-using testing::hinge_named;
 using testing::moved_by;
 using testing::Relay;
+using testing::revolute_named;
 
 // Ends where the transport begins.
 struct Port {
@@ -68,7 +68,7 @@ std::vector<FrameSpec> frames_of(const std::string& partition) {
   for (int i = 0; i < 6; ++i) {
     frames.push_back({long_name(partition + " frame", i), root, {}});
     frames.push_back(moved_by(long_name(partition + " link", i), root,
-                              hinge_named(long_name(partition + " joint", i))));
+                              revolute_named(long_name(partition + " joint", i))));
   }
   return frames;
 }

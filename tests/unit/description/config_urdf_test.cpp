@@ -8,6 +8,20 @@
 
 #include "support/catch.hpp"
 
+TEST_CASE("a joint's origin is read by its former name, too") {
+  for (const std::string key : {"origin", "mount"}) {
+    INFO(key);
+    const auto config =
+        tfdude::parse_config("urdf:\n  - file: robots/ur5e.urdf\n    joints: {elbow_joint: {" +
+                                 key + ": {stddev: [0, 0, 0.2, 0, 0, 0]}}}\n",
+                             TFDUDE_EXAMPLES "/robot.yaml");
+    REQUIRE(config.has_value());
+    const auto& elbow = *config->frames.at(3).joint;
+    CHECK(elbow.name == "elbow_joint");
+    CHECK(elbow.joint.X_PJ.covariance.stddev()[2] == tfdude::testing::Approx(0.2));
+  }
+}
+
 TEST_CASE("a configuration names URDFs") {
   const auto config = tfdude::parse_config(
       "frames: [{id: world}]\n"
@@ -19,7 +33,7 @@ TEST_CASE("a configuration names URDFs") {
       "    prefix: a_\n"
       "    strict_limits: true\n"
       "    joints:\n"
-      "      elbow_joint: {position: 0.5, stddev: 0.01, mount: {stddev: [0, 0, 0.2, 0, 0, 0]}}\n"
+      "      elbow_joint: {position: 0.5, stddev: 0.01, origin: {stddev: [0, 0, 0.2, 0, 0, 0]}}\n"
       "  - {file: robots/ur5e.urdf, prefix: b_, links: [base_link..forearm_link, tool0]}\n",
       TFDUDE_EXAMPLES "/robot.yaml");
   INFO((config ? "" : config.error().message));
@@ -84,13 +98,15 @@ TEST_CASE("a bad entry of a URDF is refused by name and line") {
   entry("joints: [a]", ": joints is not a mapping");
   entry("joints: {x: {}}", ": " + folder + "ur5e.urdf: joint 'x' is not there");
   entry("joints: {elbow_joint: {at: 1}}",
-        ": joint 'elbow_joint': unknown key 'at'; known are position, stddev, mount");
+        ": joint 'elbow_joint': unknown key 'at'; known are position, stddev, origin");
+  entry("joints: {elbow_joint: {origin: {}, mount: {}}}",
+        ": joint 'elbow_joint': unknown key 'origin'; known are position, stddev, mount");
   entry("joints: {elbow_joint: {position: up}}",
         ": joint 'elbow_joint': position is 'up', which is not a number");
-  entry("joints: {elbow_joint: {mount: {xyz: [0, 0, 0]}}}",
-        ": joint 'elbow_joint': mount: unknown key 'xyz'; known are stddev, cov");
-  entry("joints: {elbow_joint: {mount: {stddev: [-1, 0, 0, 0, 0, 0]}}}",
-        ": joint 'elbow_joint': mount: stddev[0] is negative");
+  entry("joints: {elbow_joint: {origin: {xyz: [0, 0, 0]}}}",
+        ": joint 'elbow_joint': origin: unknown key 'xyz'; known are stddev, cov");
+  entry("joints: {elbow_joint: {origin: {stddev: [-1, 0, 0, 0, 0, 0]}}}",
+        ": joint 'elbow_joint': origin: stddev[0] is negative");
   const std::string arm = folder + "ur5e.urdf";
   refused(
       "frames:\n  - id: tool0\nurdf:\n  - file: ur5e.urdf\n",

@@ -211,7 +211,7 @@ TEST_CASE("robots: hands of the two-armed robot stand where lift, turn, and tabl
   }
 }
 
-TEST_CASE("robots: three hinges in a plane") {
+TEST_CASE("robots: three revolute joints in a plane") {
   const auto robot = load("three_hinges.urdf");
   Random random(4713);
   INFO("seed " << random.seed());
@@ -225,7 +225,7 @@ TEST_CASE("robots: three hinges in a plane") {
   CHECK(tip.z() == 0);
 }
 
-TEST_CASE("robots: a degree in each hinge moves the tip by what the figure says") {
+TEST_CASE("robots: a degree in each joint moves the tip by what the figure says") {
   const auto robot = load("three_hinges.urdf");
   const Positions q{{"hinge_1", -kPi / 2}, {"hinge_2", -kPi / 3}, {"hinge_3", -kPi / 4}};
   Positions off = q;

@@ -181,14 +181,14 @@ TEST_CASE("urdf: values of joints that break their rules are refused") {
           "r.urdf:4: joint 'j': limits 1 and -1 are upside down");
   refused(pair("prismatic", limits("2e9", "3e9")),
           "r.urdf:4: joint 'j': limits 2e+09 and 3e+09 are beyond 1e9");
-  const std::string hinge = pair("revolute", limits("-1", "2"));
-  refused(hinge, with_joint("j", {2.5, {}, {}}),
+  const std::string revolute = pair("revolute", limits("-1", "2"));
+  refused(revolute, with_joint("j", {2.5, {}, {}}),
           "r.urdf:4: joint 'j': position 2.5 is outside its limits -1 and 2");
-  refused(hinge, with_joint("j", {std::nan(""), {}, {}}),
+  refused(revolute, with_joint("j", {std::nan(""), {}, {}}),
           "r.urdf:4: joint 'j': position nan is beyond 1e9");
-  refused(hinge, with_joint("j", {{}, -0.1, {}}),
+  refused(revolute, with_joint("j", {{}, -0.1, {}}),
           "r.urdf:4: joint 'j': stddev -0.1 is not within 0 and 1e9");
-  refused(hinge, with_joint("b", {}), "r.urdf: joint 'b' is not there");
+  refused(revolute, with_joint("b", {}), "r.urdf: joint 'b' is not there");
   refused(pair("fixed"), with_joint("j", {0.0, {}, {}}),
           "r.urdf:4: joint 'j': has no position: it does not move by one number");
   refused(hand(), with_joint("f2", {{}, 0.1, {}}),
@@ -227,15 +227,16 @@ TEST_CASE("urdf: a joint's position before its first sample") {
   strict.strict_limits = true;
   CHECK(at(strict).strict);
 
-  tfdude::UrdfJoint mounted{2.0, 0.0, *tfdude::Covariance::from_stddev({1, 2, 3, 4, 5, 6})};
-  const auto frame = frames_of(pair("revolute", limits("1", "3")), with_joint("j", mounted)).at(1);
+  tfdude::UrdfJoint with_origin{2.0, 0.0, *tfdude::Covariance::from_stddev({1, 2, 3, 4, 5, 6})};
+  const auto frame =
+      frames_of(pair("revolute", limits("1", "3")), with_joint("j", with_origin)).at(1);
   CHECK(frame.joint->joint.X_PJ.covariance.stddev()[1] == Approx(2));
   const auto X_PC = tfdude::value_at(*frame.joint, 2.0, 0.0);
   CHECK(frame.X_PC.covariance.upper() == X_PC.covariance.upper());
   CHECK(frame.X_PC.pose.matrix() == X_PC.pose.matrix());
-  mounted.position.reset();
-  mounted.stddev.reset();
-  CHECK(frames_of(pair("fixed"), with_joint("j", mounted))[1].X_PC.covariance.stddev()[5] ==
+  with_origin.position.reset();
+  with_origin.stddev.reset();
+  CHECK(frames_of(pair("fixed"), with_joint("j", with_origin))[1].X_PC.covariance.stddev()[5] ==
         Approx(6));
 }
 

@@ -31,7 +31,7 @@ double difference(const Matrix6d& a, const Matrix6d& b) { return (a - b).cwiseAb
 
 }  // namespace
 
-TEST_CASE("joint: a hinge turns about its axis, a slider shifts along it") {
+TEST_CASE("joint: a revolute joint turns about its axis, a prismatic one shifts along it") {
   Random random(1);
   INFO("seed " << random.seed());
   for (int run = 0; run < 500; ++run) {
@@ -49,7 +49,7 @@ TEST_CASE("joint: a hinge turns about its axis, a slider shifts along it") {
   }
 }
 
-TEST_CASE("joint: at zero the child stands at the mount") {
+TEST_CASE("joint: at zero the child stands at the origin") {
   Random random(2);
   INFO("seed " << random.seed());
   const Transform X_PJ = random.transform();
@@ -75,7 +75,7 @@ TEST_CASE("joint: the variance of the position is a covariance of rank one along
   }
 }
 
-TEST_CASE("joint: the mount's error is seen from the child") {
+TEST_CASE("joint: the origin's error is seen from the child") {
   Random random(4);
   INFO("seed " << random.seed());
   for (int run = 0; run < 100; ++run) {
@@ -90,7 +90,7 @@ TEST_CASE("joint: the mount's error is seen from the child") {
   }
 }
 
-TEST_CASE("joint: covariance is that of samples of position and mount") {
+TEST_CASE("joint: covariance is that of samples of position and origin") {
   Random random(5);
   INFO("seed " << random.seed());
   constexpr int kSamples = 20000;
@@ -101,10 +101,10 @@ TEST_CASE("joint: covariance is that of samples of position and mount") {
     const Joint joint = run % 2 == 0 ? revolute_joint(X_PJ, axis) : prismatic_joint(X_PJ, axis);
     const double q = random.uniform(-3, 3);
     const Transform X = tfdude::joint_transform(joint, q, kSigma * kSigma);
-    const tfdude::testing::Gaussian mount(X_PJ.covariance);
+    const tfdude::testing::Gaussian origin(X_PJ.covariance);
     const auto sample = [&] {
       Joint off = joint;
-      off.X_PJ.pose = X_PJ.pose * tfdude::exp(Twist(mount(random)));
+      off.X_PJ.pose = X_PJ.pose * tfdude::exp(Twist(origin(random)));
       const auto X_off = tfdude::joint_transform(off, q + kSigma * random.normal(), 0);
       return tfdude::log(X.pose.inverse() * X_off.pose);
     };

@@ -52,7 +52,7 @@ TEST_CASE("joints: of an unmeasured position the mean square distance within the
   CHECK(tfdude::unmeasured_variance(JointType::kPrismatic, JointLimits{2, 2}, 2) == 0);
 }
 
-TEST_CASE("joints: a coupled joint's own covariance is its mount's alone") {
+TEST_CASE("joints: a coupled joint's own covariance is its origin's alone") {
   JointSpec joint;
   joint.joint = tfdude::revolute_joint({{}, *tfdude::Covariance::from_stddev({1, 0, 0, 0, 0, 0})},
                                        Eigen::Vector3d::UnitX());

@@ -20,11 +20,11 @@ namespace {
 using testing::along_x;
 using testing::ContainsSubstring;
 using testing::following;
-using testing::hinge_named;
 using testing::moved_by;
 using testing::outcome;
 using testing::pose_diff;
 using testing::Replica;
+using testing::revolute_named;
 
 constexpr Time kNow{std::chrono::seconds(100)};
 
@@ -35,13 +35,13 @@ struct Arm : Replica {
   Arm() : Replica("arm"), partition("arm", 7, forest, directory) {}
 
   std::vector<FrameSpec> frames() const {
-    JointSpec elbow = hinge_named("elbow");
+    JointSpec elbow = revolute_named("elbow");
     elbow.coupled = true;
-    JointSpec rail = hinge_named("rail");
+    JointSpec rail = revolute_named("rail");
     rail.type = JointType::kPrismatic;
     rail.joint = prismatic_joint(along_x(0), {0, 1, 0});
     return {{"base", "", {}},
-            moved_by("upper", "base", hinge_named("shoulder")),
+            moved_by("upper", "base", revolute_named("shoulder")),
             moved_by("fore", "upper", elbow),
             moved_by("hand", "fore", following("wrist", "elbow", -0.5, 0.125)),
             moved_by("cart", "base", rail)};
@@ -271,7 +271,7 @@ TEST_CASE("a partition comes back with its joints where they were") {
   }
   SECTION("the description has changed") {
     auto frames = arm.frames();
-    // Seen at rest: a longer mount. Not seen at rest: an axis the other way round, and another multiplier.
+    // Seen at rest: another origin. Not seen at rest: an axis the other way round, and another multiplier.
     JointSpec longer = *frames[1].joint;
     longer.joint = revolute_joint(along_x(2), {0, 0, 1});
     frames[1] = moved_by("upper", "base", longer);
@@ -325,7 +325,7 @@ TEST_CASE("a partition comes back with its joints where they were") {
     CHECK(next.info("elbow").position == 0.125);
     CHECK(next.info("elbow").measured);
   }
-  SECTION("a hinge without limits is as good as one with them") {
+  SECTION("a revolute joint without limits is as good as one with them") {
     auto frames = arm.frames();
     frames[1].joint->type = JointType::kContinuous;
     frames[1].joint->limits.reset();

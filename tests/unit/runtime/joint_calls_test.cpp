@@ -16,9 +16,9 @@ namespace {
 
 using namespace std::chrono_literals;
 using testing::ContainsSubstring;
-using testing::hinge_named;
 using testing::moved_by;
 using testing::outcome;
+using testing::revolute_named;
 using testing::Rig;
 using testing::ScriptedOwner;
 
@@ -29,7 +29,7 @@ struct Mover : Rig {
 };
 
 std::vector<FrameSpec> arm() {
-  return {{"base", "", {}}, moved_by("fore", "base", hinge_named("elbow"))};
+  return {{"base", "", {}}, moved_by("fore", "base", revolute_named("elbow"))};
 }
 
 }  // namespace

@@ -22,13 +22,13 @@ namespace {
 
 using testing::along_x;
 using testing::eventually;
-using testing::hinge_named;
 using testing::moved_by;
+using testing::revolute_named;
 
 std::vector<FrameSpec> frames_of(const std::string& name) {
   return {{name + "_base", "", {}},
           {name + "_tip", name + "_base", {}},
-          moved_by(name + "_link", name + "_base", hinge_named(name + "_joint"))};
+          moved_by(name + "_link", name + "_base", revolute_named(name + "_joint"))};
 }
 
 }  // namespace
