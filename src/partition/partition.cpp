@@ -346,8 +346,8 @@ std::size_t Partition::apply(const Update& update) {
   return forest_.update(own, update.stamp) ? own.size() : 0;
 }
 
-// A frame asked of its owner that the owner does not have has moved on, or is gone: both are healed by
-// a fresh look into the directory.
+// A frame asked of its owner that the owner does not have has moved on, or is gone: in both cases the route is stale, and
+// the directory has another one.
 Error Partition::at_home(Error error, std::string_view id) const {
   if (error.code != Errc::kUnknownFrame && error.code != Errc::kNotOwner) return error;
   return {Errc::kNotOwner,

@@ -69,7 +69,7 @@ Result<void> Requests::change(std::vector<Part>& parts, const Deadline& deadline
   Result<void> outcome;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (const auto* error = std::get_if<Error>(&replies[i].body)) {
-      // What is not stored is told, whatever else may be healed by another attempt.
+      // What is not stored is told, whatever else another attempt with a fresh route may bring.
       if (outcome || error->code == Errc::kState) outcome = tl::unexpected(*error);
     } else if (parts[i].owner != kHeldHere) {
       await_change(parts[i], replies[i], deadline);

@@ -23,7 +23,7 @@ enum class Errc : std::uint8_t {
   kAlreadyExists = 7,      ///< add: the id is taken
   kNotConnected = 8,       ///< lookup: the frames have no common root
   kCycle = 9,              ///< move: the new parent lies below the frame
-  kNotOwner = 10,          ///< the partition asked does not own the edge now; healed by a retry
+  kNotOwner = 10,          ///< the partition asked does not own the edge now; try a fresh route
   kPartitionTaken = 11,    ///< another live daemon serves a partition of this name
   kUnreachable = 12,       ///< the owner is known to be down
   kTimeout = 13,           ///< the owner did not answer in time
