@@ -1,7 +1,6 @@
 #include "description/urdf_model.hpp"
 
 #include <algorithm>
-#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -10,6 +9,8 @@
 #include <urdf_parser/urdf_parser.h>
 
 #include "tfdude/base/id.hpp"
+
+#include "base/mutex.hpp"
 
 namespace tfdude {
 namespace {
@@ -59,8 +60,8 @@ tl::unexpected<Error> refused(const UrdfText& text, const std::string& file,
 }  // namespace
 
 Result<UrdfJoints> read_urdf_joints(const UrdfText& text, const std::string& file) {
-  static std::mutex mutex;
-  const std::lock_guard<std::mutex> lock(mutex);
+  static Mutex mutex;
+  const Lock lock(mutex);
   const Listener listener;
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text.cleaned);
   if (!model) return refused(text, file, listener.said());

@@ -1,34 +1,33 @@
 #include "runtime/callbacks.hpp"
 
-#include <condition_variable>
 #include <deque>
 #include <map>
-#include <mutex>
 #include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "base/log.hpp"
+#include "base/mutex.hpp"
 
 namespace tfdude {
 
 struct Callbacks::State {
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::deque<Job> jobs;
-  Clock::time_point moved =
+  Mutex mutex;
+  Condition changed;
+  std::deque<Job> jobs TFDUDE_GUARDED_BY(mutex);
+  Clock::time_point moved TFDUDE_GUARDED_BY(mutex) =
       Clock::time_point::min();  // when a job was last begun, or a thread added
-  std::size_t idle = 0;
-  bool stopping = false;
-  std::map<std::thread::id, std::thread> threads;
-  std::vector<std::thread> ended;  // to be joined
+  std::size_t idle TFDUDE_GUARDED_BY(mutex) = 0;
+  bool stopping TFDUDE_GUARDED_BY(mutex) = false;
+  std::map<std::thread::id, std::thread> threads TFDUDE_GUARDED_BY(mutex);
+  std::vector<std::thread> ended TFDUDE_GUARDED_BY(mutex);  // to be joined
 };
 
 Callbacks::Callbacks() : state_(std::make_shared<State>()) {}
 
-// Under the lock.
-void Callbacks::add_thread(const std::shared_ptr<State>& state) {
+// Under the lock, which the header cannot name, as it does not know the state.
+void Callbacks::add_thread(const std::shared_ptr<State>& state) TFDUDE_UNCHECKED_LOCKS {
   for (std::thread& one : std::exchange(state->ended, {})) one.join();
   state->moved = Clock::now();
   try {
@@ -42,7 +41,7 @@ void Callbacks::add_thread(const std::shared_ptr<State>& state) {
 
 void Callbacks::post(Job job) {
   {
-    const std::lock_guard lock(state_->mutex);
+    const Lock lock(state_->mutex);
     if (state_->stopping) return;
     if (state_->jobs.empty()) state_->moved = Clock::now();
     state_->jobs.push_back(std::move(job));
@@ -52,17 +51,19 @@ void Callbacks::post(Job job) {
 }
 
 std::optional<Callbacks::Clock::time_point> Callbacks::look_after(Clock::time_point now) {
-  const std::lock_guard lock(state_->mutex);
+  const Lock lock(state_->mutex);
   if (state_->stopping || state_->jobs.empty()) return std::nullopt;
   if (now >= state_->moved + kPatience) add_thread(state_);
   return state_->moved + kPatience;
 }
 
 void Callbacks::run(const std::shared_ptr<State>& state) {
-  std::unique_lock lock(state->mutex);
+  Lock lock(state->mutex);
   while (true) {
     ++state->idle;
-    state->changed.wait(lock, [&] { return state->stopping || !state->jobs.empty(); });
+    state->changed.wait(lock, [&]() TFDUDE_REQUIRES(state->mutex) {
+      return state->stopping || !state->jobs.empty();
+    });
     --state->idle;
     if (state->stopping) return;
     Job job = std::move(state->jobs.front());
@@ -87,7 +88,7 @@ void Callbacks::stop() {
   std::vector<std::thread> ended;
   std::deque<Job> dropped;  // without the lock, too
   {
-    const std::lock_guard lock(state_->mutex);
+    const Lock lock(state_->mutex);
     state_->stopping = true;
     threads.swap(state_->threads);
     ended.swap(state_->ended);

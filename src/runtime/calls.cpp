@@ -10,7 +10,7 @@ namespace tfdude {
 Calls::Call::Call(Calls& calls, const std::vector<std::string>& partitions,
                   std::function<void()> arrived)
     : calls_(calls), tell_(std::move(arrived)) {
-  const std::lock_guard lock(calls_.mutex_);
+  const Lock lock(calls_.mutex_);
   if (calls_.idle_signals_.empty()) {
     calls_.signals_.push_back(std::make_unique<Signal>());
     calls_.idle_signals_.push_back(calls_.signals_.back().get());
@@ -26,7 +26,7 @@ Calls::Call::Call(Calls& calls, const std::vector<std::string>& partitions,
 }
 
 Calls::Call::~Call() {
-  const std::lock_guard lock(calls_.mutex_);
+  const Lock lock(calls_.mutex_);
   for (const Entry& entry : entries_) calls_.waiting_.erase(calls_.number_of(entry.sequence));
   calls_.idle_signals_.push_back(arrived_);
 }
@@ -37,17 +37,17 @@ bool Calls::Call::complete() const {
 }
 
 bool Calls::Call::wait_until(Clock::time_point deadline) {
-  std::unique_lock lock(calls_.mutex_);
+  Lock lock(calls_.mutex_);
   return arrived_->wait_until(lock, deadline, [this] { return complete(); });
 }
 
 bool Calls::Call::waits(std::size_t entry) const {
-  const std::lock_guard lock(calls_.mutex_);
+  const Lock lock(calls_.mutex_);
   return !entries_[entry].reply.has_value();
 }
 
 void Calls::Call::give_up(std::size_t entry, Error error) {
-  const std::lock_guard lock(calls_.mutex_);
+  const Lock lock(calls_.mutex_);
   if (entries_[entry].reply) return;
   entries_[entry].reply = Reply{entries_[entry].sequence, 0, std::move(error)};
 }
@@ -56,7 +56,7 @@ void Calls::on_reply(const Reply& reply) {
   Signal* arrived = nullptr;
   std::function<void()> tell;
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     const auto waiting = waiting_.find(number_of(reply.sequence));
     if (waiting == waiting_.end()) return;
     const Call& call = *waiting->second.call;
@@ -75,7 +75,7 @@ void Calls::on_reply(const Reply& reply) {
 void Calls::on_lost(const std::string& partition) {
   std::vector<std::function<void()>> tell;
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     for (auto& [number, waiting] : waiting_) {
       auto& entry = waiting.call->entries_[waiting.entry];
       if (entry.partition != partition || entry.reply) continue;

@@ -1,16 +1,15 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "base/mutex.hpp"
 #include "partition/messages.hpp"
 
 namespace tfdude {
@@ -59,7 +58,7 @@ class Calls {
     Calls& calls_;
     std::vector<Entry> entries_;
     std::uint64_t awaits_from_ = 0;
-    std::condition_variable* arrived_;
+    Condition* arrived_;
     const std::function<void()> tell_;
   };
 
@@ -74,21 +73,21 @@ class Calls {
     Call* call;
     std::size_t entry;
   };
-  using Signal = std::condition_variable;
+  using Signal = Condition;
 
-  mutable std::mutex mutex_;
+  mutable Mutex mutex_;
   // Counted on where the number that travels begins anew, so that the lowest is the oldest.
   using Number = std::uint64_t;
-  [[nodiscard]] Number number_of(std::uint32_t sequence) const {
+  [[nodiscard]] Number number_of(std::uint32_t sequence) const TFDUDE_REQUIRES(mutex_) {
     return last_ - (static_cast<std::uint32_t>(last_) - sequence);
   }
 
-  Number last_ = 0;
-  std::map<Number, Waiting> waiting_;
+  Number last_ TFDUDE_GUARDED_BY(mutex_) = 0;
+  std::map<Number, Waiting> waiting_ TFDUDE_GUARDED_BY(mutex_);
   // Signals outlive their calls, so that they are given without the mutex: else whoever wakes meets it taken and
   // sleeps once more, 2 us on one processor. A call may find another's signal: it looks again.
-  std::vector<std::unique_ptr<Signal>> signals_;
-  std::vector<Signal*> idle_signals_;
+  std::vector<std::unique_ptr<Signal>> signals_ TFDUDE_GUARDED_BY(mutex_);
+  std::vector<Signal*> idle_signals_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 }  // namespace tfdude

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/log.hpp"
+#include "base/mutex.hpp"
 
 namespace tfdude {
 namespace {
@@ -38,7 +39,7 @@ Result<void> CommitLoop::start(const std::vector<FrameSpec>& configured) {
 
 void CommitLoop::stop() {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     stopping_ = true;
   }
   changed_.notify_one();
@@ -48,24 +49,24 @@ void CommitLoop::stop() {
 void CommitLoop::ask() {
   if (asked_.exchange(true)) return;
   // The lock keeps the notice from falling between the thread's look and its sleep.
-  { const std::lock_guard lock(mutex_); }
+  { const Lock lock(mutex_); }
   changed_.notify_one();
 }
 
 void CommitLoop::hurry() {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     hurried_ = true;
   }
   changed_.notify_one();
 }
 
 Result<void> CommitLoop::flush(Clock::time_point deadline) {
-  std::unique_lock lock(mutex_);
+  Lock lock(mutex_);
   const std::uint64_t mine = ++wanted_;
   changed_.notify_one();
-  const bool in_time =
-      done_.wait_until(lock, deadline, [&] { return ended_ || done_up_to_ >= mine; });
+  const bool in_time = done_.wait_until(
+      lock, deadline, [&]() TFDUDE_REQUIRES(mutex_) { return ended_ || done_up_to_ >= mine; });
   if (stored_up_to_ >= mine) return {};
   if (!in_time) return fail(Errc::kTimeout, "changed, but not stored within the time for it");
   if (failure_) return tl::unexpected(unsaved(Reply{}, *failure_));
@@ -74,16 +75,16 @@ Result<void> CommitLoop::flush(Clock::time_point deadline) {
 
 std::optional<Error> CommitLoop::failure() const {
   if (!failing_.load(std::memory_order_relaxed)) return std::nullopt;
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   return failure_;
 }
 
 void CommitLoop::run() {
-  std::unique_lock lock(mutex_);
+  Lock lock(mutex_);
   while (!stopping_) {
     const auto next = next_round();
     if (next && *next <= Clock::now()) {
-      round(lock);
+      round();
     } else if (next) {
       changed_.wait_until(lock, *next);
     } else {
@@ -91,7 +92,7 @@ void CommitLoop::run() {
     }
   }
   next_values_ = {};
-  round(lock);
+  round();
   ended_ = true;
   done_.notify_all();
 }
@@ -105,12 +106,12 @@ std::optional<CommitLoop::Clock::time_point> CommitLoop::next_round() const {
   return next;
 }
 
-void CommitLoop::round(std::unique_lock<std::mutex>& lock) {
+void CommitLoop::round() {
   // Before anything is taken: what these wait for was changed before they came.
   hurried_ = false;
   const std::uint64_t wanted = wanted_;
   const bool failed = failure_.has_value();
-  lock.unlock();
+  mutex_.unlock();
   asked_.store(false);
   const Ready ready = effects_.take();
   const Result<void> stored = store(ready);
@@ -122,7 +123,7 @@ void CommitLoop::round(std::unique_lock<std::mutex>& lock) {
     next_values_ = Clock::now() + periods_.values;
   }
   note(stored ? values : stored);
-  lock.lock();
+  mutex_.lock();
   next_commit_ = Clock::now() + (failure_ ? periods_.retry : periods_.publish);
   done_up_to_ = wanted;
   if (stored) stored_up_to_ = wanted;
@@ -162,7 +163,7 @@ void CommitLoop::note(const Result<void>& stored) {
   if (!stored && stored.error().code != Errc::kState) return;
   std::optional<Error> before;
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     before = failure_;
     failure_ = stored ? std::nullopt : std::optional<Error>(stored.error());
     failing_.store(failure_.has_value());

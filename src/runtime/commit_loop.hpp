@@ -2,15 +2,14 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "base/mutex.hpp"
 #include "partition/ready.hpp"
 #include "partition/state_store.hpp"
 
@@ -86,8 +85,8 @@ class CommitLoop {
 
  private:
   void run();
-  [[nodiscard]] std::optional<Clock::time_point> next_round() const;
-  void round(std::unique_lock<std::mutex>& lock);
+  [[nodiscard]] std::optional<Clock::time_point> next_round() const TFDUDE_REQUIRES(mutex_);
+  void round() TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] Result<void> store(const Ready& ready);
   void tell(const Ready& ready, const Result<void>& stored);
   [[nodiscard]] Result<void> save_values();
@@ -101,16 +100,16 @@ class CommitLoop {
   std::atomic<bool> asked_{false};
   std::atomic<bool> failing_{false};  // whether there is a failure_
 
-  mutable std::mutex mutex_;  // all below
-  std::condition_variable changed_;
-  std::condition_variable done_;
-  bool hurried_ = false;
-  std::uint64_t wanted_ = 0;  // calls of flush(),
-  std::uint64_t done_up_to_ = 0;
-  std::uint64_t stored_up_to_ = 0;
-  std::optional<Error> failure_;
-  bool stopping_ = false;
-  bool ended_ = false;
+  mutable Mutex mutex_;
+  Condition changed_;
+  Condition done_;
+  bool hurried_ TFDUDE_GUARDED_BY(mutex_) = false;
+  std::uint64_t wanted_ TFDUDE_GUARDED_BY(mutex_) = 0;  // calls of flush(),
+  std::uint64_t done_up_to_ TFDUDE_GUARDED_BY(mutex_) = 0;
+  std::uint64_t stored_up_to_ TFDUDE_GUARDED_BY(mutex_) = 0;
+  std::optional<Error> failure_ TFDUDE_GUARDED_BY(mutex_);
+  bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
+  bool ended_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::thread thread_;  // last: it uses the rest
 };
 

@@ -2,11 +2,11 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <thread>
 #include <utility>
+
+#include "base/mutex.hpp"
 
 namespace tfdude {
 
@@ -25,7 +25,7 @@ class Deferred {
   /// Finishes the job at hand; what is asked for from now on is not done.
   void stop() {
     {
-      const std::lock_guard lock(mutex_);
+      const Lock lock(mutex_);
       stopping_ = true;
     }
     changed_.notify_one();
@@ -38,31 +38,31 @@ class Deferred {
   void ask() {
     if (asked_.exchange(true)) return;
     // The lock keeps the notice from falling between the thread's look and its sleep.
-    { const std::lock_guard lock(mutex_); }
+    { const Lock lock(mutex_); }
     changed_.notify_one();
   }
 
  private:
   void run() {
-    std::unique_lock lock(mutex_);
+    Lock lock(mutex_);
     while (true) {
-      changed_.wait(lock, [this] { return stopping_ || asked_.load(); });
+      changed_.wait(lock, [this]() TFDUDE_REQUIRES(mutex_) { return stopping_ || asked_.load(); });
       if (stopping_) return;
       lock.unlock();
       // Before the job, so that what changes while it runs is not missed.
       asked_.store(false);
       job_();
       lock.lock();
-      changed_.wait_for(lock, period_, [this] { return stopping_; });
+      changed_.wait_for(lock, period_, [this]() TFDUDE_REQUIRES(mutex_) { return stopping_; });
     }
   }
 
   const Milliseconds period_;
   const std::function<void()> job_;
   std::atomic<bool> asked_{false};
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool stopping_ = false;
+  Mutex mutex_;
+  Condition changed_;
+  bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::thread thread_;  // last: it uses the rest
 };
 

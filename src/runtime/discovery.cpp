@@ -5,6 +5,8 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/base/time.hpp"
 
+#include "base/mutex.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -42,7 +44,7 @@ bool Discovery::complete() {
   const bool told = now >= told_by_;
   const bool met_all = told || transport_.discovered();
   const bool met_none = now >= met_by_ && !transport_.awaits_presence();
-  const std::lock_guard lock(structure_.mutex);
+  const Lock lock(structure_.mutex);
   const Directory& directory = structure_.directory;
   if (directory.behind() != nullptr) return false;
   const bool known =
@@ -62,7 +64,7 @@ Deadline Discovery::call_deadline() const {
 Result<void> Discovery::await(const Deadline& deadline) {
   {
     // One that has told of a change, and went before that came, may be there again.
-    const std::lock_guard lock(structure_.mutex);
+    const Lock lock(structure_.mutex);
     if (structure_.directory.behind() != nullptr) fell_behind();
   }
   while (!complete()) {
@@ -78,12 +80,12 @@ Error Discovery::last_word(Error error, const Deadline& deadline) {
 }
 
 void Discovery::wait_for_change(const Deadline& deadline) {
-  std::unique_lock lock(structure_.mutex);
+  Lock lock(structure_.mutex);
   structure_.changed.wait_until(lock, deadline.within(kLookAround).at());
 }
 
 Error Discovery::explained(Error error) {
-  const std::lock_guard lock(structure_.mutex);
+  const Lock lock(structure_.mutex);
   const auto missed = structure_.directory.only_heard_of();
   if (!missed || error.code == Errc::kUnknownPartition) return error;
   return {Errc::kUnreachable, error.message + ", unless it is of partition " + quote(missed->name) +
@@ -94,7 +96,7 @@ Error Discovery::explained(Error error) {
 Error Discovery::undecided(const std::string& what, const Deadline& deadline) {
   std::string missing = "nobody was met yet";
   {
-    const std::lock_guard lock(structure_.mutex);
+    const Lock lock(structure_.mutex);
     if (const std::string* partition = structure_.directory.incomplete()) {
       missing = "partition " + quote(*partition) + " has not told all of its frames yet";
     } else if (const std::string* late = structure_.directory.behind()) {

@@ -1,12 +1,12 @@
 #include "runtime/events.hpp"
 
-#include <condition_variable>
 #include <deque>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
+
+#include "base/mutex.hpp"
 
 namespace tfdude {
 namespace {
@@ -21,17 +21,17 @@ struct Waiting {
 
 struct Events::State {
   /// The next change to be told; nothing at the end.
-  [[nodiscard]] std::optional<Waiting> next(std::unique_lock<std::mutex>& lock);
+  [[nodiscard]] std::optional<Waiting> next(Lock& lock) TFDUDE_REQUIRES(mutex);
 
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::map<std::uint64_t, std::shared_ptr<const Callback>> subscribers;
+  Mutex mutex;
+  Condition changed;
+  std::map<std::uint64_t, std::shared_ptr<const Callback>> subscribers TFDUDE_GUARDED_BY(mutex);
   std::uint64_t last_subscriber = 0;
-  std::uint64_t running = 0;  // the subscriber that is being told
-  std::thread::id teller;
-  std::deque<Waiting> waiting;
-  std::size_t missed = 0;
-  bool stopping = false;
+  std::uint64_t running TFDUDE_GUARDED_BY(mutex) = 0;  // the subscriber that is being told
+  std::thread::id teller TFDUDE_GUARDED_BY(mutex);
+  std::deque<Waiting> waiting TFDUDE_GUARDED_BY(mutex);
+  std::size_t missed TFDUDE_GUARDED_BY(mutex) = 0;
+  bool stopping TFDUDE_GUARDED_BY(mutex) = false;
 };
 
 Events::Events() : state_(std::make_shared<State>()) {}
@@ -39,7 +39,7 @@ Events::Events() : state_(std::make_shared<State>()) {}
 Events::~Events() { stop(); }
 
 std::uint64_t Events::subscribe(Callback callback) {
-  const std::lock_guard lock(state_->mutex);
+  const Lock lock(state_->mutex);
   const std::uint64_t subscriber = ++state_->last_subscriber;
   if (state_->stopping) return subscriber;
   if (!thread_.joinable()) {
@@ -52,21 +52,22 @@ std::uint64_t Events::subscribe(Callback callback) {
 
 void Events::unsubscribe(std::uint64_t subscriber) {
   std::shared_ptr<const Callback> dropped;  // without the lock
-  std::unique_lock lock(state_->mutex);
+  Lock lock(state_->mutex);
   const auto found = state_->subscribers.find(subscriber);
   if (found != state_->subscribers.end()) {
     dropped = std::move(found->second);
     state_->subscribers.erase(found);
   }
   if (state_->teller != std::this_thread::get_id()) {
-    state_->changed.wait(lock, [&] { return state_->running != subscriber; });
+    state_->changed.wait(
+        lock, [&]() TFDUDE_REQUIRES(state_->mutex) { return state_->running != subscriber; });
   }
   lock.unlock();
 }
 
 void Events::post(std::vector<Change> changes) {
   {
-    const std::lock_guard lock(state_->mutex);
+    const Lock lock(state_->mutex);
     if (state_->subscribers.empty() || state_->stopping) return;
     for (Change& change : changes) {
       if (state_->waiting.size() < kMaxWaiting) {
@@ -83,7 +84,7 @@ void Events::stop() {
   std::map<std::uint64_t, std::shared_ptr<const Callback>> dropped;  // without the lock
   std::thread thread;
   {
-    const std::lock_guard lock(state_->mutex);
+    const Lock lock(state_->mutex);
     state_->stopping = true;
     dropped.swap(state_->subscribers);
     thread.swap(thread_);
@@ -97,8 +98,9 @@ void Events::stop() {
   }
 }
 
-std::optional<Waiting> Events::State::next(std::unique_lock<std::mutex>& lock) {
-  changed.wait(lock, [this] { return stopping || !waiting.empty() || missed > 0; });
+std::optional<Waiting> Events::State::next(Lock& lock) {
+  changed.wait(
+      lock, [this]() TFDUDE_REQUIRES(mutex) { return stopping || !waiting.empty() || missed > 0; });
   if (stopping) return std::nullopt;
   if (waiting.empty()) {
     Change change{ChangeKind::kMissed, {}, {}, {}, {}, {}, {}};
@@ -112,7 +114,7 @@ std::optional<Waiting> Events::State::next(std::unique_lock<std::mutex>& lock) {
 }
 
 void Events::run(State& state) {
-  std::unique_lock lock(state.mutex);
+  Lock lock(state.mutex);
   while (const auto waiting = state.next(lock)) {
     for (std::uint64_t told = 0;;) {
       const auto subscriber = state.subscribers.upper_bound(told);

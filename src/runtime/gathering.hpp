@@ -1,12 +1,12 @@
 #pragma once
 
 #include <chrono>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "base/mutex.hpp"
 #include "partition/latest.hpp"
 #include "partition/routing.hpp"
 
@@ -16,17 +16,17 @@ namespace tfdude {
 class SharedHints {
  public:
   [[nodiscard]] std::optional<Time> guess(std::string_view a, std::string_view b) const {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     return hints_.guess(a, b, std::chrono::steady_clock::now());
   }
   void note(std::string_view a, std::string_view b, const std::vector<SegmentValues>& answers) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     hints_.note(a, b, std::chrono::steady_clock::now(), answers);
   }
 
  private:
-  mutable std::mutex mutex_;
-  LatestHints hints_;
+  mutable Mutex mutex_;
+  LatestHints hints_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 /// The values that owners have answered, in order, or the first error of one.

@@ -6,6 +6,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "base/mutex.hpp"
 
 namespace tfdude {
 
@@ -47,7 +48,7 @@ Result<void> JointCalls::publish(const JointUpdate& update) {
   Result<void> outcome;
   Result<std::vector<Part>> parts;
   {
-    const std::lock_guard lock(structure_.mutex);
+    const Lock lock(structure_.mutex);
     for (const JointValue& joint : update.joints) {
       if (!structure_.directory.joint_owners(joint.name).empty()) {
         known.joints.push_back(joint);

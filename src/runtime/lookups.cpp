@@ -2,6 +2,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/mutex.hpp"
 #include "runtime/wall_clock.hpp"
 
 namespace tfdude {
@@ -43,7 +44,7 @@ Result<Gathering> Lookups::plan(const PendingLookups::Wanted& wanted) {
   if (auto ok = requests_.still_in(); !ok) return tl::unexpected(std::move(ok.error()));
   const auto& [a, b, query] = wanted;
   const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
-  const std::lock_guard lock(structure_.mutex);
+  const Lock lock(structure_.mutex);
   return route_lookup(structure_.forest, structure_.directory, a, b, query, hint)
       .map([&, &a = a, &b = b](LookupPlan plan) { return Gathering(std::move(plan), a, b, hint); });
 }

@@ -5,6 +5,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "base/mutex.hpp"
 #include "partition/requests.hpp"
 #include "runtime/wall_clock.hpp"
 
@@ -48,11 +49,13 @@ MemberRunner::MemberRunner(Structure& structure, Transport& transport, std::stri
       member_(structure.forest, structure.directory, name_) {}
 
 void MemberRunner::stop() {
+  Deferred* look = nullptr;
   {
-    const std::lock_guard lock(gone_mutex_);
+    const Lock lock(gone_mutex_);
     stopped_ = true;
+    if (gone_look_) look = &*gone_look_;
   }
-  if (gone_look_) gone_look_->stop();
+  if (look != nullptr) look->stop();
   if (commits_) commits_->stop();
 }
 
@@ -62,7 +65,7 @@ template <class Input>
 void MemberRunner::input(Input input) {
   Outcome outcome;
   {
-    const std::lock_guard lock(structure_.mutex);
+    const Lock lock(structure_.mutex);
     input();
     outcome = take_outcome();
   }
@@ -72,7 +75,7 @@ void MemberRunner::input(Input input) {
 template <class Input>
 void MemberRunner::input_of_joints(Input input) {
   this->input([&] {
-    const std::lock_guard joints(joints_mutex_);
+    const Lock joints(joints_mutex_);
     input();
   });
 }
@@ -107,7 +110,7 @@ void MemberRunner::react(const Outcome& outcome) {
 }
 
 void MemberRunner::look_for_gone() {
-  const std::lock_guard lock(gone_mutex_);
+  const Lock lock(gone_mutex_);
   if (stopped_) return;
   if (!gone_look_) {
     gone_look_.emplace(kLookForGone, [this] { input([this] { member_.on_time(Clock::now()); }); });
@@ -152,13 +155,13 @@ void MemberRunner::yield(const std::set<PendingYield>& due, bool current) {
 }
 
 Result<std::size_t> MemberRunner::apply(const JointUpdate& update) {
-  const std::lock_guard lock(joints_mutex_);
+  const Lock lock(joints_mutex_);
   return partition_->apply(update);
 }
 
 Result<std::size_t> MemberRunner::try_apply(const JointUpdate& update) {
-  const std::unique_lock lock(joints_mutex_, std::try_to_lock);
-  if (!lock.owns_lock()) return fail(Errc::kTimeout, "busy");
+  if (!joints_mutex_.try_lock()) return fail(Errc::kTimeout, "busy");
+  const Lock lock(joints_mutex_, std::adopt_lock);
   return partition_->apply(update);
 }
 
@@ -227,13 +230,13 @@ std::optional<Error> MemberRunner::refusal() const {
 Error MemberRunner::unless_unsaved(Error error, const std::string& id) {
   if (error.code != Errc::kAlreadyExists && error.code != Errc::kUnknownFrame) return error;
   auto why = refusal();
-  const std::lock_guard lock(structure_.mutex);
+  const Lock lock(structure_.mutex);
   return why && partition_->is_unsaved(id) ? *std::move(why) : error;
 }
 
 std::shared_ptr<void> MemberRunner::on_change(Events::Callback listener) {
   {
-    const std::lock_guard lock(structure_.mutex);
+    const Lock lock(structure_.mutex);
     structure_.directory.changes().watch();
   }
   const std::uint64_t subscriber = events_->subscribe(std::move(listener));
@@ -243,8 +246,8 @@ std::shared_ptr<void> MemberRunner::on_change(Events::Callback listener) {
 // ---- what the commit loop does
 
 Ready MemberRunner::take() {
-  const std::lock_guard lock(structure_.mutex);
-  const std::lock_guard joints(joints_mutex_);
+  const Lock lock(structure_.mutex);
+  const Lock joints(joints_mutex_);
   return member_.take_ready();
 }
 
@@ -257,7 +260,7 @@ void MemberRunner::publish(const Ready& ready) {
 
 void MemberRunner::take_back(const Ready& ready) {
   const auto said = with_rules([&](Member& member) {
-    const std::lock_guard joints(joints_mutex_);
+    const Lock joints(joints_mutex_);
     return member.not_stored(ready);
   });
   if (said) transport_.announce(*said);
@@ -269,16 +272,16 @@ ChangedValues MemberRunner::take_values() {
   values.since = saved_commit_;
   std::tie(values.edges, saved_commit_) = structure_.forest.changed_since(saved_commit_);
   if (values.edges.empty()) return values;
-  const std::lock_guard lock(structure_.mutex);
+  const Lock lock(structure_.mutex);
   values.edges = member_.storable(std::move(values.edges));
-  const std::lock_guard joints(joints_mutex_);
+  const Lock joints(joints_mutex_);
   values.joints = partition_->take_changed_joints();
   return values;
 }
 
 void MemberRunner::take_back(const ChangedValues& values) {
   saved_commit_ = values.since;
-  const std::lock_guard lock(joints_mutex_);
+  const Lock lock(joints_mutex_);
   partition_->still_unsaved(values.joints);
 }
 

@@ -5,13 +5,13 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "base/mutex.hpp"
 #include "partition/member.hpp"
 #include "runtime/commit_loop.hpp"
 #include "runtime/deadline.hpp"
@@ -97,7 +97,7 @@ class MemberRunner final : private CommitLoop::Effects {
   /// Hands the rules to `use`, for what brings nothing out, under the structure's lock.
   template <class Use>
   auto with_rules(Use use) {
-    const std::lock_guard lock(structure_.mutex);
+    const Lock lock(structure_.mutex);
     return use(member_);
   }
 
@@ -142,13 +142,13 @@ class MemberRunner final : private CommitLoop::Effects {
   Partition* partition_ = nullptr;  // the member's
   std::atomic<bool> out_{false};
   const std::shared_ptr<Events> events_ = std::make_shared<Events>();
-  std::mutex joints_mutex_;         // what partition_ knows of joints
+  Mutex joints_mutex_;              // what partition_ knows of joints
   std::uint64_t saved_commit_ = 0;  // of values; of the thread of commits_
   // Both stop before the transport does.
   std::optional<CommitLoop> commits_;  // set once, before partition_
-  std::mutex gone_mutex_;              // of the rest
-  bool stopped_ = false;
-  std::optional<Deferred> gone_look_;  // once somebody is silent
+  Mutex gone_mutex_;                   // of the rest
+  bool stopped_ TFDUDE_GUARDED_BY(gone_mutex_) = false;
+  std::optional<Deferred> gone_look_ TFDUDE_GUARDED_BY(gone_mutex_);  // once somebody is silent
 };
 
 }  // namespace tfdude

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <condition_variable>
 #include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <thread>
 #include <utility>
+
+#include "base/mutex.hpp"
 
 namespace tfdude {
 
@@ -20,7 +20,7 @@ class Notices {
   Notices& operator=(const Notices&) = delete;
 
   void post(std::function<void()> call) {
-    const std::lock_guard lock(shared_->mutex);
+    const Lock lock(shared_->mutex);
     if (shared_->stopping) return;
     shared_->waiting.push_back(std::move(call));
     if (!thread_.joinable()) thread_ = std::thread([shared = shared_] { run(*shared); });
@@ -31,7 +31,7 @@ class Notices {
   void stop() {
     std::thread ending;
     {
-      const std::lock_guard lock(shared_->mutex);
+      const Lock lock(shared_->mutex);
       shared_->stopping = true;
       ending = std::move(thread_);
     }
@@ -47,16 +47,18 @@ class Notices {
  private:
   // What the thread has still where its call has ended it.
   struct Shared {
-    std::mutex mutex;
-    std::condition_variable changed;
-    std::deque<std::function<void()>> waiting;
-    bool stopping = false;
+    Mutex mutex;
+    Condition changed;
+    std::deque<std::function<void()>> waiting TFDUDE_GUARDED_BY(mutex);
+    bool stopping TFDUDE_GUARDED_BY(mutex) = false;
   };
 
   static void run(Shared& shared) {
-    std::unique_lock lock(shared.mutex);
+    Lock lock(shared.mutex);
     while (true) {
-      shared.changed.wait(lock, [&] { return shared.stopping || !shared.waiting.empty(); });
+      shared.changed.wait(lock, [&]() TFDUDE_REQUIRES(shared.mutex) {
+        return shared.stopping || !shared.waiting.empty();
+      });
       if (shared.stopping) return;
       auto call = std::move(shared.waiting.front());
       shared.waiting.pop_front();

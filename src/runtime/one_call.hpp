@@ -1,10 +1,10 @@
 #pragma once
 
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <thread>
 #include <utility>
+
+#include "base/mutex.hpp"
 
 namespace tfdude {
 
@@ -20,7 +20,7 @@ class OneCall {
   void run(Argument argument) {
     Function function;
     {
-      const std::lock_guard lock(mutex_);
+      const Lock lock(mutex_);
       if (state_ != State::kWaits) return;
       state_ = State::kRuns;
       runner_ = std::this_thread::get_id();
@@ -29,7 +29,7 @@ class OneCall {
     function(std::move(argument));
     function = nullptr;  // what it holds goes before anybody hears that it is over
     {
-      const std::lock_guard lock(mutex_);
+      const Lock lock(mutex_);
       state_ = State::kOver;
     }
     over_.notify_all();
@@ -38,29 +38,29 @@ class OneCall {
   /// Once this returns the function does not run and will not, unless it is the function that calls this.
   void cancel() {
     Function dropped;  // goes without the lock
-    std::unique_lock lock(mutex_);
+    Lock lock(mutex_);
     if (state_ == State::kWaits) {
       state_ = State::kOver;
       dropped = std::move(function_);
     } else if (state_ == State::kRuns && runner_ != std::this_thread::get_id()) {
-      over_.wait(lock, [this] { return state_ == State::kOver; });
+      over_.wait(lock, [this]() TFDUDE_REQUIRES(mutex_) { return state_ == State::kOver; });
     }
     lock.unlock();
   }
 
   [[nodiscard]] bool waits() const {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     return state_ == State::kWaits;
   }
 
  private:
   enum class State { kWaits, kRuns, kOver };
 
-  mutable std::mutex mutex_;
-  std::condition_variable over_;
-  State state_ = State::kWaits;
-  std::thread::id runner_;
-  Function function_;
+  mutable Mutex mutex_;
+  Condition over_;
+  State state_ TFDUDE_GUARDED_BY(mutex_) = State::kWaits;
+  std::thread::id runner_ TFDUDE_GUARDED_BY(mutex_);
+  Function function_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 }  // namespace tfdude

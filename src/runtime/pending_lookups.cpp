@@ -4,6 +4,8 @@
 #include <iterator>
 #include <utility>
 
+#include "base/mutex.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -45,7 +47,7 @@ PendingLookups::PendingLookups(Forest& forest, Calls& calls, SharedHints& hints,
 
 void PendingLookups::stop() {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     stopping_ = true;
   }
   changed_.notify_one();
@@ -83,7 +85,7 @@ std::shared_ptr<OneCall<PendingLookups::Found>> PendingLookups::add(
 
 void PendingLookups::add(std::unique_ptr<Lookup> lookup) {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     if (!stopping_) {
       if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
       added_.push_back(std::move(lookup));
@@ -100,7 +102,7 @@ void PendingLookups::add(std::unique_ptr<Lookup> lookup) {
 void PendingLookups::wake(std::atomic<bool>& why) {
   if (why.exchange(true)) return;
   // The lock keeps the notice from falling between the thread's look and its sleep.
-  { const std::lock_guard lock(mutex_); }
+  { const Lock lock(mutex_); }
   changed_.notify_one();
 }
 
@@ -116,7 +118,7 @@ std::uint64_t PendingLookups::version() const {
 void PendingLookups::run() {
   All all;
   bool listens = false;
-  std::unique_lock lock(mutex_);
+  Lock lock(mutex_);
   while (!stopping_) {
     // Before the look, so that what comes meanwhile is not missed.
     urgent_.store(false);

@@ -1,11 +1,9 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <functional>
 #include <future>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -13,6 +11,7 @@
 
 #include "tfdude/types/query.hpp"
 
+#include "base/mutex.hpp"
 #include "runtime/asking.hpp"
 #include "runtime/callbacks.hpp"
 #include "runtime/deadline.hpp"
@@ -127,10 +126,11 @@ class PendingLookups {
   std::atomic<std::uint64_t> others_{0};  // how often others came or went
   std::atomic<bool> written_{false};      // something may be here now,
   std::atomic<bool> urgent_{false};       // or is: a new lookup, a reply
-  std::mutex mutex_;                      // of the rest, and of the wait
-  std::condition_variable changed_;
-  All added_;  // not taken by the thread yet; once it has ended, what it had
-  bool stopping_ = false;
+  Mutex mutex_;                           // of the rest, and of the wait
+  Condition changed_;
+  All added_
+      TFDUDE_GUARDED_BY(mutex_);  // not taken by the thread yet; once it has ended, what it had
+  bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::thread thread_;  // from the first lookup on
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/mutex.hpp"
+
 namespace tfdude {
 
 Pusher::Pusher(Forest& forest, Push push, End end)
@@ -11,7 +13,7 @@ Pusher::Pusher(Forest& forest, Push push, End end)
 void Pusher::stop() {
   forest_.on_commit(nullptr);
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     stopping_ = true;
   }
   changed_.notify_one();
@@ -22,7 +24,7 @@ Result<PushedValues> Pusher::watch(std::uint64_t group, const WatchRequest& requ
   if (auto ok = check_watch(request); !ok) return tl::unexpected(ok.error());
   Result<PushedValues> snapshot;
   {
-    const std::lock_guard lock(groups_mutex_);
+    const Lock lock(groups_mutex_);
     const bool first = groups_.empty();
     auto known = groups_.find(group);
     if (known == groups_.end()) {
@@ -43,7 +45,7 @@ Result<PushedValues> Pusher::watch(std::uint64_t group, const WatchRequest& requ
 
 void Pusher::tell_all(std::uint64_t group) {
   {
-    const std::lock_guard lock(groups_mutex_);
+    const Lock lock(groups_mutex_);
     const auto known = groups_.find(group);
     if (known == groups_.end()) return;
     known->second.all = true;
@@ -60,14 +62,14 @@ void Pusher::end(std::map<std::uint64_t, Group>::iterator& group) {
 void Pusher::ask() {
   if (asked_.exchange(true)) return;
   // The lock keeps the notice from falling between the thread's look and its sleep.
-  { const std::lock_guard lock(mutex_); }
+  { const Lock lock(mutex_); }
   changed_.notify_one();
 }
 
 std::vector<PushedValues> Pusher::take_due(Clock::time_point now, std::vector<std::uint64_t>& ended,
                                            std::optional<Clock::time_point>& next) {
   std::vector<PushedValues> due;
-  const std::lock_guard lock(groups_mutex_);
+  const Lock lock(groups_mutex_);
   for (auto group = groups_.begin(); group != groups_.end();) {
     if (now >= group->second.lease) {
       end(group);
@@ -106,9 +108,9 @@ std::vector<PushedValues> Pusher::take_due(Clock::time_point now, std::vector<st
 
 void Pusher::run() {
   std::optional<Clock::time_point> next;
-  std::unique_lock lock(mutex_);
+  Lock lock(mutex_);
   while (true) {
-    const auto woken = [this] { return stopping_ || asked_.load(); };
+    const auto woken = [this]() TFDUDE_REQUIRES(mutex_) { return stopping_ || asked_.load(); };
     if (next) {
       changed_.wait_until(lock, *next, woken);
     } else {

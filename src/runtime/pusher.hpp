@@ -2,15 +2,14 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <thread>
 #include <vector>
 
+#include "base/mutex.hpp"
 #include "partition/watching.hpp"
 #include "tree/forest.hpp"
 
@@ -50,7 +49,7 @@ class Pusher {
 
   void run();
   void ask();
-  void end(std::map<std::uint64_t, Group>::iterator& group);
+  void end(std::map<std::uint64_t, Group>::iterator& group) TFDUDE_REQUIRES(groups_mutex_);
   /// What is to be sent now, and when there may be more without another commit.
   [[nodiscard]] std::vector<PushedValues> take_due(Clock::time_point now,
                                                    std::vector<std::uint64_t>& ended,
@@ -59,13 +58,14 @@ class Pusher {
   Forest& forest_;
   const Push push_;
   const End end_;
-  std::mutex groups_mutex_;
-  std::map<std::uint64_t, Group> groups_;
-  std::vector<std::uint64_t> ended_;  // whose end is still to be told
+  Mutex groups_mutex_;
+  std::map<std::uint64_t, Group> groups_ TFDUDE_GUARDED_BY(groups_mutex_);
+  std::vector<std::uint64_t> ended_
+      TFDUDE_GUARDED_BY(groups_mutex_);  // whose end is still to be told
   std::atomic<bool> asked_{false};
-  std::mutex mutex_;  // of the wait; taken with the forest's lock held
-  std::condition_variable changed_;
-  bool stopping_ = false;
+  Mutex mutex_;  // of the wait; taken with the forest's lock held
+  Condition changed_;
+  bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::thread thread_;  // last: it uses the rest
 };
 

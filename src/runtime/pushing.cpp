@@ -4,18 +4,22 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/mutex.hpp"
+
 namespace tfdude {
 
 void Pushing::stop() {
+  Pusher* pusher = nullptr;
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     stopped_ = true;
+    pusher = pusher_.get();
   }
-  if (pusher_ != nullptr) pusher_->stop();
+  if (pusher != nullptr) pusher->stop();
 }
 
 Pusher* Pushing::pusher() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   if (stopped_) return nullptr;
   if (pusher_ == nullptr) {
     pusher_ = std::make_unique<Pusher>(
@@ -49,7 +53,7 @@ Reply Pushing::answer(const Request& request) {
 }
 
 void Pushing::on_watcher(std::uint64_t group) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   if (pusher_ != nullptr) pusher_->tell_all(group);
 }
 

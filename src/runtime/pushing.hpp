@@ -1,9 +1,9 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <string>
 
+#include "base/mutex.hpp"
 #include "runtime/member_runner.hpp"
 #include "runtime/pusher.hpp"
 #include "runtime/structure.hpp"
@@ -36,9 +36,9 @@ class Pushing {
   Transport& transport_;
   MemberRunner& member_;
   Watcher& watcher_;
-  std::mutex mutex_;  // of the rest
-  bool stopped_ = false;
-  std::unique_ptr<Pusher> pusher_;  // once somebody watches
+  Mutex mutex_;  // of the rest
+  bool stopped_ TFDUDE_GUARDED_BY(mutex_) = false;
+  std::unique_ptr<Pusher> pusher_ TFDUDE_GUARDED_BY(mutex_);  // once somebody watches
 };
 
 }  // namespace tfdude

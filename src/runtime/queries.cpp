@@ -5,6 +5,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/mutex.hpp"
+
 namespace tfdude {
 
 Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_view b) {
@@ -41,7 +43,7 @@ Result<std::vector<Frame>> Queries::frames() {
   std::vector<FrameInfo> infos = structure_.forest.frames();
   std::vector<Frame> frames;
   frames.reserve(infos.size());
-  const std::lock_guard lock(structure_.mutex);
+  const Lock lock(structure_.mutex);
   for (FrameInfo& info : infos) {
     frames.push_back({std::move(info.id), std::move(info.parent),
                       structure_.directory.name(info.owner), info.attached});

@@ -13,14 +13,14 @@ bool Requests::denies_plan(Errc code) {
 }
 
 void Requests::await_structure_change(std::uint64_t version, const Deadline& deadline) {
-  std::unique_lock lock(structure_.mutex);
+  Lock lock(structure_.mutex);
   structure_.changed.wait_until(lock, deadline.within(kStructureDelay).at(),
                                 [&] { return structure_.forest.structure_version() != version; });
 }
 
 void Requests::await_change(const Part& part, const Reply& reply, const Deadline& deadline) {
   const std::uint64_t epoch = reply.epoch;
-  std::unique_lock lock(structure_.mutex);
+  Lock lock(structure_.mutex);
   structure_.directory.saw_lamport_time(reply.lamport_time);
   const bool arrived = structure_.changed.wait_until(lock, deadline.at(), [&] {
     return structure_.directory.epoch(part.owner) >= epoch ||

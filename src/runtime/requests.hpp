@@ -1,7 +1,6 @@
 #pragma once
 
 #include <functional>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <type_traits>
@@ -11,6 +10,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/mutex.hpp"
 #include "partition/routing.hpp"
 #include "runtime/calls.hpp"
 #include "runtime/discovery.hpp"
@@ -68,7 +68,7 @@ class Requests {
   template <class Route>
   auto planned(const Deadline& deadline, Route route) -> decltype(route()) {
     return after_discovery(deadline, [&] {
-      const std::lock_guard lock(structure_.mutex);
+      const Lock lock(structure_.mutex);
       return route();
     });
   }
@@ -111,7 +111,7 @@ class Requests {
                                      const Deadline& deadline, Apply apply_here) {
     if (part.owner == kHeldHere) return apply_here(share);
     {
-      const std::lock_guard lock(structure_.mutex);
+      const Lock lock(structure_.mutex);
       if (auto ok = check_reachable(structure_.directory, {part}); !ok) return ok;
     }
     return transport_.send(part.partition, share, deadline.at());

@@ -11,6 +11,7 @@
 
 #include "tfdude/types/not_sent.hpp"
 
+#include "base/mutex.hpp"
 #include "runtime/mailbox.hpp"
 #include "transport/port.hpp"
 
@@ -65,7 +66,7 @@ class Sender final : public PlannedSender {
   [[nodiscard]] std::size_t size() const { return names_.size(); }
 
   void plan() override {
-    const std::lock_guard lock(planning_);
+    const Lock lock(planning_);
     mailbox_.collect();
     if (closed_) return;
     auto found = links_.find(names_);
@@ -76,8 +77,8 @@ class Sender final : public PlannedSender {
   }
 
   void close() override {
-    const std::lock_guard planning(planning_);
-    const std::lock_guard sending(sending_);
+    const Lock planning(planning_);
+    const Lock sending(sending_);
     closed_ = true;
     mailbox_.put(Plan{});
     (void)mailbox_.newest();
@@ -90,8 +91,9 @@ class Sender final : public PlannedSender {
   const std::vector<NotSent>& send(std::optional<Time> stamp, Valid valid, Fill fill) {
     forget_list();
     // Only close() takes it, too.
-    const std::unique_lock lock(sending_, std::try_to_lock);
-    if (!lock.owns_lock() || closed_) return list_all(Errc::kTransport);
+    if (!sending_.try_lock()) return list_all(Errc::kTransport);
+    const Lock lock(sending_, std::adopt_lock);
+    if (closed_) return list_all(Errc::kTransport);
     if (links_.out()) return list_all(Errc::kPartitionTaken);
     for (std::size_t i = 0; i < names_.size(); ++i) {
       if (!valid(i)) list(i, Errc::kInvalidInput, {});
@@ -186,10 +188,10 @@ class Sender final : public PlannedSender {
 
   const std::vector<std::string> names_;
   const SenderLinks<Message> links_;
-  std::mutex planning_;  // found_, planned_
-  std::vector<std::vector<Destination>> found_;
-  bool planned_ = false;
-  std::mutex sending_;
+  Mutex planning_;  // found_, planned_
+  std::vector<std::vector<Destination>> found_ TFDUDE_GUARDED_BY(planning_);
+  bool planned_ TFDUDE_GUARDED_BY(planning_) = false;
+  Mutex sending_;
   bool closed_ = false;  // under both
   Mailbox<Plan> mailbox_;
   // Of who sends.

@@ -8,6 +8,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "base/mutex.hpp"
 #include "partition/claiming.hpp"
 #include "partition/reconfigure.hpp"
 #include "runtime/wall_clock.hpp"
@@ -102,7 +103,7 @@ Result<void> Serving::take_frames(const std::vector<FrameSpec>& frames) {
   // What is left is judged by what the others own now.
   const auto incomplete = [this] {
     if (transport_.awaits_presence()) return true;
-    const std::lock_guard lock(structure_.mutex);
+    const Lock lock(structure_.mutex);
     return !structure_.directory.complete();
   };
   const bool any = !state.frames.empty() || !frames.empty();
@@ -127,7 +128,7 @@ Result<void> Serving::set_timings(const std::vector<FrameSpec>& frames) {
 void Serving::await_gone() {
   const auto patience = Clock::now() + 3 * Absences::kGrace;
   const auto undecided = [this] {
-    const std::lock_guard lock(structure_.mutex);
+    const Lock lock(structure_.mutex);
     return structure_.directory.awaits_silent();
   };
   while (Clock::now() < patience && undecided()) discovery_.wait_for_change();

@@ -1,5 +1,7 @@
 #include "runtime/stream_links.hpp"
 
+#include "base/mutex.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -9,7 +11,7 @@ std::vector<std::vector<Destination>> destinations(Structure& structure,
                                                    const std::vector<std::string>& names,
                                                    OwnersOf owners_of) {
   std::vector<std::vector<Destination>> found(names.size());
-  const std::lock_guard lock(structure.mutex);
+  const Lock lock(structure.mutex);
   for (std::size_t i = 0; i < names.size(); ++i) {
     for (const Owner owner : owners_of(names[i])) {
       const bool there = owner == kHeldHere || structure.directory.reachable(owner);

@@ -6,6 +6,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/mutex.hpp"
 #include "math/finite.hpp"
 #include "partition/joints.hpp"
 
@@ -37,7 +38,7 @@ Streams::Streams(SenderLinks<Update> of_edges, SenderLinks<JointUpdate> of_joint
 
 void Streams::stop() {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     stopped_ = true;
   }
   if (Deferred* planner = planning_.load()) planner->stop();
@@ -45,7 +46,7 @@ void Streams::stop() {
 }
 
 std::vector<std::shared_ptr<PlannedSender>> Streams::senders() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   std::vector<std::shared_ptr<PlannedSender>> there;
   for (const auto& known : senders_) {
     if (auto sender = known.lock()) there.push_back(std::move(sender));
@@ -55,7 +56,7 @@ std::vector<std::shared_ptr<PlannedSender>> Streams::senders() {
 }
 
 void Streams::add(const std::shared_ptr<PlannedSender>& sender) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   if (stopped_) {
     sender->close();
     return;

@@ -2,10 +2,10 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "base/mutex.hpp"
 #include "runtime/deferred.hpp"
 #include "runtime/sender.hpp"
 
@@ -42,10 +42,10 @@ class Streams {
 
   const SenderLinks<Update> of_edges_;
   const SenderLinks<JointUpdate> of_joints_;
-  std::mutex mutex_;
-  std::vector<std::weak_ptr<PlannedSender>> senders_;
-  bool stopped_ = false;
-  std::unique_ptr<Deferred> planner_;  // once there is a stream
+  Mutex mutex_;
+  std::vector<std::weak_ptr<PlannedSender>> senders_ TFDUDE_GUARDED_BY(mutex_);
+  bool stopped_ TFDUDE_GUARDED_BY(mutex_) = false;
+  std::unique_ptr<Deferred> planner_ TFDUDE_GUARDED_BY(mutex_);  // once there is a stream
   std::atomic<Deferred*> planning_{nullptr};
 };
 

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
 #include <string>
 #include <utility>
 
+#include "base/mutex.hpp"
 #include "partition/directory.hpp"
 #include "tree/forest.hpp"
 
@@ -19,8 +18,8 @@ struct Structure {
       : forest(std::move(clock)), directory(forest, own) {}
 
   Forest forest;
-  std::mutex mutex;                 ///< of the directory, and of the structure in the forest
-  std::condition_variable changed;  ///< told after each change
+  Mutex mutex;        ///< of the directory, and of the structure in the forest
+  Condition changed;  ///< told after each change
   Directory directory;
 };
 

@@ -4,6 +4,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/mutex.hpp"
 #include "tree/epoch.hpp"
 
 namespace tfdude {
@@ -37,32 +38,32 @@ Result<StampedTransform> WatchedPath::lookup(const Query& query) const {
     const WatchMirror* mirror = shown_.load(std::memory_order_seq_cst);
     if (mirror != nullptr) return mirror->lookup(query);
   }
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   return tl::unexpected(why_not_);
 }
 
 Result<void> WatchedPath::health() const {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   if (followed_ == nullptr) return tl::unexpected(why_not_);
   return health_;
 }
 
 void WatchedPath::set_health(Result<void> health) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   health_ = std::move(health);
   if (health_) not_connected_since_.reset();
 }
 
 bool WatchedPath::is_gone(const Error& error, Clock::time_point now) {
   if (error.code == Errc::kUnknownStart || error.code == Errc::kUnknownEnd) return true;
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   if (error.code != Errc::kNotConnected) return false;
   if (!not_connected_since_) not_connected_since_ = now;
   return now - *not_connected_since_ >= kNotConnectedFor;
 }
 
 bool WatchedPath::follows(const WatchRoute& route) const {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   const auto& latest = next_ != nullptr ? next_ : followed_;
   return latest != nullptr && latest->route().is_same(route);
 }
@@ -70,7 +71,7 @@ bool WatchedPath::follows(const WatchRoute& route) const {
 bool WatchedPath::prepare(WatchRoute route) {
   bool shown = false;
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     next_.reset();
     asked_for_history_ = 0;
     // There and back again, before the other one was shown.
@@ -88,7 +89,7 @@ WatchedPath::Taken WatchedPath::take(const PushedValues& pushed) {
   Taken taken;
   bool is_new = false;
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     if (followed_ != nullptr && followed_->take(pushed)) is_new = true;
     if (next_ != nullptr && next_->take(pushed)) is_new = true;
     taken.rerouted = swap_if_ready();
@@ -123,7 +124,7 @@ void WatchedPath::show(std::unique_ptr<WatchMirror> mirror) {
 }
 
 void WatchedPath::collect() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   const std::uint64_t below = epoch::safe_below();
   retired_.erase(std::remove_if(retired_.begin(), retired_.end(),
                                 [below](const Retired& retired) { return retired.tag < below; }),
@@ -132,7 +133,7 @@ void WatchedPath::collect() {
 
 void WatchedPath::interrupt(Error why) {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     why_not_ = std::move(why);
     next_.reset();
     show(nullptr);
@@ -141,13 +142,13 @@ void WatchedPath::interrupt(Error why) {
 }
 
 bool WatchedPath::up_to_date() const {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   if (next_ != nullptr || followed_ == nullptr || followed_->lacks()) return false;
   return asked_for_history_ >= kMostAskedForHistory || !followed_->lacks_history();
 }
 
 std::optional<Time> WatchedPath::lacks_history() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   const auto& latest = next_ != nullptr ? next_ : followed_;
   if (latest == nullptr || !latest->complete() || asked_for_history_ >= kMostAskedForHistory)
     return {};
@@ -157,12 +158,12 @@ std::optional<Time> WatchedPath::lacks_history() {
 }
 
 std::size_t WatchedPath::edge_count() const {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   return followed_ != nullptr ? followed_->route().edges.size() : 0;
 }
 
 std::set<std::uint64_t> WatchedPath::groups() const {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   std::set<std::uint64_t> groups;
   for (const auto* mirror : {followed_.get(), next_.get()}) {
     if (mirror == nullptr) continue;
@@ -172,14 +173,15 @@ std::set<std::uint64_t> WatchedPath::groups() const {
 }
 
 bool WatchedPath::wait_for_more(std::uint64_t messages, Clock::time_point deadline) const {
-  std::unique_lock lock(mutex_);
+  Lock lock(mutex_);
   return changed_.wait_until(lock, deadline, [&] { return this->messages() > messages; });
 }
 
 Result<void> WatchedPath::wait_until_live(Clock::time_point deadline) const {
-  std::unique_lock lock(mutex_);
-  changed_.wait_until(lock, deadline,
-                      [&] { return followed_ != nullptr && !followed_->lacks_history(); });
+  Lock lock(mutex_);
+  changed_.wait_until(lock, deadline, [&]() TFDUDE_REQUIRES(mutex_) {
+    return followed_ != nullptr && !followed_->lacks_history();
+  });
   if (followed_ != nullptr) return {};
   return tl::unexpected(why_not_);
 }

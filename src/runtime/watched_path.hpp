@@ -2,10 +2,8 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -14,6 +12,7 @@
 
 #include "tfdude/types/options.hpp"
 
+#include "base/mutex.hpp"
 #include "runtime/watch_mirror.hpp"
 
 namespace tfdude {
@@ -82,26 +81,27 @@ class WatchedPath {
     std::unique_ptr<const WatchMirror> mirror;
   };
 
-  [[nodiscard]] bool swap_if_ready();
-  void show(std::unique_ptr<WatchMirror> mirror);
-  [[nodiscard]] bool has_common_instant() const;
+  [[nodiscard]] bool swap_if_ready() TFDUDE_REQUIRES(mutex_);
+  void show(std::unique_ptr<WatchMirror> mirror) TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool has_common_instant() const TFDUDE_REQUIRES(mutex_);
 
   const std::string a_;
   const std::string b_;
   const WatchOptions options_;
   std::atomic<const WatchMirror*> shown_{nullptr};  // followed_, as readers see it
   std::atomic<std::uint64_t> messages_{0};
-  mutable std::condition_variable changed_;  // messages_, shown_
-  mutable std::mutex mutex_;                 // of the rest
-  std::unique_ptr<WatchMirror> followed_;
-  std::unique_ptr<WatchMirror> next_;  // to be shown once it has all values
-  Clock::time_point next_since_;
-  int asked_for_history_ = 0;
-  bool was_shown_ = false;
-  std::vector<Retired> retired_;
-  std::optional<Clock::time_point> not_connected_since_;
-  Error why_not_;
-  Result<void> health_;
+  mutable Condition changed_;  // messages_, shown_
+  mutable Mutex mutex_;        // of the rest
+  std::unique_ptr<WatchMirror> followed_ TFDUDE_GUARDED_BY(mutex_);
+  std::unique_ptr<WatchMirror> next_
+      TFDUDE_GUARDED_BY(mutex_);  // to be shown once it has all values
+  Clock::time_point next_since_ TFDUDE_GUARDED_BY(mutex_);
+  int asked_for_history_ TFDUDE_GUARDED_BY(mutex_) = 0;
+  bool was_shown_ TFDUDE_GUARDED_BY(mutex_) = false;
+  std::vector<Retired> retired_ TFDUDE_GUARDED_BY(mutex_);
+  std::optional<Clock::time_point> not_connected_since_ TFDUDE_GUARDED_BY(mutex_);
+  Error why_not_ TFDUDE_GUARDED_BY(mutex_);
+  Result<void> health_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 }  // namespace tfdude

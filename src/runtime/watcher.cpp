@@ -24,7 +24,7 @@ std::chrono::nanoseconds period_of(double rate) {
 }  // namespace
 
 void Watcher::stop() {
-  if (watches_ != nullptr) watches_->stop();
+  if (Watches* watches = watching_.load()) watches->stop();
 }
 
 Result<std::shared_ptr<WatchedPath>> Watcher::watch(const std::string& a, const std::string& b,
@@ -41,7 +41,7 @@ Result<std::shared_ptr<WatchedPath>> Watcher::watch(const std::string& a, const 
 }
 
 Watches& Watcher::watches() {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   if (watches_ == nullptr) {
     watches_ = std::make_unique<Watches>(Watches::Links{
         [this](const WatchedPath& path) { return plan(path); },
@@ -56,7 +56,7 @@ Watches& Watcher::watches() {
 Result<WatchRoute> Watcher::plan(const WatchedPath& path) {
   const WatchOptions& options = path.options();
   const std::uint64_t own_incarnation = incarnation_();
-  const std::lock_guard lock(structure_.mutex);
+  const Lock lock(structure_.mutex);
   return watch_route(structure_.forest, structure_.directory, path.a(), path.b(), options.composed,
                      period_of(options.rate), own_incarnation);
 }

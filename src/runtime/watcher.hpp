@@ -3,9 +3,9 @@
 #include <atomic>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 
+#include "base/mutex.hpp"
 #include "runtime/discovery.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/structure.hpp"
@@ -57,8 +57,8 @@ class Watcher {
   Transport& transport_;
   const std::function<std::uint64_t()> incarnation_;
   const Milliseconds timeout_;
-  std::mutex mutex_;                  // of watches_, as it is made
-  std::unique_ptr<Watches> watches_;  // once this process watches
+  Mutex mutex_;                                                 // of watches_, as it is made
+  std::unique_ptr<Watches> watches_ TFDUDE_GUARDED_BY(mutex_);  // once this process watches
   std::atomic<Watches*> watching_{nullptr};
 };
 

@@ -20,13 +20,13 @@ Watches::Watches(Links links) : links_(std::move(links)), thread_([this] { run()
 
 void Watches::stop() {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     stopping_ = true;
   }
   changed_.notify_one();
   if (thread_.joinable()) thread_.join();
   notices_.stop();
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   for (const Path& path : std::exchange(paths_, {})) {
     path->interrupt({Errc::kTransport, "the client that watched the path has gone"});
   }
@@ -36,7 +36,7 @@ std::shared_ptr<WatchedPath> Watches::watch(const std::string& a, const std::str
                                             const WatchOptions& options) {
   auto path = std::make_shared<WatchedPath>(a, b, options);
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     paths_.push_back(path);
   }
   look_again();
@@ -45,7 +45,7 @@ std::shared_ptr<WatchedPath> Watches::watch(const std::string& a, const std::str
 
 void Watches::look_again() {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     asked_ = true;
   }
   changed_.notify_one();
@@ -54,7 +54,7 @@ void Watches::look_again() {
 void Watches::on_pushed(const PushedValues& pushed) {
   std::vector<Path> paths;
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     paths = paths_;
   }
   bool lacks = false;
@@ -65,20 +65,20 @@ void Watches::on_pushed(const PushedValues& pushed) {
   }
   if (!lacks) return;
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     if (std::exchange(lacking_, true)) return;
   }
   changed_.notify_one();
 }
 
 bool Watches::can_answer(const std::string& a, const std::string& b, const Query& query) const {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   return std::any_of(paths_.begin(), paths_.end(), [&](const Path& path) {
     return path->a() == a && path->b() == b && path->lookup(query).has_value();
   });
 }
 
-void Watches::wait(std::unique_lock<std::mutex>& lock, Clock::time_point renew_at) {
+void Watches::wait(Lock& lock, Clock::time_point renew_at) {
   while (!stopping_ && !asked_) {
     const auto wake_at = lacking_ ? std::min(renew_at, last_round_ + kRetryAfter) : renew_at;
     if (Clock::now() >= wake_at) return;
@@ -88,7 +88,7 @@ void Watches::wait(std::unique_lock<std::mutex>& lock, Clock::time_point renew_a
 
 void Watches::run() {
   auto renew_at = Clock::now() + kRenewEvery;
-  std::unique_lock lock(mutex_);
+  Lock lock(mutex_);
   while (true) {
     wait(lock, renew_at);
     if (stopping_) return;

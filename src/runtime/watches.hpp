@@ -1,15 +1,14 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "base/mutex.hpp"
 #include "runtime/notices.hpp"
 #include "runtime/open_groups.hpp"
 #include "runtime/watched_path.hpp"
@@ -56,7 +55,7 @@ class Watches {
   using Path = std::shared_ptr<WatchedPath>;
 
   void run();
-  void wait(std::unique_lock<std::mutex>& lock, Clock::time_point renew_at);
+  void wait(Lock& lock, Clock::time_point renew_at) TFDUDE_REQUIRES(mutex_);
   /// @return whether it is as it should be; else it is to be tried again soon
   bool attend(const Path& path, bool renew);
   bool cannot_be_planned(const Path& path, Error why);
@@ -68,14 +67,14 @@ class Watches {
 
   const Links links_;
   Notices notices_;
-  OpenGroups open_;           // only the thread's
-  mutable std::mutex mutex_;  // of the rest
-  std::condition_variable changed_;
-  std::vector<Path> paths_;
-  bool asked_ = false;
-  bool lacking_ = false;            // a path is not as it should be
-  Clock::time_point last_round_{};  // when paths were looked at
-  bool stopping_ = false;
+  OpenGroups open_;  // only the thread's
+  mutable Mutex mutex_;
+  Condition changed_;
+  std::vector<Path> paths_ TFDUDE_GUARDED_BY(mutex_);
+  bool asked_ TFDUDE_GUARDED_BY(mutex_) = false;
+  bool lacking_ TFDUDE_GUARDED_BY(mutex_) = false;            // a path is not as it should be
+  Clock::time_point last_round_ TFDUDE_GUARDED_BY(mutex_){};  // when paths were looked at
+  bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::thread thread_;  // last: it uses the rest
 };
 

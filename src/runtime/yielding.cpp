@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "base/mutex.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -33,7 +35,7 @@ bool Yielding::catch_up() {
   const Deadline deadline(timeout_);
   std::vector<Part> parts;
   {
-    const std::lock_guard lock(structure_.mutex);
+    const Lock lock(structure_.mutex);
     for (const Owner owner : structure_.directory.reachable_owners()) {
       const std::string& name = structure_.directory.name(owner);
       parts.push_back({owner, name, Request{0, name, RemoveRequest{}}});
@@ -44,7 +46,7 @@ bool Yielding::catch_up() {
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const bool answered = std::holds_alternative<Done>(replies[i].body);
     if (answered) requests_.await_change(parts[i], replies[i], deadline);
-    const std::lock_guard lock(structure_.mutex);
+    const Lock lock(structure_.mutex);
     const Owner owner = parts[i].owner;
     const bool is_here = answered && structure_.directory.epoch(owner) >= replies[i].epoch;
     current = current && (is_here || !structure_.directory.reachable(owner));

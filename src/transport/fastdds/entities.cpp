@@ -23,7 +23,7 @@ Writer::~Writer() {
 }
 
 bool Writer::wait_until_matched(Deadline deadline) {
-  std::unique_lock lock(mutex_);
+  Lock lock(mutex_);
   return matched_.wait_until(lock, deadline, [this] { return readers_ > 0; });
 }
 
@@ -59,7 +59,7 @@ void Writer::on_publication_matched(edds::DataWriter*,
                                     const edds::PublicationMatchedStatus& status) {
   bool one_more = false;
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     one_more = status.current_count > readers_;
     readers_ = status.current_count;
   }

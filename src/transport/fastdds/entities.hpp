@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -13,6 +12,7 @@
 
 #include "tfdude/transport/fastdds.hpp"
 
+#include "base/mutex.hpp"
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/gate.hpp"
 #include "transport/fastdds/growing_stamp.hpp"
@@ -66,8 +66,8 @@ class Writer final : public edds::DataWriterListener {
   const std::function<void()> on_reader_;
   edds::Publisher* publisher_ = nullptr;
   edds::DataWriter* writer_ = nullptr;
-  std::mutex mutex_;
-  std::condition_variable matched_;
+  Mutex mutex_;
+  Condition matched_;
   std::atomic<int> readers_{0};              // changed under mutex_
   std::atomic<bool> unacknowledged_{false};  // something may be
   std::recursive_mutex writing_;             // as Fast DDS's own
@@ -111,7 +111,7 @@ class Reader : public edds::DataReaderListener {
   }
 
   void on_data_available(edds::DataReader* reader) override {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     std::size_t taken = 0;
     while (true) {
       if (taken == batch_.size()) batch_.emplace_back();
@@ -144,8 +144,8 @@ class Reader : public edds::DataReaderListener {
 
   const Context context_;
   const Calls calls_;
-  std::mutex mutex_;         // of batch_; the library may call from several threads
-  std::deque<Taken> batch_;  // kept, for their memory
+  Mutex mutex_;  // of batch_; the library may call from several threads
+  std::deque<Taken> batch_ TFDUDE_GUARDED_BY(mutex_);  // kept, for their memory
   edds::Subscriber* subscriber_ = nullptr;
   edds::DataReader* reader_ = nullptr;
 };

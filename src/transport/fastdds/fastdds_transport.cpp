@@ -7,6 +7,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "base/mutex.hpp"
 #include "transport/fastdds/discovery_gate.hpp"
 #include "transport/fastdds/discovery_server.hpp"
 #include "transport/fastdds/topics.hpp"
@@ -225,7 +226,7 @@ void FastDdsTransport::stop() {
 // --- sending ---
 
 void FastDdsTransport::announce(const Presence& presence) {
-  const std::lock_guard lock(presence_mutex_);
+  const Lock lock(presence_mutex_);
   said_ = to_wire(presence);
   said_->peers(peers_.heard_count());
   presence_writer_->write(&*said_);
@@ -237,7 +238,7 @@ void FastDdsTransport::announce(const Presence& presence) {
 void FastDdsTransport::keep_in_touch() {
   peers_.look_for_silent(Peers::Clock::now());
   const auto heard = peers_.heard_count();
-  const std::lock_guard lock(presence_mutex_);
+  const Lock lock(presence_mutex_);
   if (++looks_ < (heard > kMany ? 3 : 2)) return;
   looks_ = 0;
   if (!said_) return;
@@ -255,7 +256,7 @@ void FastDdsTransport::publish(const Page& page) {
 std::shared_ptr<Writer> FastDdsTransport::writer(Writers& writers, edds::Topic* topic,
                                                  const std::string& partition,
                                                  const char* profile) {
-  const std::lock_guard lock(writers_mutex_);
+  const Lock lock(writers_mutex_);
   auto& entry = writers[partition];
   if (entry == nullptr) entry = std::make_shared<Writer>(context(), *topic, partition, profile);
   return entry;
@@ -310,7 +311,7 @@ Result<void> FastDdsTransport::send(Writer& writer, const std::string& partition
 Result<void> FastDdsTransport::flush(Deadline deadline) {
   std::vector<std::pair<std::string, std::shared_ptr<Writer>>> streams;
   {
-    const std::lock_guard lock(writers_mutex_);
+    const Lock lock(writers_mutex_);
     streams.assign(update_writers_.begin(), update_writers_.end());
     streams.insert(streams.end(), joint_writers_.begin(), joint_writers_.end());
   }

@@ -10,6 +10,7 @@
 
 #include "tfdude/transport/fastdds.hpp"
 
+#include "base/mutex.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/owned_filter.hpp"
@@ -106,11 +107,12 @@ class FastDdsTransport final : public Transport {
   PeerId self_{};
   Topics topics_;
 
-  std::mutex presence_mutex_;
-  int looks_ = 0;                       // since it last spoke
-  std::optional<wire::Presence> said_;  // what this participant serves, as last announced
+  Mutex presence_mutex_;
+  int looks_ TFDUDE_GUARDED_BY(presence_mutex_) = 0;  // since it last spoke
+  std::optional<wire::Presence> said_
+      TFDUDE_GUARDED_BY(presence_mutex_);  // what this participant serves, as last announced
 
-  std::mutex writers_mutex_;
+  Mutex writers_mutex_;  // of the three that follow
   Writers request_writers_;
   Writers update_writers_;
   Writers joint_writers_;

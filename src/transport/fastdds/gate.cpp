@@ -1,5 +1,7 @@
 #include "transport/fastdds/gate.hpp"
 
+#include "base/mutex.hpp"
+
 namespace tfdude::fastdds {
 namespace {
 
@@ -15,8 +17,8 @@ bool Gate::enter() {
     inside_.fetch_add(1);
     if (!shut_.load()) break;
     leave();
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return closed_ || pauses_ == 0; });
+    Lock lock(mutex_);
+    changed_.wait(lock, [this]() TFDUDE_REQUIRES(mutex_) { return closed_ || pauses_ == 0; });
     if (closed_) return false;
   }
   entered = this;
@@ -28,12 +30,12 @@ void Gate::leave() {
   inside_.fetch_sub(1);
   if (!shut_.load()) return;
   // The lock keeps the notice from falling between the other's look and its sleep.
-  { const std::lock_guard lock(mutex_); }
+  { const Lock lock(mutex_); }
   changed_.notify_all();
 }
 
 void Gate::shut() {
-  std::unique_lock lock(mutex_);
+  Lock lock(mutex_);
   ++pauses_;
   shut_.store(true);
   wait_until_empty(lock);
@@ -41,7 +43,7 @@ void Gate::shut() {
 
 void Gate::open() {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     --pauses_;
     shut_.store(closed_ || pauses_ > 0);
   }
@@ -49,14 +51,14 @@ void Gate::open() {
 }
 
 void Gate::close() {
-  std::unique_lock lock(mutex_);
+  Lock lock(mutex_);
   closed_ = true;
   shut_.store(true);
   changed_.notify_all();
   wait_until_empty(lock);
 }
 
-void Gate::wait_until_empty(std::unique_lock<std::mutex>& lock) {
+void Gate::wait_until_empty(Lock& lock) {
   const int own = entered == this ? 1 : 0;
   changed_.wait(lock, [this, own] { return inside_.load() <= own; });
 }

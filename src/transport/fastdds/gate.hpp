@@ -1,8 +1,8 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
-#include <mutex>
+
+#include "base/mutex.hpp"
 
 namespace tfdude::fastdds {
 
@@ -52,14 +52,14 @@ class Gate {
   void leave();
   void shut();
   void open();
-  void wait_until_empty(std::unique_lock<std::mutex>& lock);
+  void wait_until_empty(Lock& lock);
 
   std::atomic<int> inside_{0};
   std::atomic<bool> shut_{false};  // somebody pauses, or it is closed
-  std::mutex mutex_;               // of the rest
-  std::condition_variable changed_;
-  int pauses_ = 0;
-  bool closed_ = false;
+  Mutex mutex_;                    // of the rest
+  Condition changed_;
+  int pauses_ TFDUDE_GUARDED_BY(mutex_) = 0;
+  bool closed_ TFDUDE_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace tfdude::fastdds

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "base/mutex.hpp"
+
 namespace tfdude::fastdds {
 namespace {
 
@@ -31,13 +33,13 @@ std::string participant_name(const std::string& partition) {
 }
 
 void Peers::met(const ertps::GuidPrefix_t& prefix, const std::string& name) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   last_met_ = Clock::now();
   if (name.rfind(kServer, 0) == 0) servers_.try_emplace(peer_of(prefix));
 }
 
 void Peers::left(const ertps::GuidPrefix_t& prefix) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   const auto known = servers_.find(peer_of(prefix));
   if (known == servers_.end()) return;
   const Server& server = known->second;
@@ -47,7 +49,7 @@ void Peers::left(const ertps::GuidPrefix_t& prefix) {
 
 void Peers::sent_page(const ertps::GuidPrefix_t& prefix, const Page& page) {
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     const auto known = servers_.find(peer_of(prefix));
     if (known == servers_.end()) return;
     Server& server = known->second;
@@ -62,7 +64,7 @@ void Peers::sent_page(const ertps::GuidPrefix_t& prefix, const Page& page) {
 
 void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers,
                     bool beat) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   Server& server = servers_[peer_of(prefix)];
   server.peers = peers;
   server.beats = server.beats || beat;
@@ -73,7 +75,7 @@ void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence,
 }
 
 void Peers::heard(const ertps::GuidPrefix_t& prefix) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   const auto known = servers_.find(peer_of(prefix));
   if (known == servers_.end()) return;
   Server& server = known->second;
@@ -82,7 +84,7 @@ void Peers::heard(const ertps::GuidPrefix_t& prefix) {
 }
 
 void Peers::look_for_silent(Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   const auto late = now - std::exchange(last_look_, now) - kSpeakEvery;
   for (auto& [id, server] : servers_) {
     if (late > Clock::duration::zero()) server.last_heard += late;
@@ -94,20 +96,20 @@ void Peers::look_for_silent(Clock::time_point now) {
 }
 
 bool Peers::discovered() const {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   return !servers_.empty() && Clock::now() - last_met_ >= kQuiet && all_present() &&
          nobody_hears_more();
 }
 
 std::uint32_t Peers::heard_count() const {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   return static_cast<std::uint32_t>(std::count_if(
       servers_.begin(), servers_.end(),
       [](const auto& server) { return server.second.presence && !server.second.silent; }));
 }
 
 bool Peers::silent(const std::string& partition) const {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   bool silent = false;
   for (const auto& [id, server] : servers_) {
     if (!server.presence || server.presence->partition != partition) continue;
@@ -118,7 +120,7 @@ bool Peers::silent(const std::string& partition) const {
 }
 
 bool Peers::awaits_presence() const {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   return !all_present();
 }
 

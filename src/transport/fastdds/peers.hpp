@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "base/mutex.hpp"
 #include "partition/messages.hpp"
 #include "transport/fastdds/compat.hpp"
 
@@ -91,8 +91,8 @@ class Peers {
   [[nodiscard]] bool awaits_presence() const;
 
  private:
-  [[nodiscard]] bool all_present() const;
-  [[nodiscard]] bool nobody_hears_more() const;
+  [[nodiscard]] bool all_present() const TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool nobody_hears_more() const TFDUDE_REQUIRES(mutex_);
 
   struct Server {
     std::optional<Presence> presence;
@@ -116,10 +116,11 @@ class Peers {
 
   const Tell there_;
   const Tell gone_;
-  mutable std::mutex mutex_;
-  std::map<PeerId, Server> servers_;
-  Clock::time_point last_met_{};
-  Clock::time_point last_look_ = Clock::now();
+  mutable Mutex mutex_;
+  std::map<PeerId, Server> servers_ TFDUDE_GUARDED_BY(mutex_);
+  Clock::time_point last_met_ TFDUDE_GUARDED_BY(mutex_){};
+  Clock::time_point last_look_ TFDUDE_GUARDED_BY(mutex_) = Clock::now();
+  // Set once, before anybody is met.
   std::chrono::nanoseconds silence_{};
   std::chrono::nanoseconds first_beat_{};
   bool is_server_ = false;

@@ -3,11 +3,11 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <mutex>
 #include <string_view>
 
 #include "tfdude/base/id.hpp"
 
+#include "base/mutex.hpp"
 #include "transport/fastdds/builtin_profiles.hpp"
 #include "transport/fastdds/identity.hpp"
 #include "transport/fastdds/profile_text.hpp"
@@ -37,9 +37,9 @@ std::string builtin_text() {
 // was edited anew.
 // @return what their names end with
 Result<std::string> make_known(const std::string& xml) {
-  static std::mutex mutex;
+  static Mutex mutex;
   static std::map<std::string, std::string> known;  // endings
-  const std::lock_guard lock(mutex);
+  const Lock lock(mutex);
   if (const auto before = known.find(xml); before != known.end()) return before->second;
   std::string ending = "@tfdude-" + std::to_string(known.size());
   const auto own = with_own_names(xml, ending);

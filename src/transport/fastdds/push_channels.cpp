@@ -13,7 +13,7 @@ std::string partition_of(std::uint64_t group) { return "watch " + std::to_string
 }  // namespace
 
 Result<void> PushChannels::watch(std::uint64_t group) {
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   auto& reader = readers_[group];
   if (reader != nullptr) return {};
   reader = std::make_unique<Reader<wire::State>>(
@@ -34,7 +34,7 @@ Result<void> PushChannels::watch(std::uint64_t group) {
 // Closed without the lock: a sample may be on its way to somebody who waits for it.
 void PushChannels::unwatch(std::uint64_t group) {
   std::unique_ptr<Reader<wire::State>> closed;  // outlives the lock
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   const auto known = readers_.find(group);
   if (known == readers_.end()) return;
   closed = std::move(known->second);
@@ -44,7 +44,7 @@ void PushChannels::unwatch(std::uint64_t group) {
 void PushChannels::push(const PushedValues& pushed) {
   std::shared_ptr<Writer> writer;
   {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     auto& entry = writers_[pushed.group];
     if (entry == nullptr) {
       entry =
@@ -60,7 +60,7 @@ void PushChannels::push(const PushedValues& pushed) {
 
 void PushChannels::end_pushing(std::uint64_t group) {
   std::shared_ptr<Writer> ended;  // outlives the lock
-  const std::lock_guard lock(mutex_);
+  const Lock lock(mutex_);
   const auto known = writers_.find(group);
   if (known == writers_.end()) return;
   ended = std::move(known->second);

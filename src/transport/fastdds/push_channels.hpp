@@ -4,8 +4,8 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 
+#include "base/mutex.hpp"
 #include "partition/messages.hpp"
 #include "transport/fastdds/entities.hpp"
 
@@ -32,9 +32,9 @@ class PushChannels {
   const Context context_;
   edds::Topic& topic_;
   const Calls calls_;
-  std::mutex mutex_;
-  std::map<std::uint64_t, std::unique_ptr<Reader<wire::State>>> readers_;
-  std::map<std::uint64_t, std::shared_ptr<Writer>> writers_;
+  Mutex mutex_;
+  std::map<std::uint64_t, std::unique_ptr<Reader<wire::State>>> readers_ TFDUDE_GUARDED_BY(mutex_);
+  std::map<std::uint64_t, std::shared_ptr<Writer>> writers_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 }  // namespace tfdude::fastdds

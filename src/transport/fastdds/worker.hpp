@@ -1,11 +1,11 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <deque>
 #include <functional>
-#include <mutex>
 #include <thread>
+
+#include "base/mutex.hpp"
 
 namespace tfdude::fastdds {
 
@@ -20,7 +20,7 @@ class Worker {
 
   void post(std::function<void()> job) {
     {
-      const std::lock_guard lock(mutex_);
+      const Lock lock(mutex_);
       jobs_.push_back(std::move(job));
     }
     changed_.notify_one();
@@ -38,7 +38,7 @@ class Worker {
   /// Finishes the job at hand and drops the rest.
   void stop() {
     {
-      const std::lock_guard lock(mutex_);
+      const Lock lock(mutex_);
       stopping_ = true;
     }
     changed_.notify_one();
@@ -49,11 +49,12 @@ class Worker {
   using Clock = std::chrono::steady_clock;
 
   void run() {
-    std::unique_lock lock(mutex_);
+    Lock lock(mutex_);
     while (true) {
       // By a copy, which the jobs may not change while it is waited for.
       const Clock::time_point due = due_;
-      changed_.wait_until(lock, due, [this] { return stopping_ || !jobs_.empty(); });
+      changed_.wait_until(lock, due,
+                          [this]() TFDUDE_REQUIRES(mutex_) { return stopping_ || !jobs_.empty(); });
       if (stopping_) return;
       std::function<void()> job;
       if (!jobs_.empty()) {
@@ -70,10 +71,10 @@ class Worker {
     }
   }
 
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<std::function<void()>> jobs_;
-  bool stopping_ = false;
+  Mutex mutex_;
+  Condition changed_;
+  std::deque<std::function<void()>> jobs_ TFDUDE_GUARDED_BY(mutex_);
+  bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
   // Of the thread alone.
   std::chrono::milliseconds period_{};
   std::function<void()> repeated_;

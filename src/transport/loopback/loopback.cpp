@@ -1,7 +1,6 @@
 #include "tfdude/transport/loopback.hpp"
 
 #include <algorithm>
-#include <condition_variable>
 #include <map>
 #include <mutex>
 #include <set>
@@ -11,6 +10,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/mutex.hpp"
 #include "transport/port.hpp"
 
 namespace tfdude {
@@ -25,10 +25,10 @@ class LoopbackNetwork::Hub {
     std::optional<Presence> presence;
     std::map<std::uint32_t, Page> pages;
 
-    std::mutex mutex;  // of the rest; not held during a call, since handlers may send
-    std::condition_variable idle;
-    TransportHandler* handler = nullptr;  // null: has left
-    int calls = 0;                        // of the handler, under way
+    Mutex mutex;  // of the rest; not held during a call, since handlers may send
+    Condition idle;
+    TransportHandler* handler TFDUDE_GUARDED_BY(mutex) = nullptr;  // null: has left
+    int calls TFDUDE_GUARDED_BY(mutex) = 0;                        // of the handler, under way
   };
 
   /// Calls the handler of each member chosen that has not left. @return how many
@@ -36,7 +36,7 @@ class LoopbackNetwork::Hub {
   std::size_t deliver(Choose choose, Call call) {
     std::vector<std::shared_ptr<Member>> chosen;
     {
-      const std::lock_guard lock(members_mutex_);
+      const Lock lock(members_mutex_);
       for (const auto& member : members_) {
         if (choose(*member)) chosen.push_back(member);
       }
@@ -49,8 +49,8 @@ class LoopbackNetwork::Hub {
   /// Waits until there is such a member; false at the deadline.
   template <class Choose>
   bool wait_for(Choose choose, Transport::Deadline deadline) {
-    std::unique_lock lock(members_mutex_);
-    return serving_.wait_until(lock, deadline, [&] {
+    Lock lock(members_mutex_);
+    return serving_.wait_until(lock, deadline, [&]() TFDUDE_REQUIRES(members_mutex_) {
       return std::any_of(members_.begin(), members_.end(),
                          [&](const auto& member) { return choose(*member); });
     });
@@ -58,7 +58,7 @@ class LoopbackNetwork::Hub {
 
   void serve(Member& member, const std::string& partition) {
     {
-      const std::lock_guard lock(members_mutex_);
+      const Lock lock(members_mutex_);
       member.serves = partition;
     }
     serving_.notify_all();
@@ -66,8 +66,11 @@ class LoopbackNetwork::Hub {
 
   std::shared_ptr<Member> join(TransportHandler& handler) {
     auto member = std::make_shared<Member>();
-    member->handler = &handler;
-    const std::lock_guard lock(members_mutex_);
+    {
+      const Lock lock(member->mutex);
+      member->handler = &handler;
+    }
+    const Lock lock(members_mutex_);
     ++joined_;
     for (std::size_t i = 0; i < sizeof joined_; ++i) {
       member->id[i] = static_cast<std::uint8_t>(joined_ >> (8 * i));
@@ -78,16 +81,16 @@ class LoopbackNetwork::Hub {
 
   void leave(const std::shared_ptr<Member>& member) {
     {
-      const std::lock_guard lock(members_mutex_);
+      const Lock lock(members_mutex_);
       members_.erase(std::remove(members_.begin(), members_.end(), member), members_.end());
     }
     {
-      std::unique_lock lock(member->mutex);
+      Lock lock(member->mutex);
       member->handler = nullptr;
-      member->idle.wait(lock, [&] { return member->calls == 0; });
+      member->idle.wait(lock, [&]() TFDUDE_REQUIRES(member->mutex) { return member->calls == 0; });
     }
     if (!member->presence) return;
-    const std::lock_guard telling(telling_mutex_);
+    const Lock telling(telling_mutex_);
     deliver([](const Member&) { return true; },
             [&](TransportHandler& handler) {
               handler.on_lost(member->presence->partition, member->presence->incarnation);
@@ -97,7 +100,7 @@ class LoopbackNetwork::Hub {
   /// What all others have announced and published, for one who joins.
   std::pair<std::vector<Presence>, std::vector<Page>> published(const Member& except) {
     std::pair<std::vector<Presence>, std::vector<Page>> all;
-    const std::lock_guard lock(members_mutex_);
+    const Lock lock(members_mutex_);
     for (const auto& member : members_) {
       if (member.get() == &except) continue;
       if (member->presence) all.first.push_back(*member->presence);
@@ -107,28 +110,28 @@ class LoopbackNetwork::Hub {
   }
 
   // Held while presences and pages are told, so that who joins hears nothing older after something newer.
-  std::mutex telling_mutex_;
-  std::mutex members_mutex_;  // of the list and of what the members say; never held during a call
+  Mutex telling_mutex_;
+  Mutex members_mutex_;  // of the list and of what the members say; never held during a call
 
  private:
   template <class Call>
   static std::size_t call_if_there(Member& member, Call& call) {
     TransportHandler* handler = nullptr;
     {
-      const std::lock_guard lock(member.mutex);
+      const Lock lock(member.mutex);
       handler = member.handler;
       if (handler == nullptr) return 0;
       ++member.calls;
     }
     call(*handler);
-    const std::lock_guard lock(member.mutex);
+    const Lock lock(member.mutex);
     if (--member.calls == 0) member.idle.notify_all();
     return 1;
   }
 
-  std::vector<std::shared_ptr<Member>> members_;
-  std::uint64_t joined_ = 0;
-  std::condition_variable serving_;
+  std::vector<std::shared_ptr<Member>> members_ TFDUDE_GUARDED_BY(members_mutex_);
+  std::uint64_t joined_ TFDUDE_GUARDED_BY(members_mutex_) = 0;
+  Condition serving_;
 };
 
 template <class Hub, class Message>
@@ -158,7 +161,7 @@ class LoopbackTransport final : public Transport {
   LoopbackTransport& operator=(const LoopbackTransport&) = delete;
 
   Result<void> start(TransportHandler& handler) override {
-    const std::lock_guard telling(hub_->telling_mutex_);
+    const Lock telling(hub_->telling_mutex_);
     self_ = hub_->join(handler);
     const auto [presences, pages] = hub_->published(*self_);
     for (const Presence& presence : presences) handler.on_presence(presence);
@@ -178,18 +181,18 @@ class LoopbackTransport final : public Transport {
   }
 
   void announce(const Presence& presence) override {
-    const std::lock_guard telling(hub_->telling_mutex_);
+    const Lock telling(hub_->telling_mutex_);
     {
-      const std::lock_guard lock(hub_->members_mutex_);
+      const Lock lock(hub_->members_mutex_);
       self_->presence = presence;
     }
     tell_others([&](TransportHandler& handler) { handler.on_presence(presence); });
   }
 
   void publish(const Page& page) override {
-    const std::lock_guard telling(hub_->telling_mutex_);
+    const Lock telling(hub_->telling_mutex_);
     {
-      const std::lock_guard lock(hub_->members_mutex_);
+      const Lock lock(hub_->members_mutex_);
       self_->pages[page.number] = page;
     }
     tell_others([&](TransportHandler& handler) { handler.on_page(page); });
@@ -230,13 +233,13 @@ class LoopbackTransport final : public Transport {
   }
 
   Result<void> watch(std::uint64_t group) override {
-    const std::lock_guard lock(hub_->members_mutex_);
+    const Lock lock(hub_->members_mutex_);
     self_->watches.insert(group);
     return {};
   }
 
   void unwatch(std::uint64_t group) override {
-    const std::lock_guard lock(hub_->members_mutex_);
+    const Lock lock(hub_->members_mutex_);
     self_->watches.erase(group);
   }
 
