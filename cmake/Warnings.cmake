@@ -2,7 +2,8 @@
 add_library(tfdude_options INTERFACE)
 target_compile_options(tfdude_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wold-style-cast
-  -Wnon-virtual-dtor -Woverloaded-virtual -Werror=return-type -Werror=unused-result)
+  -Wnon-virtual-dtor -Woverloaded-virtual -Werror=return-type -Werror=unused-result
+  $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>)
 if(TFDUDE_WERROR)
   target_compile_options(tfdude_options INTERFACE -Werror)
 endif()

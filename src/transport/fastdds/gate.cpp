@@ -6,6 +6,7 @@ namespace tfdude::fastdds {
 namespace {
 
 // The gate through which this thread has let in the datagram at hand, if any.
+// NOLINTNEXTLINE(*-avoid-non-const-global-variables): of this thread alone
 thread_local const Gate* entered = nullptr;
 
 }  // namespace
