@@ -1,5 +1,6 @@
 // What happens as daemons die, hang, come back, or want the same name.
 
+#include <chrono>
 #include <csignal>
 #include <optional>
 #include <string>
@@ -119,10 +120,14 @@ TEST_CASE("faults: a hanging partition costs its caller the time-out, and recove
   // Shorter than it takes to notice that a partition is gone.
   auto client = *Client::open(d.domain.options(Milliseconds(50)));
   REQUIRE(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
+  const auto frozen = std::chrono::steady_clock::now();
   d.arms->freeze();
   const auto late = client.lookup("world", "hand_left");
+  const bool quick = std::chrono::steady_clock::now() - frozen < std::chrono::milliseconds(250);
   REQUIRE_FALSE(late);
-  CHECK(late.error().code == Errc::kTimeout);
+  // A computer that is busy enough has noticed meanwhile.
+  const Errc code = late.error().code;
+  CHECK((code == Errc::kTimeout || (!quick && code == Errc::kUnreachable)));
   CHECK_THAT(late.error().message, ContainsSubstring("'arms'"));
   CHECK(eventually([&] {
     const auto lost = client.lookup("world", "hand_left");
