@@ -53,9 +53,10 @@ std::string describe(const HistoryInfo& history, Time now) {
                    rate_of(history), milliseconds(history.mean_gap), milliseconds(history.max_gap),
                    milliseconds(history.jitter));
   }
-  text += format("refused      %llu too old, %llu of a stamp that was taken\n",
+  text += format("refused      %llu too old, %llu of a stamp that was taken, %llu too far ahead\n",
                  static_cast<unsigned long long>(history.refused_old),
-                 static_cast<unsigned long long>(history.refused_equal));
+                 static_cast<unsigned long long>(history.refused_equal),
+                 static_cast<unsigned long long>(history.refused_ahead));
   return text + format("memory       %zu bytes\n", history.bytes);
 }
 
@@ -71,7 +72,8 @@ nlohmann::json history_json(const HistoryInfo& history, Time now) {
                       {"max_gap", seconds(history.max_gap)},
                       {"jitter", seconds(history.jitter)},
                       {"refused_old", history.refused_old},
-                      {"refused_equal", history.refused_equal}};
+                      {"refused_equal", history.refused_equal},
+                      {"refused_ahead", history.refused_ahead}};
   if (!history.newest) return json;
   json["oldest_ns"] = nanoseconds(*history.oldest);
   json["newest_ns"] = nanoseconds(*history.newest);
@@ -122,7 +124,8 @@ std::string monitor_table(const std::string& partition, const std::vector<Histor
     text +=
         format("  %-24s %10.1f %10s %10.3f %10.3f %10llu\n", history.id.c_str(), rate_of(history),
                age.c_str(), milliseconds(history.jitter), milliseconds(history.max_gap),
-               static_cast<unsigned long long>(history.refused_old + history.refused_equal));
+               static_cast<unsigned long long>(history.refused_old + history.refused_equal +
+                                               history.refused_ahead));
   }
   return text;
 }

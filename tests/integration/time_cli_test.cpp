@@ -101,7 +101,10 @@ TEST_CASE("time: histories and rates are shown, with what was refused") {
   CHECK(answered(d, {"update", "arm_1", "--stamp", "102"}, 1).at("error").at("code") ==
         "stamp_taken");
   CHECK(answered(d, {"update", "arm_1", "--stamp", "90"}, 1).at("error").at("code") == "too_old");
+  CHECK(answered(d, {"update", "arm_1", "--stamp", "9e9"}, 1).at("error").at("code") ==
+        "invalid_input");
   const json history = answered(d, {"history", "arm_1"});
+  CHECK(history.at("refused_ahead") == 1);
   CHECK(history.at("samples") == 5);
   CHECK(history.at("span") == 4.0);
   CHECK(history.at("rate") == 1.0);
