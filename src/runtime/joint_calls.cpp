@@ -71,11 +71,11 @@ Result<void> JointCalls::publish(const JointUpdate& update) {
 }
 
 Result<std::vector<JointInfo>> JointCalls::list(const std::string& partition) {
+  const Deadline deadline = discovery_.call_deadline();
   std::vector<JointInfo> all;
   while (true) {
     const std::string last = all.empty() ? std::string() : all.back().name;
-    auto more =
-        requests_.ask_all<JointInfo>(partition, JointsRequest{last}, discovery_.call_deadline());
+    auto more = requests_.ask_all<JointInfo>(partition, JointsRequest{last}, deadline);
     if (!more) return more;
     const bool end = more->size() < kMaxItems;
     if (!more->empty() && more->back().name <= last) {

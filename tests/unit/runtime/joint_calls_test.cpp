@@ -71,6 +71,28 @@ TEST_CASE("joints: an owner that is gone gets nothing, and is named") {
   CHECK(outcome(mover.calls.update({{{"elbow", 0.25}}, {}})) == "unreachable");
 }
 
+TEST_CASE("joints: a list that is longer than one reply is asked for in parts") {
+  constexpr std::size_t kAll = kMaxItems + 904;
+  LoopbackNetwork network;
+  ScriptedOwner owner(
+      network, "arm", arm(), [&](Transport& transport, const PeerId& from, const Request& request) {
+        const auto* asked = std::get_if<JointsRequest>(&request.body);
+        if (asked == nullptr) return false;
+        std::vector<JointInfo> part;
+        std::size_t next = asked->after.empty() ? 10000 : std::stoul(asked->after) + 1;
+        for (; part.size() < kMaxItems && next < 10000 + kAll; ++next) {
+          part.emplace_back().name = std::to_string(next);
+        }
+        transport.reply(from, {request.sequence, 0, part});
+        return true;
+      });
+  Mover mover(network);
+  const auto listed = mover.calls.list("arm");
+  REQUIRE(outcome(listed) == "ok");
+  REQUIRE(listed->size() == kAll);
+  CHECK(listed->back().name == std::to_string(10000 + kAll - 1));
+}
+
 TEST_CASE("joints: a list that does not go on is not asked for without end") {
   LoopbackNetwork network;
   ScriptedOwner owner(network, "arm", arm(),
