@@ -61,7 +61,7 @@ class TFDUDE_EXPORT Client {
   Client& operator=(Client&&) noexcept;
   /// Leaves. After this has returned no callback is running or will run, but for one that calls this itself, which may go
   /// on without the Client. Lookups that wait are cancelled; futures of them are answered kTimeout. Waits for callbacks
-  /// that run, and not for anybody else.
+  /// that run, and at most for Options::linger until owners have acknowledged what was streamed to them.
   ~Client();
 
   /// Adds a frame; an empty parent makes a root.
