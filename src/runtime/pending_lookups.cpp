@@ -52,8 +52,13 @@ void PendingLookups::stop() {
   }
   changed_.notify_one();
   if (thread_.joinable()) thread_.join();
+  All left;
+  {
+    const Lock lock(mutex_);
+    left = std::exchange(added_, {});
+  }
   // Here, as what callbacks hold goes with them.
-  for (const auto& lookup : std::exchange(added_, {})) give_up(*lookup);
+  for (const auto& lookup : left) give_up(*lookup);
   callbacks_.stop();
 }
 
@@ -136,9 +141,10 @@ void PendingLookups::run() {
     const auto rested = end + std::clamp<std::chrono::nanoseconds>(kRest * (end - begin),
                                                                    kShortestRest, kLongestRest);
     lock.lock();
-    const auto must = [this] { return stopping_ || urgent_.load(); };
+    const auto must = [this]() TFDUDE_REQUIRES(mutex_) { return stopping_ || urgent_.load(); };
     changed_.wait_until(lock, std::min(next, rested), must);
-    changed_.wait_until(lock, next, [&] { return must() || written_.load(); });
+    changed_.wait_until(lock, next,
+                        [&]() TFDUDE_REQUIRES(mutex_) { return must() || written_.load(); });
   }
   std::move(all.begin(), all.end(), std::back_inserter(added_));
   lock.unlock();
