@@ -1,5 +1,6 @@
 #include "tfdude/client/stream.hpp"
 
+#include "base/stamp.hpp"
 #include "math/finite.hpp"
 #include "runtime/sender.hpp"
 
@@ -12,7 +13,9 @@ EdgeStream::~EdgeStream() = default;
 
 const std::vector<NotSent>& EdgeStream::try_publish(const std::vector<Transform>& X_PC,
                                                     std::optional<Time> stamp) {
-  if (X_PC.size() != sender_->size()) return sender_->refuse(Errc::kInvalidInput);
+  if (X_PC.size() != sender_->size() || !is_stamp(stamp)) {
+    return sender_->refuse(Errc::kInvalidInput);
+  }
   return sender_->send(
       stamp, [&](std::size_t i) { return is_finite(X_PC[i]); },
       [&](EdgeUpdate& edge, std::size_t i) { edge.X_PC = X_PC[i]; });
@@ -27,7 +30,8 @@ JointStream::~JointStream() = default;
 const std::vector<NotSent>& JointStream::try_publish(const std::vector<double>& positions,
                                                      const std::vector<double>& variances,
                                                      std::optional<Time> stamp) {
-  if (positions.size() != sender_->size() || variances.size() != sender_->size()) {
+  if (positions.size() != sender_->size() || variances.size() != sender_->size() ||
+      !is_stamp(stamp)) {
     return sender_->refuse(Errc::kInvalidInput);
   }
   return sender_->send(

@@ -5,6 +5,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/stamp.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -81,6 +83,7 @@ Result<ObservePlan> route_observe(const Forest& forest, const Directory& directo
                                   const std::string& a, const std::string& b,
                                   const std::vector<std::string>& beside,
                                   std::optional<Time> stamp) {
+  if (auto ok = check_stamp(stamp); !ok) return tl::unexpected(std::move(ok.error()));
   auto path = forest.edges(a, b);
   if (!path) return tl::unexpected(std::move(path.error()));
   if (path->empty()) {

@@ -4,11 +4,14 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/stamp.hpp"
 #include "math/finite.hpp"
 #include "partition/joints.hpp"
 
 namespace tfdude {
 namespace {
+
+constexpr Time kFirstInstant{std::chrono::nanoseconds(1)};
 
 tl::unexpected<Error> unknown_frame(std::string_view id) {
   return fail(Errc::kUnknownFrame, "no frame " + quote(id));
@@ -138,6 +141,7 @@ template <class Body, class Edge, class Check>
 Result<std::vector<Part>> route_edges(const Forest& forest, const Directory& directory,
                                       const std::vector<Edge>& edges, std::optional<Time> stamp,
                                       Check check) {
+  if (auto ok = check_stamp(stamp); !ok) return tl::unexpected(std::move(ok.error()));
   std::vector<Part> parts;
   for (const Edge& edge : edges) {
     const auto frame = forest.info(edge.id);
@@ -185,6 +189,7 @@ Result<std::vector<Part>> route_publish(const Forest& forest, const Directory& d
 }
 
 Result<std::vector<Part>> route_joints(const Directory& directory, const JointUpdate& update) {
+  if (auto ok = check_stamp(update.stamp); !ok) return tl::unexpected(std::move(ok.error()));
   std::vector<Part> parts;
   for (const JointValue& joint : update.joints) {
     const auto owners = directory.joint_owners(joint.name);
@@ -240,6 +245,8 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
         body_for<LookupRequest>(plan.parts, directory, segment.owner, owned_end(forest, segment));
     body.segments.push_back({segment.from, segment.to});
     body.query = query;
+    // Zero is how "the latest" travels, and before the first instant that is none there are no samples either.
+    if (query.at) body.query.at = std::max(*query.at, kFirstInstant);
     body.hint = hint;
   }
   if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());

@@ -3,6 +3,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/saturating.hpp"
+#include "base/stamp.hpp"
 #include "tree/forest_impl.hpp"
 
 // What an update does to the history of its edge.
@@ -40,12 +41,8 @@ Forest::Impl::~Impl() {
 Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::size_t count,
                                              std::optional<Time> given) {
   if (given) {
+    if (auto ok = check_stamp(given); !ok) return tl::unexpected(std::move(ok.error()));
     const std::int64_t stamp = nanoseconds(*given);
-    // Zero is how "no stamp" travels.
-    if (stamp <= 0) {
-      return fail(Errc::kInvalidInput,
-                  "the stamp must be after 1970-01-01, not " + std::to_string(stamp) + " ns");
-    }
     for (std::size_t i = 0; i < count; ++i) {
       auto ok = check_ahead(frames_.newest_value(slots[i]), stamp);
       if (!ok) return tl::unexpected(std::move(ok.error()));

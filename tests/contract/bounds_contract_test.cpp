@@ -42,7 +42,7 @@ struct FirstLookup {
 }  // namespace
 
 TEST_CASE("bounds: alone in the domain a lookup waits no longer than it may") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   const FirstLookup alone(joined_by(transport), "tool", 50ms);
   INFO(alone.message);
   CHECK(alone.took >= 50ms);
@@ -55,7 +55,7 @@ TEST_CASE("bounds: alone in the domain a lookup waits no longer than it may") {
 }
 
 TEST_CASE("bounds: alone in the domain every call says after a while what it knows") {
-  auto client = *Client::open(joined_by(GENERATE(0, 1))(""));
+  auto client = *Client::open(joined_by(GENERATE(from_range(testing::networks())))(""));
   CHECK(client.frames()->empty());
   CHECK(client.partitions()->empty());
   CHECK(client.roots()->empty());
@@ -65,7 +65,7 @@ TEST_CASE("bounds: alone in the domain every call says after a while what it kno
 }
 
 TEST_CASE("bounds: the first lookup of a client waits no longer than it may") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const auto node = *Node::open(join("robot"), "robot", {{"world", "", {}}, {"tool", "world", {}}});
   const FirstLookup there(join, "tool", 20'000ms);
   INFO(there.message);

@@ -108,7 +108,7 @@ bool is_conflict(const Change& change) { return change.kind == ChangeKind::kConf
 }  // namespace
 
 TEST_CASE("an id that two partitions add at once is one's everywhere, and the other says so") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   Pair p(joined_by(transport));
   std::vector<Client*> all{&p.arms, &p.head, &p.client};
   Listener arms(p.arms);
@@ -132,7 +132,7 @@ TEST_CASE("an id that two partitions add at once is one's everywhere, and the ot
 }
 
 TEST_CASE("two moves at once that make a cycle end as one of them everywhere") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   Pair p(joined_by(transport));
   Listener client(p.client);
   bool both = false;
@@ -156,7 +156,7 @@ TEST_CASE("two moves at once that make a cycle end as one of them everywhere") {
 }
 
 TEST_CASE("a listener may use the client, and ends with its subscription") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   Pair p(joined_by(transport));
   std::mutex mutex;
   std::condition_variable changed;
@@ -185,7 +185,7 @@ TEST_CASE("a listener may use the client, and ends with its subscription") {
 }
 
 TEST_CASE("an owner hears of its own changes, too") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   Pair p(joined_by(transport));
   Listener arms(p.arms);
   REQUIRE(p.arms.add("tool", "arm", {}));
@@ -199,7 +199,7 @@ TEST_CASE("an owner hears of its own changes, too") {
 }
 
 TEST_CASE("a claim that was taken back costs nobody a frame, however late that is heard") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   auto late_transport = std::make_unique<testing::LatePages>(join("head"));
   testing::LatePages& late = *late_transport;
   Options options;

@@ -69,7 +69,7 @@ struct Robot {
 };
 
 TEST_CASE("joints: positions reach all owners, and those who follow in other partitions") {
-  Robot robot(joined_by(GENERATE(0, 1)));
+  Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   REQUIRE(robot.client->publish_joints({"turn", "shoulder", "elbow"}, {0.1, 0.2, 0.4},
                                        {1e-4, 4e-4, 9e-4}));
   const auto has_come = [&](const char* a, const char* b, double angle) {
@@ -84,8 +84,26 @@ TEST_CASE("joints: positions reach all owners, and those who follow in other par
   CHECK(X_WH->basis.sources == Names{"joint elbow"});
 }
 
+TEST_CASE("joints: what was sent arrives though its client ends at once") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Robot robot(join);
+  for (int run = 1; run <= 5; ++run) {
+    INFO("run " << run);
+    const double angle = 0.1 * run;
+    {
+      auto passing = *Client::open(join(""));
+      REQUIRE(outcome(passing.publish_joints({"turn", "elbow"}, {angle, angle}, {0, 0})) == "ok");
+    }
+    const auto has_come = [&](const char* a, const char* b, double x) {
+      return comes_true([&] { return std::abs(yaw(robot.client->lookup(a, b)) - x) < 1e-12; });
+    };
+    CHECK(has_come("world", "turret", angle));
+    CHECK(has_come("fore", "hand", -angle));
+  }
+}
+
 TEST_CASE("joints: what is updated is there when the call returns, or refused by name") {
-  Robot robot(joined_by(GENERATE(0, 1)));
+  Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   Client& client = *robot.client;
   CHECK(outcome(client.update_joints({"turn", "elbow"}, {0.5, 0.25}, {0, 0})) == "ok");
   CHECK(std::abs(yaw(client.lookup("world", "turret")) - 0.5) < 1e-12);
@@ -111,7 +129,7 @@ TEST_CASE("joints: what is updated is there when the call returns, or refused by
 }
 
 TEST_CASE("joints: of one stamp lookups at an instant see all, whoever owns them") {
-  Robot robot(joined_by(GENERATE(0, 1)));
+  Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   const Time start = wall_clock();
   std::atomic<bool> stop{false};
   REQUIRE(robot.client->update_joints({"turn", "shoulder"}, {0, 0}, {0, 0}, start));
@@ -138,7 +156,7 @@ TEST_CASE("joints: of one stamp lookups at an instant see all, whoever owns them
 }
 
 TEST_CASE("joints: one owner that is not there keeps no other from its share") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Robot robot(join);
   REQUIRE(robot.client->publish_joints({"turn", "elbow"}, {0.1, 0.1}, {0, 0}));
   robot.tool.reset();
@@ -160,7 +178,7 @@ TEST_CASE("joints: one owner that is not there keeps no other from its share") {
 }
 
 TEST_CASE("joints: who has just come tells all owners, or says who it is that nobody knows") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Robot robot(join);
   for (int i = 1; i <= 5; ++i) {
     const double angle = 0.1 * i;
@@ -179,7 +197,7 @@ TEST_CASE("joints: who has just come tells all owners, or says who it is that no
 }
 
 TEST_CASE("joints: a node that is opened again has its joints where they were") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const testing::TemporaryDirectory directory;
   Options options;
   options.state = directory.path();

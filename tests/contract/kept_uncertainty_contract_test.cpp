@@ -105,7 +105,7 @@ double difference(Client& client, const ObservedChain& chain, const Eigen::Matri
 }  // namespace
 
 TEST_CASE("kept: owners that restart between observations know what one dense filter would") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(0x4e97);
   INFO("seed " << random.seed());
   ObservedChain chain(random, kEdges);
@@ -140,7 +140,7 @@ TEST_CASE("kept: owners that restart between observations know what one dense fi
 TEST_CASE(
     "kept: what was said of correlation by request is there after a restart, and can be taken "
     "back") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(0x4e98);
   INFO("seed " << random.seed());
   const ObservedChain chain(random, kEdges);
@@ -163,7 +163,7 @@ TEST_CASE(
 }
 
 TEST_CASE("kept: what nobody may say of correlation is refused, whoever owns the edge") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(0x4e99);
   INFO("seed " << random.seed());
   const ObservedChain chain(random, kEdges);

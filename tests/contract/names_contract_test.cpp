@@ -71,7 +71,7 @@ std::size_t served(const Join& join, const std::string& name) {
 
 // Who does not get it waits for a second and a half: so many try beside each other, in process each on a network of its own.
 TEST_CASE("of two who claim a name at once exactly one serves") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   const int beside = transport == 0 ? 50 : 2;
   const int tries = transport == 0 ? 20 : 5;
   const Join shared = joined_by(transport);
@@ -93,7 +93,7 @@ TEST_CASE("of two who claim a name at once exactly one serves") {
 }
 
 TEST_CASE("an orderly end is told apart from a loss, and its frames are those of who serves them") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node base = *Node::open(join("base"), "base", {{"world", "", {}}});
   Client client = *Client::open(join(""));
   std::mutex mutex;
@@ -128,7 +128,7 @@ TEST_CASE("an orderly end is told apart from a loss, and its frames are those of
 }
 
 TEST_CASE("a partition that is gone is forgotten by all, and only then") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node base = *Node::open(join("base"), "base", {{"world", "", {}}});
   Node head = *Node::open(join("head"), "head", {{"neck", "world", {}}});
   Client client = *Client::open(join(""));

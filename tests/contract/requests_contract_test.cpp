@@ -37,7 +37,7 @@ Options patient() {
 }  // namespace
 
 TEST_CASE("a change of which many sendings are lost is made once, while other threads go on") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   constexpr int kThreads = 3;
   constexpr int kLost =
       8;  // sendings of each request of the unlucky thread, beyond a second in all
@@ -70,7 +70,7 @@ TEST_CASE("a change of which many sendings are lost is made once, while other th
 }
 
 TEST_CASE("what an owner has added is not denied while its structure has not come") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const Node arms = *Node::open(join("arms"), "arms", {{"arm", "", {}}});
   auto late_transport = std::make_unique<testing::LatePages>(join(""));
   testing::LatePages& late = *late_transport;
@@ -92,7 +92,7 @@ TEST_CASE("what an owner has added is not denied while its structure has not com
 }
 
 TEST_CASE("parts of a value are changed at its owner, the rest stays") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(0x9a75);
   const Transform X_PC = random.transform();
   auto owner =
@@ -115,7 +115,7 @@ TEST_CASE("parts of a value are changed at its owner, the rest stays") {
 }
 
 TEST_CASE("a sample of the future is refused by its owner, who counts it") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   auto owner = *Node::open(join("arms"), "arms", {{"arm", "", {}}, {"hand", "arm", {}}}, patient());
   auto client = *Client::open(join(""), patient());
   const auto refused = client.update("hand", ahead(1), time_of(9'000'000'000'000'000'000));

@@ -29,7 +29,7 @@ using testing::outcome;
 }  // namespace
 
 TEST_CASE("publish: of three owners the two that live get theirs, the error names the third") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   Node b = open_with_tip(join, "b");
   std::optional<Node> gone = open_with_tip(join, "gone");
@@ -54,7 +54,7 @@ TEST_CASE("publish: of three owners the two that live get theirs, the error name
 }
 
 TEST_CASE("publish: what was sent arrives though the client ends at once") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   for (int run = 1; run <= 10; ++run) {
     INFO("run " << run);
@@ -68,7 +68,7 @@ TEST_CASE("publish: what was sent arrives though the client ends at once") {
 }
 
 TEST_CASE("flush: says whether all was acknowledged") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   auto client = *Client::open(join(""));
   CHECK(outcome(client.flush(Milliseconds(0))) == "ok");

@@ -60,16 +60,15 @@ struct Loop {
     return text(not_sent);
   }
 
-  [[nodiscard]] double median_ms() {
-    std::sort(times.begin(), times.end());
-    return std::chrono::duration<double, std::milli>(times[times.size() / 2]).count();
+  [[nodiscard]] std::ptrdiff_t slower_than(Milliseconds limit) const {
+    return std::count_if(times.begin(), times.end(), [&](auto time) { return time > limit; });
   }
 };
 
 }  // namespace
 
 TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waited for") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   auto client = *Client::open(join(""));
   Loop loop{*client.stream({"gone_tip", "a_tip"}), {}};
   CHECK(loop.send({1, 1}) == "0 unknown_frame, 1 unknown_frame");
@@ -96,11 +95,12 @@ TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waite
   CHECK(eventually([&] {
     return loop.send({6, 6}) == "all sent" && is_at(a, "a_base", "gone_tip", 6);
   }));
-  CHECK(loop.median_ms() < 5);
+  // A busy computer may hold up one or two calls; to wait for a match takes some 30 ms, and there were three.
+  CHECK(loop.slower_than(Milliseconds(20)) < 3);
 }
 
 TEST_CASE("streams: stamps are those of the source, of all edges the same") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   Node b = open_with_tip(join, "b");
   REQUIRE(eventually([&] { return b.exists("a_tip"); }));
@@ -122,7 +122,7 @@ TEST_CASE("streams: stamps are those of the source, of all edges the same") {
 }
 
 TEST_CASE("streams: of what is invalid nothing is sent") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   auto client = *Client::open(join(""));
   auto stream = *client.stream({"a_tip", "a_base"});
@@ -142,7 +142,7 @@ TEST_CASE("streams: of what is invalid nothing is sent") {
 }
 
 TEST_CASE("streams: positions of joints reach all who have them, and who is missing is named") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   JointSpec elbow = revolute_named("elbow");
   elbow.coupled = true;
   Node arm = *Node::open(join("arm"), "arm",
@@ -175,7 +175,7 @@ TEST_CASE("streams: positions of joints reach all who have them, and who is miss
 }
 
 TEST_CASE("streams: one that outlives its client sends nothing any more") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   std::optional<Client> client = *Client::open(join(""));
   auto stream = *client->stream({"a_tip"});

@@ -49,7 +49,7 @@ const Transform kX{exp((Twist() << 0.1, -0.2, 0.3, 0.4, 0.5, -0.6).finished()),
 }  // namespace
 
 TEST_CASE("everybody looks up every pair as one tree would") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   Forest oracle;
   for (const char* file : {"/thesis/robot.yaml", "/thesis/arms.yaml"}) {
@@ -72,7 +72,7 @@ TEST_CASE("everybody looks up every pair as one tree would") {
 }
 
 TEST_CASE("frames are added, updated and moved from anywhere") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   int callers = 0;
   for (Client* caller : r.all()) {
@@ -101,7 +101,7 @@ TEST_CASE("frames are added, updated and moved from anywhere") {
 }
 
 TEST_CASE("what is not finite is refused before it is sent") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   const Transform bad{Pose::trusted(Eigen::Quaterniond::Identity(), {NAN, 0, 0}), {}};
   for (Client* caller : r.all()) {
@@ -122,7 +122,7 @@ TEST_CASE("what is not finite is refused before it is sent") {
 TEST_CASE("an answer that is semi-definite but for rounding arrives") {
   // An edge without translation seen from its child's side: the variances of the translation are zero but for
   // the rounding of those of the rotation over a lever.
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   const auto edge = [](const Eigen::Vector3d& p, const Eigen::Vector3d& rpy,
                        const std::array<double, 6>& stddev) {
@@ -149,7 +149,7 @@ TEST_CASE("an answer that is semi-definite but for rounding arrives") {
 }
 
 TEST_CASE("a removal takes all below it, and an emptied partition lives on") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   REQUIRE(r.arms->remove("robot_2"));
   CHECK_FALSE(r.arms->exists("camera"));
@@ -162,7 +162,7 @@ TEST_CASE("a removal takes all below it, and an emptied partition lives on") {
 }
 
 TEST_CASE("unknown start, unknown end and no common root are three errors") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   REQUIRE(r.client->add("island", "", kX, "arms"));
   for (Client* caller : r.all()) {
@@ -173,7 +173,7 @@ TEST_CASE("unknown start, unknown end and no common root are three errors") {
 }
 
 TEST_CASE("an update has any number of edges up to the limit") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   const std::size_t count = GENERATE(as<std::size_t>{}, 3, 100, kMaxItems, kMaxItems + 1);
   const std::vector<EdgeUpdate> edges(count, EdgeUpdate{"arm_2", kX});
@@ -190,7 +190,7 @@ TEST_CASE("an update has any number of edges up to the limit") {
 }
 
 TEST_CASE("a partition has one owner at a time") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   const Join join = joined_by(transport);
   std::optional<Node> first(*Node::open(join("arms"), "arms"));
   const auto second = Node::open(join("arms"), "arms");

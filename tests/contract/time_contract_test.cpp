@@ -115,8 +115,49 @@ class Source {
 
 }  // namespace
 
+TEST_CASE("an owner's event says that a history starts again") {
+  Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
+  std::mutex mutex;
+  std::vector<Change> heard;
+  const Subscription subscription = chain.arm->on_change([&](const Change& change) {
+    const std::lock_guard lock(mutex);
+    if (change.kind == ChangeKind::kHistoryRestarted) heard.push_back(change);
+  });
+  REQUIRE(outcome(chain.client->update("hand", along_x(1), ms(1'000'000))) == "ok");
+  for (int i = 1; i <= 4; ++i) {
+    CHECK(outcome(chain.client->update("hand", along_x(2), ms(i))) == "too_old");
+  }
+  REQUIRE(outcome(chain.client->update("hand", along_x(2), ms(5))) == "ok");
+  REQUIRE(testing::eventually([&] {
+    const std::lock_guard lock(mutex);
+    return !heard.empty();
+  }));
+  const std::lock_guard lock(mutex);
+  REQUIRE(heard.size() == 1);
+  CHECK(heard[0].frame == "hand");
+  CHECK(heard[0].partition == "arm");
+}
+
+TEST_CASE("a stamp before 1970, or none that is one, is refused wherever its edge is") {
+  Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
+  REQUIRE(outcome(chain.arm->update("hand", along_x(1), ms(1000))) == "ok");
+  const Time stamp = GENERATE(ms(0), ms(-1), Time::min());
+  for (Client* caller : {&*chain.client, static_cast<Client*>(&*chain.arm)}) {
+    CHECK(outcome(caller->update("hand", along_x(2), stamp)) == "invalid_input");
+    CHECK(outcome(caller->publish({{"hand", along_x(2)}}, stamp)) == "invalid_input");
+    CHECK(outcome(caller->update_joints({"nobody"}, {0}, {0}, stamp)) != "ok");
+    auto stream = caller->stream({"hand"});
+    REQUIRE(stream);
+    REQUIRE(stream->try_publish({along_x(2)}, stamp).size() == 1);
+    CHECK(stream->try_publish({along_x(2)}, stamp)[0].why == Errc::kInvalidInput);
+    // As an instant that is asked for it is before all samples, not the newest.
+    CHECK(outcome(caller->lookup("arm", "hand", at(stamp))) == "too_old");
+  }
+  CHECK(x_of(chain.client->lookup("arm", "hand", at(ms(1000)))) == 1);
+}
+
 TEST_CASE("all partitions answer for the same instant") {
-  Chain chain(joined_by(GENERATE(0, 1)));
+  Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   for (const int t : {1000, 2000, 3000}) {
     REQUIRE(chain.client->update("base", along_x(t), ms(t)));
     REQUIRE(chain.client->update({{"arm", along_x(2 * t)}, {"hand", along_x(3 * t)}}, ms(t - 500)));
@@ -153,7 +194,7 @@ TEST_CASE("all partitions answer for the same instant") {
 TEST_CASE(
     "of partitions in motion every answer is the motion at its stamp, unlike that of each one's "
     "newest") {
-  Chain chain(joined_by(GENERATE(0, 1)));
+  Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   Motion motion(4242, wall_clock());
   INFO("seed " << motion.seed());
   const Source base(*chain.base, motion, {0}, motion.seed() + 1);
@@ -193,7 +234,7 @@ TEST_CASE(
 }
 
 TEST_CASE("a lookup waits for its data, no longer than it may, and not for what is gone") {
-  Chain chain(joined_by(GENERATE(0, 1)));
+  Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   REQUIRE(chain.arm->update("arm", along_x(1), ms(1000)));
   REQUIRE(chain.arm->update("arm", along_x(2), ms(2000)));
   const auto start = std::chrono::steady_clock::now();
@@ -236,7 +277,7 @@ TEST_CASE("a lookup waits for its data, no longer than it may, and not for what 
 }
 
 TEST_CASE("a watched path is read without asking, and follows what its owners write") {
-  Chain chain(joined_by(GENERATE(0, 1)));
+  Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   REQUIRE(chain.base->update("base", along_x(1000), ms(1000)));
   for (Client* caller : std::vector<Client*>{&*chain.client, &*chain.arm}) {
     auto path = caller->watch("world", "tool");
@@ -261,7 +302,7 @@ TEST_CASE("a watched path is read without asking, and follows what its owners wr
 }
 
 TEST_CASE("a watched path finds its new way when frames are moved, removed and added again") {
-  Chain chain(joined_by(GENERATE(0, 1)));
+  Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   std::atomic<int> told{0};
   WatchOptions options;
   options.on_route = [&](const std::string&) { ++told; };
@@ -280,7 +321,7 @@ TEST_CASE("a watched path finds its new way when frames are moved, removed and a
 }
 
 TEST_CASE("a watched path goes on when an owner returns") {
-  const auto join = joined_by(GENERATE(0, 1));
+  const auto join = joined_by(GENERATE(from_range(testing::networks())));
   Chain chain(join);
   auto path = chain.client->watch("world", "tool");
   REQUIRE(path);
@@ -297,7 +338,7 @@ TEST_CASE("a watched path goes on when an owner returns") {
 }
 
 TEST_CASE("segments may be pushed composed, and no more often than wanted") {
-  Chain chain(joined_by(GENERATE(0, 1)));
+  Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   WatchOptions options;
   options.composed = true;
   options.rate = 20;

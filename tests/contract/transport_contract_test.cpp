@@ -29,7 +29,7 @@ Request request(std::uint32_t sequence) { return {sequence, "hand", RemoveReques
 // ---- presence and pages
 
 TEST_CASE("what is announced and published reaches all, also those that come later") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Listener early(join);
   Server arms(join, "arms", 7);
   Server legs(join, "legs", 8);
@@ -74,7 +74,7 @@ TEST_CASE("what is announced and published reaches all, also those that come lat
 }
 
 TEST_CASE("who comes late hears the last state of each page and presence, not the former ones") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Server arms(join, "arms");
   for (std::uint64_t epoch = 1; epoch <= 20; ++epoch) {
     arms.publish(static_cast<std::uint32_t>(epoch % 2), epoch);
@@ -88,7 +88,7 @@ TEST_CASE("who comes late hears the last state of each page and presence, not th
 }
 
 TEST_CASE("once a newcomer has met all it has heard of those who were there") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const Server arms(join, "arms");
   const Listener late(join);
   CHECK(late.transport->discovery_time() >= Milliseconds(0));
@@ -103,7 +103,7 @@ TEST_CASE("once a newcomer has met all it has heard of those who were there") {
 // ---- requests, replies, updates
 
 TEST_CASE("a request reaches the partition that it is sent to, the reply who asked") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Server arms(join, "arms", 7);
   Server legs(join, "legs", 8);
   Listener first(join);
@@ -129,7 +129,7 @@ TEST_CASE("a request reaches the partition that it is sent to, the reply who ask
 }
 
 TEST_CASE("an update reaches the partition that it is sent to, and brings what is owned there") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(0x7a45);
   const Server arms(join, "arms", 1, {"arm", "hand"});
   const Server legs(join, "legs", 1, {"leg"});
@@ -150,7 +150,7 @@ TEST_CASE("an update reaches the partition that it is sent to, and brings what i
 }
 
 TEST_CASE("joints reach the partition that they are sent to") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const Server arms(join, "arms", 1, {}, {"elbow"});
   const Server legs(join, "legs", 1, {}, {"knee"});
   const Listener sender(join);
@@ -166,7 +166,7 @@ TEST_CASE("joints reach the partition that they are sent to") {
 }
 
 TEST_CASE("what is sent to a partition that nobody serves times out, naming it") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const Server arms(join, "arms");
   const Listener sender(join);
   const auto check_timeout = [](const Result<void>& sent) {
@@ -181,7 +181,7 @@ TEST_CASE("what is sent to a partition that nobody serves times out, naming it")
 }
 
 TEST_CASE("what is sent waits for a partition that is not served yet") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Listener asker(join);
   bool answered = false;
   std::promise<void> begins;
@@ -196,7 +196,7 @@ TEST_CASE("what is sent waits for a partition that is not served yet") {
 }
 
 TEST_CASE("a reply to nobody harms nobody") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Server arms(join, "arms");
   Listener asker(join);
   arms.transport->reply(PeerId{1, 2, 3}, {5, 5, Done{}});
@@ -207,7 +207,7 @@ TEST_CASE("a reply to nobody harms nobody") {
 // ---- leaving
 
 TEST_CASE("when a server has gone all others hear of it, and those who come later nothing of it") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Server arms(join, "arms", 7);
   const Server legs(join, "legs", 8);
   const Listener client(join);
@@ -226,7 +226,7 @@ TEST_CASE("when a server has gone all others hear of it, and those who come late
 }
 
 TEST_CASE("a partition can be served again after its server has gone") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Listener client(join);
   {
     const Server former(join, "arms", 1);
@@ -243,7 +243,7 @@ TEST_CASE("a partition can be served again after its server has gone") {
 }
 
 TEST_CASE("a transport is stopped any number of times, also before it was started") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const auto idle = join("");
   idle->stop();
   Listener client(join);
@@ -254,7 +254,7 @@ TEST_CASE("a transport is stopped any number of times, also before it was starte
 // ---- size and order
 
 TEST_CASE("messages of the largest size arrive whole") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(0xb16);
   INFO("seed " << random.seed());
   const auto long_id = [](std::size_t i) {
@@ -293,7 +293,7 @@ TEST_CASE("messages of the largest size arrive whole") {
 }
 
 TEST_CASE("pages of one sender arrive in order, and the last of each arrives") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const Listener client(join);
   Server arms(join, "arms");
   REQUIRE(client.hears([](const Heard& h) { return h.presence("arms", 1); }));

@@ -50,7 +50,7 @@ class Repeating {
 };
 
 TEST_CASE("each of many askers of many servers gets its own replies") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   constexpr std::uint32_t kAskers = 3;
   constexpr std::uint32_t kThreads = 2;
   constexpr std::uint32_t kRequests = 50;
@@ -86,7 +86,7 @@ TEST_CASE("each of many askers of many servers gets its own replies") {
 }
 
 TEST_CASE("nothing reaches a server that has stopped, and nobody else misses it") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Listener asker(join);
   const Server legs(join, "legs");
   Server arms(join, "arms");
@@ -110,7 +110,7 @@ TEST_CASE("nothing reaches a server that has stopped, and nobody else misses it"
 }
 
 TEST_CASE("nothing reaches a listener that has stopped") {
-  const int transport = GENERATE(0, 1);
+  const int transport = GENERATE(from_range(testing::networks()));
   const Join join = joined_by(transport);
   Server arms(join, "arms");
   const Listener staying(join);
@@ -133,7 +133,7 @@ TEST_CASE("nothing reaches a listener that has stopped") {
 }
 
 TEST_CASE("who stops waits for the calls that are under way") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   std::atomic<bool> stopping{false};
   std::atomic<bool> under_way{false};
   testing::Recorder slow;
@@ -162,7 +162,7 @@ TEST_CASE("who stops waits for the calls that are under way") {
 }
 
 TEST_CASE("who joins while pages are published hears no older page after a newer one") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Server arms(join, "arms");
   const Repeating publishing([&](std::uint32_t round) { arms.publish(round % 3, round); });
   for (int joined = 0; joined < 5; ++joined) {

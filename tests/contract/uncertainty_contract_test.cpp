@@ -72,7 +72,7 @@ Belief composed(const std::vector<Belief>& edges, Order order = Order::kSecond) 
 }  // namespace
 
 TEST_CASE("uncertainty: a source that edges of several owners share is counted once") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(661);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -101,7 +101,7 @@ TEST_CASE("uncertainty: a source that edges of several owners share is counted o
 }
 
 TEST_CASE("uncertainty: a source cancels exactly over owners") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(662);
   INFO("seed " << random.seed());
   Robot robot(join, random, 0.0);
@@ -121,7 +121,7 @@ TEST_CASE("uncertainty: a source cancels exactly over owners") {
 }
 
 TEST_CASE("uncertainty: unknown correlation over owners is bounded, and told") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(663);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -145,7 +145,7 @@ TEST_CASE("uncertainty: unknown correlation over owners is bounded, and told") {
 }
 
 TEST_CASE("uncertainty: the order of a lookup counts with all owners") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(664);
   INFO("seed " << random.seed());
   Robot robot(join, random, 0.2);
@@ -169,7 +169,7 @@ TEST_CASE("uncertainty: the order of a lookup counts with all owners") {
 }
 
 TEST_CASE("uncertainty: a watched path knows what its edges share") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const bool composed_by_owners = GENERATE(false, true);
   Random random(665);
   INFO("seed " << random.seed());
@@ -192,7 +192,7 @@ TEST_CASE("uncertainty: a watched path knows what its edges share") {
 }
 
 TEST_CASE("uncertainty: a measurement over owners makes all paths as sure as one filter would") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(666);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -234,7 +234,7 @@ TEST_CASE("uncertainty: a measurement over owners makes all paths as sure as one
 }
 
 TEST_CASE("uncertainty: what the gate refuses changes nothing, and is counted") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(667);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -262,7 +262,7 @@ TEST_CASE("uncertainty: what the gate refuses changes nothing, and is counted") 
 }
 
 TEST_CASE("uncertainty: two who observe one path at once both count, and count once") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(671);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -295,7 +295,7 @@ TEST_CASE("uncertainty: two who observe one path at once both count, and count o
 }
 
 TEST_CASE("uncertainty: an edge is fused with a measurement of it, whoever owns it") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(668);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -319,7 +319,7 @@ TEST_CASE("uncertainty: an edge is fused with a measurement of it, whoever owns 
 }
 
 TEST_CASE("uncertainty: moving edges are corrected by a sample of the measurement's stamp") {
-  const Join join = joined_by(GENERATE(0, 1));
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(669);
   INFO("seed " << random.seed());
   Robot robot(join, random);

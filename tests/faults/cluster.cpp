@@ -39,7 +39,7 @@ END
 )";
 
 // Debian's faketime, which lets a process see another wall clock, and change it by a file.
-constexpr const char* kFakeTime = "/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1";
+constexpr const char* kFakeTime = TFDUDE_FAKETIME;
 
 // Room for the state of all daemons, and not more.
 constexpr const char* kDiskSize = "size=64m";

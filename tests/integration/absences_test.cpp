@@ -66,6 +66,22 @@ struct Robot {
 
 }  // namespace
 
+TEST_CASE("absences: three seconds after a death its frames are those of one that serves them") {
+  // The least of some tries, as the computer may be busy.
+  auto least = Clock::duration::max();
+  for (int attempt = 0; attempt < 3 && least > std::chrono::seconds(3); ++attempt) {
+    Robot robot;
+    auto client = *Client::open(robot.domain.options());
+    REQUIRE(client.lookup("world", "hand"));
+    const auto death = Clock::now();
+    robot.arm->kill();
+    robot.left.emplace(robot.start(robot.left_config));
+    REQUIRE(eventually([&] { return owner_of(client, "hand") == "left_arm"; }));
+    least = std::min(least, Clock::now() - death);
+  }
+  CHECK(least < std::chrono::seconds(3));
+}
+
 TEST_CASE("absences: frames of a dead daemon are those of one that serves them, and stay so") {
   Robot robot;
   auto client = *Client::open(robot.domain.options());
@@ -77,7 +93,6 @@ TEST_CASE("absences: frames of a dead daemon are those of one that serves them, 
     heard.push_back(change);
   });
   const bool orderly = GENERATE(false, true);
-  const auto death = Clock::now();
   if (orderly) {
     robot.arm->signal(SIGTERM);
     REQUIRE(robot.arm->wait(testing::in_time()));
@@ -85,14 +100,7 @@ TEST_CASE("absences: frames of a dead daemon are those of one that serves them, 
     robot.arm->kill();
   }
   robot.left.emplace(robot.start(robot.left_config));
-  const auto served = Clock::now();
   REQUIRE(eventually([&] { return owner_of(client, "hand") == "left_arm"; }));
-  const std::chrono::duration<double> since_death = Clock::now() - death;
-  const std::chrono::duration<double> since_served = Clock::now() - served;
-  INFO("agreed " << since_death.count() << " s after the death, " << since_served.count()
-                 << " s after it was served");
-  // Three seconds on a machine that is not busy with other tests.
-  CHECK(since_death < std::chrono::seconds(10));
   REQUIRE(client.lookup("world", "hand"));
   const auto fresh = robot.domain.cli({"--json", "partitions"});
   CHECK_THAT(fresh.out,
@@ -170,9 +178,9 @@ TEST_CASE("absences: what is forgotten stays so for a daemon that was away") {
 }
 
 TEST_CASE("absences: a daemon whose clock is behind that of its dead predecessor is heard") {
-  const std::string fake = "/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1";
+  const std::string fake = TFDUDE_FAKETIME;
   if (!std::filesystem::exists(fake)) {
-    WARN("skipped: needs the package faketime");
+    WARN("SKIPPED: needs the package faketime");
     return;
   }
   Robot robot;

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "tfdude/base/result.hpp"
+#include "tfdude/base/time.hpp"
+
+namespace tfdude {
+
+/// Whether a sample can have this stamp, if any. Zero is how "no stamp" travels.
+[[nodiscard]] inline bool is_stamp(std::optional<Time> stamp) {
+  return !stamp || nanoseconds(*stamp) > 0;
+}
+
+/// @return kInvalidInput naming it
+[[nodiscard]] inline Result<void> check_stamp(std::optional<Time> stamp) {
+  if (is_stamp(stamp)) return {};
+  return fail(Errc::kInvalidInput, "the stamp must be after 1970-01-01, not " +
+                                       std::to_string(nanoseconds(*stamp)) + " ns");
+}
+
+}  // namespace tfdude
