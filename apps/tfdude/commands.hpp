@@ -17,6 +17,9 @@ inline constexpr int kRefused = 1;
 inline constexpr int kWrongUsage = 2;
 inline constexpr int kNoAnswer = 3;
 
+/// Of `correlate --source`: the source's name, and one column of the loading.
+inline constexpr int kSourceSize = 7;
+
 /// What the command line says.
 struct Arguments {
   Options options;

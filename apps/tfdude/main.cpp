@@ -189,15 +189,22 @@ void add_correlate_command(CLI::App& app, Arguments& arguments, Command& chosen)
                   "correlate elbow --source supply 0 0 0 0 0 0.002", cli::run_correlate, chosen);
   add_id(correlate, arguments);
   correlate->add_flag("--unknown", arguments.unknown,
-                      "its own part may have to do with anything; else it is independent");
+                      "its own part may be correlated with anything; else it is independent");
   correlate
       ->add_option(
           "--source", arguments.sources,
           "what it shares with edges that name the same source: its error for one standard "
           "deviation there [m m m rad rad rad]; again for each dimension")
       ->type_name("NAME 6 NUMBERS")
-      ->type_size(7)
+      ->type_size(cli::kSourceSize)
       ->allow_extra_args(false);
+  correlate->parse_complete_callback([&arguments] {
+    for (std::size_t i = 0; i < arguments.sources.size(); ++i) {
+      const std::string& said = arguments.sources[i];
+      if (i % cli::kSourceSize == 0 || cli::is_number(said)) continue;
+      throw CLI::ValidationError("--source", quote(said) + " is not a number");
+    }
+  });
 }
 
 void add_out(CLI::App* command, Arguments& arguments, const std::vector<std::string>& endings) {

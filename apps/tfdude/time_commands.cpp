@@ -192,8 +192,12 @@ int run_history(Client& client, const Arguments& arguments) {
   if (!histories) return refuse(client, histories.error(), arguments);
   const Time now = wall_clock();
   if (histories->empty() || !histories->front().newest) {
-    return answer(arguments, {{"id", arguments.id}, {"moving", false}, {"samples", 0}},
-                  arguments.id + " is static: it holds for all times\n");
+    const std::uint64_t refused = histories->empty() ? 0 : histories->front().refused_ahead;
+    const nlohmann::json json{
+        {"id", arguments.id}, {"moving", false}, {"samples", 0}, {"refused_ahead", refused}};
+    std::string text = arguments.id + " is static: it holds for all times\n";
+    if (refused > 0) text += "refused      " + std::to_string(refused) + " too far ahead\n";
+    return answer(arguments, json, text);
   }
   return answer(arguments, history_json(histories->front(), now),
                 describe(histories->front(), now));

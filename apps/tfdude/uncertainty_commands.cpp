@@ -29,22 +29,15 @@ int measure(Client& client, const Arguments& arguments, Measure take) {
   return observed->accepted ? kDone : kRefused;
 }
 
-constexpr std::size_t kRows = 6;
-
 // Columns of one source are one loading, in the order in which they are said.
-Result<std::vector<CommonError>> read_common_errors(const std::vector<std::string>& said) {
+std::vector<CommonError> read_common_errors(const std::vector<std::string>& said) {
+  constexpr std::size_t kRows = kSourceSize - 1;
   std::vector<CommonError> common_errors;
-  for (std::size_t at = 0; at + kRows < said.size(); at += kRows + 1) {
+  for (std::size_t at = 0; at + kRows < said.size(); at += kSourceSize) {
     const std::string& source = said[at];
     Twist column;
     for (std::size_t row = 0; row < kRows; ++row) {
-      const std::string& text = said[at + 1 + row];
-      char* end = nullptr;
-      column[static_cast<Eigen::Index>(row)] = std::strtod(text.c_str(), &end);
-      if (text.empty() || *end != '\0') {
-        return fail(Errc::kInvalidInput,
-                    "--source " + quote(source) + ": " + quote(text) + " is not a number");
-      }
+      column[static_cast<Eigen::Index>(row)] = std::strtod(said[at + 1 + row].c_str(), nullptr);
     }
     auto common_error = std::find_if(common_errors.begin(), common_errors.end(),
                                      [&](const CommonError& one) { return one.source == source; });
@@ -61,9 +54,7 @@ Result<std::vector<CommonError>> read_common_errors(const std::vector<std::strin
 }  // namespace
 
 int run_correlate(Client& client, const Arguments& arguments) {
-  auto common_errors = read_common_errors(arguments.sources);
-  if (!common_errors) return report(common_errors.error(), arguments);
-  const Correlation said{arguments.unknown, *std::move(common_errors), {}};
+  const Correlation said{arguments.unknown, read_common_errors(arguments.sources), {}};
   return finish(client, client.correlate(arguments.id, said), arguments, "correlated");
 }
 

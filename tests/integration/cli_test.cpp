@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -37,10 +38,17 @@ json object(const ThesisDaemons& d, Arguments arguments) {
   return parse_line(result);
 }
 
-const std::vector<std::string> kCommands = {
-    "tree",  "frames", "partitions", "roots",  "parent", "children", "exists",  "lookup",
-    "watch", "add",    "update",     "remove", "move",   "echo",     "monitor", "history",
-};
+// As the help lists them.
+std::vector<std::string> commands_of(const std::string& help) {
+  std::vector<std::string> commands;
+  std::istringstream lines(help.substr(help.find("Subcommands:\n")));
+  std::string line;
+  std::getline(lines, line);
+  while (std::getline(lines, line) && line.rfind("  ", 0) == 0) {
+    commands.push_back(line.substr(2, line.find(' ', 2) - 2));
+  }
+  return commands;
+}
 
 }  // namespace
 
@@ -172,8 +180,9 @@ TEST_CASE("cli: every command has help with an example") {
   const testing::TestDomain domain;
   const CliResult all = domain.cli({"--help"});
   CHECK(all.status == 0);
-  for (const std::string& command : kCommands) {
-    CHECK_THAT(all.out, ContainsSubstring("\n  " + command + " "));
+  const std::vector<std::string> commands = commands_of(all.out);
+  CHECK(commands.size() == 25);
+  for (const std::string& command : commands) {
     const CliResult help = domain.cli({command, "--help"});
     CHECK(help.status == 0);
     CHECK(help.err.empty());

@@ -191,8 +191,14 @@ TEST_CASE("reconfigured: what observations and requests have said of correlation
   };
   CHECK(eventually(as_before));
   CHECK(arms.domain.cli({"correlate", "tip", "--source", "supply", "0", "0", "x", "0", "0", "1"})
-            .status == 1);
+            .status == 2);
   CHECK(arms.domain.cli({"correlate", "tip", "--source", "supply", "0", "0"}).status == 2);
+  CHECK(as_before());
+  REQUIRE_FALSE(before->basis.bound);
+  CHECK(arms.domain.cli({"correlate", "tip", "--unknown"}).status == 0);
+  const auto unknown = client.lookup("hand", "tip", Query{});
+  REQUIRE(unknown);
+  CHECK(unknown->basis.bound);
 }
 
 }  // namespace tfdude

@@ -114,6 +114,10 @@ TEST_CASE("time: histories and rates are shown, with what was refused") {
   CHECK_THAT(text(d, {"history", "arm_1"}), ContainsSubstring("samples      5 of at most 2048") &&
                                                 ContainsSubstring("rate         1.000 Hz"));
   CHECK(answered(d, {"history", "nobody"}, 1).at("error").at("code") == "unknown_frame");
+  CHECK(answered(d, {"update", "hand_left", "--stamp", "9e9"}, 1).at("error").at("code") ==
+        "invalid_input");
+  CHECK_THAT(text(d, {"history", "hand_left"}),
+             ContainsSubstring("hand_left is static") && ContainsSubstring("1 too far ahead"));
   const json monitor = answered(d, {"monitor", "--once"});
   CHECK(monitor.at("partitions").at(0).at("edges").at(0).at("id") == "arm_1");
   CHECK(monitor.at("partitions").at(1).at("edges").empty());
@@ -122,6 +126,25 @@ TEST_CASE("time: histories and rates are shown, with what was refused") {
   CHECK(partitions.at("partitions").at(0).at("samples") == 5);
   CHECK(partitions.at("partitions").at(0).at("history_bytes") > 1000);
   CHECK_THAT(text(d, {"partitions"}), ContainsSubstring("history 5 samples of 1 edges"));
+}
+
+TEST_CASE("time: a source whose clock jumps back starts its history again, and the log says so") {
+  ThesisDaemons d;
+  for (const char* stamp : {"1000", "1001", "1002"}) sample(d, "arm_1", "1", stamp);
+  // The fifth in a row is believed.
+  for (const char* stamp : {"100", "101", "102", "103"}) {
+    CHECK(answered(d, {"update", "arm_1", "--xyz", "2", "0", "0", "--stamp", stamp}, 1)
+              .at("error")
+              .at("code") == "too_old");
+  }
+  sample(d, "arm_1", "2", "104");
+  sample(d, "arm_1", "3", "105");
+  CHECK(answered(d, {"history", "arm_1"}).at("samples") == 2);
+  d.arms->signal(SIGTERM);
+  REQUIRE(d.arms->wait(in_time()));
+  CHECK_THAT(d.arms->err(),
+             ContainsSubstring("frame 'arm_1' of partition 'arms': its history starts again") &&
+                 ContainsSubstring("jumped back"));
 }
 
 TEST_CASE("time: a watched path shows what is written, and finds its way after a move") {
