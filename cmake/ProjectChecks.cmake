@@ -34,3 +34,9 @@ add_test(NAME "install: consumer"
     -D CXX_FLAGS=${consumer_flags}
     -P ${CMAKE_SOURCE_DIR}/tests/install_consumer/run.cmake)
 set_tests_properties("install: consumer" PROPERTIES LABELS install TIMEOUT 300)
+
+# What README.md says works as typed, also a second time, and its programs compile.
+add_test(NAME "readme: its lines and programs work"
+  COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/readme/type_blocks.py
+    ${CMAKE_BINARY_DIR} ${CMAKE_CXX_COMPILER} ${consumer_flags})
+set_tests_properties("readme: its lines and programs work" PROPERTIES LABELS integration TIMEOUT 300)

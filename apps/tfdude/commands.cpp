@@ -39,13 +39,20 @@ int list(const Arguments& arguments, const char* key, const std::vector<std::str
 }
 
 // Where nobody serves anything, nobody has answered.
+std::string profile_of(const Options& options) {
+  if (options.profile.empty()) return "the built-in profile";
+  return "profile " + quote(options.profile);
+}
+
 int none_there(Client& client, const Arguments& arguments, bool found) {
   if (found) return kDone;
   const auto partitions = client.partitions();
   if (!partitions) return report(partitions.error(), arguments);
   if (!partitions->empty()) return kDone;
   return report({Errc::kUnreachable,
-                 "no partition answers in domain " + std::to_string(arguments.options.domain)},
+                 "no partition answers in domain " + std::to_string(arguments.options.domain) +
+                     " with " + profile_of(arguments.options) +
+                     ": daemons must use the same --domain, and --local or the same --profile"},
                 arguments);
 }
 

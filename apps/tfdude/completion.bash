@@ -5,6 +5,7 @@ _tfdude_common() {
   local i
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
+      --local) echo --local ;;
       --domain | --profile | --discovery-server) printf '%s\n%s\n' "${COMP_WORDS[i]}" "${COMP_WORDS[i + 1]}" ;;
     esac
   done
@@ -35,7 +36,7 @@ _tfdude() {
     --parent | --fixed) words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null) ;;
     *)
       if [[ $word == -* ]]; then
-        words="--help --domain --profile --discovery-server --timeout --json"
+        words="--help --domain --local --profile --discovery-server --timeout --json"
         case $command in
           add) words+=" --parent --partition $pose" ;;
           update) words+=" --stamp $pose" ;;
@@ -52,6 +53,8 @@ _tfdude() {
         esac
       elif [[ -z $command ]]; then
         words=$commands
+      elif [[ $command == forget ]]; then
+        words=$(timeout 0.5 tfdude "${common[@]}" partitions 2>/dev/null | cut -d' ' -f1)
       elif [[ $command == joint ]]; then
         words=$(timeout 0.5 tfdude "${common[@]}" joints 2>/dev/null | sed -n 's/^  \([^ ]*\) .*/\1/p')
       elif [[ $command =~ ^(parent|children|exists|lookup|watch|echo|plot|history|observe|fuse|correlate|update|remove|move)$ ]]; then

@@ -15,6 +15,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
+#include "../network_options.hpp"
 #include "../numbers.hpp"
 #include "commands.hpp"
 
@@ -44,15 +45,7 @@ void add_pose_options(CLI::App& command, Arguments& arguments) {
 }
 
 void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {
-  app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232")
-      ->check(CLI::Range(0, 232));
-  app.add_option("--profile", arguments.options.profile, "XML file of DDS profiles");
-  app.add_option("--discovery-server", arguments.options.discovery_server,
-                 "HOST:PORT of a Fast DDS discovery server")
-      ->check([](const std::string& text) {
-        const auto good = check_discovery_server(text);
-        return good ? std::string() : good.error().message;
-      });
+  cli::add_network_options(app, arguments.options);
   app.add_option("--timeout", timeout_ms, "how long to wait for an answer [ms]")
       ->check(CLI::Range(1, 3600000));
   app.add_flag("--json", arguments.json, "one JSON object an answer");

@@ -6,8 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "tfdude/transport/fastdds.hpp"
-
+#include "../network_options.hpp"
 #include "../numbers.hpp"
 
 namespace tfdude::daemon {
@@ -105,9 +104,7 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   app.add_flag("--check", arguments.check,
                "only say what the configuration would change of the kept state");
   const UrdfOptions urdfs(app);
-  app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 232")
-      ->check(CLI::Range(0, 232));
-  app.add_option("--profile", arguments.options.profile, "XML file of DDS profiles");
+  cli::add_network_options(app, arguments.options);
   auto* state = app.add_option("--state", arguments.options.state,
                                "directory in which to keep the frames "
                                "(default: $XDG_STATE_HOME/tfdude or ~/.local/state/tfdude)");
@@ -117,12 +114,6 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
                "what is stored survives a loss of power, too: each change waits for the disk");
   app.add_option("--save-every", save_every_ms, "how often at most streamed values are stored [ms]")
       ->check(CLI::Range(1, 86'400'000));
-  app.add_option("--discovery-server", arguments.options.discovery_server,
-                 "HOST:PORT of a Fast DDS discovery server")
-      ->check([](const std::string& text) {
-        const auto good = check_discovery_server(text);
-        return good ? std::string() : good.error().message;
-      });
   cli::require_numbers(app);
   try {
     app.name(argv[0]);

@@ -90,7 +90,7 @@ int main(int argc, char** argv) {
   CLI::App app{"arm_controller: drives the arm of examples/robots/mobile_arm.urdf at 1 kHz"};
   app.add_option("--seconds", seconds, "for how long")->check(CLI::Range(0.001, 1e6));
   app.add_option("--domain", options.domain, "DDS domain");
-  app.add_option("--profile", options.profile, "XML file of DDS profiles");
+  app.add_option("--profile", options.profile, "XML file of DDS profiles, or local");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

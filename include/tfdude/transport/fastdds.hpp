@@ -24,7 +24,8 @@ struct FastDdsCounters {
 
 struct FastDdsOptions {
   std::uint32_t domain = 0;  ///< 0 to 232
-  std::string profile;       ///< XML file; profiles that it lacks are taken from the built-in ones
+  /// XML file, or kLocalProfile (options.hpp); profiles that it lacks are taken from the built-in ones.
+  std::string profile;
   std::string partition;     ///< the one that the participant is going to serve; empty: none
   std::shared_ptr<FastDdsCounters> counters;  ///< counted into, where given
   /// HOST:PORT of a Fast DDS discovery server with id 0; empty: participants meet by multicast

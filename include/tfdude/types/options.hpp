@@ -4,16 +4,29 @@
 #include <functional>
 #include <string>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/time.hpp"
 #include "tfdude/types/edge.hpp"
 
 namespace tfdude {
 
-/// How a participant joins.
+/// A profile that is no file: the built-in one, confined to this computer (UDP over 127.0.0.1).
+inline constexpr const char* kLocalProfile = "local";
+
+/// A domain that nobody can join: TFDUDE_DOMAIN is no number.
+inline constexpr std::uint32_t kNoDomain = UINT32_MAX;
+
+/// What TFDUDE_DOMAIN says in the environment, else 0; kNoDomain, which open() refuses, where it is no number.
+[[nodiscard]] TFDUDE_EXPORT std::uint32_t domain_of_environment();
+/// What TFDUDE_PROFILE says in the environment, else empty.
+[[nodiscard]] TFDUDE_EXPORT std::string profile_of_environment();
+
+/// How a participant joins. Participants discover each other only in the same domain and with the same profile.
 struct Options {
-  std::uint32_t domain =
-      0;                ///< DDS domain: participants of different domains do not meet; 0 to 232
-  std::string profile;  ///< XML file of DDS profiles; empty: the built-in ones
+  /// DDS domain, 0 to 232.
+  std::uint32_t domain = domain_of_environment();
+  /// XML file of DDS profiles, or kLocalProfile; empty: the built-in ones, which use all network interfaces.
+  std::string profile = profile_of_environment();
   /// HOST:PORT of a Fast DDS discovery server with id 0; empty: participants meet by multicast
   std::string discovery_server;
   Milliseconds timeout{1000};  ///< how long a call may take, see Client

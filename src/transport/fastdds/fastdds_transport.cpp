@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/types/options.hpp"
 
 #include "base/log.hpp"
 #include "base/mutex.hpp"
@@ -391,9 +392,10 @@ void log_fastdds_to_standard_error() {
 
 Result<TransportPtr> make_fastdds_transport(const FastDdsOptions& options) {
   if (options.domain > fastdds::kMaxDomain) {
-    return fail(Errc::kInvalidInput, "domain " + std::to_string(options.domain) +
-                                         " is not within 0 to " +
-                                         std::to_string(fastdds::kMaxDomain));
+    const bool unread = options.domain == kNoDomain;
+    return fail(Errc::kInvalidInput,
+                (unread ? "TFDUDE_DOMAIN" : "domain " + std::to_string(options.domain)) +
+                    " is not a number within 0 to " + std::to_string(fastdds::kMaxDomain));
   }
   if (!options.discovery_server.empty()) {
     if (auto good = check_discovery_server(options.discovery_server); !good) {

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/types/options.hpp"
 
 #include "base/mutex.hpp"
 #include "transport/fastdds/builtin_profiles.hpp"
@@ -27,8 +28,8 @@ void replace_all(std::string& text, std::string_view from, std::string_view to) 
   }
 }
 
-std::string builtin_text() {
-  std::string xml = kBuiltinProfiles;
+std::string builtin_text(const char* profiles) {
+  std::string xml = profiles;
   for (const auto& [from, to] : kRenamedElements) replace_all(xml, from, to);
   return xml;
 }
@@ -58,11 +59,16 @@ constexpr auto kMemoryPolicy = ertps::DYNAMIC_REUSABLE_MEMORY_MODE;
 }  // namespace
 
 Result<Profiles> Profiles::load(const std::string& file) {
-  auto builtin = make_known(builtin_text());
+  auto builtin = make_known(builtin_text(kBuiltinProfiles));
   if (!builtin) {
     return fail(Errc::kConfig, "the built-in DDS profiles: " + builtin.error().message);
   }
   if (file.empty()) return Profiles(*builtin, *builtin);
+  if (file == kLocalProfile) {
+    return make_known(builtin_text(kLocalProfiles)).map([&](const std::string& local) {
+      return Profiles(*builtin, local);
+    });
+  }
   std::ifstream stream(file);
   if (!stream.good()) {
     return fail(Errc::kConfig, "profile file " + quote(file) + " cannot be opened");

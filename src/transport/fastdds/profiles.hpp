@@ -14,7 +14,7 @@ namespace tfdude::fastdds {
 /// own.
 class Profiles {
  public:
-  /// @param file  empty: the built-in profiles alone
+  /// @param file  empty: the built-in profiles alone; kLocalProfile: those confined to this computer
   /// @return kConfig naming the file.
   [[nodiscard]] static Result<Profiles> load(const std::string& file);
 

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "tfdude/transport/fastdds.hpp"
+#include "tfdude/types/options.hpp"
+
+namespace tfdude::cli {
+
+/// How a program meets the others. What is not given here is taken from the environment (Options).
+inline void add_network_options(CLI::App& app, Options& options) {
+  app.add_option("--domain", options.domain, "DDS domain, 0 to 232 (else $TFDUDE_DOMAIN, else 0)")
+      ->check(CLI::Range(0, 232));
+  auto* profile = app.add_option("--profile", options.profile,
+                                 "XML file of DDS profiles (else $TFDUDE_PROFILE)");
+  app.add_flag_callback(
+         "--local", [&options] { options.profile = kLocalProfile; },
+         "this computer only, as --profile local: UDP over 127.0.0.1")
+      ->excludes(profile);
+  app.add_option("--discovery-server", options.discovery_server,
+                 "HOST:PORT of a Fast DDS discovery server")
+      ->check([](const std::string& text) {
+        const auto good = check_discovery_server(text);
+        return good ? std::string() : good.error().message;
+      });
+}
+
+}  // namespace tfdude::cli

@@ -1,0 +1,27 @@
+#include "tfdude/types/options.hpp"
+
+#include <charconv>
+#include <cstdlib>
+#include <string_view>
+
+namespace tfdude {
+namespace {
+
+std::string_view environment(const char* name) {
+  const char* const value = std::getenv(name);
+  return value != nullptr ? value : "";
+}
+
+}  // namespace
+
+std::uint32_t domain_of_environment() {
+  const std::string_view text = environment("TFDUDE_DOMAIN");
+  if (text.empty()) return 0;
+  std::uint32_t domain = 0;
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), domain);
+  return read.ec == std::errc() && read.ptr == text.data() + text.size() ? domain : kNoDomain;
+}
+
+std::string profile_of_environment() { return std::string(environment("TFDUDE_PROFILE")); }
+
+}  // namespace tfdude
