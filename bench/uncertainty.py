@@ -52,8 +52,9 @@ def two_poses(results):
         for mine, theirs in zip(ours, before):
             cells += [theirs, text(mine)]
         rows.append(cells + [f"{100 * ours[1] / ours[0]:.2g} %", f"{100 * ours[2] / ours[0]:.2g} %"])
-    return table(["α", "‖Σ‖ recalled", "ours", "second off by, recalled", "ours",
-                  "fourth off by, recalled", "ours", "second, relative", "fourth, relative"], rows)
+    return table(["α", "‖Σ‖ recalled", "ours", "error of second order, recalled", "ours",
+                  "error of fourth order, recalled", "ours", "second, relative",
+                  "fourth, relative"], rows)
 
 
 def chain(results):
@@ -63,7 +64,7 @@ def chain(results):
         before = CHAIN_BEFORE[key]
         rows.append([name, before[0], text(found["second"][key], 4), before[1],
                      text(found["fourth"][key], 4), text(found["drawn"][key], 4)])
-    return table(["", "second, recalled", "ours", "fourth, recalled", "ours", "drawn"], rows)
+    return table(["", "second, recalled", "ours", "fourth, recalled", "ours", "sampled"], rows)
 
 
 def chain_within(results):
@@ -74,7 +75,7 @@ def chain_within(results):
         one, three = results["chain"]["within"][key]
         rows.append([name, percent(one["expected"]), percent(one["drawn"]),
                      percent(three["expected"]), percent(three["drawn"])])
-    return table(["", "within 1σ, claimed", "drawn", "within 3σ, claimed", "drawn"], rows)
+    return table(["", "within 1σ, claimed", "sampled", "within 3σ, claimed", "sampled"], rows)
 
 
 def fusion(results):
@@ -82,7 +83,7 @@ def fusion(results):
     rows = [[text(row["alpha"]), f"{row['cost']:.2f}", text(row["error"]), text(row["claimed"]),
              f"{row['nees']:.2f}", f"{row['failed']} of {trials}"]
             for row in results["fusion"]["rows"]]
-    return table(["α", "cost (12)", "error", "claimed", "NEES (6)", "not fused"], rows)
+    return table(["α", "cost (12)", "error", "claimed", "NEES (6)", "failed"], rows)
 
 
 CORRELATION_ROWS = (-0.9, -0.5, 0.0, 0.5, 0.9, 1.0)
@@ -97,7 +98,7 @@ def correlation(results):
         rows.append([text(row["correlation"]), text(row["norm"])] +
                     [text(row[one]["error"], 2) for one in ASSUMPTIONS] +
                     [f"{row[one]['nees']:.2f}" for one in ASSUMPTIONS])
-    return table(["correlation", "‖Σ‖ drawn", "independent off by", "shared, second",
+    return table(["correlation", "‖Σ‖ sampled", "error: independent", "shared, second",
                   "shared, fourth", "unknown", "NEES/6 independent", "shared, second",
                   "shared, fourth", "unknown"], rows)
 
@@ -107,8 +108,8 @@ def trajectory(results):
             "independent", "bound")
     rows = [[text(row["steps"], 4), f"{text(row['metres_A'])}, {text(row['radians_A'])}"] +
             [text(row[key]["metres"]) for key in keys] for row in results["trajectory"]["rows"]]
-    return table(["steps to A", "σ of A [m, rad]", "driven: right", "shared, second",
-                  "shared, fourth", "joint Gaussian: drawn", "shared, second", "shared, fourth",
+    return table(["steps to A", "σ of A [m, rad]", "driven: true", "shared, second",
+                  "shared, fourth", "joint Gaussian: sampled", "shared, second", "shared, fourth",
                   "independent", "unknown"], rows)
 
 

@@ -45,8 +45,8 @@ def two_poses(results):
         curve(nees, rows, lambda row: row["alpha"], lambda row, order=order: row[order]["nees"],
               f"{order} order", colour, marker)
     logarithmic(off)
-    off.set_title("Distance from the drawn covariance, relative")
-    off.set_ylabel("‖Σ − Σ drawn‖ / ‖Σ drawn‖")
+    off.set_title("Distance from the sampled covariance, relative")
+    off.set_ylabel("‖Σ − Σ sampled‖ / ‖Σ sampled‖")
     logarithmic(nees, y=False)
     nees.axhline(1, color="black", linewidth=0.8)
     nees.set_title("NEES / 6: above one too sure, below too cautious")
@@ -77,7 +77,7 @@ def chain(results):
     titles = ("Second order, mapped through Exp", "Fourth order, mapped through Exp",
               "Gaussians of x and y")
     for axes, title in zip(every, titles):
-        dots(axes, found["points"], "ends of drawn chains", "#a9b4bd")
+        dots(axes, found["points"], "ends of sampled chains", "#a9b4bd")
         axes.set_title(title)
         axes.set_xlabel("x [m]")
         axes.set_xlim(60, 112)
@@ -106,7 +106,7 @@ def fusion(results):
     cost.axhline(12, color="black", linewidth=0.8, label="18 numbers, less 6 found")
     cost.set_ylim(0, 16)
     cost.set_title("Cost at the least, Σ eᵀ Σₖ⁻¹ e")
-    curve(error, rows, alpha, lambda row: row["error"], "drawn", BLUE, "o")
+    curve(error, rows, alpha, lambda row: row["error"], "sampled", BLUE, "o")
     curve(error, rows, alpha, lambda row: row["claimed"], "claimed: √ tr Σ", BROWN, "s")
     error.set_title("Error, root of the mean square")
     curve(nees, rows, alpha, lambda row: row["nees"], "mean over the trials", BLUE, "o")
@@ -129,8 +129,8 @@ def correlation(results):
         curve(nees, rows, lambda row: row["correlation"], lambda row, key=key: row[key]["nees"],
               label, colour, marker)
     logarithmic(off, x=False)
-    off.set_title("Distance from the drawn covariance, relative")
-    off.set_ylabel("‖Σ − Σ drawn‖ / ‖Σ drawn‖")
+    off.set_title("Distance from the sampled covariance, relative")
+    off.set_ylabel("‖Σ − Σ sampled‖ / ‖Σ sampled‖")
     nees.axhline(1, color="black", linewidth=0.8)
     nees.set_ylim(0, 2)
     nees.set_title("NEES / 6: above one too sure, below too cautious")
