@@ -24,7 +24,8 @@ function(tfdude_add_tests target)
   endif()
   add_executable(${target} ${ARG_SOURCES})
   target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests)
-  target_link_libraries(${target} PRIVATE tfdude_open Catch2::Catch2WithMain tfdude_options ${ARG_LIBRARIES})
+  target_link_libraries(${target} PRIVATE test_support tfdude_open Catch2::Catch2WithMain tfdude_options
+    ${ARG_LIBRARIES})
   # As the shared headers are compiled: an executable's objects would be -fPIE.
   target_compile_options(${target} PRIVATE -fPIC)
   target_precompile_headers(${target} REUSE_FROM tfdude_tests_precompiled)

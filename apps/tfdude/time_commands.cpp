@@ -4,13 +4,13 @@
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
-#include <unistd.h>
 
 #include "tfdude/base/id.hpp"
 
 #include "commands.hpp"
 #include "joint_render.hpp"
 #include "render.hpp"
+#include "screen.hpp"
 #include "time_render.hpp"
 #include "uncertainty_render.hpp"
 
@@ -89,20 +89,6 @@ int follow(Client& client, const Arguments& arguments, Show show) {
   return kDone;
 }
 
-// In a terminal the text takes the place of the one before, which had as many lines as are told.
-void redraw(const std::string& text, std::ptrdiff_t& drawn) {
-  const bool terminal = isatty(STDOUT_FILENO) != 0;
-  if (terminal && drawn > 0) std::printf("\x1b[%tdA\x1b[J", drawn);
-  std::fputs(text.c_str(), stdout);
-  if (!terminal) std::fputs("\n", stdout);
-  std::fflush(stdout);
-  drawn = std::count(text.begin(), text.end(), '\n');
-}
-
-}  // namespace
-
-namespace {
-
 // With an exponent; a long double has 64 bits, as many as a stamp.
 std::optional<std::int64_t> nanoseconds_of_power(const std::string& text) {
   char* end = nullptr;
@@ -177,12 +163,12 @@ int run_watch(Client& client, const Arguments& arguments) {
 }
 
 int run_echo(Client& client, const Arguments& arguments) {
-  std::ptrdiff_t drawn = 0;
+  Screen screen;
   return follow(client, arguments, [&](const StampedTransform& X_AB) {
     if (arguments.json) {
       (void)answer(arguments, json_of(client, arguments, X_AB), "");
     } else {
-      redraw(echo_lines(arguments.id, arguments.other, X_AB, wall_clock()), drawn);
+      screen.redraw(echo_lines(arguments.id, arguments.other, X_AB, wall_clock()));
     }
   });
 }
@@ -204,7 +190,7 @@ int run_history(Client& client, const Arguments& arguments) {
 }
 
 int run_monitor(Client& client, const Arguments& arguments) {
-  std::ptrdiff_t drawn = 0;
+  Screen screen;
   do {
     nlohmann::json json = nlohmann::json::array();
     std::string text;
@@ -240,7 +226,7 @@ int run_monitor(Client& client, const Arguments& arguments) {
     if (arguments.json) {
       (void)answer(arguments, {{"partitions", std::move(json)}}, "");
     } else {
-      redraw(text, drawn);
+      screen.redraw(text);
     }
   } while (!arguments.once && !interrupted_within(1.0 / arguments.rate));
   return kDone;

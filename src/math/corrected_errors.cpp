@@ -7,6 +7,7 @@
 #include <Eigen/QR>
 
 #include "math/semidefinite.hpp"
+#include "math/symmetric_eigen.hpp"
 
 namespace tfdude {
 namespace {
@@ -18,8 +19,8 @@ constexpr double kRounding = 1e-14;
 
 // L with L Lᵀ = A⁺.
 Matrix6d inverse_root(const Matrix6d& semidefinite) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(pseudo_inverse(semidefinite));
-  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const SymmetricEigen eigen = symmetric_eigen(pseudo_inverse(semidefinite));
+  return eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 // Columns over all edges, six rows each, that add to the joint covariance or subtract from it.

@@ -6,9 +6,8 @@
 #include <cstdio>
 #include <string>
 
-#include <Eigen/Eigenvalues>
-
 #include "math/columns.hpp"
+#include "math/symmetric_eigen.hpp"
 
 namespace tfdude {
 namespace {
@@ -100,8 +99,8 @@ Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
   Matrix6d unit = sigma;
   Twist scale;
   if (auto ok = scale_to_unit_diagonal(unit, scale); !ok) return tl::unexpected(ok.error());
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(unit);
-  const double smallest = solver.eigenvalues()[0];
+  const SymmetricEigen eigen = symmetric_eigen(unit);
+  const double smallest = eigen.values[0];
   if (!(smallest >= -kPsdTolerance)) {
     return fail(Errc::kInvalidInput,
                 "covariance is not positive semi-definite: the smallest eigenvalue "
@@ -109,10 +108,8 @@ Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
                     number(smallest));
   }
   if (smallest >= 0) return upper;
-  const Twist lifted = solver.eigenvalues().cwiseMax(0.0);
   const Twist back = scale.unaryExpr([](double s) { return s > 0 ? 1.0 / s : 0.0; });
-  const Matrix6d psd =
-      solver.eigenvectors() * lifted.asDiagonal() * solver.eigenvectors().transpose();
+  const Matrix6d psd = eigen.of([](double value) { return std::max(value, 0.0); });
   return Covariance::trusted(Matrix6d(back.asDiagonal() * psd * back.asDiagonal())).upper();
 }
 

@@ -1,14 +1,14 @@
 #include "math/semidefinite.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+
+#include "math/symmetric_eigen.hpp"
 
 namespace tfdude {
 namespace {
-
-using Solver = Eigen::SelfAdjointEigenSolver<Matrix6d>;
 
 constexpr double kRounding = 1e-12;
 
@@ -39,21 +39,18 @@ Matrix6d nearest_semidefinite(const Matrix6d& symmetric) {
   const Matrix6d even = 0.5 * (symmetric + symmetric.transpose());
   const Twist unit = units(even);
   if (Eigen::LLT<Matrix6d>(scaled(even, unit)).info() == Eigen::Success) return even;
-  const Solver solver(scaled(even, unit));
-  const Matrix6d lifted = solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).asDiagonal() *
-                          solver.eigenvectors().transpose();
+  const Matrix6d lifted =
+      symmetric_eigen(scaled(even, unit)).of([](double value) { return std::max(value, 0.0); });
   const Matrix6d back = scaled(lifted, inverse_units(unit));
   return 0.5 * (back + back.transpose());
 }
 
 Matrix6d pseudo_inverse(const Matrix6d& semidefinite, int* rank) {
   const Twist unit = units(semidefinite);
-  const Solver solver(scaled(semidefinite, unit));
-  const double least = kRounding * solver.eigenvalues().cwiseAbs().maxCoeff();
-  const Twist inverse = solver.eigenvalues().unaryExpr(
-      [least](double value) { return value > least ? 1.0 / value : 0.0; });
-  if (rank != nullptr) *rank = static_cast<int>((inverse.array() > 0).count());
-  return scaled(solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose(),
+  const SymmetricEigen eigen = symmetric_eigen(scaled(semidefinite, unit));
+  const double least = kRounding * eigen.values.cwiseAbs().maxCoeff();
+  if (rank != nullptr) *rank = static_cast<int>((eigen.values.array() > least).count());
+  return scaled(eigen.of([least](double value) { return value > least ? 1.0 / value : 0.0; }),
                 unit);
 }
 

@@ -3,8 +3,6 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Cholesky>
-
 #include "tfdude/math/belief.hpp"
 #include "tfdude/math/perturbation.hpp"
 
@@ -136,8 +134,7 @@ inline constexpr double kChainYaw = 0.03;  // rad, standard deviation of a step
 /// (Log(X̄⁻¹ X))ᵀ Σ⁻¹ Log(X̄⁻¹ X): how far a pose is from an estimate, in the estimate's own
 /// measure.
 [[nodiscard]] inline double squared_distance(const Transform& estimate, const Pose& X) {
-  const Twist e = log(estimate.pose.inverse() * X);
-  return e.dot(estimate.covariance.matrix().ldlt().solve(e));
+  return squared_distance(Twist(log(estimate.pose.inverse() * X)), estimate.covariance.matrix());
 }
 
 // ---- Correlated errors, after the idea of Mangelson et al. 2020; the parameters are ours

@@ -8,16 +8,16 @@
 #include <string>
 #include <type_traits>
 
-#include <Eigen/Eigenvalues>
-
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
+#include "support/sampling.hpp"
 
 namespace tfdude {
 namespace {
 
 using testing::covariance_diff;
+using testing::eigenvalues;
 using testing::Random;
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -55,7 +55,7 @@ double smallest_eigenvalue(const Matrix6d& sigma) {
   const double metres = std::sqrt(sigma.diagonal().head<3>().maxCoeff());
   const double radians = std::sqrt(sigma.diagonal().tail<3>().maxCoeff());
   const Matrix6d unit = scaled(sigma, metres > 0 ? 1 / metres : 0, radians > 0 ? 1 / radians : 0);
-  return Eigen::SelfAdjointEigenSolver<Matrix6d>(unit).eigenvalues()[0];
+  return eigenvalues(unit)[0];
 }
 
 // As it would come back from a text with so many significant digits.
@@ -306,7 +306,7 @@ TEST_CASE("decimal rounding is forgiven up to 1e-9 and refused beyond") {
     m = m.unaryExpr([digits](double value) { return rounded(value, digits); });
     const Twist scale = m.diagonal().cwiseSqrt().cwiseInverse();
     const Matrix6d unit = scale.asDiagonal() * m * scale.asDiagonal();
-    const double smallest = Eigen::SelfAdjointEigenSolver<Matrix6d>(unit).eigenvalues()[0];
+    const double smallest = eigenvalues(unit)[0];
     CAPTURE(i, digits, smallest);
     if (digits == 12) CHECK(smallest > -1e-10);
     const auto sigma = Covariance::from_matrix(m);

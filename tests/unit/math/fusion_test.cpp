@@ -11,6 +11,7 @@
 namespace tfdude {
 namespace {
 
+using testing::cholesky_root;
 using testing::ContainsSubstring;
 using testing::Gaussian;
 using testing::Random;
@@ -111,8 +112,8 @@ TEST_CASE(
   const Pose truth = random.pose();
   const Covariance A = random.covariance(0.01, 0.01);
   const Covariance B = random.covariance(0.01, 0.01);
-  const Matrix6d root_a = A.matrix().llt().matrixL();
-  const Matrix6d root_b = B.matrix().llt().matrixL();
+  const Matrix6d root_a = cholesky_root(A.matrix());
+  const Matrix6d root_b = cholesky_root(B.matrix());
   for (const double correlation : {1.0, 0.7, -0.7}) {
     INFO("correlation " << correlation);
     Matrix6d intersected = Matrix6d::Zero();

@@ -3,20 +3,20 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-
 #include "tfdude/math/perturbation.hpp"
 
 #include "support/catch.hpp"
 #include "support/jacobian.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
+#include "support/sampling.hpp"
 
 namespace tfdude {
 namespace {
 
+using testing::cholesky_root;
 using testing::covariance_diff;
+using testing::eigenvalues;
 using testing::numeric_jacobian;
 using testing::pose_diff;
 using testing::Random;
@@ -44,9 +44,9 @@ Covariance propagated(const Matrix6d& J, const Covariance& sigma) {
 
 // The largest ratio of variances in any direction.
 double largest_ratio(const Matrix6d& sampled, const Matrix6d& given) {
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d> solver(sampled, given,
-                                                                  Eigen::EigenvaluesOnly);
-  return solver.eigenvalues()[5];
+  const Matrix6d root = cholesky_root(given);
+  const Matrix6d half = root.triangularView<Eigen::Lower>().solve(sampled);
+  return eigenvalues(root.triangularView<Eigen::Lower>().solve(half.transpose()))[5];
 }
 
 }  // namespace
@@ -149,7 +149,7 @@ TEST_CASE("extrapolation is right for every angle, however far it goes") {
           s * (s + beyond) * B1 * X1.covariance.matrix() * B1.transpose();
       const Matrix6d given = extrapolate(X0, X1, s).covariance.matrix();
       // Relative in all directions, so that no variance is too small either.
-      const Matrix6d root = expected.llt().matrixL();
+      const Matrix6d root = cholesky_root(expected);
       const Matrix6d whitened =
           root.triangularView<Eigen::Lower>().solve(given - expected).transpose().eval();
       const Matrix6d relative = root.triangularView<Eigen::Lower>().solve(whitened);
@@ -166,8 +166,8 @@ TEST_CASE("the covariance is no less than the sampled one, however the samples a
   INFO("seed " << random.seed());
   for (const double correlation : {0.0, 0.5, 1.0}) {
     const auto [X0, X1] = samples(random, 0.7);
-    const Matrix6d root0 = X0.covariance.matrix().llt().matrixL();
-    const Matrix6d root1 = X1.covariance.matrix().llt().matrixL();
+    const Matrix6d root0 = cholesky_root(X0.covariance.matrix());
+    const Matrix6d root1 = cholesky_root(X1.covariance.matrix());
     const double s = random.uniform(0.3, 0.7);
     const double beyond = random.uniform(1.1, 2.0);
     const Transform between = interpolate(X0, X1, s);

@@ -5,8 +5,6 @@
 #include <cstdlib>
 #include <iostream>
 
-#include <Eigen/Eigenvalues>
-
 #include "tfdude/math/belief.hpp"
 #include "tfdude/math/fusion.hpp"
 #include "tfdude/math/observation.hpp"
@@ -15,10 +13,12 @@
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
+#include "support/sampling.hpp"
 
 namespace tfdude {
 namespace {
 
+using testing::eigenvalues;
 using testing::pose_diff;
 using testing::Random;
 using Real = long double;
@@ -32,7 +32,7 @@ double smallest_eigenvalue(const Covariance& covariance) {
   const Twist unit = sigma.diagonal().unaryExpr(
       [](double variance) { return variance > 0 ? 1.0 / std::sqrt(variance) : 0.0; });
   const Matrix6d scaled = unit.asDiagonal() * sigma * unit.asDiagonal();
-  return Eigen::SelfAdjointEigenSolver<Matrix6d>(scaled, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  return eigenvalues(scaled)[0];
 }
 
 // The same arithmetic with 64 bits of mantissa instead of 53, product by product.

@@ -16,6 +16,7 @@ namespace tfdude {
 namespace {
 
 using testing::ContainsSubstring;
+using testing::eigenvalues;
 using testing::Gaussian;
 using testing::ObservedChain;
 using testing::Random;
@@ -146,8 +147,7 @@ TEST_CASE("What there is no room for makes the joint covariance larger, not smal
       for (const CommonError& common_error : edge.X_PC.common_errors)
         CHECK(common_error.loading.cols() <= kMaxLoadingColumns);
     }
-    const Eigen::VectorXd values =
-        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(chain.dense() - P).eigenvalues();
+    const Eigen::VectorXd values = eigenvalues(chain.dense() - P);
     CHECK(values[0] > -1e-9 * P.cwiseAbs().maxCoeff());
   }
   // There was no room.
