@@ -7,6 +7,7 @@ BUILD_DIR stands in for build/release. All runs in a DDS domain of its own, with
 import os
 import re
 import select
+import signal
 import socket
 import subprocess
 import sys
@@ -45,7 +46,7 @@ class Shell:
     def __init__(self, environment):
         self.bash = subprocess.Popen(
             ["bash", "--noprofile", "--norc"], cwd=ROOT, env=environment,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
         self.output = b""
 
     def type(self, line):
@@ -57,28 +58,32 @@ class Shell:
             ready, _, _ = select.select([self.bash.stdout], [], [], max(0, deadline - time.monotonic()))
             new = os.read(self.bash.stdout.fileno(), 65536) if ready else b""
             if not new:
-                self.bash.kill()
                 raise SystemExit(f"no end of: {line}\n{self.output.decode()}")
             self.output += new
         printed, self.output = self.output[:mark.start()], self.output[mark.end():]
         return printed.decode(), int(mark[1])
 
-    def close(self):
-        self.bash.stdin.close()
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        """What still runs, as where a line has failed, ends with it."""
+        try:
+            os.killpg(self.bash.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
         self.bash.wait(LINE_SECONDS)
 
 
 def type_all(shell_blocks, environment):
-    shell = Shell(environment)
-    for block in shell_blocks:
-        for line in lines_of(block):
+    with Shell(environment) as shell:
+        for line in (line for block in shell_blocks for line in lines_of(block)):
             printed, status = shell.type(line)
             print(f"$ {line}\n{printed.strip()}\n", flush=True)
             if status != 0:
                 raise SystemExit(f"status {status} of: {line}")
             if line.startswith("tfdude ") and not printed.strip():
                 raise SystemExit(f"no output of: {line}")
-    shell.close()
 
 
 def compile_and_run(number, code, build, compiler, environment, work):
