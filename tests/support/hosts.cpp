@@ -15,6 +15,10 @@
 namespace tfdude::testing {
 namespace {
 
+// With a shared memory of its own: what hosts have in common is the network.
+constexpr const char* kOwnMemory =
+    "exec unshare --mount /bin/sh -c 'mount -t tmpfs none /dev/shm && exec \"$@\"' sh \"$@\"";
+
 // Where the tools are that a user's path may lack.
 constexpr const char* kPath = "PATH=/usr/sbin:/sbin:$PATH; set -e\n";
 
@@ -54,10 +58,18 @@ Hosts::Network::Network(Network&& other) noexcept : fd_(std::exchange(other.fd_,
 std::string Hosts::missing() {
   const int network = make_network();
   if (network < 0) return std::string("no network namespaces (not root?): ") + std::strerror(errno);
-  Process probe(shell("ip link add probe type bridge && nft add table inet probe"), network);
-  const auto status = probe.wait(in_time());
+  const auto fails = [&](std::vector<std::string> command) -> std::string {
+    Process probe(command, network);
+    return probe.wait(in_time()) == 0 ? std::string() : probe.err();
+  };
+  std::string why = fails(shell("ip link add probe type bridge && nft add table inet probe"));
+  if (why.empty()) {
+    auto memory = shell(kOwnMemory);
+    memory.insert(memory.end(), {"sh", "/bin/true"});
+    why = fails(std::move(memory));
+  }
   close(network);
-  return status == 0 ? "" : "ip or nft does not work: " + probe.err();
+  return why.empty() ? "" : "no hosts can be made here: " + why;
 }
 
 std::string Hosts::run(const Network& where, const std::string& script) {
@@ -95,9 +107,7 @@ Hosts::~Hosts() {
 std::string Hosts::address(std::size_t host) { return "10.77.0." + std::to_string(host + 1); }
 
 Process Hosts::start(std::size_t host, const std::vector<std::string>& argv) const {
-  // With a shared memory of its own: what hosts have in common is the network.
-  std::vector<std::string> command = shell(
-      "exec unshare --mount /bin/sh -c 'mount -t tmpfs none /dev/shm && exec \"$@\"' sh \"$@\"");
+  std::vector<std::string> command = shell(kOwnMemory);
   command.emplace_back("sh");
   command.insert(command.end(), argv.begin(), argv.end());
   return Process(command, hosts_.at(host).fd());
