@@ -6,8 +6,8 @@ add_test(NAME "layers: the check itself"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py --self-test)
 set_tests_properties("layers: sources" "layers: the check itself" PROPERTIES LABELS unit TIMEOUT 60)
 
-# Other vendors' compilers take the IDL, though names that differ by their case alone are one name to them. This one warns
-# where a type does not say its extensibility.
+# Other vendors' compilers take the IDL, though names that differ by their case alone are one name to them. This one
+# warns where a type does not say its extensibility.
 find_program(IDLC idlc REQUIRED)
 file(GLOB idl_files CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/idl/*.idl)
 foreach(idl ${idl_files})

@@ -1,9 +1,9 @@
-// One reader, back to back, alone and beside one writer of 100 joints at 1 kHz, for ours and for tf2's
-// BufferCore on the same chain of 100 edges. The reader is on processor 0, the writer on processor 1. Usage:
-// contention_bench [SECONDS of a repetition] [REPETITIONS].
+// One reader, back to back, alone and beside one writer of 100 joints at 1 kHz, for ours and for
+// tf2's BufferCore on the same chain of 100 edges. The reader is on processor 0, the writer on
+// processor 1. Usage: contention_bench [SECONDS of a repetition] [REPETITIONS].
 //
-// Keys: contention/WHO/READER/alone or /beside_writer (ns a lookup of 30 edges), contention/WHO/batch (us for
-// 100 edges), contention/ours/torn (lookups that saw half of a batch).
+// Keys: contention/WHO/READER/alone or /beside_writer (ns a lookup of 30 edges),
+// contention/WHO/batch (us for 100 edges), contention/ours/torn (lookups that saw half of a batch).
 
 #include <atomic>
 #include <cmath>
@@ -47,7 +47,8 @@ bench::Tree chain() {
   return tree;
 }
 
-/// Every joint of a batch is turned about z by the same angle, so that a whole path is by kDepth of them.
+/// Every joint of a batch is turned about z by the same angle, so that a whole path is by kDepth of
+/// them.
 Pose turned(double angle) { return exp((Twist() << 0, 0, 0, 0, 0, angle).finished()); }
 
 class Ours {
@@ -178,7 +179,8 @@ int main(int argc, char** argv) {
   Series torn("contention/ours/torn", "count");
   double torn_lookups = 0;
   const auto check = [&](const Pose& X) {
-    // A whole batch turns the path by 30 times one number of milliradians, and by less than half a turn.
+    // A whole batch turns the path by 30 times one number of milliradians, and by less than half a
+    // turn.
     const double milliradians = log(X)[5] * 1e3 / kDepth;
     if (std::abs(std::remainder(milliradians, 1.0)) > 1e-6) ++torn_lookups;
   };

@@ -1,5 +1,6 @@
-// What a process does with frames of its own, beside tf2's BufferCore on the same tree: set an edge, look up,
-// add and remove. tf2 keeps no covariance; ours is propagated wherever "pose" is not in the name.
+// What a process does with frames of its own, beside tf2's BufferCore on the same tree: set an
+// edge, look up, add and remove. tf2 keeps no covariance; ours is propagated wherever "pose" is not
+// in the name.
 //
 // Keys: core/OPERATION/WHO/DEPTH/FRAMES.
 

@@ -31,7 +31,8 @@ struct Collect : boost::default_bfs_visitor {
   std::vector<Slot>* found;
 };
 
-// Colours of what is visited only: those of all vertices would cost as much for one frame as for all.
+// Colours of what is visited only: those of all vertices would cost as much for one frame as for
+// all.
 std::vector<Slot> subtree_by_boost(const BoostGraph& graph, Slot top) {
   std::vector<Slot> found;
   std::unordered_map<std::size_t, boost::default_color_type> colours;

@@ -1,14 +1,17 @@
-// What history costs a process with frames of its own, beside tf2's BufferCore on the same tree with the same
-// samples: set an edge whose history is full, look up between two samples, and memory.
+// What history costs a process with frames of its own, beside tf2's BufferCore on the same tree
+// with the same samples: set an edge whose history is full, look up between two samples, and
+// memory.
 //
 // Keys: core/OPERATION/WHO/DEPTH/FRAMES, where the operation is one of
 //   set_history       a sample a millisecond: ours keeps 2,048, tf2 ten seconds, both by default
 //   lookup_at         18.5 samples of 1 kHz before the newest
 //   lookup_at_far     200.5 of them
 //   lookup_at_100hz   18.5 samples of 100 Hz
-//   history_bytes     bytes a sample, of an edge's full history; WHO is then ours, as Node::history() counts them, or
+// history_bytes     bytes a sample, of an edge's full history; WHO is then ours, as Node::history()
+// counts them, or
 //                     ours_heap and tf2_heap, by which the heap grew
-// Lookups are of trees of which all edges move: each turns at 1 rad/s, and has samples of 2 s, at the same instants.
+// Lookups are of trees of which all edges move: each turns at 1 rad/s, and has samples of 2 s, at
+// the same instants.
 
 #include <cstdlib>
 #include <malloc.h>
@@ -109,8 +112,8 @@ Time instant_of(const Case& of) {
   return moving(of).newest() - nanoseconds(static_cast<std::int64_t>(ago));
 }
 
-/// Of both sides, which must have measured the same: each joint turns about a fixed axis, so that the geodesic and what
-/// tf2 does are one.
+/// Of both sides, which must have measured the same: each joint turns about a fixed axis, so that
+/// the geodesic and what tf2 does are one.
 void check_agreement(const Case& of) {
   const bench::Tree& tree = moving(of).tree();
   Query query;

@@ -12,7 +12,8 @@
 
 namespace bench {
 
-/// A path of `depth` edges, up one branch to the root and down another, in a tree of `frames` frames.
+/// A path of `depth` edges, up one branch to the root and down another, in a tree of `frames`
+/// frames.
 struct Tree {
   std::vector<tfdude::FrameSpec> frames;
   std::string from;

@@ -1,5 +1,5 @@
-// Remote calls of ours beside the floor: a bare Fast DDS round trip of equal QoS and a bare UDP round trip, of
-// as many bytes of payload there and back, in turns.
+// Remote calls of ours beside the floor: a bare Fast DDS round trip of equal QoS and a bare UDP
+// round trip, of as many bytes of payload there and back, in turns.
 //
 //   floor_bench --placement one_core|two_cores --central DOMAIN --domain DOMAIN --udp-port PORT
 //               --profile FILE --calls N --repetitions R

@@ -38,8 +38,8 @@ std::uint32_t payload_size(Sample sample) {
 #endif
 }
 
-/// A participant with one writer and one reader. Nothing is checked for null: the process ends by a signal
-/// where the library cannot make something, and its log says why.
+/// A participant with one writer and one reader. Nothing is checked for null: the process ends by a
+/// signal where the library cannot make something, and its log says why.
 class FloorEndpoints {
  public:
   /// @param profile  as for our participants: a file

@@ -1,5 +1,5 @@
-// The other end of floor_bench and of scale_bench's fan-out: bare echoes over UDP and, where a domain is given,
-// over Fast DDS. Says "ready udp_port=PORT" and answers until it is stopped.
+// The other end of floor_bench and of scale_bench's fan-out: bare echoes over UDP and, where a
+// domain is given, over Fast DDS. Says "ready udp_port=PORT" and answers until it is stopped.
 //
 //   floor_echo --domain DOMAIN --profile FILE
 //   floor_echo

@@ -43,8 +43,8 @@ Value must(tfdude::Result<Value> outcome, const char* what) {
   return *std::move(outcome);
 }
 
-/// Waits until two frames are connected: many daemons that start at once on one core need longer to meet than a
-/// client looks round for.
+/// Waits until two frames are connected: many daemons that start at once on one core need longer to
+/// meet than a client looks round for.
 tfdude::Transform await_lookup(tfdude::Client& client, const std::string& a, const std::string& b);
 
 /// Now [s] by a clock that all processes of one computer share.
@@ -65,8 +65,8 @@ struct Extent {
   int block = 500;
 };
 
-/// Measures the turns in interleaved blocks, so that what else the machine does meets all of them, and prints
-/// their figures. What comes first in a run and in a block is discarded as warm-up.
+/// Measures the turns in interleaved blocks, so that what else the machine does meets all of them,
+/// and prints their figures. What comes first in a run and in a block is discarded as warm-up.
 void measure(std::vector<Turn> turns, const Extent& extent);
 
 /// A turn of one figure in microseconds: one value is the mean of `batch` calls.

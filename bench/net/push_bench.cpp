@@ -1,15 +1,16 @@
-// A pushed path of ten edges: how long an update takes from its owner to one who watches, beside a bare Fast DDS
-// sample of as many bytes and equal QoS, and what reading the path there costs.
+// A pushed path of ten edges: how long an update takes from its owner to one who watches, beside a
+// bare Fast DDS sample of as many bytes and equal QoS, and what reading the path there costs.
 //
 //   push_bench --mode own   --domain DOMAIN --profile FILE
 //   push_bench --mode watch --domain DOMAIN --profile FILE --seconds S --calls N --repetitions R
 //
-// The owner says "ready", and updates all edges 1,000 times a second, or sends bare samples, in turns by the clock that
-// both processes share; the watcher measures:
-//   pushed/latency/ours           from before update() until a waiting thread has read the new value
-//   pushed/latency/dds            from before write() until a thread that waits for the listener has the sample
+// The owner says "ready", and updates all edges 1,000 times a second, or sends bare samples, in
+// turns by the clock that both processes share; the watcher measures:
+// pushed/latency/ours           from before update() until a waiting thread has read the new value
+// pushed/latency/dds            from before write() until a thread that waits for the listener has
+// the sample
 //   pushed/latency/dds_listener   the same until the listener has it
-//   pushed/latest                 reading the path's newest value with covariance, while it is pushed
+// pushed/latest                 reading the path's newest value with covariance, while it is pushed
 
 #include <condition_variable>
 #include <cstdio>

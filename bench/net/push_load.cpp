@@ -1,5 +1,6 @@
-// What bench/pushed.py counts the bytes of: a robot's joints that are pushed to watchers, or bare samples of the size
-// of what tf2 would broadcast, to as many listeners. Each says "ready", and goes on until it is stopped.
+// What bench/pushed.py counts the bytes of: a robot's joints that are pushed to watchers, or bare
+// samples of the size of what tf2 would broadcast, to as many listeners. Each says "ready", and
+// goes on until it is stopped.
 //
 //   push_load --mode own    --domain DOMAIN --profile FILE --joints N --rate HZ
 //   push_load --mode watch  --domain DOMAIN --profile FILE --joints N --watchers N --composed 0|1

@@ -1,6 +1,6 @@
 // Network calls as the work grows; the daemons and echoes are started by the python module.
 //
-//   scale_bench --mode partitions --partitions N --central DOMAIN --domain DOMAIN --udp-ports P,P,...
+// scale_bench --mode partitions --partitions N --central DOMAIN --domain DOMAIN --udp-ports P,P,...
 //     One lookup along a chain across N partitions, beside the same lookup of one daemon that owns all, and
 //     beside a bare UDP datagram to each of N processes and back: the floor of asking N.
 //     scale/partitions/N/decentralized, /centralized, /udp_floor
@@ -11,7 +11,8 @@
 //     The same lookup and update of owners of N frames each, in domains of their own.
 //     scale/frames/N/lookup, /update
 //
-// All take --profile FILE --calls N --repetitions R. The frames chain_0, chain_1... hang each on the last.
+// All take --profile FILE --calls N --repetitions R. The frames chain_0, chain_1... hang each on
+// the last.
 
 #include <algorithm>
 #include <atomic>
@@ -31,8 +32,8 @@ using bench::must;
 using bench::Series;
 using tfdude::Client;
 
-// CDR payloads of a lookup of one segment between two of these frames, and of its reply, as idl/tfdude.idl lays
-// them out; floor_bench computes such sizes.
+// CDR payloads of a lookup of one segment between two of these frames, and of its reply, as
+// idl/tfdude.idl lays them out; floor_bench computes such sizes.
 constexpr std::size_t kRequestBytes = 56;
 constexpr std::size_t kReplyBytes = 252;
 

@@ -1,5 +1,5 @@
-// Calls that concern one daemon of those that bench/scaling.py starts, the second: frames added below its first
-// one, or lookups of that. Whoever else is woken by them has no part in it.
+// Calls that concern one daemon of those that bench/scaling.py starts, the second: frames added
+// below its first one, or lookups of that. Whoever else is woken by them has no part in it.
 
 #include <cstdio>
 #include <string>

@@ -1,19 +1,22 @@
-// Streamed updates: one publisher in one process sends all 100 edges of an owner in another at a fixed rate; then the
-// positions of 30 joints, which move 30 edges more.
+// Streamed updates: one publisher in one process sends all 100 edges of an owner in another at a
+// fixed rate; then the positions of 30 joints, which move 30 edges more.
 //
 //   stream_bench --mode own     --shared FILE --domain DOMAIN --profile FILE
-//   stream_bench --mode publish --shared FILE --domain DOMAIN --profile FILE --seconds S --repetitions R
+// stream_bench --mode publish --shared FILE --domain DOMAIN --profile FILE --seconds S
+// --repetitions R
 //
 // The owner says "ready"; the publisher measures, and prints:
 //   stream/1khz/latency       from before publish() until a lookup in the owner sees the value [us]
 //   stream/1khz/owner_cpu     processor time of the owner [% of one core], one value a repetition
 //   stream/1khz/lost          samples, one value a repetition
-//   stream/highest_rate       of 1, 2, 4... kHz and as fast as publish() returns: the highest with nothing lost [Hz]
-//   stream/unthrottled/rate   as fast as publish() returns [Hz], and stream/unthrottled/lost, in percent
+// stream/highest_rate       of 1, 2, 4... kHz and as fast as publish() returns: the highest with
+// nothing lost [Hz]
+// stream/unthrottled/rate   as fast as publish() returns [Hz], and stream/unthrottled/lost, in
+// percent
 //   stream/joints/...         the first three of these for the joints
 //
-// The first edge's translation carries the moment of publishing, by a clock that both share; so does the first joint's
-// position.
+// The first edge's translation carries the moment of publishing, by a clock that both share; so
+// does the first joint's position.
 
 #include <algorithm>
 #include <chrono>

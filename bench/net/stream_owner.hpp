@@ -32,8 +32,8 @@ class AppliedListener {
   virtual void on_applied(Streamed what) = 0;
 };
 
-/// Counts what comes to an owner without changing how it gets there: a transport between the real one and
-/// the participant.
+/// Counts what comes to an owner without changing how it gets there: a transport between the real
+/// one and the participant.
 tfdude::TransportPtr watch(tfdude::TransportPtr transport, AppliedListener& listener);
 
 }  // namespace bench

@@ -1,6 +1,6 @@
-// The thesis's experiments of section 5.2.3, repeated: each call centralized (one daemon owns all frames, this
-// process is a plain client of it) beside decentralized (this process owns its partition of the
-// example tree, a daemon the other one), in turns.
+// The thesis's experiments of section 5.2.3, repeated: each call centralized (one daemon owns all
+// frames, this process is a plain client of it) beside decentralized (this process owns its
+// partition of the example tree, a daemon the other one), in turns.
 //
 //   thesis_bench --as robot|arms --config FILE --central DOMAIN --domain DOMAIN --profile FILE
 //                --calls N --repetitions R
@@ -21,8 +21,9 @@
 //   5.10    update robot_1, in main                              update_own/robot
 //   5.11    update the connection (arm_1, below robot_1)         update_connector/robot and /arms
 //
-// "main" is the thesis's process of world and robot, ours the partition robot. The other pairs, such as
-// add_own/arms, it has not; they show that it does not matter who asks, and are measured with fewer calls.
+// "main" is the thesis's process of world and robot, ours the partition robot. The other pairs,
+// such as add_own/arms, it has not; they show that it does not matter who asks, and are measured
+// with fewer calls.
 
 #include <algorithm>
 #include <set>

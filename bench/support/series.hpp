@@ -12,8 +12,8 @@ inline double microseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
 }
 
-/// The measured values of one figure, in repetitions, so that two figures measured in turns can be compared
-/// repetition by repetition.
+/// The measured values of one figure, in repetitions, so that two figures measured in turns can be
+/// compared repetition by repetition.
 class Series {
  public:
   /// @param key   stable: the figure's name in the results, words separated by slashes

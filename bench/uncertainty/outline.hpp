@@ -7,7 +7,8 @@
 
 #include "tfdude/math/transform.hpp"
 
-// What the positions x and y of a pose of the plane may be, drawn: the error is of (x, y, yaw) only.
+// What the positions x and y of a pose of the plane may be, drawn: the error is of (x, y, yaw)
+// only.
 namespace bench {
 
 using Outline = std::vector<std::array<double, 2>>;

@@ -21,8 +21,8 @@ using testing::joined_by;
 using testing::outcome;
 using Clock = std::chrono::steady_clock;
 
-/// What the first lookup of a new client comes to, and how long it takes at best, of some clients: on a busy machine any
-/// may take longer.
+/// What the first lookup of a new client comes to, and how long it takes at best, of some clients:
+/// on a busy machine any may take longer.
 struct FirstLookup {
   FirstLookup(const Join& join, const std::string& frame, Milliseconds wait) {
     for (int i = 0; i < 5; ++i) {

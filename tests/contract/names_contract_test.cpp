@@ -1,4 +1,5 @@
-// Who serves a name, who is told of partitions that end, and what becomes of their frames, over each transport.
+// Who serves a name, who is told of partitions that end, and what becomes of their frames, over
+// each transport.
 
 #include <algorithm>
 #include <array>
@@ -69,7 +70,8 @@ std::size_t served(const Join& join, const std::string& name) {
   return std::size_t{nodes[0].has_value()} + std::size_t{nodes[1].has_value()};
 }
 
-// Who does not get it waits for a second and a half: so many try beside each other, in process each on a network of its own.
+// Who does not get it waits for a second and a half: so many try beside each other, in process each
+// on a network of its own.
 TEST_CASE("of two who claim a name at once exactly one serves") {
   const int transport = GENERATE(from_range(testing::networks()));
   const int beside = transport == 0 ? 50 : 2;

@@ -1,5 +1,5 @@
-// What is streamed: to those of several owners who live, and that it arrives though its sender ends. Once over each
-// transport.
+// What is streamed: to those of several owners who live, and that it arrives though its sender
+// ends. Once over each transport.
 
 #include <optional>
 #include <string>

@@ -95,7 +95,8 @@ TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waite
   CHECK(eventually([&] {
     return loop.send({6, 6}) == "all sent" && is_at(a, "a_base", "gone_tip", 6);
   }));
-  // A busy computer may hold up one or two calls; to wait for a match takes some 30 ms, and there were three.
+  // A busy computer may hold up one or two calls; to wait for a match takes some 30 ms, and there
+  // were three.
   CHECK(loop.slower_than(Milliseconds(20)) < 3);
 }
 

@@ -1,4 +1,5 @@
-// The function tests of the thesis, once over each transport: two owners and a client without frames.
+// The function tests of the thesis, once over each transport: two owners and a client without
+// frames.
 
 #include <array>
 #include <cmath>
@@ -120,8 +121,8 @@ TEST_CASE("what is not finite is refused before it is sent") {
 }
 
 TEST_CASE("an answer that is semi-definite but for rounding arrives") {
-  // An edge without translation seen from its child's side: the variances of the translation are zero but for
-  // the rounding of those of the rotation over a lever.
+  // An edge without translation seen from its child's side: the variances of the translation are
+  // zero but for the rounding of those of the rotation over a lever.
   const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   const auto edge = [](const Eigen::Vector3d& p, const Eigen::Vector3d& rpy,

@@ -1,4 +1,5 @@
-// Time over partitions, once over each transport: one instant for all, waiting for data, and paths that are pushed.
+// Time over partitions, once over each transport: one instant for all, waiting for data, and paths
+// that are pushed.
 
 #include <atomic>
 #include <chrono>

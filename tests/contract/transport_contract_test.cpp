@@ -1,5 +1,5 @@
-// What transport.hpp promises, once over each transport. That something does not arrive is checked after a
-// later event that did: it would have come before.
+// What transport.hpp promises, once over each transport. That something does not arrive is checked
+// after a later event that did: it would have come before.
 
 #include <future>
 #include <string>

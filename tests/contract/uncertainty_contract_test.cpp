@@ -1,4 +1,5 @@
-// Uncertainty over partitions, once over each transport: shared sources, bounds, orders, measurements.
+// Uncertainty over partitions, once over each transport: shared sources, bounds, orders,
+// measurements.
 
 #include <cmath>
 #include <optional>
@@ -107,7 +108,8 @@ TEST_CASE("uncertainty: a source cancels exactly over owners") {
   Random random(662);
   INFO("seed " << random.seed());
   Robot robot(join, random, 0.0);
-  // One encoder error that turns the base and, by the same, the arm back: about the same axis in the same place.
+  // One encoder error that turns the base and, by the same, the arm back: about the same axis in
+  // the same place.
   CommonError forth{"encoder", false, Loading::Zero(6, 1)};
   forth.loading(5, 0) = 0.05;
   CommonError back = forth;
@@ -216,7 +218,8 @@ TEST_CASE("uncertainty: a measurement over owners makes all paths as sure as one
   CHECK(testing::pose_diff(after->pose, fused->X.pose, 1e-4) == "");
   CHECK(covariance_diff(after->covariance, fused->X.covariance, 0.02) == "");
   CHECK(after->basis.sources.size() == 1);
-  // The same again, from the other end: half the error of the measurement is left, none of the edges is surer for it.
+  // The same again, from the other end: half the error of the measurement is left, none of the
+  // edges is surer for it.
   const auto again = robot.arm->observe("tool", "world", inverse(Z));
   REQUIRE(again);
   const auto twice = robot.client->lookup("world", "tool");

@@ -1,4 +1,5 @@
-// Paths that owners push, once over each transport: what reaches a watcher, and when; and what pushing leaves behind.
+// Paths that owners push, once over each transport: what reaches a watcher, and when; and what
+// pushing leaves behind.
 
 #include <algorithm>
 #include <atomic>

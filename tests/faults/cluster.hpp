@@ -15,8 +15,8 @@
 
 namespace tfdude::faults {
 
-/// Daemons that keep their state, and places for clients: each on a host of its own where there can be hosts, else
-/// all on this computer, where no link can be cut. Belongs to one thread.
+/// Daemons that keep their state, and places for clients: each on a host of its own where there can
+/// be hosts, else all on this computer, where no link can be cut. Belongs to one thread.
 class Cluster {
  public:
   /// @param clients  how many hosts there are for clients, besides the observers' one
@@ -57,7 +57,8 @@ class Cluster {
   [[nodiscard]] bool ready(std::size_t partition);
   /// @throws std::runtime_error where it does not get ready.
   void await_ready(std::size_t partition);
-  /// Daemons that have ended without being killed, each as "p1 (status 1)". They are not started again.
+  /// Daemons that have ended without being killed, each as "p1 (status 1)". They are not started
+  /// again.
   [[nodiscard]] std::vector<std::string> take_ended();
   /// What a daemon and those before it have logged, the last lines.
   [[nodiscard]] std::string log_of(std::size_t partition) const;

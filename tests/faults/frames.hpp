@@ -23,7 +23,8 @@ namespace tfdude::faults {
 /// The world and the bases of so many partitions are always there.
 void fix_bases(Model& model, std::size_t partitions);
 
-/// Whether it says that something is not there or may not be: by a replica or an owner that is behind, or rightly.
+/// Whether it says that something is not there or may not be: by a replica or an owner that is
+/// behind, or rightly.
 [[nodiscard]] bool denies(Errc code);
 /// Whether the owner is known to be away, and was not asked therefore: of a call to a single owner.
 [[nodiscard]] bool never_asked(const Error& error);

@@ -18,8 +18,8 @@ using Clock = std::chrono::steady_clock;
 /// How long after the last fault everybody has to know everything [s].
 inline constexpr double kGrace = 5.0;
 
-/// What happened in a run: how each kind of operation ended and how often, which faults there were, and what
-/// contradicts the model. Thread-safe.
+/// What happened in a run: how each kind of operation ended and how often, which faults there were,
+/// and what contradicts the model. Thread-safe.
 class Journal {
  public:
   /// Seconds since the run began.

@@ -1,5 +1,6 @@
-// Clients that change frames at random and check every answer, while daemons are killed, started again, paused and cut
-// off. Prints the seed, counts, and each violation with its history; exits with 1 where there is one.
+// Clients that change frames at random and check every answer, while daemons are killed, started
+// again, paused and cut off. Prints the seed, counts, and each violation with its history; exits
+// with 1 where there is one.
 //
 //   faults --seed 7 --seconds 60
 //   faults --rounds 100

@@ -173,7 +173,8 @@ std::set<std::string> Model::ways_up(const std::string& id, const std::string& a
   return seen;
 }
 
-// An add or move without an answer may be made after the removal of what it names: that frame stays, without its parent.
+// An add or move without an answer may be made after the removal of what it names: that frame
+// stays, without its parent.
 bool Model::goes_with(const std::string& id, const std::string& ancestor) const {
   std::string at = id;
   for (std::size_t steps = 0; at != ancestor; ++steps) {

@@ -19,9 +19,10 @@ struct Place {
   Transform X_PC;
 };
 
-/// What is known of the frames that one client alone changes. An acknowledged change leaves one possibility; one
-/// without an answer leaves both, that it was made and that it was not, until an answer tells which. A later
-/// answer of the same owner does: what one client sends to one owner arrives in order or not at all.
+/// What is known of the frames that one client alone changes. An acknowledged change leaves one
+/// possibility; one without an answer leaves both, that it was made and that it was not, until an
+/// answer tells which. A later answer of the same owner does: what one client sends to one owner
+/// arrives in order or not at all.
 class Model {
  public:
   struct Frame {
@@ -30,7 +31,8 @@ class Model {
     std::vector<std::optional<Place>> possible;
     /// What it hangs below was removed, perhaps: it may go as soon as its owner learns of that.
     bool doomed = false;
-    /// The owners of that, and of what was between: one that was away learns of the removal from them.
+    /// The owners of that, and of what was between: one that was away learns of the removal from
+    /// them.
     std::set<std::string> removed_by;
     /// A move had no answer: its owner may still make it, even after what it names was removed.
     bool may_move_late = false;
@@ -77,8 +79,8 @@ class Model {
   /// Whether a frame hangs below another, or may do so, or is that.
   [[nodiscard]] bool may_be_below(const std::string& id, const std::string& ancestor) const;
 
-  /// Judges what a lookup of b in a gave; empty: an answer that one of the two is not there, or not connected.
-  /// Drops the possibilities that an answer excludes.
+  /// Judges what a lookup of b in a gave; empty: an answer that one of the two is not there, or not
+  /// connected. Drops the possibilities that an answer excludes.
   /// @param quiet  nobody can have anything to learn any more
   /// @return empty where one of the possible states has that answer; else what was expected
   [[nodiscard]] std::string judge(const std::string& a, const std::string& b,

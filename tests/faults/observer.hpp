@@ -14,8 +14,9 @@
 
 namespace tfdude::faults {
 
-/// Measures how long it takes until a killed daemon counts as gone, and until one that was started answers a lookup
-/// of its own edge, both as seen by a client whose own link is never cut. Thread-safe.
+/// Measures how long it takes until a killed daemon counts as gone, and until one that was started
+/// answers a lookup of its own edge, both as seen by a client whose own link is never cut.
+/// Thread-safe.
 class Observer {
  public:
   explicit Observer(Client client);

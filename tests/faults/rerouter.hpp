@@ -12,8 +12,9 @@
 
 namespace tfdude::faults {
 
-/// Moves a frame to and fro between two bases while another client reads a watched path to it without a pause. Each value
-/// that is read has to be that of one of the two ways; once all is calm, each read has to give one.
+/// Moves a frame to and fro between two bases while another client reads a watched path to it
+/// without a pause. Each value that is read has to be that of one of the two ways; once all is
+/// calm, each read has to give one.
 class Rerouter {
  public:
   Rerouter(Client mover, Client watcher, std::size_t partitions, Journal& journal);

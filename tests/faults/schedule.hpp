@@ -47,8 +47,9 @@ struct Fault {
 inline constexpr double kStorm = 14.0;
 inline constexpr double kCalm = 9.0;
 
-/// All faults of a run, in the order in which they begin. A daemon is not killed and paused at once, nor is a
-/// link cut twice, and no daemon starts on a full disk; all else may happen at once. All are over as a calm begins.
+/// All faults of a run, in the order in which they begin. A daemon is not killed and paused at
+/// once, nor is a link cut twice, and no daemon starts on a full disk; all else may happen at once.
+/// All are over as a calm begins.
 [[nodiscard]] std::vector<Fault> schedule(testing::Random& random, double seconds,
                                           std::size_t partitions, std::size_t clients,
                                           const Means& means);

@@ -1,6 +1,7 @@
-// Eight daemons, a client that streams 100 joints of theirs at 1 kHz, and four that look paths between them up: for
-// minutes, while nothing goes wrong. Prints what each process takes of memory and files, and how long lookups take in
-// the first minute and in the last; exits with 1 where something grows or fails.
+// Eight daemons, a client that streams 100 joints of theirs at 1 kHz, and four that look paths
+// between them up: for minutes, while nothing goes wrong. Prints what each process takes of memory
+// and files, and how long lookups take in the first minute and in the last; exits with 1 where
+// something grows or fails.
 //
 //   soak --seconds 600
 
@@ -34,8 +35,8 @@ constexpr std::size_t kJoints = 100;
 constexpr microseconds kSamplePeriod{1000};
 constexpr microseconds kLookupPeriod{10000};
 
-// What a process may take more at the end than when it has warmed up [KiB]: what SQLite's log and the allocator
-// take once more, not what grows with time.
+// What a process may take more at the end than when it has warmed up [KiB]: what SQLite's log and
+// the allocator take once more, not what grows with time.
 constexpr long kGrowth = 2048;
 
 std::string joint(std::size_t number) { return "joint_" + std::to_string(number); }

@@ -21,7 +21,8 @@ namespace tfdude::faults {
 /// How many frames all clients change.
 inline constexpr std::size_t kContested = 12;
 
-/// A client in a thread of its own that changes frames and asks for them, and holds each answer against its model.
+/// A client in a thread of its own that changes frames and asks for them, and holds each answer
+/// against its model.
 class Worker {
  public:
   Worker(Client client, std::size_t number, std::size_t partitions, std::uint64_t seed,
@@ -62,7 +63,8 @@ class Worker {
   template <class Value>
   void record(const std::string& operation, const std::vector<std::string>& frames,
               const std::string& details, const Result<Value>& result);
-  /// The service denies something that is so. While there are faults a replica may be behind; else it may not.
+  /// The service denies something that is so. While there are faults a replica may be behind; else
+  /// it may not.
   void denied(const std::string& what, const std::string& frame);
   void contradiction(const std::string& what, const std::string& frame);
   [[nodiscard]] std::vector<std::string> own(bool anchored) const;

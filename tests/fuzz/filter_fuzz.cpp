@@ -1,5 +1,5 @@
-// What the filters between a partition's readers and the wire let pass of any bytes: what they read without
-// deserializing is what deserializing gives.
+// What the filters between a partition's readers and the wire let pass of any bytes: what they read
+// without deserializing is what deserializing gives.
 
 #include <algorithm>
 #include <string>

@@ -1,5 +1,5 @@
-// Writes seeds: make_seeds FOLDER. One file for each message of tests/support/samples.hpp, choices for the
-// harness of partitions, and stored states; those of configurations are written by hand.
+// Writes seeds: make_seeds FOLDER. One file for each message of tests/support/samples.hpp, choices
+// for the harness of partitions, and stored states; those of configurations are written by hand.
 
 #include <cstdio>
 #include <filesystem>
@@ -67,7 +67,8 @@ bool shrink(const std::filesystem::path& file) {
   return status == SQLITE_OK;
 }
 
-// A first byte says what the rest is: a file; or the length of its log in two bytes, the file and the log.
+// A first byte says what the rest is: a file; or the length of its log in two bytes, the file and
+// the log.
 Bytes state_of(std::uint8_t kind, const std::filesystem::path& file) {
   Bytes bytes = content(file);
   if (kind == 1) {

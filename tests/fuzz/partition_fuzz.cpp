@@ -1,5 +1,6 @@
-// What an owner and its hearers make of any sequence of messages, all of them valid one by one: requests of
-// peers, streams, and what other partitions say that they own; and how the owner returns. The bytes are choices, not messages.
+// What an owner and its hearers make of any sequence of messages, all of them valid one by one:
+// requests of peers, streams, and what other partitions say that they own; and how the owner
+// returns. The bytes are choices, not messages.
 
 #include <algorithm>
 #include <chrono>

@@ -13,7 +13,8 @@
 #include "fuzz/forest_checks.hpp"
 #include "partition/directory.hpp"
 
-// What must come of what partitions say, in the plainest way: everything is kept, and worked out anew each time.
+// What must come of what partitions say, in the plainest way: everything is kept, and worked out
+// anew each time.
 namespace tfdude::fuzz {
 
 struct PlainClaim {
@@ -101,7 +102,8 @@ struct PlainLife {
   [[nodiscard]] bool complete() const { return page_count && pages.size() >= *page_count; }
 };
 
-/// A partition over its lives: the one whose structure holds, and the one that is going to replace it.
+/// A partition over its lives: the one whose structure holds, and the one that is going to replace
+/// it.
 class PlainPartition {
  public:
   [[nodiscard]] const PlainLife& life() const { return life_; }

@@ -83,8 +83,8 @@ class PlainOwner {
     while (unhang(others)) yield_to(others);
   }
 
-  /// Takes over the Lamport times of what was changed just now, later than all that were known; all else is to be as it
-  /// is here already.
+  /// Takes over the Lamport times of what was changed just now, later than all that were known; all
+  /// else is to be as it is here already.
   void demand_held(const Forest& forest, std::uint64_t latest) {
     std::size_t held = 0;
     for (const FrameInfo& frame : forest.frames()) {

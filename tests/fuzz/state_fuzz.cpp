@@ -1,5 +1,5 @@
-// What an owner makes of any file as its stored state: what is refused stays as it is; what is accepted can be
-// served, published, and stored again.
+// What an owner makes of any file as its stored state: what is refused stays as it is; what is
+// accepted can be served, published, and stored again.
 
 #include <algorithm>
 #include <cstdint>

@@ -9,7 +9,8 @@
 
 namespace tfdude::fuzz {
 
-/// Puts any values into the tables of a state, as another program could, and rarely into its schema.
+/// Puts any values into the tables of a state, as another program could, and rarely into its
+/// schema.
 class RowWriter {
  public:
   RowWriter(const std::string& file, FuzzedDataProvider& choices) : choices_(choices) {

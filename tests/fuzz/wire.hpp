@@ -15,8 +15,9 @@ namespace tfdude::fuzz {
 
 using testing::Bytes;
 
-/// The sample that a reader makes of the bytes; nothing where it refuses them. Checks that the reader refuses
-/// what is not well formed and only that, and that its result does not depend on what it took before.
+/// The sample that a reader makes of the bytes; nothing where it refuses them. Checks that the
+/// reader refuses what is not well formed and only that, and that its result does not depend on
+/// what it took before.
 template <class Type, class Sample>
 [[nodiscard]] std::optional<Sample> received(const Bytes& bytes, bool well_formed) {
   static Sample reused;
@@ -60,14 +61,15 @@ inline constexpr Tolerance kAgain{1e-15, 1e-12};
 
 inline constexpr std::size_t kSigma = 7;  // where the covariance begins
 
-/// Whether a covariance is so small in places that eigenvalues lifted by 1e-9 of it underflow to zero again.
+/// Whether a covariance is so small in places that eigenvalues lifted by 1e-9 of it underflow to
+/// zero again.
 [[nodiscard]] inline bool underflows(const wire::Transform& x_pc) {
   return std::any_of(x_pc.begin() + kSigma, x_pc.end(),
                      [](double value) { return value != 0 && std::abs(value) < 1e-200; });
 }
 
-/// The standard deviations by which the library judges a covariance: an axis that is known far better than the
-/// others of its unit is judged by those.
+/// The standard deviations by which the library judges a covariance: an axis that is known far
+/// better than the others of its unit is judged by those.
 [[nodiscard]] inline std::array<double, 6> judged_stddev(const wire::Transform& x_pc) {
   std::array<double, 6> judged{};
   for (std::size_t i = 0; i < 6; ++i) {
@@ -100,8 +102,8 @@ inline void demand_same(const wire::Transform& a, const wire::Transform& b, Tole
   }
 }
 
-/// A sample without its transforms, which are compared with a tolerance; strip() takes them out, and sets to
-/// zero what a message does not keep.
+/// A sample without its transforms, which are compared with a tolerance; strip() takes them out,
+/// and sets to zero what a message does not keep.
 template <class Type, class Sample, class Strip>
 void demand_same(Sample a, Sample b, Strip strip, Tolerance tolerance) {
   std::vector<wire::Transform> of_a;

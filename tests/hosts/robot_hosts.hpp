@@ -24,8 +24,9 @@ inline const Transform kX{exp((Twist() << 0.1, -0.2, 0.3, 0.4, 0.5, -0.6).finish
 inline const Transform kY{exp((Twist() << -0.4, 0.1, 0.2, -0.7, 0.1, 0.9).finished()),
                           *Covariance::from_stddev({6e-3, 1e-3, 2e-3, 1e-3, 3e-3, 2e-3})};
 
-/// The thesis's robot on several hosts, each partition on one of its own: robot, arms and a third, whose tool is in
-/// the left hand. The test's own process is on another, and so is the discovery server where there is one.
+/// The thesis's robot on several hosts, each partition on one of its own: robot, arms and a third,
+/// whose tool is in the left hand. The test's own process is on another, and so is the discovery
+/// server where there is one.
 class RobotHosts {
  public:
   static constexpr std::size_t kOwn = 0;
@@ -46,7 +47,8 @@ class RobotHosts {
 
   void start_server() { server.emplace(start_discovery_server(hosts, kServer)); }
 
-  /// So that it may end and be started again: with what its predecessor knew, where it can read that.
+  /// So that it may end and be started again: with what its predecessor knew, where it can read
+  /// that.
   void start_server_again() {
     const std::string kept = discovery_server_reads_backup() ? directory_.path() : std::string();
     server.emplace(start_discovery_server(hosts, kServer, kept));

@@ -4,8 +4,8 @@
 #include <tfdude/client/node.hpp>
 #include <tfdude/transport/loopback.hpp>
 
-// A node that owns two frames and a client that asks for them, in one process: everything that is installed is
-// linked, and no network is needed.
+// A node that owns two frames and a client that asks for them, in one process: everything that is
+// installed is linked, and no network is needed.
 int main() {
   const auto covariance = tfdude::Covariance::from_stddev({0.3, 0, 0, 0, 0, 0});
   const auto pose = tfdude::Pose::create(Eigen::Quaterniond::Identity(), {1, 0, 0});

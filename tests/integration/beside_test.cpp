@@ -1,4 +1,5 @@
-// Beside others in one process: profiles of each participant's own, settings of the host that stay as they are.
+// Beside others in one process: profiles of each participant's own, settings of the host that stay
+// as they are.
 
 #include <algorithm>
 #include <atomic>

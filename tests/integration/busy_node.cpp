@@ -2,9 +2,9 @@
 //
 //   busy_node DOMAIN SECONDS NAME [CONFIG]
 //
-// With a configuration it owns its frames, else none. It prints "ready" once it sees all partitions, works,
-// prints "done calls=N" and serves on until SIGTERM, as others may still be calling it. Its exit status is
-// 0 where no call failed.
+// With a configuration it owns its frames, else none. It prints "ready" once it sees all
+// partitions, works, prints "done calls=N" and serves on until SIGTERM, as others may still be
+// calling it. Its exit status is 0 where no call failed.
 
 #include <algorithm>
 #include <array>

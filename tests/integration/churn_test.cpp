@@ -1,4 +1,5 @@
-// Many participants that come and go, some of them killed, while two partitions are asked all the time.
+// Many participants that come and go, some of them killed, while two partitions are asked all the
+// time.
 
 #include <atomic>
 #include <csignal>

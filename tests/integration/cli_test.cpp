@@ -1,4 +1,5 @@
-// Each command of the command line: what it prints for people, what for programs, and its exit status.
+// Each command of the command line: what it prints for people, what for programs, and its exit
+// status.
 
 #include <algorithm>
 #include <csignal>

@@ -1,4 +1,5 @@
-// DDS writers that are not ours: plain ones that stream updates, and ones that send what is not well formed.
+// DDS writers that are not ours: plain ones that stream updates, and ones that send what is not
+// well formed.
 
 #include <cmath>
 #include <memory>
@@ -75,7 +76,8 @@ TEST_CASE("a plain writer in partition * reaches the owner, and the others only 
   CHECK_FALSE(moved(other.node, "b"));
 }
 
-// What stays of a killed process: a page that cannot be read before an earlier one, of a clock that was ahead.
+// What stays of a killed process: a page that cannot be read before an earlier one, of a clock that
+// was ahead.
 TEST_CASE("a page that waits for a lost one keeps out no page of another process") {
   const testing::DomainLease domain;
   const auto transport =
@@ -177,7 +179,8 @@ constexpr Stranger kStrangers[] = {
     {"tfdude/presence", "tfdude::wire::Presence", true},
 };
 
-// What may come instead: cut short, with lengths that are not true, random bytes with and without a header.
+// What may come instead: cut short, with lengths that are not true, random bytes with and without a
+// header.
 std::vector<Bytes> malformed(testing::Random& random) {
   std::vector<Bytes> all;
   const auto good = testing::bytes_of<wire::UpdatePubSubType>(stranger_update("a_tip"));
@@ -214,7 +217,8 @@ TEST_CASE("malformed samples are counted, and change nothing") {
   for (const Stranger& stranger : kStrangers) {
     INFO("topic " << stranger.topic);
     const bool durable = stranger.keyed;
-    // Requests, updates and replies are read in DDS partitions of their own, the others in the default one.
+    // Requests, updates and replies are read in DDS partitions of their own, the others in the
+    // default one.
     ForeignWriter writer(domain.number(), stranger.topic,
                          fastdds::edds::TypeSupport(new RawType(stranger.type, stranger.keyed)),
                          stranger.keyed ? "" : "*", durable);

@@ -1,4 +1,5 @@
-// Endpoints that go while others are matched with them: where Fast DDS calls a listener that was taken away meanwhile.
+// Endpoints that go while others are matched with them: where Fast DDS calls a listener that was
+// taken away meanwhile.
 
 #include <atomic>
 #include <chrono>
@@ -99,8 +100,9 @@ TEST_CASE("leaving: nothing is handled while an endpoint is deleted") {
   CHECK(deleted.wait_for(std::chrono::seconds(20)) == std::future_status::ready);
 }
 
-// Best effort: where a reliable writer goes as its first sample is being acknowledged, and the participant is to announce
-// itself just then, Fast DDS (2.9 and 3.1) waits for itself for ever. Here that would happen within seconds.
+// Best effort: where a reliable writer goes as its first sample is being acknowledged, and the
+// participant is to announce itself just then, Fast DDS (2.9 and 3.1) waits for itself for ever.
+// Here that would happen within seconds.
 TEST_CASE("leaving: 5,000 readers go while writers come and go") {
   const testing::DomainLease lease;
   Member leaver(lease.number());

@@ -84,7 +84,8 @@ std::string Author::any_anchor() {
   return any(anchored);
 }
 
-// What was done is seen by who has done it, unless its owner is away or its word is known to be late.
+// What was done is seen by who has done it, unless its owner is away or its word is known to be
+// late.
 void Author::check_seen(const std::string& id, const std::string& parent) {
   Process& process = *process_;
   const auto frame = process.forest().info(id);

@@ -15,8 +15,8 @@ namespace tfdude::simulation {
 /// How many frames all fight over.
 inline constexpr std::size_t kContested = 4;
 
-/// A client that does one thing after the other and knows what may have come of it: of its own frames all, as nobody else
-/// changes them.
+/// A client that does one thing after the other and knows what may have come of it: of its own
+/// frames all, as nobody else changes them.
 class Author : public std::enable_shared_from_this<Author> {
  public:
   /// @param owners  whose partitions it uses; none of them is renamed

@@ -17,7 +17,8 @@ Transform at(double y, double z) {
   return {Pose::trusted(Eigen::Quaterniond::Identity(), {0, y, z}), {}};
 }
 
-// The number of a value is how far its first edge leads along y; along z the two edges cancel each other.
+// The number of a value is how far its first edge leads along y; along z the two edges cancel each
+// other.
 Transform first_edge(std::size_t value) {
   return at(static_cast<double>(value), static_cast<double>(value));
 }
@@ -151,7 +152,8 @@ void Follower::look() {
   if (const auto X = watch_->read()) judge(*X);
 }
 
-// Values that were not stored yet are lost with their owner's process: the next may have older ones.
+// Values that were not stored yet are lost with their owner's process: the next may have older
+// ones.
 void Follower::forget_order_after_restart() {
   const auto serving = process_->directory().serving(partition_);
   if (!serving || serving->incarnation == incarnation_) return;

@@ -14,8 +14,8 @@ namespace tfdude::simulation {
 
 class Process;
 
-/// One call of a client, as Requests makes it, in steps: planned, sent until it is answered, planned again where the
-/// structure has changed meanwhile, and over by its deadline.
+/// One call of a client, as Requests makes it, in steps: planned, sent until it is answered,
+/// planned again where the structure has changed meanwhile, and over by its deadline.
 class Operation : public std::enable_shared_from_this<Operation> {
  public:
   using Route = std::function<Result<std::vector<Part>>()>;

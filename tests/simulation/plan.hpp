@@ -50,7 +50,8 @@ struct Plan {
   bool stores = true;         ///< daemons keep their frames
   bool wild_stores =
       true;  ///< and so does the last, which may be renamed and replaced, and nobody relies on
-  /// Killed as the storm ends, for good: the others have to agree without it. The number of owners: nobody.
+  /// Killed as the storm ends, for good: the others have to agree without it. The number of owners:
+  /// nobody.
   std::size_t lost = 0;
   double loss_after = 0;      ///< of datagrams, when the storm is over
   std::vector<Fault> faults;  ///< in the order in which they begin

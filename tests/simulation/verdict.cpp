@@ -20,7 +20,8 @@ std::string difference(const std::vector<std::string>& a, const std::vector<std:
   return text;
 }
 
-// Whether it hangs below a root, and not below a frame that was removed: such trees the model does not know.
+// Whether it hangs below a root, and not below a frame that was removed: such trees the model does
+// not know.
 bool stands(Process& process, FrameInfo frame) {
   while (!frame.parent.empty()) {
     const auto parent = process.forest().info(frame.parent);
@@ -81,8 +82,8 @@ void Verdict::check_replica(Process& one, const std::vector<std::string>& expect
   }
 }
 
-// A process without a file whose clock is behind that of its predecessor is not heard by a client that has met that one: a
-// client cannot tell it, and no daemon may be left that could.
+// A process without a file whose clock is behind that of its predecessor is not heard by a client
+// that has met that one: a client cannot tell it, and no daemon may be left that could.
 bool Verdict::passes_over_one(Process& client) const {
   for (std::size_t i = 0; i < plan_.owners; ++i) {
     if (plan_.stores_of(i) || !cast_.daemons[i]) continue;
@@ -113,7 +114,8 @@ void Verdict::check_follower(Follower& follower) {
   }
 }
 
-// Of a frame that one serves who is there, it is the owner; who is not there has none of the configured frames.
+// Of a frame that one serves who is there, it is the owner; who is not there has none of the
+// configured frames.
 void Verdict::check_owners(Process& one) {
   for (std::size_t i = 0; i < plan_.owners; ++i) {
     if (i == plan_.lost) continue;
@@ -130,7 +132,8 @@ void Verdict::check_owners(Process& one) {
   }
 }
 
-// Who goes on under another name knows nothing of what it had under the former, by which nobody is there.
+// Who goes on under another name knows nothing of what it had under the former, by which nobody is
+// there.
 bool Verdict::is_left_over(const FrameInfo& frame, Process& seen_by) const {
   return !cast_.serves(seen_by.directory().name(frame.owner));
 }

@@ -13,7 +13,8 @@ using faults::base_edge;
 using faults::base_of;
 
 constexpr Instant kLook = milliseconds(20);
-// Longer than anything takes: that somebody counts as gone, is met again, has claimed its name and has yielded.
+// Longer than anything takes: that somebody counts as gone, is met again, has claimed its name and
+// has yielded.
 constexpr Instant kRest = milliseconds(12000);
 
 class World {
@@ -139,7 +140,8 @@ class World {
     cast_.followers.back()->start();
   }
 
-  // Of one that hung and the one in its place, one goes on. Other daemons that have ended are started again.
+  // Of one that hung and the one in its place, one goes on. Other daemons that have ended are
+  // started again.
   void look_after() {
     if (replaced_ && replaced_->ended()) replaced_.reset();
     if (replaced_ && !replaced_->paused() && cast_.daemons[cast_.wild] &&

@@ -9,8 +9,8 @@
 
 namespace tfdude::testing {
 
-/// Empty if the client sees the oracle's frames with their parents, and no other; else the first that
-/// differs.
+/// Empty if the client sees the oracle's frames with their parents, and no other; else the first
+/// that differs.
 [[nodiscard]] inline std::string structure_diff(Client& client, const Oracle& oracle) {
   const auto frames = client.frames().value();
   const auto ids = oracle.ids();
@@ -25,8 +25,8 @@ namespace tfdude::testing {
   return "";
 }
 
-/// Empty if the client looks up what the oracle computes, for every ordered pair of its frames; else the
-/// first that differs.
+/// Empty if the client looks up what the oracle computes, for every ordered pair of its frames;
+/// else the first that differs.
 [[nodiscard]] inline std::string lookups_diff(Client& client, const Oracle& oracle) {
   const auto ids = oracle.ids();
   for (const std::string& a : ids) {

@@ -9,12 +9,14 @@
 
 #include "transport/fastdds/compat.hpp"
 
-// DDS writers that know nothing of this project's library: whatever a stranger in the domain may send.
+// DDS writers that know nothing of this project's library: whatever a stranger in the domain may
+// send.
 namespace tfdude::testing {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// A type that says any name and sends any bytes: the sample is a Bytes, encapsulation header included.
+/// A type that says any name and sends any bytes: the sample is a Bytes, encapsulation header
+/// included.
 class RawType final : public fastdds::edds::TopicDataType {
  public:
   RawType(const std::string& name, bool keyed);

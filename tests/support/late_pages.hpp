@@ -10,7 +10,8 @@
 
 namespace tfdude::testing {
 
-/// A transport that can hold back what one partition says of its structure, as a starved process or a bad link does.
+/// A transport that can hold back what one partition says of its structure, as a starved process or
+/// a bad link does.
 class LatePages final : public Relay {
  public:
   using Relay::Relay;

@@ -12,7 +12,8 @@
 
 namespace tfdude::testing {
 
-/// A chain of edges with its truth, whose paths are observed; frame i is the parent of frame i + 1, by edge i.
+/// A chain of edges with its truth, whose paths are observed; frame i is the parent of frame i + 1,
+/// by edge i.
 class ObservedChain {
  public:
   ObservedChain(Random& random, std::size_t edges) {
@@ -40,7 +41,8 @@ class ObservedChain {
     sources_.push_back(name);
   }
 
-  /// Draws the truth from what is believed. @param lies  of this edge the errors are `by` times as large
+  /// Draws the truth from what is believed. @param lies  of this edge the errors are `by` times as
+  /// large
   void make_true(Random& random, std::size_t lies = SIZE_MAX, double by = 1.0) {
     std::vector<Eigen::Vector3d> drawn;
     for (std::size_t k = 0; k < sources_.size(); ++k) {
@@ -126,7 +128,8 @@ class ObservedChain {
     return P;
   }
 
-  /// What an observation makes of it: a Kalman update whose gain is zero for edges that have nothing to do with it.
+  /// What an observation makes of it: a Kalman update whose gain is zero for edges that have
+  /// nothing to do with it.
   [[nodiscard]] Eigen::MatrixXd dense_update(const Eigen::MatrixXd& P, std::size_t from,
                                              std::size_t to, const Covariance& R) const {
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(6, P.cols());

@@ -10,8 +10,9 @@
 
 namespace tfdude::testing {
 
-/// All frames in one tree, and the poses between them by plain matrices: what the service has to agree
-/// with. Written from the formulas; of the library it uses only the containers of its arguments.
+/// All frames in one tree, and the poses between them by plain matrices: what the service has to
+/// agree with. Written from the formulas; of the library it uses only the containers of its
+/// arguments.
 class Oracle {
  public:
   /// An empty parent makes a root.

@@ -21,7 +21,8 @@ namespace tfdude::testing {
   return inodes;
 }
 
-/// The local addresses of those of them that are bound to one of UDP, as the kernel writes them ("0100007F" is 127.0.0.1).
+/// The local addresses of those of them that are bound to one of UDP, as the kernel writes them
+/// ("0100007F" is 127.0.0.1).
 [[nodiscard]] inline std::multiset<std::string> addresses_of(const std::set<std::string>& inodes) {
   std::multiset<std::string> addresses;
   std::ifstream table("/proc/net/udp");

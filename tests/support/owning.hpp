@@ -28,7 +28,8 @@ struct Owning {
   return "f" + std::to_string(number);
 }
 
-/// To add one of so many frames, or to move or remove it where it is held here, as far as is known here.
+/// To add one of so many frames, or to move or remove it where it is held here, as far as is known
+/// here.
 [[nodiscard]] inline Request any_change(Random& random, const Forest& forest, std::size_t frames) {
   const std::string id = fought_frame(random.index(frames));
   const std::string other = fought_frame(random.index(frames));

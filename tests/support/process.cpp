@@ -36,7 +36,8 @@ std::array<int, 2> make_pipe() {
   return ends;
 }
 
-// Between fork and exec: only what is safe in a signal handler, as other threads' locks stay locked.
+// Between fork and exec: only what is safe in a signal handler, as other threads' locks stay
+// locked.
 [[noreturn]] void become(char* const* argv, pid_t parent, int network, int out, int err) {
   if (network >= 0 && setns(network, CLONE_NEWNET) != 0) _exit(kExecFailed);
   prctl(PR_SET_PDEATHSIG, SIGKILL);

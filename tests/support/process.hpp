@@ -16,9 +16,9 @@ using Deadline = Clock::time_point;
 /// By when anything that works has happened, even where the machine is busy with something else.
 [[nodiscard]] inline Deadline in_time() { return Clock::now() + std::chrono::seconds(30); }
 
-/// A process of its own, whose output is kept. Killed and reaped with the object; the kernel kills it
-/// where the test itself is killed, since no destructor runs then. Belongs to one thread, which has to
-/// outlive it.
+/// A process of its own, whose output is kept. Killed and reaped with the object; the kernel kills
+/// it where the test itself is killed, since no destructor runs then. Belongs to one thread, which
+/// has to outlive it.
 class Process {
  public:
   /// Starts argv[0], a path.
@@ -31,13 +31,13 @@ class Process {
 
   [[nodiscard]] pid_t pid() const { return pid_; }
 
-  /// Of standard output, the first line with this beginning; nothing where the output ends without it
-  /// or the deadline passes.
+  /// Of standard output, the first line with this beginning; nothing where the output ends without
+  /// it or the deadline passes.
   [[nodiscard]] std::optional<std::string> wait_for_line(const std::string& prefix,
                                                          Deadline deadline);
 
-  /// The exit status, or 128 and the signal's number as in a shell; nothing where it still runs at the
-  /// deadline.
+  /// The exit status, or 128 and the signal's number as in a shell; nothing where it still runs at
+  /// the deadline.
   [[nodiscard]] std::optional<int> wait(Deadline deadline);
 
   [[nodiscard]] bool runs() { return !wait(Clock::now()); }

@@ -8,7 +8,8 @@
 
 namespace tfdude::testing {
 
-/// A transport that hands on all that goes to another, and comes from there: what is to be otherwise is overridden.
+/// A transport that hands on all that goes to another, and comes from there: what is to be
+/// otherwise is overridden.
 class Relay : public Transport, protected TransportHandler {
  public:
   explicit Relay(TransportPtr real) : real_(std::move(real)) {}

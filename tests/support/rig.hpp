@@ -20,7 +20,8 @@
 #include "support/catch.hpp"
 #include "support/relay.hpp"
 
-// For tests of one part of a participant: what the parts build on, and owners whose replies a test may decide.
+// For tests of one part of a participant: what the parts build on, and owners whose replies a test
+// may decide.
 namespace tfdude::testing {
 
 [[nodiscard]] inline Options quick() {

@@ -40,8 +40,8 @@ struct BorrowedPayload : fastdds::ertps::SerializedPayload_t {
   ~BorrowedPayload() { data = nullptr; }  // not the payload's to free
 };
 
-/// What a reader of this type would make of the bytes; false where it refuses them. They are copied to a
-/// place of exactly their size, so that AddressSanitizer sees every step beyond.
+/// What a reader of this type would make of the bytes; false where it refuses them. They are copied
+/// to a place of exactly their size, so that AddressSanitizer sees every step beyond.
 template <class Type, class Sample>
 [[nodiscard]] bool deserialized(const Bytes& bytes, Sample& sample) {
   const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());

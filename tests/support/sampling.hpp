@@ -7,7 +7,8 @@
 
 #include "support/random.hpp"
 
-// Samples of errors, and linear algebra that takes the compiler seconds wherever it is used: so it is compiled once.
+// Samples of errors, and linear algebra that takes the compiler seconds wherever it is used: so it
+// is compiled once.
 namespace tfdude::testing {
 
 /// Of a symmetric matrix, ascending.
@@ -35,8 +36,8 @@ class Gaussian {
 /// E[ξ ξᵀ] over samples of ξ.
 [[nodiscard]] Matrix6d second_moment(int samples, const std::function<Twist()>& sample);
 
-/// Empty if a second moment over so many samples of a Gaussian agrees with Σ in every element, within five standard errors
-/// √((σii σjj + σij²) / N) (Isserlis) and `more` of √(σii σjj).
+/// Empty if a second moment over so many samples of a Gaussian agrees with Σ in every element,
+/// within five standard errors √((σii σjj + σij²) / N) (Isserlis) and `more` of √(σii σjj).
 [[nodiscard]] std::string moment_diff(const Matrix6d& sampled, const Matrix6d& sigma, int samples,
                                       double more = 0);
 

@@ -21,12 +21,13 @@ struct CliResult {
   std::string err;
 };
 
-/// A DDS domain that no other test uses now, on this computer only, and the service's programs in it.
+/// A DDS domain that no other test uses now, on this computer only, and the service's programs in
+/// it.
 ///
-/// With TFDUDE_TEST_LOSS in the environment, a percentage, the same test runs over several hosts of which each
-/// loses this share of the packets that come to it: the test's process is on one of them, daemons on
-/// others in turn, the command line on another. With TFDUDE_TEST_DISCOVERY=server they meet by a discovery
-/// server, else by multicast.
+/// With TFDUDE_TEST_LOSS in the environment, a percentage, the same test runs over several hosts of
+/// which each loses this share of the packets that come to it: the test's process is on one of
+/// them, daemons on others in turn, the command line on another. With TFDUDE_TEST_DISCOVERY=server
+/// they meet by a discovery server, else by multicast.
 class TestDomain {
  public:
   TestDomain();
@@ -37,7 +38,8 @@ class TestDomain {
 
   [[nodiscard]] std::uint32_t number() const { return lease_.number(); }
 
-  /// For clients in the test's process. The time-out is long, so that a busy machine is not an error.
+  /// For clients in the test's process. The time-out is long, so that a busy machine is not an
+  /// error.
   [[nodiscard]] Options options(Milliseconds timeout = Milliseconds(20000)) const;
 
   /// Starts a daemon; await_ready() tells when it serves.

@@ -13,7 +13,8 @@ namespace {
 
 using nlohmann::json;
 
-// Turned by (10, -20, 90) degrees, at (1, -2, 3); standard deviations of 1 to 3 cm and 1 to 3 degrees.
+// Turned by (10, -20, 90) degrees, at (1, -2, 3); standard deviations of 1 to 3 cm and 1 to 3
+// degrees.
 Transform example() {
   constexpr double kDegree = 0.017453292519943295;
   return {*Pose::create(from_rpy(10 * kDegree, -20 * kDegree, 90 * kDegree), {1, -2, 3}),

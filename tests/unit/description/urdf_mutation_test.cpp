@@ -53,7 +53,8 @@ std::string read(const std::string& path) {
   return text.str();
 }
 
-// Where an element or attribute begins and ends: from `open` to `close`, the first after some place. Empty: none.
+// Where an element or attribute begins and ends: from `open` to `close`, the first after some
+// place. Empty: none.
 std::pair<std::size_t, std::size_t> piece(const std::string& text, Random& random,
                                           const std::string& open, const std::string& close) {
   const std::size_t begin = text.find(open, random.index(text.size()));

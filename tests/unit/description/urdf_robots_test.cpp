@@ -67,7 +67,8 @@ const FrameSpec& frame(const std::vector<FrameSpec>& frames, const std::string& 
   throw 0;
 }
 
-// The edge where its joint, if it has one, is at its place of these; a joint that mimics where the other says.
+// The edge where its joint, if it has one, is at its place of these; a joint that mimics where the
+// other says.
 Transform edge(const FrameSpec& spec, const Positions& q, double variance) {
   if (!spec.joint) return spec.X_PC;
   const auto& mimic = spec.joint->mimic;

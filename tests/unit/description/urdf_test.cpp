@@ -68,7 +68,8 @@ TEST_CASE("urdf: what does not concern frames may be broken") {
       "<transmission name=\"t\"><joint name=\"j\"/></transmission><sensor name=\"s\"/></robot>");
   CHECK(ids_of(frames) == "a b");
   CHECK(frames[1].joint->limits->lower == -1);
-  // Of a continuous joint limits say nothing, of one that does not move nothing but its origin does.
+  // Of a continuous joint limits say nothing, of one that does not move nothing but its origin
+  // does.
   CHECK(frames_of(pair("continuous", "<limit effort=\"1\"/>"))[1].joint->limits == std::nullopt);
   CHECK(frames_of(pair("fixed", "<axis xyz=\"x\"/><limit lower=\"x\"/><mimic/>")).size() == 2);
 }

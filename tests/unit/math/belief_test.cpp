@@ -75,7 +75,8 @@ TEST_CASE("A source of fewer columns on one edge is as if the others were zero")
                         1e-12) == "");
 }
 
-// The second moment of the errors of X_AB X_BC, where both have own errors and common errors of a source.
+// The second moment of the errors of X_AB X_BC, where both have own errors and common errors of a
+// source.
 Matrix6d sampled_product(const Belief& X_AB, const Belief& X_BC, Random& random, int samples) {
   const Gaussian own_1(X_AB.own);
   const Gaussian own_2(X_BC.own);

@@ -118,8 +118,8 @@ TEST_CASE("each sample's part of the covariance is that of the Jacobian, shared 
   }
 }
 
-// B = Jr(s ξ) Jr⁻¹(ξ) by s = n + r: s Jr(s ξ) = Σ_{k<n} Ad(Exp(-k ξ)) Jr(ξ) + r Ad(Exp(-n ξ)) Jr(r ξ), all of them sums of
-// what is of the size of one.
+// B = Jr(s ξ) Jr⁻¹(ξ) by s = n + r: s Jr(s ξ) = Σ_{k<n} Ad(Exp(-k ξ)) Jr(ξ) + r Ad(Exp(-n ξ)) Jr(r
+// ξ), all of them sums of what is of the size of one.
 Matrix6d carrying(const Twist& xi, double s) {
   const int n = static_cast<int>(std::floor(s));
   const double r = s - n;
@@ -141,7 +141,8 @@ TEST_CASE("extrapolation is right for every angle, however far it goes") {
       const Twist xi = log(X0.pose.inverse() * X1.pose);
       const double beyond = s - 1.0;
       const Matrix6d B1 = carrying(xi, s);
-      // Jl((1-s) ξ) Jl⁻¹(ξ) of negative parts: Jr((s-1) ξ) Jl⁻¹(ξ) = Jr((s-1) ξ) Jr⁻¹(ξ) Ad(Exp(-ξ)).
+      // Jl((1-s) ξ) Jl⁻¹(ξ) of negative parts: Jr((s-1) ξ) Jl⁻¹(ξ) = Jr((s-1) ξ) Jr⁻¹(ξ)
+      // Ad(Exp(-ξ)).
       Matrix6d B0 = Matrix6d::Zero();
       if (beyond > 0) B0 = carrying(xi, beyond) * adjoint(exp(-xi));
       const Matrix6d expected =

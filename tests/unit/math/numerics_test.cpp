@@ -26,7 +26,8 @@ using Matrix3r = Eigen::Matrix<Real, 3, 3>;
 using Vector3r = Eigen::Matrix<Real, 3, 1>;
 using Matrix6r = Eigen::Matrix<Real, 6, 6>;
 
-// The smallest eigenvalue, in units of the axes' own deviations, where the largest is of the order of one.
+// The smallest eigenvalue, in units of the axes' own deviations, where the largest is of the order
+// of one.
 double smallest_eigenvalue(const Covariance& covariance) {
   const Matrix6d sigma = covariance.matrix();
   const Twist unit = sigma.diagonal().unaryExpr(
@@ -165,7 +166,8 @@ TEST_CASE("numerics: a covariance seen from a million metres away comes back") {
     const Matrix6d rest = back.matrix() - sigma.matrix();
     worst = std::max(worst, rest.cwiseAbs().maxCoeff());
   }
-  // What a lever of 1e6 m makes of 1 mrad is a variance of 1e6 m², of which the last bits are 1e-10 m².
+  // What a lever of 1e6 m makes of 1 mrad is a variance of 1e6 m², of which the last bits are 1e-10
+  // m².
   report("there and back over a million metres [m²]", worst);
   report("seen from a million metres: smallest eigenvalue", smallest);
   CHECK(worst < 1e-8);

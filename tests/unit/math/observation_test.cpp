@@ -26,7 +26,8 @@ constexpr auto kDown = ObservedEdge::Way::kDown;
 constexpr auto kUp = ObservedEdge::Way::kUp;
 const std::string kSource = "observed:once";
 
-// Mean normalized squared errors of one quantity over the runs, which must lie where 99 % of all such means do.
+// Mean normalized squared errors of one quantity over the runs, which must lie where 99 % of all
+// such means do.
 class Consistency {
  public:
   void add(const Belief& X, const Pose& truth) {

@@ -37,7 +37,8 @@ const std::vector<Convention>& conventions() {
       {"left", [](const Pose& X, const Twist& xi) { return exp(xi) * X; },
        [](const Pose& mean, const Pose& X) { return log(X * mean.inverse()); }, left_covariance,
        from_left_covariance},
-      // As in geometry_msgs/PoseWithCovariance: x, y, z, then turns about axes of the parent's directions.
+      // As in geometry_msgs/PoseWithCovariance: x, y, z, then turns about axes of the parent's
+      // directions.
       {"ROS",
        [](const Pose& X, const Twist& xi) {
          const Eigen::Quaterniond turn =

@@ -1,5 +1,5 @@
-// That all who hear the same agree who has a frame, and that who is there keeps what it has, whatever partitions die,
-// hang, return and are forgotten, and in whatever order that is heard.
+// That all who hear the same agree who has a frame, and that who is there keeps what it has,
+// whatever partitions die, hang, return and are forgotten, and in whatever order that is heard.
 
 #include <algorithm>
 #include <array>
@@ -190,8 +190,8 @@ class World {
     }
   }
 
-  // What is on its way from one who dies. That somebody is not heard any more is no message: whoever has not been told of
-  // an end notices it.
+  // What is on its way from one who dies. That somebody is not heard any more is no message:
+  // whoever has not been told of an end notices it.
   static void lose(std::deque<Said>& queue) {
     std::deque<Said> noticed;
     for (const Said& said : queue) {

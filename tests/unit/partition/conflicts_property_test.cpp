@@ -1,4 +1,5 @@
-// That all replicas come to hold the same, whatever owners do at once, and whoever dies and returns meanwhile.
+// That all replicas come to hold the same, whatever owners do at once, and whoever dies and returns
+// meanwhile.
 
 #include <algorithm>
 #include <array>
@@ -34,8 +35,8 @@ constexpr std::size_t kOwners = 4;
 constexpr std::size_t kSpectator = kOwners;
 constexpr std::size_t kFrames = 12;  // few, so that they are often fought over
 
-// Owners that change what they please as far as their own picture allows, hear of each other late, are killed
-// and started again from what they stored; and one who only watches.
+// Owners that change what they please as far as their own picture allows, hear of each other late,
+// are killed and started again from what they stored; and one who only watches.
 class World {
  public:
   explicit World(Random& random) : random_(random) {

@@ -30,9 +30,9 @@ constexpr std::size_t kFrames = 24;
 
 std::string frame(std::size_t number) { return "f" + std::to_string(number); }
 
-// What is said of one life of a partition: pages with frames of the common pool, and a presence. Parents
-// in a first life are any, so that lives contradict each other; in the last one they have lower numbers,
-// so that what remains has no cycle.
+// What is said of one life of a partition: pages with frames of the common pool, and a presence.
+// Parents in a first life are any, so that lives contradict each other; in the last one they have
+// lower numbers, so that what remains has no cycle.
 void live(Random& random, const std::string& partition, std::uint64_t incarnation, bool last,
           std::vector<Said>& said) {
   std::vector<Page> pages(1 + random.index(4));
@@ -125,8 +125,8 @@ TEST_CASE("what a directory holds does not depend on the order of what it heard"
   }
 }
 
-// Owners change their structure at random; what they publish travels at its own pace, a later page possibly
-// instead of an earlier one of the same number.
+// Owners change their structure at random; what they publish travels at its own pace, a later page
+// possibly instead of an earlier one of the same number.
 class World {
  public:
   explicit World(Random& random) : random_(random) {

@@ -264,7 +264,8 @@ TEST_CASE("who owns nothing hears an older process of a partition whose later on
   replica.directory.lost("arms", 10, kNow);
   replica.directory.apply(presence_of("arms", 5, 1), kNow);
   replica.directory.apply(Page{"arms", 0, 5, 6, {{"arm", "", 1}, {"hand", "arm", 2}}});
-  // Whoever owns something says that it knows a later one, which goes on as one that is later still.
+  // Whoever owns something says that it knows a later one, which goes on as one that is later
+  // still.
   CHECK(replica.directory.serving("arms").has_value() == !owns);
   CHECK(replica.forest.exists("hand") == !owns);
   CHECK(replica.directory.complete());

@@ -100,7 +100,8 @@ TEST_CASE("what follows a joint moves with it, and shares its error") {
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.04}}, {}}));
   CHECK(std::abs(arm.info("wrist").position - (-0.5 * 0.5 + 0.125)) < 1e-15);
   CHECK(std::abs(arm.info("wrist").variance - 0.25 * 0.04) < 1e-15);
-  // About one axis, the error of both is (1 - 0.5) times that of the elbow: not the root of the sum of squares.
+  // About one axis, the error of both is (1 - 0.5) times that of the elbow: not the root of the sum
+  // of squares.
   const auto X = arm.forest.lookup("upper", "hand", Query{});
   REQUIRE(X);
   CHECK(std::abs(X->covariance.stddev()[5] - 0.5 * 0.2) < 1e-12);
@@ -271,7 +272,8 @@ TEST_CASE("a partition comes back with its joints where they were") {
   }
   SECTION("the description has changed") {
     auto frames = arm.frames();
-    // Seen at rest: another origin. Not seen at rest: an axis the other way round, and another multiplier.
+    // Seen at rest: another origin. Not seen at rest: an axis the other way round, and another
+    // multiplier.
     JointSpec longer = *frames[1].joint;
     longer.joint = revolute_joint(along_x(2), {0, 0, 1});
     frames[1] = moved_by("upper", "base", longer);

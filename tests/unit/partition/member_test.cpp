@@ -1,4 +1,5 @@
-// What a participant has to store, publish, reply and tell because of what it hears and is asked for.
+// What a participant has to store, publish, reply and tell because of what it hears and is asked
+// for.
 
 #include "partition/member.hpp"
 

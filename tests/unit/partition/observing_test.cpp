@@ -21,7 +21,8 @@ using Way = ObservedEdge::Way;
 
 constexpr Time kNow{std::chrono::milliseconds(1500)};
 
-// world(robot) +- arm(arms) - hand(arms) - tool(tools), and leg(robot) beside. The process serves arms.
+// world(robot) +- arm(arms) - hand(arms) - tool(tools), and leg(robot) beside. The process serves
+// arms.
 struct Known : Replica {
   explicit Known(Random& random) : Replica("arms"), partition("arms", 1, forest, directory) {
     directory.apply(presence_of("robot", 1, 1), kNow);

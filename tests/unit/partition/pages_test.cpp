@@ -172,7 +172,8 @@ TEST_CASE("a replica fed with the pages in order has the owner's structure") {
   int late_has_all = 0;
   constexpr int kSteps = 3000;
   for (int step = 0; step < kSteps; ++step) {
-    // Several changes at a time, some of the same frame: it may have left one page for another between.
+    // Several changes at a time, some of the same frame: it may have left one page for another
+    // between.
     std::string id = "f" + std::to_string(random.index(300));
     for (std::size_t changes = 1 + random.index(3); changes > 0; --changes) {
       if (random.index(3) > 0) id = "f" + std::to_string(random.index(300));

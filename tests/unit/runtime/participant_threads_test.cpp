@@ -33,7 +33,8 @@ std::vector<std::string> structure(Client& client) {
   return lines;
 }
 
-// What one caller does: to its own frames, so that it knows what must succeed, and to one that all fight over.
+// What one caller does: to its own frames, so that it knows what must succeed, and to one that all
+// fight over.
 void work(Client& client, const std::string& name, std::uint64_t seed, std::string& wrong) {
   Random random(seed);
   const auto expect = [&wrong](const auto& result) {

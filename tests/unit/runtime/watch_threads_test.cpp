@@ -1,4 +1,5 @@
-// What readers of a watched path see while it changes under them: one of its legal transforms, always.
+// What readers of a watched path see while it changes under them: one of its legal transforms,
+// always.
 
 #include <atomic>
 #include <chrono>

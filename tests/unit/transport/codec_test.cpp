@@ -238,7 +238,8 @@ wire::Transform bad_transform(const BadValue& bad) {
   return x_pc;
 }
 
-// A request whose frames are called hand, but for the one with the bad value, which is called culprit.
+// A request whose frames are called hand, but for the one with the bad value, which is called
+// culprit.
 std::vector<wire::Request> requests_with(const wire::Transform& bad) {
   const std::vector<EdgeUpdate> edges{{"hand", {}}, {"culprit", {}}};
   const auto of = [](const std::string& id, auto body) {

@@ -21,7 +21,8 @@ CommonError common_error(double size) {
   return {"s", false, loading};
 }
 
-// Both edges have the same size of the source, or are exact: along x the chain has twice of that, and never once.
+// Both edges have the same size of the source, or are exact: along x the chain has twice of that,
+// and never once.
 struct Reader {
   std::string finding;
   std::atomic<int> answers{0};

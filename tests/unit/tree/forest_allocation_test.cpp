@@ -31,8 +31,8 @@ void plant_chain(Forest& forest) {
   }
 }
 
-// Allocations of 1000 calls after as many to warm up; -1 if a call failed. Superseded versions and the
-// lists of them find their size in the warm-up.
+// Allocations of 1000 calls after as many to warm up; -1 if a call failed. Superseded versions and
+// the lists of them find their size in the warm-up.
 template <class Call>
 std::int64_t allocations_of(const Call& call) {
   bool ok = true;

@@ -264,7 +264,8 @@ TEST_CASE("update by handle reaches the frame that was found") {
 TEST_CASE("a handle outlives moves but not its frame") {
   Forest forest;
   plant(forest);
-  // With a frame waiting for it the id stays interned while the frame is away; without one it does not.
+  // With a frame waiting for it the id stays interned while the frame is away; without one it does
+  // not.
   const bool waited_for = GENERATE(false, true);
   CAPTURE(waited_for);
   if (waited_for) REQUIRE(forest.put_remote("far", "mast", 1));

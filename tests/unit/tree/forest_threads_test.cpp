@@ -38,8 +38,9 @@ Transform saying(int k) {
           Covariance::trusted(upper)};
 }
 
-// The k that all `edges` edges of a path say; -1 if they do not say the same. By Cauchy and Schwarz the
-// sum of squares tells: edges · Σk² = (Σk)² only where all k are equal. All numbers are exact in a double.
+// The k that all `edges` edges of a path say; -1 if they do not say the same. By Cauchy and Schwarz
+// the sum of squares tells: edges · Σk² = (Σk)² only where all k are equal. All numbers are exact
+// in a double.
 int one_saying(const Transform& X, int edges) {
   const Eigen::Vector3d sum = X.pose.translation();
   const bool one = edges * sum.z() == sum.x() * sum.x() &&
@@ -154,8 +155,8 @@ void churn_leaves(Forest& forest, std::atomic<int>& newest, const std::function<
   }
 }
 
-// Another moves a subtree to and fro. The value fits only the new parent: a reader that takes one with
-// the other's gets 4000 or 6000.
+// Another moves a subtree to and fro. The value fits only the new parent: a reader that takes one
+// with the other's gets 4000 or 6000.
 void churn_tool(Forest& forest, const std::atomic<bool>& stop, Finding& finding) {
   for (int i = 0; !stop.load(std::memory_order_acquire); ++i) {
     const bool right = i % 2 == 0;

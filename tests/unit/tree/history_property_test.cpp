@@ -11,8 +11,8 @@
 #include "support/random.hpp"
 #include "tree/forest.hpp"
 
-// The forest beside one that keeps everything in maps, looks for it anew each time, and knows no limits but by its own
-// arithmetic.
+// The forest beside one that keeps everything in maps, looks for it anew each time, and knows no
+// limits but by its own arithmetic.
 namespace tfdude {
 namespace {
 
@@ -141,7 +141,8 @@ TEST_CASE("100,000 lookups at random instants agree with an oracle that keeps ev
   int answered = 0;
   for (int lookups = 0; lookups < 100'000;) {
     now += static_cast<std::int64_t>(random.index(120));
-    // Static ones stay so, the others move in batches of one stamp, sometimes late, far ahead or twice.
+    // Static ones stay so, the others move in batches of one stamp, sometimes late, far ahead or
+    // twice.
     std::vector<EdgeUpdate> batch;
     std::int64_t stamp = now;
     const std::size_t kind = random.index(20);

@@ -11,7 +11,8 @@
 #include "support/random.hpp"
 #include "tree/forest.hpp"
 
-// Readers of history while it is written: ring buffers grow, wrap round, are copied for late samples, and go.
+// Readers of history while it is written: ring buffers grow, wrap round, are copied for late
+// samples, and go.
 namespace tfdude {
 namespace {
 

@@ -1,4 +1,5 @@
-// Stamps that cannot be believed: of the future, of a clock that has jumped back, at the ends of the type.
+// Stamps that cannot be believed: of the future, of a clock that has jumped back, at the ends of
+// the type.
 
 #include <chrono>
 #include <limits>
