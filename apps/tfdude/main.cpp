@@ -96,39 +96,41 @@ void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen) {
   add_ends(lookup, arguments);
   lookup->add_flag("--cov", arguments.covariance, "print the full covariance");
   add_stamp(lookup, "--at", arguments.stamp,
-            "of which instant: seconds since the epoch or, negative, before now");
-  auto* fixed = lookup->add_option("--fixed", arguments.fixed,
-                                   "a frame that is taken as fixed between --at, of A, and --at-b");
-  add_stamp(lookup, "--at-b", arguments.other_stamp, "of which instant B is");
+            "the instant: seconds since the epoch or, negative, before now");
+  auto* fixed =
+      lookup->add_option("--fixed", arguments.fixed,
+                         "frame that does not move between --at (for A) and --at-b (for B)");
+  add_stamp(lookup, "--at-b", arguments.other_stamp, "the instant for B; --at is for A");
   lookup->get_option("--at-b")->needs(fixed);
   add_milliseconds(lookup, "--extrapolate", arguments.extrapolate_ms,
-                   "how far an edge may be taken to go on beyond its newest sample");
+                   "how far to extrapolate beyond an edge's newest sample");
   lookup->add_flag("--age-noise", arguments.age_noise,
-                   "add the process noise of the edges from then until now");
-  lookup->add_option("--order", arguments.order, "how far covariance is propagated")
+                   "add the edges' process noise from --at until now");
+  lookup->add_option("--order", arguments.order, "order of covariance propagation: 2 or 4")
       ->check(CLI::IsMember({2, 4}));
   add_milliseconds(lookup, "--wait", arguments.wait_ms, "how long to wait for frames and data");
 }
 
 // Those that go on and on.
 void add_following_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
-  auto* watch = add_command(app, "watch", "follow what the owners of a path push",
+  auto* watch = add_command(app, "watch", "follow a path: its owners push what changes",
                             "watch world hand_left --rate 5", cli::run_watch, chosen);
-  auto* echo = add_command(app, "echo", "the same on one page: position, angles, uncertainty, age",
-                           "echo world hand_left", cli::run_echo, chosen);
+  auto* echo =
+      add_command(app, "echo", "follow a path on one page: position, angles, deviations, age",
+                  "echo world hand_left", cli::run_echo, chosen);
   for (CLI::App* command : {watch, echo}) {
     add_ends(command, arguments);
-    add_rate(command, arguments.rate, "lines a second, and how often an owner sends at most [Hz]");
+    add_rate(command, arguments.rate, "output rate, and the owners' highest rate of sending [Hz]");
     command->add_flag("--composed", arguments.composed,
-                      "have each owner send its part of the path as one transform");
+                      "each owner sends its part of the path as one transform");
   }
   watch->add_flag("--cov", arguments.covariance, "print the full covariance");
-  auto* monitor = add_command(app, "monitor", "rate, age and jitter of all moving edges",
+  auto* monitor = add_command(app, "monitor", "rate, age and jitter of all dynamic edges",
                               "monitor --once", cli::run_monitor, chosen);
-  add_rate(monitor, arguments.rate, "how often a second [Hz]");
+  add_rate(monitor, arguments.rate, "output rate [Hz]");
   monitor->add_flag("--once", arguments.once, "print it once");
-  add_id(add_command(app, "history", "what is kept of an edge's history", "history hand_left",
-                     cli::run_history, chosen),
+  add_id(add_command(app, "history", "an edge's history: samples, rate, age, refusals",
+                     "history hand_left", cli::run_history, chosen),
          arguments);
 }
 
@@ -150,12 +152,13 @@ void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
 }
 
 void add_measuring_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
-  auto* observe = add_command(app, "observe", "take a measurement of B in A into account",
-                              "observe world tool --xyz 0.8 0.1 1.1 --stddev 1e-3 1e-3 1e-3 "
-                              "2e-3 2e-3 2e-3",
-                              cli::run_observe, chosen);
+  auto* observe =
+      add_command(app, "observe", "correct the edges of a path by a measurement of B in A",
+                  "observe world tool --xyz 0.8 0.1 1.1 --stddev 1e-3 1e-3 1e-3 "
+                  "2e-3 2e-3 2e-3",
+                  cli::run_observe, chosen);
   add_ends(observe, arguments);
-  auto* fuse = add_command(app, "fuse", "merge a measurement with what an edge holds",
+  auto* fuse = add_command(app, "fuse", "fuse a measurement of an edge with its value",
                            "fuse camera --xyz 0.1 0 0.3 --stddev 1e-3 1e-3 1e-3 2e-3 2e-3 2e-3",
                            cli::run_fuse, chosen);
   add_id(fuse, arguments);
@@ -165,24 +168,25 @@ void add_measuring_commands(CLI::App& app, Arguments& arguments, Command& chosen
               "when it was measured: seconds since the epoch or, negative, before now");
     command
         ->add_option("--gate", arguments.observe.gate,
-                     "which part of right measurements is accepted; 1: all, however far")
+                     "chi-squared gate probability; 1: accept all")
         ->check([](const std::string& text) {
           const double gate = std::strtod(text.c_str(), nullptr);
           return gate > 0 && gate <= 1 ? "" : text + " is not above 0 and at most 1";
         });
     command->add_flag_callback(
         "--correlated", [&arguments] { arguments.observe.independent = false; },
-        "it may have to do with what the edges hold: by covariance intersection");
+        "possibly correlated with the edges: use covariance intersection");
   }
 }
 
 void add_correlate_command(CLI::App& app, Arguments& arguments, Command& chosen) {
   auto* correlate =
-      add_command(app, "correlate", "say how an edge's error is correlated with those of others",
+      add_command(app, "correlate", "declare how an edge's error is correlated with others",
                   "correlate elbow --source supply 0 0 0 0 0 0.002", cli::run_correlate, chosen);
   add_id(correlate, arguments);
-  correlate->add_flag("--unknown", arguments.unknown,
-                      "its own part may be correlated with anything; else it is independent");
+  correlate->add_flag(
+      "--unknown", arguments.unknown,
+      "the edge's own error may be correlated with any other; default: independent");
   correlate
       ->add_option(
           "--source", arguments.sources,
@@ -222,10 +226,10 @@ void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
   add_ends(plot, arguments);
   add_out(plot, arguments, {".svg", ".png"});
   plot->add_option("--samples", arguments.samples,
-                   "how many points to draw from the uncertainty of the single edges")
+                   "number of points to sample from the edges' errors")
       ->check(CLI::Range(1, 100000));
   add_stamp(plot, "--at", arguments.stamp,
-            "of which instant: seconds since the epoch or, negative, before now");
+            "the instant: seconds since the epoch or, negative, before now");
   auto* graph = add_command(app, "graph", "draw all frames with their owners, ages, deviations",
                             "graph --out frames.svg", cli::run_graph, chosen);
   add_out(graph, arguments, {".svg", ".png", ".dot"});
@@ -234,11 +238,13 @@ void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
 void add_joint_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   add_command(app, "joints", "list all joints: positions, limits, what they follow", "joints",
               cli::run_joints, chosen);
-  auto* joint = add_command(app, "joint", "say where a joint is",
+  auto* joint = add_command(app, "joint", "set the position of a joint",
                             "joint shoulder_pan_joint 0.5 --stddev 0.001", cli::run_joint, chosen);
   joint->add_option("NAME", arguments.id, "the joint")->required();
   joint->add_option("POSITION", arguments.position, "its position [rad or m]")->required();
-  joint->add_option("--stddev", arguments.joint_stddev, "standard deviation of that [rad or m]")
+  joint
+      ->add_option("--stddev", arguments.joint_stddev,
+                   "standard deviation of the position [rad or m]")
       ->check([](const std::string& text) {
         const double stddev = std::strtod(text.c_str(), nullptr);
         return stddev >= 0 && stddev <= 1e9 ? "" : text + " is not within 0 to 1e9";
@@ -248,7 +254,7 @@ void add_joint_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
 }
 
 void add_events_command(CLI::App& app, Command& chosen) {
-  add_command(app, "events", "tell what changes: partitions that come and go, frames, conflicts",
+  add_command(app, "events", "print changes: partitions that come and go, frames, conflicts",
               "--json events", cli::run_events, chosen);
 }
 
@@ -259,7 +265,7 @@ void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen)
   add->add_option("--parent", arguments.parent, "its parent")->required();
   add->add_option("--partition", arguments.partition, "its owner, if not its parent's");
   add_pose_options(*add, arguments);
-  auto* update = add_command(app, "update", "give parts of an edge new values; the rest stays",
+  auto* update = add_command(app, "update", "set parts of an edge; the other parts stay",
                              "update tool --rpy 0 0 1.57", cli::run_update, chosen);
   add_id(update, arguments);
   add_pose_options(*update, arguments);
@@ -268,12 +274,12 @@ void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen)
   add_id(add_command(app, "remove", "remove a frame and all below it", "remove tool",
                      cli::run_remove, chosen),
          arguments);
-  add_command(app, "forget", "keep nothing of a partition that is gone for good", "forget arm",
-              cli::run_forget, chosen)
-      ->add_option("PARTITION", arguments.id, "the partition; refused while it is there")
+  add_command(app, "forget", "drop all that is kept of a partition that will not return",
+              "forget arm", cli::run_forget, chosen)
+      ->add_option("PARTITION", arguments.id, "the partition; refused while it is reachable")
       ->required();
-  auto* move = add_command(app, "move", "hang a frame under a new parent",
-                           "move tool --parent arm_2", cli::run_move, chosen);
+  auto* move = add_command(app, "move", "move a frame to a new parent", "move tool --parent arm_2",
+                           cli::run_move, chosen);
   add_id(move, arguments);
   move->add_option("--parent", arguments.parent, "the new parent")->required();
   add_pose_options(*move, arguments);
@@ -296,7 +302,7 @@ int main(int argc, char** argv) {
   Command command;
   long timeout_ms = arguments.options.timeout.count();
   CLI::App app{"tfdude: where is frame B seen from frame A, and how sure are we?"};
-  app.footer("Exit status: 0 done, 1 the service said no, 2 wrong usage, 3 no answer.");
+  app.footer("Exit status: 0 done, 1 request rejected, 2 wrong usage, 3 no answer.");
   app.require_subcommand(1);
   app.fallthrough();
   add_common_options(app, arguments, timeout_ms);

@@ -171,7 +171,7 @@ Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTr
   auto down = ancestors(by_id, arguments.other);
   if (up.empty() || down.empty() || up.back() != down.back()) {
     return fail(Errc::kNotOwner, "the frames between " + quote(arguments.id) + " and " +
-                                     quote(arguments.other) + " keep changing");
+                                     quote(arguments.other) + " change too often to be drawn");
   }
   while (up.size() > 1 && down.size() > 1 && up[up.size() - 2] == down[down.size() - 2]) {
     up.pop_back();

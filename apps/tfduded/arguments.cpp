@@ -39,7 +39,7 @@ class UrdfOptions {
  public:
   explicit UrdfOptions(CLI::App& app) : app_(app) {
     file_ = add("--urdf", "URDF file of a robot; may be given again. For the --urdf before them:");
-    root_ = add("--root", "the frame under which the robot's root link hangs");
+    root_ = add("--root", "parent frame of the robot's root link");
     prefix_ = add("--prefix", "before the names of all its links and joints");
     links_ = add("--links", "LINK or FROM..TO[..TO], separated by commas: these links only");
     strict_ = app.add_flag("--strict-limits", "refuse positions outside the joints' limits")
@@ -102,17 +102,18 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   app.add_option("--partition", arguments.partition, "the partition's name");
   app.add_option("--config", arguments.config, "YAML file of frames");
   app.add_flag("--check", arguments.check,
-               "only say what the configuration would change of the kept state");
+               "only print what the configuration would change in the stored state");
   const UrdfOptions urdfs(app);
   cli::add_network_options(app, arguments.options);
   auto* state = app.add_option("--state", arguments.options.state,
                                "directory in which to keep the frames "
                                "(default: $XDG_STATE_HOME/tfdude or ~/.local/state/tfdude)");
-  app.add_flag("--no-state", no_state, "keep nothing: begin with --config each time")
+  app.add_flag("--no-state", no_state, "store nothing: start from --config each time")
       ->excludes(state);
   app.add_flag("--sync", arguments.options.sync,
-               "what is stored survives a loss of power, too: each change waits for the disk");
-  app.add_option("--save-every", save_every_ms, "how often at most streamed values are stored [ms]")
+               "stored changes survive a loss of power: each waits for the disk");
+  app.add_option("--save-every", save_every_ms,
+                 "shortest time between two stores of streamed values [ms]")
       ->check(CLI::Range(1, 86'400'000));
   cli::require_numbers(app);
   try {

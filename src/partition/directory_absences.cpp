@@ -153,7 +153,7 @@ Result<void> Directory::check_not_there(const std::string& partition) const {
   // The own one counts as reachable.
   if (!number || !partitions_[*number].info.reachable) return {};
   return fail(Errc::kPartitionTaken,
-              "partition " + quote(partition) + " is there: stop it before it is forgotten");
+              "partition " + quote(partition) + " is reachable: stop it before you forget it");
 }
 
 Result<void> Directory::forget(const std::string& partition, std::uint64_t incarnation, Time now) {

@@ -57,8 +57,9 @@ Result<void> check_subtree(const Directory& directory, const std::vector<FrameIn
     if (frame.owner == kHeldHere || !directory.owes_change(frame.owner)) continue;
     auto ok = check_reachable(directory, frame.owner);
     if (ok)
-      ok = fail(Errc::kTimeout, "partition " + quote(directory.name(frame.owner)) + " is there");
-    ok.error().message += ", and what it has changed last has not come here: what hangs below " +
+      ok =
+          fail(Errc::kTimeout, "partition " + quote(directory.name(frame.owner)) + " is reachable");
+    ok.error().message += ", but its last change has not arrived here: which frames are below " +
                           quote(top) + " is not certain";
     return ok;
   }
@@ -216,7 +217,7 @@ Result<Part> route_move(const Forest& forest, const Directory& directory, const 
     if (auto ok = check_value(id, *request.X_PC); !ok) return tl::unexpected(ok.error());
   }
   if (id == request.parent) {
-    return fail(Errc::kCycle, "frame " + quote(id) + " cannot hang under itself");
+    return fail(Errc::kCycle, "frame " + quote(id) + " cannot be its own parent");
   }
   if (!request.parent.empty() && !forest.exists(request.parent)) {
     return fail(Errc::kUnknownParent,
@@ -224,7 +225,7 @@ Result<Part> route_move(const Forest& forest, const Directory& directory, const 
   }
   for (auto above = forest.info(request.parent); above; above = forest.info(above->parent)) {
     if (above->id == id) {
-      return fail(Errc::kCycle, "frame " + quote(id) + " cannot hang under " +
+      return fail(Errc::kCycle, "frame " + quote(id) + " cannot be moved under " +
                                     quote(request.parent) + ", which lies below it");
     }
   }

@@ -14,8 +14,7 @@ Error unsaved(const Reply& reply, const Error& why) {
   const auto* error = std::get_if<Error>(&reply.body);
   if (error != nullptr) return error->code == Errc::kState ? *error : why;
   if (why.code != Errc::kState) return why;
-  return {why.code,
-          "changed, but not stored, and others are not told before it is: " + why.message};
+  return {why.code, "changed, but not stored; others hear of it once it is stored: " + why.message};
 }
 
 }  // namespace
@@ -68,9 +67,9 @@ Result<void> CommitLoop::flush(Clock::time_point deadline) {
   const bool in_time = done_.wait_until(
       lock, deadline, [&]() TFDUDE_REQUIRES(mutex_) { return ended_ || done_up_to_ >= mine; });
   if (stored_up_to_ >= mine) return {};
-  if (!in_time) return fail(Errc::kTimeout, "changed, but not stored within the time for it");
+  if (!in_time) return fail(Errc::kTimeout, "changed, but not stored in time");
   if (failure_) return tl::unexpected(unsaved(Reply{}, *failure_));
-  return fail(Errc::kState, "changed, but not stored: this process leaves");
+  return fail(Errc::kState, "changed, but not stored: this process ends");
 }
 
 std::optional<Error> CommitLoop::failure() const {

@@ -100,9 +100,9 @@ Error Discovery::undecided(const std::string& what, const Deadline& deadline) {
     if (const std::string* partition = structure_.directory.incomplete()) {
       missing = "partition " + quote(*partition) + " has not told all of its frames yet";
     } else if (const std::string* late = structure_.directory.behind()) {
-      missing = "partition " + quote(*late) + " has made a change that has not come here yet";
+      missing = "partition " + quote(*late) + " has made a change that has not arrived here yet";
     } else if (transport_.awaits_presence()) {
-      missing = "somebody was met who has not told yet what it owns";
+      missing = "a participant was met that has not said yet what it owns";
     } else if (!structure_.directory.reachable_owners().empty()) {
       missing = "there may be others who were not met yet";
     }

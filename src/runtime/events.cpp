@@ -105,7 +105,7 @@ std::optional<Waiting> Events::State::next(Lock& lock) {
   if (waiting.empty()) {
     Change change{ChangeKind::kMissed, {}, {}, {}, {}, {}, {}};
     change.message = std::to_string(std::exchange(missed, 0)) +
-                     " changes were not told: the listeners take too long";
+                     " changes were dropped: the listeners are too slow";
     return Waiting{std::move(change), last_subscriber};
   }
   Waiting first = std::move(waiting.front());

@@ -80,7 +80,7 @@ Result<std::vector<JointInfo>> JointCalls::list(const std::string& partition) {
     const bool end = more->size() < kMaxItems;
     if (!more->empty() && more->back().name <= last) {
       return fail(Errc::kInvalidInput,
-                  "partition " + quote(partition) + " tells the same joints again and again");
+                  "partition " + quote(partition) + " repeats the same joints");
     }
     std::move(more->begin(), more->end(), std::back_inserter(all));
     if (end) return all;

@@ -22,19 +22,19 @@ std::string who(const Presence& one) {
 
 void log_outcome(const Outcome& outcome, const std::string& own) {
   for (const Directory::Outdated& one : outcome.outdated) {
-    log().warn("what process {} of partition {} says is passed over, as process {} was later",
+    log().warn("messages of process {} of partition {} are ignored, as process {} is newer",
                one.incarnation, quote(one.partition), one.latest);
   }
-  if (outcome.appeared) log().info("partition {} is there", who(*outcome.appeared));
+  if (outcome.appeared) log().info("partition {} is reachable", who(*outcome.appeared));
   if (outcome.stopped) log().info("partition {} was stopped", who(*outcome.stopped));
   if (outcome.lost)
-    log().info("partition {} is lost: it is not heard any more", quote(*outcome.lost));
+    log().info("partition {} is lost: no message for too long", quote(*outcome.lost));
   if (outcome.rival)
-    log().error("partition {} is served by another process, too", who(*outcome.rival));
+    log().error("partition {} is also served by another process", who(*outcome.rival));
   if (!outcome.overtook) return;
   log().warn(
-      "others have known a later process of partition {}, whose clock was ahead: this one takes "
-      "its place",
+      "others knew a newer process of partition {}, whose clock was ahead; this one replaces "
+      "it",
       quote(own));
 }
 
@@ -224,7 +224,7 @@ std::optional<Error> MemberRunner::refusal() const {
   if (!failure) return std::nullopt;
   return Error{failure->code,
                "partition " + quote(name_) +
-                   " changes nothing before it can store what it has changed: " + failure->message};
+                   " accepts no changes until it can store the last ones: " + failure->message};
 }
 
 Error MemberRunner::unless_unsaved(Error error, const std::string& id) {

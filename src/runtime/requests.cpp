@@ -29,7 +29,7 @@ void Requests::await_change(const Part& part, const Reply& reply, const Deadline
   structure_.directory.told_of(part.owner, epoch);
   if (arrived) return;
   discovery_.fell_behind();
-  log().warn("partition {} has made a change that has not come here within {}",
+  log().warn("partition {} has made a change that has not arrived here within {}",
              quote(part.partition), deadline.text());
 }
 

@@ -167,7 +167,7 @@ bool Watches::ask(const Path& path, WatchRoute& route, std::optional<Time> from)
     path->interrupt(error != nullptr
                         ? *error
                         : Error{Errc::kNotOwner, "partition " + quote(route.sources[i].partition) +
-                                                     " has started anew, or cannot push"});
+                                                     " has restarted, or cannot push"});
   }
   return all;
 }
@@ -179,7 +179,7 @@ void Watches::tell(const Path& path, std::string what) {
 
 void Watches::tell_rerouted(const Path& path) {
   tell(path, "the path from " + quote(path->a()) + " to " + quote(path->b()) +
-                 " is followed anew, over " + std::to_string(path->edge_count()) + " edges");
+                 " has a new route, over " + std::to_string(path->edge_count()) + " edges");
 }
 
 void Watches::close_unused(const std::vector<Path>& paths) {

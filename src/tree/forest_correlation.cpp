@@ -98,7 +98,7 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
     if (edge.commit <= seen) return {};
     return fail(Errc::kChangedMeanwhile, who + " was written while it was observed");
   }
-  if (!stamp) return fail(Errc::kChangedMeanwhile, who + " is moving since it was observed");
+  if (!stamp) return fail(Errc::kChangedMeanwhile, who + " became dynamic since it was observed");
   const std::int64_t at = nanoseconds(*stamp);
   if (auto ok = check_ahead(edge, at); !ok) return ok;
   const std::uint64_t place = edge.samples->place_of(at);

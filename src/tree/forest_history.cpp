@@ -59,7 +59,7 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
   if (!moving) return kAlways;
   if (!clock_.is_there()) {
     return fail(Errc::kInvalidInput, "frame " + quote(frames_.newest_value(slots[0]).name->text) +
-                                         " is moving: its update needs a stamp");
+                                         " is dynamic: its update needs a stamp");
   }
   // Where the clock was set back, time goes on as little as it can.
   return newest == kAlways ? clock_.now() : std::max(clock_.now(), saturating_add(newest, 1));

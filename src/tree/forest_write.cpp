@@ -34,14 +34,14 @@ Forest::Impl::Pair Forest::Impl::newest_pair(std::string_view id, std::string_vi
 
 Result<void> Forest::Impl::check_no_cycle(const Pair& pair) const {
   if (pair.id == pair.parent) {
-    return fail(Errc::kCycle, "frame " + quote(pair.id) + " cannot hang under itself");
+    return fail(Errc::kCycle, "frame " + quote(pair.id) + " cannot be its own parent");
   }
   const Version* above = pair.above;
   while (pair.frame != nullptr && above != nullptr && above != pair.frame) {
     above = above->parent == kNoSlot ? nullptr : &frames_.newest(above->parent);
   }
   if (pair.frame != nullptr && above == pair.frame) {
-    return fail(Errc::kCycle, "frame " + quote(pair.id) + " cannot hang under " +
+    return fail(Errc::kCycle, "frame " + quote(pair.id) + " cannot be moved under " +
                                   quote(pair.parent) + ", which lies below it");
   }
   return {};

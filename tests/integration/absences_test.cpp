@@ -157,7 +157,7 @@ TEST_CASE("absences: what is forgotten stays so for a daemon that was away") {
   Robot robot;
   const auto refused = robot.domain.cli({"forget", "arm"});
   CHECK(refused.status != 0);
-  CHECK_THAT(refused.err, ContainsSubstring("partition 'arm' is there"));
+  CHECK_THAT(refused.err, ContainsSubstring("partition 'arm' is reachable"));
   auto client = *Client::open(robot.domain.options());
   REQUIRE(client.exists("hand"));
   const std::string head_config = robot.directory.write(

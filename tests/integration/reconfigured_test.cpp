@@ -164,7 +164,7 @@ frames:
   - {id: hand, parent: wrist}
 )")});
   CHECK(cycle.status == 2);
-  CHECK_THAT(cycle.err, ContainsSubstring("cannot hang under 'wrist', which lies below it"));
+  CHECK_THAT(cycle.err, ContainsSubstring("cannot be moved under 'wrist', which lies below it"));
   CHECK(client.exists("wrist"));
 }
 

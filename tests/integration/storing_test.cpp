@@ -109,7 +109,7 @@ TEST_CASE("storing: of what a full disk does not take nothing is called done, or
   const auto removal = domain.cli({"remove", "kept"});
   CHECK(removal.status == 1);
   CHECK(removal.out.empty());
-  CHECK_THAT(removal.err, ContainsSubstring("changes nothing before it can store"));
+  CHECK_THAT(removal.err, ContainsSubstring("accepts no changes until it can store"));
   CHECK_THAT(removal.err, ContainsSubstring("disk is full"));
   CHECK(outcome(client.remove("kept")) == "state");
   CHECK(outcome(client.move("kept", "arm")) == "state");

@@ -202,7 +202,7 @@ TEST_CASE("a move is refused with the frame and the reason") {
   CHECK(said(arms.ask("hand", MoveRequest{"fist", {}})) ==
         "unknown_parent: no frame 'fist' to be the parent of 'hand'");
   CHECK(said(arms.ask("arm", MoveRequest{"tool", {}})) ==
-        "cycle: frame 'arm' cannot hang under 'tool', which lies below it");
+        "cycle: frame 'arm' cannot be moved under 'tool', which lies below it");
   CHECK(said(arms.ask("arm", MoveRequest{"\n", {}})).rfind("invalid_input: parent", 0) == 0);
   CHECK(arms.structure() == before);
   CHECK(arms.partition.take_pages().empty());

@@ -166,7 +166,7 @@ TEST_CASE("a removal is refused where a frame or an owner is not there") {
   known.directory.told_of(*known.directory.owner("legs"), 5);
   CHECK(message_of(route_remove(known.forest, known.directory, "hand")) ==
         kLegsLost +
-            std::string(", and what it has changed last has not come here: what hangs below "
+            std::string(", but its last change has not arrived here: which frames are below "
                         "'hand' is not certain"));
   CHECK(outcome(route_remove(known.forest, known.directory, "gem")) == "ok");
   known.directory.told_of(*known.directory.owner("arms"), 5);
@@ -232,8 +232,9 @@ TEST_CASE("a move that cannot succeed is not sent") {
   };
   CHECK(move("nobody", "base") == "unknown_frame: no frame 'nobody'");
   CHECK(move("hand", "fist") == "unknown_parent: no frame 'fist' to be the parent of 'hand'");
-  CHECK(move("arm", "gem") == "cycle: frame 'arm' cannot hang under 'gem', which lies below it");
-  CHECK(move("arm", "arm") == "cycle: frame 'arm' cannot hang under itself");
+  CHECK(move("arm", "gem") ==
+        "cycle: frame 'arm' cannot be moved under 'gem', which lies below it");
+  CHECK(move("arm", "arm") == "cycle: frame 'arm' cannot be its own parent");
   known.lose("legs");
   CHECK(move("foot", "hand") == std::string("unreachable: ") + kLegsLost);
   CHECK(move("hand", "foot") == "ok: ok");

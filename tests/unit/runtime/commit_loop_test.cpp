@@ -185,7 +185,7 @@ struct Running {
 };
 
 const std::string kUnsaved =
-    "changed, but not stored, and others are not told before it is: the disk is full";
+    "changed, but not stored; others hear of it once it is stored: the disk is full";
 
 }  // namespace
 

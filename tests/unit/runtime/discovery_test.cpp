@@ -67,7 +67,7 @@ TEST_CASE("discovery: before all are met nothing is said to be missing") {
              ContainsSubstring("no frame 'hand'") && ContainsSubstring("nobody was met yet"));
   newcomer.meeting.met_somebody = true;
   CHECK_THAT(newcomer.rig.discovery.await(soon).error().message,
-             ContainsSubstring("somebody was met who has not told yet what it owns"));
+             ContainsSubstring("a participant was met that has not said yet what it owns"));
   newcomer.meeting.met_all = true;
   CHECK(newcomer.rig.discovery.await(soon));
 }
@@ -116,7 +116,7 @@ TEST_CASE("discovery: a change that an owner has told of and has not come is wai
     newcomer.rig.structure.directory.told_of(*newcomer.rig.structure.directory.owner("arm"), 2);
   }
   CHECK_THAT(newcomer.rig.discovery.await(Deadline(10ms)).error().message,
-             ContainsSubstring("partition 'arm' has made a change that has not come here yet"));
+             ContainsSubstring("partition 'arm' has made a change that has not arrived here yet"));
   newcomer.rig.on_page(Page{"arm", 0, 1, 2, {{"hand", "", 1}, {"finger", "hand", 2}}});
   CHECK(newcomer.rig.discovery.await(Deadline(10s)));
 }

@@ -112,7 +112,7 @@ TEST_CASE("of changes beyond what may wait the number is told") {
   events.post(std::vector<Change>(Events::kMaxWaiting + 5, change("more")));
   heard.hold(false);
   REQUIRE(heard.hears(Events::kMaxWaiting + 2));
-  CHECK(heard.frames().back() == "5 changes were not told: the listeners take too long");
+  CHECK(heard.frames().back() == "5 changes were dropped: the listeners are too slow");
 }
 
 }  // namespace
