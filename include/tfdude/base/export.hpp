@@ -1,4 +1,4 @@
 #pragma once
 
-/// What the library offers to others: all else in it is hidden.
+/// /// Marks what the library exports; all other symbols are hidden.
 #define TFDUDE_EXPORT __attribute__((visibility("default")))

@@ -18,11 +18,11 @@ inline constexpr std::size_t kMaxIdBytes = 255;
 [[nodiscard]] TFDUDE_EXPORT Result<void> check_id(std::string_view id, std::string_view what);
 
 /// Checks a partition name: an id without the wildcards `*?[]` and without a comma, since the name
-/// is also the name of a DDS partition, where those mean something else.
+/// is also the name of a DDS partition, where those characters have a meaning.
 [[nodiscard]] TFDUDE_EXPORT Result<void> check_partition_name(std::string_view name);
 
-/// The text with every control character, and every byte that is not valid UTF-8, written as "\x07": fit for a
-/// terminal, where it comes from somebody else.
+/// Replaces control characters and bytes that are not valid UTF-8 by escapes such as "\x07". The
+/// result is safe for a terminal, also for text of unknown origin.
 [[nodiscard]] TFDUDE_EXPORT std::string printable(std::string_view text);
 
 /// The same in single quotes, fit for a message or a log line.

@@ -10,17 +10,18 @@
 
 namespace tfdude {
 
-/// What a Node that is opened with some frames would make of what is kept of its partition.
+/// The effect that opening a Node with some frames would have on its partition's stored state.
 struct ConfigPreview {
-  std::string file;        ///< in which that is kept; empty: nothing is kept
-  std::size_t frames = 0;  ///< that are kept now
+  std::string file;        ///< file of the stored state; empty: nothing is stored
+  std::size_t frames = 0;  ///< number of stored frames
   std::vector<ConfiguredChange> changes;
 };
 
-/// Says beforehand what Node::open() with these frames and options would change; serves nothing, meets nobody. It works on a
-/// copy of the state, which may be in use meanwhile and stays as it is. Of frames of other partitions that would
-/// wait for one that is removed it knows nothing.
-/// @return kState (naming the file), the first bad frame's error, as Node::open(). Thread-safe.
+/// Reports what Node::open() with these frames and options would change. Serves nothing and meets
+/// nobody. Works on a copy of the state, so the state may be in use and stays unchanged. Frames of
+/// other partitions whose parent would be removed are not reported.
+/// @return kState (naming the file), the error of the first invalid frame, as Node::open().
+///   Thread-safe.
 [[nodiscard]] TFDUDE_EXPORT Result<ConfigPreview> preview_config(
     const std::string& partition, const std::vector<FrameSpec>& frames, const Options& options);
 

@@ -11,22 +11,27 @@
 
 namespace tfdude {
 
-/// A process that owns a partition of the frames and serves it to others, from its own threads; the rest
-/// as for Client.
+/// A process that owns a partition and serves it to others, on its own threads. Otherwise as
+/// Client.
 class TFDUDE_EXPORT Node : public Client {
  public:
-  /// Joins a domain over DDS, makes sure that nobody serves the partition, takes the frames (in any order;
-  /// parents may be missing yet or belong to others) and serves them. With Options::state, what an
-  /// earlier process left of the partition is taken first; of the given frames those count that were not given,
-  /// or given differently, to the last process that was given any, and what was given then and is not now goes, but nothing
-  /// below it: that waits for it. No frames change nothing.
+  /// Joins a domain over DDS, makes sure that nobody else serves the partition, takes the frames
+  /// and serves them. The frames may be in any order, and parents may be missing or belong to
+  /// others.
   ///
-  /// Takes 0.4 s as a rule; 5 s and Options::discovery at most, where a predecessor still seems to be there.
+  /// With Options::state, the state that an earlier process left is loaded first. The given frames
+  /// are compared with those given to the last process that got any. Only new and changed frames
+  /// are applied. Frames that are no longer given are removed, but frames below them stay and wait
+  /// for them. An empty list changes nothing.
   ///
-  /// A Node learns, after a hang or a broken link, that another process has taken its partition since: it then
-  /// yields, reports a conflict without a frame, and answers every call with kPartitionTaken.
-  /// @return kPartitionTaken (naming host and process), kState (naming the file), the first bad frame's error,
-  ///   as Client::open.
+  /// Usually takes 0.4 s; at most 5 s plus Options::discovery, if a predecessor still seems to be
+  /// running.
+  ///
+  /// After a hang or a broken link, a Node may learn that another process has taken over its
+  /// partition. It then yields, reports a conflict without a frame, and answers every call with
+  /// kPartitionTaken.
+  /// @return kPartitionTaken (naming host and process), kState (naming the file), the error of the
+  ///   first invalid frame, errors of Client::open().
   [[nodiscard]] static Result<Node> open(const std::string& partition,
                                          const std::vector<FrameSpec>& frames = {},
                                          const Options& options = {});
@@ -37,7 +42,7 @@ class TFDUDE_EXPORT Node : public Client {
                                          const Options& options = {});
 
   [[nodiscard]] const std::string& partition() const;
-  /// How many frames the partition has.
+  /// The number of frames of the partition.
   [[nodiscard]] std::size_t own_frames() const;
 
  private:

@@ -9,15 +9,16 @@
 
 namespace tfdude {
 
-/// Keeps a listener listening; ends that when destroyed, or when another is assigned to it.
+/// Keeps a listener attached, until it is destroyed or another Subscription is assigned to it.
 ///
-/// @par Attach and detach  The listener may be called as soon as on_change() is, before that has returned. After
-///   ~Subscription has returned, and after ~Client has, whichever is first, the listener is not running and will not run:
-///   both wait for a call of it under way. Where the listener itself destroys its Subscription, another's, or the Client,
-///   that returns at once, and the listener is not called again. So a listener may use what lives longer than its
-///   Subscription, and the Client, and must not wait for a thread that destroys one of these. A Subscription that outlives
-///   its Client does nothing any more.
-/// @par Thread safety  Each Subscription is of one thread at a time.
+/// @par Attach and detach  The listener may be called as soon as on_change() is called, even before
+///   that returns. After ~Subscription or ~Client has returned, whichever is first, the listener is
+///   not running and will not run: both wait for a call of it under way. If the listener itself
+///   destroys its Subscription, another one, or the Client, the destructor returns at once, and the
+///   listener is not called again. So a listener may use what outlives its Subscription and the
+///   Client, and must not wait for a thread that destroys one of these. A Subscription that
+///   outlives its Client does nothing.
+/// @par Thread safety  Each Subscription may be used by one thread at a time.
 class Subscription {
  public:
   Subscription() = default;
@@ -32,12 +33,13 @@ class Subscription {
   std::shared_ptr<void> token_;
 };
 
-/// A lookup that waits for its data; cancelled when destroyed.
+/// A lookup that waits for its data. Destroying it cancels the lookup.
 ///
-/// @par Attach and detach  After cancel(), ~PendingLookup or ~Client has returned, the callback is not running and will
-///   not run: they wait for it where it runs, and return at once (20 ms at most) where it does not. Where the callback
-///   itself does one of these, that returns at once, too. A callback must not wait for a thread that does one of these.
-/// @par Thread safety  Each PendingLookup is of one thread at a time.
+/// @par Attach and detach  After cancel(), ~PendingLookup or ~Client has returned, the callback is
+///   not running and will not run. They wait for a running callback, and otherwise return at once
+///   (within 20 ms). If the callback itself does one of these, that also returns at once. A
+///   callback must not wait for a thread that does one of these.
+/// @par Thread safety  Each PendingLookup may be used by one thread at a time.
 class PendingLookup {
  public:
   using Callback = std::function<void(Result<StampedTransform>)>;
@@ -50,7 +52,7 @@ class PendingLookup {
   PendingLookup& operator=(PendingLookup&&) = default;
   ~PendingLookup() = default;
 
-  /// As destroying it.
+  /// Cancels the lookup, as its destructor does.
   void cancel() { task_.reset(); }
 
  private:

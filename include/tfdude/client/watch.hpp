@@ -16,29 +16,33 @@ namespace tfdude {
 
 class WatchedPath;
 
-/// A path whose owners push what changes on it, so that it is read from this process's memory. Watched as long as a copy of
-/// this lives; it may outlive the Client, and then gets nothing new.
-/// @par Thread safety  All functions.
+/// A path whose owners push its changes, so that it is read from this process's memory. It is
+/// watched while a copy of this object exists. It may outlive the Client, but then receives nothing
+/// new.
+/// @par Thread safety  All functions are thread-safe.
 class TFDUDE_EXPORT PathWatch {
  public:
   explicit PathWatch(std::shared_ptr<WatchedPath> path) : path_(std::move(path)) {}
 
-  /// X_AB at the newest instant that has come of all its moving edges. No network, lock or allocation. Always one of the
-  /// path's transforms: what an owner wrote at once is read in one piece; while the path takes another route, or an owner
-  /// starts again, it is the last one before.
-  /// @return as Forest::lookup; why, where the path does not exist any more, or is not known yet.
+  /// X_AB at the newest instant that all dynamic edges of the path have received. No network, lock
+  /// or allocation. The result is always a consistent transform of the path: an atomic update of
+  /// one owner is seen whole or not at all. While the path changes its route, or an owner restarts,
+  /// the last transform before that is returned.
+  /// @return as Client::lookup(); the reason, if the path does not exist any more or is not known
+  ///   yet.
   [[nodiscard]] Result<StampedTransform> latest() const { return lookup({}); }
   [[nodiscard]] Result<StampedTransform> at(Time t) const;
   [[nodiscard]] Result<StampedTransform> lookup(const Query& query) const;
 
-  /// Whether all owners of the path are there; while one is not, what it told last is still answered.
-  /// @return kUnreachable, naming the partition; while the path is not known, why.
+  /// Whether all owners of the path are reachable. While one is not, its last values are still
+  /// used.
+  /// @return kUnreachable, naming the partition; the reason, while the path is not known.
   [[nodiscard]] Result<void> health() const;
 
-  /// How many messages have come that said something new.
+  /// The number of received messages with new data.
   [[nodiscard]] std::uint64_t messages() const;
 
-  /// Waits until more have come than so many; false at the deadline.
+  /// Waits until messages() exceeds the given number; false at the deadline.
   [[nodiscard]] bool wait_for_more(std::uint64_t messages,
                                    std::chrono::steady_clock::time_point deadline) const;
 

@@ -10,26 +10,27 @@
 
 namespace tfdude {
 
-/// What a daemon's YAML file says. docs/configuration.md describes the keys.
+/// The content of a daemon's YAML file. docs/configuration.md describes the keys.
 struct Config {
-  std::string partition;  ///< empty where the file names none
-  EdgeTiming history;     ///< of frames that say nothing else
+  std::string partition;  ///< empty if the file names none
+  EdgeTiming history;     ///< default for frames without their own
   std::vector<FrameSpec> frames;
-  std::vector<std::string> places;  ///< where each of the frames is said, for messages
+  std::vector<std::string> places;  ///< where each of the frames is described, for messages
 };
 
-/// Reads a YAML file, and the URDFs that it names.
-/// @return kConfig naming the file and line: missing, not YAML, an unknown key, a wrong type, or what load_urdf() says;
-///   kInvalidInput naming the file, frame and field: a value that breaks its rule.
+/// Reads a YAML file and the URDF files that it names.
+/// @return kConfig naming the file and line: missing file, not YAML, unknown key, wrong type, or an
+///   error of load_urdf(); kInvalidInput naming the file, frame and field: an invalid value.
 [[nodiscard]] TFDUDE_EXPORT Result<Config> load_config(const std::string& path);
 
-/// The same from text; `name` stands for the path in messages, and its folder is that of relative URDFs.
+/// As load_config(), from text. `name` stands for the path in messages; relative URDF paths are
+/// relative to its folder.
 [[nodiscard]] TFDUDE_EXPORT Result<Config> parse_config(const std::string& text,
                                                         const std::string& name);
 
-/// Appends the frames of a URDF. The configuration is as it was where there is an error.
-/// @return what load_urdf() says; kInvalidInput naming the places of both: the id of a frame or the name of a joint that is
-///   taken; a cycle.
+/// Appends the frames of a URDF. On an error the configuration stays unchanged.
+/// @return errors of load_urdf(); kInvalidInput naming both places: a frame id or joint name that
+///   is taken; a cycle.
 [[nodiscard]] TFDUDE_EXPORT Result<void> add_urdf(Config& config, const UrdfPart& part);
 
 }  // namespace tfdude

@@ -11,37 +11,41 @@
 
 namespace tfdude {
 
-/// What is said of a joint beside its URDF.
+/// Settings of a joint that the URDF does not have.
 struct UrdfJoint {
-  /// Before the first sample [rad or m]; absent: rest_position(). A joint that mimics another has none of its own.
+  /// Before the first sample [rad or m]; absent: rest_position(). Not for a joint that mimics
+  /// another.
   std::optional<double> position{};
-  std::optional<double> stddev{};  ///< of that; absent: unmeasured_variance()
-  Covariance origin{};             ///< of its origin; of a fixed joint, too
+  /// Of the position [rad or m]; absent: the root of unmeasured_variance().
+  std::optional<double> stddev{};
+  Covariance origin{};  ///< covariance of the joint's origin; also for a fixed joint
 };
 
-/// A URDF file, or a part of it, and how it stands among the other frames.
+/// A URDF file, or a part of it, and its place among the other frames.
 struct UrdfPart {
   std::string file;
-  std::string
-      root{};  ///< the frame that the robot's root link hangs under; empty: that link is a root
+  std::string root{};    ///< parent frame of the robot's root link; empty: the link is a root
   Transform X_root{};    ///< of the root link in that frame
-  std::string prefix{};  ///< before the names of all links and joints
-  /// Which links: each entry LINK (it and all below it) or FROM..TO[..TO]: FROM and all below it, but nothing below a TO.
-  /// None: all.
+  std::string prefix{};  ///< prepended to the names of all links and joints
+  /// The links to load. Each entry is LINK (the link and all below it) or FROM..TO[..TO] (FROM and
+  /// all below it, but nothing below a TO). Empty: all links.
   std::vector<std::string> links{};
   bool strict_limits = false;
-  /// By the name in the file, without the prefix; of all joints of the robot, as one may be mimicked from within the part.
+  /// By the name in the file, without the prefix; for all joints of the robot, since a joint of the
+  /// part may mimic one outside it.
   std::map<std::string, UrdfJoint> joints{};
 };
 
-/// The frames of a robot's links, each moved by its joint, those above first. Links outside the part are not there; the edge
-/// to a link belongs to it, so that a part's topmost links hang under frames of others. Floating and planar joints are edges
-/// without a joint. What a URDF says beside frames may be broken.
-/// @return kConfig naming the file and line: not there, not a URDF; kInvalidInput naming the file, line and element: unknown
-///   parent link, two roots, a zero axis, limits upside down, a name that is taken, what a joint mimics is not there...
+/// Reads the frames of a robot's links, each moved by its joint, parents first. Links outside the
+/// part are left out. An edge belongs to its child link, so the topmost links of a part have
+/// parents outside it. Floating and planar joints become edges without a joint. URDF content other
+/// than frames and joints is ignored, even if it is malformed.
+/// @return kConfig naming the file and line: a missing file, not a URDF; kInvalidInput naming the
+///   file, line and element: unknown parent link, two roots, a zero axis, a lower limit above the
+///   upper, a name that is taken, an unknown joint in a mimic...
 [[nodiscard]] TFDUDE_EXPORT Result<std::vector<FrameSpec>> load_urdf(const UrdfPart& part);
 
-/// The same from text; part.file stands for it in messages.
+/// As load_urdf(), from text; part.file stands for the file in messages.
 [[nodiscard]] TFDUDE_EXPORT Result<std::vector<FrameSpec>> parse_urdf(const std::string& text,
                                                                       const UrdfPart& part);
 

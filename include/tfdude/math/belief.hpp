@@ -11,27 +11,28 @@
 
 namespace tfdude {
 
-/// How far covariance is propagated, in the counting of Barfoot & Furgale 2014: by order of the perturbation in the
-/// result's second moment.
+/// How far covariance is propagated. As in Barfoot & Furgale 2014, the order is that of the
+/// perturbation in the result's second moment.
 enum class Order : std::uint8_t { kSecond = 2, kFourth = 4 };
 
-/// 6xk, a column for each dimension of an error source: the perturbation for a deviation of one there. Three rows [m],
-/// three [rad].
+/// 6xk: one column per dimension of an error source, with the perturbation for a unit deviation
+/// there. Three rows [m], then three [rad].
 using Loading = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
-/// The most columns of a loading.
+/// Maximum number of columns of a loading.
 inline constexpr Eigen::Index kMaxLoadingColumns = 36;
 
-/// The most common errors that one error has a part of.
+/// Maximum number of common errors per error.
 inline constexpr std::size_t kMaxCommonErrors = 128;
 
-/// The part of an error that comes from a source which others depend on, too: F s, with the loading F and the source s of k
-/// independent dimensions of variance one, as in factor analysis. Where two loadings of a source differ in columns, the
-/// missing ones are zero.
+/// The part of an error that comes from a shared source: F s, with the loading F and the source s
+/// of k independent dimensions of variance one, as in factor analysis. If two loadings of a source
+/// differ in columns, the missing columns are zero.
 struct CommonError {
   std::string source;
-  /// It was taken off by an observation: of what is computed from common errors, this one is subtracted. The error of a path
-  /// that was observed is less than its edges' errors make it, each of which is hardly known better.
+  /// The part was removed by an observation: it is subtracted from what is computed from common
+  /// errors. After an observation the error of the path is smaller than the errors of its edges
+  /// make it, though each edge is hardly known better.
   bool subtracts = false;
   Loading loading;
 
@@ -41,48 +42,53 @@ struct CommonError {
   }
 };
 
-/// How the names of sources begin that observations make (observation.hpp).
+/// Prefix of the names of sources created by observations (observation.hpp).
 inline constexpr std::string_view kObservedPrefix = "observed:";
 
-/// Whether an observation has made the error's source.
+/// Whether the error's source was created by an observation.
 [[nodiscard]] TFDUDE_EXPORT bool is_observed(const CommonError& common_error);
 
-/// X_AB with all that is known of its error e = η + Σ F s + u, X = X̄ · Exp(e): what a path's segments must tell each
-/// other, so that what they have in common is counted once.
+/// X_AB with the full description of its error e = η + Σ F s + u, X = X̄ · Exp(e). The segments of
+/// a path exchange this, so that common errors are counted once.
 struct Belief {
   Pose pose;
-  Covariance own;  ///< of η, which is independent of all else
-  std::optional<Covariance>
-      unknown;  ///< of u, which may be correlated with anything; absent: there is none
-  std::vector<CommonError> common_errors;  ///< each source once for each sign
+  Covariance own;                     ///< of η, which is independent of everything else
+  std::optional<Covariance> unknown;  ///< of u, which may be correlated with anything; absent: none
+  std::vector<CommonError> common_errors;  ///< each source at most once per sign
 };
 
-/// X_BA. Exact: Exp(e)⁻¹ = Exp(-e), seen from the other side.
+/// X_BA. Exact: Exp(e)⁻¹ = Exp(-e), transported to the other side.
 [[nodiscard]] TFDUDE_EXPORT Belief inverse(const Belief& X_AB);
 
-/// X_AC. Own parts add up independently, common errors of one source column by column, and unknown parts by bound().
+/// X_AC. Own parts add up as independent, common errors of one source column by column, and unknown
+/// parts by bound().
 ///
-/// To fourth order the two errors' product Exp(e1) Exp(e2) is taken from the series of Baker, Campbell and Hausdorff, as
-/// in Barfoot & Furgale 2014, Eqs. 53 to 56, and their moments, where they are correlated, as those of a joint Gaussian
-/// (Isserlis, Stein): what that paper leaves out. The answer is the second moment about the product of the means, which
-/// differs from the mean by terms of second order if they are correlated, of fourth order if not. Unknown parts enter
-/// to second order only.
-/// Where that series gives no covariance, as it may for errors above half a radian, terms of sixth order are added. Beyond
-/// a radian it is no nearer to the truth than second order; docs/uncertainty.md has figures.
-/// Of X_WA⁻¹ X_WB where B's error was composed from A's, what is quadratic in A's common errors counts twice as own and
-/// does not cancel: there second order is right, and fourth is too large.
+/// To fourth order, the product of the two errors Exp(e1) Exp(e2) is taken from the
+/// Baker-Campbell-Hausdorff series, as in Barfoot & Furgale 2014, Eqs. 53 to 56. Correlated errors
+/// have the moments of a joint Gaussian (Isserlis, Stein), which that paper leaves out. The result
+/// is the second moment about the product of the means. That product differs from the mean by terms
+/// of second order if the errors are correlated, of fourth order if not. Unknown parts enter to
+/// second order only.
+/// For errors above half a radian the series may give no valid covariance; terms of sixth order are
+/// then added. Beyond a radian it is no more accurate than second order; docs/uncertainty.md has
+/// figures.
+/// In X_WA⁻¹ X_WB, where B's error was composed from A's, terms quadratic in A's common errors
+/// count twice as own and do not cancel. Second order is right there, and fourth is too large.
 [[nodiscard]] TFDUDE_EXPORT Belief compose(const Belief& X_AB, const Belief& X_BC, Order order);
 
-/// The transform with one covariance that stands for all of the belief: a bound, where parts are unknown.
+/// The transform with one covariance for the whole belief. It is an upper bound if the belief has
+/// unknown parts.
 [[nodiscard]] TFDUDE_EXPORT Transform collapse(const Belief& X_AB);
 
-/// No sum of two errors of these covariances has more than this, whatever their correlation (the product of two poses has,
-/// by terms of fourth order): (1 + 1/ε) A + (1 + ε) B, with the ε that makes the sum of both traces, of translation and
-/// of rotation, each in units of A + B, the smallest.
+/// An upper bound for the covariance of the sum of two errors with these covariances, whatever
+/// their correlation: (1 + 1/ε) A + (1 + ε) B. ε minimizes the sum of the traces of translation and
+/// rotation, each in units of A + B. The error of a product of two poses may exceed the bound by
+/// terms of fourth order.
 [[nodiscard]] TFDUDE_EXPORT Covariance bound(const Covariance& A, const Covariance& B);
 
-/// @return kInvalidInput: more than kMaxCommonErrors; naming the source: an empty name, one longer than an id, no column,
-///   more than kMaxLoadingColumns, a number that is not finite or beyond the root of kMaxVariance, one source twice.
+/// @return kInvalidInput: more than kMaxCommonErrors; naming the source: a name that is empty or
+///   longer than an id, no column, more than kMaxLoadingColumns, a number that is not finite or
+///   exceeds the root of kMaxVariance, a duplicate source.
 [[nodiscard]] TFDUDE_EXPORT Result<void> check_common_errors(
     const std::vector<CommonError>& common_errors);
 

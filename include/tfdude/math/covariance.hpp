@@ -10,18 +10,16 @@
 
 namespace tfdude {
 
-/// Largest variance that is accepted [m² or rad²]; with kMaxTranslation it keeps every chain
-/// finite.
+/// Largest accepted variance [m² or rad²]. With kMaxTranslation it keeps every chain finite.
 inline constexpr double kMaxVariance = 1e18;
 
 /// Covariance of the right perturbation X = X̄ · Exp(ξ), ξ = (ρ, θ): 6x6, translation first [m²,
-/// m·rad, rad²], expressed in the child frame. Symmetric by construction (the upper triangle is
-/// what is kept) and positive semi-definite to rounding at all times: what comes from outside
-/// enters through the from_...() functions.
+/// m·rad, rad²], expressed in the child frame. Always symmetric (only the upper triangle is stored)
+/// and positive semi-definite up to rounding: outside values must pass the from_...() functions.
 class TFDUDE_EXPORT Covariance {
  public:
   static constexpr std::size_t kSize = 21;
-  /// Upper triangle row by row: (0,0), (0,1) ... (0,5), (1,1) ... (5,5).
+  /// Upper triangle, row by row: (0,0), (0,1) ... (0,5), (1,1) ... (5,5).
   using Upper = std::array<double, kSize>;
 
   /// Zero: known exactly.
@@ -31,18 +29,20 @@ class TFDUDE_EXPORT Covariance {
   ///   element, not positive semi-definite, beyond kMaxVariance.
   [[nodiscard]] static Result<Covariance> from_matrix(const Matrix6d& matrix);
 
-  /// @return as from_matrix. Negative eigenvalues within 1e-9 of the scaled matrix, as decimal
-  ///   rounding makes them, are lifted to zero. Scaled is each axis by its own variance, but by no less
-  ///   than 1e-3 of the largest in its unit (m² or rad²): below 1e-12 of that one everything is taken
-  ///   for rounding, so that results of the library are accepted again, as a rule: where all of one unit is
-  ///   rounding of the other's, over a lever, nothing here can tell.
+  /// @return as from_matrix(). Negative eigenvalues within 1e-9 of the scaled matrix, as decimal
+  ///   rounding causes them, are raised to zero. Each axis is scaled by its own variance, but by no
+  ///   less than 1e-3 of the largest variance of its unit (m² or rad²). Values below 1e-12 of that
+  ///   largest variance count as rounding. So the library's own results are usually accepted again.
+  ///   An exception cannot be detected here: if, over a lever, all values of one unit are rounding
+  ///   errors of the other.
   [[nodiscard]] static Result<Covariance> from_upper(const Upper& upper);
 
   /// Independent errors along the six axes: three standard deviations [m], then three [rad].
   /// @return kInvalidInput naming the element: NaN, infinity, negative, beyond kMaxVariance.
   [[nodiscard]] static Result<Covariance> from_stddev(const std::array<double, 6>& stddev);
 
-  /// For results of the library's own computations: positive semi-definite to rounding.
+  /// For results of the library's own computations, which are positive semi-definite up to
+  /// rounding.
   [[nodiscard]] static Covariance trusted(const Upper& upper);
   [[nodiscard]] static Covariance trusted(const Matrix6d& symmetric);
 
@@ -51,8 +51,8 @@ class TFDUDE_EXPORT Covariance {
   /// Square roots of the diagonal: three [m], three [rad].
   [[nodiscard]] std::array<double, 6> stddev() const;
 
-  /// Ad(X) Σ Ad(X)ᵀ: the same error seen from the other side of X. Block form of the adjoint, 243
-  /// multiplications instead of 864 of two dense products.
+  /// Ad(X) Σ Ad(X)ᵀ: the same error expressed on the other side of X. Uses the block form of the
+  /// adjoint: 243 multiplications, instead of 864 for two dense products.
   [[nodiscard]] Covariance transported(const Pose& X) const;
 
   Covariance& operator+=(const Covariance& other);

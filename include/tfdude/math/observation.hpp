@@ -7,72 +7,79 @@
 #include "tfdude/base/export.hpp"
 #include "tfdude/math/belief.hpp"
 
-// A measurement of where one end of a path is seen from the other, and what it tells of the path's edges.
+// A measurement of the pose of one end of a path in the other, and its effect on the path's edges.
 namespace tfdude {
 
-/// An edge that an observation concerns.
+/// An edge affected by an observation.
 struct ObservedEdge {
   enum class Way : std::uint8_t {
-    kDown,    ///< the path goes from the parent to the child,
-    kUp,      ///< or from the child to the parent;
-    kBeside,  ///< or not along it, but its error has to do with that of an edge of the path by an earlier observation
+    kDown,    ///< the path goes from the parent to the child
+    kUp,      ///< the path goes from the child to the parent
+    kBeside,  ///< not on the path, but correlated with an edge of it by an earlier observation
   };
-  Belief X_PC;  ///< as its owner believes it to be
+  Belief X_PC;  ///< as its owner estimates it
   Way way = Way::kDown;
 };
 
-/// How a measurement is judged.
+/// How to judge a measurement.
 struct ObserveOptions {
-  /// Where a part of all right measurements above this would be refused: those whose squared Mahalanobis distance is
-  /// beyond this quantile of χ². 1: none is.
+  /// Probability with which a correct measurement is accepted: those with a squared Mahalanobis
+  /// distance beyond this quantile of χ² are refused. 1: accepts all.
   double gate = 0.999;
-  /// False: the measurement may have to do with what the edges' values come from; then by covariance intersection.
+  /// False: the measurement may be correlated with the values of the edges; covariance intersection
+  /// is used.
   bool independent = true;
 };
 
-/// What an observation says of one edge's covariance. Over many observations the mean of `squares` is that of `expected` if
-/// the covariance is right, and more if it is too small: the estimate of a variance component, v'Σ⁻¹v over its redundancy
-/// (Förstner, "Ein Verfahren zur Schätzung von Varianz- und Kovarianzkomponenten", 1979).
+/// What an observation shows about one edge's covariance. Over many observations the mean of
+/// `squares` is that of `expected` if the covariance is right, and greater if it is too small. This
+/// is the estimate of a variance component, v'Σ⁻¹v over its redundancy (Förstner, "Ein Verfahren
+/// zur Schätzung von Varianz- und Kovarianzkomponenten", 1979).
 struct NormalizedInnovation {
   double squares = 0;
   double expected = 0;
-  double variance = 0;  ///< of squares, where all is as believed
+  double variance = 0;  ///< of `squares`, if the covariances are right
 };
 
-/// One edge as it is after an observation.
+/// An edge after an observation.
 struct ObservedResult {
   Belief X_PC;
-  bool corrected = false;  ///< false: it is what it was
+  bool corrected = false;  ///< false: unchanged
   NormalizedInnovation innovation;
 };
 
 struct Observation {
-  double distance_squared = 0;        ///< of the measurement from what was believed, Mahalanobis
-  int dimensions = 0;                 ///< that it has a distance in
-  double limit = 0;                   ///< the gate's; infinite if there is none
+  /// Of the measurement from the estimate, squared Mahalanobis distance.
+  double distance_squared = 0;
+  int dimensions = 0;                 ///< of that distance
+  double limit = 0;                   ///< of the gate; infinite without a gate
   bool accepted = false;              ///< within the limit
-  std::vector<ObservedResult> edges;  ///< in the order given; corrected where accepted
+  std::vector<ObservedResult> edges;  ///< in the given order; corrected if accepted
 };
 
-/// Distributes a measurement of X_AB over the edges of the path from A to B: the most probable perturbations ξᵢ of all
-/// edges at once, of which Σ ξᵀ P⁻¹ ξ + eᵀ R⁻¹ e with e = Log(Z⁻¹ X_AB(ξ)) is least, by Gauss-Newton (an iterated
-/// Kalman update); P is the joint covariance that the edges' beliefs make. Edges without uncertainty stay as they are.
+/// Distributes a measurement of X_AB over the edges of the path from A to B. Finds the most
+/// probable perturbations ξᵢ of all edges at once, which minimize Σ ξᵀ P⁻¹ ξ + eᵀ R⁻¹ e with e =
+/// Log(Z⁻¹ X_AB(ξ)), by Gauss-Newton (an iterated Kalman update). P is the joint covariance of the
+/// edges' beliefs. Edges without uncertainty stay unchanged.
 ///
-/// What the edges know of each other afterwards is kept in common errors of a new source, which takes the place of those
-/// that earlier observations have left: so it is exact to first order for every path, and a second observation is not
-/// counted as if it were of edges with independent errors. Common errors of other sources are kept as a Schmidt-Kalman
-/// filter keeps them: what others hold of such a source need not change. An uncertain edge that is alone takes all of the
-/// correction, and needs none. More columns than a loading may have are left out so that no covariance becomes too small.
+/// The correlation between the edges afterwards is kept in common errors of a new source, which
+/// replaces those of earlier observations. So it is exact to first order for every path, and a
+/// second observation does not treat the edges' errors as independent. Common errors of other
+/// sources are kept as in a Schmidt-Kalman filter: what other edges hold of such a source need not
+/// change. A single uncertain edge takes all of the correction, and needs no new source. Columns
+/// beyond the maximum of a loading are dropped in such a way that no covariance becomes too small.
 ///
-/// Parts of unknown correlation count to the measurement's error: it is then not independent of the rest. An edge that is
-/// alone with such a part is corrected by covariance intersection.
+/// Parts of unknown correlation count as part of the measurement's error, which is then not
+/// independent of the rest. If such an edge is the only uncertain one, it is corrected by
+/// covariance intersection.
 /// O(edges · columns²).
-/// @param edges  those of the path in its order, and among them, anywhere, all others that depend on a source that an
-///   observation has made in common with them
+/// @param edges  the edges of the path in order, and, at any place among them, all others that
+///   share a source created by an observation with them
 /// @param Z_AB  the measurement
-/// @param source  the name of the new source: kObservedPrefix and something that no other observation has
-/// @return kInvalidInput: no edge has any uncertainty, several are of unknown correlation and no other is uncertain,
-///   a gate that is not within (0, 1], nothing that converges.
+/// @param source  the name of the new source: kObservedPrefix and a suffix unique to this
+///   observation
+/// @return kInvalidInput: no edge is uncertain; several edges are of unknown correlation and no
+///   other is uncertain; a gate outside (0, 1]; no convergence.
 [[nodiscard]] TFDUDE_EXPORT Result<Observation> observe(const std::vector<ObservedEdge>& edges,
                                                         const Transform& Z_AB,
                                                         const std::string& source,

@@ -3,31 +3,34 @@
 #include "tfdude/base/export.hpp"
 #include "tfdude/math/transform.hpp"
 
-// The same uncertainty in other conventions. The library's own is the right perturbation X = X̄ · Exp(ξ), ξ = (ρ, θ),
-// expressed in the child frame.
+// The same uncertainty in other conventions. The library itself uses the right perturbation X = X̄
+// · Exp(ξ), ξ = (ρ, θ), expressed in the child frame.
 namespace tfdude {
 
-/// Covariance of the left perturbation X = Exp(ξ) · X̄, expressed in the parent frame: Ad(X̄) Σ Ad(X̄)ᵀ. Exact, as
-/// X̄ · Exp(ξ) = Exp(Ad(X̄) ξ) · X̄. That of Barfoot & Furgale 2014.
+/// Covariance of the left perturbation X = Exp(ξ) · X̄, expressed in the parent frame: Ad(X̄) Σ
+/// Ad(X̄)ᵀ. Exact, since X̄ · Exp(ξ) = Exp(Ad(X̄) ξ) · X̄. The convention of Barfoot & Furgale
+/// 2014.
 [[nodiscard]] TFDUDE_EXPORT Covariance left_covariance(const Transform& X);
 
 /// The inverse of left_covariance().
 [[nodiscard]] TFDUDE_EXPORT Transform from_left_covariance(const Pose& X, const Covariance& left);
 
-/// Covariance as in ROS's geometry_msgs/PoseWithCovariance: of the child's origin p = p̄ + δp along the parent's axes
-/// [m], and of a rotation R = Exp(δθ) · R̄ about axes parallel to the parent's, fixed in the child's origin [rad]. First
-/// order, as p = p̄ + R̄ V(θ) ρ with V(θ) = 1 + θ×/2 + ...: δp = R̄ ρ, δθ = R̄ θ.
-/// @note Not the covariance of roll, pitch and yaw as numbers, which is the same only near the identity.
+/// Covariance as in ROS's geometry_msgs/PoseWithCovariance: of the child's origin p = p̄ + δp along
+/// the parent's axes [m], and of a rotation R = Exp(δθ) · R̄ about axes parallel to the parent's
+/// through the child's origin [rad]. First order: since p = p̄ + R̄ V(θ) ρ with V(θ) = 1 + θ×/2 +
+/// ..., δp = R̄ ρ and δθ = R̄ θ.
+/// @note This is not the covariance of the numbers roll, pitch and yaw, which is equal only near
+///   the identity.
 [[nodiscard]] TFDUDE_EXPORT Covariance ros_covariance(const Transform& X);
 
 /// The inverse of ros_covariance().
 [[nodiscard]] TFDUDE_EXPORT Transform from_ros_covariance(const Pose& X, const Covariance& ros);
 
-/// Jr(ξ), with Exp(ξ + δ) = Exp(ξ) · Exp(Jr(ξ) δ) for small δ, of any angle. Its power series, Solà et al.,
-/// arXiv:1812.01537, Eqs. 67 and 179. Jl(ξ) = Jr(-ξ).
+/// Jr(ξ), with Exp(ξ + δ) = Exp(ξ) · Exp(Jr(ξ) δ) for small δ; for any angle. Uses its power
+/// series, Solà et al., arXiv:1812.01537, Eqs. 67 and 179. Jl(ξ) = Jr(-ξ).
 [[nodiscard]] TFDUDE_EXPORT Matrix6d right_jacobian(const Twist& xi);
 
-/// ad(ξ), with ad(ξ) η = [ξ, η]: the bracket of se(3). Barfoot & Furgale 2014, Eq. 5.
+/// ad(ξ), with ad(ξ) η = [ξ, η], the Lie bracket of se(3). Barfoot & Furgale 2014, Eq. 5.
 [[nodiscard]] TFDUDE_EXPORT Matrix6d small_adjoint(const Twist& xi);
 
 }  // namespace tfdude

@@ -12,19 +12,19 @@ namespace tfdude {
 using Twist = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-/// Largest translation component that is accepted [m]: beyond the Moon's orbit, and small enough
-/// that no chain of edges can overflow.
+/// Largest accepted translation component [m]: beyond the Moon's orbit, and small enough that no
+/// chain of edges can overflow.
 inline constexpr double kMaxTranslation = 1e9;
 
-/// X_AB, the pose of frame B in frame A: p_A = X_AB · p_B. A rigid transform whose rotation is a
-/// unit quaternion at all times: what comes from outside enters through create().
-/// Trivially copyable, without alignment demands, so that it may be shared between builds.
+/// X_AB, the pose of frame B in frame A: p_A = X_AB · p_B. A rigid transform whose rotation is
+/// always a unit quaternion: outside values must pass create(). Trivially copyable and without
+/// alignment requirements, so that it may be shared between builds.
 class TFDUDE_EXPORT Pose {
  public:
   /// The identity.
   Pose() = default;
 
-  /// Checks what comes from outside.
+  /// Creates a pose from outside values, which it checks.
   /// @param rotation     R_AB; normalized if its norm is within 1e-3 of one
   /// @param translation  origin of B in A [m]
   /// @return kInvalidInput naming the field: NaN, infinity, not of unit length, beyond
@@ -32,7 +32,8 @@ class TFDUDE_EXPORT Pose {
   [[nodiscard]] static Result<Pose> create(const Eigen::Quaterniond& rotation,
                                            const Eigen::Vector3d& translation);
 
-  /// For results of the library's own computations: `rotation` is of unit length to rounding.
+  /// For results of the library's own computations: `rotation` must be of unit length up to
+  /// rounding.
   [[nodiscard]] static Pose trusted(const Eigen::Quaterniond& rotation,
                                     const Eigen::Vector3d& translation);
 
@@ -53,13 +54,13 @@ class TFDUDE_EXPORT Pose {
   double p_[3] = {0, 0, 0};
 };
 
-/// X_AC = X_AB · X_BC; the rotation is normalized again, so that chains do not drift.
+/// X_AC = X_AB · X_BC. The rotation is normalized again, so that chains do not drift.
 [[nodiscard]] TFDUDE_EXPORT Pose operator*(const Pose& X_AB, const Pose& X_BC);
 
 /// Exponential map, ξ = (ρ, θ) to SE(3). Solà et al., arXiv:1812.01537, Eqs. 172 and 174.
 [[nodiscard]] TFDUDE_EXPORT Pose exp(const Twist& xi);
 
-/// Logarithm with |θ| ≤ π; exact at identity and at π. Solà et al., arXiv:1812.01537, Eqs. 173,
+/// Logarithm with |θ| ≤ π; exact at the identity and at π. Solà et al., arXiv:1812.01537, Eqs. 173,
 /// 174.
 [[nodiscard]] TFDUDE_EXPORT Twist log(const Pose& X);
 
@@ -67,13 +68,13 @@ class TFDUDE_EXPORT Pose {
 /// Solà et al., arXiv:1812.01537, Eq. 175.
 [[nodiscard]] TFDUDE_EXPORT Matrix6d adjoint(const Pose& X);
 
-/// The matrix of the cross product: skew(a) b = a × b.
+/// The cross-product matrix: skew(a) b = a × b.
 [[nodiscard]] TFDUDE_EXPORT Eigen::Matrix3d skew(const Eigen::Vector3d& a);
 
-/// Rotation of fixed-axis angles as in URDF: R = Rz(yaw) · Ry(pitch) · Rx(roll) [rad].
+/// Rotation from fixed-axis angles as in URDF: R = Rz(yaw) · Ry(pitch) · Rx(roll) [rad].
 [[nodiscard]] TFDUDE_EXPORT Eigen::Quaterniond from_rpy(double roll, double pitch, double yaw);
 
-/// Inverse of from_rpy: (roll, pitch, yaw) [rad], pitch in [-π/2, π/2]; at ±π/2 roll is taken as 0.
+/// Inverse of from_rpy(): (roll, pitch, yaw) [rad], pitch in [-π/2, π/2]; at ±π/2 roll is set to 0.
 [[nodiscard]] TFDUDE_EXPORT Eigen::Vector3d to_rpy(const Eigen::Quaterniond& rotation);
 
 }  // namespace tfdude

@@ -7,15 +7,14 @@
 namespace tfdude {
 
 /// A pose X_AB with the covariance of its right perturbation, expressed in B: the value of an edge
-/// and the answer to a lookup. 28 doubles, trivially copyable; valid at all times, as its parts
-/// are.
+/// and the answer to a lookup. 28 doubles, trivially copyable; always valid, since its parts are.
 struct Transform {
   Pose pose;
   Covariance covariance;
 };
 
-/// For what did not come through the checked constructors of its parts, as the result of a computation may not
-/// be a number. Some nanoseconds.
+/// Checks values that did not pass the checked constructors, for example the result of a
+/// computation, which may be NaN. Takes some nanoseconds.
 /// @return kInvalidInput naming the field: NaN, infinity.
 [[nodiscard]] TFDUDE_EXPORT Result<void> check_finite(const Transform& X);
 

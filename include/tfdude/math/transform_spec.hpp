@@ -9,8 +9,8 @@
 
 namespace tfdude {
 
-/// A transform as people write it, in a configuration file or on the command line. What is left out
-/// is identity or zero.
+/// A transform as people write it, in a configuration file or on the command line. Omitted parts
+/// are identity or zero.
 struct TFDUDE_EXPORT TransformSpec {
   std::optional<std::array<double, 3>> xyz;     ///< translation [m]
   std::optional<std::array<double, 3>> rpy;     ///< fixed axes X, Y, Z as in URDF [rad]
@@ -21,7 +21,7 @@ struct TFDUDE_EXPORT TransformSpec {
   [[nodiscard]] bool empty() const { return !xyz && !rpy && !quat && !stddev && !cov; }
 
   /// @return kInvalidInput naming the field: both rpy and quat, both stddev and cov, or a field
-  ///   that Pose::create or Covariance refuse.
+  ///   that Pose::create() or Covariance refuses.
   [[nodiscard]] Result<Transform> build() const;
 };
 

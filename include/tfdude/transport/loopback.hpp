@@ -7,13 +7,13 @@
 
 namespace tfdude {
 
-/// A network inside one process: for tests, examples and programs that are one process. Whatever is sent
-/// is delivered before the call returns, in the caller's thread.
+/// A network inside one process, for tests, examples and single-process programs. Every message is
+/// delivered before the send returns, in the caller's thread.
 class TFDUDE_EXPORT LoopbackNetwork {
  public:
   LoopbackNetwork();
 
-  /// A participant's access to this network, which it keeps alive.
+  /// Creates a participant's access to this network. It keeps the network alive.
   [[nodiscard]] TransportPtr join();
 
  private:

@@ -6,11 +6,11 @@
 
 namespace tfdude {
 
-/// A participant's way to the others; made by LoopbackNetwork::join() or make_fastdds_transport(), and handed to
-/// Client::open() or Node::open(), which start it.
+/// A participant's connection to the others. Made by LoopbackNetwork::join() or
+/// make_fastdds_transport(), and passed to Client::open() or Node::open(), which start it.
 class Transport;
 
-/// Ends a transport.
+/// Deleter of a transport.
 struct TFDUDE_EXPORT TransportEnd {
   TransportEnd() = default;
   template <class Implementation>

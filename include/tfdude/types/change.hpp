@@ -14,29 +14,32 @@ enum class ChangeKind : std::uint8_t {
   kPartitionDown,
   kFrameAdded,
   kFrameRemoved,
-  kFrameMoved,  ///< hangs elsewhere, or belongs to another partition
+  kFrameMoved,  ///< is now under another parent, or has another owner
   kConflict,    ///< one of two partitions, or of two processes that serve one, had to yield
-  kHistoryRestarted,  ///< of a frame's edge, whose source's clock has jumped back; told by its owner's process only
-  kFrameOrphaned,   ///< waits for its parent, which that one's configuration names no more
-  kFrameTakenOver,  ///< belongs to a partition that is there, since the one that had it is not
-  kMissed,          ///< changes were not told, because the listeners took too long
+  /// The clock of an edge's source has jumped back; reported only by the owner's process.
+  kHistoryRestarted,
+  kFrameOrphaned,  ///< waits for its parent, which the parent's configuration no longer names
+  /// Now belongs to a reachable partition, since its former owner is not reachable.
+  kFrameTakenOver,
+  kMissed,  ///< changes were not reported, because the listeners took too long
 };
 
 /// The stable snake_case name of a kind, as the command line prints it in JSON.
 [[nodiscard]] TFDUDE_EXPORT std::string_view to_string(ChangeKind kind);
 
-/// Something that happened to the structure, as seen by one participant.
+/// A change of the structure, as one participant saw it.
 struct Change {
   ChangeKind kind = ChangeKind::kPartitionUp;
-  std::string partition;  ///< concerned: the frame's owner; of a conflict, who yielded
-  std::string frame;      ///< empty where it is about a partition
+  std::string partition;  ///< the frame's owner; for a conflict, the one that yielded
+  std::string frame;      ///< empty if the change concerns a partition
   std::string parent;     ///< of an added, moved or orphaned frame; empty: a root
-  /// Of a conflict: the partition that was yielded to; of an orphan: who had its parent; of a frame taken over: the
-  /// one that had it.
+  /// For a conflict: the partition that kept its claim. For an orphan: the former owner of its
+  /// parent. For a frame taken over: its former owner.
   std::string rival;
-  std::string message;   ///< for people
-  Time time{};           ///< by the clock of the participant that saw it
-  bool stopped = false;  ///< of a partition that is down: it has said so; else it was lost
+  std::string message;  ///< human-readable
+  Time time{};          ///< by the clock of the participant that saw it
+  /// For a partition that is down: it announced its stop; otherwise it was lost.
+  bool stopped = false;
 };
 
 }  // namespace tfdude

@@ -7,27 +7,27 @@
 
 namespace tfdude {
 
-/// What a configuration changes of a frame as it was left.
+/// A change that a configuration makes to a frame as it was stored.
 struct ConfiguredChange {
   enum class Kind : std::uint8_t {
-    kAdd,        ///< an entry of a frame that is not there
-    kReplace,    ///< one that is new, or differs: parent, value and correlation are as it says
-    kCorrelate,  ///< one of which only the correlation differs
-    kRemove,     ///< the entry is gone
-    kRest,       ///< its joint's stored position means nothing any more, see still_meant()
-    kOrphan,     ///< the frame stays, as a root that waits for its parent, which is removed
+    kAdd,        ///< adds a frame: an entry for a frame that does not exist
+    kReplace,    ///< a new or changed entry: sets parent, value and correlation
+    kCorrelate,  ///< a changed entry that differs in its correlation only
+    kRemove,     ///< removes the frame: its entry is gone
+    kRest,    ///< drops the joint's stored position, which has lost its meaning; see still_meant()
+    kOrphan,  ///< keeps the frame as a root that waits for its removed parent
   };
   Kind kind = Kind::kAdd;
   std::string frame;
-  std::string parent;  ///< of what is added or replaced (empty: a root), and of an orphan
-  std::string why{};   ///< of what is at rest: which joint has changed, and how
+  std::string parent;  ///< of an added or replaced frame (empty: a root), or of an orphan
+  std::string why{};   ///< for kRest: which joint has changed, and how
 
   friend bool operator==(const ConfiguredChange& a, const ConfiguredChange& b) {
     return a.kind == b.kind && a.frame == b.frame && a.parent == b.parent && a.why == b.why;
   }
 };
 
-/// One line for people.
+/// One human-readable line.
 [[nodiscard]] TFDUDE_EXPORT std::string describe(const ConfiguredChange& change);
 
 }  // namespace tfdude

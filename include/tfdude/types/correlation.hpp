@@ -7,11 +7,12 @@
 
 namespace tfdude {
 
-/// How an edge's error is correlated with those of other edges. Its covariance is that of its own part.
+/// How an edge's error is correlated with the errors of other edges. The edge's covariance
+/// describes its own part only.
 struct Correlation {
-  bool unknown = false;                    ///< that part may be correlated with anything
-  std::vector<CommonError> common_errors;  ///< beside that part
-  /// Edges that depend on a source that an observation has made, as this one does; see observe().
+  bool unknown = false;                    ///< the own part may be correlated with anything
+  std::vector<CommonError> common_errors;  ///< in addition to the own part
+  /// Edges that share with this one a source created by an observation; see observe().
   std::vector<std::string> observed_with;
 
   [[nodiscard]] bool empty() const {

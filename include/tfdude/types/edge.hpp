@@ -12,27 +12,28 @@
 
 namespace tfdude {
 
-/// A frame by number: found once by id, then used without hashing. Stands for this one frame of this one forest until
-/// it is removed; a later frame of the same id gets another handle, and to other forests of the process it is that of no
-/// frame.
+/// A frame by number: find it once by id, then use it without hashing. It is valid in one forest
+/// only and until the frame is removed: a later frame with the same id gets another handle, and
+/// other forests of the process treat the handle as an unknown frame.
 struct Handle {
   std::uint32_t slot = 0;
   std::uint32_t generation = 0;
 };
 
-/// A new value X_PC for the edge named by its child's id.
+/// A new value X_PC for the edge, which is named by the child's id.
 struct EdgeUpdate {
   std::string id;
   Transform X_PC;
 };
 
-/// The same by number.
+/// As EdgeUpdate, with the child's handle.
 struct HandleUpdate {
   Handle frame;
   Transform X_PC;
 };
 
-/// Parts of a new value X_PC for the edge named by its child's id; those that are absent stay as they are.
+/// Parts of a new value X_PC for the edge, which is named by the child's id. Absent parts stay as
+/// they are.
 struct PartialUpdate {
   std::string id;
   std::optional<Eigen::Vector3d> translation{};  ///< [m]
@@ -42,23 +43,24 @@ struct PartialUpdate {
 
 /// How an edge behaves in time.
 struct EdgeTiming {
-  /// How much of its history is kept: samples that are not older than this before the newest,
+  /// Kept history: samples not older than this before the newest,
   std::chrono::nanoseconds span = std::chrono::seconds(10);
-  /// and no more than so many; at least 2.
+  /// and at most this many; at least 2.
   std::size_t count = 2048;
-  /// How much the edge may have strayed from the geodesic between two samples, or from its last value: covariance
-  /// a second. Between samples at distance Δt, a of the way: a (1-a) Δt Q, as of a Brownian bridge.
+  /// Covariance per second by which the edge may deviate from the geodesic between two samples, or
+  /// from its last value. At the fraction a of the interval Δt between two samples this adds a
+  /// (1-a) Δt Q (Brownian bridge).
   Covariance process_noise{};
-  /// It is moving from its first update on; else from the first that is given a stamp.
+  /// True: dynamic from the first update on. False: dynamic from the first update with a stamp on.
   bool moving = false;
-  /// Samples further ahead of the owner's clock than this are refused; max(): none are.
+  /// Samples further ahead of the owner's clock are refused; max(): no limit.
   std::chrono::nanoseconds max_ahead = std::chrono::seconds(60);
-  /// So many samples in a row that are older than the span, each younger than the one before, start the history again: the
-  /// clock of their source has jumped back. 0: never.
+  /// After this many consecutive samples that are older than the span, each later than the one
+  /// before, the history restarts: the clock of their source has jumped back. 0: never.
   std::size_t restart_after = 5;
 };
 
-/// What is kept of one edge's history.
+/// Statistics of one edge's stored history.
 struct HistoryInfo {
   std::string id;
   std::size_t samples = 0;
@@ -67,19 +69,19 @@ struct HistoryInfo {
   std::size_t count_limit = 0;
   std::optional<Time> oldest;
   std::optional<Time> newest;
-  std::chrono::nanoseconds mean_gap{0};  ///< between samples
+  std::chrono::nanoseconds mean_gap{0};  ///< mean time between samples
   std::chrono::nanoseconds max_gap{0};
   std::chrono::nanoseconds jitter{0};  ///< standard deviation of the gaps
-  std::uint64_t refused_old = 0;       ///< samples that were older than what is kept,
-  std::uint64_t refused_equal = 0;     ///< or of the stamp of another,
-  std::uint64_t refused_ahead = 0;     ///< or too far ahead of the owner's clock
+  std::uint64_t refused_old = 0;       ///< samples refused as older than the kept history
+  std::uint64_t refused_equal = 0;     ///< samples refused as another sample has their stamp
+  std::uint64_t refused_ahead = 0;     ///< samples refused as too far ahead of the owner's clock
 };
 
-/// What observations have said of one edge's covariance so far.
+/// What observations have shown so far about one edge's covariance.
 struct EdgeConsistency {
   std::string id;
   std::uint64_t observations = 0;
-  std::uint64_t refused = 0;  ///< of these, by the gate
+  std::uint64_t refused = 0;  ///< of these, refused by the gate
   NormalizedInnovation sum;   ///< over all of them
 };
 

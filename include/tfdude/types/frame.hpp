@@ -10,23 +10,23 @@
 
 namespace tfdude {
 
-/// A frame as a configuration gives it; an empty parent makes a root.
+/// A frame as a configuration describes it. An empty parent makes it a root.
 struct FrameSpec {
   std::string id;
   std::string parent;
   Transform X_PC;
-  std::optional<EdgeTiming> timing{};  ///< absent: the partition's
+  std::optional<EdgeTiming> timing{};  ///< absent: the partition's default
   Correlation correlation{};
-  /// What moves it; then that says what its value is before the first sample.
+  /// The joint that moves the frame. It also determines the value before the first sample.
   std::optional<JointSpec> joint{};
 };
 
-/// A frame and where it stands.
+/// A frame and its place in the structure.
 struct Frame {
   std::string id;
   std::string parent;     ///< empty: a root
   std::string partition;  ///< the owner
-  bool attached = false;  ///< its parent is there
+  bool attached = false;  ///< its parent exists
 };
 
 /// One partition's share of a path.

@@ -7,15 +7,19 @@
 
 namespace tfdude {
 
-/// An edge or joint that try_publish() did not send, or not to all who have it.
+/// An edge or joint that try_publish() did not send, or not to all its owners.
 struct NotSent {
-  std::size_t index = 0;  ///< among those that the stream was opened with
-  /// kUnknownFrame, kUnknownJoint: nobody is known here to have it (yet). kUnreachable: its owner is known to be down.
-  /// kTimeout: the owner was not met yet, or cannot take it at once. kInvalidInput: not a number, out of range, or not as many
-  /// values as edges or joints. kPartitionTaken: this Node has lost its partition. kTransport: the Client has gone. Of what this
-  /// process owns itself also what update() and update_joints() refuse.
+  std::size_t index = 0;  ///< position in the list that the stream was opened with
+  /// - kUnknownFrame, kUnknownJoint: this process knows no owner (yet).
+  /// - kUnreachable: the owner is known to be down.
+  /// - kTimeout: the owner was not met yet, or cannot take the value at once.
+  /// - kInvalidInput: not a number, out of range, or not one value per edge or joint.
+  /// - kPartitionTaken: this Node has lost its partition.
+  /// - kTransport: the Client was destroyed.
+  /// For edges and joints of this process also the errors of update() and update_joints().
   Errc why = Errc::kTimeout;
-  /// The owner; empty where there is none. Until the next call, and the end of the Client.
+  /// The owner; empty if there is none. Valid until the next call, and until the Client is
+  /// destroyed.
   std::string_view partition;
 };
 

@@ -11,40 +11,45 @@
 
 namespace tfdude {
 
-/// What a lookup asks for: of what time, and how far covariance is to be propagated.
+/// What a lookup asks for: the instant, and the order to which covariance is propagated.
 struct Query {
-  std::optional<Time>
-      at;  ///< absent: the newest instant of which all moving edges of the path have data
-  /// How far beyond an edge's newest sample its motion may be taken to go on as between its last two.
+  /// Absent: the newest instant for which all dynamic edges of the path have data.
+  std::optional<Time> at;
+  /// How far beyond an edge's newest sample it may be extrapolated, with the motion of its last two
+  /// samples.
   std::chrono::nanoseconds extrapolate{0};
-  /// Until when the answer is to hold: the process noise of the moving edges from the instant of the answer until then
-  /// is added to its covariance.
+  /// Adds the process noise of the dynamic edges, from the instant of the answer until this one, to
+  /// the covariance of the answer.
   std::optional<Time> age_noise_until;
   Order order = Order::kSecond;
 };
 
-/// What the covariance of an answer rests on. Errors that nothing is said of are taken as independent.
+/// What the covariance of an answer is based on. Edges without a stated correlation count as
+/// independent.
 struct Basis {
   Order order = Order::kSecond;
-  /// Edges of unknown correlation are on the path: the covariance is a bound that holds for any.
+  /// The path has edges of unknown correlation: the covariance is an upper bound for any
+  /// correlation.
   bool bound = false;
-  std::vector<std::string> sources;  ///< that edges of the path share; those of observations, too
+  /// Error sources that edges of the path share, including those of observations.
+  std::vector<std::string> sources;
 };
 
-/// A transform and the instant of which it tells; absent: it holds for all times, as of static edges only.
+/// A transform and its instant. Without a stamp it holds for all times: all edges are static.
 struct StampedTransform : Transform {
   std::optional<Time> stamp;
   Basis basis{};
 };
 
-/// What came of a measurement.
+/// The result of a measurement.
 struct Observed {
-  double distance_squared = 0;  ///< of it from what was believed: squared Mahalanobis distance
-  int dimensions = 0;           ///< in which it has one
-  double limit = 0;             ///< of the gate
+  /// Squared Mahalanobis distance of the measurement from the estimate.
+  double distance_squared = 0;
+  int dimensions = 0;  ///< dimensions of that distance
+  double limit = 0;    ///< of the gate
   bool accepted = false;
   std::vector<std::string> corrected;  ///< edges whose values have changed
-  std::optional<Time> stamp;           ///< of moving edges
+  std::optional<Time> stamp;           ///< of the corrected dynamic edges
 };
 
 }  // namespace tfdude
