@@ -34,7 +34,7 @@ bool is_control(std::uint32_t value) { return value < 0x20 || (value >= 0x7F && 
 }  // namespace
 
 Result<void> check_id(std::string_view id, std::string_view what) {
-  // As most are; apart, as it is done for each edge of a stream.
+  // The common case, which is fast: this runs for each edge of a stream.
   const auto plain = [](char c) { return c >= ' ' && c <= '~'; };
   if (!id.empty() && id.size() <= kMaxIdBytes && std::all_of(id.begin(), id.end(), plain))
     return {};

@@ -4,8 +4,8 @@
 
 namespace tfdude {
 
-/// The library's logger, "tfdude", on standard error, from warnings upwards; a program may register one of that
-/// name before, as the daemon does to see all events.
+/// The library's logger, "tfdude": standard error, warnings and above. A program may register a
+/// logger of that name before, as the daemon does to show all events.
 [[nodiscard]] spdlog::logger& log();
 
 }  // namespace tfdude

@@ -4,18 +4,19 @@
 #include <mutex>
 #include <utility>
 
-// What a lock guards, for clang to check (-Wthread-safety, https://clang.llvm.org/docs/ThreadSafetyAnalysis.html). The
-// standard library's types say nothing of it, so these stand in front of them.
+// Annotations of what a lock guards, which clang checks (-Wthread-safety,
+// https://clang.llvm.org/docs/ThreadSafetyAnalysis.html). The standard library's types have no
+// annotations, so these classes wrap them.
 #if defined(__clang__)
 #define TFDUDE_LOCKS(attribute) __attribute__((attribute))
 #else
 #define TFDUDE_LOCKS(attribute)
 #endif
-/// Read and written with that mutex held only.
+/// Read and write only with that mutex held.
 #define TFDUDE_GUARDED_BY(mutex) TFDUDE_LOCKS(guarded_by(mutex))
-/// Called with that mutex held only.
+/// Call only with that mutex held.
 #define TFDUDE_REQUIRES(mutex) TFDUDE_LOCKS(requires_capability(mutex))
-/// With the reason beside it.
+/// Write the reason beside it.
 #define TFDUDE_UNCHECKED_LOCKS TFDUDE_LOCKS(no_thread_safety_analysis)
 
 namespace tfdude {
@@ -31,11 +32,11 @@ class TFDUDE_LOCKS(capability("mutex")) Mutex {
   std::mutex mutex_;
 };
 
-/// Holds a mutex, from beginning to end or in between.
+/// Holds a mutex; may release and take it again in between.
 class TFDUDE_LOCKS(scoped_lockable) Lock {
  public:
   explicit Lock(Mutex& mutex) TFDUDE_LOCKS(acquire_capability(mutex)) : lock_(mutex.mutex_) {}
-  /// Of a mutex that is held already.
+  /// For a mutex that is already held.
   Lock(Mutex& mutex, std::adopt_lock_t adopt) TFDUDE_REQUIRES(mutex) : lock_(mutex.mutex_, adopt) {}
   ~Lock() TFDUDE_LOCKS(release_capability()) {}  // NOLINT(modernize-use-equals-default): annotated
   Lock(const Lock&) = delete;
@@ -49,8 +50,8 @@ class TFDUDE_LOCKS(scoped_lockable) Lock {
   std::unique_lock<std::mutex> lock_;
 };
 
-/// A std::condition_variable for a Lock. Conditions are asked with the lock held; what they read of its members they are
-/// annotated for, which clang cannot follow through here.
+/// A std::condition_variable for a Lock. Predicates run with the lock held. They carry annotations
+/// for the members that they read, since clang cannot follow the lock through here.
 class Condition {
  public:
   void wait(Lock& lock) { changed_.wait(lock.lock_); }

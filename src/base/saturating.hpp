@@ -6,8 +6,8 @@
 
 #include "tfdude/base/time.hpp"
 
-// Arithmetic on instants and durations that stays at the end of the type where it would overflow: what comes from outside
-// may be any number.
+// Saturating arithmetic on instants and durations: it returns the limit of the type instead of
+// overflowing. Outside values may be any number.
 namespace tfdude {
 
 [[nodiscard]] constexpr std::int64_t end_of_range(bool negative) {
@@ -25,7 +25,7 @@ namespace tfdude {
   return __builtin_sub_overflow(a, b, &difference) ? end_of_range(a < 0) : difference;
 }
 
-/// The instant that is so much later.
+/// The instant `duration` later.
 [[nodiscard]] inline Time later_by(Time time, std::chrono::nanoseconds duration) {
   return time_of(saturating_add(nanoseconds(time), duration.count()));
 }
@@ -34,7 +34,7 @@ namespace tfdude {
   return time_of(saturating_subtract(nanoseconds(time), duration.count()));
 }
 
-/// How much later `later` is.
+/// The time from `earlier` to `later`.
 [[nodiscard]] inline std::chrono::nanoseconds apart(Time earlier, Time later) {
   return std::chrono::nanoseconds(saturating_subtract(nanoseconds(later), nanoseconds(earlier)));
 }
