@@ -71,7 +71,8 @@ Matrix6d joint_moment(const CommonErrors& first, const CommonErrors& second) {
   return sum;
 }
 
-// What both have in the frame of the last: X_AC as if known exactly, and the two errors there.
+// Both errors of a product, transported to the last frame: X_AC as if known exactly, and the two
+// errors there.
 struct Errors {
   Covariance own[2];
   CommonErrors common_errors[2];
@@ -83,8 +84,8 @@ Covariance add_fourth(const Errors& e, CommonErrors& common_errors) {
   const Matrix6d J_11 = own_1 + second_moment(e.common_errors[0]);
   const Matrix6d J_22 = own_2 + second_moment(e.common_errors[1]);
   const Matrix6d J_12 = joint_moment(e.common_errors[0], e.common_errors[1]);
-  // The terms of third order, ([ξ1, [ξ1, ξ2]] + [ξ2, [ξ2, ξ1]]) / 12, have with any z the moment D1 E[ξ1 zᵀ] + D2 E[ξ2 zᵀ],
-  // D the mean of their derivatives (Stein's lemma).
+  // The terms of third order are ([ξ1, [ξ1, ξ2]] + [ξ2, [ξ2, ξ1]]) / 12. Their moment with any z is
+  // D1 E[ξ1 zᵀ] + D2 E[ξ2 zᵀ], with D the mean of their derivatives (Stein's lemma).
   const Matrix6d P_12 = product_of_adjoints(J_12);
   const Matrix6d P_21 = product_of_adjoints(J_12.transpose());
   const Matrix6d D_1 = (product_of_adjoints(J_22) + P_21 - 2.0 * P_12) / 12.0;
@@ -92,7 +93,7 @@ Covariance add_fourth(const Errors& e, CommonErrors& common_errors) {
   const Matrix6d brackets = bracket_second_moment(J_11, J_22, J_12) / 4.0;
   common_errors = sum_of(product(Matrix6d::Identity() + D_1, e.common_errors[0]),
                          product(Matrix6d::Identity() + D_2, e.common_errors[1]));
-  // Of what the common errors have of it, their product has all but terms of sixth order.
+  // For the part due to the common errors, their product contains all but terms of sixth order.
   const Matrix6d cubic = D_1 * own_1 + D_2 * own_2;
   const Matrix6d series = own_1 + own_2 + brackets + cubic + cubic.transpose();
   if (is_semidefinite(series)) return Covariance::trusted(series);

@@ -7,7 +7,7 @@
 
 namespace tfdude::kernel {
 
-/// Between the library's types and the kernel's.
+/// Conversions between the library's types and the kernel's.
 [[nodiscard]] Columns columns_of(const Pose& X);
 [[nodiscard]] Pose pose_of(const Columns& X);
 [[nodiscard]] Covariance::Upper upper_of(const Blocks& sigma);

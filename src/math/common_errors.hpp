@@ -8,7 +8,7 @@ namespace tfdude {
   return a.source == b.source && a.subtracts == b.subtracts;
 }
 
-/// Gives a loading columns of zeros until it has so many.
+/// Appends columns of zeros until the loading has `columns`.
 inline void widen(Loading& loading, Eigen::Index columns) {
   const Eigen::Index before = loading.cols();
   if (columns <= before) return;

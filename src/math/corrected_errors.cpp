@@ -14,7 +14,7 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 
-// What of the largest eigenvalue can be rounding.
+// The fraction of the largest eigenvalue that may be rounding.
 constexpr double kRounding = 1e-14;
 
 // L with L Lᵀ = A⁺.
@@ -23,7 +23,8 @@ Matrix6d inverse_root(const Matrix6d& semidefinite) {
   return eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
-// Columns over all edges, six rows each, that add to the joint covariance or subtract from it.
+// Columns over all edges, six rows each, which are added to the joint covariance or subtracted from
+// it.
 class SignedColumns {
  public:
   explicit SignedColumns(std::size_t edges) : columns_(6 * static_cast<Eigen::Index>(edges), 0) {}
@@ -39,9 +40,9 @@ class SignedColumns {
     signs_.tail(more).setConstant(subtracts ? -1.0 : 1.0);
   }
 
-  // The same sum of the fewest columns, as common errors of one source. All who have it are here: so what there is no room
-  // for may be left out where it subtracts, and what adds goes to the own parts, as no correlation of n parts is more than n
-  // times their sum.
+  // Writes the same sum with the fewest columns, as common errors of one source. All edges that
+  // share the source are here. Columns beyond the maximum that subtract may therefore be dropped.
+  // Those that add go to the own parts: no correlation of n parts exceeds n times their sum.
   void give(std::vector<CorrectedError>& edges, const std::string& name) const {
     const Eigen::HouseholderQR<Matrix> qr(columns_);
     const Eigen::Index rank = std::min(columns_.rows(), columns_.cols());
@@ -108,7 +109,7 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
   }
   const bool alone = edges.size() == 1;
   if (alone) {
-    // What others know of it, they know by common errors: the rest is its own.
+    // Others are correlated with it through common errors only: the rest is its own.
     const Matrix6d rest = Matrix6d::Identity() - gains[0] * H[edges[0]];
     corrected[0].own =
         rest * prior.own()[0] * rest.transpose() + gains[0] * R * gains[0].transpose();

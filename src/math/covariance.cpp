@@ -13,14 +13,15 @@ namespace tfdude {
 namespace {
 
 constexpr double kSymmetryTolerance = 1e-9;
-// Smallest eigenvalue allowed of the matrix scaled to a unit diagonal, so that metres and radians
-// of very different size are judged alike.
+// Smallest eigenvalue allowed, for the matrix scaled to a unit diagonal, so that metres and radians
+// of very different size are treated alike.
 constexpr double kPsdTolerance = 1e-9;
-// An axis is scaled as if it had at least this share of the largest variance in metres (in radians).
-// The library's own results are semi-definite to rounding of that largest variance, as a rule: an axis that is
-// known exactly but for rounding must not be judged by its rounding error.
+// Each axis is scaled as if it had at least this share of the largest variance in metres (in
+// radians). The library's own results are usually semi-definite up to rounding of that largest
+// variance. An axis that is known exactly, up to rounding, must not be judged by its rounding
+// error.
 constexpr double kAxisShare = 1e-3;
-// Pivots above this leave no doubt about the sign of the smallest eigenvalue.
+// Pivots above this settle the sign of the smallest eigenvalue.
 constexpr double kClearPivot = 1e-7;
 
 std::string number(double value) {
@@ -33,7 +34,8 @@ std::string element(std::size_t row, std::size_t column) {
   return "covariance[" + std::to_string(row) + "][" + std::to_string(column) + "]";
 }
 
-// The variances to judge a matrix by: its own, but those far below the largest of their unit are raised.
+// The variances by which a matrix is scaled: its own, but raised if far below the largest of their
+// unit.
 Twist judged_variances(const Twist& variances) {
   Twist judged;
   judged.head<3>() = variances.head<3>().cwiseMax(kAxisShare * variances.head<3>().maxCoeff());
@@ -41,8 +43,8 @@ Twist judged_variances(const Twist& variances) {
   return judged;
 }
 
-// Scales to a unit diagonal (or less, see kAxisShare), in place. If all three variances of a unit are
-// zero, their rows must be zero all along.
+// Scales to a unit diagonal (or less, see kAxisShare), in place. If all three variances of a unit
+// are zero, their whole rows must be zero.
 Result<void> scale_to_unit_diagonal(Matrix6d& m, Twist& scale) {
   scale = judged_variances(m.diagonal()).unaryExpr([](double variance) {
     return variance > 0 ? 1.0 / std::sqrt(variance) : 0.0;
@@ -70,9 +72,9 @@ bool is_zero_axis(const Covariance::Upper& upper, std::size_t k) {
   return true;
 }
 
-// True where an LDLᵀ factorization goes through with clear pivots, each judged by its own variance, which is as if
-// the diagonal were scaled to one; rows of zeros are left out. The fast answer for most, false for what is
-// not a number.
+// Fast test that accepts most matrices: true if an LDLᵀ factorization succeeds with clear pivots.
+// Each pivot is judged by its own variance, as if the diagonal were scaled to one. Rows of zeros
+// are left out. False for NaN.
 bool clearly_psd(const Covariance::Upper& upper) {
   double a[6][6];
   for (std::size_t i = 0; i < 6; ++i) {
@@ -93,7 +95,7 @@ bool clearly_psd(const Covariance::Upper& upper) {
   return true;
 }
 
-// The matrix as it is, or with eigenvalues lifted to zero that rounding made negative.
+// The matrix unchanged, or with eigenvalues raised to zero that are negative by rounding.
 Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
   const Matrix6d sigma = Covariance::trusted(upper).matrix();
   Matrix6d unit = sigma;

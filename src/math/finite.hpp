@@ -9,13 +9,13 @@
 
 namespace tfdude {
 
-/// Whether the sum of all numbers is finite, as it is for all that the checked constructors let pass. Inline and
-/// in pairs, as it is on the path of each update of an own edge: 2 ns instead of 6 for a function that
-/// looks at one number after the other.
+/// Whether the sum of all numbers is finite; it is for everything that the checked constructors
+/// accept. Inline and in pairs, since every update of an own edge calls it: 2 ns instead of 6 for a
+/// function that checks one number after the other.
 inline bool is_finite(const Transform& X) {
   static_assert(sizeof(Transform) == 28 * sizeof(double));
   using Pair = double __attribute__((vector_size(16)));
-  // Copied, since a transform is not aligned as pairs are; the compiler loads them straight from where they are.
+  // Copied, since a transform is not aligned for pairs; the compiler loads them directly.
   const auto pair = [&X](std::size_t i) {
     Pair copy;
     // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
@@ -29,7 +29,7 @@ inline bool is_finite(const Transform& X) {
   return total - total == 0.0;
 }
 
-/// As check_finite, for the value of a frame's edge, whose id the error names.
+/// As check_finite(), for the value of a frame's edge. The error names the frame's id.
 inline Result<void> check_value(std::string_view id, const Transform& X_PC) {
   if (auto finite = check_finite(X_PC); !finite) {
     return fail_at("frame " + quote(id), finite.error());

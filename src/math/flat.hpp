@@ -7,15 +7,15 @@
 
 namespace tfdude {
 
-/// A transform as it is sent and stored: x, y, z, w of the unit quaternion; x, y, z [m]; upper triangle of the
-/// covariance row by row.
+/// A transform as sent and stored: x, y, z, w of the unit quaternion; x, y, z [m]; upper triangle
+/// of the covariance, row by row.
 using Flat = std::array<double, 28>;
 
 [[nodiscard]] Flat to_flat(const Transform& X);
 
-/// A transform that was valid or computed from such when it was made flat: of any size, and semi-definite to its
-/// rounding, so that it is not for the rules of what users give.
-/// @return kInvalidInput: not finite, or no rotation.
+/// Restores a transform that was valid, or computed from valid ones, when it was flattened. It may
+/// have any size and is semi-definite up to its rounding, so the rules for user input do not apply.
+/// @return kInvalidInput: not finite, or not a rotation.
 [[nodiscard]] Result<Transform> computed_from(const Flat& flat);
 
 }  // namespace tfdude

@@ -16,20 +16,22 @@ namespace {
 constexpr int kMostIterations = 100;
 constexpr double kConverged = 1e-12;
 
-// N(mean, covariance) of the perturbation of some pose.
+// N(mean, covariance) of a pose's perturbation.
 struct Gaussian {
   Twist mean;
   Matrix6d covariance;
 };
 
-// What an estimate says of δ in X_true = X Exp(δ): Log(Xₖ⁻¹ X Exp(δ)) = e + Jr⁻¹(e) δ is of mean zero, and Jr(e) e = e.
+// The information of an estimate about δ in X_true = X Exp(δ): Log(Xₖ⁻¹ X Exp(δ)) = e + Jr⁻¹(e) δ
+// has mean zero, and Jr(e) e = e.
 Gaussian seen_from(const Pose& X, const Transform& estimate) {
   const Twist e = log(estimate.pose.inverse() * X);
   const Matrix6d J = right_jacobian(e);
   return {-e, J * estimate.covariance.matrix() * J.transpose()};
 }
 
-// Product of two Gaussians by the gain, which needs no inverse of either. False where they contradict each other.
+// Product of two Gaussians by the gain, which needs no inverse of either. False if they contradict
+// each other.
 bool merge(Gaussian& sum, const Gaussian& more) {
   const Matrix6d S = sum.covariance + more.covariance;
   const Matrix6d inverse = pseudo_inverse(S);
@@ -62,7 +64,7 @@ Result<Fused> fuse(const std::vector<Transform>& estimates) {
       }
     }
     X = X * exp(sum.mean);
-    // The size that a translation has is rounded to.
+    // Translations are rounded in proportion to their size.
     const double scale = 1.0 + X.translation().cwiseAbs().maxCoeff();
     if (sum.mean.cwiseAbs().maxCoeff() <= kConverged * scale) {
       return Fused{{X, Covariance::trusted(nearest_semidefinite(sum.covariance))}, iteration};

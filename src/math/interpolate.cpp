@@ -12,20 +12,21 @@
 namespace tfdude {
 namespace {
 
-// The series lack terms of the fourth power of the larger of θ and s θ [rad], and the closed forms lose digits with its
-// inverse: where one takes over from the other both are exact to 1e-12.
+// The series omit terms of the fourth power of the larger of θ and s θ [rad]; the closed forms lose
+// digits in proportion to its inverse. At this threshold both are exact to 1e-12.
 constexpr double kSmallAngle = 1e-3;
 
-// (1 - exp(-i s θ)) / s, without a difference of numbers that are nearly the same; i θ at s = 0.
+// (1 - exp(-i s θ)) / s, without a difference of nearly equal numbers; i θ at s = 0.
 std::complex<double> turned(double s, double angle) {
   const double half = 0.5 * s * angle;
   const double sinc = half == 0 ? 1.0 : std::sin(half) / half;
   return std::complex<double>(0.0, angle * sinc) * std::polar(1.0, -half);
 }
 
-// g(x) = (1 - exp(-s x)) / (s (1 - exp(-x))) at x = ad(ξ) is Jr(s ξ) Jr⁻¹(ξ), as a polynomial: the eigenvalues of
-// ad(ξ) are 0, once in a block, and ±iθ, twice each, so the polynomial of fourth degree that agrees with g there, at ±iθ
-// with its derivative, is g (Higham, Functions of Matrices, definition 1.4).
+// g(x) = (1 - exp(-s x)) / (s (1 - exp(-x))) at x = ad(ξ) is Jr(s ξ) Jr⁻¹(ξ), computed as a
+// polynomial. The eigenvalues of ad(ξ) are 0, once in a block, and ±iθ, twice each. So g equals the
+// polynomial of fourth degree that agrees with it there, at ±iθ with its derivative (Higham,
+// Functions of Matrices, definition 1.4).
 std::array<double, 4> coefficients(double s, double angle) {
   if (std::max(std::abs(s), 1.0) * angle < kSmallAngle) return small_angle_coefficients(s);
   using Complex = std::complex<double>;
@@ -41,7 +42,7 @@ std::array<double, 4> coefficients(double s, double angle) {
   return {g.imag() / angle + c3 * angle2, 0.5 * dg.imag() / angle + 2.0 * c4 * angle2, c3, c4};
 }
 
-// [M, N; 0, M], as all functions of ad(ξ) are.
+// [M, N; 0, M], the form of every function of ad(ξ).
 struct Blocks {
   Eigen::Matrix3d M;
   Eigen::Matrix3d N;
@@ -64,7 +65,7 @@ Matrix6d carried(const Covariance& sigma, const Twist& xi, double s, double weig
   return weight * (B * sigma.matrix() * B.transpose());
 }
 
-// What the kernel takes a pose or a transform for; path_accumulation.cpp asserts it.
+// The layout in which the kernel reads a pose or transform; path_accumulation.cpp asserts it.
 template <class Value>
 const double* numbers(const Value& X) {
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only

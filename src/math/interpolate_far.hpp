@@ -4,7 +4,7 @@
 
 namespace tfdude {
 
-/// As interpolate(), by closed forms: for samples that the kernel's series are not for.
+/// As interpolate(), by closed forms: for samples too far apart for the kernel's series.
 void interpolate_far(const Transform& X0, const Transform& X1, double s, Transform& X);
 void interpolate_far(const Pose& X0, const Pose& X1, double s, Pose& X);
 

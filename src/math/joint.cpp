@@ -37,7 +37,7 @@ Transform joint_transform(const Joint& joint, double position, double variance) 
     }
   }
   Transform X_PC{joint.X_PJ.pose * X_JC, Covariance::trusted(upper)};
-  // Most origins are known exactly, as far as URDF says.
+  // Most origins are exact, since URDF gives no uncertainty.
   if (!is_exact(joint.X_PJ.covariance)) {
     X_PC.covariance += joint.X_PJ.covariance.transported(X_JC.inverse());
   }

@@ -7,16 +7,17 @@
 
 namespace tfdude {
 
-/// What the edges have to do with the end of the path: P Hᵀ by edge, and H P Hᵀ.
+/// How the edges are correlated with the end of the path: P Hᵀ by edge, and H P Hᵀ.
 struct Moments {
   std::vector<Matrix6d> with_edge;
   Matrix6d of_path;
 };
 
-/// The joint covariance P of the uncertain ones of some edges: P_ij = δ_ij own_i + Σ ± F_i F_jᵀ over the sources.
+/// The joint covariance P of the uncertain edges: P_ij = δ_ij own_i + Σ ± F_i F_jᵀ over the
+/// sources.
 class JointPrior {
  public:
-  /// What the edges have from one source; a loading for each uncertain edge, all of the same columns.
+  /// The edges' shares of one source: a loading per uncertain edge, all with the same columns.
   struct Source {
     std::string name;
     bool subtracts = false;
@@ -27,14 +28,14 @@ class JointPrior {
     [[nodiscard]] Loading on_path(const JointPrior& prior, const std::vector<Matrix6d>& H) const;
   };
 
-  /// The own parts and common errors of the edges; those that have neither are not of them.
+  /// Takes the own parts and common errors of the edges. Edges without either are left out.
   explicit JointPrior(const std::vector<ObservedEdge>& all);
 
-  /// Takes the edge's unknown part for its own; there must be no uncertain edge else.
+  /// Treats the edge's unknown part as its own; no other edge may be uncertain.
   void take_unknown(std::size_t edge);
   [[nodiscard]] bool is_of_unknown() const { return of_unknown_; }
 
-  /// Which of all are uncertain.
+  /// Indices of the uncertain edges.
   [[nodiscard]] const std::vector<std::size_t>& edges() const { return edges_; }
   [[nodiscard]] const std::vector<Matrix6d>& own() const { return own_; }
   [[nodiscard]] const std::vector<Source>& sources() const { return sources_; }
@@ -42,7 +43,7 @@ class JointPrior {
   /// P_ii.
   [[nodiscard]] Matrix6d marginal(std::size_t i) const;
 
-  /// @param H  by edge, of all
+  /// @param H  one per edge, for all edges
   [[nodiscard]] Moments moments(const std::vector<Matrix6d>& H) const;
 
   /// P times a factor.

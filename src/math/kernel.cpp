@@ -13,13 +13,13 @@ namespace any {
 #include "math/kernel_body.ipp"
 }  // namespace any
 
-// clang, which only checks this, has another pragma for it.
+// clang, used only for checks, needs another pragma for this.
 #if defined(__x86_64__) && !defined(__clang__)
 #define TFDUDE_HAS_AVX2
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 namespace avx2 {
-#include "math/kernel_body.ipp"  // NOLINT(readability-duplicate-include): the same for another processor
+#include "math/kernel_body.ipp"  // NOLINT(readability-duplicate-include): for another processor
 }  // namespace avx2
 #pragma GCC pop_options
 

@@ -2,12 +2,14 @@
 
 #include <cstddef>
 
-// The arithmetic that lookups spend their time in, on plain arrays, compiled once for any processor of the
-// architecture and, on x86-64, once for those with AVX2 and FMA; the processor at hand decides at run time.
-// A lookup of 30 edges with covariance took 1.3 of tf2's time with products of 3x3 matrices, edge by edge, and takes
-// 0.56 of it with this (core/lookup in bench/REPORT.md).
+// The arithmetic in which lookups spend most of their time, on plain arrays. It is compiled for any
+// processor of the architecture and, on x86-64, also for those with AVX2 and FMA; the choice is
+// made at run time. With products of 3x3 matrices, edge by edge, a lookup of 30 edges with
+// covariance took 1.3 times as long as in tf2; with this kernel it takes 0.56 of tf2's time
+// (core/lookup in bench/REPORT.md).
 //
-// Matrices are three columns of four numbers, of which the fourth is zero, so that a column is one AVX register.
+// Matrices have three columns of four numbers. The fourth is zero, so that a column fits one AVX
+// register.
 namespace tfdude::kernel {
 
 /// A pose: R and t of X = [R, t].
@@ -23,30 +25,31 @@ struct alignas(32) Blocks {
   double Q[3][4] = {};
 };
 
-/// An edge as it lies in Transform: quaternion x, y, z, w, translation, upper triangle of the covariance.
+/// An edge as stored in Transform: quaternion x, y, z, w, translation, upper triangle of the
+/// covariance.
 using Edge = const double*;
 
-/// What is to be interpolated.
+/// One interpolation.
 struct Blend {
   Edge X0 = nullptr;
   Edge X1 = nullptr;
   double s = 0;
-  double* X = nullptr;  ///< where to; room for an edge, another than X0 and X1
-  bool near = false;    ///< says whether the two are less than 0.1 rad apart; else X is not written
+  double* X = nullptr;  ///< output; room for an edge, not X0 or X1
+  bool near = false;    ///< output: the two are less than 0.1 rad apart; otherwise X is not written
 };
 
-/// Compiled for one instruction set.
+/// The functions compiled for one instruction set.
 struct Functions {
   /// X_SH := X_SC · X_PC⁻¹ for each edge in turn, C the frame reached so far.
   void (*accumulate)(Columns& X_SH, const Edge* edges, std::size_t count);
-  /// The same, and before each step sum += Ad(X_SC) Σ_C Ad(X_SC)ᵀ.
+  /// As accumulate; before each step sum += Ad(X_SC) Σ_C Ad(X_SC)ᵀ.
   void (*accumulate_with_covariance)(Columns& X_SH, Blocks& sum, const Edge* edges,
                                      std::size_t count);
   /// X · Y⁻¹.
   Columns (*quotient)(const Columns& X, const Columns& Y);
-  /// sum += Ad(X) Σ Ad(X)ᵀ, Σ an upper triangle row by row.
+  /// sum += Ad(X) Σ Ad(X)ᵀ, with Σ as an upper triangle, row by row.
   void (*add_transported)(const Columns& X, const double* upper, Blocks& sum);
-  /// As interpolate(), for those pairs that are near: X_0 to X_count.
+  /// As interpolate(), for the pairs that are near.
   void (*blend_poses)(Blend* all, std::size_t count);
   void (*blend_with_covariance)(Blend* all, std::size_t count);
 };
@@ -54,7 +57,7 @@ struct Functions {
 /// For any processor of the architecture.
 extern const Functions kPortable;
 
-/// The fastest for the processor at hand.
+/// The fastest functions that this processor supports.
 [[nodiscard]] const Functions& functions();
 
 }  // namespace tfdude::kernel

@@ -1,5 +1,6 @@
-// The end of kernel_body.ipp: interpolation between two samples of an edge that are little apart. The poses of four
-// edges at a time, each in a lane; the covariances one by one, in columns.
+// Included at the end of kernel_body.ipp: interpolation between two samples of an edge that are
+// close together. Poses are computed four edges at a time, one per lane; covariances one by one, in
+// columns.
 
 struct Vec {
   V4 x, y, z;
@@ -14,12 +15,12 @@ inline Vec cross(Vec a, Vec b) {
 
 // Four poses.
 struct Poses {
-  Vec u;  // with w the quaternions
+  Vec u;  // u and w form the quaternions
   V4 w;
   Vec t;
 };
 
-// Number `i` of all four edges.
+// Number `i` of each of the four edges.
 template <Edge Blend::*kEdge>
 inline V4 lanes(const Blend* four, int i) {
   return V4{(four[0].*kEdge)[i], (four[1].*kEdge)[i], (four[2].*kEdge)[i], (four[3].*kEdge)[i]};
@@ -36,17 +37,17 @@ inline Vec rotate(Vec u, V4 w, Vec a) {
   return a + (w + w) * once + cross(u + u, once);
 }
 
-// The ways from the ones to the others, ξ = Log(X0⁻¹ X1), and the squares of their angles.
+// The differences ξ = Log(X0⁻¹ X1), and their squared angles.
 struct Ways {
   Vec rho;
   Vec theta;
   V4 angle2;
 };
 
-// All series are cut where what is left is below 1e-11 for angles up to 0.1.
-constexpr double kSmallSine2 = 0.0025;  // of half of it, squared
+// All series are cut where the remainder is below 1e-11 for angles up to 0.1.
+constexpr double kSmallSine2 = 0.0025;  // (sin of half the angle)²
 
-// @param sine2  the squares of the sines of half the angles
+// @param sine2  the squared sines of half the angles
 inline Ways ways_between(const Poses& X0, const Poses& X1, V4& sine2) {
   const V4 w = X0.w * X1.w + dot(X0.u, X1.u);
   const Vec v = X0.w * X1.u - X1.w * X0.u - cross(X0.u, X1.u);
@@ -76,12 +77,12 @@ inline Poses go(const Poses& X0, const Ways& ways, V4 s) {
   const V4 w = 1.0 - h * (0.5 - h * (1.0 / 24 - h * (1.0 / 720)));
   const Vec u = X0.w * v + w * X0.u + cross(X0.u, v);
   const V4 real = X0.w * w - dot(X0.u, v);
-  // A step of Newton's towards length one.
+  // A Newton step towards unit length.
   const V4 k = 1.5 - 0.5 * (dot(u, u) + real * real);
   return {k * u, k * real, X0.t + rotate(X0.u, X0.w, t)};
 }
 
-// One of the ways.
+// One lane of Ways.
 struct Way {
   double rho[3];
   double theta[3];
@@ -90,8 +91,9 @@ struct Way {
 
 inline double square(const double* a) { return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]; }
 
-// sum += B Σ Bᵀ, B = [M, N; 0, M] = 1 + Σ_k c_k ad(ξ)^k, k = 1 to 4. With Θ = [θ]×, Θ³ = -|θ|² Θ and
-// d|θ|² = 2 θ·ρ along ρ, M = 1 + a Θ + b Θ² with a = c1 - c3 |θ|², b = c2 - c4 |θ|², and N is the derivative of M
+// sum += B Σ Bᵀ, B = [M, N; 0, M] = 1 + Σ_k c_k ad(ξ)^k, k = 1 to 4. With Θ = [θ]×, Θ³ = -|θ|² Θ
+// and d|θ|² = 2 θ·ρ along ρ, M = 1 + a Θ + b Θ² with a = c1 - c3 |θ|², b = c2 - c4 |θ|², and N is
+// the derivative of M along ρ.
 // along ρ.
 inline void carry(const Way& way, const double* c, const double* upper, Blocks& sum) {
   const double a = c[0] - c[2] * way.angle2;
@@ -135,8 +137,9 @@ inline void carry_weighted(const Way& way, double s, double weight, const double
   carry(way, small_angle_coefficients(s).data(), weighted, sum);
 }
 
-// The same covariance at both ends is what it is between them, but for s (1-s)/4 ad(ξ) Σ ad(ξ)ᵀ and terms of fourth order:
-// nothing where that is below a millionth of it.
+// If both ends have the same covariance, the covariance between them differs from it only by s
+// (1-s)/4 ad(ξ) Σ ad(ξ)ᵀ and terms of fourth order. Adds nothing where that term is below a
+// millionth.
 inline bool add_bulge(const Way& way, double s, const double* upper, Blocks& sum) {
   constexpr double kLittle = 16e-6;
   const double turned = upper[15] + upper[18] + upper[20];
@@ -161,7 +164,7 @@ inline bool add_bulge(const Way& way, double s, const double* upper, Blocks& sum
 }
 
 inline void blend_covariance(const Way& way, const Blend& one) {
-  // Up to here what add_bulge() leaves out is below 1e-8.
+  // Up to here, what add_bulge() leaves out is below 1e-8.
   constexpr double kQuarticEnds = 1e-3;
   const double* u0 = one.X0 + 7;
   const double* u1 = one.X1 + 7;

@@ -1,5 +1,5 @@
-// Of kernel.cpp, which includes it once for each instruction set: GCC splits the vectors below to what a
-// function may use when it reads the function, so that one body cannot be inlined into both.
+// Included by kernel.cpp once per instruction set. GCC lowers the vectors below to the instructions
+// available when it parses a function, so one body cannot be inlined into both.
 
 // Σ_k m_k x_k, the columns of m weighted by a column of numbers.
 inline V4 combine(const V4* m, double x0, double x1, double x2) {
@@ -14,11 +14,12 @@ inline V4 load(const double* column) { return *reinterpret_cast<const V4*>(colum
 
 inline void store(double* column, V4 value) { *reinterpret_cast<V4*>(column) = value; }
 
-// sum += Ad Σ Adᵀ for Ad = [R, G; 0, R], as Ad(X) is with G = [t]×R: the parts of Ad Σ Adᵀ are, with A = R P + G Cᵀ, B = R C + G Q and
-// D = R Q: A Rᵀ + B Gᵀ, B Rᵀ and D Rᵀ. 81 products of columns and numbers.
+// sum += Ad Σ Adᵀ for Ad = [R, G; 0, R], where G = [t]×R for Ad(X). With A = R P + G Cᵀ, B = R C +
+// G Q and D = R Q, the parts of Ad Σ Adᵀ are A Rᵀ + B Gᵀ, B Rᵀ and D Rᵀ. 81 products of columns and
+// numbers.
 inline void sandwich(const V4* R, const V4* G, const double* u, Blocks& sum) {
-  // Rows of R and G, as numbers: through memory, since loads that spread a number over all lanes are free
-  // where shuffles are not.
+  // Rows of R and G, as numbers, through memory: loads that broadcast a number to all lanes are
+  // free, shuffles are not.
   alignas(32) double r[3][4];
   alignas(32) double g[3][4];
   for (int k = 0; k < 3; ++k) {

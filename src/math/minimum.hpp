@@ -6,8 +6,8 @@
 
 namespace tfdude {
 
-/// One over the mean variance of the axes of each unit, zero where there is none: with it, sums over metres and radians
-/// mean something.
+/// One over the mean variance of each unit's axes, zero if that is zero. Scaled by it, metres and
+/// radians can be added.
 [[nodiscard]] inline Twist units_of(const Twist& variances) {
   Twist units = Twist::Zero();
   if (variances.head<3>().sum() > 0) units.head<3>().setConstant(3.0 / variances.head<3>().sum());
@@ -15,7 +15,8 @@ namespace tfdude {
   return units;
 }
 
-/// Where within (0, 1) a function with one minimum has it, to a hundredth: golden section.
+/// The argument within (0, 1) at which a unimodal function has its minimum, to a hundredth, by
+/// golden section.
 template <class Function>
 [[nodiscard]] double minimum_within_unit(Function f) {
   constexpr double kGolden = 0.6180339887498949;

@@ -20,8 +20,8 @@ Eigen::Vector3d mean_cross(const Matrix3d& N) {
   return {N(1, 2) - N(2, 1), N(2, 0) - N(0, 2), N(0, 1) - N(1, 0)};
 }
 
-// E[(a × u) (b × v)ᵀ] for (a, b) independent of (u, v), of which E[a bᵀ] = N and E[u vᵀ] = M: the tensor cross product
-// of both matrices, ε_pij ε_qkl N_ik M_jl.
+// E[(a × u) (b × v)ᵀ] for (a, b) independent of (u, v), with E[a bᵀ] = N and E[u vᵀ] = M: the
+// tensor cross product of both matrices, ε_pij ε_qkl N_ik M_jl.
 Matrix3d cross(const Matrix3d& N, const Matrix3d& M) {
   Matrix3d product;
   for (int p = 0; p < 3; ++p) {
@@ -53,7 +53,7 @@ Twist mean_bracket(const Matrix6d& J_12) {
   return mean;
 }
 
-// With [a, u] = (θa × ρu + ρa × θu, θa × θu).
+// Since [a, u] = (θa × ρu + ρa × θu, θa × θu).
 Matrix6d bracket_moment(const Matrix6d& N, const Matrix6d& M) {
   Matrix6d moment;
   moment.topLeftCorner<3, 3>() =
@@ -72,7 +72,7 @@ Matrix6d bracket_second_moment(const Matrix6d& J_11, const Matrix6d& J_22, const
   if (J_12.isZero(0)) return moment;
   const Twist mean = mean_bracket(J_12);
   moment += mean * mean.transpose();
-  // ξ1 of the first with ξ2 of the second, and the other way round: [v, b] = -[b, v].
+  // Pairs ξ1 of the first bracket with ξ2 of the second, and vice versa: [v, b] = -[b, v].
   moment -= bracket_moment(J_12, J_12.transpose());
   return moment;
 }

@@ -2,8 +2,8 @@
 
 #include "tfdude/math/pose.hpp"
 
-// Moments of brackets [ξ1, ξ2] of two perturbations with mean zero, jointly Gaussian where they are correlated. J_ij
-// stands for E[ξi ξjᵀ].
+// Moments of brackets [ξ1, ξ2] of two perturbations with zero mean, jointly Gaussian if correlated.
+// J_ij stands for E[ξi ξjᵀ].
 namespace tfdude {
 
 /// E[ad(ξi) ad(ξj)].
@@ -12,10 +12,11 @@ namespace tfdude {
 /// E[[ξ1, ξ2]]; zero if J_12 is symmetric.
 [[nodiscard]] Twist mean_bracket(const Matrix6d& J_12);
 
-/// E[[a, u] [b, v]ᵀ] for (a, b) independent of (u, v), of which E[a bᵀ] = N and E[u vᵀ] = M.
+/// E[[a, u] [b, v]ᵀ] for (a, b) independent of (u, v), with E[a bᵀ] = N and E[u vᵀ] = M.
 [[nodiscard]] Matrix6d bracket_moment(const Matrix6d& N, const Matrix6d& M);
 
-/// E[[ξ1, ξ2] [ξ1, ξ2]ᵀ], by Isserlis' theorem: the mean's part, and each of the other two ways to pair the four.
+/// E[[ξ1, ξ2] [ξ1, ξ2]ᵀ], by Isserlis' theorem: the part of the mean, and the two other pairings of
+/// the four.
 [[nodiscard]] Matrix6d bracket_second_moment(const Matrix6d& J_11, const Matrix6d& J_22,
                                              const Matrix6d& J_12);
 

@@ -18,11 +18,12 @@ namespace tfdude {
 namespace {
 
 constexpr int kMostIterations = 100;
-// Of an edge's deviations: where a measurement is far more precise than the edges, no more is to be had.
+// In standard deviations of an edge: if a measurement is far more precise than the edges, no
+// smaller step can be reached.
 constexpr double kConverged = 1e-6;
 constexpr double kSmallest = 1e-12;  // [m, rad]
 
-// h(ξ) = Log(Z⁻¹ X_AB(ξ)) where the path is now, and its derivative by each edge's ξ.
+// h(ξ) = Log(Z⁻¹ X_AB(ξ)) at the current path, and its derivative by each edge's ξ.
 struct Linear {
   Twist h;
   std::vector<Matrix6d> H;
@@ -31,7 +32,7 @@ struct Linear {
 Linear linearize(const std::vector<ObservedEdge>& edges, const std::vector<Twist>& xi,
                  const Transform& Z_AB) {
   Linear linear{Twist::Zero(), std::vector<Matrix6d>(edges.size())};
-  Pose X_FB;  // F: where the path is, coming from its end
+  Pose X_FB;  // F: the frame reached, starting from the end of the path
   for (std::size_t k = edges.size(); k-- > 0;) {
     linear.H[k].setZero();
     if (edges[k].way == ObservedEdge::Way::kBeside) continue;
@@ -47,7 +48,7 @@ Linear linearize(const std::vector<ObservedEdge>& edges, const std::vector<Twist
   return linear;
 }
 
-// One observation under way.
+// An observation in progress.
 class Update {
  public:
   Update(const std::vector<ObservedEdge>& edges, const Transform& Z_AB, const std::string& source,
@@ -78,7 +79,7 @@ class Update {
   }
 
  private:
-  // What is unknown counts to the measurement, unless it is all there is to correct.
+  // Parts of unknown correlation count as measurement error, unless nothing else can be corrected.
   Result<void> count_unknown() {
     std::vector<std::size_t> unknown;
     for (std::size_t k = 0; k < all_.size(); ++k) {
@@ -106,7 +107,7 @@ class Update {
     return {};
   }
 
-  // The covariance of h, as far as it is known.
+  // The known part of the covariance of h.
   struct Innovation {
     Matrix6d S;
     Matrix6d inverse;
@@ -133,7 +134,7 @@ class Update {
     observation.accepted = !impossible && observation.distance_squared <= observation.limit;
   }
 
-  // Of the corrections that this observation alone would make.
+  // Records the corrections that this observation alone would make.
   void note_innovation(const Moments& m, const Innovation& innovation,
                        Observation& observation) const {
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
@@ -146,7 +147,8 @@ class Update {
     }
   }
 
-  // Covariance intersection: both sides are made less sure, so that the edges gain most. False where that is nothing.
+  // Covariance intersection: inflates both sides, with the weight from which the edges gain most.
+  // False if they gain nothing.
   bool weigh(const Moments& m) {
     const std::vector<Twist> variances = variances_of_edges();
     double before = 0;
@@ -206,7 +208,7 @@ class Update {
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
       const std::size_t k = prior_.edges()[i];
       ObservedResult& result = observation.edges[k];
-      // The error is now that of another pose.
+      // The error now refers to another pose.
       const Matrix6d J = right_jacobian(xi_[k]);
       const Covariance own =
           Covariance::trusted(nearest_semidefinite(J * corrected[i].own * J.transpose()));

@@ -9,7 +9,7 @@
 
 namespace tfdude {
 
-// What the kernel takes an edge for: quaternion, translation, upper triangle.
+// The layout in which the kernel reads an edge: quaternion, translation, upper triangle.
 static_assert(std::is_standard_layout_v<Pose> && sizeof(Pose) == 7 * sizeof(double));
 static_assert(std::is_standard_layout_v<Transform> && sizeof(Transform) == 28 * sizeof(double));
 
@@ -56,7 +56,7 @@ void PathAccumulation<Value>::compute() {
 
 template <class Value>
 Value join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b) {
-  // Of both at once, as four take hardly longer than one.
+  // Both at once: four take hardly longer than one.
   const bool together = from_a.blend_count_ + from_b.blend_count_ <= from_a.blends_.size();
   for (std::size_t i = 0; together && i < from_b.blend_count_; ++i) {
     from_a.blends_[from_a.blend_count_++] = from_b.blends_[i];

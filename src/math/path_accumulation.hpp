@@ -10,32 +10,33 @@
 
 namespace tfdude {
 
-/// The way from a frame S up towards its root, added up in S itself: the sum Σ Ad(X_SC) Σ_C Ad(X_SC)ᵀ over the
-/// edges climbed (C the child of each) needs one adjoint an edge, whatever follows. Edges are computed some at
-/// a time, as the arithmetic then stays in registers: a value given to up() must stay where it is until the
-/// accumulation is joined.
+/// The path from a frame S up towards its root, accumulated in S itself. The sum Σ Ad(X_SC) Σ_C
+/// Ad(X_SC)ᵀ over the climbed edges (C is the child of each) needs one adjoint per edge, whatever
+/// follows. Edges are computed in batches, which keeps the arithmetic in registers. So a value
+/// passed to up() must stay in place until the accumulation is joined.
 ///
-/// @tparam Value  Transform, or Pose where the covariance is not asked for
+/// @tparam Value  Transform, or Pose if no covariance is needed
 template <class Value>
 class PathAccumulation {
  public:
   PathAccumulation() {
   }  // NOLINT(*-member-init,*-use-equals-default): what is pending is written before it is read
 
-  /// Goes up one edge: X_PC is its value, C the frame reached so far, P the frame reached then.
+  /// Goes up one edge with value X_PC, from C, the frame reached so far, to P.
   void up(const Value& X_PC) {
-    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only, see path_accumulation.cpp
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): doubles, path_accumulation.cpp
     pending_[count_++] = reinterpret_cast<kernel::Edge>(&X_PC);
     if (count_ == pending_.size()) compute();
   }
 
-  /// The same, X_PC being a part s of the way from X0 to X1 (interpolate()); these must stay where they are, too.
+  /// As up(), for X_PC at the fraction s between X0 and X1 (interpolate()), which must also stay in
+  /// place.
   void up_between(const Value& X0, const Value& X1, double s);
 
-  /// Where to compute a value that has no place of its own, for up() next.
+  /// Storage in which to compute a value for the next up().
   [[nodiscard]] Value& place() { return computed_[count_]; }
 
-  /// X_AB where A and B climbed to the same frame. Independent edges, first order.
+  /// X_AB, if A and B climbed to the same frame. Independent errors, first order.
   template <class V>
   friend V join(PathAccumulation<V>&& from_a, PathAccumulation<V>&& from_b);
 
@@ -43,15 +44,15 @@ class PathAccumulation {
   void compute();
   void blend();
 
-  kernel::Columns X_SH_;  // the pose of the frame reached (here, H) in the start S
+  kernel::Columns X_SH_;  // pose of the frame reached (here, H) in the start S
   kernel::Blocks left_;   // of the left perturbation of X_SH, expressed in S
   std::array<kernel::Edge, 16> pending_;
-  // Not set to zero, which would take as long as a short lookup.
+  // Not zeroed, which would take as long as a short lookup.
   union {
     std::array<Value, 16> computed_;
   };
   union {
-    std::array<kernel::Blend, 16> blends_;  // what of the pending is to be computed first
+    std::array<kernel::Blend, 16> blends_;  // pending interpolations
   };
   std::size_t count_ = 0;
   std::size_t blend_count_ = 0;
@@ -60,13 +61,13 @@ class PathAccumulation {
 template <class Value>
 [[nodiscard]] Value join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b);
 
-/// The same with all that is known of errors, edge by edge: some ten times slower.
+/// As above with the full error description, edge by edge: about ten times slower.
 template <>
 class PathAccumulation<Belief> {
  public:
   explicit PathAccumulation(Order order) : order_(order) {}
 
-  /// What the error of the next edge has to do with others'; common_errors: may be null.
+  /// How the error of the next edge is correlated with others; common_errors may be null.
   void correlate_next(bool unknown, const std::vector<CommonError>* common_errors) {
     unknown_ = unknown;
     common_errors_ = common_errors;
@@ -80,7 +81,7 @@ class PathAccumulation<Belief> {
 
  private:
   Order order_;
-  Belief X_HS_;  // errors in the start's frame, in which they are needed
+  Belief X_HS_;  // errors in the start's frame, where they are needed
   Transform computed_;
   bool unknown_ = false;
   const std::vector<CommonError>* common_errors_ = nullptr;

@@ -3,7 +3,7 @@
 namespace tfdude {
 namespace {
 
-// diag(R, R): turns both halves of a twist, and nothing else.
+// diag(R, R): rotates both halves of a twist.
 Pose turning(const Eigen::Quaterniond& rotation) {
   return Pose::trusted(rotation, Eigen::Vector3d::Zero());
 }
@@ -34,7 +34,8 @@ Matrix6d small_adjoint(const Twist& xi) {
 
 namespace {
 
-// Angles of up to π need some 25 terms; the translation enters linearly, whatever its size.
+// Angles of up to π need about 25 terms. The translation enters linearly, so its size does not
+// matter.
 Matrix6d right_jacobian_series(const Twist& xi) {
   constexpr int kTerms = 30;
   const Matrix6d step = -small_adjoint(xi);
@@ -49,7 +50,8 @@ Matrix6d right_jacobian_series(const Twist& xi) {
 
 }  // namespace
 
-// Larger angles by halves: Jr(2 ξ) = (1 + Ad(Exp(-ξ))) Jr(ξ) / 2, as Jr(ξ) is the mean of Ad(Exp(-τ ξ)), τ from 0 to 1.
+// Larger angles by halving: Jr(2 ξ) = (1 + Ad(Exp(-ξ))) Jr(ξ) / 2, as Jr(ξ) is the mean of
+// Ad(Exp(-τ ξ)), τ from 0 to 1.
 Matrix6d right_jacobian(const Twist& xi) {
   constexpr double kPi = 3.14159265358979323846;
   Twist part = xi;

@@ -9,13 +9,14 @@
 namespace tfdude {
 namespace {
 
-// Below this squared angle the closed forms lose digits to cancellation; two terms of the series are
-// then exact to rounding (the next is of relative size θ⁴/360 or less) unless said otherwise.
+// Below this squared angle the closed forms lose digits to cancellation. Two terms of the series
+// are then exact to rounding, unless noted otherwise: the next has a relative size of θ⁴/360 or
+// less.
 constexpr double kSmallAngleSquared = 1e-6;
 
 constexpr double kQuaternionTolerance = 1e-3;
 
-// Of a pose that is not good: apart, so that the good ones pay for no text.
+// Describes an invalid pose. Separate, so that valid poses do not pay for the text.
 tl::unexpected<Error> what_is_wrong(const Eigen::Quaterniond& rotation,
                                     const Eigen::Vector3d& translation) {
   constexpr const char* kAxes[] = {"x", "y", "z", "w"};
@@ -44,7 +45,7 @@ tl::unexpected<Error> what_is_wrong(const Eigen::Quaterniond& rotation,
 
 Result<Pose> Pose::create(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
   const double norm = rotation.norm();
-  // False for what is not a number, too.
+  // Also false for NaN.
   const bool good = std::abs(norm - 1.0) <= kQuaternionTolerance &&
                     translation.cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= kMaxTranslation;
   if (!good) return what_is_wrong(rotation, translation);
@@ -102,13 +103,13 @@ Pose exp(const Twist& xi) {
 
 Twist log(const Pose& X) {
   Eigen::Quaterniond q = X.rotation();
-  if (q.w() < 0) q.coeffs() = -q.coeffs();  // the shorter way round
+  if (q.w() < 0) q.coeffs() = -q.coeffs();  // the shorter rotation
   const double s = q.vec().norm();          // sin(θ/2)
   const double angle = 2.0 * std::atan2(s, q.w());
   const double angle2 = angle * angle;
   const bool small = angle2 < kSmallAngleSquared;
-  // θ = 2 atan2(s, w) · vec/s; for small s, 2/w · (1 - r/3 + r²/5) · vec with r = s²/w². This series
-  // converges slowly: without its third term the angle would keep 14 digits only.
+  // θ = 2 atan2(s, w) · vec/s; for small s, 2/w · (1 - r/3 + r²/5) · vec with r = s²/w². This
+  // series converges slowly: without its third term the angle would keep 14 digits only.
   const double r = s * s / (q.w() * q.w());
   const double scale = small ? 2.0 / q.w() * (1.0 - r / 3.0 + r * r / 5.0) : angle / s;
   const Eigen::Vector3d theta = scale * q.vec();
@@ -150,8 +151,8 @@ Eigen::Vector3d to_rpy(const Eigen::Quaterniond& rotation) {
   const double pitch = std::atan2(-R(2, 0), cos_pitch);
   if (cos_pitch < kGimbalLock) return {0.0, pitch, std::atan2(-R(0, 1), R(1, 1))};
   const double yaw = std::atan2(R(1, 0), R(0, 0));
-  // Roll of what is left once the yaw is taken back, Rz(-yaw) R: near gimbal lock its error makes up
-  // for that of the yaw, where atan2(R(2, 1), R(2, 2)) would add one of its own.
+  // Roll from Rz(-yaw) R, the rotation without the yaw. Near gimbal lock its error then compensates
+  // that of the yaw; atan2(R(2, 1), R(2, 2)) would add another one.
   const double c = std::cos(yaw);
   const double s = std::sin(yaw);
   const double roll = std::atan2(s * R(0, 2) - c * R(1, 2), c * R(1, 1) - s * R(0, 1));

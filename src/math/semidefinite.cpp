@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kRounding = 1e-12;
 
-// One over the standard deviation of each axis, zero where there is none.
+// One over the standard deviation of each axis, zero if that is zero.
 Twist units(const Matrix6d& symmetric) {
   return symmetric.diagonal().unaryExpr(
       [](double variance) { return variance > 0 ? 1.0 / std::sqrt(variance) : 0.0; });
@@ -30,7 +30,7 @@ Twist inverse_units(const Twist& unit) {
 
 bool is_semidefinite(const Matrix6d& symmetric) {
   if (symmetric.diagonal().minCoeff() < 0) return false;
-  // A tenth of the time that eigenvalues take.
+  // Takes a tenth of the time of eigenvalues.
   const Matrix6d lifted = scaled(symmetric, units(symmetric)) + kRounding * Matrix6d::Identity();
   return Eigen::LLT<Matrix6d>(lifted).info() == Eigen::Success;
 }
