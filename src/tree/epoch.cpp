@@ -4,11 +4,11 @@
 
 namespace tfdude::epoch {
 
-std::atomic<std::uint64_t> current{1};  // NOLINT(*-avoid-non-const-global-variables): as declared
+std::atomic<std::uint64_t> current{1};  // NOLINT(*-avoid-non-const-global-variables): see epoch.hpp
 
 namespace {
 
-// NOLINTNEXTLINE(*-avoid-non-const-global-variables): a thread reads several trees, and is one reader
+// NOLINTNEXTLINE(*-avoid-non-const-global-variables): one reader per thread, for all trees
 std::atomic<Reader*> all_readers{nullptr};
 
 Reader* take_reader() {
@@ -18,13 +18,13 @@ Reader* take_reader() {
   }
   auto* r = new Reader;
   r->next = all_readers.load(std::memory_order_relaxed);
-  // seq_cst, as the announcements: a scan that misses this reader comes before all that it reads.
+  // seq_cst, as the announcements: a scan that misses this reader precedes all that it reads.
   while (!all_readers.compare_exchange_weak(r->next, r, std::memory_order_seq_cst)) {
   }
   return r;
 }
 
-// Hands the reader back when its thread ends.
+// Releases the reader when its thread ends.
 struct Lease {
   Lease() = default;
   ~Lease() { reader->taken.store(false, std::memory_order_release); }

@@ -6,7 +6,7 @@
 #include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
 
-// What the errors of edges have to do with each other.
+// How the errors of edges are correlated.
 namespace tfdude {
 
 Belief belief_of(const Transform& X, const PathCorrelation& correlation) {

@@ -6,7 +6,7 @@
 #include "base/stamp.hpp"
 #include "tree/forest_impl.hpp"
 
-// What an update does to the history of its edge.
+// The effect of an update on the history of its edge.
 namespace tfdude {
 namespace {
 
@@ -61,7 +61,7 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
     return fail(Errc::kInvalidInput, "frame " + quote(frames_.newest_value(slots[0]).name->text) +
                                          " is dynamic: its update needs a stamp");
   }
-  // Where the clock was set back, time goes on as little as it can.
+  // If the clock was set back, time advances as little as possible.
   return newest == kAlways ? clock_.now() : std::max(clock_.now(), saturating_add(newest, 1));
 }
 
@@ -98,7 +98,8 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_P
   if (samples == nullptr) {
     samples = new SampleHistory(default_timing_);
   } else {
-    // First, so that a ring buffer of as many slots as samples will do. At least two are kept: this is not the newest.
+    // First, so that a ring buffer with as many slots as samples suffices. At least two samples are
+    // kept, so this is not the newest.
     if (samples->count() >= samples->timing().count) drop_oldest(*samples);
     if (samples->full()) {
       samples = samples->grown().release();
@@ -127,13 +128,13 @@ void Forest::Impl::restart_history(const HeldVersion& newest, const Transform& X
   if (restart_listener_) restart_listener_(restart);
 }
 
-// The newest stays what it is, in a version that knows of the history with the sample.
+// The newest sample stays unchanged, in a version that refers to the history with the new sample.
 void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_PC,
                                  std::int64_t stamp) {
   newest.name->refused.behind = {};
   const std::uint64_t place = newest.samples->place_of(stamp);
   if (place < newest.samples->next() && newest.samples->stamp(place) == stamp) {
-    // Twice in one update: the later counts, and nobody has seen the earlier.
+    // Twice in one update: the later one counts, and no reader has seen the earlier.
     newest.samples->sample(place)->X_PC = X_PC;
     if (newest.stamp == stamp) const_cast<HeldVersion&>(newest).X_PC = X_PC;
     return;
@@ -194,7 +195,7 @@ Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   if (!slot) return tl::unexpected(slot.error());
   HeldVersion& fresh = impl_->push_held(*slot, impl_->frames_.newest_value(*slot).X_PC);
   impl_->forget_history(fresh);
-  delete fresh.samples;  // nobody has seen it
+  delete fresh.samples;  // no reader has seen it
   fresh.samples = new SampleHistory(timing);
   impl_->commit();
   return {};

@@ -1,7 +1,7 @@
 #include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
 
-// What a forest takes over of another's edges.
+// Applies values from another forest.
 namespace tfdude {
 namespace {
 
@@ -11,14 +11,14 @@ bool same(const Transform& a, const Transform& b) {
 
 }  // namespace
 
-// Static, until a sample of it follows.
+// The edge is static, until a sample follows.
 void Forest::Impl::begin_told_history(std::uint32_t slot, const PushedValue& value) {
   HeldVersion& fresh = push_held(slot, value.X);
   forget_history(fresh);
   if (value.process_noise->upper() == Covariance::Upper{}) return;
   EdgeTiming timing = default_timing_;
   timing.process_noise = *value.process_noise;
-  delete fresh.samples;  // nobody has seen it
+  delete fresh.samples;  // no reader has seen it
   fresh.samples = new SampleHistory(timing);
 }
 
@@ -48,7 +48,7 @@ bool Forest::Impl::push_told(const HeldVersion& edge, const PushedValue& value, 
     return taken || value.process_noise;
   }
   if (value.process_noise) return true;
-  // Within a history an edge that moves is never static again.
+  // Within one history, a dynamic edge never becomes static again.
   if (edge.moving() || same(edge.X_PC, value.X)) return false;
   push_held(slot, value.X);
   return true;

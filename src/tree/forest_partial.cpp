@@ -4,7 +4,7 @@
 
 #include "tree/forest_impl.hpp"
 
-// Updates that give only parts of values.
+// Updates of parts of values.
 namespace tfdude {
 namespace {
 

@@ -3,7 +3,7 @@
 
 #include "tree/forest_impl.hpp"
 
-// What happened to edges: for those who follow them, and for statistics.
+// Recent values of edges, for watchers and for statistics.
 namespace tfdude {
 namespace {
 
@@ -52,7 +52,7 @@ Correlation correlation_of(const HeldVersion& edge) {
   return edge.correlation != nullptr ? edge.correlation->now : Correlation();
 }
 
-// The number of the first sample that may be told, of those up to the edge's newest.
+// The number of the first sample to report, up to the edge's newest.
 std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, std::uint64_t seen,
                             const PushedQuery& query) {
   const SampleHistory& samples = *edge.samples;
@@ -63,7 +63,7 @@ std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, s
     while (first > samples.oldest() && samples.stamp(first) > from) --first;
     return first;
   }
-  // Those that came late lie anywhere.
+  // Late samples may be anywhere.
   if (samples.rewritten > seen) return samples.oldest();
   const auto is_new = [&](std::uint64_t number) {
     const HeldVersion* sample = samples.sample(number);
@@ -89,7 +89,7 @@ void add_values(const HeldVersion& edge, std::uint32_t index, const PushedQuery&
       const HeldVersion* sample = samples.sample(number);
       if (sample != nullptr && sample->commit > seen) tell(time_of(sample->stamp), sample->X_PC);
     }
-    // The edge's version may be younger than the sample that it shows.
+    // The edge's version may be newer than the sample that it shows.
     const HeldVersion* newest = samples.sample(edge.number);
     if (newest == nullptr || newest->commit > seen) tell(time_of(edge.stamp), edge.X_PC);
   }
@@ -109,7 +109,7 @@ PushedCommit Forest::values_since(std::vector<EdgeCursor>& cursors,
   const epoch::Guard guard;
   const std::uint64_t commit = impl_->frames_.snapshot();
   PushedCommit all{{}, commit};
-  // Null where it is not held, or hangs elsewhere: that is another history.
+  // Null if it is not held, or has another parent: that is another history.
   const auto followed = [&](const EdgeCursor& cursor) -> const HeldVersion* {
     const Version* version = impl_->frames_.of(cursor.frame, commit);
     if (version == nullptr) version = impl_->frames_.present(cursor.id, commit);

@@ -9,7 +9,7 @@ Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Ow
                                 std::uint64_t lamport_time) {
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
-  // A version that counts as held carries a value, which there is none of.
+  // A version that counts as held carries a value, and there is none.
   if (owner == kHeldHere) return fail(Errc::kInvalidInput, "owner is this very forest");
   const std::lock_guard lock(impl_->mutex_);
   const Impl::Pair pair = impl_->newest_pair(id, parent);

@@ -4,7 +4,7 @@
 #include "tree/epoch.hpp"
 #include "tree/forest_impl.hpp"
 
-// Lookups of segments that somebody else's path needs.
+// Lookups of segments that another participant asks for.
 namespace tfdude {
 namespace {
 
@@ -36,7 +36,8 @@ Result<std::vector<Reached>> values_at(const std::vector<Ends>& segments, std::i
   return values;
 }
 
-// Each segment's newest, and of those with moving edges that whose newest is the oldest.
+// The newest value of each segment. If several have dynamic edges, the common instant is that of
+// the oldest.
 Result<std::vector<Reached>> newest_values(const std::vector<Ends>& segments, Order order,
                                            PathLookup::Met& met) {
   std::vector<Reached> values;
@@ -59,7 +60,7 @@ Result<std::vector<Reached>> newest_values(const std::vector<Ends>& segments, Or
   return values_at(segments, met.limiting->stamp, query, met);
 }
 
-// Of the edges on these segments.
+// The newest history among the edges of these segments.
 std::uint64_t newest_history(const std::vector<Ends>& segments) {
   std::uint64_t newest = 0;
   for (const Ends& ends : segments) {
@@ -75,7 +76,7 @@ std::uint64_t newest_history(const std::vector<Ends>& segments) {
   return newest;
 }
 
-// Correlation is told where any segment has some.
+// Correlations are reported if any segment has some.
 void tell(std::vector<Reached>&& from, std::vector<Transform>& values,
           std::vector<PathCorrelation>& correlations) {
   values.clear();
@@ -85,7 +86,7 @@ void tell(std::vector<Reached>&& from, std::vector<Transform>& values,
   for (auto& one : from) correlations.push_back(std::move(one.correlation));
 }
 
-// Adds what each single edge was observed with.
+// Adds the edges that each single edge was observed with.
 void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
   const auto edge_of = [](const Ends& ends) -> const HeldVersion* {
     const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;

@@ -9,7 +9,7 @@
 namespace tfdude {
 namespace {
 
-// Of the whole process, so that a handle of one forest's frame is none of another's.
+// Unique in the process, so that a handle of one forest's frame is valid in no other.
 std::uint32_t next_generation() {
   static std::atomic<std::uint32_t> last{0};
   return last.fetch_add(1, std::memory_order_relaxed) + 1;
@@ -83,7 +83,7 @@ T& Forest::Impl::push(std::uint32_t slot) {
   fresh->kept = false;
   // A sample stays until its history drops it.
   if (!old->kept) reclaimer_.supersede(old);
-  // Readers skip the fresh version by its number until commit(), so the rest may be filled in later.
+  // Readers skip the fresh version by its number until commit(), so it may be filled in later.
   head.store(fresh, std::memory_order_release);
   return *fresh;
 }
@@ -160,7 +160,7 @@ void Forest::Impl::renew_depths(std::uint32_t top) {
   (void)graph_.subtree(top, stale);
 }
 
-// A name that nobody uses: no frame, and none below it.
+// Releases a name without a frame and without frames below it.
 void Forest::Impl::release(Version& fresh) {
   released_names_.push_back(fresh.name);
   fresh.name = nullptr;
@@ -186,7 +186,7 @@ void Forest::Impl::commit_structure() {
 
 void Forest::Impl::show_commit() {
   frames_.show_commit();
-  // Only now: a reader of the commit before may still reach a name through the version it sees.
+  // Only now: a reader of the previous commit may still reach a name through the version it sees.
   for (const Name* name : released_names_) {
     free_slots_.push_back(name->slot);
     frames_.drop_name(name);
@@ -289,7 +289,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   }
   const auto at = stamp_for(to_update_.data(), to_update_.size(), stamp);
   if (!at) return tl::unexpected(at.error());
-  // All of them, as each counts what it refuses.
+  // Checks all of them, as each counts what it refuses.
   Result<void> fits;
   for (const std::uint32_t slot : to_update_) {
     auto ok = check_sample(frames_.newest_value(slot), *at);

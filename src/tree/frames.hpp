@@ -10,7 +10,7 @@
 
 namespace tfdude {
 
-/// The two ends of a path as they are in one commit.
+/// The two ends of a path in one commit.
 struct Ends {
   const Version* a;
   const Version* b;
@@ -21,13 +21,14 @@ struct Ends {
 [[nodiscard]] tl::unexpected<Error> unknown_end(std::string_view id);
 [[nodiscard]] tl::unexpected<Error> not_connected(const Version& a, const Version& b);
 
-/// What readers of a forest see: the slot of each id, the versions of each slot, and the number of the newest commit.
+/// What readers of a forest see: the slot of each id, the versions of each slot, and the number of
+/// the newest commit.
 ///
-/// A commit pushes a new version on each slot it concerns, all with the next commit number, then stores
-/// that number. A reader takes the number once and skips newer versions, so it sees all of a commit or
-/// nothing of it.
+/// A commit pushes a new version on each slot it concerns, all with the next commit number, then
+/// stores that number. A reader takes the number once and skips newer versions, so it sees a commit
+/// whole or not at all.
 ///
-/// @par Thread safety  Readers under an epoch::Guard, without a lock; one writer at a time.
+/// @par Thread safety  Readers need an epoch::Guard, but no lock; one writer at a time.
 class Frames {
  public:
   // --- reading ---
@@ -36,10 +37,10 @@ class Frames {
     return committed_.load(std::memory_order_seq_cst);
   }
 
-  /// How many slots there are.
+  /// The number of slots.
   [[nodiscard]] std::uint32_t size() const { return slots_.size(); }
 
-  /// What the slot held at that commit.
+  /// The version of the slot at that commit.
   [[nodiscard]] static const Version* at(const Head& head, std::uint64_t commit) {
     const Version* version = head.load(std::memory_order_acquire);
     while (version->commit > commit) version = version->older;
@@ -49,16 +50,16 @@ class Frames {
     return at(slots_[slot], commit);
   }
 
-  /// The version of the id's slot at that commit; null if no slot stood for the id then.
+  /// The version of the id's slot at that commit; null if no slot had the id then.
   [[nodiscard]] const Version* named(std::string_view id, std::uint64_t commit) const;
 
-  /// The same where the frame was there.
+  /// As named(); null also if the frame was absent.
   [[nodiscard]] const Version* present(std::string_view id, std::uint64_t commit) const {
     const Version* version = named(id, commit);
     return version != nullptr && version->present() ? version : nullptr;
   }
 
-  /// The version of the handle's frame at that commit; null if it was not there.
+  /// The version of the handle's frame at that commit; null if it did not exist.
   [[nodiscard]] const Version* of(Handle frame, std::uint64_t commit) const;
 
   /// @return kUnknownStart, kUnknownEnd.
@@ -72,7 +73,7 @@ class Frames {
 
   // --- for the writer ---
 
-  /// The newest version, that of the commit being made where there is one.
+  /// The newest version: that of the current commit, if it has one.
   [[nodiscard]] const Version& newest(std::uint32_t slot) const {
     return *slots_[slot].load(std::memory_order_relaxed);
   }
@@ -80,17 +81,17 @@ class Frames {
     return static_cast<const HeldVersion&>(newest(slot));
   }
 
-  /// The id's newest version, there or not; null if the id is not interned.
+  /// The id's newest version, present or not; null if the id is not interned.
   [[nodiscard]] const Version* newest_named(std::string_view id) const;
 
-  /// The newest version of the frame if it is held here, else null.
+  /// The newest version of the frame if it is held here, otherwise null.
   [[nodiscard]] const Version* newest_held(Handle frame) const {
     if (frame.slot >= slots_.size()) return nullptr;
     const Version& version = newest(frame.slot);
     return version.held() && version.generation == frame.generation ? &version : nullptr;
   }
 
-  /// Checks that the frame is there and held here. @return kUnknownFrame, kNotOwner.
+  /// Checks that the frame exists and is held here. @return kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<std::uint32_t> held_slot(std::string_view id) const;
   [[nodiscard]] Result<std::uint32_t> held_slot(Handle frame) const;
 
@@ -101,13 +102,13 @@ class Frames {
   /// See IdTable::collect().
   void collect_names(std::uint64_t tag, std::uint64_t safe_below) { ids_.collect(tag, safe_below); }
 
-  /// The number of the commit that is being made.
+  /// The number of the current commit.
   [[nodiscard]] std::uint64_t commit_being_made() const {
     return committed_.load(std::memory_order_relaxed) + 1;
   }
-  /// Makes all that was pushed visible at once.
+  /// Makes everything pushed visible at once.
   void show_commit() { committed_.store(commit_being_made(), std::memory_order_release); }
-  /// The store of the last commit once more, now in the order of the readers' announcements (epoch.hpp).
+  /// Repeats the store of the last commit, in the order of the readers' announcements (epoch.hpp).
   void order_commit() { committed_.fetch_add(0, std::memory_order_seq_cst); }
 
  private:

@@ -9,14 +9,15 @@
 
 namespace tfdude {
 
-/// Who hangs below whom, by slot: the writer's side of the structure. The only place that includes
-/// Boost.Graph. Vertices are never erased (a slot is reused), so that descriptors stay what they are;
-/// out-edges are vectors, which take 60 bytes a frame less than sets; the youngest of many siblings is unlinked in
-/// O(1), the oldest in O(siblings).
+/// The hierarchy of frames, by slot: the writer's side of the structure. The only place that
+/// includes Boost.Graph. Vertices are never erased (slots are reused), so that descriptors stay
+/// valid. Out-edges are vectors, which take 60 bytes per frame less than sets. The youngest of many
+/// siblings is unlinked in O(1), the oldest in O(siblings).
 ///
-/// Subtrees and removal are not Boost.Graph's own (bench/core/graph_bench.cpp has the figures): breadth_first_visit()
-/// takes 4 to 20 times as long, since a tree needs no colours, and remove_edge() twice with 100 siblings and 100 times with
-/// 10,000, since it looks from the front.
+/// Subtrees and removal do not use Boost.Graph's own functions (bench/core/graph_bench.cpp has the
+/// figures). breadth_first_visit() takes 4 to 20 times as long, since a tree needs no colours.
+/// remove_edge() takes twice as long with 100 siblings and 100 times with 10,000, since it searches
+/// from the front.
 class Graph {
  public:
   using Slot = std::uint32_t;
@@ -26,7 +27,7 @@ class Graph {
   }
   void link(Slot parent, Slot child) { boost::add_edge(parent, child, graph_); }
   void unlink(Slot parent, Slot child) {
-    // Not boost::remove_edge, which looks from the front and keeps the order.
+    // Not boost::remove_edge, which searches from the front and keeps the order.
     auto& edges = graph_.out_edge_list(parent);
     const auto last = std::find_if(edges.rbegin(), edges.rend(), [child](const auto& edge) {
       return edge.get_target() == child;
@@ -45,7 +46,7 @@ class Graph {
     for (; child != end; ++child) visit(static_cast<Slot>(*child));
   }
 
-  /// The slot and all below it where enter(child) allows it, parents before children.
+  /// The slot and all slots below it that enter(child) admits, parents before children.
   template <class Enter>
   [[nodiscard]] std::vector<Slot> subtree(Slot top, Enter enter) const {
     std::vector<Slot> order{top};

@@ -6,7 +6,7 @@
 namespace tfdude {
 namespace {
 
-// Stands where a name was, so that probing goes on past it.
+// Replaces an erased name, so that probing continues past it.
 const Name kTombstone;
 
 std::size_t hash_of(std::string_view id) { return std::hash<std::string_view>{}(id); }
@@ -51,7 +51,8 @@ void IdTable::erase(const Name* name) {
   std::size_t i = name->hash & table.mask;
   while (table.cells[i].load(std::memory_order_relaxed) != name) i = (i + 1) & table.mask;
   table.cells[i].store(&kTombstone, std::memory_order_release);
-  // Tombstones before an empty cell lead nowhere: emptied, so that coming and going does not fill the table.
+  // Tombstones before an empty cell serve no probe. They are cleared, so that repeated insertion
+  // and removal does not fill the table.
   if (table.cells[(i + 1) & table.mask].load(std::memory_order_relaxed) == nullptr) {
     while (table.cells[i].load(std::memory_order_relaxed) == &kTombstone) {
       table.cells[i].store(nullptr, std::memory_order_release);
@@ -72,7 +73,7 @@ void IdTable::collect(std::uint64_t tag, std::uint64_t safe_below) {
 }
 
 void IdTable::grow() {
-  // Sized by what lives, so that a table full of tombstones is cleaned rather than doubled.
+  // Sized by the live names, so that a table full of tombstones is cleaned rather than doubled.
   std::size_t capacity = 64;
   while (capacity < (names_ + 1) * 3) capacity *= 2;
   auto fresh = std::make_unique<Table>(capacity);

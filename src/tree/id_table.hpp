@@ -9,13 +9,14 @@
 
 namespace tfdude {
 
-/// What came for an edge and was not taken.
+/// Counts of samples that an edge refused.
 struct Refused {
-  std::atomic<std::uint64_t> old{0};    ///< samples older than what is kept,
-  std::atomic<std::uint64_t> equal{0};  ///< of the stamp of another,
-  std::atomic<std::uint64_t> ahead{0};  ///< or too far ahead of the clock
+  std::atomic<std::uint64_t> old{0};    ///< older than the kept history
+  std::atomic<std::uint64_t> equal{0};  ///< the stamp of another sample
+  std::atomic<std::uint64_t> ahead{0};  ///< too far ahead of the clock
 
-  /// Those in a row that are older than the span, while `newest` is the newest sample; for writers only.
+  /// Consecutive samples older than the span, while `newest` is the newest sample; for writers
+  /// only.
   struct Behind {
     std::uint64_t count = 0;
     std::int64_t newest = 0;
@@ -23,20 +24,21 @@ struct Refused {
   } behind;
 };
 
-/// An interned id and the slot it stands for. Immutable once it is in the table, but for `lamport_time` and `refused`.
+/// An interned id and its slot. Immutable once in the table, except for `lamport_time` and
+/// `refused`.
 struct Name {
   std::string text;
   std::size_t hash = 0;
   std::uint32_t slot = 0;
-  /// When its frame was hung where it hangs. Of the newest commit, whichever a reader sees.
+  /// When the frame got its parent. That of the newest commit, whichever a reader sees.
   mutable std::atomic<std::uint64_t> lamport_time{0};
   mutable Refused refused;
 
   void hung(std::uint64_t when) const { lamport_time.store(when, std::memory_order_relaxed); }
 };
 
-/// Id to Name: open addressing, found without a lock under an epoch::Guard, changed by one writer at a
-/// time. What a change makes unreachable waits in limbo until no reader can see it.
+/// Maps an id to its Name, by open addressing. Readers need an epoch::Guard but no lock; one writer
+/// at a time. Entries that a change makes unreachable wait in limbo until no reader can see them.
 class IdTable {
  public:
   IdTable();
@@ -52,8 +54,8 @@ class IdTable {
   /// The name must be in the table.
   void erase(const Name* name);
 
-  /// Whatever was erased since the last call gets the tag (epoch::retire_tag); what carries one below
-  /// safe_below is freed.
+  /// Gives the tag (epoch::retire_tag) to everything erased since the last call, and frees what has
+  /// a tag below safe_below.
   void collect(std::uint64_t tag, std::uint64_t safe_below);
 
  private:
@@ -69,14 +71,14 @@ class IdTable {
   };
 
   void grow();
-  /// @return whether it took a cell that had never been used
+  /// @return whether it took a cell that was never used
   static bool place(Table& table, const Name* name);
 
   std::atomic<Table*> table_;
   std::size_t names_ = 0;
   std::size_t used_ = 0;  // names and tombstones
   std::vector<Limbo> limbo_;
-  std::size_t tagged_ = 0;  // of limbo_, from the front
+  std::size_t tagged_ = 0;  // number of tagged entries at the front of limbo_
 };
 
 }  // namespace tfdude

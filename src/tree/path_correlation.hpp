@@ -9,10 +9,10 @@
 
 namespace tfdude {
 
-/// What of an edge's correlation outlives its process.
+/// The stored part of an edge's correlation.
 struct StoredCorrelation {
   Correlation said{};
-  /// What observations have left, in place of that, until the edge's next value.
+  /// Replaces `said` until the edge's next value; set by observations.
   std::optional<Correlation> observed{};
 
   [[nodiscard]] bool empty() const { return said.empty() && !observed; }
@@ -21,11 +21,11 @@ struct StoredCorrelation {
   }
 };
 
-/// What a Belief has beside its pose and own part.
+/// The part of a Belief besides its pose and own part.
 struct PathCorrelation {
   std::optional<Covariance> unknown;
   std::vector<CommonError> common_errors;
-  std::vector<std::string> observed_with;  ///< of a single edge, as in Correlation; else empty
+  std::vector<std::string> observed_with;  ///< of a single edge, as in Correlation; otherwise empty
 
   [[nodiscard]] bool empty() const {
     return !unknown && common_errors.empty() && observed_with.empty();
@@ -34,7 +34,7 @@ struct PathCorrelation {
 
 [[nodiscard]] Belief belief_of(const Transform& X, const PathCorrelation& correlation);
 
-/// An edge's new value by an observation.
+/// An edge's new value after an observation.
 struct Revision {
   std::string id;
   Transform X_PC;

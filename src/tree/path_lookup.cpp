@@ -15,7 +15,7 @@
 namespace tfdude {
 namespace {
 
-// What a walk adds up: of an edge it needs as much as a Transform for a Belief.
+// The type of an edge's value that a walk accumulates; for a Belief it is a Transform.
 template <class Value>
 using OfEdge = std::conditional_t<std::is_same_v<Value, Pose>, Pose, Transform>;
 
@@ -46,7 +46,7 @@ tl::unexpected<Error> no_data(Errc code, const HeldVersion& edge, std::int64_t t
 
 tl::unexpected<Error> too_old(const HeldVersion& edge, std::int64_t t) {
   const std::int64_t oldest = edge.samples->stamp(edge.samples->oldest());
-  // It may be dropped while it is looked at.
+  // It may be dropped meanwhile.
   if (oldest == kAlways) return no_data(Errc::kTooOld, edge, t, "it is not kept any more");
   const std::chrono::nanoseconds gap(saturating_subtract(oldest, t));
   return no_data(Errc::kTooOld, edge, t,
@@ -59,7 +59,7 @@ tl::unexpected<Error> not_yet(const HeldVersion& edge, std::int64_t t, const std
                  "its newest sample is " + in_milliseconds(gap) + " older" + more);
 }
 
-// Beyond the newest sample, as far as is allowed.
+// Extrapolates beyond the newest sample, up to the allowed limit.
 template <class Value>
 Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Query& query,
                             OfEdge<Value>& X) {
@@ -80,15 +80,15 @@ Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Query
   return {};
 }
 
-// What a walk knows of the instant it is about.
+// The instant of a walk.
 struct Moment {
   std::int64_t t;
-  std::int64_t age;  // until when it is to hold, where noise is added for that
+  std::int64_t age;  // adds the process noise until then
   const Query& query;
   std::uint64_t back = 0;  // see SampleHistory::around()
 };
 
-// A moving edge on the path.
+// Accumulates a dynamic edge of the path.
 template <class Value>
 Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edge, Moment& moment) {
   const std::int64_t t = moment.t;
@@ -150,7 +150,7 @@ Result<Value> PathLookup::walk(const Ends& ends, Absent absent, Order order, Tak
   const Version* b = ends.b;
   PathAccumulation<Value> path_a = begin_path<Value>(order);
   PathAccumulation<Value> path_b = begin_path<Value>(order);
-  // What went wrong first; from there on only the errors matter, and kNotConnected goes first.
+  // The first error. From there on only errors matter, and kNotConnected has priority.
   std::optional<Error> error;
   while (a != b) {
     const bool from_a = a->depth >= b->depth;
@@ -173,7 +173,7 @@ Result<Value> PathLookup::walk(const Ends& ends, Absent absent, Order order, Tak
   return join(std::move(path_a), std::move(path_b));
 }
 
-// Only a Belief has room for correlation.
+// Only a Belief can represent correlation.
 template <class Value>
 bool leaves_out_correlation(const HeldVersion& edge) {
   return std::is_same_v<Value, Transform> && edge.correlation != nullptr;
@@ -181,8 +181,8 @@ bool leaves_out_correlation(const HeldVersion& edge) {
 
 template <class Value>
 Result<Value> PathLookup::walk_newest(const Ends& ends, Absent absent, Order order, Met& met) {
-  // Mostly all moving edges have their newest sample of the same instant, or none is moving: then all values are as
-  // they lie there.
+  // Usually all dynamic edges have their newest sample at the same instant, or none is dynamic.
+  // Then the stored values are used unchanged.
   const HeldVersion* limiting = nullptr;
   bool mixed = false;
   bool correlated = false;
@@ -262,7 +262,7 @@ Result<Value> PathLookup::look_up(Name a, Name b) const {
   Met met;
   auto newest = walk_newest<Value>(*found, Absent::kEnds, Order::kSecond, met);
   if constexpr (std::is_same_v<Value, Transform>) {
-    // Into the same place, which then is not copied where all is independent.
+    // Into the same object, which is not copied if all errors are independent.
     if (newest && met.correlated) {
       met = {};
       newest = walk_newest<Belief>(*found, Absent::kEnds, Order::kSecond, met).map(collapse);
@@ -293,7 +293,7 @@ Result<StampedTransform> PathLookup::look_up(Name a, Name b, const Query& query)
   return collapsed(belief_of(X_AB->X, X_AB->correlation), query.order, at);
 }
 
-// For the one name of a frame and the other.
+// For a frame's id, and for its handle.
 template Result<Transform> PathLookup::look_up<Transform>(std::string_view a,
                                                           std::string_view b) const;
 template Result<Pose> PathLookup::look_up<Pose>(std::string_view a, std::string_view b) const;

@@ -6,45 +6,48 @@
 
 namespace tfdude {
 
-/// What a walk comes to, with the correlation of what has any.
+/// The result of a walk, with its correlation if there is any.
 struct Reached {
   Transform X;
   PathCorrelation correlation;
 };
 
-/// Where the frames at the two ends of a path are to each other, by a walk from both to where these meet. Stateless: under
-/// an epoch::Guard of the caller.
+/// Computes the pose between the frames at the two ends of a path, by a walk from both ends to
+/// their common ancestor. Stateless; the caller holds an epoch::Guard.
 class PathLookup {
  public:
   explicit PathLookup(const Frames& frames) : frames_(frames) {}
 
-  /// Frames that are not there end the climb, or may be passed.
+  /// Whether absent frames end the climb, or may be passed.
   enum class Absent { kEnds, kMayPass };
 
-  /// What a walk has met.
+  /// What a walk has found.
   struct Met {
-    const HeldVersion* limiting =
-        nullptr;  ///< whose newest sample is the oldest; null where none is moving
+    /// The dynamic edge whose newest sample is the oldest; null if none is dynamic.
+    const HeldVersion* limiting = nullptr;
     bool moving = false;
-    bool correlated = false;  ///< an edge is: a Transform is not enough, and none is given
+    /// An edge is correlated: a Transform does not suffice, and none is returned.
+    bool correlated = false;
   };
 
-  /// X_AB at the newest instant that all moving edges have: that of the newest sample of Met::limiting.
+  /// X_AB at the newest instant common to all dynamic edges: that of the newest sample of
+  /// Met::limiting.
   [[nodiscard]] static Result<Reached> reach_newest(const Ends& ends, Absent absent, Order order,
                                                     Met& met);
   /// X_AB at t.
   [[nodiscard]] static Result<Reached> reach_at(const Ends& ends, Absent absent, std::int64_t t,
                                                 const Query& query, Met& met);
 
-  /// Value is Transform, or Pose where the covariance is not asked for; Name is an id or a handle. With a guard of its own.
+  /// Value is Transform, or Pose if no covariance is needed; Name is an id or a handle. Takes its
+  /// own guard.
   template <class Value, class Name>
   [[nodiscard]] Result<Value> look_up(Name a, Name b) const;
   template <class Name>
   [[nodiscard]] Result<StampedTransform> look_up(Name a, Name b, const Query& query) const;
 
  private:
-  /// The walk that all lookups share. `take` is handed the accumulation that an edge belongs to, and the edge, whose value it
-  /// adds to that; the walk ends in an error of its.
+  /// The walk that all lookups share. `take` gets the accumulation of an edge, and the edge, whose
+  /// value it adds. The walk stops at an error of `take`.
   template <class Value, class Take>
   [[nodiscard]] static Result<Value> walk(const Ends& ends, Absent absent, Order order, Take take);
   template <class Value>

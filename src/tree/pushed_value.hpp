@@ -12,42 +12,42 @@
 
 namespace tfdude {
 
-/// What of an edge, while it hangs under this parent, somebody has seen already: to begin with, nothing.
+/// How much of an edge, under this parent, a watcher has seen; initially nothing.
 struct EdgeCursor {
   std::string id;
   std::string parent;
   std::uint64_t history = 0;  ///< of the values seen; 0: none
-  std::uint64_t commit = 0;   ///< up to which they were seen
-  Handle frame{};             ///< found by id where it is not there any more
+  std::uint64_t commit = 0;   ///< up to which values were seen
+  Handle frame{};             ///< found by id if it does not exist any more
 };
 
-/// A value of one of several edges that somebody follows, by its index among them.
+/// A value of one of several watched edges, with its index among them.
 struct PushedValue {
   std::uint32_t index = 0;
   std::optional<Time> stamp;
   Transform X;
-  Correlation correlation{};  ///< of the edge, with the last of its values only
-  /// Of values that have to do with each other. Where an edge is moved, or added again, or forgets its samples, another one
-  /// begins, of a higher number.
+  Correlation correlation{};  ///< of the edge; only with the last of its values
+  /// The number of the history of this value. A new history, with a higher number, starts when an
+  /// edge is moved, added again, or loses its samples.
   std::uint64_t history = 0;
-  /// That of the edge, with the first of its values that is told of a history only.
+  /// Of the edge; only with the first value reported of a history.
   std::optional<Covariance> process_noise{};
 };
 
-/// Values that were written to edges until a commit.
+/// Values written to edges up to a commit.
 struct PushedCommit {
-  /// Older stamps first, and before them those that hold for all times.
+  /// Sorted by stamp, after those that hold for all times.
   std::vector<PushedValue> values;
   std::uint64_t commit = 0;
 };
 
-/// Which samples of a moving edge are told.
+/// Which samples of a dynamic edge to report.
 struct PushedQuery {
   bool newest_only = false;
-  /// Where nothing was seen yet: those since the last that is not younger than this, instead of the newest.
+  /// If nothing was seen yet: start at the last sample not later than this, instead of the newest.
   std::optional<Time> from{};
-  /// Nothing is told as long as one of the edges is not held, or hangs elsewhere: without it, what the others tell may be half
-  /// of what was written.
+  /// Report nothing while one of the edges is not held, or has another parent: without it, the
+  /// others may be half of a commit.
   bool whole = false;
 };
 

@@ -10,8 +10,9 @@
 
 namespace tfdude {
 
-/// Gives a forest's writer versions to fill in, and takes what commits have superseded: once no reader can see that any
-/// more (epoch.hpp), versions are given out again, and all else is deleted. One writer at a time.
+/// Provides a forest's writer with versions to fill in, and takes superseded objects. Once no
+/// reader can see them (epoch.hpp), versions are reused, and all others are deleted. One writer at
+/// a time.
 class Reclaimer {
  public:
   template <class T>
@@ -23,25 +24,26 @@ class Reclaimer {
     }
   }
 
-  // Of the commit that is being made, or of one before. Null is nothing.
+  // Takes an object superseded by the current commit, or by an earlier one. Ignores null.
   void supersede(Version* version) { versions_.push_back(version); }
   void supersede(SampleHistory* samples) { rings_.superseded.emplace_back(samples); }
   void supersede(EdgeCorrelation* correlation) { ties_.superseded.emplace_back(correlation); }
 
-  /// Whether it is time for collect().
+  /// Whether collect() is due.
   [[nodiscard]] bool is_due() const { return versions_.size() > kCollectAt; }
 
-  /// To be called between two commits.
+  /// Call only between two commits.
   void collect(Frames& frames);
 
  private:
-  // How many superseded versions may wait before the readers are asked: rare enough to cost little (locked
-  // instructions, and the readers' cache lines), few enough that the pool stays in the first-level cache.
+  // How many superseded versions may wait before the readers are checked. Rare enough to cost
+  // little (locked instructions, and the readers' cache lines), few enough that the pool stays in
+  // the first-level cache.
   static constexpr std::size_t kCollectAt = 64;
 
   template <class T>
   struct Waiting {
-    std::vector<std::unique_ptr<T>> superseded;  // since the readers were last asked
+    std::vector<std::unique_ptr<T>> superseded;  // since the readers were last checked
     std::vector<std::unique_ptr<T>> retired;     // with a tag
 
     void collect(std::uint64_t tag, std::uint64_t safe_below);
@@ -49,7 +51,7 @@ class Reclaimer {
 
   VersionPool<HeldVersion> held_pool_;
   VersionPool<Version> remote_pool_;
-  std::vector<Version*> versions_;  // superseded since the readers were last asked
+  std::vector<Version*> versions_;  // superseded since the readers were last checked
   Waiting<SampleHistory> rings_;
   Waiting<EdgeCorrelation> ties_;
 };

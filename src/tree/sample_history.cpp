@@ -4,7 +4,8 @@
 
 namespace tfdude {
 
-// A slot is written anew only after the sample in it was dropped; so all that was read before holds.
+// A slot is rewritten only after its sample was dropped. So, if the first sample is still kept,
+// everything read before is valid.
 SampleHistory::Bracket SampleHistory::pair(std::uint64_t before) const {
   const Bracket found{slot(before).sample.load(std::memory_order_acquire),
                       slot(before + 1).sample.load(std::memory_order_acquire)};
@@ -13,7 +14,7 @@ SampleHistory::Bracket SampleHistory::pair(std::uint64_t before) const {
 
 SampleHistory::Bracket SampleHistory::around(std::int64_t t, std::uint64_t newest,
                                              std::uint64_t& back) const {
-  // How far a guess may be off until halving is quicker.
+  // How far a guess may be off before bisection is faster.
   constexpr int kSteps = 4;
   std::uint64_t low = oldest();
   std::uint64_t high = newest;

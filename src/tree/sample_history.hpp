@@ -13,16 +13,16 @@ struct HeldVersion;
 /// The stamp of a value that holds for all times.
 inline constexpr std::int64_t kAlways = INT64_MIN;
 
-/// The history of one edge: its samples in the order of their stamps, each the version that showed it first, in a ring
-/// buffer.
+/// The history of one edge: its samples, ordered by stamp, in a ring buffer. Each sample is the
+/// version that showed it first.
 ///
-/// Samples are numbered; the one with number n lies in slot n modulo the capacity. Appending changes nothing that a
-/// reader looks at: it begins at the version that it sees of the edge, which knows the number of its own sample,
-/// and goes back from there. Whatever else there is to do (to grow, to insert) is done in a copy, which the next
-/// version names. One writer at a time; readers under an epoch::Guard.
+/// Samples are numbered; number n is in slot n modulo the capacity. Appending changes nothing that
+/// a reader accesses: the reader starts at its version of the edge, which knows the number of its
+/// own sample, and goes back from there. Other changes (growing, inserting) are made in a copy,
+/// which the next version refers to. One writer at a time; readers need an epoch::Guard.
 class SampleHistory {
  public:
-  /// The two samples around an instant; null: there is none.
+  /// The two samples around an instant; null: none.
   struct Bracket {
     const HeldVersion* before = nullptr;
     const HeldVersion* after = nullptr;
@@ -33,13 +33,14 @@ class SampleHistory {
   [[nodiscard]] const EdgeTiming& timing() const { return timing_; }
   [[nodiscard]] bool has_noise() const { return has_noise_; }
 
-  /// The samples around t, the newest that the reader sees being number `newest`, younger than t.
-  /// @param back  how many samples before the newest they were for an edge that this one may go along with; then for
-  ///   this
-  /// @return nothing where all are younger. O(1) where the samples come at an even rate, else O(log n).
+  /// The samples around t. `newest` is the number of the newest sample that the reader sees, which
+  /// is later than t.
+  /// @param back  in: the distance from the newest sample found for an edge with similar sampling;
+  ///   out: that for this edge
+  /// @return empty if all are later. O(1) if the samples come at an even rate, otherwise O(log n).
   [[nodiscard]] Bracket around(std::int64_t t, std::uint64_t newest, std::uint64_t& back) const;
 
-  /// The stamp of a sample that is kept still; kAlways if it is not.
+  /// The stamp of a sample that is still kept; otherwise kAlways.
   [[nodiscard]] std::int64_t stamp(std::uint64_t number) const;
   [[nodiscard]] HeldVersion* sample(std::uint64_t number) const;
   [[nodiscard]] std::uint64_t oldest() const { return first_.load(std::memory_order_acquire); }
@@ -52,23 +53,23 @@ class SampleHistory {
   }
   [[nodiscard]] bool full() const { return count() > mask_; }
 
-  /// The number that a sample of this stamp is to have: those from there on are younger.
+  /// The number for a sample with this stamp; samples from that number on are later.
   [[nodiscard]] std::uint64_t place_of(std::int64_t stamp) const;
 
-  /// There must be room, and no sample be younger.
+  /// There must be room, and no later sample.
   void append(HeldVersion* sample, std::int64_t stamp);
 
-  /// Forgets the oldest sample. @return it
+  /// Drops the oldest sample. @return the dropped sample
   [[nodiscard]] HeldVersion* drop_oldest();
 
-  /// A copy with room for twice as many.
+  /// A copy with room for twice as many samples.
   [[nodiscard]] std::unique_ptr<SampleHistory> grown() const;
 
-  /// A copy with one more sample at its place.
+  /// A copy with one more sample, inserted at `place`.
   [[nodiscard]] std::unique_ptr<SampleHistory> with(HeldVersion* sample, std::int64_t stamp,
                                                     std::uint64_t place) const;
 
-  /// A copy with another sample, of the same stamp, at a place.
+  /// A copy in which `sample` replaces one with the same stamp.
   [[nodiscard]] std::unique_ptr<SampleHistory> replaced(HeldVersion* sample,
                                                         std::uint64_t place) const;
 
@@ -76,7 +77,7 @@ class SampleHistory {
     return sizeof(SampleHistory) + (mask_ + 1) * sizeof(Slot);
   }
 
-  /// The commit of the last sample that was not appended: inserted, or put in another's place. Set before readers see it.
+  /// The commit of the last sample that was inserted or replaced. Set before readers see it.
   std::uint64_t rewritten = 0;
 
   std::uint64_t retire_tag = 0;

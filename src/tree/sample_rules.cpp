@@ -15,13 +15,14 @@ std::chrono::nanoseconds apart(std::int64_t earlier, std::int64_t later) {
   return std::chrono::nanoseconds(later - earlier);
 }
 
-// Whether a sample is one more of a row that is older than all that is kept. Samples are told before they are applied, with
-// others that may refuse: so one of the same stamp is the same row again.
+// Whether a sample continues the row of samples older than the kept history. Samples are checked
+// before they are applied, together with others that may be refused. So a sample with the same
+// stamp belongs to the same row.
 bool goes_on(const Refused::Behind& row, std::int64_t newest, std::int64_t stamp) {
   return row.count > 0 && row.newest == newest && row.last <= stamp;
 }
 
-// Whether a sample that is older than the span is the one after which the history starts again; counts it.
+// Whether the history restarts with this sample, which is older than the span; counts it.
 bool starts_again(const HeldVersion& newest, std::int64_t stamp) {
   const std::size_t needed = newest.samples->timing().restart_after;
   Refused::Behind& row = newest.name->refused.behind;

@@ -8,9 +8,10 @@
 
 namespace tfdude {
 
-/// Whether a moving edge takes a sample: it may be older than others, but not than all that is kept, unless so many in a row
-/// are that the history starts again (EdgeTiming::restart_after). For the forest's writer.
-/// @return kTooOld, kStampTaken; both are counted
+/// Whether a dynamic edge accepts a sample. It may be older than other samples, but not than the
+/// kept history, unless it completes the row with which the history restarts
+/// (EdgeTiming::restart_after). For the forest's writer.
+/// @return kTooOld, kStampTaken; counts both
 [[nodiscard]] Result<void> check_sample(const HeldVersion& newest, std::int64_t stamp);
 
 }  // namespace tfdude

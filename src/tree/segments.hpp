@@ -13,10 +13,10 @@
 
 namespace tfdude {
 
-/// Whose an edge is, as a small number that the layer above gives a meaning to.
+/// The owner of an edge, as a small number whose meaning the layer above defines.
 using Owner = std::uint32_t;
 
-/// The edge's value is held in this very forest.
+/// The edge's value is held in this forest.
 inline constexpr Owner kHeldHere = 0;
 
 /// The ends of a run of edges.
@@ -32,28 +32,30 @@ struct Segment {
   std::string to;
 };
 
-/// What one owner says of its part of a path: all of one commit, and of one instant.
+/// The values of one owner's part of a path: all from one commit and for one instant.
 struct SegmentValues {
-  std::vector<Transform> values;  ///< one a segment
+  std::vector<Transform> values;  ///< one per segment
   std::optional<Time> stamp;
-  /// Since the sample before the newest, of the edge whose newest sample is the oldest.
+  /// Time between the two newest samples of the edge whose newest sample is the oldest.
   std::chrono::nanoseconds period{0};
-  std::vector<Transform> at_hint;  ///< the same at another instant; empty if that is not to be had
-  /// By segment, whose values' covariances are of own parts then; empty if no edge is correlated with any other.
+  /// `values` at the other instant; empty if they are not available.
+  std::vector<Transform> at_hint;
+  /// One per segment, whose covariance is then that of the own part; empty if no edge is
+  /// correlated.
   std::vector<PathCorrelation> correlations{};
   std::vector<PathCorrelation> correlations_at_hint{};
-  std::uint64_t commit = 0;       ///< of which the values are; see revise()
-  std::uint64_t history = 0;      ///< the newest of their edges': see PushedValue
+  std::uint64_t commit = 0;       ///< the commit of the values; see revise()
+  std::uint64_t history = 0;      ///< the newest history of their edges; see PushedValue
   std::uint64_t incarnation = 0;  ///< of the owner that counts the commits; see Partition
 };
 
-/// What is known of one frame besides its value.
+/// Information about one frame, without its value.
 struct FrameInfo {
   std::string id;
   std::string parent;  ///< empty: a root
   Owner owner = kHeldHere;
-  bool attached = false;           ///< its parent is there
-  std::uint64_t lamport_time = 0;  ///< when it was hung where it hangs
+  bool attached = false;           ///< its parent exists
+  std::uint64_t lamport_time = 0;  ///< when it got its parent
 };
 
 }  // namespace tfdude

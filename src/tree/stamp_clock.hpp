@@ -11,7 +11,7 @@
 
 namespace tfdude {
 
-/// The clock that a forest's writer judges stamps by; perhaps none. One writer at a time.
+/// The clock by which a forest's writer judges stamps, if there is one. One writer at a time.
 class StampClock {
  public:
   explicit StampClock(std::function<Time()> clock) : clock_(std::move(clock)) {}
@@ -19,8 +19,9 @@ class StampClock {
   [[nodiscard]] bool is_there() const { return clock_ != nullptr; }
   [[nodiscard]] std::int64_t now() const { return nanoseconds(clock_()); }
 
-  /// What the clock says where the stamp is further ahead of that than the limit [ns]; else nothing. It is asked anew only
-  /// where what it said last does not do, and after kGoesFor stamps, as it may have been set back.
+  /// The clock's time if the stamp is further ahead of it than the limit [ns]; otherwise nothing.
+  /// The clock is read again only if the last reading does not suffice, and after kGoesFor stamps,
+  /// as it may have been set back.
   [[nodiscard]] std::optional<std::int64_t> refuses(std::int64_t stamp, std::int64_t limit) {
     if (++asked_ago_ < kGoesFor && saturating_subtract(stamp, said_) <= limit) return std::nullopt;
     said_ = now();

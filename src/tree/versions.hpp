@@ -19,27 +19,27 @@ inline constexpr std::uint32_t kNoSlot = 0xFFFFFFFF;
 
 struct Version;
 
-/// Where a slot's newest version is found; stays where it is.
+/// Points to a slot's newest version; never moves.
 using Head = std::atomic<Version*>;
 
-/// What one commit says of the frame in one slot. Immutable once its commit is visible.
+/// The state of the frame in one slot, as of one commit. Immutable once its commit is visible.
 struct Version {
   std::uint64_t commit = 0;
   Version* older = nullptr;
-  const Name* name = nullptr;   // null: the slot stands for no id
-  const Head* above = nullptr;  // of the slot `parent`, which a climb need not look up then
+  const Name* name = nullptr;   // null: the slot has no id
+  const Head* above = nullptr;  // of the slot `parent`, so that a climb needs no lookup
   std::uint32_t parent = kNoSlot;
-  std::int32_t depth = kAbsent;  // parent's + 1, so 0 where there is none or it is absent
+  std::int32_t depth = kAbsent;  // parent's depth + 1; 0 without a parent or if it is absent
   Owner owner = kHeldHere;
   std::uint32_t slot = kNoSlot;
-  // Which frame it is; new whenever one appears, even under a kept name.
+  // Identifies the frame: a new number whenever one appears, even under the same name.
   std::uint32_t generation = 0;
-  bool kept = false;  // by a history, as a sample; only the writer looks
-  // Bookkeeping of the pool, not for readers.
+  bool kept = false;  // by a history, as a sample; for the writer only
+  // Bookkeeping of the pool; not for readers.
   std::uint64_t retire_tag = 0;
   Version* next = nullptr;
 
-  /// The depth of a slot whose name others give as their parent, while no such frame is there.
+  /// The depth of a slot that others name as their parent, while that frame does not exist.
   static constexpr std::int32_t kAbsent = -1;
 
   [[nodiscard]] bool present() const { return depth != kAbsent; }
@@ -47,7 +47,7 @@ struct Version {
   [[nodiscard]] bool held() const { return present() && owner == kHeldHere; }
 };
 
-/// What an edge's error has to do with others'. Immutable, shared by the edge's versions.
+/// How an edge's error is correlated with others. Immutable, shared by the edge's versions.
 struct EdgeCorrelation {
   Correlation said;
   Correlation now;       ///< after observations, until the next update
@@ -59,15 +59,17 @@ struct EdgeCorrelation {
 struct HeldVersion : Version {
   std::int64_t stamp = kAlways;            // of the newest sample
   std::uint64_t number = 0;                // its number in the history
-  SampleHistory* samples = nullptr;        // null: no history, nor is said how to keep one
-  EdgeCorrelation* correlation = nullptr;  // null: independent of all else
-  std::uint64_t history = 0;  // the commit with which its values began: none before is of this edge
+  SampleHistory* samples = nullptr;        // null: no history and no timing of its own
+  EdgeCorrelation* correlation = nullptr;  // null: independent
+  // The commit with which its values began; earlier values belong to another edge.
+  std::uint64_t history = 0;
   Transform X_PC;
 
   [[nodiscard]] bool moving() const { return stamp != kAlways; }
 };
 
-/// Blocks of one version type, reused in the order in which readers let go of them. One writer at a time.
+/// Blocks of one version type, reused in the order in which readers release them. One writer at a
+/// time.
 template <class T>
 class VersionPool {
  public:
@@ -78,7 +80,7 @@ class VersionPool {
     return static_cast<T*>(taken);
   }
 
-  /// Queues what a commit superseded; `tag` from epoch::retire_tag().
+  /// Queues a superseded version; `tag` from epoch::retire_tag().
   void retire(Version* version, std::uint64_t tag) {
     version->retire_tag = tag;
     version->next = nullptr;
@@ -113,8 +115,8 @@ class VersionPool {
   Version* last_ = nullptr;
 };
 
-/// The newest version of each slot. Grows without moving what readers look at: segment k holds
-/// 1024 · 2^k slots.
+/// The newest version of each slot. Grows without moving memory that readers access: segment k
+/// holds 1024 · 2^k slots.
 class SlotArray {
  public:
   SlotArray() = default;
@@ -133,7 +135,7 @@ class SlotArray {
 
   [[nodiscard]] std::uint32_t size() const { return size_.load(std::memory_order_acquire); }
 
-  /// The next slot, `first` its first version; one writer at a time.
+  /// Appends a slot with its first version; one writer at a time.
   std::uint32_t append(Version* first) {
     const std::uint32_t slot = size_.load(std::memory_order_relaxed);
     const std::uint32_t biased = slot + kFirst;
