@@ -56,7 +56,7 @@ _tfdude() {
       elif [[ $command == forget ]]; then
         words=$(timeout 0.5 tfdude "${common[@]}" partitions 2>/dev/null | cut -d' ' -f1)
       elif [[ $command == joint ]]; then
-        words=$(timeout 0.5 tfdude "${common[@]}" joints 2>/dev/null | sed -n 's/^  \([^ ]*\) .*/\1/p')
+        words=$(timeout 0.5 tfdude "${common[@]}" joints 2>/dev/null | sed -n '/^  joint /d; s/^  \([^ ]\+\) .*/\1/p')
       elif [[ $command =~ ^(parent|children|exists|lookup|watch|echo|plot|history|observe|fuse|correlate|update|remove|move)$ ]]; then
         words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null)
       fi

@@ -17,7 +17,10 @@ std::string shown(const JointInfo& joint, double value) {
 
 std::string limits_of(const JointInfo& joint) {
   if (!joint.limits) return "none";
-  return shown(joint, joint.limits->lower) + " to " + shown(joint, joint.limits->upper);
+  const bool prismatic = is_prismatic(joint);
+  const double scale = prismatic ? 1e3 : kDegrees;
+  return format("%.4g to %.4g %s", joint.limits->lower * scale, joint.limits->upper * scale,
+                prismatic ? "mm" : "deg");
 }
 
 std::string remarks_of(const JointInfo& joint) {
@@ -39,12 +42,15 @@ std::string remarks_of(const JointInfo& joint) {
 }  // namespace
 
 std::string joint_table(const std::vector<JointInfo>& joints) {
-  std::string text;
+  if (joints.empty()) return "";
+  const char* const kRow = "  %-20s %-16s %12s %11s %s\n";
+  std::string text = format(kRow, "joint", "frame", "position", "std dev", "limits");
   for (const JointInfo& joint : joints) {
-    text += format("  %-24s %-24s %-10s %14s  std dev %12s  limits %s", joint.name.c_str(),
-                   joint.frame.c_str(), to_string(joint.type), shown(joint, joint.position).c_str(),
-                   shown(joint, std::sqrt(joint.variance)).c_str(), limits_of(joint).c_str());
-    text += remarks_of(joint) + "\n";
+    text +=
+        format(kRow, joint.name.c_str(), joint.frame.c_str(), shown(joint, joint.position).c_str(),
+               shown(joint, std::sqrt(joint.variance)).c_str(), limits_of(joint).c_str());
+    const std::string remarks = remarks_of(joint);
+    if (!remarks.empty()) text += "  " + remarks + "\n";
   }
   return text;
 }
@@ -54,11 +60,11 @@ std::string outside_table(const std::vector<JointInfo>& joints) {
   for (const JointInfo& joint : joints) {
     if (joint.outside == 0 && joint.refused == 0) continue;
     if (text.empty()) {
-      text = format("  %-24s %14s %10s %10s  %s\n", "joint outside limits", "position", "applied",
+      text = format("  %-22s %12s %10s %10s  %s\n", "joint outside limits", "position", "applied",
                     "refused", "limits");
     }
     text +=
-        format("  %-24s %14s %10llu %10llu  %s\n", joint.name.c_str(),
+        format("  %-22s %12s %10llu %10llu  %s\n", joint.name.c_str(),
                shown(joint, joint.position).c_str(), static_cast<unsigned long long>(joint.outside),
                static_cast<unsigned long long>(joint.refused), limits_of(joint).c_str());
   }

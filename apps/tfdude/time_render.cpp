@@ -116,13 +116,13 @@ std::string monitor_table(const std::string& partition, const std::vector<Histor
                           Time now) {
   std::string text = "partition " + partition + ": " + describe(sum_of(histories)) + "\n";
   if (histories.empty()) return text;
-  text += format("  %-24s %10s %10s %10s %10s %10s\n", "edge", "rate [Hz]", "age [ms]",
-                 "jitter[ms]", "gap [ms]", "refused");
+  text += format("  %-22s %10s %10s %11s %10s %9s\n", "edge", "rate [Hz]", "age [ms]",
+                 "jitter [ms]", "gap [ms]", "refused");
   for (const HistoryInfo& history : histories) {
     const std::string age =
         history.newest ? format("%.1f", milliseconds(now - *history.newest)) : std::string("-");
     text +=
-        format("  %-24s %10.1f %10s %10.3f %10.3f %10llu\n", history.id.c_str(), rate_of(history),
+        format("  %-22s %10.1f %10s %11.3f %10.3f %9llu\n", history.id.c_str(), rate_of(history),
                age.c_str(), milliseconds(history.jitter), milliseconds(history.max_gap),
                static_cast<unsigned long long>(history.refused_old + history.refused_equal +
                                                history.refused_ahead));

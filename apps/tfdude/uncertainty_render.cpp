@@ -76,10 +76,10 @@ nlohmann::json observed_json(const Observed& observed) {
 
 std::string consistency_table(const std::vector<EdgeConsistency>& edges) {
   if (edges.empty()) return "";
-  std::string text = format("  %-24s %12s %8s %16s %12s  %s\n", "observed edge", "observations",
-                            "refused", "variance factor", "deviations", "its covariance");
+  std::string text = format("  %-22s %8s %8s %9s %10s  %s\n", "observed edge", "observed",
+                            "refused", "factor", "deviations", "covariance");
   for (const EdgeConsistency& edge : edges) {
-    text += format("  %-24s %12llu %8llu %16.2f %12.1f  %s\n", edge.id.c_str(),
+    text += format("  %-22s %8llu %8llu %9.2f %10.1f  %s\n", edge.id.c_str(),
                    static_cast<unsigned long long>(edge.observations),
                    static_cast<unsigned long long>(edge.refused), factor_of(edge),
                    deviation_of(edge), verdict_of(edge));
