@@ -21,7 +21,7 @@ void Absences::limit() {
 void Absences::went(const std::string& partition, std::uint64_t incarnation, bool stopped,
                     Time now) {
   const Absent::Kind then = stopped ? Absent::Kind::kStopped : Absent::Kind::kLost;
-  // What is not resolved yet of an absence before this one still is not.
+  // An earlier absence that is not resolved stays unresolved.
   const auto before = missed_.find(partition);
   const bool again = before != missed_.end() && before->second.absent.kind == Absent::Kind::kBack;
   put(partition, incarnation, now, again ? then : Absent::Kind::kSilent, then);
@@ -87,7 +87,8 @@ void Absences::forget(const std::string& partition, std::uint64_t incarnation, T
 }
 
 Absences::Looked Absences::look(Steady now) {
-  // Who has not looked for so long has hung itself: it cannot say who was there meanwhile.
+  // A process that has not called this for so long has hung: it cannot tell who was reachable
+  // meanwhile.
   const bool hung = looked_ && now - *looked_ > kGrace / 2;
   looked_ = now;
   Looked looked;

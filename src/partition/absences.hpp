@@ -13,65 +13,69 @@
 
 namespace tfdude {
 
-/// Whom a participant misses: what it noticed itself, what others have told it, and what an earlier process of its
-/// partition has left. Short silences are told apart from absences, which have consequences. Not thread-safe.
+/// The partitions that a participant misses: those that it noticed itself, those that others
+/// reported, and those that an earlier process of its partition has stored. Distinguishes short
+/// silences from absences, which have consequences. Not thread-safe.
 class Absences {
  public:
   using Steady = std::chrono::steady_clock::time_point;
 
-  /// A silence is an absence, and one that has stopped counts as outlived, once it has lasted for this long after it
-  /// was noticed. Else who has hung itself, and then hears at once how another stopped and started again, would seem to
-  /// have outlived that.
+  /// A silence counts as an absence, and a stopped partition as outlived, this long after it was
+  /// noticed. Otherwise a process that has hung, and then hears at once that another one stopped
+  /// and restarted, would seem to have outlived it.
   static constexpr std::chrono::milliseconds kGrace{500};
 
-  /// After so long its frames are those of who claims them as well. That is later, so that all know the absence by then: what
-  /// the other acknowledges as their owner is not lost to one that returns in between.
+  /// After this time, frames of the absent partition go to others that also claim them. It is
+  /// longer than kGrace, so that all know of the absence by then. So changes that the new owner
+  /// acknowledges are not lost to a partition that returns in between.
   static constexpr std::chrono::milliseconds kTakeover{700};
 
-  /// How many are kept. The oldest go first.
+  /// Maximum number of entries. The oldest are dropped first.
   static constexpr std::size_t kMost = 256;
 
-  /// A partition that was there is not heard any more, or has said that it ends.
+  /// A partition is not heard any more, or has announced its stop.
   void went(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now);
 
-  /// Another one, `teller`, misses a partition that was not met here. What is only told counts once it has stood for kGrace:
-  /// else who has hung itself, and hears late what others said meanwhile, would take it for its own experience. It stands
-  /// from the first word of a silence on, so that it counts here when it does at the others.
+  /// Another participant, `teller`, misses a partition that was not met here. Hearsay counts only
+  /// after kGrace: otherwise a process that has hung, and hears late what others reported
+  /// meanwhile, would take it for its own observation. The time starts with the first report of a
+  /// silence, so that it counts here when it does at the others.
   void told(const Absent& absent, const std::string& teller);
-  /// These are all whom the teller misses now. A silence that it has told, and does not tell any more, is over.
+  /// The complete list of those that the teller misses now. A silence that it no longer reports is
+  /// over.
   void told_all(const std::vector<Absent>& absent, const std::string& teller);
-  /// Of one that is missed a later incarnation was heard of.
+  /// A later incarnation of a missed partition was heard of.
   void heard_of(const std::string& partition, std::uint64_t incarnation);
-  /// It was missed when this process's predecessor ended.
+  /// The partition was missed when this process's predecessor ended.
   void resume(const Absent& absent);
 
-  /// It is there. @return whether it was missed
+  /// The partition is reachable. @return whether it was missed
   bool returned(const std::string& partition);
 
-  /// Of one that is back: nothing that it claims is this participant's any more.
+  /// For a returned partition: this participant no longer holds anything that it claims.
   void resolved(const std::string& partition);
 
-  /// Nothing is to be kept of a partition that is not there.
+  /// Drops everything about an unreachable partition.
   void forget(const std::string& partition, std::uint64_t incarnation, Time now);
 
   struct Looked {
-    bool counts = false;            ///< an absence counts that did not before
-    std::vector<std::string> gone;  ///< have been away for kTakeover now
+    bool counts = false;            ///< an absence counts now that did not before
+    std::vector<std::string> gone;  ///< partitions now absent for kTakeover
   };
-  /// To be called at least twice in kGrace while any_pending(): time in which it was not does not count.
+  /// Call at least twice per kGrace while any_pending(); longer gaps between calls do not count.
   Looked look(Steady now);
 
-  /// Whether the time is to be watched.
+  /// Whether look() must be called.
   [[nodiscard]] bool any_pending() const;
-  /// Whether something that others have told does not count yet.
+  /// Whether a report by others does not count yet.
   [[nodiscard]] bool any_hearsay() const;
   [[nodiscard]] std::vector<std::string> back() const;
   [[nodiscard]] std::optional<Absent> find(const std::string& partition) const;
 
-  /// Sorted by name; without what was told just now.
+  /// Sorted by name; without recent hearsay.
   [[nodiscard]] std::vector<Absent> all() const;
 
-  /// Whether an absence of this kind gives who notices it the frames that both claim.
+  /// Whether an absence of this kind gives the observer the frames that both claim.
   [[nodiscard]] static bool outlived(Absent::Kind kind) {
     return kind == Absent::Kind::kLost || kind == Absent::Kind::kStopped ||
            kind == Absent::Kind::kBack;
@@ -80,9 +84,9 @@ class Absences {
  private:
   struct Missed {
     Absent absent;
-    Absent::Kind then;  // what a silence becomes; a silence: the teller does not know yet
+    Absent::Kind then;              // what a silence becomes; kSilent: the teller does not know yet
     std::optional<Steady> noticed;  // of a silence
-    std::string teller{};           // of hearsay, which is not told on
+    std::string teller{};           // of hearsay, which is not passed on
     bool pending = false;           // until it counts as gone
   };
   void put(const std::string& partition, std::uint64_t incarnation, Time now, Absent::Kind kind,

@@ -13,20 +13,22 @@
 
 namespace tfdude {
 
-/// The conflict that a tombstone tells of. @param partition  whose tombstone it is
+/// The conflict that a tombstone describes. @param partition  the tombstone's owner
 [[nodiscard]] Change conflict_of(const Tombstone& tombstone, const std::string& partition);
 
-/// That the history of an edge has started again. @param partition  its owner
+/// The restart of an edge's history. @param partition  its owner
 [[nodiscard]] Change restarted(const HistoryRestart& restart, const std::string& partition);
 
-/// That a frame waits for its parent. @param partition  the frame's owner @param dropped_by  who had the parent
+/// A frame that waits for its parent.
+/// @param partition  the frame's owner
+/// @param dropped_by  the parent's former owner
 [[nodiscard]] Change orphan_of(const FrameInfo& frame, const std::string& partition,
                                const std::string& dropped_by);
 
-/// What happened, in the order in which it did, for those who want to know. Not thread-safe.
+/// Changes of the structure, in order, for listeners. Not thread-safe.
 class ChangeLog {
  public:
-  /// Nothing is kept before somebody wants it.
+  /// Starts recording; nothing is recorded before.
   void watch() { watched_ = true; }
   [[nodiscard]] bool watched() const { return watched_; }
 
@@ -34,12 +36,12 @@ class ChangeLog {
   void partition_down(const std::string& partition, bool stopped);
   void frame_added(std::string_view id, std::string_view parent, const std::string& partition);
   void frame_moved(std::string_view id, std::string_view parent, const std::string& partition);
-  /// @param before  the partition that had it, and is not there
+  /// @param before  the former owner, which is unreachable
   void frame_taken_over(std::string_view id, std::string_view parent, const std::string& partition,
                         const std::string& before);
   void frame_removed(std::string_view id, const std::string& partition);
 
-  /// A conflict, or an orphan, is kept always: whoever it concerns logs it.
+  /// Conflicts and orphans are always recorded, as the participants concerned log them.
   void add(Change change) { changes_.push_back(std::move(change)); }
 
   [[nodiscard]] std::vector<Change> take() { return std::exchange(changes_, {}); }

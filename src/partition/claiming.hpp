@@ -6,35 +6,36 @@
 
 namespace tfdude {
 
-/// When a process that wants a partition's name takes each of the steps of NameClaim. Not thread-safe.
+/// The timing of a process that claims a partition's name: when it takes each step of NameClaim.
+/// Not thread-safe.
 class Claiming {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// How long participants need to meet is the transport's to say.
+  /// Time limits; the transport knows how long discovery takes.
   struct Patience {
     std::chrono::milliseconds meeting{0};
-    /// How much longer somebody who was met may take to say which partition it serves.
+    /// How much longer a participant that was met may take to announce its partition.
     std::chrono::milliseconds presence{3000};
     /// How long the participant of a killed predecessor may still seem alive.
     std::chrono::milliseconds predecessor{1500};
-    /// How long one who claimed the name earlier may take to decide.
+    /// How long an earlier claimant may take to decide.
     std::chrono::milliseconds decision{3000};
   };
 
   enum class Step {
     kWait,
-    kTake,   ///< say that the name is taken; the next step is asked for after that
-    kServe,  ///< the name is this process's
-    kLeave,  ///< another one has it
+    kTake,   ///< announce that the name is taken, then ask for the next step
+    kServe,  ///< the name belongs to this process
+    kLeave,  ///< another process has it
   };
 
-  /// @param claim  as which the own presence was announced just now
+  /// @param claim  the claim with which the own presence was just announced
   Claiming(const NameClaim& claim, Patience patience, Clock::time_point now)
       : claim_(claim), patience_(patience), until_(now + patience.meeting) {}
 
-  /// What to do now.
-  /// @param awaits_presence  whether somebody was met who has not said what it serves
+  /// The step to take now.
+  /// @param awaits_presence  whether a participant was met that has not announced what it serves
   [[nodiscard]] Step next(Clock::time_point now, bool awaits_presence);
 
  private:
@@ -48,7 +49,7 @@ class Claiming {
   const NameClaim& claim_;
   const Patience patience_;
   Phase phase_ = Phase::kMeeting;
-  Clock::time_point until_;  // the phase is over by then
+  Clock::time_point until_;  // end of the phase
 };
 
 }  // namespace tfdude

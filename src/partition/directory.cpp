@@ -7,7 +7,7 @@
 namespace tfdude {
 namespace {
 
-// No clock comes so far, and one more can always be added.
+// No clock reaches this value, and one more can always be added.
 constexpr std::uint64_t kLastLamportTime = 1ULL << 63U;
 
 }  // namespace
@@ -31,7 +31,8 @@ Directory::Known& Directory::known(const std::string& partition, Owner& owner) {
   return partitions_[owner];
 }
 
-// The incarnation's pages that are gathered beside those in force; null where they need not be.
+// The pages of a new incarnation, collected beside the current ones; null if the current ones need
+// not be kept.
 Directory::Successor* Directory::succeed(Known& partition, std::uint64_t incarnation) {
   if (incarnation == partition.incarnation) return nullptr;
   if (partition.pages.empty()) {
@@ -62,7 +63,7 @@ void Directory::apply(const Presence& presence, Time now) {
     return;
   }
   if (drop_outdated(partition, presence.incarnation)) return;
-  // Of one that has stopped this is an older word.
+  // An old message of a partition that has stopped since.
   if (partition.info.stopped && partition.live == presence.incarnation) return;
   partition.live = presence.incarnation;
   if (Successor* successor = succeed(partition, presence.incarnation)) {
@@ -86,12 +87,12 @@ void Directory::apply(const Page& page) {
   Owner owner = kHeldHere;
   Known& partition = known(page.partition, owner);
   if (owner == kHeldHere) return;
-  // One that is to be followed by another is still what is known of the partition.
+  // An incarnation that is being replaced still describes the partition.
   const bool current = !partition.pages.empty() && page.incarnation == partition.incarnation;
   if (!current && drop_outdated(partition, page.incarnation)) return;
   if (page.incarnation > partition.live) {
-    // Whoever tells something new of an incarnation lives, even where the presence, which is handed
-    // the time, comes after a page.
+    // A participant that sends news of an incarnation is alive, even if its presence, which carries
+    // the time, arrives after a page.
     partition.live = page.incarnation;
     if (!partition.info.reachable) partition.info.since = Time{};
     came_back(partition, owner);
@@ -133,14 +134,15 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
     replace_joints(page, {}, owner);
   }
   partition.pages.clear();
-  // Of each frame the first claim that comes now replaces that of the life before, whichever is the younger.
+  // The first claim to each frame now replaces that of the previous incarnation, whichever is
+  // younger.
   for (const auto& [number, page] : pages) put_page(partition, owner, page, stays);
   claims_.mend();
   report(fresh, owner);
   for (const auto& [number, page] : pages) find_orphans(page.tombstones, owner);
 }
 
-// @param outdated  frames whose claims here are of an earlier incarnation; those that the page has are taken out
+// @param outdated  frames claimed by an earlier incarnation; frames of the page are removed from it
 void Directory::put_page(Known& partition, Owner owner, const Page& page, Ids& outdated) {
   Ids stays;
   for (const PageEntry& entry : page.entries) stays.insert(entry.id);
@@ -194,7 +196,7 @@ std::vector<Owner> Directory::joint_owners(const std::string& name) const {
   return owners;
 }
 
-// A page that was replaced on its way comes later than those that were published after it.
+// A page that was replaced before its delivery arrives after those that were published later.
 void Directory::note_epoch(Known& partition, const Page& page) {
   if (page.epoch >= partition.awaited_epoch) {
     partition.awaited_epoch = page.epoch;
@@ -208,7 +210,7 @@ void Directory::note_epoch(Known& partition, const Page& page) {
   if (all_there) partition.epoch = std::max(partition.epoch, partition.awaited_epoch);
 }
 
-// A frame that has changed its page is claimed by the other by now, as pages come in order.
+// If a frame has changed its page, the other page claims it by now, since pages come in order.
 void Directory::unclaim_all_but(const Ids& stays, Known& partition, Owner owner,
                                 std::uint32_t number) {
   const auto there = partition.pages.find(number);
@@ -223,7 +225,7 @@ void Directory::unclaim_all_but(const Ids& stays, Known& partition, Owner owner,
   }
 }
 
-// The tombstones that are to be reported and were not known; a newcomer does not hear of what was before it came.
+// New tombstones to report. A new participant does not report those from before its start.
 std::vector<Tombstone> Directory::new_tombstones(const Known& partition,
                                                  const std::vector<Tombstone>& tombstones) {
   std::vector<Tombstone> fresh;
@@ -250,7 +252,7 @@ void Directory::report(const std::vector<Tombstone>& fresh, Owner owner) {
   }
 }
 
-// Who owns one hears of it in any case.
+// Owners concerned are informed in any case.
 void Directory::report_orphans(const std::string& dropped, Owner by) {
   for (const FrameInfo& frame : forest_.waiting_for(dropped)) {
     const bool concerns = changes_.watched() || frame.owner == kHeldHere || by == kHeldHere;
@@ -277,7 +279,7 @@ void Directory::find_orphans() {
 }
 
 std::set<PendingYield> Directory::pending_yields() {
-  // Those that were removed or moved are resolved, and those whose parent is there again.
+  // Orphans that were removed or moved are resolved, and those whose parent exists again.
   for (auto orphan = orphans_.begin(); orphan != orphans_.end();) {
     const auto frame = forest_.info(orphan->frame);
     const bool stands = frame && frame->owner == kHeldHere &&

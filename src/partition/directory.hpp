@@ -23,9 +23,10 @@
 
 namespace tfdude {
 
-/// A participant's replica of the structure: which partition owns which frame. Writes what the owners
-/// publish into the participant's forest and names the forest's owner numbers. What it holds is a function
-/// of the pages, not of the order in which they came. Not thread-safe; the forest it writes to is.
+/// A participant's replica of the structure: which partition owns which frame. Writes what owners
+/// publish into the participant's forest, and maps partitions to the forest's owner numbers. Its
+/// content is a function of the pages, not of the order in which they came. Not thread-safe; the
+/// forest it writes to is.
 class Directory {
  public:
   /// @param own  the name of the partition that this process serves; empty: none
@@ -33,43 +34,47 @@ class Directory {
   Directory(const Directory&) = delete;
   Directory& operator=(const Directory&) = delete;
 
-  /// A partition is served, or ends. A later incarnation replaces an earlier one.
+  /// A partition is served, or stops. A later incarnation replaces an earlier one.
   void apply(const Presence& presence, Time now);
 
-  /// A piece of a partition's structure. That of an incarnation which is new, where an earlier one is known,
-  /// takes its place once all of it has come, so that what a restart does not change stays there all the time.
+  /// A page of a partition's structure. If an earlier incarnation is known, the pages of a new one
+  /// replace it only once all have come. So frames that a restart does not change exist all the
+  /// time.
   void apply(const Page& page);
 
-  /// The partition's participant has gone; its structure is kept.
-  /// @return false where this is not new
+  /// The partition's participant is lost; its structure is kept.
+  /// @return false if this was known
   bool lost(std::string_view partition, std::uint64_t incarnation, Time now);
 
-  /// Who has been silent for Absences::kGrace has been absent; who has been for kTakeover is gone: frames that others claim,
-  /// too, are theirs. To be called again while any_pending(). @return whether there are such
+  /// Evaluates silences: a partition silent for Absences::kGrace counts as absent. After kTakeover
+  /// it counts as gone, and frames that others also claim go to them. Call again while
+  /// any_pending(). @return whether any partition is newly absent or gone
   bool look_for_gone(Absences::Steady now);
   [[nodiscard]] bool any_pending() const { return absences_.any_pending(); }
 
-  /// Whether somebody whom this process has not met is said to be silent, so that it may be there again in a moment, or to be
-  /// gone since so short a time that it would not yield to this process.
+  /// Whether a partition that this process has not met is reported silent, so that it may return at
+  /// any moment, or is gone for so short a time that it would not yield to this process.
   [[nodiscard]] bool awaits_silent() const { return absences_.any_hearsay(); }
 
-  /// Whether a partition may be forgotten. @return kPartitionTaken where it is there
+  /// Whether a partition may be forgotten. @return kPartitionTaken if it is reachable
   [[nodiscard]] Result<void> check_not_there(const std::string& partition) const;
-  /// Nothing is kept of a partition that is not there.
-  /// @param incarnation  the latest that whoever says so has heard of
+  /// Drops everything about an unreachable partition.
+  /// @param incarnation  the latest that the sender of the request has heard of
   /// @return as check_not_there().
   [[nodiscard]] Result<void> forget(const std::string& partition, std::uint64_t incarnation,
                                     Time now);
-  /// The latest incarnation that was heard of; 0: of none.
+  /// The latest incarnation heard of; 0: none.
   [[nodiscard]] std::uint64_t latest_incarnation(const std::string& partition) const;
 
-  /// Whom an earlier process of this partition missed.
+  /// Restores the partitions that an earlier process of this partition missed.
   void restore(const std::vector<Absent>& absent);
 
-  /// Others know of an incarnation of this process's partition that is not this one, and would hide it: the greatest.
+  /// The greatest other incarnation of this process's partition that others know and that would
+  /// hide this one.
   [[nodiscard]] std::optional<std::uint64_t> hidden_by(std::uint64_t own) const;
 
-  /// Of whom something was dropped for its age since the last call; each incarnation once.
+  /// Partitions of which messages were dropped as outdated since the last call; each incarnation
+  /// once.
   struct Outdated {
     std::string partition;
     std::uint64_t incarnation = 0;
@@ -77,17 +82,18 @@ class Directory {
   };
   [[nodiscard]] std::vector<Outdated> take_outdated() { return std::exchange(outdated_, {}); }
 
-  /// This process's partition has a joint.
+  /// Adds a joint of this process's partition.
   void put_own_joint(const PageJoint& joint) { add_joint(joint, kHeldHere); }
   void erase_own_joint(const PageJoint& joint) { forget_joint(joint, kHeldHere); }
 
-  /// Who has a joint of this name, or one that follows it; each once. O(log joints).
+  /// The owners of a joint of this name, or of one that follows it, without duplicates. O(log
+  /// joints).
   [[nodiscard]] std::vector<Owner> joint_owners(const std::string& name) const;
 
-  /// This process released a frame that it held: another's claim to it may show now.
+  /// This process released a frame: the claim of another partition may now be in force.
   void released(const std::string& id) { claims_.released(id); }
 
-  /// This process moved a frame that it holds: another's frame may hang below it now.
+  /// This process moved a frame that it holds: frames of others may now fit below it.
   void moved() { claims_.mend(); }
 
   /// As FrameClaims::make_way().
@@ -97,64 +103,65 @@ class Directory {
   [[nodiscard]] bool take(const std::string& id) { return claims_.take(id); }
   [[nodiscard]] Owner holder(const std::string& id) const { return claims_.holder(id); }
 
-  /// What this process's partition would have to give up, by what was applied so far.
+  /// What this process's partition would have to yield, according to what was applied so far.
   /// O(contested frames).
   [[nodiscard]] std::set<PendingYield> pending_yields();
-  /// Whether there may be any. O(1).
+  /// Whether pending_yields() may be non-empty. O(1).
   [[nodiscard]] bool contested() const { return !orphans_.empty() || claims_.contested(); }
 
-  /// A partition's configuration names a frame no more: reports what waits for that now.
+  /// A partition's configuration no longer names a frame: reports the frames that now wait for it.
   void report_orphans(const std::string& dropped, Owner by);
 
   /// This process has taken frames whose parents others may have removed before.
   void find_orphans();
 
-  /// The Lamport time of a change of the structure: the time [ns since the UNIX epoch], but later than all that were given
-  /// or seen before (Lamport 1978, rule IR1 and IR2), so that whoever knew of a change has the greater one.
+  /// The Lamport time of a structure change: the time [ns since the UNIX epoch], but greater than
+  /// all given or seen before (Lamport 1978, rules IR1 and IR2). So a change made with knowledge of
+  /// another one has the greater time.
   [[nodiscard]] std::uint64_t next_lamport_time(Time now);
 
-  /// A Lamport time was given by an earlier process of this partition, or is known to a sender: those that are given from
-  /// now on are later.
+  /// Records a Lamport time given by an earlier process of this partition, or known to a sender:
+  /// later ones will be greater.
   void saw_lamport_time(std::uint64_t time);
-  /// The latest that was given or seen.
+  /// The latest Lamport time given or seen.
   [[nodiscard]] std::uint64_t latest_lamport_time() const { return latest_lamport_time_; }
 
-  /// What happened to the frames of others, and of this process as far as it is reported.
+  /// Changes of others' frames, and of this process's frames as far as they are reported.
   [[nodiscard]] ChangeLog& changes() { return changes_; }
 
-  /// The number under which the forest knows a partition; kHeldHere for the own one.
+  /// The forest's owner number of a partition; kHeldHere for the own one.
   [[nodiscard]] std::optional<Owner> owner(std::string_view partition) const;
   [[nodiscard]] const std::string& name(Owner owner) const { return partitions_[owner].info.name; }
   [[nodiscard]] bool reachable(Owner owner) const { return partitions_[owner].info.reachable; }
   [[nodiscard]] const PartitionInfo& info(Owner owner) const { return partitions_[owner].info; }
 
-  /// Up to which epoch this partition's structure is here.
+  /// The epoch up to which this partition's structure is known here.
   [[nodiscard]] std::uint64_t epoch(Owner owner) const { return partitions_[owner].epoch; }
 
   /// Whether all pages of all reachable partitions have come.
   [[nodiscard]] bool complete() const { return incomplete() == nullptr; }
-  /// The name of one of which they have not; null: there is none.
+  /// The name of a reachable partition with missing pages; null: none.
   [[nodiscard]] const std::string* incomplete() const;
 
-  /// An owner has told of a change that its structure shows in this epoch.
+  /// An owner has announced a change that its structure shows in this epoch.
   void told_of(Owner owner, std::uint64_t epoch);
   /// Whether that change has not come yet.
   [[nodiscard]] bool owes_change(Owner owner) const {
     return partitions_[owner].epoch < partitions_[owner].told_epoch;
   }
-  /// The name of a reachable one whose structure is older here than what it has told of; null: there is none.
+  /// The name of a reachable partition with an announced change that has not come yet; null: none.
   [[nodiscard]] const std::string* behind() const;
 
-  /// Whom this participant misses: what to tell others.
+  /// The partitions that this participant misses, for its presence.
   [[nodiscard]] std::vector<Absent> absent() const { return absences_.all(); }
 
   /// A partition that others miss, and of which nothing else is known here.
   [[nodiscard]] std::optional<PartitionInfo> only_heard_of() const;
 
-  /// Those other partitions that are reachable.
+  /// The other partitions that are reachable.
   [[nodiscard]] std::vector<Owner> reachable_owners() const;
 
-  /// The other partitions and, where there is one, the own; sorted by name.
+  /// The other partitions and the own one, if any; sorted by name.
   [[nodiscard]] std::vector<PartitionInfo> partitions() const;
 
   /// The live incarnation of a partition, if one is known.
@@ -164,8 +171,8 @@ class Directory {
   using PageMap = std::map<std::uint32_t, Page>;
   using Ids = std::unordered_set<std::string_view>;
 
-  /// What of a page is needed later: its ids, each after its length in one byte, since most of the memory of a
-  /// large structure would else go into strings; and its tombstones.
+  /// The part of a page that is needed later: its tombstones, and its ids, each preceded by its
+  /// length in one byte. Separate strings would take most of the memory of a large structure.
   struct KeptPage {
     std::uint64_t epoch = 0;
     std::string ids;
@@ -173,30 +180,31 @@ class Directory {
     std::vector<PageJoint> joints;
   };
 
-  /// An incarnation that follows one whose structure is here, until all of its own has come.
+  /// A new incarnation of a partition with a known structure, until all its pages have come.
   struct Successor {
     std::uint64_t incarnation = 0;
-    std::optional<std::uint32_t> page_count;  // said by its presence
+    std::optional<std::uint32_t> page_count;  // from its presence
     PageMap pages;
   };
   struct Known {
     PartitionInfo info;
-    std::uint64_t live = 0;           // the latest incarnation heard of
-    std::uint64_t announced = 0;      // the latest whose presence has come
-    std::uint64_t incarnation = 0;    // that of the pages
-    std::uint64_t epoch = 0;          // up to which all has come,
-    std::uint64_t awaited_epoch = 0;  // will have once these have, too
-    std::uint64_t told_epoch = 0;     // of a change that it has told of
+    std::uint64_t live = 0;           // the latest incarnation heard
+    std::uint64_t announced = 0;      // the latest incarnation whose presence has come
+    std::uint64_t incarnation = 0;    // of the pages
+    std::uint64_t epoch = 0;          // up to which everything has come
+    std::uint64_t awaited_epoch = 0;  // will be complete once `awaited` has come
+    std::uint64_t told_epoch = 0;     // of an announced change
     std::vector<PageEpoch> awaited;
     std::uint32_t page_count = 0;
     std::map<std::uint32_t, KeptPage> pages;
     std::optional<Successor> successor;
-    std::uint64_t heard_of = 0;   // the latest incarnation that others have spoken of
-    bool forgotten = false;       // up to that one
-    std::uint64_t to_forget = 0;  // up to that one, once it is not heard here, either
+    std::uint64_t heard_of = 0;  // the latest incarnation mentioned by others
+    bool forgotten = false;      // up to heard_of
+    // Up to this incarnation, once the partition is unreachable here, too.
+    std::uint64_t to_forget = 0;
     bool missed_by_others = false;
     [[nodiscard]] bool listed() const { return !forgotten && (live != 0 || missed_by_others); }
-    std::uint64_t reported = 0;  // the last that was dropped for its age
+    std::uint64_t reported = 0;  // the last one dropped as outdated
 
     [[nodiscard]] bool outdated(std::uint64_t one) const {
       return one < live || one < heard_of || (forgotten && one == heard_of);
@@ -230,15 +238,15 @@ class Directory {
   Forest& forest_;
   ChangeLog changes_;
   FrameClaims claims_;
-  std::vector<Known> partitions_;  // by Owner; the first is the own
+  std::vector<Known> partitions_;  // by Owner; the first is the own one
   std::unordered_map<std::string, Owner> owners_;
-  std::set<PendingYield> orphans_;  // held frames that hung below one that another removed
-  std::map<std::string, std::multiset<Owner>> joint_owners_;  // once a joint and page
+  std::set<PendingYield> orphans_;  // held frames whose parent another partition removed
+  std::map<std::string, std::multiset<Owner>> joint_owners_;  // one entry per joint and page
   std::uint64_t latest_lamport_time_ = 0;
   Absences absences_;
-  std::uint64_t own_heard_of_ =
-      0;  // the latest incarnation of the own partition that others have spoken of,
-  std::uint64_t own_forgotten_ = 0;  // or have forgotten
+  // The latest incarnation of the own partition mentioned by others.
+  std::uint64_t own_heard_of_ = 0;
+  std::uint64_t own_forgotten_ = 0;  // the latest one that others have forgotten
   std::vector<Outdated> outdated_;
 };
 

@@ -5,14 +5,15 @@
 
 #include "partition/directory.hpp"
 
-// Who is not there, who has come back, and of whom nothing is to be kept.
+// Which partitions are absent, which have returned, and which are forgotten.
 namespace tfdude {
 
 using Standing = Succession::Standing;
 
 bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
   if (!partition.outdated(incarnation)) return false;
-  // Who misses it tells it so, and it goes on as a later one; but whoever owns nothing is not heard.
+  // A participant that misses it tells it so, and it goes on with a later number. But a participant
+  // without a partition is not heard.
   const bool has_voice = !partitions_.front().info.name.empty();
   const bool is_told = has_voice && absences_.find(partition.info.name);
   if (!is_told && !partition.info.reachable && !partition.forgotten) {
@@ -72,7 +73,7 @@ bool Directory::look_for_gone(Absences::Steady now) {
   return news;
 }
 
-// Whom this participant has outlived itself.
+// Passes on the partitions that this participant has outlived.
 void Directory::tell_claims() {
   std::set<Owner> outlived;
   for (const Absent& one : absences_.all()) {
@@ -89,7 +90,7 @@ void Directory::hear_absent(Owner from, const std::vector<Absent>& absent, Time 
   for (const Absent& one : absent) {
     Owner number = kHeldHere;
     (void)known(one.partition, number);
-    // Whoever speaks is there.
+    // A sender is reachable.
     if (number == from) continue;
     if (Absences::outlived(one.kind)) outlived.insert(number);
     if (number != kHeldHere) {
@@ -106,23 +107,23 @@ void Directory::hear_of(const Absent& one, const std::string& teller, Time now) 
   Owner number = kHeldHere;
   Known& partition = known(one.partition, number);
   if (partition.info.reachable) {
-    // Whoever was away itself may notice only later that it is not there.
+    // A participant that was away itself may notice later that the partition is unreachable.
     if (one.kind == Absent::Kind::kForgotten) {
       partition.to_forget = std::max(partition.to_forget, one.incarnation);
     }
     return;
   }
   if (one.kind == Absent::Kind::kForgotten) {
-    // Another may have heard of a later life.
+    // Others may have heard of a later incarnation.
     if (one.incarnation >= std::max(partition.live, partition.heard_of))
       (void)forget(one.partition, one.incarnation, now);
     return;
   }
-  // What was forgotten here others may not have heard of yet.
+  // Others may not have heard yet of something that was forgotten here.
   if (partition.forgotten && one.incarnation <= partition.heard_of) return;
   if (one.incarnation < IncarnationSource::kEnd) {
     partition.heard_of = std::max(partition.heard_of, one.incarnation);
-    // What is hidden by that number has to hear it.
+    // Incarnations hidden by that number must hear of it.
     absences_.heard_of(one.partition, partition.heard_of);
   }
   partition.forgotten = false;
@@ -150,7 +151,7 @@ void Directory::restore(const std::vector<Absent>& absent) {
 
 Result<void> Directory::check_not_there(const std::string& partition) const {
   const auto number = number_of(partition);
-  // The own one counts as reachable.
+  // The own partition counts as reachable.
   if (!number || !partitions_[*number].info.reachable) return {};
   return fail(Errc::kPartitionTaken,
               "partition " + quote(partition) + " is reachable: stop it before you forget it");
@@ -193,7 +194,8 @@ std::optional<std::uint64_t> Directory::hidden_by(std::uint64_t own) const {
   return hidden ? std::optional(latest) : std::nullopt;
 }
 
-// Once all that one who is back claims has come, and nothing of it is held here, too.
+// A return is resolved once all claims of the partition have come, and none of its frames is held
+// here.
 void Directory::resolve_returns() {
   bool resolved = false;
   for (const std::string& name : absences_.back()) {

@@ -55,7 +55,7 @@ bool FrameClaims::claim(const std::string& id, FrameClaim claim, Counts counts) 
   std::optional<FrameClaim> before;
   if (there && there->owner == claim.owner) before = in_force(*there);
   if (const FrameClaim* mine = shadowed(id, claim.owner)) before = *mine;
-  // A page that came late: the frame has left it since.
+  // A late page: the frame has left it since.
   const bool late =
       before && before->page != claim.page && before->lamport_time > claim.lamport_time;
   if (late && counts == Counts::kTheYounger) return false;
@@ -126,7 +126,7 @@ bool FrameClaims::take(const std::string& id) {
   return true;
 }
 
-// Puts the claim in force that holds, unless this process holds the frame: then it is for the owner to yield.
+// Puts the winning claim in force, unless this process holds the frame: then its owner must yield.
 void FrameClaims::promote(const std::string& id) {
   const auto claims = shadowed_.find(id);
   if (claims == shadowed_.end() || forest_.holds(id)) return;
@@ -138,7 +138,7 @@ void FrameClaims::promote(const std::string& id) {
   put(id, heir);
 }
 
-// Who is there, or who yields to whom, has changed.
+// Re-evaluates the claims: a partition's standing, or a precedence between partitions, has changed.
 void FrameClaims::reconsider() {
   std::vector<std::string> contested;
   contested.reserve(shadowed_.size());
@@ -180,7 +180,7 @@ std::set<PendingYield> FrameClaims::pending_yields() const {
     if (!there || there->owner != kHeldHere) continue;
     const FrameClaim own = in_force(*there);
     const FrameClaim& heir = succession_.heir(all_of(claims, own));
-    // Nothing is given up for one who is not there: it may never return.
+    // Nothing is yielded to an unreachable partition, which may never return.
     if (heir.owner == kHeldHere || succession_.standing(heir.owner) != Succession::Standing::kThere)
       continue;
     all.insert({PendingYield::Kind::kRelease, id, heir.owner, there->lamport_time});
@@ -263,8 +263,9 @@ bool FrameClaims::make_way(const std::string& parent) {
   return youngest.has_value();
 }
 
-// The frame's claimed parent lies below it, where the forest has made it a root. Of the cycle's edges that others
-// own that is cut which yields to all; if a held one yields to that still, its owner has to yield, which mends it.
+// The frame's claimed parent is below it, so the forest has made the frame a root. Cuts the edge of
+// the cycle that yields to all other edges of other owners. If a held edge yields even to that one,
+// its owner has to yield, which mends the cycle.
 void FrameClaims::break_cycle(const std::string& id, const FrameClaim& claim) {
   const FrameInfo youngest = cycle_of(id, claim).youngest;
   if (youngest.id == id) {

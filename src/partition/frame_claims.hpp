@@ -16,27 +16,28 @@
 
 namespace tfdude {
 
-/// That a partition has a frame, and where it hangs it.
+/// A partition's claim to a frame and its parent.
 struct FrameClaim {
   Owner owner = kHeldHere;
   std::string parent;
   std::uint64_t lamport_time = 0;
-  std::uint32_t page = 0;  ///< of its owner's, where it says so
+  std::uint32_t page = 0;  ///< the owner's page that contains the claim
 };
 
-/// A frame, or where it hangs, that the partition of this process would have to yield because of what others claim. What is
-/// on its way may resolve it, such as a claim that was taken back: so it is done once the others were asked how far they
-/// are.
+/// A frame that this process's partition would have to yield, or move, because of claims of others.
+/// Messages on their way may resolve it, for example a claim that was withdrawn. So it is done only
+/// after the others were asked for their current state.
 struct PendingYield {
   enum class Kind : std::uint8_t {
-    kRelease,  ///< the id was claimed earlier by `rival`: release the frame
-    kUnhang,   ///< it closes a cycle with an earlier move of `rival`: make it a root
-    kRemove,   ///< the frame that it hung below was removed by `rival`: so is it
+    kRelease,  ///< `rival` has the older claim to the id: release the frame
+    kUnhang,   ///< the frame closes a cycle with an earlier move by `rival`: make it a root
+    kRemove,   ///< `rival` removed the frame's parent: remove the frame, too
   };
   Kind kind = Kind::kRelease;
   std::string frame;
   Owner rival = kHeldHere;
-  /// When the frame was hung where it hangs: another of its name, or a move, is another matter.
+  /// When the frame got its parent. Another frame of that name, or a later move, is a different
+  /// case.
   std::uint64_t lamport_time = 0;
 
   friend bool operator<(const PendingYield& a, const PendingYield& b) {
@@ -45,11 +46,12 @@ struct PendingYield {
   }
 };
 
-/// Which of all claims are in force: writes those into the forest. Of several partitions that claim a frame
-/// Succession says whose claim holds; in each cycle of claims the youngest does not, of those of partitions that are
-/// gone where there are such, and its frame is a root (of the same age: that of the greater id). So what is in force is a function of the claims and of who is there, not of
-/// the order in which they came. A held frame stays until its owner yields; whoever does not own it sees the
-/// outcome at once. Not thread-safe.
+/// Decides which claims are in force, and writes those into the forest. If several partitions claim
+/// a frame, Succession decides. In each cycle of claims the youngest one is cut, and its frame is a
+/// root; claims of partitions that are gone are cut first, and of equally old ones that of the
+/// greater id. So the result is a function of the claims and of which partitions are present, not
+/// of the order in which they came. A held frame stays until its owner yields; participants that do
+/// not own it see the result at once. Not thread-safe.
 class FrameClaims {
  public:
   FrameClaims(Forest& forest, ChangeLog& changes) : forest_(forest), changes_(changes) {}
@@ -58,44 +60,44 @@ class FrameClaims {
   Owner add_owner(std::string name) { return succession_.add_owner(std::move(name)); }
   [[nodiscard]] const std::string& name(Owner owner) const { return succession_.name(owner); }
 
-  /// Whether a partition is there; all are at first. O(contested frames) where that is new.
+  /// Sets whether a partition is present; initially all are. O(contested frames) if it changes.
   void set_standing(Owner owner, Succession::Standing standing);
-  /// Whom a partition says that it has outlived. O(contested frames) where that is new.
+  /// Sets which partitions a partition claims to have outlived. O(contested frames) if it changes.
   void set_outlived(Owner owner, std::set<Owner> outlived);
 
-  /// Whether a frame that this process holds is claimed by that partition, too. O(contested frames).
+  /// Whether that partition also claims a frame that this process holds. O(contested frames).
   [[nodiscard]] bool contests_held(Owner owner) const;
 
-  /// Which of two claims of one partition to a frame, on two of its pages, is the one to take.
+  /// Which of two claims of one partition to a frame, on two of its pages, to take.
   enum class Counts { kTheYounger, kThis };
 
-  /// A partition claims a frame, perhaps once more. O(1) where nobody else does.
-  /// @return whether it had not claimed it before
+  /// A partition claims a frame, perhaps repeatedly. O(1) if no other partition does.
+  /// @return whether the claim is new
   bool claim(const std::string& id, FrameClaim claim, Counts counts = Counts::kTheYounger);
 
-  /// A page of the partition's does not claim the frame any more. What another page has claimed since stays.
+  /// A page of the partition no longer claims the frame. A later claim of another page stays.
   /// @return whether the claim is gone
   bool unclaim(const std::string& id, Owner owner, std::uint32_t page);
 
-  /// This process released a frame that it held: another's claim to it may be in force now.
+  /// This process released a frame: the claim of another partition may now be in force.
   void released(const std::string& id);
 
-  /// This process is going to hold a frame that may be another's now. Who comes yields to who is there already,
-  /// whichever claim is the older one, unless this process's partition has outlived that.
-  /// @return false where it has to yield
+  /// Prepares for holding a frame that may belong to another partition. A new partition yields to
+  /// those present, whichever claim is older, unless it has outlived them.
+  /// @return false if it has to yield
   [[nodiscard]] bool take(const std::string& id);
-  /// To whom it has to yield then.
+  /// The partition to which it has to yield.
   [[nodiscard]] Owner holder(const std::string& id) const;
 
-  /// This process is going to hang a frame below its own place. Cuts the way from there up to it at the youngest
-  /// claim of others, for mend() to find out who has to yield.
-  /// @return false where none of the way is others'
+  /// This process is going to place a frame below itself. Cuts the path from `parent` up to the
+  /// frame, at the youngest claim of others; mend() then finds out who has to yield.
+  /// @return false if no edge of the path belongs to others
   [[nodiscard]] bool make_way(const std::string& parent);
 
-  /// Hangs frames where they belong that could not hang there before. None, but for cycles.
+  /// Connects frames whose parents were not possible before. Only cycles cause such frames.
   void mend();
 
-  /// Whether any two claims cannot both hold.
+  /// Whether any claims exclude each other.
   [[nodiscard]] bool contested() const { return !shadowed_.empty() || !cut_.empty(); }
 
   /// What this process would have to yield now. O(contested frames).
@@ -114,7 +116,8 @@ class FrameClaims {
   void put(const std::string& id, const FrameClaim& claim);
   void break_cycle(const std::string& id, const FrameClaim& claim);
   void cut(const FrameInfo& frame);
-  /// Of the cycle that a claim would close: the youngest edge that others own, and the youngest held one.
+  /// In the cycle that a claim would close: the youngest edge of other owners, and the youngest
+  /// held one.
   struct Cycle {
     FrameInfo youngest;
     std::optional<FrameInfo> held;
@@ -124,7 +127,7 @@ class FrameClaims {
   Forest& forest_;
   ChangeLog& changes_;
   Succession succession_;
-  // Frames that several partitions claim: all claims but the one in force.
+  // Frames claimed by several partitions: all claims except the one in force.
   std::unordered_map<std::string, std::vector<FrameClaim>> shadowed_;
   std::vector<std::uint32_t> page_of_slot_;  // of the claims in force
   // Claims of frames that are roots because they would close a cycle.

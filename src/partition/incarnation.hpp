@@ -6,23 +6,24 @@
 
 namespace tfdude {
 
-/// Numbers the processes that serve one partition one after the other. A number is greater than all that are known of,
-/// whatever the clock says; where nothing is known of the past the clock keeps the order. Its low bits are random, so
-/// that of two processes which start at once, knowing the same, each has its own. Not thread-safe.
+/// Numbers the successive processes that serve one partition. A number is greater than all known
+/// ones, whatever the clock says; without known ones the clock gives the order. The low bits are
+/// random, so that two processes that start at once with the same knowledge get different numbers.
+/// Not thread-safe.
 class IncarnationSource {
  public:
-  /// Numbers from here on are nobody's: what is heard may be wrong.
+  /// Numbers from here on are invalid; received ones may be wrong.
   static constexpr std::uint64_t kEnd = 1ULL << 63U;
 
-  /// How many of the low bits are random: what is left counts milliseconds, more or less.
+  /// Number of random low bits; the others count milliseconds, approximately.
   static constexpr unsigned kRandomBits = 20;
 
-  /// That there was one of this number, or a count that began with one.
+  /// Records an incarnation, or an epoch that started with one.
   void saw(std::uint64_t incarnation) {
     if (incarnation < kEnd && incarnation > latest_) latest_ = incarnation;
   }
 
-  /// @param random  any number, another one for each process
+  /// @param random  any number, different for each process
   [[nodiscard]] std::uint64_t next(Time clock, std::uint64_t random) const {
     const auto nanoseconds = clock.time_since_epoch().count();
     const std::uint64_t time = nanoseconds > 0 ? static_cast<std::uint64_t>(nanoseconds) : 0;

@@ -10,11 +10,11 @@
 namespace tfdude {
 namespace {
 
-// What the edge shares with those of the joints that are coupled with its own: the error of one number.
+// The error that the edge shares with those of coupled joints: the error of one number.
 Correlation shared_error(const JointSpec& spec, double variance) {
   if (variance == 0) return {};
   Loading loading = spec.joint.S * std::sqrt(variance);
-  // The sign is that of the leader's error.
+  // The sign of the leader's error.
   if (spec.mimic && spec.mimic->multiplier < 0) loading = -loading;
   return {false, {{shared_source(leader_of(spec)), false, std::move(loading)}}, {}};
 }
@@ -67,13 +67,14 @@ void Joints::put(const std::string& frame, const JointSpec& joint,
     mover.position = left->position;
     mover.variance = left->variance;
     mover.measured = true;
-    // The description may have been narrowed since.
+    // The limits may have been narrowed since.
     mover.outside = joint.limits && !joint.limits->contain(mover.position) ? 1 : 0;
   }
   if (joint.coupled) {
     mover.said = shared_error(joint, mover.variance);
     mover.said_variance = mover.variance;
-    // To say it anew would be the end of what observations have left, which an earlier process may have kept.
+    // Setting it again would drop what observations have left, which an earlier process may have
+    // stored.
     const auto kept = forest_.kept(frame);
     if (kept && !(kept->correlation.said == mover.said)) (void)forest_.correlate(frame, mover.said);
   }
@@ -102,7 +103,7 @@ std::vector<std::string> Joints::frames_of(std::string_view name) const {
   return frames;
 }
 
-// Of frames that were removed; another of that id is another frame.
+// For removed frames; another frame with that id is a different one.
 void Joints::forget_removed() {
   for (Mover& mover : movers_) mover.let_go = mover.let_go || !forest_.info(mover.handle);
 }
@@ -137,7 +138,7 @@ bool Joints::is_newer(const Mover& mover, std::optional<Time> stamp) const {
   return !stamp || !mover.stamp || *mover.stamp < *stamp;
 }
 
-// Whether the edge's history has started again, so that an older sample is its newest.
+// Whether the edge's history has restarted, so that an older sample is its newest.
 bool Joints::starts_again(const Mover& mover, Time stamp) const {
   const auto history = forest_.histories(mover.frame);
   return !history.empty() && history.front().newest == stamp;

@@ -13,29 +13,31 @@
 
 namespace tfdude {
 
-/// check_joint() of all frames that have one; the error names the frame, too.
+/// check_joint() for all frames with a joint; the error also names the frame.
 [[nodiscard]] Result<void> check_joints(const std::vector<FrameSpec>& frames);
 
-/// A frame's value before anything was said of it: of one with a joint, at the joint's position.
+/// A frame's initial value: with a joint, the value at the joint's position.
 [[nodiscard]] Transform value_of(const FrameSpec& frame);
 
-/// Where an earlier process has left a joint: by the one that it follows, if that is among them.
+/// The position that an earlier process left for a joint: that of the joint it follows, if stored.
 [[nodiscard]] std::optional<StoredJoint> left_of(const JointSpec& joint,
                                                  const std::vector<StoredJoint>& left);
 
-/// The joints of a partition: turns their positions into values of the edges that they move. A joint moves its edge until
-/// the frame is removed or moved by request.
+/// The joints of a partition: converts positions to values of the edges that they move. A joint
+/// moves its edge until the frame is removed or moved by request.
 ///
-/// @par Thread safety  The caller serializes all functions but moves(), which may run beside all but put().
+/// @par Thread safety  The caller serializes all functions except moves(), which may run
+///   concurrently with all but put().
 class Joints {
  public:
   explicit Joints(Forest& forest) : forest_(forest) {}
 
-  /// Has a joint move a held frame. @param left  where an earlier process left it; absent: where its description says
+  /// Assigns a joint to a held frame.
+  /// @param left  position from an earlier process; absent: that of the description
   void put(const std::string& frame, const JointSpec& joint,
            const std::optional<StoredJoint>& left);
 
-  /// The frame is moved by hand from now on.
+  /// From now on the joint does not move the frame.
   void let_go(const std::string& frame);
 
   /// Whether a position of the joint concerns this partition. O(log joints); takes no lock.
@@ -43,24 +45,25 @@ class Joints {
     return by_name_.find(name) != by_name_.end();
   }
 
-  /// Whether the frame's error is that of a joint that others follow, or that follows another.
+  /// Whether the frame's joint follows another one or is followed, and so shares its error.
   [[nodiscard]] bool is_coupled(std::string_view frame) const;
 
-  /// Moves what these joints and those that follow them move, as one commit. Joints that others have are passed over,
-  /// as are those that follow: where they are says the one that they follow.
-  /// @return how many edges were moved; kInvalidInput naming the joint: not a number, too large, negative variance, named
-  ///   twice, outside the limits of a strict joint; as Forest::update(). Where it fails nothing is moved.
+  /// Moves the edges of these joints, and of those that follow them, as one commit. Ignores joints
+  /// of other partitions and followers, whose position is that of the joint they follow.
+  /// @return the number of moved edges; kInvalidInput naming the joint: not a number, too large,
+  ///   negative variance, named twice, outside the limits of a strict joint; errors of
+  ///   Forest::update(). On an error nothing is moved.
   [[nodiscard]] Result<std::size_t> apply(const JointUpdate& update);
 
-  /// Sorted by name, those that come after this one; kMaxItems at most.
+  /// Sorted by name, starting after this one; at most kMaxItems.
   [[nodiscard]] std::vector<JointInfo> infos(std::string_view after = {}) const;
 
-  /// The frames that a joint of this name moves, with those that follow it.
+  /// The frames moved by a joint of this name, and by those that follow it.
   [[nodiscard]] std::vector<std::string> frames_of(std::string_view name) const;
 
-  /// Those that have got positions since the last call.
+  /// The joints with new positions since the last call.
   [[nodiscard]] std::vector<StoredJoint> take_changed();
-  /// They could not be saved: they will be taken again.
+  /// They could not be saved: the next take_changed() returns them again.
   void still_changed(const std::vector<StoredJoint>& joints);
 
  private:
@@ -76,12 +79,12 @@ class Joints {
     bool let_go = false;
     std::uint64_t outside = 0;
     std::uint64_t refused = 0;
-    std::uint64_t planned = 0;  // which update has moved it last
-    // What a coupled joint's error is said to be, for which variance.
+    std::uint64_t planned = 0;  // number of the last update that moved it
+    // The error set for a coupled joint, and its variance.
     Correlation said{};
     double said_variance = -1;
   };
-  // Where a sample takes a mover.
+  // The effect of a sample on a mover.
   struct Step {
     std::size_t mover = 0;
     double position = 0;
@@ -97,11 +100,11 @@ class Joints {
 
   Forest& forest_;
   std::vector<Mover> movers_;
-  // Which movers a joint has: its own and those that follow it. Of one that follows, none.
+  // The movers of a joint: its own and those that follow it. Empty for a follower.
   std::map<std::string, std::vector<std::size_t>, std::less<>> by_name_;
-  std::uint64_t plans_ = 0;                // updates so far
-  std::vector<Step> steps_;                // of the update being made, as
-  std::vector<CorrelatedUpdate> updates_;  // these; both kept for their memory
+  std::uint64_t plans_ = 0;                // number of updates so far
+  std::vector<Step> steps_;                // of the current update; kept to reuse its memory
+  std::vector<CorrelatedUpdate> updates_;  // as steps_
 };
 
 }  // namespace tfdude

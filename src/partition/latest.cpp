@@ -9,7 +9,7 @@
 namespace tfdude {
 namespace {
 
-// Of the owner whose newest is the oldest; null where all is static.
+// The answer of the owner whose newest instant is the oldest; null if all is static.
 const SegmentValues* slowest(const std::vector<SegmentValues>& answers) {
   const SegmentValues* found = nullptr;
   for (const SegmentValues& answer : answers) {
@@ -25,7 +25,7 @@ bool all_of(const std::vector<SegmentValues>& answers, Time instant) {
   });
 }
 
-// Whether each answer has values of the hint; those that then are its own.
+// Whether each answer has values at the hint; if so, these become the answers.
 bool take_hint(std::vector<SegmentValues>& answers, Time hint) {
   const bool all = std::all_of(answers.begin(), answers.end(), [&](const SegmentValues& answer) {
     return !answer.stamp || *answer.stamp == hint || !answer.at_hint.empty();

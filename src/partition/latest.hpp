@@ -11,48 +11,49 @@
 
 #include "tree/forest.hpp"
 
-// The newest instant of which all partitions on a path have data, and how it is found in one round trip.
+// Finds the newest instant for which all partitions on a path have data, in one round trip.
 //
-// Each owner answers of its own newest instant and, where it has it, of the one that the caller guesses. The newest
-// common instant T is the oldest of these. Where all answered of T, that is the answer. Else it is that of the guess, if
-// all had it and it is no older than T by two periods of the slowest edge. Else all are asked once more, of T.
+// Each owner answers for its own newest instant and, if it has data, for an instant that the caller
+// predicts. The newest common instant T is the oldest of the newest ones. If all answers include T,
+// they are used. Otherwise those at the prediction are used, if all have it and it is at most two
+// periods of the slowest edge older than T. Otherwise all are asked again, for T.
 namespace tfdude {
 
-/// What the answers of a path's owners come to.
+/// The result of combining the answers of a path's owners.
 struct OneInstant {
-  std::vector<SegmentValues> answers;  ///< all of one instant; empty: there is none yet
-  std::optional<Time> ask_again;       ///< of this
+  std::vector<SegmentValues> answers;  ///< all for one instant; empty: none yet
+  std::optional<Time> ask_again;       ///< the instant to ask for
 };
 
 /// Looks for one instant in the answers to a lookup of the newest.
-/// @param hint  the guess that was sent with it
+/// @param hint  the prediction sent with it
 [[nodiscard]] OneInstant one_instant(std::vector<SegmentValues> answers, std::optional<Time> hint);
 
-/// Guesses for the next lookup of a path, from the last: samples go on coming as they did, and whichever way the two
-/// lookups lie between two samples of an owner, its newest is at most a period older than that would make it. Not
-/// thread-safe.
+/// Predicts the instant for the next lookup of a path from the last one, assuming samples that keep
+/// their rate. Wherever the two lookups lie between two samples of an owner, its newest one is at
+/// most one period older than predicted. Not thread-safe.
 class LatestHints {
  public:
   using Steady = std::chrono::steady_clock::time_point;
 
-  /// Nothing where the path's partitions have the same newest instant time after time, or were not asked yet.
+  /// Empty if the path's partitions keep having the same newest instant, or were not asked yet.
   [[nodiscard]] std::optional<Time> guess(std::string_view a, std::string_view b, Steady now) const;
 
-  /// Takes note of what the owners said of their newest.
+  /// Records the newest instants of the owners.
   void note(std::string_view a, std::string_view b, Steady now,
             const std::vector<SegmentValues>& answers);
 
  private:
   struct Entry {
     std::size_t path = 0;         // hash
-    std::optional<Time> certain;  // what all have had a period later, at the latest
+    std::optional<Time> certain;  // the instant that all have had at most one period later
     Steady seen;
-    int together = 0;  // how many times in a row all had the same newest
+    int together = 0;  // consecutive times that all had the same newest instant
   };
 
   static constexpr int kStreak = 8;
   static constexpr std::size_t kEntries = 256;
-  std::array<Entry, kEntries> entries_{};  // by hash; the later of two takes the place
+  std::array<Entry, kEntries> entries_{};  // by hash; the newer of two replaces the other
 };
 
 }  // namespace tfdude

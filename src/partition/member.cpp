@@ -9,9 +9,9 @@
 
 namespace tfdude {
 
-// ---- what it hears
+// ---- received messages
 
-// A frame that was moved has the younger claim now, and what was missing of a conflict may have come.
+// A moved frame now has the younger claim, and missing parts of a conflict may have come.
 void Member::look_for_contests() {
   if (partition_ != nullptr && directory_.contested()) outcome_.to_yield = true;
 }
@@ -80,24 +80,24 @@ std::optional<Reply> Member::on_request(const PeerId& from, const Request& reque
     outcome_.routes = is_of_structure(request);
     look_for_contests();
   }
-  // What is not stored is not told, for as long as that may take.
+  // Changes that are not stored are not announced, however long that takes.
   if (!changes && refusal) reply.epoch = std::min(reply.epoch, told_epoch_);
   if (!changes || (!stores_ && is_of_values(request))) return reply;
   outcome_.to_reply = true;
-  // A second one to a request that waits for its first is dropped.
+  // A repeated request whose first copy still waits is dropped.
   replies_.try_emplace({from, request.sequence},
                        PendingReply{from, std::move(reply), describe(request)});
   return std::nullopt;
 }
 
-// ---- what its own process asks for
+// ---- requests of its own process
 
 Reply Member::answer(const Request& request, const std::optional<Error>& refusal, Time now) {
   if (refusal && is_of_structure(request)) return {request.sequence, 0, *refusal};
   Reply reply = partition_->answer(request, now);
   look_for_contests();
   outcome_.routes = is_of_structure(request);
-  // This process sees the change already; the others are told without making it wait.
+  // This process sees the change already; the others are informed asynchronously.
   outcome_.to_commit = !is_of_values(request) && !is_read_only(request);
   return reply;
 }
@@ -119,7 +119,7 @@ void Member::yield(const std::set<PendingYield>& due, bool current, Time now) {
   if (!partition_->pending_yields().empty()) outcome_.to_yield = true;
 }
 
-// Lookups find no value of this process's any more: none is better than an old one.
+// Lookups no longer find values of this process: no value is better than an old one.
 void Member::give_up(const Presence& rival) {
   given_up_ = "partition " + quote(rival.partition) + " was taken over by process " +
               std::to_string(rival.pid) + " on host " + rival.host + " while process " +
@@ -135,8 +135,8 @@ void Member::give_up(const Presence& rival) {
   outcome_.gave_up = outcome_.to_commit = true;
 }
 
-// Others know of a later incarnation of this partition, so that they do not hear this one: a predecessor that had another
-// clock, or this very process, which they have forgotten.
+// Others know a later incarnation of this partition, so they ignore this one: a predecessor with a
+// different clock, or this process itself, which they have forgotten.
 void Member::overtake(Time now) {
   const auto latest = directory_.hidden_by(presence_.incarnation);
   if (partition_ == nullptr || !given_up_.empty() || !latest || claim_.served()) return;
@@ -147,12 +147,12 @@ void Member::overtake(Time now) {
   outcome_.to_commit = true;
 }
 
-// ---- how it becomes an owner
+// ---- becoming an owner
 
 void Member::claim(const std::string& host, std::uint32_t pid, Time now, std::uint64_t random) {
   presence_ = {name_, incarnations_.next(now, random), host, pid, 0, false};
   presence_.ticket = presence_.incarnation;
-  // It serves as a later one, even if its clock is set back until then.
+  // It serves with a later number, even if its clock is set back until then.
   incarnations_.saw(presence_.incarnation);
   claim_.claim(presence_);
 }
@@ -180,7 +180,7 @@ std::optional<Presence> Member::leave() {
   return introduce();
 }
 
-// ---- what is to be done
+// ---- actions
 
 Ready Member::take_ready() {
   Ready ready;
@@ -202,7 +202,7 @@ Ready Member::take_ready() {
 
 std::optional<Presence> Member::stored(const Ready& ready) {
   if (!ready.refused) told_epoch_ = ready.rows.epoch;
-  // A partition that was given up meanwhile is not said to be served once more.
+  // A partition that was given up meanwhile is not announced as served again.
   const bool stands = ready.presence && given_up_.empty();
   if (stands) {
     presence_.pages = ready.presence->pages;
@@ -215,7 +215,7 @@ std::optional<Presence> Member::stored(const Ready& ready) {
 
 std::optional<Presence> Member::not_stored(const Ready& ready) {
   partition_->still_unsaved(ready.rows, ready.pages);
-  // Of one that does not serve yet nothing is said that it could not store.
+  // A partition that is not served yet announces nothing that it could not store.
   if (!ready.presence || !announced_.serving || !given_up_.empty()) return std::nullopt;
   if (ready.presence->absent == presence_.absent) return std::nullopt;
   presence_.absent = announced_.absent = ready.presence->absent;

@@ -18,81 +18,84 @@
 
 namespace tfdude {
 
-/// One participant as a state machine: what it knows of the others, and the partition that it owns, if any. Inputs go in
-/// (what it hears, what it is asked for, time); what is to be done comes out as Ready, and what its own process has to look
-/// at as Outcome. No threads, no I/O, no clock, no randomness.
+/// One participant as a state machine: its knowledge of the others, and the partition that it owns,
+/// if any. Inputs are messages, requests and time. Outputs are Ready, the actions to perform, and
+/// Outcome, for its own process. No threads, no I/O, no clock, no randomness.
 ///
-/// @par Thread safety  None: the caller serializes all functions. Those marked [joints] change what the partition knows of
-///   joints, too.
+/// @par Thread safety  None: the caller serializes all functions. Those marked [joints] also change
+///   the state of joints.
 class Member {
  public:
   using Steady = Absences::Steady;
 
-  /// @param own  the partition that it is to own; empty: none
+  /// @param own  the partition to own; empty: none
   Member(Forest& forest, Directory& directory, std::string own)
       : forest_(forest), directory_(directory), name_(std::move(own)) {}
 
-  // ---- what it hears
+  // ---- received messages
 
   void on_page(const Page& page);
   void on_presence(const Presence& presence, Time now);
   void on_lost(const std::string& partition, std::uint64_t incarnation, Time now);
-  /// To be called at least twice in Absences::kGrace while somebody is silent.
+  /// Call at least twice per Absences::kGrace while a partition is silent.
   void on_time(Steady now);
 
-  /// A request of a peer that is not answered by lookups alone. [joints]
-  /// @param refusal  why changes are not to be made now: what was changed before could not be stored
-  /// @return the reply to send at once; nothing where it follows with Ready, after what it rests on
+  /// Handles a request of a peer other than a lookup. [joints]
+  /// @param refusal  why no changes may be made now: earlier ones could not be stored
+  /// @return the reply to send at once; empty if it follows with Ready, after its changes are
+  ///   stored
   [[nodiscard]] std::optional<Reply> on_request(const PeerId& from, const Request& request,
                                                 const std::optional<Error>& refusal, Time now);
 
-  // ---- what its own process asks for
+  // ---- requests of its own process
 
-  /// The same of its own process, which sees its changes before they are stored. [joints]
+  /// As on_request(), for its own process, which sees its changes before they are stored. [joints]
   [[nodiscard]] Reply answer(const Request& request, const std::optional<Error>& refusal, Time now);
-  /// Nothing is kept of a partition that is not there. @return kPartitionTaken where it is.
+  /// Drops everything about an unreachable partition. @return kPartitionTaken if it is reachable.
   [[nodiscard]] Result<void> forget(const std::string& partition, Time now);
 
-  /// What would have to be yielded as far as is known now. O(contested frames).
+  /// What would have to be yielded according to current knowledge. O(contested frames).
   [[nodiscard]] std::set<PendingYield> pending_yields() const;
-  /// Gives up what of these still stands. [joints]
-  /// @param current  whether all has come that the others had changed when `due` was found
+  /// Yields those of `due` that still have to be yielded. [joints]
+  /// @param current  whether all changes have come that the others had made when `due` was found
   void yield(const std::set<PendingYield>& due, bool current, Time now);
 
-  // ---- how it becomes an owner
+  // ---- becoming an owner
 
-  /// It wants the partition's name from now on.
-  /// @param random  another number for each process
+  /// Claims the partition's name.
+  /// @param random  a different number for each process
   void claim(const std::string& host, std::uint32_t pid, Time now, std::uint64_t random);
   [[nodiscard]] const NameClaim& name_claim() const { return claim_; }
-  /// It says that it has taken the name.
+  /// Announces that it has taken the name.
   void take_name() { presence_.taken = true; }
-  /// It has the name, and these frames: those of the state that an earlier process has left, where one is kept, and what the
-  /// configuration changes of that. [joints]
-  /// @return the first frame's error
+  /// Serves the partition, with the frames that an earlier process left, if they are stored, and
+  /// the changes of the configuration. [joints]
+  /// @return the error of the first invalid frame
   [[nodiscard]] Result<void> serve(const StoredState* left,
                                    const std::vector<FrameSpec>& configured, Time now);
-  /// It has no name any more.
-  /// @return the last word, to be announced; nothing where nothing was said
+  /// Gives up the name.
+  /// @return the last presence to announce; empty if none was announced before
   [[nodiscard]] std::optional<Presence> leave();
-  /// What it says of itself now, to be announced before there is anything to store.
+  /// The own presence, to announce before anything has to be stored.
   [[nodiscard]] Presence introduce() { return announced_ = presence_; }
 
-  // ---- what is to be done
+  // ---- actions
 
-  /// All that is to be stored or told since the last call; what follows it is stored() or not_stored(). [joints]
+  /// Everything to store or announce since the last call. Call stored() or not_stored() afterwards.
+  /// [joints]
   [[nodiscard]] Ready take_ready();
-  /// @return what to announce once the pages are published
+  /// @return the presence to announce after the pages are published
   [[nodiscard]] std::optional<Presence> stored(const Ready& ready);
-  /// The next take_ready() gives it again, but for the replies. [joints]
-  /// @return what to announce all the same: who is missed has nothing to do with what is stored
+  /// The next take_ready() returns it again, without the replies. [joints]
+  /// @return the presence to announce all the same: absences do not depend on what is stored
   [[nodiscard]] std::optional<Presence> not_stored(const Ready& ready);
-  /// Of values that nobody waits for, those that may be stored alone. Where a frame hangs elsewhere and that is not stored
-  /// yet, its value goes with that: else it would be kept where the frame was before.
+  /// Filters values that no request waits for to those that may be stored alone. If a frame has a
+  /// new parent that is not stored yet, its value is stored with that: otherwise it would be stored
+  /// for the old parent.
   [[nodiscard]] std::vector<ChangedEdge> storable(std::vector<ChangedEdge> edges) const;
   [[nodiscard]] Outcome take_outcome();
 
-  // ---- what it is
+  // ---- state
 
   /// Null before it serves.
   [[nodiscard]] Partition* partition() { return partition_.get(); }
@@ -111,12 +114,12 @@ class Member {
   const std::string name_;
   std::unique_ptr<Partition> partition_;
   Presence presence_;
-  Presence announced_;  // as it was said last
+  Presence announced_;  // as last announced
   NameClaim claim_;
   IncarnationSource incarnations_;
   std::string given_up_;
   bool stores_ = false;
-  std::uint64_t told_epoch_ = 0;  // of what was published
+  std::uint64_t told_epoch_ = 0;  // of the published structure
   std::map<std::pair<PeerId, std::uint32_t>, PendingReply> replies_;
   Outcome outcome_;
 };

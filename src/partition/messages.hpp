@@ -16,20 +16,23 @@
 
 #include "tree/forest.hpp"
 
-// What participants say to each other, free of any transport. idl/tfdude.idl has the same on the wire.
+// The messages between participants, independent of any transport. idl/tfdude.idl defines their
+// wire format.
 namespace tfdude {
 
-/// Who speaks: given by the transport, unique in a domain, new at every start.
+/// Identifies a participant: assigned by the transport, unique in a domain, new at every start.
 using PeerId = std::array<std::uint8_t, 12>;
 
-/// The most edges, subtrees, segments or entries that one message holds.
+/// Maximum number of edges, subtrees, segments or entries per message.
 inline constexpr std::size_t kMaxItems = 4096;
 
-/// The most edges of one owner that are observed at once or correlated with others on one path, and common errors of each.
+/// Maximum number of edges of one owner that are observed at once, or correlated with others on one
+/// path; also the maximum number of common errors of each.
 inline constexpr std::uint32_t kMaxCorrelated = kMaxCommonErrors;
 
-/// The latest stamp of a change of the structure that a sender knows of (Directory::next_lamport_time). Its own change gets
-/// a later one, whatever the owner's clock says, so that what one client does in turn counts in that order.
+/// The latest Lamport time of a structure change known to a sender (Directory::next_lamport_time).
+/// Its own change gets a later one, whatever the owner's clock says, so that successive changes of
+/// one client keep their order.
 using LamportTime = std::uint64_t;
 
 struct AddRequest {
@@ -38,8 +41,9 @@ struct AddRequest {
   LamportTime lamport_time = 0;
 };
 
-/// Removes frames with all that the asked partition owns below them. None: the reply only says how far the partition's
-/// structure is; the request's id is the partition's name then.
+/// Removes frames with all frames below them that the asked partition owns. Without frames, the
+/// reply only reports the epoch of the partition's structure; the request's id is then the
+/// partition's name.
 struct RemoveRequest {
   std::vector<std::string> tops;
   LamportTime lamport_time = 0;
@@ -50,7 +54,7 @@ struct UpdateRequest {
   std::optional<Time> stamp{};    ///< of all of them
 };
 
-/// Parts of values; what is absent stays as it is at the owner.
+/// Parts of values; the owner keeps the absent parts.
 struct PartialUpdateRequest {
   std::vector<PartialUpdate> edges;  ///< at least one
   std::optional<Time> stamp{};       ///< of all of them
@@ -58,131 +62,137 @@ struct PartialUpdateRequest {
 
 struct MoveRequest {
   std::string parent;             ///< empty: becomes a root
-  std::optional<Transform> X_PC;  ///< kept where absent
+  std::optional<Transform> X_PC;  ///< absent: unchanged
   LamportTime lamport_time = 0;
 };
 
 struct LookupRequest {
   std::vector<PathEnds> segments;  ///< at least one
   Query query{};
-  /// Of what other instant the answer may be of use; see LatestHints.
+  /// Another instant at which the answer may be useful; see LatestHints.
   std::optional<Time> hint{};
-  bool edges =
-      false;  ///< each segment is an edge, to be observed: all of its correlation is wanted
+  bool edges = false;  ///< each segment is an edge to be observed: its full correlation is needed
 };
 
-/// What an observation has come to for edges of one owner.
+/// The result of an observation for the edges of one owner.
 struct ReviseRequest {
   struct Edge {
     std::string id;
     NormalizedInnovation innovation;
-    bool refused = false;  ///< the measurement, by its gate
+    bool refused = false;  ///< the gate refused the measurement
     std::optional<Revision> revision;
   };
   std::vector<Edge> edges;        ///< at least one
-  std::optional<Time> stamp{};    ///< of which moving edges were observed
-  std::uint64_t seen = 0;         ///< SegmentValues::commit of what was observed
-  std::uint64_t incarnation = 0;  ///< SegmentValues::incarnation, whose commit that is
+  std::optional<Time> stamp{};    ///< at which dynamic edges were observed
+  std::uint64_t seen = 0;         ///< SegmentValues::commit of the observed values
+  std::uint64_t incarnation = 0;  ///< SegmentValues::incarnation of that commit
 };
 
-/// Says how the error of the edge that the request's id names is correlated with those of others.
+/// Sets how the error of the edge named by the request's id is correlated with others.
 struct CorrelateRequest {
   Correlation correlation;
 };
 
-/// How well the covariance of the edge that the request's id names, or of all that the partition has, agrees with
-/// observations.
+/// How well the covariance of the edge named by the request's id, or of all edges of the partition,
+/// agrees with observations.
 struct ConsistencyRequest {
   bool all = false;
 };
 
-/// Positions of joints, applied as one commit by each owner of some of the edges that they move. Streamed, or as a request.
+/// Positions of joints. Each owner of some of the moved edges applies its share as one commit.
+/// Streamed, or as a request.
 struct JointUpdate {
   std::vector<JointValue> joints;
   std::optional<Time> stamp{};  ///< of all of them
 };
 
-/// What is known of the joints of the partition, sorted by name: of kMaxItems at most, whose names come after this one.
+/// The state of the partition's joints, sorted by name: at most kMaxItems, with names after this
+/// one.
 struct JointsRequest {
   std::string after{};
 };
 
-/// Says that another partition, which is not there, is gone for good; the request's id is the name of the one asked.
+/// Declares that another, unreachable partition will not return. The request's id is the name of
+/// the partition asked.
 struct ForgetRequest {
   std::string partition;
-  std::uint64_t incarnation = 0;  ///< the latest that was heard of
+  std::uint64_t incarnation = 0;  ///< the latest heard of
 };
 
-/// Asks for the values of edges, now and whenever they change: these are pushed to the group of watchers that have
-/// asked for the same, until it is not renewed for kWatchLease.
+/// Asks for the values of edges, now and on every change. Changes are pushed to the group of
+/// watchers with the same request, until it was not renewed for kWatchLease.
 struct WatchRequest {
   std::vector<PathEnds> segments;      ///< edges, each from its parent
-  bool composed = false;               ///< or runs of edges, each told as one transform
-  std::chrono::nanoseconds period{0};  ///< no more often than this; 0: every sample
-  /// The reply has the samples since the last that is not younger than this, instead of the newest only. Not of the group.
+  bool composed = false;               ///< or runs of edges, each sent as one transform
+  std::chrono::nanoseconds period{0};  ///< minimum interval; 0: every sample
+  /// The reply contains the samples from the last one not later than this, instead of the newest
+  /// only. Does not affect the group.
   std::optional<Time> from{};
 };
 
 /// The longest period of a watch.
 inline constexpr std::chrono::hours kMaxWatchPeriod{1};
 
-/// How long an owner pushes to watchers of whom it hears nothing.
+/// How long an owner pushes without a renewal.
 inline constexpr Milliseconds kWatchLease{5000};
 
-/// What is kept of the history of the edge that the request's id names or, instead, of all that the partition has.
+/// The history of the edge named by the request's id, or of all edges of the partition.
 struct HistoryRequest {
   bool all = false;
 };
 
 /// A request to one partition.
 struct Request {
-  /// Counts the requests of one peer; a repeated number is answered again but not applied again.
+  /// Counts the requests of one peer. A repeated number is answered again but not applied again.
   std::uint32_t sequence = 0;
-  /// The frame concerned, by which a reader filters: one that the partition owns, or the new one of an add.
+  /// The frame concerned, by which a reader filters: one owned by the partition, or the new one of
+  /// an add.
   std::string id;
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
                HistoryRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
                PartialUpdateRequest, CorrelateRequest, ForgetRequest>
       body;
-  /// Of requests with a lower number, in whatever order they come, the sender awaits no reply. Not above `sequence`, which has
-  /// its lower half only.
+  /// The sender awaits no replies to requests with lower numbers, in whatever order they come. Not
+  /// greater than the full number of this request, of which `sequence` has the lower half.
   std::uint64_t awaits_from = 0;
 };
 
-/// What was written to watched edges, to be taken over as one commit: a watcher that knows all up to `after` then knows
-/// all up to `commit`.
+/// Values written to watched edges, to be applied as one commit: a watcher that has everything up
+/// to `after` then has everything up to `commit`.
 struct PushedValues {
   std::uint64_t group = 0;           ///< watch_group() of the owner and the request
   std::vector<PushedValue> entries;  ///< by the index of the segment in the request
-  std::uint64_t after = 0;           ///< a commit of the owner's; 0: all is told
-  std::uint64_t commit = 0;          ///< a later one
-  std::uint32_t piece = 0;           ///< which one of so many that have the entries
+  std::uint64_t after = 0;           ///< a commit of the owner; 0: all values
+  std::uint64_t commit = 0;          ///< a later commit
+  std::uint32_t piece = 0;           ///< index among the pieces
   std::uint32_t pieces = 1;
 };
 
-/// How many entries are correlated with others; a message holds no more than kMaxCorrelated of them.
+/// The number of correlated entries; a message has at most kMaxCorrelated of them.
 [[nodiscard]] std::size_t correlated_entries(const PushedValues& pushed);
 
 struct Done {};
 
 struct Reply {
   std::uint32_t sequence = 0;
-  /// The partition's structure after the request; a directory that has this epoch shows its effect.
+  /// The partition's structure after the request. A directory with this epoch shows the request's
+  /// effect.
   std::uint64_t epoch = 0;
-  /// Done, or why not; or what was asked for.
+  /// Done, the error, or the requested data.
   std::variant<Done, Error, SegmentValues, PushedValues, std::vector<HistoryInfo>,
                std::vector<EdgeConsistency>, std::vector<JointInfo>>
       body;
-  /// Of a change: the latest that the owner knows of, for the next change of who has asked.
+  /// For a change: the latest time known to the owner, for the next change of the requester.
   LamportTime lamport_time = 0;
 };
 
-/// Which watchers share what an owner sends: a number of the owner, this time that it runs, and of what they ask for
-/// (FNV-1a, 64 bits).
+/// The group of watchers that share what an owner sends: a hash of the owner, its incarnation, and
+/// the request (FNV-1a, 64 bits).
 [[nodiscard]] std::uint64_t watch_group(std::string_view partition, std::uint64_t incarnation,
                                         const WatchRequest& request);
 
-/// Edge values streamed without a reply; applied as one commit by each owner of some of them.
+/// Edge values streamed without a reply. Each owner of some of them applies its share as one
+/// commit.
 struct Update {
   std::vector<EdgeUpdate> edges;
   std::optional<Time> stamp{};  ///< of all of them
@@ -191,12 +201,12 @@ struct Update {
 struct PageEntry {
   std::string id;
   std::string parent;  ///< empty: a root
-  /// When the frame was hung there, by its owner's count (Directory::next_lamport_time): of two claims that
-  /// cannot both hold, the older does.
+  /// When the frame got its parent, by its owner's count (Directory::next_lamport_time). Of two
+  /// claims that exclude each other, the older one holds.
   std::uint64_t lamport_time = 0;
 };
 
-/// That a joint moves a frame of a page.
+/// A joint that moves a frame of a page.
 struct PageJoint {
   std::string name;
   std::string follows;  ///< the joint that it mimics; empty: none
@@ -206,20 +216,19 @@ struct PageJoint {
   }
 };
 
-/// What became of a frame that is not where it was, in place of it: for those who were away meanwhile, and for those who
-/// want to know of conflicts.
+/// What became of a frame that was removed or moved, in its place: for participants that were away
+/// meanwhile, and for reports of conflicts.
 struct Tombstone {
   enum class Kind : std::uint8_t {
-    kRemoved = 1,  ///< by request; whatever hung below it since before goes, too
-    kYielded = 2,  ///< `rival` has claimed the same id earlier
-    kUnhung = 3,   ///< its move and an earlier one, of `rival`, make a cycle: it was made a root
-    kDropped =
-        4,  ///< its partition's configuration names it no more; what hung below it waits for it
+    kRemoved = 1,  ///< by request; frames that were below it before are removed, too
+    kYielded = 2,  ///< `rival` has an older claim to the id
+    kUnhung = 3,   ///< its move and an older one by `rival` make a cycle: it became a root
+    kDropped = 4,  ///< the partition's configuration no longer names it; frames below wait for it
   };
   std::string id;
   std::uint64_t lamport_time = 0;
   Kind kind = Kind::kRemoved;
-  std::string rival;  ///< a partition; empty where removed or dropped
+  std::string rival;  ///< a partition; empty if removed or dropped
 
   friend bool operator==(const Tombstone& a, const Tombstone& b) {
     return a.id == b.id && a.lamport_time == b.lamport_time && a.kind == b.kind &&
@@ -227,40 +236,41 @@ struct Tombstone {
   }
 };
 
-/// That a page was changed last in this epoch.
+/// A page and the epoch of its last change.
 struct PageEpoch {
   std::uint32_t number = 0;
   std::uint64_t epoch = 0;
 };
 
-/// A piece of a partition's structure. Each page is replaced as a whole, so that a frame costs its page
-/// and not the directory, and a late joiner reads pages and not frames.
+/// A part of a partition's structure. Pages are replaced as a whole, so that a change of a frame
+/// costs its page and not the directory, and a late joiner reads pages and not frames.
 struct Page {
   std::string partition;
   std::uint32_t number = 0;
   std::uint64_t incarnation = 0;
-  /// What it shows.
+  /// The epoch that the page shows.
   std::uint64_t epoch = 0;
   std::vector<PageEntry> entries;
   std::vector<Tombstone> tombstones{};
-  /// The other pages that were changed last: once these have come, too, all of the structure up to the page's epoch has.
+  /// The other pages that were changed last. Once these have come, too, the structure is complete
+  /// up to the page's epoch.
   std::vector<PageEpoch> others{};
   std::vector<PageJoint> joints{};
 };
 
-/// A partition that a participant has known, or heard of, and that is not there.
+/// An absent partition that a participant has known or heard of.
 struct Absent {
   enum class Kind : std::uint8_t {
-    kSilent = 1,     ///< since a moment only: it may just be busy
-    kLost = 2,       ///< it has fallen silent without a word
-    kStopped = 3,    ///< it said that it ends
-    kBack = 4,       ///< it is there again, but what both claim is not resolved yet
-    kForgotten = 5,  ///< somebody said that it is gone for good: nothing of it is kept
+    kSilent = 1,     ///< for a moment only: it may just be busy
+    kLost = 2,       ///< silent without announcing its stop
+    kStopped = 3,    ///< announced its stop
+    kBack = 4,       ///< reachable again, but conflicting claims are not resolved yet
+    kForgotten = 5,  ///< declared gone for good: nothing of it is kept
   };
   std::string partition;
-  std::int64_t since = 0;  ///< [ns since the UNIX epoch], by the clock of who misses it
+  std::int64_t since = 0;  ///< [ns since the UNIX epoch], by the clock of the observer
   Kind kind = Kind::kLost;
-  std::uint64_t incarnation = 0;  ///< the latest that was heard of
+  std::uint64_t incarnation = 0;  ///< the latest heard of
 
   friend bool operator==(const Absent& a, const Absent& b) {
     return a.partition == b.partition && a.since == b.since && a.kind == b.kind &&
@@ -268,21 +278,22 @@ struct Absent {
   }
 };
 
-/// That a partition is served, and by whom. It holds as long as its participant lives.
+/// Announces which process serves a partition. Valid as long as its participant is alive.
 struct Presence {
   std::string partition;
-  /// Which process of the partition's it is: the greater is the later (IncarnationSource).
+  /// Numbers the partition's processes; greater is later (IncarnationSource).
   std::uint64_t incarnation = 0;
   std::string host;
   std::uint32_t pid = 0;
-  std::uint32_t pages = 0;  ///< how many pages its structure has
-  bool serving = false;     ///< false: the name is only being claimed yet, or not any more
-  /// Whom the sender misses, for those who come only now and cannot, and for those who come back: whom it lists as
-  /// lost, stopped or back has to yield to it (Succession).
+  std::uint32_t pages = 0;  ///< number of pages of its structure
+  bool serving = false;     ///< false: the name is only claimed yet, or given up
+  /// The partitions that the sender misses, for new participants, which cannot know them, and for
+  /// those that return: a partition listed as lost, stopped or back has to yield to the sender
+  /// (Succession).
   std::vector<Absent> absent{};
-  bool taken = false;        ///< the name is taken; it will be served once the frames are there
-  bool stopped = false;      ///< it is the last word: the process ends, or has given the name up
-  std::uint64_t ticket = 0;  ///< of its claim to the name (NameClaim); the same as long as it lives
+  bool taken = false;        ///< the name is taken; serving starts once the frames are loaded
+  bool stopped = false;      ///< the last message: the process ends, or has given up the name
+  std::uint64_t ticket = 0;  ///< of its claim to the name (NameClaim); constant for the process
 
   friend bool operator==(const Presence& a, const Presence& b) {
     return a.partition == b.partition && a.incarnation == b.incarnation && a.host == b.host &&

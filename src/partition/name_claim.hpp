@@ -11,43 +11,45 @@
 
 namespace tfdude {
 
-/// Who of several processes that want to serve one partition gets its name. Each says that it claims it, waits until
-/// whoever was there can have been heard (twice as long as a message takes, at least), and says that it has taken it if
-/// to_take() allows it; then it looks once more, and serves if to_serve() allows it. Of those who claim at once the one
-/// with the least ticket has it, unless another has taken it before. So, as long as messages come in time, exactly one
-/// serves: of two who both say "taken" the later one of them hears the other before it looks, and who claims after
-/// somebody has taken hears that before it takes. Not thread-safe.
+/// Decides which of several processes that want to serve one partition gets its name. Each
+/// announces its claim, waits until all others can have been heard (at least twice as long as a
+/// message takes), and announces that it has taken the name if to_take() allows it. Then it checks
+/// again, and serves if to_serve() allows it. Of simultaneous claims the one with the least ticket
+/// wins, unless another process has taken the name before. So, as long as messages come in time,
+/// exactly one serves: if two processes announce "taken", the later one hears the other before it
+/// checks; and a process that claims after another has taken the name hears that before it takes
+/// the name. Not thread-safe.
 class NameClaim {
  public:
   enum class Turn {
     kMine,
-    kWait,    ///< another one, who came earlier, has not decided yet
-    kOthers,  ///< another one has it
+    kWait,    ///< an earlier claimant has not decided yet
+    kOthers,  ///< another process has it
   };
 
-  /// @param own  what this process says; its ticket is what counts
+  /// @param own  this process's presence, with its ticket
   explicit NameClaim(Presence own = {}) : own_(std::move(own)) {}
 
-  /// What this process says is known only now.
+  /// Sets this process's presence, if it was not known before.
   void claim(Presence own) { own_ = std::move(own); }
 
-  /// What another process says of the same partition.
+  /// Another process's presence for the same partition.
   void hear(const Presence& presence);
-  /// The process that said so last under this incarnation is not heard any more.
+  /// The process that last announced this incarnation is lost.
   void lost(std::uint64_t incarnation);
 
-  /// Before it is taken.
+  /// Evaluated before the name is taken.
   [[nodiscard]] Turn to_take() const;
-  /// After it was said that it is taken.
+  /// Evaluated after "taken" was announced.
   [[nodiscard]] Turn to_serve() const;
 
-  /// Whether another process serves it.
+  /// Whether another process serves the partition.
   [[nodiscard]] bool served() const;
-  /// The one that is in the way, or may be.
+  /// The process that prevents this one from serving, or may do so.
   [[nodiscard]] std::optional<Presence> rival() const;
 
  private:
-  /// By ticket, host and process: no two are the same.
+  /// By ticket, host and process: unique.
   using Key = std::tuple<std::uint64_t, std::string, std::uint32_t>;
   static Key key_of(const Presence& presence) {
     return {presence.ticket, presence.host, presence.pid};

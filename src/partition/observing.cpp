@@ -29,7 +29,7 @@ std::vector<Edge> along(std::vector<FrameInfo> path, const std::string& a) {
   return edges;
 }
 
-// The answer that an edge is in, and its place there, where edges are looked at in order.
+// The answer that contains an edge, and its index there; edges must be visited in order.
 class Places {
  public:
   explicit Places(const ObservePlan& plan) : plan_(plan), taken_(plan.parts.size(), 0) {}
@@ -50,7 +50,7 @@ class Places {
   std::vector<std::size_t> taken_;
 };
 
-// Whether one of those that an edge was observed with does not depend on the source.
+// Whether an edge that this one was observed with does not depend on the source.
 bool lacks_source(const ObservePlan& plan, const ObservedPath& path, const Belief& X,
                   const std::vector<std::string>& observed_with) {
   const auto source = std::find_if(X.common_errors.begin(), X.common_errors.end(), is_observed);
@@ -67,7 +67,7 @@ bool lacks_source(const ObservePlan& plan, const ObservedPath& path, const Belie
   return false;
 }
 
-// What an owner keeps of an edge that was observed.
+// The correlation that an owner stores for an observed edge.
 Correlation correlation_of(const Belief& X, const std::vector<std::string>& together) {
   Correlation correlation;
   correlation.unknown = X.unknown.has_value();
@@ -179,7 +179,7 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
     return std::get<ReviseRequest>(part.request.body).edges.empty();
   };
   parts.erase(std::remove_if(parts.begin(), parts.end(), idle), parts.end());
-  // The filter of an owner looks at the request's id.
+  // An owner's filter checks the request's id.
   for (Part& part : parts) {
     part.request.id = std::get<ReviseRequest>(part.request.body).edges.front().id;
   }

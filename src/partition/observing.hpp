@@ -8,21 +8,22 @@
 
 #include "partition/routing.hpp"
 
-// An observation of a path whose edges several partitions own: its edges are asked for, one by one; what the measurement
-// makes of them is computed by whoever has it (tfdude/math/observation.hpp); each owner then applies its part.
+// An observation of a path whose edges several partitions own. The observer requests the edges one
+// by one, computes their corrections (tfdude/math/observation.hpp), and each owner then applies its
+// part.
 namespace tfdude {
 
-/// The edges that an observation concerns, and who must be asked for them.
+/// The edges affected by an observation, and the requests to their owners.
 struct ObservePlan {
   struct Edge {
     FrameInfo info;
     ObservedEdge::Way way;
   };
-  std::vector<Edge> edges;  ///< those of the path in its order, then those beside it
-  std::vector<Part> parts;  ///< a LookupRequest for each owner, of its edges in that order
+  std::vector<Edge> edges;  ///< those of the path in order, then those beside it
+  std::vector<Part> parts;  ///< a LookupRequest per owner, with its edges in that order
 };
 
-/// The same with the values of all, of one instant.
+/// The plan with the values of all edges, at one instant.
 struct ObservedPath {
   std::vector<ObservedEdge> edges;
   struct Seen {
@@ -31,24 +32,26 @@ struct ObservedPath {
   };
   std::vector<Seen> seen;  ///< by part
   std::optional<Time> stamp;
-  std::vector<std::string> missing;  ///< edges beside the path that must be asked for, too
-  /// An edge lacks the source that it was observed by together with another: somebody's observation may be under way.
+  std::vector<std::string> missing;  ///< edges beside the path that must be requested, too
+  /// An edge lacks the source of its joint observation with another one: another observation may be
+  /// in progress.
   bool torn = false;
 };
 
-/// @param beside  edges that were observed together with some of the path; those that are not there are left out
-/// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable, kInvalidInput (the path has no edge, or too many).
+/// @param beside  edges observed together with some of the path; missing ones are left out
+/// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable, kInvalidInput (the path has no
+///   edge, or too many).
 [[nodiscard]] Result<ObservePlan> route_observe(const Forest& forest, const Directory& directory,
                                                 const std::string& a, const std::string& b,
                                                 const std::vector<std::string>& beside,
                                                 std::optional<Time> stamp);
 
-/// @param answers  by part, of one instant (one_instant())
-/// @return kNotOwner where an answer is not what was asked for.
+/// @param answers  by part, at one instant (one_instant())
+/// @return kNotOwner if an answer does not match the request.
 [[nodiscard]] Result<ObservedPath> observed_path(const ObservePlan& plan,
                                                  const std::vector<SegmentValues>& answers);
 
-/// What each owner is to do about an observation: a ReviseRequest for each who owns an uncertain edge.
+/// The parts of the owners: a ReviseRequest for each owner of an uncertain edge.
 [[nodiscard]] std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
                                           const Observation& observation);
 

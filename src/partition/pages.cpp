@@ -106,7 +106,7 @@ void Pages::note_epochs() {
                      [number](const PageEpoch& one) { return one.number == number; });
     if (before != changed_last_.end()) changed_last_.erase(before);
     changed_last_.push_front({number, epoch_});
-    // One more than a page tells of, as it need not tell of itself.
+    // One more than a page lists, as it need not list itself.
     if (changed_last_.size() > kOthers + 1) changed_last_.pop_back();
   }
 }

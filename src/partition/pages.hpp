@@ -18,14 +18,16 @@ namespace tfdude {
 /// An owner's structure, split into the pages that it publishes. Not thread-safe.
 class Pages {
  public:
-  /// Frames and tombstones a page: a page of long ids stays below 64 KiB, and of usual ones is about 2 KiB.
+  /// Frames and tombstones per page: a page of long ids stays below 64 KiB, one of usual ids has
+  /// about 2 KiB.
   static constexpr std::size_t kPageSize = 60;
 
-  /// Tombstones kept; the oldest go first.
+  /// Tombstones kept; the oldest are dropped first.
   static constexpr std::size_t kMaxTombstones = 1024;
 
-  /// Of how many that were changed before it a page tells. A page that a later one has replaced on its way is late; if
-  /// more than these were changed meanwhile, nobody knows.
+  /// How many previously changed pages a page lists. A page that was replaced by a later version
+  /// before its delivery arrives late. If more pages than these changed meanwhile, this is not
+  /// noticed.
   static constexpr std::size_t kOthers = 16;
 
   struct Place {
@@ -38,42 +40,42 @@ class Pages {
 
   [[nodiscard]] std::uint64_t incarnation() const { return incarnation_; }
 
-  /// Where a frame hangs, in place of its tombstone, if it has one. O(log frames).
+  /// Sets the place of a frame, and removes its tombstone, if it has one. O(log frames).
   void put(const std::string& id, const std::string& parent, std::uint64_t lamport_time);
 
-  /// Its joint was let go before.
+  /// Its joint must have been erased before.
   void erase(const std::string& id);
 
-  /// Which joint moves a frame that was put.
+  /// Sets the joint that moves a frame; the frame must have been put.
   void put_joint(const std::string& id, const PageJoint& joint);
-  /// @return the one that there was
+  /// @return the previous joint
   std::optional<PageJoint> erase_joint(const std::string& id);
 
-  /// Leaves the tombstone of a frame, in place of an earlier one.
+  /// Sets the tombstone of a frame, instead of an earlier one.
   void leave(const Tombstone& tombstone);
 
   [[nodiscard]] std::optional<Place> place(const std::string& id) const;
   [[nodiscard]] std::optional<Tombstone> tombstone(const std::string& id) const;
 
-  /// Goes on counting from here, if that is ahead.
+  /// Continues counting from here, if that is ahead.
   void resume(std::uint64_t epoch) { epoch_ = epoch > epoch_ ? epoch : epoch_; }
 
-  /// Goes on as a later incarnation: all pages are published again.
+  /// Continues as a later incarnation: all pages are published again.
   void overtake(std::uint64_t incarnation);
 
-  /// Closes a change of structure, of as many frames as it has; the epoch that shows it. It begins with the
-  /// incarnation, so that it grows over all of a partition's lives.
+  /// Ends a change of the structure, of any number of frames; returns the epoch that shows it.
+  /// Epochs start at the incarnation, so that they increase over all processes of a partition.
   std::uint64_t close_epoch() { return ++epoch_; }
   [[nodiscard]] std::uint64_t epoch() const { return epoch_; }
 
-  /// The pages to publish since the last call, in the order in which to publish them.
+  /// The pages to publish since the last call, in publishing order.
   [[nodiscard]] std::vector<Page> take_changed();
-  /// They were not published: they will be taken again, as they are then.
+  /// They were not published: the next take_changed() returns them again, with their state of then.
   void still_changed(const std::vector<Page>& pages) {
     for (const Page& page : pages) changed_.insert(page.number);
   }
 
-  /// The ids whose place or tombstone has changed since the last call; none before watch_ids().
+  /// The ids whose place or tombstone has changed since the last call; empty before watch_ids().
   [[nodiscard]] std::set<std::string> take_touched() { return std::exchange(touched_, {}); }
   void watch_ids() { watching_ = true; }
   [[nodiscard]] bool is_touched(const std::string& id) const { return touched_.count(id) != 0; }
@@ -101,7 +103,7 @@ class Pages {
   PageOf page_of_;
   PageOf page_of_tombstone_;
   std::map<std::string, PageJoint> joints_;  // by frame
-  // In the order in which they were left; what stands here no longer was replaced since.
+  // In order of creation; entries may be outdated.
   std::deque<std::pair<std::string, std::uint64_t>> oldest_tombstones_;
   std::set<std::uint32_t> with_room_;
   std::set<std::uint32_t> changed_;

@@ -41,11 +41,11 @@ Result<void> Partition::load(const std::vector<FrameSpec>& frames, Time now) {
   return {};
 }
 
-// All of them or none.
+// Takes all frames or none.
 Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t lamport_time) {
   std::vector<std::string> loaded;
   for (const FrameSpec& frame : frames) {
-    // What a partition has that is gone is there for the taking.
+    // Frames of a partition that is gone may be taken.
     (void)directory_.take(frame.id);
     auto added = forest_.add(frame.id, frame.parent, value_of(frame), Forest::MissingParent::kAllow,
                              lamport_time);
@@ -63,7 +63,7 @@ Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t
   return {};
 }
 
-// A frame that hangs elsewhere than its description says was moved by hand.
+// A frame whose parent is not that of its description was moved by hand.
 void Partition::hang_on_joints(const std::vector<FrameSpec>& frames,
                                const std::vector<StoredJoint>& left) {
   for (const FrameSpec& frame : frames) {
@@ -90,7 +90,7 @@ Reply Partition::answer(const PeerId& peer, const Request& request, Time now) {
   return reply;
 }
 
-// Kept like any reply: when the request comes once more after that, it must not be applied.
+// Stored like any reply: a later repetition of the request must not be applied.
 Reply Partition::refuse(const PeerId& peer, const Request& request, const Error& why, Time now) {
   if (auto before = replies_.find(peer, request, now)) return *std::move(before);
   Reply reply{request.sequence, 0, why};
@@ -132,7 +132,7 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
   } else if (values.error().code == Errc::kNotYet || values.error().code == Errc::kTooOld) {
     reply.body = std::move(values.error());
   } else {
-    // Whatever is missing, the caller's picture of the structure is not (or no longer) the owner's.
+    // If anything is missing, the caller's structure is not, or no longer, the owner's.
     const auto missing = std::find_if(
         lookup.segments.begin(), lookup.segments.end(),
         [this](const PathEnds& segment) { return !forest_.lookup_segments({segment}); });
@@ -218,7 +218,8 @@ void Partition::put(const std::string& id, const std::string& parent, std::uint6
   directory_.changes().frame_added(id, parent, name_);
 }
 
-// From the leaves up, so that of the tombstones, which are not kept for ever, those about the tops last longest.
+// From the leaves up: tombstones are limited in number, and those of the top frames should last
+// longest.
 void Partition::forget(const std::vector<std::string>& removed, Time now) {
   if (removed.empty()) return;
   const std::uint64_t lamport_time = directory_.next_lamport_time(now);
@@ -241,7 +242,7 @@ Result<void> Partition::update(const PartialUpdateRequest& request) {
   return told_of(request.edges, forest_.update_partial(request.edges, request.stamp));
 }
 
-// What an update has come to, of which those who save and those who ask are told.
+// Notes the result of an update for saving and for statistics.
 template <class Edge>
 Result<void> Partition::told_of(const std::vector<Edge>& edges, Result<void> updated) {
   if (updated) {
@@ -346,8 +347,8 @@ std::size_t Partition::apply(const Update& update) {
   return forest_.update(own, update.stamp) ? own.size() : 0;
 }
 
-// A frame asked of its owner that the owner does not have has moved on, or is gone: in both cases the route is stale, and
-// the directory has another one.
+// If an owner does not have a requested frame, the frame was moved or removed. In both cases the
+// route is outdated, and the directory will have a new one.
 Error Partition::at_home(Error error, std::string_view id) const {
   if (error.code != Errc::kUnknownFrame && error.code != Errc::kNotOwner) return error;
   return {Errc::kNotOwner,

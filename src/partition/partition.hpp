@@ -19,68 +19,73 @@
 
 namespace tfdude {
 
-/// The rules of an owner: what it answers to each request, and what it publishes of its structure.
+/// The rules of an owner: its answers to requests, and the structure that it publishes.
 ///
-/// @par Thread safety  The caller serializes all functions that change the structure, answer() among
-///   them, with those of the directory; answer_lookup(), answer_history(), moves() and apply() of edges may run beside
-///   anything. What has to do with joints, answer() among it, is serialized, too, and need not be with the directory.
+/// @par Thread safety  The caller serializes all functions that change the structure, including
+///   answer(), with those of the directory. answer_lookup(), answer_history(), moves() and apply()
+///   of edges may run concurrently with anything. Functions that concern joints, including
+///   answer(), are serialized, too, but not necessarily with the directory.
 class Partition {
  public:
   Partition(std::string name, std::uint64_t incarnation, Forest& forest, Directory& directory);
 
   [[nodiscard]] const std::string& name() const { return name_; }
 
-  /// Takes the frames of a configuration, in any order; parents may be missing. All or none.
-  /// @return the first frame's error: a bad or repeated id, a cycle.
+  /// Loads the frames of a configuration, in any order; parents may be missing. All or none.
+  /// @return the error of the first invalid frame: an invalid or repeated id, a cycle.
   [[nodiscard]] Result<void> load(const std::vector<FrameSpec>& frames, Time now);
 
-  /// Takes what an earlier process of this partition left, with what the configuration changes of that:
-  /// see configured_changes(); all else is as it was left. Yields where others have claimed a frame since. From now on what
-  /// changes is kept for take_unsaved().
-  /// @return the error of the first new frame of the configuration: a bad or repeated id, a cycle.
+  /// Loads the state of an earlier process of this partition, with the changes of the
+  /// configuration: see configured_changes(). Everything else is as it was stored. Yields frames
+  /// that others have claimed since. From now on changes are collected for take_unsaved().
+  /// @return the error of the first invalid new frame of the configuration: an invalid or repeated
+  ///   id, a cycle.
   [[nodiscard]] Result<void> restore(const StoredState& state,
                                      const std::vector<FrameSpec>& configured, Time now);
 
-  /// Answers any request of a peer; a repeated one as before.
+  /// Answers any request of a peer; a repeated one gets the same reply.
   [[nodiscard]] Reply answer(const PeerId& peer, const Request& request, Time now);
 
-  /// Refuses a change that is not to be made now; one that was answered before, is answered as before.
+  /// Refuses a change that may not be made now. A request that was answered before gets the same
+  /// reply.
   [[nodiscard]] Reply refuse(const PeerId& peer, const Request& request, const Error& why,
                              Time now);
 
   /// Answers a request of the owner's own process.
   [[nodiscard]] Reply answer(const Request& request, Time now);
 
-  /// Answers a request that reads.
+  /// Answers a lookup request.
   [[nodiscard]] Reply answer_lookup(std::uint32_t sequence, const LookupRequest& lookup) const;
 
-  /// What is kept of the histories of the edges that a request asks for; kMaxItems edges at most.
+  /// The histories of the requested edges; at most kMaxItems.
   [[nodiscard]] Reply answer_history(const Request& request) const;
 
-  /// Applies those edges of a stream that are owned here, as one commit.
-  /// @return how many
+  /// Applies the edges of a stream that this partition owns, as one commit.
+  /// @return the number of edges
   std::size_t apply(const Update& update);
 
-  /// Applies those joints of a stream that are owned here, as one commit. @return as Joints::apply()
+  /// Applies the joints of a stream that this partition owns, as one commit. @return as
+  /// Joints::apply()
   [[nodiscard]] Result<std::size_t> apply(const JointUpdate& update) {
     return joints_.apply(update);
   }
-  /// Whether a joint of that name, or one that follows it, is owned here. Takes no lock.
+  /// Whether this partition owns a joint of that name, or one that follows it. Takes no lock.
   [[nodiscard]] bool moves(std::string_view joint) const { return joints_.moves(joint); }
 
-  /// The joints that have got positions since the last call.
+  /// The joints with new positions since the last call.
   [[nodiscard]] std::vector<StoredJoint> take_changed_joints() { return joints_.take_changed(); }
 
-  /// What would have to be yielded as far as the directory knows now. O(contested frames).
+  /// What would have to be yielded according to the directory's current state. O(contested frames).
   [[nodiscard]] std::set<PendingYield> pending_yields() const {
     return directory_.pending_yields();
   }
 
-  /// Yields what of these would still have to be yielded: what was on its way when they were found may have resolved the
-  /// rest. @return whether the structure changed; others may be pending then
+  /// Yields those of `due` that still have to be yielded; messages that were on their way may have
+  /// resolved the others.
+  /// @return whether the structure changed; new yields may then be pending
   bool yield(const std::set<PendingYield>& due, Time now);
 
-  /// Goes on as a later incarnation, since others know of one that hides this.
+  /// Continues as a later incarnation, since others know one that hides this one.
   void overtake(std::uint64_t incarnation) {
     pages_.overtake(incarnation);
     saved_absent_.reset();
@@ -91,10 +96,11 @@ class Partition {
   [[nodiscard]] std::uint32_t page_count() const { return pages_.count(); }
   [[nodiscard]] std::size_t frame_count() const { return pages_.frame_count(); }
 
-  /// What must be saved of what was changed by requests since the last call.
+  /// The changes by requests since the last call that must be saved.
   [[nodiscard]] StateChange take_unsaved();
 
-  /// It could not be saved, and these pages were not published: all will be taken again.
+  /// The change could not be saved, and these pages were not published: both are returned again
+  /// later.
   void still_unsaved(const StateChange& change, const std::vector<Page>& pages) {
     updated_.insert(change.erased.begin(), change.erased.end());
     still_unsaved(change.joints);
@@ -102,7 +108,7 @@ class Partition {
     pages_.still_changed(pages);
   }
   void still_unsaved(const std::vector<StoredJoint>& joints) { joints_.still_changed(joints); }
-  /// Whether something that was changed of a frame by request will be taken by take_unsaved().
+  /// Whether take_unsaved() will return a change of the frame by request.
   [[nodiscard]] bool is_unsaved(const std::string& id) const {
     return updated_.count(id) != 0 || pages_.is_touched(id);
   }
@@ -145,11 +151,11 @@ class Partition {
   Pages pages_;
   Joints joints_;
   ReplyCache replies_;
-  std::map<std::string, EdgeConsistency> consistency_;  // of edges that were observed
+  std::map<std::string, EdgeConsistency> consistency_;  // of observed edges
   bool saved_ = false;
   std::set<std::string> updated_;  // by requests, since the last take_unsaved()
   std::optional<std::vector<Absent>>
-      saved_absent_;  // whom the store says that this partition misses
+      saved_absent_;  // the partitions that this one misses, as last stored
 };
 
 }  // namespace tfdude

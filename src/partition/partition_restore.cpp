@@ -5,7 +5,7 @@
 #include "partition/partition.hpp"
 #include "partition/reconfigure.hpp"
 
-// How a partition outlives its process, and what it gives up where others have been faster.
+// Restores a partition from its stored state, and yields frames that others have taken meanwhile.
 namespace tfdude {
 namespace {
 
@@ -15,7 +15,7 @@ std::map<std::string, const FrameSpec*> by_id(const std::vector<FrameSpec>& fram
   return all;
 }
 
-// At the position that its joint was left in.
+// The frame at the position that its joint was left in.
 FrameSpec as_left(FrameSpec frame, const std::vector<StoredJoint>& joints) {
   if (!frame.joint) return frame;
   if (const auto left = left_of(*frame.joint, joints)) {
@@ -25,8 +25,9 @@ FrameSpec as_left(FrameSpec frame, const std::vector<StoredJoint>& joints) {
   return frame;
 }
 
-// Frames as they were left; those that joints move, where these were left, by what their descriptions say today.
-// @param joints  those of the state that are still meant
+// The stored frames. Frames moved by joints are at the joints' stored positions, computed from the
+// current descriptions.
+// @param joints  those of the state whose positions are still valid
 std::vector<StoredFrame> frames_of(const StoredState& state, const std::vector<StoredJoint>& joints,
                                    const std::vector<FrameSpec>& configured) {
   const auto described = by_id(configured);
@@ -53,8 +54,8 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   for (const StoredFrame& frame : frames) directory_.saw_lamport_time(frame.lamport_time);
   for (const Tombstone& tombstone : state.tombstones)
     directory_.saw_lamport_time(tombstone.lamport_time);
-  // All that nobody has who is there is taken before any of it is hung, so that it does not matter in which order that
-  // is done.
+  // Takes all frames that no reachable partition has, before any of them is connected, so that the
+  // order does not matter.
   std::vector<const StoredFrame*> kept;
   std::vector<const StoredFrame*> contested;
   for (const StoredFrame& frame : frames) {
@@ -66,7 +67,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   }
   for (const Tombstone& tombstone : state.tombstones) pages_.leave(tombstone);
   pages_.resume(state.epoch);
-  // Only what changes from here on is not in the store.
+  // Only later changes are not in the store.
   saved_ = true;
   pages_.watch_ids();
   for (const StoredFrame* frame : contested) {
@@ -83,7 +84,8 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   return taken;
 }
 
-// Where others have hung the parent below this frame meanwhile, the directory finds out whose claim does not hold.
+// If others have moved the parent below this frame meanwhile, the directory decides whose claim
+// does not hold.
 bool Partition::hang_again(const StoredFrame& frame) {
   const auto add = [&] {
     return forest_.add(frame.id, frame.parent, frame.X_PC, Forest::MissingParent::kAllow,
@@ -120,7 +122,7 @@ Result<void> Partition::reconfigure(const StoredState& state,
       case Kind::kAdd:
       case Kind::kReplace:
         fresh.push_back(as_left(*entries.at(id), joints));
-        // Its parent may come later: as a missing one is allowed for what is loaded, so it is here.
+        // The new parent may come later: a missing one is allowed here, as for loaded frames.
         release(id);
         break;
       case Kind::kCorrelate:
@@ -141,7 +143,7 @@ Result<void> Partition::reconfigure(const StoredState& state,
   return {};
 }
 
-// What hangs below waits for another frame of that name.
+// Frames below wait for another frame of that name.
 bool Partition::release(const std::string& id) {
   if (!forest_.release(id)) return false;
   let_go(id);
@@ -150,7 +152,7 @@ bool Partition::release(const std::string& id) {
   return true;
 }
 
-// Others are not to remove what hung below, as they do with what a tombstone says is removed.
+// Others must not remove the frames below, as they do for a tombstone of a removed frame.
 void Partition::tell_dropped(const std::string& id, Time now) {
   pages_.leave({id, directory_.next_lamport_time(now), Tombstone::Kind::kDropped, {}});
   directory_.changes().frame_removed(id, name_);
@@ -160,7 +162,7 @@ void Partition::tell_dropped(const std::string& id, Time now) {
 bool Partition::yield(const std::set<PendingYield>& due, Time now) {
   using Kind = PendingYield::Kind;
   bool changed = false;
-  // What is released or removed may open a cycle, but not the other way round.
+  // A release or removal may open a cycle, but not vice versa.
   for (const Kind kind : {Kind::kRelease, Kind::kRemove, Kind::kUnhang}) {
     for (const PendingYield& one : directory_.pending_yields()) {
       if (one.kind == kind && due.count(one) != 0) changed = yield(one, now) || changed;
@@ -171,7 +173,7 @@ bool Partition::yield(const std::set<PendingYield>& due, Time now) {
 }
 
 bool Partition::yield(const PendingYield& pending, Time now) {
-  // What was yielded just now may have resolved this, too, or be the same.
+  // An earlier yield may have resolved this one, too, or be the same.
   const auto frame = forest_.info(pending.frame);
   if (!frame || frame->owner != kHeldHere) return false;
   switch (pending.kind) {
@@ -233,7 +235,7 @@ StateChange Partition::take_unsaved() {
     change.frames.push_back(
         {id, place->parent, edge->X_PC, place->lamport_time, std::move(edge->correlation)});
   }
-  // With the first of a process its incarnation is stored, too: the epoch is above that.
+  // The first change of a process stores its incarnation, too, since the epoch is above it.
   auto absent = directory_.absent();
   if (saved_ && saved_absent_ != absent) {
     saved_absent_ = absent;

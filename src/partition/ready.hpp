@@ -19,34 +19,35 @@ struct PendingReply {
   std::string what{};  ///< for the log; empty: nothing to log
 };
 
-/// What is to be done because of what a member was told, in this order: stored, published, announced, replied. So nobody
-/// hears of what could be lost.
+/// The actions that a member requires, in this order: store, publish, announce, reply. So nobody
+/// hears of a change that could be lost.
 struct Ready {
-  StateChange rows{};                   ///< stored before anything of it is told
-  std::vector<Page> pages{};            ///< published once that is done,
-  std::optional<Presence> presence{};   ///< announced after them,
-  std::vector<PendingReply> replies{};  ///< and then these are sent
-  /// Why none of it counts any more: nothing is stored, and whoever waits for a reply is told so.
+  StateChange rows{};                   ///< to store before anything is announced
+  std::vector<Page> pages{};            ///< to publish after storing
+  std::optional<Presence> presence{};   ///< to announce after the pages
+  std::vector<PendingReply> replies{};  ///< to send at the end
+  /// Why nothing of it is valid any more: nothing is stored, and whoever waits for a reply gets
+  /// this error.
   std::optional<Error> refused{};
 };
 
-/// What an input has changed for this process itself, at once: what it sees is not what others hear.
+/// The immediate effects of an input on this process itself, independent of what others hear.
 struct Outcome {
-  std::vector<Change> events{};  ///< in the order in which they happened; without times
+  std::vector<Change> events{};  ///< in order; without times
   std::vector<Directory::Outdated> outdated{};
-  std::optional<Presence> appeared{};       ///< a partition that is served now,
-  std::optional<Presence> stopped{};        ///< that has said that it ends,
-  std::optional<std::string> lost{};        ///< that is not heard any more
+  std::optional<Presence> appeared{};       ///< a partition that is served now
+  std::optional<Presence> stopped{};        ///< a partition that announced its stop
+  std::optional<std::string> lost{};        ///< a partition that is not heard any more
   std::optional<Presence> rival{};          ///< another process that serves the own partition
-  std::optional<std::uint64_t> overtook{};  ///< the incarnation as which this process goes on
-  bool gave_up = false;                     ///< the own partition, to the rival
-  bool heard = false;                       ///< something of others
-  bool others = false;                      ///< other partitions are there, or not any more
-  bool routes = false;                      ///< frames are elsewhere, or with others
-  bool to_commit = false;      ///< there may be something to take by take_ready(), soon,
-  bool to_reply = false;       ///< or at once, as somebody waits for a reply
+  std::optional<std::uint64_t> overtook{};  ///< the incarnation as which this process continues
+  bool gave_up = false;                     ///< the own partition was given up, to the rival
+  bool heard = false;                       ///< a message of others was processed
+  bool others = false;                      ///< other partitions have appeared or disappeared
+  bool routes = false;                      ///< frames have moved, or changed their owners
+  bool to_commit = false;      ///< take_ready() should be called soon, as there may be changes
+  bool to_reply = false;       ///< take_ready() should be called at once, as a reply is due
   bool to_yield = false;       ///< a yield may be pending
-  bool look_for_gone = false;  ///< somebody is silent: on_time() is to be called
+  bool look_for_gone = false;  ///< a partition is silent: call on_time()
 };
 
 }  // namespace tfdude

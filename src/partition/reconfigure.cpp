@@ -14,7 +14,7 @@ namespace {
 
 using Kind = ConfiguredChange::Kind;
 
-// A rotation that was stored is made a unit quaternion anew as it is read, which may change its last digit.
+// A stored rotation is normalized again when read, which may change its last digit.
 constexpr double kSameRotation = 1e-14;
 
 bool same_edge(const FrameSpec& a, const FrameSpec& b) {
@@ -25,7 +25,7 @@ bool same_edge(const FrameSpec& a, const FrameSpec& b) {
          X.pose.rotation().coeffs().isApprox(Y.pose.rotation().coeffs(), kSameRotation);
 }
 
-// @param was  the entry when the configuration was taken last; null: there was none
+// @param was  the entry of the previous configuration; null: none
 std::optional<Kind> effect(const FrameSpec& entry, const FrameSpec* was, bool is_there) {
   if (was == nullptr || !same_edge(*was, entry)) return is_there ? Kind::kReplace : Kind::kAdd;
   if (is_there && !(was->correlation == entry.correlation)) return Kind::kCorrelate;
@@ -36,7 +36,8 @@ bool is_same_unit(JointType a, JointType b) {
   return (a == JointType::kPrismatic) == (b == JointType::kPrismatic);
 }
 
-// By the names of stored joints: why their positions are numbers of another unit now; empty where they are not.
+// By the names of stored joints: why their positions are of another unit now; empty if they are
+// not.
 using Meanings = std::map<std::string_view, std::string>;
 
 Meanings meanings_of(const std::vector<StoredJoint>& joints,
@@ -56,7 +57,7 @@ Meanings meanings_of(const std::vector<StoredJoint>& joints,
   return meanings;
 }
 
-// Why the number that tells where a frame's joint was left, see left_of(), means nothing any more; null: it does.
+// Why the stored position of a frame's joint, see left_of(), is not valid any more; null: it is.
 const std::string* why_at_rest(const Meanings& meanings, const FrameSpec& frame) {
   if (!frame.joint) return nullptr;
   auto found = meanings.find(leader_of(*frame.joint));
@@ -86,7 +87,7 @@ std::vector<ConfiguredChange> configured_changes(const StoredState& state,
   if (configured.empty()) return changes;
   std::map<std::string_view, const FrameSpec*> before;
   for (const FrameSpec& frame : state.configured) before.emplace(frame.id, &frame);
-  std::map<std::string_view, std::string_view> parents;  // of those that are there
+  std::map<std::string_view, std::string_view> parents;  // of the existing frames
   for (const StoredFrame& frame : state.frames) parents.emplace(frame.id, frame.parent);
   const Meanings meanings = meanings_of(state.joints, configured);
   for (const FrameSpec& entry : configured) {
@@ -101,7 +102,7 @@ std::vector<ConfiguredChange> configured_changes(const StoredState& state,
     if (*kind != Kind::kCorrelate) parents[entry.id] = entry.parent;
     changes.push_back({*kind, entry.id, *kind == Kind::kCorrelate ? "" : entry.parent});
   }
-  std::set<std::string_view> removed;  // of the entries that are gone
+  std::set<std::string_view> removed;  // whose entries are gone
   for (const auto& [id, entry] : before) {
     if (parents.erase(id) == 0) continue;
     removed.insert(id);

@@ -10,15 +10,16 @@
 
 namespace tfdude {
 
-/// What a configuration changes of a partition that was left so. An entry counts where it is not what it was when the
-/// configuration was taken last; a frame goes where its entry has gone, and nothing below it does: what was changed at
-/// run time stays but for that. An empty configuration is none, and changes nothing. In the order of the
-/// configuration, then removals and orphans by id. O(n log n) of the frames.
+/// The changes that a configuration makes to the stored state of a partition. An entry counts if it
+/// differs from the previous configuration. A frame is removed if its entry was removed, but frames
+/// below it stay: changes made at run time are kept otherwise. An empty configuration counts as
+/// none, and changes nothing. Sorted by the order of the configuration, then removals and orphans
+/// by id. O(n log n) of the frames.
 [[nodiscard]] std::vector<ConfiguredChange> configured_changes(
     const StoredState& state, const std::vector<FrameSpec>& configured);
 
-/// Those stored positions of joints that mean today what they meant: not of a joint that turns where one of its name slid, or
-/// slides where it turned, nor of those that follow such a one.
+/// The stored joint positions that are still valid: not those of a joint whose unit has changed
+/// between rotation and translation, nor those of joints that follow it.
 [[nodiscard]] std::vector<StoredJoint> still_meant(const std::vector<StoredJoint>& joints,
                                                    const std::vector<FrameSpec>& configured);
 

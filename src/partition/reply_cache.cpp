@@ -16,14 +16,14 @@ void ReplyCache::end_below(Peer& peer, Number number) {
   peer.replies.erase(peer.replies.begin(), peer.replies.lower_bound(number));
 }
 
-// Null where there is no room for another peer.
+// Null if there is no room for another peer.
 ReplyCache::Peer* ReplyCache::touch(const PeerId& peer, Time now) {
   if (const auto known = index_.find(peer); known != index_.end()) {
     peers_.splice(peers_.begin(), peers_, known->second);
   } else {
     if (peers_.size() >= kPeers) {
       const Peer& last = peers_.back();
-      // A clock that was set back tells nothing.
+      // If the clock was set back, the time is unknown.
       if (last.heard <= now && now - last.heard < kSilence) return nullptr;
       index_.erase(last.id);
       peers_.pop_back();

@@ -13,28 +13,31 @@
 
 namespace tfdude {
 
-/// The replies to requests that change something, so that a repeated request is answered again but never applied again.
+/// The replies to requests that change something, so that a repeated request gets its reply again
+/// but is never applied again.
 ///
-/// A peer says with each request from which number on it awaits replies (Request::awaits_from): so replies are kept for as
-/// long as their request may be repeated, however many others of the same peer were answered meanwhile. Of each peer a mark
-/// remains, the number below which its requests are over. Bounded: where more than kReplies are awaited, or more than kPeers
-/// have asked, requests are refused that might have been applied before. Not thread-safe.
+/// With each request a peer gives the number from which on it awaits replies
+/// (Request::awaits_from). So replies are kept as long as their request may be repeated, however
+/// many others of the same peer were answered meanwhile. For each peer a mark is kept: the number
+/// below which its requests are over. Bounded: if more than kReplies are awaited, or more than
+/// kPeers have sent requests, requests that might have been applied before are refused. Not
+/// thread-safe.
 class ReplyCache {
  public:
-  /// The last replies that are kept, of all peers.
+  /// Maximum number of stored replies, of all peers; the newest are kept.
   static constexpr std::size_t kReplies = 65536;
-  /// The most peers of which a mark is kept;
+  /// Maximum number of peers with a mark.
   static constexpr std::size_t kPeers = 65536;
-  /// of them one makes room for another only when it has been silent for so long: longer than any call lasts.
+  /// A peer's mark is replaced only after this silence, which is longer than any call lasts.
   static constexpr std::chrono::minutes kSilence{10};
 
-  /// The reply given before; kTimeout where it is not known (any more) whether the request was applied; nothing where the
-  /// request is new, and to be applied: then its reply is to be put().
+  /// The reply given before; kTimeout if it is not known (any more) whether the request was
+  /// applied; empty if the request is new and must be applied: then put() its reply.
   [[nodiscard]] std::optional<Reply> find(const PeerId& peer, const Request& request, Time now);
   void put(const PeerId& peer, const Request& request, const Reply& reply);
 
  private:
-  // Request::sequence, counted on where that begins anew.
+  // Request::sequence, extended beyond its overflow.
   using Number = std::uint64_t;
   struct Peer {
     PeerId id{};
@@ -42,7 +45,7 @@ class ReplyCache {
     Time heard{};
     std::map<Number, Reply> replies;
   };
-  using Peers = std::list<Peer>;  // the last to ask first
+  using Peers = std::list<Peer>;  // most recent requester first
 
   static Number number_of(const Request& request) {
     return request.awaits_from +

@@ -4,19 +4,20 @@
 
 #include "partition/messages.hpp"
 
-// Which requests are of what kind.
+// Classifies requests.
 namespace tfdude {
 
-/// Whether a request changes nothing, so that a repeated one may be answered anew.
+/// Whether a request changes nothing, so that a repeated one may be executed again.
 [[nodiscard]] bool is_read_only(const Request& request);
 
-/// Whether a request changes which frames there are, or where they hang.
+/// Whether a request changes the set of frames or their parents.
 [[nodiscard]] bool is_of_structure(const Request& request);
 
-/// Whether a request changes values alone.
+/// Whether a request changes values only.
 [[nodiscard]] bool is_of_values(const Request& request);
 
-/// One line for the log, of a change of the structure; empty of others: values change too often for it.
+/// One line for the log, for a change of the structure. Empty for others: values change too often
+/// for it.
 [[nodiscard]] std::string describe(const Request& request);
 
 }  // namespace tfdude

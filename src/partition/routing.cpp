@@ -26,7 +26,8 @@ Result<void> check_reachable(const Directory& directory, Owner owner) {
                                       ": it " + why_absent(info));
 }
 
-// The owner's part, made where it is not there yet: about this id, with an empty body of this kind.
+// The owner's part. If it does not exist yet, creates it with this id and an empty body of this
+// kind.
 template <class Body>
 Body& body_for(std::vector<Part>& parts, const Directory& directory, Owner owner,
                const std::string& id) {
@@ -44,13 +45,14 @@ Result<void> check_size(const Part& part, std::size_t items, const char* what) {
                                        " at once, of at most " + std::to_string(kMaxItems));
 }
 
-// Of the two ends, the one that the segment's owner owns: where it goes up, the lower one.
+// The end of the segment that its owner owns: for a segment that goes up, the lower one.
 const std::string& owned_end(const Forest& forest, const Segment& segment) {
   const auto from = forest.info(segment.from);
   return from && from->owner == segment.owner ? segment.from : segment.to;
 }
 
-// Who has moved a frame away would else lose what hangs below it, if its owner goes before all know of the move.
+// An owner that moved a frame away, and becomes unreachable before all know of the move, would
+// otherwise lose what is below the frame.
 Result<void> check_subtree(const Directory& directory, const std::vector<FrameInfo>& frames,
                            const std::string& top) {
   for (const FrameInfo& frame : frames) {
@@ -122,7 +124,8 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
   }
   if (auto ok = check_reachable(directory, parts.front().owner); !ok)
     return tl::unexpected(ok.error());
-  // Those that cannot be told now find out when they return, by a tombstone of the first part's owner.
+  // Partitions that cannot be told now learn of it when they return, from a tombstone of the first
+  // part's owner.
   parts.erase(std::remove_if(parts.begin(), parts.end(),
                              [&](const Part& part) {
                                return part.owner != kHeldHere && !directory.reachable(part.owner);
@@ -137,7 +140,7 @@ Result<std::vector<Part>> route_remove(const Forest& forest, const Directory& di
 
 namespace {
 
-// `check` looks at one edge, before any of them is sent.
+// `check` examines each edge, before anything is sent.
 template <class Body, class Edge, class Check>
 Result<std::vector<Part>> route_edges(const Forest& forest, const Directory& directory,
                                       const std::vector<Edge>& edges, std::optional<Time> stamp,
@@ -295,7 +298,7 @@ Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
 
 namespace {
 
-// The answers in the order of the path.
+// Visits the answers in the order of the path.
 template <class Take>
 void each_segment(const LookupPlan& plan, Take take) {
   std::vector<std::size_t> taken(plan.parts.size(), 0);

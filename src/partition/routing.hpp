@@ -10,10 +10,10 @@
 #include "partition/messages.hpp"
 #include "tree/forest.hpp"
 
-// Who must be asked what: an operation as one part for each partition that it concerns, all of which may
-// be asked at the same time. Everything is answered from the caller's directory, without sending.
-// All errors are those that no request needs to find out; kUnreachable names the partition, kInvalidInput
-// what is more than one request holds.
+// Splits an operation into one request for each partition concerned; all may be sent at the same
+// time. Everything is computed from the caller's directory, without sending. Errors are those that
+// need no request to be detected; kUnreachable names the partition, kInvalidInput the part that
+// exceeds a request.
 namespace tfdude {
 
 /// One partition's part of an operation.
@@ -23,9 +23,9 @@ struct Part {
   Request request;        ///< without a sequence number
 };
 
-/// A lookup: the parts, and where the answers stand on the path.
+/// A lookup: the requests, and the places of the answers on the path.
 struct LookupPlan {
-  std::vector<Segment> segments;  ///< in the order of the path; empty where it begins where it ends
+  std::vector<Segment> segments;  ///< in the order of the path; empty if it starts where it ends
   std::vector<Part> parts;        ///< each with its owner's segments in the order of the path
 };
 
@@ -38,8 +38,8 @@ struct LookupPlan {
                                      const std::string& id, const AddRequest& request,
                                      const std::string& partition);
 
-/// The frame and all below it, each reachable partition told of those subtrees that it owns. The first part
-/// is that of the frame itself, whose owner must be reachable.
+/// Removes the frame and all below it: each reachable partition gets the subtrees that it owns. The
+/// first part is that of the frame itself, whose owner must be reachable.
 /// @return kUnknownFrame, kUnreachable, kInvalidInput.
 [[nodiscard]] Result<std::vector<Part>> route_remove(const Forest& forest,
                                                      const Directory& directory,
@@ -55,18 +55,19 @@ struct LookupPlan {
                                                      const std::vector<PartialUpdate>& edges,
                                                      std::optional<Time> stamp);
 
-/// The same of values that are streamed: whether the owners are reachable or not. @return kUnknownFrame, kInvalidInput.
+/// As route_update(), for streamed values, whether the owners are reachable or not.
+/// @return kUnknownFrame, kInvalidInput.
 [[nodiscard]] Result<std::vector<Part>> route_publish(const Forest& forest,
                                                       const Directory& directory,
                                                       const std::vector<EdgeUpdate>& edges,
                                                       std::optional<Time> stamp = std::nullopt);
 
-/// All who have one of the joints, or one that follows it, whether they are reachable or not.
+/// All owners of one of the joints, or of one that follows it, whether they are reachable or not.
 /// @return kUnknownJoint, kInvalidInput.
 [[nodiscard]] Result<std::vector<Part>> route_joints(const Directory& directory,
                                                      const JointUpdate& update);
 
-/// @return kUnreachable, naming the first part's partition that is not.
+/// @return kUnreachable, naming the first unreachable partition.
 [[nodiscard]] Result<void> check_reachable(const Directory& directory,
                                            const std::vector<Part>& parts);
 
@@ -74,30 +75,29 @@ struct LookupPlan {
 [[nodiscard]] Result<Part> route_move(const Forest& forest, const Directory& directory,
                                       const std::string& id, const MoveRequest& request);
 
-/// @param hint  another instant that may be wanted, see LatestHints
+/// @param hint  another instant that may be useful, see LatestHints
 /// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable, kInvalidInput.
 [[nodiscard]] Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory,
                                               const std::string& a, const std::string& b,
                                               const Query& query = {},
                                               std::optional<Time> hint = std::nullopt);
 
-/// A watch: the edges that tell where b is in a, in order, and a WatchRequest for each owner of some of them.
+/// A watch: the edges between a and b, in order, and a WatchRequest for each owner of some of them.
 struct WatchPlan {
-  std::vector<FrameInfo>
-      edges;  ///< where it is composed, one a segment, named by the frame where that ends
+  std::vector<FrameInfo> edges;  ///< if composed, one per segment, named by the frame at its end
   std::vector<Part> parts;
 };
 
 /// @param composed  whole segments are watched instead of their edges
-/// @param period  no more often than this; 0: every sample
+/// @param period  minimum interval; 0: every sample
 /// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable, kInvalidInput.
 [[nodiscard]] Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
                                             const std::string& a, const std::string& b,
                                             bool composed, std::chrono::nanoseconds period);
 
-/// X_AB of the answers to a plan's parts (same order); identity where the plan has none. The values must be of one
-/// instant (one_instant()).
-/// @return kNotOwner where an answer has not as many transforms as it was asked for.
+/// X_AB from the answers to a plan's parts (same order); the identity if the plan has none. The
+/// values must be at one instant (one_instant()).
+/// @return kNotOwner if the number of transforms in an answer does not match the request.
 [[nodiscard]] Result<StampedTransform> assemble(const LookupPlan& plan,
                                                 const std::vector<SegmentValues>& answers);
 

@@ -11,60 +11,60 @@
 
 namespace tfdude {
 
-/// A frame with what outlives its process.
+/// The stored data of a frame.
 struct StoredFrame {
   std::string id;
   std::string parent;  ///< empty: a root
-  Transform X_PC;      ///< its covariance is that of the edge's own part where it is correlated
+  Transform X_PC;      ///< if the edge is correlated, the covariance is that of its own part
   std::uint64_t lamport_time = 0;
   StoredCorrelation correlation{};
 };
 
-/// Where a joint was, by its last sample.
+/// A joint's position at its last sample.
 struct StoredJoint {
   std::string name;
   double position = 0;
   double variance = 0;
-  std::optional<JointType> type{};  ///< of then; absent: it was stored without
+  std::optional<JointType> type{};  ///< at that time; absent: not stored
 };
 
-/// All that outlives a partition's process.
+/// The stored state of a partition.
 struct StoredState {
   std::uint64_t epoch = 0;
   std::vector<StoredFrame> frames;
   std::vector<Tombstone> tombstones;
-  /// What the configuration said when it was last taken: what it says since differs where somebody
-  /// has changed it.
+  /// The configuration that was last loaded. Differences from the current one are edits.
   std::vector<FrameSpec> configured;
   std::vector<StoredJoint> joints{};
-  std::vector<Absent> absent{};  ///< whom the partition missed
+  std::vector<Absent> absent{};  ///< partitions that this one missed
 };
 
-/// What to change in a stored state.
+/// A change of the stored state.
 struct StateChange {
   std::uint64_t epoch = 0;
-  std::vector<std::string> erased;  ///< frames and tombstones; before the rest
+  std::vector<std::string> erased;  ///< frames and tombstones; applied before the rest
   std::vector<StoredFrame> frames;
   std::vector<Tombstone> tombstones;
   std::vector<StoredJoint> joints{};  ///< new positions
   std::optional<std::vector<Absent>>
-      absent{};  ///< all whom the partition misses, where that has changed
+      absent{};  ///< all partitions that this one misses, if that has changed
 
   [[nodiscard]] bool empty() const { return erased.empty() && !absent; }
 };
 
-/// Where a partition's state is kept. Not thread-safe.
+/// The storage of a partition's state. Not thread-safe.
 class StateStore {
  public:
   virtual ~StateStore() = default;
 
-  /// @return kState naming the file and what to do, where it cannot be read.
+  /// @return kState naming the file and a remedy, if it cannot be read.
   [[nodiscard]] virtual Result<StoredState> load() = 0;
 
-  /// All of it or nothing; what was saved survives the end of the process at any instant. @return kState.
+  /// Saves all of it or nothing. Saved changes survive the end of the process at any instant.
+  /// @return kState.
   [[nodiscard]] virtual Result<void> save(const StateChange& change) = 0;
 
-  /// New values of frames that are there, and of joints; of the others it is not told.
+  /// New values of existing frames, and of joints; the others are unchanged.
   [[nodiscard]] virtual Result<void> save_values(const std::vector<ChangedEdge>& edges,
                                                  const std::vector<StoredJoint>& joints) = 0;
 

@@ -11,7 +11,7 @@ namespace {
 
 using List = std::vector<const FrameClaim*>;
 
-// Those that meet the condition; all where none does.
+// Those that meet the condition; if none does, all.
 template <class Condition>
 List preferred(const List& claims, Condition condition) {
   List some;

@@ -11,37 +11,39 @@ namespace tfdude {
 
 struct FrameClaim;
 
-/// Which of several partitions' claims to one frame holds, by who is there and who was there while another was not:
+/// Decides which of several partitions' claims to one frame holds, from which partitions are
+/// present, and which were present while another was not:
 ///
-/// 1. Claims of partitions that are gone do not count where one of a partition counts that is not.
-/// 2. A claim does not count beside one of a partition that says it has outlived its owner (Absences), unless that
-///    says the same of it.
-/// 3. Of the claims left the oldest holds, of the same age that of the lesser name.
+/// 1. Claims of partitions that are gone do not count if another claim does.
+/// 2. A claim does not count against that of a partition that has outlived its owner (Absences),
+///    unless the owner says the same of that partition.
+/// 3. Of the remaining claims the oldest holds; if equally old, that of the lesser name.
 ///
-/// So it depends on what was said and on who is there, not on any order. Not thread-safe.
+/// So the result depends on the reports and on which partitions are present, not on any order. Not
+/// thread-safe.
 class Succession {
  public:
   enum class Standing : std::uint8_t {
     kThere,
-    kSilent,  ///< perhaps only for a moment: its claims count, but nothing is given up for them
+    kSilent,  ///< perhaps only for a moment: its claims count, but nothing is yielded to it
     kGone,
   };
 
   Owner add_owner(std::string name);
   [[nodiscard]] const std::string& name(Owner owner) const { return owners_[owner].name; }
 
-  /// @return whether that is new
+  /// @return whether it has changed
   bool set_standing(Owner owner, Standing standing);
   [[nodiscard]] Standing standing(Owner owner) const { return owners_[owner].standing; }
 
-  /// Whom a partition says that it has outlived. @return whether that is new
+  /// Sets which partitions a partition claims to have outlived. @return whether it has changed
   bool set_outlived(Owner owner, std::set<Owner> outlived);
 
-  /// Whether the claims of the second do not count beside those of the first.
+  /// Whether claims of the second do not count against those of the first.
   [[nodiscard]] bool outlived(Owner first, Owner second) const;
 
   /// @param claims  to one frame, by different owners; at least one
-  /// @return the one that holds
+  /// @return the claim that holds
   [[nodiscard]] const FrameClaim& heir(const std::vector<const FrameClaim*>& claims) const;
 
  private:

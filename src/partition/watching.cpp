@@ -9,7 +9,7 @@
 namespace tfdude {
 namespace {
 
-// FNV-1a with 64 bits; each text ends with a zero, which none contains.
+// FNV-1a with 64 bits. Each text ends with a zero, which none contains.
 class Fingerprint {
  public:
   void add(std::string_view text) {
@@ -26,7 +26,8 @@ class Fingerprint {
   std::uint64_t value_ = 14695981039346656037U;
 };
 
-// As an edge: what a segment has of its own counts as unknown, too, where a part of it is.
+// As for an edge: if a part of a segment is of unknown correlation, its own part counts as unknown,
+// too.
 void set_correlation(PushedValue& entry, const PathCorrelation& correlation) {
   entry.correlation.common_errors = correlation.common_errors;
   if (!correlation.unknown) return;
@@ -121,7 +122,7 @@ Result<PushedValues> WatchedGroup::composed(const Forest& forest, std::optional<
   if (from && found->stamp && *from < *found->stamp) {
     Query query;
     query.at = from;
-    // Where that is not to be had, the newest must do.
+    // If that is not available, the newest must do.
     const auto then = forest.lookup_segments(request_.segments, query);
     if (then && then->history == found->history) {
       const auto entries = entries_of(*then);
@@ -173,7 +174,7 @@ std::vector<PushedValues> pieces_of(PushedValues&& pushed) {
 }
 
 std::optional<PushedValues> PushedPieces::add(const PushedValues& piece) {
-  // A reply may come between the pieces of what is pushed.
+  // A reply may come between pushed pieces.
   if (piece.pieces <= 1) return piece;
   if (piece.piece == 0) {
     whole_ = piece;

@@ -11,24 +11,26 @@
 
 namespace tfdude {
 
-/// Whether that can be watched. @return kInvalidInput (the period).
+/// Checks whether a request can be watched. @return kInvalidInput (the period).
 [[nodiscard]] Result<void> check_watch(const WatchRequest& request);
 
-/// An owner's side of one group of watchers: which of what they watch they have not been sent yet. Not thread-safe; the
-/// forest is.
+/// An owner's side of one group of watchers: which values they have not been sent yet. Not
+/// thread-safe; the forest is.
 class WatchedGroup {
  public:
   WatchedGroup(std::uint64_t id, WatchRequest request);
 
   [[nodiscard]] const WatchRequest& request() const { return request_; }
 
-  /// All that is watched, as it is now; does not change what next_push() tells.
-  /// @param from  as WatchRequest::from; of more samples than a message holds only the newest are told
-  /// @return kNotOwner (naming the frame) where an edge is not held, or hangs elsewhere.
+  /// All watched values as of now; does not change what next_push() returns.
+  /// @param from  as WatchRequest::from; if there are more samples than fit a message, only the
+  ///   newest are sent
+  /// @return kNotOwner (naming the frame) if an edge is not held, or has another parent.
   [[nodiscard]] Result<PushedValues> snapshot(const Forest& forest, std::optional<Time> from) const;
 
-  /// What was written since the last call: all samples, or the newest of each edge where the watchers want them at a
-  /// lower rate. Nothing while an edge is not held, or hangs elsewhere: the watchers go another way then.
+  /// Values written since the last call: all samples, or the newest of each edge if the watchers
+  /// want a lower rate. Empty while an edge is not held, or has another parent: the watchers then
+  /// use another route.
   [[nodiscard]] PushedValues next_push(const Forest& forest);
 
  private:
@@ -38,15 +40,15 @@ class WatchedGroup {
 
   std::uint64_t id_;
   WatchRequest request_;
-  std::uint64_t told_ = 0;                        // the commit of the last push
+  std::uint64_t told_ = 0;                        // commit of the last push
   std::vector<EdgeCursor> cursors_;               // by edge
   std::vector<std::optional<PushedValue>> sent_;  // by composed segment
 };
 
-/// The values in pieces that each fit into a message.
+/// Splits the values into pieces that fit into a message.
 [[nodiscard]] std::vector<PushedValues> pieces_of(PushedValues&& pushed);
 
-/// Puts pieces together again, that come in order or not at all.
+/// Reassembles pieces, which come in order or not at all.
 class PushedPieces {
  public:
   /// @return all values, once the last piece has come
