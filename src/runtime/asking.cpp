@@ -9,7 +9,8 @@
 namespace tfdude {
 namespace {
 
-// A request without a reply is sent again after this long, then twice as long, up to the last.
+// A request without a reply is repeated after this time, then after twice as long, up to the
+// maximum.
 constexpr Milliseconds kFirstRepeat{2};
 constexpr Milliseconds kLastRepeat{160};
 

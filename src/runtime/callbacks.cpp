@@ -16,8 +16,8 @@ struct Callbacks::State {
   Mutex mutex;
   Condition changed;
   std::deque<Job> jobs TFDUDE_GUARDED_BY(mutex);
-  Clock::time_point moved TFDUDE_GUARDED_BY(mutex) =
-      Clock::time_point::min();  // when a job was last begun, or a thread added
+  // When a job was last started, or a thread added.
+  Clock::time_point moved TFDUDE_GUARDED_BY(mutex) = Clock::time_point::min();
   std::size_t idle TFDUDE_GUARDED_BY(mutex) = 0;
   bool stopping TFDUDE_GUARDED_BY(mutex) = false;
   std::map<std::thread::id, std::thread> threads TFDUDE_GUARDED_BY(mutex);
@@ -26,7 +26,7 @@ struct Callbacks::State {
 
 Callbacks::Callbacks() : state_(std::make_shared<State>()) {}
 
-// Under the lock, which the header cannot name, as it does not know the state.
+// Called under the lock, which the header cannot name, as it does not know the state.
 void Callbacks::add_thread(const std::shared_ptr<State>& state) TFDUDE_UNCHECKED_LOCKS {
   for (std::thread& one : std::exchange(state->ended, {})) one.join();
   state->moved = Clock::now();
@@ -71,7 +71,7 @@ void Callbacks::run(const std::shared_ptr<State>& state) {
     state->moved = Clock::now();
     lock.unlock();
     job();
-    job = nullptr;  // what it holds goes without the lock, and before stop() returns
+    job = nullptr;  // objects it holds are destroyed without the lock, and before stop() returns
     lock.lock();
     if (state->stopping) return;
     if (state->idle > 0 && state->jobs.empty()) {
@@ -86,7 +86,7 @@ void Callbacks::run(const std::shared_ptr<State>& state) {
 void Callbacks::stop() {
   std::map<std::thread::id, std::thread> threads;
   std::vector<std::thread> ended;
-  std::deque<Job> dropped;  // without the lock, too
+  std::deque<Job> dropped;  // destroyed without the lock, too
   {
     const Lock lock(state_->mutex);
     state_->stopping = true;
@@ -98,7 +98,7 @@ void Callbacks::stop() {
   dropped.clear();
   for (auto& [id, thread] : threads) {
     if (id == std::this_thread::get_id()) {
-      thread.detach();  // the job that calls this ends it
+      thread.detach();  // it ends with the job that calls this
     } else {
       thread.join();
     }

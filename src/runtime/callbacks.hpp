@@ -9,10 +9,10 @@
 
 namespace tfdude {
 
-/// Runs functions of the user's that may take any time: one thread runs them one after the other, and another one helps only
-/// where they take long, so that none waits for another by more than kPatience for each that runs. Threads that are not
-/// needed any more end.
-/// @par Thread safety  All functions.
+/// Runs user functions, which may take any time. One thread runs them one after the other; others
+/// help only if they take long, so that no function waits for a running one longer than kPatience.
+/// Unneeded threads end.
+/// @par Thread safety  All functions are thread-safe.
 class Callbacks {
  public:
   using Clock = std::chrono::steady_clock;
@@ -25,13 +25,14 @@ class Callbacks {
   Callbacks(const Callbacks&) = delete;
   Callbacks& operator=(const Callbacks&) = delete;
 
-  /// Has the job run soon. Whoever posts calls look_after() from then on, as it says.
+  /// Queues the job. After a post the caller calls look_after(), whenever that says so.
   void post(Job job);
 
-  /// Adds a thread where a job has waited too long. @return when to look again; nothing where none waits
+  /// Adds a thread if a job has waited too long. @return when to call again; empty if no job waits
   [[nodiscard]] std::optional<Clock::time_point> look_after(Clock::time_point now);
 
-  /// Drops what has not begun. Once this returns no job runs, but for the one that calls this.
+  /// Drops jobs that have not started. After it has returned no job runs, except one that calls
+  /// this.
   void stop();
 
  private:
@@ -39,7 +40,8 @@ class Callbacks {
   static void run(const std::shared_ptr<State>& state);
   static void add_thread(const std::shared_ptr<State>& state);
 
-  const std::shared_ptr<State> state_;  // threads may outlive this where a job of theirs ends it
+  // Threads may outlive this object if one of their jobs destroys it.
+  const std::shared_ptr<State> state_;
 };
 
 }  // namespace tfdude

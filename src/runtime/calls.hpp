@@ -14,8 +14,9 @@
 
 namespace tfdude {
 
-/// The requests that wait for their replies. A call asks several partitions at once and waits for all.
-/// @par Thread safety  All functions; a Call belongs to the thread that waits for it.
+/// Requests that wait for their replies. A call asks several partitions at once and waits for all.
+/// @par Thread safety  All functions are thread-safe; a Call belongs to the thread that waits for
+///   it.
 class Calls {
  public:
   using Clock = std::chrono::steady_clock;
@@ -26,11 +27,11 @@ class Calls {
     std::optional<Reply> reply;
   };
 
-  /// Registered with Calls from begin() until it is destroyed.
+  /// Registered with Calls from its construction until its destruction.
   class Call {
    public:
-    /// @param arrived  told once all replies have come, by the thread that brought the last, without a lock; maybe also
-    ///   when this has been destroyed meanwhile
+    /// @param arrived  called once all replies have come, by the thread that brought the last one,
+    ///   without a lock; possibly also after the destruction of this
     Call(Calls& calls, const std::vector<std::string>& partitions,
          std::function<void()> arrived = {});
     ~Call();
@@ -39,7 +40,7 @@ class Calls {
 
     [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
 
-    /// The lowest number of which anybody here awaited a reply as this call began.
+    /// The lowest number for which anybody here awaited a reply when this call started.
     [[nodiscard]] std::uint64_t awaits_from() const { return awaits_from_; }
 
     /// Waits until all replies have come; false at the deadline.
@@ -48,7 +49,7 @@ class Calls {
     /// Whether this entry still lacks its reply.
     [[nodiscard]] bool waits(std::size_t entry) const;
 
-    /// Ends the wait for one entry without a reply from outside.
+    /// Ends the wait for one entry without a reply.
     void give_up(std::size_t entry, Error error);
 
    private:
@@ -62,10 +63,10 @@ class Calls {
     const std::function<void()> tell_;
   };
 
-  /// A reply came; unknown and repeated ones are dropped.
+  /// A reply has come; unknown and repeated ones are dropped.
   void on_reply(const Reply& reply);
 
-  /// A partition has gone: what waits for it fails now.
+  /// A partition is lost: calls that wait for it fail now.
   void on_lost(const std::string& partition);
 
  private:
@@ -76,7 +77,7 @@ class Calls {
   using Signal = Condition;
 
   mutable Mutex mutex_;
-  // Counted on where the number that travels begins anew, so that the lowest is the oldest.
+  // Extended beyond the overflow of the number in messages, so that the lowest is the oldest.
   using Number = std::uint64_t;
   [[nodiscard]] Number number_of(std::uint32_t sequence) const TFDUDE_REQUIRES(mutex_) {
     return last_ - (static_cast<std::uint32_t>(last_) - sequence);
@@ -84,8 +85,9 @@ class Calls {
 
   Number last_ TFDUDE_GUARDED_BY(mutex_) = 0;
   std::map<Number, Waiting> waiting_ TFDUDE_GUARDED_BY(mutex_);
-  // Signals outlive their calls, so that they are given without the mutex: else whoever wakes meets it taken and
-  // sleeps once more, 2 us on one processor. A call may find another's signal: it looks again.
+  // Signals outlive their calls, so that they can be notified without the mutex. Otherwise the
+  // woken thread finds it locked and sleeps again, 2 us on one processor. A call may get another
+  // call's signal: it checks again.
   std::vector<std::unique_ptr<Signal>> signals_ TFDUDE_GUARDED_BY(mutex_);
   std::vector<Signal*> idle_signals_ TFDUDE_GUARDED_BY(mutex_);
 };

@@ -9,7 +9,7 @@
 namespace tfdude {
 namespace {
 
-// What a requester is told of whose change, or of what its refusal rests on, nothing is stored.
+// The reply to a requester if its change, or a change that its refusal depends on, is not stored.
 Error unsaved(const Reply& reply, const Error& why) {
   const auto* error = std::get_if<Error>(&reply.body);
   if (error != nullptr) return error->code == Errc::kState ? *error : why;
@@ -27,7 +27,7 @@ Result<void> CommitLoop::start(const std::vector<FrameSpec>& configured) {
   const Result<void> stored = store(ready);
   tell(ready, stored);
   if (!stored) return stored;
-  // None says nothing: what the last one said is still what was taken.
+  // An empty configuration changes nothing: the last one stays valid.
   if (store_ != nullptr && !configured.empty()) {
     if (auto saved = store_->save_configured(configured); !saved) return saved;
   }
@@ -47,7 +47,7 @@ void CommitLoop::stop() {
 
 void CommitLoop::ask() {
   if (asked_.exchange(true)) return;
-  // The lock keeps the notice from falling between the thread's look and its sleep.
+  // The lock prevents a notification between the thread's check and its sleep.
   { const Lock lock(mutex_); }
   changed_.notify_one();
 }
@@ -96,7 +96,7 @@ void CommitLoop::run() {
   done_.notify_all();
 }
 
-// Under the lock. Nothing where there is nothing to do.
+// Under the lock. Empty if there is nothing to do.
 std::optional<CommitLoop::Clock::time_point> CommitLoop::next_round() const {
   if (hurried_ || wanted_ > done_up_to_) return Clock::time_point{};
   std::optional<Clock::time_point> next;
@@ -106,7 +106,7 @@ std::optional<CommitLoop::Clock::time_point> CommitLoop::next_round() const {
 }
 
 void CommitLoop::round() {
-  // Before anything is taken: what these wait for was changed before they came.
+  // Before anything is taken: flush() calls up to here wait for earlier changes.
   hurried_ = false;
   const std::uint64_t wanted = wanted_;
   const bool failed = failure_.has_value();
@@ -135,7 +135,7 @@ Result<void> CommitLoop::store(const Ready& ready) {
   return store_->save(ready.rows);
 }
 
-// Nobody hears of what could be lost.
+// Nobody hears of changes that could be lost.
 void CommitLoop::tell(const Ready& ready, const Result<void>& stored) {
   if (stored || ready.refused) {
     effects_.publish(ready);
@@ -156,8 +156,8 @@ Result<void> CommitLoop::save_values() {
   return stored;
 }
 
-// What stands in the log is the beginning and the end of it, not each attempt. A commit that was refused says nothing
-// of the store.
+// Logs only the start and the end of a failure, not each attempt. A refused commit says nothing
+// about the store.
 void CommitLoop::note(const Result<void>& stored) {
   if (!stored && stored.error().code != Errc::kState) return;
   std::optional<Error> before;

@@ -8,17 +8,18 @@
 
 namespace tfdude {
 
-/// When a call must be over. Made once, where the call begins, and handed down through all that it waits for. Steady
-/// clock. A wait that reaches beyond the clock's range, as Milliseconds::max() does, has no end.
+/// The end of a call's time. Created once, at the start of the call, and passed to everything that
+/// it waits for. Steady clock. A wait beyond the clock's range, such as Milliseconds::max(), never
+/// ends.
 class Deadline {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// @param wait  how long the call may take; of a negative one the end has come
+  /// @param wait  time limit of the call; if negative, it has expired
   explicit Deadline(Milliseconds wait, Clock::time_point now = Clock::now())
       : wait_(std::max(wait, Milliseconds(0))), at_(sum(now, wait_)) {}
 
-  /// This deadline, or one so long from now on where that is earlier.
+  /// This deadline, or the one `wait` from now if that is earlier.
   [[nodiscard]] Deadline within(Milliseconds wait, Clock::time_point now = Clock::now()) const {
     const Deadline other(wait, now);
     return other.at_ < at_ ? other : *this;
@@ -27,10 +28,10 @@ class Deadline {
   [[nodiscard]] Clock::time_point at() const { return at_; }
   [[nodiscard]] bool over(Clock::time_point now = Clock::now()) const { return now >= at_; }
 
-  /// What the call was given, for people: "50 ms".
+  /// The time limit of the call, human-readable: "50 ms".
   [[nodiscard]] std::string text() const { return std::to_string(wait_.count()) + " ms"; }
 
-  /// The later instant, or the end of the clock's range.
+  /// The later instant, at most the end of the clock's range.
   [[nodiscard]] static Clock::time_point sum(Clock::time_point now, Milliseconds wait) {
     const auto left =
         std::chrono::floor<Milliseconds>(Clock::time_point::max().time_since_epoch()) -
@@ -38,7 +39,7 @@ class Deadline {
     return wait < left ? now + wait : Clock::time_point::max();
   }
 
-  /// The sum of two waits, or the longest.
+  /// The sum of two waits, at most the maximum.
   [[nodiscard]] static Milliseconds sum(Milliseconds a, Milliseconds b) {
     return a < Milliseconds::max() - b ? a + b : Milliseconds::max();
   }

@@ -10,8 +10,9 @@
 
 namespace tfdude {
 
-/// Does one job on a thread of its own soon after it is asked to, once for all that ask meanwhile, and at most
-/// once a period: whoever asks a million times a second pays nanoseconds, and the job is done a thousand times.
+/// Runs one job on its own thread soon after a request, once for all requests meanwhile, and at
+/// most once per period. A million requests a second cost nanoseconds each, and run the job a
+/// thousand times.
 class Deferred {
  public:
   using Milliseconds = std::chrono::milliseconds;
@@ -22,7 +23,7 @@ class Deferred {
   Deferred(const Deferred&) = delete;
   Deferred& operator=(const Deferred&) = delete;
 
-  /// Finishes the job at hand; what is asked for from now on is not done.
+  /// Finishes the running job; later requests are ignored.
   void stop() {
     {
       const Lock lock(mutex_);
@@ -32,12 +33,12 @@ class Deferred {
     if (thread_.joinable()) thread_.join();
   }
 
-  /// Whether what was asked for has not begun yet.
+  /// Whether a requested run has not started yet.
   [[nodiscard]] bool pending() const { return asked_.load(); }
 
   void ask() {
     if (asked_.exchange(true)) return;
-    // The lock keeps the notice from falling between the thread's look and its sleep.
+    // The lock prevents a notification between the thread's check and its sleep.
     { const Lock lock(mutex_); }
     changed_.notify_one();
   }
@@ -49,7 +50,7 @@ class Deferred {
       changed_.wait(lock, [this]() TFDUDE_REQUIRES(mutex_) { return stopping_ || asked_.load(); });
       if (stopping_) return;
       lock.unlock();
-      // Before the job, so that what changes while it runs is not missed.
+      // Before the job, so that changes while it runs are not missed.
       asked_.store(false);
       job_();
       lock.lock();
@@ -63,7 +64,7 @@ class Deferred {
   Mutex mutex_;
   Condition changed_;
   bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
-  std::thread thread_;  // last: it uses the rest
+  std::thread thread_;  // last: it uses the other members
 };
 
 }  // namespace tfdude

@@ -10,7 +10,7 @@
 namespace tfdude {
 namespace {
 
-// How often a new participant asks itself whether it has met everybody.
+// How often a new participant checks whether it has met everybody.
 constexpr Milliseconds kLookAround{2};
 
 }  // namespace
@@ -63,7 +63,7 @@ Deadline Discovery::call_deadline() const {
 
 Result<void> Discovery::await(const Deadline& deadline) {
   {
-    // One that has told of a change, and went before that came, may be there again.
+    // A partition that announced a change, and was lost before that came, may be reachable again.
     const Lock lock(structure_.mutex);
     if (structure_.directory.behind() != nullptr) fell_behind();
   }

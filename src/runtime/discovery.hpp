@@ -12,39 +12,44 @@
 
 namespace tfdude {
 
-/// Whether a new participant has met all who are there, so that what it does not know does not exist; and who waits for that.
-/// @par Thread safety  All functions, by callers that do not hold the structure's lock.
+/// Whether a new participant has met all reachable ones, so that frames it does not know do not
+/// exist; and waiting for that.
+/// @par Thread safety  All functions are thread-safe, for callers that do not hold the structure's
+///   lock.
 class Discovery {
  public:
   using Clock = Deadline::Clock;
 
-  /// @param look_round  how long somebody is looked for where nobody is met
-  /// @param timeout  of calls; those who were met, and are slow to tell what they own, are waited for three times as long
+  /// @param look_round  how long to search while nobody is met
+  /// @param timeout  of calls; participants that were met, but are slow to announce their frames,
+  ///   are waited for three times as long
   Discovery(Structure& structure, const Transport& transport, Milliseconds look_round,
             Milliseconds timeout);
 
-  /// Whether all that was there at the start is known, and all that owners have told of since.
+  /// Whether everything that existed at the start, and all changes that owners have announced
+  /// since, are known.
   [[nodiscard]] bool complete();
 
-  /// What an owner has told of did not come in time: what is not known here may be there until it has. By callers that
-  /// hold the structure's lock.
+  /// A change that an owner announced did not come in time: until it has, unknown frames may exist.
+  /// For callers that hold the structure's lock.
   void fell_behind() { complete_.store(false, std::memory_order_relaxed); }
 
-  /// Until when somebody is looked for where nobody is met.
+  /// The end of the search while nobody is met.
   [[nodiscard]] Clock::time_point met_by() const { return met_by_; }
 
-  /// When a call that begins now must be over: after the time-out; while others may still be met, the rest of that time
-  /// later.
+  /// The deadline of a call that starts now: after the timeout, plus the remaining search time
+  /// while others may still be met.
   [[nodiscard]] Deadline call_deadline() const;
 
-  /// Whether what an error says to be missing may be met yet.
+  /// Whether the cause of an error may still be resolved by discovery.
   [[nodiscard]] static bool may_appear(Errc code);
 
-  /// Waits until it is complete. @return kTimeout, naming what was missing.
+  /// Waits until complete(). @return kTimeout, naming what was missing.
   [[nodiscard]] Result<void> await(const Deadline& deadline);
 
-  /// Runs an operation that may fail for what is not known yet; repeats it until it is known for sure.
-  /// @return also kTimeout, where it was not known by then
+  /// Runs an operation that may fail due to incomplete knowledge, and repeats it until the result
+  /// is certain.
+  /// @return also kTimeout, if it was not certain in time
   template <class Operation>
   auto retry_until_known(const Deadline& deadline, Operation operation) -> decltype(operation()) {
     while (true) {
@@ -57,23 +62,24 @@ class Discovery {
     }
   }
 
-  /// What is to be said of an operation that has failed, and is not repeated any more.
+  /// The final error of an operation that failed and is not repeated.
   [[nodiscard]] Error last_word(Error error, const Deadline& deadline);
 
-  /// Until something has changed, or for a moment.
+  /// Waits until something has changed, or for a short time.
   void wait_for_change(const Deadline& deadline = Deadline(Milliseconds::max()));
 
  private:
-  /// Of what seems not to be there, as others know more.
+  /// Explains an error about something missing, if others know more.
   [[nodiscard]] Error explained(Error error);
-  /// Why it is not known yet: kTimeout.
+  /// Why the result is not certain: kTimeout.
   [[nodiscard]] Error undecided(const std::string& what, const Deadline& deadline);
 
   Structure& structure_;
   const Transport& transport_;
   const Milliseconds timeout_;
   const Clock::time_point met_by_;
-  const Clock::time_point told_by_;  // who has not told by then what it owns is not waited for
+  // Participants that have not announced their frames by then are not waited for.
+  const Clock::time_point told_by_;
   std::atomic<bool> complete_{false};
 };
 

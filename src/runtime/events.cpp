@@ -11,7 +11,7 @@
 namespace tfdude {
 namespace {
 
-/// A change, and the last of those who listened when it happened.
+/// A change, and the last listener subscribed when it happened.
 struct Waiting {
   Change change;
   std::uint64_t last_subscriber = 0;
@@ -20,14 +20,14 @@ struct Waiting {
 }  // namespace
 
 struct Events::State {
-  /// The next change to be told; nothing at the end.
+  /// The next change to report; empty at the end.
   [[nodiscard]] std::optional<Waiting> next(Lock& lock) TFDUDE_REQUIRES(mutex);
 
   Mutex mutex;
   Condition changed;
   std::map<std::uint64_t, std::shared_ptr<const Callback>> subscribers TFDUDE_GUARDED_BY(mutex);
   std::uint64_t last_subscriber = 0;
-  std::uint64_t running TFDUDE_GUARDED_BY(mutex) = 0;  // the subscriber that is being told
+  std::uint64_t running TFDUDE_GUARDED_BY(mutex) = 0;  // the subscriber being called
   std::thread::id teller TFDUDE_GUARDED_BY(mutex);
   std::deque<Waiting> waiting TFDUDE_GUARDED_BY(mutex);
   std::size_t missed TFDUDE_GUARDED_BY(mutex) = 0;
@@ -51,7 +51,7 @@ std::uint64_t Events::subscribe(Callback callback) {
 }
 
 void Events::unsubscribe(std::uint64_t subscriber) {
-  std::shared_ptr<const Callback> dropped;  // without the lock
+  std::shared_ptr<const Callback> dropped;  // destroyed without the lock
   Lock lock(state_->mutex);
   const auto found = state_->subscribers.find(subscriber);
   if (found != state_->subscribers.end()) {
@@ -81,7 +81,7 @@ void Events::post(std::vector<Change> changes) {
 }
 
 void Events::stop() {
-  std::map<std::uint64_t, std::shared_ptr<const Callback>> dropped;  // without the lock
+  std::map<std::uint64_t, std::shared_ptr<const Callback>> dropped;  // destroyed without the lock
   std::thread thread;
   {
     const Lock lock(state_->mutex);
@@ -92,7 +92,7 @@ void Events::stop() {
   state_->changed.notify_all();
   if (!thread.joinable()) return;
   if (thread.get_id() == std::this_thread::get_id()) {
-    thread.detach();  // the listener that calls this ends it
+    thread.detach();  // it ends with the listener that calls this
   } else {
     thread.join();
   }
@@ -125,7 +125,7 @@ void Events::run(State& state) {
       auto callback = subscriber->second;
       lock.unlock();
       (*callback)(waiting->change);
-      callback.reset();  // what it holds goes before anybody hears that it is over
+      callback.reset();  // objects it holds are destroyed before the end of the call is reported
       lock.lock();
       state.running = 0;
       state.changed.notify_all();

@@ -10,18 +10,19 @@
 
 namespace tfdude {
 
-/// Tells changes to whoever wants to know, one after the other, from a thread of its own that holds no lock
+/// Reports changes to listeners, one after the other, from its own thread, which holds no lock
 /// meanwhile. Thread-safe.
 ///
-/// After unsubscribe() has returned, the listener does not run and will not run; it has been destroyed, unless somebody else
-/// holds it. After stop() has returned this is so for all listeners. Both wait for the listener that runs, except where
-/// they are called by a listener, whatever its subscription: then they return at once, and after the listener that called
-/// stop() no other is called. A listener must not wait for a thread that waits in one of these.
+/// After unsubscribe() has returned, the listener is not running and will not run; it has been
+/// destroyed, unless it is held elsewhere. After stop() has returned this is so for all listeners.
+/// Both wait for a running listener, except when a listener calls them, whatever its subscription:
+/// then they return at once, and after stop() no other listener is called. A listener must not wait
+/// for a thread that waits in one of these.
 class Events {
  public:
   using Callback = std::function<void(const Change&)>;
 
-  /// Changes that wait to be told; of more, it is told only how many there were.
+  /// Maximum number of changes in the queue; of others only the number is reported.
   static constexpr std::size_t kMaxWaiting = 65'536;
 
   Events();
@@ -36,7 +37,7 @@ class Events {
 
   void post(std::vector<Change> changes);
 
-  /// Ends the telling; what waits is dropped. To be called by one thread, once or again.
+  /// Ends reporting; queued changes are dropped. May be called repeatedly, by one thread.
   void stop();
 
  private:
@@ -44,7 +45,7 @@ class Events {
   static void run(State& state);
 
   const std::shared_ptr<State>
-      state_;           // the thread may outlive this, where a listener has stopped it
+      state_;           // the thread may outlive this object if a listener has stopped it
   std::thread thread_;  // from the first subscription on; under the state's lock
 };
 

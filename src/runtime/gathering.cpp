@@ -19,7 +19,7 @@ std::optional<Result<StampedTransform>> Gathering::take(std::vector<Reply> repli
                                                         SharedHints& hints) {
   auto answers = values_of(std::move(replies));
   if (!answers) return tl::unexpected(std::move(answers.error()));
-  // Asked once more, the parts name the instant.
+  // In a second round the parts name the instant.
   const bool newest =
       !plan_.parts.empty() && !std::get<LookupRequest>(plan_.parts.front().request.body).query.at;
   if (!newest || plan_.parts.size() == 1) return assemble(plan_, *answers);

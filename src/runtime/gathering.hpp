@@ -12,7 +12,7 @@
 
 namespace tfdude {
 
-/// LatestHints for many threads.
+/// LatestHints for several threads.
 class SharedHints {
  public:
   [[nodiscard]] std::optional<Time> guess(std::string_view a, std::string_view b) const {
@@ -29,20 +29,21 @@ class SharedHints {
   LatestHints hints_ TFDUDE_GUARDED_BY(mutex_);
 };
 
-/// The values that owners have answered, in order, or the first error of one.
+/// The values in the owners' replies, in order, or the first error.
 [[nodiscard]] Result<std::vector<SegmentValues>> values_of(std::vector<Reply> replies);
 
-/// A lookup that others must be asked for: what they are asked, and what their answers come to.
+/// A lookup that needs other owners: the requests, and the evaluation of their replies.
 class Gathering {
  public:
-  /// @param hint  the instant that was guessed when the plan was made
+  /// @param hint  the instant predicted when the plan was made
   Gathering(LookupPlan plan, std::string a, std::string b, std::optional<Time> hint)
       : plan_(std::move(plan)), a_(std::move(a)), b_(std::move(b)), hint_(hint) {}
 
   [[nodiscard]] std::vector<Part>& parts() { return plan_.parts; }
 
-  /// Takes the replies to the parts.
-  /// @return X_AB; nothing where the parts are to be asked once more, as they now ask of an instant that all may have
+  /// Evaluates the replies to the parts.
+  /// @return X_AB; empty if the parts must be sent again: they now ask for an instant that all may
+  ///   have
   [[nodiscard]] std::optional<Result<StampedTransform>> take(std::vector<Reply> replies,
                                                              SharedHints& hints);
 

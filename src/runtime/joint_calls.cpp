@@ -13,7 +13,8 @@ namespace tfdude {
 void JointCalls::on_joints(const JointUpdate& update) {
   if (member_.partition() == nullptr) return;
   const auto moved = member_.apply(update);
-  // Nobody else hears of it; those that are late are counted, as of any edge. The 1st, 2nd, 4th, 8th... is told.
+  // Nobody else gets this error. Late samples are counted, as for any edge. Logs the 1st, 2nd, 4th,
+  // 8th...
   if (moved || moved.error().code != Errc::kInvalidInput) return;
   const std::uint64_t before = refused_++;
   if (((before + 1) & before) == 0) {
@@ -22,7 +23,7 @@ void JointCalls::on_joints(const JointUpdate& update) {
   }
 }
 
-// All who have a joint are told, so all must be known.
+// All owners of a joint get the update, so all must be known.
 Result<void> JointCalls::update(const JointUpdate& update) {
   if (update.joints.empty()) return {};
   const Deadline deadline = discovery_.call_deadline();
@@ -60,7 +61,7 @@ Result<void> JointCalls::publish(const JointUpdate& update) {
   }
   if (!parts) return tl::unexpected(std::move(parts.error()));
   for (const Part& part : *parts) {
-    // Whoever is there gets its share, and the error of who is not is told.
+    // Reachable owners get their shares, and the error of an unreachable one is returned.
     const auto& share = std::get<JointUpdate>(part.request.body);
     auto sent = requests_.publish(part, share, deadline, [this](const JointUpdate& own) {
       return member_.apply(own).map([](std::size_t) {});

@@ -11,8 +11,9 @@
 
 namespace tfdude {
 
-/// Positions of joints: to who has them, and from others; and what is known of them. What each returns is said at Client.
-/// @par Thread safety  All functions.
+/// Sends joint positions to their owners, applies those of others, and reports the state of joints.
+/// Client describes the return values.
+/// @par Thread safety  All functions are thread-safe.
 class JointCalls {
  public:
   JointCalls(Structure& structure, Discovery& discovery, Requests& requests, MemberRunner& member)
@@ -22,7 +23,7 @@ class JointCalls {
   [[nodiscard]] Result<void> publish(const JointUpdate& update);
   [[nodiscard]] Result<std::vector<JointInfo>> list(const std::string& partition);
 
-  /// What somebody has published. Where it is refused, that is counted and logged.
+  /// Applies published positions. Refused ones are counted and logged.
   void on_joints(const JointUpdate& update);
 
  private:

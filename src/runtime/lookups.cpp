@@ -72,7 +72,7 @@ Result<StampedTransform> Lookups::elsewhere(Handle a, Handle b, const Query& que
                                             const Deadline& deadline) {
   const auto start = structure_.forest.info(a);
   const auto end = structure_.forest.info(b);
-  // The forest's own error says which.
+  // The forest's own error says which one is unknown.
   if (!start || !end) return structure_.forest.lookup(a, b, query);
   return elsewhere(start->id, end->id, query, deadline);
 }
@@ -80,7 +80,7 @@ Result<StampedTransform> Lookups::elsewhere(Handle a, Handle b, const Query& que
 Result<StampedTransform> Lookups::wait(std::string_view a, std::string_view b, const Query& query,
                                        Milliseconds wait) {
   const Deadline deadline(wait);
-  // Without another thread, as what is wanted is there as a rule.
+  // Without another thread, since the data usually exists.
   auto found = lookup(a, b, query, deadline.within(timeout_));
   if (found || deadline.over() || !is_worth_waiting(found.error(), query)) return found;
   return pending_.add({std::string(a), std::string(b), query}, deadline, std::move(found.error()))

@@ -19,17 +19,17 @@
 
 namespace tfdude {
 
-/// Where one frame is seen from another: by what is known here, else by what the owners answer. What each function returns is
-/// said at Client.
-/// @par Thread safety  All functions; what is known here is read without a lock.
+/// Computes the pose of one frame in another, from local data or else from the owners' answers.
+/// Client describes the return values.
+/// @par Thread safety  All functions are thread-safe; local data is read without a lock.
 class Lookups {
  public:
-  /// @param watcher  of what others push here
-  /// @param timeout  of one attempt of a lookup that waits
+  /// @param watcher  of values that others push
+  /// @param timeout  of one attempt of a waiting lookup
   Lookups(Structure& structure, Discovery& discovery, Requests& requests, Transport& transport,
           const Watcher& watcher, Milliseconds timeout);
 
-  /// Nobody waits any more, and no callback runs: as PendingLookups::stop.
+  /// Ends all waiting lookups and callbacks: as PendingLookups::stop().
   void stop() { pending_.stop(); }
 
   template <class Name>
@@ -57,7 +57,7 @@ class Lookups {
   }
   [[nodiscard]] Result<StampedTransform> wait(std::string_view a, std::string_view b,
                                               const Query& query, Milliseconds wait);
-  /// @return what cancels it when its last copy goes
+  /// @return a handle; the lookup is cancelled when its last copy is destroyed
   [[nodiscard]] std::shared_ptr<void> start(const std::string& a, const std::string& b,
                                             const Query& query, Milliseconds wait,
                                             PendingLookups::Callback callback);
@@ -65,9 +65,9 @@ class Lookups {
                                                             const std::string& b,
                                                             const Query& query, Milliseconds wait);
 
-  /// Another partition came or went.
+  /// Another partition has appeared or disappeared.
   void look_again() { pending_.look_again(); }
-  /// Others have pushed something here.
+  /// Others have pushed values.
   void pushed() { pending_.pushed(); }
 
  private:
@@ -87,7 +87,7 @@ class Lookups {
   Requests& requests_;
   const Milliseconds timeout_;
   SharedHints hints_;
-  PendingLookups pending_;  // last: it uses the rest
+  PendingLookups pending_;  // last: it uses the other members
 };
 
 }  // namespace tfdude

@@ -6,9 +6,9 @@
 
 namespace tfdude {
 
-/// Hands the newest of what a maker makes to one user, who never waits, allocates or frees: what it has no more goes back to
-/// the maker, who frees it.
-/// @par Thread safety  put() and collect() are of one thread at a time, newest() of another one.
+/// Passes the newest object of a producer to one user, which never waits, allocates or frees:
+/// objects that it no longer uses go back to the producer, which frees them.
+/// @par Thread safety  put() and collect() belong to one thread at a time, newest() to another one.
 template <class T>
 class Mailbox {
  public:
@@ -21,18 +21,18 @@ class Mailbox {
     collect();
   }
 
-  /// What was put before and not taken goes.
+  /// Replaces an object that was not taken.
   void put(T value) {
     delete next_.exchange(new Letter{std::move(value), nullptr}, std::memory_order_acq_rel);
   }
 
-  /// Frees what the user has no more.
+  /// Frees objects that the user no longer uses.
   void collect() {
     Letter* letter = used_.exchange(nullptr, std::memory_order_acquire);
     while (letter != nullptr) delete std::exchange(letter, letter->below);
   }
 
-  /// Null before the first. The user's until it asks again.
+  /// Null before the first object. It stays valid until the next call.
   [[nodiscard]] T* newest() {
     if (next_.load(std::memory_order_relaxed) != nullptr) {
       Letter* before = std::exchange(current_, next_.exchange(nullptr, std::memory_order_acq_rel));
@@ -47,7 +47,7 @@ class Mailbox {
     Letter* below;
   };
 
-  // Tried again only where the maker collects at that moment, and then there is nothing below.
+  // Repeated only if the producer collects at that moment; then nothing is below.
   void give_back(Letter* letter) {
     letter->below = used_.load(std::memory_order_relaxed);
     while (!used_.compare_exchange_weak(letter->below, letter, std::memory_order_release,
@@ -57,7 +57,7 @@ class Mailbox {
 
   std::atomic<Letter*> next_{nullptr};
   std::atomic<Letter*> used_{nullptr};  // a stack
-  Letter* current_ = nullptr;           // the user's
+  Letter* current_ = nullptr;           // in use by the user
 };
 
 }  // namespace tfdude

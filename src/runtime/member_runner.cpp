@@ -12,7 +12,7 @@
 namespace tfdude {
 namespace {
 
-// How often it is looked who has been silent for long enough to count as gone.
+// How often to check whether a silent partition counts as gone.
 constexpr Milliseconds kLookForGone{50};
 
 std::string who(const Presence& one) {
@@ -59,7 +59,7 @@ void MemberRunner::stop() {
   if (commits_) commits_->stop();
 }
 
-// ---- what happens
+// ---- inputs
 
 template <class Input>
 void MemberRunner::input(Input input) {
@@ -91,7 +91,7 @@ Outcome MemberRunner::take_outcome() {
     if (change.kind == ChangeKind::kFrameOrphaned && (own || by_own))
       log().warn("{}", change.message);
   }
-  // Here, so that they are told in the order in which they happened.
+  // Posted here, to keep their order.
   if (!outcome.events.empty()) events_->post(std::move(outcome.events));
   return outcome;
 }
@@ -165,7 +165,7 @@ Result<std::size_t> MemberRunner::try_apply(const JointUpdate& update) {
   return partition_->apply(update);
 }
 
-// ---- how it becomes an owner
+// ---- becoming an owner
 
 void MemberRunner::open(std::unique_ptr<StateStore> store, Milliseconds save_every) {
   structure_.forest.on_restart([this](const HistoryRestart& restart) {
@@ -208,7 +208,7 @@ Result<void> MemberRunner::still_in() {
               with_rules([](const Member& member) { return member.given_up(); }));
 }
 
-// ---- what was changed
+// ---- changes
 
 void MemberRunner::tell(const Deadline& deadline) {
   if (commits_ && commits_->pending()) (void)commits_->flush(deadline.at());
@@ -243,7 +243,7 @@ std::shared_ptr<void> MemberRunner::on_change(Events::Callback listener) {
   return {nullptr, [events = events_, subscriber](void*) { events->unsubscribe(subscriber); }};
 }
 
-// ---- what the commit loop does
+// ---- interface of the commit loop
 
 Ready MemberRunner::take() {
   const Lock lock(structure_.mutex);

@@ -22,95 +22,98 @@
 
 namespace tfdude {
 
-/// Runs the rules of a participant: hands them what happens, one input at a time, has what comes out stored, published and
-/// replied in this order (CommitLoop), and tells the parts of this process what has changed.
+/// Runs the rules of a participant: passes them one input at a time, has their outputs stored,
+/// published and replied, in this order (CommitLoop), and notifies the parts of this process.
 ///
-/// Locks, in the order in which they may be taken: that of the structure, that of joints. None is held while anything is
-/// sent, nor while the parts are told.
-/// @par Thread safety  All functions, by callers that hold none of these locks; open(), serve() and publish_all() by the
-///   thread that makes this participant an owner.
+/// Locks, in the order in which they may be taken: that of the structure, that of joints. None is
+/// held while sending or while notifying the parts.
+/// @par Thread safety  All functions are thread-safe, for callers that hold none of these locks.
+///   open(), serve() and publish_all() are for the thread that makes this participant an owner.
 class MemberRunner final : private CommitLoop::Effects {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Told what has changed, by whoever brought the change.
+  /// Notified of changes, by the thread that brought them.
   struct Parts {
-    std::function<void()> on_routes;  ///< frames are elsewhere, or with others
-    std::function<void()> on_others;  ///< another partition came or went
-    std::function<void(const std::string& partition)> on_gone;  ///< was stopped, or is lost
-    std::function<void()> on_contest;                           ///< a yield may be pending
+    std::function<void()> on_routes;  ///< frames have moved, or changed their owners
+    std::function<void()> on_others;  ///< another partition has appeared or disappeared
+    /// The partition was stopped, or is lost.
+    std::function<void(const std::string& partition)> on_gone;
+    std::function<void()> on_contest;  ///< a yield may be pending
   };
 
-  /// @param partition  the one that it is to own; empty: none
+  /// @param partition  the partition to own; empty: none
   MemberRunner(Structure& structure, Transport& transport, std::string partition, Parts parts);
   ~MemberRunner() override { stop(); }
   MemberRunner(const MemberRunner&) = delete;
   MemberRunner& operator=(const MemberRunner&) = delete;
 
-  /// No listener runs any more.
+  /// After it has returned no listener runs.
   void stop_events() { events_->stop(); }
-  /// Stores and tells what there is; what comes later is not done.
+  /// Stores and announces pending changes; later ones are not processed.
   void stop();
 
-  // ---- what happens
+  // ---- inputs
 
   void on_page(const Page& page);
   void on_presence(const Presence& presence);
   void on_lost(const std::string& partition, std::uint64_t incarnation);
-  /// A request of a peer. @return the reply to send at once; nothing where it follows once what it rests on is stored
+  /// A request of a peer. @return the reply to send at once; empty if it follows after its changes
+  /// are stored
   [[nodiscard]] std::optional<Reply> on_request(const PeerId& from, const Request& request);
   /// A request of this process.
   [[nodiscard]] Reply answer(const Request& request);
   /// @return as Member::forget
   [[nodiscard]] Result<void> forget(const std::string& partition);
-  /// Positions of joints. @return how many were taken; kInvalidInput
+  /// Applies joint positions. @return the number of moved edges; kInvalidInput
   [[nodiscard]] Result<std::size_t> apply(const JointUpdate& update);
-  /// The same without waiting. @return kTimeout, too, where another thread does the same
+  /// As apply(), without waiting. @return also kTimeout if another thread does the same
   [[nodiscard]] Result<std::size_t> try_apply(const JointUpdate& update);
 
   /// @return as Member::yield
   void yield(const std::set<PendingYield>& due, bool current);
 
-  // ---- how it becomes an owner
+  // ---- becoming an owner
 
-  /// From now on what is changed here is stored, where there is a store, and told.
+  /// From now on changes made here are stored, if there is a store, and announced.
   void open(std::unique_ptr<StateStore> store, Milliseconds save_every);
   /// @return as Member::serve
   [[nodiscard]] Result<void> serve(const StoredState* left,
                                    const std::vector<FrameSpec>& configured);
-  /// Stores, publishes and announces all, on this thread. @return kState
+  /// Stores, publishes and announces everything, on this thread. @return kState
   [[nodiscard]] Result<void> publish_all(const std::vector<FrameSpec>& configured);
-  /// Announces what it is now.
+  /// Announces its current presence.
   void introduce();
-  /// Announces that it ends, if it has ever said that it is there.
+  /// Announces its stop, if its presence was ever announced.
   void say_goodbye();
 
-  // ---- what it is
+  // ---- state
 
   [[nodiscard]] const std::string& name() const { return name_; }
   /// Null before it serves. Set once, before the transport serves.
   [[nodiscard]] Partition* partition() const { return partition_; }
   /// Whether another process has the partition now.
   [[nodiscard]] bool out() const { return out_.load(std::memory_order_relaxed); }
-  /// @return kPartitionTaken once it is so.
+  /// @return kPartitionTaken if out().
   [[nodiscard]] Result<void> still_in();
-  /// Hands the rules to `use`, for what brings nothing out, under the structure's lock.
+  /// Calls `use` with the rules, under the structure's lock; for calls without outputs.
   template <class Use>
   auto with_rules(Use use) {
     const Lock lock(structure_.mutex);
     return use(member_);
   }
 
-  // ---- what was changed
+  // ---- changes
 
-  /// Has what was changed here told to others.
+  /// Announces changes made here to others.
   void tell(const Deadline& deadline);
-  /// Waits until what a request has changed here is stored, if it is to be.
+  /// Waits until the changes of a request are stored here, if required.
   [[nodiscard]] Result<void> await_stored(const Request& request, const Deadline& deadline);
-  /// Where an own frame is not stored, neither that it is there nor that it is gone is said.
+  /// While a change of an own frame is not stored, neither its existence nor its absence is
+  /// reported.
   [[nodiscard]] Error unless_unsaved(Error error, const std::string& id);
 
-  /// @return what ends it when its last copy goes
+  /// @return a handle; the listener ends when its last copy is destroyed
   [[nodiscard]] std::shared_ptr<void> on_change(Events::Callback listener);
 
  private:
@@ -122,16 +125,16 @@ class MemberRunner final : private CommitLoop::Effects {
   void take_back(const ChangedValues& values) override;
   void reply(const PendingReply& reply) override;
 
-  /// Under the lock of the structure,
+  /// Under the lock of the structure.
   template <class Input>
   void input(Input input);
-  /// and that of joints, too.
+  /// As input(), and under that of joints.
   template <class Input>
   void input_of_joints(Input input);
   [[nodiscard]] Outcome take_outcome();
   void react(const Outcome& outcome);
   void look_for_gone();
-  /// Why a change is refused as long as what was changed before it cannot be stored.
+  /// Why changes are refused while earlier ones cannot be stored.
   [[nodiscard]] std::optional<Error> refusal() const;
 
   Structure& structure_;
@@ -139,16 +142,16 @@ class MemberRunner final : private CommitLoop::Effects {
   const std::string name_;
   const Parts parts_;
   Member member_;                   // under the structure's lock
-  Partition* partition_ = nullptr;  // the member's
+  Partition* partition_ = nullptr;  // owned by member_
   std::atomic<bool> out_{false};
   const std::shared_ptr<Events> events_ = std::make_shared<Events>();
-  Mutex joints_mutex_;              // what partition_ knows of joints
-  std::uint64_t saved_commit_ = 0;  // of values; of the thread of commits_
+  Mutex joints_mutex_;              // guards the joints of partition_
+  std::uint64_t saved_commit_ = 0;  // of values; used by the thread of commits_
   // Both stop before the transport does.
   std::optional<CommitLoop> commits_;  // set once, before partition_
-  Mutex gone_mutex_;                   // of the rest
+  Mutex gone_mutex_;                   // guards the following members
   bool stopped_ TFDUDE_GUARDED_BY(gone_mutex_) = false;
-  std::optional<Deferred> gone_look_ TFDUDE_GUARDED_BY(gone_mutex_);  // once somebody is silent
+  std::optional<Deferred> gone_look_ TFDUDE_GUARDED_BY(gone_mutex_);  // once a partition is silent
 };
 
 }  // namespace tfdude

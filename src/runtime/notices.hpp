@@ -10,8 +10,8 @@
 
 namespace tfdude {
 
-/// Calls what users want to be called, one after the other, from a thread of its own that holds no lock: so it may call
-/// whatever it likes. Thread-safe.
+/// Calls user functions, one after the other, from its own thread, which holds no lock: so they may
+/// call any function. Thread-safe.
 class Notices {
  public:
   Notices() = default;
@@ -27,7 +27,7 @@ class Notices {
     shared_->changed.notify_one();
   }
 
-  /// Waits for the call under way, unless it is itself that calls; what waits is dropped.
+  /// Waits for a running call, unless that call itself calls this; queued calls are dropped.
   void stop() {
     std::thread ending;
     {
@@ -45,7 +45,7 @@ class Notices {
   }
 
  private:
-  // What the thread has still where its call has ended it.
+  // Kept by the thread if its own call has ended this object.
   struct Shared {
     Mutex mutex;
     Condition changed;
@@ -64,7 +64,7 @@ class Notices {
       shared.waiting.pop_front();
       lock.unlock();
       call();
-      call = nullptr;  // what it holds may call here as it goes
+      call = nullptr;  // objects it holds may call this class when they are destroyed
       lock.lock();
     }
   }

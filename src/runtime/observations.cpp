@@ -15,10 +15,11 @@
 namespace tfdude {
 namespace {
 
-// How often edges that were written meanwhile, or were observed with still others, are asked for again.
+// How often to repeat an observation if edges were written meanwhile, or were observed with still
+// others.
 constexpr int kObserveAttempts = 8;
 
-// How often, and for how long, is waited for somebody else's observation to reach all owners.
+// How often, and for how long, to wait for another observation to reach all owners.
 constexpr int kTornAttempts = 5;
 constexpr Milliseconds kTornPause{1};
 
@@ -39,7 +40,7 @@ Result<std::vector<SegmentValues>> Observations::values(std::vector<Part>& parts
   return values_of(requests_.ask(parts, deadline));
 }
 
-// The values of all edges that the plan names, of one instant.
+// The values of all edges of the plan, at one instant.
 Result<ObservedPath> Observations::path(ObservePlan& plan, const Deadline& deadline) {
   auto answers = values(plan.parts, deadline);
   if (!answers) return tl::unexpected(std::move(answers.error()));
@@ -55,8 +56,9 @@ Result<ObservedPath> Observations::path(ObservePlan& plan, const Deadline& deadl
   return observed_path(plan, found.answers);
 }
 
-// Nothing was applied (false), or all (true). One owner is asked before the others, the same for all who observe this path:
-// of two who have seen the same, one is refused there, and may try again before anything was applied.
+// False: nothing was applied; true: everything. One owner is asked before the others, the same for
+// all observers of this path. Of two observers that have seen the same values, one is refused
+// there, and can retry before anything was applied.
 Result<bool> Observations::revise(std::vector<Part> parts, const Deadline& deadline) {
   if (parts.empty()) return true;
   const auto first = std::min_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
@@ -107,7 +109,8 @@ Result<Observed> Observations::observe(const std::string& a, const std::string& 
       beside.insert(beside.end(), path->missing.begin(), path->missing.end());
       continue;
     }
-    // What one owner has been told already the others will have soon, unless an edge was given another value since.
+    // Other owners will soon have what one owner has applied already, unless an edge was written
+    // since.
     if (path->torn && torn < kTornAttempts && !deadline.over()) {
       std::this_thread::sleep_for(kTornPause * (1 << torn++));
       --attempt;

@@ -13,8 +13,9 @@
 
 namespace tfdude {
 
-/// Measurements of paths, and what they have said of covariances. What each function returns is said at Client.
-/// @par Thread safety  All functions.
+/// Applies measurements of paths, and reports how consistent covariances are. Client describes the
+/// return values.
+/// @par Thread safety  All functions are thread-safe.
 class Observations {
  public:
   Observations(Structure& structure, Discovery& discovery, Requests& requests)

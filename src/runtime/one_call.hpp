@@ -8,7 +8,7 @@
 
 namespace tfdude {
 
-/// A function that is called once at most, and may be called off from any thread.
+/// A function that is called at most once, and may be cancelled from any thread.
 template <class Argument>
 class OneCall {
  public:
@@ -16,7 +16,7 @@ class OneCall {
 
   explicit OneCall(Function function) : function_(std::move(function)) {}
 
-  /// Calls it, unless it was called or called off before.
+  /// Calls it, unless it was called or cancelled before.
   void run(Argument argument) {
     Function function;
     {
@@ -27,7 +27,7 @@ class OneCall {
       function = std::move(function_);
     }
     function(std::move(argument));
-    function = nullptr;  // what it holds goes before anybody hears that it is over
+    function = nullptr;  // objects it holds are destroyed before the end of the call is reported
     {
       const Lock lock(mutex_);
       state_ = State::kOver;
@@ -35,9 +35,10 @@ class OneCall {
     over_.notify_all();
   }
 
-  /// Once this returns the function does not run and will not, unless it is the function that calls this.
+  /// After it has returned the function is not running and will not run, unless the function itself
+  /// calls this.
   void cancel() {
-    Function dropped;  // goes without the lock
+    Function dropped;  // destroyed without the lock
     Lock lock(mutex_);
     if (state_ == State::kWaits) {
       state_ = State::kOver;

@@ -57,11 +57,11 @@ Requests::Own Participant::own() {
 }
 
 Participant::~Participant() {
-  // Callbacks may use all of the rest.
+  // Callbacks may use all other parts.
   lookups_.stop();
   member_.stop_events();
   streams_.stop();
-  // These are used by the transport's threads until that has stopped.
+  // The transport's threads use these until it has stopped.
   watcher_.stop();
   pushing_.stop();
   yielding_.stop();

@@ -25,12 +25,13 @@
 
 namespace tfdude {
 
-/// One participant: what it knows, what it runs, and its transport, wired together. What happens is handed to the part whose
-/// job it is; what a client asks for is asked of that part.
-/// @par Thread safety  All functions, but start() and serve(), which are of one thread and come first.
+/// One participant: its structure, its parts, and its transport, wired together. Passes each
+/// message and each request of a client to the part responsible.
+/// @par Thread safety  All functions are thread-safe, except start() and serve(), which are called
+///   first, by one thread.
 class Participant final : public TransportHandler {
  public:
-  /// @param partition  the one that it is to own; empty: none
+  /// @param partition  the partition to own; empty: none
   Participant(TransportPtr transport, std::string partition, const Options& options);
   ~Participant() override;
   Participant(const Participant&) = delete;
@@ -38,7 +39,7 @@ class Participant final : public TransportHandler {
 
   [[nodiscard]] Result<void> start() { return transport_->start(*this); }
 
-  /// Makes this participant the owner of its partition. @return as Serving::serve
+  /// Makes this participant the owner of its partition. @return as Serving::serve()
   [[nodiscard]] Result<void> serve(const std::vector<FrameSpec>& frames);
 
   [[nodiscard]] Forest& forest() { return structure_.forest; }
@@ -52,7 +53,7 @@ class Participant final : public TransportHandler {
   [[nodiscard]] Lookups& lookups() { return lookups_; }
   [[nodiscard]] Streams& streams() { return streams_; }
 
-  /// Waits until what was sent to reliable streams is acknowledged. @return kTimeout, kTransport
+  /// Waits until data sent on reliable streams is acknowledged. @return kTimeout, kTransport
   [[nodiscard]] Result<void> flush(Milliseconds wait) {
     return transport_->flush(Deadline(wait).at());
   }
@@ -77,7 +78,7 @@ class Participant final : public TransportHandler {
  private:
   [[nodiscard]] MemberRunner::Parts parts();
   [[nodiscard]] Requests::Own own();
-  /// The reply to what changes nothing; nothing for other requests.
+  /// The reply to a request that changes nothing; empty for other requests.
   [[nodiscard]] std::optional<Reply> answer_query(const Request& request);
 
   const Options options_;

@@ -9,14 +9,15 @@
 namespace tfdude {
 namespace {
 
-// Owners are asked again after a quarter of the time that was waited for them so far, within these bounds,
+// Owners are asked again after a quarter of the time waited so far, within these bounds.
 constexpr std::chrono::nanoseconds kAskSoonest = Milliseconds(1);
 constexpr std::chrono::nanoseconds kAskLatest = Milliseconds(50);
-// and on behalf of all lookups that wait no more often than this.
+// Minimum interval of requests, for all waiting lookups together.
 constexpr std::chrono::microseconds kAskEvery{250};
 
-// Whoever writes without a pause has all that waits looked at no more often than this, and so that it takes a quarter of a
-// processor at most: who writes wakes the thread, which costs it some microseconds.
+// If a thread writes continuously, waiting lookups are checked at most at this interval, and take
+// at most a quarter of a processor: the writer wakes the thread, which costs the writer some
+// microseconds.
 constexpr int kRest = 3;
 constexpr std::chrono::nanoseconds kShortestRest = std::chrono::microseconds(100);
 constexpr std::chrono::nanoseconds kLongestRest = Milliseconds(10);
@@ -35,7 +36,7 @@ bool is_worth_waiting(const Error& error, const Query& query) {
     case Errc::kNotOwner:
       return true;
     case Errc::kTooOld:
-      // Of the newest common instant: where one edge is ahead of what another has.
+      // For the newest common instant: one edge is ahead of the data of another.
       return !query.at;
     default:
       return is_structural(error.code);
@@ -57,7 +58,7 @@ void PendingLookups::stop() {
     const Lock lock(mutex_);
     left = std::exchange(added_, {});
   }
-  // Here, as what callbacks hold goes with them.
+  // Here, since objects held by callbacks are destroyed with them.
   for (const auto& lookup : left) give_up(*lookup);
   callbacks_.stop();
 }
@@ -106,7 +107,7 @@ void PendingLookups::add(std::unique_ptr<Lookup> lookup) {
 // May be called with the forest's lock held.
 void PendingLookups::wake(std::atomic<bool>& why) {
   if (why.exchange(true)) return;
-  // The lock keeps the notice from falling between the thread's look and its sleep.
+  // The lock prevents a notification between the thread's check and its sleep.
   { const Lock lock(mutex_); }
   changed_.notify_one();
 }
@@ -125,7 +126,7 @@ void PendingLookups::run() {
   bool listens = false;
   Lock lock(mutex_);
   while (!stopping_) {
-    // Before the look, so that what comes meanwhile is not missed.
+    // Before the check, so that events meanwhile are not missed.
     urgent_.store(false);
     const bool written = written_.exchange(false);
     std::move(added_.begin(), added_.end(), std::back_inserter(all));
@@ -165,7 +166,7 @@ PendingLookups::Clock::time_point PendingLookups::attend(All& all, bool written)
   return next;
 }
 
-/// Each of the following is true where the lookup is over.
+/// Each of the following returns true if the lookup is finished.
 bool PendingLookups::attend(Lookup& lookup, bool written) {
   if (lookup.callback != nullptr && !lookup.callback->waits()) return true;
   if (lookup.asking) return go_on_asking(lookup);
@@ -194,7 +195,7 @@ bool PendingLookups::attempt(Lookup& lookup) {
 bool PendingLookups::ask(Lookup& lookup) {
   lookup.asking.emplace(calls_, lookup.gathering->parts(), [this] { wake(urgent_); });
   if (const Error* lacking = lookup.asking->answer(links_.answer_here)) {
-    // Nobody else is asked in vain.
+    // No other owner is asked in vain.
     Error error = *lacking;
     lookup.asking.reset();
     return judge(lookup, tl::unexpected(std::move(error)), false);
@@ -210,7 +211,7 @@ bool PendingLookups::go_on_asking(Lookup& lookup) {
   if (!lookup.asking->complete()) {
     if (!lookup.until->over(now)) return false;
     lookup.asking->give_up(*lookup.until);
-    // What they said before they were asked for the last time tells more than that they had no time to say it again.
+    // Their last answer is more informative than the fact that they had no time to repeat it.
     if (lookup.deadline.over(now) && lookup.last.code != Errc::kTimeout) {
       lookup.asking.reset();
       return judge(lookup, tl::unexpected(lookup.last), true);
@@ -233,19 +234,19 @@ bool PendingLookups::judge(Lookup& lookup, Found found, bool far) {
   }
   lookup.far = far;
   lookup.next = next_attempt(lookup, far);
-  // It may have come while they were asked.
+  // The data may have come during the request.
   if (far) hurry(lookup);
   return false;
 }
 
-/// Those who push what is wanted are asked once more, out of turn.
+/// Owners that have pushed the wanted data are asked again at once.
 void PendingLookups::hurry(Lookup& lookup) {
   if (lookup.hurried || !links_.was_pushed(lookup.wanted)) return;
   lookup.hurried = true;
   lookup.next = Clock::now();
 }
 
-// What is lacking here wakes the thread when it comes.
+// Missing local data wakes the thread when it comes.
 PendingLookups::Clock::time_point PendingLookups::next_attempt(const Lookup& lookup,
                                                                bool far) const {
   if (!far) return lookup.deadline.at();
@@ -253,7 +254,7 @@ PendingLookups::Clock::time_point PendingLookups::next_attempt(const Lookup& loo
   const std::chrono::nanoseconds waited = now - lookup.began;
   std::chrono::nanoseconds pause = waited / 4;
   if (const auto at = lookup.wanted.query.at) {
-    // Most sources stamp by a clock that runs as the wall clock does.
+    // Most sources use stamps of a clock that agrees with the wall clock.
     const Time today = links_.clock();
     if (*at > today) {
       pause = *at - today;
@@ -270,7 +271,7 @@ void PendingLookups::finish(Lookup& lookup, Found found) {
     lookup.promise.set_value(std::move(found));
     return;
   }
-  // Where it is dropped instead, what its function holds goes, too.
+  // If the job is dropped instead, objects held by its function are destroyed, too.
   const std::shared_ptr<OneCall<Found>> call(lookup.callback.get(),
                                              [owner = lookup.callback](auto*) { owner->cancel(); });
   callbacks_.post([call, found = std::move(found)]() mutable { call->run(std::move(found)); });

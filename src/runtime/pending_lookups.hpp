@@ -21,14 +21,14 @@
 
 namespace tfdude {
 
-/// Whether what a lookup lacks may come yet.
+/// Whether data that a lookup lacks may still come.
 [[nodiscard]] bool is_worth_waiting(const Error& error, const Query& query);
 
-/// The lookups of a participant that wait for their data. One thread attends to all of them: it sleeps until something is
-/// written to the forest here, or the structure changes; who owns what is lacking is asked again, ever less often, and once
-/// more as soon as it has pushed here what does. It
-/// never waits for anybody else, and runs nothing of the user's.
-/// @par Thread safety  All functions.
+/// The lookups of a participant that wait for their data. One thread attends to all of them. It
+/// sleeps until the local forest is written, or the structure changes. Owners of missing data are
+/// polled at growing intervals, and asked again as soon as they have pushed sufficient data. The
+/// thread never waits for others, and runs no user code.
+/// @par Thread safety  All functions are thread-safe.
 class PendingLookups {
  public:
   using Clock = Deadline::Clock;
@@ -41,20 +41,21 @@ class PendingLookups {
     Query query;
   };
 
-  /// What it needs of the participant. None of them may wait.
+  /// What it needs of the participant. None of these functions may wait.
   struct Links {
-    /// Whom to ask, with what is known of the structure now. @return as Client::lookup
+    /// The owners to ask, according to the current structure. @return as Client::lookup()
     std::function<Result<Gathering>(const Wanted&)> plan;
-    /// Sends a request once. @return kNotYet where its partition cannot be reached yet.
+    /// Sends a request once. @return kNotYet if its partition cannot be reached yet.
     Asking::Send send;
     std::function<Reply(const Request&)> answer_here;
-    /// Whether what others have pushed here would do: then they have it, too.
+    /// Whether the values pushed here would suffice: then their owners have them, too.
     std::function<bool(const Wanted&)> was_pushed;
-    /// What is to be said where the time is over: the error of the last attempt, or that it was too early to know.
+    /// The error to return at the deadline: that of the last attempt, or that the result is not
+    /// certain.
     std::function<Error(Error last, const Deadline&)> last_word;
-    /// Of the sources that stamp samples.
+    /// The clock of sources that stamp samples.
     std::function<Time()> clock;
-    /// How long the owners are waited for at most, each time that they are asked.
+    /// Maximum wait for the owners, for each request.
     Milliseconds timeout;
   };
 
@@ -63,19 +64,19 @@ class PendingLookups {
   PendingLookups(const PendingLookups&) = delete;
   PendingLookups& operator=(const PendingLookups&) = delete;
 
-  /// Those that wait are answered kTimeout; their callbacks are not called. Once this returns none runs, but for one that
-  /// calls this.
+  /// Waiting lookups get kTimeout; their callbacks are not called. After it has returned no
+  /// callback runs, except one that calls this.
   void stop();
 
-  /// @param last  why there was no answer up to now
+  /// @param last  why there was no answer so far
   [[nodiscard]] std::future<Found> add(Wanted wanted, const Deadline& deadline, Error last);
   [[nodiscard]] std::shared_ptr<OneCall<Found>> add(Wanted wanted, const Deadline& deadline,
                                                     Error last, OneCall<Found>::Function callback);
 
-  /// Another partition came or went.
+  /// Another partition has appeared or disappeared.
   void look_again();
 
-  /// Others have pushed something. At once, where nobody waits.
+  /// Others have pushed values. Returns at once if no lookup waits.
   void pushed() { wake(written_); }
 
  private:
@@ -86,18 +87,18 @@ class PendingLookups {
     const Wanted wanted;
     const Deadline deadline;
     Error last;
-    // Who is to be told: one of both.
+    // One of the two gets the answer.
     std::promise<Found> promise;
     std::shared_ptr<OneCall<Found>> callback;
 
-    // The thread's.
+    // The following belong to the thread.
     const Clock::time_point began = Clock::now();
-    Clock::time_point next = Clock::time_point::min();  // attempt, or look at what is under way
+    Clock::time_point next = Clock::time_point::min();  // attempt, or check of requests in progress
     std::uint64_t version = 0;                          // of the structure at the last attempt
-    bool far = false;                                   // others lacked something then
-    bool hurried = false;                               // was asked anew for what they have pushed
-    std::optional<Gathering> gathering;                 // under way,
-    std::optional<Deadline> until;                      // as long as this
+    bool far = false;                                   // others lacked data then
+    bool hurried = false;                               // was asked again for pushed values
+    std::optional<Gathering> gathering;                 // in progress,
+    std::optional<Deadline> until;                      // until this deadline
     std::optional<Asking> asking;
   };
   using All = std::vector<std::unique_ptr<Lookup>>;
@@ -122,14 +123,14 @@ class PendingLookups {
   SharedHints& hints_;
   const Links links_;
   Callbacks callbacks_;
-  std::size_t count_ = 0;                 // that wait; the thread's
-  std::atomic<std::uint64_t> others_{0};  // how often others came or went
-  std::atomic<bool> written_{false};      // something may be here now,
-  std::atomic<bool> urgent_{false};       // or is: a new lookup, a reply
-  Mutex mutex_;                           // of the rest, and of the wait
+  std::size_t count_ = 0;                 // number of waiting lookups; belongs to the thread
+  std::atomic<std::uint64_t> others_{0};  // how often partitions have appeared or disappeared
+  std::atomic<bool> written_{false};      // new data may have arrived
+  std::atomic<bool> urgent_{false};       // a new lookup or a reply has arrived
+  Mutex mutex_;                           // guards the following members, and the wait
   Condition changed_;
   All added_
-      TFDUDE_GUARDED_BY(mutex_);  // not taken by the thread yet; once it has ended, what it had
+      TFDUDE_GUARDED_BY(mutex_);  // not yet taken by the thread; after its end, the remaining ones
   bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::thread thread_;  // from the first lookup on
 };

@@ -53,7 +53,7 @@ void Pusher::tell_all(std::uint64_t group) {
   ask();
 }
 
-// Told by the thread, which may be pushing to the group still.
+// The thread reports the end, as it may still be pushing to the group.
 void Pusher::end(std::map<std::uint64_t, Group>::iterator& group) {
   ended_.push_back(group->first);
   group = groups_.erase(group);
@@ -61,7 +61,7 @@ void Pusher::end(std::map<std::uint64_t, Group>::iterator& group) {
 
 void Pusher::ask() {
   if (asked_.exchange(true)) return;
-  // The lock keeps the notice from falling between the thread's look and its sleep.
+  // The lock prevents a notification between the thread's check and its sleep.
   { const Lock lock(mutex_); }
   changed_.notify_one();
 }
@@ -81,7 +81,7 @@ std::vector<PushedValues> Pusher::take_due(Clock::time_point now, std::vector<st
       PushedValues pushed = one.watched.next_push(forest_);
       if (!pushed.entries.empty()) {
         due.push_back(std::move(pushed));
-        // On the beat, as long as that can be kept.
+        // Keeps the period, as far as possible.
         one.due = std::max(one.due + period, now - period);
       }
     } else {
@@ -92,14 +92,14 @@ std::vector<PushedValues> Pusher::take_due(Clock::time_point now, std::vector<st
     }
     ++group;
   }
-  // One that is watched again goes on.
+  // A group that is watched again continues.
   for (const std::uint64_t group : std::exchange(ended_, {})) {
     if (groups_.count(group) == 0) ended.push_back(group);
   }
   if (groups_.empty()) {
     forest_.on_commit(nullptr);
   } else {
-    // To end what is not renewed.
+    // To end groups that are not renewed.
     const auto look = now + std::chrono::seconds(1);
     next = next ? std::min(*next, look) : look;
   }
@@ -118,7 +118,7 @@ void Pusher::run() {
     }
     if (stopping_) return;
     lock.unlock();
-    // Before the look, so that what is written meanwhile is not missed.
+    // Before the check, so that writes meanwhile are not missed.
     asked_.store(false);
     next.reset();
     std::vector<std::uint64_t> ended;

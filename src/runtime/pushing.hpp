@@ -12,33 +12,34 @@
 
 namespace tfdude {
 
-/// The owner's side of watched paths: answers who wants to watch, and pushes to them, this process among them.
-/// @par Thread safety  All functions.
+/// The owner's side of watched paths: answers watch requests, and pushes to watchers, including
+/// this process.
+/// @par Thread safety  All functions are thread-safe.
 class Pushing {
  public:
   Pushing(Structure& structure, Transport& transport, MemberRunner& member, Watcher& watcher)
       : structure_(structure), transport_(transport), member_(member), watcher_(watcher) {}
 
-  /// Nothing is pushed any more, and who asks to watch is refused.
+  /// Ends pushing; later watch requests are refused.
   void stop();
 
   /// The reply to a WatchRequest.
   [[nodiscard]] Reply answer(const Request& request);
 
-  /// Somebody listens to the group only now.
+  /// A watcher of the group has only now been matched.
   void on_watcher(std::uint64_t group);
 
  private:
-  /// @return null where this participant is leaving
+  /// @return null while this participant leaves
   [[nodiscard]] Pusher* pusher();
 
   Structure& structure_;
   Transport& transport_;
   MemberRunner& member_;
   Watcher& watcher_;
-  Mutex mutex_;  // of the rest
+  Mutex mutex_;  // guards the following members
   bool stopped_ TFDUDE_GUARDED_BY(mutex_) = false;
-  std::unique_ptr<Pusher> pusher_ TFDUDE_GUARDED_BY(mutex_);  // once somebody watches
+  std::unique_ptr<Pusher> pusher_ TFDUDE_GUARDED_BY(mutex_);  // once there is a watcher
 };
 
 }  // namespace tfdude

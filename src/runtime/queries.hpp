@@ -14,8 +14,9 @@
 
 namespace tfdude {
 
-/// What is known of frames and partitions besides their values. What each function returns is said at Client.
-/// @par Thread safety  All functions.
+/// Information about frames and partitions besides their values. Client describes the return
+/// values.
+/// @par Thread safety  All functions are thread-safe.
 class Queries {
  public:
   Queries(Structure& structure, Discovery& discovery, Requests& requests, MemberRunner& member)
@@ -32,7 +33,7 @@ class Queries {
   [[nodiscard]] Result<std::vector<std::string>> roots();
   [[nodiscard]] Result<std::vector<PartitionInfo>> partitions();
   [[nodiscard]] std::size_t own_frames();
-  /// What is kept of the history of a frame's edge, and of all edges of a partition.
+  /// The history of a frame's edge, and those of all edges of a partition.
   [[nodiscard]] Result<std::vector<HistoryInfo>> history(const std::string& id);
   [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition);
 

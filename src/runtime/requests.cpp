@@ -34,7 +34,7 @@ void Requests::await_change(const Part& part, const Reply& reply, const Deadline
 }
 
 std::vector<Reply> Requests::ask(std::vector<Part>& parts, const Deadline& deadline) {
-  // What this process has changed itself comes before what it asks for: others build on that.
+  // Own changes are announced before a request: other owners build on them.
   const bool builds = std::any_of(parts.begin(), parts.end(), [](const Part& part) {
     return part.owner != kHeldHere && !is_read_only(part.request);
   });
@@ -69,7 +69,7 @@ Result<void> Requests::change(std::vector<Part>& parts, const Deadline& deadline
   Result<void> outcome;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (const auto* error = std::get_if<Error>(&replies[i].body)) {
-      // What is not stored is told, whatever else another attempt with a fresh route may bring.
+      // An error of storing is returned, whatever a retry with a fresh route may bring.
       if (outcome || error->code == Errc::kState) outcome = tl::unexpected(*error);
     } else if (parts[i].owner != kHeldHere) {
       await_change(parts[i], replies[i], deadline);

@@ -19,43 +19,46 @@
 
 namespace tfdude {
 
-/// Requests of this process to the owners of frames, itself among them: planned by what is known of the structure, sent again
-/// until they are answered, and planned again where the structure has changed meanwhile. One deadline counts for all of that.
-/// @par Thread safety  All functions, by callers that hold no lock.
+/// Requests of this process to the owners of frames, including itself. They are planned according
+/// to the known structure, repeated until answered, and planned again if the structure has changed
+/// meanwhile. One deadline covers all of this.
+/// @par Thread safety  All functions are thread-safe, for callers that hold no lock.
 class Requests {
  public:
   using Clock = Deadline::Clock;
 
-  /// How often an owner is asked that may not be the owner any more.
+  /// How often to ask a partition that may no longer be the owner.
   static constexpr int kAttempts = 3;
-  /// How long the structure may take to reach us where a reply says that ours is old.
+  /// How long a structure change may take to arrive if a reply says that the known structure is
+  /// outdated.
   static constexpr Milliseconds kStructureDelay{100};
-  /// Whether an owner denies what the plan has checked before it was asked.
+  /// Whether an owner denies what the plan has checked before.
   [[nodiscard]] static bool denies_plan(Errc code);
 
-  /// What this process does as an owner.
+  /// The functions of this process as an owner.
   struct Own {
     std::function<Reply(const Request&)> answer;
-    /// Has what was changed here told to others, who are asked to build on it.
+    /// Announces changes made here to others, which are asked to build on them.
     std::function<void(const Deadline&)> tell;
-    /// Waits until what a request has changed here is stored, if it is to be.
+    /// Waits until the changes of a request are stored here, if required.
     std::function<Result<void>(const Request&, const Deadline&)> await_stored;
-    /// @return kPartitionTaken once it has given its partition up.
+    /// @return kPartitionTaken if it has given up its partition.
     std::function<Result<void>()> still_in;
   };
 
   Requests(Structure& structure, Discovery& discovery, Transport& transport, Own own)
       : structure_(structure), discovery_(discovery), transport_(transport), own_(std::move(own)) {}
 
-  /// Those that wait for replies: for who gets these, and for lookups that wait.
+  /// The calls that wait for replies: for whoever receives these, and for waiting lookups.
   [[nodiscard]] Calls& calls() { return calls_; }
   /// The reply of this process itself.
   [[nodiscard]] Reply answer_here(const Request& request) const { return own_.answer(request); }
-  /// @return kPartitionTaken once this process has given its partition up.
+  /// @return kPartitionTaken if this process has given up its partition.
   [[nodiscard]] Result<void> still_in() const { return own_.still_in(); }
 
-  /// Runs an operation that may fail for what is not known yet; repeats it until it is known for sure.
-  /// @return also kTimeout, where it was not known by then
+  /// Runs an operation that may fail due to incomplete knowledge, and repeats it until the result
+  /// is certain.
+  /// @return also kTimeout, if it was not certain in time
   template <class Operation>
   auto after_discovery(const Deadline& deadline, Operation operation) -> decltype(operation()) {
     return discovery_.retry_until_known(deadline, [&]() -> decltype(operation()) {
@@ -73,8 +76,8 @@ class Requests {
     });
   }
 
-  /// Plans, asks, and plans again where the structure has changed meanwhile: the owner asked knows something
-  /// newer than this process, or has not heard yet of a change that this process knows of.
+  /// Plans, asks, and plans again if the structure has changed meanwhile: the owner knows a newer
+  /// structure than this process, or has not yet heard of a change that this process knows.
   template <class Route, class Ask, class Plan = typename std::invoke_result_t<Route>::value_type>
   std::invoke_result_t<Ask, Plan&> retry_on_stale_route(const Deadline& deadline, Route route,
                                                         Ask ask) {
@@ -97,15 +100,16 @@ class Requests {
     }
   }
 
-  /// A reply for each part; kTimeout of who has not replied by the deadline.
+  /// A reply for each part; kTimeout for those that have not replied by the deadline.
   [[nodiscard]] std::vector<Reply> ask(std::vector<Part>& parts, const Deadline& deadline);
 
-  /// Asks for changes, and waits until they are known here, and stored where this process has made them.
+  /// Requests changes, and waits until they are known here; changes made by this process are also
+  /// stored.
   [[nodiscard]] Result<void> change(std::vector<Part>& parts, const Deadline& deadline);
 
-  /// Hands an owner its share of what is streamed, for which there is no reply.
-  /// @param apply_here  takes what is this process's own
-  /// @return kUnreachable where the owner is not there; as Transport::send
+  /// Sends an owner its share of streamed values, for which there is no reply.
+  /// @param apply_here  applies the share of this process
+  /// @return kUnreachable if the owner is not reachable; as Transport::send()
   template <class Message, class Apply>
   [[nodiscard]] Result<void> publish(const Part& part, const Message& share,
                                      const Deadline& deadline, Apply apply_here) {
@@ -117,7 +121,7 @@ class Requests {
     return transport_.send(part.partition, share, deadline.at());
   }
 
-  /// The list that is a partition's answer.
+  /// The list that a partition returns.
   template <class Item>
   [[nodiscard]] Result<std::vector<Item>> ask_list(Part part, const Deadline& deadline) {
     std::vector<Part> parts{std::move(part)};
@@ -127,7 +131,7 @@ class Requests {
     return all != nullptr ? std::move(*all) : std::vector<Item>();
   }
 
-  /// The same by the partition's name, of all that it has.
+  /// As ask_list(), by the partition's name, for everything that it has.
   template <class Item, class Body>
   [[nodiscard]] Result<std::vector<Item>> ask_all(const std::string& partition, const Body& body,
                                                   const Deadline& deadline) {
@@ -141,8 +145,9 @@ class Requests {
         [&](Part& part) { return ask_list<Item>(std::move(part), deadline); });
   }
 
-  /// Waits until the structure of who has answered is here up to the reply's epoch, so that whoever changed something finds it
-  /// changed; no longer than the deadline. Nothing is denied after that before it has come.
+  /// Waits until the structure of the replying owner has come up to the reply's epoch, so that the
+  /// requester sees its change; at most until the deadline. If it has not come, missing frames are
+  /// not reported as certain until it has.
   void await_change(const Part& part, const Reply& reply, const Deadline& deadline);
 
  private:

@@ -17,7 +17,7 @@
 
 namespace tfdude {
 
-/// To whom one edge or joint is to be sent.
+/// One destination of an edge or joint.
 struct Destination {
   Owner owner = kHeldHere;
   std::string partition;
@@ -31,10 +31,10 @@ struct Destination {
 /// What a sender needs of the participant.
 template <class Message>
 struct SenderLinks {
-  /// Where each of these is now; empty for one that nobody has.
+  /// The current owners of each name; empty for one without an owner.
   std::function<std::vector<std::vector<Destination>>(const std::vector<std::string>& names)> find;
   std::function<std::unique_ptr<Channel<Message>>(const std::string& partition)> connect;
-  /// Applies it to what this process owns. Must not wait or, if that succeeds, allocate.
+  /// Applies it to this process's own part. Must not wait or, on success, allocate.
   std::function<Result<void>(const Message&)> apply_here;
   /// Whether this process has lost its partition. Must not wait.
   std::function<bool()> out;
@@ -45,19 +45,20 @@ struct SenderLinks {
 class PlannedSender {
  public:
   virtual ~PlannedSender() = default;
-  /// The structure has changed, or who is there.
+  /// The structure or the reachable partitions have changed.
   virtual void plan() = 0;
-  /// Nothing is sent any more, and no link used, after this has returned.
+  /// After it has returned nothing is sent, and no link is used.
   virtual void close() = 0;
 };
 
-/// Behind a stream: messages that are made once, an owner each, and filled in anew for each sample. They are made elsewhere
-/// and taken over when they are ready (Mailbox), so that who sends neither waits nor allocates.
-/// @par Thread safety  send() is of one thread at a time; the rest may be called by any.
+/// The implementation of a stream: one message per owner, created once and filled again for each
+/// sample. Messages are created elsewhere and taken over when they are ready (Mailbox), so that the
+/// sending thread neither waits nor allocates.
+/// @par Thread safety  send() may be used by one thread at a time; the other functions by any.
 template <class Message>
 class Sender final : public PlannedSender {
  public:
-  /// @param names  each once
+  /// @param names  without duplicates
   Sender(std::vector<std::string> names, SenderLinks<Message> links)
       : names_(std::move(names)), links_(std::move(links)), listed_(names_.size(), 0) {
     not_sent_.reserve(names_.size());
@@ -85,12 +86,12 @@ class Sender final : public PlannedSender {
     mailbox_.collect();
   }
 
-  /// @param valid  whether the value of this index may be sent
-  /// @param fill   writes it into an item of a message
+  /// @param valid  whether the value with this index may be sent
+  /// @param fill   writes the value into an item of a message
   template <class Valid, class Fill>
   const std::vector<NotSent>& send(std::optional<Time> stamp, Valid valid, Fill fill) {
     forget_list();
-    // Only close() takes it, too.
+    // Otherwise only close() locks it.
     if (!sending_.try_lock()) return list_all(Errc::kTransport);
     const Lock lock(sending_, std::adopt_lock);
     if (closed_) return list_all(Errc::kTransport);
@@ -123,7 +124,7 @@ class Sender final : public PlannedSender {
     Owner owner = kHeldHere;
     std::string partition;
     bool reachable = true;
-    std::unique_ptr<Channel<Message>> channel;  // null where it is held here
+    std::unique_ptr<Channel<Message>> channel;  // null if held here
     Message message;
     std::vector<std::size_t> indices;  // of its items
   };
@@ -188,13 +189,13 @@ class Sender final : public PlannedSender {
 
   const std::vector<std::string> names_;
   const SenderLinks<Message> links_;
-  Mutex planning_;  // found_, planned_
+  Mutex planning_;  // guards found_, planned_
   std::vector<std::vector<Destination>> found_ TFDUDE_GUARDED_BY(planning_);
   bool planned_ TFDUDE_GUARDED_BY(planning_) = false;
   Mutex sending_;
-  bool closed_ = false;  // under both
+  bool closed_ = false;  // guarded by both mutexes
   Mailbox<Plan> mailbox_;
-  // Of who sends.
+  // The following belong to the sending thread.
   std::vector<NotSent> not_sent_;
   std::vector<char> listed_;
 };

@@ -25,8 +25,8 @@ std::string host_name() {
   return name.data();
 }
 
-// What a configuration changes of what was kept; before the first one there is nothing. Orphans are told as events, with
-// those of other partitions.
+// Logs the changes of a configuration to the stored state; none before the first configuration.
+// Orphans are reported as events, with those of other partitions.
 void log_configured(const StoredState& state, const std::vector<FrameSpec>& frames) {
   if (state.configured.empty() && state.frames.empty()) return;
   for (const ConfiguredChange& change : configured_changes(state, frames)) {
@@ -100,7 +100,7 @@ Result<void> Serving::take_frames(const std::vector<FrameSpec>& frames) {
   }
   const bool kept = store != nullptr;
   member_.open(std::move(store), options_.save_every);
-  // What is left is judged by what the others own now.
+  // The stored state is compared with what the others own now.
   const auto incomplete = [this] {
     if (transport_.awaits_presence()) return true;
     const Lock lock(structure_.mutex);
@@ -116,15 +116,16 @@ Result<void> Serving::take_frames(const std::vector<FrameSpec>& frames) {
 
 Result<void> Serving::set_timings(const std::vector<FrameSpec>& frames) {
   for (const FrameSpec& frame : frames) {
-    // One that was removed by request has no edge of which to say anything.
+    // A frame removed by request has no edge to set.
     if (!frame.timing || !structure_.forest.holds(frame.id)) continue;
     if (auto set = structure_.forest.set_timing(frame.id, *frame.timing); !set) return set;
   }
   return {};
 }
 
-// Who is said to be silent may be there again in a moment, or gone: that decides whose a frame is. And who returns yields
-// only to those that count it as gone: else what this process acknowledges in its first moments could be lost.
+// Waits until silent partitions are back or gone, which decides who owns contested frames. A
+// returning partition yields only to those that count it as gone: otherwise changes that this
+// process acknowledges in its first moments could be lost.
 void Serving::await_gone() {
   const auto patience = Clock::now() + 3 * Absences::kGrace;
   const auto undecided = [this] {

@@ -14,8 +14,8 @@
 
 namespace tfdude {
 
-/// How a participant becomes the owner of its partition: it claims the name, takes what an earlier process has left and what
-/// the configuration says, and tells the others. Not thread-safe.
+/// Makes a participant the owner of its partition: claims the name, loads the state of an earlier
+/// process and the configuration, and announces the result. Not thread-safe.
 class Serving {
  public:
   Serving(Structure& structure, Discovery& discovery, Transport& transport, MemberRunner& member,
@@ -26,7 +26,7 @@ class Serving {
         member_(member),
         options_(options) {}
 
-  /// @return kPartitionTaken, kState; the error of the first frame that cannot be taken
+  /// @return kPartitionTaken, kState; the error of the first invalid frame
   [[nodiscard]] Result<void> serve(const std::vector<FrameSpec>& frames);
 
  private:

@@ -5,7 +5,7 @@
 namespace tfdude {
 namespace {
 
-// @param owners_of  of the name of an edge or joint
+// @param owners_of  returns the owners of an edge or joint
 template <class OwnersOf>
 std::vector<std::vector<Destination>> destinations(Structure& structure,
                                                    const std::vector<std::string>& names,

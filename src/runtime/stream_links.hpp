@@ -7,11 +7,11 @@
 
 namespace tfdude {
 
-/// Where streams of edges go to, and how.
+/// The destinations of streams of edges.
 [[nodiscard]] SenderLinks<Update> edge_links(Structure& structure, Transport& transport,
                                              MemberRunner& member);
 
-/// The same of joints.
+/// The destinations of streams of joints.
 [[nodiscard]] SenderLinks<JointUpdate> joint_links(Structure& structure, Transport& transport,
                                                    MemberRunner& member);
 

@@ -13,7 +13,7 @@
 namespace tfdude {
 namespace {
 
-// How often at most it is looked where all are.
+// Minimum interval at which destinations are updated.
 constexpr Milliseconds kPlanEvery{1};
 
 Result<void> check_names(const std::vector<std::string>& names, const char* what) {

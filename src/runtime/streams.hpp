@@ -11,8 +11,8 @@
 
 namespace tfdude {
 
-/// The streams that a participant has given away, and the thread that finds out where they go to when that changes.
-/// @par Thread safety  All functions.
+/// The streams of a participant, and the thread that updates their destinations.
+/// @par Thread safety  All functions are thread-safe.
 class Streams {
  public:
   Streams(SenderLinks<Update> of_edges, SenderLinks<JointUpdate> of_joints);
@@ -20,15 +20,15 @@ class Streams {
   Streams(const Streams&) = delete;
   Streams& operator=(const Streams&) = delete;
 
-  /// All streams send nothing any more, and use nothing of the participant.
+  /// After it has returned all streams send nothing, and use nothing of the participant.
   void stop();
 
-  /// @return kInvalidInput: one that is no id, or named twice; more than kMaxItems.
+  /// @return kInvalidInput: an invalid or duplicate id; more than kMaxItems.
   [[nodiscard]] Result<std::shared_ptr<Sender<Update>>> edges(const std::vector<std::string>& ids);
   [[nodiscard]] Result<std::shared_ptr<Sender<JointUpdate>>> joints(
       const std::vector<std::string>& names);
 
-  /// The structure has changed, or who is there.
+  /// The structure or the reachable partitions have changed.
   void look_again() {
     if (Deferred* planner = planning_.load()) planner->ask();
   }

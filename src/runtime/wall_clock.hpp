@@ -6,7 +6,7 @@
 
 namespace tfdude {
 
-/// The clock of a process's own stamps.
+/// The clock for stamps of this process.
 inline Time wall_clock() {
   return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
 }

@@ -46,7 +46,7 @@ Result<WatchRoute> watch_route(const Forest& forest, const Directory& directory,
 WatchMirror::WatchMirror(const std::string& a, const std::string& b, WatchRoute route,
                          const EdgeTiming& timing)
     : route_(std::move(route)), edges_(route_.edges.size()), sources_(route_.sources.size()) {
-  // It is the owner who judges a source's clock.
+  // The owner judges a source's clock.
   EdgeTiming told = timing;
   told.restart_after = 0;
   told.max_ahead = std::chrono::nanoseconds::max();
@@ -55,7 +55,7 @@ WatchMirror::WatchMirror(const std::string& a, const std::string& b, WatchRoute 
   for (const FrameInfo& edge : route_.edges) {
     (void)forest_.add(edge.id, edge.parent, Transform(), kAllow);
   }
-  // What is not the child of an edge is the root of the path.
+  // A parent that is not the child of another edge is the root of the path.
   for (const FrameInfo& edge : route_.edges) {
     if (!forest_.exists(edge.parent)) (void)forest_.add(edge.parent, "", Transform());
   }
@@ -108,7 +108,8 @@ std::optional<PushedValue> WatchMirror::admitted(const Source& source, PushedVal
   Edge& edge = edges_[entry.index];
   const bool begins = entry.history > edge.history;
   if (entry.history < edge.history || (begins && !entry.process_noise)) return std::nullopt;
-  // A sample is where the edge was then; but what holds from now on may be half of what was written at once.
+  // A sample gives the edge's value at its stamp. But a value without a stamp may be half of a
+  // commit.
   if (!follows_on && !entry.stamp) return std::nullopt;
   if (begins) {
     edge.newest.reset();
@@ -128,11 +129,11 @@ bool WatchMirror::take(const PushedValues& pushed) {
   Source& source = sources_[static_cast<std::size_t>(told - route_.sources.begin())];
   auto whole = source.pieces.add(pushed);
   if (!whole) return false;
-  // Of what is known in whole, samples may be missing that came between those that the whole has told.
+  // A complete commit that does not follow on may lack samples between those reported.
   const bool is_old = whole->commit <= source.commit;
   const bool follows_on = !is_old && whole->after <= source.commit;
   source.heard = std::max(source.heard, whole->commit);
-  // Before the first values there is nothing that a sample could belong to.
+  // Before the first complete values there is nothing that a sample could belong to.
   if (!follows_on && source.commit == 0) return false;
   if (follows_on) source.commit = whole->commit;
   std::vector<PushedValue> values;

@@ -13,7 +13,7 @@
 
 namespace tfdude {
 
-/// How a watched path lies, and who sends it.
+/// The edges of a watched path, and the owners that push them.
 struct WatchRoute {
   /// A part of the path that one owner pushes.
   struct Source {
@@ -26,25 +26,25 @@ struct WatchRoute {
   std::vector<Source> sources;
   std::vector<Part> parts;  ///< a WatchRequest for each source
 
-  /// Whether it has the same edges of the same owners.
+  /// Whether it has the same edges with the same owners.
   [[nodiscard]] bool is_same(const WatchRoute& other) const;
 };
 
-/// The route of the path from a to b as the structure is now, each edge alone or `composed`.
-/// @param own_incarnation  of the partition's process that asks
-/// @return as route_watch
+/// The route of the path from a to b in the current structure, with single edges or `composed`.
+/// @param own_incarnation  of the requesting process's partition
+/// @return as route_watch()
 [[nodiscard]] Result<WatchRoute> watch_route(const Forest& forest, const Directory& directory,
                                              const std::string& a, const std::string& b,
                                              bool composed, std::chrono::nanoseconds period,
                                              std::uint64_t own_incarnation);
 
-/// What owners have told of one route: a forest of its edges, written as they push them. A value belongs to its edge by
-/// its group, which is of this route; of an edge's histories the newest is shown; what an owner wrote as one commit is
-/// one here.
-/// @par Thread safety  lookup(), without a lock; of the rest one function at a time.
+/// The values that owners have pushed for one route: a forest of its edges. A value belongs to its
+/// edge by its group, which is specific to this route. Only the newest history of an edge is shown.
+/// A commit of an owner is one commit here.
+/// @par Thread safety  lookup() is thread-safe, without a lock; of the others one at a time.
 class WatchMirror {
  public:
-  /// @param timing  how long a history is kept
+  /// @param timing  how much history is kept
   WatchMirror(const std::string& a, const std::string& b, WatchRoute route,
               const EdgeTiming& timing);
   WatchMirror(const WatchMirror&) = delete;
@@ -57,39 +57,41 @@ class WatchMirror {
 
   [[nodiscard]] const WatchRoute& route() const { return route_; }
 
-  /// What another mirror knows of edges that are here, too: so their history goes on. To be called before anything is taken.
+  /// Copies another mirror's values of common edges, so that their history continues. Call before
+  /// anything is taken.
   void inherit(const WatchMirror& before);
 
-  /// What an owner told. @return whether something of it is new here
+  /// Applies values from an owner. @return whether any of them is new here
   bool take(const PushedValues& pushed);
 
   /// Whether all edges have their values.
   [[nodiscard]] bool complete() const;
 
-  /// Whether something was lost on its way, or has come before what it builds on: then all must be asked for.
+  /// Whether a message was lost, or has come before an earlier one: then all values must be
+  /// requested.
   [[nodiscard]] bool lacks() const;
 
-  /// Whether the other one has heard later of an owner that both hear.
+  /// Whether the other mirror has newer data of an owner common to both.
   [[nodiscard]] bool is_behind(const WatchMirror& other) const;
 
-  /// The newest instant that all moving edges have reached, where one of them has no sample that is not younger: its
-  /// owner may know where it was then.
+  /// The newest instant that all dynamic edges have reached, if one of them has no sample at or
+  /// before it: its owner may have an earlier one.
   [[nodiscard]] std::optional<Time> lacks_history() const;
 
  private:
   struct Edge {
-    std::uint64_t history = 0;   // the owner's number; 0: nothing is known
+    std::uint64_t history = 0;   // the owner's number; 0: unknown
     std::optional<Time> newest;  // of its samples
     std::size_t source = 0;
   };
   struct Source {
     std::vector<std::uint32_t> edges;  // by the entries' indices
     PushedPieces pieces;
-    std::uint64_t commit = 0;  // of the owner's: all until then is here; 0: nothing yet
-    std::uint64_t heard = 0;   // the newest commit of which something came
+    std::uint64_t commit = 0;  // of the owner: complete up to this commit; 0: nothing yet
+    std::uint64_t heard = 0;   // the newest commit of which anything has come
   };
 
-  /// The entry as the mirror is to take it, unless it is old or must wait.
+  /// The entry to apply, unless it is old or must wait.
   [[nodiscard]] std::optional<PushedValue> admitted(const Source& source, PushedValue entry,
                                                     bool follows_on);
   [[nodiscard]] const Source* source_like(const WatchRoute::Source& source) const;
@@ -98,7 +100,7 @@ class WatchMirror {
   Forest forest_;
   Handle a_;
   Handle b_;
-  std::vector<Handle> handles_;  // by edge, as the rest
+  std::vector<Handle> handles_;  // by edge, as the others
   std::vector<Edge> edges_;
   std::vector<Source> sources_;
 };

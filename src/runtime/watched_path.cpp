@@ -10,14 +10,14 @@
 namespace tfdude {
 namespace {
 
-// How long a frame may hang under one that is not there before the path counts as gone: its parent's owner may be heard
-// later than its own.
+// How long a frame's parent may be missing before the path counts as gone: news of the parent's
+// owner may come later than that of the frame's.
 constexpr Milliseconds kNotConnectedFor{500};
 
-// How long a route whose edges have no instant in common waits for one while another is shown.
+// How long a route whose edges have no common instant waits for one while another route is shown.
 constexpr Milliseconds kWaitForCommon{1000};
 
-// How often owners are asked for what was before.
+// How often owners are asked for earlier samples.
 constexpr int kMostAskedForHistory = 10;
 
 }  // namespace
@@ -74,7 +74,7 @@ bool WatchedPath::prepare(WatchRoute route) {
     const Lock lock(mutex_);
     next_.reset();
     asked_for_history_ = 0;
-    // There and back again, before the other one was shown.
+    // The path returned to its route before the other one was shown.
     if (followed_ != nullptr && followed_->route().is_same(route)) return false;
     next_ = std::make_unique<WatchMirror>(a_, b_, std::move(route), options_.timing);
     next_since_ = Clock::now();
@@ -97,7 +97,7 @@ WatchedPath::Taken WatchedPath::take(const PushedValues& pushed) {
     taken.lacks = latest != nullptr && latest->lacks();
     if (is_new) messages_.fetch_add(1, std::memory_order_relaxed);
   }
-  changed_.notify_all();  // late samples are nothing new to show, but waited for
+  changed_.notify_all();  // late samples are not new to show, but may be waited for
   return taken;
 }
 
@@ -106,7 +106,7 @@ bool WatchedPath::has_common_instant() const {
   return newest || newest.error().code != Errc::kTooOld;
 }
 
-// Of what is shown, nothing may be older than what was shown before.
+// Shown values must not be older than those shown before.
 bool WatchedPath::swap_if_ready() {
   if (next_ == nullptr || !next_->complete()) return false;
   if (followed_ != nullptr) {

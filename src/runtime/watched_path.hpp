@@ -17,9 +17,9 @@
 
 namespace tfdude {
 
-/// One watched path. It shows the mirror of one route, which readers find by one load. Where the path takes another
-/// route, that has a mirror of its own, which is shown instead once it has all values; readers of the one before have it
-/// until they are done (epoch.hpp).
+/// One watched path. It shows the mirror of one route, which readers find by one load. If the path
+/// takes another route, that has its own mirror, which is shown once it has all values; readers of
+/// the previous one keep it until they are done (epoch.hpp).
 class WatchedPath {
  public:
   using Clock = std::chrono::steady_clock;
@@ -31,13 +31,14 @@ class WatchedPath {
 
   // --- from any thread ---
 
-  /// No lock or allocation, but where the path is not followed.
+  /// No lock or allocation, except while the path is not followed.
   [[nodiscard]] Result<StampedTransform> lookup(const Query& query) const;
 
   [[nodiscard]] Result<void> health() const;
   [[nodiscard]] std::uint64_t messages() const { return messages_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool wait_for_more(std::uint64_t messages, Clock::time_point deadline) const;
-  /// Waits until the path is followed, and its moving edges have an instant in common; in vain for the latter is no error.
+  /// Waits until the path is followed and its dynamic edges have a common instant; lack of the
+  /// latter is no error.
   /// @return why it is not followed, at the deadline
   [[nodiscard]] Result<void> wait_until_live(Clock::time_point deadline) const;
 
@@ -45,34 +46,35 @@ class WatchedPath {
   [[nodiscard]] const std::string& b() const { return b_; }
   [[nodiscard]] const WatchOptions& options() const { return options_; }
 
-  /// What has come of pushed values.
+  /// The result of applying pushed values.
   struct Taken {
-    bool rerouted = false;  ///< another route is shown from now on
-    bool lacks = false;     ///< something is to be asked for
+    bool rerouted = false;  ///< another route is shown now
+    bool lacks = false;     ///< missing values must be requested
   };
   Taken take(const PushedValues& pushed);
 
   // --- for Watches, from one thread ---
 
   [[nodiscard]] bool live() const { return shown_.load(std::memory_order_acquire) != nullptr; }
-  /// Whether that is the way it takes, or is about to.
+  /// Whether the path uses this route, or is about to.
   [[nodiscard]] bool follows(const WatchRoute& route) const;
   /// Prepares another route. @return whether it is shown already, as it needs no values
   bool prepare(WatchRoute route);
-  /// Whether the route is shown with all that its owners have told, as far as that can be had.
+  /// Whether the route is shown with all values of its owners, as far as they are available.
   [[nodiscard]] bool up_to_date() const;
-  /// See WatchMirror::lacks_history(); asked for a few times only, as nobody may know.
+  /// See WatchMirror::lacks_history(); returned a few times only, as no owner may have the samples.
   [[nodiscard]] std::optional<Time> lacks_history();
-  /// Why there is no answer for now.
+  /// Sets the reason why there is no answer for now.
   void interrupt(Error why);
-  /// Whether this says that the path does not exist any more. News of a move may come before those of where to.
+  /// Whether the error means that the path no longer exists. The news of a move may come before
+  /// that of its destination.
   [[nodiscard]] bool is_gone(const Error& error, Clock::time_point now);
-  /// Whether all owners are there.
+  /// Sets whether all owners are reachable.
   void set_health(Result<void> health);
   [[nodiscard]] std::size_t edge_count() const;
-  /// The groups of which it needs values.
+  /// The groups whose values it needs.
   [[nodiscard]] std::set<std::uint64_t> groups() const;
-  /// Gives back mirrors that nobody reads any more.
+  /// Frees mirrors that have no readers any more.
   void collect();
 
  private:
@@ -88,13 +90,12 @@ class WatchedPath {
   const std::string a_;
   const std::string b_;
   const WatchOptions options_;
-  std::atomic<const WatchMirror*> shown_{nullptr};  // followed_, as readers see it
+  std::atomic<const WatchMirror*> shown_{nullptr};  // followed_, for readers
   std::atomic<std::uint64_t> messages_{0};
-  mutable Condition changed_;  // messages_, shown_
-  mutable Mutex mutex_;        // of the rest
+  mutable Condition changed_;  // of messages_, shown_
+  mutable Mutex mutex_;        // guards the following members
   std::unique_ptr<WatchMirror> followed_ TFDUDE_GUARDED_BY(mutex_);
-  std::unique_ptr<WatchMirror> next_
-      TFDUDE_GUARDED_BY(mutex_);  // to be shown once it has all values
+  std::unique_ptr<WatchMirror> next_ TFDUDE_GUARDED_BY(mutex_);  // shown once it has all values
   Clock::time_point next_since_ TFDUDE_GUARDED_BY(mutex_);
   int asked_for_history_ TFDUDE_GUARDED_BY(mutex_) = 0;
   bool was_shown_ TFDUDE_GUARDED_BY(mutex_) = false;

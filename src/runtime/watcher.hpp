@@ -14,12 +14,13 @@
 
 namespace tfdude {
 
-/// The watcher's side of what owners push: plans watched paths by the structure, and hands them what comes.
-/// @par Thread safety  All functions.
+/// The watcher's side of pushed values: plans watched paths according to the structure, and passes
+/// values to them.
+/// @par Thread safety  All functions are thread-safe.
 class Watcher {
  public:
-  /// @param incarnation  of the own partition's process
-  /// @param timeout  within which all owners of a path are to answer
+  /// @param incarnation  of the own partition
+  /// @param timeout  for the answers of all owners of a path
   Watcher(Structure& structure, Discovery& discovery, Requests& requests, Transport& transport,
           std::function<std::uint64_t()> incarnation, Milliseconds timeout)
       : structure_(structure),
@@ -29,22 +30,23 @@ class Watcher {
         incarnation_(std::move(incarnation)),
         timeout_(timeout) {}
 
-  /// The paths get nothing new from now on. By one thread, after which nobody calls watch().
+  /// After it has returned the paths get nothing new. Call from one thread; watch() must not be
+  /// called afterwards.
   void stop();
 
-  /// @return as Client::watch
+  /// @return as Client::watch()
   [[nodiscard]] Result<std::shared_ptr<WatchedPath>> watch(const std::string& a,
                                                            const std::string& b,
                                                            const WatchOptions& options);
 
-  /// What was pushed. @return whether anybody here watches
+  /// Applies pushed values. @return whether a path here needs them
   bool on_pushed(const PushedValues& pushed);
 
-  /// Whether a path that is watched could be looked up so from what has been pushed.
+  /// Whether pushed values of a watched path suffice for this lookup.
   [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,
                                 const Query& query) const;
 
-  /// The structure has changed, or who is there.
+  /// The structure or the reachable partitions have changed.
   void look_again();
 
  private:
@@ -57,8 +59,8 @@ class Watcher {
   Transport& transport_;
   const std::function<std::uint64_t()> incarnation_;
   const Milliseconds timeout_;
-  Mutex mutex_;                                                 // of watches_, as it is made
-  std::unique_ptr<Watches> watches_ TFDUDE_GUARDED_BY(mutex_);  // once this process watches
+  Mutex mutex_;                                                 // guards the creation of watches_
+  std::unique_ptr<Watches> watches_ TFDUDE_GUARDED_BY(mutex_);  // once this process watches a path
   std::atomic<Watches*> watching_{nullptr};
 };
 

@@ -8,10 +8,10 @@
 namespace tfdude {
 namespace {
 
-// How often owners are told that they are watched still; several times within kWatchLease.
+// How often watches are renewed at their owners; several times within kWatchLease.
 constexpr Milliseconds kRenewEvery{1000};
 
-// A path that could not be followed, or lacks something, is tried again after this.
+// Interval of retries for a path that could not be followed, or lacks values.
 constexpr Milliseconds kRetryAfter{50};
 
 }  // namespace
@@ -95,7 +95,8 @@ void Watches::run() {
     asked_ = false;
     lacking_ = false;
     last_round_ = Clock::now();
-    // Whom nobody else has, nobody reads any more. They go without the lock, with what their users gave them.
+    // Paths without other holders have no readers. They are destroyed without the lock, with their
+    // callbacks.
     const auto unused = std::stable_partition(
         paths_.begin(), paths_.end(), [](const Path& path) { return path.use_count() > 1; });
     std::vector<Path> gone(unused, paths_.end());
@@ -130,7 +131,7 @@ bool Watches::attend(const Path& path, bool renew) {
     }
   }
   if (!ask(path, *route, path->lacks_history())) return false;
-  // Only the first answers show that one edge is ahead of what another has.
+  // Only the first answers show that one edge is ahead of the data of another.
   if (const auto from = path->lacks_history()) {
     if (!ask(path, *route, from)) return false;
   }
@@ -140,7 +141,7 @@ bool Watches::attend(const Path& path, bool renew) {
 bool Watches::cannot_be_planned(const Path& path, Error why) {
   const bool was_live = path->live();
   if (was_live && !path->is_gone(why, Clock::now())) {
-    // What is here goes on to be told, with its stamps; the owner may return.
+    // Known values are still returned, with their stamps; the owner may return.
     const bool may_return = why.code == Errc::kUnreachable;
     path->set_health(tl::unexpected(std::move(why)));
     return may_return;
@@ -156,7 +157,7 @@ bool Watches::ask(const Path& path, WatchRoute& route, std::optional<Time> from)
   bool all = true;
   for (std::size_t i = 0; i < replies.size(); ++i) {
     const auto* pushed = std::get_if<PushedValues>(&replies[i].body);
-    // An owner that has started anew since it was heard has other groups.
+    // An owner that has restarted since the plan has other groups.
     if (pushed != nullptr && pushed->group == route.sources[i].group) {
       if (path->take(*pushed).rerouted) tell_rerouted(path);
       continue;

@@ -15,13 +15,13 @@
 
 namespace tfdude {
 
-/// The paths that a participant watches, and the thread that tells their owners so, again and again: that is how an
-/// owner that has restarted knows of them, and what was lost is made good.
+/// The paths that a participant watches, and the thread that renews them at their owners
+/// periodically. So an owner that has restarted learns of them, and lost values are sent again.
 class Watches {
  public:
   /// What it needs of the participant.
   struct Links {
-    /// How the path lies now. @return as Client::lookup
+    /// The current route of the path. @return as Client::lookup()
     std::function<Result<WatchRoute>(const WatchedPath&)> plan;
     std::function<std::vector<Reply>(std::vector<Part>&)> ask;
     std::function<Result<void>(std::uint64_t group)> open;
@@ -33,21 +33,21 @@ class Watches {
   Watches(const Watches&) = delete;
   Watches& operator=(const Watches&) = delete;
 
-  /// The paths get nothing new from now on, and say so; nobody is called any more.
+  /// After it has returned the paths get nothing new, and report so; no callback runs.
   void stop();
 
-  /// @return the path; watched as long as somebody else has it
+  /// @return the path; watched while it has another holder
   [[nodiscard]] std::shared_ptr<WatchedPath> watch(const std::string& a, const std::string& b,
                                                    const WatchOptions& options);
 
-  /// What was pushed.
+  /// Applies pushed values.
   void on_pushed(const PushedValues& pushed);
 
-  /// Whether a path that is watched could be looked up so from what has been pushed.
+  /// Whether pushed values of a watched path suffice for this lookup.
   [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,
                                 const Query& query) const;
 
-  /// The structure has changed, or who is there.
+  /// The structure or the reachable partitions have changed.
   void look_again();
 
  private:
@@ -56,10 +56,11 @@ class Watches {
 
   void run();
   void wait(Lock& lock, Clock::time_point renew_at) TFDUDE_REQUIRES(mutex_);
-  /// @return whether it is as it should be; else it is to be tried again soon
+  /// @return whether it is up to date; otherwise it must be retried soon
   bool attend(const Path& path, bool renew);
   bool cannot_be_planned(const Path& path, Error why);
-  /// Asks the owners for all values, or samples from an instant on. @return whether all have answered
+  /// Requests all values from the owners, or samples from an instant on. @return whether all have
+  /// answered
   bool ask(const Path& path, WatchRoute& route, std::optional<Time> from);
   void tell(const Path& path, std::string what);
   void tell_rerouted(const Path& path);
@@ -67,15 +68,15 @@ class Watches {
 
   const Links links_;
   Notices notices_;
-  OpenGroups open_;  // only the thread's
+  OpenGroups open_;  // used by the thread only
   mutable Mutex mutex_;
   Condition changed_;
   std::vector<Path> paths_ TFDUDE_GUARDED_BY(mutex_);
   bool asked_ TFDUDE_GUARDED_BY(mutex_) = false;
-  bool lacking_ TFDUDE_GUARDED_BY(mutex_) = false;            // a path is not as it should be
-  Clock::time_point last_round_ TFDUDE_GUARDED_BY(mutex_){};  // when paths were looked at
+  bool lacking_ TFDUDE_GUARDED_BY(mutex_) = false;            // a path is not up to date
+  Clock::time_point last_round_ TFDUDE_GUARDED_BY(mutex_){};  // when paths were last checked
   bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
-  std::thread thread_;  // last: it uses the rest
+  std::thread thread_;  // last: it uses the other members
 };
 
 }  // namespace tfdude

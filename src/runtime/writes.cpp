@@ -24,7 +24,7 @@ Result<void> Writes::add(const std::string& id, const AddRequest& request,
 
 Result<void> Writes::remove(const std::string& id) {
   const Deadline deadline = discovery_.call_deadline();
-  // All below it are told by name, so all must be known.
+  // All frames below it are removed by name, so all must be known.
   if (auto all = discovery_.await(deadline); !all) return all;
   bool asked = false;
   auto removed = requests_.retry_on_stale_route(
@@ -33,7 +33,7 @@ Result<void> Writes::remove(const std::string& id) {
         asked = true;
         return requests_.change(parts, deadline);
       });
-  // Gone by the time of a second attempt: what was asked for has come to be.
+  // Missing at a second attempt: the removal has succeeded.
   if (removed) return removed;
   const bool is_missing = is_elsewhere(removed.error());
   if (is_missing && asked && !structure_.forest.exists(id)) return {};
@@ -78,7 +78,7 @@ Result<void> Writes::publish(const std::vector<EdgeUpdate>& edges, std::optional
   Result<void> outcome;
   for (Part& part : *parts) {
     const Update share{std::move(std::get<UpdateRequest>(part.request.body).edges), stamp};
-    // Whoever is there gets its share, and the error of who is not is told.
+    // Reachable owners get their shares, and the error of an unreachable one is returned.
     auto sent = requests_.publish(part, share, deadline, [this](const Update& own) {
       return structure_.forest.update(own.edges, own.stamp);
     });
@@ -105,7 +105,7 @@ Result<void> Writes::correlate(const std::string& id, const Correlation& correla
 
 Result<void> Writes::forget(const std::string& partition) {
   const Deadline deadline = discovery_.call_deadline();
-  // All who are there are to be told.
+  // All reachable participants must be told.
   if (auto all = discovery_.await(deadline); !all) return all;
   auto parts = requests_.planned(deadline, [&] { return route_forget(partition); });
   if (!parts) return tl::unexpected(std::move(parts.error()));

@@ -10,9 +10,9 @@
 
 namespace tfdude {
 
-/// What a participant changes of frames, its own and those of others: their structure, their values, what is kept of them.
-/// What each returns is said at Client.
-/// @par Thread safety  All functions.
+/// A participant's changes of frames, its own and those of others: structure, values, stored data.
+/// Client describes the return values.
+/// @par Thread safety  All functions are thread-safe.
 class Writes {
  public:
   Writes(Structure& structure, Discovery& discovery, Requests& requests, MemberRunner& member)
@@ -31,7 +31,7 @@ class Writes {
   [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
   [[nodiscard]] Result<void> forget(const std::string& partition);
 
-  /// Of an update of what is here: whether it concerns what others hold.
+  /// Whether a local update failed because it concerns frames held elsewhere.
   static bool is_elsewhere(const Error& error) {
     return error.code == Errc::kUnknownFrame || error.code == Errc::kNotOwner;
   }

@@ -9,7 +9,7 @@
 namespace tfdude {
 namespace {
 
-// How often at most the others are asked whether what seems to be a conflict is one.
+// Minimum interval at which others are asked whether an apparent conflict is real.
 constexpr Milliseconds kYieldEvery{100};
 
 }  // namespace
@@ -30,7 +30,8 @@ void Yielding::yield() {
   member_.yield(due, current);
 }
 
-// Whether all that those who are reachable had changed when this was called is known here now.
+// Whether everything that reachable participants had changed at the time of the call is known here
+// now.
 bool Yielding::catch_up() {
   const Deadline deadline(timeout_);
   std::vector<Part> parts;

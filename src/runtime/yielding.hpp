@@ -9,10 +9,10 @@
 
 namespace tfdude {
 
-/// Yields frames that others have a better claim to, once it is sure that the claim still stands: a claim may have been
-/// taken back long ago by an owner whose pages are late. So what is yielded must stand after all of the others have told how
-/// far they are, and their structure up to there has come.
-/// @par Thread safety  ask() and stop(), after start().
+/// Yields frames to better claims, once it is certain that those are still valid: a claim may have
+/// been withdrawn long ago by an owner whose pages are late. So a claim must persist after all
+/// others have reported their epochs, and their structure up to those has come.
+/// @par Thread safety  ask() and stop() are thread-safe, after start().
 class Yielding {
  public:
   Yielding(Structure& structure, Requests& requests, MemberRunner& member, Milliseconds timeout)
@@ -21,7 +21,7 @@ class Yielding {
   Yielding(const Yielding&) = delete;
   Yielding& operator=(const Yielding&) = delete;
 
-  /// Before the participant owns anything.
+  /// Call before the participant owns anything.
   void start();
   void stop();
 
@@ -36,7 +36,7 @@ class Yielding {
   Requests& requests_;
   MemberRunner& member_;
   const Milliseconds timeout_;
-  std::optional<Deferred> thread_;  // last: it uses the rest
+  std::optional<Deferred> thread_;  // last: it uses the other members
 };
 
 }  // namespace tfdude
