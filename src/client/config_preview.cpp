@@ -24,7 +24,7 @@ Result<ConfigPreview> preview_config(const std::string& partition,
   }
   preview.frames = state.frames.size();
   preview.changes = configured_changes(state, frames);
-  // As the Node would take it, but with nobody there: what that refuses is refused here.
+  // Loads it as the Node would, but without other participants: errors of that are returned here.
   Forest forest;
   Directory directory(forest, partition);
   Partition taken(partition, 1, forest, directory);
