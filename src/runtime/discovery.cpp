@@ -95,13 +95,15 @@ Error Discovery::explained(Error error) {
 
 Error Discovery::undecided(const std::string& what, const Deadline& deadline) {
   std::string missing = "nobody was met yet";
+  // Before the lock is taken: the transport reports presences under a lock of its own.
+  const bool awaits_presence = transport_.awaits_presence();
   {
     const Lock lock(structure_.mutex);
     if (const std::string* partition = structure_.directory.incomplete()) {
       missing = "partition " + quote(*partition) + " has not told all of its frames yet";
     } else if (const std::string* late = structure_.directory.behind()) {
       missing = "partition " + quote(*late) + " has made a change that has not arrived here yet";
-    } else if (transport_.awaits_presence()) {
+    } else if (awaits_presence) {
       missing = "a participant was met that has not said yet what it owns";
     } else if (!structure_.directory.reachable_owners().empty()) {
       missing = "there may be others who were not met yet";

@@ -3,6 +3,7 @@
 #include "runtime/discovery.hpp"
 
 #include <atomic>
+#include <functional>
 #include <thread>
 
 #include "support/catch.hpp"
@@ -21,8 +22,12 @@ class Meeting final : public testing::Relay {
  public:
   using Relay::Relay;
   bool discovered() const override { return met_all; }
-  bool awaits_presence() const override { return met_somebody; }
+  bool awaits_presence() const override {
+    if (if_asked) if_asked();
+    return met_somebody;
+  }
 
+  std::function<void()> if_asked;
   std::atomic<bool> met_all{false};
   std::atomic<bool> met_somebody{false};
 };
@@ -70,6 +75,29 @@ TEST_CASE("discovery: before all are met nothing is said to be missing") {
              ContainsSubstring("a participant was met that has not said yet what it owns"));
   newcomer.meeting.met_all = true;
   CHECK(newcomer.rig.discovery.await(soon));
+}
+
+// A transport may hold one lock here and where it reports a presence, which takes the structure's.
+TEST_CASE("discovery: the transport is asked without the lock of the structure") {
+  Options options = quick();
+  options.discovery = 10s;
+  Newcomer newcomer(options);
+  int asked = 0;
+  int locked = 0;
+  newcomer.meeting.if_asked = [&] {
+    ++asked;
+    std::thread([&] {
+      Mutex& mutex = newcomer.rig.structure.mutex;
+      if (!mutex.try_lock()) {
+        ++locked;
+      } else {
+        mutex.unlock();
+      }
+    }).join();
+  };
+  CHECK_FALSE(newcomer.rig.discovery.await(Deadline(20ms)));
+  CHECK(asked > 0);
+  CHECK(locked == 0);
 }
 
 TEST_CASE("discovery: an operation is repeated until what it lacks has come") {
