@@ -40,7 +40,7 @@ const Name* IdTable::insert(std::string_view id, std::uint32_t slot) {
     grow();
     table = table_.load(std::memory_order_relaxed);
   }
-  const auto* name = new Name{std::string(id), hash_of(id), slot, {}};
+  const auto* name = new Name{std::string(id), hash_of(id), slot, {}, {}};
   if (place(*table, name)) ++used_;
   ++names_;
   return name;

@@ -19,8 +19,8 @@ edds::DomainParticipantFactory& factory() {
 class MutedDescriptor final : public fastdds::etransport::ChainingTransportDescriptor {
  public:
   MutedDescriptor(std::shared_ptr<fastdds::etransport::TransportDescriptorInterface> real,
-                  std::shared_ptr<const std::atomic<bool>> muted)
-      : ChainingTransportDescriptor(std::move(real)), muted(std::move(muted)) {}
+                  std::shared_ptr<const std::atomic<bool>> is_muted)
+      : ChainingTransportDescriptor(std::move(real)), muted(std::move(is_muted)) {}
   [[nodiscard]] fastdds::etransport::TransportInterface* create_transport() const override;
 
   std::shared_ptr<const std::atomic<bool>> muted;
