@@ -234,4 +234,16 @@ Outcome Member::take_outcome() {
   return std::exchange(outcome_, {});
 }
 
+std::vector<PartitionInfo> Member::partitions() const {
+  auto all = directory_.partitions();
+  if (partition_ == nullptr) return all;
+  for (PartitionInfo& info : all) {
+    if (info.name != name_) continue;
+    info.host = presence_.host;
+    info.pid = presence_.pid;
+    info.frames = partition_->frame_count();
+  }
+  return all;
+}
+
 }  // namespace tfdude

@@ -102,6 +102,8 @@ class Member {
   [[nodiscard]] const Presence& presence() const { return presence_; }
   /// Why another process has the partition now; empty: it has not.
   [[nodiscard]] const std::string& given_up() const { return given_up_; }
+  /// As Directory::partitions(), with what only this process knows of the own one.
+  [[nodiscard]] std::vector<PartitionInfo> partitions() const;
 
  private:
   void on_own_presence(const Presence& presence);

@@ -45,10 +45,9 @@ bool Discovery::complete() {
   const bool met_all = told || transport_.discovered();
   const bool met_none = now >= met_by_ && !transport_.awaits_presence();
   const Lock lock(structure_.mutex);
-  const Directory& directory = structure_.directory;
-  if (directory.behind() != nullptr) return false;
-  const bool known =
-      met_all ? told || directory.complete() : met_none && directory.reachable_owners().empty();
+  if (structure_.directory.behind() != nullptr) return false;
+  const bool known = met_all ? told || structure_.directory.complete()
+                             : met_none && structure_.directory.reachable_owners().empty();
   if (known) complete_.store(true, std::memory_order_relaxed);
   return known;
 }

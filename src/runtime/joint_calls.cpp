@@ -30,11 +30,10 @@ Result<void> JointCalls::update(const JointUpdate& update) {
   if (auto all = discovery_.await(deadline); !all) return all;
   return requests_.retry_on_stale_route(
       deadline,
-      [&]() -> Result<std::vector<Part>> {
-        auto parts = route_joints(structure_.directory, update);
+      [&](const Directory& directory) -> Result<std::vector<Part>> {
+        auto parts = route_joints(directory, update);
         if (!parts) return parts;
-        if (auto ok = check_reachable(structure_.directory, *parts); !ok)
-          return tl::unexpected(ok.error());
+        if (auto ok = check_reachable(directory, *parts); !ok) return tl::unexpected(ok.error());
         return parts;
       },
       [&](std::vector<Part>& parts) { return requests_.change(parts, deadline); });

@@ -56,8 +56,8 @@ Result<StampedTransform> Lookups::elsewhere(std::string_view a, std::string_view
   const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
   return requests_.retry_on_stale_route(
       deadline,
-      [&] {
-        return route_lookup(structure_.forest, structure_.directory, start, end, query, hint);
+      [&](const Directory& directory) {
+        return route_lookup(structure_.forest, directory, start, end, query, hint);
       },
       [&](LookupPlan& plan) {
         Gathering gathering(std::move(plan), start, end, hint);

@@ -66,7 +66,7 @@ void MemberRunner::input(Input input) {
   Outcome outcome;
   {
     const Lock lock(structure_.mutex);
-    input();
+    input(member_);
     outcome = take_outcome();
   }
   react(outcome);
@@ -74,9 +74,9 @@ void MemberRunner::input(Input input) {
 
 template <class Input>
 void MemberRunner::input_of_joints(Input input) {
-  this->input([&] {
+  this->input([&](Member& member) {
     const Lock joints(joints_mutex_);
-    input();
+    input(member);
   });
 }
 
@@ -113,45 +113,47 @@ void MemberRunner::look_for_gone() {
   const Lock lock(gone_mutex_);
   if (stopped_) return;
   if (!gone_look_) {
-    gone_look_.emplace(kLookForGone, [this] { input([this] { member_.on_time(Clock::now()); }); });
+    gone_look_.emplace(kLookForGone,
+                       [this] { input([](Member& member) { member.on_time(Clock::now()); }); });
   }
   gone_look_->ask();
 }
 
 void MemberRunner::on_page(const Page& page) {
-  input([&] { member_.on_page(page); });
+  input([&](Member& member) { member.on_page(page); });
 }
 
 void MemberRunner::on_presence(const Presence& presence) {
-  input([&] { member_.on_presence(presence, wall_clock()); });
+  input([&](Member& member) { member.on_presence(presence, wall_clock()); });
 }
 
 void MemberRunner::on_lost(const std::string& partition, std::uint64_t incarnation) {
-  input([&] { member_.on_lost(partition, incarnation, wall_clock()); });
+  input([&](Member& member) { member.on_lost(partition, incarnation, wall_clock()); });
 }
 
 std::optional<Reply> MemberRunner::on_request(const PeerId& from, const Request& request) {
   const auto refused = refusal();
   std::optional<Reply> reply;
-  input_of_joints([&] { reply = member_.on_request(from, request, refused, wall_clock()); });
+  input_of_joints(
+      [&](Member& member) { reply = member.on_request(from, request, refused, wall_clock()); });
   return reply;
 }
 
 Reply MemberRunner::answer(const Request& request) {
   const auto refused = refusal();
   Reply reply;
-  input_of_joints([&] { reply = member_.answer(request, refused, wall_clock()); });
+  input_of_joints([&](Member& member) { reply = member.answer(request, refused, wall_clock()); });
   return reply;
 }
 
 Result<void> MemberRunner::forget(const std::string& partition) {
   Result<void> forgotten;
-  input([&] { forgotten = member_.forget(partition, wall_clock()); });
+  input([&](Member& member) { forgotten = member.forget(partition, wall_clock()); });
   return forgotten;
 }
 
 void MemberRunner::yield(const std::set<PendingYield>& due, bool current) {
-  input_of_joints([&] { member_.yield(due, current, wall_clock()); });
+  input_of_joints([&](Member& member) { member.yield(due, current, wall_clock()); });
 }
 
 Result<std::size_t> MemberRunner::apply(const JointUpdate& update) {
@@ -182,9 +184,9 @@ void MemberRunner::open(std::unique_ptr<StateStore> store, Milliseconds save_eve
 Result<void> MemberRunner::serve(const StoredState* left,
                                  const std::vector<FrameSpec>& configured) {
   Result<void> served;
-  input_of_joints([&] {
-    served = member_.serve(left, configured, wall_clock());
-    partition_ = member_.partition();
+  input_of_joints([&](Member& member) {
+    served = member.serve(left, configured, wall_clock());
+    partition_ = member.partition();
   });
   return served;
 }

@@ -25,8 +25,7 @@ namespace tfdude {
 /// Runs the rules of a participant: passes them one input at a time, has their outputs stored,
 /// published and replied, in this order (CommitLoop), and notifies the parts of this process.
 ///
-/// Locks, in the order in which they may be taken: that of the structure, that of joints. None is
-/// held while sending or while notifying the parts.
+/// No lock is held while sending or while notifying the parts.
 /// @par Thread safety  All functions are thread-safe, for callers that hold none of these locks.
 ///   open(), serve() and publish_all() are for the thread that makes this participant an owner.
 class MemberRunner final : private CommitLoop::Effects {
@@ -125,13 +124,13 @@ class MemberRunner final : private CommitLoop::Effects {
   void take_back(const ChangedValues& values) override;
   void reply(const PendingReply& reply) override;
 
-  /// Under the lock of the structure.
+  /// Passes the rules to `input`, under the lock of the structure.
   template <class Input>
   void input(Input input);
   /// As input(), and under that of joints.
   template <class Input>
   void input_of_joints(Input input);
-  [[nodiscard]] Outcome take_outcome();
+  [[nodiscard]] Outcome take_outcome() TFDUDE_REQUIRES(structure_.mutex);
   void react(const Outcome& outcome);
   void look_for_gone();
   /// Why changes are refused while earlier ones cannot be stored.
@@ -141,15 +140,15 @@ class MemberRunner final : private CommitLoop::Effects {
   Transport& transport_;
   const std::string name_;
   const Parts parts_;
-  Member member_;                   // under the structure's lock
+  Member member_ TFDUDE_GUARDED_BY(structure_.mutex);
   Partition* partition_ = nullptr;  // owned by member_
   std::atomic<bool> out_{false};
   const std::shared_ptr<Events> events_ = std::make_shared<Events>();
-  Mutex joints_mutex_;              // guards the joints of partition_
-  std::uint64_t saved_commit_ = 0;  // of values; used by the thread of commits_
+  Mutex joints_mutex_{LockRank::kJoints};  // guards the joints of partition_
+  std::uint64_t saved_commit_ = 0;         // of values; used by the thread of commits_
   // Both stop before the transport does.
-  std::optional<CommitLoop> commits_;  // set once, before partition_
-  Mutex gone_mutex_;                   // guards the following members
+  std::optional<CommitLoop> commits_;   // set once, before partition_
+  Mutex gone_mutex_{LockRank::kParts};  // guards the following members
   bool stopped_ TFDUDE_GUARDED_BY(gone_mutex_) = false;
   std::optional<Deferred> gone_look_ TFDUDE_GUARDED_BY(gone_mutex_);  // once a partition is silent
 };

@@ -97,7 +97,9 @@ Result<Observed> Observations::observe(const std::string& a, const std::string& 
     ObservePlan used;
     auto path = requests_.retry_on_stale_route(
         deadline,
-        [&] { return route_observe(structure_.forest, structure_.directory, a, b, beside, stamp); },
+        [&](const Directory& directory) {
+          return route_observe(structure_.forest, directory, a, b, beside, stamp);
+        },
         [&](ObservePlan& plan) {
           auto found = this->path(plan, deadline);
           used = std::move(plan);

@@ -37,7 +37,7 @@ class Pushing {
   Transport& transport_;
   MemberRunner& member_;
   Watcher& watcher_;
-  Mutex mutex_;  // guards the following members
+  Mutex mutex_{LockRank::kParts};  // guards the following members
   bool stopped_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::unique_ptr<Pusher> pusher_ TFDUDE_GUARDED_BY(mutex_);  // once there is a watcher
 };

@@ -10,16 +10,17 @@
 namespace tfdude {
 
 Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_view b) {
-  return requests_.planned(discovery_.call_deadline(), [&]() -> Result<std::vector<PathSegment>> {
+  const auto route = [&](const Directory& directory) -> Result<std::vector<PathSegment>> {
     auto segments = structure_.forest.segments(a, b);
     if (!segments) return tl::unexpected(std::move(segments.error()));
     std::vector<PathSegment> path;
     for (Segment& segment : *segments) {
-      path.push_back({structure_.directory.name(segment.owner), std::move(segment.from),
-                      std::move(segment.to)});
+      path.push_back(
+          {directory.name(segment.owner), std::move(segment.from), std::move(segment.to)});
     }
     return path;
-  });
+  };
+  return requests_.planned(discovery_.call_deadline(), route);
 }
 
 Result<Handle> Queries::find(std::string_view id) {
@@ -65,18 +66,7 @@ Result<std::vector<std::string>> Queries::roots() {
 
 Result<std::vector<PartitionInfo>> Queries::partitions() {
   if (auto known = all_known(); !known) return tl::unexpected(std::move(known.error()));
-  return member_.with_rules([&](Member& member) {
-    auto all = structure_.directory.partitions();
-    const Partition* own = member.partition();
-    if (own == nullptr) return all;
-    for (PartitionInfo& info : all) {
-      if (info.name != own->name()) continue;
-      info.host = member.presence().host;
-      info.pid = member.presence().pid;
-      info.frames = own->frame_count();
-    }
-    return all;
-  });
+  return member_.with_rules([](const Member& member) { return member.partitions(); });
 }
 
 std::size_t Queries::own_frames() {
@@ -89,10 +79,10 @@ Result<std::vector<HistoryInfo>> Queries::history(const std::string& id) {
   const Deadline deadline = discovery_.call_deadline();
   return requests_.retry_on_stale_route(
       deadline,
-      [&]() -> Result<Part> {
+      [&](const Directory& directory) -> Result<Part> {
         const auto info = structure_.forest.info(id);
         if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
-        return route_to(structure_.directory, info->owner, Request{0, id, HistoryRequest{}});
+        return route_to(directory, info->owner, Request{0, id, HistoryRequest{}});
       },
       [&](Part& part) { return requests_.ask_list<HistoryInfo>(std::move(part), deadline); });
 }

@@ -67,18 +67,20 @@ class Requests {
     });
   }
 
-  /// Plans under the structure's lock.
+  /// Plans with the directory, under the structure's lock.
   template <class Route>
-  auto planned(const Deadline& deadline, Route route) -> decltype(route()) {
+  auto planned(const Deadline& deadline, Route route)
+      -> std::invoke_result_t<Route, const Directory&> {
     return after_discovery(deadline, [&] {
       const Lock lock(structure_.mutex);
-      return route();
+      return route(structure_.directory);
     });
   }
 
   /// Plans, asks, and plans again if the structure has changed meanwhile: the owner knows a newer
   /// structure than this process, or has not yet heard of a change that this process knows.
-  template <class Route, class Ask, class Plan = typename std::invoke_result_t<Route>::value_type>
+  template <class Route, class Ask,
+            class Plan = typename std::invoke_result_t<Route, const Directory&>::value_type>
   std::invoke_result_t<Ask, Plan&> retry_on_stale_route(const Deadline& deadline, Route route,
                                                         Ask ask) {
     int attempts = 0;
@@ -137,10 +139,10 @@ class Requests {
                                                   const Deadline& deadline) {
     return retry_on_stale_route(
         deadline,
-        [&]() -> Result<Part> {
-          const auto owner = structure_.directory.owner(partition);
+        [&](const Directory& directory) -> Result<Part> {
+          const auto owner = directory.owner(partition);
           if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
-          return route_to(structure_.directory, *owner, Request{0, partition, body});
+          return route_to(directory, *owner, Request{0, partition, body});
         },
         [&](Part& part) { return ask_list<Item>(std::move(part), deadline); });
   }

@@ -189,10 +189,10 @@ class Sender final : public PlannedSender {
 
   const std::vector<std::string> names_;
   const SenderLinks<Message> links_;
-  Mutex planning_;  // guards found_, planned_
+  Mutex planning_{LockRank::kPlanning};
   std::vector<std::vector<Destination>> found_ TFDUDE_GUARDED_BY(planning_);
   bool planned_ TFDUDE_GUARDED_BY(planning_) = false;
-  Mutex sending_;
+  Mutex sending_{LockRank::kSending};
   bool closed_ = false;  // guarded by both mutexes
   Mailbox<Plan> mailbox_;
   // The following belong to the sending thread.

@@ -5,7 +5,7 @@
 namespace tfdude {
 namespace {
 
-// @param owners_of  returns the owners of an edge or joint
+// @param owners_of  returns the owners of an edge or joint, from the directory
 template <class OwnersOf>
 std::vector<std::vector<Destination>> destinations(Structure& structure,
                                                    const std::vector<std::string>& names,
@@ -13,7 +13,7 @@ std::vector<std::vector<Destination>> destinations(Structure& structure,
   std::vector<std::vector<Destination>> found(names.size());
   const Lock lock(structure.mutex);
   for (std::size_t i = 0; i < names.size(); ++i) {
-    for (const Owner owner : owners_of(names[i])) {
+    for (const Owner owner : owners_of(structure.directory, names[i])) {
       const bool there = owner == kHeldHere || structure.directory.reachable(owner);
       found[i].push_back({owner, structure.directory.name(owner), there});
     }
@@ -26,7 +26,7 @@ std::vector<std::vector<Destination>> destinations(Structure& structure,
 SenderLinks<Update> edge_links(Structure& structure, Transport& transport, MemberRunner& member) {
   SenderLinks<Update> links;
   links.find = [&structure](const std::vector<std::string>& ids) {
-    return destinations(structure, ids, [&structure](const std::string& id) {
+    return destinations(structure, ids, [&structure](const Directory&, const std::string& id) {
       const auto frame = structure.forest.info(id);
       return frame ? std::vector<Owner>{frame->owner} : std::vector<Owner>{};
     });
@@ -44,8 +44,8 @@ SenderLinks<JointUpdate> joint_links(Structure& structure, Transport& transport,
                                      MemberRunner& member) {
   SenderLinks<JointUpdate> links;
   links.find = [&structure](const std::vector<std::string>& names) {
-    return destinations(structure, names, [&structure](const std::string& name) {
-      return structure.directory.joint_owners(name);
+    return destinations(structure, names, [](const Directory& directory, const std::string& name) {
+      return directory.joint_owners(name);
     });
   };
   links.connect = [&transport](const std::string& to) { return transport.joint_channel(to); };

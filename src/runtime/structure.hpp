@@ -18,9 +18,9 @@ struct Structure {
       : forest(std::move(clock)), directory(forest, own) {}
 
   Forest forest;
-  Mutex mutex;        ///< guards the directory, and the structure in the forest
-  Condition changed;  ///< notified after each change
-  Directory directory;
+  Mutex mutex{LockRank::kStructure};  ///< also for writing structure in the forest
+  Condition changed;                  ///< notified after each change
+  Directory directory TFDUDE_GUARDED_BY(mutex);
 };
 
 }  // namespace tfdude

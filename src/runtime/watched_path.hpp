@@ -92,8 +92,8 @@ class WatchedPath {
   const WatchOptions options_;
   std::atomic<const WatchMirror*> shown_{nullptr};  // followed_, for readers
   std::atomic<std::uint64_t> messages_{0};
-  mutable Condition changed_;  // of messages_, shown_
-  mutable Mutex mutex_;        // guards the following members
+  mutable Condition changed_;                    // of messages_, shown_
+  mutable Mutex mutex_{LockRank::kWatchedPath};  // guards the following members
   std::unique_ptr<WatchMirror> followed_ TFDUDE_GUARDED_BY(mutex_);
   std::unique_ptr<WatchMirror> next_ TFDUDE_GUARDED_BY(mutex_);  // shown once it has all values
   Clock::time_point next_since_ TFDUDE_GUARDED_BY(mutex_);

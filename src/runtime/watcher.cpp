@@ -31,7 +31,8 @@ Result<std::shared_ptr<WatchedPath>> Watcher::watch(const std::string& a, const 
                                                     const WatchOptions& options) {
   if (auto ok = check_rate(options.rate); !ok) return tl::unexpected(std::move(ok.error()));
   const Deadline deadline = discovery_.call_deadline();
-  auto known = requests_.planned(deadline, [&] { return structure_.forest.segments(a, b); });
+  auto known = requests_.planned(
+      deadline, [&](const Directory&) { return structure_.forest.segments(a, b); });
   if (!known) return tl::unexpected(std::move(known.error()));
   auto path = watches().watch(a, b, options);
   if (auto live = path->wait_until_live(deadline.at()); !live) {

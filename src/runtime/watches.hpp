@@ -69,7 +69,7 @@ class Watches {
   const Links links_;
   Notices notices_;
   OpenGroups open_;  // used by the thread only
-  mutable Mutex mutex_;
+  mutable Mutex mutex_{LockRank::kParts};
   Condition changed_;
   std::vector<Path> paths_ TFDUDE_GUARDED_BY(mutex_);
   bool asked_ TFDUDE_GUARDED_BY(mutex_) = false;

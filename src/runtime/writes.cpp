@@ -16,7 +16,9 @@ Result<void> Writes::add(const std::string& id, const AddRequest& request,
   const Deadline deadline = discovery_.call_deadline();
   auto added = requests_.retry_on_stale_route(
       deadline,
-      [&] { return route_add(structure_.forest, structure_.directory, id, request, partition); },
+      [&](const Directory& directory) {
+        return route_add(structure_.forest, directory, id, request, partition);
+      },
       [&](Part& part) { return change(std::move(part), deadline); });
   if (added) return added;
   return tl::unexpected(member_.unless_unsaved(std::move(added.error()), id));
@@ -28,7 +30,8 @@ Result<void> Writes::remove(const std::string& id) {
   if (auto all = discovery_.await(deadline); !all) return all;
   bool asked = false;
   auto removed = requests_.retry_on_stale_route(
-      deadline, [&] { return route_remove(structure_.forest, structure_.directory, id); },
+      deadline,
+      [&](const Directory& directory) { return route_remove(structure_.forest, directory, id); },
       [&](std::vector<Part>& parts) {
         asked = true;
         return requests_.change(parts, deadline);
@@ -43,7 +46,10 @@ Result<void> Writes::remove(const std::string& id) {
 Result<void> Writes::move(const std::string& id, const MoveRequest& request) {
   const Deadline deadline = discovery_.call_deadline();
   return requests_.retry_on_stale_route(
-      deadline, [&] { return route_move(structure_.forest, structure_.directory, id, request); },
+      deadline,
+      [&](const Directory& directory) {
+        return route_move(structure_.forest, directory, id, request);
+      },
       [&](Part& part) { return change(std::move(part), deadline); });
 }
 
@@ -51,7 +57,10 @@ template <class Edge>
 Result<void> Writes::ask_to_update(const std::vector<Edge>& edges, std::optional<Time> stamp) {
   const Deadline deadline = discovery_.call_deadline();
   return requests_.retry_on_stale_route(
-      deadline, [&] { return route_update(structure_.forest, structure_.directory, edges, stamp); },
+      deadline,
+      [&](const Directory& directory) {
+        return route_update(structure_.forest, directory, edges, stamp);
+      },
       [&](std::vector<Part>& parts) { return requests_.change(parts, deadline); });
 }
 
@@ -71,8 +80,8 @@ Result<void> Writes::publish(const std::vector<EdgeUpdate>& edges, std::optional
   auto updated = structure_.forest.update(edges, stamp);
   if (updated || !is_elsewhere(updated.error())) return updated;
   const Deadline deadline = discovery_.call_deadline();
-  auto parts = requests_.planned(deadline, [&] {
-    return route_publish(structure_.forest, structure_.directory, edges, stamp);
+  auto parts = requests_.planned(deadline, [&](const Directory& directory) {
+    return route_publish(structure_.forest, directory, edges, stamp);
   });
   if (!parts) return tl::unexpected(std::move(parts.error()));
   Result<void> outcome;
@@ -91,14 +100,13 @@ Result<void> Writes::correlate(const std::string& id, const Correlation& correla
   const Deadline deadline = discovery_.call_deadline();
   return requests_.retry_on_stale_route(
       deadline,
-      [&]() -> Result<Part> {
+      [&](const Directory& directory) -> Result<Part> {
         const auto frame = structure_.forest.info(id);
         if (!frame) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
         if (auto ok = check_common_errors(correlation.common_errors); !ok) {
           return fail_at("frame " + quote(id), ok.error());
         }
-        return route_to(structure_.directory, frame->owner,
-                        Request{0, id, CorrelateRequest{correlation}});
+        return route_to(directory, frame->owner, Request{0, id, CorrelateRequest{correlation}});
       },
       [&](Part& part) { return change(std::move(part), deadline); });
 }
@@ -107,14 +115,15 @@ Result<void> Writes::forget(const std::string& partition) {
   const Deadline deadline = discovery_.call_deadline();
   // All reachable participants must be told.
   if (auto all = discovery_.await(deadline); !all) return all;
-  auto parts = requests_.planned(deadline, [&] { return route_forget(partition); });
+  auto parts = requests_.planned(
+      deadline, [&](const Directory& directory) { return route_forget(directory, partition); });
   if (!parts) return tl::unexpected(std::move(parts.error()));
   if (auto told = requests_.change(*parts, deadline); !told) return told;
   return member_.forget(partition);
 }
 
-Result<std::vector<Part>> Writes::route_forget(const std::string& partition) {
-  const Directory& directory = structure_.directory;
+Result<std::vector<Part>> Writes::route_forget(const Directory& directory,
+                                               const std::string& partition) {
   if (!directory.owner(partition)) {
     return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
   }

@@ -41,7 +41,8 @@ class Writes {
   template <class Edge>
   [[nodiscard]] Result<void> ask_to_update(const std::vector<Edge>& edges,
                                            std::optional<Time> stamp);
-  [[nodiscard]] Result<std::vector<Part>> route_forget(const std::string& partition);
+  [[nodiscard]] Result<std::vector<Part>> route_forget(const Directory& directory,
+                                                       const std::string& partition);
 
   Structure& structure_;
   Discovery& discovery_;

@@ -46,7 +46,7 @@ Result<void> Forest::correlate(std::string_view id, const Correlation& correlati
   if (auto ok = check_common_errors(correlation.common_errors); !ok) {
     return fail_at("frame " + quote(id), ok.error());
   }
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   impl_->say_correlation(*slot, correlation);
@@ -58,7 +58,7 @@ Result<void> Forest::resume(std::string_view id, const StoredCorrelation& correl
   auto ok = check_common_errors(correlation.said.common_errors);
   if (ok && correlation.observed) ok = check_common_errors(correlation.observed->common_errors);
   if (!ok) return fail_at("frame " + quote(id), ok.error());
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   HeldVersion& fresh = impl_->push_held(*slot, impl_->frames_.newest_value(*slot).X_PC);
@@ -146,7 +146,7 @@ Transform Forest::Impl::whole(const Transform& X_PC, const Correlation& correlat
 
 Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Time> stamp,
                             std::uint64_t seen) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   std::vector<std::uint32_t> slots;
   for (const Revision& edge : edges) {
     const auto slot = impl_->frames_.held_slot(edge.id);

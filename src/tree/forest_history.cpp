@@ -190,7 +190,7 @@ void Forest::Impl::forget_history(HeldVersion& fresh) {
 
 Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   if (auto ok = check_timing(timing); !ok) return fail_at("frame " + quote(id), ok.error());
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   HeldVersion& fresh = impl_->push_held(*slot, impl_->frames_.newest_value(*slot).X_PC);
@@ -203,7 +203,7 @@ Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
 
 Result<void> Forest::set_default_timing(const EdgeTiming& timing) {
   if (auto ok = check_timing(timing); !ok) return ok;
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   impl_->default_timing_ = timing;
   return {};
 }

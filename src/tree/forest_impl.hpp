@@ -1,7 +1,5 @@
 #pragma once
 
-#include <mutex>
-
 #include "tree/epoch.hpp"
 #include "tree/forest.hpp"
 #include "tree/frames.hpp"
@@ -36,88 +34,94 @@ class Forest::Impl {
     const Version* frame;
     const Version* above;
   };
-  [[nodiscard]] Pair newest_pair(std::string_view id, std::string_view parent) const;
+  [[nodiscard]] Pair newest_pair(std::string_view id, std::string_view parent) const
+      TFDUDE_REQUIRES(mutex_);
 
   /// Checks that the parent (empty: none) is allowed for the frame. @return kCycle.
-  [[nodiscard]] Result<void> check_no_cycle(const Pair& pair) const;
+  [[nodiscard]] Result<void> check_no_cycle(const Pair& pair) const TFDUDE_REQUIRES(mutex_);
 
   /// The parent's slot; a new absent one if the id is not interned; kNoSlot for an empty id.
-  std::uint32_t parent_slot(const Pair& pair);
+  std::uint32_t parent_slot(const Pair& pair) TFDUDE_REQUIRES(mutex_);
 
   /// Creates a name for an id that is not interned, on a slot whose next version is to get it.
-  const Name* intern(std::string_view id);
+  const Name* intern(std::string_view id) TFDUDE_REQUIRES(mutex_);
 
   /// Pushes a copy of the newest version, to be changed before commit().
-  HeldVersion& push_held(std::uint32_t slot, const Transform& X_PC);
-  Version& push_remote(std::uint32_t slot);
+  HeldVersion& push_held(std::uint32_t slot, const Transform& X_PC) TFDUDE_REQUIRES(mutex_);
+  Version& push_remote(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
 
   /// Moves the slot with this fresh version to another parent (kNoSlot: none).
-  void relink(Version& fresh, std::uint32_t parent);
+  void relink(Version& fresh, std::uint32_t parent) TFDUDE_REQUIRES(mutex_);
 
   /// Makes the frame in the slot absent; frames below it become roots.
-  void make_absent(std::uint32_t slot);
+  void make_absent(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
 
   /// Makes everything pushed visible at once.
-  void commit();
-  void commit_structure();
+  void commit() TFDUDE_REQUIRES(mutex_);
+  void commit_structure() TFDUDE_REQUIRES(mutex_);
 
   /// Updates one edge, given by its newest version.
   [[nodiscard]] Result<void> update_one(const HeldVersion& edge, const Transform& X_PC,
-                                        std::optional<Time> stamp);
-  [[nodiscard]] bool may_be_moving(const HeldVersion& edge) const {
+                                        std::optional<Time> stamp) TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool may_be_moving(const HeldVersion& edge) const TFDUDE_REQUIRES(mutex_) {
     return edge.samples != nullptr || default_timing_.moving;
   }
 
   /// Updates all as one commit, or none; `frame` gives the id or the handle of an update.
   template <class Update, class Frame>
   [[nodiscard]] Result<void> update_all(const std::vector<Update>& edges, Frame frame,
-                                        std::optional<Time> stamp);
+                                        std::optional<Time> stamp) TFDUDE_REQUIRES(mutex_);
   /// The edges' values, with the given parts replaced.
   [[nodiscard]] Result<std::vector<EdgeUpdate>> completed(
-      const std::vector<PartialUpdate>& edges) const;
+      const std::vector<PartialUpdate>& edges) const TFDUDE_REQUIRES(mutex_);
 
   // History (forest_history.cpp).
 
   /// The stamp for an update of all these edges: the given one, or, if one is needed, the clock's,
   /// later than all their samples.
   [[nodiscard]] Result<std::int64_t> stamp_for(const std::uint32_t* slots, std::size_t count,
-                                               std::optional<Time> given);
-  [[nodiscard]] const EdgeTiming& timing_of(const HeldVersion& edge) const {
+                                               std::optional<Time> given) TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] const EdgeTiming& timing_of(const HeldVersion& edge) const TFDUDE_REQUIRES(mutex_) {
     return edge.samples != nullptr ? edge.samples->timing() : default_timing_;
   }
   /// @return kInvalidInput (naming both times) if the stamp is too far ahead of the clock; counts
   ///   it
-  [[nodiscard]] Result<void> check_ahead(const HeldVersion& edge, std::int64_t stamp);
+  [[nodiscard]] Result<void> check_ahead(const HeldVersion& edge, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
   /// Pushes a checked update: a sample if the edge is dynamic or becomes so, otherwise the value
   /// for all times.
-  void push_value(std::uint32_t slot, const Transform& X_PC, std::int64_t stamp);
+  void push_value(std::uint32_t slot, const Transform& X_PC, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
   /// Makes the fresh version static and clears its history, but keeps its timing.
-  void forget_history(HeldVersion& fresh);
+  void forget_history(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
   /// Retires a history with all its samples. If the newest sample is also the newest version, that
   /// one is superseded next.
-  void give_back(SampleHistory* samples, std::uint32_t slot);
+  void give_back(SampleHistory* samples, std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
 
   // Values from another forest (forest_mirror.cpp).
 
   /// Pushes a value of one edge. @return whether it is new here
-  bool push_told(const HeldVersion& edge, const PushedValue& value, bool replace);
+  bool push_told(const HeldVersion& edge, const PushedValue& value, bool replace)
+      TFDUDE_REQUIRES(mutex_);
   bool push_told_sample(const HeldVersion& edge, const Transform& X_PC, std::int64_t stamp,
-                        bool replace);
-  void begin_told_history(std::uint32_t slot, const PushedValue& value);
+                        bool replace) TFDUDE_REQUIRES(mutex_);
+  void begin_told_history(std::uint32_t slot, const PushedValue& value) TFDUDE_REQUIRES(mutex_);
 
   // Correlations (forest_correlation.cpp).
 
   /// Sets the correlation of the fresh version; null for none.
-  void set_correlation(HeldVersion& fresh, std::unique_ptr<EdgeCorrelation> correlation);
+  void set_correlation(HeldVersion& fresh, std::unique_ptr<EdgeCorrelation> correlation)
+      TFDUDE_REQUIRES(mutex_);
   /// Drops what an observation has set for the edge, with its value.
-  void end_revision(HeldVersion& fresh) {
+  void end_revision(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_) {
     if (fresh.correlation != nullptr && fresh.correlation->revised) correlate_as_said(fresh);
   }
-  void correlate_as_said(HeldVersion& fresh);
+  void correlate_as_said(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
   /// Pushes the newest value again, with another correlation.
-  void say_correlation(std::uint32_t slot, const Correlation& said);
+  void say_correlation(std::uint32_t slot, const Correlation& said) TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] Result<void> check_revision(const HeldVersion& edge, const Revision& revision,
-                                            std::optional<Time> stamp, std::uint64_t seen);
+                                            std::optional<Time> stamp, std::uint64_t seen)
+      TFDUDE_REQUIRES(mutex_);
   /// The value with the whole covariance of an edge, except for common errors of declared sources.
   /// It is stored for an observed edge if the common errors of observations are not.
   [[nodiscard]] static Transform whole(const Transform& X_PC, const Correlation& correlation);
@@ -127,39 +131,45 @@ class Forest::Impl {
   }
   [[nodiscard]] static ChangedEdge kept(const HeldVersion& edge);
   /// Replaces the dynamic edge's sample with that stamp, if there is one.
-  void replace_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
+  void replace_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
 
   Frames frames_;
-  EdgeTiming default_timing_;
+  EdgeTiming default_timing_ TFDUDE_GUARDED_BY(mutex_);
   /// With the owner of each.
-  std::vector<std::pair<const void*, std::function<void()>>> commit_listeners_;
-  std::function<void(const HistoryRestart&)> restart_listener_;
+  std::vector<std::pair<const void*, std::function<void()>>> commit_listeners_
+      TFDUDE_GUARDED_BY(mutex_);
+  std::function<void(const HistoryRestart&)> restart_listener_ TFDUDE_GUARDED_BY(mutex_);
   std::atomic<std::uint64_t> structure_version_{0};
   mutable WriteLock mutex_;
-  Graph graph_;
+  Graph graph_ TFDUDE_GUARDED_BY(mutex_);
 
  private:
   template <class T>
-  T& push(std::uint32_t slot);
-  void append_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
-  void restart_history(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
-  void insert_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp);
-  void show_commit();
-  void tell_commit() const {
+  T& push(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
+  void append_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
+  void restart_history(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
+  void insert_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
+  void show_commit() TFDUDE_REQUIRES(mutex_);
+  void tell_commit() const TFDUDE_REQUIRES(mutex_) {
     for (const auto& [whose, listener] : commit_listeners_) listener();
   }
-  void drop_oldest(SampleHistory& samples);
-  void drop_samples(SampleHistory& samples);
-  void hang(Version& fresh, std::uint32_t parent) const;
-  void renew_depths(std::uint32_t top);
-  void release(Version& fresh);
-  void release_if_unused(std::uint32_t slot);
+  void drop_oldest(SampleHistory& samples) TFDUDE_REQUIRES(mutex_);
+  void drop_samples(SampleHistory& samples) TFDUDE_REQUIRES(mutex_);
+  void hang(Version& fresh, std::uint32_t parent) const TFDUDE_REQUIRES(mutex_);
+  void renew_depths(std::uint32_t top) TFDUDE_REQUIRES(mutex_);
+  void release(Version& fresh) TFDUDE_REQUIRES(mutex_);
+  void release_if_unused(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
 
-  StampClock clock_;
-  Reclaimer reclaimer_;
-  std::vector<const Name*> released_names_;  // by the current commit
-  std::vector<std::uint32_t> free_slots_;
-  std::vector<std::uint32_t> to_update_;  // edges of the current update; kept to reuse its memory
+  StampClock clock_ TFDUDE_GUARDED_BY(mutex_);
+  Reclaimer reclaimer_ TFDUDE_GUARDED_BY(mutex_);
+  std::vector<const Name*> released_names_ TFDUDE_GUARDED_BY(mutex_);  // by the current commit
+  std::vector<std::uint32_t> free_slots_ TFDUDE_GUARDED_BY(mutex_);
+  std::vector<std::uint32_t> to_update_
+      TFDUDE_GUARDED_BY(mutex_);  // edges of the current update; kept to reuse its memory
 };
 
 }  // namespace tfdude

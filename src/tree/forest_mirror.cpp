@@ -56,7 +56,7 @@ bool Forest::Impl::push_told(const HeldVersion& edge, const PushedValue& value, 
 
 void Forest::take(const std::vector<Handle>& edges, const std::vector<PushedValue>& values,
                   bool replace) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const auto edge_of = [&](const PushedValue& value) {
     const Version* edge =
         value.index < edges.size() ? impl_->frames_.newest_held(edges[value.index]) : nullptr;

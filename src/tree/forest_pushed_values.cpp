@@ -153,7 +153,7 @@ std::vector<HistoryInfo> Forest::histories(std::string_view id) const {
 }
 
 void Forest::on_commit(std::function<void()> listener, const void* whose) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   auto& all = impl_->commit_listeners_;
   all.erase(std::remove_if(all.begin(), all.end(),
                            [whose](const auto& one) { return one.first == whose; }),
@@ -162,7 +162,7 @@ void Forest::on_commit(std::function<void()> listener, const void* whose) {
 }
 
 void Forest::on_restart(std::function<void(const HistoryRestart&)> listener) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   impl_->restart_listener_ = std::move(listener);
 }
 

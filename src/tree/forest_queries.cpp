@@ -134,7 +134,7 @@ std::vector<FrameInfo> Forest::frames() const {
 }
 
 std::vector<FrameInfo> Forest::subtree(std::string_view id) const {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const epoch::Guard guard;
   const std::uint64_t commit = impl_->frames_.snapshot();
   const Version* top = impl_->frames_.present(id, commit);
@@ -147,7 +147,7 @@ std::vector<FrameInfo> Forest::subtree(std::string_view id) const {
 }
 
 Result<std::vector<std::string>> Forest::children(std::string_view id) const {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const Version* version = impl_->frames_.newest_named(id);
   if (version == nullptr || !version->present()) {
     return fail(Errc::kUnknownFrame, "no frame " + quote(id));
@@ -170,7 +170,7 @@ std::vector<std::string> Forest::roots() const {
 }
 
 std::vector<FrameInfo> Forest::waiting_for(std::string_view id) const {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const epoch::Guard guard;
   std::vector<FrameInfo> all;
   const Version* absent = impl_->frames_.newest_named(id);

@@ -11,7 +11,7 @@ Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Ow
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   // A version that counts as held carries a value, and there is none.
   if (owner == kHeldHere) return fail(Errc::kInvalidInput, "owner is this very forest");
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const Impl::Pair pair = impl_->newest_pair(id, parent);
   if (pair.frame != nullptr && pair.frame->held()) {
     return fail(Errc::kAlreadyExists, "frame " + quote(id) + " is held here");
@@ -32,7 +32,7 @@ Result<void> Forest::put_remote(std::string_view id, std::string_view parent, Ow
 }
 
 void Forest::drop_remote(std::string_view id, Owner owner) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const Version* there = impl_->frames_.newest_named(id);
   if (there == nullptr || !there->present() || there->owner != owner || owner == kHeldHere) return;
   impl_->make_absent(there->slot);

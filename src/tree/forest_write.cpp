@@ -148,7 +148,8 @@ void Forest::Impl::make_absent(std::uint32_t slot) {
 
 void Forest::Impl::renew_depths(std::uint32_t top) {
   if (graph_.is_leaf(top)) return;
-  const auto stale = [this](std::uint32_t child) {
+  // The caller holds the lock while the graph calls this.
+  const auto stale = [this](std::uint32_t child) TFDUDE_UNCHECKED_LOCKS {
     const Version& version = frames_.newest(child);
     if (version.depth == frames_.newest(version.parent).depth + 1) return false;
     Version& fresh = version.held()
@@ -200,7 +201,7 @@ Result<void> Forest::add(std::string_view id, std::string_view parent, const Tra
   if (auto ok = check_id(id, "id"); !ok) return ok;
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   if (!is_finite(X_PC)) return check_value(id, X_PC);
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const Impl::Pair pair = impl_->newest_pair(id, parent);
   if (pair.frame != nullptr && pair.frame->present()) {
     return fail(Errc::kAlreadyExists, "frame " + quote(id) + " exists already");
@@ -222,7 +223,7 @@ Result<void> Forest::add(std::string_view id, std::string_view parent, const Tra
 }
 
 Result<std::vector<std::string>> Forest::remove(std::string_view id) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const auto top = impl_->frames_.held_slot(id);
   if (!top) return tl::unexpected(top.error());
   const auto slots = impl_->graph_.subtree(
@@ -236,7 +237,7 @@ Result<std::vector<std::string>> Forest::remove(std::string_view id) {
 }
 
 Result<void> Forest::release(std::string_view id) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   impl_->make_absent(*slot);
@@ -261,14 +262,14 @@ Result<void> Forest::Impl::update_one(const HeldVersion& edge, const Transform& 
 }
 
 Result<void> Forest::update(std::string_view id, const Transform& X_PC, std::optional<Time> stamp) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   return impl_->update_one(impl_->frames_.newest_value(*slot), X_PC, stamp);
 }
 
 Result<void> Forest::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const Version* version = impl_->frames_.newest_held(frame);
   if (version == nullptr) return tl::unexpected(impl_->frames_.held_slot(frame).error());
   return impl_->update_one(static_cast<const HeldVersion&>(*version), X_PC, stamp);
@@ -305,18 +306,18 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
 }
 
 Result<void> Forest::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   return impl_->update_all(edges, &EdgeUpdate::id, stamp);
 }
 
 Result<void> Forest::update(const std::vector<HandleUpdate>& edges, std::optional<Time> stamp) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   return impl_->update_all(edges, &HandleUpdate::frame, stamp);
 }
 
 Result<void> Forest::update_partial(const std::vector<PartialUpdate>& edges,
                                     std::optional<Time> stamp) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   const auto whole = impl_->completed(edges);
   if (!whole) return tl::unexpected(whole.error());
   return impl_->update_all(*whole, &EdgeUpdate::id, stamp);
@@ -324,14 +325,14 @@ Result<void> Forest::update_partial(const std::vector<PartialUpdate>& edges,
 
 Result<void> Forest::update_correlated(const std::vector<CorrelatedUpdate>& edges,
                                        std::optional<Time> stamp) {
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   return impl_->update_all(edges, &CorrelatedUpdate::frame, stamp);
 }
 
 Result<void> Forest::move(std::string_view id, std::string_view parent,
                           const std::optional<Transform>& X_PC, std::uint64_t lamport_time) {
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
-  const std::lock_guard lock(impl_->mutex_);
+  const Writing lock(impl_->mutex_);
   if (X_PC && !is_finite(*X_PC)) return check_value(id, *X_PC);
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());

@@ -5,14 +5,12 @@
 namespace tfdude::fastdds {
 
 std::unique_ptr<Channel<Update>> FastDdsTransport::update_channel(const std::string& partition) {
-  return std::make_unique<StreamChannel<Update, wire::Update>>(
-      writer(update_writers_, topics_.update, partition, "update_writer"));
+  return std::make_unique<StreamChannel<Update, wire::Update>>(update_writers_.open(partition));
 }
 
 std::unique_ptr<Channel<JointUpdate>> FastDdsTransport::joint_channel(
     const std::string& partition) {
-  return std::make_unique<StreamChannel<JointUpdate, wire::Joints>>(
-      writer(joint_writers_, topics_.joint, partition, "update_writer"));
+  return std::make_unique<StreamChannel<JointUpdate, wire::Joints>>(joint_writers_.open(partition));
 }
 
 }  // namespace tfdude::fastdds

@@ -254,22 +254,19 @@ void FastDdsTransport::publish(const Page& page) {
   }
 }
 
-std::shared_ptr<Writer> FastDdsTransport::writer(Writers& writers, edds::Topic* topic,
-                                                 const std::string& partition,
-                                                 const char* profile) {
-  const Lock lock(writers_mutex_);
-  auto& entry = writers[partition];
-  if (entry == nullptr) entry = std::make_shared<Writer>(context(), *topic, partition, profile);
-  return entry;
+WriterTable<std::string> FastDdsTransport::writers_of(edds::Topic*& topic, const char* profile) {
+  return WriterTable<std::string>([this, &topic, profile](const std::string& partition) {
+    return std::make_shared<Writer>(context(), *topic, partition, profile);
+  });
 }
 
 void FastDdsTransport::prepare(const std::string& partition) {
-  (void)writer(request_writers_, topics_.request, partition, "call_writer");
+  (void)request_writers_.open(partition);
 }
 
 Result<void> FastDdsTransport::send(const std::string& partition, const Request& request,
                                     Deadline deadline) {
-  const auto to = writer(request_writers_, topics_.request, partition, "call_writer");
+  const auto to = request_writers_.open(partition);
   thread_local wire::Request sample;
   write_wire(request, partition, sample);
   return send(*to, partition, &sample, deadline);
@@ -277,14 +274,14 @@ Result<void> FastDdsTransport::send(const std::string& partition, const Request&
 
 Result<void> FastDdsTransport::send(const std::string& partition, const Update& update,
                                     Deadline deadline) {
-  const auto to = writer(update_writers_, topics_.update, partition, "update_writer");
+  const auto to = update_writers_.open(partition);
   wire::Update sample = to_wire(update);
   return send(*to, partition, &sample, deadline);
 }
 
 Result<void> FastDdsTransport::send(const std::string& partition, const JointUpdate& update,
                                     Deadline deadline) {
-  const auto to = writer(joint_writers_, topics_.joint, partition, "update_writer");
+  const auto to = joint_writers_.open(partition);
   wire::Joints sample = to_wire(update);
   return send(*to, partition, &sample, deadline);
 }
@@ -310,12 +307,8 @@ Result<void> FastDdsTransport::send(Writer& writer, const std::string& partition
 }
 
 Result<void> FastDdsTransport::flush(Deadline deadline) {
-  std::vector<std::pair<std::string, std::shared_ptr<Writer>>> streams;
-  {
-    const Lock lock(writers_mutex_);
-    streams.assign(update_writers_.begin(), update_writers_.end());
-    streams.insert(streams.end(), joint_writers_.begin(), joint_writers_.end());
-  }
+  auto streams = update_writers_.all();
+  for (auto& stream : joint_writers_.all()) streams.push_back(std::move(stream));
   Result<void> outcome;
   for (const auto& [partition, stream] : streams) {
     // Who is silent is not waited for; what it had acknowledged before is none the less.
@@ -330,30 +323,20 @@ Result<void> FastDdsTransport::flush(Deadline deadline) {
 
 // --- replying ---
 
-std::shared_ptr<Writer> FastDdsTransport::reply_writer(const PeerId& peer) {
-  const std::shared_lock lock(reply_mutex_);
-  const auto known = reply_writers_.find(peer);
-  return known != reply_writers_.end() ? known->second : nullptr;
-}
-
 // Of one that has left nothing is to be made: it would be kept for ever.
 void FastDdsTransport::open_reply_writer(const PeerId& peer) {
-  if (there_.count(peer) == 0 || reply_writer(peer) != nullptr) return;
-  auto opened =
-      std::make_shared<Writer>(context(), *topics_.reply, reply_partition(peer), "call_writer");
-  const std::unique_lock lock(reply_mutex_);
-  reply_writers_.emplace(peer, std::move(opened));
+  if (there_.count(peer) != 0) (void)reply_writers_.open(peer);
 }
 
 void FastDdsTransport::reply(const PeerId& to, const Reply& reply) {
   wire::Reply sample = to_wire(reply);
-  if (const auto writer = reply_writer(to)) {
+  if (const auto writer = reply_writers_.find(to)) {
     if (writer->good()) writer->write(&sample);
     return;
   }
   worker_->post([this, to, late = std::move(sample)]() mutable {
     open_reply_writer(to);
-    const auto writer = reply_writer(to);
+    const auto writer = reply_writers_.find(to);
     if (writer != nullptr && writer->good()) writer->write(&late);
   });
 }
@@ -368,14 +351,7 @@ void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
   peers_.left(prefix);
   worker_->post([this, peer = peer_of(prefix)] {
     there_.erase(peer);
-    std::shared_ptr<Writer> writer;
-    {
-      const std::unique_lock lock(reply_mutex_);
-      const auto known = reply_writers_.find(peer);
-      if (known == reply_writers_.end()) return;
-      writer = std::move(known->second);
-      reply_writers_.erase(known);
-    }
+    const auto writer = reply_writers_.take(peer);
     while (writer.use_count() > 1) std::this_thread::yield();
   });
 }

@@ -1,11 +1,8 @@
 #pragma once
 
-#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
-#include <shared_mutex>
 #include <string>
 
 #include "tfdude/transport/fastdds.hpp"
@@ -17,6 +14,7 @@
 #include "transport/fastdds/peers.hpp"
 #include "transport/fastdds/push_channels.hpp"
 #include "transport/fastdds/worker.hpp"
+#include "transport/fastdds/writer_table.hpp"
 #include "transport/port.hpp"
 
 namespace tfdude::fastdds {
@@ -68,7 +66,6 @@ class FastDdsTransport final : public Transport {
     edds::Topic* directory = nullptr;
     edds::Topic* presence = nullptr;
   };
-  using Writers = std::map<std::string, std::shared_ptr<Writer>>;
 
   Result<void> create_participant();
   Result<void> create_endpoints();
@@ -78,9 +75,8 @@ class FastDdsTransport final : public Transport {
 
   void keep_in_touch();
   [[nodiscard]] Context context() const { return {*participant_, *profiles_, *gate_, *counters_}; }
-  std::shared_ptr<Writer> writer(Writers& writers, edds::Topic* topic, const std::string& partition,
-                                 const char* profile);
-  std::shared_ptr<Writer> reply_writer(const PeerId& peer);
+  /// A table whose writers are in the DDS partitions of their names.
+  WriterTable<std::string> writers_of(edds::Topic*& topic, const char* profile);
   void open_reply_writer(const PeerId& peer);
   Result<void> send(Writer& writer, const std::string& partition, void* sample,
                     Deadline deadline) const;
@@ -107,17 +103,18 @@ class FastDdsTransport final : public Transport {
   PeerId self_{};
   Topics topics_;
 
-  Mutex presence_mutex_;
+  Mutex presence_mutex_{LockRank::kAnnouncing};
   int looks_ TFDUDE_GUARDED_BY(presence_mutex_) = 0;  // since it last spoke
   std::optional<wire::Presence> said_
       TFDUDE_GUARDED_BY(presence_mutex_);  // what this participant serves, as last announced
 
-  Mutex writers_mutex_;  // of the three that follow
-  Writers request_writers_;
-  Writers update_writers_;
-  Writers joint_writers_;
-  std::shared_mutex reply_mutex_;
-  std::map<PeerId, std::shared_ptr<Writer>> reply_writers_;
+  WriterTable<std::string> request_writers_{writers_of(topics_.request, "call_writer")};
+  WriterTable<std::string> update_writers_{writers_of(topics_.update, "update_writer")};
+  WriterTable<std::string> joint_writers_{writers_of(topics_.joint, "update_writer")};
+  WriterTable<PeerId> reply_writers_{[this](const PeerId& peer) {
+    return std::make_shared<Writer>(context(), *topics_.reply, reply_partition(peer),
+                                    "call_writer");
+  }};
   std::set<PeerId> there_;  // who was met and has not left; only the worker's
 
   std::unique_ptr<OwnedFilters> filters_;

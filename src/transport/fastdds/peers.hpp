@@ -116,7 +116,7 @@ class Peers {
 
   const Tell there_;
   const Tell gone_;
-  mutable Mutex mutex_;
+  mutable Mutex mutex_{LockRank::kReporting};  // also while reporting, to keep the order
   std::map<PeerId, Server> servers_ TFDUDE_GUARDED_BY(mutex_);
   Clock::time_point last_met_ TFDUDE_GUARDED_BY(mutex_){};
   Clock::time_point last_look_ TFDUDE_GUARDED_BY(mutex_) = Clock::now();

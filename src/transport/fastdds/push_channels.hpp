@@ -32,7 +32,7 @@ class PushChannels {
   const Context context_;
   edds::Topic& topic_;
   const Calls calls_;
-  Mutex mutex_;
+  Mutex mutex_{LockRank::kChannels};
   std::map<std::uint64_t, std::unique_ptr<Reader<wire::State>>> readers_ TFDUDE_GUARDED_BY(mutex_);
   std::map<std::uint64_t, std::shared_ptr<Writer>> writers_ TFDUDE_GUARDED_BY(mutex_);
 };

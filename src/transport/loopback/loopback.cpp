@@ -110,7 +110,7 @@ class LoopbackNetwork::Hub {
   }
 
   // Held while presences and pages are told, so that who joins hears nothing older after something newer.
-  Mutex telling_mutex_;
+  Mutex telling_mutex_{LockRank::kReporting};
   Mutex members_mutex_;  // of the list and of what the members say; never held during a call
 
  private:

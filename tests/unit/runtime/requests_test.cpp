@@ -31,8 +31,8 @@ constexpr std::uint64_t kFarEpoch = std::uint64_t{1} << 62U;  // that is never r
 Result<void> add_finger(Rig& rig, const Deadline& deadline) {
   return rig.requests.retry_on_stale_route(
       deadline,
-      [&] {
-        return route_add(rig.structure.forest, rig.structure.directory, "finger",
+      [&](const Directory& directory) {
+        return route_add(rig.structure.forest, directory, "finger",
                          AddRequest{"hand", along_x(1)}, "");
       },
       [&](Part& part) {
