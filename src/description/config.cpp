@@ -26,7 +26,7 @@ constexpr std::array<std::string_view, 10> kFrameKeys = {
 constexpr std::array<std::string_view, 6> kHistoryKeys = {"span",   "count",     "process_noise",
                                                           "moving", "max_ahead", "restart_after"};
 
-// Reads what a daemon's file may hold.
+// Reads the configuration file of a daemon.
 class Reader : public YamlFields {
  public:
   using YamlFields::YamlFields;
@@ -68,7 +68,7 @@ Result<void> Reader::max_ahead(const Fields& entries, const std::string& what,
   return {};
 }
 
-// What is left out is as in `timing`.
+// Keys that are left out keep their values of `timing`.
 Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
                                    EdgeTiming timing) const {
   const std::string what = place + ": history";
@@ -110,7 +110,8 @@ Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
   return timing;
 }
 
-// A list of columns, each the error for one standard deviation of one dimension of the source.
+// Reads a list of columns. Each is the edge's error for one standard deviation of one dimension of
+// the source.
 Result<CommonError> Reader::common_error(const std::string& source, const Field& field,
                                          const std::string& place) const {
   const std::string what = place + ": source " + tfdude::quote(source);
@@ -164,7 +165,7 @@ Result<Correlation> Reader::correlation(const Fields& entries, const std::string
 Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index,
                                 const EdgeTiming& timing) const {
   const std::string nth = "frames[" + std::to_string(index) + "]";
-  // The message of a bad key names the frame too, where the id can be made out.
+  // Messages about a bad key also name the frame, if its id can be read.
   const auto is_id = [](const auto& entry) {
     return entry.first.IsScalar() && entry.first.Scalar() == "id";
   };

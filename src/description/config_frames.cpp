@@ -10,7 +10,7 @@
 namespace tfdude {
 namespace {
 
-// Frames' ids, or joints' names, with the index of their frame.
+// The index of a frame, by the frame's id or by the name of its joint.
 using Names = std::unordered_map<std::string_view, std::size_t>;
 
 Result<void> check_names(const Config& config) {
@@ -35,7 +35,7 @@ Result<void> check_names(const Config& config) {
 
 }  // namespace
 
-// Each frame climbs until where another has been that found its root.
+// Each frame climbs until it reaches a root, or a frame that an earlier climb has visited.
 Result<void> check_no_cycle(const Config& config) {
   const auto& frames = config.frames;
   Names index;

@@ -4,7 +4,7 @@
 
 namespace tfdude {
 
-/// @return kInvalidInput naming the place and frame: a parent that lies below it.
+/// @return kInvalidInput naming place and frame: its parent is the frame itself or lies below it.
 [[nodiscard]] Result<void> check_no_cycle(const Config& config);
 
 }  // namespace tfdude

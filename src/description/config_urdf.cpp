@@ -13,14 +13,14 @@ constexpr std::array<std::string_view, 11> kUrdfKeys = {"file",  "root",        
                                                         "links", "strict_limits", "joints"};
 constexpr std::array<std::string_view, 5> kRootKeys = {"xyz", "rpy", "quat", "stddev", "cov"};
 constexpr std::array<std::string_view, 3> kJointKeys = {"position", "stddev", "origin"};
-// As files of before have it.
+// The key in files of earlier versions.
 constexpr const char* kFormerOrigin = "mount";
 constexpr std::array<std::string_view, 3> kFormerJointKeys = {"position", "stddev", kFormerOrigin};
 constexpr std::array<std::string_view, 2> kOriginKeys = {"stddev", "cov"};
 
 }  // namespace
 
-// Where the robot's root link is.
+// Reads the parent frame of the robot's root link, and the root link's pose in it.
 Result<void> UrdfFields::stand(const YAML::Node& node, const Fields& entries,
                                const std::string& place, UrdfPart& part) const {
   if (entries.find("root") == entries.end()) {

@@ -9,7 +9,7 @@ namespace tfdude {
 /// Reads the entries of a configuration's key `urdf`.
 class UrdfFields : public YamlFields {
  public:
-  /// @param folder  of the YAML file, which relative paths begin at
+  /// @param folder  the YAML file's folder; relative paths start there
   UrdfFields(std::string name, std::string folder)
       : YamlFields(std::move(name)), folder_(std::move(folder)) {}
 

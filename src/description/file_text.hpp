@@ -6,8 +6,9 @@
 
 namespace tfdude {
 
-/// All of a file, of 64 MiB at most: room for half a million frames, and an end to /dev/zero.
-/// @return kConfig naming it: missing, a directory, not readable, longer.
+/// Reads a whole file of at most 64 MiB. That is room for half a million frames, and also stops
+/// reading /dev/zero.
+/// @return kConfig naming the file: missing, a directory, not readable, too long.
 [[nodiscard]] Result<std::string> read_text(const std::string& path);
 
 }  // namespace tfdude

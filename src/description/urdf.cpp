@@ -21,7 +21,7 @@ tl::unexpected<Error> link_error(const UrdfTree& tree, const UrdfTree::Link& lin
                     "link " + quote(link.name) + ": " + message);
 }
 
-// The root link is in no frame of the robot itself.
+// The given root must not be a frame of the robot itself, and the part must have the root link.
 Result<void> check_root(const UrdfTree& tree, const UrdfPart& part,
                         const std::vector<std::size_t>& links) {
   if (part.root.empty()) return {};
@@ -84,7 +84,7 @@ Result<std::vector<FrameSpec>> read_frames(const std::string& text, const UrdfPa
 }  // namespace
 
 Result<std::vector<FrameSpec>> parse_urdf(const std::string& text, const UrdfPart& part) {
-  // What messages say is for people to read.
+  // Messages contain the name of the file, so it must be printable.
   UrdfPart named = part;
   named.file = printable(part.file);
   try {

@@ -10,7 +10,7 @@
 namespace tfdude {
 namespace {
 
-// Of positions and limits [rad or m], multipliers and offsets: with it no variance overflows.
+// The largest position or limit [rad or m], multiplier and offset. Up to it no variance overflows.
 constexpr double kLargest = 1e9;
 
 std::string written(double value) {
@@ -19,7 +19,7 @@ std::string written(double value) {
   return out.str();
 }
 
-bool is_sane(double value) { return std::abs(value) <= kLargest; }  // not so for NaN
+bool is_sane(double value) { return std::abs(value) <= kLargest; }  // false for NaN
 
 std::optional<JointType> moving_type(const urdf::Joint& joint) {
   switch (joint.type) {
@@ -90,11 +90,12 @@ class EdgeReader {
   const UrdfPart& part_;
   const UrdfJoint nothing_;
   std::vector<UrdfEdge> edges_;
-  std::vector<bool>
-      chosen_;  // joints of the part: what others mimic is for those to judge who have them
+  // The joints of the part. Broken mimics of other joints are no error here: the owner of such a
+  // joint reports them.
+  std::vector<bool> chosen_;
 };
 
-// All but what follows from other joints.
+// Reads everything that does not depend on other joints.
 Result<void> EdgeReader::read(Index i) {
   const urdf::Joint& urdf = urdf_of(i);
   const urdf::Pose& origin = urdf.parent_to_joint_origin_transform;
@@ -143,7 +144,7 @@ Result<void> EdgeReader::read_limits(Index i, JointSpec& joint) const {
   if (!(limits->lower <= limits->upper)) {
     return tree_.joint_error(i, "limits " + both + " are upside down");
   }
-  // What is further away than any position can be is none.
+  // A limit beyond every valid position is no limit.
   joint.limits->lower = std::max(limits->lower, -kLargest);
   joint.limits->upper = std::min(limits->upper, kLargest);
   if (joint.limits->lower <= -kLargest && joint.limits->upper >= kLargest) joint.limits.reset();
@@ -151,7 +152,7 @@ Result<void> EdgeReader::read_limits(Index i, JointSpec& joint) const {
   return tree_.joint_error(i, "limits " + both + " are beyond 1e9");
 }
 
-// Where both ends say something of where it may be.
+// The limits, if there is one at each end; otherwise none.
 std::optional<JointLimits> range_of(const JointSpec& joint) {
   const auto& limits = joint.limits;
   const bool open = limits && (limits->lower <= -kLargest || limits->upper >= kLargest);
@@ -182,7 +183,7 @@ Result<void> EdgeReader::read_position(Index i, JointSpec& joint) const {
   return {};
 }
 
-// As it stands in the file.
+// The mimic as the file has it: its joint may itself mimic another one.
 Result<Mimic> EdgeReader::read_mimic(Index i) const {
   const urdf::JointMimic& mimic = *urdf_of(i).mimic;
   const std::string what = "mimics " + quote(mimic.joint_name);
@@ -194,7 +195,8 @@ Result<Mimic> EdgeReader::read_mimic(Index i) const {
   return Mimic{mimic.joint_name, mimic.multiplier, mimic.offset};
 }
 
-// Follows the chain of joints that mimic each other to the one that mimics none, and goes back along it.
+// Follows the chain of mimics to the joint that mimics none. Then goes back along the chain and
+// makes each joint mimic that last joint directly.
 Result<void> EdgeReader::resolve(Index i) {
   std::vector<Index> chain;
   std::vector<Mimic> links;
@@ -230,7 +232,8 @@ Result<void> EdgeReader::resolve(Index i) {
   return {};
 }
 
-// Both joints of a mimic have errors of one source; and the one that follows is where the other says.
+// Both joints of a mimic share an error source. The follower's position and variance are computed
+// from the other joint.
 Result<void> EdgeReader::couple(Index i) {
   auto& joint = edges_[i].joint;
   if (!joint || !joint->mimic) return {};

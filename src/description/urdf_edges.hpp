@@ -10,17 +10,17 @@
 
 namespace tfdude {
 
-/// What a URDF's joint makes of the edge to its child link.
+/// The edge from a URDF joint's parent link to its child link.
 struct UrdfEdge {
   Transform X_PJ;  ///< its origin
   std::optional<JointSpec> joint;
 };
 
-/// The edges of all joints, in the order of tree.joints: what a joint mimics may be outside the part. What those outside mimic
-/// may be broken.
-/// @param links  that the part has
-/// @return kInvalidInput naming file, line and joint: an origin, axis, limit, mimic, or what the part says of a joint, that
-///   breaks its rule.
+/// The edges of all joints, in the order of tree.joints. Joints outside the part are read as well,
+/// because a joint of the part may mimic one of them. A broken mimic outside the part is no error.
+/// @param links  the links of the part
+/// @return kInvalidInput naming file, line and joint: an invalid origin, axis, limit or mimic, or
+/// invalid values of the part for a joint.
 [[nodiscard]] Result<std::vector<UrdfEdge>> read_urdf_edges(const UrdfTree& tree,
                                                             const UrdfJoints& joints,
                                                             const UrdfPart& part,

@@ -15,8 +15,8 @@
 namespace tfdude {
 namespace {
 
-// Keeps what urdfdom says, which it would print. The output of console_bridge is the process's: what other threads say goes
-// where it went.
+// Collects urdfdom's messages instead of printing them. The output handler of console_bridge
+// belongs to the whole process, so messages of other threads go to the previous handler.
 class Listener final : public console_bridge::OutputHandler {
  public:
   Listener() { console_bridge::useOutputHandler(this); }
@@ -41,7 +41,7 @@ class Listener final : public console_bridge::OutputHandler {
   std::vector<std::string> said_;
 };
 
-// The joint is the one that some message names in brackets.
+// The error names the joint that a message has in brackets, if there is one.
 tl::unexpected<Error> refused(const UrdfText& text, const std::string& file,
                               const std::vector<std::string>& said) {
   const std::string reason = said.empty() ? "not a URDF" : printable(said.front());
@@ -65,7 +65,7 @@ Result<UrdfJoints> read_urdf_joints(const UrdfText& text, const std::string& fil
   const Listener listener;
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text.cleaned);
   if (!model) return refused(text, file, listener.said());
-  // Links own those below them: without this a long chain would be destroyed by as deep a recursion.
+  // A link owns the links below it. Without this, destroying a long chain would recurse as deep.
   for (const auto& [name, link] : model->links_) link->child_links.clear();
   return model->joints_;
 }

@@ -14,7 +14,7 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-// What urdfdom is shown of a joint's elements.
+// An element of a joint, and those of its attributes that urdfdom gets to see.
 struct Kept {
   const char* element;
   std::vector<const char*> attributes;
@@ -33,7 +33,7 @@ std::vector<Kept> kept_of(std::string_view type) {
   return kept;
 }
 
-// The first element of xacro, which is of another language.
+// Finds the first element of xacro: a file with macros is not yet a URDF.
 class XacroSearch final : public tinyxml2::XMLVisitor {
  public:
   [[nodiscard]] const XMLElement* found() const { return found_; }
@@ -47,7 +47,7 @@ class XacroSearch final : public tinyxml2::XMLVisitor {
   const XMLElement* found_ = nullptr;
 };
 
-// As XML has it: a tab or new line within an attribute is a space. Empty where there is none.
+// An attribute as XML defines it: a tab or line end in it is a space. Empty if there is none.
 std::string attribute(const XMLElement& element, const char* name) {
   const char* value = element.Attribute(name);
   std::string text = value == nullptr ? "" : value;
@@ -60,7 +60,7 @@ std::string described(const char* kind, const std::string& name) {
   return std::string(kind) + " " + quote(name);
 }
 
-// "XML_ERROR_MISMATCHED_ELEMENT" in the way of all messages.
+// Turns "XML_ERROR_MISMATCHED_ELEMENT" into the style of all messages.
 std::string reason(const tinyxml2::XMLDocument& document) {
   std::string name = document.ErrorName();
   constexpr std::string_view kStart = "XML_ERROR_";
@@ -124,7 +124,7 @@ class TextReader {
       if (const auto* again = part->NextSiblingElement(kept.element)) {
         return error(*again, what + ": <" + kept.element + "> is given twice");
       }
-      // A later URDF's; to pass over it would turn the frame.
+      // An attribute of later URDF versions. Ignoring it would give the frame a wrong rotation.
       if (part->Attribute("quat_xyzw") != nullptr) {
         return error(*part, what + ": quat_xyzw is not known; give rpy");
       }
@@ -143,7 +143,7 @@ class TextReader {
                                        const std::string& what) {
     printer_.OpenElement(kept.element);
     for (const char* name : kept.attributes) {
-      // urdfdom logs a bad number as a format for printf.
+      // urdfdom logs a bad number as a format of printf, so it must contain no percent sign.
       const std::string value = attribute(part, name);
       const bool names = std::strcmp(name, "link") == 0 || std::strcmp(name, "joint") == 0;
       if (!names && value.find('%') != std::string::npos) {
@@ -152,7 +152,7 @@ class TextReader {
       push(part, name);
     }
     if (kept.element == std::string_view("limit")) {
-      // urdfdom insists on them.
+      // urdfdom requires these attributes.
       printer_.PushAttribute("effort", "0");
       printer_.PushAttribute("velocity", "0");
     }

@@ -7,7 +7,7 @@
 
 namespace tfdude {
 
-/// What of a URDF concerns frames, as it stands in its file.
+/// The parts of a URDF that concern frames, as the file has them.
 struct UrdfText {
   struct Link {
     std::string name;
@@ -22,17 +22,17 @@ struct UrdfText {
 
   std::vector<Link> links;
   std::vector<Joint> joints;
-  std::string cleaned;  ///< a URDF of these alone: what else a robot has may be broken
+  std::string cleaned;  ///< a URDF with only these parts: all other parts may be malformed
 };
 
-/// The failing side of any Result, with its place in front: "arm.urdf:12: ...".
-/// @param line  zero where it is not known
+/// An error for any Result. Its message starts with the place: "arm.urdf:12: ...".
+/// @param line  zero if unknown
 [[nodiscard]] tl::unexpected<Error> urdf_error(Errc code, const std::string& file, int line,
                                                const std::string& message);
 
 /// @param file  for messages
-/// @return kConfig naming file and line: not XML, not a URDF, one for xacro; kInvalidInput: a link or joint without its name
-///   or links, an element that is given twice.
+/// @return kConfig naming file and line: not XML, not a URDF, or a file for xacro; kInvalidInput: a
+/// link or joint without a name, a joint without its links, a duplicate element.
 [[nodiscard]] Result<UrdfText> read_urdf_text(const std::string& text, const std::string& file);
 
 }  // namespace tfdude

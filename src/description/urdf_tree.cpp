@@ -7,7 +7,7 @@
 namespace tfdude {
 namespace {
 
-// The links from `top` down, but nothing below those that are ends.
+// The links from `top` down, without those below an end.
 std::vector<std::size_t> links_below(const UrdfTree& tree, std::size_t top,
                                      const std::vector<bool>& is_end) {
   std::vector<std::size_t> found;
@@ -62,7 +62,8 @@ Result<void> join(UrdfTree& tree, const UrdfText::Joint& said) {
   return {};
 }
 
-// Some joint of the cycle above a link that no root is above of.
+// Names a joint of the cycle that lies above the link. @param link  a link that has no root above
+// it
 tl::unexpected<Error> cycle(const UrdfTree& tree, std::size_t link) {
   std::vector<bool> seen(tree.links.size());
   while (!seen[link]) {
@@ -102,7 +103,7 @@ tl::unexpected<Error> refused(const UrdfTree& tree, const std::string& entry,
   return fail(Errc::kInvalidInput, tree.file + ": links " + quote(entry) + ": " + why);
 }
 
-// FROM..TO[..TO], or one link.
+// The links that an entry names: FROM..TO[..TO], or one link.
 Result<std::vector<std::size_t>> links_named(const UrdfTree& tree, const std::string& entry) {
   if (const auto whole = tree.link_index.find(entry); whole != tree.link_index.end()) {
     return std::vector<std::size_t>{whole->second};

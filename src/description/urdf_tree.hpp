@@ -10,13 +10,13 @@
 
 namespace tfdude {
 
-/// A robot's links and what joins them: one tree, whose names are known once each.
+/// A robot's links and joints: one tree, in which each name is unique.
 struct UrdfTree {
   struct Link {
     std::string name;
     int line = 0;
-    std::optional<std::size_t> joint;  ///< above it; none: the root link
-    std::vector<std::size_t> joints;   ///< below it
+    std::optional<std::size_t> joint;  ///< the joint above it; none: this is the root link
+    std::vector<std::size_t> joints;   ///< the joints below it
   };
   struct Joint {
     std::string name;
@@ -26,23 +26,24 @@ struct UrdfTree {
   };
 
   std::string file;
-  std::vector<Link> links;    ///< as they stand in the file
-  std::vector<Joint> joints;  ///< the same
+  std::vector<Link> links;    ///< in the order of the file
+  std::vector<Joint> joints;  ///< in the order of the file
   std::unordered_map<std::string, std::size_t> link_index;
   std::unordered_map<std::string, std::size_t> joint_index;
   std::size_t root = 0;
 
-  /// About a joint, naming file, line and joint.
+  /// An error of a joint, naming file, line and joint.
   [[nodiscard]] tl::unexpected<Error> joint_error(std::size_t joint,
                                                   const std::string& message) const;
 };
 
-/// @return kInvalidInput naming file, line and element: a name that is taken, an unknown link, a link with two parents, two
-///   roots, a cycle.
+/// @return kInvalidInput naming file, line and element: a duplicate name, an unknown link, a link
+/// with two parents, two roots, a cycle.
 [[nodiscard]] Result<UrdfTree> build_urdf_tree(const UrdfText& text, const std::string& file);
 
-/// The links of a part (UrdfPart::links), each after the one above it.
-/// @return kInvalidInput naming the file and the entry: an unknown link, an end that is not below, parts that overlap.
+/// The links of a part (UrdfPart::links); a parent comes before its children.
+/// @return kInvalidInput naming the file and the entry: an unknown link, an end that is not below
+/// the start, parts that overlap.
 [[nodiscard]] Result<std::vector<std::size_t>> select_links(
     const UrdfTree& tree, const std::vector<std::string>& entries);
 

@@ -12,7 +12,7 @@
 namespace tfdude {
 namespace {
 
-// The key whose line a complaint of TransformSpec::build() belongs to.
+// The key that an error message of TransformSpec::build() is about; its line is reported.
 std::string_view blamed_key(const std::string& message, const TransformSpec& spec) {
   const auto starts = [&](std::string_view word) { return message.rfind(word, 0) == 0; };
   if (starts("translation")) return "xyz";
@@ -27,7 +27,7 @@ std::string_view blamed_key(const std::string& message, const TransformSpec& spe
 
 tl::unexpected<Error> YamlFields::error(Errc code, const YAML::Mark& mark,
                                         const std::string& message) const {
-  // A key may be any bytes.
+  // A key may contain arbitrary bytes.
   return fail(code, place(mark) + ": " + printable(message));
 }
 

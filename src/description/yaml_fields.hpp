@@ -18,16 +18,16 @@ namespace tfdude {
 /// Reads the nodes of one YAML file, with errors that name the file, the line and the key.
 class YamlFields {
  public:
-  /// A key's value; where there is none, it is the key that has a place in the file.
+  /// A key's value, and its place in the file; the place of the key if the value is empty.
   struct Field {
     YAML::Node value;
     YAML::Mark mark;
   };
 
-  /// What a mapping holds, by key.
+  /// The entries of a mapping, by key.
   using Fields = std::map<std::string, Field, std::less<>>;
 
-  /// @param name  of the file, for messages
+  /// @param name  the file's name, for messages
   explicit YamlFields(std::string name) : name_(std::move(name)) {}
 
   [[nodiscard]] tl::unexpected<Error> error(Errc code, const YAML::Mark& mark,
@@ -35,10 +35,10 @@ class YamlFields {
 
  protected:
   [[nodiscard]] const std::string& name() const { return name_; }
-  /// The file and the line.
+  /// "FILE:LINE", or the file alone if the mark has no line.
   [[nodiscard]] std::string place(const YAML::Mark& mark) const;
 
-  /// A mapping of these keys; of any where none are given.
+  /// The entries of a mapping. @param allowed  the keys it may have; empty or left out: any
   template <std::size_t N>
   [[nodiscard]] Result<Fields> fields(const YAML::Node& map,
                                       const std::array<std::string_view, N>& allowed,
@@ -52,7 +52,7 @@ class YamlFields {
   [[nodiscard]] Result<std::string> text(const Field& field, const std::string& what) const;
   [[nodiscard]] Result<double> number(const YAML::Node& node, const std::string& what) const;
 
-  /// So many numbers under a key, if it is there.
+  /// A list of exactly N numbers under a key. Without the key, `out` stays as it is.
   template <std::size_t N>
   [[nodiscard]] Result<void> numbers(const Fields& fields, std::string_view key,
                                      const std::string& place,
@@ -61,10 +61,11 @@ class YamlFields {
                                     const std::string& place, std::optional<double>& out) const;
   [[nodiscard]] Result<void> flag(const Fields& fields, std::string_view key,
                                   const std::string& place, bool& out) const;
-  /// What is there under `key`, as an id.
+  /// The id under `key`, which must exist.
   [[nodiscard]] Result<std::string> id(const Fields& fields, std::string_view key,
                                        const std::string& place) const;
-  /// What xyz, rpy or quat, and stddev or cov say; identity and zero where they are not there.
+  /// The transform given by xyz, rpy or quat, and stddev or cov. Missing keys mean identity and
+  /// zero covariance.
   [[nodiscard]] Result<Transform> transform(const YAML::Node& node, const Fields& fields,
                                             const std::string& place) const;
 

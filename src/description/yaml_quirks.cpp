@@ -9,7 +9,7 @@
 namespace tfdude {
 namespace {
 
-// Notes where a document begins, and what else it holds is of no interest.
+// Records the start of a document, and ignores its contents.
 class DocumentStart final : public YAML::EventHandler {
  public:
   [[nodiscard]] const YAML::Mark& mark() const { return mark_; }
@@ -58,7 +58,8 @@ std::string plain_number(const std::string& text) {
   return number;
 }
 
-// Not by YAML::LoadAll(), which for "!!str ," finds one document after the other where it stands, and never ends.
+// Does not use YAML::LoadAll(): for "!!str ," it finds document after document without advancing,
+// and never returns.
 std::optional<YAML::Mark> second_document(const std::string& text) {
   std::istringstream stream(text);
   YAML::Parser parser(stream);
