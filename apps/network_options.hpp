@@ -9,7 +9,8 @@
 
 namespace tfdude::cli {
 
-/// How a program meets the others. What is not given here is taken from the environment (Options).
+/// Adds the options of discovery and the network. The environment provides those that are not given
+/// (Options).
 inline void add_network_options(CLI::App& app, Options& options) {
   app.add_option("--domain", options.domain, "DDS domain, 0 to 232 (else $TFDUDE_DOMAIN, else 0)")
       ->check(CLI::Range(0, 232));

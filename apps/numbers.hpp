@@ -9,7 +9,7 @@
 
 namespace tfdude::cli {
 
-/// Whether the whole of a text is one number.
+/// Whether a text is exactly one number.
 [[nodiscard]] inline bool is_number(const std::string& text) {
   if (text.empty() || std::isspace(static_cast<unsigned char>(text[0])) != 0) return false;
   char* end = nullptr;
@@ -17,16 +17,16 @@ namespace tfdude::cli {
   return end == text.c_str() + text.size();
 }
 
-/// Makes all options that take numbers, of all commands, refuse what is none: CLI11 takes an empty text for 0. To be called
-/// once all options are there.
+/// Makes all options that take numbers, of all commands, reject other text: CLI11 reads an empty
+/// text as 0. Call it after all options are added.
 inline void require_numbers(CLI::App& app) {
   for (CLI::Option* option : app.get_options([](CLI::Option* one) {
          const std::string type = one->get_type_name();
          const bool takes_text = type.rfind("TEXT", 0) == 0 || type.rfind("FILE", 0) == 0 ||
-                                 type.rfind("NAME", 0) == 0;  // with numbers, which are read later
+                                 type.rfind("NAME", 0) == 0;       // its numbers are checked later
          return one->get_items_expected_max() > 0 && !takes_text;  // a flag expects none
        })) {
-    // Before what else is checked of it, as its range.
+    // A transform runs before the other checks, such as that of the range.
     option->transform(CLI::Validator(
         [](const std::string& text) {
           return is_number(text) ? std::string() : "'" + text + "' is not a number";
@@ -36,7 +36,8 @@ inline void require_numbers(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands({})) require_numbers(*command);
 }
 
-/// The arguments in the order that CLI::App::parse() takes, "-.5" being written "-0.5", as CLI11 takes it for an option else.
+/// The arguments in the order that CLI::App::parse() expects. "-.5" becomes "-0.5", because CLI11
+/// would take it for an option.
 [[nodiscard]] inline std::vector<std::string> arguments_of(int argc, char** argv) {
   std::vector<std::string> arguments;
   for (int i = argc - 1; i > 0; --i) {

@@ -22,7 +22,7 @@ void print_error(std::string_view code, std::string_view message) {
   print(dump({{"error", {{"code", code}, {"message", message}}}}) + "\n");
 }
 
-// Those that end what goes on and on; main() has blocked them.
+// The signals that end a command that runs until interrupted; main() has blocked them.
 sigset_t signals_to_stop() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -31,19 +31,19 @@ sigset_t signals_to_stop() {
   return signals;
 }
 
-// A list of ids, a line each.
+// Prints a list of ids, one per line.
 int list(const Arguments& arguments, const char* key, const std::vector<std::string>& ids) {
   std::string text;
   for (const std::string& id : ids) text += id + "\n";
   return answer(arguments, {{key, ids}}, text);
 }
 
-// Where nobody serves anything, nobody has answered.
 std::string profile_of(const Options& options) {
   if (options.profile.empty()) return "the built-in profile";
   return "profile " + quote(options.profile);
 }
 
+// An empty answer without any partition counts as no answer. @return the exit status
 int none_there(Client& client, const Arguments& arguments, bool found) {
   if (found) return kDone;
   const auto partitions = client.partitions();
@@ -164,7 +164,7 @@ int run_partitions(Client& client, const Arguments& arguments) {
   for (const PartitionInfo& partition : *partitions) {
     json.push_back(partition_json(partition));
     text += partition.name;
-    // Nothing else is known of one that went before this process came.
+    // Only the name is known of a partition that was lost before this process started.
     if (!partition.host.empty()) {
       text += "  frames " + std::to_string(partition.frames) + "  host " + partition.host +
               "  pid " + std::to_string(partition.pid);
@@ -262,7 +262,7 @@ int run_exists(Client& client, const Arguments& arguments) {
 }
 
 int run_events(Client& client, const Arguments& arguments) {
-  // What is there already is no event.
+  // Completes discovery first, so that partitions that exist already are no events.
   (void)client.partitions();
   const auto subscription = client.on_change([&](const Change& change) {
     print(arguments.json ? dump(change_json(change)) + "\n"

@@ -17,10 +17,10 @@ inline constexpr int kRefused = 1;
 inline constexpr int kWrongUsage = 2;
 inline constexpr int kNoAnswer = 3;
 
-/// Of `correlate --source`: the source's name, and one column of the loading.
+/// Number of values of `correlate --source`: the source's name, and one column of the loading.
 inline constexpr int kSourceSize = 7;
 
-/// What the command line says.
+/// The command line.
 struct Arguments {
   Options options;
   bool json = false;
@@ -42,35 +42,35 @@ struct Arguments {
   int order = 2;
   ObserveOptions observe;
   bool unknown = false;              ///< correlation
-  std::vector<std::string> sources;  ///< of each column: its source's name and 6 numbers
-  std::string out;                   ///< the file of a picture
+  std::vector<std::string> sources;  ///< for each column: its source's name and 6 numbers
+  std::string out;                   ///< the picture's file
   int samples = 0;
-  double position = 0;  ///< of a joint [rad or m], and its
-  double joint_stddev = 0;
+  double position = 0;      ///< of a joint [rad or m]
+  double joint_stddev = 0;  ///< of this position [rad or m]
 };
 
 [[nodiscard]] Time wall_clock();
 
-/// A stamp as written on the command line: decimal seconds since the epoch, exact to nanoseconds, or, where negative,
-/// before now. @return kInvalidInput naming the text.
+/// Reads a stamp of the command line: decimal seconds since the epoch, exact to nanoseconds. A
+/// negative number counts back from now. @return kInvalidInput naming the text.
 [[nodiscard]] Result<Time> parse_stamp(const std::string& text, Time now);
 
-/// The same where there may be none: nothing for an empty text.
+/// As parse_stamp(), but no stamp for an empty text.
 [[nodiscard]] Result<std::optional<Time>> optional_stamp(const std::string& text, Time now);
 
-/// How long to wait between the lines of what goes on and on, until it is interrupted.
-/// @return whether it was
+/// Waits between two outputs of a command that runs until interrupted.
+/// @return whether it was interrupted
 [[nodiscard]] bool interrupted_within(double seconds);
 
-/// Prints an answer as JSON or as text, and returns the exit status.
+/// Prints an answer as JSON or as text. @return the exit status
 int answer(const Arguments& arguments, const nlohmann::json& json, const std::string& text);
-/// Prints that something was done to the frame or joint of the command, or why not, and returns the exit status.
+/// Prints that the command changed its frame or joint, or why it did not. @return the exit status
 int finish(Client& client, const Result<void>& changed, const Arguments& arguments,
            const std::string& what);
-/// Prints what the service said against it, and returns the exit status.
+/// Prints why the request failed. @return the exit status
 int refuse(Client& client, const Error& error, const Arguments& arguments);
 
-// Each runs one command, prints its answer and returns the exit status.
+// Each function runs one command, prints its answer and returns the exit status.
 int run_tree(Client& client, const Arguments& arguments);
 int run_frames(Client& client, const Arguments& arguments);
 int run_partitions(Client& client, const Arguments& arguments);
@@ -97,10 +97,10 @@ int run_monitor(Client& client, const Arguments& arguments);
 int run_plot(Client& client, const Arguments& arguments);
 int run_graph(Client& client, const Arguments& arguments);
 
-/// Prints what is wrong with the command line itself, as JSON, and returns the exit status.
+/// Prints an error of the command line as JSON. @return the exit status
 int report_usage(const std::string& message);
 
-/// Prints an error and returns the exit status that it means.
+/// Prints an error. @return the exit status for it
 int report(const Error& error, const Arguments& arguments);
 
 }  // namespace tfdude::cli

@@ -1,5 +1,5 @@
-# Completion of tfdude's commands, options and frames for bash; installed where bash-completion looks for it.
-# The frames are asked for with the domain and profile already on the line, for half a second at most.
+# Completes tfdude's commands, options and frames in bash; installed where bash-completion looks for it.
+# It runs tfdude to list frames, partitions and joints, with the network options on the line, for at most half a second.
 
 _tfdude_common() {
   local i

@@ -6,7 +6,7 @@
 
 namespace tfdude::cli {
 
-inline constexpr double kDegrees = 57.29577951308232;  // of a radian
+inline constexpr double kDegrees = 57.29577951308232;  // degrees per radian
 
 /// As printf(), cut after 255 bytes.
 template <class... Values>
@@ -16,7 +16,8 @@ template <class... Values>
   return text.data();
 }
 
-/// An angle [°] in a picture: two or three digits, or all that stand before the point; less than a thousandth is zero.
+/// An angle [°] in a picture, with so many significant digits; from 99.5 on, a whole number. Below
+/// half a thousandth it is zero.
 [[nodiscard]] inline std::string angle_text(double degrees, int digits) {
   if (degrees < 5e-4) return "0";
   return degrees < 99.5 ? format("%.*g", digits, degrees) : format("%.0f", degrees);

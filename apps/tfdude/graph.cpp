@@ -30,7 +30,7 @@ struct Colours {
 
 Colours grey() { return {"#eceef1", "#aeb4bc"}; }
 
-// Of hue, saturation and value in [0, 1].
+// The colour with this hue, saturation and value, each in [0, 1].
 std::string colour(double hue, double saturation, double value) {
   const auto channel = [&](double shift) {
     const double k = std::fmod(shift + hue * 6, 6.0);
@@ -40,17 +40,18 @@ std::string colour(double hue, double saturation, double value) {
   return format("#%02x%02x%02x", channel(5), channel(3), channel(1));
 }
 
-// Each hue is far from those before it, however many there are.
+// The golden ratio keeps each hue far from all earlier ones, however many there are.
 Colours colours_of(std::size_t index) {
   constexpr double kGolden = 0.381966011250105;
   const double hue = std::fmod(0.58 + kGolden * static_cast<double>(index), 1.0);
   return {colour(hue, 0.16, 0.98), colour(hue, 0.6, 0.66)};
 }
 
-// Long ones would push all others apart; Graphviz shows the whole one where a pointer rests on it.
+// Shortens a long name, which would push the other nodes apart. Graphviz shows the full name when
+// the pointer rests on it.
 std::string name_of(const std::string& id) { return dot_label(elide(id, 12, 220)); }
 
-// How each partition is drawn; what is not among them, as one that is not reachable.
+// The colours of each partition; a partition that is not in the map is drawn as unreachable.
 using Looks = std::map<std::string, Colours>;
 
 Looks looks_of(const std::vector<PartitionInfo>& partitions) {
@@ -74,7 +75,7 @@ std::string legend_row(const PartitionInfo& partition, const Colours& look) {
   std::string text = R"(<TR><TD BGCOLOR=")" + look.fill + R"(" COLOR=")" + look.line +
                      R"(" BORDER="1" WIDTH="22"></TD><TD ALIGN="LEFT">)" +
                      xml_escape(partition.name);
-  // Nothing else is known of one that went before this process came.
+  // Only the name is known of a partition that was lost before this process started.
   if (!partition.host.empty()) {
     text += "  on " + xml_escape(partition.host) + ", pid " + std::to_string(partition.pid);
   }
@@ -120,7 +121,7 @@ std::string edge_text(const EdgeLabel& edge, Time now) {
   const auto s = edge.covariance->stddev();
   const double metres = *std::max_element(s.begin(), s.begin() + 3);
   const double turn = *std::max_element(s.begin() + 3, s.end()) * kDegrees;
-  // What is written as a number may be a little less for rounding.
+  // A value read from decimal text may be a little smaller, due to rounding.
   constexpr double kAlmost = 1 - 1e-9;
   if (metres < kMetres * kAlmost && turn < kTurn * kAlmost) return text;
   return text + (text.empty() ? "" : "  ") + "±" + length_text(metres) + " " + "±" +

@@ -8,10 +8,10 @@
 
 #include "tfdude/client/client.hpp"
 
-// The whole forest as a picture: what is known in, text for Graphviz out.
+// Draws the whole forest: from its data to text for Graphviz.
 namespace tfdude::cli {
 
-/// What is known of the edge from a frame's parent to the frame.
+/// The edge from a frame's parent to the frame, as far as it is known.
 struct EdgeLabel {
   std::optional<Covariance> covariance;
   std::optional<Time> newest;  ///< of its samples
@@ -24,16 +24,16 @@ struct Graph {
   Time now;
 };
 
-/// What stands beside an edge: the age of its newest sample, and its largest standard deviations from a millimetre or a tenth
-/// of a degree on.
+/// The label of an edge: the age of its newest sample, and its largest standard deviations of
+/// position and rotation, if one is at least a millimetre or a tenth of a degree.
 [[nodiscard]] std::string edge_text(const EdgeLabel& edge, Time now);
 
 /// A name in quotes, as DOT reads it.
 [[nodiscard]] std::string dot_id(std::string_view id);
-/// The same of text that is shown, where DOT reads entities and escapes.
+/// As dot_id(), for a label: there DOT interprets entities and escapes.
 [[nodiscard]] std::string dot_label(std::string_view text);
 
-/// The picture in DOT; the same for the same graph.
+/// The picture in DOT; equal graphs give equal text.
 [[nodiscard]] std::string draw_graph(const Graph& graph);
 
 }  // namespace tfdude::cli

@@ -1,7 +1,7 @@
 #include "commands.hpp"
 #include "joint_render.hpp"
 
-// Commands that have to do with joints.
+// Commands for joints.
 namespace tfdude::cli {
 
 int run_joint(Client& client, const Arguments& arguments) {

@@ -9,7 +9,7 @@ namespace {
 
 bool is_prismatic(const JointInfo& joint) { return joint.type == JointType::kPrismatic; }
 
-// In degrees or millimetres, as people think of joints.
+// A position in degrees or millimetres, the usual units of joints.
 std::string shown(const JointInfo& joint, double value) {
   return is_prismatic(joint) ? format("%.3f mm", value * 1e3)
                              : format("%.3f deg", value * kDegrees);

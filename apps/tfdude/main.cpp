@@ -1,4 +1,4 @@
-// The command line: one question or change at a time.
+// The command line: each run is one query or one change.
 
 #include <algorithm>
 #include <csignal>
@@ -48,7 +48,7 @@ void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {
   cli::add_network_options(app, arguments.options);
   app.add_option("--timeout", timeout_ms, "how long to wait for an answer [ms]")
       ->check(CLI::Range(1, 3600000));
-  app.add_flag("--json", arguments.json, "one JSON object an answer");
+  app.add_flag("--json", arguments.json, "one JSON object per answer");
 }
 
 CLI::App* add_command(CLI::App& app, const char* name, const char* help, const char* example,
@@ -64,8 +64,8 @@ void add_id(CLI::App* command, Arguments& arguments) {
 }
 
 void add_ends(CLI::App* command, Arguments& arguments) {
-  command->add_option("A", arguments.id, "the frame to see from")->required();
-  command->add_option("B", arguments.other, "the frame seen")->required();
+  command->add_option("A", arguments.id, "the reference frame")->required();
+  command->add_option("B", arguments.other, "the frame seen from A")->required();
 }
 
 void add_stamp(CLI::App* command, const char* name, std::string& stamp, const char* help) {
@@ -77,7 +77,7 @@ void add_stamp(CLI::App* command, const char* name, std::string& stamp, const ch
 
 void add_milliseconds(CLI::App* command, const char* name, double& value, const char* help) {
   command->add_option(name, value, help)->type_name("MS")->check([](const std::string& text) {
-    // Not CLI::Range, which takes NaN.
+    // CLI::Range would accept NaN.
     const double ms = std::strtod(text.c_str(), nullptr);
     return ms >= 0 && ms <= 3.6e6 ? "" : text + " is not within 0 to 3600000";
   });
@@ -111,7 +111,7 @@ void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen) {
   add_milliseconds(lookup, "--wait", arguments.wait_ms, "how long to wait for frames and data");
 }
 
-// Those that go on and on.
+// Commands that follow changes, most of them until interrupted.
 void add_following_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   auto* watch = add_command(app, "watch", "follow a path: its owners push what changes",
                             "watch world hand_left --rate 5", cli::run_watch, chosen);
@@ -129,7 +129,7 @@ void add_following_commands(CLI::App& app, Arguments& arguments, Command& chosen
                               "monitor --once", cli::run_monitor, chosen);
   add_rate(monitor, arguments.rate, "output rate [Hz]");
   monitor->add_flag("--once", arguments.once, "print it once");
-  add_id(add_command(app, "history", "an edge's history: samples, rate, age, refusals",
+  add_id(add_command(app, "history", "an edge's history: samples, rate, age, rejected samples",
                      "history hand_left", cli::run_history, chosen),
          arguments);
 }
@@ -190,8 +190,8 @@ void add_correlate_command(CLI::App& app, Arguments& arguments, Command& chosen)
   correlate
       ->add_option(
           "--source", arguments.sources,
-          "what it shares with edges that name the same source: its error for one standard "
-          "deviation there [m m m rad rad rad]; again for each dimension")
+          "error shared with all edges that name the same source: this edge's error for one "
+          "standard deviation of the source [m m m rad rad rad]; repeat for each dimension")
       ->type_name("NAME 6 NUMBERS")
       ->type_size(cli::kSourceSize)
       ->allow_extra_args(false);
@@ -218,7 +218,6 @@ void add_out(CLI::App* command, Arguments& arguments, const std::vector<std::str
       });
 }
 
-// Those that draw.
 void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   auto* plot =
       add_command(app, "plot", "draw where B is in A, with its uncertainty",
@@ -296,7 +295,7 @@ int run(const Arguments& arguments, const Command& command) {
 
 }  // namespace
 
-// NOLINTNEXTLINE(bugprone-exception-escape): nothing but a lack of memory, which should end it
+// NOLINTNEXTLINE(bugprone-exception-escape): only a lack of memory throws, and should end it
 int main(int argc, char** argv) {
   Arguments arguments;
   Command command;
@@ -323,7 +322,7 @@ int main(int argc, char** argv) {
     const auto unknown = app.remaining();
     const bool no_command = app.get_subcommands().empty() && !unknown.empty();
     const std::string what = no_command ? "no command " + quote(unknown.front()) : error.what();
-    // Not in arguments, which a command line that is wrong has not filled.
+    // Looks for --json itself: CLI11 does not fill `arguments` from a wrong command line.
     if (std::find(argv, argv + argc, std::string_view("--json")) != argv + argc) {
       return cli::report_usage(what);
     }
@@ -331,12 +330,13 @@ int main(int argc, char** argv) {
     (void)app.exit(error);
     return cli::kWrongUsage;
   }
-  // To meet by a server takes most of the usual second.
+  // Discovery by a server takes most of the default timeout of a second.
   const bool by_server = !arguments.options.discovery_server.empty();
   if (by_server && app.count("--timeout") == 0) timeout_ms = kTimeoutByServer;
   arguments.options.timeout = Milliseconds(timeout_ms);
   arguments.options.discovery = arguments.options.timeout;
-  // Before any thread starts, so that what goes on and on can wait for them.
+  // Blocks the signals before any thread starts, so that commands that run until interrupted can
+  // wait for them.
   sigset_t stop_signals;
   sigemptyset(&stop_signals);
   sigaddset(&stop_signals, SIGINT);

@@ -27,7 +27,7 @@ namespace {
 // Long enough for Graphviz to lay out some thousand frames.
 constexpr std::chrono::seconds kProgramTimeout{120};
 
-// What another program is needed for a picture.
+// Another program that a picture needs, and the Debian package that contains it.
 struct Program {
   std::vector<std::string> argv;
   const char* package;
@@ -71,7 +71,7 @@ class Descriptor {
   int fd_;
 };
 
-// Its status as waitpid() tells it; ended by force where it takes too long.
+// The status of a process as waitpid() returns it; none if it took too long and was killed.
 std::optional<int> wait_for(pid_t pid) {
   const auto deadline = std::chrono::steady_clock::now() + kProgramTimeout;
   int status = 0;
@@ -86,7 +86,8 @@ std::optional<int> wait_for(pid_t pid) {
   return status;
 }
 
-// Without a shell; what it reads and writes are files in memory, so that nobody has to wait for anybody.
+// Runs a program without a shell. It reads and writes files in memory, so neither process waits for
+// a pipe.
 Result<std::string> run_program(Program program, const std::string& input) {
   const Descriptor in(memfd_create("in", MFD_CLOEXEC));
   const Descriptor out(memfd_create("out", MFD_CLOEXEC));
@@ -103,7 +104,7 @@ Result<std::string> run_program(Program program, const std::string& input) {
   posix_spawn_file_actions_adddup2(&actions, in.get(), STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, out.get(), STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, err.get(), STDERR_FILENO);
-  posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);  // sockets of DDS
+  posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);  // closes DDS's sockets
   pid_t pid = 0;
   const int failed = posix_spawnp(&pid, argv[0], &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
@@ -121,7 +122,7 @@ Result<std::string> run_program(Program program, const std::string& input) {
   return out.read_all();
 }
 
-// By way of another name, so that there is the whole file or none.
+// Writes under another name and renames, so that the file is complete or does not change.
 Result<void> write_file(const std::string& file, const std::string& bytes) {
   const std::string beside = file + "." + std::to_string(getpid()) + ".tmp";
   const auto failed = [&] {
@@ -139,7 +140,7 @@ bool ends_with(const std::string& text, std::string_view end) {
   return text.size() > end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-// Writes the picture as it is, or as the program makes it, and says so.
+// Writes the picture to its file, and prints the answer.
 int finish(Client& client, const Arguments& arguments, const Result<std::string>& picture,
            nlohmann::json json) {
   if (!picture) return refuse(client, picture.error(), arguments);
@@ -149,7 +150,7 @@ int finish(Client& client, const Arguments& arguments, const Result<std::string>
   return answer(arguments, json, "wrote " + printable(arguments.out) + "\n");
 }
 
-// From a frame up to its root, itself included.
+// The frames from a frame up to its root, both included.
 std::vector<const Frame*> ancestors(const std::map<std::string, const Frame*>& frames,
                                     const std::string& id) {
   std::vector<const Frame*> way;
@@ -161,7 +162,7 @@ std::vector<const Frame*> ancestors(const std::map<std::string, const Frame*>& f
   return way;
 }
 
-// The frames from A to B and the edges between them, each looked up at the instant of the answer.
+// The frames from A to B and the edges between them, each looked up at the stamp of X_AB.
 Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTransform& X_AB) {
   const auto all = client.frames();
   if (!all) return tl::unexpected(all.error());
@@ -177,7 +178,7 @@ Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTr
     up.pop_back();
     down.pop_back();
   }
-  // What both ends have in common is now the last of either.
+  // Now the common ancestor is the last of both lists; it is kept in one.
   down.pop_back();
   std::reverse(down.begin(), down.end());
   Plot plot{X_AB, {}, {}, arguments.samples};
@@ -201,7 +202,8 @@ Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTr
   return plot;
 }
 
-// Edges of partitions that answer; one that does not is asked no more, and drawn as not reachable.
+// Collects the frames, and the edges of partitions that answer. A partition that does not answer is
+// not asked again, and is drawn as unreachable.
 Result<Graph> graph_of(Client& client) {
   auto frames = client.frames();
   if (!frames) return tl::unexpected(std::move(frames.error()));
@@ -252,7 +254,7 @@ int run_plot(Client& client, const Arguments& arguments) {
   add_stamp(json, X_AB->stamp);
   Result<std::string> picture = draw_plot(*plot);
   if (ends_with(arguments.out, ".png")) {
-    // Twice as fine, for screens that are.
+    // Doubles the resolution, for screens with high density.
     picture =
         run_program({{"rsvg-convert", "--zoom", "2", "--unlimited"}, "librsvg2-bin"}, *picture);
   }

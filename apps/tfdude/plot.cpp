@@ -16,14 +16,14 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// The layout [px]. As wide as a page shows it, so that letters keep their size.
+// The layout [px]. The width is that of a page, so that text is not scaled there.
 constexpr double kWidth = 900;
 constexpr double kLeft = 62;
 constexpr double kRight = 14;
 constexpr double kGap = 66;
 constexpr double kPanel = (kWidth - kLeft - kRight - 2 * kGap) / 3;
 constexpr double kHeader = 96;
-constexpr double kRow = kPanel + 70;  // with its heading and the axes' names
+constexpr double kRow = kPanel + 70;  // with the heading and the axes' names
 constexpr double kFooter = 34;
 constexpr double kLine = 18;
 constexpr int kTicks = 6;
@@ -67,19 +67,19 @@ constexpr std::array<Plane, 3> kPlanes = {{{0, 1}, {0, 2}, {1, 2}}};
 
 Vector2d seen_in(const Plane& plane, const Vector3d& p) { return {p[plane.across], p[plane.up]}; }
 
-// All that is drawn, from the plot.
+// All that is drawn, computed from the plot.
 struct Scene {
   const Plot& plot;
   std::vector<Vector3d> chain;
-  std::vector<Vector3d> points;  // from the mean
+  std::vector<Vector3d> points;  // relative to the mean
   Vector3d mean;
   Eigen::Matrix3d covariance;
-  Vector3d center;  // of the upper row
-  double reach;     // of a panel from its middle, in the upper row
-  double spread;    // the same in the lower one; 0 where nothing is uncertain
+  Vector3d center;  // of the panels in the upper row
+  double reach;     // from the middle of a panel to its side, in the upper row [m]
+  double spread;    // the same in the lower row [m]; 0 if nothing is uncertain
 };
 
-// A square of a plane of A, and where it is in the picture.
+// A square region of a coordinate plane of A, and its place in the picture.
 struct Panel {
   Box box;
   Plane plane;
@@ -93,7 +93,7 @@ struct Panel {
   }
 };
 
-// A few far ones would make the picture small.
+// The 99.7 % quantile of the points' distances: a few outliers would make all else small.
 double reach_of(const std::vector<Vector3d>& points) {
   if (points.empty()) return 0;
   std::vector<double> distances;
@@ -117,15 +117,15 @@ Scene scene_of(const Plot& plot) {
   }
   scene.center = (low + high) / 2;
   scene.reach = 1.3 * (high - low).maxCoeff() / 2;
-  if (!(scene.reach > 0)) scene.reach = 1.2;  // [m]: any will do
+  if (!(scene.reach > 0)) scene.reach = 1.2;  // [m], arbitrary
   scene.points = sample_ends(plot.steps, plot.samples, kSampleSeed);
   for (Vector3d& p : scene.points) p -= scene.mean;
   scene.spread = std::max(1.2 * outer.maxCoeff(), 1.1 * reach_of(scene.points));
-  if (scene.spread < 1e-12 * scene.reach) scene.spread = 0;  // rounding
+  if (scene.spread < 1e-12 * scene.reach) scene.spread = 0;  // a rounding error
   return scene;
 }
 
-// Down to a tenth of the deviation.
+// A coordinate with its deviation, with decimals down to a tenth of the deviation.
 std::string position_text(double metres, double stddev, const Unit& unit) {
   constexpr int kExactly = 4;
   const double tenth = 1 - std::log10(stddev / unit.metres);
@@ -143,7 +143,7 @@ void draw_header(Svg& svg, const Scene& scene) {
   const double each = (room - text_width(" in ", 20)) / 2;
   const std::string& from = plot.frames.front();
   const std::string& to = plot.frames.back();
-  // What one does not need of its half is the other's.
+  // Each name has half of the room; what one does not need is left for the other.
   const double rest = std::max(each, 2 * each - text_width(from, 20));
   const std::string shown = elide(to, 20, rest);
   svg.text({kLeft, 34},
@@ -163,7 +163,8 @@ void draw_header(Svg& svg, const Scene& scene) {
            "");
 }
 
-// Ground, grid, numbers and names of the axes. `prefix` stands before their names.
+// Draws the background, the grid, and the numbers and names of the axes.
+// @param prefix  precedes the names
 void draw_axes(Svg& svg, const Panel& panel, const char* prefix) {
   svg.rect(panel.box, "panel");
   const Unit unit = unit_for(panel.reach);
@@ -222,7 +223,7 @@ void draw_whole(Svg& svg, const Panel& panel, const Scene& scene) {
   draw_axes(svg, panel, "");
   const Vector2d mean = seen_in(panel.plane, scene.mean);
   double side = kPanel * scene.spread / scene.reach;
-  if (side < 14 || side > 0.8 * kPanel) side = 0;  // nothing to see, or most of it
+  if (side < 14 || side > 0.8 * kPanel) side = 0;  // too small to see, or most of the panel
   const Point at = panel.at(mean);
   if (side > 0) svg.rect({at.x - side / 2, at.y - side / 2, side, side}, "zoom");
   draw_ellipses(svg, panel, scene, mean, false);
@@ -241,7 +242,8 @@ void draw_whole(Svg& svg, const Panel& panel, const Scene& scene) {
   svg.rect(panel.box, "edge");
 }
 
-// Many points are spread over strokes that lie over each other, so that it is darker where there are more.
+// Spreads the points over several strokes: where translucent strokes overlap, the colour is darker,
+// so dense regions stand out.
 void draw_points(Svg& svg, const Panel& panel, const std::vector<Vector3d>& points) {
   constexpr std::size_t kStrokes = 12;
   const char* look = points.size() <= 500 ? "few" : points.size() <= 5000 ? "some" : "many";
@@ -261,7 +263,6 @@ void draw_zoomed(Svg& svg, const Panel& panel, const Scene& scene) {
   svg.rect(panel.box, "edge");
 }
 
-// What is what, from left to right.
 void draw_legend(Svg& svg, const Scene& scene, double y) {
   double x = kLeft;
   const auto entry = [&](const std::string& text, auto draw) {
@@ -275,7 +276,7 @@ void draw_legend(Svg& svg, const Scene& scene, double y) {
     svg.circle(at, 2.6, "frame");
   });
   if (scene.spread == 0) return;
-  // What of a Gaussian in two dimensions is within.
+  // The part of a Gaussian in two dimensions that lies within.
   entry("1σ: 39 %", [&](Point at) { svg.rect({at.x - 8, at.y - 5, 16, 10}, "inner"); });
   entry("3σ: 98.9 %", [&](Point at) { svg.rect({at.x - 8, at.y - 5, 16, 10}, "outer"); });
   if (scene.points.empty()) return;
@@ -302,7 +303,7 @@ void draw_row(Svg& svg, const Scene& scene, bool zoomed, double top) {
   }
 }
 
-// What the points do not know.
+// A note that the points ignore correlation, if that makes a difference.
 std::string note_of(const Plot& plot) {
   const Basis& basis = plot.X_AB.basis;
   if (plot.samples == 0 || (!basis.bound && basis.sources.empty())) return "";

@@ -8,14 +8,14 @@
 
 #include "plot_geometry.hpp"
 
-// Where a frame is, with its uncertainty, as a picture: what is to be drawn in, SVG out.
+// Draws where a frame is, with its uncertainty: from its data to SVG.
 namespace tfdude::cli {
 
 struct Plot {
   StampedTransform X_AB;
   std::vector<std::string> frames;  ///< of the path, from A to B
   std::vector<Step> steps;          ///< between them
-  int samples = 0;                  ///< how many points to draw
+  int samples = 0;                  ///< number of points to sample and draw
 };
 
 inline constexpr std::uint64_t kSampleSeed = 1;

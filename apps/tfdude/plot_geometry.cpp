@@ -15,7 +15,8 @@ constexpr double kPi = 3.141592653589793;
 
 Pose pose_of(const Step& step, const Pose& X_PC) { return step.up ? X_PC.inverse() : X_PC; }
 
-// Such that root rootᵀ is the covariance. Each axis is scaled by its own deviation first, or metres would drown radians.
+// Returns a root with root rootᵀ = covariance. Each axis is first scaled by its own deviation:
+// otherwise an axis with large numbers would cost the others their precision.
 Matrix6d root_of(const Covariance& covariance) {
   const auto stddev = covariance.stddev();
   const Twist scale = Eigen::Map<const Twist>(stddev.data());
@@ -82,7 +83,7 @@ std::string length_text(double metres) {
 
 Ticks ticks_within(double low, double high, int most) {
   double step = std::pow(10.0, std::floor(std::log10((high - low) / most)));
-  // One step more than the number of steps may fit.
+  // A range of n steps may contain n + 1 ticks.
   const auto count = [&](double each) {
     return std::floor(high / each) - std::ceil(low / each) + 1;
   };

@@ -7,11 +7,11 @@ namespace {
 
 constexpr double kLabelWidth = 100;
 
-// Where a name may stand by its dot.
+// A place for a name beside its dot.
 struct Spot {
-  double right;  // in units of the dot's radius and a margin
+  double right;  // offset from the dot, in units of its radius plus a margin
   double down;
-  double before;  // which part of the name is left of there
+  double before;  // fraction of the name's width that lies left of this place
   const char* look;
 };
 constexpr Spot kSpots[] = {{1, 0, 0, "name"},           {-1, 0, 1, "name end"},
@@ -19,7 +19,8 @@ constexpr Spot kSpots[] = {{1, 0, 0, "name"},           {-1, 0, 1, "name end"},
                            {0.8, -0.9, 0, "name"},      {0.8, 0.9, 0, "name"},
                            {-0.8, -0.9, 1, "name end"}, {-0.8, 0.9, 1, "name end"}};
 
-// Puts names beside their dots where there is room: not over another name or dot, and rather not over the path.
+// Places names beside their dots where there is room: never over another name or dot, and over the
+// path only if the caller allows it.
 class Names {
  public:
   Names(const Box& panel, const std::vector<Dot>& dots) : panel_(panel), dots_(dots) {
@@ -29,7 +30,7 @@ class Names {
     }
   }
 
-  // Whether there was room.
+  // @return whether there was room
   bool place(Svg& svg, std::size_t index, const std::string& frame, bool over_path) {
     constexpr double kHeight = 14;
     constexpr double kBetween = 5;
@@ -71,7 +72,7 @@ class Names {
 void draw_names(Svg& svg, const Box& panel, const std::vector<std::string>& frames,
                 const std::vector<Dot>& dots) {
   Names names(panel, dots);
-  // The ends first, and even over the path.
+  // The ends come first, and may cover the path.
   const std::size_t last = frames.size() - 1;
   for (const std::size_t end : {last, std::size_t{0}}) {
     if (!names.place(svg, end, frames[end], false)) (void)names.place(svg, end, frames[end], true);

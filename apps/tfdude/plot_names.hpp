@@ -7,16 +7,16 @@
 
 namespace tfdude::cli {
 
-/// Of most text in a plot, as its style sheet says [px].
+/// Size of most text in a plot [px], as in its style sheet.
 inline constexpr double kLabelSize = 11.5;
 
-/// What has a name, and how far from it that may begin.
+/// A point with a name, and the radius that the name must keep clear [px].
 struct Dot {
   Point at;
   double radius;
 };
 
-/// Writes the names of the frames of a path beside their dots, those for which there is room in the panel.
+/// Writes the names of a path's frames beside their dots, as far as there is room in the panel.
 void draw_names(Svg& svg, const Box& panel, const std::vector<std::string>& frames,
                 const std::vector<Dot>& dots);
 

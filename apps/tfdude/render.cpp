@@ -11,7 +11,7 @@ namespace {
 
 using Children = std::map<std::string, std::vector<const Frame*>>;
 
-// A frame that is to be drawn, and what stands before it and before those below it.
+// A frame to draw, and the prefixes of its line and of its children's lines.
 struct Line {
   const Frame* frame;
   std::string before;
@@ -33,7 +33,7 @@ std::string label(const Frame& frame, const std::vector<std::string>& unreachabl
 std::string draw_tree(const std::vector<Frame>& frames,
                       const std::vector<std::string>& unreachable) {
   Children children;
-  std::vector<Line> to_draw;  // the next one last
+  std::vector<Line> to_draw;  // a stack: the next frame is the last one
   for (const Frame& frame : frames) {
     if (frame.attached) {
       children[frame.parent].push_back(&frame);

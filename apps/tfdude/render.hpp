@@ -10,7 +10,8 @@
 // Answers as text for people, and as JSON for programs.
 namespace tfdude::cli {
 
-/// All frames as trees, each with its owner. @param reachable  the partitions that answer
+/// All frames as trees, each with its owner.
+/// @param unreachable  the partitions that do not answer
 [[nodiscard]] std::string draw_tree(const std::vector<Frame>& frames,
                                     const std::vector<std::string>& unreachable);
 
@@ -23,7 +24,7 @@ namespace tfdude::cli {
 [[nodiscard]] nlohmann::json partition_json(const PartitionInfo& partition);
 [[nodiscard]] nlohmann::json change_json(const Change& change);
 
-/// One line of JSON; what is not valid UTF-8 is replaced.
+/// One line of JSON; invalid UTF-8 is replaced.
 [[nodiscard]] std::string dump(const nlohmann::json& json);
 
 }  // namespace tfdude::cli

@@ -11,7 +11,7 @@
 namespace tfdude::cli {
 namespace {
 
-// The first so many characters of UTF-8.
+// The first `count` characters of a line in UTF-8.
 std::string first_characters(const std::string& line, std::size_t count) {
   std::size_t seen = 0;
   for (std::size_t i = 0; i < line.size(); ++i) {
@@ -51,7 +51,7 @@ void Screen::redraw(const std::string& page) {
   } else {
     winsize size{};
     const bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row > 1;
-    // The cursor stands below the last line.
+    // One row is left for the cursor, which stands below the last line.
     const std::string text = known ? fitted(page, size.ws_row - 1U, size.ws_col) : page;
     if (drawn_ > 0) std::printf("\x1b[%tdA\x1b[J", drawn_);
     std::fputs(text.c_str(), stdout);

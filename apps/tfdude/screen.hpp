@@ -5,18 +5,19 @@
 
 namespace tfdude::cli {
 
-/// What of a text fits on a screen: lines are cut at so many columns, and where there are too many, the last line that fits
-/// says how many are left out. @param text  lines of UTF-8, each with its end
+/// Cuts a text to fit on a screen. Lines are cut at so many columns. If there are too many lines,
+/// the last line that fits says how many are left out.
+/// @param text  lines of UTF-8, each with its end
 [[nodiscard]] std::string fitted(const std::string& text, std::size_t rows, std::size_t columns);
 
-/// Standard output, where a page is drawn again and again in the same place if it is a terminal.
+/// Standard output. On a terminal each page is drawn over the one before.
 class Screen {
  public:
-  /// In a pipe pages follow each other, with an empty line between.
+  /// In a pipe or file, pages follow each other, with an empty line between them.
   void redraw(const std::string& page);
 
  private:
-  std::ptrdiff_t drawn_ = 0;  // lines
+  std::ptrdiff_t drawn_ = 0;  // number of lines of the last page
 };
 
 }  // namespace tfdude::cli

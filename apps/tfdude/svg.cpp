@@ -9,7 +9,7 @@
 namespace tfdude::cli {
 namespace {
 
-// A hundredth of a pixel is enough, and zeros at the end say nothing.
+// A hundredth of a pixel is enough; zeros at the end are dropped.
 std::string number(double value) {
   std::string text = format("%.2f", value);
   text.erase(text.find_last_not_of('0') + 1);
@@ -25,7 +25,8 @@ std::string attribute(std::string_view name, std::string_view value) {
 
 bool begins_code_point(char c) { return (static_cast<std::uint8_t>(c) & 0xC0U) != 0x80U; }
 
-// In units of the font's size, on the generous side. From U+3000 on letters may be as wide as Chinese ones.
+// The width of a character in units of the font's size, rather too large than too small. From about
+// U+3000 on, characters may be as wide as Chinese ones.
 double advance(char first) {
   const auto byte = static_cast<std::uint8_t>(first);
   if (byte >= 0xE3U) return 1.05;
@@ -47,7 +48,7 @@ bool Box::overlaps(const Box& other) const {
   return other.x < right() && x < other.right() && other.y < bottom() && y < other.bottom();
 }
 
-// Cuts off the line what lies beyond each side in turn (Liang and Barsky).
+// Clips the line at the two sides of each axis in turn (Liang and Barsky).
 bool Box::crosses(Point a, Point b) const {
   double from = 0;
   double to = 1;

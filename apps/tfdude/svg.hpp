@@ -6,7 +6,7 @@
 
 namespace tfdude::cli {
 
-/// In pixels, y downwards.
+/// A position [px]; y points down.
 struct Point {
   double x = 0;
   double y = 0;
@@ -22,38 +22,40 @@ struct Box {
   [[nodiscard]] double bottom() const { return y + height; }
   [[nodiscard]] bool contains(const Box& other) const;
   [[nodiscard]] bool overlaps(const Box& other) const;
-  /// Whether any of the line from a to b is within.
+  /// Whether any part of the line from a to b lies within.
   [[nodiscard]] bool crosses(Point a, Point b) const;
 };
 
-/// Valid UTF-8 without control characters, where what may not be in XML none the less is U+FFFD.
+/// Replaces characters that XML forbids by U+FFFD.
+/// @param text  valid UTF-8 without control characters
 [[nodiscard]] std::string xml_allowed(std::string_view text);
 
-/// The same where what has a meaning in XML is written as an entity.
+/// As xml_allowed(), and characters with a meaning in XML become entities.
 [[nodiscard]] std::string xml_escape(std::string_view text);
 
-/// How wide a line of text may get in a usual sans-serif font of a size; no font is asked.
+/// The width that a line of text may need in a usual sans-serif font of a size [px]. This is an
+/// estimate: no font is read.
 [[nodiscard]] double text_width(std::string_view text, double size);
 
-/// The text, or its ends with "…" between them where it would be wider.
+/// The text; if it is wider than `width`, its start and its end with "…" between them.
 [[nodiscard]] std::string elide(std::string_view text, double size, double width);
 
-/// Writes a picture as SVG. How a thing looks is said by names of classes of the style sheet.
+/// Writes a picture as SVG. The parameter `look` has the names of classes in the style sheet.
 class Svg {
  public:
-  /// @param title  for those who cannot see it
+  /// @param title  for readers who cannot see the picture
   /// @param style  CSS
   Svg(double width, double height, std::string_view title, std::string_view style);
 
   void rect(const Box& box, std::string_view look);
   void line(Point a, Point b, std::string_view look);
   void circle(Point center, double radius, std::string_view look);
-  /// Through all points, also where they are all the same.
+  /// A line through all points, drawn even if all of them are the same.
   void curve(const std::vector<Point>& points, bool closed, std::string_view look);
-  /// A stroke without length for each point: round where the style gives it round caps.
+  /// A stroke without length for each point: round if the style gives it round caps.
   void dots(const std::vector<Point>& points, std::string_view look);
   void text(Point at, std::string_view text, std::string_view look);
-  /// The same, written upwards.
+  /// As text(), turned to read upwards.
   void text_up(Point at, std::string_view text, std::string_view look);
 
   [[nodiscard]] std::string finish() const { return out_ + "</svg>\n"; }

@@ -14,7 +14,7 @@
 #include "time_render.hpp"
 #include "uncertainty_render.hpp"
 
-// Commands that have to do with time.
+// Commands for stamps, histories and followed paths.
 namespace tfdude::cli {
 namespace {
 
@@ -58,7 +58,8 @@ nlohmann::json json_of(Client& client, const Arguments& arguments, const Stamped
   return json;
 }
 
-// Calls show(path) at the rate until interrupted; while the path cannot be watched, or an owner is not there, says so.
+// Calls show() with the path's newest transform at the rate, until interrupted. While the path
+// cannot be watched, or an owner is unreachable, it reports that instead.
 template <class Show>
 int follow(Client& client, const Arguments& arguments, Show show) {
   std::optional<PathWatch> path;
@@ -89,7 +90,7 @@ int follow(Client& client, const Arguments& arguments, Show show) {
   return kDone;
 }
 
-// With an exponent; a long double has 64 bits, as many as a stamp.
+// Reads seconds with an exponent. The 64 bits of a long double's mantissa are enough for a stamp.
 std::optional<std::int64_t> nanoseconds_of_power(const std::string& text) {
   char* end = nullptr;
   const long double ns = std::strtold(text.c_str(), &end) * 1e9L;
@@ -101,7 +102,7 @@ std::optional<std::int64_t> nanoseconds_of_power(const std::string& text) {
 
 }  // namespace
 
-// Not by way of a double, which would round a stamp of today to a quarter of a microsecond.
+// Does not convert to double, which would round a current stamp to a quarter of a microsecond.
 Result<Time> parse_stamp(const std::string& text, Time now) {
   constexpr std::int64_t kSecond = 1'000'000'000;
   constexpr std::size_t kDigits = 9;

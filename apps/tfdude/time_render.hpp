@@ -8,23 +8,23 @@
 
 #include "tfdude/client/client.hpp"
 
-// What has to do with time, as text for people, and as JSON for programs.
+// Stamps, histories and followed paths as text for people, and as JSON for programs.
 namespace tfdude::cli {
 
 /// "1700000000.123456789": seconds since the epoch, exact.
 [[nodiscard]] std::string seconds_of(Time stamp);
 
-/// The line that says of when a transform is.
+/// The line with the stamp of a transform.
 [[nodiscard]] std::string describe_stamp(const std::optional<Time>& stamp, Time now);
 
-/// Of a transform's JSON: `stamp` in seconds and `stamp_ns`, both null where it holds for all times.
+/// Adds `stamp` [s] and `stamp_ns` to a transform's JSON; both are null if it holds for all times.
 void add_stamp(nlohmann::json& json, const std::optional<Time>& stamp);
 
 /// The history of one edge, or that it has none.
 [[nodiscard]] std::string describe(const HistoryInfo& history, Time now);
 [[nodiscard]] nlohmann::json history_json(const HistoryInfo& history, Time now);
 
-/// What a partition keeps of histories.
+/// The total of a partition's histories.
 struct HistorySum {
   std::size_t edges = 0;
   std::size_t samples = 0;
@@ -33,11 +33,11 @@ struct HistorySum {
 [[nodiscard]] HistorySum sum_of(const std::vector<HistoryInfo>& histories);
 [[nodiscard]] std::string describe(const HistorySum& sum);
 
-/// A transform in few lines that are always as many: position, angles, standard deviations, age.
+/// A transform in a fixed, small number of lines: position, angles, standard deviations, age.
 [[nodiscard]] std::string echo_lines(const std::string& a, const std::string& b,
                                      const StampedTransform& X_AB, Time now);
 
-/// One partition's moving edges as a table.
+/// One partition's dynamic edges as a table.
 [[nodiscard]] std::string monitor_table(const std::string& partition,
                                         const std::vector<HistoryInfo>& histories, Time now);
 

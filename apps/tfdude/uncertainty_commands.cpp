@@ -7,7 +7,7 @@
 #include "commands.hpp"
 #include "uncertainty_render.hpp"
 
-// Commands that take measurements into account.
+// Commands for measurements and correlation.
 namespace tfdude::cli {
 namespace {
 
@@ -15,7 +15,7 @@ using Measure = Result<Observed> (*)(Client&, const Arguments&, const Transform&
                                      std::optional<Time>);
 
 int measure(Client& client, const Arguments& arguments, Measure take) {
-  // Zeros would say that it is exact, which nobody means by leaving them out.
+  // A default of zero would mean an exact measurement, which is hardly intended.
   if (!arguments.spec.stddev && !arguments.spec.cov) {
     return report({Errc::kInvalidInput, "a measurement needs --stddev or --cov"}, arguments);
   }
@@ -29,7 +29,7 @@ int measure(Client& client, const Arguments& arguments, Measure take) {
   return observed->accepted ? kDone : kRefused;
 }
 
-// Columns of one source are one loading, in the order in which they are said.
+// The columns of one source form one loading, in the order in which they are given.
 std::vector<CommonError> read_common_errors(const std::vector<std::string>& said) {
   constexpr std::size_t kRows = kSourceSize - 1;
   std::vector<CommonError> common_errors;

@@ -14,18 +14,18 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-// How many times larger its variance should be.
+// The factor by which the edge's variance should be larger.
 double factor_of(const EdgeConsistency& edge) {
   return edge.sum.expected > 0 ? edge.sum.squares / edge.sum.expected : 0.0;
 }
 
-// By how many standard deviations the squares are not what they should be.
+// The difference of the squares from their expected value, in standard deviations.
 double deviation_of(const EdgeConsistency& edge) {
   if (!(edge.sum.variance > 0)) return 0.0;
   return (edge.sum.squares - edge.sum.expected) / std::sqrt(edge.sum.variance);
 }
 
-// Where chance alone comes one time in a hundred.
+// If the covariances are right, one verdict in a hundred is not "agrees".
 const char* verdict_of(const EdgeConsistency& edge) {
   constexpr double kBeyondChance = 2.576;
   const double deviation = deviation_of(edge);

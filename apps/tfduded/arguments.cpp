@@ -12,7 +12,7 @@
 namespace tfdude::daemon {
 namespace {
 
-// Of the XDG base directory specification. @return empty where there is no home
+// The directory by the XDG base directory specification. @return empty if there is no home
 // NOLINTBEGIN(concurrency-mt-unsafe): there are no other threads yet
 std::string default_state() {
   const char* state = std::getenv("XDG_STATE_HOME");
@@ -34,19 +34,20 @@ std::vector<std::string> split(const std::string& text) {
   return parts;
 }
 
-// Options that may be given again and again, each for the --urdf before it.
+// Options that may be repeated; each applies to the --urdf before it.
 class UrdfOptions {
  public:
   explicit UrdfOptions(CLI::App& app) : app_(app) {
-    file_ = add("--urdf", "URDF file of a robot; may be given again. For the --urdf before them:");
+    file_ = add("--urdf",
+                "URDF file of a robot; may be repeated. These apply to the --urdf before them:");
     root_ = add("--root", "parent frame of the robot's root link");
-    prefix_ = add("--prefix", "before the names of all its links and joints");
+    prefix_ = add("--prefix", "prefix of the names of all its links and joints");
     links_ = add("--links", "LINK or FROM..TO[..TO], separated by commas: these links only");
-    strict_ = app.add_flag("--strict-limits", "refuse positions outside the joints' limits")
+    strict_ = app.add_flag("--strict-limits", "reject positions outside the joints' limits")
                   ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   }
 
-  // @throws CLI::ParseError where an option follows no --urdf, or is given twice for one
+  // @throws CLI::ParseError if an option comes before any --urdf, or is given twice for one
   [[nodiscard]] std::vector<UrdfPart> parts() const {
     std::vector<UrdfPart> parts;
     std::map<const CLI::Option*, std::size_t> used;

@@ -11,16 +11,17 @@ namespace tfdude::daemon {
 
 inline constexpr int kWrongUsage = 2;
 
-/// What the daemon's command line says.
+/// The daemon's command line.
 struct Arguments {
   std::string partition;
   std::string config;
   std::vector<UrdfPart> urdfs;
-  bool check = false;  ///< say what the configuration changes, and serve nothing
+  bool check = false;  ///< only print what the configuration would change
   Options options;
 };
 
-/// @return the exit status where there is nothing to serve: help, or wrong usage, which it has told.
+/// Prints help and errors of usage itself.
+/// @return the exit status if the program should end: after help or wrong usage
 [[nodiscard]] std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments);
 
 }  // namespace tfdude::daemon

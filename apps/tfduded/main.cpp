@@ -1,4 +1,5 @@
-// The daemon of one subsystem: loads its frames, owns them, serves them until it is told to stop.
+// The daemon of one subsystem: loads its frames, owns them, and serves them until a signal stops
+// it.
 
 #include <atomic>
 #include <csignal>
@@ -49,7 +50,8 @@ tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
   return config;
 }
 
-// Waits for a signal to stop, or until another process has the partition. @return the exit status
+// Waits for a signal to stop, or until another process has taken the partition.
+// @return the exit status
 int run(tfdude::Node& node, const sigset_t& stop_signals) {
   std::atomic<bool> given_up{false};
   const auto subscription = node.on_change([&](const tfdude::Change& change) {
@@ -65,7 +67,7 @@ int run(tfdude::Node& node, const sigset_t& stop_signals) {
   return 0;
 }
 
-// Says what serving would begin with. @return the exit status
+// Prints what the configuration would change in the stored state. @return the exit status
 int check(const Arguments& arguments, const tfdude::Config& config) {
   const auto preview = tfdude::preview_config(config.partition, config.frames, arguments.options);
   if (!preview) {
@@ -105,18 +107,19 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
 
 }  // namespace
 
-// NOLINTNEXTLINE(bugprone-exception-escape): nothing but a lack of memory, which should end it
+// NOLINTNEXTLINE(bugprone-exception-escape): only a lack of memory throws, and should end it
 int main(int argc, char** argv) {
   Arguments arguments;
   if (const auto status = read_arguments(argc, argv, arguments)) return *status;
-  // Before any thread starts, so that all inherit it and sigwait() gets the signals.
+  // Blocks the signals before any thread starts: all threads inherit this, so sigwait() gets them.
   sigset_t stop_signals;
   sigemptyset(&stop_signals);
   sigaddset(&stop_signals, SIGINT);
   sigaddset(&stop_signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
-  // Standard output is for the line "ready" alone. The library takes the logger of this name for its own. A reader
-  // of the log that does not read must not hold up who serves: rather lines are lost.
+  // Logs go to standard error: standard output has only the line "ready", or the result of --check.
+  // The library uses the logger of this name. If nobody reads the log, lines are lost rather than
+  // delaying the daemon.
   spdlog::set_default_logger(
       spdlog::create_async_nb<spdlog::sinks::stderr_color_sink_mt>("tfdude"));
   tfdude::log_fastdds_to_standard_error();
