@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Finds lines that are wider than declared: 100 columns in C and C++, 120 elsewhere; rows of tables may be longer."""
+"""Finds lines that are too long: over 100 columns in C and C++, over 120 elsewhere. Rows of tables may be longer."""
 import re
 import subprocess
 import sys
 
 LIMITS = {r"\.(hpp|cpp|c|ipp|idl)$": 100, r"\.(md|py|cmake|xml|yaml|yml|sh)$|CMakeLists\.txt$|^scripts/[^.]+$": 120}
-# Rows of tables, addresses, and what a tool wants in one line.
+# Rows of tables, addresses, and lines that a tool requires in one piece.
 FREE = re.compile(r"^\s*\||https?://|file://|^\s*#include|NOLINT|^<img ")
 
 

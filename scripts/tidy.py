@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Runs clang-tidy over src/ and apps/: tidy.py BUILD_DIR, the folder of compile_commands.json.
 
-A file found clean is not looked at again until its preprocessed text, its compile command, the
-rules or the tool change: a full run takes many seconds a file, most of them in headers of others.
+A clean file is not checked again until its preprocessed text, its compile command, the rules or the tool change: a
+full run takes many seconds per file, most of them in headers of other projects.
 """
 
 import concurrent.futures
@@ -22,7 +22,7 @@ def output_of(*command):
 
 
 def fingerprint(entry, rules):
-    """What decides clang-tidy's verdict on a file; comments count, for the NOLINT in them."""
+    """A hash of everything that determines clang-tidy's findings for a file; comments count, for their NOLINT."""
     arguments = shlex.split(entry["command"])
     arguments = arguments[: arguments.index("-o")] + ["-E", "-C", entry["file"]]
     if pathlib.Path(arguments[0]).name == "ccache":
@@ -32,7 +32,7 @@ def fingerprint(entry, rules):
 
 
 def check(entry, rules, build, stamps):
-    """Returns the findings, or None where there are none."""
+    """Returns the findings, or None if there are none."""
     try:
         stamp = stamps / fingerprint(entry, rules)
     except subprocess.CalledProcessError as error:
