@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Enforces the layers: check_layers.py [--root DIR], --self-test to check this check, or --picture to print who
-includes whom, as docs/architecture.md has it.
+"""Enforces the layers: check_layers.py [--root DIR]. --self-test tests this program; --picture prints which layer
+includes which, as in docs/architecture.md.
 
-A layer may include headers of itself and of the layers before it. What is foreign to a layer (DDS,
-YAML, threads, the clock ...) stays where the tables below put it. Tests and benchmarks are exempt.
+A layer may include headers of itself and of the layers before it. The tables below say which files may use other
+libraries (DDS, YAML ...), threads and the clock. Tests and benchmarks are exempt.
 """
 
 import argparse
@@ -45,7 +45,7 @@ COMMENT_OR_LITERAL = re.compile(
 
 
 def strip_comments(text, literals_too=False):
-    """Blanks comments (and literals), keeping the lines where they are."""
+    """Replaces comments (and literals) by blanks; line numbers stay the same."""
     def blank(match):
         comment = match.group().startswith("/")
         return re.sub(r"[^\n]", " ", match.group()) if comment or literals_too else match.group()
@@ -53,7 +53,7 @@ def strip_comments(text, literals_too=False):
 
 
 def layer_of(path):
-    """The layer of a file of the project; None for one that lies in no layer."""
+    """The layer of a file of the project; None if it belongs to no layer."""
     match = re.match(r"(?:include/tfdude|src)/([^/]+)/|(apps)/", path)
     name = match and (match[1] or match[2])
     return name if name in LAYERS else None
@@ -80,7 +80,7 @@ class Checker:
         self.findings.append((rule, f"{path}:{line}: [{rule}] {message}"))
 
     def resolve(self, path, name):
-        """The project's file that an include names, the way the compiler would find it; or None."""
+        """The project's file that an include names, found as by the compiler; or None."""
         here = path.rsplit("/", 1)[0]
         for folder in (here, "include", "src"):
             parts = []
@@ -96,7 +96,7 @@ class Checker:
     def check_include(self, path, layer, position, name):
         target = self.resolve(path, name)
         if target is None and name.startswith("tfdude/"):
-            target = "include/" + name  # a header that is not there (yet) still has its layer
+            target = "include/" + name  # a header that does not exist (yet) still has a layer
         if target is not None:
             self.check_own(path, layer, position, name, target)
             return
@@ -135,7 +135,7 @@ class Checker:
                 self.report(path, None, "listed", "is not in the header list of src/CMakeLists.txt")
 
     def picture(self):
-        """Who includes whom, in Mermaid's words, but for what follows from the rest."""
+        """A Mermaid diagram of which layer includes which, without arrows that follow from others."""
         def reaches(start, end):
             return any(other == end or reaches(other, end)
                        for layer, other in self.arrows if layer == start)
@@ -167,7 +167,7 @@ class Checker:
 
 
 class SelfTest(unittest.TestCase):
-    """Every rule must find its violation, and nothing where there is none."""
+    """Every rule finds its violation, and nothing in a clean tree."""
 
     CLEAN = {
         "idl/wire.idl": "",

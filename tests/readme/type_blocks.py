@@ -2,7 +2,7 @@
 
     type_blocks.py BUILD_DIR CXX [CXX_FLAGS...]
 
-BUILD_DIR stands in for build/release. All runs in a DDS domain of its own, with an empty home directory.
+BUILD_DIR replaces build/release. Everything runs in its own DDS domain, with an empty home directory.
 """
 import os
 import re
@@ -28,7 +28,7 @@ def lines_of(block):
 
 
 def lease_domain():
-    """As tests/support/domain_lease.cpp does."""
+    """Reserves a DDS domain, as tests/support/domain_lease.cpp does. It is free again when the socket is closed."""
     for i in range(200):
         domain = 20 + (os.getpid() * 7 + i) % 200
         lease = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -41,7 +41,7 @@ def lease_domain():
 
 
 class Shell:
-    """What is typed is run by bash; a mark with the status follows the output of each line."""
+    """Passes typed lines to bash; a mark with the status follows the output of each line."""
 
     def __init__(self, environment):
         self.bash = subprocess.Popen(
@@ -50,7 +50,7 @@ class Shell:
         self.output = b""
 
     def type(self, line):
-        """Returns what the line and background jobs have printed, and the status."""
+        """Returns the output of the line and of background jobs, and the status."""
         self.bash.stdin.write(f"{line}\necho; echo '=== status' $?\n".encode())
         self.bash.stdin.flush()
         deadline = time.monotonic() + LINE_SECONDS
@@ -67,7 +67,7 @@ class Shell:
         return self
 
     def __exit__(self, *_):
-        """What still runs, as where a line has failed, ends with it."""
+        """Kills programs that still run, for example after a line has failed."""
         try:
             os.killpg(self.bash.pid, signal.SIGKILL)
         except ProcessLookupError:
