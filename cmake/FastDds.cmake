@@ -1,12 +1,12 @@
-# All that differs in the build between Fast DDS 2.9 (Debian 12) and 3.1 (Debian 13): the names of the
-# package and its targets, and the names of what fastddsgen writes. Gives the target tfdude_fastdds and
-# the function tfdude_generate_idl().
+# Contains all differences in the build between Fast DDS 2.9 (Debian 12) and 3.1 (Debian 13): the names of the package,
+# of its targets and of the files that fastddsgen writes. Defines the target tfdude_fastdds and the function
+# tfdude_generate_idl().
 find_package(fastcdr REQUIRED)
 find_package(fastdds QUIET)
 if(fastdds_FOUND)
   set(TFDUDE_FASTDDS_MAJOR 3)
   set(_fastdds_target fastdds)
-  # So says tinyxml2, through Fast DDS, to some targets; precompiled headers that all share want it of all.
+  # tinyxml2 defines this, through Fast DDS, for some targets; shared precompiled headers require it for all.
   add_compile_definitions(_FILE_OFFSET_BITS=64)
 else()
   find_package(fastrtps 2.9 REQUIRED)
@@ -19,8 +19,8 @@ target_compile_definitions(tfdude_fastdds INTERFACE TFDUDE_FASTDDS_MAJOR=${TFDUD
 
 find_program(FASTDDSGEN fastddsgen REQUIRED)
 
-# tfdude_generate_idl(target file.idl): generates C++ of an IDL file into the build tree as an object
-# library, whose headers are system headers to whoever links it.
+# tfdude_generate_idl(target file.idl): generates C++ from an IDL file in the build tree, as an object library. Its
+# headers are system headers for targets that link it.
 function(tfdude_generate_idl target idl)
   get_filename_component(name ${idl} NAME_WE)
   set(dir ${CMAKE_CURRENT_BINARY_DIR}/generated)
@@ -45,6 +45,6 @@ function(tfdude_generate_idl target idl)
   target_include_directories(${target} SYSTEM PUBLIC ${dir})
   target_link_libraries(${target} PUBLIC tfdude_fastdds)
   set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
-  # Fast CDR 1 calls a member of the null array of an empty sequence, which does no harm.
+  # For an empty sequence Fast CDR 1 calls a member of a null array, which is harmless.
   target_compile_options(${target} PRIVATE -w -fno-sanitize=null)
 endfunction()

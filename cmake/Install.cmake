@@ -1,5 +1,5 @@
-# Installs the library as the CMake package "tfdude" (find_package(tfdude), target tfdude::tfdude), the
-# programs, and what they need at run time.
+# Installs the library as the CMake package "tfdude" (find_package(tfdude), target tfdude::tfdude), the programs, and
+# the files that they need at run time.
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/tfdude)
 
@@ -12,7 +12,7 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/tfdudeConfigVersion.cmake
 install(FILES ${CMAKE_BINARY_DIR}/tfdudeConfig.cmake ${CMAKE_BINARY_DIR}/tfdudeConfigVersion.cmake
   DESTINATION ${package_dir})
 
-# The programs look for the library beside themselves, so that the prefix may be moved.
+# The programs find the library by a path relative to themselves, so the prefix may be moved.
 file(RELATIVE_PATH bin_to_lib ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
 foreach(program tfduded tfdude_cli)
   if(TARGET ${program})

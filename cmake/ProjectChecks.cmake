@@ -1,4 +1,4 @@
-# Tests of the project itself rather than of its code: the layers, the IDL, and that the installed package works.
+# Tests of the project itself rather than of its code: the layers, the IDL, the installed package and the README.
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
 add_test(NAME "layers: sources" COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py)
@@ -6,8 +6,8 @@ add_test(NAME "layers: the check itself"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py --self-test)
 set_tests_properties("layers: sources" "layers: the check itself" PROPERTIES LABELS unit TIMEOUT 60)
 
-# Other vendors' compilers take the IDL, though names that differ by their case alone are one name to them. This one
-# warns where a type does not say its extensibility.
+# Checks that another vendor's compiler accepts the IDL; to it, names that differ only in case are the same name. It
+# warns if a type does not declare its extensibility.
 find_program(IDLC idlc REQUIRED)
 file(GLOB idl_files CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/idl/*.idl)
 foreach(idl ${idl_files})
@@ -17,7 +17,7 @@ foreach(idl ${idl_files})
     FAIL_REGULAR_EXPRESSION "extensibility")
 endforeach()
 
-# A test whose name ctest cannot hand on, as one with a semicolon, runs nothing: that must not pass.
+# If ctest cannot pass on a test's name, such as one with a semicolon, no test case runs. This must not count as passed.
 add_test(NAME "suite: a test that runs nothing fails" COMMAND base_test "no test has this name")
 set_tests_properties("suite: a test that runs nothing fails" PROPERTIES LABELS unit TIMEOUT 60
   FAIL_REGULAR_EXPRESSION "${TFDUDE_NOTHING_RAN}" WILL_FAIL TRUE)
@@ -35,7 +35,7 @@ add_test(NAME "install: consumer"
     -P ${CMAKE_SOURCE_DIR}/tests/install_consumer/run.cmake)
 set_tests_properties("install: consumer" PROPERTIES LABELS install TIMEOUT 300)
 
-# What README.md says works as typed, also a second time, and its programs compile.
+# The commands of README.md work as typed, also a second time, and its programs compile and run.
 add_test(NAME "readme: its lines and programs work"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/readme/type_blocks.py
     ${CMAKE_BINARY_DIR} ${CMAKE_CXX_COMPILER} ${consumer_flags})
