@@ -62,8 +62,7 @@ Result<void> join(UrdfTree& tree, const UrdfText::Joint& said) {
   return {};
 }
 
-// Names a joint of the cycle that lies above the link. @param link  a link that has no root above
-// it
+// Names a joint of the cycle above a link that has no root above it.
 tl::unexpected<Error> cycle(const UrdfTree& tree, std::size_t link) {
   std::vector<bool> seen(tree.links.size());
   while (!seen[link]) {
