@@ -1,8 +1,8 @@
-"""The form of a measured figure, and what is computed from figures.
+"""The format of a measured figure, and functions that compute values from figures.
 
 A figure is a dict as the C++ programs print it (bench/support/series.cpp): unit, n, min, p5, p25,
 median, p75, p90, p95, p99, p99.9, max, mean, and medians, the median of each repetition. The
-results hold them by their key, words separated by slashes.
+results contain the figures by key; a key consists of words separated by slashes.
 """
 
 import math
@@ -13,12 +13,12 @@ QUANTILES = {"min": 0.0, "p5": 0.05, "p25": 0.25, "median": 0.5, "p75": 0.75, "p
 
 
 def quantile(ordered, share):
-    """Of sorted values; the nearest rank, as in series.cpp."""
+    """The quantile of sorted values by the nearest rank, as in series.cpp."""
     return ordered[max(math.ceil(share * len(ordered)), 1) - 1]
 
 
 def summary(key, unit, values):
-    """The figure of values each of which is a repetition."""
+    """The figure of values; each value is one repetition."""
     ordered = sorted(values)
     figure = {"key": key, "unit": unit, "n": len(values)}
     figure.update({name: quantile(ordered, share) for name, share in QUANTILES.items()})
@@ -28,10 +28,11 @@ def summary(key, unit, values):
 
 
 def ratio(figures, over, under, which="median"):
-    """What `over` is times `under`, or None where one of them is missing.
+    """The ratio of `over` to `under`, or None if one of them is missing.
 
-    Of medians, repetition by repetition where both have as many: what disturbed the machine in one
-    repetition then disturbs both sides. Of another quantile the plain quotient.
+    For medians, the median of the ratios of each repetition, if both sides have the same number of
+    repetitions: a disturbance of the machine in one repetition then affects both sides. For another
+    quantile, the plain quotient.
     """
     a, b = figures.get(over), figures.get(under)
     if not a or not b or which not in a or which not in b:
@@ -44,7 +45,7 @@ def ratio(figures, over, under, which="median"):
 
 
 def numbered(figures, pattern):
-    """[(number, figure)] of the keys that fit `pattern`, a star being the number; sorted."""
+    """[(number, figure)] of the keys that match `pattern`, sorted; the star stands for the number."""
     before, after = pattern.split("*")
     found = []
     for key, figure in figures.items():
@@ -55,7 +56,7 @@ def numbered(figures, pattern):
 
 
 def growth(points):
-    """The exponent e of y ~ x^e by least squares of the logarithms, or None below three points."""
+    """The exponent e of y ~ x^e by least squares of the logarithms, or None for fewer than three points."""
     logs = [(math.log(x), math.log(y)) for x, y in points if x > 0 and y > 0]
     if len(logs) < 3:
         return None
@@ -68,7 +69,7 @@ def growth(points):
 
 
 def growth_in_words(exponent):
-    """What an exponent means, for a reader."""
+    """A description of an exponent for the report."""
     if exponent < -0.1:
         kind = "falls"
     elif exponent < 0.1:
@@ -86,12 +87,12 @@ NANOSECONDS = {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9}
 
 
 def nanoseconds(figure, which="median"):
-    """A time of a figure."""
+    """A time of a figure [ns]."""
     return figure[which] * NANOSECONDS[figure["unit"]]
 
 
 def microseconds(figure, which="median"):
-    """A time of a figure."""
+    """A time of a figure [us]."""
     return nanoseconds(figure, which) / 1e3
 
 
@@ -101,7 +102,7 @@ def as_measured(figure, which="median"):
 
 
 def number(value):
-    """A value for a reader: three digits that count, and whole numbers whole."""
+    """A value as text: three significant digits; whole numbers without decimals."""
     if value is None:
         return "missing"
     if isinstance(value, int) or value == 0 or abs(value) >= 100:

@@ -1,4 +1,4 @@
-"""What the figures were measured on."""
+"""Describes the machine on which the figures are measured."""
 
 import datetime
 import os
@@ -24,7 +24,7 @@ def _said(*command):
 
 
 def _package(*names):
-    """Name and version of the first of Debian's packages that is installed."""
+    """Name and version of the first of these Debian packages that is installed."""
     for name in names:
         version = _said("dpkg-query", "-W", "-f", "${Version}", name)
         if version:
@@ -34,7 +34,7 @@ def _package(*names):
 
 def _commit():
     commit = _said("git", "rev-parse", "--short=12", "HEAD") or "unknown"
-    # The results themselves are not what is measured.
+    # Changes of the results do not change the measured programs.
     changed = _said("git", "status", "--porcelain", "--", ":!bench/results", ":!bench/REPORT.md")
     return commit + (" with changes not committed" if changed else "")
 
@@ -47,13 +47,13 @@ def _read(path):
 
 
 def _processor_times():
-    """(all, idle) in ticks since the start; waiting for a disk counts as idle."""
+    """(all, idle) in ticks since the system started; waiting for a disk counts as idle."""
     fields = [int(word) for word in _read("/proc/stat").split("\n")[0].split()[1:9]]
     return sum(fields), fields[3] + fields[4]
 
 
 def busy(seconds=3):
-    """How busy others keep the processors [%]; the load average would show our own build."""
+    """The load by other processes [% of all processors]. The load average would also show the build before."""
     try:
         begin, idle_begin = _processor_times()
         time.sleep(seconds)
@@ -64,7 +64,7 @@ def busy(seconds=3):
 
 
 def description(build_dir):
-    """What there is to know of the machine, by name."""
+    """Properties of the machine and the build, by name."""
     cache = _read(pathlib.Path(build_dir) / "CMakeCache.txt")
     compiler = _first(r"^CMAKE_CXX_COMPILER:[A-Z]+=(.+)$", cache, "c++")
     flags = _read("/proc/cpuinfo")

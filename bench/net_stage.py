@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The network benchmarks: starts the daemons as shipped, pins, runs the programs of bench/net, and yields what
-they print, one dictionary a figure.
+"""The network benchmarks: starts the shipped daemons, pins all programs to cores, runs those of bench/net, and yields
+their output, one dictionary per figure.
 
     python3 bench/net_stage.py [--quick] [--bin DIR]    prints the lines
 """
@@ -24,13 +24,13 @@ EXAMPLES = processes.ROOT / "examples" / "thesis"
 
 ALL_CPUS = ",".join(map(str, sorted(os.sched_getaffinity(0))))
 
-MEETING_S = 1.0  # for many daemons to have met [s]
+MEETING_S = 1.0  # time for many daemons to discover each other [s]
 
 
 def patient_profile(work: pathlib.Path) -> pathlib.Path:
-    """The loopback profile, but whoever is silent counts as gone after 9 s only: a call that fails ends a
-    benchmark, and a virtual machine may stop for half a second within a quarter of an hour. Nothing that
-    is measured depends on it."""
+    """The loopback profile with a lease of 9 s, after which a silent participant counts as lost. A failed call ends a
+    benchmark, and a virtual machine may stop for half a second within a quarter of an hour. The measured values do
+    not depend on the lease."""
     shipped = processes.PROFILE.read_text()
     patient = shipped.replace("<leaseDuration><nanosec>450000000</nanosec>",
                               "<leaseDuration><sec>9</sec>")
@@ -41,7 +41,7 @@ def patient_profile(work: pathlib.Path) -> pathlib.Path:
 
 
 class Stage:
-    """Runs processes and never leaves one behind."""
+    """Runs processes, and ends all of them."""
 
     def __init__(self, bin_dir: pathlib.Path, work: pathlib.Path):
         self.bin_dir = bin_dir
@@ -50,7 +50,7 @@ class Stage:
         self.leases = {}
 
     def domain(self, name: str) -> int:
-        """The DDS domain that stands for a name in this stage."""
+        """The DDS domain with this name in this stage; reserved at the first call."""
         if name not in self.leases:
             self.leases[name] = processes.lease_domain()
         return self.leases[name][0]
@@ -60,14 +60,14 @@ class Stage:
 
     @contextlib.contextmanager
     def servers(self, commands: list[list[str]]) -> Iterator[list["Server"]]:
-        """Starts all at once, and stops them in the end."""
+        """Starts all servers at once, and stops them at the end."""
         with open(self.work / "servers.log", "ab") as log, contextlib.ExitStack() as started:
             running = []
             for command in commands:
                 server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, bufsize=0)
                 running.append(server)
                 started.callback(processes.end, server)
-            # Told all at once, before any is waited for.
+            # Sends the signal to all, before waiting for the first.
             started.callback(lambda: [server.terminate() for server in running])
             yield [Server(server, ready_line(server)) for server in running]
 
@@ -94,7 +94,7 @@ class Stage:
 
 class Server:
     def __init__(self, process: subprocess.Popen, ready: str):
-        self.ready = ready  # what it said
+        self.ready = ready  # its line "ready ..."
         self.stat = pathlib.Path(f"/proc/{process.pid}/stat")
 
     def udp_port(self) -> str:
@@ -115,7 +115,7 @@ def ready_line(server: subprocess.Popen) -> str:
 
 
 def idle_cpu(key: str, servers: list[Server], seconds: float, repetitions: int) -> dict:
-    """What the servers together use while nobody asks them [% of a core]."""
+    """The processor time of all servers together while there are no requests [% of a core]."""
     shares = []
     for _ in range(repetitions):
         before, start = sum(server.cpu() for server in servers), time.monotonic()
@@ -126,7 +126,7 @@ def idle_cpu(key: str, servers: list[Server], seconds: float, repetitions: int) 
 
 
 def merged(work: pathlib.Path, configs: list[pathlib.Path]) -> pathlib.Path:
-    """A configuration of one partition, "central", that has the frames of all."""
+    """A configuration of one partition, "central", with the frames of all configurations."""
     lines = ["partition: central", "frames:"]
     for config in configs:
         _, frames = config.read_text().split("\nframes:\n")
@@ -137,10 +137,10 @@ def merged(work: pathlib.Path, configs: list[pathlib.Path]) -> pathlib.Path:
 
 
 def thesis(stage: Stage, quick: bool) -> Iterator[dict]:
-    """Who asks has a core of its own, those who are asked the other."""
+    """The caller has one core, the daemons have the other."""
     central_domain = stage.domain("central")
     decentral_domain = stage.domain("decentral")
-    calls, repetitions = (1000, 5) if quick else (60000, 5)  # full: the thesis's 300,000 a case
+    calls, repetitions = (1000, 5) if quick else (60000, 5)  # full: 300,000 per case, as in the thesis
     configs = {name: EXAMPLES / f"{name}.yaml" for name in ("robot", "arms")}
     central = stage.daemon("1", central_domain, merged(stage.work, list(configs.values())))
     for asking, other in (("robot", "arms"), ("arms", "robot")):
@@ -155,7 +155,7 @@ def thesis(stage: Stage, quick: bool) -> Iterator[dict]:
 
 
 def floor(stage: Stage, quick: bool) -> Iterator[dict]:
-    """On one core, where a wake-up is cheap, the programs' own work shows; two cores are what one has."""
+    """On one core a wake-up is cheap, so the time is that of the programs' own work. Two cores are the usual case."""
     central_domain = stage.domain("central")
     floor_domain = stage.domain("floor")
     calls, repetitions = (1000, 5) if quick else (20000, 5)
@@ -172,7 +172,7 @@ def floor(stage: Stage, quick: bool) -> Iterator[dict]:
 
 
 def stream(stage: Stage, quick: bool) -> Iterator[dict]:
-    """The publisher has one core, the owner the other."""
+    """The publisher has one core, the owner has the other."""
     stream_domain = stage.domain("stream")
     seconds, repetitions = (1, 5) if quick else (8, 5)
     common = ["--shared", stage.work / "stream", "--domain", stream_domain, "--profile", stage.profile]
@@ -186,7 +186,7 @@ def stream(stage: Stage, quick: bool) -> Iterator[dict]:
 
 def chain_config(work: pathlib.Path, partition: str, first: int, count: int,
                  others: int = 0) -> pathlib.Path:
-    """`count` frames of the chain chain_0, chain_1... from the `first` on, and others below its start."""
+    """`count` frames of the chain chain_0, chain_1... from `first` on, and `others` frames below chain_0."""
     value = "xyz: [0.1, 0.2, 0.3], rpy: [0.1, 0.2, 0.3], stddev: [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]"
     lines = [f"partition: {partition}", "frames:"]
     for number in range(first, first + count):
@@ -199,9 +199,9 @@ def chain_config(work: pathlib.Path, partition: str, first: int, count: int,
 
 
 def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
-    """The asking process and the daemon of all frames have a core each, the partitions' daemons and the echoes
-    both: two cores are few for so many computers. Daemons of 32 partitions keep them busy by telling each
-    other that they are there (idle_cpu), so that there this measures the machine."""
+    """The caller and the daemon of all frames have a core each; the partitions' daemons and the echoes share both
+    cores. Two cores are few, because each daemon stands for a computer. The daemons of 32 partitions keep them busy
+    with their presence alone (idle_cpu), so that row measures the machine."""
     central_domain = stage.domain("central")
     decentral_domain = stage.domain("decentral")
     repetitions = 5
@@ -276,7 +276,7 @@ def main() -> None:
     parser.add_argument("--bin", type=pathlib.Path, default=processes.ROOT / "build" / "release" / "bin")
     parser.add_argument("parts", nargs="*", metavar="part", help=f"of {', '.join(PARTS)}")
     arguments = parser.parse_args()
-    # So that what was started is stopped then, too.
+    # Exits in order, so that all started processes are stopped.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     with tempfile.TemporaryDirectory(prefix="tfdude-bench-") as work:
         stage = Stage(arguments.bin, pathlib.Path(work))

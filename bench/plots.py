@@ -1,4 +1,4 @@
-"""Draws the figures: box plots of what was timed, curves of what grows. Each as SVG and PNG.
+"""Draws the figures: box plots of times, curves of values that grow. Each plot is an SVG and a PNG file.
 
 Boxes are from the 25th to the 75th percentile with the median as a line, whiskers from the 5th to
 the 95th, and a cross is the 99th.
@@ -7,7 +7,7 @@ the 95th, and a cross is the 99th.
 import matplotlib
 
 matplotlib.use("Agg")
-import matplotlib.pyplot as pyplot  # noqa: E402  (after the choice of what draws)
+import matplotlib.pyplot as pyplot  # noqa: E402  (after the choice of the backend)
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator  # noqa: E402
 
 import thesis  # noqa: E402
@@ -18,7 +18,7 @@ BOXES = "Boxes: quartiles and median; whiskers: 5th to 95th percentile; cross: 9
 BLUE, GREEN, BROWN, GREY = "#2f6f9f", "#3f9f6f", "#b07040", "#7f7f7f"
 COLOURS = {"centralized": BROWN, "decentralized": BLUE, "ours": BLUE, "dds": GREY,
            "udp": "#b9b9b9", "tf2": BROWN, "alone": GREY, "beside": BLUE}
-LOG_FROM = 10.0  # an axis is logarithmic where its values span more than this
+LOG_FROM = 10.0  # an axis is logarithmic if the ratio of its largest to its smallest value is above this
 
 matplotlib.rcParams.update({
     "font.size": 8, "axes.titlesize": 8, "figure.titlesize": 9, "axes.grid": True,
@@ -53,7 +53,7 @@ def boxes(axes, labelled, colours):
 
 
 def log_where_needed(axes, values):
-    """The upright axis logarithmic where the values span more than ten times; else from zero."""
+    """Makes the y axis logarithmic if the values span more than LOG_FROM; otherwise it starts at zero."""
     values = [value for value in values if value > 0]
     if values and max(values) > LOG_FROM * min(values):
         upright_log(axes)
@@ -63,7 +63,7 @@ def log_where_needed(axes, values):
 
 
 def upright_log(axes):
-    """Makes the upright axis logarithmic, with enough ticks to read it."""
+    """Makes the y axis logarithmic, with enough ticks to read it."""
     axes.set_yscale("log")
     low, high = axes.get_ylim()
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0,) if high > 100 * low else (1.0, 2.0, 5.0)))
@@ -72,7 +72,7 @@ def upright_log(axes):
 
 
 def grid(count, columns, width, height):
-    """A page of panels: the figure and as many axes as are wanted."""
+    """A page of panels: the figure and `count` axes."""
     rows = -(-count // columns)
     page, axes = pyplot.subplots(rows, columns, figsize=(width * columns, height * rows),
                                  squeeze=False, layout="constrained")
@@ -83,7 +83,7 @@ def grid(count, columns, width, height):
 
 
 def draw_thesis(figures):
-    """The thesis's figures 5.1 to 5.11: centralized beside decentralized."""
+    """The thesis's figures 5.1 to 5.11: centralized compared with decentralized."""
     sides = ("centralized", "decentralized")
     cases = [case for case in thesis.CASES
              if case.figure and all(f"thesis/{case.key}/{side}" in figures for side in sides)]
@@ -109,7 +109,7 @@ FLOOR_PANELS = tuple((operation, placement) for operation in ("update", "lookup"
 
 
 def draw_floor(figures):
-    """Ours, bare DDS and bare UDP, a panel for each operation and placement."""
+    """tf-dude, bare DDS and bare UDP, a panel for each operation and placement."""
     panels = []
     for operation, placement in FLOOR_PANELS:
         found = [(who, figures[key]) for who in ("ours", "dds", "udp")
@@ -135,7 +135,7 @@ def curve(axes, points, label, colour=None, style="-", convert=microseconds):
                       markersize=3, linewidth=1.2, color=colour, label=label)
     low, high = ([convert(figure, which) for _, figure in points] for which in ("p5", "p95"))
     axes.fill_between(xs, low, high, color=line.get_color(), alpha=0.15, linewidth=0)
-    # What finds a free place for the legend sees lines, not bands.
+    # matplotlib considers lines, but not bands, when it looks for a free place for the legend.
     for edge in (low, high):
         axes.plot(xs, edge, alpha=0)
 
@@ -151,7 +151,7 @@ def by_shape(figures, prefix):
 
 
 def finish_curves(axes, x_label, y_label):
-    """The lower axis logarithmic, a tick at each x that was measured; the other where needed."""
+    """Makes the x axis logarithmic, with a tick at each measured x, and the y axis if needed."""
     xs = sorted({x for line in axes.lines for x in line.get_xdata()})
     if not xs:
         return
@@ -170,7 +170,7 @@ CORE_STYLES = (("ours_by_handle", "ours, covariance, by handle", BLUE, "-"),
                ("tf2", "tf2, no covariance", BROWN, "-"),
                ("ours", "ours, through a node", BLUE, "-"),
                ("ours_forest", "ours, in the forest", GREEN, "-"))
-CORE_DEPTH = 30  # at which the number of frames is varied
+CORE_DEPTH = 30  # the depth for which the number of frames is varied
 CORE_PANELS = ("look up by depth", "look up by frames", "set by frames", "add and remove by frames")
 
 
@@ -178,7 +178,7 @@ def core_points(figures, panel, who):
     """[(x, figure)] of one curve, sorted."""
     operation = {"lo": "lookup", "se": "set", "ad": "add_remove"}[panel[:2]]
     shapes = by_shape(figures, f"core/{operation}/{who}")
-    if panel == "look up by depth":  # of the largest tree of each
+    if panel == "look up by depth":  # the largest tree of each depth
         return sorted({depth: figure for depth, _, figure in shapes}.items())
     if panel == "look up by frames":
         shapes = [shape for shape in shapes if shape[0] == CORE_DEPTH]
@@ -186,7 +186,7 @@ def core_points(figures, panel, who):
 
 
 def core_curves(figures):
-    """All of them: (name, points)."""
+    """Yields all curves of own frames: (name, points)."""
     for panel in CORE_PANELS:
         for who, label, _, _ in CORE_STYLES:
             if points := core_points(figures, panel, who):
@@ -194,7 +194,7 @@ def core_curves(figures):
 
 
 def draw_core(figures):
-    """A process's own frames beside tf2."""
+    """A process's own frames compared with tf2."""
     if not any(key.startswith("core/") for key in figures):
         return None
     page, panels = grid(len(CORE_PANELS), 2, 4.2, 3.0)
@@ -211,7 +211,7 @@ def draw_core(figures):
 
 
 def draw_contention(figures):
-    """Readers alone and beside a writer."""
+    """Readers alone and concurrently with a writer."""
     readers = [key.removesuffix("/alone") for key in sorted(figures)
                if key.startswith("contention/") and key.endswith("/alone")]
     labelled, colours = [], []
@@ -230,7 +230,7 @@ def draw_contention(figures):
     return page
 
 
-# What was varied, the axes' words, the curves' keys and words, and what converts the figures.
+# The varied quantity, the labels of both axes, the conversion of the figures, and key and label of each curve.
 SCALES = (
     ("partitions", "partitions on the path", "lookup [µs]", microseconds, (
         ("decentralized", "decentralized"), ("centralized", "centralized"),
@@ -242,7 +242,7 @@ SCALES = (
 
 
 def growths(figures):
-    """{(what, who): exponent} of all that was measured over a range."""
+    """{(what, who): exponent} of everything that was measured over a range."""
     found = {}
     for what, _, _, _, curves in SCALES:
         for who, _ in curves:
@@ -275,7 +275,7 @@ PLOTS = {"thesis": draw_thesis, "floor": draw_floor, "core": draw_core,
 
 
 def draw(figures, folder):
-    """Draws what there are figures for; returns {name: PNG file}. Other plots do not stay."""
+    """Draws the plots for which there are figures, and removes the files of others. Returns {name: PNG file}."""
     drawn = {}
     for name, function in PLOTS.items():
         files = [folder / f"{name}.{ending}" for ending in ("svg", "png")]
@@ -284,7 +284,7 @@ def draw(figures, folder):
             if page is None:
                 file.unlink(missing_ok=True)
             else:
-                # The same figures make the same file.
+                # Without a date, equal figures give equal files.
                 dateless = {"Date": None} if file.suffix == ".svg" else None
                 page.savefig(file, dpi=130, metadata=dateless)
         if page is not None:

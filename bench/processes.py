@@ -1,4 +1,4 @@
-"""Programs that a stage starts, waits for, and ends again."""
+"""Starts programs for a stage, waits for them, and ends them."""
 
 import contextlib
 import pathlib
@@ -11,16 +11,16 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROFILE = ROOT / "profiles" / "loopback.xml"
 DOMAINS = range(140, 172)
-PATIENCE_S = 40  # for a program to start or to answer
+PATIENCE_S = 40  # time for a program to start or to answer
 
 
 class Skipped(Exception):
-    """A stage cannot be run here, and why."""
+    """The reason why a stage cannot run here."""
 
 
 def lease_domain():
-    """A DDS domain that no other benchmark and no test has, and what keeps it: a name of the kernel's, as in
-    tests/support/domain_lease.cpp."""
+    """Reserves a DDS domain that no other benchmark or test uses. Returns it with the socket that holds it: the
+    socket's name in the kernel is the reservation, as in tests/support/domain_lease.cpp."""
     for domain in DOMAINS:
         lease = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
@@ -32,7 +32,7 @@ def lease_domain():
 
 
 def end(process, how=signal.SIGTERM):
-    """Ends a program that we started."""
+    """Ends a program: by the signal, or after PATIENCE_S by SIGKILL."""
     if process.poll() is None:
         process.send_signal(how)
         try:
@@ -43,7 +43,7 @@ def end(process, how=signal.SIGTERM):
 
 
 def await_line(stream, what):
-    """The next line of an unbuffered pipe, or an error when it does not come in time."""
+    """The next line of an unbuffered pipe, or an error if it does not come in time."""
     deadline = time.monotonic() + PATIENCE_S
     line = b""
     while not line.endswith(b"\n"):
@@ -77,7 +77,7 @@ def daemons(bin_dir, configs, domain, logs, options=("--profile", PROFILE)):
 
 
 def output_of(command, timeout, **more):
-    """What a program prints; it is ended with an error where it takes longer."""
+    """The output of a program. Raises an error if the program fails or takes longer than `timeout` [s]."""
     run = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                          timeout=timeout, check=False, **more)
     if run.returncode != 0:

@@ -1,4 +1,4 @@
-"""The stages that are one program each: the core beside tf2, and readers beside a writer."""
+"""The stages without daemons: the core compared with tf2, and readers concurrent with a writer."""
 
 import json
 import os
@@ -10,12 +10,12 @@ SECONDS_FOR_A_STAGE = 900
 
 
 def pinned():
-    """The command that keeps a program on the last core: the first has most of the interrupts."""
+    """The command that pins a program to the last core, because the first handles most of the interrupts."""
     return ["taskset", "-c", str(max(os.sched_getaffinity(0)))]
 
 
 def core(quick, bin_dir, _work):
-    """Google Benchmark's figures: a repetition is a value. Repetitions of all are interleaved."""
+    """Google Benchmark's figures: each repetition is a value. The repetitions of all benchmarks are interleaved."""
     for name in ("core_bench", "time_bench"):
         program = bin_dir / name
         if not program.exists():
@@ -24,7 +24,7 @@ def core(quick, bin_dir, _work):
 
 
 def google_benchmark(program, quick):
-    """Runs one such program."""
+    """Runs one program of Google Benchmark."""
     repetitions, seconds = (5, 0.02) if quick else (11, 0.2)
     printed = processes.output_of(
         pinned() + [program, f"--benchmark_repetitions={repetitions}",
@@ -33,9 +33,9 @@ def google_benchmark(program, quick):
     measured = {}
     for run in json.loads(printed)["benchmarks"]:
         if run["run_type"] == "iteration":
-            # Of the processor: nothing in these waits, and what else runs is not theirs.
+            # Processor time: these benchmarks never wait, and the time of other programs must not count.
             value, unit = run["cpu_time"], run["time_unit"]
-            if "bytes" in run:  # what is weighed, not timed
+            if "bytes" in run:  # measures memory, not time
                 value, unit = run["bytes"], "bytes"
             key = run["run_name"].removesuffix("/iterations:1")
             measured.setdefault(key, []).append((run["repetition_index"], value, unit))
@@ -44,7 +44,7 @@ def google_benchmark(program, quick):
 
 
 def contention(quick, bin_dir, _work):
-    """Prints figures itself; it places its threads itself, too."""
+    """The program prints figures and pins its threads itself."""
     program = bin_dir / "contention_bench"
     if not program.exists():
         raise processes.Skipped("contention_bench is not built")

@@ -1,11 +1,11 @@
-"""Paths that are pushed to who watches them: how long that takes beside bare DDS, and bytes beside tf2's broadcast.
+"""Paths that are pushed to watchers: latency compared with bare DDS, and bytes compared with tf2's broadcast.
 
-Keys: pushed/latency/... and pushed/latest as bench/net/push_bench.cpp says them; and of a robot with 30 joints, counted
-in captures: pushed/WHAT/WHO/RATE/WATCHERS, where WHO is edges (all joints' edges are watched), composed (the path from
-base to tip as one transform) or tf2 (bare DDS samples of the size of tf2's message), and WHAT is
-    payload   CDR bytes of samples a second
-    udp       all of it as UDP packets, with acknowledgements and the watchers' renewals, a second
-    samples   that were sent to each watcher, a second
+Keys: pushed/latency/... and pushed/latest are defined by bench/net/push_bench.cpp. The others are counted in captures
+of a robot with 30 joints: pushed/WHAT/WHO/RATE/WATCHERS, where WHO is edges (all joints' edges are watched), composed
+(the path from base to tip as one transform) or tf2 (bare DDS samples of the size of tf2's message), and WHAT is
+    payload   CDR bytes of DDS samples per second
+    udp       bytes of all UDP packets, with acknowledgements and the watchers' renewals, per second
+    samples   DDS samples sent to each watcher per second
 pushed/message/tf2 is the computed size of a tf2_msgs/TFMessage of all joints.
 """
 
@@ -23,12 +23,12 @@ WATCHERS = (1, 10)
 OURS = {"tfdude/state", "tfdude/request", "tfdude/reply"}
 BARE = {"floor/ping"}
 SAMPLES = {"tfdude/state", "floor/ping"}
-QUIET_S = 0.5  # after all have met
-KEPT = 1500  # bytes of each packet in the capture; what tells of endpoints is shorter
+QUIET_S = 0.5  # pause after discovery
+KEPT = 1500  # bytes of each packet in the capture; messages of discovery are shorter
 
 
 def robot_links():
-    """(parent, child) of a robot's 30 joints, with names as robot descriptions have them."""
+    """(parent, child) of a robot's 30 joints, with names as in common robot descriptions."""
     arm = ("shoulder_pan", "shoulder_lift", "upper_arm_roll", "elbow_flex", "forearm_roll", "wrist_flex", "wrist_roll")
     leg = ("hip_yaw", "hip_roll", "hip_pitch", "knee_pitch", "ankle_pitch", "ankle_roll")
     limbs = [("", "base_link", ("torso_lift", "torso_yaw")), ("", "torso_yaw_link", ("head_pan", "head_tilt"))]
@@ -44,12 +44,13 @@ def robot_links():
 
 
 def tf2_message_bytes():
-    """Of a tf2_msgs/TFMessage of all joints in one sample, as ROS 2 serializes it: CDR with its header of four bytes,
-    a sequence of geometry_msgs/TransformStamped, each a stamp (8 bytes), two strings, and seven doubles."""
+    """The size of a tf2_msgs/TFMessage with all joints in one DDS sample, as ROS 2 serializes it: CDR with its header
+    of four bytes, and a sequence of geometry_msgs/TransformStamped, each with a stamp (8 bytes), two strings, and
+    seven doubles."""
     def aligned(at, to):
         return -(-at // to) * to
 
-    at = 4  # the sequence's length
+    at = 4  # after the sequence's length
     for parent, child in robot_links():
         at = aligned(at, 4) + 8
         for name in (parent, child):
@@ -59,7 +60,7 @@ def tf2_message_bytes():
 
 
 def latency(stage, quick):
-    """The owner has one core, who watches the other."""
+    """The owner has one core, the watcher has the other."""
     common = ["--domain", stage.domain("pushed"), "--profile", stage.profile]
     seconds, calls = (2, 1000) if quick else (10, 20000)
     with stage.servers([stage.command("0", "push_bench", ["--mode", "own", *common])]):
@@ -70,7 +71,7 @@ def latency(stage, quick):
 
 
 def counted(file, topics, watchers, begin_ns, end_ns):
-    """{what: a second} of the packets of some topics."""
+    """{what: rate per second} of the packets of these topics."""
     counts = dict.fromkeys(("payload", "udp", "samples"), 0)
     capture = rtps.Capture(file)
     for packet in capture.between(begin_ns, end_ns):

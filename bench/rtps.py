@@ -1,7 +1,7 @@
 """Reads a capture of UDP over Ethernet or Linux's loopback (pcap), and the RTPS messages in it.
 
-Only what telling topics apart needs: RTPS 2.2, sections 8.3.7 and 9.4.5. Which topic an endpoint
-is of is learned from the capture itself, from the discovery of endpoints: it must begin before.
+Implements only the parts of RTPS 2.2 that are needed to distinguish topics (sections 8.3.7 and 9.4.5). The topics of
+endpoints are learned from their discovery messages, so the capture must begin before discovery.
 """
 
 import dataclasses
@@ -9,7 +9,7 @@ import struct
 
 ACKNACK, HEARTBEAT, GAP, INFO_DST, DATA, DATA_FRAG = 0x06, 0x07, 0x08, 0x0E, 0x15, 0x16
 VENDORS_OWN = 0x80  # and above
-SEDP_WRITERS = (0x000003C2, 0x000004C2)  # tell of the endpoints that publish, and that subscribe
+SEDP_WRITERS = (0x000003C2, 0x000004C2)  # announce endpoints that publish, and that subscribe
 PID_TOPIC_NAME, PID_ENDPOINT_GUID, PID_SENTINEL = 0x0005, 0x005A, 0x0001
 INLINE_QOS = 0x02  # a flag of DATA
 RTPS_HEADER = 20
@@ -27,13 +27,13 @@ class Packet:
     sender: bytes           # participant
     rtps_bytes: int
     payload_bytes: int = 0  # of its DATA submessages: CDR with its header of four bytes
-    vendor_bytes: int = 0   # of submessages that are Fast DDS's own, for statistics
+    vendor_bytes: int = 0   # of Fast DDS's own submessages, for statistics
     kinds: list = dataclasses.field(default_factory=list)    # of its submessages, in order
     writers: list = dataclasses.field(default_factory=list)  # (participant, entity) they are about
 
     @property
     def udp_bytes(self):
-        """With IP and UDP headers."""
+        """Its size with IP and UDP headers."""
         return self.rtps_bytes + UDP_HEADERS
 
 
@@ -48,14 +48,14 @@ def _datagrams(path):
             raise ValueError(f"{path} is not of Ethernet or the loopback interface")
         while len(record := file.read(16)) == 16:
             seconds, fraction, kept, length = struct.unpack(order + "IIII", record)
-            # What was not kept of it counts, though it cannot be read.
+            # Pads a truncated packet: the bytes that were not captured count as well.
             frame = file.read(kept).ljust(length, b"\0")
             if frame[12:14] == b"\x08\x00":
                 yield seconds * 10**9 + fraction * nanoseconds, frame[14:]
 
 
 def _parameters(payload):
-    """The parameters of a list as discovery sends it: {id: value}."""
+    """The parameters of a parameter list as in discovery: {id: value}."""
     order = "<" if payload[1] & 1 else ">"
     found, at = {}, 4
     while at + 4 <= len(payload):
@@ -122,7 +122,7 @@ class Capture:
                     self._learn(payload)
             elif kind in (HEARTBEAT, GAP):
                 packet.writers.append((sender, struct.unpack(">I", body[4:8])[0]))
-            elif kind == ACKNACK:  # from a reader to the writer, who is the one addressed
+            elif kind == ACKNACK:  # from a reader to a writer of the addressed participant
                 packet.writers.append((receiver, struct.unpack(">I", body[4:8])[0]))
         return packet
 
@@ -139,16 +139,16 @@ class Capture:
         self._topics[endpoint] = name[4:4 + length - 1].decode()
 
     def topic(self, packet):
-        """The topic a packet is about: None for discovery and the like."""
+        """The topic that a packet is about; None for discovery and similar packets."""
         for writer in packet.writers:
             if writer in self._topics:
                 return self._topics[writer]
         return None
 
     def is_of_participant(self, packet):
-        """Whether who sent it is a participant whose endpoints were heard of here."""
+        """Whether the sender is a participant whose endpoints were announced in this capture."""
         return packet.sender in self._participants
 
     def between(self, begin_ns, end_ns):
-        """The packets of that time."""
+        """The packets from `begin_ns` to `end_ns`, which is excluded."""
         return [packet for packet in self.packets if begin_ns <= packet.time_ns < end_ns]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs the benchmarks; writes results, plots and report. scripts/bench builds before."""
+"""Runs the benchmarks; writes results, plots and report. scripts/bench first builds them."""
 
 import argparse
 import json
@@ -26,7 +26,7 @@ STAGES = ("core", "contention", "net", "wire", "pushed")
 
 
 def stage(name):
-    """What yields the figures, given quick, the binaries' folder and a folder to work in."""
+    """The function of a stage: it yields figures, given quick, the binaries' folder and a working folder."""
     modules = {"net": net_stage, "wire": wire, "pushed": pushed}
     if name in modules:
         return modules[name].run
@@ -34,7 +34,7 @@ def stage(name):
 
 
 def run_stage(name, quick, bin_dir, figures):
-    """Puts a stage's figures to the others, by their keys; returns how it went."""
+    """Adds a stage's figures to `figures`, by their keys; returns "done", or why it was skipped or failed."""
     with tempfile.TemporaryDirectory(prefix=f"tfdude-{name}-") as work:
         try:
             for figure in stage(name)(quick, bin_dir, pathlib.Path(work)):
@@ -47,7 +47,7 @@ def run_stage(name, quick, bin_dir, figures):
             return "done"
         except processes.Skipped as reason:
             return f"skipped: {reason}"
-        except Exception as error:  # whatever it is, the other stages can still be run
+        except Exception as error:  # the other stages can still run, whatever the error
             for log in sorted(pathlib.Path(work).glob("*.log")):
                 print(f"--- {log.name}\n{log.read_text(errors='replace')[-2000:]}")
             traceback.print_exc()
@@ -55,7 +55,7 @@ def run_stage(name, quick, bin_dir, figures):
 
 
 def measure(names, quick, bin_dir):
-    """Runs the stages; returns the figures by key, and how each stage went by its name."""
+    """Runs the stages; returns the figures by key, and the outcome of each stage by name."""
     figures, went = {}, {}
     for name in names:
         begin = time.monotonic()
@@ -76,13 +76,13 @@ def write(results, folder, report_file):
 
 
 def arguments():
-    """What the command line says."""
+    """The command line's arguments."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer values: under 5 minutes")
     parser.add_argument("--check", action="store_true",
-                        help="a quick run beside the targets; leaves the committed results alone")
+                        help="a quick run, compared with the targets; does not change the committed results")
     parser.add_argument("--from", dest="saved", type=pathlib.Path, metavar="FILE",
-                        help="make plots and report of a saved latest.json, without measuring")
+                        help="write plots and report from a saved latest.json, without measuring")
     parser.add_argument("--build", type=pathlib.Path, default=processes.ROOT / "build" / "release",
                         help="where the programs were built (%(default)s)")
     parser.add_argument("--stages", default=",".join(STAGES), help="only these (%(default)s)")
@@ -96,7 +96,7 @@ def arguments():
 
 
 def main():
-    # So that what was started is stopped then, too.
+    # Exits in order, so that all started processes are stopped.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("terminated"))
     chosen = arguments()
     if chosen.saved:
@@ -111,7 +111,7 @@ def main():
     if chosen.check:
         print(targets.table(results["figures"]))
     else:
-        # A report of other results stays with them.
+        # The report of results in another folder is written there.
         home = BENCH if chosen.results.resolve() == RESULTS else chosen.results
         write(results, chosen.results, home / "REPORT.md")
     failed = [name for name, how in results["settings"]["stages"].items()

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""What partitions and frames cost as they become many: scripts/scaling runs this.
+"""Measures the cost of large numbers of partitions and frames; run by scripts/scaling.
 
   scaling.py [--bin DIR] [--frames N] [--partitions N,N,...] [--discovery-server]
 
-For each number of daemons, which share the frames evenly: how long until all of them serve, how long a newcomer
-takes to list all frames, memory, what idling costs, what one added frame costs the others, and who is woken by
-requests. Runs in a network namespace of its own where it may, so that nothing but its own packets is counted.
+For each number of daemons, which share the frames evenly, it measures: the time until all of them serve, the time of a
+new participant to list all frames, memory, the cost of idling, the cost of an added frame for the other daemons, and
+which daemons are woken by requests. With the rights for it, it runs in its own network namespace, so that only its own
+packets are counted.
 """
 
 import argparse
@@ -29,7 +30,7 @@ SERVER_PORT = 11811
 
 
 def enter_namespace():
-    """Starts this program again where its packets are alone. Returns whether it is there."""
+    """Restarts this program in its own network namespace. Returns whether it runs in one."""
     if os.environ.get("TFDUDE_SCALING_ALONE"):
         subprocess.run(["ip", "link", "set", "lo", "up", "multicast", "on"], check=True)
         subprocess.run(["ip", "route", "add", "239.0.0.0/8", "dev", "lo"], check=True)
@@ -41,7 +42,7 @@ def enter_namespace():
 
 
 def loopback():
-    """Packets and bytes that the loopback interface has carried."""
+    """Packets and bytes that the loopback interface has received."""
     for line in pathlib.Path("/proc/net/dev").read_text().splitlines():
         name, _, counts = line.partition(":")
         if name.strip() == "lo":
@@ -50,7 +51,7 @@ def loopback():
 
 
 def status_of(pid, key):
-    """A number of a process's status, in the unit in which it stands there."""
+    """A number in a process's status file, in the unit of that file."""
     for line in pathlib.Path(f"/proc/{pid}/status").read_text().splitlines():
         if line.startswith(key + ":"):
             return int(line.split()[1])
@@ -58,7 +59,7 @@ def status_of(pid, key):
 
 
 def wakes_of(pid):
-    """How often the threads of a process have gone to sleep, hence been woken."""
+    """How often the threads of a process have gone to sleep, which is how often they were woken."""
     total = 0
     for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
         for line in (task / "status").read_text().splitlines():
@@ -68,13 +69,13 @@ def wakes_of(pid):
 
 
 def seconds_of(pid):
-    """Processor time of a process."""
+    """Processor time of a process [s]."""
     fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
 def configurations(work, count, frames):
-    """One file a daemon: a chain across all daemons' first frames, and the others below that in tens."""
+    """One file per daemon. The first frames of all daemons form a chain; each frame has up to ten others below it."""
     files = []
     for number in range(count):
         own = frames // count + (1 if number < frames % count else 0)
@@ -89,7 +90,7 @@ def configurations(work, count, frames):
 
 
 class Run:
-    """Daemons that serve, and what can be measured of them."""
+    """The running daemons, and the measurements of them."""
 
     def __init__(self, bin_dir, running, domain, options):
         self.bin_dir, self.running, self.options = bin_dir, running, options
@@ -99,14 +100,14 @@ class Run:
         return processes.output_of([self.bin_dir / "tfdude", *self.common, *arguments], 60)
 
     def listed(self):
-        """How many frames a new process lists; none where it meets nobody in its time."""
+        """The number of frames that a new process lists; 0 if it discovers nobody in time."""
         try:
             return len(self.tfdude("frames").splitlines())
         except RuntimeError:
             return 0
 
     def await_known(self, frames):
-        """Waits until daemons that started all at once have told each other and newcomers what they own."""
+        """Waits until a new process lists all frames, after the daemons have started all at once."""
         deadline = time.monotonic() + processes.PATIENCE_S
         while self.listed() != frames:
             if time.monotonic() > deadline:
@@ -121,7 +122,7 @@ class Run:
         return time.monotonic() - begin
 
     def over(self, work):
-        """What happens while work() runs: seconds, packets, bytes, and per daemon wakes and processor time."""
+        """Measures while work() runs: seconds, packets, bytes, and per daemon wake-ups and processor time."""
         pids = [process.pid for process in self.running]
         before = loopback(), [(wakes_of(pid), seconds_of(pid)) for pid in pids], time.monotonic()
         work()
@@ -161,12 +162,12 @@ def measure(bin_dir, count, frames, server):
 
 
 def changes(run, idle):
-    """What frames added to the second daemon, and lookups that it answers, cost those that have no part in it."""
+    """The cost of frames added to the second daemon, and of lookups that it answers, for it and for the others."""
     def load(mode, calls):
         processes.output_of([run.bin_dir / "scale_load", mode, "--calls", str(calls), *run.common], 120)
 
     def calls_of(mode, calls):
-        """What the calls take, without what a client's coming and going does."""
+        """The cost of a call, without that of a client's start and end."""
         none, all_of = run.over(lambda: load(mode, 1)), run.over(lambda: load(mode, calls + 1))
         span = all_of["seconds"] - none["seconds"]
         quiet = {key: idle[key] / idle["seconds"] * span for key in ("packets", "bytes")}
@@ -187,7 +188,7 @@ def main():
     parser.add_argument("--bin", type=pathlib.Path, default=processes.ROOT / "build/release/bin")
     parser.add_argument("--frames", type=int, default=100000)
     parser.add_argument("--partitions", default="2,4,8,16,32")
-    parser.add_argument("--discovery-server", action="store_true", help="meet by Fast DDS's discovery server")
+    parser.add_argument("--discovery-server", action="store_true", help="discovery by Fast DDS's discovery server")
     arguments = parser.parse_args()
     if not enter_namespace():
         print("scaling: packets of others are counted, too: needs root and iproute2", file=sys.stderr)

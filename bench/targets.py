@@ -1,6 +1,6 @@
-"""What is to be reached, as data: how each is computed from the figures, and its bound.
+"""The targets as data: how each value is computed from the figures, and its bound.
 
-A ratio of medians is the median of the ratios of each repetition, where both sides have as many
+A ratio of medians is the median of the ratios of each repetition, if both sides have the same number of repetitions
 (figures.ratio).
 """
 
@@ -15,7 +15,7 @@ MOST, LEAST = "at most", "at least"
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """A bound for what `compute` makes of the figures; None where they are missing."""
+    """A bound for the value that `compute` returns for the figures; that is None if they are missing."""
 
     group: str
     name: str
@@ -25,7 +25,7 @@ class Target:
     unit: str = ""  # empty: a ratio
 
     def verdict(self, figures):
-        """(value, reached), or (None, None) where the figures are missing."""
+        """(value, reached), or (None, None) if the figures are missing."""
         value = self.compute(figures)
         if value is None:
             return None, None
@@ -33,12 +33,12 @@ class Target:
 
 
 def ratio_of(over, under, which="median"):
-    """Computes what one figure is times another."""
+    """A function that computes the ratio of two figures."""
     return lambda figures: ratio(figures, over, under, which)
 
 
 def value_of(key, which="median", convert=as_measured):
-    """Computes a value of one figure."""
+    """A function that computes a value of one figure."""
     return lambda figures: convert(figures[key], which) if key in figures else None
 
 
@@ -152,7 +152,7 @@ ALL = (
            _worst_over_partitions, 1.3),
     *_wire(), *_floor(), *_stream(), *_core(), *_history(), *_contention(), *_pushed(),
 )
-# Why a target is not reached, by the start of "GROUP: NAME"; said only where it is not.
+# Why a target is not reached, by the start of "GROUP: NAME"; printed only if it is not reached.
 WHY = {
     "Across partitions: lookup over 2 to 16":
         "All are asked at once, but two processors have to run all of them: each asked process costs "
@@ -180,20 +180,20 @@ TARGETS = tuple(sorted(ALL, key=lambda target: GROUPS.index(target.group)))
 
 
 def why(target):
-    """The reason known for missing a target, or nothing."""
+    """The known reason for missing a target, or an empty text."""
     full = f"{target.group}: {target.name}"
     return next((reason for start, reason in WHY.items() if full.startswith(start)), "")
 
 
 def rows(figures):
-    """(target, value or "missing", bound, verdict) of each, as text."""
+    """Yields (target, value or "missing", bound, verdict) of each target; all but the target as text."""
     for target in TARGETS:
         value, reached = target.verdict(figures)
         unit = f" {target.unit}" if target.unit else ""
         verdict = {True: "yes", False: "NO", None: "missing"}[reached]
         found = number(value)
         if value is not None:
-            if found == number(target.bound):  # show on which side it is
+            if found == number(target.bound):  # more digits show on which side of the bound it is
                 found = f"{value:.5g}"
             found += unit
         yield target, found, f"{target.direction} {target.bound:g}{unit}", verdict

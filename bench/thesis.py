@@ -1,7 +1,7 @@
-"""The thesis's chapter 5 as data: its figures' cases, and what it says of each.
+"""The thesis's chapter 5 as data: the cases of its figures, and its results for each.
 
-It prints medians beside one plot only (5.10); of the others its text says a ratio or a difference,
-or that one is like another.
+It prints medians for one plot only (5.10). For the others its text gives a ratio, a difference, or another case that is
+similar.
 """
 
 import dataclasses
@@ -10,14 +10,14 @@ import typing
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A figure of the thesis, or a case beside them. Its connector was main's, ours is arms'."""
+    """A figure of the thesis, or an additional case. In the thesis main owned the connector; here arms owns it."""
 
-    figure: str           # of the thesis; empty: it has none
+    figure: str           # in the thesis; empty: an additional case
     key: str              # thesis/KEY/centralized and thesis/KEY/decentralized
     title: str
     kind: str             # whose frames: own, other, or across
-    ratio: typing.Optional[float] = None  # the thesis's, centralized over decentralized
-    words: str = ""       # what it says of it
+    ratio: typing.Optional[float] = None  # in the thesis, centralized / decentralized
+    words: str = ""       # the thesis's result in words
     medians: tuple = ()   # [us] centralized, decentralized
 
 
@@ -39,7 +39,7 @@ CASES = (
     Case("5.11", "update_connector/robot", "update connector, by other", "other", None,
          "better than 5.10"),
     Case("", "path_other/robot", "path in other, from robot", "other"),
-    # What the thesis measured in one of the processes, in the other one.
+    # Cases that the thesis measured in one of the processes, here in the other one.
     Case("", "add_own/arms", "add, own, in arms", "own"),
     Case("", "add_other/arms", "add, other, in arms", "other"),
     Case("", "remove_own/arms", "remove, own, in arms", "own"),
@@ -49,6 +49,6 @@ CASES = (
     Case("", "update_other/arms", "update, other, in arms", "other"),
 )
 
-# Table 5.1: bytes of request and reply by our operation's key.
+# Table 5.1: bytes of request and reply by the key of our operation.
 SIZES = {"add": (364, 1), "remove": (10, 1), "lookup_other": (20, 345), "update": (354, 1)}
 WORST_CASE_PER_PROCESS = 365

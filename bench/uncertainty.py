@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Draws the figures of docs/uncertainty.md and writes its tables, of what the library computes.
+"""Draws the figures of docs/uncertainty.md and writes its tables, from results of the library.
 
-The page's words are written by hand; what stands between two markers is written here.
+The page's text is written by hand; this program writes the tables between two markers.
 """
 
 import argparse
@@ -17,7 +17,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "uncertainty.md"
 FIGURES = ROOT / "docs" / "uncertainty"
 
-# What the reference run gave that the project's issue has, with 10^6 samples of its own.
+# Results of an earlier reference run with its own 10^6 samples.
 TWO_POSES_BEFORE = {1.0: ("29.8", "3.63", "0.395"), 0.2: ("", "0.143", "0.015")}
 CHAIN_BEFORE = {"xx": ("0", "1.678"), "yy": ("295.5", ""), "ytheta": ("-4.455", ""),
                 "thetatheta": ("0.09", "")}
@@ -26,7 +26,7 @@ CHAIN_NAMES = {"xx": "xx [m²]", "yy": "yy [m²]", "ytheta": "yθ [m·rad]",
 
 
 def text(value, digits=3):
-    """So many digits, and not as a power of ten."""
+    """A number with so many significant digits, not as a power of ten."""
     shown = f"{value:.{digits}g}"
     if "e" in shown:
         shown = f"{value:.0f}" if abs(value) >= 1 else f"{value:.6f}".rstrip("0")
@@ -38,7 +38,7 @@ def percent(share):
 
 
 def table(head, rows):
-    """Markdown; the first column to the left, the others to the right."""
+    """A Markdown table; the first column is left-aligned, the others are right-aligned."""
     lines = [head, ["---"] + ["---:"] * (len(head) - 1)] + rows
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
@@ -118,7 +118,7 @@ TABLES = {"two_poses": two_poses, "chain": chain, "chain_within": chain_within, 
 
 
 def filled(page, results):
-    """The page with the tables of these results."""
+    """The page, with its tables filled from these results."""
     for name, make in TABLES.items():
         begin = f"<!-- scripts/uncertainty: {name} -->"
         pattern = re.compile(re.escape(begin) + r"\n.*?<!-- end -->", re.DOTALL)
@@ -130,10 +130,10 @@ def filled(page, results):
 
 
 def arguments():
-    """What the command line says."""
+    """The command line's arguments."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true",
-                        help="write nothing; fails where the page's tables are not these")
+                        help="write nothing; fail if the page's tables differ from the results")
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build" / "release",
                         help="where the program was built (%(default)s)")
     return parser.parse_args()
@@ -147,7 +147,7 @@ def main():
     before = PAGE.read_text(encoding="utf-8")
     after = filled(before, results)
     if chosen.check:
-        sys.exit("uncertainty: the page's tables are not the library's; run scripts/uncertainty"
+        sys.exit("uncertainty: the page's tables differ from the library's results; run scripts/uncertainty"
                  if after != before else 0)
     uncertainty_figures.draw(results, FIGURES)
     PAGE.write_text(after, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The figures of docs/uncertainty.md, as SVG; the same results make the same file."""
+"""Draws the figures of docs/uncertainty.md as SVG; equal results give equal files."""
 
 import io
 import re
@@ -21,7 +21,7 @@ def page_of(columns, height=3.1):
 
 
 def logarithmic(axes, x=True, y=True):
-    """Axes with powers of ten as numbers for people."""
+    """Makes axes logarithmic, with plain numbers instead of powers of ten."""
     for wanted, axis, scale in ((x, axes.xaxis, axes.set_xscale), (y, axes.yaxis, axes.set_yscale)):
         if wanted:
             scale("log")
@@ -30,7 +30,7 @@ def logarithmic(axes, x=True, y=True):
 
 
 def curve(axes, rows, across, up, label, colour, marker):
-    """One line with its points."""
+    """A line with markers at its points."""
     axes.plot([across(row) for row in rows], [up(row) for row in rows], label=label, color=colour,
               marker=marker, markersize=3.5, linewidth=1.2)
 
@@ -64,7 +64,7 @@ def outline(axes, points, label, colour, style, width=1.3):
 
 
 def dots(axes, points, label, colour):
-    """Many points as one path of short strokes: as markers they would fill the file."""
+    """Many points as one path of short strokes, because markers would make the file large."""
     places = [(place, y) for x, y in points for place in (x, x + 0.05, float("nan"))]
     axes.plot([x for x, _ in places], [y for _, y in places], color=colour, linewidth=1.7,
               solid_capstyle="round", zorder=1)
@@ -166,13 +166,13 @@ FIGURES = {"two_poses": two_poses, "chain": chain, "fusion": fusion, "correlatio
 
 
 def draw(results, folder):
-    """Writes all of them."""
+    """Writes all figures to the folder."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, function in FIGURES.items():
         page = function(results)
         drawn = io.StringIO()
         page.savefig(drawn, format="svg", metadata={"Date": None})
         pyplot.close(page)
-        # A hundredth of a point is enough.
+        # Two decimals are precise enough.
         short = re.sub(r"(\d\.\d\d)\d+", r"\1", drawn.getvalue())
         (folder / f"{name}.svg").write_text(short, encoding="utf-8")

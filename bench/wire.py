@@ -1,12 +1,11 @@
-"""What an operation puts on the wire, counted in a capture: the thesis's table 5.1, measured.
+"""The traffic of each operation, counted in a capture: the thesis's table 5.1, measured.
 
-Keys: wire/OPERATION/PART_LAYER [bytes], wire/OPERATION/packets, and wire/OPERATION/vendor_rtps:
-what Fast DDS adds to messages for its statistics where it was built with them (Debian's is). PART
-is request, reply, or other: the news of the structure that an added or removed frame makes, and
-what DDS sends to acknowledge; LAYER is payload (CDR with its header of four bytes), rtps (the
-message) or udp (with IP and UDP headers).
-wire/lookup_over_N_partitions/total_udp is a lookup's whole traffic while six partitions are there;
-wire/idle/udp_per_second is discovery's and presence's while two daemons and a client do nothing.
+Keys: wire/OPERATION/PART_LAYER [bytes], wire/OPERATION/packets, and wire/OPERATION/vendor_rtps: the bytes that Fast DDS
+adds to messages for its statistics, if it was built with them (Debian's is). PART is request, reply, or other. Other
+means changes of the structure after a frame was added or removed, and DDS's acknowledgements. LAYER is payload (CDR
+with its header of four bytes), rtps (the message) or udp (with IP and UDP headers).
+wire/lookup_over_N_partitions/total_udp is the whole traffic of a lookup with six partitions in the domain;
+wire/idle/udp_per_second is that of discovery and presence while two daemons and a client do nothing.
 """
 
 import contextlib
@@ -19,8 +18,8 @@ import figures
 import processes
 import rtps
 
-PAUSE_S = 0.2  # after an operation: several of DDS's heartbeats and acknowledgements
-FLUSH_S = 1.5  # the kernel hands packets to a capture in blocks, up to a second late
+PAUSE_S = 0.2  # after an operation: time for several of DDS's heartbeats and acknowledgements
+FLUSH_S = 1.5  # the kernel passes packets to a capture in blocks, up to a second late
 IDLE_S = 2.0
 PARTITIONS = 6
 PATHS = (1, 2, 4)  # partitions on the path
@@ -47,7 +46,7 @@ class WireClient:
             stdout=subprocess.PIPE, stderr=log, bufsize=0)
 
     def perform(self, operation):
-        """Returns when it began, in nanoseconds of the system's clock."""
+        """Performs an operation. Returns the time of its start, in nanoseconds of the system clock."""
         self._process.stdin.write(f"{operation}\n".encode())
         answer = processes.await_line(self._process.stdout, "wire_client")
         time.sleep(PAUSE_S)
@@ -56,7 +55,7 @@ class WireClient:
         return int(answer.split()[0])
 
     def wait_until_met(self, lookup):
-        """Waits until it has met everybody, which takes longer where the machine is busy."""
+        """Waits until discovery is complete, which takes longer on a busy machine."""
         deadline = time.monotonic() + processes.PATIENCE_S
         while True:
             try:
@@ -67,14 +66,14 @@ class WireClient:
                     raise
 
     def close(self):
-        """Lets it leave the domain."""
+        """Ends the client; it leaves the domain in order."""
         self._process.stdin.close()
         processes.end(self._process)
 
 
 @contextlib.contextmanager
 def client_of(bin_dir, domain, work):
-    """A client until the block is left."""
+    """Runs a client until the block is left."""
     with open(work / "wire_client.log", "wb") as log:
         client = WireClient(bin_dir, domain, log)
     try:
@@ -85,9 +84,9 @@ def client_of(bin_dir, domain, work):
 
 @contextlib.contextmanager
 def capturing(file, domain, kept=0):
-    """Captures a domain's packets until the block is left; of each so many bytes, or all."""
+    """Captures a domain's packets until the block is left: `kept` bytes of each packet, or all if zero."""
     first = 7400 + 250 * domain  # RTPS 2.2, section 9.6.1.1
-    # Presence has sockets of its own, with ports from the range for such.
+    # Presence has separate sockets, with ports from the dynamic range.
     ports = f"udp and (dst portrange {first}-{first + 249} or dst portrange 49152-65535)"
     try:
         process = subprocess.Popen(
@@ -112,7 +111,7 @@ def capturing(file, domain, kept=0):
 
 
 def part_of(capture, packet):
-    """request, reply or other; None for what is there without an operation, too."""
+    """request, reply or other; None for packets that are also sent without an operation."""
     topic = capture.topic(packet)
     if topic is None or not topic.startswith("tfdude/") or topic == "tfdude/presence":
         return None
@@ -125,7 +124,7 @@ def part_of(capture, packet):
 
 
 def count(capture, begin_ns):
-    """What one operation put on the wire: {name: number}."""
+    """Counts the packets of one operation: {name: number}."""
     counts = {f"{part}_{layer}": 0 for part in ("request", "reply", "other")
               for layer in ("payload", "rtps", "udp")}
     counts.update(packets=0, total_udp=0, vendor_rtps=0)
@@ -143,7 +142,7 @@ def count(capture, begin_ns):
 
 
 def figures_of(capture, operation, begins, names=None):
-    """The figures of an operation that was performed at `begins`."""
+    """The figures of an operation that was performed at each time in `begins`."""
     counted = [count(capture, begin) for begin in begins]
     for name in names or counted[0]:
         unit = "packets" if name == "packets" else "bytes"
@@ -163,7 +162,7 @@ def joint_config(work):
 
 
 def measure_operations(bin_dir, work, rounds):
-    """Table 5.1 on the thesis's tree, asked by a client that owns nothing."""
+    """Table 5.1 on the thesis's tree, by a client that owns no frames."""
     file = work / "operations.pcap"
     domain, _lease = processes.lease_domain()
     configs = [processes.ROOT / "examples" / "thesis" / f"{name}.yaml" for name in THESIS_CONFIGS]
@@ -175,7 +174,7 @@ def measure_operations(bin_dir, work, rounds):
             for turn in range(rounds + 1):
                 for name, operation in OPERATIONS.items():
                     begin = client.perform(operation)
-                    if turn > 0:  # the first time writers are made
+                    if turn > 0:  # the first turn also creates writers
                         begins[name].append(begin)
             idle_begin = time.time_ns()
             time.sleep(IDLE_S)
@@ -189,7 +188,7 @@ def measure_operations(bin_dir, work, rounds):
 
 
 def measure_joint(bin_dir, work, rounds):
-    """The position of one joint, beside the edge that `publish` sends."""
+    """The position of one joint, to compare with the edge that `publish` sends."""
     file = work / "joint.pcap"
     domain, _lease = processes.lease_domain()
     begins = []
@@ -204,7 +203,7 @@ def measure_joint(bin_dir, work, rounds):
 
 
 def chain_configs(work):
-    """A daemon's configuration for each of six partitions, each hanging on the one before."""
+    """The configurations of six daemons; the parent of each partition's first frame is in the partition before."""
     for number in range(1, PARTITIONS + 1):
         parent = f"    parent: link_{number - 1}_b\n" if number > 1 else ""
         config = work / f"chain_{number}.yaml"
@@ -215,7 +214,7 @@ def chain_configs(work):
 
 
 def measure_chain(bin_dir, work, rounds):
-    """A lookup over some of six partitions: who is not on the path should cost nothing."""
+    """A lookup over some of six partitions: those that are not on the path should cost nothing."""
     file = work / "chain.pcap"
     domain, _lease = processes.lease_domain()
     begins = {over: [] for over in PATHS}

@@ -1,18 +1,20 @@
-// Network calls as the work grows; the daemons and echoes are started by the python module.
+// Network calls as the number of partitions, clients or frames grows; bench/net_stage.py starts the
+// daemons and echoes.
 //
-// scale_bench --mode partitions --partitions N --central DOMAIN --domain DOMAIN --udp-ports P,P,...
-//     One lookup along a chain across N partitions, beside the same lookup of one daemon that owns all, and
-//     beside a bare UDP datagram to each of N processes and back: the floor of asking N.
+//   scale_bench --mode partitions --partitions N --central DOMAIN --domain DOMAIN --udp-ports P,P,...
+//     One lookup along a chain across N partitions, compared with the same lookup of one daemon
+//     that owns all frames, and with a bare UDP datagram to each of N processes and back, which is
+//     the lower bound of asking N processes.
 //     scale/partitions/N/decentralized, /centralized, /udp_floor
 //   scale_bench --mode clients --domain DOMAIN
-//     1 to 16 clients at once, a thread each, that ask one owner.
+//     1 to 16 concurrent clients, each with its own thread, that ask one owner.
 //     scale/clients/N/latency, /rate
 //   scale_bench --mode frames --frames N,N,... --domain-0 DOMAIN --domain-1 DOMAIN...
-//     The same lookup and update of owners of N frames each, in domains of their own.
+//     The same lookup and update of owners of N frames each, each in its own domain.
 //     scale/frames/N/lookup, /update
 //
-// All take --profile FILE --calls N --repetitions R. The frames chain_0, chain_1... hang each on
-// the last.
+// All modes take --profile FILE --calls N --repetitions R. Frame chain_0 is the parent of chain_1,
+// and so on.
 
 #include <algorithm>
 #include <atomic>
