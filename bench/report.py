@@ -1,4 +1,4 @@
-"""Writes the report from the results only: what was not measured is said to be missing."""
+"""Writes the report from the results only; values that were not measured are marked as missing."""
 
 import os
 
@@ -13,61 +13,64 @@ NOTHING = "No figures in this run.\n"
 IDLE_UP_TO = 5  # percent of the processors' time
 
 METHOD = """\
-**Method.** The shipped library and daemons, one run, everything over the loopback interface. What
-is compared is measured in turns; a ratio of medians is the median of the ratios of each
-repetition. Warm-up is discarded. Of own frames beside tf2 a value is a repetition's mean processor
-time. Elsewhere a value is one call; calls on own frames take hardly longer than reading the clock,
-so theirs is the mean of several. The 99th percentile (p99) is of all values of all repetitions.
+**Method.** The shipped library and daemons, one run, everything over the loopback interface. Values
+that are compared are measured in turns; a ratio of medians is the median of the ratios of each
+repetition. Warm-up is discarded. For own frames compared with tf2, a value is the mean processor
+time of a repetition. Elsewhere a value is one call; calls on own frames take hardly longer than
+reading the clock, so their value is the mean of several calls. The 99th percentile (p99) is that of
+all values of all repetitions.
 """
 NOT_IDLE = """\
-**The machine was not idle**: others kept its processors busy by {busy:g} % before the run. Read
-times with that in mind; what waits for another process suffers most.
+**The machine was not idle**: other programs used {busy:g} % of its processors before the run. That
+affects times, most of all those of calls that wait for another process.
 """
 THESIS = """\
 Microseconds. Centralized: one daemon owns all frames, and the caller is a plain client.
-Decentralized: the caller is the process `robot` (the thesis's main process) unless it says `arms`,
-and owns its frames. The ratio is centralized / decentralized: above one the decentralized tree is
-faster. The thesis's ratio is what its text says, in words where it has no number.
+Decentralized: the caller is the process `robot` (the thesis's main process), or `arms` if the case
+names it, and owns its frames. The ratio is centralized / decentralized: above one the decentralized
+tree is faster. The thesis's ratio is taken from its text, in words if the text has no number.
 """
 WIRE = """\
-Bytes of request / reply, captured on the loopback interface; the caller owns nothing, and ids have
-ten characters. Payloads are CDR with its header of four bytes. "Other" is the news of the
-structure, which goes to everybody, and acknowledgements, as UDP packets.
+Bytes of request / reply, captured on the loopback interface; the caller owns no frames, and ids
+have ten characters. Payloads are CDR with its header of four bytes. "Other" is UDP packets with
+changes of the structure, which go to all participants, and acknowledgements.
 """
 FLOOR = """\
-Round trips in microseconds, median / p99, beside a bare Fast DDS ping-pong and bare UDP of equal
-payload.
+Round trips in microseconds, median / p99, compared with a bare Fast DDS ping-pong and with bare UDP,
+both with the same payload.
 """
 CORE = """\
-Nanoseconds. Ours carries a covariance unless it says pose only; tf2 has none.
+Nanoseconds. Our values include a covariance unless the row says "pose only"; tf2 has none.
 """
 HISTORY = """\
-In lookups of a while ago all edges move, turning at 1 rad/s, and both sides are asked for the same
-instant between the same samples, again and again. Ours keeps 2,048 samples of an edge by default,
-tf2 those of ten seconds. A sample of an edge with a full history takes {ours} bytes by
-what `history()` says and {heap} by how the heap grows; {tf2} in tf2, without a covariance.
+For lookups in the past, all edges are dynamic and turn at 1 rad/s. Both sides repeat lookups of the
+same instant, between the same samples. tf-dude keeps 2,048 samples of an edge by default, tf2 those
+of ten seconds. A sample of an edge with a full history takes {ours} bytes according to `history()`,
+and {heap} bytes measured by the growth of the heap; in tf2, without a covariance, {tf2} bytes.
 """
 CONTENTION = """\
-A writer of 100 joints at 1 kHz, and a reader that looks up a path of 30 of them again and again.
+A writer of 100 joints at 1 kHz, and a reader that repeatedly looks up a path of 30 of them.
 """
 PUSHED = """\
-A path of ten edges that another process watches; its owner updates all of them at 1 kHz.
-Microseconds from just before `update()` until a waiting thread has read the new value, beside one
-bare Fast DDS sample of as many bytes and equal QoS, in turns, a core for each process: from before
-`write()` until a waiting thread has it, and until the listener has it, which is one wake-up less.
+A path of ten edges that another process watches; its owner updates all of them at 1 kHz. Each
+process has its own core. Microseconds from just before `update()` until a waiting thread has read
+the new value. Measured in turns with a bare Fast DDS sample of the same size and QoS: from just
+before `write()` until a waiting thread has it, and until the listener has it, which needs one
+wake-up less.
 """
 PUSHED_BYTES = """\
-Bytes of a robot with 30 joints, which all move at once. Ours is watched from base to tip, as if all
-joints were one chain: every edge (240 bytes, of which 168 are its covariance), or the path composed
-to one transform. For tf2 no middleware is here: its message is computed ({tf2} CDR bytes: one
-`TFMessage` of all 30 `TransformStamped`, with names such as `left_shoulder_pan_link`), and samples
-of that size were sent by bare Fast DDS to as many listeners. Counted on the loopback interface; UDP
-is with acknowledgements, and for ours with the watchers' renewals. Each watcher is a participant of
-its own and is sent its own copy. Presence and discovery are left out on both sides.
+Bytes of a robot with 30 joints, which all move at once. With tf-dude, the path from base to tip is
+watched, as if all joints were one chain: every edge (240 bytes, of which 168 are its covariance), or
+the path composed to one transform. tf2's middleware is not part of this comparison: the size of its
+message is computed ({tf2} CDR bytes: one `TFMessage` of all 30 `TransformStamped`, with names such
+as `left_shoulder_pan_link`), and bare Fast DDS sends samples of that size to the same number of
+listeners. Counted on the loopback interface; UDP includes acknowledgements, and for tf-dude the
+watchers' renewals. Each watcher is a separate participant and receives its own copy. Presence and
+discovery are left out on both sides.
 """
 SCALE = """\
-How the median grows with the number of each. The exponent is that of a power law fitted over all
-that was measured, so a fixed cost at the small end lowers it.
+How the median grows with each number. The exponent is that of a power law fitted to all measured
+points, so a fixed cost at the small end lowers it.
 """
 
 
@@ -99,12 +102,12 @@ def picture(drawn, name, home):
 
 
 def duration(seconds):
-    """As a reader wants it."""
+    """A duration as text."""
     return f"{seconds} seconds" if seconds < 120 else f"{seconds / 60:.0f} minutes"
 
 
 def introduction(results):
-    """Machine, method, and what was left out."""
+    """Machine, method, and stages that were not measured."""
     machine, settings = results["machine"], results["settings"]
     about = [machine.get(name, "unknown") for name in (
         "cpu", "vector instructions", "distribution", "compiler", "build type", "fastdds", "tf2")]
@@ -128,7 +131,7 @@ def introduction(results):
 
 
 def targets_section(figures):
-    """All targets; what is not reached stands first."""
+    """All targets; first those that are not reached."""
     rows = list(targets.rows(figures))
     groups = []
     for group in (*targets.GROUPS, "All"):
@@ -183,17 +186,17 @@ def wire_section(figures, _drawn, _home):
     paths = ", ".join(f"{size(f'lookup_over_{count}_partitions/total_udp')} over {count}"
                       for count in (1, 2, 4))
     return [WIRE, table(head, rows),
-            f"- Of an update's RTPS bytes, both ways, {size('update/vendor_rtps')} are what this "
-            "build of Fast DDS adds for its statistics.\n"
-            f"- With six partitions there, a lookup's UDP bytes by those on its path: {paths}. The "
-            f"thesis's worst case is {thesis.WORST_CASE_PER_PROCESS} payload bytes for each "
-            "process that there is.\n"
+            f"- This build of Fast DDS adds {size('update/vendor_rtps')} of an update's RTPS bytes, "
+            "in both directions together, for its statistics.\n"
+            f"- UDP bytes of a lookup with six partitions in the domain, by the number of partitions on "
+            f"its path: {paths}. The thesis's worst case is {thesis.WORST_CASE_PER_PROCESS} payload "
+            "bytes for each existing process.\n"
             "- Discovery and presence of two daemons and a client that do nothing: "
             f"{size('idle/udp_per_second')} UDP bytes a second.\n"]
 
 
 def floor_section(figures, drawn, home):
-    """Ours beside bare DDS and bare UDP."""
+    """tf-dude compared with bare DDS and bare UDP."""
     rows = []
     for operation, placement in plots.FLOOR_PANELS:
         ours, dds, udp = (f"floor/{operation}/{who}/{placement}" for who in ("ours", "dds", "udp"))
@@ -211,12 +214,12 @@ def stream_section(figures, _drawn, _home):
         name = f"{key.removeprefix('stream/').replace('_', ' ')} [{unit_of(figures[key])}]"
         rows.append((name, *(value(figures, key, which, as_measured)
                              for which in ("median", "p90", "p99", "max"))))
-    return ["One publisher to one owner, 100 edges a sample; `joints`: positions of 30 joints.\n",
+    return ["One publisher to one owner, 100 edges per message; `joints`: positions of 30 joints.\n",
             table(("figure", "median", "p90", "p99", "max"), rows)]
 
 
 def core_rows(figures):
-    """Each operation of ours with tf2's of the same, where tf2 has one."""
+    """Each operation of ours with the same of tf2, if tf2 has it."""
     found = (("ours_by_handle", "by handle"), ("ours_by_name", "by name"),
              ("ours_pose", "pose only, by handle"))
     operations = (("lookup", found, "look up {who}, depth {depth:,} of {frames:,}"),
@@ -243,7 +246,7 @@ def core_rows(figures):
 
 
 def core_section(figures, drawn, home):
-    """Beside tf2."""
+    """Own frames compared with tf2."""
     def bytes_of(who):
         return value(figures, f"core/history_bytes/{who}/2/100", convert=as_measured)
 
@@ -254,7 +257,7 @@ def core_section(figures, drawn, home):
 
 
 def contention_section(figures, drawn, home):
-    """Readers beside a writer."""
+    """Readers concurrent with a writer."""
     rows = []
     for key in sorted(key for key in figures if key.startswith("contention/")):
         timed = figures[key]["unit"] in NANOSECONDS
@@ -267,7 +270,7 @@ def contention_section(figures, drawn, home):
 
 
 def pushed_section(figures, _drawn, _home):
-    """Watched paths: latency beside bare DDS, bytes beside tf2."""
+    """Watched paths: latency compared with bare DDS, bytes with tf2."""
     ours = "pushed/latency/ours"
     rows = [(name, *(value(figures, key, which) for which in ("median", "p90", "p99")),
              number(ratio(figures, ours, key)), number(ratio(figures, ours, key, "p99")))
@@ -286,14 +289,14 @@ def pushed_section(figures, _drawn, _home):
                       *(f"{kilobytes('payload', who)} / {kilobytes('udp', who)}"
                         for who in ("edges", "composed", "tf2"))))
     return [PUSHED, table(head, rows),
-            f"Reading the newest value meanwhile, with covariance: {latest} ns.\n",
+            f"Reading the newest value at the same time, with covariance: {latest} ns.\n",
             PUSHED_BYTES.format(tf2=value(figures, "pushed/message/tf2", convert=as_measured)),
             table(("payload / UDP, kB a second", "ours, edges", "ours, composed", "tf2's size"),
                   sizes)]
 
 
 def scale_table(figures, what):
-    """All that was measured over the numbers of one thing."""
+    """All measurements for which one number was varied."""
     keys = [key.split("/") for key in figures if key.startswith(f"scale/{what}/")]
     curves = sorted({who for _, _, _, who in keys})
     units = {who: unit_of(figures[f"scale/{what}/{count}/{who}"]) for _, _, count, who in keys}
@@ -305,7 +308,7 @@ def scale_table(figures, what):
 
 
 def scale_section(figures, drawn, home):
-    """What grows with what."""
+    """How values grow with the number of partitions, clients and frames."""
     fitted = {f"{what}, {who.replace('_', ' ')}": exponent
               for (what, who), exponent in plots.growths(figures).items()}
     for name, points in plots.core_curves(figures):
@@ -319,7 +322,7 @@ def scale_section(figures, drawn, home):
             picture(drawn, "scale", home)]
 
 
-# Heading, what the keys begin with of which there must be some, and what writes it.
+# The heading of a section, the prefixes of its keys, and the function that writes it. It needs at least one such key.
 SECTIONS = (
     ("The thesis's cases", ("thesis/",), thesis_section),
     ("On the wire: the thesis's table 5.1", ("wire/",), wire_section),
@@ -333,7 +336,7 @@ SECTIONS = (
 
 
 def text(results, drawn, home):
-    """The whole report, to be put into the folder `home`."""
+    """The whole report, as a file in the folder `home`."""
     figures = results["figures"]
     parts = [introduction(results), targets_section(figures)]
     for heading, prefixes, section in SECTIONS:

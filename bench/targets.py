@@ -155,24 +155,25 @@ ALL = (
 # Why a target is not reached, by the start of "GROUP: NAME"; printed only if it is not reached.
 WHY = {
     "Across partitions: lookup over 2 to 16":
-        "All are asked at once, but two processors have to run all of them: each asked process costs "
-        "a wake-up, a receive and a send. A bare UDP fan-out to as many processes (`udp floor` "
-        "below) grows alike.",
+        "All owners are asked at once, but two processors have to run all of them: each asked process "
+        "costs a wake-up, a receive and a send. A bare UDP fan-out to as many processes (`udp floor` "
+        "below) grows in the same way.",
     "Floor: lookup, one core":
-        "What is ours in a round trip, planning and the codec at both ends, takes two to four "
-        "microseconds; on one core nothing hides them.",
+        "Planning and the codec at both ends take two to four microseconds of a round trip; on one "
+        "core they are not hidden by waiting.",
     "Core: set an edge":
-        "Two fifths of it are the one locked instruction of the writers' lock, which waits until "
-        "the former update's 290 bytes have left the store buffer.",
+        "The one locked instruction of the writers' lock takes two fifths of it: it waits until the "
+        "290 bytes of the update before have left the store buffer.",
     "History: lookup between samples":
-        "Each edge is interpolated on its geodesic, where tf2 goes straight from one translation to "
-        "the other, and the covariances of both samples are carried to the instant: two products of "
-        "6x6 matrices for each, which tf2 has not.",
+        "Each edge is interpolated on its geodesic, while tf2 interpolates translations linearly. The "
+        "covariances of both samples are also transported to the instant, which takes two products of "
+        "6x6 matrices for each; tf2 has no covariance.",
     "Pushed: from before update()":
-        "update() does not wait for the network: it wakes a thread that looks for what is new and "
-        "sends it. That wake-up is what the bare sample, which is sent by the caller, has not.",
+        "update() does not wait for the network: it wakes a thread that finds the changes and sends "
+        "them. The bare sample needs no such wake-up, because the caller sends it.",
     "Core: add and remove a leaf in 100,000 frames, through a node":
-        "A node also plans, keeps the pages that others get, and wakes their publisher.",
+        "A node also plans, keeps the pages for other participants, and wakes the thread that publishes "
+        "them.",
 }
 
 GROUPS = tuple(dict.fromkeys(target.group for target in ALL))
@@ -208,6 +209,6 @@ def table(figures):
             lines.append(f"\n{group}")
         lines.append(f"  {verdict:8}{value:>14}   {bound:18}{target.name}")
     counted = [line.split()[0] for line in lines if line.startswith("  ")]
-    lines.append(f"\n{counted.count('yes')} hold, {counted.count('NO')} do not, "
-                 f"{counted.count('missing')} have no figures")
+    lines.append(f"\n{counted.count('yes')} reached, {counted.count('NO')} not reached, "
+                 f"{counted.count('missing')} without figures")
     return "\n".join(lines)

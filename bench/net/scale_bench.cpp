@@ -1,7 +1,8 @@
 // Network calls as the number of partitions, clients or frames grows; bench/net_stage.py starts the
 // daemons and echoes.
 //
-//   scale_bench --mode partitions --partitions N --central DOMAIN --domain DOMAIN --udp-ports P,P,...
+//   scale_bench --mode partitions --partitions N --central DOMAIN --domain DOMAIN
+//               --udp-ports P,P,...
 //     One lookup along a chain across N partitions, compared with the same lookup of one daemon
 //     that owns all frames, and with a bare UDP datagram to each of N processes and back, which is
 //     the lower bound of asking N processes.
