@@ -1,8 +1,10 @@
-// One reader, back to back, alone and beside one writer of 100 joints at 1 kHz, for ours and for
-// tf2's BufferCore on the same chain of 100 edges. The reader is on processor 0, the writer on
-// processor 1. Usage: contention_bench [SECONDS of a repetition] [REPETITIONS].
+// One reader that looks up without pauses, alone and concurrently with one writer of 100 joints at
+// 1 kHz, for tf-dude and for tf2's BufferCore on the same chain of 100 edges. The reader is on
+// processor 0, the writer on processor 1.
 //
-// Keys: contention/WHO/READER/alone or /beside_writer (ns a lookup of 30 edges),
+//   contention_bench [SECONDS per repetition] [REPETITIONS]
+//
+// Keys: contention/WHO/READER/alone or /beside_writer (ns per lookup of 30 edges),
 // contention/WHO/batch (us for 100 edges), contention/ours/torn (lookups that saw half of a batch).
 
 #include <atomic>
@@ -26,7 +28,7 @@ using bench::Series;
 
 constexpr std::size_t kJoints = 100;
 constexpr std::size_t kDepth = 30;
-constexpr int kLookupsPerSample = 16;  // as a clock costs as much as a lookup
+constexpr int kLookupsPerSample = 16;  // because reading the clock takes as long as a lookup
 
 void pin(std::size_t processor) {
   cpu_set_t set;
@@ -47,8 +49,8 @@ bench::Tree chain() {
   return tree;
 }
 
-/// Every joint of a batch is turned about z by the same angle, so that a whole path is by kDepth of
-/// them.
+/// Every joint of a batch is turned about z by the same angle, so a whole path is turned by kDepth
+/// times this angle.
 Pose turned(double angle) { return exp((Twist() << 0, 0, 0, 0, 0, angle).finished()); }
 
 class Ours {
@@ -153,7 +155,7 @@ void read_for(double seconds, Series& series, Read read) {
   series.end_repetition();
 }
 
-/// Alone and beside the writer, in turns.
+/// Measures alone and concurrently with the writer, in turns.
 template <class Who, class Read>
 void measure(const std::string& name, Who& who, Series& batch, double seconds, int repetitions,
              Read read) {
@@ -179,8 +181,8 @@ int main(int argc, char** argv) {
   Series torn("contention/ours/torn", "count");
   double torn_lookups = 0;
   const auto check = [&](const Pose& X) {
-    // A whole batch turns the path by 30 times one number of milliradians, and by less than half a
-    // turn.
+    // A whole batch turns the path by 30 times an integer number of milliradians, and by less than
+    // half a turn.
     const double milliradians = log(X)[5] * 1e3 / kDepth;
     if (std::abs(std::remainder(milliradians, 1.0)) > 1e-6) ++torn_lookups;
   };

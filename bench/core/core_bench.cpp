@@ -1,6 +1,6 @@
-// What a process does with frames of its own, beside tf2's BufferCore on the same tree: set an
-// edge, look up, add and remove. tf2 keeps no covariance; ours is propagated wherever "pose" is not
-// in the name.
+// Operations of a process on its own frames, compared with tf2's BufferCore on the same tree: set
+// an edge, look up, add and remove. tf2 has no covariance; tf-dude propagates it unless the name
+// contains "pose".
 //
 // Keys: core/OPERATION/WHO/DEPTH/FRAMES.
 
@@ -25,7 +25,7 @@ using Shape = std::pair<std::size_t, std::size_t>;  // depth, frames
 constexpr Shape kShapes[] = {{2, 10},     {8, 100},    {30, 100},    {30, 1000},
                              {30, 10000}, {100, 1000}, {1000, 10000}};
 
-/// One of each kind a shape, made when first needed.
+/// One tree of each kind per shape, created when first needed.
 const bench::Tree& tree_of(const Shape& shape) {
   static std::map<Shape, bench::Tree> trees;
   auto [entry, fresh] = trees.try_emplace(shape);
@@ -94,7 +94,7 @@ void set_by_name(benchmark::State& state, Shape shape) {
 }
 
 void set_tf2(benchmark::State& state, Shape shape) {
-  // Of its own, as the moving stamp makes a history.
+  // A tree of its own, because the growing stamps create a history.
   tf2::BufferCore buffer;
   bench::fill(buffer, tree_of(shape));
   auto message = bench::stamped(tree_of(shape).frames[1], ros::Time(2));

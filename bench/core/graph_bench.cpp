@@ -1,4 +1,4 @@
-// What Graph does by itself, beside what Boost.Graph has for it.
+// Operations of Graph alone, compared with those of Boost.Graph.
 #include <cstddef>
 #include <cstdint>
 #include <unordered_map>
@@ -31,8 +31,8 @@ struct Collect : boost::default_bfs_visitor {
   std::vector<Slot>* found;
 };
 
-// Colours of what is visited only: those of all vertices would cost as much for one frame as for
-// all.
+// Stores colours of visited vertices only: initializing the colours of all vertices would make one
+// frame as expensive as all.
 std::vector<Slot> subtree_by_boost(const BoostGraph& graph, Slot top) {
   std::vector<Slot> found;
   std::unordered_map<std::size_t, boost::default_color_type> colours;
@@ -61,7 +61,7 @@ void subtree_boost(benchmark::State& state) {
   state.counters["frames"] = static_cast<double>(find().size());
 }
 
-// The youngest of so many siblings goes, and comes again.
+// Removes and adds again the youngest of so many siblings.
 void unlink(benchmark::State& state) {
   const auto siblings = static_cast<Slot>(state.range(0));
   tfdude::Graph graph;

@@ -1,16 +1,17 @@
-// What history costs a process with frames of its own, beside tf2's BufferCore on the same tree
-// with the same samples: set an edge whose history is full, look up between two samples, and
-// memory.
+// The cost of history for a process with its own frames, compared with tf2's BufferCore on the same
+// tree with the same samples: setting an edge whose history is full, lookup between two samples,
+// and memory.
 //
 // Keys: core/OPERATION/WHO/DEPTH/FRAMES, where the operation is one of
-//   set_history       a sample a millisecond: ours keeps 2,048, tf2 ten seconds, both by default
+//   set_history       a sample per millisecond: tf-dude keeps 2,048, tf2 ten seconds, both by
+//                     default
 //   lookup_at         18.5 samples of 1 kHz before the newest
-//   lookup_at_far     200.5 of them
-//   lookup_at_100hz   18.5 samples of 100 Hz
-// history_bytes     bytes a sample, of an edge's full history; WHO is then ours, as Node::history()
-// counts them, or
-//                     ours_heap and tf2_heap, by which the heap grew
-// Lookups are of trees of which all edges move: each turns at 1 rad/s, and has samples of 2 s, at
+//   lookup_at_far     200.5 samples of 1 kHz before the newest
+//   lookup_at_100hz   18.5 samples of 100 Hz before the newest
+//   history_bytes     bytes per sample of an edge's full history; WHO is then ours, as counted by
+//                     Node::history(), or ours_heap and tf2_heap, by the growth of the heap
+//
+// In the trees of lookups all edges are dynamic: each turns at 1 rad/s, and has samples of 2 s, at
 // the same instants.
 
 #include <cstdlib>
@@ -39,7 +40,7 @@ constexpr nanoseconds kMillisecond{1000000};
 constexpr nanoseconds kSpan = std::chrono::seconds(2);
 constexpr double kTurning = 1.0;  // of each edge [rad/s]
 
-// Samples until nothing grows any more: beyond our 2,048 and tf2's ten seconds.
+// Samples until no history grows: more than 2,048, and more than ten seconds for tf2.
 constexpr int kFull = 11000;
 
 Time start() { return time_of(1000000000); }
@@ -56,7 +57,7 @@ Node open_node(const bench::Tree& tree) {
   return *std::move(node);
 }
 
-/// A tree in motion, which ours and tf2 both have the samples of.
+/// A tree with dynamic edges; tf-dude and tf2 have the same samples of it.
 class Moving {
  public:
   Moving(std::size_t depth, nanoseconds period)
@@ -94,7 +95,7 @@ class Moving {
   Time newest_;
 };
 
-/// A lookup: along how many edges, of how long a history.
+/// A lookup: its number of edges, and the length of their history.
 struct Case {
   std::size_t depth;
   nanoseconds period;
@@ -112,8 +113,8 @@ Time instant_of(const Case& of) {
   return moving(of).newest() - nanoseconds(static_cast<std::int64_t>(ago));
 }
 
-/// Of both sides, which must have measured the same: each joint turns about a fixed axis, so that
-/// the geodesic and what tf2 does are one.
+/// Checks that both sides give the same result: each joint turns about a fixed axis, so the
+/// geodesic and tf2's interpolation agree.
 void check_agreement(const Case& of) {
   const bench::Tree& tree = moving(of).tree();
   Query query;
@@ -147,7 +148,7 @@ void look_up_tf2(benchmark::State& state, Case of) {
   }
 }
 
-/// One edge of a tree, given a sample a millisecond.
+/// Gives one edge of a tree a sample per millisecond.
 class Ours {
  public:
   explicit Ours(const bench::Tree& tree)
@@ -182,7 +183,7 @@ class Tf2 {
 
 template <class Who>
 void set_with_history(benchmark::State& state) {
-  // From the child of the root, which is what the message of tf2 says, too.
+  // Starts at the child of the root, as the message for tf2 does.
   Who who(bench::up_down_tree(2, kFrames));
   for (int i = 0; i < kFull; ++i) {
     if (!who.set()) std::abort();
@@ -206,7 +207,7 @@ double heap_bytes() {
   return static_cast<double>(info.uordblks + info.hblkhd);
 }
 
-/// @param samples  as many as are kept; the heap grows by these alone
+/// @param samples  the number that is kept; the heap grows only by these
 template <class Who>
 void weigh_history(benchmark::State& state, int samples) {
   const bench::Tree tree = bench::up_down_tree(2, kFrames);

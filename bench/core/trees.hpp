@@ -54,7 +54,7 @@ inline geometry_msgs::TransformStamped stamped(const tfdude::FrameSpec& frame, r
   return message;
 }
 
-/// Both hold the tree, each edge with one value.
+/// The same tree in tf-dude and in tf2, each edge with one value.
 inline void fill(tf2::BufferCore& buffer, const Tree& tree) {
   for (const auto& frame : tree.frames) {
     if (!frame.parent.empty()) buffer.setTransform(stamped(frame, ros::Time(1)), "bench", false);

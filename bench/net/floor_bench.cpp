@@ -1,5 +1,6 @@
-// Remote calls of ours beside the floor: a bare Fast DDS round trip of equal QoS and a bare UDP
-// round trip, of as many bytes of payload there and back, in turns.
+// Remote calls of tf-dude compared with their lower bounds: a bare Fast DDS round trip with the
+// same QoS, and a bare UDP round trip. All have the same payload bytes in each direction, and take
+// turns.
 //
 //   floor_bench --placement one_core|two_cores --central DOMAIN --domain DOMAIN --udp-port PORT
 //               --profile FILE --calls N --repetitions R
@@ -41,7 +42,7 @@ Sizes sizes_of(const tfdude::Request& request, const tfdude::Reply& reply) {
           bench::payload_size<wire::ReplyPubSubType>(codec::to_wire(reply))};
 }
 
-/// Writes, and waits for the listener of the reply's reader, as our client does.
+/// Writes, and waits for the listener of the reply's reader, as tf-dude's client does.
 class DdsPing final : public edds::DataReaderListener {
  public:
   DdsPing(std::uint32_t domain, const std::string& profile)
@@ -58,7 +59,7 @@ class DdsPing final : public edds::DataReaderListener {
     ping_.sequence_number(ping_.sequence_number() + 1);
     endpoints_.write(ping_);
     std::unique_lock lock(mutex_);
-    // As ours repeats a request.
+    // Repeats the request, as tf-dude does.
     while (!arrived_.wait_for(lock, std::chrono::milliseconds(2),
                               [this] { return answered_ == ping_.sequence_number(); })) {
       endpoints_.write(ping_);

@@ -12,7 +12,7 @@
 #include <floorPubSubTypes.hpp>
 #endif
 
-// Bare Fast DDS, with QoS from the very profiles that our transport takes for its own.
+// Bare Fast DDS, with QoS from the same profiles that our transport uses.
 namespace bench {
 
 namespace fastdds = tfdude::fastdds;
@@ -20,11 +20,11 @@ namespace fastdds = tfdude::fastdds;
 inline constexpr const char* kPingTopic = "floor/ping";
 inline constexpr const char* kPongTopic = "floor/pong";
 
-/// What a ping's CDR payload has besides the filler: the encapsulation and three numbers.
+/// The bytes of a ping's CDR payload besides the filler: the encapsulation and three numbers.
 inline constexpr std::uint32_t kPingOverhead = 16;
 
 inline bool any_payload(const std::uint8_t*, std::size_t) { return true; }
-/// Preallocates as our types do.
+/// Preallocates memory, as our types do.
 using PingType = fastdds::CheckedType<wire::PingPubSubType, any_payload>;
 
 /// Bytes of a sample's CDR payload.
@@ -38,12 +38,12 @@ std::uint32_t payload_size(Sample sample) {
 #endif
 }
 
-/// A participant with one writer and one reader. Nothing is checked for null: the process ends by a
-/// signal where the library cannot make something, and its log says why.
+/// A participant with one writer and one reader. Nothing is checked for null: if the library cannot
+/// create an entity, a signal ends the process, and its log says why.
 class FloorEndpoints {
  public:
   /// @param profile  as for our participants: a file
-  /// @param kind  what the names of the profiles of both begin with: "call", "update"
+  /// @param kind  the start of the names of both profiles: "call", "update"
   FloorEndpoints(std::uint32_t domain, const std::string& profile, const char* to, const char* from,
                  fastdds::edds::DataReaderListener& listener, const std::string& kind);
   ~FloorEndpoints();
@@ -59,7 +59,7 @@ class FloorEndpoints {
   fastdds::edds::DataReader* reader_;
 };
 
-/// Gives up where nobody is met.
+/// Ends the program if nobody is discovered.
 void await_match(const FloorEndpoints& endpoints);
 
 }  // namespace bench

@@ -1,5 +1,5 @@
-// The other end of floor_bench and of scale_bench's fan-out: bare echoes over UDP and, where a
-// domain is given, over Fast DDS. Says "ready udp_port=PORT" and answers until it is stopped.
+// The other end of floor_bench and of scale_bench's fan-out: bare echoes over UDP and, if a domain
+// is given, over Fast DDS. Prints "ready udp_port=PORT" and answers until it is stopped.
 //
 //   floor_echo --domain DOMAIN --profile FILE
 //   floor_echo
@@ -15,7 +15,7 @@ namespace {
 
 namespace edds = tfdude::fastdds::edds;
 
-/// Answers in the callback, through a writer that is there already.
+/// Answers in the callback, with a writer that already exists.
 class DdsEcho final : public edds::DataReaderListener {
  public:
   DdsEcho(std::uint32_t domain, const std::string& profile)

@@ -11,8 +11,8 @@
 namespace bench {
 namespace {
 
-constexpr int kWarmUp = 300;      // calls of each turn, at first
-constexpr int kBlockWarmUp = 10;  // calls after the others' turn
+constexpr int kWarmUp = 300;      // calls of each turn at the start
+constexpr int kBlockWarmUp = 10;  // calls at the start of each block
 constexpr std::size_t kMostFigures = 4;
 
 void warm_up(const Turn& turn, int calls) {
@@ -46,7 +46,7 @@ tfdude::Options Arguments::options(const std::string& domain_name) const {
   tfdude::Options options;
   options.domain = static_cast<std::uint32_t>(number(domain_name));
   options.profile = text("profile");
-  // A call that fails ends the benchmark; one that a busy computer holds up is a value like others.
+  // A failed call ends the benchmark; a call that a busy computer delays counts as any other.
   options.timeout = std::chrono::seconds(9);
   return options;
 }
@@ -54,7 +54,7 @@ tfdude::Options Arguments::options(const std::string& domain_name) const {
 void give_up(const std::string& message) {
   std::fprintf(stderr, "benchmark given up: %s\n", message.c_str());
   std::fflush(nullptr);
-  std::_Exit(1);  // the library's threads may be at work
+  std::_Exit(1);  // threads of the library may still run
 }
 
 tfdude::Transform await_lookup(tfdude::Client& client, const std::string& a, const std::string& b) {
@@ -72,7 +72,7 @@ double shared_clock() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// A sleep comes some 60 us too late.
+// A sleep ends about 60 us too late.
 void sleep_until(double moment) {
   constexpr double kOversleep = 100e-6;
   while (true) {

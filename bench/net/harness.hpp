@@ -11,17 +11,17 @@
 
 #include "support/series.hpp"
 
-// What the network benchmarks have in common.
+// Shared code of the network benchmarks.
 namespace bench {
 
-/// "--name value" of the command line; whatever is not there ends the program with a message.
+/// "--name value" of the command line; a missing option ends the program with a message.
 class Arguments {
  public:
   Arguments(int argc, char** argv);
 
   [[nodiscard]] const std::string& text(const std::string& name) const;
   [[nodiscard]] int number(const std::string& name) const;
-  /// How to join the domain given under a name, with the profile of --profile.
+  /// Options for the domain given under a name, with the profile of --profile.
   [[nodiscard]] tfdude::Options options(const std::string& domain_name) const;
 
  private:
@@ -30,7 +30,7 @@ class Arguments {
 
 [[noreturn]] void give_up(const std::string& message);
 
-/// A benchmark that measured a failure would measure nothing.
+/// Ends the program: measuring a failure would be meaningless.
 template <class Value>
 void check(const tfdude::Result<Value>& outcome, const char* what) {
   if (!outcome) give_up(std::string(what) + ": " + outcome.error().message);
@@ -43,13 +43,13 @@ Value must(tfdude::Result<Value> outcome, const char* what) {
   return *std::move(outcome);
 }
 
-/// Waits until two frames are connected: many daemons that start at once on one core need longer to
-/// meet than a client looks round for.
+/// Waits until two frames are connected: many daemons that start at once on one core need longer
+/// for discovery than a client waits.
 tfdude::Transform await_lookup(tfdude::Client& client, const std::string& a, const std::string& b);
 
 /// Now [s] by a clock that all processes of one computer share.
 double shared_clock();
-/// Until then by that clock, the end of it awake.
+/// Waits until then by that clock; it polls at the end, without sleeping.
 void sleep_until(double moment);
 
 /// One side of a comparison: once() makes the calls and writes one value for each of the figures.
@@ -58,15 +58,15 @@ struct Turn {
   std::function<void(double* values)> once;
 };
 
-/// How much is measured: `calls` a repetition and turn, in blocks that take turns.
+/// How much is measured: `calls` per repetition and turn, in blocks that take turns.
 struct Extent {
   int calls = 0;
   int repetitions = 0;
   int block = 500;
 };
 
-/// Measures the turns in interleaved blocks, so that what else the machine does meets all of them,
-/// and prints their figures. What comes first in a run and in a block is discarded as warm-up.
+/// Measures the turns in interleaved blocks, so that other load of the machine affects all of them,
+/// and prints their figures. The first calls of a run and of a block are discarded as warm-up.
 void measure(std::vector<Turn> turns, const Extent& extent);
 
 /// A turn of one figure in microseconds: one value is the mean of `batch` calls.

@@ -1,16 +1,19 @@
-// A pushed path of ten edges: how long an update takes from its owner to one who watches, beside a
-// bare Fast DDS sample of as many bytes and equal QoS, and what reading the path there costs.
+// A pushed path of ten edges: the time of an update from its owner to a watcher, compared with a
+// bare Fast DDS sample of the same size and QoS, and the cost of reading the path at the watcher.
 //
 //   push_bench --mode own   --domain DOMAIN --profile FILE
 //   push_bench --mode watch --domain DOMAIN --profile FILE --seconds S --calls N --repetitions R
 //
-// The owner says "ready", and updates all edges 1,000 times a second, or sends bare samples, in
-// turns by the clock that both processes share; the watcher measures:
-// pushed/latency/ours           from before update() until a waiting thread has read the new value
-// pushed/latency/dds            from before write() until a thread that waits for the listener has
-// the sample
+// The owner prints "ready". Then it updates all edges 1,000 times a second, or sends bare samples,
+// in turns by the clock that both processes share. The watcher measures:
+//   pushed/latency/ours           from before update() until a waiting thread has read the new
+// value
+//   pushed/latency/dds            from before write() until a thread that waits for the listener
+// has
+//                                 the sample
 //   pushed/latency/dds_listener   the same until the listener has it
-// pushed/latest                 reading the path's newest value with covariance, while it is pushed
+//   pushed/latest                 reading the path's newest value with covariance, while it is
+//                                 pushed
 
 #include <condition_variable>
 #include <cstdio>
@@ -32,12 +35,12 @@ using tfdude::PathWatch;
 
 constexpr int kJoints = 10;
 constexpr double kPeriod = 1e-3;
-constexpr double kTurn = 0.25;  // how long one is measured before it is the other's turn [s]
+constexpr double kTurn = 0.25;  // duration of a turn [s]
 
-/// The number of the turn: ours are even.
+/// The number of the turn: tf-dude has the even ones.
 std::int64_t turn_at(double moment) { return static_cast<std::int64_t>(moment / kTurn); }
 
-/// CDR bytes of what is pushed with each update.
+/// CDR bytes of the message that is pushed with each update.
 std::uint32_t pushed_bytes() {
   tfdude::PushedValues pushed;
   for (std::uint32_t i = 0; i < kJoints; ++i) pushed.entries.push_back({i, tfdude::Time(), {}});
@@ -78,7 +81,7 @@ class BareReceiver final : public edds::DataReaderListener {
       : endpoints_(domain, profile, bench::kPongTopic, bench::kPingTopic, *this, "update") {}
 
   void on_data_available(edds::DataReader* reader) override {
-    // More than one where this was late: then the newest.
+    // There is more than one sample if this thread was late; then the newest counts.
     while (tfdude::fastdds::ok(reader->take_next_sample(&ping_, &info_))) {
       if (!info_.valid_data) continue;
       const std::lock_guard lock(mutex_);
@@ -93,7 +96,7 @@ class BareReceiver final : public edds::DataReaderListener {
     return last_;
   }
 
-  /// One that was sent after the given one, which it replaces; false at the deadline.
+  /// Waits for a sample that was sent after the given one, and replaces it; false at the deadline.
   bool wait_for_more(Clock::time_point deadline, Arrival& arrival) {
     std::unique_lock lock(mutex_);
     if (!arrived_.wait_until(lock, deadline, [&] { return last_.sent > arrival.sent; })) {
@@ -112,7 +115,7 @@ class BareReceiver final : public edds::DataReaderListener {
   bench::FloorEndpoints endpoints_;
 };
 
-/// Latencies, without the first after a pause.
+/// Latencies, without the first one after a pause.
 class Latencies {
  public:
   explicit Latencies(const std::string& who) : series_("pushed/latency/" + who, "us") {}
@@ -160,7 +163,7 @@ class Watcher {
   }
 
  private:
-  // What came after the end of the last turn has been waited for by nobody.
+  // Nobody waited for samples that came after the end of the last turn.
   void see_ours(Clock::time_point until) {
     std::uint64_t messages = path_.messages();
     std::int64_t last = newest();
@@ -168,7 +171,7 @@ class Watcher {
       messages = path_.messages();
       const std::int64_t sent = newest();
       const auto seen = Clock::now();
-      // What is said again every second comes as a message, too.
+      // The renewal of every second arrives as a message, too.
       if (sent > last) ours_.add(sent, seen);
       last = sent;
     }

@@ -1,13 +1,13 @@
-// What bench/pushed.py counts the bytes of: a robot's joints that are pushed to watchers, or bare
-// samples of the size of what tf2 would broadcast, to as many listeners. Each says "ready", and
-// goes on until it is stopped.
+// The traffic whose bytes bench/pushed.py counts: a robot's joints that are pushed to watchers, or
+// bare samples of the size of tf2's broadcast, to the same number of listeners. Each mode prints
+// "ready", and runs until it is stopped.
 //
 //   push_load --mode own    --domain DOMAIN --profile FILE --joints N --rate HZ
 //   push_load --mode watch  --domain DOMAIN --profile FILE --joints N --watchers N --composed 0|1
 //   push_load --mode send   --domain DOMAIN --profile FILE --bytes N --rate HZ
 //   push_load --mode listen --domain DOMAIN --profile FILE --watchers N
 //
-// Each watcher is a participant; all are in one process, which spares processors, not bytes.
+// Each watcher is a participant; all are in one process, which saves processor time, but no bytes.
 
 #include <cstdio>
 #include <deque>
@@ -63,7 +63,7 @@ std::uint32_t domain_of(const Arguments& arguments) {
     (void)bench::await_lookup(clients.back(), bench::kBase, end);
     paths.push_back(must(clients.back().watch(bench::kBase, end, options), "a pushed path"));
   }
-  // Until the stream has come to all: what is said again every second is less.
+  // Waits until the stream has reached all watchers: the renewals of every second alone are fewer.
   for (const tfdude::PathWatch& path : paths) {
     constexpr std::uint64_t kStreaming = 20;
     const auto deadline = bench::Clock::now() + std::chrono::seconds(20);

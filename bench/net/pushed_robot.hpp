@@ -12,15 +12,15 @@
 #include "net/floor_dds.hpp"
 #include "net/harness.hpp"
 
-// What the benchmarks of pushed paths push, and the bare samples beside it.
+// The robot that the benchmarks of pushed paths push, and bare samples for comparison.
 namespace bench {
 
 inline constexpr const char* kBase = "base";
 
-/// Of a chain: the first hangs on the base, each other on the one before.
+/// A chain: the parent of the first frame is the base, that of each other frame is the one before.
 inline std::string joint(int number) { return "joint_" + std::to_string(number); }
 
-/// The owner of such a chain, all joints of which move at once.
+/// The owner of such a chain; all of its joints move at once.
 class PushedRobot {
  public:
   PushedRobot(int joints, const tfdude::Options& options) : node_(open(joints, options)) {
@@ -50,10 +50,10 @@ class PushedRobot {
   int steps_ = 0;
 };
 
-/// Reads nothing.
+/// Ignores all samples.
 class NoListener final : public fastdds::edds::DataReaderListener {};
 
-/// Sends samples of a size as values are pushed, to whoever listens.
+/// Sends samples of a size in the way in which values are pushed, to all listeners.
 class BareSender {
  public:
   BareSender(std::uint32_t domain, const std::string& profile, std::uint32_t bytes)
@@ -61,7 +61,7 @@ class BareSender {
     ping_.filler().resize(bytes - kPingOverhead);
   }
 
-  /// Begins with the moment, as PushedRobot's stamps.
+  /// The sample begins with the moment of sending, as PushedRobot's stamps.
   void send() {
     const std::int64_t now = std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
     std::memcpy(ping_.filler().data(), &now, sizeof now);

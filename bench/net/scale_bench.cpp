@@ -53,7 +53,7 @@ bench::Extent extent_of(const Arguments& arguments) {
 
 std::string chain(int number) { return "chain_" + std::to_string(number); }
 
-/// A lookup that must succeed, for what it takes.
+/// A lookup that must succeed; only its time matters.
 auto lookup(Client& client, const std::string& a, const std::string& b) {
   return [&client, a, b] { bench::check(client.lookup(a, b), "lookup"); };
 }
@@ -86,7 +86,7 @@ void compare_partitions(const Arguments& arguments) {
   auto central = must(Client::open(arguments.options("central")), "the centralized deployment");
   auto decentral = must(Client::open(arguments.options("domain")), "the decentralized deployment");
   FanOut fan_out(numbers(arguments.text("udp-ports")));
-  // Each partition owns two frames; the first one's first is the root.
+  // Each partition owns two frames; the first frame of the first partition is the root.
   const std::string last = chain(2 * partitions - 1);
   (void)bench::await_lookup(central, chain(0), last);
   (void)bench::await_lookup(decentral, chain(0), last);
@@ -98,7 +98,7 @@ void compare_partitions(const Arguments& arguments) {
 
 // --- clients ---
 
-/// What some clients at once measured.
+/// The measurements of concurrent clients.
 struct Crowd {
   explicit Crowd(int count)
       : size(count),

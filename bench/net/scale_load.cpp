@@ -1,5 +1,6 @@
-// Calls that concern one daemon of those that bench/scaling.py starts, the second: frames added
-// below its first one, or lookups of that. Whoever else is woken by them has no part in it.
+// Calls that concern only the second of the daemons that bench/scaling.py starts: frames added
+// below its first frame, or lookups of that frame. Other daemons that are woken by them are not
+// involved.
 
 #include <cstdio>
 #include <string>
@@ -37,7 +38,7 @@ int main(int argc, char** argv) {
   if (!client) return failed(client.error());
   for (int i = 0; i < calls; ++i) {
     if (mode == "add") {
-      // Other names in each run.
+      // Each run uses new names.
       const std::string id = "added_" + std::to_string(getpid()) + "_" + std::to_string(i);
       const auto added = client->add(id, "p1_0", {});
       if (!added) return failed(added.error());

@@ -1,12 +1,12 @@
-// What keeping the state costs: the same calls of an owner that stores and of one that does not, in
-// turns.
+// The cost of storing the state: the same calls to an owner that stores it and to one that does
+// not, in turns.
 //
-// state_bench --profile FILE --domain-kept DOMAIN --domain-not DOMAIN --state DIR --calls N
-// --repetitions R
+//   state_bench --profile FILE --domain-kept DOMAIN --domain-not DOMAIN --state DIR --calls N
+//               --repetitions R
 //
-// state/WHAT/kept and state/WHAT/not: an own update by handle, an own add and remove, an update by
-// request, an add and remove by request. The owner has 100 frames, and stores values every 20 ms,
-// so that the storing meets the calls.
+// Keys: state/WHAT/kept and state/WHAT/not: an own update by handle, an own add and remove, an
+// update by request, an add and remove by request. The owner has 100 frames, and stores values
+// every 20 ms, so that storing and calls overlap.
 
 #include <string>
 #include <utility>

@@ -1,22 +1,22 @@
-// Streamed updates: one publisher in one process sends all 100 edges of an owner in another at a
-// fixed rate; then the positions of 30 joints, which move 30 edges more.
+// Streamed updates: one publisher in one process sends all 100 edges of an owner in another process
+// at a fixed rate; then the positions of 30 joints, which move 30 other edges.
 //
 //   stream_bench --mode own     --shared FILE --domain DOMAIN --profile FILE
-// stream_bench --mode publish --shared FILE --domain DOMAIN --profile FILE --seconds S
-// --repetitions R
+//   stream_bench --mode publish --shared FILE --domain DOMAIN --profile FILE --seconds S
+//                --repetitions R
 //
-// The owner says "ready"; the publisher measures, and prints:
+// The owner prints "ready"; the publisher measures, and prints:
 //   stream/1khz/latency       from before publish() until a lookup in the owner sees the value [us]
-//   stream/1khz/owner_cpu     processor time of the owner [% of one core], one value a repetition
-//   stream/1khz/lost          samples, one value a repetition
-// stream/highest_rate       of 1, 2, 4... kHz and as fast as publish() returns: the highest with
-// nothing lost [Hz]
-// stream/unthrottled/rate   as fast as publish() returns [Hz], and stream/unthrottled/lost, in
-// percent
+//   stream/1khz/owner_cpu     processor time of the owner [% of one core], one value per repetition
+//   stream/1khz/lost          lost samples, one value per repetition
+//   stream/highest_rate       the highest rate without loss [Hz], of 1, 2, 4... kHz and as fast as
+//                             publish() returns
+//   stream/unthrottled/rate   as fast as publish() returns [Hz]
+//   stream/unthrottled/lost   loss at this rate [%]
 //   stream/joints/...         the first three of these for the joints
 //
-// The first edge's translation carries the moment of publishing, by a clock that both share; so
-// does the first joint's position.
+// The first edge's translation contains the moment of publishing, by a clock that both processes
+// share; so does the first joint's position.
 
 #include <algorithm>
 #include <chrono>
@@ -52,7 +52,7 @@ std::string joint(int number) { return "joint_" + std::to_string(number); }
 std::string name_of_joint(int number) { return "joint_" + std::to_string(number); }
 std::string carriage(int number) { return "carriage_" + std::to_string(number); }
 
-// The first is prismatic, along x; the others are revolute, as most joints are.
+// The first joint is prismatic, along x; the others are revolute, as most joints are.
 FrameSpec moved_frame(int number) {
   JointSpec spec;
   spec.name = name_of_joint(number);
@@ -63,7 +63,7 @@ FrameSpec moved_frame(int number) {
 
 // --- the owner ---
 
-/// Looks, as a reader does, whether what came is visible.
+/// Checks with a lookup whether received values are visible.
 class Latency final : public bench::AppliedListener {
  public:
   explicit Latency(StreamState& state) : state_(state) {}
@@ -117,7 +117,7 @@ class Latency final : public bench::AppliedListener {
 // --- the publisher ---
 
 struct Run {
-  double rate = 0;  // reached [Hz]
+  double rate = 0;  // the rate reached [Hz]
   double owner_cpu = 0;
   double published = 0;
   double lost = 0;
@@ -131,7 +131,7 @@ class Publisher {
     if (::clock_getcpuclockid(state_.owner_pid, &owner_clock_) != 0) bench::give_up("no owner");
   }
 
-  /// @param rate  [Hz]; 0: as fast as it goes
+  /// @param rate  [Hz]; 0: as fast as possible
   Run run(double rate, double seconds) {
     const std::uint64_t before = state_.applied;
     state_.latency_count = 0;
@@ -151,7 +151,7 @@ class Publisher {
   }
 
  private:
-  // Until all is applied, or nothing more comes.
+  // Waits until everything is applied, or nothing more arrives.
   void await_rest(std::uint64_t expected) const {
     std::uint64_t seen = 0;
     do {

@@ -1,11 +1,12 @@
-// The thesis's experiments of section 5.2.3, repeated: each call centralized (one daemon owns all
-// frames, this process is a plain client of it) beside decentralized (this process owns its
+// Repeats the thesis's experiments of section 5.2.3. Each call is measured centralized (one daemon
+// owns all frames, this process is a plain client of it) and decentralized (this process owns its
 // partition of the example tree, a daemon the other one), in turns.
 //
 //   thesis_bench --as robot|arms --config FILE --central DOMAIN --domain DOMAIN --profile FILE
 //                --calls N --repetitions R
 //
-// The python module starts the daemons: of all frames in CENTRAL, of the other partition in DOMAIN.
+// bench/net_stage.py starts the daemons: that of all frames in CENTRAL, that of the other partition
+// in DOMAIN.
 // Keys: thesis/CASE/AS/DEPLOYMENT, where AS is the process that asks.
 //
 //   figure  what the thesis measured                             key
@@ -21,9 +22,9 @@
 //   5.10    update robot_1, in main                              update_own/robot
 //   5.11    update the connection (arm_1, below robot_1)         update_connector/robot and /arms
 //
-// "main" is the thesis's process of world and robot, ours the partition robot. The other pairs,
-// such as add_own/arms, it has not; they show that it does not matter who asks, and are measured
-// with fewer calls.
+// "main" is the thesis's process of world and robot; here it is the partition robot. The thesis
+// does not have the other pairs, such as add_own/arms. They show that it does not matter which
+// process asks, and are measured with fewer calls.
 
 #include <algorithm>
 #include <set>
@@ -42,10 +43,10 @@ using bench::must;
 using tfdude::Client;
 using tfdude::Transform;
 
-// Calls on own frames take fractions of a microsecond, near to what reading the clock takes.
+// Calls on own frames take fractions of a microsecond, about as long as reading the clock.
 constexpr int kOwnBatch = 32;
 
-/// The frames that each case uses, by who asks.
+/// The frames that each case uses, by the asking process.
 struct Role {
   const char* own_parent;  // of the leaf that is added
   const char* other_parent;
@@ -60,7 +61,7 @@ constexpr Role kRobot{"camera",  "arm_2", {"world", "robot_1"}, {"arm_1", "hand_
 constexpr Role kArms{"arm_2", "camera", {"arm_1", "hand_left"}, {"world", "robot_1"},
                      "arm_2", "robot_1"};
 
-// What the thesis has, as in the table.
+// The cases of the thesis, as in the table.
 const std::set<std::string> kFigures{
     "add_own/robot",          "add_other/robot",      "path_across/robot", "path_other/arms",
     "path_own/robot",         "update_other/robot",   "update_own/arms",   "update_own/robot",
@@ -118,7 +119,7 @@ class ThesisBench {
         what, [=](Client& client) { check(client.update(frame, X_), "update"); }, batch);
   }
 
-  // In turns, so that the tree stays the same.
+  // Adds and removes in turns, so that the tree stays the same.
   void compare_add_and_remove(const std::string& whose, const std::string& parent) const {
     const auto turn = [&](Client& client, const char* deployment) -> bench::Turn {
       return {{bench::Series(key("add_" + whose, deployment), "us"),
@@ -152,7 +153,7 @@ int main(int argc, char** argv) {
   auto central = must(Client::open(arguments.options("central")), "the centralized deployment");
   auto node = must(tfdude::Node::open(config.partition, config.frames, arguments.options("domain")),
                    "the decentralized deployment");
-  // All are there before anything is timed.
+  // Waits until all frames are known, before measuring.
   for (Client* client : {&central, static_cast<Client*>(&node)}) {
     (void)bench::await_lookup(*client, "world", "hand_left");
   }

@@ -16,10 +16,10 @@ class UdpSocket {
 
   [[nodiscard]] std::uint16_t port() const;
 
-  /// Sends a datagram that asks for one of `reply_bytes`; both at least 8 bytes.
+  /// Sends a datagram that asks for a reply of `reply_bytes`; both have at least 8 bytes.
   void ask(std::uint16_t port, std::uint32_t number, std::size_t bytes, std::size_t reply_bytes);
 
-  /// The number of the next reply; gives up where none comes.
+  /// The number of the next reply; ends the program if none comes.
   std::uint32_t await_reply();
 
   /// Answers forever.

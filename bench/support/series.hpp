@@ -16,7 +16,7 @@ inline double microseconds_since(Clock::time_point start) {
 /// compared repetition by repetition.
 class Series {
  public:
-  /// @param key   stable: the figure's name in the results, words separated by slashes
+  /// @param key   the figure's name in the results, words separated by slashes; must stay the same
   /// @param unit  of the values
   Series(std::string key, std::string unit) : key_(std::move(key)), unit_(std::move(unit)) {}
 
@@ -32,7 +32,7 @@ class Series {
   std::string unit_;
   std::vector<double> values_;
   std::vector<double> medians_;
-  std::size_t begin_ = 0;  // of the repetition under way
+  std::size_t begin_ = 0;  // of the current repetition
 };
 
 }  // namespace bench

@@ -21,14 +21,14 @@ using namespace tfdude;
 using Json = nlohmann::json;
 
 constexpr std::uint64_t kSeed = 20140629;
-constexpr int kPairs = 1'000'000;     // drawn of two poses
-constexpr int kCorrelated = 300'000;  // drawn for a correlation, or a length of the trajectory
-constexpr int kChains = 100'000;      // drawn
-constexpr int kShownChains = 800;     // of them in the picture
+constexpr int kPairs = 1'000'000;     // samples of two poses
+constexpr int kCorrelated = 300'000;  // samples per correlation, or per length of the trajectory
+constexpr int kChains = 100'000;      // samples of the chain
+constexpr int kShownChains = 800;     // of these, in the picture
 constexpr int kTrials = 4000;         // of a fusion
 constexpr double kCorrelatedAlpha = 0.2;
 
-// E[eᵀ Σ⁻¹ e] / 6 for errors of this second moment: above one where Σ belittles them.
+// E[eᵀ Σ⁻¹ e] / 6 for errors of this second moment: above one if Σ is too small for them.
 double nees(const Matrix6d& sigma, const Matrix6d& moment) {
   return sigma.ldlt().solve(moment).trace() / 6.0;
 }
@@ -36,7 +36,7 @@ double nees(const Matrix6d& sigma, const Matrix6d& moment) {
 double metres(const Matrix6d& sigma) { return std::sqrt(sigma.topLeftCorner<3, 3>().trace()); }
 double radians(const Matrix6d& sigma) { return std::sqrt(sigma.bottomRightCorner<3, 3>().trace()); }
 
-// How a covariance does beside the moment that was drawn.
+// Compares a covariance with the sampled moment.
 Json beside(const Matrix6d& sigma, const Matrix6d& moment) {
   return {{"error", (sigma - moment).norm()},
           {"nees", nees(sigma, moment)},
@@ -93,8 +93,8 @@ DrawnChains draw_chains(const Pose& mean) {
   return drawn;
 }
 
-// The parts of all chains within one and three standard deviations, by some squared distance, and
-// what a Gaussian of so many dimensions has there.
+// The fractions of all chains within one and three standard deviations, by a squared distance, and
+// those of a Gaussian with so many dimensions.
 template <class Distance>
 Json share_within(const std::vector<Pose>& poses, int dimensions, const Distance& squared) {
   Json shares = Json::array();
@@ -239,7 +239,7 @@ Json way_after(int steps, testing::Random& random) {
   };
   const Belief A = t.A();
   const Belief B = t.B();
-  // As it is where B was made of A and of the way: to fourth order by an error of B that has both.
+  // B is composed of A and of the way: to fourth order by an error of B that contains both.
   const Belief X_AB{t.X_AB.pose, t.X_AB.covariance, std::nullopt, {}};
   const Matrix6d second = way(A, compose(A, X_AB, Order::kSecond), Order::kSecond);
   const Matrix6d fourth = way(A, compose(A, X_AB, Order::kFourth), Order::kFourth);
@@ -265,7 +265,7 @@ Json trajectories() {
   return {{"samples", kCorrelated}, {"rows", rows}};
 }
 
-// Six digits: what a reader and a picture need.
+// Six digits are enough for a reader and for a picture.
 void round_all(Json& value) {
   if (value.is_structured()) {
     for (Json& part : value) round_all(part);

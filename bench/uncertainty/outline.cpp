@@ -14,10 +14,10 @@ using tfdude::Twist;
 
 constexpr int kAround = 240;     // points of an ellipse
 constexpr int kRows = 300;       // of an outline, each with a point on both sides
-constexpr int kAcross = 1400;    // places looked at in a row
-constexpr int kHeadings = 200;   // looked at for a place
-constexpr double kFarX = 70.0;   // m: how far from the mean an outline is looked for
-constexpr double kBeyond = 1.2;  // times what the standard deviation of y has it to be
+constexpr int kAcross = 1400;    // places to check in a row
+constexpr int kHeadings = 200;   // headings to check for a place
+constexpr double kFarX = 70.0;   // m: how far from the mean to look for an outline
+constexpr double kBeyond = 1.2;  // times the distance that follows from the standard deviation of y
 
 Eigen::Vector2d place(const Pose& mean, double x, double y, double yaw) {
   Twist xi;
@@ -25,7 +25,7 @@ Eigen::Vector2d place(const Pose& mean, double x, double y, double yaw) {
   return (mean * tfdude::exp(xi)).translation().head<2>();
 }
 
-// Whether there is a heading with which a pose at `p`, as seen from the mean, is within.
+// Whether there is a heading for which a pose at `p`, relative to the mean, lies within.
 class Within {
  public:
   Within(const Eigen::Matrix3d& sigma, double sigmas)

@@ -7,8 +7,8 @@
 
 #include "tfdude/math/transform.hpp"
 
-// What the positions x and y of a pose of the plane may be, drawn: the error is of (x, y, yaw)
-// only.
+// Outlines of the possible positions x and y of a pose in the plane: the error is only that of
+// (x, y, yaw).
 namespace bench {
 
 using Outline = std::vector<std::array<double, 2>>;

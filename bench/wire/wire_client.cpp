@@ -1,12 +1,12 @@
-// One long-lived client for bench/wire.py, which counts what an operation puts on the wire:
-// discovery is over before the first one.
+// One long-lived client for bench/wire.py, which counts the traffic of each operation: discovery is
+// complete before the first one.
 //
 //   wire_client DOMAIN PROFILE
 //
-// Reads operations from standard input, one a line:
+// Reads operations from standard input, one per line:
 //   add ID PARENT | remove ID | update ID | publish ID | joint NAME | lookup A B
-// and answers each with "BEGIN done", BEGIN being when it began by the system's clock [ns], which a
-// capture has, too; or with "failed" and why.
+// and answers each with "BEGIN done", or with "failed" and the reason. BEGIN is the time of its
+// start by the system clock [ns], which captures use as well.
 
 #include <chrono>
 #include <cstdlib>
