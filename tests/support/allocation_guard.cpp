@@ -7,7 +7,7 @@
 
 namespace {
 
-// Plain numbers: they are there before and after all other objects of the thread.
+// Plain numbers: they exist before and after all other objects of the thread.
 thread_local std::uint64_t allocations = 0;
 thread_local std::int64_t live_bytes = 0;
 
@@ -37,7 +37,8 @@ std::size_t number(std::align_val_t alignment) { return static_cast<std::size_t>
 
 }  // namespace
 
-// Every form: a sanitizer brings its own of those that are left out, and they do not go together.
+// Replaces every form: a sanitizer provides its own version of the others, and the two do not
+// match.
 using std::align_val_t;
 using std::nothrow_t;
 using std::size_t;

@@ -5,8 +5,9 @@
 
 namespace tfdude::testing {
 
-/// What the calling thread allocates from here on. Only in binaries that link allocation_guard.cpp,
-/// which replaces the global operator new and delete, also those of shared libraries.
+/// Counts allocations of the calling thread from its construction on. Works only in binaries that
+/// link allocation_guard.cpp, which replaces the global operator new and delete, also those of
+/// shared libraries.
 class AllocationGuard {
  public:
   AllocationGuard();

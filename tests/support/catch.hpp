@@ -1,7 +1,7 @@
 #pragma once
 
-// The one place that knows which Catch2 is there: 3 (Debian 13) or 2 (Debian 12). Names that differ
-// are given in tfdude::testing.
+// The only file that depends on the version of Catch2: 3 (Debian 13) or 2 (Debian 12). Names that
+// differ are defined in tfdude::testing.
 #if __has_include(<catch2/catch_all.hpp>)
 #include <catch2/catch_all.hpp>
 #else
@@ -10,7 +10,7 @@
 
 #include "tfdude/base/result.hpp"
 
-/// What a result is that should have been another: its error's message.
+/// Prints an unexpected result: its error's message.
 template <class T>
 struct Catch::StringMaker<tl::expected<T, tfdude::Error>> {
   static std::string convert(const tl::expected<T, tfdude::Error>& result) {

@@ -15,8 +15,8 @@ namespace {
 constexpr std::uint32_t kFirst = 20;
 constexpr std::uint32_t kCount = 200;
 
-// A name in the abstract namespace of the kernel: one process has it at a time, and loses it as it
-// ends.
+// A name in the kernel's abstract namespace of sockets: only one process can have it at a time, and
+// the kernel frees it when the process ends.
 int claim(std::uint32_t domain) {
   const std::string name = "tfdude-test-domain-" + std::to_string(domain);
   sockaddr_un address{};

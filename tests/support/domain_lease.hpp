@@ -7,7 +7,7 @@ namespace tfdude::testing {
 /// A DDS domain from 20 to 219 that no other test on this computer uses now.
 class DomainLease {
  public:
-  /// @throws std::runtime_error where all are taken.
+  /// @throws std::runtime_error if all are taken.
   DomainLease();
   ~DomainLease();
   DomainLease(const DomainLease&) = delete;

@@ -15,7 +15,7 @@ edds::DomainParticipantFactory& factory() {
   return *edds::DomainParticipantFactory::get_instance();
 }
 
-/// Another transport that may be muted.
+/// A DDS transport that can be muted.
 class MutedDescriptor final : public fastdds::etransport::ChainingTransportDescriptor {
  public:
   MutedDescriptor(std::shared_ptr<fastdds::etransport::TransportDescriptorInterface> real,
@@ -71,7 +71,7 @@ bool RawType::fill(const Bytes& bytes, fastdds::ertps::SerializedPayload_t& payl
 ForeignWriter::ForeignWriter(std::uint32_t domain, const char* topic_name, edds::TypeSupport type,
                              const std::string& partition, bool durable) {
   edds::DomainParticipantQos participant_qos;
-  factory().load_XML_profiles_file(TFDUDE_LOOPBACK_PROFILE);  // once is enough, twice does no harm
+  factory().load_XML_profiles_file(TFDUDE_LOOPBACK_PROFILE);  // loading it twice is harmless
   factory().get_participant_qos_from_profile("tfdude_participant", participant_qos);
   for (auto& transport : participant_qos.transport().user_transports) {
     transport = std::make_shared<MutedDescriptor>(transport, muted_);

@@ -9,14 +9,14 @@
 
 #include "transport/fastdds/compat.hpp"
 
-// DDS writers that know nothing of this project's library: whatever a stranger in the domain may
+// DDS writers that do not use this project's library: they send what any program in the domain may
 // send.
 namespace tfdude::testing {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// A type that says any name and sends any bytes: the sample is a Bytes, encapsulation header
-/// included.
+/// A type with any name that sends any bytes: the sample is a Bytes, which includes the
+/// encapsulation header.
 class RawType final : public fastdds::edds::TopicDataType {
  public:
   RawType(const std::string& name, bool keyed);
@@ -62,7 +62,7 @@ class RawType final : public fastdds::edds::TopicDataType {
   static bool fill(const Bytes& bytes, fastdds::ertps::SerializedPayload_t& payload);
 };
 
-/// A sample of a generated type as it stands on the wire.
+/// The bytes of a sample of a generated type on the wire.
 template <class GeneratedType, class Sample>
 Bytes bytes_of(Sample sample) {
   GeneratedType type;
@@ -80,21 +80,21 @@ Bytes bytes_of(Sample sample) {
 class ForeignWriter {
  public:
   /// @param partition  of DDS; empty: the default one
-  /// @throws std::runtime_error where it cannot be made.
+  /// @throws std::runtime_error if it cannot be created.
   ForeignWriter(std::uint32_t domain, const char* topic, fastdds::edds::TypeSupport type,
                 const std::string& partition, bool durable = false);
   ~ForeignWriter();
   ForeignWriter(const ForeignWriter&) = delete;
   ForeignWriter& operator=(const ForeignWriter&) = delete;
 
-  /// Waits until so many readers were met. @throws std::runtime_error where they are not.
+  /// Waits until so many readers are matched. @throws std::runtime_error if they are not.
   void await_readers(int count);
 
-  /// From now on nothing that is sent arrives, or all of it again.
+  /// Mutes the writer, or ends that: while it is muted, nothing that it sends arrives.
   void mute(bool muted) { *muted_ = muted; }
 
   /// A sample of the writer's type. @param ahead  by how much the writer's clock is
-  /// @throws std::runtime_error where it is not taken.
+  /// @throws std::runtime_error if DDS does not accept it.
   void write(void* sample, std::chrono::nanoseconds ahead = {});
 
  private:

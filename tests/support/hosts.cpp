@@ -15,23 +15,23 @@
 namespace tfdude::testing {
 namespace {
 
-// With a shared memory of its own: what hosts have in common is the network.
+// With its own shared memory, because hosts share only the network.
 constexpr const char* kOwnMemory =
     "exec unshare --mount /bin/sh -c 'mount -t tmpfs none /dev/shm && exec \"$@\"' sh \"$@\"";
 
-// Where the tools are that a user's path may lack.
+// Folders of the tools that may be missing in a user's path.
 constexpr const char* kPath = "PATH=/usr/sbin:/sbin:$PATH; set -e\n";
 
 std::string port(std::size_t host) { return "port" + std::to_string(host); }
 
-// The calling thread's network; -1 where it cannot be opened.
+// The network namespace of the calling thread; -1 if it cannot be opened.
 int open_own_network() { return open("/proc/thread-self/ns/net", O_RDONLY | O_CLOEXEC); }
 
 std::vector<std::string> shell(const std::string& script) {
   return {"/bin/sh", "-c", kPath + script};
 }
 
-// One that nothing is in yet; -1 with errno where that is not allowed.
+// A new, empty namespace; -1 with errno if that is not permitted.
 int make_network() {
   int fd = -1;
   int error = 0;
@@ -81,7 +81,7 @@ std::string Hosts::run(const Network& where, const std::string& script) {
 }
 
 Hosts::Hosts(std::size_t count) : home_(open_own_network()), hosts_(count) {
-  // Snooping would need somebody who asks for the groups' members.
+  // Snooping would need a querier for the members of multicast groups.
   run(switch_, "ip link add switch type bridge mcast_snooping 0 && ip link set switch up");
   for (std::size_t i = 0; i < count; ++i) {
     const std::string network =
@@ -93,7 +93,7 @@ Hosts::Hosts(std::size_t count) : home_(open_own_network()), hosts_(count) {
                        "nft -f - <<END\n"
                        "table inet loss {\n"
                        "  counter dropped {}\n"
-                       // Before fragments are put together, each of which may be lost.
+                       // Runs before fragments are reassembled, because each may be lost.
                        "  chain arriving { type filter hook prerouting priority raw; }\n"
                        "}\nEND\n");
   }
@@ -144,7 +144,7 @@ void Hosts::cut(std::size_t host) const { run(switch_, "ip link set " + port(hos
 void Hosts::heal(std::size_t host) const { run(switch_, "ip link set " + port(host) + " up"); }
 
 Process start_discovery_server(const Hosts& hosts, std::size_t host, const std::string& backup) {
-  // By its address: Fast DDS 3.1 cannot listen on all at once.
+  // Listens on this address: Fast DDS 3.1 cannot listen on all at once.
   const std::string command =
       "exec fast-discovery-server -i 0 -l " + Hosts::address(host) + " -p 11811";
   Process server = hosts.start(

@@ -12,13 +12,13 @@
 
 namespace tfdude::testing {
 
-/// Computers of one test, joined by a switch: network namespaces, each with an address, a loopback
-/// interface and firewall rules of its own. The kernel keeps them only as long as this object or a
-/// process inside is there, so nothing is left behind, however a test ends, and tests at the same
-/// time do not meet.
+/// Computers of one test, connected by a switch. They are network namespaces, each with its own
+/// address, loopback interface and firewall rules. The kernel keeps them only while this object or
+/// a process inside exists. So nothing is left behind, however a test ends, and concurrent tests do
+/// not see each other.
 class Hosts {
  public:
-  /// Why there can be no hosts here; empty where there can.
+  /// Why there can be no hosts here; empty if there can.
   [[nodiscard]] static std::string missing();
 
   /// @throws std::runtime_error with what the tools said.
@@ -32,11 +32,11 @@ class Hosts {
 
   [[nodiscard]] Process start(std::size_t host, const std::vector<std::string>& argv) const;
 
-  /// Moves the calling thread to a host, with all threads and sockets that it makes from now on.
-  /// The thread that has made this object returns as that goes.
+  /// Moves the calling thread to a host, with all threads and sockets that it creates from now on.
+  /// The thread that created this object returns when the object is destroyed.
   void enter(std::size_t host) const;
 
-  /// What a function gives that runs on a host, in a thread of its own.
+  /// Runs a function on a host, in its own thread. @return its result
   template <class Function>
   [[nodiscard]] auto on(std::size_t host, Function function) const {
     std::optional<decltype(function())> result;
@@ -47,13 +47,12 @@ class Hosts {
     return *std::move(result);
   }
 
-  /// From now on each host drops this share of all packets that come to it over the network, at
-  /// random.
+  /// From now on each host drops this share of the packets that arrive over the network, at random.
   void lose(int percent) const;
-  /// How many were dropped so far, by all hosts.
+  /// How many packets all hosts have dropped so far.
   [[nodiscard]] std::uint64_t lost() const;
 
-  /// Pulls a host's cable out of the switch, and puts it back.
+  /// Unplugs a host's cable from the switch, and plugs it in again.
   void cut(std::size_t host) const;
   void heal(std::size_t host) const;
 
@@ -73,23 +72,23 @@ class Hosts {
 
   static std::string run(const Network& where, const std::string& script);
 
-  int home_ = -1;  // where the test came from
+  int home_ = -1;  // the namespace in which the test started
   Network switch_;
   std::vector<Network> hosts_;
 };
 
 /// Starts Fast DDS's discovery server on a host, with id 0, and waits until it runs.
-/// @param backup  a directory in which it keeps what it knows for its successor; empty: it does not
+/// @param backup  a directory in which it stores its data for its successor; empty: it does not
 [[nodiscard]] Process start_discovery_server(const Hosts& hosts, std::size_t host,
                                              const std::string& backup = {});
-/// Whether a server can be killed, and its successor read what it has kept: that of Fast DDS 3.1
-/// crashes as it reads.
+/// Whether a killed server's successor can read its stored data: that of Fast DDS 3.1 crashes when
+/// it reads them.
 [[nodiscard]] constexpr bool discovery_server_reads_backup() { return TFDUDE_FASTDDS_MAJOR == 2; }
-/// Where the others find it, for --discovery-server.
+/// The server's address, for --discovery-server.
 [[nodiscard]] std::string discovery_address(std::size_t host);
 
-/// Whether a test has to be left out for want of what Hosts needs; then says so, in the words by
-/// which ctest knows a test that was skipped.
+/// Whether a test must be skipped because Hosts does not work here. Then prints that, in the words
+/// by which ctest recognizes a skipped test.
 [[nodiscard]] bool skip_without_hosts();
 
 }  // namespace tfdude::testing

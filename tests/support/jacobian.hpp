@@ -6,8 +6,8 @@
 
 namespace tfdude::testing {
 
-/// Jacobian at zero of the right perturbation of `perturbed(ξ)` by that of its arguments, by
-/// central differences: no formula of the library's but exp, log and the product.
+/// Jacobian at zero of the right perturbation of `perturbed(ξ)` with respect to that of its
+/// arguments, by central differences. Of the library it uses only exp, log and the product.
 [[nodiscard]] inline Matrix6d numeric_jacobian(const std::function<Pose(const Twist&)>& perturbed) {
   constexpr double kStep = 1e-4;
   const Pose X_inv = perturbed(Twist::Zero()).inverse();

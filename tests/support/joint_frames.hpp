@@ -17,7 +17,8 @@ namespace tfdude::testing {
   return {frame, parent, X_PC, {}, {}, std::move(joint)};
 }
 
-/// About the z axis, a metre along x, within -1 to 2 rad; at rest uncertain by half a radian.
+/// A joint about the z axis, a metre along x, with limits of -1 and 2 rad; at rest its standard
+/// deviation is half a radian.
 [[nodiscard]] inline JointSpec revolute_named(const std::string& name) {
   JointSpec spec;
   spec.name = name;
@@ -28,7 +29,7 @@ namespace tfdude::testing {
   return spec;
 }
 
-/// The same, following another.
+/// The same joint, which follows another one.
 [[nodiscard]] inline JointSpec following(const std::string& name, const std::string& leader,
                                          double multiplier, double offset) {
   JointSpec spec = revolute_named(name);
@@ -37,7 +38,7 @@ namespace tfdude::testing {
   return spec;
 }
 
-/// The turn about z [rad]; not a number where there is none.
+/// The rotation about z [rad]; NaN if there is no value.
 [[nodiscard]] inline double yaw(const Result<Transform>& X) {
   if (!X) return std::nan("");
   return 2 * std::atan2(X->pose.rotation().z(), X->pose.rotation().w());

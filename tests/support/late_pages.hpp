@@ -10,8 +10,7 @@
 
 namespace tfdude::testing {
 
-/// A transport that can hold back what one partition says of its structure, as a starved process or
-/// a bad link does.
+/// A transport that can delay the pages of one partition, as a starved process or a bad link does.
 class LatePages final : public Relay {
  public:
   using Relay::Relay;
@@ -21,7 +20,7 @@ class LatePages final : public Relay {
     const std::lock_guard lock(mutex_);
     held_ = partition;
   }
-  /// Lets the oldest of them through, once there is one.
+  /// Waits for a page, and passes on the oldest one.
   void let_one_through() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return !waiting_.empty(); });
@@ -29,13 +28,13 @@ class LatePages final : public Relay {
     waiting_.pop_front();
     handler().on_page(page);
   }
-  /// Lets all through, as they come.
+  /// Passes on all of them in order, and no longer delays pages.
   void let_through() {
     const std::lock_guard lock(mutex_);
     held_.clear();
     for (const Page& page : std::exchange(waiting_, {})) handler().on_page(page);
   }
-  /// Waits until the partition was asked how far its structure is.
+  /// Waits until the partition was asked for the epoch of its structure.
   [[nodiscard]] bool wait_until_asked(Milliseconds longest) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, longest, [this] { return asked_; });

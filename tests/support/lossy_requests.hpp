@@ -10,10 +10,10 @@
 
 namespace tfdude::testing {
 
-/// A transport that loses those requests that a test wants lost.
+/// A transport that loses the requests that a test selects.
 class LossyRequests final : public Relay {
  public:
-  /// Called one after the other. @return whether this sending is lost
+  /// Never called concurrently. @return whether this sending is lost
   using Loses = std::function<bool(const Request& request)>;
 
   LossyRequests(TransportPtr real, Loses loses)

@@ -23,7 +23,7 @@ using Join = std::function<TransportPtr(const std::string& partition)>;
 }
 
 [[nodiscard]] inline Join join_fastdds() {
-  // Kept until the process ends, as the participants may live longer than what is returned.
+  // Kept until the process ends, because participants may live longer than the returned function.
   static std::deque<DomainLease> leases;
   const std::uint32_t domain = leases.emplace_back().number();
   return [domain](const std::string& partition) {
@@ -35,7 +35,7 @@ using Join = std::function<TransportPtr(const std::string& partition)>;
   return transport == 0 ? join_loopback() : join_fastdds();
 }
 
-/// What joined_by() takes. ThreadSanitizer does not see what Fast DDS locks.
+/// The values for joined_by(). ThreadSanitizer does not see the locks of Fast DDS.
 [[nodiscard]] inline std::vector<int> networks() {
 #ifdef __SANITIZE_THREAD__
   return {0};

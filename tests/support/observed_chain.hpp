@@ -12,8 +12,8 @@
 
 namespace tfdude::testing {
 
-/// A chain of edges with its truth, whose paths are observed; frame i is the parent of frame i + 1,
-/// by edge i.
+/// A chain of edges with its true values, whose paths are observed. Edge i leads from frame i to
+/// its child, frame i + 1.
 class ObservedChain {
  public:
   ObservedChain(Random& random, std::size_t edges) {
@@ -41,7 +41,7 @@ class ObservedChain {
     sources_.push_back(name);
   }
 
-  /// Draws the truth from what is believed. @param lies  of this edge the errors are `by` times as
+  /// Samples the true values from the beliefs. @param lies  the edge whose errors are `by` times as
   /// large
   void make_true(Random& random, std::size_t lies = SIZE_MAX, double by = 1.0) {
     std::vector<Eigen::Vector3d> drawn;
@@ -94,12 +94,12 @@ class ObservedChain {
     return take(from, to, {Z, R});
   }
 
-  /// A measurement of just what is believed: it changes no pose.
+  /// A measurement equal to the belief: it changes no pose.
   void observe_exactly(std::size_t from, std::size_t to, const Covariance& R) {
     take(from, to, {believed(from, to).pose, R});
   }
 
-  /// As if edges knew nothing of each other.
+  /// The covariance if edges were independent.
   void forget_common_errors() {
     for (ObservedEdge& edge : edges_) {
       edge.X_PC.own = collapse(edge.X_PC).covariance;
@@ -108,7 +108,7 @@ class ObservedChain {
     for (std::size_t i = 0; i < edges_.size(); ++i) cluster_[i] = i;
   }
 
-  /// The joint covariance of all edges that their beliefs make.
+  /// The joint covariance of all edges, from their beliefs.
   [[nodiscard]] Eigen::MatrixXd dense() const {
     const auto size = static_cast<Eigen::Index>(6 * edges_.size());
     Eigen::MatrixXd P = Eigen::MatrixXd::Zero(size, size);
@@ -128,8 +128,8 @@ class ObservedChain {
     return P;
   }
 
-  /// What an observation makes of it: a Kalman update whose gain is zero for edges that have
-  /// nothing to do with it.
+  /// The covariance after an observation: a Kalman update whose gain is zero for edges that are not
+  /// correlated with it.
   [[nodiscard]] Eigen::MatrixXd dense_update(const Eigen::MatrixXd& P, std::size_t from,
                                              std::size_t to, const Covariance& R) const {
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(6, P.cols());

@@ -89,7 +89,7 @@ bool Oracle::is_below(const std::string& id, const std::string& ancestor) const 
 Transform Oracle::between(const std::string& a, const std::string& b) const {
   auto from_a = way_up(a);
   auto from_b = way_up(b);
-  // The edges above the place where both meet are no part of the path.
+  // The edges above the common ancestor are no part of the path.
   while (!from_a.empty() && !from_b.empty() && from_a.back() == from_b.back()) {
     from_a.pop_back();
     from_b.pop_back();

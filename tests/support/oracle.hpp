@@ -10,16 +10,16 @@
 
 namespace tfdude::testing {
 
-/// All frames in one tree, and the poses between them by plain matrices: what the service has to
-/// agree with. Written from the formulas; of the library it uses only the containers of its
-/// arguments.
+/// All frames in one tree, and the poses between them by plain matrices: the service must agree
+/// with them. It is written from the formulas, and uses only the types of its arguments from the
+/// library.
 class Oracle {
  public:
   /// An empty parent makes a root.
   void add(const std::string& id, const std::string& parent, const Transform& X_PC);
   void update(const std::string& id, const Transform& X_PC);
   void move(const std::string& id, const std::string& parent) { frames_.at(id).parent = parent; }
-  /// With all below it.
+  /// Removes a frame with all frames below it.
   void remove(const std::string& id);
 
   /// Sorted.
@@ -29,7 +29,7 @@ class Oracle {
   }
   [[nodiscard]] bool is_below(const std::string& id, const std::string& ancestor) const;
 
-  /// X_AB; both frames are there and connected.
+  /// X_AB; both frames exist and are connected.
   [[nodiscard]] Transform between(const std::string& a, const std::string& b) const;
 
  private:

@@ -13,7 +13,7 @@
 // Owners that fight over the same few frames.
 namespace tfdude::testing {
 
-/// One of them, with what it has said.
+/// An owner, with the messages that it has sent.
 struct Owning {
   Owning(const std::string& name, std::uint64_t incarnation)
       : replica(name), partition(name, incarnation, replica.forest, replica.directory) {}
@@ -28,8 +28,8 @@ struct Owning {
   return "f" + std::to_string(number);
 }
 
-/// To add one of so many frames, or to move or remove it where it is held here, as far as is known
-/// here.
+/// A request to add one of so many frames, or to move or remove it if this owner holds it, as far
+/// as this owner knows.
 [[nodiscard]] inline Request any_change(Random& random, const Forest& forest, std::size_t frames) {
   const std::string id = fought_frame(random.index(frames));
   const std::string other = fought_frame(random.index(frames));

@@ -1,6 +1,6 @@
 #pragma once
 
-// What most tests include, compiled once for all of them; the preset dev builds without it.
+// Headers that most tests include, compiled once for all of them; the dev preset builds without it.
 #include <future>
 
 #include "tfdude/client/client.hpp"

@@ -22,7 +22,7 @@ using std::chrono::milliseconds;
 
 constexpr int kExecFailed = 127;
 
-// How long to wait for output before anything else is looked at.
+// How long to wait for output before checking anything else.
 constexpr milliseconds kLook{5};
 
 [[noreturn]] void fail_with_errno(const char* what) {
@@ -120,7 +120,7 @@ bool Process::reap() {
 std::optional<int> Process::wait(Deadline deadline) {
   do {
     read_some(deadline);
-    // All that was written belongs to the result, so the end of the streams comes first.
+    // Reads the streams to their end first, because all output belongs to the result.
     if (ended() && reap()) return status_;
   } while (Clock::now() <= deadline);
   return std::nullopt;
@@ -139,7 +139,7 @@ void Process::kill() {
 void Process::freeze() const {
   signal(SIGSTOP);
   siginfo_t info{};
-  // What ended instead is left for wait().
+  // If the process has ended instead, wait() handles that.
   waitid(P_PID, static_cast<id_t>(pid_), &info, WSTOPPED | WEXITED | WNOWAIT);
 }
 

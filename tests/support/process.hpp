@@ -13,17 +13,17 @@ namespace tfdude::testing {
 using Clock = std::chrono::steady_clock;
 using Deadline = Clock::time_point;
 
-/// By when anything that works has happened, even where the machine is busy with something else.
+/// A time limit that working code meets even on a busy machine.
 [[nodiscard]] inline Deadline in_time() { return Clock::now() + std::chrono::seconds(30); }
 
-/// A process of its own, whose output is kept. Killed and reaped with the object; the kernel kills
-/// it where the test itself is killed, since no destructor runs then. Belongs to one thread, which
-/// has to outlive it.
+/// A child process whose output is kept. The destructor kills and reaps it. If the test itself is
+/// killed, no destructor runs, and the kernel kills the process. Belongs to one thread, which must
+/// outlive it.
 class Process {
  public:
   /// Starts argv[0], a path.
   /// @param network  a namespace of the kernel to start it in, as an open file; -1: this thread's
-  /// @throws std::system_error where there can be no new process.
+  /// @throws std::system_error if no process can be created.
   explicit Process(const std::vector<std::string>& argv, int network = -1);
   ~Process();
   Process(Process&& other) noexcept;
@@ -31,25 +31,25 @@ class Process {
 
   [[nodiscard]] pid_t pid() const { return pid_; }
 
-  /// Of standard output, the first line with this beginning; nothing where the output ends without
-  /// it or the deadline passes.
+  /// The first line of standard output with this prefix; none if the output ends without it, or at
+  /// the deadline.
   [[nodiscard]] std::optional<std::string> wait_for_line(const std::string& prefix,
                                                          Deadline deadline);
 
-  /// The exit status, or 128 and the signal's number as in a shell; nothing where it still runs at
-  /// the deadline.
+  /// The exit status, or 128 plus the signal's number as in a shell; none if it still runs at the
+  /// deadline.
   [[nodiscard]] std::optional<int> wait(Deadline deadline);
 
   [[nodiscard]] bool runs() { return !wait(Clock::now()); }
 
   void signal(int number) const;
 
-  /// Kills it, and waits until it is no more.
+  /// Kills it, and waits for its end.
   void kill();
-  /// Stops it as a debugger does, and waits until it stands still; SIGCONT lets it go on.
+  /// Stops it as a debugger does, and waits until it has stopped; SIGCONT continues it.
   void freeze() const;
 
-  /// What was written until the last wait.
+  /// The output until the last wait.
   [[nodiscard]] const std::string& out() const { return streams_[0].text; }
   [[nodiscard]] const std::string& err() const { return streams_[1].text; }
 
@@ -59,7 +59,7 @@ class Process {
     std::string text;
   };
 
-  /// Takes what was written, or waits a moment for that.
+  /// Reads the output, or waits a moment for it.
   void read_some(Deadline deadline);
   [[nodiscard]] bool ended() const { return streams_[0].fd < 0 && streams_[1].fd < 0; }
   bool reap();
@@ -69,7 +69,7 @@ class Process {
   std::array<Stream, 2> streams_;  // standard output and error
 };
 
-/// A directory for generated files, gone with the object.
+/// A directory for generated files; the destructor removes it.
 class TemporaryDirectory {
  public:
   TemporaryDirectory();
@@ -86,7 +86,7 @@ class TemporaryDirectory {
   std::string path_;
 };
 
-/// Tries again and again until it holds. @return false where it does not within a deadline
+/// Repeats until the condition is true. @return false if it is not within a deadline
 template <class Condition>
 [[nodiscard]] bool eventually(Condition condition) {
   const Deadline deadline = in_time();

@@ -9,13 +9,12 @@
 #include "support/random.hpp"
 #include "support/sampling.hpp"
 
-// The experiments of docs/uncertainty.md: their parameters and what is drawn of them. The tests and
-// the program that makes the page's figures both take them from here, so that they cannot come to
-// differ.
+// The experiments of docs/uncertainty.md: their parameters and samples. Both the tests and the
+// program that computes the page's figures use this file, so they cannot differ.
 //
 // Barfoot & Furgale, "Associating uncertainty with three-dimensional poses for use in estimation
-// problems", 2014, has the left perturbation X = Exp(ξ) · X̄. What is drawn is drawn that way, and
-// the library is asked by way of from_left_covariance(): a conversion that was wrong would show.
+// problems", 2014, use the left perturbation X = Exp(ξ) · X̄. The samples use it, too, while the
+// library gets its covariance by from_left_covariance(): so an error in this conversion would show.
 namespace tfdude::testing {
 
 [[nodiscard]] inline Twist twist(double x, double y, double z, double rx, double ry, double rz) {
@@ -53,9 +52,9 @@ struct TwoPoses {
 }
 
 /// E[ξ ξᵀ] of ξ = Log(X1 X2 (X̄1 X̄2)⁻¹), where the errors of both have this correlation, axis by
-/// axis, each in units of its own standard deviation. What is drawn is the difference from the
-/// linear part of ξ, whose moment is known: so the chance is in what the orders differ by, and not
-/// in all of the covariance.
+/// axis, each in units of its own standard deviation. Only the difference from the linear part of ξ
+/// is sampled, because the moment of that part is known. So chance affects only the difference
+/// between the orders, not the whole covariance.
 [[nodiscard]] inline Matrix6d sampled_product(const TwoPoses& poses, double correlation,
                                               Random& random, int samples) {
   const Gaussian unit(Eigen::MatrixXd::Identity(6, 6));
@@ -79,7 +78,7 @@ struct TwoPoses {
   return J_1 * J_1.transpose() + J_2 * J_2.transpose() + cross + cross.transpose() + sum / samples;
 }
 
-/// The covariance of the left perturbation of both poses' product, their errors being independent.
+/// The covariance of the left perturbation of the product of both poses, with independent errors.
 [[nodiscard]] inline Matrix6d composed(const TwoPoses& poses, Order order) {
   return left_covariance(collapse(compose(poses.first.belief(), poses.second.belief(), order)))
       .matrix();
@@ -121,7 +120,7 @@ inline constexpr double kChainYaw = 0.03;  // rad, standard deviation of a step
           diagonal(alpha * twist(5, 5, 25, 1, 0.5, 0.5))};
 }
 
-/// One trial: estimates with errors as they say.
+/// One trial: estimates whose errors agree with their covariances.
 [[nodiscard]] inline std::vector<Transform> drawn_estimates(double alpha, Random& random) {
   std::vector<Transform> estimates;
   for (const Covariance& sigma : fused_covariances(alpha)) {
@@ -131,15 +130,15 @@ inline constexpr double kChainYaw = 0.03;  // rad, standard deviation of a step
   return estimates;
 }
 
-/// (Log(X̄⁻¹ X))ᵀ Σ⁻¹ Log(X̄⁻¹ X): how far a pose is from an estimate, in the estimate's own
-/// measure.
+/// (Log(X̄⁻¹ X))ᵀ Σ⁻¹ Log(X̄⁻¹ X): the squared distance of a pose from an estimate, in units of the
+/// estimate's standard deviations.
 [[nodiscard]] inline double squared_distance(const Transform& estimate, const Pose& X) {
   return squared_distance(Twist(log(estimate.pose.inverse() * X)), estimate.covariance.matrix());
 }
 
 // ---- Correlated errors, after the idea of Mangelson et al. 2020; the parameters are ours
 
-/// Both poses as beliefs whose errors have this correlation by a source that they share.
+/// Both poses as beliefs whose errors have this correlation, by a source that they share.
 struct SharedPair {
   Belief first;
   Belief second;
@@ -157,7 +156,7 @@ struct SharedPair {
   return {part(poses.first, 1.0), part(poses.second, correlation < 0 ? -1.0 : 1.0)};
 }
 
-/// The same two, of whose errors nothing is known but their own covariances.
+/// The same two poses; only their own covariances are known, not their correlation.
 [[nodiscard]] inline SharedPair unknown_pair(const TwoPoses& poses) {
   const auto part = [](const LeftGaussian& pose) {
     return Belief{pose.mean, {}, pose.belief().own, {}};
@@ -165,8 +164,7 @@ struct SharedPair {
   return {part(poses.first), part(poses.second)};
 }
 
-/// A trajectory as SLAM has it: A and B are poses on it in the world W, and all that is wrong with
-/// A is wrong with B, too.
+/// A trajectory as in SLAM: A and B are poses on it in the world W, and B contains all errors of A.
 struct Trajectory {
   Transform X_WA;
   Transform X_AB;   ///< the way between them, of independent error
@@ -184,8 +182,8 @@ struct Trajectory {
   }
 };
 
-/// A after so many steps of 1 m in a wide arc, B after ten more. Each step errs by 2 cm along each
-/// axis and 0.01 rad about each.
+/// A after so many steps of 1 m in a wide arc, B after ten more. Each step has a standard deviation
+/// of 2 cm along each axis and 0.01 rad about each axis.
 [[nodiscard]] inline Trajectory trajectory(int steps) {
   const Transform step{exp(twist(1, 0, 0, 0, 0, 0.02)),
                        diagonal(twist(4e-4, 4e-4, 4e-4, 1e-4, 1e-4, 1e-4))};
@@ -197,7 +195,7 @@ struct Trajectory {
 }
 
 /// E[ξ ξᵀ] of the right perturbation of X_AB, where the errors of A and B are jointly Gaussian in
-/// their tangent spaces: what Mangelson et al. take them for.
+/// their tangent spaces, as Mangelson et al. assume.
 [[nodiscard]] inline Matrix6d sampled_way(const Trajectory& t, Random& random, int samples) {
   const Gaussian unit(Eigen::MatrixXd::Identity(6, 6));
   const Gaussian of_way(t.X_AB.covariance);

@@ -13,7 +13,8 @@
 
 namespace tfdude::testing {
 
-/// The seed of a test: its own, or that of the environment's TFDUDE_SEED for a search or a replay.
+/// The seed of a test: its own, or that of the environment variable TFDUDE_SEED, for a search or a
+/// replay.
 [[nodiscard]] inline std::uint64_t seed_or(std::uint64_t fallback) {
   const char* text = std::getenv("TFDUDE_SEED");
   return text == nullptr || *text == '\0' ? fallback : std::strtoull(text, nullptr, 0);

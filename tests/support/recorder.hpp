@@ -17,7 +17,7 @@
 
 namespace tfdude::testing {
 
-/// All that a transport handed to one participant, in the order in which it came.
+/// Everything that a transport passed to one participant, in order of arrival.
 struct Heard {
   std::vector<Request> requests;
   std::vector<Reply> replies;
@@ -27,7 +27,7 @@ struct Heard {
   std::vector<Page> pages;
   std::vector<Presence> presences;
   std::vector<std::pair<std::string, std::uint64_t>> lost;
-  std::size_t after_close = 0;  ///< calls that came when none may come any more
+  std::size_t after_close = 0;  ///< calls after close(), which are errors
 
   [[nodiscard]] bool page(const std::string& partition, std::uint32_t number,
                           std::uint64_t epoch) const {
@@ -60,7 +60,7 @@ template <class Message>
 /// Records what arrives, for tests that wait until it has.
 class Recorder final : public TransportHandler {
  public:
-  /// Nothing takes longer, unless it is broken.
+  /// Working code never takes longer.
   static constexpr std::chrono::seconds kLong{20};
 
   /// Set before the transport starts: what to do with a request besides recording it.
@@ -72,7 +72,7 @@ class Recorder final : public TransportHandler {
   /// Likewise, the joints that move them.
   std::set<std::string, std::less<>> joints;
 
-  /// Waits until condition(heard) holds; false where it does not for long.
+  /// Waits until condition(heard) holds; false if it does not in time.
   template <class Condition>
   [[nodiscard]] bool hears(Condition condition, std::chrono::milliseconds patience = kLong) const {
     std::unique_lock lock(mutex_);
@@ -84,7 +84,7 @@ class Recorder final : public TransportHandler {
     return heard_;
   }
 
-  /// From now on nothing may arrive.
+  /// After this call nothing may arrive.
   void close() {
     const std::lock_guard lock(mutex_);
     closed_ = true;
@@ -148,7 +148,7 @@ struct Listener {
   }
   [[nodiscard]] Heard heard() const { return recorder.heard(); }
 
-  /// Asks and waits for the reply; asks again where it does not come, as requests may be lost.
+  /// Sends a request and waits for the reply; repeats the request, because it may be lost.
   [[nodiscard]] bool ask(const std::string& partition, const Request& request) {
     const auto end = soon(Recorder::kLong);
     while (std::chrono::steady_clock::now() < end) {
@@ -170,7 +170,8 @@ struct Listener {
   Listener(const Join& join, const std::string& partition) : transport(join(partition)) {}
 };
 
-/// One that also serves a partition: it answers each request with its incarnation as epoch.
+/// A participant that also serves a partition: it answers each request with its incarnation as
+/// epoch.
 struct Server : Listener {
   Server(const Join& join, std::string name, std::uint64_t life = 1,
          std::set<std::string, std::less<>> frames = {},

@@ -8,8 +8,8 @@
 
 namespace tfdude::testing {
 
-/// A transport that hands on all that goes to another, and comes from there: what is to be
-/// otherwise is overridden.
+/// A transport that passes everything to and from another one; subclasses override what shall
+/// differ.
 class Relay : public Transport, protected TransportHandler {
  public:
   explicit Relay(TransportPtr real) : real_(std::move(real)) {}

@@ -9,19 +9,20 @@
 
 namespace tfdude::testing {
 
-/// What one participant knows: its forest and the directory that writes others' structure into it.
+/// The knowledge of one participant: its forest, and the directory that writes others' structure
+/// into it.
 struct Replica {
   /// @param own  the partition that it serves; empty: none
   explicit Replica(const std::string& own = {}) : directory(forest, own) {
     EdgeTiming timing;
-    timing.max_ahead = std::chrono::nanoseconds::max();  // as the clock stands
+    timing.max_ahead = std::chrono::nanoseconds::max();  // because the clock does not advance
     (void)forest.set_default_timing(timing);
   }
   Replica(const Replica&) = delete;
   Replica& operator=(const Replica&) = delete;
 
-  /// "id < parent @ partition, attached" of each frame, sorted. Owners by name, since their numbers
-  /// depend on who was heard of first.
+  /// "id < parent @ partition, attached" of each frame, sorted. Owners appear by name, because
+  /// their numbers depend on the order of discovery.
   [[nodiscard]] std::vector<std::string> structure() const {
     std::vector<std::string> lines;
     for (const FrameInfo& frame : forest.frames()) {
@@ -37,11 +38,11 @@ struct Replica {
     for (const Page& page : pages) directory.apply(page);
   }
 
-  Forest forest{[] { return Time(std::chrono::seconds(1)); }};  // at which the clock stands
+  Forest forest{[] { return Time(std::chrono::seconds(1)); }};  // the clock does not advance
   Directory directory;
 };
 
-/// Empty if both are the same; else what one of them lacks. Both sorted.
+/// Empty if both are equal; otherwise the elements that one of them lacks. Both must be sorted.
 [[nodiscard]] inline std::string lines_diff(const std::vector<std::string>& actual,
                                             const std::vector<std::string>& expected) {
   std::vector<std::string> lacks;

@@ -20,8 +20,8 @@
 #include "support/catch.hpp"
 #include "support/relay.hpp"
 
-// For tests of one part of a participant: what the parts build on, and owners whose replies a test
-// may decide.
+// For tests of one part of a participant: the objects that the parts need, and owners whose replies
+// a test may determine.
 namespace tfdude::testing {
 
 [[nodiscard]] inline Options quick() {
@@ -31,7 +31,7 @@ namespace tfdude::testing {
   return options;
 }
 
-/// What most parts of a participant build on, wired as Participant does it.
+/// The objects that most parts of a participant need, connected as Participant does it.
 class Rig : public TransportHandler {
  public:
   explicit Rig(TransportPtr to, const std::string& partition = "", const Options& with = quick())
@@ -102,7 +102,7 @@ class Rig : public TransportHandler {
   Requests requests;
 };
 
-/// An owner, some of whose requests a test answers, or loses.
+/// An owner; a test answers or loses some of its requests.
 class ScriptedOwner {
  public:
   /// @return whether the request goes no further
@@ -117,7 +117,7 @@ class ScriptedOwner {
 
   Node& node() { return *node_; }
   [[nodiscard]] int asked() const { return ear_->asked; }
-  /// It ends, and says so.
+  /// It ends in order, and announces that.
   void leave() { node_.reset(); }
 
  private:

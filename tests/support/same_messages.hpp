@@ -8,10 +8,10 @@
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"
 
-// Checks that what has travelled is what was sent.
+// Checks that a received message is equal to the one that was sent.
 namespace tfdude::testing {
 
-// Unit quaternions are normalized again on arrival, all else is exact.
+// Unit quaternions are normalized again on arrival; everything else is exact.
 inline void check_same(const Transform& actual, const Transform& expected) {
   CHECK(pose_diff(actual.pose, expected.pose, 1e-15) == "");
   CHECK(actual.covariance.upper() == expected.covariance.upper());

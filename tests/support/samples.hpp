@@ -10,10 +10,10 @@
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/topics.hpp"
 
-// Samples as bytes: what DDS would carry.
+// DDS samples as bytes.
 namespace tfdude::testing {
 
-/// What a writer of this type would send.
+/// The bytes that a writer of this type sends.
 template <class Type, class Sample>
 [[nodiscard]] Bytes serialized(Sample sample) {
   Type type;
@@ -28,7 +28,7 @@ template <class Type, class Sample>
   return {payload.data, payload.data + payload.length};
 }
 
-/// A payload of bytes that remain somebody else's.
+/// A payload with bytes that it does not own.
 struct BorrowedPayload : fastdds::ertps::SerializedPayload_t {
   BorrowedPayload(std::uint8_t* bytes, std::size_t size) {
     data = bytes;
@@ -40,8 +40,8 @@ struct BorrowedPayload : fastdds::ertps::SerializedPayload_t {
   ~BorrowedPayload() { data = nullptr; }  // not the payload's to free
 };
 
-/// What a reader of this type would make of the bytes; false where it refuses them. They are copied
-/// to a place of exactly their size, so that AddressSanitizer sees every step beyond.
+/// Deserializes the bytes as a reader of this type does; false if it rejects them. They are copied
+/// into a buffer of exactly their size, so that AddressSanitizer sees every access beyond it.
 template <class Type, class Sample>
 [[nodiscard]] bool deserialized(const Bytes& bytes, Sample& sample) {
   const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());
@@ -55,7 +55,7 @@ template <class Type, class Sample>
 #endif
 }
 
-/// One message of each kind, and what its topic does with bytes.
+/// One message of each kind, and the functions of its topic.
 struct WireKind {
   std::string name;
   Bytes valid;

@@ -7,8 +7,8 @@
 
 #include "support/random.hpp"
 
-// Samples of errors, and linear algebra that takes the compiler seconds wherever it is used: so it
-// is compiled once.
+// Samples of errors, and linear algebra that takes the compiler seconds wherever it is used; so it
+// is compiled only once.
 namespace tfdude::testing {
 
 /// Of a symmetric matrix, ascending.
@@ -41,7 +41,7 @@ class Gaussian {
 [[nodiscard]] std::string moment_diff(const Matrix6d& sampled, const Matrix6d& sigma, int samples,
                                       double more = 0);
 
-/// The smallest eigenvalue of Σ - sampled in units of Σ's own axes: how far Σ is from dominating.
+/// The smallest eigenvalue of Σ - sampled, in units of Σ's own axes. Negative: Σ is too small.
 [[nodiscard]] double domination(const Matrix6d& sigma, const Matrix6d& sampled);
 
 }  // namespace tfdude::testing

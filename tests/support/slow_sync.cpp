@@ -1,4 +1,4 @@
-// Preloaded into a process, makes its disk slow: each sync takes TFDUDE_SYNC_MS longer.
+// Preloaded into a process, this makes its disk slow: each sync takes TFDUDE_SYNC_MS longer.
 
 #include <chrono>
 #include <cstdlib>

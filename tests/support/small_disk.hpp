@@ -9,7 +9,8 @@
 
 namespace tfdude::testing {
 
-/// A disk of its own, so small that it is soon full. Needs root: without, it is not mounted.
+/// A separate disk that is so small that it is soon full. Needs root: without it, it is not
+/// mounted.
 class SmallDisk {
  public:
   explicit SmallDisk(int kibibytes) {
@@ -25,7 +26,7 @@ class SmallDisk {
   [[nodiscard]] bool mounted() const { return mounted_; }
   [[nodiscard]] const std::string& path() const { return directory_.path(); }
 
-  /// To the last byte.
+  /// Fills the disk to the last byte.
   void fill() const {
     std::ofstream filler(file(), std::ios::binary | std::ios::app);
     const std::string block(1024, 'x');

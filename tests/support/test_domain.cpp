@@ -14,7 +14,7 @@ constexpr std::size_t kFirstDaemonHost = 1;
 constexpr std::size_t kDaemonHosts = 3;
 constexpr std::size_t kCommandHost = 4;
 
-// For whoever meets the others while packets are lost.
+// The time-out while packets are lost, which delays discovery.
 constexpr Milliseconds kLossyTimeout{20000};
 
 std::string environment(const char* name) {

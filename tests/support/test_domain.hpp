@@ -14,7 +14,7 @@
 
 namespace tfdude::testing {
 
-/// What a run of the command line gave.
+/// The result of a run of the command line.
 struct CliResult {
   int status = -1;
   std::string out;
@@ -24,14 +24,14 @@ struct CliResult {
 /// A DDS domain that no other test uses now, on this computer only, and the service's programs in
 /// it.
 ///
-/// With TFDUDE_TEST_LOSS in the environment, a percentage, the same test runs over several hosts of
-/// which each loses this share of the packets that come to it: the test's process is on one of
-/// them, daemons on others in turn, the command line on another. With TFDUDE_TEST_DISCOVERY=server
-/// they meet by a discovery server, else by multicast.
+/// With TFDUDE_TEST_LOSS in the environment, a percentage, the same test runs over several hosts,
+/// each of which loses this share of its incoming packets. The test's process is on one host, the
+/// daemons are on others in turn, the command line is on another one. TFDUDE_TEST_DISCOVERY=server
+/// selects discovery by a server instead of multicast.
 class TestDomain {
  public:
   TestDomain();
-  /// Checks that packets were lost where some were to be.
+  /// Checks that packets were lost if loss was requested.
   ~TestDomain();
   TestDomain(const TestDomain&) = delete;
   TestDomain& operator=(const TestDomain&) = delete;
@@ -50,7 +50,7 @@ class TestDomain {
   [[nodiscard]] Process serve(const std::string& config) const;
 
   [[nodiscard]] Process start_cli(const std::vector<std::string>& arguments) const;
-  /// @throws std::runtime_error where it does not end.
+  /// @throws std::runtime_error if it does not end.
   [[nodiscard]] CliResult cli(const std::vector<std::string>& arguments) const;
 
  private:
@@ -66,10 +66,10 @@ class TestDomain {
 };
 
 /// @return the line by which a daemon says that it serves
-/// @throws std::runtime_error with what it wrote where it does not come to that.
+/// @throws std::runtime_error with its output if it does not start to serve.
 std::string await_ready(Process& daemon);
 
-/// Waits for the end of a process. @throws std::runtime_error where it does not end.
+/// Waits for the end of a process. @throws std::runtime_error if it does not end.
 CliResult finish(Process& process);
 
 }  // namespace tfdude::testing

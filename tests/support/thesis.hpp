@@ -20,7 +20,7 @@ struct ThesisDaemons {
   std::optional<Process> arms = domain.serve(kArmsFile);
 };
 
-/// What a command prints for people, where all is well.
+/// The text output of a command that must succeed.
 [[nodiscard]] inline std::string text(const ThesisDaemons& d,
                                       const std::vector<std::string>& arguments) {
   const CliResult result = d.domain.cli(arguments);

@@ -18,7 +18,7 @@ struct PartitionSpec {
 };
 
 /// Five partitions of two or three frames, in one tree, with random edges. The first has the root.
-/// @param star  the others all hang below the first; else each below the one before
+/// @param star  all others are below the first; otherwise each is below the one before
 [[nodiscard]] std::vector<PartitionSpec> five_partitions(Random& random, bool star);
 
 }  // namespace tfdude::testing

@@ -47,16 +47,15 @@ Matrix6d sample_covariance(const Pose& mean, const std::function<Pose()>& sample
   return sum / kSamples;
 }
 
-// Empty if the sample covariance S agrees with the propagated Σ in every element, else the first
-// that does not. Two reasons to differ are granted:
+// Empty if the sample covariance S agrees with the propagated Σ in every element, otherwise the
+// first element that does not. Two reasons for a difference are allowed:
 //  - Chance. For a Gaussian, Var(ξi ξj) = σii σjj + σij² (Isserlis), so the mean of N samples has
-//  the
-//    standard error √((σii σjj + σij²) / N); five of them, exceeded by luck in one of 1.7 million.
-//  - Second order. log(Exp(a) Exp(b)) = a + b + ½[a, b] + ⅟₁₂[a, [a, b]] + ..., and |[a, b]| ≤
-//  2|a||b| where
-//    a and b are both expressed in the result's frame. The neglected ¼ E[[a, b][a, b]ᵀ] and the
-//    mixed third-order terms, 2 · ⅟₁₂ · 2 · 2 for each of a and b, stay below 3 tr(Σa) tr(Σb) in
-//    all elements.
+//    the standard error √((σii σjj + σij²) / N). Five of them are allowed; chance exceeds that in
+//    one case of 1.7 million.
+//  - Second order. log(Exp(a) Exp(b)) = a + b + ½[a, b] + ⅟₁₂[a, [a, b]] + ..., and
+//    |[a, b]| ≤ 2|a||b|, where a and b are both expressed in the result's frame. The neglected
+//    ¼ E[[a, b][a, b]ᵀ] and the mixed third-order terms, 2 · ⅟₁₂ · 2 · 2 for each of a and b, stay
+//    below 3 tr(Σa) tr(Σb) in all elements.
 std::string disagreement(const Matrix6d& S, const Matrix6d& sigma, double second_order) {
   for (int i = 0; i < 6; ++i) {
     for (int j = i; j < 6; ++j) {
