@@ -20,7 +20,7 @@ using testing::Process;
 
 constexpr std::size_t kLogShown = 3000;
 
-// Drops what comes from some hosts, or what passes some interfaces.
+// Drops packets from some hosts, or packets that pass some interfaces.
 constexpr const char* kFirewall = R"(nft -f - <<END
 table ip parted {
   set others { type ipv4_addr; }
@@ -41,7 +41,7 @@ END
 // Debian's faketime, which lets a process see another wall clock, and change it by a file.
 constexpr const char* kFakeTime = TFDUDE_FAKETIME;
 
-// Room for the state of all daemons, and not more.
+// Just enough room for the state of all daemons.
 constexpr const char* kDiskSize = "size=64m";
 
 std::string config_of(std::size_t partition) {
@@ -64,7 +64,7 @@ Cluster::Cluster(std::size_t partitions, std::size_t clients,
       variants_(partitions, Variant::kUsual),
       daemons_(partitions) {
   mkdir(state_directory().c_str(), S_IRWXU);
-  // Seen by this thread and by the processes that it starts.
+  // Visible to this thread and to the processes that it starts.
   disk_ = unshare(CLONE_NEWNS) == 0 &&
           mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
           mount("none", state_directory().c_str(), "tmpfs", 0, kDiskSize) == 0;
@@ -152,7 +152,7 @@ std::string Cluster::clock_file(std::size_t partition) const {
 }
 
 void Cluster::start(std::size_t partition) {
-  // Its log goes into a file, as nobody may come to read a pipe in time.
+  // Its log goes into a file, because nobody may read a pipe in time.
   std::string script = "exec 2>>" + log_file(partition) + "; ";
   if (clocks_) {
     script += std::string("export FAKETIME_DONT_FAKE_MONOTONIC=1 FAKETIME_CACHE_DURATION=1") +

@@ -15,18 +15,18 @@
 
 namespace tfdude::faults {
 
-/// Daemons that keep their state, and places for clients: each on a host of its own where there can
-/// be hosts, else all on this computer, where no link can be cut. Belongs to one thread.
+/// Daemons that store their state, and places for clients. Each has its own host if there can be
+/// hosts; otherwise all are on this computer, where no link can be cut. Belongs to one thread.
 class Cluster {
  public:
-  /// @param clients  how many hosts there are for clients, besides the observers' one
+  /// @param clients  number of hosts for clients, besides that of the observers
   Cluster(std::size_t partitions, std::size_t clients, std::vector<std::string> daemon_options);
   ~Cluster();
   Cluster(const Cluster&) = delete;
   Cluster& operator=(const Cluster&) = delete;
 
   [[nodiscard]] std::size_t partitions() const { return daemons_.size(); }
-  /// Why no link can be cut; empty where they can.
+  /// Why no link can be cut; empty if links can be cut.
   [[nodiscard]] const std::string& no_links() const { return no_links_; }
   [[nodiscard]] Means means() const { return {no_links_.empty(), clocks_, disk_}; }
   [[nodiscard]] std::string state_directory() const { return directory_.path() + "/state"; }
@@ -55,19 +55,19 @@ class Cluster {
   [[nodiscard]] pid_t pid(std::size_t partition) const { return daemons_[partition]->pid(); }
   /// Whether a daemon has said that it serves. Does not wait.
   [[nodiscard]] bool ready(std::size_t partition);
-  /// @throws std::runtime_error where it does not get ready.
+  /// @throws std::runtime_error if it does not start to serve.
   void await_ready(std::size_t partition);
   /// Daemons that have ended without being killed, each as "p1 (status 1)". They are not started
   /// again.
   [[nodiscard]] std::vector<std::string> take_ended();
-  /// What a daemon and those before it have logged, the last lines.
+  /// The last lines of the log of a daemon and its predecessors.
   [[nodiscard]] std::string log_of(std::size_t partition) const;
 
   [[nodiscard]] std::size_t daemon_host(std::size_t partition) const { return 1 + partition; }
   [[nodiscard]] std::size_t client_host(std::size_t client) const {
     return 1 + partitions() + client;
   }
-  // The host sees its network as before, but nothing passes.
+  // The host sees no difference of its network, but no packet passes.
   void cut(std::size_t host) const;
   void heal(std::size_t host) const;
   // The host sees that its cable is not connected.

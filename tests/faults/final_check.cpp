@@ -45,7 +45,7 @@ std::string describe(const Frames& frames, const std::string& id) {
   return faults::describe(find(frames, id));
 }
 
-// Empty where both are the same; else the first frame that differs.
+// Empty if both are equal; otherwise the first frame that differs.
 std::string difference(const Frames& a, const Frames& b) {
   std::set<std::string> ids;
   for (const auto* frames : {&a, &b}) {
@@ -110,7 +110,7 @@ void check_values(const std::string& when, std::vector<Client>& clients, const W
   std::printf("%s: %zu values looked up\n", when.c_str(), looked_up);
 }
 
-// What nobody's model knows has to be the same for all who ask.
+// Frames that no model knows must be the same for all clients.
 void check_contested(const std::string& when, std::vector<Client>& clients, Journal& journal) {
   for (std::size_t i = 0; i < kContested; ++i) {
     const std::string id = contested_frame(i);

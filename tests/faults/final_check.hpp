@@ -10,9 +10,9 @@
 
 namespace tfdude::faults {
 
-/// Once all is quiet: waits until the workers' clients, an observer and two new clients see the
-/// same frames, and those that the models say are there; then looks all of them up. What does not
-/// come true in time is a violation.
+/// Runs after the last fault. Waits until the workers' clients, an observer and two new clients see
+/// the same frames, and these agree with the models; then looks all of them up. If that does not
+/// happen in time, it is a violation.
 void check_all(const std::string& when, Cluster& cluster, Client& observer,
                const std::vector<std::unique_ptr<Worker>>& workers, Journal& journal);
 

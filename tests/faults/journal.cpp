@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t kFaultsKept = 40;
 
-// What is wrong first tells most.
+// The first violations say most about the cause.
 constexpr std::size_t kViolationsTold = 8;
 
 }  // namespace

@@ -15,11 +15,11 @@ namespace tfdude::faults {
 
 using Clock = std::chrono::steady_clock;
 
-/// How long after the last fault everybody has to know everything [s].
+/// How long after the last fault all participants must be up to date [s].
 inline constexpr double kGrace = 5.0;
 
-/// What happened in a run: how each kind of operation ended and how often, which faults there were,
-/// and what contradicts the model. Thread-safe.
+/// The events of a run: how often each kind of operation ended in which way, the faults, and the
+/// contradictions to the model. Thread-safe.
 class Journal {
  public:
   /// Seconds since the run began.
@@ -62,7 +62,7 @@ template <class Value>
 /// "  12.345", as times are printed here [s].
 [[nodiscard]] std::string seconds(double time);
 
-/// "p50 0.1 ms, p90 0.2 ms, p99 0.3 ms, longest 0.4 ms of 17"; "none" where there are none.
+/// "p50 0.1 ms, p90 0.2 ms, p99 0.3 ms, longest 0.4 ms of 17"; "none" if there are none.
 [[nodiscard]] std::string distribution(std::vector<double> milliseconds);
 
 }  // namespace tfdude::faults

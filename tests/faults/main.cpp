@@ -1,6 +1,6 @@
-// Clients that change frames at random and check every answer, while daemons are killed, started
-// again, paused and cut off. Prints the seed, counts, and each violation with its history; exits
-// with 1 where there is one.
+// Clients that change frames at random and check every answer, while daemons are killed, restarted,
+// paused and cut off. Prints the seed, counts, and each violation with its history; exits with 1 if
+// there is one.
 //
 //   faults --seed 7 --seconds 60
 //   faults --rounds 100
@@ -30,7 +30,7 @@ struct Arguments {
   std::size_t rounds = 0;
 };
 
-// Beyond this [ms] it is not the machine that is slow.
+// A longer delay [ms] is not caused by a slow machine.
 constexpr double kTooLong = 10000;
 
 void report_time(const char* what, const std::vector<double>& times, double target,

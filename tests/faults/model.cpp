@@ -24,7 +24,7 @@ void insert(std::vector<std::optional<Place>>& places, const std::optional<Place
   if (!known) places.push_back(place);
 }
 
-// The frame and all above it, the root first; empty where one of them is not there.
+// The frame and all above it, the root first; empty if one of them does not exist.
 template <class State>
 std::vector<std::string> way_down(const State& state, const std::string& id) {
   std::vector<std::string> way;
@@ -257,7 +257,7 @@ std::string Model::judge(const std::string& a, const std::string& b,
     for (const std::string& id : ids) insert(left[id], state.at(id));
   });
   if (!agrees) return "lookup of " + b + " in " + a + expected;
-  // A denial may come from a replica that is behind; an answer comes from the owners.
+  // A denial may come from a replica that is not up to date; an answer comes from the owners.
   if (X_AB) {
     for (auto& [id, places] : left) {
       Frame& frame = frames_.at(id);

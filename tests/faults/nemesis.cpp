@@ -8,7 +8,7 @@
 namespace tfdude::faults {
 namespace {
 
-// How often the daemons are looked at.
+// The interval of checking the daemons.
 constexpr double kLookEvery = 0.02;
 
 std::string name_of(FaultKind kind) {
@@ -78,7 +78,7 @@ bool Nemesis::connected(std::size_t partition) const { return cut_.count(partiti
 void Nemesis::kill(std::size_t partition) {
   cluster_.kill(partition);
   if (starting_.erase(partition) > 0) {
-    // It never served, so nobody can miss it.
+    // It never served, so nobody can notice that it is gone.
     observer_.disregard(partition);
     journal_.calm_down();
   } else if (connected(partition)) {
@@ -102,7 +102,7 @@ void Nemesis::begin(const Fault& fault) {
       cluster_.step_clock(fault.target, fault.step);
       break;
     case FaultKind::kFillDisk:
-      // A daemon that starts needs room, and says so by ending.
+      // A daemon that starts needs room on the disk, and ends if there is none.
       if (starting_.empty()) cluster_.fill_disk();
       break;
     case FaultKind::kPause:
@@ -164,7 +164,7 @@ void Nemesis::end(const Fault& fault) {
 
 void Nemesis::start(std::size_t partition) {
   cluster_.start(partition);
-  // Until it serves.
+  // Waits until it serves.
   journal_.disturb();
   starting_.insert(partition);
   if (connected(partition)) observer_.started(partition);

@@ -12,16 +12,16 @@
 
 namespace tfdude::faults {
 
-/// Makes the faults of a schedule happen, and watches that no daemon ends of its own accord.
+/// Executes the faults of a schedule, and checks that no daemon ends by itself.
 class Nemesis {
  public:
   Nemesis(Cluster& cluster, Observer& observer, Journal& journal)
       : cluster_(cluster), observer_(observer), journal_(journal) {}
 
-  /// Returns when this many seconds are over and all faults are.
+  /// Returns when this many seconds have passed and all faults are over.
   void run(const std::vector<Fault>& faults, double seconds);
 
-  /// Kills all daemons at once, and starts them again.
+  /// Kills all daemons at once, and restarts them.
   void restart_all();
 
  private:

@@ -9,7 +9,7 @@ double milliseconds_since(Clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
 
-// How exactly an answer's time is known.
+// The precision of an answer's time.
 constexpr std::chrono::milliseconds kAskEvery{5};
 
 }  // namespace
@@ -40,7 +40,7 @@ void Observer::died(std::size_t partition) {
 
 void Observer::started(std::size_t partition) {
   const std::lock_guard lock(mutex_);
-  // Who comes back before it is missed is not missed.
+  // A daemon that returns before it counts as gone is not measured.
   died_.erase(partition_name(partition));
   started_[partition] = Clock::now();
 }

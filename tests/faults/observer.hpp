@@ -14,8 +14,8 @@
 
 namespace tfdude::faults {
 
-/// Measures how long it takes until a killed daemon counts as gone, and until one that was started
-/// answers a lookup of its own edge, both as seen by a client whose own link is never cut.
+/// Measures how long it takes until a killed daemon counts as gone, and until a started daemon
+/// answers a lookup of its own edge. Both are measured by a client whose own link is never cut.
 /// Thread-safe.
 class Observer {
  public:
@@ -28,13 +28,13 @@ class Observer {
 
   void died(std::size_t partition);
   void started(std::size_t partition);
-  /// Something else happens to a partition, so that what is measured now means nothing.
+  /// Another fault hits a partition, which makes its current measurement meaningless.
   void disregard(std::size_t partition);
 
-  /// How long it took [ms].
+  /// The measured times [ms].
   [[nodiscard]] std::vector<double> until_gone() const;
   [[nodiscard]] std::vector<double> until_answer() const;
-  /// How many are being measured yet.
+  /// The number of measurements that are not finished.
   [[nodiscard]] std::size_t open() const;
 
  private:

@@ -84,7 +84,7 @@ void Rerouter::read() {
     }
     const double calm = journal_.calm();
     for (std::size_t i = 0; i < kReads; ++i) judge(path->latest(), calm);
-    // The load leaves the machine time for those who are asked.
+    // Leaves the machine time for the processes that answer.
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
 }

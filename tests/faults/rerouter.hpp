@@ -12,9 +12,9 @@
 
 namespace tfdude::faults {
 
-/// Moves a frame to and fro between two bases while another client reads a watched path to it
-/// without a pause. Each value that is read has to be that of one of the two ways; once all is
-/// calm, each read has to give one.
+/// Moves a frame back and forth between two bases while another client continuously reads a watched
+/// path to it. Each value must be that of one of the two paths; without faults, each read must give
+/// a value.
 class Rerouter {
  public:
   Rerouter(Client mover, Client watcher, std::size_t partitions, Journal& journal);
@@ -38,7 +38,7 @@ class Rerouter {
   std::array<Eigen::Vector3d, 2> legal_;
   std::atomic<bool> stopping_{false};
   std::thread moving_;
-  std::thread reading_;  // last: both use the rest
+  std::thread reading_;  // last: both threads use the other members
 };
 
 }  // namespace tfdude::faults

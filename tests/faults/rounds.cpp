@@ -31,7 +31,7 @@ double milliseconds_since(Clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
 
-// The database, and what SQLite keeps beside it while it is open.
+// The database, and the files that SQLite keeps next to it while it is open.
 bool one_database(const std::set<std::string>& names) {
   std::set<std::string> databases;
   for (const std::string& name : names) {

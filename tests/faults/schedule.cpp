@@ -7,7 +7,7 @@
 namespace tfdude::faults {
 namespace {
 
-// What a fault occupies: a daemon's process, or a link between two hosts (zero: to all others).
+// The target of a fault: a daemon's process, or a link between two hosts (zero: to all others).
 using Claim = std::pair<int, std::pair<std::size_t, std::size_t>>;
 
 std::vector<Claim> claims_of(const Fault& fault, std::size_t partitions) {
@@ -21,7 +21,7 @@ std::vector<Claim> claims_of(const Fault& fault, std::size_t partitions) {
     case FaultKind::kKill:
     case FaultKind::kReconfigure:
     case FaultKind::kPause:
-    // Fast DDS never hears of a network that comes after the participant was made.
+    // Fast DDS does not notice a network that appears after the participant was created.
     case FaultKind::kUnplug:
       return {{0, {fault.target, 0}}};
     case FaultKind::kCutDaemon:
@@ -34,7 +34,7 @@ std::vector<Claim> claims_of(const Fault& fault, std::size_t partitions) {
   return {{3, std::minmax(fault.target, fault.other)}};
 }
 
-// Too short to be noticed, as long as it takes to be given up by the service, or by DDS too.
+// Too short to be noticed, or long enough for the service, or also for DDS, to consider it lost.
 double duration(testing::Random& random) {
   const std::size_t draw = random.index(10);
   if (draw < 4) return random.uniform(0.02, 0.45);
@@ -42,7 +42,7 @@ double duration(testing::Random& random) {
   return random.uniform(4.0, 12.0);
 }
 
-// What may happen, each as often as it stands here.
+// The possible faults; one that is listed several times is more frequent.
 std::vector<FaultKind> kinds(const Means& means) {
   std::vector<FaultKind> kinds{FaultKind::kKill, FaultKind::kKill, FaultKind::kPause,
                                FaultKind::kPause, FaultKind::kReconfigure};
@@ -61,7 +61,7 @@ Fault draw(testing::Random& random, std::size_t partitions, std::size_t clients,
   fault.kind = kinds[random.index(kinds.size())];
   fault.target = random.index(fault.kind == FaultKind::kCutClient ? clients : partitions);
   fault.variant = static_cast<Variant>(random.index(3));
-  // Beyond what a clock may be wrong by before it is set, too.
+  // Also larger than the tolerated error of a clock.
   fault.step = static_cast<int>(random.index(2) == 0 ? random.index(7200) : random.index(20)) *
                (random.index(2) == 0 ? 1 : -1);
   if (partitions > 1) fault.other = (fault.target + 1 + random.index(partitions - 1)) % partitions;

@@ -8,29 +8,29 @@
 namespace tfdude::faults {
 
 enum class FaultKind {
-  kKill,         ///< a daemon, which is started again at the end
-  kPause,        ///< a daemon
-  kCutDaemon,    ///< its host from all others, without a sign
-  kCutClient,    ///< as that
-  kUnplug,       ///< a daemon's host from all others, as it can see
-  kPart,         ///< two daemons' hosts from each other
-  kReconfigure,  ///< a daemon is killed, and started again with another configuration
-  kStepClock,    ///< of a daemon, and back at the end
-  kFillDisk,     ///< on which all daemons keep their state
+  kKill,         ///< kills a daemon, and restarts it at the end
+  kPause,        ///< pauses a daemon
+  kCutDaemon,    ///< cuts its host off from all others; the host does not notice
+  kCutClient,    ///< the same for a client's host
+  kUnplug,       ///< cuts a daemon's host off from all others; the host sees that
+  kPart,         ///< separates the hosts of two daemons
+  kReconfigure,  ///< kills a daemon, and restarts it with another configuration
+  kStepClock,    ///< sets the clock of a daemon, and sets it back at the end
+  kFillDisk,     ///< fills the disk on which all daemons store their state
 };
 
-/// What can be done here besides killing and pausing.
+/// The faults that are possible here, besides killing and pausing.
 struct Means {
   bool links = false;
   bool clocks = false;
   bool disks = false;
 };
 
-/// What a daemon is configured with. Its usual frame is in the first two, and was stored by then.
+/// The configuration of a daemon. The first two contain its usual frame, which is already stored.
 enum class Variant {
   kUsual,
-  kWithSpare,  ///< and a frame more below that
-  kNone,       ///< no configuration: its state alone
+  kWithSpare,  ///< and another frame below that
+  kNone,       ///< no configuration, only its stored state
 };
 
 struct Fault {
@@ -38,18 +38,18 @@ struct Fault {
   double end = 0;
   FaultKind kind = FaultKind::kKill;
   std::size_t target = 0;             ///< a partition, or a client
-  std::size_t other = 0;              ///< the second partition that is parted
+  std::size_t other = 0;              ///< the second partition of kPart
   Variant variant = Variant::kUsual;  ///< of the next configuration
   int step = 0;                       ///< of the clock [s]
 };
 
-/// How long there are faults, then none, by turns [s].
+/// The durations of alternating phases with and without faults [s].
 inline constexpr double kStorm = 14.0;
 inline constexpr double kCalm = 9.0;
 
-/// All faults of a run, in the order in which they begin. A daemon is not killed and paused at
-/// once, nor is a link cut twice, and no daemon starts on a full disk; all else may happen at once.
-/// All are over as a calm begins.
+/// All faults of a run, in the order in which they begin. A daemon is not killed and paused at the
+/// same time, a link is not cut twice at the same time, and no daemon starts on a full disk. All
+/// other faults may overlap. All are over when a phase without faults begins.
 [[nodiscard]] std::vector<Fault> schedule(testing::Random& random, double seconds,
                                           std::size_t partitions, std::size_t clients,
                                           const Means& means);

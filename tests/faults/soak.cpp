@@ -1,7 +1,7 @@
-// Eight daemons, a client that streams 100 joints of theirs at 1 kHz, and four that look paths
-// between them up: for minutes, while nothing goes wrong. Prints what each process takes of memory
-// and files, and how long lookups take in the first minute and in the last; exits with 1 where
-// something grows or fails.
+// Runs eight daemons, a client that streams 100 of their joints at 1 kHz, and four clients that
+// look up paths between them, for minutes and without faults. Prints memory and open files of each
+// process, and the times of lookups in the first and in the last minute. Exits with 1 if memory or
+// the number of open files grows, or if something fails.
 //
 //   soak --seconds 600
 
@@ -35,8 +35,8 @@ constexpr std::size_t kJoints = 100;
 constexpr microseconds kSamplePeriod{1000};
 constexpr microseconds kLookupPeriod{10000};
 
-// What a process may take more at the end than when it has warmed up [KiB]: what SQLite's log and
-// the allocator take once more, not what grows with time.
+// How much more memory a process may use at the end than after warming up [KiB]: SQLite's log and
+// the allocator may still grow once, but not with time.
 constexpr long kGrowth = 2048;
 
 std::string joint(std::size_t number) { return "joint_" + std::to_string(number); }
@@ -58,7 +58,7 @@ Usage usage_of(const std::string& pid) {
   return usage;
 }
 
-/// What the threads share.
+/// The data that the threads share.
 struct Load {
   explicit Load(double seconds) : length(seconds) {}
 
@@ -72,7 +72,8 @@ struct Load {
   std::atomic<std::uint64_t> late{0};  // samples that could not be sent when due
 };
 
-/// Times of lookups in the first minute and in the last [ms], in memory taken beforehand.
+/// Times of lookups in the first and in the last minute [ms], in memory that is allocated
+/// beforehand.
 struct Times {
   explicit Times(const Load& load) {
     for (auto* times : {&first, &last}) {

@@ -21,7 +21,7 @@ std::string translation(const Transform& X) {
   return text;
 }
 
-// Without a rotation, so that a streamed value can be read off.
+// Without rotation, so that a streamed value can be recognized.
 Transform joint_value(std::uint32_t serial, std::size_t owner) {
   return {Pose::trusted(Eigen::Quaterniond::Identity(), {double(serial), double(owner), 0.5}), {}};
 }
@@ -68,7 +68,7 @@ void Worker::run() {
   while (!stopping_) {
     calm_ = journal_.calm();
     step();
-    // The load leaves the machine time for those who are asked.
+    // Leaves the machine time for the processes that answer.
     std::this_thread::sleep_for(std::chrono::microseconds(random_.index(4000)));
   }
 }
@@ -106,11 +106,11 @@ void Worker::record(const std::string& operation, const std::vector<std::string>
   std::string line = seconds(journal_.now()) + " " + operation + " " + details + ": " + outcome;
   if (!result) line += " (" + result.error().message + ")";
   for (const std::string& frame : frames) {
-    // That a frame is not there which may be gone tells nothing.
+    // A denial of a frame that may be gone gives no information.
     const bool expected = !result && denies(result.error().code) && !model_.frame(frame).certain();
     if (!expected) model_.note(frame, line);
   }
-  // No disk is full any more.
+  // At this time no disk is full.
   if (!result && result.error().code == Errc::kState && calm_ > kGrace) {
     journal_.violation(prefix_ + " " + line);
   }
@@ -148,7 +148,8 @@ void Worker::add() {
   if (random_.index(2) == 0) partition = partition_name(random_.index(partitions_));
   const auto added = client_.add(id, place.parent, place.X_PC, partition);
   const std::string owner = partition.empty() ? model_.frame(place.parent).partition : partition;
-  // Nobody else adds this frame: where it exists, an earlier try of the same call has added it.
+  // No other client adds this frame: if it exists, an earlier attempt of the same call has added
+  // it.
   const bool exists = !added && added.error().code == Errc::kAlreadyExists;
   const bool refused = !added && !exists && denies(added.error().code);
   model_.add(id, owner, place, added || exists);
@@ -185,7 +186,8 @@ void Worker::move() {
   const std::string id = any(ids);
   const std::string parent = any_anchor();
   const bool cycle = model_.may_be_below(parent, id);
-  // An owner who is cut off may not know that it is one; then it takes it, and undoes it later.
+  // An owner that is cut off may not know that this is a cycle; then it makes the change, and
+  // undoes it later.
   if (cycle && calm_ <= kGrace) return;
   std::optional<Transform> X_PC;
   if (random_.index(2) == 0) X_PC = random_.transform();
@@ -224,7 +226,7 @@ void Worker::remove() {
 }
 
 void Worker::look_up() {
-  // Those of which it is not known where they are are asked for until it is.
+  // Frames whose place is not known are looked up until it is.
   const auto ids = own(random_.index(3) != 0);
   if (ids.empty()) return;
   const std::string b = any(ids);

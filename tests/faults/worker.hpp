@@ -21,8 +21,8 @@ namespace tfdude::faults {
 /// How many frames all clients change.
 inline constexpr std::size_t kContested = 12;
 
-/// A client in a thread of its own that changes frames and asks for them, and holds each answer
-/// against its model.
+/// A client with its own thread that changes frames and looks them up, and compares each answer
+/// with its model.
 class Worker {
  public:
   Worker(Client client, std::size_t number, std::size_t partitions, std::uint64_t seed,
@@ -38,9 +38,9 @@ class Worker {
   [[nodiscard]] Client& client() { return client_; }
   [[nodiscard]] Model& model() { return model_; }
 
-  /// Empty where a joint has a value that was streamed.
+  /// Empty if a joint has a value that was streamed.
   [[nodiscard]] std::string judge_joint(const std::string& id, const Transform& X_PC) const;
-  /// The frames that were streamed, and the bases that they hang below.
+  /// The frames that were streamed, and the bases above them.
   [[nodiscard]] const std::map<std::string, std::string>& joints() const { return joints_; }
 
  private:
@@ -59,16 +59,16 @@ class Worker {
   void look_up_joint();
   void contest();
 
-  /// Counts it, and writes it down beside the frames that it is about.
+  /// Counts an outcome, and adds it to the history of its frames.
   template <class Value>
   void record(const std::string& operation, const std::vector<std::string>& frames,
               const std::string& details, const Result<Value>& result);
-  /// The service denies something that is so. While there are faults a replica may be behind; else
-  /// it may not.
+  /// The service denies something that is true. That is allowed only while there are faults,
+  /// because a replica may then not be up to date.
   void denied(const std::string& what, const std::string& frame);
   void contradiction(const std::string& what, const std::string& frame);
   [[nodiscard]] std::vector<std::string> own(bool anchored) const;
-  /// Whether all that was ever asked for has been done, or never will be, and this client knows it.
+  /// Whether each requested change was made or will never be made, and this client knows which.
   [[nodiscard]] bool quiet();
   [[nodiscard]] std::string any(const std::vector<std::string>& ids) {
     return ids[random_.index(ids.size())];
