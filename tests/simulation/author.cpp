@@ -14,7 +14,7 @@ using faults::never_asked;
 using faults::partition_name;
 using faults::Place;
 
-constexpr std::size_t kFrames = 12;  // of one author at a time
+constexpr std::size_t kFrames = 12;  // of one author at the same time
 
 }  // namespace
 
@@ -84,8 +84,7 @@ std::string Author::any_anchor() {
   return any(anchored);
 }
 
-// What was done is seen by who has done it, unless its owner is away or its word is known to be
-// late.
+// A client sees its own changes, unless the owner is unreachable or known to be late.
 void Author::check_seen(const std::string& id, const std::string& parent) {
   Process& process = *process_;
   const auto frame = process.forest().info(id);
@@ -116,7 +115,7 @@ void Author::add() {
             .map([](Part part) { return std::vector<Part>{std::move(part)}; });
       },
       [this, id, place, owner](const Result<void>& added) {
-        // Nobody else adds it.
+        // No other client adds it.
         const bool exists = !added && added.error().code == Errc::kAlreadyExists;
         const bool refused = !added && !exists && denies(added.error().code);
         model_.add(id, owner, place, added || exists);
@@ -241,7 +240,7 @@ void Author::look_up(const std::string& a, const std::string& b, bool quiet) {
       }));
 }
 
-// Whatever comes of it: all have to agree on that in the end.
+// Any result is allowed, but in the end all must agree on it.
 void Author::contest() {
   const std::string id = contested_frame(random_.index(kContested));
   const std::string other = contested_frame(random_.index(kContested));

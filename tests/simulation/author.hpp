@@ -12,11 +12,11 @@
 
 namespace tfdude::simulation {
 
-/// How many frames all fight over.
+/// Number of frames that all clients change.
 inline constexpr std::size_t kContested = 4;
 
-/// A client that does one thing after the other and knows what may have come of it: of its own
-/// frames all, as nobody else changes them.
+/// A client that makes one call after the other and knows the possible results. It knows all about
+/// its own frames, because no other client changes them.
 class Author : public std::enable_shared_from_this<Author> {
  public:
   /// @param owners  whose partitions it uses; none of them is renamed

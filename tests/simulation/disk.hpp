@@ -4,7 +4,7 @@
 
 namespace tfdude::simulation {
 
-/// What a daemon stores, which outlives its process; and whether there is room for more.
+/// The stored state of a daemon, which outlives its process, and whether there is room for more.
 struct Disk {
   testing::MemoryStore store;
   bool full = false;

@@ -17,8 +17,7 @@ Transform at(double y, double z) {
   return {Pose::trusted(Eigen::Quaterniond::Identity(), {0, y, z}), {}};
 }
 
-// The number of a value is how far its first edge leads along y; along z the two edges cancel each
-// other.
+// The number of a value is the y of its first edge; along z the two edges cancel each other.
 Transform first_edge(std::size_t value) {
   return at(static_cast<double>(value), static_cast<double>(value));
 }
@@ -64,7 +63,7 @@ void Follower::begin(const std::string& what, Operation::Route route,
       }));
 }
 
-// With frames of other names: what has become of those before is not known.
+// Uses new names of frames, because the state of the former ones is not known.
 void Follower::begin_anew() {
   ++generation_;
   watch_.reset();
@@ -152,8 +151,8 @@ void Follower::look() {
   if (const auto X = watch_->read()) judge(*X);
 }
 
-// Values that were not stored yet are lost with their owner's process: the next may have older
-// ones.
+// Values that were not stored yet are lost with their owner's process: the next process may have
+// older ones.
 void Follower::forget_order_after_restart() {
   const auto serving = process_->directory().serving(partition_);
   if (!serving || serving->incarnation == incarnation_) return;
@@ -182,7 +181,7 @@ void Follower::judge(const StampedTransform& X) {
   if (value < -1e-9 || number >= written_.size()) {
     return world.violation(what + ", which nobody has written");
   }
-  // What the owner's last process has told may be shown until all of the next one's is here.
+  // Values of the owner's former process may be shown until all pages of the next one have arrived.
   if (number < newest_read_ && !std::exchange(may_go_back_, false)) {
     return world.violation(what + ": value " + std::to_string(number) + " after " +
                            std::to_string(newest_read_));

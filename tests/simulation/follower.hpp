@@ -13,10 +13,10 @@
 
 namespace tfdude::simulation {
 
-/// A client that writes two edges of its own in one commit, moves them from base to base, and reads
-/// them all the while by a watched path. What it reads must be something that was written, whole,
-/// in a place where it was, and never older than what it has read before, as long as their owner
-/// lives.
+/// A client that writes two edges of its own in one commit, moves them from base to base, and
+/// continuously reads them by a watched path. Each value must be one that was written, of one
+/// commit, in a place where the frames were, and never older than an earlier value while their
+/// owner lives.
 class Follower : public std::enable_shared_from_this<Follower> {
  public:
   /// @param owners  whose partitions it uses; none of them is renamed

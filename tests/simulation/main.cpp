@@ -13,7 +13,7 @@
 
 namespace {
 
-// What must have happened in so many runs.
+// The states that must occur at least once in so many runs.
 constexpr std::uint64_t kMany = 1000;
 constexpr const char* kRare[] = {"a process gave its partition up",
                                  "a process overtook its predecessor",
@@ -80,7 +80,7 @@ int main(int argc, char** argv) {
     }
     for (const std::string& violation : one.violations) std::printf("  %s\n", violation.c_str());
   }
-  // What never happens is not tested.
+  // A state that never occurs is not tested.
   for (const char* rare : kRare) {
     if (count < kMany || counts[rare] > 0) continue;
     ++failed;

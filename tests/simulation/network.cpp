@@ -8,7 +8,7 @@
 namespace tfdude::simulation {
 namespace {
 
-// When what was lost is sent again.
+// The delay until lost data are sent again.
 constexpr milliseconds kRepeat{100};
 
 bool same_key(const Sample& a, const Sample& b) {
@@ -74,7 +74,7 @@ std::vector<std::uint64_t> Network::met_by(const Process& one) const {
   return all;
 }
 
-// One that was replaced before it was sent is not sent, as a rule.
+// A sample that is replaced before it is sent is usually not sent.
 void Network::put(Channel& channel, const Sample& sample) {
   const auto same = std::find_if(channel.waiting.begin(), channel.waiting.end(),
                                  [&](const Sample& other) { return same_key(other, sample); });

@@ -17,10 +17,11 @@ namespace tfdude::simulation {
 
 class Process;
 
-/// What is told reliably, the newest of each key; who is met later hears it, too.
+/// Samples that are sent reliably, the newest of each key; participants that join later get it,
+/// too.
 using Sample = std::variant<Presence, Page>;
 
-/// The computers and what lies between them.
+/// The computers and the network between them.
 class Network {
  public:
   Network(Timeline& timeline, const Plan& plan)
@@ -32,7 +33,7 @@ class Network {
 
   void join(const std::shared_ptr<Process>& process);
 
-  /// A datagram, which may be lost, come twice, or be overtaken.
+  /// Sends a datagram, which may be lost, arrive twice, or be overtaken.
   void send(const Process& from, std::uint64_t to, std::function<void(Process&)> arrival);
   /// To all who are met.
   void publish(const Process& from, const Sample& sample);
@@ -47,7 +48,7 @@ class Network {
   void cut_out(std::size_t host, int change) { hosts_[host].mute += change; }
   void part(std::size_t a, std::size_t b, int change) { parted_[std::minmax(a, b)] += change; }
 
-  /// From now on so much is lost on its way.
+  /// From now on this share is lost on the way.
   void set_loss(double loss) { loss_ = loss; }
 
   static constexpr std::size_t kMostHosts = 64;

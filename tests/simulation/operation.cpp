@@ -156,7 +156,7 @@ void Operation::look_again() {
   }
 }
 
-// After a while, or as soon as the structure has changed where the route was stale.
+// Retries after a while; if the route was stale, as soon as the structure has changed.
 void Operation::retry(Instant pause) {
   phase_ = Phase::kPlan;
   await_change(std::min(now() + pause, deadline_), pause == Requests::kStructureDelay);
@@ -174,7 +174,7 @@ void Operation::finish(Result<void> outcome) {
   over_ = true;
   std::vector<Reply> replies;
   for (auto& reply : replies_) replies.push_back(reply ? *reply : Reply{});
-  // What is called may own the process that owns this.
+  // The callback may own the process that owns this.
   std::exchange(then_, nullptr)(outcome, std::move(replies));
 }
 

@@ -14,8 +14,8 @@ namespace tfdude::simulation {
 
 class Process;
 
-/// One call of a client, as Requests makes it, in steps: planned, sent until it is answered,
-/// planned again where the structure has changed meanwhile, and over by its deadline.
+/// One call of a client in steps, as Requests makes it: it is planned, sent until it is answered,
+/// planned again if the structure has changed meanwhile, and ends at its deadline at the latest.
 class Operation : public std::enable_shared_from_this<Operation> {
  public:
   using Route = std::function<Result<std::vector<Part>>()>;
@@ -23,13 +23,13 @@ class Operation : public std::enable_shared_from_this<Operation> {
 
   static constexpr milliseconds kTimeout{1000};
 
-  /// @param then  told once
+  /// @param then  called once
   Operation(Process& caller, Route route, Then then);
 
   void start();
   void on_reply(const Reply& reply);
   void on_lost(const std::string& partition);
-  /// Something has changed that it may wait for.
+  /// Something has changed for which it may wait.
   void look_again();
   [[nodiscard]] bool over() const { return over_; }
   /// Requests from here on are awaited.

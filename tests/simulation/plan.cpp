@@ -14,7 +14,7 @@ Instant between(Random& random, milliseconds least, milliseconds most) {
       std::chrono::duration<double>(least).count(), std::chrono::duration<double>(most).count())));
 }
 
-// Too short to be noticed, long enough to be, or so long that others act on it.
+// Too short to be noticed, long enough to be noticed, or so long that others react.
 Instant length(Random& random) {
   switch (random.index(3)) {
     case 0:
@@ -26,7 +26,7 @@ Instant length(Random& random) {
   }
 }
 
-// What can happen, each as often as its weight says; some never in this run.
+// The possible faults, with their weights; some do not occur in this run.
 std::array<std::size_t, kFaultKinds> draw_weights(Random& random, bool stores) {
   std::array<std::size_t, kFaultKinds> weights{};
   for (std::size_t& weight : weights) weight = random.index(3) == 0 ? 0 : 1 + random.index(5);
@@ -73,7 +73,7 @@ Plan draw_plan(std::uint64_t seed) {
   const auto weights = draw_weights(random, plan.stores);
   plan.lost = plan.owners > 2 && random.index(4) == 0 ? random.index(plan.owners) : plan.owners;
   plan.loss_after = random.index(2) == 0 ? 0 : random.uniform(0, 0.02);
-  const double harshness = random.uniform(0.2, 1.5);  // faults a second
+  const double harshness = random.uniform(0.2, 1.5);  // faults per second
   for (Instant at = milliseconds(1500); at < plan.storm;
        at += between(random, milliseconds(0), milliseconds(static_cast<int>(2000 / harshness)))) {
     Fault fault;
