@@ -1,4 +1,4 @@
-// What a daemon makes of any text as its configuration: what it accepts can be served.
+// Reads any text as a daemon's configuration: a daemon must be able to serve what it accepts.
 
 #include <set>
 #include <string>

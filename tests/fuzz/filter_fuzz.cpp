@@ -1,5 +1,5 @@
-// What the filters between a partition's readers and the wire let pass of any bytes: what they read
-// without deserializing is what deserializing gives.
+// Passes any bytes to the filters of a partition's readers: fields that they read without
+// deserializing must be equal to the deserialized ones.
 
 #include <algorithm>
 #include <string>
@@ -18,7 +18,7 @@ namespace {
 
 using testing::Bytes;
 
-// Not the one to which the seeds are addressed, so that it matters who owns the frame.
+// Not the partition to which the seeds are addressed, so that the frame's owner matters.
 constexpr const char* kPartition = "legs";
 
 class Owner final : public TransportHandler {

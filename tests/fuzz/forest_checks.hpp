@@ -22,7 +22,7 @@ using Frames = std::map<std::string, FrameInfo>;
   return frames;
 }
 
-/// The frame, its parent and so on, as far as they are there.
+/// The frame, its parent and so on, as far as they exist.
 [[nodiscard]] inline std::vector<std::string> line_of(const Frames& frames, const std::string& id) {
   std::vector<std::string> line;
   for (auto at = frames.find(id); at != frames.end(); at = frames.find(at->second.parent)) {
@@ -80,7 +80,7 @@ inline void demand_paths(const Forest& forest, const Frames& frames) {
   }
 }
 
-/// That all functions of a forest tell of the same frames, without a cycle.
+/// Checks that all functions of a forest report the same frames, without a cycle.
 inline void demand_consistent(const Forest& forest) {
   const Frames frames = frames_of(forest);
   demand_structure(forest, frames);

@@ -11,7 +11,7 @@ namespace tfdude::fuzz {
 
 using Key = std::array<std::uint8_t, 16>;
 
-/// The instance that DDS takes a sample for.
+/// The key of the DDS instance to which a sample belongs.
 template <class Type, class Sample>
 [[nodiscard]] Key key_of(Sample& sample) {
   Type type;

@@ -29,7 +29,7 @@ void write_samples(const std::filesystem::path& folder) {
   Random random(0x5eed);
   for (const testing::WireKind& kind : testing::wire_kinds(random)) {
     const std::string topic = kind.name.substr(0, kind.name.find(' '));
-    if (topic == "state") continue;  // the harness of that name is given stored ones
+    if (topic == "state") continue;  // the harness of that name gets stored states instead
     const std::string rest = kind.name.substr(kind.name.rfind(' ') + 1);
     write(folder / topic, rest, kind.valid);
   }
@@ -67,7 +67,7 @@ bool shrink(const std::filesystem::path& file) {
   return status == SQLITE_OK;
 }
 
-// A first byte says what the rest is: a file; or the length of its log in two bytes, the file and
+// The first byte says what follows: a file; or two bytes with the length of its log, the file and
 // the log.
 Bytes state_of(std::uint8_t kind, const std::filesystem::path& file) {
   Bytes bytes = content(file);

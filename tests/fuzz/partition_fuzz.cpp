@@ -1,6 +1,6 @@
-// What an owner and its hearers make of any sequence of messages, all of them valid one by one:
-// requests of peers, streams, and what other partitions say that they own; and how the owner
-// returns. The bytes are choices, not messages.
+// Passes any sequence of messages to an owner and its listeners. Each message is valid: requests of
+// peers, streams, and claims of other partitions. The owner may also restart. The bytes are
+// choices, not messages.
 
 #include <algorithm>
 #include <chrono>
@@ -29,7 +29,7 @@ constexpr const char* kOwn = "chest";
 constexpr const char* kOthers[] = {"arms", "bench", "legs"};
 constexpr std::uint8_t kIds = 8;
 
-// The messages that the bytes choose, about few frames, so that they meet.
+// The messages that the bytes choose. They are about few frames, so that they interfere.
 class Choices {
  public:
   Choices(const std::uint8_t* data, std::size_t size) : data_(data, size) {}
@@ -104,7 +104,7 @@ class Choices {
   FuzzedDataProvider data_;
 };
 
-// A process that serves a partition, and the model of what it holds and has heard.
+// A process that serves a partition, and the model of its frames and of what it has heard.
 struct Serving {
   explicit Serving(std::uint64_t life)
       : incarnation(life),
@@ -203,7 +203,7 @@ class World {
     demand(same || refused, "a repeated request is answered as before, or called too old");
   }
 
-  // Gives up what there is to give up, as the others have nothing more to say.
+  // Gives up frames that others claim with more right, because the others have reported everything.
   void yield(Time now) {
     while (own_->partition.yield(own_->partition.pending_yields(), now)) {
     }
@@ -247,7 +247,8 @@ class World {
     return latest;
   }
 
-  // The owner returns from what it stored, and hears all others before it begins or after.
+  // The owner restarts from its stored state, and hears all others before or after it starts to
+  // serve.
   void restart(Time now, bool knowing) {
     const std::vector<Page> said = own_->others.pages();
     start(now, knowing ? said : std::vector<Page>());
@@ -289,7 +290,7 @@ class World {
     demand(own_->partition.apply(update) == held, "of a stream all is taken that is held");
   }
 
-  // Who comes late, and hears those first who were heard last, has the same picture.
+  // A participant that joins late, and hears the others in reverse order, must get the same result.
   void demand_late_joiner() const {
     testing::Replica late;
     PlainClaims said;

@@ -13,8 +13,8 @@
 #include "fuzz/forest_checks.hpp"
 #include "partition/directory.hpp"
 
-// What must come of what partitions say, in the plainest way: everything is kept, and worked out
-// anew each time.
+// The result that claims of partitions must have, in the simplest implementation: it keeps
+// everything, and computes the result again each time.
 namespace tfdude::fuzz {
 
 struct PlainClaim {
@@ -23,7 +23,7 @@ struct PlainClaim {
   std::uint32_t page = 0;
 };
 
-/// A frame with the partition whose claim to it holds.
+/// A frame with the partition whose claim to it is in force.
 struct PlainFrame {
   std::string owner;
   std::string parent;
@@ -35,7 +35,7 @@ using Picture = std::map<std::string, PlainFrame>;
   return std::tie(a.lamport_time, a.owner) < std::tie(b.lamport_time, b.owner);
 }
 
-/// The frames that hang in each cycle.
+/// The frames of each cycle.
 [[nodiscard]] inline std::vector<std::set<std::string>> cycles_of(const Picture& picture) {
   std::vector<std::set<std::string>> cycles;
   std::set<std::string> known;
@@ -67,7 +67,7 @@ using Picture = std::map<std::string, PlainFrame>;
   return cut;
 }
 
-/// What one process of a partition has said so far.
+/// The messages of one process of a partition so far.
 struct PlainLife {
   std::uint64_t incarnation = 0;
   std::uint64_t epoch = 0;
@@ -90,7 +90,7 @@ struct PlainLife {
     for (const PageEntry& entry : page.entries) {
       latest = std::max(latest, entry.lamport_time);
       const auto there = claims.find(entry.id);
-      // It has left this page for another since.
+      // The frame has moved to another page since.
       if (there != claims.end() && there->second.page != page.number &&
           there->second.lamport_time > entry.lamport_time) {
         continue;
@@ -102,8 +102,8 @@ struct PlainLife {
   [[nodiscard]] bool complete() const { return page_count && pages.size() >= *page_count; }
 };
 
-/// A partition over its lives: the one whose structure holds, and the one that is going to replace
-/// it.
+/// A partition with its processes: the one whose structure is in force, and the one that is going
+/// to replace it.
 class PlainPartition {
  public:
   [[nodiscard]] const PlainLife& life() const { return life_; }
@@ -162,7 +162,7 @@ class PlainPartition {
   std::uint64_t latest_ = 0;
 };
 
-/// What all partitions have said to one who hears them.
+/// The messages of all partitions to one participant.
 class PlainClaims {
  public:
   /// A page or a presence. @return the tombstones that are new by it
@@ -206,7 +206,8 @@ class PlainClaims {
     return there != partitions_.end() ? &there->second.life() : nullptr;
   }
 
-  /// That a directory which heard all of it, in this order, knows who said how much.
+  /// Checks that a directory that heard all messages in this order knows the epochs of all
+  /// partitions.
   void demand_counted(const Directory& directory) const {
     for (const auto& [name, partition] : partitions_) {
       const auto owner = directory.owner(name);
@@ -223,7 +224,7 @@ class PlainClaims {
   std::map<std::string, PlainPartition> partitions_;
 };
 
-/// That a forest shows this picture.
+/// Checks that a forest shows this result.
 inline void demand_shows(const Forest& forest, const Directory& directory, const Picture& picture) {
   const Frames frames = frames_of(forest);
   for (const auto& [id, frame] : picture) demand(frames.count(id) != 0, "what is claimed is there");

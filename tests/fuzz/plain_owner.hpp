@@ -12,10 +12,11 @@
 #include "fuzz/plain_claims.hpp"
 #include "partition/messages.hpp"
 
-// What an owner must make of requests and of what others claim, in the plainest way.
+// The result that requests and claims of others must have at an owner, in the simplest
+// implementation.
 namespace tfdude::fuzz {
 
-/// Of a change that is yet to be given a Lamport time: later than all others.
+/// The Lamport time of a change that has none yet: later than all others.
 inline constexpr std::uint64_t kJustNow = std::numeric_limits<std::uint64_t>::max();
 
 /// The owner's frames.
@@ -74,7 +75,7 @@ class PlainOwner {
   void hears(const std::string& partition) { silent_.erase(partition); }
   void hears_all() { silent_.clear(); }
 
-  /// Gives up what others claim with more right.
+  /// Gives up frames that others claim with more right.
   /// @param tombstones  what is new of what others removed
   void yield(const Picture& others, const std::vector<Tombstone>& tombstones) {
     yield_to(others);
@@ -103,7 +104,7 @@ class PlainOwner {
     demand(held == places_.size(), "what was not given up is held");
   }
 
-  /// That this life's pages tell of all frames, and of what became of others.
+  /// Checks that this process's pages contain all frames, and tombstones for the others.
   void demand_told(const PlainLife& life) const {
     demand(life.claims.size() == places_.size(), "nothing is published but what is held");
     for (const auto& [id, place] : places_) {

@@ -1,4 +1,4 @@
-// What a participant makes of bytes on the topic of presence.
+// Passes any bytes to a participant on the topic of presence.
 
 #include <vector>
 

@@ -1,4 +1,4 @@
-// What a participant makes of bytes on the topic of replies.
+// Passes any bytes to a participant on the topic of replies.
 
 #include <variant>
 #include <vector>

@@ -1,4 +1,4 @@
-// What a participant makes of bytes on the topic of requests, and what an owner answers.
+// Passes any bytes to a participant on the topic of requests, and checks an owner's answer.
 
 #include <cmath>
 #include <string>

@@ -1,5 +1,5 @@
-// What an owner makes of any file as its stored state: what is refused stays as it is; what is
-// accepted can be served, published, and stored again.
+// Gives an owner any file as its stored state. A rejected file must not change. An accepted state
+// must be fit to be served, published, and stored again.
 
 #include <algorithm>
 #include <cstdint>
@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kPartition = "arms";
 
-// A folder in memory, gone with the process.
+// A folder in memory, which disappears with the process.
 class Folder {
  public:
   Folder() {
@@ -62,7 +62,7 @@ void write(const std::string& file, std::string_view bytes) {
   std::ofstream(file, std::ios::binary) << bytes;
 }
 
-// "id < parent, Lamport time, value" of all that a state holds.
+// "id < parent, Lamport time, value" of each frame of a state.
 std::vector<std::string> lines_of(const StoredState& state) {
   std::vector<std::string> lines{"epoch " + std::to_string(state.epoch)};
   const auto bits = [](const Transform& X) {
@@ -101,7 +101,7 @@ StateChange all_of(const StoredState& state) {
   return change;
 }
 
-// Others take all that is published, and nothing is lost that was stored.
+// Others accept all published pages, and no stored frame is lost.
 void demand_served(const StoredState& state) {
   testing::Replica replica(kPartition);
   Partition partition(kPartition, 1, replica.forest, replica.directory);

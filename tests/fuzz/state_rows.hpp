@@ -9,8 +9,7 @@
 
 namespace tfdude::fuzz {
 
-/// Puts any values into the tables of a state, as another program could, and rarely into its
-/// schema.
+/// Writes any values to the tables of a state, as another program could, and rarely to its schema.
 class RowWriter {
  public:
   RowWriter(const std::string& file, FuzzedDataProvider& choices) : choices_(choices) {
@@ -24,7 +23,7 @@ class RowWriter {
     sqlite3_close(database_);
   }
 
-  // What SQLite does not take is left out.
+  // Statements that SQLite rejects are ignored.
   void step() {
     static constexpr const char* kInserts[] = {
         "INSERT OR REPLACE INTO frames VALUES(?1, ?2, ?3, ?4)",

@@ -1,4 +1,4 @@
-// What a participant makes of bytes on the topic of updates.
+// Passes any bytes to a participant on the topic of updates.
 
 #include <string_view>
 #include <vector>

@@ -1,4 +1,5 @@
-// What a daemon makes of any text as its URDF: what it accepts can be served, and its joints moved.
+// Reads any text as a daemon's URDF: a daemon must be able to serve what it accepts, and to move
+// its joints.
 
 #include <string>
 

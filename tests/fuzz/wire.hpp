@@ -10,14 +10,14 @@
 #include "fuzz/demand.hpp"
 #include "support/samples.hpp"
 
-// What all harnesses of samples do: take the bytes as a reader does, up to the message.
+// Shared by all harnesses of DDS samples: reads the bytes as a reader does, up to the message.
 namespace tfdude::fuzz {
 
 using testing::Bytes;
 
-/// The sample that a reader makes of the bytes; nothing where it refuses them. Checks that the
-/// reader refuses what is not well formed and only that, and that its result does not depend on
-/// what it took before.
+/// The sample that a reader deserializes from the bytes; none if it rejects them. Checks that the
+/// reader rejects exactly the bytes that are not well-formed, and that its result does not depend
+/// on earlier samples.
 template <class Type, class Sample>
 [[nodiscard]] std::optional<Sample> received(const Bytes& bytes, bool well_formed) {
   static Sample reused;
@@ -32,7 +32,7 @@ template <class Type, class Sample>
   return fresh;
 }
 
-/// What a sample becomes that is sent and received.
+/// A sample after it was sent and received.
 template <class Type, class Sample>
 [[nodiscard]] Sample travelled(const Sample& sample) {
   Sample arrived;
@@ -48,7 +48,7 @@ void demand_refusal(const Result<T>& result) {
   demand_printable(result.error());
 }
 
-/// How far apart two transforms may be that are the same.
+/// The largest difference of two transforms that count as equal.
 struct Tolerance {
   double rotation;    // of each number of the quaternion
   double covariance;  // of each number of the matrix scaled to a unit diagonal
@@ -68,8 +68,8 @@ inline constexpr std::size_t kSigma = 7;  // where the covariance begins
                      [](double value) { return value != 0 && std::abs(value) < 1e-200; });
 }
 
-/// The standard deviations by which the library judges a covariance: an axis that is known far
-/// better than the others of its unit is judged by those.
+/// The standard deviations by which the library judges a covariance: an axis that is far more
+/// certain than the others of its unit is judged by those.
 [[nodiscard]] inline std::array<double, 6> judged_stddev(const wire::Transform& x_pc) {
   std::array<double, 6> judged{};
   for (std::size_t i = 0; i < 6; ++i) {
@@ -121,7 +121,7 @@ inline void take_out(wire::Transform& x_pc, std::vector<wire::Transform>& out) {
   x_pc.fill(0);
 }
 
-/// Reads a sample into a message, sends that on, reads it once more: all three say the same.
+/// Reads a sample into a message, sends that, and reads it again: all three must be equal.
 /// @param encode  message to sample
 /// @param decode  sample to Result of a message
 template <class Type, class Sample, class Encode, class Decode, class Strip>
