@@ -9,7 +9,7 @@
 namespace tfdude::simulation {
 namespace {
 
-constexpr Instant kMeeting = milliseconds(300);  // how long participants need to meet
+constexpr Instant kMeeting = milliseconds(300);  // time of discovery
 constexpr Instant kLookRound = milliseconds(1000);
 constexpr Instant kSilence = milliseconds(450);
 constexpr Instant kBeat = milliseconds(60);
@@ -20,7 +20,7 @@ constexpr Instant kPublishEvery = milliseconds(1);
 constexpr Instant kRetryStoring = milliseconds(200);
 constexpr Instant kSaveValuesEvery = milliseconds(1000);
 
-// Who speaks, as its number in its first eight bytes.
+// The sender, with its number in the first eight bytes.
 PeerId peer_of(std::uint64_t process) {
   PeerId peer{};
   std::memcpy(peer.data(), &process, sizeof process);
@@ -49,7 +49,7 @@ Process::Process(Surroundings& world, Setting setting)
 }
 
 Time Process::wall() const {
-  // Such a day that a clock may be behind by hours.
+  // So late that a clock may be hours behind.
   constexpr std::chrono::seconds kBeginning{1'700'000'000};
   return Time(kBeginning + world_.timeline.now() +
               (setting_.clock_offset != nullptr ? *setting_.clock_offset : milliseconds(0)));
@@ -87,7 +87,8 @@ void Process::step_claim() {
   later(milliseconds(5), [this] { step_claim(); });
 }
 
-// What is left is judged by what the others own now, and by whether those who are silent are gone.
+// The remaining frames are judged by the frames of others now, and by whether silent partitions are
+// gone.
 void Process::take_frames() {
   const Instant now = world_.timeline.now();
   const bool incomplete = now < born_ + kLookRound && (awaits_presence() || !directory_.complete());
@@ -107,7 +108,7 @@ void Process::serve() {
   }
   serving_ = true;
   perform(member_.take_ready());
-  // A daemon that starts needs room, and says so by ending.
+  // A daemon that starts needs room on the disk, and ends if there is none.
   if (failure_) return leave();
   if (setting_.disk != nullptr) (void)setting_.disk->store.save_configured(setting_.configured);
   announce(member_.introduce());
@@ -352,7 +353,7 @@ void Process::ask_commit(Instant wait) {
   later(wait, [this] { commit(); });
 }
 
-// Taken now, on the disk a moment later; who is killed meanwhile has stored it or not.
+// Taken now, on the disk a moment later; a process that is killed meanwhile has stored it or not.
 void Process::commit() {
   commit_asked_ = false;
   const auto waiting = std::make_shared<decltype(waiting_)>(std::exchange(waiting_, {}));
@@ -417,7 +418,7 @@ std::vector<Sample> Process::published() const {
   return all;
 }
 
-// What is given up must stand after all of the others have told how far they are.
+// Frames may be given up only after all others have reported the epochs of their structure.
 void Process::yield() {
   const auto due = member_.pending_yields();
   yielding_ = false;

@@ -20,18 +20,18 @@
 
 namespace tfdude::simulation {
 
-/// What all processes of a run share.
+/// The data that all processes of a run share.
 struct Surroundings {
   Timeline& timeline;
   Network& network;
   const Plan& plan;
   testing::Random& random;
   std::function<void(const std::string&)> trace;  ///< each step, so that two runs can be compared
-  std::function<void(const std::string&)> violation;  ///< of what must never be
-  std::function<void(const std::string&)> count;      ///< of what should happen now and then
+  std::function<void(const std::string&)> violation;  ///< reports a state that is not allowed
+  std::function<void(const std::string&)> count;      ///< counts states that should occur sometimes
 };
 
-/// One life of a participant: the loops that a process has around its Member, in simulated time.
+/// One process of a participant: the loops that it runs around its Member, in simulated time.
 class Process : public std::enable_shared_from_this<Process> {
  public:
   /// What a life begins with.
@@ -40,8 +40,8 @@ class Process : public std::enable_shared_from_this<Process> {
     std::uint64_t id = 0;   ///< unique in a run
     std::string partition;  ///< empty: a client
     std::vector<FrameSpec> configured;
-    Disk* disk = nullptr;                        ///< null: nothing is kept
-    const milliseconds* clock_offset = nullptr;  ///< by which the clock of its computer is ahead
+    Disk* disk = nullptr;                        ///< null: nothing is stored
+    const milliseconds* clock_offset = nullptr;  ///< how far the clock of its computer is ahead
   };
 
   Process(Surroundings& world, Setting setting);
@@ -52,10 +52,10 @@ class Process : public std::enable_shared_from_this<Process> {
   void pause() { ++pauses_; }
   void resume();
   [[nodiscard]] bool paused() const { return pauses_ > 0; }
-  /// It says its last word.
+  /// Ends in order, and announces that.
   void leave();
 
-  // ---- what the network hands over
+  // ---- input from the network
   /// Runs now, or when the process is resumed.
   void run(std::function<void()> what);
   void met(std::uint64_t peer) { peers_.try_emplace(peer); }
@@ -64,21 +64,21 @@ class Process : public std::enable_shared_from_this<Process> {
   void on_reply(const Reply& reply);
   /// @param number  the sender counts what it pushes
   void on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed);
-  /// Somebody listens to a group of watchers.
+  /// A participant listens to a group of watchers.
   void on_watcher(std::uint64_t group);
 
-  // ---- what callers ask for
+  // ---- calls
   void begin(std::shared_ptr<Operation> operation);
   [[nodiscard]] Reply answer(const Request& request);
-  /// Once all that was changed before is stored; whether it could be.
+  /// Reports when all earlier changes are stored, and whether that succeeded.
   void when_stored(std::function<void(const Result<void>&)> then);
   [[nodiscard]] std::uint32_t next_sequence() { return ++sequence_; }
   void send(const std::string& partition, const Request& request);
-  /// From now on it is handed what concerns watched paths.
+  /// From now on it gets the input for watched paths.
   void watch(const std::shared_ptr<Watch>& watch) { watches_.push_back(watch); }
-  /// Tells who serves a partition that a group of watchers has one more.
+  /// Tells the owner of a partition that a group of watchers has one more member.
   void listen(const std::string& partition, std::uint64_t group);
-  /// Whether what it does not know does not exist.
+  /// Whether frames that it does not know do not exist.
   [[nodiscard]] bool discovered() const;
 
   void later(Instant wait, std::function<void()> what);
@@ -94,7 +94,7 @@ class Process : public std::enable_shared_from_this<Process> {
   [[nodiscard]] Directory& directory() { return directory_; }
   [[nodiscard]] Member& member() { return member_; }
   [[nodiscard]] Surroundings& world() { return world_; }
-  /// id, parent and partition of each frame whose owner is there; sorted.
+  /// id, parent and partition of each frame whose owner is reachable; sorted.
   [[nodiscard]] std::vector<std::string> structure() const;
 
  private:

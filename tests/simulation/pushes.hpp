@@ -19,14 +19,14 @@ class Pushes {
   Pushes(Forest& forest, std::function<void()> later, Push push)
       : forest_(forest), later_(std::move(later)), push_(std::move(push)) {}
 
-  /// Begins to push to a group, or goes on for another lease.
+  /// Starts to push to a group, or continues for another lease.
   [[nodiscard]] Result<PushedValues> watch(std::uint64_t group, const WatchRequest& request,
                                            Instant now);
 
-  /// Somebody listens to the group only now.
+  /// A reader of the group was matched only now.
   void tell_all(std::uint64_t group);
 
-  /// What was written since is pushed.
+  /// Pushes the values that were written since the last call.
   void push_due(Instant now);
 
  private:

@@ -16,14 +16,14 @@ namespace tfdude::simulation {
 using Instant = std::chrono::nanoseconds;  ///< since the simulation began
 using std::chrono::milliseconds;
 
-/// What happens when. Of two events at one instant chance decides which is the first.
+/// The future events. Of two events at the same instant, chance decides which comes first.
 class Timeline {
  public:
   explicit Timeline(std::uint64_t seed) : order_(seed) {}
 
   [[nodiscard]] Instant now() const { return now_; }
   [[nodiscard]] std::chrono::steady_clock::time_point steady() const {
-    // Not the clock's beginning, which stands for "never" in places.
+    // Not zero, which means "never" in some places.
     return std::chrono::steady_clock::time_point(std::chrono::hours(1) + now_);
   }
 

@@ -20,8 +20,8 @@ std::string difference(const std::vector<std::string>& a, const std::vector<std:
   return text;
 }
 
-// Whether it hangs below a root, and not below a frame that was removed: such trees the model does
-// not know.
+// Whether the frame is below a root, and not below a removed frame: the model does not know such
+// trees.
 bool stands(Process& process, FrameInfo frame) {
   while (!frame.parent.empty()) {
     const auto parent = process.forest().info(frame.parent);
@@ -93,7 +93,7 @@ bool Verdict::passes_over_one(Process& client) const {
   return false;
 }
 
-// Long after the last write it shows what the owners have.
+// Long after the last write it shows the values of the owners.
 void Verdict::check_follower(Follower& follower) {
   Process* const owner = cast_.find_daemon(follower.partition());
   const auto arm = owner ? owner->forest().info(follower.arm()) : std::nullopt;
@@ -114,7 +114,7 @@ void Verdict::check_follower(Follower& follower) {
   }
 }
 
-// Of a frame that one serves who is there, it is the owner; who is not there has none of the
+// A reachable daemon owns the frame that it is configured with; an unreachable one owns none of the
 // configured frames.
 void Verdict::check_owners(Process& one) {
   for (std::size_t i = 0; i < plan_.owners; ++i) {
@@ -132,8 +132,7 @@ void Verdict::check_owners(Process& one) {
   }
 }
 
-// Who goes on under another name knows nothing of what it had under the former, by which nobody is
-// there.
+// A renamed daemon knows nothing of its frames under the former name, which no daemon serves.
 bool Verdict::is_left_over(const FrameInfo& frame, Process& seen_by) const {
   return !cast_.serves(seen_by.directory().name(frame.owner));
 }
@@ -144,7 +143,7 @@ void Verdict::check_author(Author& author) {
     for (const auto& [id, model] : *models) {
       if (!cast_.serves(model.partition)) continue;
       const auto there = process.forest().info(id);
-      // Nobody is left who could tell its owner that it is removed.
+      // No participant is left that could tell its owner about the removal.
       const bool untold = std::any_of(model.removed_by.begin(), model.removed_by.end(),
                                       [&](const auto& one) { return !cast_.serves(one); });
       if (there && untold && !model.may_be_there()) continue;

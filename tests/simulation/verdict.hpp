@@ -13,7 +13,7 @@
 
 namespace tfdude::simulation {
 
-/// Who takes part in a run.
+/// The participants of a run.
 struct Cast {
   explicit Cast(const Plan& plan)
       : daemons(plan.owners), wild(plan.owners - 1), has_extra(plan.owners, false) {}
@@ -21,7 +21,7 @@ struct Cast {
   std::vector<std::shared_ptr<Process>> daemons;  ///< by owner; null: it is down
   const std::size_t wild;       ///< the last owner, which may be renamed and replaced
   int renamed = 0;              ///< how often
-  std::vector<bool> has_extra;  ///< by owner, whether its configuration has one frame more
+  std::vector<bool> has_extra;  ///< by owner, whether its configuration has one more frame
   std::vector<std::shared_ptr<Author>> authors;
   std::vector<std::shared_ptr<Follower>> followers;
 
@@ -35,7 +35,7 @@ struct Cast {
 /// The frame that a configuration may have besides the base.
 [[nodiscard]] std::string extra_of(std::size_t owner);
 
-/// What must be true once those who are left have had time to agree.
+/// Checks what must be true after the remaining participants have had time to agree.
 class Verdict {
  public:
   struct Calls {

@@ -52,7 +52,7 @@ void Watch::ask(WatchRoute& route) {
   }
 }
 
-// DDS matches a reader a moment after it was made; the owner then tells all once more.
+// DDS matches a reader a moment after its creation; the owner then sends everything again.
 void Watch::open(const WatchRoute::Source& source) {
   if (!opened_.insert(source.group).second) return;
   const auto wait = std::chrono::microseconds(process_.world().random.index(50'000));
@@ -73,7 +73,7 @@ void Watch::on_reply(const Reply& reply) {
   if (!path_.live()) path_.interrupt(error ? *error : Error{Errc::kNotOwner, "another group"});
 }
 
-// A DDS reader drops what comes after something that the same writer has sent later.
+// A DDS reader drops a sample that arrives after a later sample of the same writer.
 void Watch::on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed) {
   if (heard_.count(pushed.group) == 0) return;
   std::uint64_t& newest = newest_[from];

@@ -15,20 +15,20 @@ namespace tfdude::simulation {
 
 class Process;
 
-/// A watched path of a client, attended to as Watches does, in steps.
+/// A watched path of a client, maintained in steps as Watches does it.
 class Watch : public std::enable_shared_from_this<Watch> {
  public:
-  /// @param shown  called when it may show something else
+  /// @param shown  called when its value may have changed
   Watch(Process& process, const std::string& a, const std::string& b, std::function<void()> shown)
       : process_(process), path_(a, b, {}), shown_(std::move(shown)) {}
 
-  /// Goes on as long as somebody has it.
+  /// Continues as long as it has a holder.
   void start() { attend(); }
 
-  /// By what was pushed; no answer where the path was never live.
+  /// Answers from pushed values; no answer if the path was never live.
   [[nodiscard]] Result<StampedTransform> read() const { return path_.lookup({}); }
 
-  // ---- what the process hands over
+  // ---- input from the process
   void on_reply(const Reply& reply);
   /// @param from  the process that has pushed it; @param number  it counts what it pushes
   void on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed);

@@ -13,8 +13,8 @@ using faults::base_edge;
 using faults::base_of;
 
 constexpr Instant kLook = milliseconds(20);
-// Longer than anything takes: that somebody counts as gone, is met again, has claimed its name and
-// has yielded.
+// Longer than a participant takes to count as gone, to be discovered again, to claim its name and
+// to yield.
 constexpr Instant kRest = milliseconds(12000);
 
 class World {
@@ -140,8 +140,8 @@ class World {
     cast_.followers.back()->start();
   }
 
-  // Of one that hung and the one in its place, one goes on. Other daemons that have ended are
-  // started again.
+  // Of a daemon that hung and the one in its place, one continues. Other daemons that have ended
+  // are restarted.
   void look_after() {
     if (replaced_ && replaced_->ended()) replaced_.reset();
     if (replaced_ && !replaced_->paused() && cast_.daemons[cast_.wild] &&
@@ -176,7 +176,7 @@ class World {
       case FaultKind::kReplace:
         if (!cast_.daemons[cast_.wild] || cast_.daemons[cast_.wild]->paused() || replaced_) break;
         cast_.daemons[cast_.wild]->pause();
-        // On another computer, which has nothing of it.
+        // Starts on another computer, which has no stored state of it.
         replaced_ = std::exchange(cast_.daemons[cast_.wild], nullptr);
         replaced_by_ = &fault;
         start_daemon(cast_.wild, nullptr);
@@ -242,7 +242,7 @@ class World {
     }
   }
 
-  // The last word of one who stops is still sent.
+  // The last message of a stopping daemon is still sent.
   void take_down(std::size_t owner, bool gently) {
     ++down_[owner];
     if (owner == cast_.wild) replaced_.reset();
@@ -266,7 +266,7 @@ class World {
   std::vector<milliseconds> offsets_;
   std::vector<int> down_;
   std::map<const Fault*, std::weak_ptr<Process>> hung_;
-  std::shared_ptr<Process> replaced_;  // the wild one, while it hangs
+  std::shared_ptr<Process> replaced_;  // the wild daemon, while it hangs
   const Fault* replaced_by_ = nullptr;
   std::uint64_t processes_ = 0;
   Run run_;

@@ -12,7 +12,7 @@
 
 namespace tfdude::simulation {
 
-/// What a run has come to.
+/// The result of a run.
 struct Run {
   std::vector<std::string> violations;
   std::vector<std::uint64_t> hashes;          ///< of the steps so far, after each
@@ -20,7 +20,8 @@ struct Run {
   Instant duration{};
 };
 
-/// Runs a plan: the storm, then what must be true when those who are left have had time to agree.
+/// Runs a plan: first the phase with faults, then the checks after the remaining participants have
+/// had time to agree.
 /// @param trace  prints each step
 [[nodiscard]] Run run(const Plan& plan, bool trace = false);
 
