@@ -1,4 +1,4 @@
-// How long calls take at most, once over each transport.
+// The maximum time of calls, over each transport.
 
 #include <algorithm>
 #include <chrono>
@@ -21,8 +21,8 @@ using testing::joined_by;
 using testing::outcome;
 using Clock = std::chrono::steady_clock;
 
-/// What the first lookup of a new client comes to, and how long it takes at best, of some clients:
-/// on a busy machine any may take longer.
+/// The result of the first lookup of a new client, and the shortest time among several clients,
+/// because any of them may take longer on a busy machine.
 struct FirstLookup {
   FirstLookup(const Join& join, const std::string& frame, Milliseconds wait) {
     for (int i = 0; i < 5; ++i) {

@@ -1,4 +1,5 @@
-// What owners do at once that cannot both hold, and what is told of it, over each transport.
+// Concurrent changes of owners that contradict each other, and the reports of them, over each
+// transport.
 
 #include <array>
 #include <atomic>
@@ -47,7 +48,7 @@ class Listener {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<Change> heard_;
-  Subscription subscription_;  // last: it ends before the rest does
+  Subscription subscription_;  // last: it ends before the other members
 };
 
 std::vector<std::string> structure(Client& client) {
@@ -64,7 +65,7 @@ struct Pair {
       : arms(*Node::open(join("arms"), "arms", {{"arm", "", {}}})),
         head(*Node::open(join("head"), "head", {{"neck", "", {}}})),
         client(*Client::open(join(""))) {
-    // Whoever was there first hears of the other a moment later.
+    // The owner that started first hears of the other a moment later.
     REQUIRE(agree());
     REQUIRE(client.exists("arm"));
     REQUIRE(client.exists("neck"));
@@ -84,7 +85,7 @@ struct Pair {
   Client client;
 };
 
-/// Does both at the same instant. @return whether both were done
+/// Makes both changes at the same instant. @return whether both succeeded
 template <class First, class Second>
 bool at_once(First first, Second second) {
   std::atomic<int> ready{0};
@@ -140,7 +141,7 @@ TEST_CASE("two moves at once that make a cycle end as one of them everywhere") {
     both = at_once([&] { return p.arms.move("arm", "neck").has_value(); },
                    [&] { return p.head.move("neck", "arm").has_value(); });
     if (both) break;
-    // One was refused: undone, and tried again.
+    // One was rejected: undoes it, and tries again.
     REQUIRE(p.arms.move("arm", ""));
     REQUIRE(p.head.move("neck", ""));
     REQUIRE(p.agree());
@@ -214,7 +215,8 @@ TEST_CASE("a claim that was taken back costs nobody a frame, however late that i
   REQUIRE(client.add("camera", "neck", {}));
   late.let_one_through();
   REQUIRE(late.wait_until_asked(kLong));
-  // The answer has said that there is more to come, so it stays at that however long it takes.
+  // The answer says that more pages will come, so the state stays the same, however long that
+  // takes.
   std::this_thread::sleep_for(3 * options.timeout);
   CHECK(head.path("neck", "camera").has_value());
   late.let_through();

@@ -1,4 +1,4 @@
-// Joints over partitions, once over each transport.
+// Joints over partitions, over each transport.
 
 #include <atomic>
 #include <chrono>
@@ -36,7 +36,7 @@ Time wall_clock() {
   return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
 }
 
-// What is published may be on its way for a while.
+// A published value takes a while to arrive.
 template <class Condition>
 bool comes_true(Condition condition) {
   const auto end = std::chrono::steady_clock::now() + kLong;

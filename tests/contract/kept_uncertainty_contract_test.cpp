@@ -1,4 +1,4 @@
-// What owners that restart keep of uncertainty, once over each transport.
+// The uncertainty that owners keep over a restart, over each transport.
 
 #include <algorithm>
 #include <array>
@@ -33,7 +33,7 @@ constexpr std::size_t kEdges = 5;
 
 std::string frame(std::size_t i) { return "frame_" + std::to_string(i); }
 
-// A chain of three owners who keep what they have; edge i leads to frame i + 1.
+// A chain of three owners that store their state; edge i leads to frame i + 1.
 class Kept {
  public:
   Kept(const Join& join, const ObservedChain& chain) : join_(join) {
@@ -78,7 +78,7 @@ class Kept {
   std::map<std::string, Node> nodes_;
 };
 
-// What the dense filter's covariance of all edges makes of a path.
+// The covariance of a path, from the dense filter's covariance of all edges.
 Matrix6d of_path(const ObservedChain& chain, const Eigen::MatrixXd& P, std::size_t from,
                  std::size_t to) {
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(6, P.cols());
@@ -88,7 +88,7 @@ Matrix6d of_path(const ObservedChain& chain, const Eigen::MatrixXd& P, std::size
   return H * P * H.transpose();
 }
 
-// By how much the worst path differs, in parts of what it should be.
+// The largest relative difference of a path from its expected value.
 double difference(Client& client, const ObservedChain& chain, const Eigen::MatrixXd& P) {
   double worst = 0;
   for (std::size_t from = 0; from < kEdges; ++from) {
@@ -111,7 +111,7 @@ TEST_CASE("kept: owners that restart between observations know what one dense fi
   ObservedChain chain(random, kEdges);
   chain.add_source("supply", {0, 3}, random);
   Kept robot(join, chain);
-  // One says it in its configuration, of the other it is said by request.
+  // One owner has it in its configuration, the other gets it by a request.
   REQUIRE(eventually([&] {
     return robot.client->correlate(frame(4), {false, chain.edges()[3].X_PC.common_errors, {}})
         .has_value();

@@ -1,5 +1,5 @@
-// Who serves a name, who is told of partitions that end, and what becomes of their frames, over
-// each transport.
+// Who serves a name, who hears of partitions that end, and what happens to their frames, over each
+// transport.
 
 #include <algorithm>
 #include <array>
@@ -54,7 +54,7 @@ PartitionInfo info_of(Client& client, const std::string& name) {
 
 }  // namespace
 
-// How many serve a name that two claim at once.
+// How many owners serve a name that two claim at the same time.
 std::size_t served(const Join& join, const std::string& name) {
   std::array<std::optional<Node>, 2> nodes;
   std::atomic<int> ready{0};
@@ -70,8 +70,8 @@ std::size_t served(const Join& join, const std::string& name) {
   return std::size_t{nodes[0].has_value()} + std::size_t{nodes[1].has_value()};
 }
 
-// Who does not get it waits for a second and a half: so many try beside each other, in process each
-// on a network of its own.
+// An owner that does not get the name waits for 1.5 s. So many pairs try at the same time; within
+// one process each pair has its own network.
 TEST_CASE("of two who claim a name at once exactly one serves") {
   const int transport = GENERATE(from_range(testing::networks()));
   const int beside = transport == 0 ? 50 : 2;
@@ -154,7 +154,7 @@ TEST_CASE("a partition that is gone is forgotten by all, and only then") {
     CHECK(comes([&] { return !one->exists("hand"); }));
     CHECK(comes([&] { return info_of(*one, "arm").name.empty(); }));
   }
-  // Started again it is as new.
+  // After a restart it is as new.
   arm.emplace(*Node::open(join("arm"), "arm", {{"hand", "world", {}}}));
   CHECK(comes([&] { return owner_of(client, "hand") == "arm"; }));
   CHECK(comes([&] { return client.lookup("world", "hand").has_value(); }));

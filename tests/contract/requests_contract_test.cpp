@@ -1,4 +1,4 @@
-// Requests that are lost, and those that are sent again, over each transport.
+// Requests that are lost, and requests that are repeated, over each transport.
 
 #include <atomic>
 #include <map>

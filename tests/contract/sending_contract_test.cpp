@@ -1,5 +1,5 @@
-// What is streamed: to those of several owners who live, and that it arrives though its sender
-// ends. Once over each transport.
+// Streamed values: they reach the reachable ones of several owners, and arrive although their
+// sender ends. Over each transport.
 
 #include <optional>
 #include <string>
@@ -62,7 +62,7 @@ TEST_CASE("publish: what was sent arrives though the client ends at once") {
       auto client = *Client::open(join(""));
       REQUIRE(outcome(client.publish({{"a_tip", along_x(run)}})) == "ok");
     }
-    // It is there when the client is gone, but for the thread that applies it.
+    // It has arrived when the client has ended; only the owner's thread may still have to apply it.
     CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", run); }));
   }
 }

@@ -1,4 +1,4 @@
-// Streams that never wait, once over each transport.
+// Streams that never wait, over each transport.
 
 #include <algorithm>
 #include <chrono>
@@ -46,7 +46,7 @@ std::string text(const std::vector<NotSent>& all) {
   return lines.empty() ? "all sent" : lines;
 }
 
-// A stream of as many edges, all of them sent to the same place, and how long each call took.
+// A stream of edges along x, and the time of each call.
 struct Loop {
   EdgeStream stream;
   std::vector<Clock::duration> times;
@@ -85,7 +85,7 @@ TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waite
   CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", 4); }));
 
   gone = open_with_tip(join, "gone");
-  // Also where DDS has met its predecessor only, for whom it waits longer than we do.
+  // Also if DDS has discovered only its predecessor, for which DDS waits longer than we do.
   CHECK(eventually([&] {
     return loop.send({5, 5}) == "all sent" && is_at(*gone, "gone_base", "gone_tip", 5);
   }));
@@ -95,8 +95,8 @@ TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waite
   CHECK(eventually([&] {
     return loop.send({6, 6}) == "all sent" && is_at(a, "a_base", "gone_tip", 6);
   }));
-  // A busy computer may hold up one or two calls; to wait for a match takes some 30 ms, and there
-  // were three.
+  // A busy computer may delay one or two calls. There were three matches, and waiting for one
+  // would take some 30 ms.
   CHECK(loop.slower_than(Milliseconds(20)) < 3);
 }
 
@@ -118,7 +118,7 @@ TEST_CASE("streams: stamps are those of the source, of all edges the same") {
   REQUIRE(history);
   REQUIRE(history->size() == 1);
   CHECK(history->front().newest == stamp);
-  // The one that it owns says at once what it makes of it.
+  // The result for its own edge is known at once.
   CHECK(text(stream.try_publish({along_x(7), along_x(8)}, stamp)) == "1 stamp_taken b");
 }
 

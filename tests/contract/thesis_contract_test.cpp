@@ -1,5 +1,4 @@
-// The function tests of the thesis, once over each transport: two owners and a client without
-// frames.
+// The function tests of the thesis, over each transport: two owners and a client without frames.
 
 #include <array>
 #include <cmath>
@@ -33,7 +32,7 @@ struct Robot {
     arms.emplace(*Node::open(join("arms"), "arms",
                              load_config(TFDUDE_EXAMPLES "/thesis/arms.yaml")->frames));
     client.emplace(*Client::open(join("")));
-    // Who was there before hears of a newcomer's frames a moment later.
+    // Earlier participants hear of the frames of a new participant a moment later.
     for (Client* one : all())
       REQUIRE(testing::eventually([&] { return one->frames()->size() == 9; }));
   }
@@ -77,7 +76,7 @@ TEST_CASE("frames are added, updated and moved from anywhere") {
   Robot r(joined_by(transport));
   int callers = 0;
   for (Client* caller : r.all()) {
-    // Names of its own, since a caller misses a moment later what another has removed.
+    // Uses its own names, because a caller hears of another one's removal only a moment later.
     const std::string tool = "tool" + std::to_string(++callers);
     const std::string hand = "hand" + std::to_string(callers);
     REQUIRE(caller->add(tool, "camera", kX));
@@ -121,8 +120,8 @@ TEST_CASE("what is not finite is refused before it is sent") {
 }
 
 TEST_CASE("an answer that is semi-definite but for rounding arrives") {
-  // An edge without translation seen from its child's side: the variances of the translation are
-  // zero but for the rounding of those of the rotation over a lever.
+  // An edge without translation seen from its child: the variances of the translation are zero,
+  // except for rounding errors of the variances of rotation over a lever.
   const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   const auto edge = [](const Eigen::Vector3d& p, const Eigen::Vector3d& rpy,
@@ -136,7 +135,7 @@ TEST_CASE("an answer that is semi-definite but for rounding arrives") {
   REQUIRE(r.client->add("a", "arm_2",
                         edge({0, 0, 0}, {1.1, -0.072, -0.28}, {0, 0, 0, 2.1e-3, 0, 5.3e-3})));
   REQUIRE(r.client->add("b", "a", edge({0, 0, 0.3}, {0, 0, 0}, {0, 0, 0, 0, 1.3e-5, 0})));
-  // Farther than a user may say that anything is, since two such edges add up.
+  // Farther than a user may place a frame, because two such edges add up.
   const auto far = edge({9e8, 0, 0}, {0, 0, 0}, {9e8, 9e8, 9e8, 1, 1, 1});
   REQUIRE(r.client->add("far1", "arm_2", far));
   REQUIRE(r.client->add("far2", "far1", far));

@@ -1,5 +1,5 @@
-// Time over partitions, once over each transport: one instant for all, waiting for data, and paths
-// that are pushed.
+// Time over partitions, over each transport: one instant for all owners, waiting for data, and
+// pushed paths.
 
 #include <atomic>
 #include <chrono>
@@ -56,7 +56,7 @@ struct Chain {
 Query at(Time t) { return {t, 0ns, {}}; }
 Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
 
-// Each edge with a twist of its own, from the epoch of the test on: interpolation is exact for it.
+// Each edge has its own twist, from the start of the test on: interpolation is exact for it.
 class Motion {
  public:
   Motion(std::uint64_t seed, Time start) : random_(seed), start_(start) {
@@ -151,7 +151,7 @@ TEST_CASE("a stamp before 1970, or none that is one, is refused wherever its edg
     REQUIRE(stream);
     REQUIRE(stream->try_publish({along_x(2)}, stamp).size() == 1);
     CHECK(stream->try_publish({along_x(2)}, stamp)[0].why == Errc::kInvalidInput);
-    // As an instant that is asked for it is before all samples, not the newest.
+    // As the instant of a lookup it is before all samples, not the newest one.
     CHECK(outcome(caller->lookup("arm", "hand", at(stamp))) == "too_old");
   }
   CHECK(x_of(chain.client->lookup("arm", "hand", at(ms(1000)))) == 1);
@@ -213,7 +213,7 @@ TEST_CASE(
     REQUIRE(found);
     REQUIRE(found->stamp.has_value());
     REQUIRE(testing::pose_diff(found->pose, motion.whole(*found->stamp), 1e-8) == "");
-    // Not old either: where lookups follow each other, no more than a moment.
+    // It is not old either: for consecutive lookups, no more than a moment.
     REQUIRE(wall_clock() - *found->stamp < 5s);
     const auto one = chain.client->lookup("world", "base", Query{});
     const auto two = chain.client->lookup("base", "hand", Query{});
@@ -252,7 +252,7 @@ TEST_CASE("a lookup waits for its data, no longer than it may, and not for what 
   REQUIRE(chain.tool->add("later", "tool", along_x(100)));
   CHECK(x_of(future.get()) == Approx(3 + 5));
   CHECK(called.get_future().get() == Approx(3 + 5 + 100));
-  // A callback may end what called it.
+  // A callback may end the lookup that called it.
   std::atomic<bool> ended{false};
   PendingLookup ends_itself;
   std::mutex held;

@@ -1,5 +1,5 @@
-// What transport.hpp promises, once over each transport. That something does not arrive is checked
-// after a later event that did: it would have come before.
+// The promises of transport.hpp, over each transport. To check that something does not arrive, a
+// test waits for a later event: it would have arrived before that.
 
 #include <future>
 #include <string>
@@ -67,7 +67,7 @@ TEST_CASE("what is announced and published reaches all, also those that come lat
     CHECK(presence.pid == 4711);
     CHECK(presence.serving);
   }
-  // Nobody hears of himself.
+  // A participant does not receive its own messages.
   const Heard by_arms = arms.heard();
   for (const Page& page : by_arms.pages) CHECK(page.partition == "legs");
   for (const Presence& presence : by_arms.presences) CHECK(presence.partition == "legs");
@@ -297,7 +297,7 @@ TEST_CASE("pages of one sender arrive in order, and the last of each arrives") {
   const Listener client(join);
   Server arms(join, "arms");
   REQUIRE(client.hears([](const Heard& h) { return h.presence("arms", 1); }));
-  // Large enough that some are lost on the way, and come later or not at all.
+  // Large enough that some are lost on the way, and arrive later or not at all.
   const std::vector<PageEntry> entries(60, PageEntry{std::string(255, 'i'), std::string(255, 'p')});
   constexpr std::uint64_t kLast = 600;
   for (std::uint64_t epoch = 1; epoch <= kLast; ++epoch) {

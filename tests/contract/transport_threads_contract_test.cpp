@@ -1,4 +1,4 @@
-// What transport.hpp promises to several threads at once, over each transport.
+// The promises of transport.hpp for several concurrent threads, over each transport.
 
 #include <array>
 #include <atomic>
@@ -23,7 +23,7 @@ using testing::Server;
 
 Request request(std::uint32_t sequence) { return {sequence, "hand", RemoveRequest{{"hand"}}}; }
 
-/// Runs something over and over in a thread of its own.
+/// Runs a function repeatedly in its own thread.
 class Repeating {
  public:
   template <class Action>
@@ -116,7 +116,7 @@ TEST_CASE("nothing reaches a listener that has stopped") {
   const Listener staying(join);
   const Repeating publishing([&](std::uint32_t round) {
     arms.publish(round % 5, round);
-    std::this_thread::yield();  // a loop that takes a lock at once again starves who joins
+    std::this_thread::yield();  // a loop that takes the lock again at once starves joining threads
   });
   // Joining takes long over DDS.
   for (int left = 0; left < (transport == 0 ? 500 : 5); ++left) {

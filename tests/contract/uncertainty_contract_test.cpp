@@ -1,5 +1,4 @@
-// Uncertainty over partitions, once over each transport: shared sources, bounds, orders,
-// measurements.
+// Uncertainty over partitions, over each transport: shared sources, bounds, orders, measurements.
 
 #include <cmath>
 #include <optional>
@@ -94,7 +93,7 @@ TEST_CASE("uncertainty: a source that edges of several owners share is counted o
     REQUIRE(back);
     CHECK(transform_diff(*back, inverse(collapse(expected)), 1e-9) == "");
   }
-  // Independence would be another answer.
+  // Independent errors would give another answer.
   const auto X = robot.client->lookup("world", "tool");
   REQUIRE(X);
   const Transform independent =
@@ -108,8 +107,8 @@ TEST_CASE("uncertainty: a source cancels exactly over owners") {
   Random random(662);
   INFO("seed " << random.seed());
   Robot robot(join, random, 0.0);
-  // One encoder error that turns the base and, by the same, the arm back: about the same axis in
-  // the same place.
+  // One encoder error turns the base, and turns the arm back by the same angle, about the same axis
+  // in the same place.
   CommonError forth{"encoder", false, Loading::Zero(6, 1)};
   forth.loading(5, 0) = 0.05;
   CommonError back = forth;
@@ -134,7 +133,7 @@ TEST_CASE("uncertainty: unknown correlation over owners is bounded, and told") {
   const auto X = robot.client->lookup("world", "tool", Query{});
   REQUIRE(X);
   CHECK(X->basis.bound);
-  // As bad as can be: both errors are one, in the tool.
+  // The worst case: both errors are the same one, in the tool.
   const Pose X_tool_base =
       (robot.X_base_arm.pose * robot.X_arm_hand.pose * robot.X_hand_tool.pose).inverse();
   const Matrix6d of_base = robot.X_world_base.covariance.transported(X_tool_base).matrix();
@@ -210,7 +209,7 @@ TEST_CASE("uncertainty: a measurement over owners makes all paths as sure as one
   CHECK(observed->accepted);
   CHECK(observed->dimensions == 6);
   CHECK(observed->corrected == std::vector<std::string>{"base", "arm", "hand", "tool"});
-  // The path is what both estimates come to.
+  // The path is the fusion of both estimates.
   const auto fused = fuse({*before, Z});
   const auto after = robot.client->lookup("world", "tool", Query{});
   REQUIRE(fused);
@@ -230,7 +229,7 @@ TEST_CASE("uncertainty: a measurement over owners makes all paths as sure as one
   const auto edge = robot.client->lookup("base", "arm");
   REQUIRE(edge);
   CHECK(testing::domination(robot.X_base_arm.covariance.matrix(), edge->covariance.matrix()) > 0);
-  // A fresh value knows nothing of it.
+  // A new value is not correlated with it.
   REQUIRE(robot.client->update("arm", robot.X_base_arm));
   const auto fresh = robot.client->lookup("base", "arm", Query{});
   REQUIRE(fresh);
@@ -287,7 +286,7 @@ TEST_CASE("uncertainty: two who observe one path at once both count, and count o
   std::thread thread([&] { observe_all(*other, others); });
   observe_all(*robot.client, mine);
   thread.join();
-  // Who finds it changed each time gives up, having changed nothing.
+  // A caller that finds the edge changed each time gives up, and has changed nothing.
   CHECK(mine + others > kEach);
   const std::vector<Transform> all(static_cast<std::size_t>(mine + others), Z);
   std::vector<Transform> estimates = {*before};

@@ -1,5 +1,5 @@
-// Paths that owners push, once over each transport: what reaches a watcher, and when; and what
-// pushing leaves behind.
+// Paths that owners push, over each transport: what reaches a watcher, and when; and what pushing
+// leaves behind.
 
 #include <algorithm>
 #include <atomic>
@@ -87,7 +87,7 @@ TEST_CASE("watch: a lookup that waits is looked at again as soon as its path is 
   const auto watched = robot.client->watch("arm", "hand");
   REQUIRE(watched);
   std::vector<double> late;
-  // So far ahead that the owner is asked each 50 ms only.
+  // So far ahead that the owner is asked only each 50 ms.
   const auto now = std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
   REQUIRE(robot.arm->update("hand", along_x(0), now));
   for (int i = 1; i <= 15; ++i) {
@@ -117,7 +117,7 @@ TEST_CASE("watch: late samples and process noise are what lookups see, too") {
   Robot robot(joined_by(GENERATE(from_range(testing::networks()))), noisy);
   const auto path = robot.client->watch("world", "hand");
   REQUIRE(path);
-  // Once they have met.
+  // Waits for discovery first.
   REQUIRE(robot.arm->update("hand", random.transform(), ms(1000)));
   REQUIRE(eventually([&] { return path->latest() && path->latest()->stamp == ms(1000); }));
   for (const int t : {3000, 2000, 4000, 1500, 3990}) {
@@ -217,8 +217,8 @@ TEST_CASE("watch: a rate that is no rate is refused") {
   CHECK(robot.client->watch("world", "hand", options));
 }
 
-#ifndef __SANITIZE_THREAD__  // which does not see what Fast DDS locks
-// Fewer than could be, as each costs milliseconds; pusher_test.cpp has 1,000 watches.
+#ifndef __SANITIZE_THREAD__  // ThreadSanitizer does not see the locks of Fast DDS
+// Not more, because each costs milliseconds; pusher_test.cpp has 1,000 watches.
 TEST_CASE("watch: as many writers are there after watches and clients as before") {
   CountedDomain domain;
   auto base = *Node::open(domain.join("base", true), "base",
@@ -281,7 +281,7 @@ TEST_CASE("watch: a reply to a peer that has left makes no writer") {
     REQUIRE(eventually([&] { return domain.writers() == before; }));
     transport->reply(*peer, Reply{1, 0, Done{}});
   }
-  // Of one that is there what is sent arrives, after all that was to be done before.
+  // A sample of an existing writer arrives, after everything that was to be done before.
   testing::Recorder asker;
   const auto asking = domain.join("");
   REQUIRE(asking->start(asker));

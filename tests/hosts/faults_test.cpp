@@ -1,4 +1,4 @@
-// What hosts make of packets that are lost and of links that are cut.
+// Hosts with lost packets and cut links.
 
 #include <algorithm>
 #include <cstdio>

@@ -1,4 +1,4 @@
-// The service over several hosts: network namespaces, each with an address of its own.
+// The service over several hosts: network namespaces, each with its own address.
 
 #include "hosts/robot_hosts.hpp"
 
@@ -55,7 +55,7 @@ TEST_CASE("hosts: a client on a fourth host uses what three others own") {
     return client.publish({{"robot_1", kX}, {"tool", kY}}) &&
            lookups_diff(witness, r.oracle).empty();
   }));
-  // Who joins late, a process or a client, learns all of it.
+  // A process or client that joins late learns all of it.
   auto late = r.open_client(RobotHosts::kTools);
   check_agreement(r, late);
   const auto answer = r.cli(RobotHosts::kServer, {"lookup", "world", "marker"});
@@ -74,7 +74,7 @@ TEST_CASE("hosts: a discovery server may come late, end, and come again") {
   r.start_server_again();
   check_agreement(r, early);
   r.end_server();
-  // Those who have met go on without it.
+  // Participants that know each other continue without it.
   REQUIRE(early.add("marker", "tool", kX));
   r.oracle.add("marker", "tool", kX);
   check_agreement(r, early);

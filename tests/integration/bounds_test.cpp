@@ -1,4 +1,4 @@
-// How long calls take beside daemons that hang.
+// The time of calls while other daemons hang.
 
 #include <algorithm>
 #include <chrono>

@@ -1,5 +1,4 @@
-// Each command of the command line: what it prints for people, what for programs, and its exit
-// status.
+// Each command of the command line: its output as text and as JSON, and its exit status.
 
 #include <algorithm>
 #include <csignal>

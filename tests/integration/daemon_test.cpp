@@ -1,4 +1,4 @@
-// What a daemon says where it cannot serve.
+// The messages of a daemon that cannot serve.
 
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-// What is told of changes, and who has to yield.
+// Reports of changes, and which owner has to yield.
 
 #include <csignal>
 #include <string>

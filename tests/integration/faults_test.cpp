@@ -1,4 +1,4 @@
-// What happens as daemons die, hang, come back, or want the same name.
+// Daemons that die, hang, return, or want the same name.
 
 #include <chrono>
 #include <csignal>

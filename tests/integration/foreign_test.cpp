@@ -1,5 +1,4 @@
-// DDS writers that are not ours: plain ones that stream updates, and ones that send what is not
-// well formed.
+// DDS writers of other programs: some stream valid updates, others send malformed samples.
 
 #include <cmath>
 #include <memory>
@@ -40,7 +39,8 @@ struct Counted {
   Node node;
 };
 
-// A stranger's update of one frame: one metre along x, a millimetre of deviation in each direction.
+// Another program's update of one frame: one metre along x, a standard deviation of a millimetre in
+// each direction.
 wire::Update stranger_update(const std::string& id) {
   wire::Edge edge;
   edge.id(id);
@@ -179,8 +179,7 @@ constexpr Stranger kStrangers[] = {
     {"tfdude/presence", "tfdude::wire::Presence", true},
 };
 
-// What may come instead: cut short, with lengths that are not true, random bytes with and without a
-// header.
+// Malformed samples: truncated, with wrong lengths, random bytes with and without a header.
 std::vector<Bytes> malformed(testing::Random& random) {
   std::vector<Bytes> all;
   const auto good = testing::bytes_of<wire::UpdatePubSubType>(stranger_update("a_tip"));

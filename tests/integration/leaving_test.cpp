@@ -1,5 +1,5 @@
-// Endpoints that go while others are matched with them: where Fast DDS calls a listener that was
-// taken away meanwhile.
+// Endpoints that are deleted while others are matched with them: Fast DDS may then call a listener
+// that was removed meanwhile.
 
 #include <atomic>
 #include <chrono>

@@ -1,4 +1,4 @@
-// What a daemon keeps when it is killed, and what it does not overwrite.
+// The state that a daemon keeps when it is killed, and files that it does not overwrite.
 
 #include <atomic>
 #include <csignal>

@@ -1,4 +1,4 @@
-// What a daemon makes of its state where its configuration was edited, or is gone.
+// The state of a daemon after its configuration was edited or removed.
 
 #include <algorithm>
 #include <mutex>

@@ -1,4 +1,4 @@
-// What the command line says, and with which exit status, where something cannot be done.
+// The messages and exit statuses of the command line if something cannot be done.
 
 #include <string>
 #include <vector>

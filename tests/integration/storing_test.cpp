@@ -1,4 +1,4 @@
-// What a daemon says and does while its disk is full, or slow.
+// Messages and behaviour of a daemon while its disk is full or slow.
 
 #include <algorithm>
 #include <atomic>
@@ -73,7 +73,7 @@ std::vector<std::string> add_until_full(Client& client, const std::string& name,
   return there;
 }
 
-// The longest time without a streamed value that has come to be looked up.
+// The longest time in which no new streamed value became visible to lookups.
 Clock::duration longest_silence(Client& client, const std::atomic<bool>& stop) {
   Clock::duration longest{0};
   auto last = Clock::now();

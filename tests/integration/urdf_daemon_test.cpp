@@ -1,4 +1,4 @@
-// What a daemon makes of URDFs, from its command line and from its configuration.
+// URDFs of a daemon, from its command line and from its configuration.
 
 #include <string>
 #include <vector>

@@ -1,6 +1,6 @@
 // Experiments of the literature, as far as their parameters are known to us, with the numbers that
-// docs/uncertainty.md shows. A tolerance is at least five standard errors of what is drawn, so that
-// any seed will do.
+// docs/uncertainty.md shows. A tolerance is at least five standard errors of the samples, so that
+// any seed passes.
 
 #include "support/published.hpp"
 

@@ -1,5 +1,6 @@
-// That all who hear the same agree who has a frame, and that who is there keeps what it has,
-// whatever partitions die, hang, return and are forgotten, and in whatever order that is heard.
+// All participants that hear the same messages agree on the owner of a frame, and a reachable owner
+// keeps its frames, whatever partitions die, hang, return and are forgotten, and in whatever order
+// that is heard.
 
 #include <algorithm>
 #include <array>
@@ -40,7 +41,7 @@ using Said = std::variant<Presence, Page, Silence>;
 
 constexpr std::size_t kOwners = 4;
 constexpr std::size_t kSpectator = kOwners;
-constexpr std::size_t kFrames = 8;  // few, so that they are often fought over
+constexpr std::size_t kFrames = 8;  // few, so that owners often compete for them
 
 struct Counts {
   std::size_t kept = 0;
@@ -78,7 +79,7 @@ class World {
     }
   }
 
-  /// All that was said is heard, and whoever is not there counts as gone.
+  /// Delivers all messages; unreachable partitions count as gone.
   void run_until_quiet() {
     drain();
     grow_late();
@@ -91,7 +92,7 @@ class World {
       REQUIRE(lines_diff(owned_by_those_there(owners_[who]->replica),
                          owned_by_those_there(spectator_)) == "");
     }
-    // Whatever somebody has who is there is not another's who is not.
+    // A frame of a reachable owner does not belong to an unreachable one as well.
     for (std::size_t who = 0; who < kOwners; ++who) {
       if (!serves(who)) continue;
       for (const FrameInfo& frame : owners_[who]->replica.forest.frames()) {
@@ -123,7 +124,7 @@ class World {
     return who == kSpectator ? spectator_ : owners_[who]->replica;
   }
 
-  // Of those frames that somebody has who is there.
+  // The frames of reachable owners.
   std::vector<std::string> owned_by_those_there(const Replica& replica) const {
     std::vector<std::string> lines;
     for (const FrameInfo& frame : replica.forest.frames()) {
@@ -135,7 +136,7 @@ class World {
     return lines;
   }
 
-  // Frames that nobody has who is there, among them perhaps those of one who is not.
+  // Frames without a reachable owner; some may belong to an unreachable one.
   std::vector<FrameSpec> some_free_frames() {
     std::vector<FrameSpec> frames;
     for (std::size_t i = 0; i < 2; ++i) {
@@ -152,7 +153,7 @@ class World {
   void start(std::size_t who, bool configured) {
     const std::vector<FrameSpec> frames =
         configured ? some_free_frames() : std::vector<FrameSpec>();
-    // Those who serve have been met, and all that they have to say was heard.
+    // All serving owners are known, and all their messages were heard.
     auto owner = std::make_unique<Owning>(name(who), ++lives_);
     for (std::size_t other = 0; other < kOwners; ++other) {
       if (!serves(other)) continue;
@@ -190,8 +191,8 @@ class World {
     }
   }
 
-  // What is on its way from one who dies. That somebody is not heard any more is no message:
-  // whoever has not been told of an end notices it.
+  // Messages on their way from an owner that dies. Silence is no message: participants that did not
+  // hear of the end notice the silence.
   static void lose(std::deque<Said>& queue) {
     std::deque<Said> noticed;
     for (const Said& said : queue) {
@@ -373,7 +374,7 @@ class World {
       }
       return;
     }
-    // Who has more to say is waited for before anything is given up.
+    // Before anything is given up, the others must have reported all their pages.
     const bool all_heard = std::none_of(queues_.begin(), queues_.end(), [&](const auto& queue) {
       return queue.first.second == hearer;
     });
@@ -383,7 +384,7 @@ class World {
     publish(hearer);
   }
 
-  // What an owner did itself may be to be given up, too.
+  // An owner may also have to give up its own changes.
   void drain() {
     do {
       while (deliver_one()) {

@@ -1,4 +1,5 @@
-// Who is not there, what that means for frames that others claim, too, and what is kept of whom.
+// Unreachable partitions: the effect on frames that others claim, too, and what is stored about
+// them.
 
 #include "partition/absences.hpp"
 
@@ -172,7 +173,7 @@ TEST_CASE("a stop is told apart from a death") {
     (void)base.directory.look_for_gone(kStart);
     base.wait();
     CHECK(base.directory.absent()[0].kind == Kind::kStopped);
-    // That it is gone, and a beat that was late, change nothing of that.
+    // Its absence and a late beat do not change that.
     CHECK_FALSE(base.directory.lost("arm", 1, kNow));
     base.directory.apply(presence_of("arm", 1, 1), kNow);
     CHECK_FALSE(base.directory.partitions()[0].reachable);
@@ -196,12 +197,12 @@ TEST_CASE("who returns without having ended yields to who says that it has outli
   base.hear("left_arm", 1, 20, {missed});
   base.hear("arm", 1, 10);
   CHECK(base.owner_of("hand") == "left_arm");
-  // Another notices the absence later than the one that says so.
+  // Another participant notices the absence later than the one that reports it.
   Witness head("head");
   head.hear("left_arm", 1, 20, {missed});
   CHECK(head.owner_of("hand") == "left_arm");
   CHECK(head.told(ChangeKind::kFrameTakenOver).size() == 1);
-  // The same to one who was not there.
+  // The same for a participant that joined later.
   Replica late;
   Presence there = presence_of("left_arm", 1, 1);
   there.absent = {{"arm", 0, Kind::kBack, 1}};
@@ -328,7 +329,7 @@ TEST_CASE("what is forgotten is gone, for those as well who were away when it wa
   CHECK_FALSE(base.directory.owner("arm"));
   CHECK(base.directory.partitions().size() == 1);
   CHECK_FALSE(base.directory.only_heard_of());
-  // One who has not heard of it does not bring it back.
+  // A participant that has not heard of it does not bring it back.
   Presence head = presence_of("head", 1, 0);
   head.absent = away.directory.absent();
   base.directory.apply(head, kNow);
@@ -341,7 +342,7 @@ TEST_CASE("what is forgotten is gone, for those as well who were away when it wa
   // It goes on saying so.
   REQUIRE(away.directory.absent().size() == 1);
   CHECK(away.directory.absent()[0].kind == Kind::kForgotten);
-  // What is left of it is late; a new life is not.
+  // Its remaining messages are late; those of a new process are not.
   base.directory.apply(page_of("arm", {{"hand", "", 10}}));
   base.directory.apply(presence_of("arm", 1, 1), kNow);
   CHECK_FALSE(base.directory.owner("arm"));
@@ -397,7 +398,7 @@ TEST_CASE("who is there is not forgotten") {
   CHECK(refused.error().code == Errc::kPartitionTaken);
   CHECK_FALSE(base.directory.forget("base", 1, kNow));
   CHECK(base.owner_of("hand") == "arm");
-  // Nor because another says so.
+  // A report of another participant does not change that either.
   Presence head = presence_of("head", 1, 0);
   head.absent = {{"arm", 0, Kind::kForgotten, 1}};
   base.directory.apply(head, kNow);

@@ -1,5 +1,5 @@
-// That all replicas come to hold the same, whatever owners do at once, and whoever dies and returns
-// meanwhile.
+// All replicas become equal, whatever owners do at the same time, and whichever owners die and
+// return meanwhile.
 
 #include <algorithm>
 #include <array>
@@ -33,10 +33,10 @@ using Said = std::variant<Presence, Page>;
 
 constexpr std::size_t kOwners = 4;
 constexpr std::size_t kSpectator = kOwners;
-constexpr std::size_t kFrames = 12;  // few, so that they are often fought over
+constexpr std::size_t kFrames = 12;  // few, so that owners often compete for them
 
-// Owners that change what they please as far as their own picture allows, hear of each other late,
-// are killed and started again from what they stored; and one who only watches.
+// Owners that make any change that their own replica allows, hear of each other late, and are
+// killed and restarted from their stored state; and one participant that only listens.
 class World {
  public:
   explicit World(Random& random) : random_(random) {

@@ -1,4 +1,4 @@
-// That a replica is a function of what was said, not of the order in which it was heard.
+// A replica is a function of the messages, not of the order of their arrival.
 
 #include <algorithm>
 #include <deque>
@@ -30,9 +30,9 @@ constexpr std::size_t kFrames = 24;
 
 std::string frame(std::size_t number) { return "f" + std::to_string(number); }
 
-// What is said of one life of a partition: pages with frames of the common pool, and a presence.
-// Parents in a first life are any, so that lives contradict each other; in the last one they have
-// lower numbers, so that what remains has no cycle.
+// The messages of one process of a partition: pages with frames of the common pool, and a presence.
+// In a first process any frame may be the parent, so that processes contradict each other. In the
+// last one parents have lower numbers, so that the result has no cycle.
 void live(Random& random, const std::string& partition, std::uint64_t incarnation, bool last,
           std::vector<Said>& said) {
   std::vector<Page> pages(1 + random.index(4));

@@ -1,5 +1,4 @@
-// What a participant has to store, publish, reply and tell because of what it hears and is asked
-// for.
+// What a participant stores, publishes, replies and reports because of messages and requests.
 
 #include "partition/member.hpp"
 
@@ -21,7 +20,7 @@ using testing::Replica;
 constexpr Time kNow{std::chrono::nanoseconds(1000)};
 constexpr PeerId kPeer{7};
 
-// One that serves "arms" with a frame "arm", and has told that.
+// A participant that serves "arms" with a frame "arm", and has announced that.
 struct Serving : Replica {
   explicit Serving(bool stores = true) : Replica("arms"), member(forest, directory, "arms") {
     member.claim("here", 42, kNow, 5);
@@ -97,7 +96,7 @@ TEST_CASE("member: what could not be stored is ready again, but for the replies"
   CHECK_FALSE(arms.ask(2, "hand", AddRequest{"arm", along_x(1)}));
   const Ready ready = arms.member.take_ready();
   CHECK_FALSE(arms.member.not_stored(ready));
-  // Meanwhile changes are refused, and of those that are not stored nothing is told.
+  // Meanwhile changes are rejected, and changes that are not stored are not announced.
   CHECK_FALSE(arms.ask(3, "foot", AddRequest{"", along_x(1)}, kFull));
   CHECK(arms.ask(4, "arms", RemoveRequest{}, kFull)->epoch == epoch);
   const Ready again = arms.member.take_ready();

@@ -150,7 +150,7 @@ TEST_CASE("watch mirror: another route takes over what it has in common with the
   CHECK(next.is_behind(watched.mirror));
   CHECK(next.take({kTools, {}, 11, 12}));
   CHECK_FALSE(next.is_behind(watched.mirror));
-  // Of an owner that has started anew nothing is taken over.
+  // Nothing is taken over from an owner that has restarted.
   other.sources[1] = {"tools", 2, 13, {"tool"}};
   WatchMirror restarted("world", "tool", other, {});
   restarted.inherit(watched.mirror);

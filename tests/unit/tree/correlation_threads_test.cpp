@@ -7,7 +7,7 @@
 #include "support/catch.hpp"
 #include "tree/forest.hpp"
 
-// Readers of edges' correlation, while that is said anew, revised and forgotten.
+// Readers of edges' correlation, while it is declared again, revised and dropped.
 namespace tfdude {
 namespace {
 

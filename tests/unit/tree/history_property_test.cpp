@@ -11,8 +11,8 @@
 #include "support/random.hpp"
 #include "tree/forest.hpp"
 
-// The forest beside one that keeps everything in maps, looks for it anew each time, and knows no
-// limits but by its own arithmetic.
+// Compares the forest with one that keeps everything in maps, searches them each time, and computes
+// its limits independently.
 namespace tfdude {
 namespace {
 

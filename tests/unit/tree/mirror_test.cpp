@@ -1,4 +1,4 @@
-// What one forest tells of its edges, and another takes over.
+// The edges' values that one forest reports, and that another one takes over.
 
 #include <chrono>
 #include <optional>
@@ -22,7 +22,7 @@ using testing::x_of;
 
 Time at(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
 
-// world -> arm -> hand, at an owner and at who follows it.
+// world -> arm -> hand, at an owner and at its watcher.
 struct Followed {
   Followed() {
     for (Forest* forest : {&owner, &mirror}) {

@@ -1,5 +1,4 @@
-// Stamps that cannot be believed: of the future, of a clock that has jumped back, at the ends of
-// the type.
+// Implausible stamps: in the future, from a clock that has jumped back, at the ends of the type.
 
 #include <chrono>
 #include <limits>
