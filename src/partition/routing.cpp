@@ -249,7 +249,8 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
         body_for<LookupRequest>(plan.parts, directory, segment.owner, owned_end(forest, segment));
     body.segments.push_back({segment.from, segment.to});
     body.query = query;
-    // Zero is how "the latest" travels, and before the first instant that is none there are no samples either.
+    // In a message zero means the latest instant. So an instant up to zero becomes the first valid
+    // one: there are no samples before that either.
     if (query.at) body.query.at = std::max(*query.at, kFirstInstant);
     body.hint = hint;
   }

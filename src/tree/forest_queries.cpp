@@ -13,7 +13,8 @@ Forest::~Forest() = default;
 
 namespace {
 
-// Calls visit(edge, from, to) for the edges from a to b, in order; an edge's version is that of its child.
+// Calls visit(edge, from, to) for the edges from a to b, in order; an edge's version is that of its
+// child.
 template <class Visit>
 Result<void> for_each_edge(const Ends& ends, Visit visit) {
   const Version* up = ends.a;
