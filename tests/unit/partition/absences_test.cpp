@@ -10,59 +10,21 @@
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/replica.hpp"
+#include "support/witness.hpp"
 
 namespace tfdude {
 namespace {
 
 using testing::along_x;
+using testing::kNow;
+using testing::kStart;
+using testing::page_of;
 using testing::presence_of;
 using testing::Replica;
+using testing::Witness;
 using Lines = std::vector<std::string>;
 using Kind = Absent::Kind;
 using std::chrono::milliseconds;
-
-constexpr Time kNow{std::chrono::seconds(100)};
-constexpr Absences::Steady kStart{};
-
-Page page_of(const std::string& partition, std::vector<PageEntry> entries,
-             std::uint64_t incarnation = 1) {
-  return {partition, 0, incarnation, incarnation + 1, std::move(entries)};
-}
-
-// A participant that has heard of both who claim "hand"; that of "arm" is the older claim.
-struct Witness : Replica {
-  explicit Witness(const std::string& own = "base") : Replica(own) {
-    directory.changes().watch();
-    hear("arm", 1, 10);
-  }
-  void hear(const std::string& partition, std::uint64_t incarnation, std::uint64_t lamport_time,
-            std::vector<Absent> absent = {}) {
-    Presence presence = presence_of(partition, incarnation, 1);
-    presence.absent = std::move(absent);
-    directory.apply(presence, kNow);
-    directory.apply(page_of(partition, {{"hand", "", lamport_time}}, incarnation));
-  }
-  void lose(const std::string& partition, std::uint64_t incarnation) {
-    CHECK(directory.lost(partition, incarnation, kNow));
-    (void)directory.look_for_gone(kStart);
-  }
-  void wait() {
-    CHECK_FALSE(directory.look_for_gone(kStart + Absences::kGrace / 2));
-    CHECK(directory.look_for_gone(kStart + Absences::kGrace));
-    CHECK(directory.look_for_gone(kStart + Absences::kTakeover));
-  }
-  std::string owner_of(const std::string& id) const {
-    const auto frame = forest.info(id);
-    return frame ? directory.name(frame->owner) : "nobody";
-  }
-  std::vector<std::string> told(ChangeKind kind) {
-    std::vector<std::string> messages;
-    for (const Change& one : directory.changes().take()) {
-      if (one.kind == kind) messages.push_back(one.message);
-    }
-    return messages;
-  }
-};
 
 TEST_CASE("a short silence changes nothing but who is reachable") {
   Witness base;
@@ -317,40 +279,6 @@ TEST_CASE("who is told of a silence waits for its end") {
   CHECK_FALSE(replica.directory.awaits_silent());
 }
 
-TEST_CASE("what is forgotten is gone, for those as well who were away when it was said") {
-  Witness base;
-  base.lose("arm", 1);
-  base.wait();
-  Witness away("head");
-  away.lose("arm", 1);
-  away.wait();
-  REQUIRE(base.directory.forget("arm", 1, kNow));
-  CHECK(base.structure().empty());
-  CHECK_FALSE(base.directory.owner("arm"));
-  CHECK(base.directory.partitions().size() == 1);
-  CHECK_FALSE(base.directory.only_heard_of());
-  // A participant that has not heard of it does not bring it back.
-  Presence head = presence_of("head", 1, 0);
-  head.absent = away.directory.absent();
-  base.directory.apply(head, kNow);
-  CHECK_FALSE(base.directory.owner("arm"));
-  Presence said = presence_of("base", 1, 0);
-  said.absent = base.directory.absent();
-  away.directory.apply(said, kNow);
-  CHECK(away.structure().empty());
-  CHECK_FALSE(away.directory.owner("arm"));
-  // It goes on saying so.
-  REQUIRE(away.directory.absent().size() == 1);
-  CHECK(away.directory.absent()[0].kind == Kind::kForgotten);
-  // Its remaining messages are late; those of a new process are not.
-  base.directory.apply(page_of("arm", {{"hand", "", 10}}));
-  base.directory.apply(presence_of("arm", 1, 1), kNow);
-  CHECK_FALSE(base.directory.owner("arm"));
-  base.hear("arm", 2, 10);
-  CHECK(base.owner_of("hand") == "arm");
-  CHECK(base.directory.absent().empty());
-}
-
 TEST_CASE("who has hung itself has outlived nobody of whose absence it is told late") {
   Witness arms("arms");
   Presence head = presence_of("head", 1, 0);
@@ -361,18 +289,6 @@ TEST_CASE("who has hung itself has outlived nobody of whose absence it is told l
   arms.directory.apply(presence_of("leg", 5, 0), kNow);
   CHECK(arms.directory.absent().empty());
   CHECK_FALSE(arms.directory.any_pending());
-}
-
-TEST_CASE("what was forgotten while it still seemed to be there is forgotten as that ends") {
-  Witness base;
-  Presence head = presence_of("head", 1, 0);
-  head.absent = {{"arm", 0, Kind::kForgotten, 1}};
-  base.directory.apply(head, kNow);
-  const bool lives_anew = GENERATE(false, true);
-  if (lives_anew) base.hear("arm", 2, 10);
-  CHECK(base.directory.lost("arm", lives_anew ? 2 : 1, kNow));
-  CHECK(base.directory.owner("arm").has_value() == lives_anew);
-  CHECK(base.forest.exists("hand") == lives_anew);
 }
 
 TEST_CASE("in a cycle who is there keeps the parent, not who is gone") {
@@ -391,96 +307,6 @@ TEST_CASE("in a cycle who is there keeps the parent, not who is gone") {
   CHECK(base.structure() == Lines{"hand < tool @ arm, attached", "tool <  @ bench"});
 }
 
-TEST_CASE("who is there is not forgotten") {
-  Witness base;
-  const auto refused = base.directory.forget("arm", 1, kNow);
-  REQUIRE_FALSE(refused);
-  CHECK(refused.error().code == Errc::kPartitionTaken);
-  CHECK_FALSE(base.directory.forget("base", 1, kNow));
-  CHECK(base.owner_of("hand") == "arm");
-  // A report of another participant does not change that either.
-  Presence head = presence_of("head", 1, 0);
-  head.absent = {{"arm", 0, Kind::kForgotten, 1}};
-  base.directory.apply(head, kNow);
-  CHECK(base.owner_of("hand") == "arm");
-}
-
-TEST_CASE("a process learns that others know of a later one of its partition") {
-  Replica arm("arm");
-  Presence base = presence_of("base", 1, 0);
-  CHECK_FALSE(arm.directory.hidden_by(5));
-  SECTION("missed") {
-    base.absent = {{"arm", 0, Kind::kLost, 9}};
-    arm.directory.apply(base, kNow);
-    CHECK(arm.directory.hidden_by(5) == 9);
-    CHECK_FALSE(arm.directory.hidden_by(9));
-  }
-  SECTION("itself missed, and forgotten") {
-    base.absent = {{"arm", 0, Kind::kForgotten, 5}};
-    arm.directory.apply(base, kNow);
-    CHECK(arm.directory.hidden_by(5) == 5);
-    CHECK_FALSE(arm.directory.hidden_by(6));
-  }
-}
-
-TEST_CASE("what is dropped for its age is reported, once an incarnation") {
-  Witness base;
-  base.hear("arm", 9, 10);
-  (void)base.directory.take_outdated();
-  for (int times = 0; times < 3; ++times) {
-    base.directory.apply(presence_of("arm", 5, 1), kNow);
-    base.directory.apply(page_of("arm", {}, 5));
-  }
-  const auto dropped = base.directory.take_outdated();
-  REQUIRE(dropped.size() == 1);
-  CHECK(dropped[0].partition == "arm");
-  CHECK(dropped[0].incarnation == 5);
-  CHECK(dropped[0].latest == 9);
-  CHECK(base.owner_of("hand") == "arm");
-}
-
-TEST_CASE("a number of which nobody can tell a partition any more hides it from nobody") {
-  Replica head("head");
-  Presence base = presence_of("base", 1, 0);
-  base.absent = {{"arm", 0, Kind::kSilent, 9}};
-  head.directory.apply(base, kNow);
-  head.directory.apply(presence_of("arm", 5, 1), kNow);
-  CHECK_FALSE(head.directory.serving("arm"));
-  CHECK(head.directory.lost("base", 1, kNow));
-  head.directory.apply(presence_of("arm", 5, 1), kNow);
-  head.directory.apply(page_of("arm", {{"hand", "", 10}}, 5));
-  CHECK(head.directory.serving("arm"));
-  CHECK(head.structure() == Lines{"hand <  @ arm"});
-}
-
-TEST_CASE("a partition is told the highest number that hides it") {
-  Witness base;
-  base.lose("arm", 1);
-  Presence head = presence_of("head", 1, 0);
-  head.absent = {{"arm", 0, Kind::kLost, 9}};
-  base.directory.apply(head, kNow);
-  base.hear("arm", 5, 10);
-  CHECK_FALSE(base.directory.serving("arm"));
-  REQUIRE(base.directory.absent().size() == 1);
-  CHECK(base.directory.absent()[0].incarnation == 9);
-}
-
-TEST_CASE("a process that goes on as a later one is heard again") {
-  Witness base;
-  base.hear("arm", 9, 10);
-  base.lose("arm", 9);
-  Replica arm("arm");
-  Partition partition("arm", 5, arm.forest, arm.directory);
-  REQUIRE(partition.load({{"hand", "", {}}, {"tool", "hand", {}}}, kNow));
-  (void)partition.take_pages();
-  partition.overtake(12);
-  const auto pages = partition.take_pages();
-  REQUIRE(pages.size() == 1);
-  base.directory.apply(presence_of("arm", 12, 1), kNow);
-  base.directory.apply(pages[0]);
-  CHECK(base.structure() == Lines{"hand <  @ arm", "tool < hand @ arm, attached"});
-}
-
 TEST_CASE("a conflict that a returning partition resolves is reported to who has known it") {
   Witness base;
   base.lose("arm", 1);
@@ -491,28 +317,6 @@ TEST_CASE("a conflict that a returning partition resolves is reported to who has
   base.directory.apply(
       Page{"arm", 0, 2, 3, {}, {{"hand", 30, Tombstone::Kind::kYielded, "left_arm"}}});
   CHECK(base.told(ChangeKind::kConflict).size() == 1);
-}
-
-TEST_CASE("who restarts misses whom its predecessor missed") {
-  Replica replica("base");
-  replica.directory.restore(
-      {{"arm", 5, Kind::kBack, 7}, {"leg", 6, Kind::kForgotten, 8}, {"tail", 7, Kind::kSilent, 9}});
-  const auto absent = replica.directory.absent();
-  REQUIRE(absent.size() == 2);
-  CHECK(absent[0] == Absent{"arm", 5, Kind::kLost, 7});
-  CHECK(absent[1].kind == Kind::kForgotten);
-  CHECK(replica.directory.owner("arm"));
-  CHECK_FALSE(replica.directory.owner("leg"));
-  CHECK(replica.directory.latest_incarnation("arm") == 7);
-}
-
-TEST_CASE("absences are bounded") {
-  Absences absences;
-  for (std::size_t i = 0; i < 2 * Absences::kMost; ++i) {
-    absences.resume({"p" + std::to_string(i), static_cast<std::int64_t>(i), Kind::kLost, 1});
-  }
-  CHECK(absences.all().size() == Absences::kMost);
-  CHECK_FALSE(absences.find("p0"));
 }
 
 }  // namespace

@@ -1,0 +1,90 @@
+// Partitions that are gone for good, and the number of absences that are kept.
+
+#include <string>
+#include <vector>
+
+#include "partition/absences.hpp"
+#include "support/catch.hpp"
+#include "support/replica.hpp"
+#include "support/witness.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::kNow;
+using testing::page_of;
+using testing::presence_of;
+using testing::Witness;
+using Kind = Absent::Kind;
+
+TEST_CASE("what is forgotten is gone, for those as well who were away when it was said") {
+  Witness base;
+  base.lose("arm", 1);
+  base.wait();
+  Witness away("head");
+  away.lose("arm", 1);
+  away.wait();
+  REQUIRE(base.directory.forget("arm", 1, kNow));
+  CHECK(base.structure().empty());
+  CHECK_FALSE(base.directory.owner("arm"));
+  CHECK(base.directory.partitions().size() == 1);
+  CHECK_FALSE(base.directory.only_heard_of());
+  // A participant that has not heard of it does not bring it back.
+  Presence head = presence_of("head", 1, 0);
+  head.absent = away.directory.absent();
+  base.directory.apply(head, kNow);
+  CHECK_FALSE(base.directory.owner("arm"));
+  Presence said = presence_of("base", 1, 0);
+  said.absent = base.directory.absent();
+  away.directory.apply(said, kNow);
+  CHECK(away.structure().empty());
+  CHECK_FALSE(away.directory.owner("arm"));
+  // It goes on saying so.
+  REQUIRE(away.directory.absent().size() == 1);
+  CHECK(away.directory.absent()[0].kind == Kind::kForgotten);
+  // Its remaining messages are late; those of a new process are not.
+  base.directory.apply(page_of("arm", {{"hand", "", 10}}));
+  base.directory.apply(presence_of("arm", 1, 1), kNow);
+  CHECK_FALSE(base.directory.owner("arm"));
+  base.hear("arm", 2, 10);
+  CHECK(base.owner_of("hand") == "arm");
+  CHECK(base.directory.absent().empty());
+}
+
+TEST_CASE("what was forgotten while it still seemed to be there is forgotten as that ends") {
+  Witness base;
+  Presence head = presence_of("head", 1, 0);
+  head.absent = {{"arm", 0, Kind::kForgotten, 1}};
+  base.directory.apply(head, kNow);
+  const bool lives_anew = GENERATE(false, true);
+  if (lives_anew) base.hear("arm", 2, 10);
+  CHECK(base.directory.lost("arm", lives_anew ? 2 : 1, kNow));
+  CHECK(base.directory.owner("arm").has_value() == lives_anew);
+  CHECK(base.forest.exists("hand") == lives_anew);
+}
+
+TEST_CASE("who is there is not forgotten") {
+  Witness base;
+  const auto refused = base.directory.forget("arm", 1, kNow);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == Errc::kPartitionTaken);
+  CHECK_FALSE(base.directory.forget("base", 1, kNow));
+  CHECK(base.owner_of("hand") == "arm");
+  // A report of another participant does not change that either.
+  Presence head = presence_of("head", 1, 0);
+  head.absent = {{"arm", 0, Kind::kForgotten, 1}};
+  base.directory.apply(head, kNow);
+  CHECK(base.owner_of("hand") == "arm");
+}
+
+TEST_CASE("absences are bounded") {
+  Absences absences;
+  for (std::size_t i = 0; i < 2 * Absences::kMost; ++i) {
+    absences.resume({"p" + std::to_string(i), static_cast<std::int64_t>(i), Kind::kLost, 1});
+  }
+  CHECK(absences.all().size() == Absences::kMost);
+  CHECK_FALSE(absences.find("p0"));
+}
+
+}  // namespace
+}  // namespace tfdude

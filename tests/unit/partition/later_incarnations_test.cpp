@@ -1,0 +1,112 @@
+// Processes of one partition, one after the other: which of them is heard.
+
+#include <string>
+#include <vector>
+
+#include "partition/partition.hpp"
+#include "support/catch.hpp"
+#include "support/replica.hpp"
+#include "support/witness.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::kNow;
+using testing::page_of;
+using testing::presence_of;
+using testing::Replica;
+using testing::Witness;
+using Lines = std::vector<std::string>;
+using Kind = Absent::Kind;
+
+TEST_CASE("a process learns that others know of a later one of its partition") {
+  Replica arm("arm");
+  Presence base = presence_of("base", 1, 0);
+  CHECK_FALSE(arm.directory.hidden_by(5));
+  SECTION("missed") {
+    base.absent = {{"arm", 0, Kind::kLost, 9}};
+    arm.directory.apply(base, kNow);
+    CHECK(arm.directory.hidden_by(5) == 9);
+    CHECK_FALSE(arm.directory.hidden_by(9));
+  }
+  SECTION("itself missed, and forgotten") {
+    base.absent = {{"arm", 0, Kind::kForgotten, 5}};
+    arm.directory.apply(base, kNow);
+    CHECK(arm.directory.hidden_by(5) == 5);
+    CHECK_FALSE(arm.directory.hidden_by(6));
+  }
+}
+
+TEST_CASE("what is dropped for its age is reported, once an incarnation") {
+  Witness base;
+  base.hear("arm", 9, 10);
+  (void)base.directory.take_outdated();
+  for (int times = 0; times < 3; ++times) {
+    base.directory.apply(presence_of("arm", 5, 1), kNow);
+    base.directory.apply(page_of("arm", {}, 5));
+  }
+  const auto dropped = base.directory.take_outdated();
+  REQUIRE(dropped.size() == 1);
+  CHECK(dropped[0].partition == "arm");
+  CHECK(dropped[0].incarnation == 5);
+  CHECK(dropped[0].latest == 9);
+  CHECK(base.owner_of("hand") == "arm");
+}
+
+TEST_CASE("a number of which nobody can tell a partition any more hides it from nobody") {
+  Replica head("head");
+  Presence base = presence_of("base", 1, 0);
+  base.absent = {{"arm", 0, Kind::kSilent, 9}};
+  head.directory.apply(base, kNow);
+  head.directory.apply(presence_of("arm", 5, 1), kNow);
+  CHECK_FALSE(head.directory.serving("arm"));
+  CHECK(head.directory.lost("base", 1, kNow));
+  head.directory.apply(presence_of("arm", 5, 1), kNow);
+  head.directory.apply(page_of("arm", {{"hand", "", 10}}, 5));
+  CHECK(head.directory.serving("arm"));
+  CHECK(head.structure() == Lines{"hand <  @ arm"});
+}
+
+TEST_CASE("a partition is told the highest number that hides it") {
+  Witness base;
+  base.lose("arm", 1);
+  Presence head = presence_of("head", 1, 0);
+  head.absent = {{"arm", 0, Kind::kLost, 9}};
+  base.directory.apply(head, kNow);
+  base.hear("arm", 5, 10);
+  CHECK_FALSE(base.directory.serving("arm"));
+  REQUIRE(base.directory.absent().size() == 1);
+  CHECK(base.directory.absent()[0].incarnation == 9);
+}
+
+TEST_CASE("a process that goes on as a later one is heard again") {
+  Witness base;
+  base.hear("arm", 9, 10);
+  base.lose("arm", 9);
+  Replica arm("arm");
+  Partition partition("arm", 5, arm.forest, arm.directory);
+  REQUIRE(partition.load({{"hand", "", {}}, {"tool", "hand", {}}}, kNow));
+  (void)partition.take_pages();
+  partition.overtake(12);
+  const auto pages = partition.take_pages();
+  REQUIRE(pages.size() == 1);
+  base.directory.apply(presence_of("arm", 12, 1), kNow);
+  base.directory.apply(pages[0]);
+  CHECK(base.structure() == Lines{"hand <  @ arm", "tool < hand @ arm, attached"});
+}
+
+TEST_CASE("who restarts misses whom its predecessor missed") {
+  Replica replica("base");
+  replica.directory.restore(
+      {{"arm", 5, Kind::kBack, 7}, {"leg", 6, Kind::kForgotten, 8}, {"tail", 7, Kind::kSilent, 9}});
+  const auto absent = replica.directory.absent();
+  REQUIRE(absent.size() == 2);
+  CHECK(absent[0] == Absent{"arm", 5, Kind::kLost, 7});
+  CHECK(absent[1].kind == Kind::kForgotten);
+  CHECK(replica.directory.owner("arm"));
+  CHECK_FALSE(replica.directory.owner("leg"));
+  CHECK(replica.directory.latest_incarnation("arm") == 7);
+}
+
+}  // namespace
+}  // namespace tfdude
