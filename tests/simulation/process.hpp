@@ -31,6 +31,10 @@ struct Surroundings {
   std::function<void(const std::string&)> count;      ///< counts states that should occur sometimes
 };
 
+/// A process as a sender: its number is in the first eight bytes.
+PeerId peer_of(std::uint64_t process);
+std::uint64_t process_of(const PeerId& peer);
+
 /// One process of a participant: the loops that it runs around its Member, in simulated time.
 class Process : public std::enable_shared_from_this<Process> {
  public:
@@ -98,6 +102,9 @@ class Process : public std::enable_shared_from_this<Process> {
   [[nodiscard]] std::vector<std::string> structure() const;
 
  private:
+  static constexpr Instant kPublishEvery = milliseconds(1);
+  static constexpr Instant kSaveValuesEvery = milliseconds(1000);
+
   struct Peer {
     std::optional<Presence> said;
     std::optional<Presence> by_page;

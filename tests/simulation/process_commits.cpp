@@ -1,0 +1,94 @@
+#include <cstddef>
+#include <utility>
+
+#include "simulation/process.hpp"
+
+// What a process stores, publishes and replies, in this order, as CommitLoop does.
+namespace tfdude::simulation {
+namespace {
+
+constexpr Instant kRetryStoring = milliseconds(200);
+
+}  // namespace
+
+void Process::when_stored(std::function<void(const Result<void>&)> then) {
+  if (setting_.disk == nullptr) return then({});
+  waiting_.push_back(std::move(then));
+  ask_commit(Instant(0));
+}
+
+void Process::ask_commit(Instant wait) {
+  if (committing_) {
+    commit_asked_ = true;
+    return;
+  }
+  committing_ = true;
+  later(wait, [this] { commit(); });
+}
+
+// Taken now, on the disk a moment later; a process that is killed meanwhile has stored it or not.
+void Process::commit() {
+  commit_asked_ = false;
+  const auto waiting = std::make_shared<decltype(waiting_)>(std::exchange(waiting_, {}));
+  const auto ready = std::make_shared<Ready>(member_.take_ready());
+  const auto longest = static_cast<std::size_t>(world_.plan.disk.count());
+  const Instant disk(setting_.disk != nullptr ? world_.random.index(longest + 1) : 0);
+  later(disk, [this, ready, waiting] {
+    perform(*ready);
+    const Result<void> stored = failure_ ? tl::unexpected(*failure_) : Result<void>();
+    for (const auto& then : *waiting) then(stored);
+    committing_ = false;
+    if (commit_asked_ || failure_) ask_commit(failure_ ? kRetryStoring : kPublishEvery);
+  });
+}
+
+void Process::perform(const Ready& ready) {
+  Result<void> stored;
+  if (ready.refused) {
+    stored = tl::unexpected(*ready.refused);
+  } else if (setting_.disk != nullptr) {
+    stored = setting_.disk->save(ready.rows);
+    failure_ = stored ? std::nullopt : std::optional<Error>(stored.error());
+  }
+  if (stored || ready.refused) {
+    const auto said = member_.stored(ready);
+    for (const Page& page : ready.pages) {
+      pages_[page.number] = page;
+      world_.network.publish(*this, page);
+    }
+    announce(said);
+  } else {
+    announce(member_.not_stored(ready));
+  }
+  for (const PendingReply& pending : ready.replies) {
+    Reply reply = pending.reply;
+    if (!stored) reply.body = stored.error();
+    world_.network.send(*this, process_of(pending.to),
+                        [reply](Process& there) { there.on_reply(reply); });
+  }
+  react();
+}
+
+void Process::save_values() {
+  later(kSaveValuesEvery, [this] { save_values(); });
+  // One thread does both.
+  if (committing_ || setting_.disk->full) return;
+  auto [edges, commit] = forest_.changed_since(saved_commit_);
+  saved_commit_ = commit;
+  (void)setting_.disk->store.save_values(member_.storable(std::move(edges)), {});
+}
+
+void Process::announce(const std::optional<Presence>& presence) {
+  if (!presence) return;
+  presence_ = *presence;
+  world_.network.publish(*this, *presence);
+}
+
+std::vector<Sample> Process::published() const {
+  std::vector<Sample> all;
+  if (presence_) all.emplace_back(*presence_);
+  for (const auto& [number, page] : pages_) all.emplace_back(page);
+  return all;
+}
+
+}  // namespace tfdude::simulation
