@@ -59,15 +59,13 @@ Result<void> JointCalls::publish(const JointUpdate& update) {
     parts = route_joints(structure_.directory, known);
   }
   if (!parts) return tl::unexpected(std::move(parts.error()));
-  for (const Part& part : *parts) {
-    // Reachable owners get their shares, and the error of an unreachable one is returned.
-    const auto& share = std::get<JointUpdate>(part.request.body);
-    auto sent = requests_.publish(part, share, deadline, [this](const JointUpdate& own) {
-      return member_.apply(own).map([](std::size_t) {});
-    });
-    if (!sent && outcome) outcome = std::move(sent);
-  }
-  return outcome;
+  const auto share_of = [&](std::size_t i) -> const JointUpdate& {
+    return std::get<JointUpdate>((*parts)[i].request.body);
+  };
+  auto sent = requests_.publish(*parts, deadline, share_of, [this](const JointUpdate& own) {
+    return member_.apply(own).map([](std::size_t) {});
+  });
+  return outcome ? sent : outcome;
 }
 
 Result<std::vector<JointInfo>> JointCalls::list(const std::string& partition) {

@@ -109,18 +109,33 @@ class Requests {
   /// stored.
   [[nodiscard]] Result<void> change(std::vector<Part>& parts, const Deadline& deadline);
 
-  /// Sends an owner its share of streamed values, for which there is no reply.
+  /// Sends each owner its share of streamed values, for which there is no reply. Owners that can
+  /// take theirs at once get it first, so none waits for one that is still being discovered.
+  /// @param share_of  the share of the i-th part
   /// @param apply_here  applies the share of this process
-  /// @return kUnreachable if the owner is not reachable; as Transport::send()
-  template <class Message, class Apply>
-  [[nodiscard]] Result<void> publish(const Part& part, const Message& share,
-                                     const Deadline& deadline, Apply apply_here) {
-    if (part.owner == kHeldHere) return apply_here(share);
-    {
-      const Lock lock(structure_.mutex);
-      if (auto ok = check_reachable(structure_.directory, {part}); !ok) return ok;
+  /// @return the first error, after all others were sent theirs: kUnreachable if an owner is not
+  ///   reachable; as Transport::send()
+  template <class ShareOf, class Apply>
+  [[nodiscard]] Result<void> publish(const std::vector<Part>& parts, const Deadline& deadline,
+                                     ShareOf share_of, Apply apply_here) {
+    Result<void> outcome;
+    const auto keep_first = [&outcome](Result<void> sent) {
+      if (!sent && outcome) outcome = std::move(sent);
+    };
+    std::vector<std::size_t> later;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      auto sent = publish_share(parts[i], share_of(i), Deadline(Milliseconds(0)), apply_here);
+      const bool wait = !sent && sent.error().code == Errc::kTimeout;
+      if (wait) {
+        later.push_back(i);
+      } else {
+        keep_first(std::move(sent));
+      }
     }
-    return transport_.send(part.partition, share, deadline.at());
+    for (const std::size_t i : later) {
+      keep_first(publish_share(parts[i], share_of(i), deadline, apply_here));
+    }
+    return outcome;
   }
 
   /// The list that a partition returns.
@@ -153,6 +168,17 @@ class Requests {
   void await_change(const Part& part, const Reply& reply, const Deadline& deadline);
 
  private:
+  template <class Message, class Apply>
+  [[nodiscard]] Result<void> publish_share(const Part& part, const Message& share,
+                                           const Deadline& deadline, Apply apply_here) {
+    if (part.owner == kHeldHere) return apply_here(share);
+    {
+      const Lock lock(structure_.mutex);
+      if (auto ok = check_reachable(structure_.directory, {part}); !ok) return ok;
+    }
+    return transport_.send(part.partition, share, deadline.at());
+  }
+
   void await_structure_change(std::uint64_t version, const Deadline& deadline);
 
   Structure& structure_;

@@ -84,16 +84,14 @@ Result<void> Writes::publish(const std::vector<EdgeUpdate>& edges, std::optional
     return route_publish(structure_.forest, directory, edges, stamp);
   });
   if (!parts) return tl::unexpected(std::move(parts.error()));
-  Result<void> outcome;
+  std::vector<Update> shares;
   for (Part& part : *parts) {
-    const Update share{std::move(std::get<UpdateRequest>(part.request.body).edges), stamp};
-    // Reachable owners get their shares, and the error of an unreachable one is returned.
-    auto sent = requests_.publish(part, share, deadline, [this](const Update& own) {
-      return structure_.forest.update(own.edges, own.stamp);
-    });
-    if (!sent && outcome) outcome = std::move(sent);
+    shares.push_back({std::move(std::get<UpdateRequest>(part.request.body).edges), stamp});
   }
-  return outcome;
+  const auto share_of = [&](std::size_t i) -> const Update& { return shares[i]; };
+  return requests_.publish(*parts, deadline, share_of, [this](const Update& own) {
+    return structure_.forest.update(own.edges, own.stamp);
+  });
 }
 
 Result<void> Writes::correlate(const std::string& id, const Correlation& correlation) {

@@ -30,7 +30,52 @@ struct Writer : Rig {
 const std::vector<FrameSpec> kArm{{"arm", "", {}}, {"hand", "arm", {}}};
 const std::vector<FrameSpec> kLeg{{"leg", "", {}}, {"foot", "leg", {}}};
 
+/// One owner is not met before the deadline.
+class Unmet final : public testing::Relay {
+ public:
+  Unmet(TransportPtr real, std::string owner) : Relay(std::move(real)), owner_(std::move(owner)) {}
+
+  using Relay::send;
+  Result<void> send(const std::string& partition, const Update& update,
+                    Deadline deadline) override {
+    if (partition != owner_) return Relay::send(partition, update, deadline);
+    std::this_thread::sleep_until(deadline);
+    return fail(Errc::kTimeout, partition + " was not met");
+  }
+
+ private:
+  const std::string owner_;
+};
+
 }  // namespace
+
+TEST_CASE("writes: a share that is published does not wait for an owner that is not met yet") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(network, "arm", kArm);
+  ScriptedOwner leg(network, "leg", kLeg);
+  for (const std::string unmet : {"arm", "leg"}) {
+    Rig rig(std::make_unique<Unmet>(network.join(), unmet));
+    Writes writes(rig.structure, rig.discovery, rig.requests, rig.member);
+    REQUIRE(rig.discovery.await(rig.deadline()));
+    Result<void> sent;
+    std::thread publisher([&] {
+      sent = writes.publish({{"hand", along_x(5)}, {"foot", along_x(5)}}, std::nullopt);
+    });
+    const bool leg_is_met = unmet == "arm";
+    const auto start = Deadline::Clock::now();
+    const auto arrived = [&] {
+      return x_of(leg_is_met ? leg.node().lookup("leg", "foot")
+                             : arm.node().lookup("arm", "hand")) == 5;
+    };
+    while (!arrived() && Deadline::Clock::now() - start < 5s) std::this_thread::yield();
+    // The other owner's share is waited for until the call's time is over.
+    CHECK(Deadline::Clock::now() - start < rig.options.timeout / 2);
+    publisher.join();
+    CHECK(outcome(sent) == "timeout");
+    REQUIRE(arm.node().update({{"hand", {}}}));
+    REQUIRE(leg.node().update({{"foot", {}}}));
+  }
+}
 
 TEST_CASE("writes: frames of others are added, moved and removed where they are owned") {
   LoopbackNetwork network;
