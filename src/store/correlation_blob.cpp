@@ -37,7 +37,7 @@ class Writer {
   std::string blob_;
 };
 
-// What there is not enough of is nothing, and makes all of it bad.
+// A value that is cut short reads as zero or empty, and makes the whole blob invalid.
 class Reader {
  public:
   explicit Reader(std::string_view rest) : rest_(rest) {}
@@ -48,7 +48,7 @@ class Reader {
     good_ = good_ && (value == 0 || value == 1);
     return value == 1;
   }
-  // @param most  more than these there cannot be
+  // @param most  a greater count is invalid
   std::uint32_t count(std::size_t most) {
     std::uint32_t value = 0;
     raw(&value, sizeof value);

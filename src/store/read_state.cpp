@@ -16,7 +16,7 @@ using sqlite::Database;
 using sqlite::each_row;
 using sqlite::Statement;
 
-// Of those that are sorted by id; null where there is none.
+// The frames are sorted by id. @return null if there is no such frame
 template <class Frame>
 Frame* find_frame(std::vector<Frame>& frames, const std::string& id) {
   const auto at =
@@ -61,7 +61,7 @@ Result<void> load_tombstones(const Database& database, std::int64_t /*format*/,
     state.tombstones.push_back(*std::move(tombstone));
     return {};
   });
-  // The oldest are the first to go.
+  // The oldest come first, because they are dropped first.
   std::stable_sort(
       state.tombstones.begin(), state.tombstones.end(),
       [](const Tombstone& a, const Tombstone& b) { return a.lamport_time < b.lamport_time; });
@@ -106,7 +106,7 @@ Result<void> load_absent(const Database& database, std::int64_t format, StoredSt
   });
 }
 
-// Each is of a frame, or an entry, that is there.
+// Each correlation must belong to a stored frame or configuration entry.
 Result<void> load_correlations(const Database& database, std::int64_t format, StoredState& state) {
   if (format < kCorrelationFormat) return {};
   const auto nobody = [](const Statement& row) {

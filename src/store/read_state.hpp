@@ -7,7 +7,7 @@
 
 namespace tfdude {
 
-/// All that a file of this format or an older one says. @return kState or kInvalidInput: a row that cannot be.
+/// Reads the whole state from a file of this format. @return kState or kInvalidInput: invalid row
 [[nodiscard]] Result<StoredState> read_state(const sqlite::Database& database, std::int64_t format);
 
 }  // namespace tfdude

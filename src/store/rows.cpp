@@ -12,14 +12,14 @@ constexpr std::uint64_t kLastCount = 1ULL << 63U;
 
 }  // namespace
 
-// No clock comes so far, and what is counted from there on is still greater.
+// No clock reaches this limit, and counting on from it does not overflow.
 Result<std::uint64_t> read_count(const sqlite::Statement& row, int column) {
   const std::uint64_t count = row.number(column);
   if (count > kLastCount) return fail(Errc::kState, "a time of " + std::to_string(count));
   return count;
 }
 
-// What one row says of a frame, and whether that can be. Rows come in the order of their ids.
+// Reads a frame from a row and checks it. Rows come in the order of their ids.
 Result<FrameSpec> read_frame(const sqlite::Statement& row, const std::string& before) {
   FrameSpec frame{row.text(0), row.text(1), {}};
   if (auto ok = check_id(frame.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));

@@ -6,11 +6,11 @@
 #include "partition/state_store.hpp"
 #include "store/sqlite.hpp"
 
-// What the rows of a state say, and whether that can be. @return kState or kInvalidInput, where it cannot
+// Read and check the rows of a state. @return kState or kInvalidInput if a row is invalid
 namespace tfdude {
 
 [[nodiscard]] Result<std::uint64_t> read_count(const sqlite::Statement& row, int column);
-/// Rows come in the order of their ids. @param before  the id of the row before
+/// Rows come in the order of their ids. @param before  the id of the previous row
 [[nodiscard]] Result<FrameSpec> read_frame(const sqlite::Statement& row, const std::string& before);
 [[nodiscard]] Result<Tombstone> read_tombstone(const sqlite::Statement& row,
                                                const std::string& before);

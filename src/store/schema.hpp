@@ -8,14 +8,14 @@ namespace tfdude {
 
 inline constexpr std::int64_t kApplication = 0x74666475;  // "tfdu"
 
-inline constexpr std::int64_t kJointsFormat = 2;  ///< the first that has joints,
-inline constexpr std::int64_t kCorrelationFormat =
-    3;  ///< and the types of these, and what edges' errors have to do with each other,
-inline constexpr std::int64_t kAbsentFormat = 3;  ///< and whom the partition misses
+// The first formats with joints; with joint types and correlations; with absent partitions.
+inline constexpr std::int64_t kJointsFormat = 2;
+inline constexpr std::int64_t kCorrelationFormat = 3;
+inline constexpr std::int64_t kAbsentFormat = 3;
 inline constexpr std::int64_t kFormat = 3;
 
-/// What makes the tables of a format, or those that it has more than an older one. A file with other words than these is
-/// refused: a change of them needs another format.
+/// The SQL that creates the tables of a format, or only those that an older format lacks. A file
+/// whose schema has other words than these is refused, so each change of them needs a new format.
 [[nodiscard]] std::string schema_of(std::int64_t format, std::int64_t older = 0);
 
 }  // namespace tfdude

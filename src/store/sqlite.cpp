@@ -8,10 +8,12 @@
 namespace tfdude::sqlite {
 namespace {
 
-// Longer than any row that is ever written: the correlation of an edge may have 128 common errors of 36 columns, twice.
+// Longer than any row that is ever written: the correlation of an edge may have 128 common errors
+// of 36 columns, twice.
 constexpr int kLongestRow = 1024 * 1024;
 
-// What SQLite says, with the code by which its documentation tells more, and what the system says where that is why.
+// SQLite's message with its error code, which its documentation explains; and the system's message
+// if the system is the cause.
 std::string reason_of(sqlite3* handle) {
   const int code = sqlite3_extended_errcode(handle);
   std::string reason =
@@ -25,7 +27,8 @@ std::string reason_of(sqlite3* handle) {
 
 tl::unexpected<Error> failed(sqlite3* handle) { return fail(Errc::kState, reason_of(handle)); }
 
-// A file may come from anywhere: what its schema says is not to be run, and the file not to be touched by looking.
+// A file may come from anywhere: code in its schema must not run, and reading must not change the
+// file.
 void distrust(sqlite3* handle) {
   constexpr std::array<std::pair<int, int>, 6> kSettings{{{SQLITE_DBCONFIG_DEFENSIVE, 1},
                                                           {SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0},
@@ -89,7 +92,7 @@ Result<void> Database::atomically(const std::function<Result<void>()>& write) {
   auto done = run("BEGIN IMMEDIATE");
   if (done) done = write();
   if (done) done = run("COMMIT");
-  // Some failures have ended it already.
+  // Some failures have already ended the transaction.
   if (!done && sqlite3_get_autocommit(handle_.get()) == 0) (void)run("ROLLBACK");
   return done;
 }
@@ -179,7 +182,7 @@ void Statement::bind(int at, const Flat& flat) {
 }
 
 void Statement::bind(int at, const Blob& blob) {
-  // An empty one is none, not NULL.
+  // An empty blob must not become NULL.
   const char* bytes = blob.bytes.empty() ? "" : blob.bytes.data();
   sqlite3_bind_blob(handle_.get(), at, bytes, static_cast<int>(blob.bytes.size()),
                     SQLITE_TRANSIENT);

@@ -14,28 +14,32 @@
 
 namespace tfdude::sqlite {
 
-/// An open database. Errors are kState and say what SQLite says. Not thread-safe.
+/// An open database. Errors are kState with SQLite's message. Not thread-safe.
 class Database {
  public:
   [[nodiscard]] static Result<Database> open(const std::string& file);
 
-  /// Closes the log of a file that was changed, into the file; before, a file is left as it was found.
+  /// From now on, closing merges the log into the file. Without this call, closing leaves the file
+  /// as it was found.
   void tidy_up_at_close();
 
-  /// Runs statements that give no rows.
+  /// Runs statements that return no rows.
   [[nodiscard]] Result<void> run(const char* sql);
 
-  /// Runs it in a transaction: all that it writes stays, or nothing, and no transaction is left open.
+  /// Runs a function in a transaction: either all of its writes are kept, or none; no transaction
+  /// is left open.
   [[nodiscard]] Result<void> atomically(const std::function<Result<void>()>& write);
 
-  /// The first column of the first row, as a number; 0 where there is no row.
+  /// The first column of the first row, as a number; 0 if there is no row.
   [[nodiscard]] Result<std::int64_t> number(const char* sql);
-  /// The same as text; empty where there is no row.
+  /// The same as text; empty if there is no row.
   [[nodiscard]] Result<std::string> text(const char* sql);
 
-  /// Of a failure just now: whether the file is to blame, not the directory, the disk or the computer.
+  /// Whether the last failure was caused by the file, not by the directory, the disk or the
+  /// computer.
   [[nodiscard]] bool is_damaged() const;
-  /// Whether it could be opened for reading only: its first write would fail for reasons that name none.
+  /// Whether the file could only be opened for reading. Its first write would fail with an error
+  /// that does not name the cause.
   [[nodiscard]] bool is_read_only() const {
     return sqlite3_db_readonly(handle_.get(), "main") == 1;
   }
@@ -49,12 +53,12 @@ class Database {
   std::unique_ptr<sqlite3, Close> handle_;
 };
 
-/// Bytes that are no text.
+/// Bytes that are not text.
 struct Blob {
   std::string bytes;
 };
 
-/// A prepared statement, used again and again.
+/// A prepared statement, used repeatedly.
 class Statement {
  public:
   Statement() = default;
@@ -79,14 +83,15 @@ class Statement {
   }
   [[nodiscard]] Result<bool> next();
 
-  /// That the row is of these types, each SQLITE_INTEGER or the like: a column may hold any. @return kState.
+  /// Checks the types of the row's columns (SQLITE_INTEGER and so on), because a column may hold
+  /// any type. @return kState
   [[nodiscard]] Result<void> check_types(std::initializer_list<int> types) const;
   [[nodiscard]] std::string text(int column) const;
   [[nodiscard]] std::uint64_t number(int column) const;
   [[nodiscard]] double real(int column) const;
-  /// Of a text, or of a blob, all of its bytes.
+  /// All bytes of a text or a blob.
   [[nodiscard]] std::string bytes(int column) const { return text(column); }
-  /// @return kState where the column is not as large as one.
+  /// @return kState if the column does not have the size of a flat transform
   [[nodiscard]] Result<Flat> flat(int column) const;
 
  private:
@@ -102,7 +107,7 @@ class Statement {
   std::unique_ptr<sqlite3_stmt, Finalize> handle_;
 };
 
-/// Calls take(row) for each row that a query gives, up to the first that it refuses.
+/// Calls take(row) for each row that a query returns, up to the first row that it refuses.
 template <class Take>
 Result<void> each_row(const Database& database, const char* sql, Take take) {
   auto rows = Statement::prepare(database, sql);

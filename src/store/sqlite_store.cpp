@@ -76,7 +76,7 @@ class SqliteStore final : public StateStore {
   Statement put_tombstone_;
   Statement set_value_;
   Statement put_configured_;
-  // Of tables that an older format has not got.
+  // For tables that older formats lack.
   Statement put_joint_;
   Statement put_joint_type_;
   Statement erase_correlation_;
@@ -90,7 +90,7 @@ tl::unexpected<Error> SqliteStore::unusable(const std::string& why) const {
   return fail(Errc::kState, "state file " + quote(file_) + " " + why);
 }
 
-// Only what is known to be lost is advised to be moved away.
+// Advises to move the file away only if it is known to be damaged.
 tl::unexpected<Error> SqliteStore::unreadable(const std::string& why) const {
   if (!database_->is_damaged()) {
     return unusable("cannot be used: " + printable(why) + kKeep);
@@ -113,7 +113,7 @@ Result<void> SqliteStore::open(const std::string& partition) {
   return {};
 }
 
-// One process at a time, which then needs no shared memory for the log.
+// Only one process at a time opens the file, so the log needs no shared memory.
 Result<void> SqliteStore::lock() {
   auto locked = database_->run("PRAGMA busy_timeout = 200; PRAGMA locking_mode = EXCLUSIVE;");
   if (locked) locked = database_->run("BEGIN IMMEDIATE; ROLLBACK;");
@@ -123,8 +123,8 @@ Result<void> SqliteStore::lock() {
               : unreadable(locked.error().message);
 }
 
-// Nothing is written before it is known that the file is this partition's, or new; nor are its tables looked into
-// before it is known that they are plain ones.
+// Writes nothing before it is known that the file belongs to this partition or is new. Reads no
+// table before it is known that they are plain tables.
 Result<void> SqliteStore::check(const std::string& partition) {
   if (auto locked = lock(); !locked) return locked;
   const auto application = database_->number("PRAGMA application_id");
@@ -152,7 +152,7 @@ Result<void> SqliteStore::check(const std::string& partition) {
                   ": move it away, or put the right one back");
 }
 
-// The tables are those that were made, and nothing besides: no trigger, view or check that would run.
+// The file must contain exactly the tables of its format: no trigger, view or check that would run.
 Result<void> SqliteStore::check_tables(std::int64_t format) {
   std::string schema;
   const char* sql = "SELECT type, sql FROM sqlite_master ORDER BY rowid";
@@ -298,7 +298,7 @@ Result<void> SqliteStore::save(const StateChange& change) {
 Result<void> SqliteStore::save_absent(const std::vector<Absent>& absent) {
   Result<void> done = clear_absent_.run();
   for (const Absent& one : absent) {
-    // What others have said of themselves may be beyond what can be read again.
+    // Others may have announced a number too large to be read back.
     const std::uint64_t incarnation = std::min(one.incarnation, IncarnationSource::kEnd);
     const auto kind = static_cast<std::uint64_t>(one.kind);
     const auto since = static_cast<std::uint64_t>(one.since);

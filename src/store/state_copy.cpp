@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 constexpr int kAttempts = 20;
 constexpr std::chrono::milliseconds kPause{25};
 
-// A folder of its own, which goes with the object.
+// A temporary folder that is removed with the object.
 class Scratch {
  public:
   Scratch() {
@@ -40,8 +40,9 @@ class Scratch {
   std::string path_;
 };
 
-// What is written goes to the log, and from there to the file: so the file and a log that was copied after it belong together
-// unless the file was written meanwhile. The end of a log that is only half written does not count in SQLite.
+// Writes go to the log first, and from there to the file. So the file and a log that was copied
+// after it are consistent unless the file was written meanwhile. SQLite ignores an incomplete end
+// of a log.
 std::error_code copy_once(const std::string& file, const std::string& copy, bool& kept_still) {
   std::error_code error;
   const auto before = fs::last_write_time(file, error);

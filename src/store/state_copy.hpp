@@ -6,9 +6,10 @@
 
 namespace tfdude {
 
-/// What a state file says, read from a copy of it: the file may be in use by who serves the partition, and is not touched.
-/// Where there is no file nothing is stored.
-/// @return kState as open_sqlite_store(); or that no copy can be made, or that the file does not keep still for one.
+/// Reads a state file from a copy of it, because the partition's owner may be using the file. The
+/// file itself is not changed. If there is no file, the state is empty.
+/// @return kState as open_sqlite_store(); or if no copy can be made, or the file changes during
+///   each attempt to copy it
 [[nodiscard]] Result<StoredState> read_state_copy(const std::string& file,
                                                   const std::string& partition);
 
