@@ -10,27 +10,29 @@
 
 namespace tfdude::fastdds {
 
-/// How a participant enters a domain so that it hears whatever answers it. Nobody answers twice: who is not
-/// heard is met at its next announcement only, and what it told of its endpoints is asked for again after
-/// 70 ms, a time of Fast DDS's built-in readers that cannot be set.
+/// Makes a new participant of a domain receive all answers to its announcement. Nobody answers
+/// twice: a participant whose answer is missed is met only at its next announcement. Its endpoints
+/// are asked for again after 70 ms, a time of Fast DDS's built-in readers that cannot be set.
 ///
-/// - Fast DDS 2.9 announces a participant before it starts to receive (RTPSParticipantImpl::enable). So
-///   nothing is sent until the participant is there, and the first announcement is the next of the initial
-///   ones, some milliseconds later.
-/// - An answer comes to the multicast socket and what follows on it to the unicast one, where another thread
-///   may be faster. So a client does not listen to multicast: all comes to one socket, in order. It
-///   then meets later participants by its own announcements, and other clients not at all.
-/// - A client announces itself every 2 ms at first, later every 100 ms; servers as the profile says.
+/// - Fast DDS 2.9 announces a participant before it starts to receive
+///   (RTPSParticipantImpl::enable). So nothing is sent until the participant is created. The first
+///   announcement sent is the next of the initial ones, some milliseconds later.
+/// - An answer comes to the multicast socket, and the messages after it to the unicast one, where
+///   another thread may be faster. So a client does not listen to multicast: all messages come to
+///   one socket, in order. It then meets later participants by its own announcements, and does not
+///   meet other clients.
+/// - A client announces itself every 2 ms at first, later every 100 ms; a server as set in the
+///   profile.
 class DiscoveryGate {
  public:
-  /// @param gate  what is received over UDP passes it
+  /// @param gate  all datagrams received over UDP pass it
   explicit DiscoveryGate(std::shared_ptr<Gate> gate) : gate_(std::move(gate)) {}
 
-  /// Prepares a participant that is going to be created. Of transports other than UDP, and of discovery that
-  /// the profile has arranged otherwise, all stays as it is.
+  /// Prepares the creation of a participant. Changes neither transports other than UDP, nor
+  /// discovery settings that the profile overrides.
   void prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) const;
 
-  /// The participant is there.
+  /// Lets the participant send: it has been created.
   void open() { open_->store(true, std::memory_order_relaxed); }
 
  private:

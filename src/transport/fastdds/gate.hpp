@@ -6,16 +6,18 @@
 
 namespace tfdude::fastdds {
 
-/// Where a participant's datagrams come in. Fast DDS handles each on the thread that received it, up to our callbacks and to
-/// the matching of what the others have. It reads the listener of an endpoint several times while it matches that, without
-/// the lock under which the listener is taken away as the endpoint is deleted (2.9's EDP.cpp; its issue 3303): a null
-/// pointer is then called. So nothing is handled while an endpoint is deleted, and nothing any more once the participant
-/// leaves.
+/// The entry of a participant's datagrams. Fast DDS handles each on the thread that received it,
+/// including our callbacks and the matching of endpoints. While it matches an endpoint, it reads
+/// the endpoint's listener several times. It does so without the lock under which a deletion of the
+/// endpoint removes the listener (2.9's EDP.cpp; its issue 3303), and then calls a null pointer. So
+/// no datagram is handled while an endpoint is deleted, and none after the participant leaves.
 ///
-/// @par Thread safety  All functions; a datagram that nothing holds up pays for two atomic additions.
+/// @par Thread safety  All functions are thread-safe. Without a pause, a datagram costs two atomic
+///   additions.
 class Gate {
  public:
-  /// Held while a datagram is handled; waits where the gate is shut. False inside: drop it.
+  /// Held while a datagram is handled; its constructor waits while the gate is shut. If it converts
+  /// to false, drop the datagram.
   class Pass {
    public:
     explicit Pass(Gate& gate) : gate_(gate), entered_(gate.enter()) {}
@@ -31,8 +33,8 @@ class Gate {
     const bool entered_;
   };
 
-  /// While one exists no datagram is handled, but one on whose behalf this thread runs. Whoever holds a lock that a callback
-  /// takes must not make one.
+  /// While a Pause exists no datagram is handled, except the one that this thread is handling. Do
+  /// not create one while holding a lock that a callback takes.
   class Pause {
    public:
     explicit Pause(Gate& gate) : gate_(gate) { gate_.shut(); }
@@ -44,7 +46,7 @@ class Gate {
     Gate& gate_;
   };
 
-  /// Drops all that comes from now on; returns when nothing is handled any more.
+  /// Drops all datagrams from now on; returns when none is being handled any more.
   void close();
 
  private:
@@ -55,8 +57,8 @@ class Gate {
   void wait_until_empty(Lock& lock);
 
   std::atomic<int> inside_{0};
-  std::atomic<bool> shut_{false};  // somebody pauses, or it is closed
-  Mutex mutex_;                    // of the rest
+  std::atomic<bool> shut_{false};  // a Pause exists, or the gate is closed
+  Mutex mutex_;                    // guards the rest
   Condition changed_;
   int pauses_ TFDUDE_GUARDED_BY(mutex_) = 0;
   bool closed_ TFDUDE_GUARDED_BY(mutex_) = false;

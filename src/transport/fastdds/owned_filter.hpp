@@ -14,10 +14,10 @@
 
 namespace tfdude::fastdds {
 
-/// The filters between a partition's readers and the wire: they let pass what concerns a frame or joint that the
-/// partition owns, and requests addressed to it by name; they drop what is not well formed. Evaluated at
-/// the reader, on the bytes, against the live set of owned frames: the announced expression, the partition's
-/// name, never changes.
+/// The filters of a partition's readers. They pass messages about a frame or joint that the
+/// partition owns, and requests addressed to it by name. They drop messages that are not well
+/// formed. They are evaluated at the reader, on the bytes, against the current set of owned frames:
+/// the announced expression, the partition's name, never changes.
 class OwnedFilters final : public edds::IContentFilterFactory {
  public:
   /// The name under which the class is registered and announced.

@@ -6,11 +6,12 @@
 
 namespace tfdude::fastdds {
 
-/// A file of profiles whose names are its own. Fast DDS keeps profiles and transports by name for the whole process, the
-/// first of each name: so each file's names get an ending that no other file's have.
+/// Makes the names in a file of profiles unique. Fast DDS keeps profiles and transports by name for
+/// the whole process, the first of each name. So the names of each file get an ending that no other
+/// file has.
 ///
-/// What is not a profile (settings of the log or of the library, types) is taken out, and so is the mark of default
-/// profiles: they would hold for everybody in the process.
+/// Everything that is not a profile is removed (settings of the log or of the library, types), and
+/// so is the mark of default profiles: they would be valid for the whole process.
 /// @param ending  appended to the names of profiles and of transports described there
 /// @return kConfig: not well-formed XML, or without profiles.
 [[nodiscard]] Result<std::string> with_own_names(const std::string& xml, const std::string& ending);

@@ -9,12 +9,13 @@
 
 namespace tfdude::fastdds {
 
-/// QoS by the names of profiles/tfdude.xml, without their prefix ("participant", "call_writer"...): of the file that one
-/// participant named, and where that lacks one, of the built-in profiles. Other participants of the process have their
-/// own.
+/// QoS by the names in profiles/tfdude.xml, without their prefix ("participant", "call_writer"...).
+/// They come from the file that a participant named, and profiles that it lacks from the built-in
+/// ones. Other participants of the process have their own.
 class Profiles {
  public:
-  /// @param file  empty: the built-in profiles alone; kLocalProfile: those confined to this computer
+  /// @param file  empty: only the built-in profiles; kLocalProfile: those restricted to this
+  ///   computer
   /// @return kConfig naming the file.
   [[nodiscard]] static Result<Profiles> load(const std::string& file);
 
@@ -30,7 +31,7 @@ class Profiles {
   template <class Read>
   void fill(const std::string& name, Read read) const;
 
-  // What the names in the process end with.
+  // The endings of the profile names in the process.
   std::string builtin_;
   std::string own_;
 };

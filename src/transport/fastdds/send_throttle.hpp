@@ -8,24 +8,28 @@
 
 namespace tfdude::fastdds {
 
-/// Which hosts are heard, so that little is sent to the others. The kernel keeps what is sent to a neighbour that does
-/// not answer to ARP, three seconds and more, and counts it against the one socket through which Fast DDS
-/// sends: were that full, nothing would go to anybody.
-/// @par Thread safety  All functions; without a lock, as every datagram passes here.
+/// Records which hosts are heard, so that little is sent to the others. If a neighbour does not
+/// answer to ARP, the kernel keeps the data for it three seconds and more, and counts it against
+/// the one socket through which Fast DDS sends. If that were full, nothing could be sent to any
+/// host.
+/// @par Thread safety  All functions are thread-safe, without a lock, as every datagram passes
+///   here.
 class SendThrottle {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Who was not heard for this long...
+  /// A host that was not heard for this long is silent.
   static constexpr std::chrono::milliseconds kSilence{500};
-  /// ...is sent no more than one datagram in this time at each port, by which they meet again. Who only listens is
-  /// silent, too: beats come less often, and each listener has a port for them.
+  /// A silent host is sent at most one datagram in this time at each port, by which they meet again.
+  /// A host that only listens is silent, too. It loses no beats: these come less often, and each
+  /// listener has a port for them.
   static constexpr std::chrono::milliseconds kTryEvery{50};
 
   /// @param host  an IPv4 address
   void heard(std::uint32_t host, Clock::time_point now);
 
-  /// Whether a datagram may be sent; counts it if so. Of more hosts and ports than there is room for, always.
+  /// Whether a datagram may be sent; if so, counts it. Always true for hosts and ports for which
+  /// there is no room.
   [[nodiscard]] bool may_send(std::uint32_t host, std::uint32_t port, Clock::time_point now);
 
  private:
@@ -34,7 +38,7 @@ class SendThrottle {
     std::atomic<std::int64_t> time{0};  // of the clock
   };
 
-  /// The time that is kept for a key, which is made with a first one. Null where there is no room.
+  /// The time stored for a key; a new key gets the first one. Null if there is no room.
   std::atomic<std::int64_t>* find(std::uint64_t key, std::int64_t first);
 
   std::array<Entry, 1024>
