@@ -16,8 +16,8 @@ namespace tfdude {
 
 /// What a participant does with what arrives.
 /// @par Thread safety  Called from the transport's threads, also at the same time; never after
-///   Transport::stop() has returned. The handler may send and reply from on_request() only, and must
-///   not wait for anything that arrives later.
+///   Transport::stop() has returned. The handler may send and reply only from on_request(), and
+///   must not wait for anything that arrives later.
 class TransportHandler {
  public:
   virtual ~TransportHandler() = default;

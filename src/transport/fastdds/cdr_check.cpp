@@ -4,7 +4,8 @@ namespace tfdude::fastdds {
 namespace detail {
 
 CdrWalk::CdrWalk(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {
-  // The encapsulation: two bytes of kind (0: big-endian, 1: little-endian plain CDR), two of options.
+  // The encapsulation: two bytes of kind (0: big-endian, 1: little-endian plain CDR), two of
+  // options.
   constexpr std::size_t kHeader = 4;
   if (data == nullptr || size < kHeader || data[0] != 0 || data[1] > 1) {
     good_ = false;

@@ -6,9 +6,10 @@
 
 #include "partition/messages.hpp"
 
-// Reads the bytes of samples without deserializing them: whether they are well formed (every length within
-// the bytes that are there and within the bounds of idl/tfdude.idl), and what a filter needs of them. The
-// generated code checks neither bounds nor discriminators, and allocates what a length says.
+// Reads the bytes of DDS samples without deserializing them: whether they are well formed (every
+// length within the bytes present and within the bounds of idl/tfdude.idl), and the fields that a
+// filter needs. The generated code checks neither bounds nor discriminators, and allocates whatever
+// size a length says.
 namespace tfdude::fastdds {
 
 [[nodiscard]] bool well_formed_request(const std::uint8_t* data, std::size_t size);
@@ -46,7 +47,7 @@ template <class Predicate>
 
 namespace detail {
 
-/// Walks over CDR (plain, either byte order). Past the end, or out of bounds, all further steps fail.
+/// Reads plain CDR of either byte order. After the end or a violated bound, all further steps fail.
 class CdrWalk {
  public:
   CdrWalk(const std::uint8_t* data, std::size_t size);

@@ -10,8 +10,8 @@
 #include "partition/messages.hpp"
 #include "transport/fastdds/compat.hpp"
 
-// Between the messages of the partition layer and what travels. What comes in is checked field by field: an
-// error says which frame and field.
+// Converts between the messages of the partition layer and those on the network. Received messages
+// are checked field by field: an error names the frame and the field.
 namespace tfdude::fastdds {
 
 /// One that is absent travels as 0.
@@ -19,8 +19,8 @@ namespace tfdude::fastdds {
   return stamp ? nanoseconds(*stamp) : 0;
 }
 
-/// Into a sample that may have been used before: the generated union has a place for every kind of request, some
-/// 1.5 KB, which take longer to make than to fill.
+/// Fills a DDS sample that may have been used before: the generated union has a member for every
+/// kind of request, some 1.5 KB, which takes longer to create than to fill.
 void write_wire(const Request& request, std::string_view partition, wire::Request& sample);
 /// Likewise, without allocating where the sample has held as many edges or joints of names as long.
 void write_wire(const Update& update, wire::Update& sample);

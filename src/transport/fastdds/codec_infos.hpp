@@ -3,8 +3,8 @@
 #include "partition/messages.hpp"
 #include "transport/fastdds/compat.hpp"
 
-// What owners tell of their edges and joints, from what travels. Names are for people to read: whatever a sender has put
-// into them can be shown.
+// Converts what owners report of their edges and joints from the network. Names are for people to
+// read: whatever a sender has put into them can be shown.
 namespace tfdude::fastdds {
 
 [[nodiscard]] EdgeConsistency read_consistency(const wire::EdgeConsistency& body);

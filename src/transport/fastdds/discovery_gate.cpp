@@ -25,7 +25,8 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   std::shared_ptr<SendThrottle> reach = std::make_shared<SendThrottle>();
 };
 
-// Of another computer; else 0: groups have no neighbours to wait for, and this computer is always there.
+// The address if it is another computer, otherwise 0: multicast groups need no ARP, and this
+// computer is always reachable.
 std::uint32_t host_of(const ertps::Locator_t& locator) {
   const ertps::octet* address = ertps::IPLocator::getIPv4(locator);
   if (address[0] == 127 || address[0] >= 224) return 0;
@@ -84,8 +85,8 @@ void hear_by_unicast_only(edds::DomainParticipantQos& qos, std::uint32_t domain)
   builtin.initialPeersList.push_back(group);
 }
 
-// Whoever enters to ask does not wait for its next announcement; there are few of them at a time, and not for
-// long, where each server's announcement is heard by all.
+// A client announces itself often, so that it need not wait long for its next announcement. There
+// are few clients at a time, and not for long, while each server's announcement is heard by all.
 void announce_eagerly(edds::DomainParticipantQos& qos) {
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.initial_announcements.period = {0, 2'000'000};

@@ -18,7 +18,7 @@
 #include "transport/fastdds/growing_stamp.hpp"
 #include "transport/fastdds/profiles.hpp"
 
-// DDS entities with a lifetime. Each may be null inside where the library could not make it: good() tells.
+// DDS entities with a lifetime. If the library could not create one, it is null inside: see good().
 namespace tfdude::fastdds {
 
 using Deadline = std::chrono::steady_clock::time_point;
@@ -35,8 +35,8 @@ struct Context {
 class Writer final : public edds::DataWriterListener {
  public:
   /// @param partition  DDS partition; empty: the default one
-  /// @param on_reader  called when one more reader has been met: what is written from now on reaches it. From a thread of
-  ///   the library, which may hold locks
+  /// @param on_reader  called when one more reader was matched: data written from now on reaches
+  ///   it. Called by a thread of the library, which may hold locks
   Writer(const Context& context, edds::Topic& topic, const std::string& partition,
          const std::string& profile, std::function<void()> on_reader = nullptr);
   ~Writer() override;
@@ -54,8 +54,8 @@ class Writer final : public edds::DataWriterListener {
   /// A sample of the topic's type. Thread-safe.
   bool write(void* sample);
 
-  /// Of a reliable writer: waits until all that was written is acknowledged. False at the deadline, and where nobody is left
-  /// who could do that.
+  /// For a reliable writer: waits until everything written is acknowledged. False at the deadline,
+  /// or if no reader is left that could acknowledge.
   [[nodiscard]] bool flush(Deadline deadline);
 
   void on_publication_matched(edds::DataWriter*,
@@ -74,8 +74,8 @@ class Writer final : public edds::DataWriterListener {
   GrowingStamp source_stamp_;                // under writing_
 };
 
-/// A reader with a subscriber of its own, hence in a DDS partition of its own. Samples are handed on one at a
-/// time, those of one writer in the order in which they were written.
+/// A reader with its own subscriber, hence in its own DDS partition. It passes DDS samples on one
+/// at a time, those of one writer in the order in which they were written.
 template <class Sample>
 class Reader : public edds::DataReaderListener {
  public:

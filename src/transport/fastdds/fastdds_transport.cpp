@@ -58,8 +58,8 @@ Result<void> FastDdsTransport::create_participant() {
   edds::DomainParticipantQos qos = profiles_->participant();
   qos.name(participant_name(options_.partition));
   qos.properties().properties().emplace_back("fastdds.ignore_local_endpoints", "true");
-  // Fast DDS 3 describes types to the others in a way that Cyclone DDS takes for other types than its own; without, it goes
-  // by their names.
+  // Fast DDS 3 announces type descriptions that Cyclone DDS takes for types other than its own.
+  // Without them, it compares only the names.
   qos.properties().properties().emplace_back("fastdds.type_propagation", "disabled");
   take_lease(qos);
   if (!options_.discovery_server.empty()) {
@@ -169,7 +169,8 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
   auto* joints = create_filtered(topics_.joint, partition);
   if (requests == nullptr || updates == nullptr || joints == nullptr)
     return not_created("the filtered topics");
-  // A peer that meets our reader is going to ask: its reply's writer is made while its request travels.
+  // A peer that matches our reader is going to ask: the writer for its replies is created while its
+  // request is on the way.
   const auto asker_matched = [this](const Prefix& from, int change) {
     if (change > 0) worker_->post([this, peer = peer_of(from)] { open_reply_writer(peer); });
   };
@@ -200,7 +201,8 @@ void FastDdsTransport::stop() {
   if (presence_writer_ != nullptr) {
     (void)presence_writer_->flush(std::chrono::steady_clock::now() + kLastWord);
   }
-  // From here on nothing is matched while endpoints go (see Gate); then whoever makes and deletes them, too.
+  // From here on nothing is matched while endpoints are deleted (see Gate). Then the worker that
+  // creates and deletes them stops, too.
   gate_->close();
   worker_->stop();
   participant_->set_listener(nullptr);
@@ -233,9 +235,10 @@ void FastDdsTransport::announce(const Presence& presence) {
   presence_writer_->write(&*said_);
 }
 
-// Each time it looks who has fallen silent; every second time it speaks, among many every third, since what all hear of
-// all grows with the square. That is a beat that may be lost, as the next one follows; how many it hears is in that
-// alone, as it changes often just when there is most to do.
+// Each call checks who is silent. Every second call sends a beat, or every third among many
+// participants, since the traffic of all beats grows with the square. A beat may be lost, as the
+// next one follows. Only the beat says how many servers this one hears, because that number changes
+// often just when there is most to do.
 void FastDdsTransport::keep_in_touch() {
   peers_.look_for_silent(Peers::Clock::now());
   const auto heard = peers_.heard_count();
@@ -346,7 +349,8 @@ void FastDdsTransport::met(const ertps::GuidPrefix_t& prefix, const std::string&
   worker_->post([this, peer = peer_of(prefix)] { there_.insert(peer); });
 }
 
-// A callback may hold the writer still; the worker then waits for it, so as to be the one who deletes it.
+// A callback may still hold the writer. The worker then waits for it, so that the worker deletes
+// it.
 void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
   peers_.left(prefix);
   worker_->post([this, peer = peer_of(prefix)] {

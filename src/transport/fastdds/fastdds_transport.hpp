@@ -19,9 +19,9 @@
 
 namespace tfdude::fastdds {
 
-/// Requests and updates travel in the DDS partition named like the tf-dude partition, replies in one of the
-/// peer's own, presence and directory in the default one. A sender keeps a writer for each partition, and
-/// an owner one for each peer, so that whatever is sent reaches only whom it concerns.
+/// Requests and updates are sent in the DDS partition named like the tf-dude partition, replies in
+/// one of the peer's own, presence and directory in the default one. A sender keeps a writer for
+/// each partition, and an owner one for each peer, so messages reach only those concerned.
 class FastDdsTransport final : public Transport {
  public:
   explicit FastDdsTransport(FastDdsOptions options);

@@ -11,8 +11,8 @@ thread_local const Gate* entered = nullptr;
 
 }  // namespace
 
-// Who enters counts itself before it looks whether the gate is shut, and who shuts it looks the other way round: so one of
-// the two sees the other (both are sequentially consistent).
+// enter() counts itself before it reads whether the gate is shut; shut() does these in the opposite
+// order. So at least one of the two sees the other (all accesses are sequentially consistent).
 bool Gate::enter() {
   while (true) {
     inside_.fetch_add(1);

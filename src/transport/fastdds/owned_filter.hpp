@@ -7,8 +7,8 @@
 #include "transport/fastdds/compat.hpp"
 #include "transport/port.hpp"
 
-// The library's interfaces have no virtual destructor; the classes here are final and never deleted through
-// them. NOLINTBEGIN(cppcoreguidelines-virtual-class-destructor)
+// The library's interfaces have no virtual destructor; the classes here are final and never deleted
+// through them. NOLINTBEGIN(cppcoreguidelines-virtual-class-destructor)
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wnon-virtual-dtor"
 

@@ -24,35 +24,38 @@ namespace tfdude::fastdds {
 /// The name a participant announces: whether it serves a partition, and which.
 [[nodiscard]] std::string participant_name(const std::string& partition);
 
-/// Who was met, what each said that it serves, and who has fallen silent. Thread-safe; what is told is told
-/// under a lock, so that of one peer all is told in order: whoever is told must not hold a lock of its own
-/// when it asks here.
+/// The participants that were met, what each announced that it serves, and which are silent.
+/// Thread-safe. The callbacks run under a lock, so that those about one peer come in order. Code
+/// that a callback runs must not hold a lock of its own when it calls functions here.
 ///
-/// Each server says what it serves when that changes, reliably, and again and again as a beat that may be lost, to
-/// readers with sockets of their own, which no other traffic fills: of a reliable stream, what follows a lost
-/// sample is late, too. Leases of Fast DDS 2.9 are not used for this: a short one of a participant ends the
-/// match on the side only that was starved, and the other's count of acknowledgements, an old one, keeps it
-/// from being renewed; and liveliness of a topic is renewed by any participant (issue 4373).
+/// Each server announces reliably what it serves when that changes. It also repeats this
+/// periodically as a beat, which may be lost. Readers of beats have their own sockets, which no
+/// other traffic fills. Beats are not reliable because in a reliable stream a lost DDS sample also
+/// delays those after it. Leases of Fast DDS 2.9 are not used for this: a short lease of a
+/// participant ends the match only on the side that was starved, and the outdated acknowledgement
+/// count of the other side prevents its renewal; and liveliness of a topic is renewed by any
+/// participant (issue 4373 of Fast DDS).
 class Peers {
  public:
   using Clock = std::chrono::steady_clock;
   using Tell = std::function<void(const Presence&)>;
 
-  /// Whatever answers a newcomer has answered, as a rule, once nobody new was met for this long.
+  /// If nobody new was met for this long, usually all have answered a new participant.
   static constexpr std::chrono::milliseconds kQuiet{200};
 
-  /// How often a server says that it is there. Seven beats must be lost before it counts as gone after the usual 450 ms.
+  /// The period of a server's beats. Seven must be lost before it counts as lost after the usual
+  /// 450 ms.
   static constexpr std::chrono::milliseconds kSpeakEvery{60};
 
-  /// @param there  a peer said what it serves, or is heard again
-  /// @param gone   a peer that had said so, or sent a page, has left or fallen silent; of one that sent only pages, with
-  ///               what these say of it
+  /// @param there  a peer announced what it serves, or is heard again
+  /// @param gone   a peer that had announced this, or sent a page, has left or is silent; if it
+  ///               sent only pages, the presence contains what these say of it
   Peers(Tell there, Tell gone) : there_(std::move(there)), gone_(std::move(gone)) {}
 
-  /// To be called before anybody is met.
-  /// @param silence     whoever has not been heard for this long counts as gone
-  /// @param first_beat  how long its first beat may take, whose way DDS may have to find still when the presence has
-  ///                    come already
+  /// Call before anybody is met.
+  /// @param silence     a peer that was not heard for this long counts as lost
+  /// @param first_beat  how long a peer's first beat may take: DDS may still be matching its
+  ///                    endpoints when the presence has already arrived
   /// @param is_server   the others count this participant, too
   void configure(std::chrono::nanoseconds silence, std::chrono::nanoseconds first_beat,
                  bool is_server) {
@@ -63,31 +66,31 @@ class Peers {
 
   void met(const ertps::GuidPrefix_t& prefix, const std::string& name);
   void left(const ertps::GuidPrefix_t& prefix);
-  /// @param peers  how many other servers that one hears
-  /// @param beat   whether this is said again and again
+  /// @param peers  number of other servers that the sender hears
+  /// @param beat   whether this is repeated periodically
   void present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers,
                bool beat);
-  /// A server sent a page, which may come before what it says of itself.
+  /// A server sent a page, which may arrive before its presence.
   void sent_page(const ertps::GuidPrefix_t& prefix, const Page& page);
-  /// A server sent something else: a sign of life, should what it says of itself be late.
+  /// A server sent another message: it is alive, even if its presence is late.
   void heard(const ertps::GuidPrefix_t& prefix);
 
-  /// Tells who has fallen silent since the last time. Whoever looks late was kept from hearing, too, and
-  /// does not hold that against the others.
+  /// Reports the peers that became silent since the last call. A late call means that this process
+  /// was prevented from receiving, too, so that delay is not counted as silence of the others.
   void look_for_silent(Clock::time_point now);
 
   /// How many servers are heard.
   [[nodiscard]] std::uint32_t heard_count() const;
 
-  /// Whether whoever served this partition has fallen silent.
+  /// Whether the server of this partition is silent.
   [[nodiscard]] bool silent(const std::string& partition) const;
 
-  /// Whether some server was met, nobody new for a while, all servers have said what they serve, and none hears
-  /// more others than this participant knows.
+  /// Whether some server was met, nobody new for kQuiet, all servers have announced what they
+  /// serve, and none hears more others than this participant knows.
   [[nodiscard]] bool discovered() const;
 
-  /// Whether some server was met that has not said yet what it serves. One that has sent a page, and then nothing more for
-  /// as long as a first beat may take, is not waited for.
+  /// Whether some server was met that has not announced yet what it serves. A server that has sent
+  /// a page, and then nothing for as long as a first beat may take, is not waited for.
   [[nodiscard]] bool awaits_presence() const;
 
  private:
@@ -96,7 +99,7 @@ class Peers {
 
   struct Server {
     std::optional<Presence> presence;
-    std::optional<Presence> by_page;  // what its pages say, before there is a presence as late
+    std::optional<Presence> by_page;  // from its pages, until a presence as new arrives
     std::size_t peers = 0;
     Clock::time_point last_heard;
     bool beats = false;

@@ -11,8 +11,8 @@
 
 namespace tfdude::fastdds {
 
-/// Values pushed to watchers: each group of them has a DDS partition, so that who does not watch is sent nothing,
-/// and who watches the same shares one writer. Thread-safe.
+/// Values pushed to watchers. Each group of watchers has its own DDS partition, so others are sent
+/// nothing, and those that watch the same edges share one writer. Thread-safe.
 class PushChannels {
  public:
   struct Calls {

@@ -20,9 +20,9 @@ class SendThrottle {
 
   /// A host that was not heard for this long is silent.
   static constexpr std::chrono::milliseconds kSilence{500};
-  /// A silent host is sent at most one datagram in this time at each port, by which they meet again.
-  /// A host that only listens is silent, too. It loses no beats: these come less often, and each
-  /// listener has a port for them.
+  /// A silent host is sent at most one datagram in this time at each port, by which they meet
+  /// again. A host that only listens is silent, too. It loses no beats: these come less often, and
+  /// each listener has a port for them.
   static constexpr std::chrono::milliseconds kTryEvery{50};
 
   /// @param host  an IPv4 address

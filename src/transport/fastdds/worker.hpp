@@ -9,8 +9,8 @@
 
 namespace tfdude::fastdds {
 
-/// A thread that does what must not be done in a DDS callback, creating and deleting entities, and what
-/// is to be done again and again.
+/// A thread for work that is not allowed in a DDS callback, such as creating and deleting entities,
+/// and for periodic work.
 class Worker {
  public:
   Worker() : thread_([this] { run(); }) {}

@@ -109,7 +109,8 @@ class LoopbackNetwork::Hub {
     return all;
   }
 
-  // Held while presences and pages are told, so that who joins hears nothing older after something newer.
+  // Held while presences and pages are delivered, so that a joining participant gets nothing older
+  // after something newer.
   Mutex telling_mutex_{LockRank::kReporting};
   Mutex members_mutex_;  // of the list and of what the members say; never held during a call
 
