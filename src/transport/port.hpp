@@ -14,7 +14,7 @@
 
 namespace tfdude {
 
-/// What a participant does with what arrives.
+/// Handles the messages that a participant receives.
 /// @par Thread safety  Called from the transport's threads, also at the same time; never after
 ///   Transport::stop() has returned. The handler may send and reply only from on_request(), and
 ///   must not wait for anything that arrives later.

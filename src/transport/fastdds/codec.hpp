@@ -14,7 +14,7 @@
 // are checked field by field: an error names the frame and the field.
 namespace tfdude::fastdds {
 
-/// One that is absent travels as 0.
+/// An absent one is sent as 0.
 [[nodiscard]] inline std::int64_t wire_stamp(std::optional<Time> stamp) {
   return stamp ? nanoseconds(*stamp) : 0;
 }

@@ -6,7 +6,7 @@
 #include "partition/messages.hpp"
 #include "transport/fastdds/compat.hpp"
 
-// Pieces that several messages have, from what travels.
+// Converts parts that several messages have from the network.
 namespace tfdude::fastdds {
 
 [[nodiscard]] inline std::string_view text(const wire::Identifier& id) {

@@ -12,7 +12,7 @@
 #include "transport/fastdds/codec_partial.hpp"
 #include "transport/fastdds/kinds.hpp"
 
-// From what travels.
+// Converts messages from the network.
 namespace tfdude::fastdds {
 namespace {
 

@@ -5,7 +5,7 @@
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_correlation.hpp"
 
-// The structure, from what travels.
+// Converts the structure from the network.
 namespace tfdude::fastdds {
 namespace {
 

@@ -6,7 +6,7 @@
 #include "transport/fastdds/codec_partial.hpp"
 #include "transport/fastdds/kinds.hpp"
 
-// Into what travels.
+// Converts messages for the network.
 namespace tfdude::fastdds {
 namespace {
 

@@ -121,10 +121,9 @@ class ParticipantListener final : public edds::DomainParticipantListener {
   Observer& observer_;
 };
 
-/// A generated type that checks payloads before it deserializes them, and refuses those that are not
-/// well formed. Its key is
-/// computed without the buffer that the generated code shares between threads. It
-/// preallocates for usual samples, not for the largest.
+/// A generated type that refuses payloads that are not well formed before it deserializes them. Its
+/// key is computed without the buffer that the generated code shares between threads. It
+/// preallocates for usual DDS samples, not for the largest.
 template <class Generated, bool (*WellFormed)(const std::uint8_t*, std::size_t)>
 class CheckedType final : public Generated {
  public:

@@ -314,7 +314,7 @@ Result<void> FastDdsTransport::flush(Deadline deadline) {
   for (auto& stream : joint_writers_.all()) streams.push_back(std::move(stream));
   Result<void> outcome;
   for (const auto& [partition, stream] : streams) {
-    // Who is silent is not waited for; what it had acknowledged before is none the less.
+    // A silent peer is not waited for; what it has acknowledged before still counts.
     const bool silent = peers_.silent(partition);
     if (stream->flush(silent ? Deadline() : deadline) || !outcome) continue;
     outcome =

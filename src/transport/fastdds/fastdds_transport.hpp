@@ -115,7 +115,7 @@ class FastDdsTransport final : public Transport {
     return std::make_shared<Writer>(context(), *topics_.reply, reply_partition(peer),
                                     "call_writer");
   }};
-  std::set<PeerId> there_;  // who was met and has not left; only the worker's
+  std::set<PeerId> there_;  // peers that were met and have not left; only for the worker
 
   std::unique_ptr<OwnedFilters> filters_;
   std::unique_ptr<Writer> presence_writer_;

@@ -45,7 +45,7 @@ void rename(XMLElement& profiles, const std::string& ending) {
       child.SetAttribute("profile_name", (name + ending).c_str());
     }
   });
-  // Others are of whoever described them.
+  // Other names belong to whoever described them.
   for_each_transport(profiles, [&](XMLElement& id) {
     const std::string name = text_of(id);
     if (described.count(name) != 0) id.SetText((name + ending).c_str());

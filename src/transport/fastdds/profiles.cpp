@@ -36,7 +36,7 @@ std::string builtin_text(const char* profiles) {
 
 // Loads profiles into the process under unique names. They are identified by their text: the same
 // text is loaded once, and an edited file is loaded again.
-// @return what their names end with
+// @return the ending of their names
 Result<std::string> make_known(const std::string& xml) {
   static Mutex mutex;
   static std::map<std::string, std::string> known;  // endings
@@ -106,9 +106,8 @@ edds::DataWriterQos Profiles::writer(edds::Publisher& publisher, const std::stri
   // of a core, and 32 daemons that start at once send a quarter of the packets.
   if (name == "update_writer" || name == "directory_writer")
     qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
-  // Writers evaluate no filters: in Fast DDS 2.9 and 3.1 the map of filters is changed without a
-  // lock
-  // while a write goes through it, and crashes as readers come and go.
+  // Writers evaluate no filters: Fast DDS 2.9 and 3.1 change the map of filters without a lock
+  // while a write iterates over it, and crash when readers come and go.
   qos.writer_resource_limits().reader_filters_allocation.initial = 0;
   qos.writer_resource_limits().reader_filters_allocation.maximum = 0;
   qos.endpoint().history_memory_policy = kMemoryPolicy;
@@ -121,7 +120,7 @@ edds::DataReaderQos Profiles::reader(edds::Subscriber& subscriber, const std::st
     return subscriber.get_datareader_qos_from_profile(profile, qos);
   });
   qos.endpoint().history_memory_policy = kMemoryPolicy;
-  // A socket of its own, that other traffic does not fill: else the living would seem dead.
+  // Its own socket, which other traffic does not fill: otherwise live servers would seem lost.
   if (name == "beat_reader") {
     qos.properties().properties().emplace_back("fastdds.unique_network_flows", "");
   }

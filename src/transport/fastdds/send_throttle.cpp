@@ -36,7 +36,7 @@ void SendThrottle::heard(std::uint32_t host, Clock::time_point now) {
 
 bool SendThrottle::may_send(std::uint32_t host, std::uint32_t port, Clock::time_point now) {
   const std::int64_t at = ticks(now.time_since_epoch());
-  // Nobody is silent who had no time to speak.
+  // A host that is checked for the first time counts as heard now: it had no time to send yet.
   const auto* known = find(key_of(host, 0), at);
   if (known == nullptr) return true;
   if (at - known->load(std::memory_order_relaxed) < ticks(kSilence)) return true;

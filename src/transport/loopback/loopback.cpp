@@ -15,7 +15,7 @@
 
 namespace tfdude {
 
-/// Who is there, and what late joiners must be told.
+/// The members, and what those that join late must get.
 class LoopbackNetwork::Hub {
  public:
   struct Member {
@@ -97,7 +97,7 @@ class LoopbackNetwork::Hub {
             });
   }
 
-  /// What all others have announced and published, for one who joins.
+  /// All announced and published messages of the others, for a new member.
   std::pair<std::vector<Presence>, std::vector<Page>> published(const Member& except) {
     std::pair<std::vector<Presence>, std::vector<Page>> all;
     const Lock lock(members_mutex_);
