@@ -260,7 +260,7 @@ class SendFilter : public etransport::ChainingTransport {
   [[nodiscard]] virtual bool may_send(const ertps::Locator_t& to) const = 0;
   virtual void heard(const ertps::Locator_t& from) const = 0;
 
-  // What may not be sent counts as sent, as what is lost on the way does.
+  // A datagram that may not be sent counts as sent, like one that is lost on the way.
   template <class Send>
   bool send_to(ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end, Send send) const {
     thread_local std::vector<ertps::Locator_t> destinations;  // kept for its memory

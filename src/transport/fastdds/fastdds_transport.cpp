@@ -89,7 +89,8 @@ Result<void> FastDdsTransport::create_participant() {
   return {};
 }
 
-// The profile's lease is for what is noticed here; DDS itself keeps a match for longer (see Peers).
+// The profile's lease is used only to detect loss here; DDS itself keeps a match for longer (see
+// Peers).
 void FastDdsTransport::take_lease(edds::DomainParticipantQos& qos) {
   auto& lease = qos.wire_protocol().builtin.discovery_config.leaseDuration;
   const auto silence =

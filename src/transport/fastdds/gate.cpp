@@ -30,7 +30,7 @@ void Gate::leave() {
   entered = nullptr;
   inside_.fetch_sub(1);
   if (!shut_.load()) return;
-  // The lock keeps the notice from falling between the other's look and its sleep.
+  // The lock prevents a notification between the other thread's check and its sleep.
   { const Lock lock(mutex_); }
   changed_.notify_all();
 }
