@@ -144,7 +144,7 @@ class Reader : public edds::DataReaderListener {
 
   const Context context_;
   const Calls calls_;
-  Mutex mutex_{LockRank::kReceiving};  // the library may call from several threads
+  Mutex mutex_{LockRank::kReceiving};                  // the library may call from several threads
   std::deque<Taken> batch_ TFDUDE_GUARDED_BY(mutex_);  // kept, for their memory
   edds::Subscriber* subscriber_ = nullptr;
   edds::DataReader* reader_ = nullptr;

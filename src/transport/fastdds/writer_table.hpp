@@ -12,8 +12,8 @@
 namespace tfdude::fastdds {
 
 /// The writers of one topic, one for each partition or peer.
-/// @par Thread safety  All functions are thread-safe. find() may be called in callbacks of Fast DDS,
-///   since it does not wait while a writer is created.
+/// @par Thread safety  All functions are thread-safe. find() may be called in callbacks of Fast
+///   DDS, since it does not wait while a writer is created.
 template <class Key>
 class WriterTable {
  public:

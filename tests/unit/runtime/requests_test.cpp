@@ -32,8 +32,8 @@ Result<void> add_finger(Rig& rig, const Deadline& deadline) {
   return rig.requests.retry_on_stale_route(
       deadline,
       [&](const Directory& directory) {
-        return route_add(rig.structure.forest, directory, "finger",
-                         AddRequest{"hand", along_x(1)}, "");
+        return route_add(rig.structure.forest, directory, "finger", AddRequest{"hand", along_x(1)},
+                         "");
       },
       [&](Part& part) {
         std::vector<Part> parts{std::move(part)};
