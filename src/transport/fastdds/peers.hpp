@@ -25,8 +25,8 @@ namespace tfdude::fastdds {
 [[nodiscard]] std::string participant_name(const std::string& partition);
 
 /// The participants that were met, what each announced that it serves, and which are silent.
-/// Thread-safe. The callbacks run under a lock, so that those about one peer come in order. Code
-/// that a callback runs must not hold a lock of its own when it calls functions here.
+/// Thread-safe. The callbacks run under a lock, so that those about one peer come in order. So no
+/// function here may be called with a lock that the callbacks take (LockRank::kReporting).
 ///
 /// Each server announces reliably what it serves when that changes. It also repeats this
 /// periodically as a beat, which may be lost. Readers of beats have their own sockets, which no
