@@ -19,6 +19,10 @@ namespace tfdude::fastdds {
   return stamp ? nanoseconds(*stamp) : 0;
 }
 
+/// @param field  the name for an error
+/// @return kInvalidInput if the stamp is before 1970
+[[nodiscard]] Result<std::optional<Time>> stamp_from_wire(std::int64_t stamp, const char* field);
+
 /// Fills a DDS sample that may have been used before: the generated union has a member for every
 /// kind of request, some 1.5 KB, which takes longer to create than to fill.
 void write_wire(const Request& request, std::string_view partition, wire::Request& sample);

@@ -8,12 +8,20 @@
 #include "partition/watching.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_correlation.hpp"
-#include "transport/fastdds/codec_infos.hpp"
 #include "transport/fastdds/codec_partial.hpp"
 #include "transport/fastdds/kinds.hpp"
 
-// Converts messages from the network.
+// Converts requests and streams from the network.
 namespace tfdude::fastdds {
+
+Result<std::optional<Time>> stamp_from_wire(std::int64_t stamp, const char* field) {
+  if (stamp < 0) {
+    return fail(Errc::kInvalidInput,
+                std::string(field) + " of " + std::to_string(stamp) + " ns is before 1970");
+  }
+  return stamp == 0 ? std::nullopt : std::optional<Time>(time_of(stamp));
+}
+
 namespace {
 
 Result<Transform> from_wire(const wire::Transform& in, std::string_view frame) {
@@ -25,14 +33,6 @@ Result<Transform> from_wire(const wire::Transform& in, std::string_view frame) {
   const auto covariance = Covariance::from_upper(upper);
   if (!covariance) return fail_at("frame " + quote(frame), covariance.error());
   return Transform{*pose, *covariance};
-}
-
-Result<std::optional<Time>> stamp_from_wire(std::int64_t stamp, const char* field) {
-  if (stamp < 0) {
-    return fail(Errc::kInvalidInput,
-                std::string(field) + " of " + std::to_string(stamp) + " ns is before 1970");
-  }
-  return stamp == 0 ? std::nullopt : std::optional<Time>(time_of(stamp));
 }
 
 Result<std::chrono::nanoseconds> duration_from_wire(std::int64_t duration, const char* field) {
@@ -116,17 +116,6 @@ Result<WatchRequest> read_watch(const wire::WatchBody& body) {
   watch.from = *from;
   if (auto ok = check_watch(watch); !ok) return tl::unexpected(ok.error());
   return watch;
-}
-
-Result<Covariance> read_process_noise(const std::vector<double>& numbers) {
-  if (numbers.empty()) return Covariance();
-  if (numbers.size() != Covariance::kSize) {
-    return fail(Errc::kInvalidInput,
-                "process noise of " + std::to_string(numbers.size()) + " numbers");
-  }
-  Covariance::Upper upper{};
-  std::copy(numbers.begin(), numbers.end(), upper.begin());
-  return Covariance::from_upper(upper);
 }
 
 Result<ReviseRequest> read_revise(const wire::ReviseBody& body) {
@@ -248,155 +237,6 @@ Result<Request> from_wire(const wire::Request& sample) {
   if (auto ok = check_id(request.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
   if (auto ok = read_body(sample, request); !ok) return tl::unexpected(std::move(ok.error()));
   return request;
-}
-
-namespace {
-
-Result<std::vector<Transform>> read_values(const std::vector<wire::Transform>& body) {
-  std::vector<Transform> values;
-  values.reserve(body.size());
-  for (const wire::Transform& in : body) {
-    auto X = computed_from(in);
-    if (!X) return fail_at("a reply", X.error());
-    values.push_back(*X);
-  }
-  return values;
-}
-
-Result<SegmentValues> read_stamped(const wire::StampedTransforms& body) {
-  SegmentValues found;
-  const auto stamp = stamp_from_wire(body.stamp(), "the stamp of a reply");
-  if (!stamp) return tl::unexpected(stamp.error());
-  found.stamp = *stamp;
-  found.period = std::chrono::nanoseconds(body.period());
-  auto values = read_values(body.values());
-  if (!values) return tl::unexpected(std::move(values.error()));
-  found.values = *std::move(values);
-  auto at_hint = read_values(body.at_hint());
-  if (!at_hint) return tl::unexpected(std::move(at_hint.error()));
-  found.at_hint = *std::move(at_hint);
-  return found;
-}
-
-Result<SegmentValues> read_correlated(const wire::CorrelatedTransforms& body) {
-  wire::StampedTransforms plain;
-  plain.stamp(body.stamp());
-  plain.period(body.period());
-  plain.values(body.values());
-  plain.at_hint(body.at_hint());
-  auto found = read_stamped(plain);
-  if (!found) return found;
-  found->commit = body.seen();
-  found->incarnation = body.incarnation();
-  for (const auto& [in, out] :
-       {std::pair{&body.correlations(), &found->correlations},
-        std::pair{&body.correlations_at_hint(), &found->correlations_at_hint}}) {
-    for (const wire::Correlation& one : *in) {
-      auto correlation = read_path_correlation(one);
-      if (!correlation) return fail_at("a reply", correlation.error());
-      out->push_back(*std::move(correlation));
-    }
-  }
-  return found;
-}
-
-template <class Body, class Read>
-Result<void> put(Reply& reply, Result<Read> read) {
-  if (!read) return tl::unexpected(std::move(read.error()));
-  reply.body = Body(*std::move(read));
-  return {};
-}
-
-Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
-  switch (body._d()) {
-    case kError:
-      // For people to read, though its sender may have put anything in it.
-      reply.body = Error{static_cast<Errc>(body.error().code()), printable(body.error().message())};
-      return {};
-    case kTransforms:
-      return put<SegmentValues>(reply, read_values(body.transforms()).map([](auto&& values) {
-        return SegmentValues{std::move(values), std::nullopt, {}, {}};
-      }));
-    case kDoneReply:
-      return {};
-    case kStamped:
-      return put<SegmentValues>(reply, read_stamped(body.stamped()));
-    case kState:
-      return put<PushedValues>(reply, tfdude::fastdds::from_wire(body.watched()));
-    case kPasts: {
-      std::vector<HistoryInfo> histories;
-      for (const wire::HistoryInfo& history : body.histories())
-        histories.push_back(read_history(history));
-      reply.body = std::move(histories);
-      return {};
-    }
-    case kTied:
-      return put<SegmentValues>(reply, read_correlated(body.correlated()));
-    case kConsistencies: {
-      std::vector<EdgeConsistency> all;
-      for (const wire::EdgeConsistency& one : body.consistency())
-        all.push_back(read_consistency(one));
-      reply.body = std::move(all);
-      return {};
-    }
-    case kJointInfos: {
-      std::vector<JointInfo> joints;
-      for (const wire::JointState& one : body.joint_states()) joints.push_back(read_joint(one));
-      reply.body = std::move(joints);
-      return {};
-    }
-    default:
-      return fail(Errc::kInvalidInput, "no reply of kind " + std::to_string(body._d()));
-  }
-}
-
-}  // namespace
-
-Result<Reply> from_wire(const wire::Reply& sample) {
-  Reply reply;
-  reply.sequence = sample.sequence_number();
-  reply.epoch = sample.epoch();
-  reply.lamport_time = sample.lamport_time();
-  if (auto ok = read_body(sample.body(), reply); !ok) return tl::unexpected(std::move(ok.error()));
-  return reply;
-}
-
-Result<PushedValues> from_wire(const wire::State& sample) {
-  PushedValues pushed;
-  pushed.group = sample.group();
-  pushed.after = sample.after();
-  pushed.commit = sample.commit();
-  pushed.piece = sample.piece();
-  pushed.pieces = sample.pieces();
-  pushed.entries.reserve(sample.entries().size());
-  for (const wire::PushedEntry& entry : sample.entries()) {
-    const auto stamp = stamp_from_wire(entry.stamp(), "the stamp of a pushed value");
-    if (!stamp) return tl::unexpected(stamp.error());
-    auto X = computed_from(entry.x());
-    if (!X) return fail_at("pushed values", X.error());
-    pushed.entries.push_back({entry.index(), *stamp, *X, {}, entry.history(), {}});
-  }
-  for (const wire::PushedCorrelation& one : sample.correlations()) {
-    if (one.entry() >= pushed.entries.size()) {
-      return fail(Errc::kInvalidInput, "pushed values: correlation of entry " +
-                                           std::to_string(one.entry()) + ", of " +
-                                           std::to_string(pushed.entries.size()));
-    }
-    auto correlation = read_correlation(one.edge_correlation());
-    if (!correlation) return fail_at("pushed values", correlation.error());
-    pushed.entries[one.entry()].correlation = *std::move(correlation);
-  }
-  for (const wire::PushedBeginning& one : sample.beginnings()) {
-    if (one.entry() >= pushed.entries.size()) {
-      return fail(Errc::kInvalidInput, "pushed values: a history begins with entry " +
-                                           std::to_string(one.entry()) + ", of " +
-                                           std::to_string(pushed.entries.size()));
-    }
-    auto noise = read_process_noise(one.process_noise());
-    if (!noise) return fail_at("pushed values", noise.error());
-    pushed.entries[one.entry()].process_noise = *noise;
-  }
-  return pushed;
 }
 
 Result<Update> from_wire(const wire::Update& sample,
