@@ -60,7 +60,7 @@ class Pusher {
   Forest& forest_;
   const Push push_;
   const End end_;
-  Mutex groups_mutex_;
+  Mutex groups_mutex_{LockRank::kParts};
   std::map<std::uint64_t, Group> groups_ TFDUDE_GUARDED_BY(groups_mutex_);
   std::vector<std::uint64_t> ended_
       TFDUDE_GUARDED_BY(groups_mutex_);  // whose end is not reported yet

@@ -53,8 +53,12 @@ Reply Pushing::answer(const Request& request) {
 }
 
 void Pushing::on_watcher(std::uint64_t group) {
-  const Lock lock(mutex_);
-  if (pusher_ != nullptr) pusher_->tell_all(group);
+  Pusher* pusher = nullptr;
+  {
+    const Lock lock(mutex_);
+    pusher = pusher_.get();
+  }
+  if (pusher != nullptr) pusher->tell_all(group);
 }
 
 }  // namespace tfdude

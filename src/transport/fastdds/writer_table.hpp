@@ -54,10 +54,13 @@ class WriterTable {
     return {writers_.begin(), writers_.end()};
   }
 
-  /// When no other thread uses the table any more.
+  /// Deletes the writers. For when no other thread uses the table any more.
   void clear() {
-    const Lock lock(mutex_);
-    writers_.clear();
+    std::map<Key, std::shared_ptr<Writer>> all;  // deleted without the lock
+    {
+      const Lock lock(mutex_);
+      all.swap(writers_);
+    }
   }
 
  private:
