@@ -113,8 +113,9 @@ TEST_CASE("discovery: an operation is repeated until what it lacks has come") {
   });
   const auto found =
       newcomer.rig.discovery.retry_until_known(newcomer.rig.deadline(), [&]() -> Result<int> {
+        const bool is_known = newcomer.rig.structure.forest.exists("hand");
         ++tries;
-        return newcomer.rig.structure.forest.exists("hand") ? Result<int>(1) : missing();
+        return is_known ? Result<int>(1) : missing();
       });
   other.join();
   CHECK(found);
