@@ -42,7 +42,7 @@ std::uint32_t CdrWalk::ulong() {
   return value;
 }
 
-// Length with the closing zero, then the bytes; a zero inside would hide what follows it.
+// The length, including the final zero, then the bytes. A zero inside would hide the rest.
 std::string_view CdrWalk::string(std::size_t max_bytes) {
   const std::uint32_t length = ulong();
   if (!good_ || length == 0) return {};

@@ -8,7 +8,7 @@ namespace tfdude::fastdds {
 
 [[nodiscard]] wire::PartialEdge wire_partial(const PartialUpdate& edge);
 
-/// @return kInvalidInput naming the frame and what of the parts that are given breaks its rule.
+/// @return kInvalidInput naming the frame and the invalid part
 [[nodiscard]] Result<PartialUpdate> read_partial(const wire::PartialEdge& in);
 
 }  // namespace tfdude::fastdds

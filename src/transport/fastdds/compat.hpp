@@ -102,7 +102,7 @@ inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps:
   discovery.m_DiscoveryServers = {server};
 }
 
-/// Tells of participants that come and go: met(guid prefix, name) and left(guid prefix).
+/// Reports participants: met(guid prefix, name) and left(guid prefix).
 template <class Observer>
 class ParticipantListener final : public edds::DomainParticipantListener {
  public:
@@ -226,7 +226,8 @@ inline bool write(edds::DataWriter& writer, void* data) {
   return write(writer, data, params);
 }
 
-/// A transport that sends through another, to whom it may, and sees from whom something comes.
+/// A transport that sends through another one, only to allowed destinations, and sees the source of
+/// each datagram.
 class SendFilter : public etransport::ChainingTransport {
  public:
   using ChainingTransport::ChainingTransport;

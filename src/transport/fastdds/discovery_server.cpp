@@ -52,7 +52,7 @@ Result<void> check_discovery_server(const std::string& address) {
 namespace fastdds {
 namespace {
 
-// Not by Fast DDS, whose versions differ in what they resolve.
+// Names are not resolved by Fast DDS, because its versions differ in this.
 Result<std::string> resolve(const std::string& host) {
   addrinfo hints{};
   hints.ai_family = AF_INET;
@@ -85,7 +85,7 @@ Result<void> use_discovery_server(edds::DomainParticipantQos& qos, const std::st
   ertps::IPLocator::setIPv4(at, *resolved);
   at.port = parsed->port;
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
-  // How often a server is called that has not answered yet.
+  // The period of calls to a server that has not answered yet.
   discovery.discoveryServer_client_syncperiod = {0, 100'000'000};
   discover_by_server(discovery, at);
   return {};

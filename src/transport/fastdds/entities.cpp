@@ -29,7 +29,7 @@ bool Writer::wait_until_matched(Deadline deadline) {
 
 bool Writer::write(void* sample) {
   unacknowledged_ = true;
-  // Numbers and timestamps are given in one order.
+  // Sequence numbers and source timestamps are assigned in the same order.
   const std::lock_guard lock(writing_);
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   ertps::Time_t stamp;
@@ -42,7 +42,7 @@ bool Writer::write(void* sample) {
 bool Writer::flush(Deadline deadline) {
   if (!good() || !unacknowledged_.exchange(false)) return true;
   const bool anybody = wait_until_matched(Deadline());
-  // No longer than what DDS can count.
+  // At most the longest time that DDS can represent.
   const Deadline now = Deadline::clock::now();
   const auto left =
       std::min(deadline, now + std::chrono::hours(24 * 365)) - std::min(now, deadline);

@@ -18,19 +18,19 @@ namespace {
 
 constexpr std::chrono::seconds kLongLease{30};
 
-// What is lost of the discovery is repeated after a second; by a server it takes more steps.
+// DDS repeats a lost discovery message after a second; discovery by a server takes more steps.
 constexpr std::chrono::milliseconds kFirstBeat{1500};
 constexpr std::chrono::milliseconds kFirstBeatByServer{8000};
 
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
 
-// How long the others may take to hear that this participant ends.
+// Time for the other participants to hear that this one ends.
 constexpr std::chrono::milliseconds kLastWord{100};
 
-// Among more servers than these each speaks less often.
+// If there are more servers than this, each sends its beat less often.
 constexpr std::uint32_t kMany = 12;
 
-// The DDS partition of the beats: those of a topic who are in different ones do not match.
+// The DDS partition of the beats, so that they do not match the readers of presences.
 constexpr const char* kBeatPartition = "tfdude-beat";
 
 tl::unexpected<Error> not_created(const char* what) {
@@ -192,7 +192,7 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
   return good ? Result<void>() : not_created("the readers");
 }
 
-// A server passes on what it hears several times a second, one step of the discovery at a time.
+// A discovery server forwards several times per second, one step of the discovery at a time.
 Milliseconds FastDdsTransport::discovery_time() const {
   return Milliseconds(options_.discovery_server.empty() ? 400 : 1500);
 }
@@ -327,7 +327,7 @@ Result<void> FastDdsTransport::flush(Deadline deadline) {
 
 // --- replying ---
 
-// Of one that has left nothing is to be made: it would be kept for ever.
+// No writer is created for a peer that has left: nothing would delete it.
 void FastDdsTransport::open_reply_writer(const PeerId& peer) {
   if (there_.count(peer) != 0) (void)reply_writers_.open(peer);
 }

@@ -124,7 +124,7 @@ bool Peers::awaits_presence() const {
   return !all_present();
 }
 
-// How many a server hears is told by its beats: what came with its presence may be as old as that.
+// Only beats say how many others a server hears: the number in its presence may be outdated.
 bool Peers::nobody_hears_more() const {
   const std::size_t others = servers_.size() - 1 + (is_server_ ? 1 : 0);
   return std::all_of(servers_.begin(), servers_.end(), [others](const auto& known) {

@@ -31,7 +31,7 @@ Result<void> PushChannels::watch(std::uint64_t group) {
   return fail(Errc::kTransport, "Fast DDS could not make a reader of what is watched");
 }
 
-// Closed without the lock: a sample may be on its way to somebody who waits for it.
+// Closed without the lock: a callback that delivers a DDS sample may be waiting for it.
 void PushChannels::unwatch(std::uint64_t group) {
   std::unique_ptr<Reader<wire::State>> closed;  // outlives the lock
   const Lock lock(mutex_);

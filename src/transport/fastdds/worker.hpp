@@ -26,7 +26,7 @@ class Worker {
     changed_.notify_one();
   }
 
-  /// Does a job once a period from now on, between the others. One such job at a time.
+  /// Runs a job once per period from now on, between other jobs. There can be only one such job.
   void repeat(std::chrono::milliseconds period, std::function<void()> job) {
     post([this, period, job = std::move(job)]() mutable {
       period_ = period;
@@ -35,7 +35,7 @@ class Worker {
     });
   }
 
-  /// Finishes the job at hand and drops the rest.
+  /// Finishes the current job and drops the others.
   void stop() {
     {
       const Lock lock(mutex_);
