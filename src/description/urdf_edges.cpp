@@ -51,7 +51,7 @@ class EdgeReader {
   [[nodiscard]] Result<std::vector<UrdfEdge>> edges() {
     for (const auto& [name, said] : part_.joints) {
       if (tree_.joint_index.count(name) == 0) {
-        return fail(Errc::kInvalidInput, part_.file + ": joint " + quote(name) + " is not there");
+        return fail(Errc::kInvalidInput, part_.file + ": joint " + quote(name) + " does not exist");
       }
     }
     Result<void> ok;
@@ -188,7 +188,8 @@ Result<Mimic> EdgeReader::read_mimic(Index i) const {
   const urdf::JointMimic& mimic = *urdf_of(i).mimic;
   const std::string what = "mimics " + quote(mimic.joint_name);
   const auto other = tree_.joint_index.find(mimic.joint_name);
-  if (other == tree_.joint_index.end()) return tree_.joint_error(i, what + ", which is not there");
+  if (other == tree_.joint_index.end())
+    return tree_.joint_error(i, what + ", which does not exist");
   if (!moving_type(urdf_of(other->second))) {
     return tree_.joint_error(i, what + ", which does not move by one number");
   }

@@ -36,7 +36,7 @@ Result<std::size_t> end_of(const UrdfTree& tree, std::size_t joint, const char* 
                            const std::string& name) {
   const auto link = tree.link_index.find(name);
   if (link != tree.link_index.end()) return link->second;
-  return tree.joint_error(joint, std::string(which) + " link " + quote(name) + " is not there");
+  return tree.joint_error(joint, std::string(which) + " link " + quote(name) + " does not exist");
 }
 
 Result<void> join(UrdfTree& tree, const UrdfText::Joint& said) {
@@ -113,7 +113,7 @@ Result<std::vector<std::size_t>> links_named(const UrdfTree& tree, const std::st
     const std::string name = entry.substr(begin, end - begin);
     const auto link = tree.link_index.find(name);
     if (link == tree.link_index.end()) {
-      return refused(tree, entry, "link " + quote(name) + " is not there");
+      return refused(tree, entry, "link " + quote(name) + " does not exist");
     }
     named.push_back(link->second);
     begin = end + 2;

@@ -83,7 +83,7 @@ void ChangeLog::partition_up(const std::string& partition, const std::string& ho
        {},
        {},
        {},
-       "partition " + quote(partition) + " is there (host " + host + ", pid " +
+       "partition " + quote(partition) + " is reachable (host " + host + ", pid " +
            std::to_string(pid) + ")",
        {}});
 }
@@ -134,7 +134,7 @@ void ChangeLog::frame_taken_over(std::string_view id, std::string_view parent,
        std::string(parent),
        before,
        "frame " + quote(id) + " of partition " + quote(before) +
-           ", which is not there, is now of " + quote(partition) + under(parent),
+           ", which is not reachable, now belongs to " + quote(partition) + under(parent),
        {}});
 }
 

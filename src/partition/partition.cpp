@@ -295,7 +295,7 @@ Result<void> Partition::correlate(const std::string& id, const Correlation& corr
                                          ": names of this kind are given to observations");
   }
   if (!correlation.observed_with.empty()) {
-    return fail(Errc::kInvalidInput, who + ": what it was observed with is said by observations");
+    return fail(Errc::kInvalidInput, who + ": only observations set what it was observed with");
   }
   if (joints_.is_coupled(id)) {
     return fail(Errc::kInvalidInput, who +

@@ -122,11 +122,11 @@ std::string describe(const ConfiguredChange& change) {
     case Kind::kAdd:
       return frame + ": added" + under;
     case Kind::kReplace:
-      return frame + ": as its entry says now," + under;
+      return frame + ": changed to its new entry," + under;
     case Kind::kCorrelate:
-      return frame + ": its correlation is as its entry says now";
+      return frame + ": its correlation changes to that of its entry";
     case Kind::kRemove:
-      return frame + ": removed, as its entry is gone";
+      return frame + ": removed, because its entry was deleted";
     case Kind::kRest:
       return frame + ": at rest, its stored position is not taken: " + change.why;
     case Kind::kOrphan:

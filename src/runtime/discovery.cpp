@@ -89,23 +89,23 @@ Error Discovery::explained(Error error) {
   if (!missed || error.code == Errc::kUnknownPartition) return error;
   return {Errc::kUnreachable, error.message + ", unless it is of partition " + quote(missed->name) +
                                   ", which is not reachable since " + to_string(missed->since) +
-                                  ", before this process came: it " + why_absent(*missed)};
+                                  ", before this process started: it " + why_absent(*missed)};
 }
 
 Error Discovery::undecided(const std::string& what, const Deadline& deadline) {
-  std::string missing = "nobody was met yet";
+  std::string missing = "no participant was discovered yet";
   // Before the lock is taken: the transport reports presences under a lock of its own.
   const bool awaits_presence = transport_.awaits_presence();
   {
     const Lock lock(structure_.mutex);
     if (const std::string* partition = structure_.directory.incomplete()) {
-      missing = "partition " + quote(*partition) + " has not told all of its frames yet";
+      missing = "partition " + quote(*partition) + " has not sent all of its frames yet";
     } else if (const std::string* late = structure_.directory.behind()) {
       missing = "partition " + quote(*late) + " has made a change that has not arrived here yet";
     } else if (awaits_presence) {
-      missing = "a participant was met that has not said yet what it owns";
+      missing = "a discovered participant has not announced yet what it owns";
     } else if (!structure_.directory.reachable_owners().empty()) {
-      missing = "there may be others who were not met yet";
+      missing = "more participants may be discovered";
     }
   }
   return {Errc::kTimeout, what + ", as far as is known after " + deadline.text() + ": " + missing};

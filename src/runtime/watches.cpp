@@ -28,7 +28,7 @@ void Watches::stop() {
   notices_.stop();
   const Lock lock(mutex_);
   for (const Path& path : std::exchange(paths_, {})) {
-    path->interrupt({Errc::kTransport, "the client that watched the path has gone"});
+    path->interrupt({Errc::kTransport, "the client of this watched path has ended"});
   }
 }
 

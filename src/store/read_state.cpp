@@ -110,7 +110,7 @@ Result<void> load_absent(const Database& database, std::int64_t format, StoredSt
 Result<void> load_correlations(const Database& database, std::int64_t format, StoredState& state) {
   if (format < kCorrelationFormat) return {};
   const auto nobody = [](const Statement& row) {
-    return fail(Errc::kState, "correlation of " + quote(row.text(0)) + ", which is not there");
+    return fail(Errc::kState, "correlation of " + quote(row.text(0)) + ", which does not exist");
   };
   const auto of_frame = [&](const Statement& row) -> Result<void> {
     auto correlation = read_stored_correlation(row);

@@ -169,7 +169,7 @@ Result<void> SqliteStore::check_tables(std::int64_t format) {
   const auto rows = database_->number("SELECT count(*) FROM about");
   if (!rows) return tl::unexpected(rows.error());
   if (*sound != "ok") return fail(Errc::kState, *sound);
-  if (*rows != 1) return fail(Errc::kState, "it says of " + std::to_string(*rows) + " partitions");
+  if (*rows != 1) return fail(Errc::kState, "it contains " + std::to_string(*rows) + " partitions");
   return {};
 }
 

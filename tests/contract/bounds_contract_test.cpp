@@ -50,7 +50,7 @@ TEST_CASE("bounds: alone in the domain a lookup waits no longer than it may") {
   // Nobody can come unseen in one process.
   CHECK(alone.what == (transport == 0 ? "unknown_start" : "timeout"));
   if (transport == 0) return;
-  CHECK_THAT(alone.message, testing::ContainsSubstring("nobody was met yet"));
+  CHECK_THAT(alone.message, testing::ContainsSubstring("no participant was discovered yet"));
   CHECK_THAT(alone.message, testing::ContainsSubstring("'world'"));
 }
 

@@ -144,7 +144,7 @@ TEST_CASE("reconfigured: what a configuration would change is said beforehand, a
   const CliResult shrunk = arms.check(arms.with_arm);
   CHECK(shrunk.status == 0);
   CHECK(shrunk.out == "state " + file +
-                          ": frames=3\nframe 'hand': removed, as its entry is gone\n"
+                          ": frames=3\nframe 'hand': removed, because its entry was deleted\n"
                           "frame 'tool': waits for its parent 'hand', which is removed\n");
   const CliResult same = arms.check(arms.with_both);
   CHECK(same.status == 0);

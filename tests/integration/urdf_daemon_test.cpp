@@ -65,7 +65,7 @@ TEST_CASE("daemon: options of no URDF, and URDFs that cannot be served, are wron
   refused({"--strict-limits", "--urdf", kArm}, "--strict-limits: comes before any --urdf");
   refused({"--urdf", kArm, "--prefix", "a", "--prefix", "b"}, "--prefix: is given twice");
   refused({"--urdf", "/nowhere.urdf"}, "/nowhere.urdf: cannot be opened");
-  refused({"--urdf", kArm, "--links", "x"}, kArm + ": links 'x': link 'x' is not there");
+  refused({"--urdf", kArm, "--links", "x"}, kArm + ": links 'x': link 'x' does not exist");
   refused({"--urdf", kArm, "--urdf", kArm}, "frame 'base_link': id is taken by the frame in");
 }
 

@@ -296,11 +296,11 @@ Result<void> FastDdsTransport::send(Writer& writer, const std::string& partition
   while (!writer.wait_until_matched(std::min(deadline, Peers::Clock::now() + Peers::kSpeakEvery))) {
     if (peers_.silent(partition)) {
       return fail(Errc::kUnreachable,
-                  "partition " + quote(partition) + " went away before it was met");
+                  "partition " + quote(partition) + " left before it was discovered");
     }
     if (Peers::Clock::now() < deadline) continue;
     return fail(Errc::kTimeout, "partition " + quote(partition) +
-                                    " was not met in time in domain " +
+                                    " was not discovered in time in domain " +
                                     std::to_string(options_.domain));
   }
   if (!writer.write(sample)) {

@@ -273,7 +273,7 @@ class LoopbackTransport final : public Transport {
     while (hub_->wait_for(serves, deadline)) {
       if (hub_->deliver(serves, call) > 0) return {};
     }
-    return fail(Errc::kTimeout, "partition " + quote(partition) + " was not there in time");
+    return fail(Errc::kTimeout, "partition " + quote(partition) + " was not reachable in time");
   }
 
   std::shared_ptr<LoopbackNetwork::Hub> hub_;

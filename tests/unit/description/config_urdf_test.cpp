@@ -94,9 +94,9 @@ TEST_CASE("a bad entry of a URDF is refused by name and line") {
   entry("links: tool0", ": links is not a list of links");
   entry("links: []", ": links is not a list of links");
   entry("links: [[tool0]]", ": links[0] is not text");
-  entry("links: [x]", ": " + folder + "ur5e.urdf: links 'x': link 'x' is not there");
+  entry("links: [x]", ": " + folder + "ur5e.urdf: links 'x': link 'x' does not exist");
   entry("joints: [a]", ": joints is not a mapping");
-  entry("joints: {x: {}}", ": " + folder + "ur5e.urdf: joint 'x' is not there");
+  entry("joints: {x: {}}", ": " + folder + "ur5e.urdf: joint 'x' does not exist");
   entry("joints: {elbow_joint: {at: 1}}",
         ": joint 'elbow_joint': unknown key 'at'; known are position, stddev, origin");
   entry("joints: {elbow_joint: {origin: {}, mount: {}}}",

@@ -76,7 +76,7 @@ TEST_CASE("urdf: what cannot be mimicked is refused") {
         joint("k", type, "b", "c", "<mimic joint=\"l\"/>") +
         joint("l", "continuous", "c", "d", "<mimic joint=\"k\"/>"));
   };
-  refused(mimic("fixed", "x"), "r.urdf:6: joint 'j': mimics 'x', which is not there");
+  refused(mimic("fixed", "x"), "r.urdf:6: joint 'j': mimics 'x', which does not exist");
   refused(mimic("fixed", "j"), "r.urdf:6: joint 'j': mimics itself");
   refused(mimic("fixed", "k"),
           "r.urdf:6: joint 'j': mimics 'k', which does not move by one number");
@@ -100,7 +100,7 @@ TEST_CASE("urdf: what joints of other parts mimic may be broken") {
     REQUIRE_FALSE(refused_part);
     CHECK_THAT(
         refused_part.error().message,
-        tfdude::testing::ContainsSubstring("joint 'k': mimics 'nothing', which is not there"));
+        tfdude::testing::ContainsSubstring("joint 'k': mimics 'nothing', which does not exist"));
   }
 }
 
@@ -155,10 +155,10 @@ TEST_CASE("urdf: a part of the links is taken") {
   const auto bad = [](const std::vector<std::string>& links, const std::string& why) {
     refused(tree(), with_links(links), "r.urdf: links " + why);
   };
-  bad({"x"}, "'x': link 'x' is not there");
-  bad({""}, "'': link '' is not there");
-  bad({"base.."}, "'base..': link '' is not there");
-  bad({"base..x"}, "'base..x': link 'x' is not there");
+  bad({"x"}, "'x': link 'x' does not exist");
+  bad({""}, "'': link '' does not exist");
+  bad({"base.."}, "'base..': link '' does not exist");
+  bad({"base..x"}, "'base..x': link 'x' does not exist");
   bad({"lift..base"}, "'lift..base': link 'base' is not below 'lift', or below another end");
   bad({"base..lift..tool"},
       "'base..lift..tool': link 'tool' is not below 'base', or below another end");

@@ -136,7 +136,7 @@ TEST_CASE("urdf: nothing is taken for a format of printf") {
   refused(pair(format), "r.urdf:4: joint 'j': Joint [j] has no known type [" + format + "]",
           Errc::kConfig);
   refused(pair("continuous", "<mimic joint=\"" + format + "\"/>"),
-          "r.urdf:4: joint 'j': mimics '" + format + "', which is not there");
+          "r.urdf:4: joint 'j': mimics '" + format + "', which does not exist");
   const std::string named = robot(link(format) + link("b") +
                                   joint(format, "continuous", format, "b", "<axis xyz=\"x\"/>"));
   CHECK_THAT(tfdude::parse_urdf(named, {"r.urdf"}).error().message,
@@ -152,9 +152,9 @@ TEST_CASE("urdf: links and joints that make no tree are refused") {
   refused(robot(link("a") + "<joint name=\"j\" type=\"fixed\"><parent link=\"a\"/></joint>\n"),
           "r.urdf:3: joint 'j': has no <child link=\"...\">");
   refused(robot(link("a") + joint("j", "fixed", "x", "a")),
-          "r.urdf:3: joint 'j': parent link 'x' is not there");
+          "r.urdf:3: joint 'j': parent link 'x' does not exist");
   refused(robot(link("a") + joint("j", "fixed", "a", "x")),
-          "r.urdf:3: joint 'j': child link 'x' is not there");
+          "r.urdf:3: joint 'j': child link 'x' does not exist");
   refused(robot(link("a") + link("a")),
           "r.urdf:3: link 'a': the name is taken by the link in line 2");
   refused(robot(link("a") + link("b") + link("c") + joint("j", "fixed", "a", "b") +
@@ -189,7 +189,7 @@ TEST_CASE("urdf: values of joints that break their rules are refused") {
           "r.urdf:4: joint 'j': position nan is beyond 1e9");
   refused(revolute, with_joint("j", {{}, -0.1, {}}),
           "r.urdf:4: joint 'j': stddev -0.1 is not within 0 and 1e9");
-  refused(revolute, with_joint("b", {}), "r.urdf: joint 'b' is not there");
+  refused(revolute, with_joint("b", {}), "r.urdf: joint 'b' does not exist");
   refused(pair("fixed"), with_joint("j", {0.0, {}, {}}),
           "r.urdf:4: joint 'j': has no position: it does not move by one number");
   refused(hand(), with_joint("f2", {{}, 0.1, {}}),

@@ -57,9 +57,9 @@ TEST_CASE(
     base.directory.apply(last, kNow);
   }
   CHECK(base.owner_of("hand") == "left_arm");
-  CHECK(
-      base.told(ChangeKind::kFrameTakenOver) ==
-      Lines{"frame 'hand' of partition 'arm', which is not there, is now of 'left_arm' as a root"});
+  CHECK(base.told(ChangeKind::kFrameTakenOver) ==
+        Lines{"frame 'hand' of partition 'arm', which is not reachable, now belongs to 'left_arm' "
+              "as a root"});
 }
 
 TEST_CASE("who returns yields before what it had is routed to another") {

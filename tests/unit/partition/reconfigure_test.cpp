@@ -102,7 +102,7 @@ TEST_CASE("an entry that is gone takes its frame and nothing below it") {
     Life second(store, {kArm}, 2);
     CHECK(second.structure() == Lines{"arm <  @ arms", "tool < hand @ arms"});
     CHECK(second.described() ==
-          Lines{"frame 'hand': removed, as its entry is gone",
+          Lines{"frame 'hand': removed, because its entry was deleted",
                 "frame 'tool': waits for its parent 'hand', which is removed"});
     CHECK(second.orphans() ==
           Lines{"frame 'tool' of partition 'arms' waits for its parent 'hand', which the "
@@ -147,12 +147,12 @@ TEST_CASE("an entry of a frame that was removed, or moved, at run time") {
     Life third(store, {{"arm", "", along_x(2)}, {"hand", "arm", along_x(11)}}, 3);
     CHECK(third.structure() == Lines{"arm <  @ arms", "hand < arm @ arms, attached"});
     CHECK(third.described() == Lines{"frame 'arm': added as a root",
-                                     "frame 'hand': as its entry says now, under 'arm'"});
+                                     "frame 'hand': changed to its new entry, under 'arm'"});
   }
   SECTION("takes what is left where it is gone") {
     Life third(store, {kArm}, 3);
     CHECK(third.structure().empty());
-    CHECK(third.described() == Lines{"frame 'hand': removed, as its entry is gone"});
+    CHECK(third.described() == Lines{"frame 'hand': removed, because its entry was deleted"});
   }
 }
 
@@ -163,7 +163,8 @@ TEST_CASE("of an entry of which only the correlation is edited the value stays")
   hand.correlation = kSupply;
   {
     Life second(store, {kArm, hand}, 2);
-    CHECK(second.described() == Lines{"frame 'hand': its correlation is as its entry says now"});
+    CHECK(second.described() ==
+          Lines{"frame 'hand': its correlation changes to that of its entry"});
     CHECK(x_of(second.forest.lookup("arm", "tool")) == 120);
     CHECK(second.forest.kept("hand")->correlation.said == kSupply);
   }

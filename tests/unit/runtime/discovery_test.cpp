@@ -68,11 +68,11 @@ TEST_CASE("discovery: before all are met nothing is said to be missing") {
   const auto found = newcomer.rig.discovery.retry_until_known(soon, [] { return missing(); });
   REQUIRE_FALSE(found);
   CHECK(found.error().code == Errc::kTimeout);
-  CHECK_THAT(found.error().message,
-             ContainsSubstring("no frame 'hand'") && ContainsSubstring("nobody was met yet"));
+  CHECK_THAT(found.error().message, ContainsSubstring("no frame 'hand'") &&
+                                        ContainsSubstring("no participant was discovered yet"));
   newcomer.meeting.met_somebody = true;
   CHECK_THAT(newcomer.rig.discovery.await(soon).error().message,
-             ContainsSubstring("a participant was met that has not said yet what it owns"));
+             ContainsSubstring("a discovered participant has not announced yet what it owns"));
   newcomer.meeting.met_all = true;
   CHECK(newcomer.rig.discovery.await(soon));
 }
