@@ -154,7 +154,7 @@ TEST_CASE("cli: changes are made and confirmed") {
   CHECK(text(d, {"frames"}) == "camera\nisland\nrobot_1\nrobot_2\nworld\n");
 }
 
-TEST_CASE("cli: watch looks up again and again, and survives what it watches") {
+TEST_CASE("cli: watch polls, and continues after its daemons have ended") {
   ThesisDaemons d;
   Process watch = d.domain.start_cli({"--json", "watch", "world", "hand_left", "--rate", "50"});
   const auto lines = [&watch] {

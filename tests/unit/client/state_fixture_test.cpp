@@ -64,7 +64,7 @@ TEST_CASE("a state of format 2 has all that was stored in it") {
   CHECK(state->joints[0].variance == Approx(0.003 * 0.003));
 }
 
-TEST_CASE("a state and a configuration of format 2 open with all that they had, again and again") {
+TEST_CASE("a state and a configuration of format 2 open with all that they had, repeatedly") {
   const TemporaryDirectory directory;
   copy_into(directory);
   Options options;

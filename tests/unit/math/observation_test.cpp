@@ -96,7 +96,8 @@ TEST_CASE("After observations edges and paths are as sure as they say, over 1,00
   }
 }
 
-TEST_CASE("Without what edges know of each other, a path that is observed again and again is not") {
+TEST_CASE(
+    "Without correlations between edges, a path that is observed repeatedly is overconfident") {
   Random random(632);
   INFO("seed " << random.seed());
   const auto found = simulate(random, std::vector<Ends>(8, {0, 4}), {{0, 1}}, false);

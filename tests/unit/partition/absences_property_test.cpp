@@ -420,7 +420,9 @@ class World {
   Absences::Steady steady_{};
 };
 
-TEST_CASE("who is there has its frames, all agree on that, and it keeps them when others return") {
+TEST_CASE(
+    "a reachable partition has its frames, all agree on that, and it keeps them when others "
+    "return") {
   Random random(0xab5e);
   INFO("seed " << random.seed());
   Counts counts;

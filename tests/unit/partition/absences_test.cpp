@@ -291,7 +291,7 @@ TEST_CASE("who has hung itself has outlived nobody of whose absence it is told l
   CHECK_FALSE(arms.directory.any_pending());
 }
 
-TEST_CASE("in a cycle who is there keeps the parent, not who is gone") {
+TEST_CASE("in a cycle, a reachable partition keeps its parent, a lost one does not") {
   Replica base("base");
   base.directory.apply(presence_of("arm", 1, 1), kNow);
   base.directory.apply(page_of("arm", {{"hand", "tool", 10}}));

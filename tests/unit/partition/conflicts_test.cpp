@@ -316,7 +316,8 @@ void bury(Directory& directory, const std::string& partition) {
 }
 
 TEST_CASE(
-    "who returns yields to who is there, whichever claim is the older, but not to who is gone") {
+    "a returning partition yields to a reachable one, even with an older claim, but not to a lost "
+    "one") {
   MemoryStore store;
   add_in_former_life(store, "camera");
   Owning arms("arms", &store);

@@ -63,7 +63,7 @@ TEST_CASE("what was forgotten while it still seemed to be there is forgotten as 
   CHECK(base.forest.exists("hand") == lives_anew);
 }
 
-TEST_CASE("who is there is not forgotten") {
+TEST_CASE("a reachable partition cannot be forgotten") {
   Witness base;
   const auto refused = base.directory.forget("arm", 1, kNow);
   REQUIRE_FALSE(refused);

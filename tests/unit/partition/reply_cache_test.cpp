@@ -92,7 +92,7 @@ TEST_CASE("what nobody awaits is never applied again, in whatever order it comes
   CHECK(owner.applied() == 3);
 }
 
-TEST_CASE("the counter of requests may begin anew") {
+TEST_CASE("the counter of requests may restart") {
   constexpr std::uint64_t kRound = std::uint64_t{1} << 32U;
   Owner owner;
   (void)owner.answer(peer(1), request(0xFFFFFFFF, kRound - 1));

@@ -48,7 +48,7 @@ Result<int> missing() { return fail(Errc::kUnknownFrame, "no frame 'hand'"); }
 
 }  // namespace
 
-TEST_CASE("discovery: where nobody is met all is known after the look round") {
+TEST_CASE("discovery: without other participants, it is complete after the discovery time") {
   Newcomer newcomer;
   const auto before = Deadline::Clock::now();
   CHECK_FALSE(newcomer.rig.discovery.complete());
@@ -60,7 +60,7 @@ TEST_CASE("discovery: where nobody is met all is known after the look round") {
   CHECK(found.error().code == Errc::kUnknownFrame);
 }
 
-TEST_CASE("discovery: before all are met nothing is said to be missing") {
+TEST_CASE("discovery: no negative answer before all participants are discovered") {
   Options options = quick();
   options.discovery = 10s;
   Newcomer newcomer(options);
@@ -100,7 +100,7 @@ TEST_CASE("discovery: the transport is asked without the lock of the structure")
   CHECK(locked == 0);
 }
 
-TEST_CASE("discovery: an operation is repeated until what it lacks has come") {
+TEST_CASE("discovery: an operation is repeated until its missing frame has arrived") {
   Options options = quick();
   options.discovery = 10s;
   options.timeout = 20s;
@@ -150,7 +150,7 @@ TEST_CASE("discovery: a change that an owner has told of and has not come is wai
   CHECK(newcomer.rig.discovery.await(Deadline(10s)));
 }
 
-TEST_CASE("discovery: a call has the rest of the look round besides its time-out") {
+TEST_CASE("discovery: a call may also take the rest of the discovery time") {
   Options options = quick();
   options.discovery = 10s;
   Newcomer newcomer(options);

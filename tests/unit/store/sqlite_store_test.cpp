@@ -130,7 +130,7 @@ TEST_CASE("whom a partition misses is kept as it was said last, by itself") {
   CHECK(state->absent[0].incarnation >= IncarnationSource::kEnd);
 }
 
-TEST_CASE("what edges have to do with each other is kept with their values, and goes with them") {
+TEST_CASE("correlations are stored and removed with the values of their edges") {
   Random random(0x57a7f);
   INFO("seed " << random.seed());
   const Correlation supply{true, {{"supply", false, Loading::Ones(6, 2)}}, {}};
