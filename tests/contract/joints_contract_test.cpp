@@ -222,4 +222,23 @@ TEST_CASE("joints: a node that is opened again has its joints where they were") 
 }
 
 }  // namespace
+TEST_CASE("joints: an owner lists more of them than one reply holds") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  constexpr std::size_t kAll = 4100;  // a reply holds 4,096
+  std::vector<FrameSpec> frames{{"base", "", {}}};
+  for (std::size_t i = 0; i < kAll; ++i) {
+    const std::string number = std::to_string(10000 + i);
+    frames.push_back(moved_by("frame" + number, "base", revolute_named("joint" + number)));
+  }
+  const auto owner = Node::open(join("arm"), "arm", frames);
+  REQUIRE(owner);
+  auto client = *Client::open(join(""));
+  const auto listed = client.joints("arm");
+  REQUIRE(listed);
+  REQUIRE(listed->size() == kAll);
+  for (std::size_t i = 0; i < kAll; ++i) {
+    if ((*listed)[i].name != "joint" + std::to_string(10000 + i)) FAIL("joint " << i);
+  }
+}
+
 }  // namespace tfdude

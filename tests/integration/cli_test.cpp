@@ -143,6 +143,11 @@ TEST_CASE("cli: changes are made and confirmed") {
   CHECK(placed.at("translation") == json({-0.5, 0.001, 0.25}));
   CHECK(placed.at("rotation") == updated.at("rotation"));
   CHECK(placed.at("covariance") == updated.at("covariance"));
+  CHECK(object(d, {"update", "tool", "--xyz", "1", "2", "3"}).at("done") == "updated");
+  const json again = object(d, {"lookup", "camera", "tool"});
+  CHECK(again.at("translation") == json({1.0, 2.0, 3.0}));
+  CHECK(again.at("rotation") == updated.at("rotation"));
+  CHECK(again.at("covariance") == updated.at("covariance"));
   // A move keeps the edge's value, or takes a new one.
   CHECK(text(d, {"move", "tool", "--parent", "island"}) == "moved tool\n");
   CHECK(text(d, {"parent", "tool"}) == "island\n");

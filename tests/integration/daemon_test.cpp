@@ -35,6 +35,8 @@ TEST_CASE("daemon: what it cannot serve it refuses by name, without being ready"
       {{"--partition", std::string(256, 'x')}, {"256 bytes"}},
       {{"--partition", "legs", "--domain", "233"}, {"233", "232"}},
       {{"--partition", "legs", "--domain", "far"}, {"--domain", "far"}},
+      {{"--partition", "legs", "--domain", ""}, {"--domain", "not a number"}},
+      {{"--partition", "legs", "--save-every", ""}, {"--save-every", "not a number"}},
       {{"--partition", "legs", "--profile", "/nowhere/profile.xml"}, {"/nowhere/profile.xml"}},
       {{"--partition", "legs", "--profile", directory.write("broken.xml", "<profiles><")},
        {"broken.xml"}},

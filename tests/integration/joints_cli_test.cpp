@@ -1,6 +1,7 @@
 // A robot of two daemons, from one URDF, driven by joints.
 
 #include <cmath>
+#include <csignal>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +21,7 @@ using testing::await_ready;
 using testing::CliResult;
 using testing::ContainsSubstring;
 using testing::eventually;
+using testing::in_time;
 using testing::Process;
 using testing::TemporaryDirectory;
 using testing::TestDomain;
@@ -142,6 +144,19 @@ TEST_CASE("joints: a daemon that is killed comes back with its joints") {
   CHECK(robot.turn("upper_arm_link", "forearm_link") == Approx(1.25));
   robot.answered({"joint", "elbow_joint", "1.5"});
   CHECK(robot.turn("upper_arm_link", "forearm_link") == Approx(1.5));
+}
+
+TEST_CASE("joints: a path of joints that begin to move is watched without an error") {
+  const Robot robot;
+  Process watch = robot.domain.start_cli({"watch", "world", "tool0", "--rate", "200"});
+  REQUIRE(watch.wait_for_line("translation", in_time()));
+  const Process controller({TFDUDE_CONTROLLER, "--seconds", "60", "--domain",
+                            std::to_string(robot.domain.number()), "--profile",
+                            TFDUDE_LOOPBACK_PROFILE});
+  REQUIRE(watch.wait_for_line("stamp", in_time()));
+  watch.signal(SIGINT);
+  CHECK(watch.wait(in_time()) == 0);
+  CHECK(watch.err().empty());
 }
 
 TEST_CASE("joints: the example's controller drives the arm, and outlives a killed daemon") {
