@@ -187,7 +187,8 @@ std::set<PendingYield> FrameClaims::pending_yields() const {
   }
   for (const auto& [id, claim] : cut_) {
     const Cycle cycle = cycle_of(id, claim);
-    if (cycle.held && yields_to(*cycle.held, cycle.youngest)) {
+    // What an unreachable partition claims may be outdated, so that there is no cycle.
+    if (cycle.held && cycle.all_there && yields_to(*cycle.held, cycle.youngest)) {
       all.insert({PendingYield::Kind::kUnhang, cycle.held->id, cycle.youngest.owner,
                   cycle.held->lamport_time});
     }
@@ -235,14 +236,18 @@ void FrameClaims::put(const std::string& id, const FrameClaim& claim) {
 }
 
 FrameClaims::Cycle FrameClaims::cycle_of(const std::string& id, const FrameClaim& claim) const {
-  Cycle cycle{{id, claim.parent, claim.owner, false, claim.lamport_time}, std::nullopt};
+  const auto there = [this](Owner owner) {
+    return succession_.standing(owner) == Succession::Standing::kThere;
+  };
+  Cycle cycle{{id, claim.parent, claim.owner, false, claim.lamport_time}, {}, there(claim.owner)};
   for (auto edge = forest_.info(claim.parent); edge && edge->id != id;
        edge = forest_.info(edge->parent)) {
     if (edge->owner == kHeldHere) {
       if (!cycle.held || yields_to(*edge, *cycle.held)) cycle.held = edge;
-    } else if (yields_to(*edge, cycle.youngest)) {
-      cycle.youngest = *edge;
+      continue;
     }
+    cycle.all_there = cycle.all_there && there(edge->owner);
+    if (yields_to(*edge, cycle.youngest)) cycle.youngest = *edge;
   }
   return cycle;
 }

@@ -121,6 +121,7 @@ class FrameClaims {
   struct Cycle {
     FrameInfo youngest;
     std::optional<FrameInfo> held;
+    bool all_there = true;  ///< the owners of all edges are
   };
   [[nodiscard]] Cycle cycle_of(const std::string& id, const FrameClaim& claim) const;
 

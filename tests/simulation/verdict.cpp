@@ -21,11 +21,12 @@ std::string difference(const std::vector<std::string>& a, const std::vector<std:
 }
 
 // Whether the frame is below a root, and not below a removed frame: the model does not know such
-// trees.
-bool stands(Process& process, FrameInfo frame) {
+// trees. A frame whose removal was confirmed may still seem to be there, if its owner is lost and
+// told nobody else.
+bool stands(Process& process, const faults::Model& model, FrameInfo frame) {
   while (!frame.parent.empty()) {
     const auto parent = process.forest().info(frame.parent);
-    if (!parent) return false;
+    if (!parent || model.removed().count(frame.parent) != 0) return false;
     frame = *parent;
   }
   return true;
@@ -160,7 +161,7 @@ void Verdict::check_author(Author& author) {
   std::vector<std::pair<std::string, std::string>> edges;
   for (const auto& [id, model] : author.model().frames()) {
     const auto frame = process.forest().info(id);
-    if (frame && cast_.serves(model.partition) && stands(process, *frame))
+    if (frame && cast_.serves(model.partition) && stands(process, author.model(), *frame))
       edges.emplace_back(frame->parent, id);
   }
   for (const auto& [parent, id] : edges) author.look_up(parent, id, true);

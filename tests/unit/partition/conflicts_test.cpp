@@ -144,6 +144,32 @@ TEST_CASE("of two moves that make a cycle the later is undone to a root") {
   }
 }
 
+TEST_CASE("a cycle through a frame of an unreachable partition undoes no move") {
+  Owning arms("arms");
+  arms.directory.apply(presence_of("legs", 1, 1), kNow);
+  arms.directory.apply(page_of("head", {{"neck", "", 10}}));
+  arms.directory.apply(page_of("legs", {{"leg", "hand", 500}}));
+  REQUIRE(arms.ask("hand", AddRequest{"", along_x(1)}) == "ok");
+  // Legs have moved their frame elsewhere, which is not known here.
+  REQUIRE(arms.ask("hand", MoveRequest{"neck", {}}, Time(std::chrono::nanoseconds(2000))) == "ok");
+  arms.directory.apply(page_of("head", {{"neck", "leg", 1500}}));
+  REQUIRE(arms.partition.pending_yields().size() == 1);
+  REQUIRE(arms.directory.lost("legs", 1, kNow));
+  CHECK_FALSE(arms.yield());
+  CHECK(arms.conflicts().empty());
+  SECTION("which has moved it away") {
+    arms.directory.apply(page_of("legs", {{"leg", "", 600}}));
+    CHECK_FALSE(arms.yield());
+    CHECK(arms.structure() ==
+          Lines{"hand < neck @ arms, attached", "leg <  @ legs", "neck < leg @ head, attached"});
+  }
+  SECTION("which has not") {
+    arms.directory.apply(presence_of("legs", 1, 1), kNow);
+    CHECK(arms.yield());
+    CHECK(arms.conflicts().size() == 1);
+  }
+}
+
 TEST_CASE("a cycle that is there only while a page is read undoes nothing") {
   Owning arms("arms");
   arms.directory.apply(page_of("head", {{"a", "", 10}, {"b", "a", 20}}));
