@@ -115,6 +115,7 @@ int report(const Error& error, const Arguments& arguments) {
   switch (error.code) {
     case Errc::kTimeout:
     case Errc::kUnreachable:
+    case Errc::kIncompatible:
       return kNoAnswer;
     case Errc::kConfig:
       return kWrongUsage;
@@ -164,6 +165,13 @@ int run_partitions(Client& client, const Arguments& arguments) {
   for (const PartitionInfo& partition : *partitions) {
     json.push_back(partition_json(partition));
     text += partition.name;
+    if (!partition.compatible()) {
+      text += "  incompatible: tf-dude " +
+              (partition.program.empty() ? "of an unknown version" : partition.program) +
+              " speaks protocol " + to_string(partition.protocol) + ", this is " +
+              to_string(kProtocolVersion) + "\n";
+      continue;
+    }
     // Only the name is known of a partition that was lost before this process started.
     if (!partition.host.empty()) {
       text += "  frames " + std::to_string(partition.frames) + "  host " + partition.host +
@@ -193,17 +201,24 @@ int run_add(Client& client, const Arguments& arguments) {
   return finish(client, added, arguments, "added");
 }
 
-int run_update(Client& client, const Arguments& arguments) {
-  const TransformSpec& spec = arguments.spec;
+// The parts that the options give.
+Result<PartialTransform> given_parts(const TransformSpec& spec) {
   const auto X_PC = spec.build();
-  if (!X_PC) return refuse_pose(X_PC.error(), arguments);
-  PartialUpdate given{arguments.id};
+  if (!X_PC) return tl::unexpected(X_PC.error());
+  PartialTransform given;
   if (spec.xyz) given.translation = X_PC->pose.translation();
   if (spec.rpy || spec.quat) given.rotation = X_PC->pose.rotation();
   if (spec.stddev || spec.cov) given.covariance = X_PC->covariance;
+  return given;
+}
+
+int run_update(Client& client, const Arguments& arguments) {
+  const auto given = given_parts(arguments.spec);
+  if (!given) return refuse_pose(given.error(), arguments);
   const auto stamp = optional_stamp(arguments.stamp, wall_clock());
   if (!stamp) return report(stamp.error(), arguments);
-  const auto updated = client.update_partial({given}, *stamp);
+  const auto updated = client.update_partial(
+      {{arguments.id, given->translation, given->rotation, given->covariance}}, *stamp);
   return finish(client, updated, arguments, "updated");
 }
 
@@ -218,13 +233,9 @@ int run_forget(Client& client, const Arguments& arguments) {
 }
 
 int run_move(Client& client, const Arguments& arguments) {
-  std::optional<Transform> X_PC;
-  if (!arguments.spec.empty()) {
-    const auto built = arguments.spec.build();
-    if (!built) return refuse_pose(built.error(), arguments);
-    X_PC = *built;
-  }
-  const auto moved = client.move(arguments.id, arguments.parent, X_PC);
+  const auto given = given_parts(arguments.spec);
+  if (!given) return refuse_pose(given.error(), arguments);
+  const auto moved = client.move(arguments.id, arguments.parent, *given);
   return finish(client, moved, arguments, "moved");
 }
 

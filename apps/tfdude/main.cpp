@@ -14,6 +14,7 @@
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/transport/fastdds.hpp"
+#include "tfdude/types/version.hpp"
 
 #include "../network_options.hpp"
 #include "../numbers.hpp"
@@ -302,6 +303,7 @@ int main(int argc, char** argv) {
   long timeout_ms = arguments.options.timeout.count();
   CLI::App app{"tfdude: where is frame B seen from frame A, and how sure are we?"};
   app.footer("Exit status: 0 done, 1 request rejected, 2 wrong usage, 3 no answer.");
+  app.set_version_flag("--version", version_line());
   app.require_subcommand(1);
   app.fallthrough();
   add_common_options(app, arguments, timeout_ms);

@@ -113,7 +113,13 @@ nlohmann::json partition_json(const PartitionInfo& partition) {
                       {"pid", partition.pid},
                       {"frames", partition.frames},
                       {"reachable", partition.reachable}};
-  if (!partition.reachable) json["reason"] = partition.stopped ? "stopped" : "lost";
+  if (!partition.program.empty()) json["program"] = partition.program;
+  json["protocol"] = to_string(partition.protocol);
+  if (!partition.compatible()) {
+    json["reason"] = "incompatible";
+  } else if (!partition.reachable) {
+    json["reason"] = partition.stopped ? "stopped" : "lost";
+  }
   return json;
 }
 

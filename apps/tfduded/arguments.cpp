@@ -6,6 +6,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "tfdude/types/version.hpp"
+
 #include "../network_options.hpp"
 #include "../numbers.hpp"
 
@@ -100,6 +102,7 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   int save_every_ms = 1000;
   CLI::App app{"tfduded: owns a partition of the coordinate frames and serves it over DDS"};
   app.footer("Example: tfduded --partition arms --config examples/thesis/arms.yaml --domain 7");
+  app.set_version_flag("--version", version_line());
   app.add_option("--partition", arguments.partition, "the partition's name");
   app.add_option("--config", arguments.config, "YAML file of frames");
   app.add_flag("--check", arguments.check,

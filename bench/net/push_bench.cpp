@@ -43,7 +43,10 @@ std::int64_t turn_at(double moment) { return static_cast<std::int64_t>(moment / 
 /// CDR bytes of the message that is pushed with each update.
 std::uint32_t pushed_bytes() {
   tfdude::PushedValues pushed;
-  for (std::uint32_t i = 0; i < kJoints; ++i) pushed.entries.push_back({i, tfdude::Time(), {}});
+  for (std::uint32_t i = 0; i < kJoints; ++i) {
+    // The joints' covariances stay the same, so they are not pushed again.
+    pushed.entries.push_back({i, tfdude::Time(), {}, {}, 1, {}, 1, true});
+  }
   return bench::payload_size<tfdude::wire::StatePubSubType>(tfdude::fastdds::to_wire(pushed));
 }
 

@@ -65,8 +65,9 @@ int main(int argc, char** argv) {
   await_reader(participant, joints);
   await_reader(participant, edges);
 
-  tfdude_wire_JointPosition elbow = {
-      .id = "elbow_joint", .position = 0.5 /* rad */, .variance = 1e-6 /* rad^2 */};
+  double position[] = {0.5 /* rad */, 1e-6 /* its variance, rad^2 */};
+  tfdude_wire_JointPosition elbow = {.id = "elbow_joint",
+                                     .numbers = {._maximum = 2, ._length = 2, ._buffer = position}};
   tfdude_wire_Joints positions = {
       .positions = {._maximum = 1, ._length = 1, ._buffer = &elbow},
       .stamp = dds_time(),  // nanoseconds since the UNIX epoch
@@ -75,13 +76,13 @@ int main(int argc, char** argv) {
 
   // The tool in its parent: no rotation, 0.2 m along z, with standard deviations of 1 mm and 0.01
   // rad on each axis.
-  tfdude_wire_Edge tool = {
-      .id = "tool0",
-      .x_pc = {0, 0, 0, 1, 0, 0,
-               0.2, [7] = 1e-6, [13] = 1e-6, [18] = 1e-6, [22] = 1e-4, [25] = 1e-4, [27] = 1e-4}};
+  double x_pc[28] = {0,           0,           0,          1,           0,
+                     0,           0.2,         [7] = 1e-6, [13] = 1e-6, [18] = 1e-6,
+                     [22] = 1e-4, [25] = 1e-4, [27] = 1e-4};
+  tfdude_wire_Edge tool = {.id = "tool0", .x_pc = {._maximum = 28, ._length = 28, ._buffer = x_pc}};
   tfdude_wire_Update update = {
       .edges = {._maximum = 1, ._length = 1, ._buffer = &tool},
-      .stamp = 0,  // no stamp: the value holds for all times
+      .stamp = -1,  // no stamp: the value holds for all times
   };
   publish(edges, &update);
 

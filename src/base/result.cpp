@@ -46,6 +46,10 @@ std::string_view to_string(Errc code) {
       return "unknown_joint";
     case Errc::kChangedMeanwhile:
       return "changed_meanwhile";
+    case Errc::kIncompatible:
+      return "incompatible";
+    case Errc::kUnsupported:
+      return "unsupported";
   }
   return "unknown";
 }

@@ -9,7 +9,7 @@
 
 namespace tfdude {
 
-/// Whether a sample can have this stamp, if any. Zero is how "no stamp" travels.
+/// Whether a sample can have this stamp, if any.
 [[nodiscard]] inline bool is_stamp(std::optional<Time> stamp) {
   return !stamp || nanoseconds(*stamp) > 0;
 }

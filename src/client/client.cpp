@@ -136,7 +136,7 @@ Result<std::vector<JointInfo>> Client::joints(const std::string& partition) {
 }
 
 Result<void> Client::move(const std::string& id, const std::string& parent,
-                          const std::optional<Transform>& X_PC) {
+                          const PartialTransform& X_PC) {
   return participant_->writes().move(id, {parent, X_PC});
 }
 

@@ -78,6 +78,8 @@ void Directory::apply(const Presence& presence, Time now) {
   partition.announced = presence.incarnation;
   info.host = presence.host;
   info.pid = presence.pid;
+  info.program = presence.program;
+  info.protocol = presence.protocol;
   if (!info.reachable || info.since == Time{}) info.since = now;
   came_back(partition, owner);
   resolve_returns();

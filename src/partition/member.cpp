@@ -152,6 +152,7 @@ void Member::overtake(Time now) {
 void Member::claim(const std::string& host, std::uint32_t pid, Time now, std::uint64_t random) {
   presence_ = {name_, incarnations_.next(now, random), host, pid, 0, false};
   presence_.ticket = presence_.incarnation;
+  presence_.program = program_version();
   // It serves with a later number, even if its clock is set back until then.
   incarnations_.saw(presence_.incarnation);
   claim_.claim(presence_);

@@ -13,6 +13,7 @@
 #include "tfdude/base/time.hpp"
 #include "tfdude/math/observation.hpp"
 #include "tfdude/types/joint_spec.hpp"
+#include "tfdude/types/version.hpp"
 
 #include "tree/forest.hpp"
 
@@ -61,8 +62,8 @@ struct PartialUpdateRequest {
 };
 
 struct MoveRequest {
-  std::string parent;             ///< empty: becomes a root
-  std::optional<Transform> X_PC;  ///< absent: unchanged
+  std::string parent;     ///< empty: becomes a root
+  PartialTransform X_PC;  ///< absent parts are unchanged
   LamportTime lamport_time = 0;
 };
 
@@ -294,11 +295,16 @@ struct Presence {
   bool taken = false;        ///< the name is taken; serving starts once the frames are loaded
   bool stopped = false;      ///< the last message: the process ends, or has given up the name
   std::uint64_t ticket = 0;  ///< of its claim to the name (NameClaim); constant for the process
+  ProtocolVersion protocol = kProtocolVersion;
+  std::string program{};        ///< the version of its program, for people
+  std::optional<Time> clock{};  ///< of its stamps, when it was sent; absent: the system's clock
 
   friend bool operator==(const Presence& a, const Presence& b) {
     return a.partition == b.partition && a.incarnation == b.incarnation && a.host == b.host &&
            a.pid == b.pid && a.pages == b.pages && a.serving == b.serving && a.absent == b.absent &&
-           a.taken == b.taken && a.stopped == b.stopped && a.ticket == b.ticket;
+           a.taken == b.taken && a.stopped == b.stopped && a.ticket == b.ticket &&
+           a.protocol == b.protocol && a.program == b.program &&
+           a.clock.has_value() == b.clock.has_value();
   }
 };
 

@@ -207,7 +207,7 @@ Result<void> Partition::forget_partition(const ForgetRequest& request, Time now)
 
 void Partition::unhang(const std::string& id, Owner rival, Time now) {
   const std::uint64_t lamport_time = directory_.next_lamport_time(now);
-  if (!forest_.move(id, {}, std::nullopt, lamport_time)) return;
+  if (!forest_.move(id, {}, {}, lamport_time)) return;
   let_go(id);
   pages_.put(id, {}, lamport_time);
   directory_.changes().frame_moved(id, {}, name_);

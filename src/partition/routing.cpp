@@ -216,8 +216,9 @@ Result<Part> route_move(const Forest& forest, const Directory& directory, const 
                         const MoveRequest& request) {
   const auto frame = forest.info(id);
   if (!frame) return unknown_frame(id);
-  if (request.X_PC) {
-    if (auto ok = check_value(id, *request.X_PC); !ok) return tl::unexpected(ok.error());
+  const PartialTransform& X_PC = request.X_PC;
+  if (auto ok = check_parts({id, X_PC.translation, X_PC.rotation, X_PC.covariance}); !ok) {
+    return tl::unexpected(ok.error());
   }
   if (id == request.parent) {
     return fail(Errc::kCycle, "frame " + quote(id) + " cannot be its own parent");

@@ -78,8 +78,49 @@ Result<void> check_watch(const WatchRequest& request) {
                                        in_milliseconds(request.period));
 }
 
+void CovarianceNumbers::push(PushedValue& value) {
+  Told& told = told_[value.index];
+  const Covariance::Upper& covariance = value.X.covariance.upper();
+  value.covariance_known = told.number != 0 && told.covariance == covariance;
+  if (!value.covariance_known) told = {std::max(told.number + 1, 1U), covariance};
+  value.covariance_number = told.number;
+}
+
+void CovarianceNumbers::label(PushedValue& value) const {
+  const Told& told = told_[value.index];
+  if (told.covariance == value.X.covariance.upper()) value.covariance_number = told.number;
+}
+
+bool KnownCovariances::fill_in(std::vector<PushedValue>& values) {
+  std::size_t known = 0;
+  for (PushedValue& value : values) {
+    if (!fill_in(value)) continue;
+    if (&values[known] != &value) values[known] = std::move(value);
+    ++known;
+  }
+  const bool all = known == values.size();
+  values.resize(known);
+  return all;
+}
+
+bool KnownCovariances::fill_in(PushedValue& value) {
+  if (value.covariance_number == 0 || value.index >= known_.size()) return !value.covariance_known;
+  Known& known = known_[value.index];
+  if (!value.covariance_known) {
+    known = {value.covariance_number, value.X.covariance};
+    return true;
+  }
+  if (known.number != value.covariance_number) return false;
+  value.X.covariance = known.covariance;
+  value.covariance_known = false;
+  return true;
+}
+
 WatchedGroup::WatchedGroup(std::uint64_t id, WatchRequest request)
-    : id_(id), request_(std::move(request)), sent_(request_.segments.size()) {
+    : id_(id),
+      request_(std::move(request)),
+      sent_(request_.segments.size()),
+      numbers_(request_.segments.size()) {
   if (!request_.composed) cursors_ = fresh_cursors();
 }
 
@@ -91,6 +132,19 @@ std::vector<EdgeCursor> WatchedGroup::fresh_cursors() const {
 }
 
 Result<PushedValues> WatchedGroup::snapshot(const Forest& forest, std::optional<Time> from) const {
+  auto values = all(forest, from);
+  if (!values) return values;
+  for (PushedValue& value : values->entries) numbers_.label(value);
+  return values;
+}
+
+PushedValues WatchedGroup::next_push(const Forest& forest) {
+  PushedValues pushed = changed(forest);
+  for (PushedValue& value : pushed.entries) numbers_.push(value);
+  return pushed;
+}
+
+Result<PushedValues> WatchedGroup::all(const Forest& forest, std::optional<Time> from) const {
   if (request_.composed) return composed(forest, from);
   auto cursors = fresh_cursors();
   auto found = forest.values_since(cursors, {!from, from});
@@ -106,7 +160,7 @@ Result<PushedValues> WatchedGroup::snapshot(const Forest& forest, std::optional<
   return PushedValues{id_, std::move(found.values), 0, found.commit};
 }
 
-PushedValues WatchedGroup::next_push(const Forest& forest) {
+PushedValues WatchedGroup::changed(const Forest& forest) {
   if (request_.composed) return next_composed_push(forest);
   const bool newest_only = request_.period > std::chrono::nanoseconds(0);
   auto found = forest.values_since(cursors_, {newest_only, {}, true});

@@ -14,6 +14,45 @@ namespace tfdude {
 /// Checks whether a request can be watched. @return kInvalidInput (the period).
 [[nodiscard]] Result<void> check_watch(const WatchRequest& request);
 
+/// An owner's side of the numbers that stand for covariances which a group was sent before: an edge
+/// whose covariance stays the same costs a quarter of the bytes.
+class CovarianceNumbers {
+ public:
+  explicit CovarianceNumbers(std::size_t edges) : told_(edges) {}
+
+  /// For a value that all of the group are sent: gives it the number of its covariance, and omits
+  /// that if the group was sent it last.
+  void push(PushedValue& value);
+  /// For a value that some may be sent alone: its covariance always comes with it.
+  void label(PushedValue& value) const;
+
+ private:
+  struct Told {
+    std::uint32_t number = 0;  // 0: nothing yet
+    Covariance::Upper covariance{};
+  };
+  std::vector<Told> told_;  // last, by index
+};
+
+/// A watcher's side of these numbers.
+class KnownCovariances {
+ public:
+  explicit KnownCovariances(std::size_t edges) : known_(edges) {}
+
+  /// Fills in the covariances that were omitted, and drops the values for which that is not known.
+  /// @return whether all were known
+  [[nodiscard]] bool fill_in(std::vector<PushedValue>& values);
+
+ private:
+  [[nodiscard]] bool fill_in(PushedValue& value);
+
+  struct Known {
+    std::uint32_t number = 0;
+    Covariance covariance;
+  };
+  std::vector<Known> known_;  // the last received, by index
+};
+
 /// An owner's side of one group of watchers: which values they have not been sent yet. Not
 /// thread-safe; the forest is.
 class WatchedGroup {
@@ -36,13 +75,16 @@ class WatchedGroup {
  private:
   [[nodiscard]] std::vector<EdgeCursor> fresh_cursors() const;
   [[nodiscard]] Result<PushedValues> composed(const Forest& forest, std::optional<Time> from) const;
+  [[nodiscard]] Result<PushedValues> all(const Forest& forest, std::optional<Time> from) const;
   [[nodiscard]] PushedValues next_composed_push(const Forest& forest);
+  [[nodiscard]] PushedValues changed(const Forest& forest);
 
   std::uint64_t id_;
   WatchRequest request_;
   std::uint64_t told_ = 0;                        // commit of the last push
   std::vector<EdgeCursor> cursors_;               // by edge
   std::vector<std::optional<PushedValue>> sent_;  // by composed segment
+  CovarianceNumbers numbers_;
 };
 
 /// Splits the values into pieces that fit into a message.

@@ -84,6 +84,11 @@ void Discovery::wait_for_change(const Deadline& deadline) {
 }
 
 Error Discovery::explained(Error error) {
+  // Before the lock is taken: the transport has a lock of its own.
+  if (const auto strangers = transport_.incompatible(); !strangers.empty()) {
+    return {Errc::kIncompatible,
+            error.message + ", as far as is known: " + strangers.front().text()};
+  }
   const Lock lock(structure_.mutex);
   const auto missed = structure_.directory.only_heard_of();
   if (!missed || error.code == Errc::kUnknownPartition) return error;
@@ -96,6 +101,9 @@ Error Discovery::undecided(const std::string& what, const Deadline& deadline) {
   std::string missing = "no participant was discovered yet";
   // Before the lock is taken: the transport reports presences under a lock of its own.
   const bool awaits_presence = transport_.awaits_presence();
+  if (const auto strangers = transport_.incompatible(); !strangers.empty()) {
+    missing = strangers.front().text();
+  }
   {
     const Lock lock(structure_.mutex);
     if (const std::string* partition = structure_.directory.incomplete()) {

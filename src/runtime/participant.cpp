@@ -18,7 +18,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       requests_(structure_, discovery_, *transport_, own()),
       yielding_(structure_, requests_, member_, options.timeout),
       serving_(structure_, discovery_, *transport_, member_, options_),
-      queries_(structure_, discovery_, requests_, member_),
+      queries_(structure_, discovery_, requests_, member_, *transport_),
       writes_(structure_, discovery_, requests_, member_),
       joints_(structure_, discovery_, requests_, member_),
       observations_(structure_, discovery_, requests_),

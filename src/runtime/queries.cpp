@@ -66,7 +66,16 @@ Result<std::vector<std::string>> Queries::roots() {
 
 Result<std::vector<PartitionInfo>> Queries::partitions() {
   if (auto known = all_known(); !known) return tl::unexpected(std::move(known.error()));
-  return member_.with_rules([](const Member& member) { return member.partitions(); });
+  auto partitions = member_.with_rules([](const Member& member) { return member.partitions(); });
+  for (IncompatiblePeer& peer : transport_.incompatible()) {
+    PartitionInfo info;
+    info.name = std::move(peer.partition);
+    info.since = peer.since;
+    info.program = std::move(peer.program);
+    info.protocol = peer.protocol;
+    partitions.push_back(std::move(info));
+  }
+  return partitions;
 }
 
 std::size_t Queries::own_frames() {

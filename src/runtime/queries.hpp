@@ -19,8 +19,13 @@ namespace tfdude {
 /// @par Thread safety  All functions are thread-safe.
 class Queries {
  public:
-  Queries(Structure& structure, Discovery& discovery, Requests& requests, MemberRunner& member)
-      : structure_(structure), discovery_(discovery), requests_(requests), member_(member) {}
+  Queries(Structure& structure, Discovery& discovery, Requests& requests, MemberRunner& member,
+          const Transport& transport)
+      : structure_(structure),
+        discovery_(discovery),
+        requests_(requests),
+        member_(member),
+        transport_(transport) {}
 
   [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b);
   [[nodiscard]] Result<Handle> find(std::string_view id);
@@ -44,6 +49,7 @@ class Queries {
   Discovery& discovery_;
   Requests& requests_;
   MemberRunner& member_;
+  const Transport& transport_;
 };
 
 }  // namespace tfdude

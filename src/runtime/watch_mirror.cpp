@@ -73,6 +73,7 @@ WatchMirror::WatchMirror(const std::string& a, const std::string& b, WatchRoute 
       sources_[i].edges.push_back(static_cast<std::uint32_t>(index));
       if (edge != route_.edges.end()) edges_[index].source = i;
     }
+    sources_[i].covariances = KnownCovariances(sources_[i].edges.size());
   }
 }
 
@@ -129,9 +130,10 @@ bool WatchMirror::take(const PushedValues& pushed) {
   Source& source = sources_[static_cast<std::size_t>(told - route_.sources.begin())];
   auto whole = source.pieces.add(pushed);
   if (!whole) return false;
+  const bool knows_all = source.covariances.fill_in(whole->entries);
   // A complete commit that does not follow on may lack samples between those reported.
   const bool is_old = whole->commit <= source.commit;
-  const bool follows_on = !is_old && whole->after <= source.commit;
+  const bool follows_on = !is_old && whole->after <= source.commit && knows_all;
   source.heard = std::max(source.heard, whole->commit);
   // Before the first complete values there is nothing that a sample could belong to.
   if (!follows_on && source.commit == 0) return false;

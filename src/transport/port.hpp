@@ -5,14 +5,27 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
 #include "tfdude/transport/transport.hpp"
+#include "tfdude/types/version.hpp"
 
 #include "partition/messages.hpp"
 
 namespace tfdude {
+
+/// A participant that speaks another major version of the protocol: nothing is exchanged with it.
+struct IncompatiblePeer {
+  std::string partition;  ///< that it serves; empty: none
+  ProtocolVersion protocol;
+  std::string program;  ///< the version of its program
+  Time since;           ///< when it was met, by the system's clock
+
+  /// Who it is, both versions, and what to do.
+  [[nodiscard]] std::string text() const;
+};
 
 /// Handles the messages that a participant receives.
 /// @par Thread safety  Called from the transport's threads, also at the same time; never after
@@ -121,6 +134,9 @@ class Transport {
 
   /// Whether a participant was met that has not announced yet which partition it serves.
   [[nodiscard]] virtual bool awaits_presence() const = 0;
+
+  /// The owners of partitions that were met and cannot be understood.
+  [[nodiscard]] virtual std::vector<IncompatiblePeer> incompatible() const { return {}; }
 
   /// How long a new participant needs to meet all others, by experience.
   [[nodiscard]] virtual Milliseconds discovery_time() const = 0;

@@ -36,6 +36,10 @@ struct CorrelatedUpdate {
 ///   away.
 [[nodiscard]] Result<void> check_parts(const PartialUpdate& edge);
 
+/// A value with these parts replaced. @return kInvalidInput naming the frame and the invalid part.
+[[nodiscard]] Result<Transform> with_parts(const Transform& X_PC, std::string_view id,
+                                           const PartialTransform& parts);
+
 /// Reports that the history of an edge has restarted.
 struct HistoryRestart {
   std::string id;
@@ -156,12 +160,12 @@ class Forest {
   [[nodiscard]] Result<void> revise(const std::vector<Revision>& edges, std::optional<Time> stamp,
                                     std::uint64_t seen);
 
-  /// Moves a held frame, with all below it, to a new parent; empty makes it a root. Without X_PC
-  /// the edge keeps its value. The history is cleared, as it was that of another edge: the edge is
+  /// Moves a held frame, with all below it, to a new parent; empty makes it a root. Absent parts of
+  /// X_PC keep their value. The history is cleared, as it was that of another edge: the edge is
   /// static until its next sample. O(subtree).
   /// @return kUnknownFrame, kNotOwner, kUnknownParent, kCycle, kInvalidInput (not finite).
   [[nodiscard]] Result<void> move(std::string_view id, std::string_view parent,
-                                  const std::optional<Transform>& X_PC = std::nullopt,
+                                  const PartialTransform& X_PC = {},
                                   std::uint64_t lamport_time = 0);
 
   // --- frames held elsewhere: structure only ---

@@ -8,17 +8,22 @@
 namespace tfdude {
 namespace {
 
-Result<Transform> with_parts(const Transform& X_PC, const PartialUpdate& parts) {
-  const auto pose = Pose::create(parts.rotation.value_or(X_PC.pose.rotation()),
-                                 parts.translation.value_or(X_PC.pose.translation()));
-  if (!pose) return fail_at("frame " + quote(parts.id), pose.error());
-  return Transform{*pose, parts.covariance.value_or(X_PC.covariance)};
+PartialTransform parts_of(const PartialUpdate& edge) {
+  return {edge.translation, edge.rotation, edge.covariance};
 }
 
 }  // namespace
 
+Result<Transform> with_parts(const Transform& X_PC, std::string_view id,
+                             const PartialTransform& parts) {
+  const auto pose = Pose::create(parts.rotation.value_or(X_PC.pose.rotation()),
+                                 parts.translation.value_or(X_PC.pose.translation()));
+  if (!pose) return fail_at("frame " + quote(id), pose.error());
+  return Transform{*pose, parts.covariance.value_or(X_PC.covariance)};
+}
+
 Result<void> check_parts(const PartialUpdate& edge) {
-  return with_parts(Transform(), edge).map([](const Transform&) {});
+  return with_parts(Transform(), edge.id, parts_of(edge)).map([](const Transform&) {});
 }
 
 Result<std::vector<EdgeUpdate>> Forest::Impl::completed(
@@ -30,7 +35,7 @@ Result<std::vector<EdgeUpdate>> Forest::Impl::completed(
     const auto slot = frames_.held_slot(edge.id);
     if (!slot) return tl::unexpected(slot.error());
     Transform& X_PC = values.try_emplace(*slot, whole(frames_.newest_value(*slot))).first->second;
-    auto given = with_parts(X_PC, edge);
+    auto given = with_parts(X_PC, edge.id, parts_of(edge));
     if (!given) return tl::unexpected(std::move(given.error()));
     X_PC = *given;
     all.push_back({edge.id, X_PC});

@@ -330,10 +330,9 @@ Result<void> Forest::update_correlated(const std::vector<CorrelatedUpdate>& edge
 }
 
 Result<void> Forest::move(std::string_view id, std::string_view parent,
-                          const std::optional<Transform>& X_PC, std::uint64_t lamport_time) {
+                          const PartialTransform& X_PC, std::uint64_t lamport_time) {
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   const Writing lock(impl_->mutex_);
-  if (X_PC && !is_finite(*X_PC)) return check_value(id, *X_PC);
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   const Impl::Pair pair = impl_->newest_pair(id, parent);
@@ -343,11 +342,14 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   }
   if (auto ok = impl_->check_no_cycle(pair); !ok) return ok;
   const auto& old = static_cast<const HeldVersion&>(*pair.frame);
+  const auto value = with_parts(Impl::whole(old), id, X_PC);
+  if (!value) return tl::unexpected(value.error());
+  if (!is_finite(*value)) return check_value(id, *value);
   const std::uint32_t parent_slot = impl_->parent_slot(pair);
   old.name->hung(lamport_time);
-  HeldVersion& fresh = impl_->push_held(*slot, X_PC.value_or(old.X_PC));
+  HeldVersion& fresh = impl_->push_held(*slot, X_PC.empty() ? old.X_PC : *value);
   impl_->forget_history(fresh);
-  if (X_PC) impl_->end_revision(fresh);
+  if (!X_PC.empty()) impl_->end_revision(fresh);
   impl_->relink(fresh, parent_slot);
   impl_->commit_structure();
   return {};

@@ -32,6 +32,11 @@ struct PushedValue {
   std::uint64_t history = 0;
   /// Of the edge; only with the first value reported of a history.
   std::optional<Covariance> process_noise{};
+  /// Identifies the covariance among those of this edge in its group of watchers
+  /// (CovarianceNumbers); 0: not numbered.
+  std::uint32_t covariance_number = 0;
+  /// The covariance of this number was pushed before, and X comes without it.
+  bool covariance_known = false;
 };
 
 /// Values written to edges up to a commit.

@@ -11,7 +11,7 @@
 namespace tfdude::fuzz {
 namespace {
 
-void strip(wire::Joints&, std::vector<wire::Transform>&) {}
+void strip(wire::Joints&, std::vector<fastdds::Numbers>&) {}
 
 void demand_same_names(const Bytes& bytes, const wire::Joints& sample) {
   auto joint = sample.positions().begin();

@@ -50,7 +50,7 @@ void run(const Bytes& bytes) {
   const auto page = round_trip<fastdds::PageType>(
       *sample, [](const Page& message) { return fastdds::to_wire(message); },
       [](const wire::Page& wire) { return fastdds::from_wire(wire); },
-      [](const wire::Page&, const std::vector<wire::Transform>&) {});
+      [](const wire::Page&, const std::vector<fastdds::Numbers>&) {});
   if (!page) return;
   wire::Page sent = fastdds::to_wire(*page);
   demand(key_of<fastdds::PageType>(sent) == key, "a page keeps its key");

@@ -31,7 +31,7 @@ void run(const Bytes& bytes) {
   const auto presence = round_trip<fastdds::PresenceType>(
       *sample, [](const Presence& message) { return fastdds::to_wire(message); },
       [](const wire::Presence& wire) { return fastdds::from_wire(wire); },
-      [](wire::Presence& wire, const std::vector<wire::Transform>&) { wire.peers(0); });
+      [](wire::Presence& wire, const std::vector<fastdds::Numbers>&) { wire.peers(0); });
   if (!presence) return;
   wire::Presence sent = fastdds::to_wire(*presence);
   demand(key_of<fastdds::PresenceType>(sent) == key, "a presence keeps its key");

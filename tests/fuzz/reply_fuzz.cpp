@@ -8,12 +8,12 @@
 namespace tfdude::fuzz {
 namespace {
 
-void strip(wire::Reply& sample, std::vector<wire::Transform>& out) {
+void strip(wire::Reply& sample, std::vector<fastdds::Numbers>& out) {
   wire::ReplyBody& body = sample.body();
   if (body._d() == 1) {
     body.error().message(printable(body.error().message()).substr(0, 4096));
   } else if (body._d() == 2) {
-    for (wire::Transform& X : body.transforms()) take_out(X, out);
+    for (fastdds::Numbers& X : body.transforms()) take_out(X, out);
   } else if (body._d() == 3) {
     body.done(0);
   } else {

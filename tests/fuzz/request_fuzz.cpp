@@ -12,7 +12,7 @@
 namespace tfdude::fuzz {
 namespace {
 
-void strip(wire::Request& sample, std::vector<wire::Transform>& out) {
+void strip(wire::Request& sample, std::vector<fastdds::Numbers>& out) {
   sample.addressee(0);
   wire::RequestBody& body = sample.body();
   switch (body._d()) {
@@ -22,9 +22,6 @@ void strip(wire::Request& sample, std::vector<wire::Transform>& out) {
     case 3:
       take_out(body.update().x_pc(), out);
       for (wire::Edge& edge : body.update().more()) take_out(edge.x_pc(), out);
-      break;
-    case 5:
-      take_out(body.move_and_update().x_pc(), out);
       break;
     case 2:
     case 4:

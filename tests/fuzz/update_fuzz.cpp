@@ -8,7 +8,7 @@
 namespace tfdude::fuzz {
 namespace {
 
-void strip(wire::Update& sample, std::vector<wire::Transform>& out) {
+void strip(wire::Update& sample, std::vector<fastdds::Numbers>& out) {
   for (wire::Edge& edge : sample.edges()) take_out(edge.x_pc(), out);
 }
 

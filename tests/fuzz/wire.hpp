@@ -9,6 +9,7 @@
 
 #include "fuzz/demand.hpp"
 #include "support/samples.hpp"
+#include "transport/fastdds/codec_values.hpp"
 
 // Shared by all harnesses of DDS samples: reads the bytes as a reader does, up to the message.
 namespace tfdude::fuzz {
@@ -44,7 +45,8 @@ template <class Type, class Sample>
 
 template <class T>
 void demand_refusal(const Result<T>& result) {
-  demand(result.error().code == Errc::kInvalidInput, "what is refused is called invalid");
+  demand(result.error().code == Errc::kInvalidInput || result.error().code == Errc::kUnsupported,
+         "what is refused is called invalid or unsupported");
   demand_printable(result.error());
 }
 
@@ -63,14 +65,14 @@ inline constexpr std::size_t kSigma = 7;  // where the covariance begins
 
 /// Whether a covariance is so small in places that eigenvalues lifted by 1e-9 of it underflow to
 /// zero again.
-[[nodiscard]] inline bool underflows(const wire::Transform& x_pc) {
+[[nodiscard]] inline bool underflows(const fastdds::Numbers& x_pc) {
   return std::any_of(x_pc.begin() + kSigma, x_pc.end(),
                      [](double value) { return value != 0 && std::abs(value) < 1e-200; });
 }
 
 /// The standard deviations by which the library judges a covariance: an axis that is far more
 /// certain than the others of its unit is judged by those.
-[[nodiscard]] inline std::array<double, 6> judged_stddev(const wire::Transform& x_pc) {
+[[nodiscard]] inline std::array<double, 6> judged_stddev(const fastdds::Numbers& x_pc) {
   std::array<double, 6> judged{};
   for (std::size_t i = 0; i < 6; ++i) {
     const std::size_t unit = i / 3 * 3;
@@ -83,7 +85,8 @@ inline constexpr std::size_t kSigma = 7;  // where the covariance begins
   return judged;
 }
 
-inline void demand_same(const wire::Transform& a, const wire::Transform& b, Tolerance tolerance) {
+inline void demand_same(const fastdds::Numbers& a, const fastdds::Numbers& b, Tolerance tolerance) {
+  demand(a.size() == b.size(), "a transform keeps its numbers");
   const auto near = [](double x, double y, double bound) {
     return x == y || std::abs(x - y) <= bound;
   };
@@ -106,8 +109,8 @@ inline void demand_same(const wire::Transform& a, const wire::Transform& b, Tole
 /// and sets to zero what a message does not keep.
 template <class Type, class Sample, class Strip>
 void demand_same(Sample a, Sample b, Strip strip, Tolerance tolerance) {
-  std::vector<wire::Transform> of_a;
-  std::vector<wire::Transform> of_b;
+  std::vector<fastdds::Numbers> of_a;
+  std::vector<fastdds::Numbers> of_b;
   strip(a, of_a);
   strip(b, of_b);
   demand(testing::serialized<Type>(a) == testing::serialized<Type>(b),
@@ -116,9 +119,9 @@ void demand_same(Sample a, Sample b, Strip strip, Tolerance tolerance) {
   for (std::size_t i = 0; i < of_a.size(); ++i) demand_same(of_a[i], of_b[i], tolerance);
 }
 
-inline void take_out(wire::Transform& x_pc, std::vector<wire::Transform>& out) {
+inline void take_out(fastdds::Numbers& x_pc, std::vector<fastdds::Numbers>& out) {
   out.push_back(x_pc);
-  x_pc.fill(0);
+  x_pc.clear();
 }
 
 /// Reads a sample into a message, sends that, and reads it again: all three must be equal.

@@ -44,12 +44,13 @@ struct Counted {
 wire::Update stranger_update(const std::string& id) {
   wire::Edge edge;
   edge.id(id);
-  edge.x_pc() = {};
+  edge.x_pc().resize(28);
   edge.x_pc()[3] = 1.0;  // w of the quaternion
   edge.x_pc()[4] = 1.0;  // x
   for (const std::size_t diagonal : {7U, 13U, 18U}) edge.x_pc()[diagonal] = 1e-6;
   wire::Update update;
   update.edges({edge});
+  update.stamp(-1);
   return update;
 }
 
@@ -137,15 +138,14 @@ TEST_CASE("joints of a plain writer move the edges of who has them") {
   const auto sample = [](const char* name, double position, std::int64_t stamp) {
     wire::JointPosition joint;
     joint.id(name);
-    joint.position(position);
-    joint.variance(1e-4);
+    joint.numbers({position, 1e-4});
     wire::Joints joints;
     joints.positions({joint});
     joints.stamp(stamp);
     return joints;
   };
-  wire::Joints of_others = sample("knee", 1, 0);
-  wire::Joints bad = sample("elbow", std::nan(""), 0);
+  wire::Joints of_others = sample("knee", 1, -1);
+  wire::Joints bad = sample("elbow", std::nan(""), -1);
   wire::Joints good = sample("elbow", 0.5, 1'700'000'000'000'000'000);
   std::uint64_t written = 0;
   for (wire::Joints* joints : {&of_others, &bad, &good}) {

@@ -133,7 +133,7 @@ void Follower::move() {
       "move below " + base_of(base),
       [this, base, id = arm()] {
         return route_move(process_->forest(), process_->directory(), id,
-                          MoveRequest{base_of(base), std::nullopt})
+                          MoveRequest{base_of(base), {}})
             .map([](Part part) { return std::vector<Part>{std::move(part)}; });
       },
       [this, base](const Result<void>& moved) {

@@ -16,6 +16,7 @@ class Cdr {
   }
 
   Cdr& octet(unsigned value) { return number(value, 1); }
+  Cdr& ushort(unsigned value) { return number(value, 2); }
   Cdr& ulong(std::uint64_t value) { return number(value, 4); }
   Cdr& ulonglong(std::uint64_t value) { return number(value, 8); }
   Cdr& string(const std::string& text) { return string(text, text.size() + 1); }
@@ -25,10 +26,14 @@ class Cdr {
     bytes_.push_back(0);
     return *this;
   }
-  Cdr& transform() {
-    for (int i = 0; i < 28; ++i) ulonglong(0);
+  Cdr& numbers(std::uint64_t count) {
+    ulong(count);
+    for (std::uint64_t i = 0; i < count; ++i) ulonglong(0);
     return *this;
   }
+  Cdr& transform() { return numbers(28); }
+  /// What comes before the body of a request.
+  Cdr& head(const std::string& id) { return string(id).ulong(0).ulong(0).ulonglong(0); }
   Cdr& edge(const std::string& id) { return string(id).transform(); }
 
   [[nodiscard]] const Bytes& bytes() const { return bytes_; }

@@ -6,6 +6,10 @@
 #include <thread>
 #include <utility>
 
+#include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/peers.hpp"
+#include "transport/fastdds/topics.hpp"
+
 namespace tfdude::testing {
 namespace {
 
@@ -69,13 +73,15 @@ bool RawType::fill(const Bytes& bytes, fastdds::ertps::SerializedPayload_t& payl
 }
 
 ForeignWriter::ForeignWriter(std::uint32_t domain, const char* topic_name, edds::TypeSupport type,
-                             const std::string& partition, bool durable) {
+                             const std::string& partition, bool durable, const Name& name) {
   edds::DomainParticipantQos participant_qos;
   factory().load_XML_profiles_file(TFDUDE_LOOPBACK_PROFILE);  // loading it twice is harmless
   factory().get_participant_qos_from_profile("tfdude_participant", participant_qos);
   for (auto& transport : participant_qos.transport().user_transports) {
     transport = std::make_shared<MutedDescriptor>(transport, muted_);
   }
+  if (!name.name.empty()) participant_qos.name(name.name);
+  participant_qos.user_data().data_vec({name.user_data.begin(), name.user_data.end()});
   participant_ = factory().create_participant(domain, participant_qos);
   if (participant_ == nullptr) throw std::runtime_error("no participant for a foreign writer");
   type.register_type(participant_);
@@ -96,6 +102,40 @@ ForeignWriter::ForeignWriter(std::uint32_t domain, const char* topic_name, edds:
 ForeignWriter::~ForeignWriter() {
   participant_->delete_contained_entities();
   factory().delete_participant(participant_);
+}
+
+std::shared_ptr<const Replies> ForeignWriter::read_replies() {
+  const edds::TypeSupport type(new fastdds::ReplyType);
+  type.register_type(participant_);
+  edds::Topic* topic = participant_->create_topic(fastdds::kReplyTopic, type.get_type_name(),
+                                                  edds::TOPIC_QOS_DEFAULT);
+  edds::SubscriberQos subscriber_qos;
+  const auto self = fastdds::peer_of(participant_->guid().guidPrefix);
+  subscriber_qos.partition().push_back(fastdds::reply_partition(self).c_str());
+  edds::Subscriber* subscriber = participant_->create_subscriber(subscriber_qos);
+  edds::DataReaderQos qos;
+  qos.data_sharing().off();
+  qos.endpoint().history_memory_policy = fastdds::ertps::DYNAMIC_REUSABLE_MEMORY_MODE;
+  if (subscriber->create_datareader(topic, qos, replies_.get()) == nullptr) {
+    throw std::runtime_error("no reader of replies");
+  }
+  return replies_;
+}
+
+void Replies::on_data_available(edds::DataReader* reader) {
+  wire::Reply sample;
+  edds::SampleInfo info;
+  while (fastdds::ok(reader->take_next_sample(&sample, &info))) {
+    auto reply = fastdds::from_wire(sample);
+    if (!info.valid_data || !reply) continue;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    last_ = *std::move(reply);
+  }
+}
+
+std::optional<Reply> Replies::last() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return last_;
 }
 
 void ForeignWriter::await_readers(int count) {

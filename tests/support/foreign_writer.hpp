@@ -4,9 +4,12 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "partition/messages.hpp"
 #include "transport/fastdds/compat.hpp"
 
 // DDS writers that do not use this project's library: they send what any program in the domain may
@@ -76,14 +79,34 @@ Bytes bytes_of(Sample sample) {
   return done ? Bytes(payload.data, payload.data + payload.length) : Bytes();
 }
 
+/// What a participant says of itself in discovery.
+struct Name {
+  std::string name;
+  std::string user_data;
+};
+
+/// The last reply that came.
+class Replies : public fastdds::edds::DataReaderListener {
+ public:
+  void on_data_available(fastdds::edds::DataReader* reader) override;
+  [[nodiscard]] std::optional<Reply> last() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::optional<Reply> last_;
+};
+
 /// A participant with one writer on one topic, on this computer only.
 class ForeignWriter {
  public:
   /// @param partition  of DDS; empty: the default one
   /// @throws std::runtime_error if it cannot be created.
   ForeignWriter(std::uint32_t domain, const char* topic, fastdds::edds::TypeSupport type,
-                const std::string& partition, bool durable = false);
+                const std::string& partition, bool durable = false, const Name& name = {});
   ~ForeignWriter();
+
+  /// Reads the replies to this participant.
+  [[nodiscard]] std::shared_ptr<const Replies> read_replies();
   ForeignWriter(const ForeignWriter&) = delete;
   ForeignWriter& operator=(const ForeignWriter&) = delete;
 
@@ -98,6 +121,7 @@ class ForeignWriter {
   void write(void* sample, std::chrono::nanoseconds ahead = {});
 
  private:
+  const std::shared_ptr<Replies> replies_ = std::make_shared<Replies>();
   const std::shared_ptr<std::atomic<bool>> muted_ = std::make_shared<std::atomic<bool>>(false);
   fastdds::edds::DomainParticipant* participant_ = nullptr;
   fastdds::edds::DataWriter* writer_ = nullptr;

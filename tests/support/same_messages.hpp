@@ -96,6 +96,14 @@ inline std::string listed(const JointInfo& joint) {
   return text.str();
 }
 
+inline void check_same(const PartialTransform& actual, const PartialTransform& expected) {
+  CHECK(actual.translation == expected.translation);
+  REQUIRE(actual.rotation.has_value() == expected.rotation.has_value());
+  if (actual.rotation) CHECK(actual.rotation->isApprox(*expected.rotation, 1e-15));
+  REQUIRE(actual.covariance.has_value() == expected.covariance.has_value());
+  if (actual.covariance) CHECK(actual.covariance->upper() == expected.covariance->upper());
+}
+
 inline void check_same(const PartialUpdateRequest& actual, const PartialUpdateRequest& expected) {
   CHECK(actual.stamp == expected.stamp);
   REQUIRE(actual.edges.size() == expected.edges.size());
@@ -103,11 +111,8 @@ inline void check_same(const PartialUpdateRequest& actual, const PartialUpdateRe
     const PartialUpdate& came = actual.edges[i];
     const PartialUpdate& sent = expected.edges[i];
     CHECK(came.id == sent.id);
-    CHECK(came.translation == sent.translation);
-    REQUIRE(came.rotation.has_value() == sent.rotation.has_value());
-    if (came.rotation) CHECK(came.rotation->isApprox(*sent.rotation, 1e-15));
-    REQUIRE(came.covariance.has_value() == sent.covariance.has_value());
-    if (came.covariance) CHECK(came.covariance->upper() == sent.covariance->upper());
+    check_same(PartialTransform(came.translation, came.rotation, came.covariance),
+               PartialTransform(sent.translation, sent.rotation, sent.covariance));
   }
 }
 
@@ -129,9 +134,7 @@ inline void check_same(const Request& actual, const Request& expected) {
   } else if (const auto* move = std::get_if<MoveRequest>(&expected.body)) {
     CHECK(std::get<MoveRequest>(actual.body).parent == move->parent);
     CHECK(std::get<MoveRequest>(actual.body).lamport_time == move->lamport_time);
-    const auto& X_PC = std::get<MoveRequest>(actual.body).X_PC;
-    REQUIRE(X_PC.has_value() == move->X_PC.has_value());
-    if (X_PC) check_same(*X_PC, *move->X_PC);
+    check_same(std::get<MoveRequest>(actual.body).X_PC, move->X_PC);
   } else if (const auto* watch = std::get_if<WatchRequest>(&expected.body)) {
     const auto& arrived = std::get<WatchRequest>(actual.body);
     CHECK(arrived.composed == watch->composed);

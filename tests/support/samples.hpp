@@ -103,7 +103,8 @@ bool take(const Bytes& bytes) {
       {3, "hand", RemoveRequest{{"hand", "arm_1", "\xc3\xa4rmel"}, 1U << 20U}},
       {4, "hand", UpdateRequest{{edge("hand")}}},
       {5, "hand", UpdateRequest{{edge("hand"), edge("arm"), edge("x")}}},
-      {6, "hand", MoveRequest{"arm", std::nullopt, 7}},
+      {6, "hand", MoveRequest{"arm", {}, 7}},
+      {23, "hand", MoveRequest{"arm", {std::nullopt, random.transform().pose.rotation(), {}}, 8}},
       {7, "hand", MoveRequest{"", random.transform(), 1ULL << 63U}},
       {8, "hand", LookupRequest{{{"hand", "arm"}, {"camera", "world"}}}},
       {9, "hand", UpdateRequest{{edge("hand"), edge("arm")}, time_of(1)}},
@@ -132,7 +133,7 @@ bool take(const Bytes& bytes) {
       {21, "arm", partial_updates(random)},
       {22, "arm", CorrelateRequest{correlation(random)}},
       {30, "base", ForgetRequest{"arm", 18446744073709551615ULL}},
-      {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), std::nullopt},
+      {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), {}},
        18446744073709551610ULL}};
 }
 
@@ -217,7 +218,8 @@ bool take(const Bytes& bytes) {
           {4,
            {{0, {}, random.transform(), {}, 18446744073709551615ULL, Covariance()},
             {1, time_of(7), Transform(), {}, 3, random.transform().covariance},
-            {1, time_of(8), Transform(), {}, 3, {}}},
+            {1, time_of(8), Transform(), {}, 3, {}, 4294967295U},
+            {1, time_of(9), Transform(), {}, 3, {}, 4294967295U, true}},
            5,
            18446744073709551615ULL,
            1,
@@ -259,7 +261,10 @@ bool take(const Bytes& bytes) {
             {std::string(255, 'a'), 7, Absent::Kind::kSilent, 1}},
            true,
            true,
-           18446744073709551614ULL}};
+           18446744073709551614ULL,
+           {65535, 65534},
+           "1.2.3-rc",
+           time_of(0)}};
 }
 
 [[nodiscard]] inline std::vector<WireKind> wire_kinds(Random& random) {

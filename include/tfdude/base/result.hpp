@@ -35,6 +35,8 @@ enum class Errc : std::uint8_t {
   kStampTaken = 19,        ///< update: the edge has another sample of that stamp
   kChangedMeanwhile = 20,  ///< observe: an edge was written while it was observed
   kUnknownJoint = 21,      ///< no joint of that name
+  kIncompatible = 22,      ///< a participant speaks another major version of the protocol
+  kUnsupported = 23,       ///< an earlier version does not know what was sent to it
 };
 
 /// The stable snake_case name of a code, as the command line prints it in JSON.

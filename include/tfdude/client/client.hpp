@@ -166,10 +166,11 @@ class TFDUDE_EXPORT Client {
 
   /// Moves a frame, with all frames below it, to a new parent (empty: makes it a root). The owner
   /// stays the same.
-  /// @param X_PC  the new edge's value; absent: the old value is kept
+  /// @param X_PC  the new edge's value, a Transform or parts of one; absent parts keep their value,
+  ///   as the owner has it
   /// @return kUnknownFrame, kUnknownParent, kCycle.
   [[nodiscard]] Result<void> move(const std::string& id, const std::string& parent,
-                                  const std::optional<Transform>& X_PC = std::nullopt);
+                                  const PartialTransform& X_PC = {});
 
   /// X_AB, the pose of frame b in frame a, with the covariance of its right perturbation, expressed
   /// in b. The instant is the newest for which all dynamic edges on the path have data. Covariance

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "tfdude/base/time.hpp"
 #include "tfdude/math/observation.hpp"
@@ -30,6 +31,23 @@ struct EdgeUpdate {
 struct HandleUpdate {
   Handle frame;
   Transform X_PC;
+};
+
+/// Parts of a transform. A whole transform converts to all of its parts.
+struct PartialTransform {
+  PartialTransform() = default;
+  PartialTransform(std::optional<Eigen::Vector3d> p, std::optional<Eigen::Quaterniond> q,
+                   std::optional<Covariance> cov)
+      : translation(std::move(p)), rotation(std::move(q)), covariance(std::move(cov)) {}
+  // NOLINTNEXTLINE(google-explicit-constructor): it is the whole, of the same meaning
+  PartialTransform(const Transform& X)
+      : translation(X.pose.translation()), rotation(X.pose.rotation()), covariance(X.covariance) {}
+
+  [[nodiscard]] bool empty() const { return !translation && !rotation && !covariance; }
+
+  std::optional<Eigen::Vector3d> translation;  ///< [m]
+  std::optional<Eigen::Quaterniond> rotation;
+  std::optional<Covariance> covariance;
 };
 
 /// Parts of a new value X_PC for the edge, which is named by the child's id. Absent parts stay as

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "tfdude/base/time.hpp"
+#include "tfdude/types/version.hpp"
 
 namespace tfdude {
 
@@ -15,8 +16,13 @@ struct PartitionInfo {
   std::uint32_t pid = 0;
   std::size_t frames = 0;
   bool reachable = false;
-  Time since{};          ///< when `reachable` last changed, by the caller's clock
-  bool stopped = false;  ///< if not reachable: it announced its stop; otherwise it was lost
+  Time since{};           ///< when `reachable` last changed, by the caller's clock
+  bool stopped = false;   ///< if not reachable: it announced its stop; otherwise it was lost
+  std::string program{};  ///< the version of its program; empty: not known
+  ProtocolVersion protocol = kProtocolVersion;
+
+  /// Whether its protocol is understood here. If not, only its name and versions are known.
+  [[nodiscard]] bool compatible() const { return protocol.major == kProtocolVersion.major; }
 };
 
 /// "was stopped" or "is lost", for a partition that is not reachable.

@@ -1,5 +1,7 @@
 #include "transport/fastdds/cdr_check.hpp"
 
+#include "transport/fastdds/kinds.hpp"
+
 namespace tfdude::fastdds {
 namespace detail {
 
@@ -55,6 +57,12 @@ std::string_view CdrWalk::string(std::size_t max_bytes) {
   return text;
 }
 
+void CdrWalk::numbers(std::uint32_t most) {
+  const std::uint32_t length = ulong();
+  if (length > most) good_ = false;
+  if (length > 0) skip(length * sizeof(double), 8);
+}
+
 void CdrWalk::path_ends() {
   id();
   id();
@@ -67,11 +75,11 @@ void CdrWalk::transforms() {
 void CdrWalk::correlation() {
   constexpr std::uint32_t kMaxLoading = 216;
   octet();
-  sequence([&] { skip(8, 8); }, Covariance::kSize);
+  numbers(Covariance::kSize);
   sequence(
       [&] {
         octet();
-        sequence([&] { skip(8, 8); }, kMaxLoading);
+        numbers(kMaxLoading);
         id();
       },
       kMaxCorrelated);
@@ -93,8 +101,9 @@ void CdrWalk::state() {
   ulong();
   sequence([&] {
     skip(2 * 8, 8);
-    transform();
     ulong();
+    ulong();
+    transform();
   });
   sequence(
       [&] {
@@ -104,7 +113,7 @@ void CdrWalk::state() {
       kMaxCorrelated);
   sequence([&] {
     ulong();
-    sequence([&] { skip(8, 8); }, Covariance::kSize);
+    numbers(Covariance::kSize);
   });
 }
 
@@ -116,7 +125,7 @@ std::string_view CdrWalk::edge() {
 
 std::string_view CdrWalk::joint() {
   const std::string_view name = id();
-  skip(2 * 8, 8);
+  numbers(2);
   return name;
 }
 
@@ -128,49 +137,41 @@ using detail::CdrWalk;
 
 constexpr std::size_t kMaxMessage = 4096;
 
-void request_body(CdrWalk& walk) {
-  switch (walk.octet()) {
-    case 1:  // add
-    case 5:  // move and update
+void change_body(CdrWalk& walk, RequestKind kind) {
+  switch (kind) {
+    case kAdd:
       walk.id();
       walk.transform();
       walk.skip(8, 8);
       break;
-    case 2:  // remove
+    case kRemove:
       walk.sequence([&] { walk.id(); });
       walk.skip(8, 8);
       break;
-    case 3:  // update
+    case kUpdate:
       walk.transform();
       walk.skip(8, 8);
       walk.sequence([&] { walk.edge(); });
       break;
-    case 4:  // move
+    case kMove:
       walk.id();
       walk.skip(8, 8);
       break;
-    case 6:  // lookup
-      walk.sequence([&] { walk.path_ends(); });
-      break;
-    case 7:  // lookup at an instant
-      walk.skip(4 * 8, 8);
-      walk.sequence([&] { walk.path_ends(); });
-      walk.octet();
-      walk.octet();
-      break;
-    case 8:  // watch
-      walk.skip(2 * 8, 8);
-      walk.sequence([&] { walk.path_ends(); });
-      walk.octet();
-      break;
-    case 9:   // history
-    case 11:  // consistency
-      walk.octet();
-      break;
-    case 13:  // joint states
+    case kMoveAndUpdate:
       walk.id();
+      walk.octet();
+      walk.transform();
+      walk.skip(8, 8);
       break;
-    case 17:  // partial update
+    case kRevise:
+      walk.skip(3 * 8, 8);
+      walk.sequence([&] { walk.revised_edge(); }, kMaxCorrelated);
+      break;
+    case kJoints:
+      walk.sequence([&] { walk.joint(); });
+      walk.skip(8, 8);
+      break;
+    case kPartialUpdate:
       walk.skip(8, 8);
       walk.sequence([&] {
         walk.id();
@@ -178,23 +179,43 @@ void request_body(CdrWalk& walk) {
         walk.transform();
       });
       break;
-    case 20:  // forget
+    case kCorrelate:
+      walk.correlation();
+      break;
+    case kForget:
       walk.skip(8, 8);
       walk.id();
       break;
-    case 12:  // joints
-      walk.sequence([&] { walk.joint(); });
-      walk.skip(8, 8);
+    default:;  // a request of a later version, which is refused by name
+  }
+}
+
+void request_body(CdrWalk& walk) {
+  const auto kind = static_cast<RequestKind>(walk.octet());
+  switch (kind) {
+    case kLookup:
+      walk.sequence([&] { walk.path_ends(); });
       break;
-    case 10:  // revise
-      walk.skip(3 * 8, 8);
-      walk.sequence([&] { walk.revised_edge(); }, kMaxCorrelated);
+    case kLookupAt:
+      walk.skip(4 * 8, 8);
+      walk.sequence([&] { walk.path_ends(); });
+      walk.octet();
+      walk.octet();
       break;
-    case 14:  // correlate
-      walk.correlation();
+    case kWatch:
+      walk.skip(2 * 8, 8);
+      walk.sequence([&] { walk.path_ends(); });
+      walk.octet();
+      break;
+    case kHistory:
+    case kConsistency:
+      walk.octet();
+      break;
+    case kJointStates:
+      walk.id();
       break;
     default:
-      walk.skip(static_cast<std::size_t>(-1), 1);  // no such request
+      change_body(walk, kind);
   }
 }
 
@@ -203,10 +224,10 @@ void request_body(CdrWalk& walk) {
 bool read_request_head(const std::uint8_t* data, std::size_t size, RequestHead& head) {
   CdrWalk walk(data, size);
   head.id = walk.id();
-  request_body(walk);
   head.addressee = walk.ulong();
   walk.ulong();
   walk.skip(8, 8);
+  request_body(walk);
   return walk.good();
 }
 
@@ -220,54 +241,54 @@ bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
   walk.skip(2 * 8, 8);
   walk.ulong();
   switch (walk.octet()) {
-    case 1:
+    case kError:
       walk.octet();
       walk.string(kMaxMessage);
       break;
-    case 2:
+    case kTransforms:
       walk.transforms();
       break;
-    case 3:
+    case kDoneReply:
       walk.octet();
       break;
-    case 4:
+    case kStamped:
       walk.skip(2 * 8, 8);
       walk.transforms();
       walk.transforms();
       break;
-    case 5:
+    case kState:
       walk.state();
       break;
-    case 6:
+    case kHistories:
       walk.sequence([&] {
         walk.skip(12 * 8, 8);
         walk.id();
       });
       break;
-    case 7:
+    case kCorrelated:
       walk.skip(4 * 8, 8);
       walk.transforms();
       walk.transforms();
       walk.sequence([&] { walk.correlation(); }, kMaxCorrelated);
       walk.sequence([&] { walk.correlation(); }, kMaxCorrelated);
       break;
-    case 8:
+    case kConsistencies:
       walk.sequence([&] {
         walk.skip(5 * 8, 8);
         walk.id();
       });
       break;
-    case 9:
+    case kJointInfos:
       walk.sequence([&] {
-        walk.skip(8 * 8, 8);
+        walk.skip(7 * 8, 8);
         walk.skip(3, 1);
         walk.id();
         walk.id();
         walk.id();
+        walk.numbers(1);
       });
       break;
-    default:
-      return false;
+    default:;  // a reply of a later version, which is refused by name
   }
   return walk.good();
 }
@@ -338,6 +359,12 @@ bool well_formed_presence(const std::uint8_t* data, std::size_t size) {
   walk.skip(8, 8);
   walk.octet();
   walk.octet();
+  walk.skip(2, 2);
+  walk.skip(2, 2);
+  walk.string(255);
+  const std::uint32_t clocks = walk.ulong();
+  if (clocks > 1) return false;
+  if (clocks == 1) walk.skip(8, 8);
   return walk.good();
 }
 

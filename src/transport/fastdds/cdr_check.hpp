@@ -20,7 +20,8 @@ namespace tfdude::fastdds {
 [[nodiscard]] bool well_formed_page(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_presence(const std::uint8_t* data, std::size_t size);
 
-/// What a filter must know of a request; the id points into the sample.
+/// What a filter must know of a request; the id points into the sample. It comes before the body,
+/// so that also requests of later versions can be answered.
 struct RequestHead {
   std::string_view id;
   std::uint32_t addressee = 0;
@@ -67,7 +68,9 @@ class CdrWalk {
   }
 
   std::string_view id() { return string(255); }
-  void transform() { skip(28 * sizeof(double), 8); }
+  /// A sequence of doubles.
+  void numbers(std::uint32_t most);
+  void transform() { numbers(28); }
   void path_ends();
   void transforms();
   void correlation();

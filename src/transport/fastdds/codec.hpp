@@ -14,13 +14,15 @@
 // are checked field by field: an error names the frame and the field.
 namespace tfdude::fastdds {
 
-/// An absent one is sent as 0.
+/// What is sent instead of an absent stamp.
+inline constexpr std::int64_t kNoStamp = -1;
+
 [[nodiscard]] inline std::int64_t wire_stamp(std::optional<Time> stamp) {
-  return stamp ? nanoseconds(*stamp) : 0;
+  return stamp ? nanoseconds(*stamp) : kNoStamp;
 }
 
 /// @param field  the name for an error
-/// @return kInvalidInput if the stamp is before 1970
+/// @return kInvalidInput if the stamp is negative, but not kNoStamp
 [[nodiscard]] Result<std::optional<Time>> stamp_from_wire(std::int64_t stamp, const char* field);
 
 /// Fills a DDS sample that may have been used before: the generated union has a member for every

@@ -23,7 +23,7 @@ JointInfo read_joint(const wire::JointState& body) {
     joint.mimic = Mimic{leader, body.multiplier(), body.offset()};
   }
   joint.position = body.position();
-  joint.variance = body.variance();
+  if (!body.variance().empty()) joint.variance = body.variance().front();
   joint.measured = body.measured() != 0;
   joint.outside = body.outside();
   joint.refused = body.refused();
@@ -32,7 +32,7 @@ JointInfo read_joint(const wire::JointState& body) {
 
 HistoryInfo read_history(const wire::HistoryInfo& body) {
   const auto stamp = [](std::int64_t ns) {
-    return ns > 0 ? std::optional<Time>(time_of(ns)) : std::nullopt;
+    return ns >= 0 ? std::optional<Time>(time_of(ns)) : std::nullopt;
   };
   HistoryInfo history;
   history.id = printable(text(body.id()));

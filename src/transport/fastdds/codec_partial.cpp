@@ -1,10 +1,9 @@
 #include "transport/fastdds/codec_partial.hpp"
 
-#include <algorithm>
+#include <utility>
 
 #include "tfdude/base/id.hpp"
 
-#include "math/flat.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_correlation.hpp"
 
@@ -16,37 +15,54 @@ enum Part : std::uint8_t { kTranslation = 1, kRotation = 2, kCovariance = 4 };
 
 }  // namespace
 
+std::uint8_t write_parts(const PartialTransform& parts, Numbers& out) {
+  const Pose pose = Pose::trusted(parts.rotation.value_or(Eigen::Quaterniond::Identity()),
+                                  parts.translation.value_or(Eigen::Vector3d::Zero()));
+  if (parts.covariance) {
+    write_transform({pose, *parts.covariance}, out);
+  } else {
+    write_pose(pose, out);
+  }
+  return static_cast<std::uint8_t>((parts.translation ? kTranslation : 0) |
+                                   (parts.rotation ? kRotation : 0) |
+                                   (parts.covariance ? kCovariance : 0));
+}
+
+Result<PartialTransform> read_parts(std::uint8_t given, const Numbers& in, std::string_view frame) {
+  const std::string place = "frame " + quote(frame);
+  if (in.size() < kPoseNumbers) {
+    return fail(Errc::kInvalidInput,
+                place + ": a transform of " + std::to_string(in.size()) + " numbers");
+  }
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+  if ((given & kRotation) != 0) rotation = Eigen::Quaterniond(in[3], in[0], in[1], in[2]);
+  if ((given & kTranslation) != 0) translation = {in[4], in[5], in[6]};
+  const auto pose = Pose::create(rotation, translation);
+  if (!pose) return fail_at(place, pose.error());
+  PartialTransform parts;
+  if ((given & kRotation) != 0) parts.rotation = pose->rotation();
+  if ((given & kTranslation) != 0) parts.translation = pose->translation();
+  if ((given & kCovariance) == 0) return parts;
+  const auto covariance = read_covariance({in.begin() + kPoseNumbers, in.end()}, place);
+  if (!covariance) return tl::unexpected(covariance.error());
+  parts.covariance = *covariance;
+  return parts;
+}
+
 wire::PartialEdge wire_partial(const PartialUpdate& edge) {
-  const Pose pose = Pose::trusted(edge.rotation.value_or(Eigen::Quaterniond::Identity()),
-                                  edge.translation.value_or(Eigen::Vector3d::Zero()));
   wire::PartialEdge out;
   out.id(edge.id);
-  out.parts(static_cast<std::uint8_t>((edge.translation ? kTranslation : 0) |
-                                      (edge.rotation ? kRotation : 0) |
-                                      (edge.covariance ? kCovariance : 0)));
-  out.x_pc(to_flat({pose, edge.covariance.value_or(Covariance())}));
+  out.parts(write_parts({edge.translation, edge.rotation, edge.covariance}, out.x_pc()));
   return out;
 }
 
 Result<PartialUpdate> read_partial(const wire::PartialEdge& in) {
-  PartialUpdate edge{string_of(in.id())};
-  if (auto ok = check_id(edge.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
-  const auto& x = in.x_pc();
-  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-  if ((in.parts() & kRotation) != 0) rotation = Eigen::Quaterniond(x[3], x[0], x[1], x[2]);
-  if ((in.parts() & kTranslation) != 0) translation = {x[4], x[5], x[6]};
-  const auto pose = Pose::create(rotation, translation);
-  if (!pose) return fail_at("frame " + quote(edge.id), pose.error());
-  if ((in.parts() & kRotation) != 0) edge.rotation = pose->rotation();
-  if ((in.parts() & kTranslation) != 0) edge.translation = pose->translation();
-  if ((in.parts() & kCovariance) == 0) return edge;
-  Covariance::Upper upper{};
-  std::copy_n(x.begin() + 7, Covariance::kSize, upper.begin());
-  const auto covariance = Covariance::from_upper(upper);
-  if (!covariance) return fail_at("frame " + quote(edge.id), covariance.error());
-  edge.covariance = *covariance;
-  return edge;
+  std::string id = string_of(in.id());
+  if (auto ok = check_id(id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
+  auto parts = read_parts(in.parts(), in.x_pc(), id);
+  if (!parts) return tl::unexpected(std::move(parts.error()));
+  return PartialUpdate{std::move(id), parts->translation, parts->rotation, parts->covariance};
 }
 
 }  // namespace tfdude::fastdds

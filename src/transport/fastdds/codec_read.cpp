@@ -1,39 +1,26 @@
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
-#include "math/flat.hpp"
 #include "partition/watching.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_correlation.hpp"
 #include "transport/fastdds/codec_partial.hpp"
+#include "transport/fastdds/codec_values.hpp"
 #include "transport/fastdds/kinds.hpp"
 
 // Converts requests and streams from the network.
 namespace tfdude::fastdds {
 
 Result<std::optional<Time>> stamp_from_wire(std::int64_t stamp, const char* field) {
-  if (stamp < 0) {
-    return fail(Errc::kInvalidInput,
-                std::string(field) + " of " + std::to_string(stamp) + " ns is before 1970");
-  }
-  return stamp == 0 ? std::nullopt : std::optional<Time>(time_of(stamp));
+  if (stamp == kNoStamp) return std::nullopt;
+  if (stamp >= 0) return time_of(stamp);
+  return fail(Errc::kInvalidInput,
+              std::string(field) + " of " + std::to_string(stamp) + " ns is negative");
 }
 
 namespace {
-
-Result<Transform> from_wire(const wire::Transform& in, std::string_view frame) {
-  const auto pose =
-      Pose::create(Eigen::Quaterniond(in[3], in[0], in[1], in[2]), {in[4], in[5], in[6]});
-  if (!pose) return fail_at("frame " + quote(frame), pose.error());
-  Covariance::Upper upper{};
-  std::copy_n(in.begin() + 7, Covariance::kSize, upper.begin());
-  const auto covariance = Covariance::from_upper(upper);
-  if (!covariance) return fail_at("frame " + quote(frame), covariance.error());
-  return Transform{*pose, *covariance};
-}
 
 Result<std::chrono::nanoseconds> duration_from_wire(std::int64_t duration, const char* field) {
   if (duration >= 0) return std::chrono::nanoseconds(duration);
@@ -41,9 +28,9 @@ Result<std::chrono::nanoseconds> duration_from_wire(std::int64_t duration, const
               std::string(field) + " of " + std::to_string(duration) + " ns is negative");
 }
 
-Result<EdgeUpdate> edge_from_wire(std::string_view id, const wire::Transform& x_pc) {
+Result<EdgeUpdate> edge_from_wire(std::string_view id, const Numbers& x_pc) {
   if (auto ok = check_id(id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
-  auto X_PC = from_wire(x_pc, id);
+  auto X_PC = read_transform(x_pc, id);
   if (!X_PC) return tl::unexpected(std::move(X_PC.error()));
   return EdgeUpdate{std::string(id), *X_PC};
 }
@@ -130,7 +117,7 @@ Result<ReviseRequest> read_revise(const wire::ReviseBody& body) {
                   "frame " + quote(edge.id) + ": its normalized innovation is not a finite number");
     }
     if (in.revised() != 0) {
-      auto X_PC = computed_from(in.x_pc());
+      auto X_PC = read_computed(in.x_pc());
       if (!X_PC) return fail_at("frame " + quote(edge.id), X_PC.error());
       auto correlation = read_correlation(in.edge_correlation());
       if (!correlation) return fail_at("frame " + quote(edge.id), correlation.error());
@@ -149,14 +136,14 @@ Result<CorrelateRequest> read_correlate(std::string_view id, const wire::Correla
 }
 
 Result<AddRequest> read_add(std::string_view id, const wire::AddBody& body) {
-  return from_wire(body.x_pc(), id).map([&](const Transform& X_PC) {
+  return read_transform(body.x_pc(), id).map([&](const Transform& X_PC) {
     return AddRequest{string_of(body.parent()), X_PC, body.lamport_time()};
   });
 }
 
 Result<MoveRequest> read_move(std::string_view id, const wire::MoveAndUpdate& body) {
-  return from_wire(body.x_pc(), id).map([&](const Transform& X_PC) {
-    return MoveRequest{string_of(body.parent()), X_PC, body.lamport_time()};
+  return read_parts(body.parts(), body.x_pc(), id).map([&](PartialTransform X_PC) {
+    return MoveRequest{string_of(body.parent()), std::move(X_PC), body.lamport_time()};
   });
 }
 
@@ -196,8 +183,7 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
     case kUpdate:
       return take(request, update_from_wire(request.id, body.update()));
     case kMove:
-      return as(
-          MoveRequest{string_of(body.move().parent()), std::nullopt, body.move().lamport_time()});
+      return as(MoveRequest{string_of(body.move().parent()), {}, body.move().lamport_time()});
     case kMoveAndUpdate:
       return take(request, read_move(request.id, body.move_and_update()));
     case kLookup:
@@ -206,7 +192,7 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
       return take(request, read_lookup(body.lookup_at()));
     case kWatch:
       return take(request, read_watch(body.watch()));
-    case kPast:
+    case kHistory:
       return as(HistoryRequest{body.history() != 0});
     case kRevise:
       return take(request, read_revise(body.revise()));
@@ -223,7 +209,9 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
     case kForget:
       return as(ForgetRequest{string_of(body.forget().partition()), body.forget().incarnation()});
     default:
-      return fail(Errc::kInvalidInput, "no request of kind " + std::to_string(body._d()));
+      return fail(Errc::kUnsupported, "requests of kind " + std::to_string(body._d()) +
+                                          " are not known to protocol " +
+                                          to_string(kProtocolVersion));
   }
 }
 
@@ -263,10 +251,19 @@ Result<JointUpdate> from_wire(const wire::Joints& sample,
   update.stamp = *stamp;
   for (const wire::JointPosition& joint : sample.positions()) {
     if (!accept(text(joint.id()))) continue;
-    update.joints.push_back({string_of(joint.id()), joint.position(), joint.variance()});
-    if (auto ok = check_id(update.joints.back().name, "joint"); !ok) {
+    if (auto ok = check_id(text(joint.id()), "joint"); !ok) {
       return tl::unexpected(std::move(ok.error()));
     }
+    const Numbers& numbers = joint.numbers();
+    if (numbers.size() != 2) {
+      const bool unspecified = numbers.size() == 1;
+      return fail(unspecified ? Errc::kUnsupported : Errc::kInvalidInput,
+                  "joint " + quote(text(joint.id())) +
+                      (unspecified ? ": its variance is unspecified, which this version does not "
+                                     "support"
+                                   : " without a position"));
+    }
+    update.joints.push_back({string_of(joint.id()), numbers[0], numbers[1]});
   }
   return update;
 }

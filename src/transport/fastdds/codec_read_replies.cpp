@@ -1,34 +1,26 @@
-#include <algorithm>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
-#include "math/flat.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_correlation.hpp"
 #include "transport/fastdds/codec_infos.hpp"
+#include "transport/fastdds/codec_values.hpp"
 #include "transport/fastdds/kinds.hpp"
 
 // Converts replies and pushed values from the network.
 namespace tfdude::fastdds {
 namespace {
 
-Result<Covariance> read_process_noise(const std::vector<double>& numbers) {
-  if (numbers.empty()) return Covariance();
-  if (numbers.size() != Covariance::kSize) {
-    return fail(Errc::kInvalidInput,
-                "process noise of " + std::to_string(numbers.size()) + " numbers");
-  }
-  Covariance::Upper upper{};
-  std::copy(numbers.begin(), numbers.end(), upper.begin());
-  return Covariance::from_upper(upper);
+Result<Covariance> read_process_noise(const Numbers& numbers) {
+  return numbers.empty() ? Covariance() : read_covariance(numbers, "process noise");
 }
 
-Result<std::vector<Transform>> read_values(const std::vector<wire::Transform>& body) {
+Result<std::vector<Transform>> read_values(const std::vector<Numbers>& body) {
   std::vector<Transform> values;
   values.reserve(body.size());
-  for (const wire::Transform& in : body) {
-    auto X = computed_from(in);
+  for (const Numbers& in : body) {
+    auto X = read_computed(in);
     if (!X) return fail_at("a reply", X.error());
     values.push_back(*X);
   }
@@ -95,14 +87,14 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
       return put<SegmentValues>(reply, read_stamped(body.stamped()));
     case kState:
       return put<PushedValues>(reply, tfdude::fastdds::from_wire(body.watched()));
-    case kPasts: {
+    case kHistories: {
       std::vector<HistoryInfo> histories;
       for (const wire::HistoryInfo& history : body.histories())
         histories.push_back(read_history(history));
       reply.body = std::move(histories);
       return {};
     }
-    case kTied:
+    case kCorrelated:
       return put<SegmentValues>(reply, read_correlated(body.correlated()));
     case kConsistencies: {
       std::vector<EdgeConsistency> all;
@@ -118,7 +110,9 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
       return {};
     }
     default:
-      return fail(Errc::kInvalidInput, "no reply of kind " + std::to_string(body._d()));
+      return fail(Errc::kUnsupported, "replies of kind " + std::to_string(body._d()) +
+                                          " are not known to protocol " +
+                                          to_string(kProtocolVersion));
   }
 }
 
@@ -144,9 +138,11 @@ Result<PushedValues> from_wire(const wire::State& sample) {
   for (const wire::PushedEntry& entry : sample.entries()) {
     const auto stamp = stamp_from_wire(entry.stamp(), "the stamp of a pushed value");
     if (!stamp) return tl::unexpected(stamp.error());
-    auto X = computed_from(entry.x());
+    const bool known = entry.covariance() != 0 && is_pose_only(entry.x());
+    auto X = known ? read_computed_pose(entry.x()) : read_computed(entry.x());
     if (!X) return fail_at("pushed values", X.error());
-    pushed.entries.push_back({entry.index(), *stamp, *X, {}, entry.history(), {}});
+    pushed.entries.push_back(
+        {entry.index(), *stamp, *X, {}, entry.history(), {}, entry.covariance(), known});
   }
   for (const wire::PushedCorrelation& one : sample.correlations()) {
     if (one.entry() >= pushed.entries.size()) {

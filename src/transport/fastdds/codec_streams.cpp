@@ -1,5 +1,5 @@
-#include "math/flat.hpp"
 #include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/codec_values.hpp"
 
 namespace tfdude::fastdds {
 
@@ -7,7 +7,7 @@ void write_wire(const Update& update, wire::Update& sample) {
   sample.edges().resize(update.edges.size());
   for (std::size_t i = 0; i < update.edges.size(); ++i) {
     sample.edges()[i].id(update.edges[i].id);
-    sample.edges()[i].x_pc(to_flat(update.edges[i].X_PC));
+    write_transform(update.edges[i].X_PC, sample.edges()[i].x_pc());
   }
   sample.stamp(wire_stamp(update.stamp));
 }
@@ -22,8 +22,10 @@ void write_wire(const JointUpdate& update, wire::Joints& sample) {
   sample.positions().resize(update.joints.size());
   for (std::size_t i = 0; i < update.joints.size(); ++i) {
     sample.positions()[i].id(update.joints[i].name);
-    sample.positions()[i].position(update.joints[i].position);
-    sample.positions()[i].variance(update.joints[i].variance);
+    auto& numbers = sample.positions()[i].numbers();
+    numbers.resize(2);
+    numbers[0] = update.joints[i].position;
+    numbers[1] = update.joints[i].variance;
   }
   sample.stamp(wire_stamp(update.stamp));
 }

@@ -77,11 +77,14 @@ Result<Presence> from_wire(const wire::Presence& sample) {
                     {},
                     sample.taken() != 0,
                     sample.stopped() != 0,
-                    sample.ticket()};
+                    sample.ticket(),
+                    {sample.major_version(), sample.minor_version()},
+                    printable(sample.program().c_str())};
   if (auto ok = check_partition_name(presence.partition); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
   if (auto ok = check_id(presence.host, "host"); !ok) return tl::unexpected(std::move(ok.error()));
+  if (!sample.clock().empty()) presence.clock = time_of(sample.clock().front());
   for (const wire::Absent& one : sample.absent()) {
     const auto kind = static_cast<Absent::Kind>(one.kind());
     if (kind < Absent::Kind::kSilent || kind > Absent::Kind::kForgotten) {

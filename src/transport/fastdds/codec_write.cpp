@@ -1,9 +1,9 @@
 #include <utility>
 
-#include "math/flat.hpp"
 #include "transport/fastdds/cdr_check.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_partial.hpp"
+#include "transport/fastdds/codec_values.hpp"
 #include "transport/fastdds/kinds.hpp"
 
 // Converts messages for the network.
@@ -15,7 +15,7 @@ constexpr std::size_t kMaxMessage = 4096;
 wire::Edge wire_edge(const EdgeUpdate& edge) {
   wire::Edge out;
   out.id(edge.id);
-  out.x_pc(to_flat(edge.X_PC));
+  write_transform(edge.X_PC, out.x_pc());
   return out;
 }
 
@@ -72,8 +72,9 @@ wire::RevisedEdge wire_revised(const ReviseRequest::Edge& edge) {
   body.id(edge.id);
   body.refused(edge.refused ? 1 : 0);
   body.revised(edge.revision ? 1 : 0);
-  body.x_pc(to_flat(edge.revision ? edge.revision->X_PC : Transform()));
-  if (edge.revision) body.edge_correlation(wire_correlation(edge.revision->correlation));
+  if (!edge.revision) return body;
+  write_transform(edge.revision->X_PC, body.x_pc());
+  body.edge_correlation(wire_correlation(edge.revision->correlation));
   return body;
 }
 
@@ -83,7 +84,7 @@ struct BodyWriter {
   void operator()(const AddRequest& add) {
     wire::AddBody body;
     body.parent(add.parent);
-    body.x_pc(to_flat(add.X_PC));
+    write_transform(add.X_PC, body.x_pc());
     body.lamport_time(add.lamport_time);
     out.add(std::move(body));
   }
@@ -95,7 +96,7 @@ struct BodyWriter {
   }
   void operator()(const UpdateRequest& update) {
     wire::UpdateBody body;
-    body.x_pc(to_flat(update.edges.front().X_PC));
+    write_transform(update.edges.front().X_PC, body.x_pc());
     body.stamp(wire_stamp(update.stamp));
     for (auto edge = update.edges.begin() + 1; edge != update.edges.end(); ++edge) {
       body.more().push_back(wire_edge(*edge));
@@ -109,18 +110,18 @@ struct BodyWriter {
     out.partial_update(std::move(body));
   }
   void operator()(const MoveRequest& move) {
-    if (move.X_PC) {
-      wire::MoveAndUpdate body;
-      body.parent(move.parent);
-      body.x_pc(to_flat(*move.X_PC));
-      body.lamport_time(move.lamport_time);
-      out.move_and_update(std::move(body));
-    } else {
+    if (move.X_PC.empty()) {
       wire::MoveBody body;
       body.parent(move.parent);
       body.lamport_time(move.lamport_time);
       out.move(std::move(body));
+      return;
     }
+    wire::MoveAndUpdate body;
+    body.parent(move.parent);
+    body.parts(write_parts(move.X_PC, body.x_pc()));
+    body.lamport_time(move.lamport_time);
+    out.move_and_update(std::move(body));
   }
   void operator()(const LookupRequest& lookup) {
     auto segments = wire_segments(lookup.segments);
@@ -177,10 +178,10 @@ struct BodyWriter {
 
 void write_wire(const Request& request, std::string_view partition, wire::Request& sample) {
   sample.id(request.id);
-  std::visit(BodyWriter{sample.body()}, request.body);
   sample.addressee(addressee_of(partition));
   sample.sequence_number(request.sequence);
   sample.awaits_from(request.awaits_from);
+  std::visit(BodyWriter{sample.body()}, request.body);
 }
 
 wire::Request to_wire(const Request& request, std::string_view partition) {
@@ -191,10 +192,10 @@ wire::Request to_wire(const Request& request, std::string_view partition) {
 
 namespace {
 
-std::vector<wire::Transform> wire_values(const std::vector<Transform>& values) {
-  std::vector<wire::Transform> body;
+std::vector<Numbers> wire_values(const std::vector<Transform>& values) {
+  std::vector<Numbers> body;
   body.reserve(values.size());
-  for (const Transform& X : values) body.push_back(to_flat(X));
+  for (const Transform& X : values) body.push_back(numbers_of(X));
   return body;
 }
 
@@ -221,7 +222,7 @@ wire::JointState wire_joint(const JointInfo& joint) {
   const Mimic mimic = joint.mimic.value_or(Mimic{});
   wire::JointState body;
   body.position(joint.position);
-  body.variance(joint.variance);
+  body.variance({joint.variance});
   body.lower(limits.lower);
   body.upper(limits.upper);
   body.multiplier(mimic.multiplier);
@@ -322,7 +323,12 @@ wire::State to_wire(const PushedValues& pushed) {
     sample.entries()[i].index(pushed.entries[i].index);
     sample.entries()[i].stamp(wire_stamp(pushed.entries[i].stamp));
     sample.entries()[i].history(pushed.entries[i].history);
-    sample.entries()[i].x(to_flat(pushed.entries[i].X));
+    sample.entries()[i].covariance(pushed.entries[i].covariance_number);
+    if (pushed.entries[i].covariance_known) {
+      write_pose(pushed.entries[i].X.pose, sample.entries()[i].x());
+    } else {
+      write_transform(pushed.entries[i].X, sample.entries()[i].x());
+    }
     if (const auto& noise = pushed.entries[i].process_noise) {
       sample.beginnings().emplace_back();
       sample.beginnings().back().entry(static_cast<std::uint32_t>(i));
@@ -390,6 +396,10 @@ wire::Presence to_wire(const Presence& presence) {
   sample.taken(presence.taken ? 1 : 0);
   sample.stopped(presence.stopped ? 1 : 0);
   sample.ticket(presence.ticket);
+  sample.major_version(presence.protocol.major);
+  sample.minor_version(presence.protocol.minor);
+  sample.program(presence.program);
+  if (presence.clock) sample.clock({nanoseconds(*presence.clock)});
   return sample;
 }
 

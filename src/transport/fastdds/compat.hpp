@@ -102,7 +102,7 @@ inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps:
   discovery.m_DiscoveryServers = {server};
 }
 
-/// Reports participants: met(guid prefix, name) and left(guid prefix).
+/// Reports participants: met(guid prefix, name, user data) and left(guid prefix).
 template <class Observer>
 class ParticipantListener final : public edds::DomainParticipantListener {
  public:
@@ -111,7 +111,8 @@ class ParticipantListener final : public edds::DomainParticipantListener {
   void on_participant_discovery(edds::DomainParticipant*, ParticipantInfo&& info) override {
     const auto& prefix = info.info.m_guid.guidPrefix;
     if (info.status == ParticipantInfo::DISCOVERED_PARTICIPANT) {
-      observer_.met(prefix, info.info.m_participantName.to_string());
+      observer_.met(prefix, info.info.m_participantName.to_string(),
+                    info.info.m_userData.data_vec());
     } else if (info.status != ParticipantInfo::CHANGED_QOS_PARTICIPANT) {
       observer_.left(prefix);
     }
@@ -182,7 +183,7 @@ class ParticipantListener final : public edds::DomainParticipantListener {
                                 const edds::ParticipantBuiltinTopicData& info, bool&) override {
     const auto& prefix = info.guid.guidPrefix;
     if (reason == ertps::ParticipantDiscoveryStatus::DISCOVERED_PARTICIPANT) {
-      observer_.met(prefix, info.participant_name.to_string());
+      observer_.met(prefix, info.participant_name.to_string(), info.user_data.data_vec());
     } else if (reason != ertps::ParticipantDiscoveryStatus::CHANGED_QOS_PARTICIPANT) {
       observer_.left(prefix);
     }

@@ -8,6 +8,7 @@
 namespace tfdude::fastdds {
 
 void FastDdsTransport::take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from) {
+  if (peers_.is_incompatible(from)) return;
   const PeerId peer = peer_of(from);
   auto request = from_wire(sample);
   if (request) {
@@ -42,14 +43,15 @@ void FastDdsTransport::take_reply(const wire::Reply& sample) {
   if (reply) {
     handler_->on_reply(*reply);
   } else {
-    log_refused(kReplyTopic, reply.error());
+    // Who awaits it gets the error; if nobody does, a stranger has sent it.
+    if (reply.error().code != Errc::kUnsupported) log_refused(kReplyTopic, reply.error());
     handler_->on_reply(Reply{sample.sequence_number(), sample.epoch(), std::move(reply.error())});
   }
 }
 
 // Before Fast DDS 2.10 nothing but this keeps a participant from hearing itself.
 void FastDdsTransport::take_page(const wire::Page& sample, const ertps::GuidPrefix_t& from) {
-  if (peer_of(from) == self_) return;
+  if (peer_of(from) == self_ || peers_.is_incompatible(from)) return;
   const auto page = from_wire(sample);
   if (page) {
     handler_->on_page(*page);
@@ -61,7 +63,7 @@ void FastDdsTransport::take_page(const wire::Page& sample, const ertps::GuidPref
 
 void FastDdsTransport::take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from,
                                      bool beat) {
-  if (peer_of(from) == self_) return;
+  if (peer_of(from) == self_ || peers_.is_incompatible(from)) return;
   const auto presence = from_wire(sample);
   if (!presence) {
     log_refused(kPresenceTopic, presence.error());

@@ -9,6 +9,7 @@
 
 #include "base/log.hpp"
 #include "base/mutex.hpp"
+#include "transport/fastdds/announcement.hpp"
 #include "transport/fastdds/discovery_gate.hpp"
 #include "transport/fastdds/discovery_server.hpp"
 #include "transport/fastdds/topics.hpp"
@@ -57,6 +58,7 @@ Result<void> FastDdsTransport::start(TransportHandler& handler) {
 Result<void> FastDdsTransport::create_participant() {
   edds::DomainParticipantQos qos = profiles_->participant();
   qos.name(participant_name(options_.partition));
+  qos.user_data().data_vec(version_data());
   qos.properties().properties().emplace_back("fastdds.ignore_local_endpoints", "true");
   // Fast DDS 3 announces type descriptions that Cyclone DDS takes for types other than its own.
   // Without them, it compares only the names.
@@ -345,8 +347,11 @@ void FastDdsTransport::reply(const PeerId& to, const Reply& reply) {
   });
 }
 
-void FastDdsTransport::met(const ertps::GuidPrefix_t& prefix, const std::string& name) {
-  peers_.met(prefix, name);
+void FastDdsTransport::met(const ertps::GuidPrefix_t& prefix, const std::string& name,
+                           const std::vector<std::uint8_t>& user_data) {
+  const Announcement said = read_announcement(name, user_data);
+  peers_.met(prefix, said);
+  if (!said.compatible()) return;
   worker_->post([this, peer = peer_of(prefix)] { there_.insert(peer); });
 }
 

@@ -4,6 +4,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "tfdude/transport/fastdds.hpp"
 
@@ -50,10 +51,12 @@ class FastDdsTransport final : public Transport {
   void end_pushing(std::uint64_t group) override { push_channels_->end_pushing(group); }
   bool discovered() const override { return peers_.discovered(); }
   bool awaits_presence() const override { return peers_.awaits_presence(); }
+  std::vector<IncompatiblePeer> incompatible() const override { return peers_.incompatible(); }
   Milliseconds discovery_time() const override;
 
   // Of ParticipantListener, from a thread of the library.
-  void met(const ertps::GuidPrefix_t& prefix, const std::string& name);
+  void met(const ertps::GuidPrefix_t& prefix, const std::string& name,
+           const std::vector<std::uint8_t>& user_data);
   void left(const ertps::GuidPrefix_t& prefix);
 
  private:

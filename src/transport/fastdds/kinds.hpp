@@ -14,25 +14,28 @@ enum RequestKind : std::uint8_t {
   kLookup = 6,
   kLookupAt = 7,
   kWatch = 8,
-  kPast = 9,
+  kHistory = 9,
   kRevise = 10,
   kConsistency = 11,
   kJoints = 12,
   kJointStates = 13,
   kCorrelate = 14,
-  kPartialUpdate = 17,
-  kForget = 20
+  kPartialUpdate = 15,
+  kForget = 16,
+  kLastRequestKind = kForget
 };
+
 enum ReplyKind : std::uint8_t {
   kError = 1,
   kTransforms = 2,
   kDoneReply = 3,
   kStamped = 4,
   kState = 5,
-  kPasts = 6,
-  kTied = 7,
+  kHistories = 6,
+  kCorrelated = 7,
   kConsistencies = 8,
-  kJointInfos = 9
+  kJointInfos = 9,
+  kLastReplyKind = kJointInfos
 };
 
 }  // namespace tfdude::fastdds

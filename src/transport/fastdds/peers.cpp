@@ -2,16 +2,10 @@
 
 #include <algorithm>
 
+#include "base/log.hpp"
 #include "base/mutex.hpp"
 
 namespace tfdude::fastdds {
-namespace {
-
-constexpr const char* kServer = "tfdude serving ";
-constexpr const char* kClient = "tfdude client";
-
-}  // namespace
-
 PeerId peer_of(const ertps::GuidPrefix_t& prefix) {
   PeerId peer{};
   std::copy_n(prefix.value, peer.size(), peer.begin());
@@ -28,18 +22,41 @@ std::string reply_partition(const PeerId& peer) {
   return name;
 }
 
-std::string participant_name(const std::string& partition) {
-  return partition.empty() ? kClient : kServer + partition;
-}
-
-void Peers::met(const ertps::GuidPrefix_t& prefix, const std::string& name) {
+void Peers::met(const ertps::GuidPrefix_t& prefix, const Announcement& said) {
   const Lock lock(mutex_);
   last_met_ = Clock::now();
-  if (name.rfind(kServer, 0) == 0) servers_.try_emplace(peer_of(prefix));
+  if (said.compatible()) {
+    if (!said.partition.empty()) servers_.try_emplace(peer_of(prefix));
+    return;
+  }
+  IncompatiblePeer peer{said.partition, said.protocol, said.program,
+                        std::chrono::system_clock::now()};
+  if (logged_.insert(peer.text()).second) {
+    log().error("{}: no messages are exchanged with it", peer.text());
+  }
+  incompatible_.insert_or_assign(peer_of(prefix), std::move(peer));
+  any_incompatible_ = true;
+}
+
+std::vector<IncompatiblePeer> Peers::incompatible() const {
+  std::vector<IncompatiblePeer> servers;
+  if (!any_incompatible_) return servers;
+  const Lock lock(mutex_);
+  for (const auto& [id, peer] : incompatible_) {
+    if (!peer.partition.empty()) servers.push_back(peer);
+  }
+  return servers;
+}
+
+bool Peers::is_incompatible(const ertps::GuidPrefix_t& prefix) const {
+  if (!any_incompatible_) return false;
+  const Lock lock(mutex_);
+  return incompatible_.count(peer_of(prefix)) != 0;
 }
 
 void Peers::left(const ertps::GuidPrefix_t& prefix) {
   const Lock lock(mutex_);
+  incompatible_.erase(peer_of(prefix));
   const auto known = servers_.find(peer_of(prefix));
   if (known == servers_.end()) return;
   const Server& server = known->second;

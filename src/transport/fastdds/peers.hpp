@@ -1,17 +1,22 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/mutex.hpp"
 #include "partition/messages.hpp"
+#include "transport/fastdds/announcement.hpp"
 #include "transport/fastdds/compat.hpp"
+#include "transport/port.hpp"
 
 namespace tfdude::fastdds {
 
@@ -20,9 +25,6 @@ namespace tfdude::fastdds {
 
 /// The DDS partition in which a peer reads its replies.
 [[nodiscard]] std::string reply_partition(const PeerId& peer);
-
-/// The name a participant announces: whether it serves a partition, and which.
-[[nodiscard]] std::string participant_name(const std::string& partition);
 
 /// The participants that were met, what each announced that it serves, and which are silent.
 /// Thread-safe. The callbacks run under a lock, so that those about one peer come in order. So no
@@ -64,7 +66,8 @@ class Peers {
     is_server_ = is_server;
   }
 
-  void met(const ertps::GuidPrefix_t& prefix, const std::string& name);
+  /// A participant that speaks another major version is logged once and otherwise ignored.
+  void met(const ertps::GuidPrefix_t& prefix, const Announcement& said);
   void left(const ertps::GuidPrefix_t& prefix);
   /// @param peers  number of other servers that the sender hears
   /// @param beat   whether this is repeated periodically
@@ -78,6 +81,12 @@ class Peers {
   /// Reports the peers that became silent since the last call. A late call means that this process
   /// was prevented from receiving, too, so that delay is not counted as silence of the others.
   void look_for_silent(Clock::time_point now);
+
+  /// The servers that were met and speak another major version.
+  [[nodiscard]] std::vector<IncompatiblePeer> incompatible() const;
+
+  /// Whether messages of this participant cannot be understood. O(1) while there is none such.
+  [[nodiscard]] bool is_incompatible(const ertps::GuidPrefix_t& prefix) const;
 
   /// How many servers are heard.
   [[nodiscard]] std::uint32_t heard_count() const;
@@ -121,6 +130,9 @@ class Peers {
   const Tell gone_;
   mutable Mutex mutex_{LockRank::kReporting};  // also while reporting, to keep the order
   std::map<PeerId, Server> servers_ TFDUDE_GUARDED_BY(mutex_);
+  std::map<PeerId, IncompatiblePeer> incompatible_ TFDUDE_GUARDED_BY(mutex_);
+  std::set<std::string> logged_ TFDUDE_GUARDED_BY(mutex_);  // of these
+  std::atomic<bool> any_incompatible_{false};
   Clock::time_point last_met_ TFDUDE_GUARDED_BY(mutex_){};
   Clock::time_point last_look_ TFDUDE_GUARDED_BY(mutex_) = Clock::now();
   // Set once, before anybody is met.

@@ -56,7 +56,7 @@ std::string text(const Part& part) {
     body = "update";
     for (const EdgeUpdate& edge : update->edges) body += " " + edge.id;
   } else if (const auto* move = std::get_if<MoveRequest>(&part.request.body)) {
-    body = "move below " + move->parent + (move->X_PC ? " with value" : "");
+    body = "move below " + move->parent + (move->X_PC.empty() ? "" : " with value");
   } else {
     body = "lookup";
     for (const PathEnds& ends : std::get<LookupRequest>(part.request.body).segments) {

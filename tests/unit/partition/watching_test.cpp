@@ -64,6 +64,49 @@ TEST_CASE("a group is told all, then what changes, once") {
   CHECK(listed(group.next_push(arm.forest)) == "0@2=9 1@2=99 ");
 }
 
+TEST_CASE("a covariance that stays the same is pushed once") {
+  const auto with_stddev = [](double x, double stddev) {
+    Transform X = along_x(x);
+    X.covariance = *Covariance::from_stddev({stddev, stddev, stddev, stddev, stddev, stddev});
+    return X;
+  };
+  // "number" with the covariance, "(number)" without, in the order of the entries.
+  const auto numbers = [](const PushedValues& pushed) {
+    std::string text;
+    for (const PushedValue& entry : pushed.entries) {
+      const std::string number = std::to_string(entry.covariance_number);
+      text += entry.covariance_known ? "(" + number + ") " : number + " ";
+    }
+    return text;
+  };
+  Arm arm;
+  WatchedGroup group(7, {{kArm, kHand}});
+  CHECK(numbers(*group.snapshot(arm.forest, {})) == "0 0 ");  // nothing was pushed yet
+  CHECK(numbers(group.next_push(arm.forest)) == "1 1 ");
+  REQUIRE(arm.forest.update("arm", along_x(11)));
+  CHECK(numbers(group.next_push(arm.forest)) == "(1) ");
+  REQUIRE(arm.forest.update("hand", with_stddev(101, 0.1), ms(1)));
+  REQUIRE(arm.forest.update("hand", with_stddev(102, 0.1), ms(2)));
+  REQUIRE(arm.forest.update("hand", with_stddev(103, 0.2), ms(3)));
+  CHECK(numbers(*group.snapshot(arm.forest, {})) == "1 0 ");  // its newest was not pushed yet
+  CHECK(numbers(group.next_push(arm.forest)) == "2 (2) 3 ");
+  // Whoever begins to watch now has what the next push refers to.
+  CHECK(numbers(*group.snapshot(arm.forest, {})) == "1 3 ");
+  KnownCovariances known(2);
+  auto all = *group.snapshot(arm.forest, {});
+  REQUIRE(known.fill_in(all.entries));
+  REQUIRE(arm.forest.update("hand", with_stddev(104, 0.2), ms(4)));
+  auto next = group.next_push(arm.forest);
+  CHECK(numbers(next) == "(3) ");
+  for (PushedValue& entry : next.entries) entry.X.covariance = Covariance();  // as it travels
+  REQUIRE(known.fill_in(next.entries));
+  CHECK(next.entries.front().X.covariance.stddev()[0] == testing::Approx(0.2));
+  KnownCovariances stranger(2);
+  next.entries.front().covariance_known = true;
+  CHECK_FALSE(stranger.fill_in(next.entries));
+  CHECK(next.entries.empty());
+}
+
 TEST_CASE("each push follows on from the one before, and the first begins with nothing") {
   Arm arm;
   WatchedGroup group(7, {{kArm, kHand}});

@@ -20,7 +20,7 @@ using testing::ScriptedOwner;
 
 struct Asker : Rig {
   explicit Asker(LoopbackNetwork& network)
-      : Rig(network.join()), queries(structure, discovery, requests, member) {}
+      : Rig(network.join()), queries(structure, discovery, requests, member, *transport) {}
   Queries queries;
 };
 

@@ -110,6 +110,37 @@ TEST_CASE("watch mirror: after a loss nothing is shown by half") {
   CHECK(watched.mirror.lacks());
 }
 
+TEST_CASE("watch mirror: a covariance that was pushed before is not sent again") {
+  const auto uncertain = [](PushedValue value, double stddev, std::uint32_t number, bool known) {
+    const Covariance covariance =
+        *Covariance::from_stddev({stddev, stddev, stddev, stddev, stddev, stddev});
+    if (!known) value.X.covariance = covariance;
+    value.covariance_number = number;
+    value.covariance_known = known;
+    return value;
+  };
+  Watched watched;
+  const auto stddev = [&] { return watched.mirror.lookup({})->covariance.stddev()[0]; };
+  CHECK(watched.mirror.take({kTools, {uncertain(entry(0, 100, 1, false), 0.1, 4, false)}, 3, 4}));
+  CHECK(stddev() == Approx(0.1));
+  CHECK(watched.mirror.take({kTools, {uncertain(entry(0, 200, 1, false), 0, 4, true)}, 4, 5}));
+  CHECK(watched.x() == 211);
+  CHECK(stddev() == Approx(0.1));
+  CHECK_FALSE(watched.mirror.lacks());
+  // The message with number 5 was lost, though its commit was not: nothing is guessed.
+  CHECK(watched.mirror.take({kTools, {uncertain(entry(0, 300, 1, false), 0, 5, true)}, 5, 6}));
+  CHECK(watched.x() == 211);
+  CHECK(stddev() == Approx(0.1));
+  CHECK(watched.mirror.lacks());
+  CHECK(watched.mirror.take({kTools, {uncertain(entry(0, 300, 1), 0.2, 5, false)}, 0, 6}));
+  CHECK(watched.x() == 311);
+  CHECK(stddev() == Approx(0.2));
+  CHECK_FALSE(watched.mirror.lacks());
+  CHECK(watched.mirror.take({kTools, {uncertain(sample(0, 7, 400, 1), 0, 5, true)}, 6, 7}));
+  CHECK(watched.x() == 411);
+  CHECK(stddev() == Approx(0.2));
+}
+
 TEST_CASE("watch mirror: values in pieces are shown when the last of them has come") {
   Watched watched;
   CHECK_FALSE(watched.mirror.take({kArms, {entry(0, 2, 1, false)}, 5, 6, 0, 2}));

@@ -5,6 +5,7 @@
 
 #include "support/catch.hpp"
 #include "support/samples.hpp"
+#include "transport/fastdds/codec_values.hpp"
 
 namespace tfdude::fastdds {
 namespace {
@@ -21,6 +22,7 @@ bool well_formed(const wire::State& sample) {
 wire::State state_of(const wire::Correlation& correlation, std::size_t count = 1) {
   wire::State state;
   state.entries().resize(1);
+  state.entries()[0].x(Numbers(28));
   state.entries()[0].x()[3] = 1.0;
   state.correlations().resize(count);
   for (auto& one : state.correlations()) one.edge_correlation(correlation);

@@ -215,7 +215,7 @@ class Duel {
     const NaiveTransform value = dense(X);
     const bool keep = random_.index(2) == 0;
     text_ = "move " + id + " under " + parent + (keep ? "" : ", new value");
-    const auto result = forest_.move(id, parent, keep ? std::nullopt : std::optional(X));
+    const auto result = forest_.move(id, parent, keep ? PartialTransform() : X);
     return verdict(outcome(result), naive_.move(id, parent, keep ? nullptr : &value));
   }
 

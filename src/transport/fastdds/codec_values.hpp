@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tfdude/base/result.hpp"
+#include "tfdude/math/transform.hpp"
+
+// Transforms and positions of joints as sequences of numbers (idl/tfdude.idl): the last of them,
+// the covariance or variance, are absent if it is unspecified.
+namespace tfdude::fastdds {
+
+using Numbers = std::vector<double>;
+
+inline constexpr std::size_t kPoseNumbers = 7;
+
+/// All 28 numbers. Does not allocate where the vector has held as many before.
+void write_transform(const Transform& X, Numbers& out);
+/// The first seven, without the covariance.
+void write_pose(const Pose& pose, Numbers& out);
+
+[[nodiscard]] Numbers numbers_of(const Transform& X);
+
+/// Whether the covariance is absent.
+[[nodiscard]] bool is_pose_only(const Numbers& in);
+
+/// A transform that a user has given.
+/// @return kInvalidInput naming the frame and what is wrong; kUnsupported if the covariance is
+///   unspecified
+[[nodiscard]] Result<Transform> read_transform(const Numbers& in, std::string_view frame);
+
+/// A transform that was computed (computed_from()).
+/// @return kInvalidInput; kUnsupported if the covariance is unspecified
+[[nodiscard]] Result<Transform> read_computed(const Numbers& in);
+/// The same of a pose without its covariance, which is zero in the result.
+[[nodiscard]] Result<Transform> read_computed_pose(const Numbers& in);
+
+/// @param what  names the place in an error
+[[nodiscard]] Result<Covariance> read_covariance(const Numbers& upper, const std::string& what);
+
+}  // namespace tfdude::fastdds
