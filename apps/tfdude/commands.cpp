@@ -52,7 +52,8 @@ int none_there(Client& client, const Arguments& arguments, bool found) {
   return report({Errc::kUnreachable,
                  "no partition answers in domain " + std::to_string(arguments.options.domain) +
                      " with " + profile_of(arguments.options) +
-                     ": daemons must use the same --domain, and --local or the same --profile"},
+                     ": all participants must use the same --domain, --profile (or --local) and "
+                     "--discovery-server"},
                 arguments);
 }
 

@@ -27,14 +27,14 @@ std::string remarks_of(const JointInfo& joint) {
   std::string text;
   if (!joint.measured) text += "  no sample yet";
   if (joint.mimic) {
-    text += format("  follows %s times %g plus %g", joint.mimic->joint.c_str(),
-                   joint.mimic->multiplier, joint.mimic->offset);
+    text += format("  mimics %s (x %g %+g)", joint.mimic->joint.c_str(), joint.mimic->multiplier,
+                   joint.mimic->offset);
   }
   if (joint.outside > 0) {
     text += format("  outside %llu times", static_cast<unsigned long long>(joint.outside));
   }
   if (joint.refused > 0) {
-    text += format("  refused %llu times", static_cast<unsigned long long>(joint.refused));
+    text += format("  rejected %llu times", static_cast<unsigned long long>(joint.refused));
   }
   return text;
 }
@@ -61,7 +61,7 @@ std::string outside_table(const std::vector<JointInfo>& joints) {
     if (joint.outside == 0 && joint.refused == 0) continue;
     if (text.empty()) {
       text = format("  %-22s %12s %10s %10s  %s\n", "joint outside limits", "position", "applied",
-                    "refused", "limits");
+                    "rejected", "limits");
     }
     text +=
         format("  %-22s %12s %10llu %10llu  %s\n", joint.name.c_str(),

@@ -139,7 +139,8 @@ void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
   add_command(app, "tree", "draw all frames with their owners", "tree", cli::run_tree, chosen);
   add_command(app, "frames", "list all frames", "--json frames", cli::run_frames, chosen);
   add_command(app, "partitions", "list all partitions", "partitions", cli::run_partitions, chosen);
-  add_command(app, "roots", "list frames without a parent", "roots", cli::run_roots, chosen);
+  add_command(app, "roots", "list roots: frames whose parent does not exist", "roots",
+              cli::run_roots, chosen);
   add_id(
       add_command(app, "parent", "a frame's parent", "parent hand_left", cli::run_parent, chosen),
       arguments);
@@ -236,7 +237,7 @@ void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
 }
 
 void add_joint_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
-  add_command(app, "joints", "list all joints: positions, limits, what they follow", "joints",
+  add_command(app, "joints", "list all joints: positions, limits, which joint they mimic", "joints",
               cli::run_joints, chosen);
   auto* joint = add_command(app, "joint", "set the position of a joint",
                             "joint shoulder_pan_joint 0.5 --stddev 0.001", cli::run_joint, chosen);
@@ -265,7 +266,7 @@ void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen)
   add->add_option("--parent", arguments.parent, "its parent")->required();
   add->add_option("--partition", arguments.partition, "its owner, if not its parent's");
   add_pose_options(*add, arguments);
-  auto* update = add_command(app, "update", "set parts of an edge; the other parts stay",
+  auto* update = add_command(app, "update", "set parts of an edge; other parts stay unchanged",
                              "update tool --rpy 0 0 1.57", cli::run_update, chosen);
   add_id(update, arguments);
   add_pose_options(*update, arguments);
@@ -274,9 +275,9 @@ void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen)
   add_id(add_command(app, "remove", "remove a frame and all below it", "remove tool",
                      cli::run_remove, chosen),
          arguments);
-  add_command(app, "forget", "drop all that is kept of a partition that will not return",
-              "forget arm", cli::run_forget, chosen)
-      ->add_option("PARTITION", arguments.id, "the partition; refused while it is reachable")
+  add_command(app, "forget", "delete all data of a partition that will not return", "forget arm",
+              cli::run_forget, chosen)
+      ->add_option("PARTITION", arguments.id, "the partition; rejected while it is reachable")
       ->required();
   auto* move = add_command(app, "move", "move a frame to a new parent", "move tool --parent arm_2",
                            cli::run_move, chosen);

@@ -183,7 +183,7 @@ int run_history(Client& client, const Arguments& arguments) {
     const nlohmann::json json{
         {"id", arguments.id}, {"moving", false}, {"samples", 0}, {"refused_ahead", refused}};
     std::string text = arguments.id + " is static: it holds for all times\n";
-    if (refused > 0) text += "refused      " + std::to_string(refused) + " too far ahead\n";
+    if (refused > 0) text += "rejected     " + std::to_string(refused) + " too far ahead\n";
     return answer(arguments, json, text);
   }
   return answer(arguments, history_json(histories->front(), now),

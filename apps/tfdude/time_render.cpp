@@ -53,7 +53,7 @@ std::string describe(const HistoryInfo& history, Time now) {
                    rate_of(history), milliseconds(history.mean_gap), milliseconds(history.max_gap),
                    milliseconds(history.jitter));
   }
-  text += format("refused      %llu too old, %llu of a stamp that was taken, %llu too far ahead\n",
+  text += format("rejected     %llu too old, %llu duplicate stamps, %llu too far ahead\n",
                  static_cast<unsigned long long>(history.refused_old),
                  static_cast<unsigned long long>(history.refused_equal),
                  static_cast<unsigned long long>(history.refused_ahead));
@@ -108,8 +108,7 @@ std::string echo_lines(const std::string& a, const std::string& b, const Stamped
   text += format("std dev   %12.6f %12.6f %12.6f m\n", s[0], s[1], s[2]);
   text += format("          %12.4f %12.4f %12.4f deg\n", s[3] * kDegrees, s[4] * kDegrees,
                  s[5] * kDegrees);
-  return text + "age       " + (X_AB.stamp ? ago(*X_AB.stamp, now) : "none: it does not move") +
-         "\n";
+  return text + "age       " + (X_AB.stamp ? ago(*X_AB.stamp, now) : "none (static)") + "\n";
 }
 
 std::string monitor_table(const std::string& partition, const std::vector<HistoryInfo>& histories,
@@ -117,7 +116,7 @@ std::string monitor_table(const std::string& partition, const std::vector<Histor
   std::string text = "partition " + partition + ": " + describe(sum_of(histories)) + "\n";
   if (histories.empty()) return text;
   text += format("  %-22s %10s %10s %11s %10s %9s\n", "edge", "rate [Hz]", "age [ms]",
-                 "jitter [ms]", "gap [ms]", "refused");
+                 "jitter [ms]", "gap [ms]", "rejected");
   for (const HistoryInfo& history : histories) {
     const std::string age =
         history.newest ? format("%.1f", milliseconds(now - *history.newest)) : std::string("-");

@@ -29,8 +29,8 @@ double deviation_of(const EdgeConsistency& edge) {
 const char* verdict_of(const EdgeConsistency& edge) {
   constexpr double kBeyondChance = 2.576;
   const double deviation = deviation_of(edge);
-  if (deviation > kBeyondChance) return "too sure";
-  return deviation < -kBeyondChance ? "too careful" : "agrees";
+  if (deviation > kBeyondChance) return "too small";
+  return deviation < -kBeyondChance ? "too large" : "agrees";
 }
 
 }  // namespace
@@ -51,7 +51,7 @@ nlohmann::json basis_json(const Basis& basis) {
 }
 
 std::string describe(const Observed& observed) {
-  std::string text = observed.accepted ? "accepted" : "refused by the gate";
+  std::string text = observed.accepted ? "accepted" : "rejected by the gate";
   text += format("     squared distance %.3f in %d dimensions", observed.distance_squared,
                  observed.dimensions);
   if (std::isfinite(observed.limit)) text += format(", limit %.3f", observed.limit);
@@ -77,7 +77,7 @@ nlohmann::json observed_json(const Observed& observed) {
 std::string consistency_table(const std::vector<EdgeConsistency>& edges) {
   if (edges.empty()) return "";
   std::string text = format("  %-22s %8s %8s %9s %10s  %s\n", "observed edge", "observed",
-                            "refused", "factor", "deviations", "covariance");
+                            "rejected", "factor", "deviations", "covariance");
   for (const EdgeConsistency& edge : edges) {
     text += format("  %-22s %8llu %8llu %9.2f %10.1f  %s\n", edge.id.c_str(),
                    static_cast<unsigned long long>(edge.observations),

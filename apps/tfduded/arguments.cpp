@@ -41,7 +41,8 @@ class UrdfOptions {
  public:
   explicit UrdfOptions(CLI::App& app) : app_(app) {
     file_ = add("--urdf",
-                "URDF file of a robot; may be repeated. These apply to the --urdf before them:");
+                "URDF file of a robot; may be repeated. --root, --prefix, --links and "
+                "--strict-limits apply to the --urdf before them");
     root_ = add("--root", "parent frame of the robot's root link");
     prefix_ = add("--prefix", "prefix of the names of all its links and joints");
     links_ = add("--links", "LINK or FROM..TO[..TO], separated by commas: these links only");
@@ -115,7 +116,7 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   app.add_flag("--no-state", no_state, "store nothing: start from --config each time")
       ->excludes(state);
   app.add_flag("--sync", arguments.options.sync,
-               "stored changes survive a loss of power: each waits for the disk");
+               "acknowledged changes survive a power failure: each waits for the disk");
   app.add_option("--save-every", save_every_ms,
                  "shortest time between two stores of streamed values [ms]")
       ->check(CLI::Range(1, 86'400'000));
@@ -131,7 +132,7 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   if (!arguments.options.state.empty() || no_state) return std::nullopt;
   arguments.options.state = default_state();
   if (!arguments.options.state.empty()) return std::nullopt;
-  std::fputs("tfduded: no home for the state: give --state DIR or --no-state\n", stderr);
+  std::fputs("tfduded: no home directory: give --state DIR or --no-state\n", stderr);
   return kWrongUsage;
 }
 

@@ -62,7 +62,7 @@ Result<void> check_partition_name(std::string_view name) {
   if (auto ok = check_id(name, "partition"); !ok) return ok;
   if (const auto at = name.find_first_of("*?[],"); at != std::string_view::npos) {
     return fail(Errc::kInvalidInput, "partition " + quote(name) + " holds '" + name[at] +
-                                         "', which DDS gives a meaning");
+                                         "', which has a special meaning in DDS");
   }
   return {};
 }

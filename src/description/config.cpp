@@ -62,7 +62,7 @@ Result<void> Reader::max_ahead(const Fields& entries, const std::string& what,
   constexpr double kLongest = 1e9;
   if (!(*seconds >= 0 && *seconds <= kLongest)) {
     return error(Errc::kInvalidInput, found->second.mark,
-                 what + ": max_ahead is not within 0 and 1e9 seconds, nor none");
+                 what + ": max_ahead must be 0 to 1e9 seconds, or none");
   }
   out = std::chrono::nanoseconds(std::llround(*seconds * 1e9));
   return {};
@@ -90,14 +90,14 @@ Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
   };
   constexpr double kLongest = 1e6;
   if (span && !(*span >= 1e-6 && *span <= kLongest)) {
-    return refuse("span", " is not within 1e-6 and 1e6 seconds");
+    return refuse("span", " must be 1e-6 to 1e6 seconds");
   }
   constexpr double kMost = 1U << 24U;
   if (count && !(*count >= 2 && *count <= kMost && *count == std::floor(*count))) {
-    return refuse("count", " is not a whole number within 2 and 16777216");
+    return refuse("count", " must be a whole number from 2 to 16777216");
   }
   if (restart && !(*restart >= 0 && *restart <= kMost && *restart == std::floor(*restart))) {
-    return refuse("restart_after", " is not a whole number within 0 and 16777216");
+    return refuse("restart_after", " must be a whole number from 0 to 16777216");
   }
   if (restart) timing.restart_after = static_cast<std::size_t>(*restart);
   if (span) timing.span = std::chrono::nanoseconds(std::llround(*span * 1e9));
@@ -136,7 +136,8 @@ Result<CommonError> Reader::common_error(const std::string& source, const Field&
     return error(Errc::kInvalidInput, field.mark, place + ": " + ok.error().message);
   }
   if (!is_observed(common_error)) return common_error;
-  return error(Errc::kInvalidInput, field.mark, what + ": such names are given to observations");
+  return error(Errc::kInvalidInput, field.mark,
+               what + ": names with this prefix are reserved for observations");
 }
 
 Result<Correlation> Reader::correlation(const Fields& entries, const std::string& place) const {

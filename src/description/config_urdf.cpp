@@ -29,7 +29,7 @@ Result<void> UrdfFields::stand(const YAML::Node& node, const Fields& entries,
       if (found == entries.end()) continue;
       return error(
           Errc::kConfig, found->second.mark,
-          place + ": " + found->first + " is that of the root link in root, which is missing");
+          place + ": " + found->first + " needs root: it places the root link in that frame");
     }
     return {};
   }

@@ -142,7 +142,7 @@ Result<void> EdgeReader::read_limits(Index i, JointSpec& joint) const {
   joint.limits = JointLimits{limits->lower, limits->upper};
   const std::string both = written(limits->lower) + " and " + written(limits->upper);
   if (!(limits->lower <= limits->upper)) {
-    return tree_.joint_error(i, "limits " + both + " are upside down");
+    return tree_.joint_error(i, "limits " + both + ": the lower limit is above the upper one");
   }
   // A limit beyond every valid position is no limit.
   joint.limits->lower = std::max(limits->lower, -kLargest);

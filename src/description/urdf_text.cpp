@@ -200,7 +200,7 @@ Result<UrdfText> read_urdf_text(const std::string& text, const std::string& file
   if (search.found() != nullptr) {
     return urdf_error(Errc::kConfig, file, search.found()->GetLineNum(),
                       "<" + printable(search.found()->Name()) +
-                          "> is of xacro: run xacro first, and give what it makes of this file");
+                          "> is a xacro element: run xacro first, and load its output");
   }
   UrdfText found;
   if (auto ok = TextReader(found, file).robot(*robot); !ok) return tl::unexpected(ok.error());

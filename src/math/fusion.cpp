@@ -60,7 +60,7 @@ Result<Fused> fuse(const std::vector<Transform>& estimates) {
       if (!merge(sum, seen_from(X, estimates[k]))) {
         return fail(Errc::kInvalidInput,
                     "estimate " + std::to_string(k) +
-                        " contradicts those before it in what all know exactly");
+                        " contradicts earlier ones in an axis with zero variance");
       }
     }
     X = X * exp(sum.mean);

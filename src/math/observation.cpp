@@ -97,11 +97,13 @@ class Update {
     } else if (unknown.size() == 1) {
       prior_.take_unknown(unknown.front());
     } else if (unknown.empty()) {
-      return fail(Errc::kInvalidInput, "no edge of the path has any uncertainty to be corrected");
+      return fail(Errc::kInvalidInput,
+                  "all edges of the path are known exactly: none can be corrected");
     } else {
       return fail(Errc::kInvalidInput,
-                  "all uncertain edges of the path are of unknown correlation, " +
-                      std::to_string(unknown.size()) + " of them: which to correct is not known");
+                  "all " + std::to_string(unknown.size()) +
+                      " uncertain edges of the path have unknown correlation: it is undetermined "
+                      "which of them to correct");
     }
     independent_ = independent_ && unknown.empty();
     return {};

@@ -44,8 +44,9 @@ Change conflict_of(const Tombstone& tombstone, const std::string& partition) {
     change.message += "claimed by partition " + quote(tombstone.rival) +
                       ", which keeps it, and by " + quote(partition) + ", which yields";
   } else {
-    change.message += "moved by partition " + quote(partition) + " so that with a move by " +
-                      quote(tombstone.rival) + " it makes a cycle; it is made a root";
+    change.message += "its move by partition " + quote(partition) +
+                      " forms a cycle with a move by " + quote(tombstone.rival) +
+                      "; it is undone, and the frame becomes a root";
   }
   return change;
 }
@@ -57,8 +58,8 @@ Change restarted(const HistoryRestart& restart, const std::string& partition) {
           {},
           {},
           "frame " + quote(restart.id) + " of partition " + quote(partition) +
-              ": its history starts again at " + to_string(restart.stamp) +
-              ", as the clock of its source has jumped back from " + to_string(restart.newest),
+              ": history restarted at " + to_string(restart.stamp) +
+              ": the clock of its source jumped back from " + to_string(restart.newest),
           {}};
 }
 
@@ -71,7 +72,7 @@ Change orphan_of(const FrameInfo& frame, const std::string& partition,
           dropped_by,
           "frame " + quote(frame.id) + " of partition " + quote(partition) +
               " waits for its parent " + quote(frame.parent) +
-              ", which the configuration of partition " + quote(dropped_by) + " names no more",
+              ", which the configuration of partition " + quote(dropped_by) + " no longer contains",
           {}};
 }
 
@@ -96,7 +97,7 @@ void ChangeLog::partition_down(const std::string& partition, bool stopped) {
        {},
        {},
        "partition " + quote(partition) +
-           (stopped ? " was stopped" : " is lost: it is not heard any more"),
+           (stopped ? " was stopped" : " is lost: it no longer sends"),
        {},
        stopped});
 }

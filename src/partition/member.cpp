@@ -121,10 +121,10 @@ void Member::yield(const std::set<PendingYield>& due, bool current, Time now) {
 
 // Lookups no longer find values of this process: no value is better than an old one.
 void Member::give_up(const Presence& rival) {
+  const std::string own = "process " + std::to_string(presence_.pid) + " on host " + presence_.host;
   given_up_ = "partition " + quote(rival.partition) + " was taken over by process " +
-              std::to_string(rival.pid) + " on host " + rival.host + " while process " +
-              std::to_string(presence_.pid) + " on host " + presence_.host +
-              " was not heard, which has given it up";
+              std::to_string(rival.pid) + " on host " + rival.host + ", because " + own +
+              " was silent; " + own + " has given it up";
   presence_.serving = false;
   presence_.stopped = true;
   for (const FrameInfo& frame : forest_.frames()) {

@@ -111,10 +111,9 @@ Result<ObservePlan> route_observe(const Forest& forest, const Directory& directo
   }
   if (plan.edges.size() <= kMaxCorrelated) return plan;
   return fail(Errc::kInvalidInput, "the path from " + quote(a) + " to " + quote(b) +
-                                       ", with what was observed with it, has " +
-                                       std::to_string(plan.edges.size()) + " edges, of at most " +
-                                       std::to_string(kMaxCorrelated) +
-                                       " that are observed at once");
+                                       " and the edges observed with it earlier are " +
+                                       std::to_string(plan.edges.size()) + " edges; at most " +
+                                       std::to_string(kMaxCorrelated) + " can be observed at once");
 }
 
 Result<ObservedPath> observed_path(const ObservePlan& plan,

@@ -267,7 +267,7 @@ Result<void> Partition::revise(const ReviseRequest& request) {
   }
   if (request.incarnation != pages_.incarnation()) {
     return fail(Errc::kChangedMeanwhile,
-                "partition " + quote(name_) + " has been started again since it was observed");
+                "partition " + quote(name_) + " has restarted since the observation began");
   }
   if (!edges.empty()) {
     if (auto revised = forest_.revise(edges, request.stamp, request.seen); !revised) return revised;
@@ -292,15 +292,15 @@ Result<void> Partition::correlate(const std::string& id, const Correlation& corr
       std::find_if(correlation.common_errors.begin(), correlation.common_errors.end(), is_observed);
   if (observed != correlation.common_errors.end()) {
     return fail(Errc::kInvalidInput, who + ": source " + quote(observed->source) +
-                                         ": names of this kind are given to observations");
+                                         ": names with this prefix are reserved for observations");
   }
   if (!correlation.observed_with.empty()) {
     return fail(Errc::kInvalidInput, who + ": only observations set what it was observed with");
   }
   if (joints_.is_coupled(id)) {
     return fail(Errc::kInvalidInput, who +
-                                         " has the error of its joint, which is that of others "
-                                         "that move with it");
+                                         " is moved by a joint that others mimic; its correlation "
+                                         "cannot be set");
   }
   if (auto said = forest_.correlate(id, correlation); !said) {
     return tl::unexpected(at_home(std::move(said.error()), id));

@@ -128,7 +128,7 @@ std::string describe(const ConfiguredChange& change) {
     case Kind::kRemove:
       return frame + ": removed, because its entry was deleted";
     case Kind::kRest:
-      return frame + ": at rest, its stored position is not taken: " + change.why;
+      return frame + ": starts at its initial position; the stored one is dropped: " + change.why;
     case Kind::kOrphan:
       return frame + ": waits for its parent " + quote(change.parent) + ", which is removed";
   }

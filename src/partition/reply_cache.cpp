@@ -5,7 +5,7 @@ namespace {
 
 Reply refused(std::uint32_t sequence, const std::string& why) {
   return {sequence, 0,
-          Error{Errc::kTimeout, "request " + std::to_string(sequence) + " was not taken: " + why}};
+          Error{Errc::kTimeout, "request " + std::to_string(sequence) + " was rejected: " + why}};
 }
 
 }  // namespace
@@ -39,16 +39,15 @@ ReplyCache::Peer* ReplyCache::touch(const PeerId& peer, Time now) {
 std::optional<Reply> ReplyCache::find(const PeerId& from, const Request& request, Time now) {
   Peer* peer = touch(from, now);
   if (peer == nullptr) {
-    return refused(request.sequence, "more than " + std::to_string(kPeers) +
-                                         " others have asked for changes of late");
+    return refused(request.sequence,
+                   "more than " + std::to_string(kPeers) + " clients have sent changes recently");
   }
   end_below(*peer, request.awaits_from);
   const Number number = number_of(request);
   if (number < peer->over_below) {
-    return refused(
-        request.sequence,
-        "it is not known any more whether it was applied before, as all of this peer below " +
-            std::to_string(peer->over_below) + " are over");
+    return refused(request.sequence,
+                   "it may have been applied already; requests of this client below " +
+                       std::to_string(peer->over_below) + " are closed");
   }
   const auto before = peer->replies.find(number);
   if (before == peer->replies.end()) return std::nullopt;

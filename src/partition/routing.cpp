@@ -22,7 +22,7 @@ Result<void> check_reachable(const Directory& directory, Owner owner) {
   const PartitionInfo& info = directory.info(owner);
   return fail(Errc::kUnreachable, "partition " + quote(info.name) + " (host " + info.host +
                                       ", pid " + std::to_string(info.pid) +
-                                      ") is not reachable since " + to_string(info.since) +
+                                      ") has not been reachable since " + to_string(info.since) +
                                       ": it " + why_absent(info));
 }
 

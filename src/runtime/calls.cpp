@@ -79,9 +79,9 @@ void Calls::on_lost(const std::string& partition) {
     for (auto& [number, waiting] : waiting_) {
       auto& entry = waiting.call->entries_[waiting.entry];
       if (entry.partition != partition || entry.reply) continue;
-      entry.reply = Reply{entry.sequence, 0,
-                          Error{Errc::kUnreachable,
-                                "partition " + quote(partition) + " went away while it was asked"}};
+      entry.reply = Reply{
+          entry.sequence, 0,
+          Error{Errc::kUnreachable, "partition " + quote(partition) + " left before it replied"}};
       if (!waiting.call->complete()) continue;
       waiting.call->arrived_->notify_one();
       if (waiting.call->tell_) tell.push_back(waiting.call->tell_);

@@ -170,7 +170,7 @@ void CommitLoop::note(const Result<void>& stored) {
   if (!stored && (!before || before->message != stored.error().message)) {
     log().error("{}", stored.error().message);
   }
-  if (stored && before) log().warn("what could not be stored is stored now");
+  if (stored && before) log().warn("pending changes are stored again");
 }
 
 }  // namespace tfdude

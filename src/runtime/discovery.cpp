@@ -92,9 +92,10 @@ Error Discovery::explained(Error error) {
   const Lock lock(structure_.mutex);
   const auto missed = structure_.directory.only_heard_of();
   if (!missed || error.code == Errc::kUnknownPartition) return error;
-  return {Errc::kUnreachable, error.message + ", unless it is of partition " + quote(missed->name) +
-                                  ", which is not reachable since " + to_string(missed->since) +
-                                  ", before this process started: it " + why_absent(*missed)};
+  return {Errc::kUnreachable, error.message + "; it may belong to partition " +
+                                  quote(missed->name) + ", which has not been reachable since " +
+                                  to_string(missed->since) + ", before this process started: it " +
+                                  why_absent(*missed)};
 }
 
 Error Discovery::undecided(const std::string& what, const Deadline& deadline) {

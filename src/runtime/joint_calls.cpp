@@ -18,7 +18,7 @@ void JointCalls::on_joints(const JointUpdate& update) {
   if (moved || moved.error().code != Errc::kInvalidInput) return;
   const std::uint64_t before = refused_++;
   if (((before + 1) & before) == 0) {
-    log().warn("refused positions of joints ({} times so far): {}", before + 1,
+    log().warn("rejected positions of joints ({} times so far): {}", before + 1,
                moved.error().message);
   }
 }

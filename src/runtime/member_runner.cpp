@@ -22,19 +22,18 @@ std::string who(const Presence& one) {
 
 void log_outcome(const Outcome& outcome, const std::string& own) {
   for (const Directory::Outdated& one : outcome.outdated) {
-    log().warn("messages of process {} of partition {} are ignored, as process {} is newer",
+    log().warn("messages of process {} of partition {} are ignored: process {} is newer",
                one.incarnation, quote(one.partition), one.latest);
   }
   if (outcome.appeared) log().info("partition {} is reachable", who(*outcome.appeared));
   if (outcome.stopped) log().info("partition {} was stopped", who(*outcome.stopped));
-  if (outcome.lost)
-    log().info("partition {} is lost: no message for too long", quote(*outcome.lost));
+  if (outcome.lost) log().info("partition {} is lost: it no longer sends", quote(*outcome.lost));
   if (outcome.rival)
     log().error("partition {} is also served by another process", who(*outcome.rival));
   if (!outcome.overtook) return;
   log().warn(
-      "others knew a newer process of partition {}, whose clock was ahead; this one replaces "
-      "it",
+      "others knew a newer process of partition {}, whose clock was ahead; this process now has "
+      "a higher number",
       quote(own));
 }
 
@@ -290,7 +289,7 @@ void MemberRunner::take_back(const ChangedValues& values) {
 void MemberRunner::reply(const PendingReply& pending) {
   if (!pending.what.empty()) {
     const auto* error = std::get_if<Error>(&pending.reply.body);
-    log().info("{}: {}", pending.what, error != nullptr ? "refused: " + error->message : "done");
+    log().info("{}: {}", pending.what, error != nullptr ? "rejected: " + error->message : "done");
   }
   transport_.reply(pending.to, pending.reply);
 }

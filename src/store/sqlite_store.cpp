@@ -24,8 +24,7 @@ using sqlite::each_row;
 using sqlite::Statement;
 
 constexpr const char* kKeep =
-    "; it was not changed: keep it, and see to it that it and its directory can be read and "
-    "written";
+    "; it was not changed. Keep it, and make the file and its directory readable and writable";
 
 std::string without_spaces(std::string_view text) {
   std::string plain;
@@ -138,7 +137,7 @@ Result<void> SqliteStore::check(const std::string& partition) {
     return unusable("belongs to another program: name another directory, or move it away");
   }
   if (*format < 1 || *format > kFormat) {
-    return unusable("has format " + std::to_string(*format) + ", of which this version reads " +
+    return unusable("has format " + std::to_string(*format) + "; this version reads formats 1 to " +
                     std::to_string(kFormat) +
                     ": use the version that wrote it, or move it away to start from the "
                     "configuration");

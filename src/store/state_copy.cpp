@@ -59,7 +59,7 @@ std::error_code copy_once(const std::string& file, const std::string& copy, bool
 }
 
 tl::unexpected<Error> unreadable(const std::string& file, const std::string& why) {
-  return fail(Errc::kState, "state file " + quote(file) + " cannot be copied to be read: " + why);
+  return fail(Errc::kState, "state file " + quote(file) + " cannot be copied: " + why);
 }
 
 }  // namespace
@@ -77,7 +77,7 @@ Result<StoredState> read_state_copy(const std::string& file, const std::string& 
     if (const auto failed = copy_once(file, copy, kept_still))
       return unreadable(file, failed.message());
   }
-  if (!kept_still) return unreadable(file, "it is written all the time");
+  if (!kept_still) return unreadable(file, "it changed during each attempt");
   auto store = open_sqlite_store(copy, partition);
   auto state = store ? (*store)->load() : tl::unexpected(std::move(store.error()));
   if (state) return state;

@@ -56,7 +56,7 @@ Result<const HeldVersion*> Frames::held_value(std::string_view id) const {
   const Version* version = present(id, snapshot());
   if (version == nullptr) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
   if (!version->held()) {
-    return fail(Errc::kNotOwner, "frame " + quote(id) + " is held by another partition");
+    return fail(Errc::kNotOwner, "frame " + quote(id) + " is owned by another partition");
   }
   return static_cast<const HeldVersion*>(version);
 }
@@ -85,7 +85,7 @@ Result<std::uint32_t> Frames::held_slot(std::string_view id) const {
     return fail(Errc::kUnknownFrame, "no frame " + quote(id));
   }
   if (!version->held()) {
-    return fail(Errc::kNotOwner, "frame " + quote(id) + " is held by another partition");
+    return fail(Errc::kNotOwner, "frame " + quote(id) + " is owned by another partition");
   }
   return version->slot;
 }
@@ -98,7 +98,7 @@ Result<std::uint32_t> Frames::held_slot(Handle frame) const {
   }
   if (!version->held()) {
     return fail(Errc::kNotOwner,
-                "frame " + quote(version->name->text) + " is held by another partition");
+                "frame " + quote(version->name->text) + " is owned by another partition");
   }
   return frame.slot;
 }

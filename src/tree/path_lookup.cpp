@@ -40,17 +40,16 @@ void add_noise(Transform& X, const HeldVersion& edge, double seconds) {
 
 tl::unexpected<Error> no_data(Errc code, const HeldVersion& edge, std::int64_t t,
                               const std::string& why) {
-  return fail(code, "the edge of " + quote(edge.name->text) + " has no data of " +
+  return fail(code, "the edge of " + quote(edge.name->text) + " has no data for " +
                         to_string(time_of(t)) + ": " + why);
 }
 
 tl::unexpected<Error> too_old(const HeldVersion& edge, std::int64_t t) {
   const std::int64_t oldest = edge.samples->stamp(edge.samples->oldest());
   // It may be dropped meanwhile.
-  if (oldest == kAlways) return no_data(Errc::kTooOld, edge, t, "it is not kept any more");
+  if (oldest == kAlways) return no_data(Errc::kTooOld, edge, t, "it is no longer kept");
   const std::chrono::nanoseconds gap(saturating_subtract(oldest, t));
-  return no_data(Errc::kTooOld, edge, t,
-                 "its oldest sample is " + in_milliseconds(gap) + " younger");
+  return no_data(Errc::kTooOld, edge, t, "its oldest sample is " + in_milliseconds(gap) + " later");
 }
 
 tl::unexpected<Error> not_yet(const HeldVersion& edge, std::int64_t t, const std::string& more) {
@@ -67,13 +66,12 @@ Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Query
   const std::int64_t limit = query.extrapolate.count();
   if (limit == 0) return not_yet(edge, t, "");
   if (beyond > limit) {
-    return not_yet(
-        edge, t,
-        ", and no more than " + in_milliseconds(query.extrapolate) + " is to be extrapolated");
+    return not_yet(edge, t,
+                   ", and the extrapolation limit is " + in_milliseconds(query.extrapolate));
   }
   const HeldVersion* before =
       edge.number > edge.samples->oldest() ? edge.samples->sample(edge.number - 1) : nullptr;
-  if (before == nullptr) return not_yet(edge, t, ", and the only one: its motion is not known");
+  if (before == nullptr) return not_yet(edge, t, ", and the only one: cannot extrapolate");
   const double s = seconds(t - before->stamp) / seconds(edge.stamp - before->stamp);
   X = extrapolate(value_of<Value>(*before), value_of<Value>(edge), s);
   add_noise(X, edge, seconds(beyond));
@@ -159,7 +157,7 @@ Result<Value> PathLookup::walk(const Ends& ends, Absent absent, Order order, Tak
     if (top) return not_connected(*ends.a, *ends.b);
     if (!here->held()) {
       error = Error{Errc::kNotOwner,
-                    "the edge of " + quote(here->name->text) + " is held by another partition"};
+                    "the edge of " + quote(here->name->text) + " is owned by another partition"};
     } else if (!error) {
       const auto& edge = static_cast<const HeldVersion&>(*here);
       PathAccumulation<Value>& path = from_a ? path_a : path_b;

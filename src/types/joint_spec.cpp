@@ -42,12 +42,12 @@ Result<void> check_joint(const JointSpec& joint) {
   const auto bad = [&](const char* what) { return fail(Errc::kInvalidInput, who + ": " + what); };
   if (joint.mimic && !joint.coupled) return bad("follows another, so it is coupled");
   if (joint.coupled && !check_id(shared_source(leader_of(joint)), "source")) {
-    return bad("it is coupled, and its name, or that of the joint that it follows, is too long");
+    return bad("it is coupled, and its name, or that of the joint that it mimics, is too long");
   }
   const bool unit = std::abs(joint.joint.S.norm() - 1.0) < 1e-9;
   if (!unit) return bad("its twist is not of unit length");
   if (joint.limits && !(joint.limits->lower <= joint.limits->upper)) {
-    return bad("its limits are upside down");
+    return bad("its lower limit is above its upper limit");
   }
   if (!is_finite(joint.joint.X_PJ)) return bad("its origin is not finite");
   return check_value({joint.name, joint.position, joint.variance});

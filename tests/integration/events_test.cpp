@@ -70,7 +70,7 @@ TEST_CASE("events: a daemon that hung while its name was taken gives it up") {
   CHECK(result.status == 1);
   CHECK_THAT(result.err, ContainsSubstring("partition 'arms' was taken over by process " +
                                            std::to_string(successor.pid())));
-  CHECK_THAT(result.err, ContainsSubstring("while process " + std::to_string(d.arms->pid())));
+  CHECK_THAT(result.err, ContainsSubstring("because process " + std::to_string(d.arms->pid())));
   CHECK(successor.runs());
   CHECK(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
   CHECK(client.partitions()->at(0).pid == static_cast<std::uint32_t>(successor.pid()));

@@ -143,7 +143,7 @@ TEST_CASE("time: a source whose clock jumps back starts its history again, and t
   d.arms->signal(SIGTERM);
   REQUIRE(d.arms->wait(in_time()));
   CHECK_THAT(d.arms->err(),
-             ContainsSubstring("frame 'arm_1' of partition 'arms': its history starts again") &&
+             ContainsSubstring("frame 'arm_1' of partition 'arms': history restarted") &&
                  ContainsSubstring("jumped back"));
 }
 

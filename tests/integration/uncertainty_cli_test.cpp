@@ -96,7 +96,7 @@ TEST_CASE("uncertainty: measurements correct, are gated, and are counted") {
   const CliResult text =
       robot.run(with({"observe", "world", "arm", "--xyz", "9", "1", "0"}, kSure));
   CHECK(text.status == 1);
-  CHECK_THAT(text.out, ContainsSubstring("refused by the gate"));
+  CHECK_THAT(text.out, ContainsSubstring("rejected by the gate"));
   const json fused = robot.answered(with({"fuse", "tool", "--xyz", "0", "0", "1"}, kSure));
   CHECK(fused.at("corrected") == json({"tool"}));
   const json monitor = robot.answered({"monitor", "--once"});
@@ -109,9 +109,9 @@ TEST_CASE("uncertainty: measurements correct, are gated, and are counted") {
     if (name == "tool") continue;
     CHECK(edges.at(0).at("observations") == 3);
     CHECK(edges.at(0).at("refused") == 2);
-    CHECK(edges.at(0).at("verdict") == "too sure");
+    CHECK(edges.at(0).at("verdict") == "too small");
   }
-  CHECK_THAT(robot.run({"monitor", "--once"}).out, ContainsSubstring("too sure"));
+  CHECK_THAT(robot.run({"monitor", "--once"}).out, ContainsSubstring("too small"));
 }
 
 TEST_CASE("uncertainty: measurements that cannot be meant are refused") {

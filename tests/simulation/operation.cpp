@@ -98,7 +98,7 @@ void Operation::on_lost(const std::string& partition) {
   if (over_ || phase_ != Phase::kAsk) return;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     if (replies_[i] || parts_[i].partition != partition) continue;
-    replies_[i] = Reply{0, 0, Error{Errc::kUnreachable, "it went away while it was asked"}};
+    replies_[i] = Reply{0, 0, Error{Errc::kUnreachable, "it left before it replied"}};
   }
   take_if_answered();
 }

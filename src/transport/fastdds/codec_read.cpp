@@ -62,7 +62,7 @@ Result<PartialUpdateRequest> read_partial_update(const wire::PartialUpdate& body
     update.edges.push_back(*std::move(edge));
   }
   if (!update.edges.empty()) return update;
-  return fail(Errc::kInvalidInput, "an update of no edge");
+  return fail(Errc::kInvalidInput, "an update without edges");
 }
 
 std::vector<PathEnds> read_segments(const std::vector<wire::PathEnds>& body) {
@@ -126,7 +126,7 @@ Result<ReviseRequest> read_revise(const wire::ReviseBody& body) {
     revise.edges.push_back(std::move(edge));
   }
   if (!revise.edges.empty()) return revise;
-  return fail(Errc::kInvalidInput, "an observation of no edge");
+  return fail(Errc::kInvalidInput, "an observation without edges");
 }
 
 Result<CorrelateRequest> read_correlate(std::string_view id, const wire::Correlation& body) {
@@ -156,7 +156,8 @@ RemoveRequest read_remove(const wire::RemoveBody& body) {
 
 Result<JointUpdate> read_joints(const wire::Joints& body) {
   auto joints = tfdude::fastdds::from_wire(body, [](std::string_view) { return true; });
-  if (joints && joints->joints.empty()) return fail(Errc::kInvalidInput, "an update of no joint");
+  if (joints && joints->joints.empty())
+    return fail(Errc::kInvalidInput, "an update without joints");
   return joints;
 }
 

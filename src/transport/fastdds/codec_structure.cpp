@@ -12,7 +12,8 @@ namespace {
 Result<Tombstone> read_tombstone(const wire::Tombstone& sample) {
   constexpr auto kLast = static_cast<std::uint8_t>(Tombstone::Kind::kDropped);
   if (sample.kind() < 1 || sample.kind() > kLast) {
-    return fail(Errc::kInvalidInput, "kind " + std::to_string(sample.kind()) + " of a tombstone");
+    return fail(Errc::kInvalidInput,
+                "unknown kind " + std::to_string(sample.kind()) + " of a tombstone");
   }
   Tombstone tombstone{string_of(sample.id()), sample.lamport_time(),
                       static_cast<Tombstone::Kind>(sample.kind()), string_of(sample.rival())};
@@ -88,7 +89,8 @@ Result<Presence> from_wire(const wire::Presence& sample) {
   for (const wire::Absent& one : sample.absent()) {
     const auto kind = static_cast<Absent::Kind>(one.kind());
     if (kind < Absent::Kind::kSilent || kind > Absent::Kind::kForgotten) {
-      return fail(Errc::kInvalidInput, "absent: no kind " + std::to_string(one.kind()));
+      return fail(Errc::kInvalidInput,
+                  "unknown kind " + std::to_string(one.kind()) + " of an absence");
     }
     presence.absent.push_back({string_of(one.partition()), one.since(), kind, one.incarnation()});
     if (auto ok = check_partition_name(presence.absent.back().partition); !ok) {

@@ -306,8 +306,7 @@ Result<void> FastDdsTransport::send(Writer& writer, const std::string& partition
                                     std::to_string(options_.domain));
   }
   if (!writer.write(sample)) {
-    return fail(Errc::kTimeout,
-                "partition " + quote(partition) + " does not take what is sent to it");
+    return fail(Errc::kTimeout, "partition " + quote(partition) + " cannot be sent more data now");
   }
   return {};
 }

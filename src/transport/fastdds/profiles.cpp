@@ -46,7 +46,7 @@ Result<std::string> make_known(const std::string& xml) {
   const auto own = with_own_names(xml, ending);
   if (!own) return own;
   if (!ok(factory().load_XML_profiles_string(own->data(), own->size()))) {
-    return fail(Errc::kConfig, "not what Fast DDS takes for profiles");
+    return fail(Errc::kConfig, "Fast DDS cannot parse it as profiles");
   }
   known.emplace(xml, ending);
   return ending;

@@ -86,7 +86,7 @@ TEST_CASE("a bad entry of a URDF is refused by name and line") {
   entry("spam: 1",
         ": unknown key 'spam'; known are file, root, xyz, rpy, quat, stddev, cov, prefix, links, "
         "strict_limits, joints");
-  entry("rpy: [0, 0, 0]", ": rpy is that of the root link in root, which is missing");
+  entry("rpy: [0, 0, 0]", ": rpy needs root: it places the root link in that frame");
   entry("root: ''", ": root is empty");
   entry("root: w, xyz: [1, 2]", ": xyz has 2, not 3 numbers");
   entry("prefix: [a]", ": prefix is not text");

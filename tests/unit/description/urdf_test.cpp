@@ -101,7 +101,7 @@ TEST_CASE("urdf: what is no URDF is refused") {
   bad("<robot/>\n<robot/>", "r.urdf:2: not XML: <robot> after the end of <robot>");
   bad(std::string("<robot>\n\0</robot>", 17), "r.urdf:2: not XML: holds a zero byte");
   bad(robot("<link name=\"a\">\n<xacro:wheel/></link>"),
-      "r.urdf:3: <xacro:wheel> is of xacro: run xacro first, and give what it makes of this file");
+      "r.urdf:3: <xacro:wheel> is a xacro element: run xacro first, and load its output");
   bad(pair("rotary"), "r.urdf:4: joint 'j': Joint [j] has no known type [rotary]");
   bad(pair("revolute"),
       "r.urdf:4: joint 'j': Joint [j] is of type REVOLUTE but it does not specify limits");
@@ -179,7 +179,7 @@ TEST_CASE("urdf: values of joints that break their rules are refused") {
   refused(pair("fixed", "<origin xyz=\"0 2e9 0\"/>"),
           "r.urdf:4: joint 'j': origin: translation.y is beyond 1e9 m");
   refused(pair("revolute", limits("1", "-1")),
-          "r.urdf:4: joint 'j': limits 1 and -1 are upside down");
+          "r.urdf:4: joint 'j': limits 1 and -1: the lower limit is above the upper one");
   refused(pair("prismatic", limits("2e9", "3e9")),
           "r.urdf:4: joint 'j': limits 2e+09 and 3e+09 are beyond 1e9");
   const std::string revolute = pair("revolute", limits("-1", "2"));

@@ -207,7 +207,7 @@ TEST_CASE("descriptions of joints that cannot be meant are refused by frame and 
   CHECK_THAT(refused([](JointSpec& joint) {
                joint.limits = JointLimits{1, 0};
              }),
-             ContainsSubstring("upside down"));
+             ContainsSubstring("lower limit is above its upper limit"));
   CHECK_THAT(refused([](JointSpec& joint) { joint.variance = -1; }), ContainsSubstring("variance"));
   CHECK_THAT(refused([](JointSpec& joint) { joint.mimic->joint.assign(250, 'x'); }),
              ContainsSubstring("too long"));
@@ -310,8 +310,8 @@ TEST_CASE("a partition comes back with its joints where they were") {
     REQUIRE(changes.size() >= 2);
     CHECK(
         describe(changes[0]) ==
-        "frame 'fore': at rest, its stored position is not taken: joint 'elbow' is prismatic, and "
-        "was revolute");
+        "frame 'fore': starts at its initial position; the stored one is dropped: joint 'elbow' is "
+        "prismatic, and was revolute");
     REQUIRE(arm.partition.restore(*store.load(), frames, kNow));
     CHECK(arm.info("elbow").position == 0);
     CHECK_FALSE(arm.info("elbow").measured);

@@ -106,7 +106,7 @@ TEST_CASE("an entry that is gone takes its frame and nothing below it") {
                 "frame 'tool': waits for its parent 'hand', which is removed"});
     CHECK(second.orphans() ==
           Lines{"frame 'tool' of partition 'arms' waits for its parent 'hand', which the "
-                "configuration of partition 'arms' names no more"});
+                "configuration of partition 'arms' no longer contains"});
   }
   SECTION("which stays so") {
     Life third(store, {kArm}, 3);

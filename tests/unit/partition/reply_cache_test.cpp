@@ -81,11 +81,11 @@ TEST_CASE("what nobody awaits is never applied again, in whatever order it comes
   (void)owner.answer(peer(1), request(7, 5));
   CHECK(owner.applied() == 2);
   for (const std::uint32_t over : {1U, 4U}) {
-    CHECK(refusal(owner.answer(peer(1), request(over, 1))) ==
-          "timeout: request " + std::to_string(over) +
-              " was not taken: it is not known any more whether it was applied before, as all of "
-              "this peer "
-              "below 5 are over");
+    CHECK(
+        refusal(owner.answer(peer(1), request(over, 1))) ==
+        "timeout: request " + std::to_string(over) +
+            " was rejected: it may have been applied already; requests of this client below 5 are "
+            "closed");
   }
   CHECK(owner.applied() == 2);
   CHECK(refusal(owner.answer(peer(1), request(5, 1))).empty());
@@ -126,7 +126,7 @@ TEST_CASE("no peer is forgotten that may still repeat a request") {
   for (std::uint32_t i = 0; i < kPeers; ++i) (void)owner.answer(peer(i), request(1, 1));
   const std::uint64_t before = owner.applied();
   CHECK(refusal(owner.answer(peer(kPeers), request(1, 1))) ==
-        "timeout: request 1 was not taken: more than 65536 others have asked for changes of late");
+        "timeout: request 1 was rejected: more than 65536 clients have sent changes recently");
   (void)owner.answer(peer(0), request(1, 1));
   CHECK(owner.applied() == before);
   SECTION("the one that was silent for longest goes first") {

@@ -78,7 +78,7 @@ std::string message_of(const Result<T>& result) {
 }
 
 constexpr const char* kLegsLost =
-    "partition 'legs' (host host-of-legs, pid 4711) is not reachable since "
+    "partition 'legs' (host host-of-legs, pid 4711) has not been reachable since "
     "1970-01-01 00:00:01.500 UTC: it is lost";
 
 // ---- add

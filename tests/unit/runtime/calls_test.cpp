@@ -107,7 +107,7 @@ TEST_CASE("the loss of a partition fails what waits for it, in all calls, and no
   Calls::Call second(calls, {"b", "c"});
   calls.on_reply(reply_to(first.entries()[0], 1));
   calls.on_lost("a");
-  const std::string lost = "unreachable: partition 'a' went away while it was asked";
+  const std::string lost = "unreachable: partition 'a' left before it replied";
   CHECK(error_of(first.entries()[0]) == "ok");
   CHECK(error_of(first.entries()[1]) == "waits");
   CHECK(error_of(first.entries()[2]) == lost);

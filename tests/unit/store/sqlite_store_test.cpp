@@ -235,7 +235,7 @@ TEST_CASE("a file that cannot be this partition's state is refused and stays as 
   }
   SECTION("of a newer format") {
     put(file, 60, std::string("\0\0\0\4", 4));
-    CHECK_THAT(refused(file), ContainsSubstring("has format 4, of which this version reads 3"));
+    CHECK_THAT(refused(file), ContainsSubstring("has format 4; this version reads formats 1 to 3"));
   }
   SECTION("of another program") {
     put(file, 68, std::string("\0\0\0\2", 4));

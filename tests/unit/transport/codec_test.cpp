@@ -180,8 +180,8 @@ TEST_CASE("a page with a tombstone that means nothing is refused") {
     return page ? "ok" : page.error().message;
   };
   CHECK(read({"hand", 1, Tombstone::Kind::kYielded, "arms"}) == "ok");
-  CHECK(read({"hand", 1, static_cast<Tombstone::Kind>(0), ""}) == "kind 0 of a tombstone");
-  CHECK(read({"hand", 1, static_cast<Tombstone::Kind>(5), ""}) == "kind 5 of a tombstone");
+  CHECK(read({"hand", 1, static_cast<Tombstone::Kind>(0), ""}) == "unknown kind 0 of a tombstone");
+  CHECK(read({"hand", 1, static_cast<Tombstone::Kind>(5), ""}) == "unknown kind 5 of a tombstone");
   CHECK(read({"hand", 1, Tombstone::Kind::kDropped, ""}) == "ok");
   CHECK(read({"", 1, Tombstone::Kind::kRemoved, ""}) != "ok");
   CHECK(read({"hand", 1, Tombstone::Kind::kYielded, "arms,head"}) != "ok");

@@ -86,7 +86,7 @@ TEST_CASE("a moving edge is where its samples say, and nowhere else") {
   CHECK(says(message(arm.hand(query(2001))),
              {"'hand'", "1.000 ms older", "1970-01-01 00:00:02.001"}));
   CHECK(outcome(arm.hand(query(750))) == "too_old");
-  CHECK(says(message(arm.hand(query(750))), {"'hand'", "250.000 ms younger"}));
+  CHECK(says(message(arm.hand(query(750))), {"'hand'", "250.000 ms later"}));
   CHECK(x_of(arm.forest.lookup("world", "base", query(1))) == 1);
 }
 
@@ -111,7 +111,7 @@ TEST_CASE("edges without a common instant have no newest one, and the younger is
   REQUIRE(arm.forest.update("tip", along_x(1), at(2003)));
   const auto X = arm.forest.lookup("world", "tip", Query{});
   CHECK(outcome(X) == "too_old");
-  CHECK(says(message(X), {"'tip'", "3.000 ms younger"}));
+  CHECK(says(message(X), {"'tip'", "3.000 ms later"}));
 }
 
 TEST_CASE("a sample may come late, but not twice and not after what is kept") {
