@@ -111,14 +111,14 @@ class Run:
         deadline = time.monotonic() + processes.PATIENCE_S
         while self.listed() != frames:
             if time.monotonic() > deadline:
-                raise RuntimeError(f"newcomers do not come to list {frames} frames")
+                raise RuntimeError(f"no new participant lists {frames} frames")
 
-    def newcomer(self, frames):
+    def list_all(self, frames):
         """Seconds until a new process has listed all frames."""
         begin = time.monotonic()
         listed = self.listed()
         if listed != frames:
-            raise RuntimeError(f"a newcomer lists {listed} frames of {frames}")
+            raise RuntimeError(f"a new participant lists {listed} frames of {frames}")
         return time.monotonic() - begin
 
     def over(self, work):
@@ -150,7 +150,7 @@ def measure(bin_dir, count, frames, server):
             run.await_known(frames)
             row = {"daemons": count, "frames": frames, "started_s": started,
                    "known_s": time.monotonic() - begin,
-                   "newcomer_s": statistics.median(run.newcomer(frames) for _ in range(5)),
+                   "new_participant_s": statistics.median(run.list_all(frames) for _ in range(5)),
                    "rss_kib": statistics.median(status_of(one.pid, "VmRSS") for one in running)}
             idle = run.over(lambda: time.sleep(IDLE_S))
             row["idle_packets_s"] = idle["packets"] / idle["seconds"]

@@ -43,7 +43,7 @@ bool FloorEndpoints::matched() const {
 void await_match(const FloorEndpoints& endpoints) {
   const auto deadline = Clock::now() + std::chrono::seconds(20);
   while (!endpoints.matched()) {
-    if (Clock::now() > deadline) give_up("no other end of the bare DDS was met");
+    if (Clock::now() > deadline) give_up("no other end of the bare DDS was discovered");
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
 }

@@ -74,7 +74,8 @@ int run(const tfdude::Options& options, double seconds) {
     // An unreachable daemon may return; until then the other one still gets its values.
     const std::string problem = sent ? "" : sent.error().message;
     if (problem != trouble) {
-      std::fprintf(stderr, "arm_controller: %s\n", sent ? "all owners are there" : problem.c_str());
+      std::fprintf(stderr, "arm_controller: %s\n",
+                   sent ? "all owners are reachable" : problem.c_str());
     }
     trouble = problem;
     // Missed cycles are skipped.

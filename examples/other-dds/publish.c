@@ -46,7 +46,7 @@ static void await_reader(dds_entity_t participant, dds_entity_t writer) {
   dds_entity_t waitset = checked(dds_create_waitset(participant), "waitset");
   checked(dds_waitset_attach(waitset, writer, writer), "waitset");
   if (checked(dds_waitset_wait(waitset, NULL, 0, DDS_SECS(10)), "waitset") == 0) {
-    fputs("no owner was met within 10 s\n", stderr);
+    fputs("no owner was discovered within 10 s\n", stderr);
     exit(1);
   }
   checked(dds_delete(waitset), "waitset");

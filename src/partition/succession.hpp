@@ -17,7 +17,7 @@ struct FrameClaim;
 /// 1. Claims of partitions that are gone do not count if another claim does.
 /// 2. A claim does not count against that of a partition that has outlived its owner (Absences),
 ///    unless the owner says the same of that partition.
-/// 3. Of the remaining claims the oldest holds; if equally old, that of the lesser name.
+/// 3. Of the remaining claims the oldest is in force; ties: the alphabetically first partition.
 ///
 /// So the result depends on the reports and on which partitions are present, not on any order. Not
 /// thread-safe.

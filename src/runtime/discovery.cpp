@@ -10,17 +10,17 @@
 namespace tfdude {
 namespace {
 
-// How often a new participant checks whether it has met everybody.
-constexpr Milliseconds kLookAround{2};
+// How often a new participant checks whether it has discovered everybody.
+constexpr Milliseconds kPollEvery{2};
 
 }  // namespace
 
-Discovery::Discovery(Structure& structure, const Transport& transport, Milliseconds look_round,
+Discovery::Discovery(Structure& structure, const Transport& transport, Milliseconds search_time,
                      Milliseconds timeout)
     : structure_(structure),
       transport_(transport),
       timeout_(timeout),
-      met_by_(Deadline(look_round).at()),
+      met_by_(Deadline(search_time).at()),
       told_by_(Deadline::sum(met_by_, Deadline::sum(timeout, Deadline::sum(timeout, timeout)))) {}
 
 bool Discovery::may_appear(Errc code) {
@@ -80,7 +80,7 @@ Error Discovery::last_word(Error error, const Deadline& deadline) {
 
 void Discovery::wait_for_change(const Deadline& deadline) {
   Lock lock(structure_.mutex);
-  structure_.changed.wait_until(lock, deadline.within(kLookAround).at());
+  structure_.changed.wait_until(lock, deadline.within(kPollEvery).at());
 }
 
 Error Discovery::explained(Error error) {

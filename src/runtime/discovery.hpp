@@ -12,18 +12,18 @@
 
 namespace tfdude {
 
-/// Whether a new participant has met all reachable ones, so that frames it does not know do not
-/// exist; and waiting for that.
+/// Whether a new participant has discovered all reachable ones, so that frames it does not know do
+/// not exist; and waiting for that.
 /// @par Thread safety  All functions are thread-safe, for callers that do not hold the structure's
 ///   lock.
 class Discovery {
  public:
   using Clock = Deadline::Clock;
 
-  /// @param look_round  how long to search while nobody is met
-  /// @param timeout  of calls; participants that were met, but are slow to announce their frames,
-  ///   are waited for three times as long
-  Discovery(Structure& structure, const Transport& transport, Milliseconds look_round,
+  /// @param search_time  how long to search while nobody is discovered
+  /// @param timeout  of calls; participants that were discovered, but are slow to announce their
+  ///   frames, are waited for three times as long
+  Discovery(Structure& structure, const Transport& transport, Milliseconds search_time,
             Milliseconds timeout);
 
   /// Whether everything that existed at the start, and all changes that owners have announced
@@ -34,7 +34,7 @@ class Discovery {
   /// For callers that hold the structure's lock.
   void fell_behind() { complete_.store(false, std::memory_order_relaxed); }
 
-  /// The end of the search while nobody is met.
+  /// The end of the search while nobody is discovered.
   [[nodiscard]] Clock::time_point met_by() const { return met_by_; }
 
   /// The deadline of a call that starts now: after the timeout, plus the remaining search time

@@ -30,7 +30,7 @@ class PlainOwner {
 
   explicit PlainOwner(std::string name) : name_(std::move(name)) {}
 
-  /// What is said of a frame that is not where it was.
+  /// What the owner reports of a frame that is no longer where it was.
   struct Word {
     Tombstone::Kind kind = Tombstone::Kind::kRemoved;
     std::string rival;
@@ -70,7 +70,7 @@ class PlainOwner {
     return all;
   }
 
-  /// Somebody is not heard for the moment: nothing is given up for it.
+  /// A partition is silent for a moment: nothing is given up for it.
   void misses(const std::string& partition) { silent_.insert(partition); }
   void hears(const std::string& partition) { silent_.erase(partition); }
   void hears_all() { silent_.clear(); }

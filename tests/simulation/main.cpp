@@ -17,7 +17,7 @@ namespace {
 constexpr std::uint64_t kMany = 1000;
 constexpr const char* kRare[] = {"a process gave its partition up",
                                  "a process overtook its predecessor",
-                                 "an older process was passed over",
+                                 "an older process was ignored",
                                  "a frame was taken over",
                                  "a conflict was told",
                                  "fault kill",
@@ -44,7 +44,7 @@ constexpr const char* kRare[] = {"a process gave its partition up",
 
 int main(int argc, char** argv) {
   using namespace tfdude::simulation;
-  CLI::App app("Runs whole systems in simulated time, each drawn from a seed and run twice.");
+  CLI::App app("Runs whole systems in simulated time, each generated from a seed and run twice.");
   std::uint64_t seed = 1;
   std::uint64_t count = 1;
   bool trace = false;

@@ -222,7 +222,7 @@ void Process::react() {
 void Process::count(const Outcome& outcome) {
   if (outcome.gave_up) world_.count("a process gave its partition up");
   if (outcome.overtook) world_.count("a process overtook its predecessor");
-  if (!outcome.outdated.empty()) world_.count("an older process was passed over");
+  if (!outcome.outdated.empty()) world_.count("an older process was ignored");
   for (const Change& event : outcome.events) {
     if (event.kind == ChangeKind::kFrameTakenOver) world_.count("a frame was taken over");
     if (event.kind == ChangeKind::kFrameOrphaned) world_.count("a frame was orphaned");

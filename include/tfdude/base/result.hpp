@@ -11,8 +11,8 @@
 
 namespace tfdude {
 
-/// What went wrong, by what a caller can do about it. The numbers travel on the wire: never reuse
-/// one.
+/// Kinds of errors, by what a caller can do about them. The numbers are sent over the network:
+/// never reuse one.
 enum class Errc : std::uint8_t {
   kInvalidInput = 1,       ///< a field breaks its rule; the message names the field
   kUnknownFrame = 2,       ///< no frame of that id
@@ -23,15 +23,15 @@ enum class Errc : std::uint8_t {
   kAlreadyExists = 7,      ///< add: the id is taken
   kNotConnected = 8,       ///< lookup: the frames have no common root
   kCycle = 9,              ///< move: the new parent lies below the frame
-  kNotOwner = 10,          ///< the partition asked does not own the edge now; try a fresh route
+  kNotOwner = 10,          ///< the partition asked does not own the edge now; retry
   kPartitionTaken = 11,    ///< another live daemon serves a partition of this name
   kUnreachable = 12,       ///< the owner is known to be down
   kTimeout = 13,           ///< the owner did not answer in time
-  kConfig = 14,            ///< a file (configuration, profile) is missing or broken
+  kConfig = 14,            ///< a file (configuration, profile) is missing or invalid
   kTransport = 15,         ///< the transport could not be set up
-  kState = 16,             ///< what is kept of a partition could not be read or written
-  kNotYet = 17,            ///< an edge has no data of that instant yet
-  kTooOld = 18,            ///< an edge has no data of that instant any more
+  kState = 16,             ///< the stored state of a partition could not be read or written
+  kNotYet = 17,            ///< an edge has no data for that instant yet
+  kTooOld = 18,            ///< an edge no longer has data for that instant
   kStampTaken = 19,        ///< update: the edge has another sample of that stamp
   kChangedMeanwhile = 20,  ///< observe: an edge was written while it was observed
   kUnknownJoint = 21,      ///< no joint of that name
@@ -56,7 +56,7 @@ using Result = tl::expected<T, Error>;
   return tl::unexpected<Error>(Error{code, std::move(message)});
 }
 
-/// The same error with the place it happened in put in front: "frame 'arm_1': stddev[2]: ...".
+/// Prefixes the error with the place where it happened: "frame 'arm_1': stddev[2]: ...".
 [[nodiscard]] inline tl::unexpected<Error> fail_at(const std::string& place, const Error& error) {
   return fail(error.code, place + ": " + error.message);
 }

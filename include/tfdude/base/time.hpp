@@ -8,13 +8,13 @@
 
 namespace tfdude {
 
-/// Wall-clock instant in nanoseconds since the UNIX epoch. Logic is handed one; only `client` and
-/// `transport` read the clock.
+/// Wall-clock instant in nanoseconds since the UNIX epoch. Most layers get the time as an argument;
+/// only `client`, `runtime` and `transport` read the clock.
 using Time = std::chrono::time_point<std::chrono::system_clock, std::chrono::nanoseconds>;
 
 using Milliseconds = std::chrono::milliseconds;
 
-/// As it travels and is kept: nanoseconds since the UNIX epoch.
+/// As sent and stored: nanoseconds since the UNIX epoch.
 [[nodiscard]] inline std::int64_t nanoseconds(Time time) { return time.time_since_epoch().count(); }
 [[nodiscard]] inline Time time_of(std::int64_t nanoseconds) {
   return Time(std::chrono::nanoseconds(nanoseconds));

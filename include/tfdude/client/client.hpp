@@ -118,7 +118,7 @@ class TFDUDE_EXPORT Client {
   /// Streams edge values to their owners without acknowledgement, for example joints at 1 kHz and
   /// more. Waits only until the owners can be reached, within the deadline of all calls. A share
   /// that an owner cannot take in time may be lost, but never in part. If one owner cannot be
-  /// reached, the others get their shares all the same. Stamps as for update(); refused samples are
+  /// reached, the others still get their shares. Stamps as for update(); rejected samples are
   /// counted (histories()).
   /// @return kUnknownFrame.
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
@@ -179,8 +179,8 @@ class TFDUDE_EXPORT Client {
   ///
   /// A path of own edges of a Node uses no network, no lock and no allocation. Other paths take one
   /// round trip, however many partitions they cross, or two if the partitions have no common
-  /// instant near the predicted one (see latest.hpp). An answer at a predicted instant may be older
-  /// than the newest common instant, by up to two samples of the slowest edge. A handle is valid
+  /// instant near the predicted one. An answer at a predicted instant may be older
+  /// than the latest common time, by up to two samples of the slowest edge. A handle is valid
   /// for this client only; other clients treat it as an unknown frame.
   /// @return kUnknownStart, kUnknownEnd, kNotConnected, kNotYet, kTooOld (all edges have no instant
   ///   in common).
@@ -239,7 +239,7 @@ class TFDUDE_EXPORT Client {
   /// Applies a measurement of X_AB: corrects the edges between a and b according to their
   /// uncertainty (see tfdude/math/observation.hpp), whoever owns them. Each owner applies its part
   /// as one commit. Dynamic edges are corrected by a sample with the measurement's stamp. A
-  /// measurement that the gate refuses changes nothing; this is not an error. Takes at least two
+  /// measurement that the gate rejects changes nothing; this is not an error. Takes at least two
   /// round trips, since each edge is requested separately, together with those that were observed
   /// with it.
   /// @param X_AB  with the covariance of the measurement's own error
@@ -280,10 +280,11 @@ class TFDUDE_EXPORT Client {
 
   /// Finds a frame once, for later calls without hashing. @return kUnknownFrame.
   /// @note This function and all below send no requests. They answer from this process's replica of
-  ///   the structure, and wait only while a new participant may still be meeting others. Without a
-  ///   network, and if nobody is met, they wait once for the rest of Options::discovery. Then they
-  ///   answer from what is known here: on a Node its own frames, otherwise nothing. They fail with
-  ///   kTimeout if a participant was met that has not announced all its frames by the deadline.
+  ///   the structure, and wait only while a new participant may still be discovering others.
+  ///   Without a network, and if nobody is discovered, they wait once for the rest of
+  ///   Options::discovery. Then they answer from what is known here: on a Node its own frames,
+  ///   otherwise nothing. They fail with kTimeout if a participant was discovered that has not
+  ///   announced all its frames by the deadline.
   [[nodiscard]] Result<Handle> find(std::string_view id);
 
   /// The partitions that a lookup asks, in the order of the path; empty if a is b.

@@ -17,8 +17,8 @@ struct ConfigPreview {
   std::vector<ConfiguredChange> changes;
 };
 
-/// Reports what Node::open() with these frames and options would change. Serves nothing and meets
-/// nobody. Works on a copy of the state, so the state may be in use and stays unchanged. Frames of
+/// Reports what Node::open() with these frames and options would change. Does not join the
+/// domain. Works on a copy of the state, so the state may be in use and stays unchanged. Frames of
 /// other partitions whose parent would be removed are not reported.
 /// @return kState (naming the file), the error of the first invalid frame, as Node::open().
 ///   Thread-safe.

@@ -27,10 +27,11 @@ class Sender;
 ///
 /// @par Bound  try_publish() takes time proportional to the number of edges and owners, plus one
 ///   write of the transport per owner. With Fast DDS the write is synchronous: it locks the writer
-///   and calls the operating system's send. Above the write, and while no value is refused, nothing
-///   is allocated and no lock is taken that another thread may hold; docs/realtime.md describes
-///   what the write itself allocates. Edges of this process are written as by Client::update(),
-///   under the writers' lock of its forest. The loopback transport calls the owner directly.
+///   and calls the operating system's send. Above the write, and while no value is rejected,
+///   nothing is allocated and no lock is taken that another thread may hold; docs/realtime.md
+///   describes what the write itself allocates. Edges of this process are written as by
+///   Client::update(), under the writers' lock of its forest. The loopback transport calls the
+///   owner directly.
 /// @par Thread safety  Each stream may be used by one thread at a time. A thread may have many
 ///   streams, and several streams may have the same edges.
 class TFDUDE_EXPORT EdgeStream {

@@ -28,7 +28,7 @@ class TFDUDE_EXPORT PathWatch {
   /// or allocation. The result is always a consistent transform of the path: an atomic update of
   /// one owner is seen whole or not at all. While the path changes its route, or an owner restarts,
   /// the last transform before that is returned.
-  /// @return as Client::lookup(); the reason, if the path does not exist any more or is not known
+  /// @return as Client::lookup(); the reason, if the path no longer exists or is not known
   ///   yet.
   [[nodiscard]] Result<StampedTransform> latest() const { return lookup({}); }
   [[nodiscard]] Result<StampedTransform> at(Time t) const;

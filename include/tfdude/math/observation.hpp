@@ -24,7 +24,7 @@ struct ObservedEdge {
 /// How to judge a measurement.
 struct ObserveOptions {
   /// Probability with which a correct measurement is accepted: those with a squared Mahalanobis
-  /// distance beyond this quantile of χ² are refused. 1: accepts all.
+  /// distance beyond this quantile of χ² are rejected. 1: accepts all.
   double gate = 0.999;
   /// False: the measurement may be correlated with the values of the edges; covariance intersection
   /// is used.

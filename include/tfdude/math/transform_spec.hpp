@@ -21,7 +21,7 @@ struct TFDUDE_EXPORT TransformSpec {
   [[nodiscard]] bool empty() const { return !xyz && !rpy && !quat && !stddev && !cov; }
 
   /// @return kInvalidInput naming the field: both rpy and quat, both stddev and cov, or a field
-  ///   that Pose::create() or Covariance refuses.
+  ///   that Pose::create() or Covariance rejects.
   [[nodiscard]] Result<Transform> build() const;
 };
 

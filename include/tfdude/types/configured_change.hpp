@@ -14,8 +14,8 @@ struct ConfiguredChange {
     kReplace,    ///< a new or changed entry: sets parent, value and correlation
     kCorrelate,  ///< a changed entry that differs in its correlation only
     kRemove,     ///< removes the frame: its entry is gone
-    kRest,    ///< drops the joint's stored position, which has lost its meaning; see still_meant()
-    kOrphan,  ///< keeps the frame as a root that waits for its removed parent
+    kRest,       ///< drops the joint's stored position, because the joint's type changed
+    kOrphan,     ///< keeps the frame as a root that waits for its removed parent
   };
   Kind kind = Kind::kAdd;
   std::string frame;

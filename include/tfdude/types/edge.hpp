@@ -61,9 +61,9 @@ struct PartialUpdate {
 
 /// How an edge behaves in time.
 struct EdgeTiming {
-  /// Kept history: samples not older than this before the newest,
+  /// Samples that are older than the newest one by more than this are dropped.
   std::chrono::nanoseconds span = std::chrono::seconds(10);
-  /// and at most this many; at least 2.
+  /// Maximum number of samples; at least 2.
   std::size_t count = 2048;
   /// Covariance per second by which the edge may deviate from the geodesic between two samples, or
   /// from its last value. At the fraction a of the interval Δt between two samples this adds a
@@ -71,7 +71,7 @@ struct EdgeTiming {
   Covariance process_noise{};
   /// True: dynamic from the first update on. False: dynamic from the first update with a stamp on.
   bool moving = false;
-  /// Samples further ahead of the owner's clock are refused; max(): no limit.
+  /// Samples further ahead of the owner's clock are rejected; max(): no limit.
   std::chrono::nanoseconds max_ahead = std::chrono::seconds(60);
   /// After this many consecutive samples that are older than the span, each later than the one
   /// before, the history restarts: the clock of their source has jumped back. 0: never.
@@ -90,16 +90,16 @@ struct HistoryInfo {
   std::chrono::nanoseconds mean_gap{0};  ///< mean time between samples
   std::chrono::nanoseconds max_gap{0};
   std::chrono::nanoseconds jitter{0};  ///< standard deviation of the gaps
-  std::uint64_t refused_old = 0;       ///< samples refused as older than the kept history
-  std::uint64_t refused_equal = 0;     ///< samples refused as another sample has their stamp
-  std::uint64_t refused_ahead = 0;     ///< samples refused as too far ahead of the owner's clock
+  std::uint64_t refused_old = 0;       ///< samples rejected: older than the kept history
+  std::uint64_t refused_equal = 0;     ///< samples rejected: stamp of another sample
+  std::uint64_t refused_ahead = 0;     ///< samples rejected: too far ahead of the owner's clock
 };
 
 /// What observations have shown so far about one edge's covariance.
 struct EdgeConsistency {
   std::string id;
   std::uint64_t observations = 0;
-  std::uint64_t refused = 0;  ///< of these, refused by the gate
+  std::uint64_t refused = 0;  ///< of these, rejected by the gate
   NormalizedInnovation sum;   ///< over all of them
 };
 

@@ -32,7 +32,7 @@ struct Mimic {
   double multiplier = 1;
   double offset = 0;
 
-  /// Position and variance of the follower.
+  /// Position and variance of the mimic joint.
   [[nodiscard]] double position(double of_other) const { return multiplier * of_other + offset; }
   [[nodiscard]] double variance(double of_other) const {
     return multiplier * multiplier * of_other;
@@ -48,7 +48,7 @@ struct JointSpec {
   std::optional<Mimic> mimic;
   /// The joint follows another one, or others follow it: they share one error.
   bool coupled = false;
-  bool strict = false;  ///< positions outside the limits are refused
+  bool strict = false;  ///< positions outside the limits are rejected
   double position = 0;  ///< before the first sample [rad or m]
   double variance = 0;  ///< of the position [rad² or m²]
 };
@@ -64,7 +64,7 @@ struct JointInfo {
   double variance = 0;    ///< [rad² or m²]
   bool measured = false;  ///< true: by a sample, of this process or the one before; false: assumed
   std::uint64_t outside = 0;  ///< applied positions outside the limits
-  std::uint64_t refused = 0;  ///< refused positions outside the limits
+  std::uint64_t refused = 0;  ///< rejected positions outside the limits
 };
 
 /// The joint whose position determines this one: itself, or the one it follows.
@@ -90,7 +90,7 @@ struct JointValue {
 /// Checks a joint description made by code.
 /// @return kInvalidInput naming the joint: an invalid name; a name longer than 249 bytes if others
 ///   follow the joint; a lower limit above the upper; a twist whose axis is not of unit length; a
-///   mimic that is not coupled; what check_value() refuses.
+///   mimic that is not coupled; what check_value() rejects.
 [[nodiscard]] TFDUDE_EXPORT Result<void> check_joint(const JointSpec& joint);
 
 /// The edge's value at a joint position. The error of a coupled joint is not part of the

@@ -12,7 +12,7 @@ struct NotSent {
   std::size_t index = 0;  ///< position in the list that the stream was opened with
   /// - kUnknownFrame, kUnknownJoint: this process knows no owner (yet).
   /// - kUnreachable: the owner is known to be down.
-  /// - kTimeout: the owner was not met yet, or cannot take the value at once.
+  /// - kTimeout: the owner was not discovered yet, or cannot be sent the value at once.
   /// - kInvalidInput: not a number, out of range, or not one value per edge or joint.
   /// - kPartitionTaken: this Node has lost its partition.
   /// - kTransport: the Client was destroyed.

@@ -10,14 +10,14 @@
 
 namespace tfdude {
 
-/// A profile that is no file: the built-in one, confined to this computer (UDP over 127.0.0.1).
+/// A built-in profile instead of a file: this computer only (UDP over 127.0.0.1).
 inline constexpr const char* kLocalProfile = "local";
 
 /// A domain that nobody can join: TFDUDE_DOMAIN is not a number.
 inline constexpr std::uint32_t kNoDomain = UINT32_MAX;
 
 /// The domain in the environment's TFDUDE_DOMAIN, else 0. If that is not a number, kNoDomain, which
-/// open() refuses.
+/// open() rejects.
 [[nodiscard]] TFDUDE_EXPORT std::uint32_t domain_of_environment();
 /// The profile in the environment's TFDUDE_PROFILE, else empty.
 [[nodiscard]] TFDUDE_EXPORT std::string profile_of_environment();
@@ -34,9 +34,9 @@ struct Options {
   std::string discovery_server;
   Milliseconds timeout{1000};  ///< time limit of a call, see Client
   /// Maximum time that a new participant searches for others before it reports a frame as unknown.
-  /// It waits this long only if it meets nobody. If another participant was met or heard of, but
-  /// has not announced its structure yet, calls fail with kTimeout, until three times
-  /// Options::timeout later.
+  /// It waits this long only if it discovers nobody. If it has discovered a participant that has
+  /// not announced its structure, calls fail with kTimeout, for up to three times Options::timeout
+  /// more.
   Milliseconds discovery{1000};
   /// Directory in which a Node stores its partition's frames, from which its next process restores
   /// them; empty: nothing is stored. Changes requested by others are stored before they are
