@@ -33,7 +33,7 @@ class Absences {
   /// Maximum number of entries. The oldest are dropped first.
   static constexpr std::size_t kMost = 256;
 
-  /// A partition is not heard any more, or has announced its stop.
+  /// A partition no longer sends, or has announced its stop.
   void went(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now);
 
   /// Another participant, `teller`, misses a partition that was not met here. Hearsay counts only

@@ -37,7 +37,7 @@ struct Outcome {
   std::vector<Directory::Outdated> outdated{};
   std::optional<Presence> appeared{};       ///< a partition that is served now
   std::optional<Presence> stopped{};        ///< a partition that announced its stop
-  std::optional<std::string> lost{};        ///< a partition that is not heard any more
+  std::optional<std::string> lost{};        ///< a partition that no longer sends
   std::optional<Presence> rival{};          ///< another process that serves the own partition
   std::optional<std::uint64_t> overtook{};  ///< the incarnation as which this process continues
   bool gave_up = false;                     ///< the own partition was given up, to the rival

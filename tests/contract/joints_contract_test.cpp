@@ -182,14 +182,14 @@ TEST_CASE("joints: who has just come tells all owners, or says who it is that no
   Robot robot(join);
   for (int i = 1; i <= 5; ++i) {
     const double angle = 0.1 * i;
-    auto newcomer = Client::open(join(""));
-    REQUIRE(newcomer);
-    REQUIRE(newcomer->update_joints({"elbow"}, {angle}, {0}));
+    auto joiner = Client::open(join(""));
+    REQUIRE(joiner);
+    REQUIRE(joiner->update_joints({"elbow"}, {angle}, {0}));
     CHECK(std::abs(yaw(robot.client->lookup("upper", "fore")) - angle) < 1e-12);
     CHECK(std::abs(yaw(robot.client->lookup("fore", "hand")) + angle) < 1e-12);
   }
-  auto newcomer = Client::open(join(""));
-  const auto published = newcomer->publish_joints({"knee", "elbow"}, {1, 0.75}, {0, 0});
+  auto joiner = Client::open(join(""));
+  const auto published = joiner->publish_joints({"knee", "elbow"}, {1, 0.75}, {0, 0});
   CHECK(outcome(published) == "unknown_joint");
   CHECK_THAT(published.error().message, ContainsSubstring("'knee'"));
   CHECK(comes_true(

@@ -87,7 +87,7 @@ TEST_CASE("who comes late hears the last state of each page and presence, not th
   CHECK(late.heard().presences.back().pages == 2);
 }
 
-TEST_CASE("once a newcomer has met all it has heard of those who were there") {
+TEST_CASE("a new participant that has discovered all others knows all partitions") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const Server arms(join, "arms");
   const Listener late(join);

@@ -322,7 +322,7 @@ TEST_CASE("uncertainty: an edge is fused with a measurement of it, whoever owns 
   CHECK(far.error().code == Errc::kInvalidInput);
 }
 
-TEST_CASE("uncertainty: moving edges are corrected by a sample of the measurement's stamp") {
+TEST_CASE("uncertainty: dynamic edges are corrected by a sample with the measurement's stamp") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(669);
   INFO("seed " << random.seed());

@@ -100,7 +100,7 @@ TEST_CASE("beside: each client of a process has the sockets that its own profile
   CHECK(wide.count(kAnyAddress) > 0);
 }
 
-TEST_CASE("beside: a profile file that was edited is read anew") {
+TEST_CASE("beside: an edited profile file is read again") {
   const testing::DomainLease lease;
   const testing::TemporaryDirectory directory;
   const std::string file = directory.path() + "/profile.xml";

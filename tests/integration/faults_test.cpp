@@ -71,11 +71,11 @@ TEST_CASE("faults: who needs a killed daemon is told at once, and others do not 
 TEST_CASE("faults: who comes after a daemon was killed is told by the others what is missing") {
   ThesisDaemons d;
   d.arms->kill();
-  auto newcomer = *Client::open(d.domain.options(kPatience));
+  auto joiner = *Client::open(d.domain.options(kPatience));
   // It may come before the other daemon has noticed.
-  REQUIRE(eventually([&] { return newcomer.partitions()->size() == 2; }));
-  CHECK_FALSE(newcomer.partitions()->at(0).reachable);
-  check_arms_missing(newcomer);
+  REQUIRE(eventually([&] { return joiner.partitions()->size() == 2; }));
+  CHECK_FALSE(joiner.partitions()->at(0).reachable);
+  check_arms_missing(joiner);
 }
 
 TEST_CASE("faults: an owner is told of a killed daemon, and goes on with its own frames") {

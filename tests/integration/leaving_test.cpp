@@ -106,13 +106,13 @@ TEST_CASE("leaving: nothing is handled while an endpoint is deleted") {
 TEST_CASE("leaving: 5,000 readers go while writers come and go") {
   const testing::DomainLease lease;
   Member leaver(lease.number());
-  Member newcomer(lease.number());
+  Member joiner(lease.number());
   std::atomic<bool> over{false};
   std::atomic<int> matches{0};
   std::thread others([&] {
     while (!over) {
       std::vector<std::unique_ptr<Writer>> writers;
-      for (int i = 0; i < 5; ++i) writers.push_back(newcomer.write("call_writer"));
+      for (int i = 0; i < 5; ++i) writers.push_back(joiner.write("call_writer"));
     }
   });
   // Several at a time: then one of them goes whenever a writer is matched with them.

@@ -116,13 +116,13 @@ TEST_CASE("storing: of what a full disk does not take nothing is called done, or
   CHECK(outcome(client.update("kept", along_x(3))) == "state");
   // Nobody has seen it, so nobody is told that it is there.
   CHECK(outcome(client.add(refused, "hand", {})) == "state");
-  auto newcomer = *Client::open(domain.options());
-  CHECK_FALSE(newcomer.exists(refused));
-  CHECK(newcomer.exists("kept"));
+  auto joiner = *Client::open(domain.options());
+  CHECK_FALSE(joiner.exists(refused));
+  CHECK(joiner.exists("kept"));
 
   SECTION("it is stored, told and done once there is room") {
     disk.make_room();
-    CHECK(eventually([&] { return newcomer.exists(refused); }));
+    CHECK(eventually([&] { return joiner.exists(refused); }));
     CHECK(eventually([&] { return client.remove("kept").has_value(); }));
     there.push_back(refused);
   }

@@ -44,7 +44,7 @@ void Follower::next() {
 }
 
 void Follower::step() {
-  if (watch_ == nullptr) return arm_added_ ? add_tip() : begin_anew();
+  if (watch_ == nullptr) return arm_added_ ? add_tip() : restart();
   if (random_.index(3) == 0) return move();
   write();
 }
@@ -64,7 +64,7 @@ void Follower::begin(const std::string& what, Operation::Route route,
 }
 
 // Uses new names of frames, because the state of the former ones is not known.
-void Follower::begin_anew() {
+void Follower::restart() {
   ++generation_;
   watch_.reset();
   const std::size_t base = random_.index(owners_);

@@ -45,7 +45,7 @@ class Follower : public std::enable_shared_from_this<Follower> {
 
   void next();
   void step();
-  void begin_anew();
+  void restart();
   void add_tip();
   void write();
   void move();

@@ -10,7 +10,7 @@ namespace tfdude::simulation {
 namespace {
 
 constexpr Instant kMeeting = milliseconds(300);  // time of discovery
-constexpr Instant kLookRound = milliseconds(1000);
+constexpr Instant kSearchTime = milliseconds(1000);
 constexpr Instant kSilence = milliseconds(450);
 constexpr Instant kBeat = milliseconds(60);
 constexpr Instant kLookForGone = milliseconds(50);
@@ -87,9 +87,10 @@ void Process::step_claim() {
 // gone.
 void Process::take_frames() {
   const Instant now = world_.timeline.now();
-  const bool incomplete = now < born_ + kLookRound && (awaits_presence() || !directory_.complete());
+  const bool incomplete =
+      now < born_ + kSearchTime && (awaits_presence() || !directory_.complete());
   const bool undecided =
-      now < born_ + kLookRound + milliseconds(3 * Absences::kGrace) && directory_.awaits_silent();
+      now < born_ + kSearchTime + milliseconds(3 * Absences::kGrace) && directory_.awaits_silent();
   if (incomplete || undecided) return later(milliseconds(5), [this] { take_frames(); });
   serve();
 }
@@ -328,7 +329,7 @@ void Process::each_server(const std::string& partition,
 }
 
 bool Process::discovered() const {
-  const bool met = world_.timeline.now() >= born_ + kLookRound;
+  const bool met = world_.timeline.now() >= born_ + kSearchTime;
   return met && !awaits_presence() && directory_.behind() == nullptr;
 }
 

@@ -83,7 +83,7 @@ void Verdict::check_replica(Process& one, const std::vector<std::string>& expect
   }
 }
 
-// A process without a file whose clock is behind that of its predecessor is not heard by a client
+// A process without a file whose clock is behind that of its predecessor is ignored by a client
 // that has met that one: a client cannot tell it, and no daemon may be left that could.
 bool Verdict::passes_over_one(Process& client) const {
   for (std::size_t i = 0; i < plan_.owners; ++i) {

@@ -146,7 +146,7 @@ TEST_CASE("A chain of steps has the covariance of the closed form, and of the pa
   CHECK(fourth(5, 5) == Approx(0.09));
 }
 
-TEST_CASE("A chain drawn at random spreads along its way as only fourth order has it") {
+TEST_CASE("A chain sampled at random spreads along its path as only fourth order predicts") {
   constexpr int kChains = 30'000;
   Random random(703);
   INFO("seed " << random.seed());

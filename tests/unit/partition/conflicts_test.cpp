@@ -256,7 +256,7 @@ TEST_CASE("a partition has back what it stored") {
           Lines{"arm <  @ arms", "hand < arm @ arms, attached", "tool < hand @ arms, attached"});
     CHECK(x_of(arms.forest.lookup("arm", "tool")) == 120);
   }
-  SECTION("what the configuration says anew counts") {
+  SECTION("a changed entry of the configuration counts") {
     arms.start({{"arm", "", along_x(1)}, {"hand", "", along_x(30)}, {"eye", "arm", along_x(2)}});
     CHECK(arms.structure() == Lines{"arm <  @ arms", "eye < arm @ arms, attached", "hand <  @ arms",
                                     "tool < hand @ arms, attached"});

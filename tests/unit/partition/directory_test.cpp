@@ -134,25 +134,25 @@ TEST_CASE("who comes too late to know a partition hears from others that it was 
   known.directory.apply(presence_of("arms", 1, 1), kNow);
   CHECK(known.directory.absent().empty());
   REQUIRE(known.directory.lost("arms", 1, kLater));
-  Replica newcomer;
-  CHECK_FALSE(newcomer.directory.only_heard_of());
+  Replica joiner;
+  CHECK_FALSE(joiner.directory.only_heard_of());
   Presence head = presence_of("head", 1, 0);
   head.absent = known.directory.absent();
-  newcomer.directory.apply(head, kNow);
-  REQUIRE(newcomer.directory.only_heard_of());
-  CHECK(newcomer.directory.only_heard_of()->name == "arms");
-  CHECK(newcomer.directory.only_heard_of()->since == kLater);
-  CHECK_FALSE(newcomer.directory.reachable(*newcomer.directory.owner("arms")));
-  CHECK(newcomer.directory.complete());
+  joiner.directory.apply(head, kNow);
+  REQUIRE(joiner.directory.only_heard_of());
+  CHECK(joiner.directory.only_heard_of()->name == "arms");
+  CHECK(joiner.directory.only_heard_of()->since == kLater);
+  CHECK_FALSE(joiner.directory.reachable(*joiner.directory.owner("arms")));
+  CHECK(joiner.directory.complete());
   SECTION("it does not tell so itself, or it would be told for ever") {
-    CHECK(newcomer.directory.absent().empty());
+    CHECK(joiner.directory.absent().empty());
   }
   SECTION("until it returns") {
-    newcomer.directory.apply(presence_of("arms", 2, 1), kLater);
-    CHECK_FALSE(newcomer.directory.only_heard_of());
-    CHECK(newcomer.directory.reachable(*newcomer.directory.owner("arms")));
-    newcomer.directory.apply(head, kNow);
-    CHECK(newcomer.directory.reachable(*newcomer.directory.owner("arms")));
+    joiner.directory.apply(presence_of("arms", 2, 1), kLater);
+    CHECK_FALSE(joiner.directory.only_heard_of());
+    CHECK(joiner.directory.reachable(*joiner.directory.owner("arms")));
+    joiner.directory.apply(head, kNow);
+    CHECK(joiner.directory.reachable(*joiner.directory.owner("arms")));
   }
 }
 
@@ -286,7 +286,9 @@ TEST_CASE("a directory is complete when all pages of all reachable partitions ha
   CHECK(replica.directory.complete());
 }
 
-TEST_CASE("of two claims as old the lesser name has it, the other gets it when that goes") {
+TEST_CASE(
+    "of two claims of one age the alphabetically first wins; the other one wins once that is "
+    "gone") {
   const Page of_arms = page_of("arms", {{"hand", "arm"}});
   const Page of_legs = page_of("legs", {{"hand", "foot"}});
   const Page of_wings = page_of("wings", {{"hand", "tip"}});
@@ -344,7 +346,7 @@ TEST_CASE("frames that hung below each other meanwhile end up where they belong"
     }
     CHECK(replica.structure() == both);
   }
-  SECTION("while a lesser name claims it") {
+  SECTION("while an alphabetically earlier name claims it") {
     replica.directory.apply(foot_moved);
     replica.directory.apply(page_of("chest", {{"foot", "rib"}}));
     replica.directory.apply(hand_moved);

@@ -56,11 +56,11 @@ TEST_CASE("what was forgotten while it still seemed to be there is forgotten as 
   Presence head = presence_of("head", 1, 0);
   head.absent = {{"arm", 0, Kind::kForgotten, 1}};
   base.directory.apply(head, kNow);
-  const bool lives_anew = GENERATE(false, true);
-  if (lives_anew) base.hear("arm", 2, 10);
-  CHECK(base.directory.lost("arm", lives_anew ? 2 : 1, kNow));
-  CHECK(base.directory.owner("arm").has_value() == lives_anew);
-  CHECK(base.forest.exists("hand") == lives_anew);
+  const bool lives_again = GENERATE(false, true);
+  if (lives_again) base.hear("arm", 2, 10);
+  CHECK(base.directory.lost("arm", lives_again ? 2 : 1, kNow));
+  CHECK(base.directory.owner("arm").has_value() == lives_again);
+  CHECK(base.forest.exists("hand") == lives_again);
 }
 
 TEST_CASE("a reachable partition cannot be forgotten") {

@@ -122,7 +122,7 @@ TEST_CASE("what follows a joint moves with it, and shares its error") {
   CHECK(correlate("upper"));
 }
 
-TEST_CASE("what is said of a joint that follows another is passed over") {
+TEST_CASE("values for a mimic joint are ignored") {
   Arm arm;
   arm.load();
   const auto moved = arm.partition.apply(JointUpdate{{{"wrist", 1, 1}, {"elbow", 0.5, 0.04}}, {}});

@@ -285,11 +285,11 @@ TEST_CASE("a repeated request is answered again but not applied again") {
   // Of another peer, or by another number, it is another request.
   CHECK(said(arms.partition.answer(PeerId{2}, add, kNow)) == "ok");
   CHECK(arms.forest.exists("finger"));
-  const Request anew{6, "finger", AddRequest{"hand", along_x(1)}};
+  const Request repeated{6, "finger", AddRequest{"hand", along_x(1)}};
   const std::string refused = "already_exists: frame 'finger' exists already";
-  CHECK(said(arms.partition.answer(peer, anew, kNow)) == refused);
+  CHECK(said(arms.partition.answer(peer, repeated, kNow)) == refused);
   REQUIRE(said(arms.ask("finger", RemoveRequest{{"finger"}})) == "ok");
-  CHECK(said(arms.partition.answer(peer, anew, kNow)) == refused);
+  CHECK(said(arms.partition.answer(peer, repeated, kNow)) == refused);
 }
 
 TEST_CASE("parts of values are replaced by their owner, who names what it does not have") {

@@ -32,8 +32,8 @@ class Meeting final : public testing::Relay {
   std::atomic<bool> met_somebody{false};
 };
 
-struct Newcomer {
-  explicit Newcomer(const Options& options = quick())
+struct Joiner {
+  explicit Joiner(const Options& options = quick())
       : own(std::make_unique<Meeting>(network.join())),
         meeting(*own),
         rig(std::move(own), "", options) {}
@@ -49,13 +49,13 @@ Result<int> missing() { return fail(Errc::kUnknownFrame, "no frame 'hand'"); }
 }  // namespace
 
 TEST_CASE("discovery: without other participants, it is complete after the discovery time") {
-  Newcomer newcomer;
+  Joiner joiner;
   const auto before = Deadline::Clock::now();
-  CHECK_FALSE(newcomer.rig.discovery.complete());
-  REQUIRE(newcomer.rig.discovery.await(newcomer.rig.deadline()));
+  CHECK_FALSE(joiner.rig.discovery.complete());
+  REQUIRE(joiner.rig.discovery.await(joiner.rig.deadline()));
   CHECK(Deadline::Clock::now() - before >= 40ms);
   const auto found =
-      newcomer.rig.discovery.retry_until_known(newcomer.rig.deadline(), [] { return missing(); });
+      joiner.rig.discovery.retry_until_known(joiner.rig.deadline(), [] { return missing(); });
   REQUIRE_FALSE(found);
   CHECK(found.error().code == Errc::kUnknownFrame);
 }
@@ -63,31 +63,31 @@ TEST_CASE("discovery: without other participants, it is complete after the disco
 TEST_CASE("discovery: no negative answer before all participants are discovered") {
   Options options = quick();
   options.discovery = 10s;
-  Newcomer newcomer(options);
+  Joiner joiner(options);
   const Deadline soon(20ms);
-  const auto found = newcomer.rig.discovery.retry_until_known(soon, [] { return missing(); });
+  const auto found = joiner.rig.discovery.retry_until_known(soon, [] { return missing(); });
   REQUIRE_FALSE(found);
   CHECK(found.error().code == Errc::kTimeout);
   CHECK_THAT(found.error().message, ContainsSubstring("no frame 'hand'") &&
                                         ContainsSubstring("no participant was discovered yet"));
-  newcomer.meeting.met_somebody = true;
-  CHECK_THAT(newcomer.rig.discovery.await(soon).error().message,
+  joiner.meeting.met_somebody = true;
+  CHECK_THAT(joiner.rig.discovery.await(soon).error().message,
              ContainsSubstring("a discovered participant has not announced yet what it owns"));
-  newcomer.meeting.met_all = true;
-  CHECK(newcomer.rig.discovery.await(soon));
+  joiner.meeting.met_all = true;
+  CHECK(joiner.rig.discovery.await(soon));
 }
 
 // A transport may hold one lock here and where it reports a presence, which takes the structure's.
 TEST_CASE("discovery: the transport is asked without the lock of the structure") {
   Options options = quick();
   options.discovery = 10s;
-  Newcomer newcomer(options);
+  Joiner joiner(options);
   int asked = 0;
   int locked = 0;
-  newcomer.meeting.if_asked = [&] {
+  joiner.meeting.if_asked = [&] {
     ++asked;
     std::thread([&] {
-      Mutex& mutex = newcomer.rig.structure.mutex;
+      Mutex& mutex = joiner.rig.structure.mutex;
       if (!mutex.try_lock()) {
         ++locked;
       } else {
@@ -95,7 +95,7 @@ TEST_CASE("discovery: the transport is asked without the lock of the structure")
       }
     }).join();
   };
-  CHECK_FALSE(newcomer.rig.discovery.await(Deadline(20ms)));
+  CHECK_FALSE(joiner.rig.discovery.await(Deadline(20ms)));
   CHECK(asked > 0);
   CHECK(locked == 0);
 }
@@ -104,16 +104,16 @@ TEST_CASE("discovery: an operation is repeated until its missing frame has arriv
   Options options = quick();
   options.discovery = 10s;
   options.timeout = 20s;
-  Newcomer newcomer(options);
+  Joiner joiner(options);
   std::atomic<int> tries{0};
   std::thread other([&] {
     while (tries == 0) std::this_thread::yield();
-    newcomer.rig.on_presence(testing::presence_of("arm", 1, 1));
-    newcomer.rig.on_page(Page{"arm", 0, 1, 1, {{"hand", "", 1}}});
+    joiner.rig.on_presence(testing::presence_of("arm", 1, 1));
+    joiner.rig.on_page(Page{"arm", 0, 1, 1, {{"hand", "", 1}}});
   });
   const auto found =
-      newcomer.rig.discovery.retry_until_known(newcomer.rig.deadline(), [&]() -> Result<int> {
-        const bool is_known = newcomer.rig.structure.forest.exists("hand");
+      joiner.rig.discovery.retry_until_known(joiner.rig.deadline(), [&]() -> Result<int> {
+        const bool is_known = joiner.rig.structure.forest.exists("hand");
         ++tries;
         return is_known ? Result<int>(1) : missing();
       });
@@ -123,10 +123,10 @@ TEST_CASE("discovery: an operation is repeated until its missing frame has arriv
 }
 
 TEST_CASE("discovery: an error that is not of what is unknown is returned at once") {
-  Newcomer newcomer;
+  Joiner joiner;
   int tries = 0;
   const auto found =
-      newcomer.rig.discovery.retry_until_known(newcomer.rig.deadline(), [&]() -> Result<int> {
+      joiner.rig.discovery.retry_until_known(joiner.rig.deadline(), [&]() -> Result<int> {
         ++tries;
         return fail(Errc::kCycle, "a cycle");
       });
@@ -135,29 +135,29 @@ TEST_CASE("discovery: an error that is not of what is unknown is returned at onc
 }
 
 TEST_CASE("discovery: a change that an owner has told of and has not come is waited for") {
-  Newcomer newcomer;
-  newcomer.meeting.met_all = true;
-  newcomer.rig.on_presence(testing::presence_of("arm", 1, 1));
-  newcomer.rig.on_page(Page{"arm", 0, 1, 1, {{"hand", "", 1}}});
-  REQUIRE(newcomer.rig.discovery.complete());
+  Joiner joiner;
+  joiner.meeting.met_all = true;
+  joiner.rig.on_presence(testing::presence_of("arm", 1, 1));
+  joiner.rig.on_page(Page{"arm", 0, 1, 1, {{"hand", "", 1}}});
+  REQUIRE(joiner.rig.discovery.complete());
   {
-    const std::lock_guard lock(newcomer.rig.structure.mutex);
-    newcomer.rig.structure.directory.told_of(*newcomer.rig.structure.directory.owner("arm"), 2);
+    const std::lock_guard lock(joiner.rig.structure.mutex);
+    joiner.rig.structure.directory.told_of(*joiner.rig.structure.directory.owner("arm"), 2);
   }
-  CHECK_THAT(newcomer.rig.discovery.await(Deadline(10ms)).error().message,
+  CHECK_THAT(joiner.rig.discovery.await(Deadline(10ms)).error().message,
              ContainsSubstring("partition 'arm' has made a change that has not arrived here yet"));
-  newcomer.rig.on_page(Page{"arm", 0, 1, 2, {{"hand", "", 1}, {"finger", "hand", 2}}});
-  CHECK(newcomer.rig.discovery.await(Deadline(10s)));
+  joiner.rig.on_page(Page{"arm", 0, 1, 2, {{"hand", "", 1}, {"finger", "hand", 2}}});
+  CHECK(joiner.rig.discovery.await(Deadline(10s)));
 }
 
 TEST_CASE("discovery: a call may also take the rest of the discovery time") {
   Options options = quick();
   options.discovery = 10s;
-  Newcomer newcomer(options);
-  CHECK(newcomer.rig.deadline().at() > Deadline::Clock::now() + 9s);
-  newcomer.meeting.met_all = true;
-  REQUIRE(newcomer.rig.discovery.complete());
-  const auto until = newcomer.rig.deadline().at();
+  Joiner joiner(options);
+  CHECK(joiner.rig.deadline().at() > Deadline::Clock::now() + 9s);
+  joiner.meeting.met_all = true;
+  REQUIRE(joiner.rig.discovery.complete());
+  const auto until = joiner.rig.deadline().at();
   CHECK(until <= Deadline::Clock::now() + options.timeout);
 }
 

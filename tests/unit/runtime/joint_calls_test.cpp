@@ -108,7 +108,7 @@ TEST_CASE("joints: a list that does not go on is not asked for without end") {
   CHECK(owner.asked() <= 2);
 }
 
-TEST_CASE("joints: what comes to a participant without a partition is passed over") {
+TEST_CASE("joints: a participant without a partition ignores positions") {
   LoopbackNetwork network;
   Mover mover(network);
   mover.calls.on_joints({{{"elbow", std::nan("")}}, {}});

@@ -59,9 +59,9 @@ TEST_CASE("queries: what is not there is denied once all are known, and not befo
   CHECK(outcome(asker.queries.history("hand")) == "unknown_frame");
   // One that has said that it has two pages, of which none has come.
   asker.on_presence({"arm", 1, "host", 1, 2, true});
-  Asker newcomer(network);
-  newcomer.on_presence({"arm", 1, "host", 1, 2, true});
-  CHECK(outcome(newcomer.queries.info("hand", Deadline(10ms))) == "timeout");
+  Asker joiner(network);
+  joiner.on_presence({"arm", 1, "host", 1, 2, true});
+  CHECK(outcome(joiner.queries.info("hand", Deadline(10ms))) == "timeout");
 }
 
 TEST_CASE("queries: partitions, and what is kept of history") {

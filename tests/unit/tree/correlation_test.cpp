@@ -197,7 +197,7 @@ TEST_CASE("A revision of static edges holds until their next update") {
   CHECK(updated->correlations[1].common_errors.size() == 2);
 }
 
-TEST_CASE("A revision of a moving edge is a sample, or replaces that of its stamp") {
+TEST_CASE("A revision of a dynamic edge is a sample, or replaces the one with its stamp") {
   Random random(657);
   INFO("seed " << random.seed());
   Robot robot(random);

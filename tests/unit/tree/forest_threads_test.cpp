@@ -155,8 +155,8 @@ void churn_leaves(Forest& forest, std::atomic<int>& newest, const std::function<
   }
 }
 
-// Another moves a subtree to and fro. The value fits only the new parent: a reader that takes one
-// with the other's gets 4000 or 6000.
+// Another moves a subtree back and forth. The value fits only the new parent: a reader that takes
+// one with the other's gets 4000 or 6000.
 void churn_tool(Forest& forest, const std::atomic<bool>& stop, Finding& finding) {
   for (int i = 0; !stop.load(std::memory_order_acquire); ++i) {
     const bool right = i % 2 == 0;

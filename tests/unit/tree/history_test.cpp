@@ -76,7 +76,7 @@ TEST_CASE("a static edge holds for all times") {
   CHECK_FALSE(forest.lookup("world", "base", Query{})->stamp.has_value());
 }
 
-TEST_CASE("a moving edge is where its samples say, and nowhere else") {
+TEST_CASE("only its samples define the value of a dynamic edge") {
   const Arm arm;
   CHECK(x_of(arm.hand(query(1000))) == 111);
   CHECK(x_of(arm.hand(query(1500))) == Approx(166));
@@ -90,7 +90,7 @@ TEST_CASE("a moving edge is where its samples say, and nowhere else") {
   CHECK(x_of(arm.forest.lookup("world", "base", query(1))) == 1);
 }
 
-TEST_CASE("the newest instant is that which all moving edges of the path have") {
+TEST_CASE("the latest common time is that of all dynamic edges of the path") {
   Arm arm;
   CHECK(arm.hand({})->stamp == at(2000));
   REQUIRE(arm.forest.update("arm", along_x(40), at(3000)));

@@ -48,7 +48,7 @@ TEST_CASE("parts of a value that are not given stay as they are") {
   }
 }
 
-TEST_CASE("a moving edge keeps what its newest sample says") {
+TEST_CASE("a partial update of a dynamic edge keeps the other parts of its newest sample") {
   Random random(0x9a72);
   Arm arm(random);
   REQUIRE(arm.forest.update("arm", arm.given, time_of(1000)));

@@ -187,7 +187,7 @@ TEST_CASE("stray samples never start a history again") {
   SECTION("that come in no order") {
     for (int i = 1; i < 1000; ++i) CHECK_FALSE(arm.sample(-1, back - i * 1ms));
   }
-  SECTION("of one stamp again and again") {
+  SECTION("of one stamp, repeatedly") {
     for (int i = 1; i < 1000; ++i) CHECK_FALSE(arm.sample(-1, back));
   }
   SECTION("where that is switched off") {
