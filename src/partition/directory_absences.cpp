@@ -12,8 +12,8 @@ using Standing = Succession::Standing;
 
 bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
   if (!partition.outdated(incarnation)) return false;
-  // A participant that misses it informs it, and it continues with a higher number. But a participant
-  // without a partition cannot inform it.
+  // A participant that misses it informs it, and it continues with a higher number. But a
+  // participant without a partition cannot inform it.
   const bool has_voice = !partitions_.front().info.name.empty();
   const bool is_told = has_voice && absences_.find(partition.info.name);
   if (!is_told && !partition.info.reachable && !partition.forgotten) {
