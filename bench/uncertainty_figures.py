@@ -49,7 +49,7 @@ def two_poses(results):
     off.set_ylabel("‖Σ − Σ sampled‖ / ‖Σ sampled‖")
     logarithmic(nees, y=False)
     nees.axhline(1, color="black", linewidth=0.8)
-    nees.set_title("NEES / 6: above one too sure, below too cautious")
+    nees.set_title("NEES / 6: above one too small, below too large")
     for axes in (off, nees):
         axes.axvline(1, color=RED, linewidth=0.8, linestyle=":", label="an axis with σ = 1 rad")
         axes.set_xlabel("α")
@@ -133,7 +133,7 @@ def correlation(results):
     off.set_ylabel("‖Σ − Σ sampled‖ / ‖Σ sampled‖")
     nees.axhline(1, color="black", linewidth=0.8)
     nees.set_ylim(0, 2)
-    nees.set_title("NEES / 6: above one too sure, below too cautious")
+    nees.set_title("NEES / 6: above one too small, below too large")
     for axes in (off, nees):
         axes.set_xlabel("correlation of both errors")
     nees.legend(frameon=False)

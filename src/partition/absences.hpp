@@ -36,8 +36,8 @@ class Absences {
   /// A partition no longer sends, or has announced its stop.
   void went(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now);
 
-  /// Another participant, `teller`, misses a partition that was not met here. Hearsay counts only
-  /// after kGrace: otherwise a process that has hung, and hears late what others reported
+  /// Another participant, `teller`, misses a partition that was not discovered here. Hearsay counts
+  /// only after kGrace: otherwise a process that has hung, and hears late what others reported
   /// meanwhile, would take it for its own observation. The time starts with the first report of a
   /// silence, so that it counts here when it does at the others.
   void told(const Absent& absent, const std::string& teller);

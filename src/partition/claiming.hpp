@@ -15,7 +15,7 @@ class Claiming {
   /// Time limits; the transport knows how long discovery takes.
   struct Patience {
     std::chrono::milliseconds meeting{0};
-    /// How much longer a participant that was met may take to announce its partition.
+    /// How much longer a participant that was discovered may take to announce its partition.
     std::chrono::milliseconds presence{3000};
     /// How long the participant of a killed predecessor may still seem alive.
     std::chrono::milliseconds predecessor{1500};
@@ -35,7 +35,8 @@ class Claiming {
       : claim_(claim), patience_(patience), until_(now + patience.meeting) {}
 
   /// The step to take now.
-  /// @param awaits_presence  whether a participant was met that has not announced what it serves
+  /// @param awaits_presence  whether a participant was discovered that has not announced what it
+  ///   serves
   [[nodiscard]] Step next(Clock::time_point now, bool awaits_presence);
 
  private:

@@ -52,8 +52,8 @@ class Directory {
   bool look_for_gone(Absences::Steady now);
   [[nodiscard]] bool any_pending() const { return absences_.any_pending(); }
 
-  /// Whether a partition that this process has not met is reported silent, so that it may return at
-  /// any moment, or is gone for so short a time that it would not yield to this process.
+  /// Whether a partition that this process has not discovered is reported silent, so that it may
+  /// return at any moment, or is gone for so short a time that it would not yield to this process.
   [[nodiscard]] bool awaits_silent() const { return absences_.any_hearsay(); }
 
   /// Whether a partition may be forgotten. @return kPartitionTaken if it is reachable

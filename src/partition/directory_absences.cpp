@@ -140,7 +140,7 @@ void Directory::restore(const std::vector<Absent>& absent) {
   for (const Absent& one : absent) {
     if (one.kind == Absent::Kind::kSilent) continue;
     Absent told = one;
-    // This process has not met it yet.
+    // This process has not discovered it yet.
     if (told.kind == Absent::Kind::kBack) told.kind = Absent::Kind::kLost;
     const auto number = number_of(one.partition);
     const bool met = number && partitions_[*number].info.reachable;

@@ -14,7 +14,7 @@
 // Finds the newest instant for which all partitions on a path have data, in one round trip.
 //
 // Each owner answers for its own newest instant and, if it has data, for an instant that the caller
-// predicts. The newest common instant T is the oldest of the newest ones. If all answers include T,
+// predicts. The latest common time T is the oldest of the newest ones. If all answers include T,
 // they are used. Otherwise those at the prediction are used, if all have it and it is at most two
 // periods of the slowest edge older than T. Otherwise all are asked again, for T.
 namespace tfdude {

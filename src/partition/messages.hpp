@@ -80,7 +80,7 @@ struct ReviseRequest {
   struct Edge {
     std::string id;
     NormalizedInnovation innovation;
-    bool refused = false;  ///< the gate refused the measurement
+    bool refused = false;  ///< the gate rejected the measurement
     std::optional<Revision> revision;
   };
   std::vector<Edge> edges;        ///< at least one

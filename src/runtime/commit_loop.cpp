@@ -156,7 +156,7 @@ Result<void> CommitLoop::save_values() {
   return stored;
 }
 
-// Logs only the start and the end of a failure, not each attempt. A refused commit says nothing
+// Logs only the start and the end of a failure, not each attempt. A rejected commit says nothing
 // about the store.
 void CommitLoop::note(const Result<void>& stored) {
   if (!stored && stored.error().code != Errc::kState) return;

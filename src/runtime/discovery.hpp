@@ -38,7 +38,7 @@ class Discovery {
   [[nodiscard]] Clock::time_point met_by() const { return met_by_; }
 
   /// The deadline of a call that starts now: after the timeout, plus the remaining search time
-  /// while others may still be met.
+  /// while others may still be discovered.
   [[nodiscard]] Deadline call_deadline() const;
 
   /// Whether the cause of an error may still be resolved by discovery.

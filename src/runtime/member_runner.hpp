@@ -133,7 +133,7 @@ class MemberRunner final : private CommitLoop::Effects {
   [[nodiscard]] Outcome take_outcome() TFDUDE_REQUIRES(structure_.mutex);
   void react(const Outcome& outcome);
   void look_for_gone();
-  /// Why changes are refused while earlier ones cannot be stored.
+  /// Why changes are rejected while earlier ones cannot be stored.
   [[nodiscard]] std::optional<Error> refusal() const;
 
   Structure& structure_;

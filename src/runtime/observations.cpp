@@ -57,7 +57,7 @@ Result<ObservedPath> Observations::path(ObservePlan& plan, const Deadline& deadl
 }
 
 // False: nothing was applied; true: everything. One owner is asked before the others, the same for
-// all observers of this path. Of two observers that have seen the same values, one is refused
+// all observers of this path. Of two observers that have seen the same values, one is rejected
 // there, and can retry before anything was applied.
 Result<bool> Observations::revise(std::vector<Part> parts, const Deadline& deadline) {
   if (parts.empty()) return true;

@@ -36,7 +36,7 @@ bool is_worth_waiting(const Error& error, const Query& query) {
     case Errc::kNotOwner:
       return true;
     case Errc::kTooOld:
-      // For the newest common instant: one edge is ahead of the data of another.
+      // For the latest common time: one edge is ahead of the data of another.
       return !query.at;
     default:
       return is_structural(error.code);

@@ -107,7 +107,7 @@ class Statement {
   std::unique_ptr<sqlite3_stmt, Finalize> handle_;
 };
 
-/// Calls take(row) for each row that a query returns, up to the first row that it refuses.
+/// Calls take(row) for each row that a query returns, up to the first row that it rejects.
 template <class Take>
 Result<void> each_row(const Database& database, const char* sql, Take take) {
   auto rows = Statement::prepare(database, sql);

@@ -21,7 +21,7 @@ struct IncompatiblePeer {
   std::string partition;  ///< that it serves; empty: none
   ProtocolVersion protocol;
   std::string program;  ///< the version of its program
-  Time since;           ///< when it was met, by the system's clock
+  Time since;           ///< when it was discovered, by the system's clock
 
   /// Who it is, both versions, and what to do.
   [[nodiscard]] std::string text() const;
@@ -132,13 +132,13 @@ class Transport {
   /// arrived by now.
   [[nodiscard]] virtual bool discovered() const = 0;
 
-  /// Whether a participant was met that has not announced yet which partition it serves.
+  /// Whether a participant was discovered that has not announced yet which partition it serves.
   [[nodiscard]] virtual bool awaits_presence() const = 0;
 
-  /// The owners of partitions that were met and cannot be understood.
+  /// The owners of partitions that were discovered and cannot be understood.
   [[nodiscard]] virtual std::vector<IncompatiblePeer> incompatible() const { return {}; }
 
-  /// How long a new participant needs to meet all others, by experience.
+  /// How long a new participant needs to discover all others, by experience.
   [[nodiscard]] virtual Milliseconds discovery_time() const = 0;
 };
 

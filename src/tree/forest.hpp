@@ -78,7 +78,7 @@ class Forest {
   using Clock = std::function<Time()>;
 
   /// @param clock  stamps updates of dynamic edges that have no stamp; without a clock these are
-  ///   refused
+  ///   rejected
   explicit Forest(Clock clock = nullptr);
   ~Forest();
   Forest(const Forest&) = delete;

@@ -290,7 +290,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   }
   const auto at = stamp_for(to_update_.data(), to_update_.size(), stamp);
   if (!at) return tl::unexpected(at.error());
-  // Checks all of them, as each counts what it refuses.
+  // Checks all of them, as each counts what it rejects.
   Result<void> fits;
   for (const std::uint32_t slot : to_update_) {
     auto ok = check_sample(frames_.newest_value(slot), *at);

@@ -76,7 +76,7 @@ struct Robot {
   Oracle oracle;
 };
 
-/// A refusal has its own code, names what it is about, and leaves everything as it was.
+/// A rejection has its own code, names what it is about, and leaves everything as it was.
 void check_refused(Robot& r, const Result<void>& result, Errc code,
                    const std::vector<std::string>& names) {
   REQUIRE_FALSE(result);

@@ -61,7 +61,7 @@ struct WireKind {
   Bytes valid;
   bool (*well_formed)(const std::uint8_t* data, std::size_t size);
   bool (*take)(
-      const Bytes& bytes);  ///< reads as a participant does, up to the message; false: refused
+      const Bytes& bytes);  ///< reads as a participant does, up to the message; false: rejected
 };
 
 template <class Type, class Sample>

@@ -186,7 +186,7 @@ void change_body(CdrWalk& walk, RequestKind kind) {
       walk.skip(8, 8);
       walk.id();
       break;
-    default:;  // a request of a later version, which is refused by name
+    default:;  // a request of a later version, which is rejected by name
   }
 }
 
@@ -288,7 +288,7 @@ bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
         walk.numbers(1);
       });
       break;
-    default:;  // a reply of a later version, which is refused by name
+    default:;  // a reply of a later version, which is rejected by name
   }
   return walk.good();
 }

@@ -168,8 +168,8 @@ Result<void> take(Request& request, Result<Body> body) {
   return {};
 }
 
-// The ids in a body need no check here: ids without a frame are refused as unknown, and new ids are
-// checked where they are added.
+// The ids in a body need no check here: ids without a frame are rejected as unknown, and new ids
+// are checked where they are added.
 Result<void> read_body(const wire::Request& sample, Request& request) {
   const wire::RequestBody& body = sample.body();
   const auto as = [&request](auto read) {

@@ -92,8 +92,8 @@ inline std::string name_of(const edds::TopicDataType& type) { return type.getNam
 /// Elements of XML profiles that have another name in this version than in profiles/tfdude.xml.
 inline constexpr std::array<std::pair<const char*, const char*>, 0> kRenamedElements{};
 
-/// Makes a participant meet the others by a discovery server. A participant of this version also
-/// identifies a server by its id: 0 by default, as for the servers.
+/// Makes a participant discover the others by a discovery server. A participant of this version
+/// also identifies a server by its id: 0 by default, as for the servers.
 inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps::Locator_t& at) {
   etransport::RemoteServerAttributes server;
   server.ReadguidPrefix("44.53.00.5f.45.50.52.4f.53.49.4d.41");
@@ -122,7 +122,7 @@ class ParticipantListener final : public edds::DomainParticipantListener {
   Observer& observer_;
 };
 
-/// A generated type that refuses payloads that are not well formed before it deserializes them. Its
+/// A generated type that rejects payloads that are not well formed before it deserializes them. Its
 /// key is computed without the buffer that the generated code shares between threads. It
 /// preallocates for usual DDS samples, not for the largest.
 template <class Generated, bool (*WellFormed)(const std::uint8_t*, std::size_t)>

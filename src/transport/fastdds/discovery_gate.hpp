@@ -11,16 +11,17 @@
 namespace tfdude::fastdds {
 
 /// Makes a new participant of a domain receive all answers to its announcement. Nobody answers
-/// twice: a participant whose answer is missed is met only at its next announcement. Its endpoints
-/// are asked for again after 70 ms, a time of Fast DDS's built-in readers that cannot be set.
+/// twice: a participant whose answer is missed is discovered only at its next announcement. Its
+/// endpoints are asked for again after 70 ms, a time of Fast DDS's built-in readers that cannot be
+/// set.
 ///
 /// - Fast DDS 2.9 announces a participant before it starts to receive
 ///   (RTPSParticipantImpl::enable). So nothing is sent until the participant is created. The first
 ///   announcement sent is the next of the initial ones, some milliseconds later.
 /// - An answer comes to the multicast socket, and the messages after it to the unicast one, where
 ///   another thread may be faster. So a client does not listen to multicast: all messages come to
-///   one socket, in order. It then meets later participants by its own announcements, and does not
-///   meet other clients.
+///   one socket, in order. It then discovers later participants by its own announcements, and does
+///   not discover other clients.
 /// - A client announces itself every 2 ms at first, later every 100 ms; a server as set in the
 ///   profile.
 class DiscoveryGate {

@@ -9,8 +9,8 @@
 // Discovery by a server, where the network has no multicast or is to be kept free of it.
 namespace tfdude::fastdds {
 
-/// Prepares a participant to meet the others by the server at this address, HOST:PORT. The server
-/// need not run yet, but the host's name must be known.
+/// Prepares a participant to discover the others by the server at this address, HOST:PORT. The
+/// server need not run yet, but the host's name must be known.
 /// @return kInvalidInput naming the address.
 [[nodiscard]] Result<void> use_discovery_server(edds::DomainParticipantQos& qos,
                                                 const std::string& address);

@@ -45,10 +45,10 @@ class Writer final : public edds::DataWriterListener {
 
   [[nodiscard]] bool good() const { return writer_ != nullptr; }
 
-  /// Whether a reader has been met. Does not wait.
+  /// Whether a reader has been discovered. Does not wait.
   [[nodiscard]] bool matched() const { return readers_ > 0; }
 
-  /// Waits until a reader has been met; false at the deadline.
+  /// Waits until a reader has been discovered; false at the deadline.
   [[nodiscard]] bool wait_until_matched(Deadline deadline);
 
   /// A sample of the topic's type. Thread-safe.

@@ -118,7 +118,7 @@ class FastDdsTransport final : public Transport {
     return std::make_shared<Writer>(context(), *topics_.reply, reply_partition(peer),
                                     "call_writer");
   }};
-  std::set<PeerId> there_;  // peers that were met and have not left; only for the worker
+  std::set<PeerId> there_;  // peers that were discovered and have not left; only for the worker
 
   std::unique_ptr<OwnedFilters> filters_;
   std::unique_ptr<Writer> presence_writer_;

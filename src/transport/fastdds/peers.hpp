@@ -26,7 +26,7 @@ namespace tfdude::fastdds {
 /// The DDS partition in which a peer reads its replies.
 [[nodiscard]] std::string reply_partition(const PeerId& peer);
 
-/// The participants that were met, what each announced that it serves, and which are silent.
+/// The participants that were discovered, what each announced that it serves, and which are silent.
 /// Thread-safe. The callbacks run under a lock, so that those about one peer come in order. So no
 /// function here may be called with a lock that the callbacks take (LockRank::kReporting).
 ///
@@ -42,7 +42,7 @@ class Peers {
   using Clock = std::chrono::steady_clock;
   using Tell = std::function<void(const Presence&)>;
 
-  /// If nobody new was met for this long, usually all have answered a new participant.
+  /// If nobody new was discovered for this long, usually all have answered a new participant.
   static constexpr std::chrono::milliseconds kQuiet{200};
 
   /// The period of a server's beats. Seven must be lost before it counts as lost after the usual
@@ -54,7 +54,7 @@ class Peers {
   ///               sent only pages, the presence contains what these say of it
   Peers(Tell there, Tell gone) : there_(std::move(there)), gone_(std::move(gone)) {}
 
-  /// Call before anybody is met.
+  /// Call before anybody is discovered.
   /// @param silence     a peer that was not heard for this long counts as lost
   /// @param first_beat  how long a peer's first beat may take: DDS may still be matching its
   ///                    endpoints when the presence has already arrived
@@ -82,7 +82,7 @@ class Peers {
   /// was prevented from receiving, too, so that delay is not counted as silence of the others.
   void look_for_silent(Clock::time_point now);
 
-  /// The servers that were met and speak another major version.
+  /// The servers that were discovered and speak another major version.
   [[nodiscard]] std::vector<IncompatiblePeer> incompatible() const;
 
   /// Whether messages of this participant cannot be understood. O(1) while there is none such.
@@ -94,12 +94,12 @@ class Peers {
   /// Whether the server of this partition is silent.
   [[nodiscard]] bool silent(const std::string& partition) const;
 
-  /// Whether some server was met, nobody new for kQuiet, all servers have announced what they
-  /// serve, and none hears more others than this participant knows.
+  /// Whether some server was discovered, nobody new for kQuiet, all servers have announced what
+  /// they serve, and none hears more others than this participant knows.
   [[nodiscard]] bool discovered() const;
 
-  /// Whether some server was met that has not announced yet what it serves. A server that has sent
-  /// a page, and then nothing for as long as a first beat may take, is not waited for.
+  /// Whether some server was discovered that has not announced yet what it serves. A server that
+  /// has sent a page, and then nothing for as long as a first beat may take, is not waited for.
   [[nodiscard]] bool awaits_presence() const;
 
  private:
@@ -135,7 +135,7 @@ class Peers {
   std::atomic<bool> any_incompatible_{false};
   Clock::time_point last_met_ TFDUDE_GUARDED_BY(mutex_){};
   Clock::time_point last_look_ TFDUDE_GUARDED_BY(mutex_) = Clock::now();
-  // Set once, before anybody is met.
+  // Set once, before anybody is discovered.
   std::chrono::nanoseconds silence_{};
   std::chrono::nanoseconds first_beat_{};
   bool is_server_ = false;

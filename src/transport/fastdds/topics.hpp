@@ -5,7 +5,7 @@
 #include "transport/fastdds/cdr_check.hpp"
 #include "transport/fastdds/compat.hpp"
 
-// The topics by name and type, and the handling of refused DDS samples.
+// The topics by name and type, and the handling of rejected DDS samples.
 namespace tfdude::fastdds {
 
 inline constexpr const char* kRequestTopic = "tfdude/request";

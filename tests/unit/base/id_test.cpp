@@ -7,7 +7,7 @@
 namespace tfdude {
 namespace {
 
-// The message of a refusal; empty where the id is accepted.
+// The message of a rejection; empty where the id is accepted.
 std::string refusal(std::string_view id) {
   const auto ok = check_id(id, "child");
   if (ok) return "";

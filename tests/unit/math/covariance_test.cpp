@@ -27,7 +27,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 static_assert(std::is_trivially_copyable_v<Covariance>);
 static_assert(sizeof(Covariance) == 21 * sizeof(double));
 
-// The message of a refusal; empty where the matrix is accepted.
+// The message of a rejection; empty where the matrix is accepted.
 std::string refusal(const Matrix6d& matrix) {
   const auto sigma = Covariance::from_matrix(matrix);
   if (sigma) return "";

@@ -18,7 +18,7 @@ using testing::transform_diff;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// The message of a refusal; empty where the spec is accepted.
+// The message of a rejection; empty where the spec is accepted.
 std::string refusal(const TransformSpec& spec) {
   const auto X = spec.build();
   if (X) return "";

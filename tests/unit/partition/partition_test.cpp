@@ -328,7 +328,7 @@ TEST_CASE("the epoch advances with the structure only, and pages carry it") {
   arms.plant();
   CHECK(arms.ask("arm", UpdateRequest{{{"arm", {}}}}).epoch == kLife + 1);
   CHECK(arms.ask("arm", LookupRequest{{{"arm", "hand"}}}).epoch == 0);  // reads tell no epoch
-  CHECK(arms.ask("hand", AddRequest{"arm", {}}).epoch == kLife + 1);    // refused
+  CHECK(arms.ask("hand", AddRequest{"arm", {}}).epoch == kLife + 1);    // rejected
   CHECK(arms.partition.take_pages().empty());
   CHECK(arms.ask("finger", AddRequest{"hand", {}}).epoch == kLife + 2);
   CHECK(arms.ask("finger", MoveRequest{"arm", {}}).epoch == kLife + 3);

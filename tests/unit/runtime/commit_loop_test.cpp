@@ -227,7 +227,7 @@ TEST_CASE("commit loop: of what could not be stored nothing is published or call
   CHECK(flushed.error().code == Errc::kState);
   CHECK_THAT(flushed.error().message, ContainsSubstring("the disk is full"));
 
-  // A refusal rests on what is not stored as well.
+  // A rejection rests on what is not stored as well.
   owner.ask(Reply{2, 0, Error{Errc::kAlreadyExists, "it exists"}});
   REQUIRE(eventually([&] { return owner.replied(2, "the disk is full"); }));
 

@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 using testing::ContainsSubstring;
 using testing::quick;
 
-/// Somebody may still be met.
+/// Somebody may still be discovered.
 class Meeting final : public testing::Relay {
  public:
   using Relay::Relay;

@@ -59,7 +59,7 @@ Clock::duration quickest(Action action) {
   return best;
 }
 
-/// Requests may get lost, and are counted; the others may not all have been met.
+/// Requests may get lost, and are counted; the others may not all have been discovered.
 class Deaf final : public testing::Relay {
  public:
   using Relay::Relay;

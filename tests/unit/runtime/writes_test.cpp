@@ -30,7 +30,7 @@ struct Writer : Rig {
 const std::vector<FrameSpec> kArm{{"arm", "", {}}, {"hand", "arm", {}}};
 const std::vector<FrameSpec> kLeg{{"leg", "", {}}, {"foot", "leg", {}}};
 
-/// One owner is not met before the deadline.
+/// One owner is not discovered before the deadline.
 class Unmet final : public testing::Relay {
  public:
   Unmet(TransportPtr real, std::string owner) : Relay(std::move(real)), owner_(std::move(owner)) {}

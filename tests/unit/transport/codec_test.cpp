@@ -282,7 +282,7 @@ TEST_CASE("no stamp is another than the stamp zero") {
   }
 }
 
-// ---- values that are refused
+// ---- values that are rejected
 
 struct BadValue {
   std::size_t index;  // among the numbers of a transform
@@ -376,7 +376,7 @@ TEST_CASE("a covariance that is not positive semi-definite as a whole is refused
   }
 }
 
-// ---- names that are refused
+// ---- names that are rejected
 
 TEST_CASE("a request for a frame that no frame can be called is refused") {
   for (const char* id : {"", "a\nb", "\xff"}) {

@@ -1,5 +1,5 @@
-// Bounds of what is told of correlation: what exceeds them is refused before it is deserialized, or
-// read.
+// Bounds of what is told of correlation: what exceeds them is rejected before it is deserialized,
+// or read.
 
 #include <limits>
 

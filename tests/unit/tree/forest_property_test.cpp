@@ -181,7 +181,7 @@ class Duel {
   std::string put_remote() {
     const std::string id = any_id();
     const std::string parent = random_.index(4) == 0 ? any_id() : any_parent();
-    const auto owner = static_cast<Owner>(random_.index(4));  // 0 is refused
+    const auto owner = static_cast<Owner>(random_.index(4));  // 0 is rejected
     text_ = "put_remote " + id + " under " + parent + " by " + std::to_string(owner);
     const std::string difference = verdict(outcome(forest_.put_remote(id, parent, owner)),
                                            naive_.put_remote(id, parent, owner));
