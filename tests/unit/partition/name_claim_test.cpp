@@ -49,7 +49,7 @@ TEST_CASE("of processes that start at once, knowing the same, each has an incarn
   std::set<std::uint64_t> all;
   const IncarnationSource source;
   for (int i = 0; i < 500; ++i) all.insert(source.next(at(42), random.engine()()));
-  // Of 2^20 numbers 500 are drawn: more than a few are not discovered twice.
+  // 500 random numbers out of 2^20: only a few may occur twice.
   CHECK(all.size() >= 498);
 }
 
