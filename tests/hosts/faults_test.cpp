@@ -72,8 +72,8 @@ TEST_CASE("hosts: replicas become equal again after a link was cut") {
   auto far = r.open_client(RobotHosts::kArms);
   for (Client* client : {&near, &far}) {
     REQUIRE(eventually([&] { return structure_diff(*client, r.oracle).empty(); }));
-    // By then each has discovered all that it is going to ask, because a server that is cut off does
-    // not help to discover others.
+    // By then each has discovered all that it is going to ask, because a server that is cut off
+    // does not help to discover others.
     CHECK(lookups_diff(*client, r.oracle) == "");
   }
   const auto begin = Clock::now();
