@@ -113,7 +113,7 @@ def capturing(file, domain, kept=0):
 def part_of(capture, packet):
     """request, reply or other; None for packets that are also sent without an operation."""
     topic = capture.topic(packet)
-    if topic is None or not topic.startswith("tfdude/") or topic == "tfdude/presence":
+    if topic is None or not topic.startswith("tfdude/") or topic in ("tfdude/presence", "tfdude/beat"):
         return None
     if rtps.DATA in packet.kinds or rtps.DATA_FRAG in packet.kinds:
         if topic in ("tfdude/request", "tfdude/update", "tfdude/joint"):

@@ -2,6 +2,8 @@
 
 #include <chrono>
 #include <csignal>
+#include <fstream>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <unistd.h>
@@ -76,6 +78,29 @@ TEST_CASE("faults: who comes after a daemon was killed is told by the others wha
   REQUIRE(eventually([&] { return joiner.partitions()->size() == 2; }));
   CHECK_FALSE(joiner.partitions()->at(0).reachable);
   check_arms_missing(joiner);
+}
+
+TEST_CASE("faults: a longer lease in the profile moves the time of a loss") {
+  testing::TestDomain domain;
+  std::ifstream patient(TFDUDE_PATIENT_PROFILE);
+  std::string text{std::istreambuf_iterator<char>(patient), {}};
+  const std::string ten = "<sec>10</sec>";
+  text.replace(text.find(ten), ten.size(), "<sec>2</sec>");
+  const testing::TemporaryDirectory directory;
+  Options options = domain.options();
+  options.profile = directory.write("two_seconds.xml", text);
+  Process arms = domain.start_daemon({"--config", kArmsFile, "--profile", options.profile});
+  testing::await_ready(arms);
+  auto client = *Client::open(options);
+  REQUIRE(eventually([&] { return client.lookup("arm_1", "hand_left").has_value(); }));
+  arms.kill();
+  const auto killed = testing::Clock::now();
+  // Instead of 450 ms, from its last beat on.
+  REQUIRE(eventually([&] {
+    const auto partitions = client.partitions();
+    return partitions && !partitions->front().reachable;
+  }));
+  CHECK(testing::Clock::now() - killed > std::chrono::milliseconds(1800));
 }
 
 TEST_CASE("faults: an owner is told of a killed daemon, and goes on with its own frames") {

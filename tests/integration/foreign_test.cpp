@@ -1,6 +1,8 @@
 // DDS writers of other programs: some stream valid updates, others send malformed samples.
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +17,7 @@
 #include "support/process.hpp"
 #include "support/random.hpp"
 #include "support/recorder.hpp"
+#include "transport/fastdds/codec.hpp"
 #include "transport/port.hpp"
 
 namespace tfdude {
@@ -52,6 +55,17 @@ wire::Update stranger_update(const std::string& id) {
   update.edges({edge});
   update.stamp(-1);
   return update;
+}
+
+// The loopback profile with another reliability of streamed values.
+std::string with_best_effort_updates() {
+  std::ifstream file(TFDUDE_LOOPBACK_PROFILE);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string writer =
+      "<data_writer "
+      "profile_name=\"tfdude_update_writer\"><qos><reliability><kind>BEST_EFFORT</kind>"
+      "</reliability><data_sharing><kind>OFF</kind></data_sharing></qos></data_writer>";
+  return text.insert(text.find("</profiles>"), writer);
 }
 
 bool moved(Node& node, const std::string& frame) {
@@ -160,6 +174,43 @@ TEST_CASE("joints of a plain writer move the edges of who has them") {
   CHECK(nanoseconds(*X->stamp) == 1'700'000'000'000'000'000);
   CHECK(std::abs(X->covariance.stddev()[5] - 0.01) < 1e-12);
   CHECK(counters->updates_passed == 2);
+}
+
+TEST_CASE("requests that are sent to all reach only the owner of their frame") {
+  const testing::DomainLease domain;
+  Counted owner(domain.number(), "owner", "a");
+  Counted other(domain.number(), "other", "b");
+  ForeignWriter writer(domain.number(), "tfdude/request",
+                       fastdds::edds::TypeSupport(new wire::RequestPubSubType), "*");
+  writer.await_readers(2);
+  constexpr std::uint32_t kRequests = 20;
+  wire::Request request = fastdds::to_wire(Request{1, "a_tip", HistoryRequest{}}, "");
+  request.addressee(0);  // whoever owns the frame
+  for (std::uint32_t i = 1; i <= kRequests; ++i) {
+    request.sequence_number(i);
+    writer.write(&request);
+  }
+  CHECK(eventually([&] { return owner.counters->requests_arrived == kRequests; }));
+  CHECK(eventually([&] { return other.counters->requests_arrived == kRequests; }));
+  CHECK(owner.counters->requests_passed == kRequests);
+  CHECK(other.counters->requests_passed == 0);
+}
+
+TEST_CASE("a participant whose profile has another reliability is told which, and where") {
+  const testing::DomainLease domain;
+  Counted owner(domain.number(), "owner", "a");
+  const testing::TemporaryDirectory directory;
+  // As the loopback profile, but updates are sent best effort.
+  const std::string profile = directory.write("best_effort.xml", with_best_effort_updates());
+  auto client = Client::open(*make_fastdds_transport({domain.number(), profile, "", nullptr}));
+  REQUIRE(client);
+  REQUIRE(eventually([&] { return client->lookup("a", "a_tip").has_value(); }));
+  const auto sent = client->publish({{"a_tip", {}}});
+  REQUIRE_FALSE(sent);
+  CHECK(sent.error().code == Errc::kConfig);
+  CHECK(sent.error().message ==
+        "partition 'owner': topic tfdude/update, reliability: a writer offers BEST_EFFORT, but a "
+        "reader requests RELIABLE. Use the same profile for all participants");
 }
 
 namespace {

@@ -1,8 +1,31 @@
 #include "transport/fastdds/entities.hpp"
 
+#include <set>
 #include <utility>
 
+#include "base/log.hpp"
+
 namespace tfdude::fastdds {
+
+// Each policy has one order, so who offers less than is requested has the lower value.
+std::string mismatch_of(const std::string& topic, edds::QosPolicyId_t policy) {
+  std::string values;
+  if (policy == edds::RELIABILITY_QOS_POLICY_ID) {
+    values = "reliability: a writer offers BEST_EFFORT, but a reader requests RELIABLE";
+  } else if (policy == edds::DURABILITY_QOS_POLICY_ID) {
+    values = "durability: a writer offers VOLATILE, but a reader requests TRANSIENT_LOCAL";
+  } else {
+    values = "policy number " + std::to_string(policy) + " of DDS";
+  }
+  return "topic " + topic + ", " + values + ". Use the same profile for all participants";
+}
+
+void log_mismatch(const std::string& mismatch) {
+  static Mutex mutex;
+  static std::set<std::string> logged;
+  const Lock lock(mutex);
+  if (logged.insert(mismatch).second) log().error("{}", mismatch);
+}
 
 Writer::Writer(const Context& context, edds::Topic& topic, const std::string& partition,
                const std::string& profile, std::function<void()> on_reader)
@@ -53,6 +76,19 @@ bool Writer::flush(Deadline deadline) {
                                                        static_cast<std::uint32_t>(rest)}));
   if (!acknowledged) unacknowledged_ = true;
   return acknowledged;
+}
+
+std::string Writer::mismatch() const {
+  const Lock lock(mutex_);
+  return mismatch_;
+}
+
+void Writer::on_offered_incompatible_qos(edds::DataWriter* writer,
+                                         const edds::OfferedIncompatibleQosStatus& status) {
+  std::string mismatch = mismatch_of(writer->get_topic()->get_name(), status.last_policy_id);
+  log_mismatch(mismatch);
+  const Lock lock(mutex_);
+  mismatch_ = std::move(mismatch);
 }
 
 void Writer::on_publication_matched(edds::DataWriter*,

@@ -31,6 +31,11 @@ struct Context {
   FastDdsCounters& counters;
 };
 
+/// Why a writer and a reader of a topic do not match: the setting, and what each side has.
+[[nodiscard]] std::string mismatch_of(const std::string& topic, edds::QosPolicyId_t policy);
+/// Once for each.
+void log_mismatch(const std::string& mismatch);
+
 /// A writer with a publisher of its own, hence in a DDS partition of its own.
 class Writer final : public edds::DataWriterListener {
  public:
@@ -58,15 +63,21 @@ class Writer final : public edds::DataWriterListener {
   /// or if no reader is left that could acknowledge.
   [[nodiscard]] bool flush(Deadline deadline);
 
+  /// Why a reader that was discovered does not match (mismatch_of()); empty: none was.
+  [[nodiscard]] std::string mismatch() const;
+
   void on_publication_matched(edds::DataWriter*,
                               const edds::PublicationMatchedStatus& status) override;
+  void on_offered_incompatible_qos(edds::DataWriter* writer,
+                                   const edds::OfferedIncompatibleQosStatus& status) override;
 
  private:
   const Context context_;
   const std::function<void()> on_reader_;
   edds::Publisher* publisher_ = nullptr;
   edds::DataWriter* writer_ = nullptr;
-  Mutex mutex_;
+  mutable Mutex mutex_;
+  std::string mismatch_ TFDUDE_GUARDED_BY(mutex_);
   Condition matched_;
   std::atomic<int> readers_{0};              // changed under mutex_
   std::atomic<bool> unacknowledged_{false};  // something may be
@@ -127,6 +138,11 @@ class Reader : public edds::DataReaderListener {
     for (auto one = batch_.begin(); one != end; ++one) {
       calls_.on_sample(one->sample, one->info.sample_identity.writer_guid().guidPrefix);
     }
+  }
+
+  void on_requested_incompatible_qos(edds::DataReader* reader,
+                                     const edds::RequestedIncompatibleQosStatus& status) override {
+    log_mismatch(mismatch_of(reader->get_topicdescription()->get_name(), status.last_policy_id));
   }
 
   void on_subscription_matched(edds::DataReader*,

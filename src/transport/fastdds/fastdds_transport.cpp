@@ -31,9 +31,6 @@ constexpr std::chrono::milliseconds kLastWord{100};
 // If there are more servers than this, each sends its beat less often.
 constexpr std::uint32_t kMany = 12;
 
-// The DDS partition of the beats, so that they do not match the readers of presences.
-constexpr const char* kBeatPartition = "tfdude-beat";
-
 tl::unexpected<Error> not_created(const char* what) {
   return fail(Errc::kTransport, std::string("Fast DDS could not create ") + what);
 }
@@ -78,14 +75,15 @@ Result<void> FastDdsTransport::create_participant() {
   entrance.open();
   self_ = peer_of(participant_->guid().guidPrefix);
   topics_.presence = create_topic(kPresenceTopic, edds::TypeSupport(new PresenceType));
+  topics_.beat = create_topic(kBeatTopic, edds::TypeSupport(new PresenceType));
   topics_.directory = create_topic(kDirectoryTopic, edds::TypeSupport(new PageType));
   topics_.reply = create_topic(kReplyTopic, edds::TypeSupport(new ReplyType));
   topics_.request = create_topic(kRequestTopic, edds::TypeSupport(new RequestType));
   topics_.update = create_topic(kUpdateTopic, edds::TypeSupport(new UpdateType));
   topics_.joint = create_topic(kJointTopic, edds::TypeSupport(new JointsType));
   topics_.state = create_topic(kStateTopic, edds::TypeSupport(new StateType));
-  for (const auto* topic : {topics_.presence, topics_.directory, topics_.reply, topics_.request,
-                            topics_.update, topics_.joint, topics_.state}) {
+  for (const auto* topic : {topics_.presence, topics_.beat, topics_.directory, topics_.reply,
+                            topics_.request, topics_.update, topics_.joint, topics_.state}) {
     if (topic == nullptr) return not_created("the topics");
   }
   return {};
@@ -121,7 +119,7 @@ Result<void> FastDdsTransport::create_endpoints() {
                                     },
                                     nullptr});
   beats_ = std::make_unique<Reader<wire::Presence>>(
-      context(), *topics_.presence, kBeatPartition, "beat_reader",
+      context(), *topics_.beat, std::string(), "beat_reader",
       Reader<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
                                       take_presence(sample, from, true);
                                     },
@@ -144,8 +142,7 @@ Result<void> FastDdsTransport::create_endpoints() {
   if (options_.partition.empty()) return {};
   presence_writer_ =
       std::make_unique<Writer>(context(), *topics_.presence, std::string(), "presence_writer");
-  beat_writer_ =
-      std::make_unique<Writer>(context(), *topics_.presence, kBeatPartition, "beat_writer");
+  beat_writer_ = std::make_unique<Writer>(context(), *topics_.beat, std::string(), "beat_writer");
   directory_writer_ =
       std::make_unique<Writer>(context(), *topics_.directory, std::string(), "directory_writer");
   if (!presence_writer_->good() || !beat_writer_->good() || !directory_writer_->good()) {
@@ -299,6 +296,9 @@ Result<void> FastDdsTransport::send(Writer& writer, const std::string& partition
     if (peers_.silent(partition)) {
       return fail(Errc::kUnreachable,
                   "partition " + quote(partition) + " left before it was discovered");
+    }
+    if (const std::string mismatch = writer.mismatch(); !mismatch.empty()) {
+      return fail(Errc::kConfig, "partition " + quote(partition) + ": " + mismatch);
     }
     if (Peers::Clock::now() < deadline) continue;
     return fail(Errc::kTimeout, "partition " + quote(partition) +

@@ -68,6 +68,7 @@ class FastDdsTransport final : public Transport {
     edds::Topic* state = nullptr;
     edds::Topic* directory = nullptr;
     edds::Topic* presence = nullptr;
+    edds::Topic* beat = nullptr;
   };
 
   Result<void> create_participant();
