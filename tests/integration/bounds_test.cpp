@@ -78,6 +78,23 @@ TEST_CASE("bounds: beside a daemon that hangs a flush says who has not acknowled
   CHECK(testing::eventually([&] { return client.flush(100ms).has_value(); }));
 }
 
+TEST_CASE("bounds: no flush says that all is acknowledged while another still waits for that") {
+  ThesisDaemons d;
+  auto client = *Client::open(d.domain.options());
+  REQUIRE(client.publish({{"hand_left", testing::along_x(1)}}));
+  REQUIRE(client.flush(20'000ms));
+  d.arms->freeze();
+  REQUIRE(client.publish({{"hand_left", testing::along_x(2)}}));
+  auto first = std::async(std::launch::async, [&] { return client.flush(2000ms); });
+  // The first one has begun to wait when one of these begins.
+  for (int i = 0; i < 4; ++i) {
+    const auto meanwhile = client.flush(50ms);
+    REQUIRE_FALSE(meanwhile);
+    CHECK_THAT(meanwhile.error().message, ContainsSubstring("'arms'"));
+  }
+  CHECK_FALSE(first.get());
+}
+
 TEST_CASE("bounds: a client that has streamed to a daemon that hangs ends all the same") {
   ThesisDaemons d;
   std::optional<Client> client = *Client::open(d.domain.options());

@@ -51,7 +51,6 @@ bool Writer::wait_until_matched(Deadline deadline) {
 }
 
 bool Writer::write(void* sample) {
-  unacknowledged_ = true;
   // Sequence numbers and source timestamps are assigned in the same order.
   const std::lock_guard lock(writing_);
   const auto now = std::chrono::system_clock::now().time_since_epoch();
@@ -59,11 +58,16 @@ bool Writer::write(void* sample) {
   stamp.from_ns(source_stamp_.next(std::chrono::nanoseconds(now).count()));
   ertps::WriteParams params;
   params.source_timestamp(stamp);
-  return fastdds::write(*writer_, sample, params);
+  if (!fastdds::write(*writer_, sample, params)) return false;
+  ++written_;
+  return true;
 }
 
 bool Writer::flush(Deadline deadline) {
-  if (!good() || !unacknowledged_.exchange(false)) return true;
+  // What is written during the wait is left to the next flush.
+  const std::uint64_t written = written_;
+  std::uint64_t before = acknowledged_;
+  if (before >= written) return true;
   const bool anybody = wait_until_matched(Deadline());
   // At most the longest time that DDS can represent.
   const Deadline now = Deadline::clock::now();
@@ -74,8 +78,11 @@ bool Writer::flush(Deadline deadline) {
   const bool acknowledged =
       anybody && ok(writer_->wait_for_acknowledgments({static_cast<std::int32_t>(seconds.count()),
                                                        static_cast<std::uint32_t>(rest)}));
-  if (!acknowledged) unacknowledged_ = true;
-  return acknowledged;
+  if (!acknowledged) return false;
+  // Another flush may have waited for more.
+  while (before < written && !acknowledged_.compare_exchange_weak(before, written)) {
+  }
+  return true;
 }
 
 std::string Writer::mismatch() const {

@@ -79,10 +79,11 @@ class Writer final : public edds::DataWriterListener {
   mutable Mutex mutex_;
   std::string mismatch_ TFDUDE_GUARDED_BY(mutex_);
   Condition matched_;
-  std::atomic<int> readers_{0};              // changed under mutex_
-  std::atomic<bool> unacknowledged_{false};  // something may be
-  std::recursive_mutex writing_;             // as Fast DDS's own
-  GrowingStamp source_stamp_;                // under writing_
+  std::atomic<int> readers_{0};                 // changed under mutex_
+  std::atomic<std::uint64_t> written_{0};       // number of samples, counted once written
+  std::atomic<std::uint64_t> acknowledged_{0};  // at least so many of them
+  std::recursive_mutex writing_;                // as Fast DDS's own
+  GrowingStamp source_stamp_;                   // under writing_
 };
 
 /// A reader with its own subscriber, hence in its own DDS partition. It passes DDS samples on one
