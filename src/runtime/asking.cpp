@@ -33,19 +33,37 @@ Asking::Asking(Calls& calls, std::vector<Part>& parts, std::function<void()> arr
     if (part.owner == kHeldHere) continue;
     part.request.sequence = call_.entries()[requests_.size()].sequence;
     part.request.awaits_from = call_.awaits_from();
-    requests_.push_back(&part.request);
+    requests_.push_back({&part.request});
   }
 }
 
 Asking::Clock::time_point Asking::send_due(Clock::time_point now, const Send& send) {
   if (now < due_) return due_;
   for (std::size_t i = 0; i < requests_.size(); ++i) {
-    if (!call_.waits(i)) continue;
-    auto sent = send(call_.entries()[i].partition, *requests_[i]);
-    if (!sent && sent.error().code != Errc::kNotYet) call_.give_up(i, std::move(sent.error()));
+    if (call_.waits(i)) this->send(i, send);
   }
   if (sent_++ > 0) pause_ = std::min(2 * pause_, kLastRepeat);
   return due_ = Clock::now() + pause_;
+}
+
+bool Asking::send_unsent(const Send& send) {
+  bool left = false;
+  for (std::size_t i = 0; i < requests_.size(); ++i) {
+    if (!requests_[i].unsent || !call_.waits(i)) continue;
+    this->send(i, send);
+    left = left || requests_[i].unsent;
+    if (requests_[i].unsent) continue;
+    // Its first repeats come soon, however long it could not be sent: it may have been too early.
+    pause_ = kFirstRepeat;
+    due_ = std::min(due_, Clock::now() + pause_);
+  }
+  return left;
+}
+
+void Asking::send(std::size_t i, const Send& send) {
+  auto sent = send(call_.entries()[i].partition, *requests_[i].request);
+  requests_[i].unsent = !sent && sent.error().code == Errc::kNotYet;
+  if (!sent && !requests_[i].unsent) call_.give_up(i, std::move(sent.error()));
 }
 
 void Asking::give_up(const Deadline& deadline) {

@@ -14,15 +14,21 @@ namespace tfdude {
 class Asking {
  public:
   using Clock = Calls::Clock;
-  /// An error other than kNotYet ends the wait for this partition's reply.
+  /// An error ends the wait for this partition's reply, except kNotYet: it cannot be reached yet.
   using Send = std::function<Result<void>(const std::string& partition, const Request& request)>;
 
   /// @param parts  get sequence numbers; must outlive this. Parts held here are not sent.
   /// @param arrived  called once all replies have come, from another thread; must not block
   Asking(Calls& calls, std::vector<Part>& parts, std::function<void()> arrived = {});
 
-  /// Sends the requests without a reply that are due. @return when the next one is due
+  /// Sends the requests without a reply that are due. @return due()
   Clock::time_point send_due(Clock::time_point now, const Send& send);
+
+  /// When the next one is due.
+  [[nodiscard]] Clock::time_point due() const { return due_; }
+
+  /// Tries again to send the requests that could not be sent yet. @return whether any is left
+  bool send_unsent(const Send& send);
 
   /// Whether all replies have come.
   [[nodiscard]] bool complete() { return call_.wait_until(Clock::time_point::min()); }
@@ -39,9 +45,15 @@ class Asking {
   [[nodiscard]] std::vector<Reply> take_replies();
 
  private:
+  struct Outgoing {
+    const Request* request;
+    bool unsent = false;  // it was due, but could not be sent
+  };
+  void send(std::size_t i, const Send& send);
+
   std::vector<Part>& parts_;
-  std::vector<const Request*> requests_;  // requests that are sent
-  std::vector<Reply> replies_;            // one per part
+  std::vector<Outgoing> requests_;
+  std::vector<Reply> replies_;  // one per part
   Calls::Call call_;
   int sent_ = 0;
   Milliseconds pause_;

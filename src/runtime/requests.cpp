@@ -1,6 +1,7 @@
 #include "runtime/requests.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/log.hpp"
 #include "partition/requests.hpp"
@@ -43,19 +44,28 @@ std::vector<Reply> Requests::ask(std::vector<Part>& parts, const Deadline& deadl
   for (const Part& part : parts) {
     if (part.owner != kHeldHere) transport_.prepare(part.partition);
   }
-  const auto send = [&](const std::string& partition, const Request& request) {
-    return transport_.send(partition, request, deadline.at());
+  Milliseconds wait{0};
+  const Asking::Send send = [&](const std::string& partition, const Request& request) {
+    const Deadline turn = deadline.within(std::exchange(wait, Milliseconds(0)));
+    auto sent = transport_.send(partition, request, turn.at());
+    const bool again = !sent && sent.error().code == Errc::kTimeout && !deadline.over();
+    if (again) sent.error().code = Errc::kNotYet;
+    return sent;
   };
   Asking asking(calls_, parts);
-  auto due = asking.send_due(Clock::now(), send);
+  asking.send_due(Clock::now(), send);
   asking.answer(own_.answer);
-  while (!asking.wait_until(std::min(due, deadline.at()))) {
+  while (true) {
+    wait = kTurn;
+    const bool unsent = asking.send_unsent(send);
+    wait = Milliseconds(0);
+    if (asking.wait_until(unsent ? Clock::now() : std::min(asking.due(), deadline.at()))) break;
     const auto now = Clock::now();
-    if (deadline.over(now)) {
+    if (!unsent && deadline.over(now)) {
       asking.give_up(deadline);
       break;
     }
-    due = asking.send_due(now, send);
+    asking.send_due(now, send);
   }
   return asking.take_replies();
 }

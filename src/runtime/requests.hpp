@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <numeric>
 #include <string>
 #include <thread>
 #include <type_traits>
@@ -32,6 +33,9 @@ class Requests {
   /// How long a structure change may take to arrive if a reply says that the known structure is
   /// outdated.
   static constexpr Milliseconds kStructureDelay{100};
+  /// Of several owners that are still being discovered, the first is waited for at most so long
+  /// before all are tried again.
+  static constexpr Milliseconds kTurn{2};
   /// Whether an owner denies what the plan has checked before.
   [[nodiscard]] static bool denies_plan(Errc code);
 
@@ -109,8 +113,8 @@ class Requests {
   /// stored.
   [[nodiscard]] Result<void> change(std::vector<Part>& parts, const Deadline& deadline);
 
-  /// Sends each owner its share of streamed values, for which there is no reply. Owners that can
-  /// take theirs at once get it first, so none waits for one that is still being discovered.
+  /// Sends each owner its share of streamed values, for which there is no reply. Each gets it as
+  /// soon as it can take it, so none waits for one that is still being discovered.
   /// @param share_of  the share of the i-th part
   /// @param apply_here  applies the share of this process
   /// @return the first error, after all others were sent theirs: kUnreachable if an owner is not
@@ -119,21 +123,23 @@ class Requests {
   [[nodiscard]] Result<void> publish(const std::vector<Part>& parts, const Deadline& deadline,
                                      ShareOf share_of, Apply apply_here) {
     Result<void> outcome;
-    const auto keep_first = [&outcome](Result<void> sent) {
-      if (!sent && outcome) outcome = std::move(sent);
-    };
-    std::vector<std::size_t> later;
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      auto sent = publish_share(parts[i], share_of(i), Deadline(Milliseconds(0)), apply_here);
-      const bool wait = !sent && sent.error().code == Errc::kTimeout;
-      if (wait) {
-        later.push_back(i);
-      } else {
-        keep_first(std::move(sent));
+    std::vector<std::size_t> unsent(parts.size());
+    std::iota(unsent.begin(), unsent.end(), std::size_t{0});
+    Milliseconds wait{0};
+    while (!unsent.empty()) {
+      std::vector<std::size_t> later;
+      for (const std::size_t i : unsent) {
+        const bool last = deadline.over();
+        const Deadline turn = deadline.within(std::exchange(wait, Milliseconds(0)));
+        auto sent = publish_share(parts[i], share_of(i), turn, apply_here);
+        if (!sent && sent.error().code == Errc::kTimeout && !last) {
+          later.push_back(i);
+        } else if (!sent && outcome) {
+          outcome = std::move(sent);
+        }
       }
-    }
-    for (const std::size_t i : later) {
-      keep_first(publish_share(parts[i], share_of(i), deadline, apply_here));
+      unsent = std::move(later);
+      wait = kTurn;
     }
     return outcome;
   }

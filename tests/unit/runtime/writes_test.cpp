@@ -30,50 +30,64 @@ struct Writer : Rig {
 const std::vector<FrameSpec> kArm{{"arm", "", {}}, {"hand", "arm", {}}};
 const std::vector<FrameSpec> kLeg{{"leg", "", {}}, {"foot", "leg", {}}};
 
-/// One owner is not discovered before the deadline.
+/// Two owners of which one is never met, and the other one only after a while.
 class Unmet final : public testing::Relay {
  public:
-  Unmet(TransportPtr real, std::string owner) : Relay(std::move(real)), owner_(std::move(owner)) {}
+  Unmet(TransportPtr real, std::string never, Deadline met)
+      : Relay(std::move(real)), never_(std::move(never)), met_(met) {}
 
   using Relay::send;
   Result<void> send(const std::string& partition, const Update& update,
                     Deadline deadline) override {
-    if (partition != owner_) return Relay::send(partition, update, deadline);
-    std::this_thread::sleep_until(deadline);
-    return fail(Errc::kTimeout, partition + " was not met");
+    auto met = await(partition, deadline);
+    return met ? Relay::send(partition, update, deadline) : met;
+  }
+  Result<void> send(const std::string& partition, const Request& request,
+                    Deadline deadline) override {
+    auto met = await(partition, deadline);
+    return met ? Relay::send(partition, request, deadline) : met;
   }
 
  private:
-  const std::string owner_;
+  Result<void> await(const std::string& partition, Deadline deadline) const {
+    const bool in_time = partition != never_ && met_ <= deadline;
+    std::this_thread::sleep_until(in_time ? met_ : deadline);
+    if (in_time || (partition != never_ && met_ <= Deadline::clock::now())) return {};
+    return fail(Errc::kTimeout, partition + " was not met");
+  }
+
+  const std::string never_;
+  const Deadline met_;
 };
 
 }  // namespace
 
-TEST_CASE("writes: a share that is published does not wait for an owner that is not met yet") {
-  LoopbackNetwork network;
-  ScriptedOwner arm(network, "arm", kArm);
-  ScriptedOwner leg(network, "leg", kLeg);
-  for (const std::string unmet : {"arm", "leg"}) {
-    Rig rig(std::make_unique<Unmet>(network.join(), unmet));
+TEST_CASE("writes: no share waits for an owner that is not met, whichever comes first") {
+  const bool as_request = GENERATE(false, true);
+  for (const std::string never : {"arm", "leg"}) {
+    LoopbackNetwork network;
+    ScriptedOwner arm(network, "arm", kArm);
+    ScriptedOwner leg(network, "leg", kLeg);
+    const auto start = Deadline::Clock::now();
+    Options options = testing::quick();
+    options.timeout = 2000ms;
+    Rig rig(std::make_unique<Unmet>(network.join(), never, start + 50ms), "", options);
     Writes writes(rig.structure, rig.discovery, rig.requests, rig.member);
     REQUIRE(rig.discovery.await(rig.deadline()));
     Result<void> sent;
-    std::thread publisher([&] {
-      sent = writes.publish({{"hand", along_x(5)}, {"foot", along_x(5)}}, std::nullopt);
+    std::thread sender([&] {
+      const std::vector<EdgeUpdate> both{{"hand", along_x(5)}, {"foot", along_x(5)}};
+      sent = as_request ? writes.update(both, std::nullopt) : writes.publish(both, std::nullopt);
     });
-    const bool leg_is_met = unmet == "arm";
-    const auto start = Deadline::Clock::now();
     const auto arrived = [&] {
-      return x_of(leg_is_met ? leg.node().lookup("leg", "foot")
-                             : arm.node().lookup("arm", "hand")) == 5;
+      return x_of(never == "arm" ? leg.node().lookup("leg", "foot")
+                                 : arm.node().lookup("arm", "hand")) == 5;
     };
-    while (!arrived() && Deadline::Clock::now() - start < 5s) std::this_thread::yield();
-    // The other owner's share is waited for until the call's time is over.
-    CHECK(Deadline::Clock::now() - start < rig.options.timeout / 2);
-    publisher.join();
-    CHECK(outcome(sent) == "timeout");
-    REQUIRE(arm.node().update({{"hand", {}}}));
-    REQUIRE(leg.node().update({{"foot", {}}}));
+    while (!arrived() && Deadline::Clock::now() - start < 10s) std::this_thread::yield();
+    CHECK(Deadline::Clock::now() - start < options.timeout / 2);
+    sender.join();
+    REQUIRE(outcome(sent) == "timeout");
+    CHECK_THAT(sent.error().message, ContainsSubstring(never));
   }
 }
 
