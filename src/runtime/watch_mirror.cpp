@@ -122,6 +122,11 @@ std::optional<PushedValue> WatchMirror::admitted(const Source& source, PushedVal
   return entry;
 }
 
+bool WatchMirror::has(std::uint64_t group) const {
+  return std::any_of(route_.sources.begin(), route_.sources.end(),
+                     [&](const WatchRoute::Source& source) { return source.group == group; });
+}
+
 bool WatchMirror::take(const PushedValues& pushed) {
   const auto told =
       std::find_if(route_.sources.begin(), route_.sources.end(),

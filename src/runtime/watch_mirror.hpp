@@ -57,6 +57,9 @@ class WatchMirror {
 
   [[nodiscard]] const WatchRoute& route() const { return route_; }
 
+  /// Whether values of this group belong to it.
+  [[nodiscard]] bool has(std::uint64_t group) const;
+
   /// Copies another mirror's values of common edges, so that their history continues. Call before
   /// anything is taken.
   void inherit(const WatchMirror& before);

@@ -20,6 +20,16 @@ constexpr Milliseconds kWaitForCommon{1000};
 // How often owners are asked for earlier samples.
 constexpr int kMostAskedForHistory = 10;
 
+// Whether the edges have no instant in common.
+bool lacks_common(const Result<StampedTransform>& newest) {
+  return !newest && newest.error().code == Errc::kTooOld;
+}
+
+// Whether the last transform may be returned for this query, once there is no newer one.
+bool wants_newest(const Query& query) {
+  return !query.at && !query.age_noise_until && query.order == Order::kSecond;
+}
+
 }  // namespace
 
 WatchedPath::WatchedPath(std::string a, std::string b, WatchOptions options)
@@ -36,10 +46,24 @@ Result<StampedTransform> WatchedPath::lookup(const Query& query) const {
     const epoch::Guard guard;
     // seq_cst: after the guard's announcement, see epoch.hpp.
     const WatchMirror* mirror = shown_.load(std::memory_order_seq_cst);
-    if (mirror != nullptr) return mirror->lookup(query);
+    if (mirror != nullptr) {
+      auto found = mirror->lookup(query);
+      if (!wants_newest(query) || !lacks_common(found)) return found;
+      if (const auto* held = held_.load(std::memory_order_seq_cst)) return *held;
+    }
   }
   const Lock lock(mutex_);
-  return tl::unexpected(why_not_);
+  if (followed_ == nullptr) return tl::unexpected(why_not_);
+  // Without the lock, values may just have been arriving.
+  auto found = followed_->lookup(query);
+  if (wants_newest(query) && lacks_common(found) && newest_) return *newest_;
+  return found;
+}
+
+bool WatchedPath::has_data(const Query& query) const {
+  const epoch::Guard guard;
+  const WatchMirror* mirror = shown_.load(std::memory_order_seq_cst);
+  return mirror != nullptr && mirror->lookup(query).has_value();
 }
 
 Result<void> WatchedPath::health() const {
@@ -90,7 +114,10 @@ WatchedPath::Taken WatchedPath::take(const PushedValues& pushed) {
   bool is_new = false;
   {
     const Lock lock(mutex_);
-    if (followed_ != nullptr && followed_->take(pushed)) is_new = true;
+    if (followed_ != nullptr && followed_->has(pushed.group)) {
+      is_new = followed_->take(pushed);
+      remember_newest();
+    }
     if (next_ != nullptr && next_->take(pushed)) is_new = true;
     taken.rerouted = swap_if_ready();
     const auto& latest = next_ != nullptr ? next_ : followed_;
@@ -101,9 +128,21 @@ WatchedPath::Taken WatchedPath::take(const PushedValues& pushed) {
   return taken;
 }
 
-bool WatchedPath::has_common_instant() const {
-  const auto newest = next_->lookup({});
-  return newest || newest.error().code != Errc::kTooOld;
+void WatchedPath::remember_newest() {
+  auto newest = followed_->lookup({});
+  if (newest) {
+    newest_ = *std::move(newest);
+    hold(nullptr);
+  } else if (lacks_common(newest) && newest_ && holder_ == nullptr) {
+    hold(std::make_unique<const StampedTransform>(*newest_));
+  }
+}
+
+void WatchedPath::hold(std::unique_ptr<const StampedTransform> X) {
+  if (X == holder_) return;
+  held_.store(X.get(), std::memory_order_seq_cst);
+  if (holder_ != nullptr) retired_.push_back({epoch::retire_tag(), std::move(holder_)});
+  holder_ = std::move(X);
 }
 
 // Shown values must not be older than those shown before.
@@ -111,9 +150,11 @@ bool WatchedPath::swap_if_ready() {
   if (next_ == nullptr || !next_->complete()) return false;
   if (followed_ != nullptr) {
     if (next_->is_behind(*followed_)) return false;
-    if (!has_common_instant() && Clock::now() - next_since_ < kWaitForCommon) return false;
+    if (lacks_common(next_->lookup({})) && Clock::now() - next_since_ < kWaitForCommon)
+      return false;
   }
   show(std::move(next_));
+  remember_newest();
   return std::exchange(was_shown_, true);
 }
 
@@ -137,6 +178,8 @@ void WatchedPath::interrupt(Error why) {
     why_not_ = std::move(why);
     next_.reset();
     show(nullptr);
+    newest_.reset();
+    hold(nullptr);
   }
   changed_.notify_all();
 }

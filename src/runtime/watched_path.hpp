@@ -19,7 +19,8 @@ namespace tfdude {
 
 /// One watched path. It shows the mirror of one route, which readers find by one load. If the path
 /// takes another route, that has its own mirror, which is shown once it has all values; readers of
-/// the previous one keep it until they are done (epoch.hpp).
+/// the previous one keep it until they are done (epoch.hpp). While the shown mirror has no instant
+/// that all its edges have, its last transform is shown instead.
 class WatchedPath {
  public:
   using Clock = std::chrono::steady_clock;
@@ -31,8 +32,11 @@ class WatchedPath {
 
   // --- from any thread ---
 
-  /// No lock or allocation, except while the path is not followed.
+  /// No lock or allocation, except while the path is not followed, and at the moment when its edges
+  /// lose or regain their common instant.
   [[nodiscard]] Result<StampedTransform> lookup(const Query& query) const;
+  /// Whether the pushed values suffice for this query.
+  [[nodiscard]] bool has_data(const Query& query) const;
 
   [[nodiscard]] Result<void> health() const;
   [[nodiscard]] std::uint64_t messages() const { return messages_.load(std::memory_order_relaxed); }
@@ -80,23 +84,29 @@ class WatchedPath {
  private:
   struct Retired {
     std::uint64_t tag;
-    std::unique_ptr<const WatchMirror> mirror;
+    std::shared_ptr<const void> object;
   };
 
   [[nodiscard]] bool swap_if_ready() TFDUDE_REQUIRES(mutex_);
   void show(std::unique_ptr<WatchMirror> mirror) TFDUDE_REQUIRES(mutex_);
-  [[nodiscard]] bool has_common_instant() const TFDUDE_REQUIRES(mutex_);
+  /// Call after any change of the shown values.
+  void remember_newest() TFDUDE_REQUIRES(mutex_);
+  void hold(std::unique_ptr<const StampedTransform> X) TFDUDE_REQUIRES(mutex_);
 
   const std::string a_;
   const std::string b_;
   const WatchOptions options_;
-  std::atomic<const WatchMirror*> shown_{nullptr};  // followed_, for readers
+  std::atomic<const WatchMirror*> shown_{nullptr};      // followed_, for readers
+  std::atomic<const StampedTransform*> held_{nullptr};  // holder_, for readers
   std::atomic<std::uint64_t> messages_{0};
   mutable Condition changed_;                    // of messages_, shown_
   mutable Mutex mutex_{LockRank::kWatchedPath};  // guards the following members
   std::unique_ptr<WatchMirror> followed_ TFDUDE_GUARDED_BY(mutex_);
   std::unique_ptr<WatchMirror> next_ TFDUDE_GUARDED_BY(mutex_);  // shown once it has all values
   Clock::time_point next_since_ TFDUDE_GUARDED_BY(mutex_);
+  std::optional<StampedTransform> newest_
+      TFDUDE_GUARDED_BY(mutex_);  // the last one, of all mirrors
+  std::unique_ptr<const StampedTransform> holder_ TFDUDE_GUARDED_BY(mutex_);
   int asked_for_history_ TFDUDE_GUARDED_BY(mutex_) = 0;
   bool was_shown_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::vector<Retired> retired_ TFDUDE_GUARDED_BY(mutex_);

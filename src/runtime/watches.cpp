@@ -74,7 +74,7 @@ void Watches::on_pushed(const PushedValues& pushed) {
 bool Watches::can_answer(const std::string& a, const std::string& b, const Query& query) const {
   const Lock lock(mutex_);
   return std::any_of(paths_.begin(), paths_.end(), [&](const Path& path) {
-    return path->a() == a && path->b() == b && path->lookup(query).has_value();
+    return path->a() == a && path->b() == b && path->has_data(query);
   });
 }
 

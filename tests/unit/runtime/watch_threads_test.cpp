@@ -158,6 +158,75 @@ TEST_CASE("a path is read on while an owner starts again") {
   CHECK(reader.end() == "");
 }
 
+TEST_CASE("a path is read on while an edge's first sample is ahead of the others") {
+  Robot robot;
+  const auto move_left = [&](std::int64_t k) {
+    return robot.base->update("left", along_x(static_cast<double>(k)), Time(k * 10ms));
+  };
+  REQUIRE(robot.tool->update("tool", along_x(1000)));
+  REQUIRE(move_left(50));
+  const auto path = robot.client->watch("world", "tool");
+  REQUIRE(path);
+  REQUIRE(eventually([&] { return path->latest()->stamp == Time(500ms); }));
+  Time last{};
+  Reader reader(*path, [&](const StampedTransform& X) -> std::string {
+    if (!X.stamp) return "no stamp";
+    const double x = X.pose.translation().x();
+    const double expected = std::chrono::duration<double>(X.stamp->time_since_epoch()) / 10ms +
+                            (*X.stamp < Time(1s) ? 1000 : 2000);
+    const std::string what = std::to_string(x) + " at " + to_string(*X.stamp);
+    if (std::abs(x - expected) > 1e-9) return what + ", not " + std::to_string(expected);
+    if (*X.stamp < last) return what + ", after " + to_string(last);
+    last = *X.stamp;
+    return "";
+  });
+  REQUIRE(robot.tool->update("tool", along_x(2000), Time(1s)));
+  const auto heard = [&](std::uint64_t before) {
+    return eventually([&] { return path->messages() > before; });
+  };
+  for (const std::int64_t k : {60, 70, 110, 111}) {
+    reader.await_reads();
+    const std::uint64_t before = path->messages();
+    REQUIRE(move_left(k));
+    REQUIRE(heard(before));
+    reader.await_reads();
+  }
+  CHECK(eventually([&] { return path->latest()->stamp == Time(1s); }));
+  REQUIRE(robot.tool->update("tool", along_x(2000), Time(1100ms)));
+  CHECK(eventually([&] { return path->latest()->stamp == Time(1100ms); }));
+  CHECK(reader.end() == "");
+}
+
+TEST_CASE("a path is read on where its new route has no instant that all edges have") {
+  Robot robot;
+  REQUIRE(robot.tool->add("gripper", "tool", {}));
+  REQUIRE(robot.tool->update("gripper", along_x(1), Time(1s)));
+  REQUIRE(robot.base->update("left", along_x(10), Time(1s)));
+  REQUIRE(robot.base->update("right", along_x(20), Time(5s)));
+  std::atomic<bool> rerouted{false};
+  WatchOptions options;
+  options.on_route = [&](const std::string&) { rerouted = true; };
+  REQUIRE(eventually([&] { return robot.client->exists("gripper"); }));
+  const auto path = robot.client->watch("world", "gripper", options);
+  REQUIRE(path);
+  Reader reader(*path, [&](const StampedTransform& X) -> std::string {
+    const double x = X.pose.translation().x();
+    const bool legal = X.stamp == (x == 11 ? Time(1s) : Time(6s)) && (x == 11 || x == 22);
+    return legal ? "" : std::to_string(x);
+  });
+  REQUIRE(robot.client->move("tool", "right"));
+  REQUIRE(eventually([&] { return rerouted.load(); }));
+  reader.await_reads();
+  CHECK(path->latest()->pose.translation().x() == 11);
+  Query then;
+  then.at = Time(1s);
+  CHECK(testing::outcome(path->lookup(then)) == "too_old");
+  REQUIRE(robot.base->update("right", along_x(21), Time(6s)));
+  REQUIRE(robot.tool->update("gripper", along_x(1), Time(6s)));
+  CHECK(eventually([&] { return path->latest()->pose.translation().x() == 22; }));
+  CHECK(reader.end() == "");
+}
+
 TEST_CASE("what is updated in one call is read in one piece") {
   Robot robot;
   const auto path = robot.client->watch("left", "hand");
