@@ -5,6 +5,8 @@
 #include <sstream>
 #include <utility>
 
+#include "tfdude/base/id.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -35,10 +37,22 @@ Result<std::shared_ptr<WatchedPath>> Watcher::watch(const std::string& a, const 
       deadline, [&](const Directory&) { return structure_.forest.segments(a, b); });
   if (!known) return tl::unexpected(std::move(known.error()));
   auto path = watches().watch(a, b, options);
-  if (auto live = path->wait_until_live(deadline.at()); !live) {
-    return tl::unexpected(std::move(live.error()));
+  auto live = path->wait_until_live(deadline.at());
+  if (live) return path;
+  if (live.error().code == Errc::kNotYet) return unanswered(*path, deadline);
+  return tl::unexpected(std::move(live.error()));
+}
+
+tl::unexpected<Error> Watcher::unanswered(const WatchedPath& path, const Deadline& deadline) {
+  std::string owners;
+  if (const auto route = plan(path)) {
+    for (const WatchRoute::Source& source : route->sources) {
+      owners += (owners.empty() ? "" : ", ") + quote(source.partition);
+    }
   }
-  return path;
+  return fail(Errc::kTimeout, "of the owners of the path from " + quote(path.a()) + " to " +
+                                  quote(path.b()) + " (" + owners + ") not all answered within " +
+                                  deadline.text());
 }
 
 Watches& Watcher::watches() {

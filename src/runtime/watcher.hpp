@@ -52,6 +52,8 @@ class Watcher {
  private:
   [[nodiscard]] Watches& watches();
   [[nodiscard]] Result<WatchRoute> plan(const WatchedPath& path);
+  /// kTimeout, naming the owners.
+  [[nodiscard]] tl::unexpected<Error> unanswered(const WatchedPath& path, const Deadline& deadline);
 
   Structure& structure_;
   Discovery& discovery_;

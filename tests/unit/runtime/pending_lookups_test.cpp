@@ -19,6 +19,7 @@
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "support/joint_frames.hpp"
 #include "support/process.hpp"
 #include "support/relay.hpp"
 #include "transport/port.hpp"
@@ -77,11 +78,15 @@ class Deaf final : public testing::Relay {
   std::atomic<int> requests{0};
 };
 
-/// world and base here; arm and hand in a partition of their own; a client without frames.
+/// world and base here; arm, hand and finger in a partition of their own; a client without frames.
 struct Robot {
   explicit Robot(const Options& options = {}) {
     base.emplace(*Node::open(network.join(), "base", {{"world", "", {}}, {"base", "world", {}}}));
-    arm.emplace(*Node::open(network.join(), "arm", {{"arm", "base", {}}, {"hand", "arm", {}}}));
+    arm.emplace(
+        *Node::open(network.join(), "arm",
+                    {{"arm", "base", {}},
+                     {"hand", "arm", {}},
+                     testing::moved_by("finger", "hand", testing::revolute_named("bend"))}));
     auto transport = std::make_unique<Deaf>(network.join());
     ear = transport.get();
     client.emplace(*Client::open(std::move(transport), options));
@@ -191,6 +196,7 @@ TEST_CASE("lookups: a call without a wait has a bound, too, and says what it lac
   Options options;
   options.timeout = Milliseconds(50);
   options.discovery = Milliseconds(0);
+  const std::vector<PartialUpdate> raised{{"hand", Eigen::Vector3d(0, 0, 1)}};
   const auto of_new_client = [&](bool met_all, auto call) {
     std::string what;
     auto best = Clock::duration::max();
@@ -212,12 +218,29 @@ TEST_CASE("lookups: a call without a wait has a bound, too, and says what it lac
   CHECK(early([](Client& c) { return c.roots(); }) == "timeout");
   CHECK(early([](Client& c) { return c.children("world"); }) == "timeout");
   CHECK(early([](Client& c) { return c.remove("world"); }) == "timeout");
+  CHECK(early([](Client& c) { return c.forget("arm"); }) == "timeout");
+  CHECK(early([](Client& c) { return c.watch("world", "nobody"); }) == "timeout");
+  CHECK(early([](Client& c) { return c.add("nobody", "nowhere", {}); }) == "timeout");
+  CHECK(early([](Client& c) { return c.correlate("nobody", {}); }) == "timeout");
+  CHECK(early([](Client& c) { return c.update_joints({"nobody"}, {1}, {0}); }) == "timeout");
+  CHECK(early([](Client& c) { return c.joints("nowhere"); }) == "timeout");
+  CHECK(early([](Client& c) { return c.history("nobody"); }) == "timeout");
+  CHECK(early([](Client& c) { return c.histories("nowhere"); }) == "timeout");
+  CHECK(early([&](Client& c) { return c.update_partial(raised); }) == "timeout");
   const auto deaf = [&](auto call) { return of_new_client(true, call); };
   CHECK(deaf([](Client& c) { return c.lookup("world", "hand"); }) == "timeout");
   CHECK(deaf([](Client& c) { return c.update("hand", {}); }) == "timeout");
   CHECK(deaf([](Client& c) { return c.move("hand", "base"); }) == "timeout");
   CHECK(deaf([](Client& c) { return c.observe("world", "hand", {}); }) == "timeout");
   CHECK(deaf([](Client& c) { return c.fuse("hand", {}); }) == "timeout");
+  CHECK(deaf([](Client& c) { return c.watch("world", "hand"); }) == "timeout");
+  CHECK(deaf([](Client& c) { return c.add("tool", "hand", {}); }) == "timeout");
+  CHECK(deaf([](Client& c) { return c.correlate("hand", {}); }) == "timeout");
+  CHECK(deaf([](Client& c) { return c.update_joints({"bend"}, {1}, {0}); }) == "timeout");
+  CHECK(deaf([](Client& c) { return c.joints("arm"); }) == "timeout");
+  CHECK(deaf([](Client& c) { return c.history("hand"); }) == "timeout");
+  CHECK(deaf([](Client& c) { return c.histories("arm"); }) == "timeout");
+  CHECK(deaf([&](Client& c) { return c.update_partial(raised); }) == "timeout");
   CHECK(deaf([](Client& c) { return c.lookup("world", Query{}, "hand", Query{}, "arm"); }) ==
         "timeout");
   // Three time-outs after discovery what is known has to do.

@@ -84,7 +84,9 @@ TEST_CASE("watcher: a path of which an owner pushes nothing is not live by the d
   const ScriptedOwner arm(network, "arm", kArm,
                           [](Transport&, const PeerId&, const Request&) { return true; });
   WatchingRig rig(network);
-  CHECK(outcome(rig.watcher.watch("arm", "hand", {})) == "timeout");
+  const auto unanswered = rig.watcher.watch("arm", "hand", {});
+  CHECK(outcome(unanswered) == "timeout");
+  CHECK_THAT(unanswered.error().message, ContainsSubstring("'arm'"));
   CHECK(outcome(rig.watcher.watch("arm", "foot", {})) == "unknown_end");
 }
 
