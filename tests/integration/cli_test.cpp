@@ -1,6 +1,7 @@
 // Each command of the command line: its output as text and as JSON, and its exit status.
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <sstream>
 #include <string>
@@ -15,6 +16,7 @@ namespace tfdude {
 namespace {
 
 using nlohmann::json;
+using testing::Approx;
 using testing::CliResult;
 using testing::ContainsSubstring;
 using testing::eventually;
@@ -143,6 +145,17 @@ TEST_CASE("cli: changes are made and confirmed") {
   CHECK(placed.at("translation") == json({-0.5, 0.001, 0.25}));
   CHECK(placed.at("rotation") == updated.at("rotation"));
   CHECK(placed.at("covariance") == updated.at("covariance"));
+  CHECK(text(d, {"update", "tool", "--rpy", "0", "0", "-.5"}) == "updated tool\n");
+  CHECK(object(d, {"lookup", "camera", "tool"}).at("rotation")[2] ==
+        Approx(std::sin(-0.25)).epsilon(1e-12));
+  CHECK(text(d, {"update", "tool", "--cov", "9e9", "0", "0", "0", "0", "0", "1", "0",   "0",
+                 "0",      "0",    "1",     "0",   "0", "0", "1", "0", "0", "1", "-.5", "1"}) ==
+        "updated tool\n");
+  const json spread = object(d, {"lookup", "camera", "tool"}).at("covariance");
+  CHECK(spread[0][0] == 9e9);
+  CHECK(spread[4][5] == -0.5);
+  CHECK(text(d, {"update", "tool", "--quat", "0", "0", "1", "0", "--stddev", "0.5", "0", "0", "0",
+                 "0", "0"}) == "updated tool\n");
   CHECK(object(d, {"update", "tool", "--xyz", "1", "2", "3"}).at("done") == "updated");
   const json again = object(d, {"lookup", "camera", "tool"});
   CHECK(again.at("translation") == json({1.0, 2.0, 3.0}));

@@ -97,6 +97,12 @@ const std::vector<Refusal> kRefusals = {
     {{"lookup", "nowhere", "world"}, "unknown_start", {"'nowhere'"}},
 };
 
+Arguments with_cov(Arguments arguments, const Arguments& values) {
+  arguments.emplace_back("--cov");
+  arguments.insert(arguments.end(), values.begin(), values.end());
+  return arguments;
+}
+
 /// All that can be seen: the structure and each edge's value.
 std::string snapshot(Client& client) {
   std::string all;
@@ -112,6 +118,25 @@ std::string snapshot(Client& client) {
     all += value.str();
   }
   return all;
+}
+
+/// Each must be said on standard error, or in JSON, with status 2.
+void check_wrong_usage(const TestDomain& domain, const std::vector<Refusal>& wrong) {
+  for (const Refusal& usage : wrong) {
+    const CliResult result = domain.cli(usage.arguments);
+    INFO(result.err);
+    CHECK(result.status == 2);
+    CHECK(result.out.empty());
+    for (const std::string& name : usage.names) CHECK_THAT(result.err, ContainsSubstring(name));
+    Arguments arguments = usage.arguments;
+    arguments.insert(arguments.begin(), "--json");
+    const CliResult program = domain.cli(arguments);
+    CHECK(program.status == 2);
+    const json error = json::parse(program.out).at("error");
+    for (const std::string& name : usage.names) {
+      CHECK_THAT(error.at("message").get<std::string>(), ContainsSubstring(name));
+    }
+  }
 }
 
 }  // namespace
@@ -138,68 +163,69 @@ TEST_CASE("cli: what breaks a rule is refused by name and changes nothing") {
 TEST_CASE("cli: wrong usage is 2") {
   const ThesisDaemons d;
   const TemporaryDirectory directory;
-  const std::vector<Refusal> wrong = {
-      {{}, "", {"subcommand"}},
-      {{"nonsense"}, "", {"nonsense"}},
-      {{"lookup"}, "", {"A"}},
-      {{"lookup", "world"}, "", {"B"}},
-      {{"lookup", "world", "camera", "arm_1"}, "", {"arm_1"}},
-      {{"add", "tool"}, "", {"--parent"}},
-      {{"add", "tool", "--parent", "camera", "--xyz", "1", "two", "3"}, "", {"--xyz", "two"}},
-      {{"add", "tool", "--parent", "camera", "--xyz", "1", "2"}, "", {"--xyz"}},
-      {{"update", "camera", "--quat", "0", "0", "0", "1", "--rpy", "0", "0", "0"}, "", {"--quat"}},
-      {{"watch", "world", "camera", "--rate", "0"}, "", {"--rate"}},
-      {{"watch", "world", "camera", "--rate", "nan"}, "", {"--rate", "nan"}},
-      {{"watch", "world", "camera", "--rate", "2x"}, "", {"--rate", "2x"}},
-      {{"tree", "--discovery-server", "nowhere"}, "", {"'nowhere'", "HOST:PORT"}},
-      {{"tree", "--timeout", "soon"}, "", {"--timeout", "soon"}},
-      {{"tree", "--profile", "/nowhere/profile.xml"}, "", {"/nowhere/profile.xml"}},
-      {{"tree", "--profile", directory.write("broken.xml", "<profiles><")}, "", {"broken.xml"}},
-      {{"tree", "--domain", "233"}, "", {"233", "232"}},
-      {{"tree", "--domain", "-1"}, "", {"--domain", "-1"}},
-      {{"tree", "--domain", ""}, "", {"--domain", "not a number"}},
-      {{"tree", "--timeout", ""}, "", {"--timeout", "not a number"}},
-      {{"joint", "elbow", ""}, "", {"POSITION", "not a number"}},
-      {{"joint", "elbow", " 1"}, "", {"POSITION", "' 1' is not a number"}},
-      {{"joint", "elbow", "0", "--stddev", ""}, "", {"--stddev", "not a number"}},
-      {{"joint", "elbow", "0", "--stamp", ""}, "", {"--stamp"}},
-      {{"update", "camera", "--xyz", "", "", ""}, "", {"--xyz", "not a number"}},
-      {{"update", "camera", "--rpy", "0", "", "0"}, "", {"--rpy", "not a number"}},
-      {{"update", "camera", "--quat", "0", "0", "0", ""}, "", {"--quat", "not a number"}},
-      {{"add", "tool", "--parent", "camera", "--stddev", "", "", "", "", "", ""},
-       "",
-       {"--stddev", "not a number"}},
-      {{"lookup", "world", "camera", "--wait", ""}, "", {"--wait", "not a number"}},
-      {{"lookup", "world", "camera", "--extrapolate", ""}, "", {"--extrapolate", "not a number"}},
-      {{"lookup", "world", "camera", "--order", ""}, "", {"--order", "not a number"}},
-      {{"watch", "world", "camera", "--rate", ""}, "", {"--rate", "not a number"}},
-      {{"fuse", "camera", "--gate", ""}, "", {"--gate", "not a number"}},
-      {{"plot", "world", "camera", "--out", "x.svg", "--samples", ""},
-       "",
-       {"--samples", "not a number"}},
-      {{"observe", "world", "camera", "--cov", ""}, "", {"--cov"}},
-      {{"correlate", "camera", "--source", "supply", "0", "0", "0", "0", "0", ""},
-       "",
-       {"--source", "not a number"}},
-      {{"lookup", "world", "camera", "--at", "9223372036854775807"}, "", {"--at"}},
-      {{"lookup", "world", "camera", "--at", "1e10"}, "", {"--at"}},
-      {{"lookup", "world", "camera", "--at", "-9223372035"}, "", {"--at"}},
-  };
-  for (const Refusal& usage : wrong) {
-    const CliResult result = d.domain.cli(usage.arguments);
-    INFO(result.err);
-    CHECK(result.status == 2);
-    CHECK(result.out.empty());
-    for (const std::string& name : usage.names) CHECK_THAT(result.err, ContainsSubstring(name));
-    Arguments arguments = usage.arguments;
-    arguments.insert(arguments.begin(), "--json");
-    const CliResult program = d.domain.cli(arguments);
-    CHECK(program.status == 2);
-    const json error = json::parse(program.out).at("error");
-    for (const std::string& name : usage.names) {
-      CHECK_THAT(error.at("message").get<std::string>(), ContainsSubstring(name));
-    }
-  }
+  check_wrong_usage(
+      d.domain,
+      {
+          {{}, "", {"subcommand"}},
+          {{"nonsense"}, "", {"nonsense"}},
+          {{"lookup"}, "", {"A"}},
+          {{"lookup", "world"}, "", {"B"}},
+          {{"lookup", "world", "camera", "arm_1"}, "", {"arm_1"}},
+          {{"add", "tool"}, "", {"--parent"}},
+          {{"add", "tool", "--parent", "camera", "--xyz", "1", "two", "3"}, "", {"--xyz", "two"}},
+          {{"add", "tool", "--parent", "camera", "--xyz", "1", "2"}, "", {"--xyz"}},
+          {{"update", "camera", "--quat", "0", "0", "0", "1", "--rpy", "0", "0", "0"},
+           "",
+           {"--quat"}},
+          {{"watch", "world", "camera", "--rate", "0"}, "", {"--rate"}},
+          {{"watch", "world", "camera", "--rate", "nan"}, "", {"--rate", "nan"}},
+          {{"watch", "world", "camera", "--rate", "2x"}, "", {"--rate", "2x"}},
+          {{"tree", "--discovery-server", "nowhere"}, "", {"'nowhere'", "HOST:PORT"}},
+          {{"tree", "--timeout", "soon"}, "", {"--timeout", "soon"}},
+          {{"tree", "--profile", "/nowhere/profile.xml"}, "", {"/nowhere/profile.xml"}},
+          {{"tree", "--profile", directory.write("broken.xml", "<profiles><")}, "", {"broken.xml"}},
+          {{"tree", "--domain", "233"}, "", {"233", "232"}},
+          {{"tree", "--domain", "-1"}, "", {"--domain", "-1"}},
+          {{"joint", "elbow", " 1"}, "", {"POSITION", "' 1' is not a number"}},
+          {{"lookup", "world", "camera", "--at", "9223372036854775807"}, "", {"--at"}},
+          {{"lookup", "world", "camera", "--at", "1e10"}, "", {"--at"}},
+          {{"lookup", "world", "camera", "--at", "-9223372035"}, "", {"--at"}},
+      });
+}
+
+TEST_CASE("cli: no option takes an empty text for a number") {
+  const ThesisDaemons d;
+  check_wrong_usage(
+      d.domain,
+      {
+          {{"tree", "--domain", ""}, "", {"--domain", "not a number"}},
+          {{"tree", "--timeout", ""}, "", {"--timeout", "not a number"}},
+          {{"joint", "elbow", ""}, "", {"POSITION", "not a number"}},
+          {{"joint", "elbow", "0", "--stddev", ""}, "", {"--stddev", "not a number"}},
+          {{"joint", "elbow", "0", "--stamp", ""}, "", {"--stamp"}},
+          {{"update", "camera", "--xyz", "", "", ""}, "", {"--xyz", "not a number"}},
+          {{"update", "camera", "--rpy", "0", "", "0"}, "", {"--rpy", "not a number"}},
+          {{"update", "camera", "--quat", "0", "0", "0", ""}, "", {"--quat", "not a number"}},
+          {{"add", "tool", "--parent", "camera", "--stddev", "", "", "", "", "", ""},
+           "",
+           {"--stddev", "not a number"}},
+          {{"lookup", "world", "camera", "--wait", ""}, "", {"--wait", "not a number"}},
+          {{"lookup", "world", "camera", "--extrapolate", ""},
+           "",
+           {"--extrapolate", "not a number"}},
+          {{"lookup", "world", "camera", "--order", ""}, "", {"--order", "not a number"}},
+          {{"watch", "world", "camera", "--rate", ""}, "", {"--rate", "not a number"}},
+          {{"fuse", "camera", "--gate", ""}, "", {"--gate", "not a number"}},
+          {{"plot", "world", "camera", "--out", "x.svg", "--samples", ""},
+           "",
+           {"--samples", "not a number"}},
+          {with_cov({"observe", "world", "camera"}, {""}), "", {"--cov"}},
+          {with_cov({"observe", "world", "camera"}, Arguments(21)), "", {"--cov", "not a number"}},
+          {with_cov({"update", "camera"}, Arguments(21)), "", {"--cov", "not a number"}},
+          {{"correlate", "camera", "--source", "supply", "0", "0", "0", "0", "0", ""},
+           "",
+           {"--source", "not a number"}},
+      });
 }
 
 TEST_CASE("cli: no answer is 3") {

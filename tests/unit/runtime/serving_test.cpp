@@ -3,13 +3,22 @@
 #include "runtime/serving.hpp"
 
 #include <atomic>
+#include <condition_variable>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <sstream>
 #include <string>
 #include <unistd.h>
 #include <vector>
 
+#include <spdlog/sinks/ostream_sink.h>
+
+#include "base/log.hpp"
 #include "runtime/yielding.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "support/joint_frames.hpp"
 #include "support/process.hpp"
 #include "support/replica.hpp"
 #include "support/rig.hpp"
@@ -43,6 +52,72 @@ struct OwnerRig : Rig {
 };
 
 const std::vector<FrameSpec> kArm{{"arm", "", {}}, {"hand", "arm", along_x(4)}};
+
+/// A disk that may stand still.
+struct Disk {
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool stands_still = false;
+  int waiting = 0;
+
+  void let_it_stand_still(bool still) {
+    {
+      const std::lock_guard lock(mutex);
+      stands_still = still;
+    }
+    changed.notify_all();
+  }
+  void write() {
+    std::unique_lock lock(mutex);
+    ++waiting;
+    changed.wait(lock, [this] { return !stands_still; });
+    --waiting;
+  }
+  [[nodiscard]] bool is_waited_for() {
+    const std::lock_guard lock(mutex);
+    return stands_still && waiting > 0;
+  }
+};
+
+class SlowStore final : public StateStore {
+ public:
+  explicit SlowStore(Disk& disk) : disk_(disk) {}
+  Result<StoredState> load() override { return StoredState{}; }
+  Result<void> save(const StateChange&) override { return write(); }
+  Result<void> save_values(const std::vector<ChangedEdge>&,
+                           const std::vector<StoredJoint>&) override {
+    return write();
+  }
+  Result<void> save_configured(const std::vector<FrameSpec>&) override { return write(); }
+
+ private:
+  Result<void> write() {
+    disk_.write();
+    return {};
+  }
+  Disk& disk_;
+};
+
+/// What is logged while it exists; no other thread may log as it begins and ends.
+class CapturedLog {
+ public:
+  CapturedLog() { log().sinks().push_back(sink_); }
+  ~CapturedLog() { log().sinks().pop_back(); }
+  CapturedLog(const CapturedLog&) = delete;
+  CapturedLog& operator=(const CapturedLog&) = delete;
+
+  /// How often a text occurs.
+  [[nodiscard]] int count(const std::string& what) const {
+    const std::string all = text_.str();
+    int found = 0;
+    for (auto at = all.find(what); at != std::string::npos; at = all.find(what, at + 1)) ++found;
+    return found;
+  }
+
+ private:
+  std::ostringstream text_;
+  const spdlog::sink_ptr sink_ = std::make_shared<spdlog::sinks::ostream_sink_mt>(text_);
+};
 
 }  // namespace
 
@@ -124,6 +199,64 @@ TEST_CASE("member runner: a participant without a partition stores nothing and r
   rig.member.tell(Deadline(1s));
   const Error error{Errc::kUnknownFrame, "no frame 'hand'"};
   CHECK(rig.member.unless_unsaved(error, "hand").message == error.message);
+}
+
+TEST_CASE("member runner: the owner's own updates wait for no disk") {
+  const bool structural = GENERATE(false, true);
+  LoopbackNetwork network;
+  Disk disk;
+  OwnerRig owner(network.join());
+  const std::vector<FrameSpec> frames{
+      {"arm", "", {}},
+      {"hand", "arm", {}},
+      testing::moved_by("finger", "hand", testing::revolute_named("bend"))};
+  owner.member.with_rules([](Member& member) { member.claim("here", 1, Time(1s), 1); });
+  owner.member.open(std::make_unique<SlowStore>(disk), 1ms);
+  REQUIRE(owner.member.serve(nullptr, frames));
+  REQUIRE(owner.member.publish_all(frames));
+  disk.let_it_stand_still(true);
+  std::future<Result<void>> change;
+  if (structural) {
+    change = std::async(std::launch::async, [&] {
+      std::vector<Part> parts{{kHeldHere, "arm", {1, "tool", AddRequest{"hand", {}}}}};
+      return owner.requests.change(parts, Deadline(20s));
+    });
+  } else {
+    REQUIRE(owner.structure.forest.update("hand", along_x(1)));
+  }
+  REQUIRE(eventually([&] { return disk.is_waited_for(); }));
+  auto own = std::async(std::launch::async, [&] {
+    for (int i = 1; i <= 100; ++i) {
+      if (auto set = owner.structure.forest.update("hand", along_x(i)); !set) return set;
+      auto moved = owner.member.apply(JointUpdate{{{"bend", 0.01 * i}}, {}});
+      if (!moved) return Result<void>(tl::unexpected(moved.error()));
+    }
+    return Result<void>();
+  });
+  const bool in_time = own.wait_for(5s) == std::future_status::ready;
+  CHECK(disk.is_waited_for());
+  CHECK(testing::x_of(owner.structure.forest.lookup("arm", "hand")) == 100);
+  CHECK(testing::yaw(owner.structure.forest.lookup("hand", "finger")) == testing::Approx(1));
+  disk.let_it_stand_still(false);
+  CHECK(in_time);
+  CHECK(outcome(own.get()) == "ok");
+  if (structural) CHECK(outcome(change.get()) == "ok");
+}
+
+TEST_CASE("member runner: of a process whose messages are ignored that is logged once") {
+  const CapturedLog logged;
+  LoopbackNetwork network;
+  Rig rig(network.join());
+  rig.on_presence(presence_of("leg", 8, 1));
+  for (int i = 0; i < 3; ++i) {
+    rig.on_presence(presence_of("leg", 7, 1));
+    rig.on_page(Page{"leg", 0, 7, 1, {{"foot", "", 1}}});
+  }
+  CHECK_FALSE(rig.structure.forest.exists("foot"));
+  CHECK(logged.count("messages of process 7 of partition 'leg' are ignored") == 1);
+  rig.on_presence(presence_of("leg", 6, 1));
+  CHECK(logged.count("messages of process 6 of partition 'leg' are ignored") == 1);
+  CHECK(logged.count("are ignored") == 2);
 }
 
 TEST_CASE("yielding: a frame is given up once its other owner has confirmed its older claim") {

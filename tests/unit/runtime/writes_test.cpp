@@ -165,11 +165,12 @@ TEST_CASE("writes: correlation is set at the owner, once it is known to be sound
   correlation.common_errors.push_back({"camera", false, Matrix6d(1e-3 * Matrix6d::Identity())});
   const int before = arm.asked();
   CHECK(writer.writes.correlate("hand", correlation));
-  CHECK(arm.asked() == before + 1);
+  const int asked = arm.asked();
+  CHECK(asked > before);  // more than once if the reply is late
   correlation.common_errors.push_back(correlation.common_errors.front());
   CHECK(outcome(writer.writes.correlate("hand", correlation)) == "invalid_input");
   CHECK(outcome(writer.writes.correlate("foot", {})) == "unknown_frame");
-  CHECK(arm.asked() == before + 1);
+  CHECK(arm.asked() == asked);
 }
 
 TEST_CASE("writes: a partition is forgotten once it is not there, at all who are") {
