@@ -4,6 +4,7 @@
 //
 //   faults --seed 7 --seconds 60
 //   faults --rounds 100
+//   faults --endings 30000
 
 #include <algorithm>
 #include <cstdio>
@@ -13,6 +14,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "faults/endings.hpp"
 #include "faults/final_check.hpp"
 #include "faults/nemesis.hpp"
 #include "faults/rerouter.hpp"
@@ -28,6 +30,7 @@ struct Arguments {
   std::size_t partitions = 4;
   std::size_t clients = 4;
   std::size_t rounds = 0;
+  std::size_t endings = 0;
 };
 
 // A longer delay [ms] is not caused by a slow machine.
@@ -98,7 +101,10 @@ int main(int argc, char** argv) {
   app.add_option("--clients", arguments.clients, "how many clients")->check(CLI::PositiveNumber);
   app.add_option("--rounds", arguments.rounds,
                  "instead: kill and start one daemon this often, and look at what it leaves");
+  app.add_option("--endings", arguments.endings,
+                 "instead: run this many programs that end at once, and look for crashes");
   CLI11_PARSE(app, argc, argv);
+  if (arguments.endings > 0) return tfdude::faults::run_endings(arguments.endings);
   if (arguments.rounds > 0) return tfdude::faults::run_rounds(arguments.rounds);
   return tfdude::faults::run(arguments);
 }
