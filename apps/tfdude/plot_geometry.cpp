@@ -4,8 +4,6 @@
 #include <cmath>
 #include <random>
 
-#include <Eigen/Eigenvalues>
-
 #include "format.hpp"
 
 namespace tfdude::cli {
@@ -15,25 +13,52 @@ constexpr double kPi = 3.141592653589793;
 
 Pose pose_of(const Step& step, const Pose& X_PC) { return step.up ? X_PC.inverse() : X_PC; }
 
-// Returns a root with root rootᵀ = covariance. Each axis is first scaled by its own deviation:
-// otherwise an axis with large numbers would cost the others their precision.
+// Returns a root with root rootᵀ = covariance, by Cholesky decomposition with pivots, which also
+// works if the covariance is singular. It is written out because Eigen's solvers take the compiler
+// many seconds. Each axis is first scaled by its own deviation: otherwise an axis with large
+// numbers would cost the others their precision.
 Matrix6d root_of(const Covariance& covariance) {
   const auto stddev = covariance.stddev();
-  const Twist scale = Eigen::Map<const Twist>(stddev.data());
-  const Twist inverse = scale.unaryExpr([](double s) { return s > 0 ? 1 / s : 0.0; });
-  const Matrix6d unit = inverse.asDiagonal() * covariance.matrix() * inverse.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(unit);
-  return scale.asDiagonal() * solver.eigenvectors() *
-         solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  Matrix6d rest = covariance.matrix();
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      const double scale =
+          stddev[static_cast<std::size_t>(i)] * stddev[static_cast<std::size_t>(j)];
+      rest(i, j) = scale > 0 ? rest(i, j) / scale : 0.0;
+    }
+  }
+  Matrix6d root = Matrix6d::Zero();
+  for (int column = 0; column < 6; ++column) {
+    int pivot = 0;
+    for (int i = 1; i < 6; ++i) {
+      if (rest(i, i) > rest(pivot, pivot)) pivot = i;
+    }
+    constexpr double kRounding = 1e-14;
+    if (rest(pivot, pivot) <= kRounding) break;
+    const double length = std::sqrt(rest(pivot, pivot));
+    for (int i = 0; i < 6; ++i) root(i, column) = rest(i, pivot) / length;
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) rest(i, j) -= root(i, column) * root(j, column);
+    }
+  }
+  for (int i = 0; i < 6; ++i) root.row(i) *= stddev[static_cast<std::size_t>(i)];
+  return root;
 }
 
 }  // namespace
 
 Ellipse ellipse_of(const Eigen::Matrix2d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance);
-  const Eigen::Vector2d axes = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  const Eigen::Vector2d major = solver.eigenvectors().col(1);
-  return {axes[1], axes[0], std::atan2(major.y(), major.x())};
+  // The eigenvalues are mean ± radius.
+  const double mean = (covariance(0, 0) + covariance(1, 1)) / 2;
+  const double half = (covariance(0, 0) - covariance(1, 1)) / 2;
+  const double radius = std::hypot(half, covariance(0, 1));
+  const double largest = mean + radius;
+  // mean - radius would lose all digits if one axis is much longer.
+  const double determinant =
+      covariance(0, 0) * covariance(1, 1) - covariance(0, 1) * covariance(0, 1);
+  const double smallest = largest > 0 ? determinant / largest : 0.0;
+  return {std::sqrt(std::max(largest, 0.0)), std::sqrt(std::max(smallest, 0.0)),
+          std::atan2(covariance(0, 1), half) / 2};
 }
 
 std::vector<Eigen::Vector2d> outline_of(const Ellipse& ellipse, double deviations) {
