@@ -1,18 +1,20 @@
 // Shows how a controller uses tf-dude. It drives the arm of examples/robots/mobile_arm.urdf along a
 // path at 1 kHz, while its base drives in a circle. Sines replace the encoders of a robot.
 //
-//   arm_controller [--seconds S] [--domain N] [--profile FILE]
+//   arm_controller [--seconds S] [--domain N] [--local | --profile FILE]
+//                  [--discovery-server HOST:PORT]
 
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <tfdude/client/client.hpp>
 
 namespace {
@@ -85,19 +87,52 @@ int run(const tfdude::Options& options, double seconds) {
   return trouble.empty() ? 0 : 1;
 }
 
+// @return whether the whole text is a number
+bool read_number(const std::string& text, double& number) {
+  char* end = nullptr;
+  number = std::strtod(text.c_str(), &end);
+  return !text.empty() && *end == 0;
+}
+
+// @return whether the arguments are right
+bool read_arguments(int argc, char** argv, tfdude::Options& options, double& seconds) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string name = argv[i];
+    if (name == "--local") {
+      options.profile = tfdude::kLocalProfile;
+      continue;
+    }
+    if (++i == argc) return false;
+    const std::string value = argv[i];
+    double domain = 0;
+    if (name == "--seconds") {
+      if (!read_number(value, seconds) || !(seconds > 0)) return false;
+    } else if (name == "--domain") {
+      if (!read_number(value, domain) || !(domain >= 0 && domain <= 232)) return false;
+      options.domain = static_cast<std::uint32_t>(domain);
+    } else if (name == "--profile") {
+      options.profile = value;
+    } else if (name == "--discovery-server") {
+      options.discovery_server = value;
+    } else {
+      return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   tfdude::Options options;
   double seconds = 10;
-  CLI::App app{"arm_controller: drives the arm of examples/robots/mobile_arm.urdf at 1 kHz"};
-  app.add_option("--seconds", seconds, "for how long")->check(CLI::Range(0.001, 1e6));
-  app.add_option("--domain", options.domain, "DDS domain");
-  app.add_option("--profile", options.profile, "XML file of DDS profiles, or local");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+  if (!read_arguments(argc, argv, options, seconds)) {
+    std::fputs(
+        "arm_controller: drives the arm of examples/robots/mobile_arm.urdf at 1 kHz\n"
+        "usage: arm_controller [--seconds S] [--domain N] [--local | --profile FILE]\n"
+        "                      [--discovery-server HOST:PORT]\n",
+        stderr);
+    return 2;
   }
   return run(options, seconds);
 }
