@@ -190,7 +190,7 @@ struct Trajectory {
   Trajectory t;
   for (int k = 0; k < steps; ++k) t.X_WA = k == 0 ? step : compose(t.X_WA, step);
   for (int k = 0; k < 10; ++k) t.X_AB = k == 0 ? step : compose(t.X_AB, step);
-  t.root_A = t.X_WA.covariance.matrix().llt().matrixL();
+  t.root_A = cholesky_root(t.X_WA.covariance.matrix());
   return t;
 }
 

@@ -5,6 +5,8 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/QR>
 
 namespace tfdude::testing {
 
@@ -14,6 +16,13 @@ Eigen::VectorXd eigenvalues(const Eigen::MatrixXd& symmetric) {
 }
 
 Matrix6d cholesky_root(const Matrix6d& positive) { return positive.llt().matrixL(); }
+
+Matrix6d inverse_of(const Matrix6d& matrix) { return matrix.inverse(); }
+
+Matrix6d random_orthogonal(Random& random) {
+  const auto normal = [&](auto, auto) { return random.normal(); };
+  return Eigen::HouseholderQR<Matrix6d>(Matrix6d::NullaryExpr(normal)).householderQ();
+}
 
 double squared_distance(const Twist& error, const Matrix6d& sigma) {
   return error.dot(sigma.ldlt().solve(error));

@@ -17,6 +17,11 @@ namespace tfdude::testing {
 /// L with L Lᵀ = A.
 [[nodiscard]] Matrix6d cholesky_root(const Matrix6d& positive);
 
+[[nodiscard]] Matrix6d inverse_of(const Matrix6d& matrix);
+
+/// Uniform over all orthogonal matrices.
+[[nodiscard]] Matrix6d random_orthogonal(Random& random);
+
 /// ξᵀ Σ⁻¹ ξ.
 [[nodiscard]] double squared_distance(const Twist& error, const Matrix6d& sigma);
 

@@ -145,10 +145,7 @@ TEST_CASE("What is unknown is bounded, whatever the correlation") {
     const Covariance B = random.covariance(0.1, 0.3);
     const Matrix6d sum = bound(A, B).matrix();
     // Any cross-covariance is A^{1/2} M B^{1/2} with |M| ≤ 1, the worst are turns.
-    const Eigen::MatrixXd M =
-        Eigen::HouseholderQR<Eigen::MatrixXd>(Eigen::MatrixXd::NullaryExpr(6, 6, [&](auto, auto) {
-          return random.normal();
-        })).householderQ();
+    const Matrix6d M = testing::random_orthogonal(random);
     const Matrix6d root_a = cholesky_root(A.matrix());
     const Matrix6d root_b = cholesky_root(B.matrix());
     const Matrix6d cross = root_a * M * root_b.transpose();
@@ -170,8 +167,8 @@ TEST_CASE(
     INFO("correlation " << correlation);
     Belief X_AB{random.pose(), {}, random.covariance(0.01, 0.01), {}};
     Belief X_BC{random.pose(), {}, random.covariance(0.01, 0.01), {}};
-    const Matrix6d root_1 = X_AB.unknown->matrix().llt().matrixL();
-    const Matrix6d root_2 = X_BC.unknown->matrix().llt().matrixL();
+    const Matrix6d root_1 = cholesky_root(X_AB.unknown->matrix());
+    const Matrix6d root_2 = cholesky_root(X_BC.unknown->matrix());
     const Pose mean_inverse = (X_AB.pose * X_BC.pose).inverse();
     const Matrix6d sampled = testing::second_moment(kSamples, [&] {
       Twist s;

@@ -126,7 +126,7 @@ Matrix6d carrying(const Twist& xi, double s) {
   Matrix6d sum = Matrix6d::Zero();
   for (int k = 0; k < n; ++k) sum += adjoint(exp(-static_cast<double>(k) * xi));
   const Matrix6d rest = adjoint(exp(-static_cast<double>(n) * xi)) * right_jacobian(r * xi);
-  sum += r * rest * right_jacobian(xi).inverse();
+  sum += r * rest * testing::inverse_of(right_jacobian(xi));
   return sum / s;
 }
 

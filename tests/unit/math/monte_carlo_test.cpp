@@ -3,13 +3,12 @@
 #include <sstream>
 #include <string>
 
-#include <Eigen/Cholesky>
-
 #include "tfdude/math/transform.hpp"
 
 #include "math/path_accumulation.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
+#include "support/sampling.hpp"
 
 namespace tfdude {
 namespace {
@@ -18,11 +17,11 @@ using testing::Random;
 
 constexpr int kSamples = 100'000;
 
-// Draws X̄ · Exp(ξ) with ξ ~ N(0, Σ).
+// Samples X̄ · Exp(ξ) with ξ ~ N(0, Σ).
 class Sampler {
  public:
   explicit Sampler(const Transform& X)
-      : mean_(X.pose), root_(X.covariance.matrix().llt().matrixL()) {}
+      : mean_(X.pose), root_(testing::cholesky_root(X.covariance.matrix())) {}
 
   Pose operator()(Random& random) const {
     Twist unit;
