@@ -13,6 +13,9 @@ namespace {
 // How often a new participant checks whether it has discovered everybody.
 constexpr Milliseconds kPollEvery{2};
 
+// If nobody answers, this is often the cause.
+constexpr const char* kHint = "domains, profiles or discovery servers may differ";
+
 }  // namespace
 
 Discovery::Discovery(Structure& structure, const Transport& transport, Milliseconds search_time,
@@ -90,6 +93,9 @@ Error Discovery::explained(Error error) {
             error.message + ", as far as is known: " + strangers.front().text()};
   }
   const Lock lock(structure_.mutex);
+  if (structure_.directory.partitions().empty()) {
+    return {error.code, error.message + "; no partition answers: " + kHint};
+  }
   const auto missed = structure_.directory.only_heard_of();
   if (!missed || error.code == Errc::kUnknownPartition) return error;
   return {Errc::kUnreachable, error.message + "; it may belong to partition " +
@@ -99,7 +105,7 @@ Error Discovery::explained(Error error) {
 }
 
 Error Discovery::undecided(const std::string& what, const Deadline& deadline) {
-  std::string missing = "no participant was discovered yet";
+  std::string missing = std::string("no participant was discovered yet; ") + kHint;
   // Before the lock is taken: the transport reports presences under a lock of its own.
   const bool awaits_presence = transport_.awaits_presence();
   if (const auto strangers = transport_.incompatible(); !strangers.empty()) {

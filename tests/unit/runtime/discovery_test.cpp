@@ -58,6 +58,8 @@ TEST_CASE("discovery: without other participants, it is complete after the disco
       joiner.rig.discovery.retry_until_known(joiner.rig.deadline(), [] { return missing(); });
   REQUIRE_FALSE(found);
   CHECK(found.error().code == Errc::kUnknownFrame);
+  CHECK(found.error().message ==
+        "no frame 'hand'; no partition answers: domains, profiles or discovery servers may differ");
 }
 
 TEST_CASE("discovery: no negative answer before all participants are discovered") {
