@@ -4,7 +4,8 @@ import re
 import subprocess
 import sys
 
-LIMITS = {r"\.(hpp|cpp|c|ipp|idl)$": 100, r"\.(md|py|cmake|xml|yaml|yml|sh)$|CMakeLists\.txt$|^scripts/[^.]+$": 120}
+LIMITS = {r"\.(hpp|cpp|c|ipp|idl)$": 100,
+          r"\.(md|py|cmake|xml|yaml|yml|sh|bash)$|CMakeLists\.txt$|^scripts/[^.]+$": 120}
 # Rows of tables, addresses, and lines that a tool requires in one piece.
 FREE = re.compile(r"^\s*\||https?://|file://|^\s*#include|NOLINT|^<img ")
 

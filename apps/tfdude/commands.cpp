@@ -8,7 +8,6 @@
 #include "tfdude/base/id.hpp"
 
 #include "render.hpp"
-#include "time_render.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -49,12 +48,7 @@ int none_there(Client& client, const Arguments& arguments, bool found) {
   const auto partitions = client.partitions();
   if (!partitions) return report(partitions.error(), arguments);
   if (!partitions->empty()) return kDone;
-  return report({Errc::kUnreachable,
-                 "no partition answers in domain " + std::to_string(arguments.options.domain) +
-                     " with " + profile_of(arguments.options) +
-                     ": all participants must use the same --domain, --profile (or --local) and "
-                     "--discovery-server"},
-                arguments);
+  return report({Errc::kUnreachable, nobody_answers(arguments)}, arguments);
 }
 
 int refuse_pose(const Error& error, const Arguments& arguments) {
@@ -62,6 +56,12 @@ int refuse_pose(const Error& error, const Arguments& arguments) {
 }
 
 }  // namespace
+
+std::string nobody_answers(const Arguments& arguments) {
+  return "no partition answers in domain " + std::to_string(arguments.options.domain) + " with " +
+         profile_of(arguments.options) +
+         ": all participants must use the same domain, profile and discovery server";
+}
 
 Time wall_clock() {
   return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
@@ -162,37 +162,20 @@ int run_partitions(Client& client, const Arguments& arguments) {
     return status;
   }
   nlohmann::json json = nlohmann::json::array();
-  std::string text;
+  std::vector<PartitionRow> rows;
   for (const PartitionInfo& partition : *partitions) {
     json.push_back(partition_json(partition));
-    text += partition.name;
-    if (!partition.compatible()) {
-      text += "  incompatible: tf-dude " +
-              (partition.program.empty() ? "of an unknown version" : partition.program) +
-              " speaks protocol " + to_string(partition.protocol) + ", this is " +
-              to_string(kProtocolVersion) + "\n";
-      continue;
-    }
-    // Only the name is known of a partition that was lost before this process started.
-    if (!partition.host.empty()) {
-      text += "  frames " + std::to_string(partition.frames) + "  host " + partition.host +
-              "  pid " + std::to_string(partition.pid);
-    }
-    if (!partition.reachable) {
-      text += (partition.stopped ? "  stopped since " : "  lost since ") +
-              to_string(partition.since) + "\n";
-      continue;
-    }
+    rows.push_back({partition, std::nullopt});
+    if (!partition.reachable) continue;
     if (const auto histories = client.histories(partition.name)) {
       const HistorySum sum = sum_of(*histories);
       json.back()["moving"] = sum.edges;
       json.back()["samples"] = sum.samples;
       json.back()["history_bytes"] = sum.bytes;
-      if (sum.edges > 0) text += "  history " + describe(sum);
+      rows.back().history = sum;
     }
-    text += "\n";
   }
-  return answer(arguments, {{"partitions", json}}, text);
+  return answer(arguments, {{"partitions", json}}, partition_table(rows));
 }
 
 int run_add(Client& client, const Arguments& arguments) {
@@ -275,7 +258,11 @@ int run_exists(Client& client, const Arguments& arguments) {
 
 int run_events(Client& client, const Arguments& arguments) {
   // Completes discovery first, so that partitions that exist already are no events.
-  (void)client.partitions();
+  const auto partitions = client.partitions();
+  if (!partitions || partitions->empty()) {
+    const std::string why = partitions ? nobody_answers(arguments) : partitions.error().message;
+    std::fprintf(stderr, "tfdude: %s\n", why.c_str());
+  }
   const auto subscription = client.on_change([&](const Change& change) {
     print(arguments.json ? dump(change_json(change)) + "\n"
                          : to_string(change.time) + "  " + change.message + "\n");

@@ -67,6 +67,8 @@ int answer(const Arguments& arguments, const nlohmann::json& json, const std::st
 /// Prints that the command changed its frame or joint, or why it did not. @return the exit status
 int finish(Client& client, const Result<void>& changed, const Arguments& arguments,
            const std::string& what);
+/// That no partition answers, and what may be the cause.
+[[nodiscard]] std::string nobody_answers(const Arguments& arguments);
 /// Prints why the request failed. @return the exit status
 int refuse(Client& client, const Error& error, const Arguments& arguments);
 

@@ -22,17 +22,25 @@ _tfdude_command() {
   done
 }
 
+# All names in an answer. Its tables shorten long names.
+_tfdude_names() {
+  timeout 0.5 tfdude "${common[@]}" --json "$1" 2>/dev/null | grep -o '"name":"[^"]*"' | cut -d'"' -f4
+}
+
 _tfdude() {
   local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command words common
-  local commands="tree frames partitions roots parent children exists lookup watch echo history monitor plot graph events joints joint observe fuse correlate add update remove forget move"
+  local commands="tree frames partitions roots parent children exists lookup watch echo history monitor plot graph"
+  commands+=" events joints joint observe fuse correlate add update remove forget move"
+  local of_frames=" parent children exists lookup watch echo plot history observe fuse correlate update remove move "
   local pose="--xyz --rpy --quat --stddev --cov"
   COMPREPLY=()
   command=$(_tfdude_command)
   mapfile -t common < <(_tfdude_common)
   case $previous in
     --profile | --out) mapfile -t COMPREPLY < <(compgen -f -- "$word"); return ;;
-    --domain | --discovery-server | --timeout | --rate | --at | --at-b | --stamp | --gate | --source | --order | --samples | --extrapolate | --wait | --xyz | --rpy | --quat | --stddev) return ;;
-    --partition) words=$(timeout 0.5 tfdude "${common[@]}" partitions 2>/dev/null | cut -d' ' -f1) ;;
+    --domain | --discovery-server | --timeout | --rate | --at | --at-b | --stamp | --gate | --source) return ;;
+    --order | --samples | --extrapolate | --wait | --xyz | --rpy | --quat | --stddev) return ;;
+    --partition) words=$(_tfdude_names partitions) ;;
     --parent | --fixed) words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null) ;;
     *)
       if [[ $word == -* ]]; then
@@ -54,10 +62,10 @@ _tfdude() {
       elif [[ -z $command ]]; then
         words=$commands
       elif [[ $command == forget ]]; then
-        words=$(timeout 0.5 tfdude "${common[@]}" partitions 2>/dev/null | cut -d' ' -f1)
+        words=$(_tfdude_names partitions)
       elif [[ $command == joint ]]; then
-        words=$(timeout 0.5 tfdude "${common[@]}" joints 2>/dev/null | sed -n '/^  joint /d; s/^  \([^ ]\+\) .*/\1/p')
-      elif [[ $command =~ ^(parent|children|exists|lookup|watch|echo|plot|history|observe|fuse|correlate|update|remove|move)$ ]]; then
+        words=$(_tfdude_names joints)
+      elif [[ $of_frames == *" $command "* ]]; then
         words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null)
       fi
       ;;

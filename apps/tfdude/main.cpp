@@ -110,6 +110,7 @@ void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen) {
   lookup->add_option("--order", arguments.order, "order of covariance propagation: 2 or 4")
       ->check(CLI::IsMember({2, 4}));
   add_milliseconds(lookup, "--wait", arguments.wait_ms, "how long to wait for frames and data");
+  lookup->get_option("--wait")->excludes(fixed);
 }
 
 // Commands that follow changes, most of them until interrupted.

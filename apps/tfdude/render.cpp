@@ -5,6 +5,7 @@
 #include <map>
 
 #include "format.hpp"
+#include "table.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -59,6 +60,38 @@ std::string draw_tree(const std::vector<Frame>& frames,
   return text;
 }
 
+std::string partition_table(const std::vector<PartitionRow>& rows) {
+  const auto line = [](const std::string& name, const std::string& frames, const std::string& host,
+                       const std::string& pid, const std::string& samples,
+                       const std::string& memory) {
+    return cell(name, 18) + format(" %8s ", frames.c_str()) + cell(host, 16) +
+           format(" %8s %10s %12s\n", pid.c_str(), samples.c_str(), memory.c_str());
+  };
+  std::string text = line("partition", "frames", "host", "pid", "samples", "history");
+  for (const PartitionRow& row : rows) {
+    const PartitionInfo& partition = row.partition;
+    // Only the name is known of a partition that was lost before this process started.
+    const bool known = !partition.host.empty();
+    const bool sampled = row.history && row.history->edges > 0;
+    text +=
+        line(partition.name, known ? std::to_string(partition.frames) : "-",
+             known ? partition.host : "-", known ? std::to_string(partition.pid) : "-",
+             sampled ? std::to_string(row.history->samples) : "-",
+             sampled ? format("%.1f KiB", static_cast<double>(row.history->bytes) / 1024.0) : "-");
+    if (!partition.compatible()) {
+      text += "  incompatible: tf-dude " +
+              (partition.program.empty() ? "of an unknown version" : partition.program) +
+              " speaks protocol " + to_string(partition.protocol) + ", this program speaks " +
+              to_string(kProtocolVersion) + "\n";
+      continue;
+    }
+    if (partition.reachable) continue;
+    text += (partition.stopped ? "  stopped since " : "  lost since ") +
+            to_string(partition.since) + "\n";
+  }
+  return text;
+}
+
 std::string describe(const Transform& X_AB, bool with_covariance) {
   const Eigen::Vector3d t = X_AB.pose.translation();
   const Eigen::Quaterniond q = X_AB.pose.rotation();
@@ -69,13 +102,18 @@ std::string describe(const Transform& X_AB, bool with_covariance) {
   std::string text = format("translation  %.6f  %.6f  %.6f  m\n", t.x(), t.y(), t.z());
   text += format("quaternion   %.6f  %.6f  %.6f  %.6f  (x y z w)\n", q.x(), q.y(), q.z(), q.w());
   text += format("rpy          %.4f  %.4f  %.4f  deg\n", rpy.x(), rpy.y(), rpy.z());
-  text += format("std dev      %.6f  %.6f  %.6f  m   %.4f  %.4f  %.4f  deg\n", s[0], s[1], s[2],
-                 s[3] * kDegrees, s[4] * kDegrees, s[5] * kDegrees);
+  const std::string deviations = format("std dev      %.6f  %.6f  %.6f  m", s[0], s[1], s[2]);
+  const std::string angles =
+      format("%.4f  %.4f  %.4f  deg", s[3] * kDegrees, s[4] * kDegrees, s[5] * kDegrees);
+  const bool fits = deviations.size() + 3 + angles.size() <= 80;
+  text += deviations + (fits ? "   " : "\n             ") + angles + "\n";
   if (!with_covariance) return text;
   text += "covariance   (translation first, of the right perturbation; m, rad)\n";
+  for (const char* axis : {"x", "y", "z", "rx", "ry", "rz"}) text += format(" %12s", axis);
+  text += "\n";
   const Matrix6d sigma = X_AB.covariance.matrix();
   for (int row = 0; row < 6; ++row) {
-    for (int column = 0; column < 6; ++column) text += format(" % .6e", sigma(row, column));
+    for (int column = 0; column < 6; ++column) text += format(" % .5e", sigma(row, column));
     text += "\n";
   }
   return text;

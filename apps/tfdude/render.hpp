@@ -1,11 +1,14 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "tfdude/client/client.hpp"
+
+#include "time_render.hpp"
 
 // Answers as text for people, and as JSON for programs.
 namespace tfdude::cli {
@@ -14,6 +17,13 @@ namespace tfdude::cli {
 /// @param unreachable  the partitions that do not answer
 [[nodiscard]] std::string draw_tree(const std::vector<Frame>& frames,
                                     const std::vector<std::string>& unreachable);
+
+/// A partition and, if it answers, the total of its histories.
+struct PartitionRow {
+  PartitionInfo partition;
+  std::optional<HistorySum> history;
+};
+[[nodiscard]] std::string partition_table(const std::vector<PartitionRow>& rows);
 
 [[nodiscard]] std::string describe(const Transform& X_AB, bool with_covariance);
 

@@ -7,19 +7,10 @@
 #include <vector>
 
 #include "format.hpp"
+#include "table.hpp"
 
 namespace tfdude::cli {
 namespace {
-
-// The first `count` characters of a line in UTF-8.
-std::string first_characters(const std::string& line, std::size_t count) {
-  std::size_t seen = 0;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const bool begins = (static_cast<unsigned char>(line[i]) & 0xC0U) != 0x80U;
-    if (begins && seen++ == count) return line.substr(0, i);
-  }
-  return line;
-}
 
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;

@@ -200,6 +200,7 @@ int run_monitor(Client& client, const Arguments& arguments) {
     if (partitions->empty() && arguments.once) {
       return refuse(client, {Errc::kUnknownPartition, "no partition"}, arguments);
     }
+    if (partitions->empty()) text = nobody_answers(arguments) + "\n";
     for (const PartitionInfo& partition : *partitions) {
       const auto histories = client.histories(partition.name);
       const Time now = wall_clock();

@@ -1,6 +1,7 @@
 #include "time_render.hpp"
 
 #include "format.hpp"
+#include "table.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -49,9 +50,10 @@ std::string describe(const HistoryInfo& history, Time now) {
         "oldest       " + seconds_of(*history.oldest) + "  (" + ago(*history.oldest, now) + ")\n";
     text +=
         "newest       " + seconds_of(*history.newest) + "  (" + ago(*history.newest, now) + ")\n";
-    text += format("rate         %.3f Hz, gaps %.3f ms on average, %.3f at most, jitter %.3f ms\n",
-                   rate_of(history), milliseconds(history.mean_gap), milliseconds(history.max_gap),
+    text += format("rate         %.3f Hz, jitter %.3f ms\n", rate_of(history),
                    milliseconds(history.jitter));
+    text += format("gaps         %.3f ms on average, %.3f ms at most\n",
+                   milliseconds(history.mean_gap), milliseconds(history.max_gap));
   }
   text += format("rejected     %llu too old, %llu duplicate stamps, %llu too far ahead\n",
                  static_cast<unsigned long long>(history.refused_old),
@@ -102,7 +104,7 @@ std::string echo_lines(const std::string& a, const std::string& b, const Stamped
   const Eigen::Vector3d t = X_AB.pose.translation();
   const Eigen::Vector3d rpy = to_rpy(X_AB.pose.rotation()) * kDegrees;
   const auto s = X_AB.covariance.stddev();
-  std::string text = b + " seen from " + a + "\n";
+  std::string text = shortened(b, 34) + " seen from " + shortened(a, 34) + "\n";
   text += format("position  %12.6f %12.6f %12.6f m\n", t.x(), t.y(), t.z());
   text += format("rpy       %12.4f %12.4f %12.4f deg\n", rpy.x(), rpy.y(), rpy.z());
   text += format("std dev   %12.6f %12.6f %12.6f m\n", s[0], s[1], s[2]);
@@ -113,18 +115,25 @@ std::string echo_lines(const std::string& a, const std::string& b, const Stamped
 
 std::string monitor_table(const std::string& partition, const std::vector<HistoryInfo>& histories,
                           Time now) {
-  std::string text = "partition " + partition + ": " + describe(sum_of(histories)) + "\n";
+  std::string text =
+      "partition " + shortened(partition, 24) + ": " + describe(sum_of(histories)) + "\n";
   if (histories.empty()) return text;
-  text += format("  %-22s %10s %10s %11s %10s %9s\n", "edge", "rate [Hz]", "age [ms]",
-                 "jitter [ms]", "gap [ms]", "rejected");
+  const auto row = [](const std::string& edge, const std::string& rate, const std::string& age,
+                      const std::string& jitter, const std::string& gap,
+                      const std::string& rejected) {
+    return "  " + cell(edge, 22) +
+           format(" %10s %10s %11s %10s %9s\n", rate.c_str(), age.c_str(), jitter.c_str(),
+                  gap.c_str(), rejected.c_str());
+  };
+  text += row("edge", "rate [Hz]", "age [ms]", "jitter [ms]", "gap [ms]", "rejected");
   for (const HistoryInfo& history : histories) {
-    const std::string age =
-        history.newest ? format("%.1f", milliseconds(now - *history.newest)) : std::string("-");
-    text +=
-        format("  %-22s %10.1f %10s %11.3f %10.3f %9llu\n", history.id.c_str(), rate_of(history),
-               age.c_str(), milliseconds(history.jitter), milliseconds(history.max_gap),
-               static_cast<unsigned long long>(history.refused_old + history.refused_equal +
-                                               history.refused_ahead));
+    const std::uint64_t rejected =
+        history.refused_old + history.refused_equal + history.refused_ahead;
+    text += row(history.id, number(rate_of(history), 1, 10),
+                history.newest ? number(milliseconds(now - *history.newest), 1, 10) : "-",
+                number(milliseconds(history.jitter), 3, 11),
+                number(milliseconds(history.max_gap), 3, 10),
+                number(static_cast<double>(rejected), 0, 9));
   }
   return text;
 }

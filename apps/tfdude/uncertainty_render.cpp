@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "format.hpp"
+#include "table.hpp"
 #include "time_render.hpp"
 
 namespace tfdude::cli {
@@ -76,13 +77,19 @@ nlohmann::json observed_json(const Observed& observed) {
 
 std::string consistency_table(const std::vector<EdgeConsistency>& edges) {
   if (edges.empty()) return "";
-  std::string text = format("  %-22s %8s %8s %9s %10s  %s\n", "observed edge", "observed",
-                            "rejected", "factor", "deviations", "covariance");
+  const auto row = [](const std::string& edge, const std::string& observed,
+                      const std::string& rejected, const std::string& factor,
+                      const std::string& deviations, const char* covariance) {
+    return "  " + cell(edge, 22) +
+           format(" %8s %8s %9s %10s  %s\n", observed.c_str(), rejected.c_str(), factor.c_str(),
+                  deviations.c_str(), covariance);
+  };
+  std::string text =
+      row("observed edge", "observed", "rejected", "factor", "deviations", "covariance");
   for (const EdgeConsistency& edge : edges) {
-    text += format("  %-22s %8llu %8llu %9.2f %10.1f  %s\n", edge.id.c_str(),
-                   static_cast<unsigned long long>(edge.observations),
-                   static_cast<unsigned long long>(edge.refused), factor_of(edge),
-                   deviation_of(edge), verdict_of(edge));
+    text += row(edge.id, number(static_cast<double>(edge.observations), 0, 8),
+                number(static_cast<double>(edge.refused), 0, 8), number(factor_of(edge), 2, 9),
+                number(deviation_of(edge), 1, 10), verdict_of(edge));
   }
   return text;
 }

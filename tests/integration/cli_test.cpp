@@ -69,8 +69,9 @@ TEST_CASE("cli: questions are answered for people") {
   CHECK(text(d, {"frames"}) ==
         "arm_1\narm_2\narm_left\narm_right\ncamera\nhand_left\nrobot_1\nrobot_2\nworld\n");
   const std::string partitions = text(d, {"partitions"});
-  CHECK_THAT(partitions, ContainsSubstring("arms  frames 5"));
-  CHECK_THAT(partitions, ContainsSubstring("pid " + std::to_string(d.robot.pid())));
+  CHECK_THAT(partitions, ContainsSubstring("partition            frames host "));
+  CHECK_THAT(partitions, ContainsSubstring("arms                      5 "));
+  CHECK_THAT(partitions, ContainsSubstring(" " + std::to_string(d.robot.pid()) + " "));
   CHECK(text(d, {"roots"}) == "world\n");
   CHECK(text(d, {"parent", "arm_1"}) == "robot_1\n");
   CHECK(text(d, {"parent", "world"}) == "(root)\n");

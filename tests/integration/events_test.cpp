@@ -58,6 +58,21 @@ TEST_CASE("events: the command line tells what happens, a line each") {
   CHECK(finish(events).status == 0);
 }
 
+TEST_CASE("events: where nobody answers, commands that run until interrupted say so") {
+  const testing::TestDomain domain;
+  const auto start = [&](const std::string& command) {
+    return Process({TFDUDE_CLI, "--local", "--domain", std::to_string(domain.number()), "--timeout",
+                    "300", command});
+  };
+  Process monitor = start("monitor");
+  CHECK(monitor.wait_for_line("no partition answers in domain", in_time()));
+  Process events = start("events");
+  CHECK(eventually([&] {
+    (void)events.wait(testing::Clock::now());  // reads what it has printed
+    return events.err().find("same domain, profile and discovery server") != std::string::npos;
+  }));
+}
+
 TEST_CASE("events: a daemon that hung while its name was taken gives it up") {
   ThesisDaemons d;
   auto client = *Client::open(d.domain.options());

@@ -125,7 +125,7 @@ TEST_CASE("time: histories and rates are shown, with what was refused") {
   const json partitions = answered(d, {"partitions"});
   CHECK(partitions.at("partitions").at(0).at("samples") == 5);
   CHECK(partitions.at("partitions").at(0).at("history_bytes") > 1000);
-  CHECK_THAT(text(d, {"partitions"}), ContainsSubstring("history 5 samples of 1 edges"));
+  CHECK_THAT(text(d, {"partitions"}), ContainsSubstring(" 5      2.0 KiB"));
 }
 
 TEST_CASE("time: a source whose clock jumps back starts its history again, and the log says so") {

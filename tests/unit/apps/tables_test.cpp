@@ -5,6 +5,8 @@
 #include <string>
 
 #include "tfdude/joint_render.hpp"
+#include "tfdude/render.hpp"
+#include "tfdude/table.hpp"
 #include "tfdude/time_render.hpp"
 #include "tfdude/uncertainty_render.hpp"
 
@@ -13,10 +15,14 @@
 namespace tfdude::cli {
 namespace {
 
+using testing::ContainsSubstring;
+
+const std::string kLong = "left_arm_of_the_second_robot_shoulder_pan_joint";
+
 std::size_t width_of(const std::string& table) {
   std::istringstream lines(table);
   std::size_t width = 0;
-  for (std::string line; std::getline(lines, line);) width = std::max(width, line.size());
+  for (std::string line; std::getline(lines, line);) width = std::max(width, length_of(line));
   return width;
 }
 
@@ -32,30 +38,70 @@ JointInfo shoulder() {
   return joint;
 }
 
-}  // namespace
-
-TEST_CASE("tables: joints have a header, and fit 80 columns") {
-  const std::string table = joint_table({shoulder()});
-  CHECK(table ==
-        "  joint                frame                position     std dev limits\n"
-        "  shoulder_pan_joint   shoulder_link    -180.000 deg 208.166 deg -360 to 360 deg\n"
-        "    no sample yet  outside 3 times\n");
-  CHECK(width_of(table) <= 80);
-  CHECK(width_of(outside_table({shoulder()})) <= 80);
-  CHECK(joint_table({}).empty());
+// Everything in it is as long as it can be.
+JointInfo longest() {
+  JointInfo joint = shoulder();
+  joint.name = joint.frame = kLong;
+  joint.type = JointType::kPrismatic;
+  joint.position = -1e9;
+  joint.variance = 1e18;
+  joint.limits = JointLimits{-1e9, 1e9};
+  joint.mimic = Mimic{kLong + kLong, -1.23456e-300, -1.23456e-300};
+  joint.outside = joint.refused = UINT64_MAX / 1'000'000'000;
+  return joint;
 }
 
-TEST_CASE("tables: rates of edges fit 80 columns") {
+HistoryInfo history_of(const std::string& id) {
   HistoryInfo history;
-  history.id = "shoulder_link";
+  history.id = id;
   history.samples = 2000;
   history.newest = Time(std::chrono::seconds(1'000'000));
   history.oldest = *history.newest - std::chrono::seconds(2);
   history.mean_gap = std::chrono::milliseconds(1);
   history.refused_old = 1'000'000;
+  return history;
+}
+
+}  // namespace
+
+TEST_CASE("tables: joints have a header, and fit 80 columns") {
+  const std::string table = joint_table({shoulder()});
+  CHECK(table ==
+        "  joint              frame             position   std dev unit limits\n"
+        "  shoulder_pan_joint shoulder_link     -180.000   208.166 deg  -360..360\n"
+        "    no sample yet\n"
+        "    outside 3 times\n");
+  CHECK(width_of(outside_table({shoulder()})) <= 80);
+  CHECK(joint_table({}).empty());
+}
+
+TEST_CASE("tables: long names and numbers of joints fit 80 columns") {
+  JointInfo head = shoulder();
+  head.limits = JointLimits{-2.7995, 2.7995};
+  CHECK_THAT(joint_table({head}), ContainsSubstring("-160.4..160.4"));
+  CHECK(width_of(joint_table({head, longest()})) <= 80);
+  CHECK(width_of(outside_table({head, longest()})) <= 80);
+  CHECK_THAT(joint_table({longest()}), ContainsSubstring("  left_arm…pan_joint "));
+}
+
+TEST_CASE("tables: rates of edges fit 80 columns") {
+  const HistoryInfo history = history_of("shoulder_link");
   const std::string table = monitor_table("arm", {history}, *history.newest);
-  CHECK_THAT(table, testing::ContainsSubstring("rate [Hz]"));
+  CHECK_THAT(table, ContainsSubstring("rate [Hz]"));
   CHECK(width_of(table) <= 80);
+}
+
+TEST_CASE("tables: long names and numbers of edges fit 80 columns") {
+  HistoryInfo history = history_of(kLong);
+  history.refused_old = UINT64_MAX / 2;
+  history.mean_gap = std::chrono::nanoseconds(1);
+  history.max_gap = history.jitter = std::chrono::hours(100'000);
+  history.bytes = 100'000'000;
+  const Time later = *history.newest + std::chrono::hours(500'000);
+  CHECK(width_of(monitor_table(kLong, {history, history_of("a")}, later)) <= 80);
+  history.refused_old = history.refused_equal = history.refused_ahead = 1'000'000;
+  CHECK(width_of(describe(history, later)) <= 80);
+  CHECK(width_of(echo_lines(kLong, kLong, {}, later)) <= 80);
 }
 
 TEST_CASE("tables: observed edges fit 80 columns") {
@@ -63,8 +109,55 @@ TEST_CASE("tables: observed edges fit 80 columns") {
   edge.id = "shoulder_link";
   edge.observations = 1'000'000;
   const std::string table = consistency_table({edge});
-  CHECK_THAT(table, testing::ContainsSubstring("observed edge"));
+  CHECK_THAT(table, ContainsSubstring("observed edge"));
   CHECK(width_of(table) <= 80);
+  edge.id = kLong;
+  edge.observations = edge.refused = UINT64_MAX;
+  edge.sum = {1e300, 1e-8, 1e-300};
+  CHECK(width_of(consistency_table({edge})) <= 80);
+}
+
+TEST_CASE("tables: partitions have a header, and fit 80 columns") {
+  PartitionInfo base;
+  base.name = "base";
+  base.host = "robot";
+  base.pid = 4711;
+  base.frames = 12;
+  base.reachable = true;
+  PartitionInfo lost = base;
+  lost.name = lost.host = kLong;
+  lost.pid = 4'194'304;
+  lost.frames = 100'000;
+  lost.reachable = false;
+  PartitionInfo unknown;
+  unknown.name = "arm";
+  const std::string table =
+      partition_table({{base, HistorySum{100, 204'800, 67'108'864}}, {lost, {}}, {unknown, {}}});
+  CHECK(table ==
+        "partition            frames host                  pid    samples      history\n"
+        "base                     12 robot                4711     204800  65536.0 KiB\n"
+        "left_arm…pan_joint   100000 left_ar…an_joint  4194304          -            -\n"
+        "  lost since 1970-01-01 00:00:00.000 UTC\n"
+        "arm                       - -                       -          -            -\n"
+        "  lost since 1970-01-01 00:00:00.000 UTC\n");
+  CHECK(width_of(table) <= 80);
+}
+
+TEST_CASE("tables: a transform with its covariance fits 80 columns") {
+  const Transform X{*Pose::create(Eigen::Quaterniond::Identity(), {-1234.5, 1234.5, 0}),
+                    *Covariance::from_stddev({123, 123, 123, 3, 3, 3})};
+  const std::string text = describe(X, true);
+  CHECK_THAT(text, ContainsSubstring("            x            y            z           rx"));
+  CHECK(width_of(text) <= 80);
+}
+
+TEST_CASE("tables: the middle of a long name is left out") {
+  CHECK(shortened("shoulder", 8) == "shoulder");
+  CHECK(shortened("shoulders", 8) == "sho…ders");
+  CHECK(shortened("äöüäöüäöü", 4) == "ä…öü");
+  CHECK(cell("é", 3) == "é  ");
+  CHECK(number(1234.5, 1, 6) == "1234.5");
+  CHECK(number(-123456789.0, 1, 10) == "-1.23e+08");
 }
 
 }  // namespace tfdude::cli

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+// Parts of tables that fit a terminal of 80 columns, however long names and numbers are.
+namespace tfdude::cli {
+
+/// Number of characters of a text in UTF-8.
+[[nodiscard]] std::size_t length_of(const std::string& text);
+
+/// The first characters of a text in UTF-8.
+[[nodiscard]] std::string first_characters(const std::string& text, std::size_t count);
+
+/// A text of at most so many characters. If it is too long, its middle is left out: names often
+/// differ only at their ends.
+[[nodiscard]] std::string shortened(const std::string& text, std::size_t columns);
+
+/// A name at the left of so many columns, shortened if it is too long.
+[[nodiscard]] std::string cell(const std::string& name, std::size_t columns);
+
+/// A number with so many decimals; in powers of ten if it would need too many columns.
+[[nodiscard]] std::string number(double value, int decimals, std::size_t columns);
+
+}  // namespace tfdude::cli
