@@ -8,7 +8,7 @@ install(EXPORT tfdudeTargets NAMESPACE tfdude:: DESTINATION ${package_dir})
 configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/tfdudeConfig.cmake.in
   ${CMAKE_BINARY_DIR}/tfdudeConfig.cmake INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/tfdudeConfigVersion.cmake
-  COMPATIBILITY SameMajorVersion)
+  COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/tfdudeConfig.cmake ${CMAKE_BINARY_DIR}/tfdudeConfigVersion.cmake
   DESTINATION ${package_dir})
 
