@@ -1,22 +1,32 @@
-"""Types the shell blocks of README.md into one shell, line by line, twice; compiles and runs its C++ blocks.
+"""Types the commands of README.md and docs/install.md into a shell, line by line, in a fresh clone of this checkout.
 
-    type_blocks.py BUILD_DIR CXX [CXX_FLAGS...]
+    type_blocks.py BUILD_DIR
+    type_blocks.py --self-test
 
-BUILD_DIR replaces build/release. Everything runs in its own DDS domain, with an empty home directory.
+The clone's build/release is a link to BUILD_DIR, and `cmake --preset` does nothing, so that nothing is built again.
+README.md is typed twice, because a user may run its tour twice. Its C++ program is built against the installed package,
+as docs/install.md says. All runs in a DDS domain and an empty home directory of its own.
 """
+import fcntl
 import os
+import pty
 import re
 import select
+import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-LINE_SECONDS = 60
+LINE_SECONDS = 120
+COLUMNS = 80
+MARK = re.compile(rb"\n=== status (\d+)\n")
 
 
 def blocks(text, language):
@@ -41,79 +51,186 @@ def lease_domain():
 
 
 class Shell:
-    """Passes typed lines to bash; a mark with the status follows the output of each line."""
+    """An interactive bash on a terminal of its own. Its prompt shows the status of the line before."""
 
-    def __init__(self, environment):
-        self.bash = subprocess.Popen(
-            ["bash", "--noprofile", "--norc"], cwd=ROOT, env=environment,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
+    def __init__(self, folder, environment):
         self.output = b""
+        self.pid, self.terminal = pty.fork()
+        if self.pid == 0:
+            os.chdir(folder)
+            os.execvpe("bash", ["bash", "--noprofile", "--norc", "--noediting", "-i"],
+                       {**environment, "PS1": r"\n=== status $?\n"})
+        fcntl.ioctl(self.terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, COLUMNS, 0, 0))
+        settings = termios.tcgetattr(self.terminal)
+        settings[3] &= ~termios.ECHO
+        termios.tcsetattr(self.terminal, termios.TCSANOW, settings)
+        self.read_until_prompt("the start of bash")
 
     def type(self, line):
         """Returns the output of the line and of background jobs, and the status."""
-        self.bash.stdin.write(f"{line}\necho; echo '=== status' $?\n".encode())
-        self.bash.stdin.flush()
+        os.write(self.terminal, f"{line}\n".encode())
+        if "# until Ctrl-C" in line:
+            self.read(time.monotonic() + 3)
+            os.write(self.terminal, b"\x03")
+        return self.read_until_prompt(line)
+
+    def read_until_prompt(self, what):
         deadline = time.monotonic() + LINE_SECONDS
-        while not (mark := re.search(rb"\n=== status (\d+)\n", self.output)):
-            ready, _, _ = select.select([self.bash.stdout], [], [], max(0, deadline - time.monotonic()))
-            new = os.read(self.bash.stdout.fileno(), 65536) if ready else b""
-            if not new:
-                raise SystemExit(f"no end of: {line}\n{self.output.decode()}")
-            self.output += new
+        entered = False
+        while not (mark := MARK.search(self.output)):
+            if not self.read(deadline):
+                raise SystemExit(f"no end of: {what}\n{self.output.decode()}")
+            if b"until you press Enter" in self.output and not entered:
+                os.write(self.terminal, b"\n")
+                entered = True
         printed, self.output = self.output[:mark.start()], self.output[mark.end():]
         return printed.decode(), int(mark[1])
+
+    def read(self, deadline):
+        """Waits for output. Returns whether there was any before the deadline."""
+        ready, _, _ = select.select([self.terminal], [], [], max(0, deadline - time.monotonic()))
+        try:
+            new = os.read(self.terminal, 65536) if ready else b""
+        except OSError:  # bash has ended
+            new = b""
+        self.output = (self.output + new).replace(b"\r\n", b"\n")
+        return bool(new)
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
-        """Kills programs that still run, for example after a line has failed."""
-        try:
-            os.killpg(self.bash.pid, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
-        self.bash.wait(LINE_SECONDS)
+        """Kills bash and what it started, for example after a line has failed."""
+        for process in Path("/proc").glob("[0-9]*"):
+            try:
+                session = (process / "stat").read_text().rpartition(")")[2].split()[3]
+                if int(session) == self.pid:
+                    os.kill(int(process.name), signal.SIGKILL)
+            except (FileNotFoundError, ProcessLookupError):
+                pass  # it has just ended
+        os.waitpid(self.pid, 0)
+        os.close(self.terminal)
 
 
-def type_all(shell_blocks, environment):
-    with Shell(environment) as shell:
+def check_width(line, printed):
+    """What a person reads fits the terminal."""
+    if not line.startswith("tfdude ") or "--json" in line or "# until Ctrl-C" in line:
+        return
+    for printed_line in printed.splitlines():
+        from_background = printed_line.startswith("[")  # a daemon's log, or bash about a job
+        if len(printed_line) > COLUMNS and not from_background:
+            raise SystemExit(f"more than {COLUMNS} columns of: {line}\n{printed_line}")
+
+
+def type_all(shell_blocks, folder, environment):
+    """Returns all output."""
+    transcript = ""
+    with Shell(folder, environment) as shell:
         for line in (line for block in shell_blocks for line in lines_of(block)):
             printed, status = shell.type(line)
             print(f"$ {line}\n{printed.strip()}\n", flush=True)
-            if status != 0:
+            # A program that Ctrl-C kills before it can react has status 130.
+            if status != 0 and not ("# until Ctrl-C" in line and status == 130):
                 raise SystemExit(f"status {status} of: {line}")
-            if line.startswith("tfdude ") and not printed.strip():
+            if re.match("tfdude (?!events)", line) and not printed.strip():
                 raise SystemExit(f"no output of: {line}")
+            check_width(line, printed)
+            transcript += printed
+    return transcript
 
 
-def compile_and_run(number, code, build, compiler, environment, work):
-    source = work / f"block_{number}.cpp"
-    source.write_text(code)
-    program = source.with_suffix("")
-    subprocess.run([*compiler, "-std=c++17", "-Wall", "-Wextra", "-Werror", f"-I{ROOT}/include",
-                    "-isystem", "/usr/include/eigen3", source, f"-L{build}/lib", "-ltfdude",
-                    f"-Wl,-rpath,{build}/lib", "-o", program], check=True)
-    done = subprocess.run([program], env=environment, timeout=LINE_SECONDS, check=True,
-                          stdout=subprocess.PIPE, text=True)
-    print(f"C++ block {number}: {done.stdout}")
-    if not done.stdout:
-        raise SystemExit(f"no output of C++ block {number}")
+def check_samples(samples, transcript):
+    """The output that a page shows is output of its commands."""
+    for line in (line for block in samples for line in block.splitlines()):
+        if line not in transcript:
+            raise SystemExit(f"no command printed this line: {line}")
+
+
+def clone(folder, environment):
+    """A clone of the last commit, with the changes of tracked files that are not committed yet."""
+    subprocess.run(["git", "clone", "--quiet", ROOT, folder], env=environment, check=True)
+    changes = subprocess.run(["git", "-C", ROOT, "diff", "--binary", "HEAD"], env=environment, check=True,
+                             stdout=subprocess.PIPE).stdout
+    if changes:
+        subprocess.run(["git", "-C", folder, "apply"], env=environment, check=True, input=changes)
+
+
+def put_in_front_of_cmake(folder):
+    """A cmake that does not configure or build the clone, and passes on all else."""
+    folder.mkdir()
+    wrapper = folder / "cmake"
+    wrapper.write_text(f"""#!/bin/sh
+case "$*" in
+  *--preset*) exit 0 ;;
+  *) exec {shutil.which("cmake")} "$@" ;;
+esac
+""")
+    wrapper.chmod(0o755)
+
+
+def try_pages(build, work, domain):
+    home, checkout, project = work / "home", work / "tf-dude", work / "project"
+    for folder in (home, project):
+        folder.mkdir()
+    (home / ".gitconfig").write_text("[safe]\n\tdirectory = *\n")  # the checkout may belong to another user
+    put_in_front_of_cmake(work / "bin")
+    environment = {**os.environ, "HOME": str(home), "TFDUDE_DOMAIN": str(domain), "TERM": "xterm",
+                   "PATH": f"{work}/bin:{os.environ['PATH']}", "CXXFLAGS": "-Wall -Wextra -Werror"}
+    clone(checkout, environment)
+    (checkout / "build").mkdir()
+    (checkout / "build/release").symlink_to(build)
+
+    readme = (checkout / "README.md").read_text()
+    install = (checkout / "docs/install.md").read_text()
+    (program,) = blocks(readme, "cpp")
+    (lists,) = blocks(install, "cmake")
+    in_clone, in_project = blocks(install, "sh")
+    transcript = type_all(blocks(readme, "sh"), checkout, environment)
+    type_all(blocks(readme, "sh"), checkout, environment)
+    type_all([in_clone], checkout, environment)
+    (project / "CMakeLists.txt").write_text(lists)
+    (project / "arm.cpp").write_text(program)
+    transcript += type_all([in_project], project, {**environment, "TFDUDE_PROFILE": "local"})
+    check_samples(blocks(readme, "text"), transcript)
+
+
+def fails(*arguments):
+    try:
+        type_all(*arguments)
+    except SystemExit:
+        return True
+    return False
+
+
+def self_test(work):
+    """Finds what it must find."""
+    environment = {**os.environ, "HOME": str(work), "PATH": f"{work}:{os.environ['PATH']}"}
+    program = work / "tfdude"
+    program.write_text("#!/bin/sh\nprintf '%s' \"$1\"\n")
+    program.chmod(0o755)
+    assert not fails(["true\n", "tfdude words\n"], work, environment)
+    assert fails(["true\nfalse\ntrue\n"], work, environment)
+    assert fails(["no-such-program\n"], work, environment)
+    assert fails(["tfdude ''\n"], work, environment)
+    assert fails([f"tfdude {'x' * (COLUMNS + 1)}\n"], work, environment)
+    assert not fails(["sleep 1000  # until Ctrl-C\n"], work, environment)
+    assert not fails(["echo It runs until you press Enter.; read -r\n"], work, environment)
+    assert "two\n" in type_all(["sh -c 'echo two' &\nwait\n"], work, environment)
+    check_samples(["one\ntwo\n"], "zero\none\ntwo\n")
+    try:
+        check_samples(["one\nthree\n"], "zero\none\ntwo\n")
+    except SystemExit:
+        return
+    raise AssertionError("a sample that no command printed is accepted")
 
 
 def main():
-    build, compiler = Path(sys.argv[1]).resolve(), sys.argv[2:]
-    text = (ROOT / "README.md").read_text()
-    shell_blocks = [block.replace("$PWD/build/release", str(build)) for block in blocks(text, "sh")]
-    programs = blocks(text, "cpp")
-    if not shell_blocks or not programs:
-        raise SystemExit("README.md has no blocks to try")
-    domain, _lease = lease_domain()
-    with tempfile.TemporaryDirectory() as home:
-        environment = {**os.environ, "HOME": home, "TFDUDE_DOMAIN": str(domain)}
-        for _ in range(2):
-            type_all(shell_blocks, environment)
-        for number, code in enumerate(programs):
-            compile_and_run(number, code, build, compiler, {**environment, "TFDUDE_PROFILE": "local"}, Path(home))
+    with tempfile.TemporaryDirectory() as work:
+        if sys.argv[1:] == ["--self-test"]:
+            self_test(Path(work))
+        else:
+            domain, _lease = lease_domain()
+            try_pages(Path(sys.argv[1]).resolve(), Path(work), domain)
 
 
 if __name__ == "__main__":
