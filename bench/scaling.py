@@ -35,7 +35,9 @@ def enter_namespace():
         subprocess.run(["ip", "link", "set", "lo", "up", "multicast", "on"], check=True)
         subprocess.run(["ip", "route", "add", "239.0.0.0/8", "dev", "lo"], check=True)
         return True
-    if os.geteuid() != 0 or shutil.which("unshare") is None or shutil.which("ip") is None:
+    if shutil.which("unshare") is None or shutil.which("ip") is None:
+        return False
+    if subprocess.run(["unshare", "-n", "ip", "link", "set", "lo", "up"], stderr=subprocess.DEVNULL).returncode != 0:
         return False
     os.environ["TFDUDE_SCALING_ALONE"] = "1"
     os.execvp("unshare", ["unshare", "-n", sys.executable, *sys.argv])

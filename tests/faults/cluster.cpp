@@ -1,6 +1,8 @@
 #include "faults/cluster.hpp"
 
+#include <cerrno>
 #include <csignal>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <sched.h>
@@ -68,6 +70,7 @@ Cluster::Cluster(std::size_t partitions, std::size_t clients,
   disk_ = unshare(CLONE_NEWNS) == 0 &&
           mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
           mount("none", state_directory().c_str(), "tmpfs", 0, kDiskSize) == 0;
+  if (!disk_) no_disk_ = std::string("none can be mounted: ") + std::strerror(errno);
   if (no_links_.empty()) {
     hosts_.emplace(1 + partitions + clients);
     hosts_->enter(kObservers);

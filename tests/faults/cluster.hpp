@@ -28,6 +28,7 @@ class Cluster {
   [[nodiscard]] std::size_t partitions() const { return daemons_.size(); }
   /// Why no link can be cut; empty if links can be cut.
   [[nodiscard]] const std::string& no_links() const { return no_links_; }
+  [[nodiscard]] const std::string& no_disk() const { return no_disk_; }
   [[nodiscard]] Means means() const { return {no_links_.empty(), clocks_, disk_}; }
   [[nodiscard]] std::string state_directory() const { return directory_.path() + "/state"; }
 
@@ -94,6 +95,7 @@ class Cluster {
   std::optional<testing::DomainLease> domain_;  // without hosts
   bool clocks_ = false;
   bool disk_ = false;
+  std::string no_disk_;
   std::vector<Variant> variants_;
   std::vector<std::optional<testing::Process>> daemons_;
 };

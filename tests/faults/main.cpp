@@ -55,7 +55,7 @@ int run(const Arguments& arguments) {
   const Means means = cluster.means();
   if (!means.links) std::printf("no link is cut: %s\n", cluster.no_links().c_str());
   if (!means.clocks) std::printf("no clock is stepped: needs the package faketime\n");
-  if (!means.disks) std::printf("no disk is full: needs root\n");
+  if (!means.disks) std::printf("no disk is full: %s\n", cluster.no_disk().c_str());
   std::fflush(stdout);
   for (std::size_t i = 0; i < arguments.partitions; ++i) cluster.start(i);
   for (std::size_t i = 0; i < arguments.partitions; ++i) cluster.await_ready(i);

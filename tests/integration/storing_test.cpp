@@ -93,7 +93,7 @@ Clock::duration longest_silence(Client& client, const std::atomic<bool>& stop) {
 TEST_CASE("storing: of what a full disk does not take nothing is called done, or seen by others") {
   const SmallDisk disk(400);
   if (!disk.mounted()) {
-    WARN("SKIPPED: a small disk needs root");
+    WARN("SKIPPED: " << disk.missing());
     return;
   }
   Arms arms(disk);
@@ -136,7 +136,7 @@ TEST_CASE("storing: of what a full disk does not take nothing is called done, or
 TEST_CASE("storing: a removal that was refused has not happened after a kill") {
   const SmallDisk disk(400);
   if (!disk.mounted()) {
-    WARN("SKIPPED: a small disk needs root");
+    WARN("SKIPPED: " << disk.missing());
     return;
   }
   Arms arms(disk);

@@ -284,7 +284,7 @@ TEST_CASE("a sound file in a directory that became read-only is not called damag
 TEST_CASE("where the disk is full nothing is lost, and storing goes on once it is not") {
   testing::SmallDisk disk(300);
   if (!disk.mounted()) {
-    WARN("SKIPPED: a small disk needs root");
+    WARN("SKIPPED: " << disk.missing());
     return;
   }
   const std::string file = state_file(disk.path(), 7, "arms");
@@ -311,7 +311,7 @@ TEST_CASE(
     "a file of the format before that cannot be brought up to date stays as it is until it can") {
   testing::SmallDisk disk(300);
   if (!disk.mounted()) {
-    WARN("SKIPPED: a small disk needs root");
+    WARN("SKIPPED: " << disk.missing());
     return;
   }
   const std::string file = state_file(disk.path(), 7, "arms");
