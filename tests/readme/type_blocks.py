@@ -189,7 +189,7 @@ def try_pages(build, work, domain):
     type_all(blocks(readme, "sh"), checkout, environment)
     type_all([in_clone], checkout, environment)
     (project / "CMakeLists.txt").write_text(lists)
-    (project / "arm.cpp").write_text(program)
+    (project / "main.cpp").write_text(program)
     transcript += type_all([in_project], project, {**environment, "TFDUDE_PROFILE": "local"})
     check_samples(blocks(readme, "text"), transcript)
 
