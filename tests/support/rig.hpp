@@ -32,7 +32,7 @@ namespace tfdude::testing {
 }
 
 /// The objects that most parts of a participant need, connected as Participant does it.
-class Rig : public TransportHandler {
+class Rig {
  public:
   explicit Rig(TransportPtr to, const std::string& partition = "", const Options& with = quick())
       : options(with),
@@ -58,9 +58,9 @@ class Rig : public TransportHandler {
                     return member.await_stored(request, deadline);
                   },
                   [this] { return still_in ? still_in() : member.still_in(); }}) {
-    REQUIRE(transport->start(*this));
+    REQUIRE(transport->start(ear_));
   }
-  ~Rig() override {
+  virtual ~Rig() {
     member.stop_events();
     member.stop();
     transport->stop();
@@ -70,22 +70,11 @@ class Rig : public TransportHandler {
 
   [[nodiscard]] tfdude::Deadline deadline() const { return discovery.call_deadline(); }
 
-  void on_request(const PeerId& from, const Request& request) override {
-    if (auto reply = member.on_request(from, request)) transport->reply(from, *reply);
-  }
-  void on_reply(const Reply& reply) override { requests.calls().on_reply(reply); }
-  void on_update(const Update&) override {}
-  void on_joints(const JointUpdate&) override {}
-  void on_pushed(const PushedValues& values) override {
-    if (pushed) pushed(values);
-  }
-  void on_page(const Page& page) override { member.on_page(page); }
-  void on_presence(const Presence& presence) override { member.on_presence(presence); }
-  void on_lost(const std::string& partition, std::uint64_t incarnation) override {
+  void on_page(const Page& page) { member.on_page(page); }
+  void on_presence(const Presence& presence) { member.on_presence(presence); }
+  void on_lost(const std::string& partition, std::uint64_t incarnation) {
     member.on_lost(partition, incarnation);
   }
-  [[nodiscard]] bool owns(std::string_view id) const override { return structure.forest.holds(id); }
-  [[nodiscard]] bool owns_joint(std::string_view) const override { return true; }
 
   const Options options;
   std::function<void()> on_contest;
@@ -100,6 +89,37 @@ class Rig : public TransportHandler {
   Discovery discovery;
   MemberRunner member;
   Requests requests;
+
+ private:
+  /// Passes on what is received. Not the Rig itself, whose virtual functions change as a class
+  /// derived from it is destroyed, while the transport still calls.
+  class Ear final : public TransportHandler {
+   public:
+    explicit Ear(Rig& rig) : rig_(rig) {}
+
+    void on_request(const PeerId& from, const Request& request) override {
+      if (auto reply = rig_.member.on_request(from, request)) rig_.transport->reply(from, *reply);
+    }
+    void on_reply(const Reply& reply) override { rig_.requests.calls().on_reply(reply); }
+    void on_update(const Update&) override {}
+    void on_joints(const JointUpdate&) override {}
+    void on_pushed(const PushedValues& values) override {
+      if (rig_.pushed) rig_.pushed(values);
+    }
+    void on_page(const Page& page) override { rig_.on_page(page); }
+    void on_presence(const Presence& presence) override { rig_.on_presence(presence); }
+    void on_lost(const std::string& partition, std::uint64_t incarnation) override {
+      rig_.on_lost(partition, incarnation);
+    }
+    [[nodiscard]] bool owns(std::string_view id) const override {
+      return rig_.structure.forest.holds(id);
+    }
+    [[nodiscard]] bool owns_joint(std::string_view) const override { return true; }
+
+   private:
+    Rig& rig_;
+  };
+  Ear ear_{*this};
 };
 
 /// An owner; a test answers or loses some of its requests.
