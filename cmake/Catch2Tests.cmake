@@ -2,32 +2,42 @@
 find_package(Catch2 REQUIRED)
 include(Catch)
 
-# Compiles the headers that all tests share, once. CMake needs a source for that, so there is an empty one.
+# Compiles the headers that all tests share, once without and once with optimization, because the compiler takes
+# precompiled headers only if they have the same. CMake needs a source for that, so there is an empty one.
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/precompiled.cpp "")
-add_library(tfdude_tests_precompiled OBJECT ${CMAKE_CURRENT_BINARY_DIR}/precompiled.cpp)
-set_target_properties(tfdude_tests_precompiled PROPERTIES POSITION_INDEPENDENT_CODE ON)
-target_include_directories(tfdude_tests_precompiled PRIVATE ${CMAKE_SOURCE_DIR}/tests)
-target_link_libraries(tfdude_tests_precompiled PRIVATE tfdude_open Catch2::Catch2 tfdude_options)
-set(TFDUDE_TESTS_HEADERS ${CMAKE_SOURCE_DIR}/tests/support/precompiled.hpp)
-target_precompile_headers(tfdude_tests_precompiled PRIVATE ${TFDUDE_TESTS_HEADERS})
+foreach(target tfdude_tests_precompiled tfdude_tests_precompiled_optimized)
+  add_library(${target} OBJECT ${CMAKE_CURRENT_BINARY_DIR}/precompiled.cpp)
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests)
+  target_link_libraries(${target} PRIVATE tfdude_open Catch2::Catch2 tfdude_options)
+  target_precompile_headers(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests/support/precompiled.hpp)
+endforeach()
+set(TFDUDE_OPTIMIZED_TEST $<$<CONFIG:Release>:-O1>)
+target_compile_options(tfdude_tests_precompiled_optimized PRIVATE ${TFDUDE_OPTIMIZED_TEST})
 
-# tfdude_use_precompiled(target...): for programs of the tests that are no Catch2 binaries, too.
+# tfdude_use_precompiled([OPTIMIZED] target...): for tests, and for their programs that are no Catch2 binaries.
 function(tfdude_use_precompiled)
-  foreach(target IN LISTS ARGN)
+  cmake_parse_arguments(ARG "OPTIMIZED" "" "" ${ARGN})
+  foreach(target IN LISTS ARG_UNPARSED_ARGUMENTS)
     # Uses -fPIC as the shared headers do: by default an executable's objects have -fPIE.
     target_compile_options(${target} PRIVATE -fPIC)
-    target_precompile_headers(${target} REUSE_FROM tfdude_tests_precompiled)
+    if(ARG_OPTIMIZED)
+      target_compile_options(${target} PRIVATE ${TFDUDE_OPTIMIZED_TEST})
+      target_precompile_headers(${target} REUSE_FROM tfdude_tests_precompiled_optimized)
+    else()
+      target_precompile_headers(${target} REUSE_FROM tfdude_tests_precompiled)
+    endif()
   endforeach()
 endfunction()
 
 # The output of Catch2 2 and 3 if a filter matches no test case; Catch2 2 still exits with success.
 set(TFDUDE_NOTHING_RAN "No test cases matched|No tests ran")
 
-# tfdude_add_tests(target LABELS label... [TIMEOUT seconds] [SKIPPED_BY regex] [OPTIMIZE flag] SOURCES file...
+# tfdude_add_tests(target [OPTIMIZED] LABELS label... [TIMEOUT seconds] [SKIPPED_BY regex] SOURCES file...
 # [LIBRARIES target...]): adds a Catch2 binary. Each of its test cases becomes a ctest test, which counts as skipped if
-# its output matches the regular expression. The flag replaces the -O0 of tests in a release build.
+# its output matches the regular expression. OPTIMIZED is for tests that compute for seconds.
 function(tfdude_add_tests target)
-  cmake_parse_arguments(ARG "" "TIMEOUT;SKIPPED_BY;OPTIMIZE" "LABELS;SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "OPTIMIZED" "TIMEOUT;SKIPPED_BY" "LABELS;SOURCES;LIBRARIES" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 60)
   endif()
@@ -35,10 +45,8 @@ function(tfdude_add_tests target)
   target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests)
   target_link_libraries(${target} PRIVATE test_support tfdude_open Catch2::Catch2WithMain tfdude_options
     ${ARG_LIBRARIES})
-  if(ARG_OPTIMIZE)
-    # The compiler takes precompiled headers only if they have the same optimization.
-    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:${ARG_OPTIMIZE}>)
-    target_precompile_headers(${target} PRIVATE ${TFDUDE_TESTS_HEADERS})
+  if(ARG_OPTIMIZED)
+    tfdude_use_precompiled(OPTIMIZED ${target})
   else()
     tfdude_use_precompiled(${target})
   endif()
