@@ -191,7 +191,7 @@ void Worker::move() {
   if (cycle && calm_ <= kGrace) return;
   std::optional<Transform> X_PC;
   if (random_.index(2) == 0) X_PC = random_.transform();
-  const auto moved = client_.move(id, parent, X_PC);
+  const auto moved = client_.move(id, parent, X_PC ? PartialTransform(*X_PC) : PartialTransform());
   const bool refused = !moved && denies(moved.error().code);
   const bool asked = moved || !never_asked(moved.error());
   if (!refused && !cycle && asked) model_.move(id, parent, X_PC, moved.has_value());

@@ -136,7 +136,8 @@ void Author::move() {
   begin(
       "move " + id + " under " + parent,
       [this, id, parent, X_PC] {
-        return route_move(process_->forest(), process_->directory(), id, {parent, X_PC})
+        const MoveRequest move{parent, X_PC ? PartialTransform(*X_PC) : PartialTransform()};
+        return route_move(process_->forest(), process_->directory(), id, move)
             .map([](Part part) { return std::vector<Part>{std::move(part)}; });
       },
       [this, id, parent, X_PC](const Result<void>& moved) {
