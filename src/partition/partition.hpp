@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <optional>
 #include <set>
@@ -95,6 +96,8 @@ class Partition {
   [[nodiscard]] std::vector<Page> take_pages() { return pages_.take_changed(); }
   [[nodiscard]] std::uint32_t page_count() const { return pages_.count(); }
   [[nodiscard]] std::size_t frame_count() const { return pages_.frame_count(); }
+  /// The number of replies kept for requests that may be repeated.
+  [[nodiscard]] std::size_t kept_replies() const { return replies_.size(); }
 
   /// The changes by requests since the last call that must be saved.
   [[nodiscard]] StateChange take_unsaved();

@@ -54,6 +54,12 @@ std::optional<Reply> ReplyCache::find(const PeerId& from, const Request& request
   return before->second;
 }
 
+std::size_t ReplyCache::size() const {
+  std::size_t all = 0;
+  for (const Peer& peer : peers_) all += peer.replies.size();
+  return all;
+}
+
 void ReplyCache::put(const PeerId& from, const Request& request, const Reply& reply) {
   const Number number = number_of(request);
   const auto known = index_.find(from);

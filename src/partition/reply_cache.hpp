@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <list>
@@ -35,6 +36,8 @@ class ReplyCache {
   /// applied; empty if the request is new and must be applied: then put() its reply.
   [[nodiscard]] std::optional<Reply> find(const PeerId& peer, const Request& request, Time now);
   void put(const PeerId& peer, const Request& request, const Reply& reply);
+  /// The number of stored replies. O(peers).
+  [[nodiscard]] std::size_t size() const;
 
  private:
   // Request::sequence, extended beyond its overflow.

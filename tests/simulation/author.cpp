@@ -30,16 +30,14 @@ Author::Author(std::shared_ptr<Process> process, std::size_t number, std::size_t
 void Author::start() { next(); }
 
 void Author::next() {
-  idle_ = true;
   if (stopped_) return;
   const Instant pause = std::chrono::microseconds(random_.index(40'000));
-  process_->later(pause, [self = shared_from_this()] {
+  process_->later("author", pause, [self = shared_from_this()] {
     if (!self->stopped_) self->step();
   });
 }
 
 void Author::step() {
-  idle_ = false;
   const auto& plan = process_->world().plan;
   if (!plan.stores || random_.uniform(0, 1) < plan.contest) return contest();
   const std::size_t draw = random_.index(100);
@@ -56,20 +54,18 @@ void Author::step() {
 
 void Author::begin(const std::string& what, Operation::Route route,
                    std::function<void(const Result<void>&)> then) {
-  const Instant began = process_->world().timeline.now();
-  process_->begin(std::make_shared<Operation>(
-      *process_, std::move(route),
-      [self = shared_from_this(), what, then, began](const Result<void>& outcome, const auto&) {
-        Surroundings& world = self->process_->world();
-        const std::string code = outcome ? "done" : std::string(to_string(outcome.error().code));
-        ++self->outcomes_[what.substr(0, what.find(' ')) + " " + code];
-        world.trace(self->prefix_ + " " + what + ": " + code);
-        if (world.timeline.now() > began + Operation::kTimeout + milliseconds(20)) {
-          world.violation(what + " did not end by its deadline");
-        }
-        then(outcome);
-        self->next();
-      }));
+  process_->begin(
+      what, std::make_shared<Operation>(
+                *process_, std::move(route),
+                [self = shared_from_this(), what, then](const Result<void>& outcome, const auto&) {
+                  Surroundings& world = self->process_->world();
+                  const std::string code =
+                      outcome ? "done" : std::string(to_string(outcome.error().code));
+                  ++self->outcomes_[what.substr(0, what.find(' ')) + " " + code];
+                  world.trace(self->prefix_ + " " + what + ": " + code);
+                  then(outcome);
+                  self->next();
+                }));
 }
 
 std::vector<std::string> Author::own(bool anchored) const { return model_.ids(prefix_, anchored); }
@@ -92,8 +88,9 @@ void Author::check_seen(const std::string& id, const std::string& parent) {
   const bool excused =
       !owner || !process.directory().reachable(*owner) || process.directory().behind() != nullptr;
   if (excused || (frame && frame->parent == parent)) return;
-  process.world().violation(id + " was hung under " + parent + ", and its author sees it " +
-                            (frame ? "under " + frame->parent : "nowhere"));
+  process.world().violation("an author does not see its change",
+                            id + " was hung under " + parent + ", and its author sees it " +
+                                (frame ? "under " + frame->parent : "nowhere"));
 }
 
 void Author::doubt_unless_stored(const std::string& id, const Result<void>& outcome) {
@@ -209,36 +206,39 @@ void Author::remove() {
 
 void Author::look_up(const std::string& a, const std::string& b, bool quiet) {
   auto plan = std::make_shared<LookupPlan>();
-  process_->begin(std::make_shared<Operation>(
-      *process_,
-      [this, a, b, plan]() -> Result<std::vector<Part>> {
-        auto planned = route_lookup(process_->forest(), process_->directory(), a, b);
-        if (!planned) return tl::unexpected(planned.error());
-        *plan = *std::move(planned);
-        return plan->parts;
-      },
-      [self = shared_from_this(), a, b, plan, quiet](const Result<void>& outcome,
-                                                     const std::vector<Reply>& replies) {
-        Surroundings& world = self->process_->world();
-        Result<StampedTransform> X_AB = fail(Errc::kTimeout, "");
-        if (outcome) {
-          std::vector<SegmentValues> answers;
-          for (const Reply& reply : replies) answers.push_back(std::get<SegmentValues>(reply.body));
-          X_AB = assemble(*plan, answers);
-        } else {
-          X_AB = tl::unexpected(outcome.error());
-        }
-        const std::string code = X_AB ? "done" : std::string(to_string(X_AB.error().code));
-        ++self->outcomes_["lookup " + code];
-        world.trace(self->prefix_ + " lookup " + a + " " + b + ": " + code);
-        std::string wrong;
-        if (X_AB) wrong = self->model_.judge(a, b, *X_AB, quiet);
-        if (quiet && !X_AB && denies(X_AB.error().code)) {
-          wrong = self->model_.judge(a, b, std::nullopt, true);
-        }
-        if (!wrong.empty()) world.violation(wrong);
-        if (!quiet) self->next();
-      }));
+  process_->begin(
+      "lookup of " + b + " in " + a,
+      std::make_shared<Operation>(
+          *process_,
+          [this, a, b, plan]() -> Result<std::vector<Part>> {
+            auto planned = route_lookup(process_->forest(), process_->directory(), a, b);
+            if (!planned) return tl::unexpected(planned.error());
+            *plan = *std::move(planned);
+            return plan->parts;
+          },
+          [self = shared_from_this(), a, b, plan, quiet](const Result<void>& outcome,
+                                                         const std::vector<Reply>& replies) {
+            Surroundings& world = self->process_->world();
+            Result<StampedTransform> X_AB = fail(Errc::kTimeout, "");
+            if (outcome) {
+              std::vector<SegmentValues> answers;
+              for (const Reply& reply : replies)
+                answers.push_back(std::get<SegmentValues>(reply.body));
+              X_AB = assemble(*plan, answers);
+            } else {
+              X_AB = tl::unexpected(outcome.error());
+            }
+            const std::string code = X_AB ? "done" : std::string(to_string(X_AB.error().code));
+            ++self->outcomes_["lookup " + code];
+            world.trace(self->prefix_ + " lookup " + a + " " + b + ": " + code);
+            std::string wrong;
+            if (X_AB) wrong = self->model_.judge(a, b, *X_AB, quiet);
+            if (quiet && !X_AB && denies(X_AB.error().code)) {
+              wrong = self->model_.judge(a, b, std::nullopt, true);
+            }
+            if (!wrong.empty()) world.violation("a wrong answer", wrong);
+            if (!quiet) self->next();
+          }));
 }
 
 // Any result is allowed, but in the end all must agree on it.

@@ -26,7 +26,8 @@ class Author : public std::enable_shared_from_this<Author> {
   /// Goes on until stop().
   void start();
   void stop() { stopped_ = true; }
-  [[nodiscard]] bool idle() const { return idle_; }
+  /// How many frames of its own it has tried to add.
+  [[nodiscard]] std::size_t added() const { return added_; }
 
   [[nodiscard]] faults::Model& model() { return model_; }
   [[nodiscard]] Process& process() { return *process_; }
@@ -59,7 +60,6 @@ class Author : public std::enable_shared_from_this<Author> {
   std::map<std::string, std::size_t> outcomes_;
   std::size_t added_ = 0;
   bool stopped_ = false;
-  bool idle_ = true;
 };
 
 }  // namespace tfdude::simulation

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "support/memory_store.hpp"
 
 namespace tfdude::simulation {
@@ -9,9 +11,13 @@ struct Disk {
   testing::MemoryStore store;
   bool full = false;
 
+  std::uint64_t epoch = 0;  ///< of the structure that is stored
+
   [[nodiscard]] Result<void> save(const StateChange& rows) {
     if (full) return fail(Errc::kState, "the disk is full");
-    return rows.empty() ? Result<void>() : store.save(rows);
+    if (rows.empty()) return {};
+    epoch = rows.epoch;
+    return store.save(rows);
   }
 };
 

@@ -38,7 +38,7 @@ void Follower::start() { next(); }
 void Follower::next() {
   if (stopped_) return;
   const Instant pause = std::chrono::microseconds(random_.index(60'000));
-  process_->later(pause, [self = shared_from_this()] {
+  process_->later("follower", pause, [self = shared_from_this()] {
     if (!self->stopped_) self->step();
   });
 }
@@ -52,15 +52,17 @@ void Follower::step() {
 void Follower::begin(const std::string& what, Operation::Route route,
                      std::function<void(const Result<void>&)> then) {
   process_->world().trace(tip() + ": begins to " + what);
-  process_->begin(std::make_shared<Operation>(
-      *process_, std::move(route),
-      [self = shared_from_this(), what, then](const Result<void>& outcome, const auto&) {
-        const std::string code = outcome ? "done" : std::string(to_string(outcome.error().code));
-        self->process_->world().trace(self->tip() + ": " + what + ": " + code);
-        ++self->outcomes_["follower: " + what.substr(0, what.find(' ')) + " " + code];
-        then(outcome);
-        self->next();
-      }));
+  process_->begin(
+      what, std::make_shared<Operation>(
+                *process_, std::move(route),
+                [self = shared_from_this(), what, then](const Result<void>& outcome, const auto&) {
+                  const std::string code =
+                      outcome ? "done" : std::string(to_string(outcome.error().code));
+                  self->process_->world().trace(self->tip() + ": " + what + ": " + code);
+                  ++self->outcomes_["follower: " + what.substr(0, what.find(' ')) + " " + code];
+                  then(outcome);
+                  self->next();
+                }));
 }
 
 // Uses new names of frames, because the state of the former ones is not known.
@@ -175,20 +177,20 @@ void Follower::judge(const StampedTransform& X) {
                            std::to_string(at.y()) + ", " + std::to_string(at.z()) + ")";
   const double value = at.y() - of_base.y();
   if (std::abs(at.x() - of_base.x()) > 1e-9 || std::abs(at.z() - of_base.z()) > 1e-9) {
-    return world.violation(what + ", half of what was written");
+    return world.violation("half a commit", what + ", half of what was written");
   }
   const auto number = static_cast<std::size_t>(std::lround(value));
   if (value < -1e-9 || number >= written_.size()) {
-    return world.violation(what + ", which nobody has written");
+    return world.violation("a value that nobody wrote", what + ", which nobody has written");
   }
   // Values of the owner's former process may be shown until all pages of the next one have arrived.
   if (number < newest_read_ && !std::exchange(may_go_back_, false)) {
-    return world.violation(what + ": value " + std::to_string(number) + " after " +
-                           std::to_string(newest_read_));
+    return world.violation("regress", what + ": value " + std::to_string(number) + " after " +
+                                          std::to_string(newest_read_));
   }
   if (written_[number].bases.count(base) == 0) {
-    return world.violation(what + ": value " + std::to_string(number) + " never was below " +
-                           base_of(base));
+    return world.violation("a value elsewhere", what + ": value " + std::to_string(number) +
+                                                    " never was below " + base_of(base));
   }
   if (number > newest_read_) {
     world.count("a watched path showed something newer");

@@ -29,12 +29,18 @@ class Follower : public std::enable_shared_from_this<Follower> {
 
   [[nodiscard]] Process& process() { return *process_; }
   [[nodiscard]] const std::map<std::string, std::size_t>& outcomes() const { return outcomes_; }
+  /// How many frames it has tried to add.
+  [[nodiscard]] std::size_t added() const { return 2 * static_cast<std::size_t>(generation_); }
   /// The owner of both edges; empty: it has none.
   [[nodiscard]] const std::string& partition() const { return partition_; }
   [[nodiscard]] std::string arm() const { return id("arm"); }
   [[nodiscard]] std::string tip() const { return id("tip"); }
   [[nodiscard]] bool watches() const { return watch_ != nullptr; }
   [[nodiscard]] Result<StampedTransform> read() const;
+  /// The groups of watchers that it belongs to.
+  [[nodiscard]] std::set<std::uint64_t> groups() const {
+    return watch_ != nullptr ? watch_->groups() : std::set<std::uint64_t>();
+  }
 
  private:
   /// One value of both edges.

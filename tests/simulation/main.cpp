@@ -64,21 +64,18 @@ int main(int argc, char** argv) {
     const Run again = run(plan);
     simulated += one.duration;
     for (const auto& [what, times] : one.counts) counts[what] += times;
-    const auto differs = std::mismatch(one.hashes.begin(), one.hashes.end(), again.hashes.begin(),
-                                       again.hashes.end());
-    const bool same = differs.first == one.hashes.end() && differs.second == again.hashes.end();
-    if (same && one.violations.empty()) continue;
+    const auto differs = first_difference(one.steps, again.steps);
+    if (!differs && one.failures.empty()) continue;
     ++failed;
     std::printf("%s\n", plan.text().c_str());
     if (shrunk) {
-      const auto fails = [](const Plan& milder) { return !run(milder).violations.empty(); };
+      const auto fails = [](const Plan& milder) { return !run(milder).failures.empty(); };
       std::printf("  milder: %s\n", shrink(plan, fails).text().c_str());
     }
-    if (!same) {
-      std::printf("  the second run differs from step %td on\n",
-                  differs.first - one.hashes.begin());
+    if (differs) std::printf("  the second run differs from %s\n", differs->c_str());
+    for (const Failure& failure : one.failures) {
+      std::printf("  %s: %s\n", failure.kind.c_str(), failure.what.c_str());
     }
-    for (const std::string& violation : one.violations) std::printf("  %s\n", violation.c_str());
   }
   // A state that never occurs is not tested.
   for (const char* rare : kRare) {

@@ -41,7 +41,8 @@ void Network::join(const std::shared_ptr<Process>& process) {
   for (const auto& [id, other] : processes_) {
     if (!other.lock()) continue;
     const auto wait = std::chrono::microseconds(5'000 + random_.index(150'000));
-    timeline_.after(wait, [this, a = process->id(), b = id] { meet(a, b); });
+    timeline_.after(wait, {"meeting", process->id()},
+                    [this, a = process->id(), b = id] { meet(a, b); });
   }
   processes_[process->id()] = process;
 }
@@ -51,7 +52,7 @@ void Network::meet(std::uint64_t a, std::uint64_t b) {
   const auto other = find(b);
   if (!one || !other) return;
   if (!reaches(one->host(), other->host()) || !reaches(other->host(), one->host())) {
-    timeline_.after(kRepeat, [this, a, b] { meet(a, b); });
+    timeline_.after(kRepeat, {"meeting", a}, [this, a, b] { meet(a, b); });
     return;
   }
   open(*one, b);
@@ -96,7 +97,8 @@ void Network::move(const Way& way) {
   if (channel.moving || channel.waiting.empty()) return;
   channel.moving = true;
   const bool lost = random_.uniform(0, 1) < loss_;
-  timeline_.after(delay() + (lost ? kRepeat : milliseconds(0)), [this, way] { arrive(way); });
+  timeline_.after(delay() + (lost ? kRepeat : milliseconds(0)), {"sample", way.second},
+                  [this, way] { arrive(way); });
 }
 
 void Network::arrive(const Way& way) {
@@ -110,7 +112,7 @@ void Network::arrive(const Way& way) {
   channel.moving = false;
   if (!reaches(from->host(), to->host()) || from->paused()) {
     channel.moving = true;
-    timeline_.after(kRepeat, [this, way] { arrive(way); });
+    timeline_.after(kRepeat, {"sample", way.second}, [this, way] { arrive(way); });
     return;
   }
   Sample sample = std::move(channel.waiting.front());
@@ -123,7 +125,7 @@ void Network::send(const Process& from, std::uint64_t to, std::function<void(Pro
   const int copies = random_.uniform(0, 1) < plan_.repeats ? 2 : 1;
   for (int i = 0; i < copies; ++i) {
     if (random_.uniform(0, 1) < loss_) continue;
-    timeline_.after(delay(), [this, host = from.host(), to, arrival] {
+    timeline_.after(delay(), {"datagram", to}, [this, host = from.host(), to, arrival] {
       const auto there = find(to);
       if (!there || !reaches(host, there->host())) return;
       there->run([there = there.get(), arrival] { arrival(*there); });

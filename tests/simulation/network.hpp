@@ -32,6 +32,8 @@ class Network {
         hosts_(kMostHosts) {}
 
   void join(const std::shared_ptr<Process>& process);
+  /// Null: it has ended.
+  [[nodiscard]] std::shared_ptr<Process> find(std::uint64_t process) const;
 
   /// Sends a datagram, which may be lost, arrive twice, or be overtaken.
   void send(const Process& from, std::uint64_t to, std::function<void(Process&)> arrival);
@@ -66,7 +68,6 @@ class Network {
 
   [[nodiscard]] bool reaches(std::size_t from, std::size_t to) const;
   [[nodiscard]] Instant delay();
-  [[nodiscard]] std::shared_ptr<Process> find(std::uint64_t process) const;
   void meet(std::uint64_t a, std::uint64_t b);
   void open(const Process& from, std::uint64_t to);
   void put(Channel& channel, const Sample& sample);

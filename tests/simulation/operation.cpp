@@ -21,7 +21,7 @@ Instant Operation::now() const { return caller_.world().timeline.now(); }
 
 void Operation::start() {
   deadline_ = now() + kTimeout;
-  caller_.later(kTimeout, [self = shared_from_this()] {
+  caller_.later("deadline", kTimeout, [self = shared_from_this()] {
     if (self->over_) return;
     if (self->phase_ == Phase::kPlan) {
       self->finish(fail(Errc::kTimeout, "not all is known"));
@@ -53,7 +53,7 @@ void Operation::plan() {
   if (parts) return ask(*std::move(parts));
   if (certain || !Discovery::may_appear(parts.error().code))
     return finish(tl::unexpected(parts.error()));
-  caller_.later(kPoll, [self = shared_from_this()] {
+  caller_.later("plan", kPoll, [self = shared_from_this()] {
     if (!self->over_ && self->phase_ == Phase::kPlan) self->plan();
   });
 }
@@ -80,7 +80,7 @@ void Operation::send(Instant pause, int round) {
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     if (!replies_[i]) caller_.send(parts_[i].partition, parts_[i].request);
   }
-  caller_.later(pause, [self = shared_from_this(), pause, round] {
+  caller_.later("repeat", pause, [self = shared_from_this(), pause, round] {
     self->send(std::min<Instant>(2 * pause, milliseconds(160)), round);
   });
 }
@@ -166,7 +166,7 @@ void Operation::await_change(Instant until, bool stale) {
   if (over_ || phase_ != Phase::kPlan) return;
   const bool changed = stale && caller_.forest().structure_version() != version_;
   if (changed || now() >= until) return plan();
-  caller_.later(milliseconds(1),
+  caller_.later("retry", milliseconds(1),
                 [self = shared_from_this(), until, stale] { self->await_change(until, stale); });
 }
 

@@ -16,6 +16,9 @@ constexpr Instant kBeat = milliseconds(60);
 constexpr Instant kLookForGone = milliseconds(50);
 constexpr Instant kYieldEvery = milliseconds(100);
 constexpr Instant kPushAfter = std::chrono::microseconds(20);
+constexpr Instant kLookAtLeases = milliseconds(1000);
+// How much later than its deadline a call may end.
+constexpr Instant kEndsWithin = milliseconds(20);
 
 }  // namespace
 
@@ -39,7 +42,9 @@ Process::Process(Surroundings& world, Setting setting)
       member_(forest_, directory_, setting_.partition),
       pushes_(
           forest_,
-          [this] { later(kPushAfter, [this] { pushes_.push_due(world_.timeline.now()); }); },
+          [this] {
+            later("push", kPushAfter, [this] { pushes_.push_due(world_.timeline.now()); });
+          },
           [this](const PushedValues& pushed) { push(pushed); }) {
   directory_.changes().watch();
 }
@@ -80,7 +85,7 @@ void Process::step_claim() {
     member_.take_name();
     announce(member_.introduce());
   }
-  later(milliseconds(5), [this] { step_claim(); });
+  later("claim", milliseconds(5), [this] { step_claim(); });
 }
 
 // The remaining frames are judged by the frames of others now, and by whether silent partitions are
@@ -91,7 +96,7 @@ void Process::take_frames() {
       now < born_ + kSearchTime && (awaits_presence() || !directory_.complete());
   const bool undecided =
       now < born_ + kSearchTime + milliseconds(3 * Absences::kGrace) && directory_.awaits_silent();
-  if (incomplete || undecided) return later(milliseconds(5), [this] { take_frames(); });
+  if (incomplete || undecided) return later("claim", milliseconds(5), [this] { take_frames(); });
   serve();
 }
 
@@ -100,16 +105,21 @@ void Process::serve() {
   if (setting_.disk != nullptr) left = *setting_.disk->store.load();
   const auto taken = member_.serve(left ? &*left : nullptr, setting_.configured, wall());
   if (!taken) {
-    world_.violation("partition " + partition() + " does not serve: " + taken.error().message);
+    world_.violation("a partition does not serve", partition() + ": " + taken.error().message);
     return leave();
   }
   serving_ = true;
+  if (left && left->epoch >= member_.presence().incarnation) {
+    world_.violation("an incarnation goes back",
+                     partition() + " had stored epoch " + std::to_string(left->epoch) +
+                         " and is served as " + std::to_string(member_.presence().incarnation));
+  }
   perform(member_.take_ready());
   // A daemon that starts needs room on the disk, and ends if there is none.
   if (failure_) return leave();
   if (setting_.disk != nullptr) (void)setting_.disk->store.save_configured(setting_.configured);
   announce(member_.introduce());
-  if (setting_.disk != nullptr) later(kSaveValuesEvery, [this] { save_values(); });
+  if (setting_.disk != nullptr) later("values", kSaveValuesEvery, [this] { save_values(); });
   react();
 }
 
@@ -122,6 +132,7 @@ void Process::leave() {
 
 void Process::resume() {
   if (--pauses_ > 0) return;
+  resumed_ = world_.timeline.now();
   for (const auto& what : std::exchange(backlog_, {})) run(what);
 }
 
@@ -133,8 +144,8 @@ void Process::run(std::function<void()> what) {
   }
 }
 
-void Process::later(Instant wait, std::function<void()> what) {
-  world_.timeline.after(wait, [weak = weak_from_this(), what = std::move(what)] {
+void Process::later(const char* kind, Instant wait, std::function<void()> what) {
+  world_.timeline.after(wait, {kind, id()}, [weak = weak_from_this(), what = std::move(what)] {
     if (const auto self = weak.lock()) self->run(what);
   });
 }
@@ -143,7 +154,7 @@ void Process::later(Instant wait, std::function<void()> what) {
 
 void Process::tick() {
   look_for_silent();
-  later(kBeat, [this] { tick(); });
+  later("tick", kBeat, [this] { tick(); });
 }
 
 // As Peers does.
@@ -174,6 +185,7 @@ void Process::hear(std::uint64_t from, const Sample& sample) {
   const bool was_silent = std::exchange(peer.silent, false);
   peer.heard = world_.timeline.now();
   if (const auto* page = std::get_if<Page>(&sample)) {
+    world_.steps.mix(page->epoch + page->number);
     member_.on_page(*page);
     if (!peer.said || peer.said->incarnation < page->incarnation) {
       peer.by_page.emplace();
@@ -185,6 +197,7 @@ void Process::hear(std::uint64_t from, const Sample& sample) {
     }
   } else {
     const auto& presence = std::get<Presence>(sample);
+    world_.steps.mix(presence.incarnation + presence.pages);
     if (was_silent || !peer.said || !(*peer.said == presence)) {
       peer.said = presence;
       member_.on_presence(presence, wall());
@@ -194,14 +207,15 @@ void Process::hear(std::uint64_t from, const Sample& sample) {
 }
 
 void Process::react() {
+  ++inputs_;
   const Outcome outcome = member_.take_outcome();
   if (outcome.to_commit && serving_) ask_commit(kPublishEvery);
   if (outcome.to_reply && serving_) ask_commit(Instant(0));
   if (outcome.to_yield && !std::exchange(yielding_, true)) {
-    later(kYieldEvery, [this] { yield(); });
+    later("yield", kYieldEvery, [this] { yield(); });
   }
   if (outcome.look_for_gone && !std::exchange(looking_for_gone_, true)) {
-    later(kLookForGone, [this] {
+    later("look for gone", kLookForGone, [this] {
       looking_for_gone_ = false;
       member_.on_time(world_.timeline.steady());
       react();
@@ -235,6 +249,7 @@ void Process::count(const Outcome& outcome) {
 
 void Process::on_request(std::uint64_t from, const Request& request) {
   if (!serving_) return;
+  world_.steps.mix((from << 32U) + request.sequence);
   const PeerId peer = peer_of(from);
   const auto reply_now = [&](const Reply& reply) {
     world_.network.send(*this, from, [reply](Process& there) { there.on_reply(reply); });
@@ -249,6 +264,7 @@ void Process::on_request(std::uint64_t from, const Request& request) {
 }
 
 void Process::on_reply(const Reply& reply) {
+  world_.steps.mix(reply.epoch + reply.sequence);
   const auto operations = operations_;
   for (const auto& one : operations) one->on_reply(reply);
   for (const auto& one : watches_) {
@@ -259,6 +275,7 @@ void Process::on_reply(const Reply& reply) {
 void Process::answer_watch(std::uint64_t from, const Request& request) {
   const auto& body = std::get<WatchRequest>(request.body);
   const std::uint64_t group = watch_group(partition(), member_.presence().incarnation, body);
+  if (pushes_.groups().empty()) later("leases", kLookAtLeases, [this] { look_at_leases(); });
   auto pushed = pushes_.watch(group, body, world_.timeline.now());
   Reply reply{request.sequence, 0, Done{}};
   if (pushed) {
@@ -267,6 +284,12 @@ void Process::answer_watch(std::uint64_t from, const Request& request) {
     reply.body = std::move(pushed.error());
   }
   world_.network.send(*this, from, [reply](Process& there) { there.on_reply(reply); });
+}
+
+// Groups that are not renewed end even if nothing is written.
+void Process::look_at_leases() {
+  pushes_.push_due(world_.timeline.now());
+  if (!pushes_.groups().empty()) later("leases", kLookAtLeases, [this] { look_at_leases(); });
 }
 
 void Process::push(const PushedValues& pushed) {
@@ -280,6 +303,7 @@ void Process::push(const PushedValues& pushed) {
 }
 
 void Process::on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed) {
+  world_.steps.mix(pushed.group + pushed.commit);
   for (const auto& one : watches_) {
     if (const auto watch = one.lock()) watch->on_pushed(from, number, pushed);
   }
@@ -293,8 +317,10 @@ void Process::listen(const std::string& partition, std::uint64_t group) {
   });
 }
 
-void Process::begin(std::shared_ptr<Operation> operation) {
+void Process::begin(const std::string& what, const std::shared_ptr<Operation>& operation) {
   operations_.push_back(operation);
+  world_.invariants.called(shared_from_this(), operation, what,
+                           world_.timeline.now() + Operation::kTimeout + kEndsWithin);
   operation->start();
 }
 
@@ -348,17 +374,25 @@ void Process::yield() {
     return parts;
   };
   const auto asked = ask_all();
-  begin(std::make_shared<Operation>(
-      *this, ask_all, [this, due, asked](const Result<void>& outcome, const auto& replies) {
-        bool current = outcome.has_value() && replies.size() == asked->size();
-        for (std::size_t i = 0; current && i < replies.size(); ++i) {
-          const Owner owner = (*asked)[i].owner;
-          current = directory_.epoch(owner) >= replies[i].epoch || !directory_.reachable(owner);
-        }
-        yielding_ = false;
-        member_.yield(due, current, wall());
-        react();
-      }));
+  begin("yield",
+        std::make_shared<Operation>(
+            *this, ask_all, [this, due, asked](const Result<void>& outcome, const auto& replies) {
+              bool current = outcome.has_value() && replies.size() == asked->size();
+              for (std::size_t i = 0; current && i < replies.size(); ++i) {
+                const Owner owner = (*asked)[i].owner;
+                current =
+                    directory_.epoch(owner) >= replies[i].epoch || !directory_.reachable(owner);
+              }
+              yielding_ = false;
+              member_.yield(due, current, wall());
+              react();
+            }));
+}
+
+std::size_t Process::open_calls() const {
+  const auto open = std::count_if(operations_.begin(), operations_.end(),
+                                  [](const auto& one) { return !one->over(); });
+  return static_cast<std::size_t>(open) + waiting_.size();
 }
 
 std::vector<std::string> Process::structure() const {

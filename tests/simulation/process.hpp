@@ -12,9 +12,11 @@
 #include "partition/claiming.hpp"
 #include "partition/member.hpp"
 #include "simulation/disk.hpp"
+#include "simulation/invariants.hpp"
 #include "simulation/network.hpp"
 #include "simulation/operation.hpp"
 #include "simulation/pushes.hpp"
+#include "simulation/steps.hpp"
 #include "simulation/watch.hpp"
 #include "tree/forest.hpp"
 
@@ -27,8 +29,10 @@ struct Surroundings {
   const Plan& plan;
   testing::Random& random;
   std::function<void(const std::string&)> trace;  ///< each step, so that two runs can be compared
-  std::function<void(const std::string&)> violation;  ///< reports a state that is not allowed
-  std::function<void(const std::string&)> count;      ///< counts states that should occur sometimes
+  Violation violation;
+  std::function<void(const std::string&)> count;  ///< counts states that should occur sometimes
+  Steps& steps;
+  Invariants& invariants;
 };
 
 /// A process as a sender: its number is in the first eight bytes.
@@ -54,6 +58,8 @@ class Process : public std::enable_shared_from_this<Process> {
 
   // ---- faults
   void pause() { ++pauses_; }
+  /// Whether it hangs, or has hung after this instant.
+  [[nodiscard]] bool hung_since(Instant then) const { return paused() || resumed_ >= then; }
   void resume();
   [[nodiscard]] bool paused() const { return pauses_ > 0; }
   /// Ends in order, and announces that.
@@ -72,7 +78,8 @@ class Process : public std::enable_shared_from_this<Process> {
   void on_watcher(std::uint64_t group);
 
   // ---- calls
-  void begin(std::shared_ptr<Operation> operation);
+  /// @param what  for people
+  void begin(const std::string& what, const std::shared_ptr<Operation>& operation);
   [[nodiscard]] Reply answer(const Request& request);
   /// Reports when all earlier changes are stored, and whether that succeeded.
   void when_stored(std::function<void(const Result<void>&)> then);
@@ -85,7 +92,8 @@ class Process : public std::enable_shared_from_this<Process> {
   /// Whether frames that it does not know do not exist.
   [[nodiscard]] bool discovered() const;
 
-  void later(Instant wait, std::function<void()> what);
+  /// @param kind  a literal
+  void later(const char* kind, Instant wait, std::function<void()> what);
 
   [[nodiscard]] std::uint64_t id() const { return setting_.id; }
   [[nodiscard]] std::size_t host() const { return setting_.host; }
@@ -98,6 +106,15 @@ class Process : public std::enable_shared_from_this<Process> {
   [[nodiscard]] Directory& directory() { return directory_; }
   [[nodiscard]] Member& member() { return member_; }
   [[nodiscard]] Surroundings& world() { return world_; }
+  /// Counts what has changed it.
+  [[nodiscard]] std::uint64_t inputs() const { return inputs_; }
+  /// The epoch of the stored structure; the greatest: nothing is stored.
+  [[nodiscard]] std::uint64_t stored_epoch() const {
+    return setting_.disk != nullptr ? setting_.disk->epoch : ~0ULL;
+  }
+  /// Calls that have not ended, and changes that wait to be stored.
+  [[nodiscard]] std::size_t open_calls() const;
+  [[nodiscard]] std::vector<std::uint64_t> pushed_groups() const { return pushes_.groups(); }
   /// id, parent and partition of each frame whose owner is reachable; sorted.
   [[nodiscard]] std::vector<std::string> structure() const;
 
@@ -119,6 +136,7 @@ class Process : public std::enable_shared_from_this<Process> {
 
   [[nodiscard]] Time wall() const;
   void answer_watch(std::uint64_t from, const Request& request);
+  void look_at_leases();
   void push(const PushedValues& pushed);
   void each_server(const std::string& partition, const std::function<void(std::uint64_t)>& tell);
   void tick();
@@ -156,11 +174,14 @@ class Process : public std::enable_shared_from_this<Process> {
   std::uint32_t sequence_ = 0;
   Instant born_{};
   Instant ticked_{};
+  Instant resumed_{-1};
+  std::uint64_t inputs_ = 0;
   int pauses_ = 0;
   bool serving_ = false;
   bool ended_ = false;
   bool committing_ = false;
   bool commit_asked_ = false;
+  bool values_due_ = false;
   bool yielding_ = false;
   bool looking_for_gone_ = false;
 };

@@ -23,7 +23,7 @@ void Process::ask_commit(Instant wait) {
     return;
   }
   committing_ = true;
-  later(wait, [this] { commit(); });
+  later("commit", wait, [this] { commit(); });
 }
 
 // Taken now, on the disk a moment later; a process that is killed meanwhile has stored it or not.
@@ -33,11 +33,12 @@ void Process::commit() {
   const auto ready = std::make_shared<Ready>(member_.take_ready());
   const auto longest = static_cast<std::size_t>(world_.plan.disk.count());
   const Instant disk(setting_.disk != nullptr ? world_.random.index(longest + 1) : 0);
-  later(disk, [this, ready, waiting] {
+  later("disk", disk, [this, ready, waiting] {
     perform(*ready);
     const Result<void> stored = failure_ ? tl::unexpected(*failure_) : Result<void>();
     for (const auto& then : *waiting) then(stored);
     committing_ = false;
+    if (std::exchange(values_due_, false)) save_values();
     if (commit_asked_ || failure_) ask_commit(failure_ ? kRetryStoring : kPublishEvery);
   });
 }
@@ -53,6 +54,7 @@ void Process::perform(const Ready& ready) {
   if (stored || ready.refused) {
     const auto said = member_.stored(ready);
     for (const Page& page : ready.pages) {
+      if (stored) world_.invariants.publishes(*this, page);
       pages_[page.number] = page;
       world_.network.publish(*this, page);
     }
@@ -63,16 +65,21 @@ void Process::perform(const Ready& ready) {
   for (const PendingReply& pending : ready.replies) {
     Reply reply = pending.reply;
     if (!stored) reply.body = stored.error();
+    world_.invariants.replies(*this, reply);
     world_.network.send(*this, process_of(pending.to),
                         [reply](Process& there) { there.on_reply(reply); });
   }
   react();
 }
 
+// One thread does both.
 void Process::save_values() {
-  later(kSaveValuesEvery, [this] { save_values(); });
-  // One thread does both.
-  if (committing_ || setting_.disk->full) return;
+  if (committing_) {
+    values_due_ = true;
+    return;
+  }
+  later("values", kSaveValuesEvery, [this] { save_values(); });
+  if (setting_.disk->full) return;
   auto [edges, commit] = forest_.changed_since(saved_commit_);
   saved_commit_ = commit;
   (void)setting_.disk->store.save_values(member_.storable(std::move(edges)), {});

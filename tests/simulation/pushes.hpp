@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <vector>
 
 #include "partition/watching.hpp"
 #include "simulation/timeline.hpp"
@@ -26,8 +27,15 @@ class Pushes {
   /// A reader of the group was matched only now.
   void tell_all(std::uint64_t group);
 
-  /// Pushes the values that were written since the last call.
+  /// Pushes the values that were written since the last call, and ends groups that were not
+  /// renewed.
   void push_due(Instant now);
+
+  [[nodiscard]] std::vector<std::uint64_t> groups() const {
+    std::vector<std::uint64_t> all;
+    for (const auto& [group, state] : groups_) all.push_back(group);
+    return all;
+  }
 
  private:
   struct Group {

@@ -1,12 +1,16 @@
 #include "simulation/verdict.hpp"
 
 #include <algorithm>
+#include <set>
 
 namespace tfdude::simulation {
 namespace {
 
 using faults::base_of;
 using faults::partition_name;
+
+// A call asks a few times, and the replies to it are kept until the next one.
+constexpr std::size_t kRepliesPerClient = 8;
 
 std::string difference(const std::vector<std::string>& a, const std::vector<std::string>& b) {
   std::string text;
@@ -47,9 +51,9 @@ Process* Cast::find_daemon(const std::string& partition) const {
   return nullptr;
 }
 
-void Verdict::violation(const std::string& what) {
+void Verdict::violation(const std::string& kind, const std::string& what) {
   agreed_ = false;
-  calls_.violation(what);
+  calls_.violation(kind, what);
 }
 
 void Verdict::check() {
@@ -67,18 +71,69 @@ void Verdict::check() {
   check_owners(*all.back());
   for (Author* author : authors) check_author(*author);
   for (const auto& follower : cast_.followers) check_follower(*follower);
+  for (const auto& follower : cast_.followers) all.push_back(&follower->process());
+  for (Process* one : all) check_kept(*one);
+}
+
+// Nothing grows: what is kept is bounded by what the run did, and what served calls, watches and
+// silences that are over is gone.
+void Verdict::check_kept(Process& one) {
+  const std::string who = one.partition().empty() ? "a client" : one.partition();
+  const auto grows = [&](const std::string& what) { violation("something grows", who + what); };
+  if (one.open_calls() > 0) grows(" has " + std::to_string(one.open_calls()) + " open calls");
+  for (const Absent& absent : one.directory().absent()) {
+    if (cast_.serves(absent.partition))
+      grows(" has not forgotten the absence of " + absent.partition);
+    if (absent.kind == Absent::Kind::kSilent) grows(" takes " + absent.partition + " for silent");
+  }
+  if (!one.partition().empty()) check_kept_by_owner(one);
+}
+
+void Verdict::check_kept_by_owner(Process& owner) {
+  const auto grows = [&](const std::string& what) {
+    violation("something grows", owner.partition() + what);
+  };
+  const Partition* partition = owner.member().partition();
+  if (partition == nullptr) return;
+  const std::size_t clients = cast_.authors.size() + cast_.followers.size();
+  if (partition->kept_replies() > kRepliesPerClient * clients) {
+    grows(" keeps " + std::to_string(partition->kept_replies()) + " replies");
+  }
+  std::set<std::string> frames;
+  std::set<std::string> tombstones;
+  for (const Sample& sample : owner.published()) {
+    const auto* page = std::get_if<Page>(&sample);
+    if (page == nullptr) continue;
+    for (const PageEntry& entry : page->entries) frames.insert(entry.id);
+    for (const Tombstone& tombstone : page->tombstones) tombstones.insert(tombstone.id);
+  }
+  if (frames.size() + tombstones.size() > named_) {
+    grows(" lists " + std::to_string(frames.size()) + " frames and " +
+          std::to_string(tombstones.size()) + " tombstones of " + std::to_string(named_));
+  }
+  for (const std::string& id : tombstones) {
+    if (frames.count(id) > 0) grows(" lists " + id + " and its tombstone");
+  }
+  std::set<std::uint64_t> watched;
+  for (const auto& follower : cast_.followers) watched.merge(follower->groups());
+  for (const std::uint64_t group : owner.pushed_groups()) {
+    if (watched.count(group) == 0) grows(" pushes to a group that nobody watches");
+  }
 }
 
 void Verdict::check_replica(Process& one, const std::vector<std::string>& expected) {
   const std::string who = one.partition().empty() ? "a client" : one.partition();
-  if (!one.partition().empty() && !one.serves()) violation(who + " does not serve");
-  if (one.structure() != expected) {
-    violation(who + " sees " + difference(one.structure(), expected));
+  if (!one.partition().empty() && !one.serves()) {
+    violation("a daemon does not serve", who);
   }
-  if (!one.member().pending_yields().empty()) violation(who + " has something to yield");
+  if (one.structure() != expected) {
+    violation("replicas differ", who + " sees " + difference(one.structure(), expected));
+  }
+  if (!one.member().pending_yields().empty()) violation("a yield is pending", who);
   for (const PartitionInfo& partition : one.directory().partitions()) {
     if (partition.reachable != cast_.serves(partition.name)) {
-      violation(who + (partition.reachable ? " still hears " : " misses ") + partition.name);
+      violation("presences differ",
+                who + (partition.reachable ? " still hears " : " misses ") + partition.name);
     }
   }
 }
@@ -109,9 +164,9 @@ void Verdict::check_follower(Follower& follower) {
   calls_.count("watched paths checked", 1);
   const auto seen = follower.read();
   if (!seen) {
-    violation(follower.tip() + " is not seen: " + seen.error().message);
+    violation("a watched path shows nothing", follower.tip() + ": " + seen.error().message);
   } else if (((X_WB->pose * X_BT->pose).translation() - seen->pose.translation()).norm() > 1e-9) {
-    violation(follower.tip() + " is not seen where it is");
+    violation("a watched path shows an old value", follower.tip());
   }
 }
 
@@ -122,13 +177,17 @@ void Verdict::check_owners(Process& one) {
     if (i == plan_.lost) continue;
     const auto frame = one.forest().info(base_of(i));
     const std::string owner = frame ? one.directory().name(frame->owner) : "nobody";
-    if (owner != cast_.name_of_daemon(i)) violation(base_of(i) + " is of " + owner);
+    if (owner != cast_.name_of_daemon(i)) {
+      violation("a configured frame is another's", base_of(i) + " is of " + owner);
+    }
     const auto extra = one.forest().info(extra_of(i));
     if (extra && !cast_.has_extra[i] && is_left_over(*extra, one)) continue;
     if (extra.has_value() != cast_.has_extra[i]) {
-      violation(extra_of(i) + (extra ? " is there" : " is missing"));
+      violation("a configuration does not hold",
+                extra_of(i) + (extra ? " is there" : " is missing"));
     } else if (extra && one.directory().name(extra->owner) != cast_.name_of_daemon(i)) {
-      violation(extra_of(i) + " is of " + one.directory().name(extra->owner));
+      violation("a configured frame is another's",
+                extra_of(i) + " is of " + one.directory().name(extra->owner));
     }
   }
 }
@@ -153,7 +212,7 @@ void Verdict::check_author(Author& author) {
         seen = {id, there->parent, process.directory().name(there->owner), there->attached};
       }
       const std::string wrong = faults::misplaced(id, model, there ? &seen : nullptr);
-      if (!wrong.empty()) violation(wrong);
+      if (!wrong.empty()) violation("an acknowledged change is lost", wrong);
     }
   }
   if (!agreed_) return;

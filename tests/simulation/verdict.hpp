@@ -8,6 +8,7 @@
 
 #include "simulation/author.hpp"
 #include "simulation/follower.hpp"
+#include "simulation/invariants.hpp"
 #include "simulation/plan.hpp"
 #include "simulation/process.hpp"
 
@@ -39,27 +40,31 @@ struct Cast {
 class Verdict {
  public:
   struct Calls {
-    std::function<void(const std::string&)> violation;
+    Violation violation;
     std::function<void(const std::string&, std::size_t)> count;
     std::function<void(Instant)> wait;
   };
 
-  Verdict(const Plan& plan, const Cast& cast, Calls calls)
-      : plan_(plan), cast_(cast), calls_(std::move(calls)) {}
+  /// @param named  how many frames anybody has tried to add
+  Verdict(const Plan& plan, const Cast& cast, std::size_t named, Calls calls)
+      : plan_(plan), cast_(cast), named_(named), calls_(std::move(calls)) {}
 
   void check();
 
  private:
-  void violation(const std::string& what);
+  void violation(const std::string& kind, const std::string& what);
   [[nodiscard]] bool passes_over_one(Process& client) const;
   void check_replica(Process& one, const std::vector<std::string>& expected);
   void check_follower(Follower& follower);
   void check_owners(Process& one);
   [[nodiscard]] bool is_left_over(const FrameInfo& frame, Process& seen_by) const;
   void check_author(Author& author);
+  void check_kept(Process& one);
+  void check_kept_by_owner(Process& owner);
 
   const Plan& plan_;
   const Cast& cast_;
+  const std::size_t named_;
   const Calls calls_;
   bool agreed_ = true;
 };

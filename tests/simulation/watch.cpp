@@ -14,7 +14,7 @@ constexpr Instant kRetryAfter = milliseconds(50);
 
 void Watch::attend() {
   look();
-  process_.later(kRetryAfter, [weak = weak_from_this()] {
+  process_.later("watch", kRetryAfter, [weak = weak_from_this()] {
     if (const auto self = weak.lock()) self->attend();
   });
 }
@@ -56,7 +56,7 @@ void Watch::ask(WatchRoute& route) {
 void Watch::open(const WatchRoute::Source& source) {
   if (!opened_.insert(source.group).second) return;
   const auto wait = std::chrono::microseconds(process_.world().random.index(50'000));
-  process_.later(wait, [weak = weak_from_this(), source] {
+  process_.later("match", wait, [weak = weak_from_this(), source] {
     const auto self = weak.lock();
     if (!self) return;
     self->heard_.insert(source.group);

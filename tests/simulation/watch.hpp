@@ -28,6 +28,9 @@ class Watch : public std::enable_shared_from_this<Watch> {
   /// Answers from pushed values; no answer if the path was never live.
   [[nodiscard]] Result<StampedTransform> read() const { return path_.lookup({}); }
 
+  /// The groups whose values it needs.
+  [[nodiscard]] std::set<std::uint64_t> groups() const { return path_.groups(); }
+
   // ---- input from the process
   void on_reply(const Reply& reply);
   /// @param from  the process that has pushed it; @param number  it counts what it pushes

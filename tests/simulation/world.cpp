@@ -13,6 +13,7 @@ using faults::base_edge;
 using faults::base_of;
 
 constexpr Instant kLook = milliseconds(20);
+constexpr std::size_t kMostFailures = 10;
 // Longer than a participant takes to count as gone, to be discovered again, to claim its name and
 // to yield.
 constexpr Instant kRest = milliseconds(12000);
@@ -25,25 +26,32 @@ class World {
         timeline_(plan.seed),
         network_(timeline_, plan),
         random_(plan.seed ^ 0x776f726cU),
+        invariants_([this](const auto& kind, const auto& what) { violation(kind, what); }),
         surroundings_{timeline_,
                       network_,
                       plan_,
                       random_,
                       [this](const std::string& step) { note(step); },
-                      [this](const std::string& what) { violation(what); },
-                      [this](const std::string& what) { ++run_.counts[what]; }},
+                      [this](const auto& kind, const auto& what) { violation(kind, what); },
+                      [this](const std::string& what) { ++run_.counts[what]; },
+                      run_.steps,
+                      invariants_},
         cast_(plan),
         disks_(plan.owners + 1),
         offsets_(plan.owners),
-        down_(plan.owners, 0) {}
+        down_(plan.owners, 0) {
+    run_.steps.add({}, {"start"});
+    timeline_.watch([this](const Touch& touch) { run_.steps.add(timeline_.now(), touch); },
+                    [this](const Touch& touch) { look_at(touch); });
+  }
 
   Run run() {
     for (std::size_t i = 0; i < plan_.owners; ++i) start_daemon(i);
     for (std::size_t i = 0; i < plan_.clients; ++i) start_author(i);
     for (std::size_t i = 0; i < plan_.followers; ++i) start_follower(i);
     for (const Fault& fault : plan_.faults) {
-      timeline_.at(fault.begin, [this, &fault] { begin(fault); });
-      timeline_.at(fault.end, [this, &fault] { end(fault); });
+      timeline_.at(fault.begin, {"fault"}, [this, &fault] { begin(fault); });
+      timeline_.at(fault.end, {"end of fault"}, [this, &fault] { end(fault); });
     }
     look_after();
     advance(plan_.storm);
@@ -54,11 +62,12 @@ class World {
     advance(plan_.storm + kRest);
     Verdict({plan_,
              cast_,
-             {[this](const std::string& what) { violation(what); },
+             frames_named(),
+             {[this](const auto& kind, const auto& what) { violation(kind, what); },
               [this](const std::string& what, std::size_t n) { run_.counts[what] += n; },
               [this](Instant wait) { advance(timeline_.now() + wait); }}})
         .check();
-    if (replaced_) violation("one that was replaced serves on");
+    if (replaced_) violation("one that was replaced serves on", replaced_->partition());
     for (const auto& author : cast_.authors) {
       for (const auto& [what, count] : author->outcomes()) run_.counts[what] += count;
     }
@@ -75,22 +84,37 @@ class World {
     }
   }
 
+  // What an event has changed, and whether that is allowed.
+  void look_at(const Touch& touch) {
+    if (const auto touched = touch.who != 0 ? network_.find(touch.who) : nullptr) {
+      run_.steps.mix(touched->forest().structure_version());
+      run_.steps.mix(touched->directory().latest_lamport_time());
+      run_.steps.mix(touched->member().presence().incarnation + touched->open_calls());
+      invariants_.after(*touched);
+    }
+    invariants_.after(timeline_.now());
+  }
+
   void note(const std::string& step) {
-    std::uint64_t hash = run_.hashes.empty() ? 14695981039346656037ULL : run_.hashes.back();
-    const std::string line = std::to_string(timeline_.now().count()) + " " + step;
-    for (const char c : line) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
-    run_.hashes.push_back(hash);
+    run_.steps.mix(step);
     if (trace_)
       std::printf("%12.3f ms  %s\n",
                   std::chrono::duration<double, std::milli>(timeline_.now()).count(), step.c_str());
   }
 
-  void violation(const std::string& what) {
-    note("VIOLATION " + what);
-    if (run_.violations.size() < 10) {
-      run_.violations.push_back(std::to_string(timeline_.now().count() / 1'000'000) +
-                                " ms: " + what);
-    }
+  void violation(const std::string& kind, const std::string& what) {
+    note("VIOLATION: " + kind + ": " + what);
+    if (run_.failures.size() >= kMostFailures) return;
+    run_.failures.push_back(
+        {kind, std::to_string(timeline_.now().count() / 1'000'000) + " ms: " + what});
+  }
+
+  // How many frames anybody has tried to add, including those of the configurations.
+  [[nodiscard]] std::size_t frames_named() const {
+    std::size_t named = 1 + 2 * plan_.owners + kContested;
+    for (const auto& author : cast_.authors) named += author->added();
+    for (const auto& follower : cast_.followers) named += follower->added();
+    return named;
   }
 
   [[nodiscard]] Disk* disk_of(std::size_t owner) {
@@ -155,7 +179,7 @@ class World {
       cast_.daemons[i].reset();
       start_daemon(i);
     }
-    timeline_.after(kLook, [this] { look_after(); });
+    timeline_.after(kLook, {"look"}, [this] { look_after(); });
   }
 
   void begin(const Fault& fault) {
@@ -248,7 +272,7 @@ class World {
     if (owner == cast_.wild) replaced_.reset();
     if (!cast_.daemons[owner]) return;
     auto dying = std::exchange(cast_.daemons[owner], nullptr);
-    if (gently) timeline_.after(milliseconds(5), [dying] {});
+    if (gently) timeline_.after(milliseconds(5), {"end"}, [dying] {});
   }
 
   void bring_up(std::size_t owner) {
@@ -260,6 +284,8 @@ class World {
   Timeline timeline_;
   Network network_;
   testing::Random random_;
+  Invariants invariants_;
+  Run run_;
   Surroundings surroundings_;
   Cast cast_;
   std::vector<Disk> disks_;  // the last is the renamed one's
@@ -269,7 +295,6 @@ class World {
   std::shared_ptr<Process> replaced_;  // the wild daemon, while it hangs
   const Fault* replaced_by_ = nullptr;
   std::uint64_t processes_ = 0;
-  Run run_;
 };
 
 }  // namespace

@@ -1,21 +1,25 @@
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <map>
-#include <memory>
-#include <set>
 #include <string>
 #include <vector>
 
-#include "simulation/author.hpp"
-#include "simulation/follower.hpp"
+#include "simulation/plan.hpp"
+#include "simulation/steps.hpp"
 
 namespace tfdude::simulation {
 
+/// A rule that was broken.
+struct Failure {
+  std::string kind;  ///< two runs with the same one fail in the same way
+  std::string what;
+};
+
 /// The result of a run.
 struct Run {
-  std::vector<std::string> violations;
-  std::vector<std::uint64_t> hashes;          ///< of the steps so far, after each
+  std::vector<Failure> failures;  ///< the first ones
+  Steps steps;
   std::map<std::string, std::size_t> counts;  ///< of outcomes, faults, and rare states
   Instant duration{};
 };

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "partition/messages.hpp"
+#include "simulation/network.hpp"
+#include "simulation/timeline.hpp"
+
+namespace tfdude::simulation {
+
+class Operation;
+class Process;
+
+/// Reports a state that is not allowed.
+/// @param kind  the rule that is broken: two runs that break the same one fail in the same way
+using Violation = std::function<void(const std::string& kind, const std::string& what)>;
+
+/// The rules that hold after each event of a run, whoever it concerns:
+///
+/// - The incarnation of a process only grows, and no other process of its partition ever has it.
+/// - What a process knows of a partition that it hears only grows: incarnation and epoch.
+/// - No frame is below itself, and an owner publishes exactly the frames that it holds.
+/// - Nobody hears of what is not stored: no page, and no reply to a change.
+/// - Each call ends by its deadline.
+class Invariants {
+ public:
+  explicit Invariants(Violation violation) : violation_(std::move(violation)) {}
+
+  /// An event has ended that concerned this process.
+  void after(Process& one);
+  /// An event has ended.
+  void after(Instant now);
+
+  /// A call that must have ended by then, unless its process has ended or hung.
+  void called(const std::shared_ptr<Process>& caller, const std::shared_ptr<Operation>& call,
+              const std::string& what, Instant must_end);
+
+  /// What a process is about to publish.
+  void publishes(const Process& one, const Sample& sample);
+  /// What a process is about to reply to a request that may have changed something.
+  void replies(const Process& one, const Reply& reply);
+
+ private:
+  struct Heard {
+    std::uint64_t incarnation = 0;
+    std::uint64_t epoch = 0;
+    bool may_fall = true;  // once: when the pages of this incarnation replace those before
+  };
+  struct Known {
+    std::uint64_t inputs = ~0ULL;
+    std::uint64_t structure = ~0ULL;
+    std::uint64_t incarnation = 0;
+    std::map<std::string, Heard> others;               // that are reachable
+    std::map<std::uint32_t, std::uint64_t> published;  // epochs, by page
+  };
+  struct Call {
+    std::weak_ptr<Process> caller;
+    std::weak_ptr<Operation> call;
+    std::string what;
+  };
+
+  void check_incarnation(Process& one, Known& known);
+  void check_heard(Process& one, Known& known);
+  void check_structure(Process& one);
+
+  const Violation violation_;
+  std::map<std::uint64_t, Known> known_;                                    // by process
+  std::map<std::pair<std::string, std::uint64_t>, std::uint64_t> numbers_;  // processes
+  std::multimap<Instant, Call> calls_;                                      // by when they must end
+};
+
+}  // namespace tfdude::simulation
