@@ -52,8 +52,12 @@ void Directory::apply(const Presence& presence, Time now) {
   Owner owner = kHeldHere;
   (void)known(presence.partition, owner);
   if (owner == kHeldHere) return;
-  if (presence.serving && !partitions_[owner].outdated(presence.incarnation)) {
-    hear_absent(owner, presence.absent, now);
+  if (presence.serving) {
+    // Also of one that was forgotten here: two that have forgotten each other go on as later ones.
+    hear_of_itself(presence.absent);
+    if (!partitions_[owner].outdated(presence.incarnation)) {
+      hear_absent(owner, presence.absent, now);
+    }
   }
   Known& partition = partitions_[owner];
   if (presence.stopped) {

@@ -12,11 +12,11 @@ using Standing = Succession::Standing;
 
 bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
   if (!partition.outdated(incarnation)) return false;
-  // A participant that misses it informs it, and it continues with a higher number. But a
-  // participant without a partition cannot inform it.
+  // A participant that misses it, or has forgotten it, informs it, and it continues with a higher
+  // number. But a participant without a partition cannot inform it.
   const bool has_voice = !partitions_.front().info.name.empty();
   const bool is_told = has_voice && absences_.find(partition.info.name);
-  if (!is_told && !partition.info.reachable && !partition.forgotten) {
+  if (!is_told && !partition.info.reachable) {
     partition.live = partition.heard_of = 0;
     partition.successor.reset();
     return false;
@@ -93,14 +93,18 @@ void Directory::hear_absent(Owner from, const std::vector<Absent>& absent, Time 
     // A sender is reachable.
     if (number == from) continue;
     if (Absences::outlived(one.kind)) outlived.insert(number);
-    if (number != kHeldHere) {
-      hear_of(one, teller, now);
-    } else if (one.incarnation < IncarnationSource::kEnd) {
-      std::uint64_t& latest = one.kind == Absent::Kind::kForgotten ? own_forgotten_ : own_heard_of_;
-      latest = std::max(latest, one.incarnation);
-    }
+    if (number != kHeldHere) hear_of(one, teller, now);
   }
   claims_.set_outlived(from, std::move(outlived));
+}
+
+void Directory::hear_of_itself(const std::vector<Absent>& absent) {
+  const std::string& own = partitions_.front().info.name;
+  for (const Absent& one : absent) {
+    if (own.empty() || one.partition != own || one.incarnation >= IncarnationSource::kEnd) continue;
+    std::uint64_t& latest = one.kind == Absent::Kind::kForgotten ? own_forgotten_ : own_heard_of_;
+    latest = std::max(latest, one.incarnation);
+  }
 }
 
 void Directory::hear_of(const Absent& one, const std::string& teller, Time now) {

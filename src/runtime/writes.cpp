@@ -136,6 +136,11 @@ Result<std::vector<Part>> Writes::route_forget(const Directory& directory,
   if (member_.partition() != nullptr) {
     all.push_back({kHeldHere, member_.name(), Request{0, member_.name(), body}});
   }
+  // A client cannot tell the partition itself, should it return.
+  if (all.empty()) {
+    return fail(Errc::kUnreachable, "no partition is reachable that could remember that " +
+                                        quote(partition) + " is forgotten");
+  }
   return all;
 }
 

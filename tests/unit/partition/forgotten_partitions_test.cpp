@@ -51,6 +51,28 @@ TEST_CASE("what is forgotten is gone, for those as well who were away when it wa
   CHECK(base.directory.absent().empty());
 }
 
+TEST_CASE("two partitions that have forgotten each other learn of it from each other") {
+  Witness base;
+  base.lose("arm", 1);
+  base.wait();
+  REQUIRE(base.directory.forget("arm", 1, kNow));
+  Presence arm = presence_of("arm", 1, 1);
+  arm.absent = {{"base", 0, Kind::kForgotten, 1}};
+  base.directory.apply(arm, kNow);
+  CHECK_FALSE(base.directory.owner("arm"));
+  CHECK(base.directory.hidden_by(1) == 1);
+}
+
+TEST_CASE("a client cannot tell a partition that it has forgotten it, so it hears it again") {
+  Witness client("");
+  client.lose("arm", 1);
+  client.wait();
+  REQUIRE(client.directory.forget("arm", 1, kNow));
+  CHECK_FALSE(client.directory.owner("arm"));
+  client.hear("arm", 1, 10);
+  CHECK(client.owner_of("hand") == "arm");
+}
+
 TEST_CASE("what was forgotten while it still seemed to be there is forgotten as that ends") {
   Witness base;
   Presence head = presence_of("head", 1, 0);

@@ -185,6 +185,10 @@ TEST_CASE("writes: a partition is forgotten once it is not there, at all who are
   REQUIRE(writer.writes.forget("leg"));
   CHECK_FALSE(writer.structure.forest.exists("foot"));
   CHECK_FALSE(arm.node().exists("foot"));
+  // Nobody is left who could tell a partition that returns.
+  arm.leave();
+  CHECK(outcome(writer.writes.forget("arm")) == "unreachable");
+  CHECK(writer.structure.forest.exists("hand"));
 }
 
 }  // namespace tfdude
