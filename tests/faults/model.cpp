@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <set>
+#include <utility>
 
 #include "support/oracle.hpp"
 #include "support/pose_diff.hpp"
@@ -106,6 +107,61 @@ void Model::remove(const std::string& id, bool done) {
     insert(frames_.at(below).possible, std::nullopt);
     frames_.at(below).doomed = true;
   }
+}
+
+void Model::may_be_as_in(const Model& earlier, const std::string& partition) {
+  for (const auto& [id, before] : earlier.frames_) {
+    if (before.partition != partition) continue;
+    auto now = frames_.find(id);
+    if (now == frames_.end()) {
+      now = frames_.insert(removed_.extract(id)).position;
+      // Others may know that a frame above it was removed.
+      now->second.doomed = true;
+    }
+    Frame& frame = now->second;
+    for (const auto& place : before.possible) insert(frame.possible, place);
+    frame.doomed = frame.doomed || before.doomed;
+    frame.may_move_late = frame.may_move_late || before.may_move_late;
+  }
+  for (auto& [id, frame] : frames_) {
+    const bool later = earlier.frames_.count(id) == 0 && earlier.removed_.count(id) == 0;
+    if (frame.partition == partition && later) insert(frame.possible, std::nullopt);
+  }
+  allow_cycles();
+  allow_removals();
+}
+
+// A frame may be below one again that was removed after it was moved away: it is removed, too, with
+// all below it.
+void Model::allow_removals() {
+  std::vector<std::string> doomed;
+  for (const auto& [id, frame] : frames_) {
+    const bool orphan = std::any_of(
+        frame.possible.begin(), frame.possible.end(),
+        [this](const auto& place) { return place && removed_.count(place->parent) > 0; });
+    if (orphan) doomed.push_back(id);
+  }
+  for (const std::string& top : doomed) {
+    for (auto& [id, frame] : frames_) {
+      const auto ways = ways_up(id, top);
+      if (ways.count(top) == 0) continue;
+      insert(frame.possible, std::nullopt);
+      frame.doomed = true;
+      for (const std::string& at : ways) frame.removed_by.insert(frames_.at(at).partition);
+    }
+  }
+}
+
+// A move that was made after one that is lost may be a part of a cycle, and be undone.
+void Model::allow_cycles() {
+  std::vector<std::pair<std::string, Transform>> roots;
+  for (const auto& [id, frame] : frames_) {
+    for (const auto& place : frame.possible) {
+      const bool cycle = place && may_be_below(place->parent, id);
+      if (cycle) roots.emplace_back(id, place->X_PC);
+    }
+  }
+  for (const auto& [id, X_PC] : roots) insert(frames_.at(id).possible, Place{"", X_PC});
 }
 
 void Model::doubt(const std::string& id) {

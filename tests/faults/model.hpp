@@ -55,6 +55,9 @@ class Model {
             bool done);
   void remove(const std::string& id, bool done);
 
+  /// A partition may be again as an earlier model says: its stored changes since then may be lost.
+  void may_be_as_in(const Model& earlier, const std::string& partition);
+
   /// A change may have been made, but could not be stored.
   void doubt(const std::string& id);
 
@@ -87,6 +90,8 @@ class Model {
                                   const std::optional<Transform>& X_AB, bool quiet);
 
  private:
+  void allow_cycles();
+  void allow_removals();
   [[nodiscard]] bool goes_with(const std::string& id, const std::string& ancestor) const;
   /// The frames on all paths that a frame may have up to another one, with both ends.
   [[nodiscard]] std::set<std::string> ways_up(const std::string& id,

@@ -1,13 +1,18 @@
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
+#include <deque>
+#include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "faults/frames.hpp"
 #include "faults/model.hpp"
+#include "simulation/joints.hpp"
 #include "simulation/process.hpp"
 
 namespace tfdude::simulation {
@@ -19,13 +24,20 @@ inline constexpr std::size_t kContested = 4;
 /// its own frames, because no other client changes them.
 class Author : public std::enable_shared_from_this<Author> {
  public:
+  /// @param actor  the number by which its operations are counted
   /// @param owners  whose partitions it uses; none of them is renamed
-  Author(std::shared_ptr<Process> process, std::size_t number, std::size_t owners,
-         std::uint64_t seed);
+  Author(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
+         std::size_t owners);
 
   /// Goes on until stop().
   void start();
   void stop() { stopped_ = true; }
+  /// A partition has lost its stored changes from an instant on.
+  void lost_power(const std::string& partition, Instant first);
+  /// Whether it ever has.
+  [[nodiscard]] bool has_lost_power(const std::string& partition) const {
+    return losses_.count(partition) > 0;
+  }
   /// How many frames of its own it has tried to add.
   [[nodiscard]] std::size_t added() const { return added_; }
 
@@ -33,6 +45,13 @@ class Author : public std::enable_shared_from_this<Author> {
   [[nodiscard]] Process& process() { return *process_; }
   [[nodiscard]] const std::map<std::string, std::size_t>& outcomes() const { return outcomes_; }
 
+  /// Forgets a partition that is not reachable.
+  void forget(const std::string& partition);
+  /// Whether it has forgotten it for all since then.
+  [[nodiscard]] bool has_forgotten(const std::string& partition, Instant since) const {
+    const auto known = forgotten_.find(partition);
+    return known != forgotten_.end() && known->second >= since;
+  }
   /// Looks up b in a, and judges that.
   void look_up(const std::string& a, const std::string& b, bool quiet);
 
@@ -43,9 +62,18 @@ class Author : public std::enable_shared_from_this<Author> {
   void move();
   void update();
   void remove();
+  void set_joint();
+  void forget_one();
   void contest();
   void begin(const std::string& what, Operation::Route route,
              std::function<void(const Result<void>&)> then);
+  [[nodiscard]] OperationKind draw_kind();
+  void remember();
+  /// Whether a partition, or any, may have lost what it has acknowledged since then.
+  [[nodiscard]] bool may_be_lost(const std::string& partition, Instant since) const;
+  [[nodiscard]] bool may_be_lost(Instant since) const;
+  void judge(const std::string& a, const std::string& b, const Result<StampedTransform>& X_AB,
+             bool quiet, Instant began);
   void doubt_unless_stored(const std::string& id, const Result<void>& outcome);
   void check_seen(const std::string& id, const std::string& parent);
   [[nodiscard]] std::vector<std::string> own(bool anchored) const;
@@ -53,11 +81,19 @@ class Author : public std::enable_shared_from_this<Author> {
   [[nodiscard]] std::string any_anchor();
 
   std::shared_ptr<Process> process_;
-  std::string prefix_;
-  std::size_t owners_;
-  testing::Random random_;
+  const std::string prefix_;
+  const std::vector<MovedFrame> moved_;  // by its joint
+  const std::size_t actor_;
+  const std::size_t owners_;
+  testing::Random random_;  // of the current step
   faults::Model model_;
   std::map<std::string, std::size_t> outcomes_;
+  // What was known after each operation, if a power loss may undo some of them.
+  std::deque<std::pair<Instant, faults::Model>> known_;
+  std::map<std::string, Instant> losses_;  // the last power loss, by partition
+  std::map<std::string, Instant> forgotten_;
+  Instant began_{};  // of the current operation
+  std::size_t steps_ = 0;
   std::size_t added_ = 0;
   bool stopped_ = false;
 };

@@ -25,9 +25,9 @@ Transform second_edge(std::size_t value) { return at(0, -static_cast<double>(val
 
 }  // namespace
 
-Follower::Follower(std::shared_ptr<Process> process, std::size_t number, std::size_t owners,
-                   std::uint64_t seed)
-    : process_(std::move(process)), number_(number), owners_(owners), random_(seed) {}
+Follower::Follower(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
+                   std::size_t owners)
+    : process_(std::move(process)), number_(number), actor_(actor), owners_(owners), random_(0) {}
 
 std::string Follower::id(const char* which) const {
   return "w" + std::to_string(number_) + "_" + std::to_string(generation_) + "_" + which;
@@ -37,6 +37,7 @@ void Follower::start() { next(); }
 
 void Follower::next() {
   if (stopped_) return;
+  random_ = testing::Random(process_->world().plan.seed_of(actor_, ++steps_));
   const Instant pause = std::chrono::microseconds(random_.index(60'000));
   process_->later("follower", pause, [self = shared_from_this()] {
     if (!self->stopped_) self->step();
@@ -44,6 +45,8 @@ void Follower::next() {
 }
 
 void Follower::step() {
+  if (process_->world().plan.leaves_out(actor_, steps_)) return next();
+  process_->world().did(actor_, steps_);
   if (watch_ == nullptr) return arm_added_ ? add_tip() : restart();
   if (random_.index(3) == 0) return move();
   write();
@@ -52,6 +55,7 @@ void Follower::step() {
 void Follower::begin(const std::string& what, Operation::Route route,
                      std::function<void(const Result<void>&)> then) {
   process_->world().trace(tip() + ": begins to " + what);
+  began_ = process_->world().timeline.now();
   process_->begin(
       what, std::make_shared<Operation>(
                 *process_, std::move(route),
@@ -71,7 +75,7 @@ void Follower::restart() {
   watch_.reset();
   const std::size_t base = random_.index(owners_);
   partition_ = partition_name(random_.index(owners_));
-  bases_ = {base};
+  bases_ = ever_ = {base};
   written_ = {{bases_}};
   newest_read_ = 0;
   incarnation_ = 0;
@@ -113,9 +117,9 @@ void Follower::write() {
         return route_update(process_->forest(), process_->directory(), both, std::nullopt);
       },
       [this, value](const Result<void>& updated) {
-        if (updated) {
+        if (updated && !may_be_lost()) {
           for (std::size_t i = 0; i < value; ++i) written_[i].replaced = true;
-        } else if (denies(updated.error().code)) {
+        } else if (!updated && denies(updated.error().code)) {
           watch_.reset();
         }
       });
@@ -123,6 +127,7 @@ void Follower::write() {
 
 void Follower::moving_to(std::size_t base) {
   bases_.insert(base);
+  ever_.insert(base);
   for (Written& one : written_) {
     if (!one.replaced) one.bases.insert(base);
   }
@@ -139,7 +144,7 @@ void Follower::move() {
             .map([](Part part) { return std::vector<Part>{std::move(part)}; });
       },
       [this, base](const Result<void>& moved) {
-        if (moved) bases_ = {base};
+        if (moved && !may_be_lost()) bases_ = {base};
       });
 }
 
@@ -160,6 +165,17 @@ void Follower::forget_order_after_restart() {
   if (!serving || serving->incarnation == incarnation_) return;
   if (std::exchange(incarnation_, serving->incarnation) == 0) return;
   process_->world().count("the owner of a watched path was started again");
+  may_be_older();
+}
+
+void Follower::lost_power(const std::string& partition) {
+  if (partition != partition_) return;
+  lost_ = process_->world().timeline.now();
+  bases_ = ever_;
+  may_be_older();
+}
+
+void Follower::may_be_older() {
   may_go_back_ = true;
   for (Written& one : written_) {
     one.replaced = false;

@@ -19,13 +19,16 @@ namespace tfdude::simulation {
 /// owner lives.
 class Follower : public std::enable_shared_from_this<Follower> {
  public:
+  /// @param actor  the number by which its operations are counted
   /// @param owners  whose partitions it uses; none of them is renamed
-  Follower(std::shared_ptr<Process> process, std::size_t number, std::size_t owners,
-           std::uint64_t seed);
+  Follower(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
+           std::size_t owners);
 
   /// Goes on until stop(); looks at what comes after that, too.
   void start();
   void stop() { stopped_ = true; }
+  /// A partition has lost some of its stored changes.
+  void lost_power(const std::string& partition);
 
   [[nodiscard]] Process& process() { return *process_; }
   [[nodiscard]] const std::map<std::string, std::size_t>& outcomes() const { return outcomes_; }
@@ -60,22 +63,29 @@ class Follower : public std::enable_shared_from_this<Follower> {
   void look();
   void judge(const StampedTransform& X);
   void forget_order_after_restart();
+  void may_be_older();
   void moving_to(std::size_t base);
   [[nodiscard]] std::string id(const char* which) const;
+  [[nodiscard]] bool may_be_lost() const { return lost_ >= began_; }
 
   std::shared_ptr<Process> process_;
   const std::size_t number_;
+  const std::size_t actor_;
   const std::size_t owners_;
-  testing::Random random_;
+  testing::Random random_;  // of the current step
   std::shared_ptr<Watch> watch_;
   std::string partition_;
   bool arm_added_ = false;        // and not the tip yet
   int generation_ = 0;            // of the two frames
   std::set<std::size_t> bases_;   // below which they may be now
+  std::set<std::size_t> ever_;    // below which they may have been
   std::vector<Written> written_;  // by the number of the value
   std::size_t newest_read_ = 0;
   std::uint64_t incarnation_ = 0;  // of the owner
   bool may_go_back_ = false;       // once, since the owner was started again
+  Instant began_{};                // of the current operation
+  Instant lost_{-1};               // when its owner last lost changes
+  std::size_t steps_ = 0;
   std::map<std::string, std::size_t> outcomes_;
   bool stopped_ = false;
 };

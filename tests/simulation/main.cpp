@@ -1,6 +1,6 @@
-// Runs whole systems in simulated time: simulate [--seed N] [--count N] [--trace].
-#include <algorithm>
+// Runs whole systems in simulated time: simulate [--seed N] [--count N] [--trace] [--shrink].
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/log.hpp"
+#include "simulation/shrink.hpp"
 #include "simulation/world.hpp"
 
 namespace {
@@ -17,16 +18,25 @@ namespace {
 constexpr std::uint64_t kMany = 1000;
 constexpr const char* kRare[] = {"a process gave its partition up",
                                  "a process overtook its predecessor",
-                                 "an older process was ignored",
+                                 "an older process was passed over",
                                  "a frame was taken over",
                                  "a conflict was told",
                                  "fault kill",
                                  "fault stop",
                                  "fault pause",
                                  "fault cut",
-                                 "fault cut one way",
+                                 "fault mute",
+                                 "fault deafen",
+                                 "fault power loss",
                                  "fault part",
                                  "fault step clock",
+                                 "a power loss has lost stored changes",
+                                 "lasting kill",
+                                 "lasting pause",
+                                 "lasting cut",
+                                 "lasting mute",
+                                 "lasting part",
+                                 "lasting fill disk",
                                  "fault fill disk",
                                  "fault replace",
                                  "fault rename",
@@ -36,57 +46,89 @@ constexpr const char* kRare[] = {"a process gave its partition up",
                                  "remove done",
                                  "move done",
                                  "update unreachable",
+                                 "joint done",
+                                 "forget done",
+                                 "forget partition_taken",
+                                 "somebody forgets who is lost",
                                  "a watched path took another route",
                                  "the owner of a watched path was started again",
                                  "watched paths checked"};
 
-}  // namespace
+using namespace tfdude::simulation;
 
-int main(int argc, char** argv) {
-  using namespace tfdude::simulation;
-  CLI::App app("Runs whole systems in simulated time, each generated from a seed and run twice.");
-  std::uint64_t seed = 1;
-  std::uint64_t count = 1;
-  bool trace = false;
-  bool shrunk = false;
-  app.add_option("--seed", seed, "the first seed")->capture_default_str();
-  app.add_option("--count", count, "how many seeds, one after the other")->capture_default_str();
-  app.add_flag("--trace", trace, "print each step");
-  app.add_flag("--shrink", shrunk, "of a seed that fails, look for a milder run that fails");
-  CLI11_PARSE(app, argc, argv);
-  tfdude::log().set_level(spdlog::level::off);
+/// What has come of all runs so far.
+struct Total {
   std::uint64_t failed = 0;
   Instant simulated{};
   std::map<std::string, std::size_t> counts;
-  for (std::uint64_t i = 0; i < count; ++i) {
-    const Plan plan = draw_plan(seed + i);
-    const Run one = run(plan, trace);
-    const Run again = run(plan);
-    simulated += one.duration;
-    for (const auto& [what, times] : one.counts) counts[what] += times;
-    const auto differs = first_difference(one.steps, again.steps);
-    if (!differs && one.failures.empty()) continue;
-    ++failed;
-    std::printf("%s\n", plan.text().c_str());
-    if (shrunk) {
-      const auto fails = [](const Plan& milder) { return !run(milder).failures.empty(); };
-      std::printf("  milder: %s\n", shrink(plan, fails).text().c_str());
-    }
-    if (differs) std::printf("  the second run differs from %s\n", differs->c_str());
-    for (const Failure& failure : one.failures) {
-      std::printf("  %s: %s\n", failure.kind.c_str(), failure.what.c_str());
-    }
+};
+
+// Prints what is left of a run that fails, and how to run that again.
+void print_shrunk(const Remains& failing, bool trace) {
+  const Remains left = shrink(failing);
+  const Plan plan = plan_without(left.seed, left.without, left.storm);
+  std::printf("shrunk to scripts/simulate %s\n%s\n", left.options().c_str(), plan.text().c_str());
+  const Run shrunk = run(plan, trace);
+  std::printf("  %zu operations\n", shrunk.operations.size());
+  if (shrunk.failures.empty()) return;
+  const Failure& first = shrunk.failures.front();
+  std::printf("  %s: %s\n", first.kind.c_str(), first.what.c_str());
+}
+
+void run_twice(const Remains& remains, bool trace, Total& total) {
+  const Plan plan = plan_without(remains.seed, remains.without, remains.storm);
+  const Run one = run(plan, trace);
+  const Run again = run(plan);
+  total.simulated += one.duration;
+  for (const auto& [what, times] : one.counts) total.counts[what] += times;
+  const auto differs = first_difference(one.steps, again.steps);
+  if (!differs && one.failures.empty()) return;
+  ++total.failed;
+  std::printf("%s\n", plan.text().c_str());
+  if (differs) std::printf("  the second run differs from %s\n", differs->c_str());
+  for (const Failure& failure : one.failures) {
+    std::printf("  %s: %s\n", failure.kind.c_str(), failure.what.c_str());
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Runs whole systems in simulated time, each drawn from a seed and run twice.");
+  Remains remains{1, {}, Instant::max()};
+  std::uint64_t count = 1;
+  std::string without;
+  std::int64_t storm = 0;
+  bool trace = false;
+  bool shrunk = false;
+  app.add_option("--seed", remains.seed, "the first seed")->capture_default_str();
+  app.add_option("--count", count, "how many seeds, one after the other")->capture_default_str();
+  app.add_option("--without", without, "leave out decisions and operations: 3,7,1000-1016");
+  app.add_option("--storm", storm, "how long there are faults at most [ms]");
+  app.add_flag("--trace", trace, "print each step");
+  app.add_flag("--shrink", shrunk,
+               "of a seed that fails, look for a smaller run that fails in the same way");
+  CLI11_PARSE(app, argc, argv);
+  tfdude::log().set_level(spdlog::level::off);
+  remains.without = numbers_of(without);
+  if (storm > 0) remains.storm = milliseconds(storm);
+  Total total;
+  const std::uint64_t first = remains.seed;
+  for (; remains.seed < first + count; ++remains.seed) {
+    const std::uint64_t failed = total.failed;
+    run_twice(remains, trace && !shrunk, total);
+    if (shrunk && total.failed > failed) print_shrunk(remains, trace);
   }
   // A state that never occurs is not tested.
   for (const char* rare : kRare) {
-    if (count < kMany || counts[rare] > 0) continue;
-    ++failed;
+    if (count < kMany || total.counts[rare] > 0) continue;
+    ++total.failed;
     std::printf("  it never happened that %s\n", rare);
   }
-  for (const auto& [what, times] : counts) std::printf("  %s: %zu\n", what.c_str(), times);
+  for (const auto& [what, times] : total.counts) std::printf("  %s: %zu\n", what.c_str(), times);
   std::printf("%llu seeds from %llu on, %.1f simulated hours: %llu failed\n",
-              static_cast<unsigned long long>(count), static_cast<unsigned long long>(seed),
-              std::chrono::duration<double, std::ratio<3600>>(simulated).count(),
-              static_cast<unsigned long long>(failed));
-  return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+              static_cast<unsigned long long>(count), static_cast<unsigned long long>(first),
+              std::chrono::duration<double, std::ratio<3600>>(total.simulated).count(),
+              static_cast<unsigned long long>(total.failed));
+  return total.failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -1,8 +1,6 @@
 #include "simulation/plan.hpp"
 
 #include <algorithm>
-#include <array>
-#include <sstream>
 
 namespace tfdude::simulation {
 namespace {
@@ -26,16 +24,18 @@ Instant length(Random& random) {
   }
 }
 
+using FaultWeights = std::array<std::size_t, kFaultKinds>;
+
 // The possible faults, with their weights; some do not occur in this run.
-std::array<std::size_t, kFaultKinds> draw_weights(Random& random, bool stores) {
-  std::array<std::size_t, kFaultKinds> weights{};
+FaultWeights draw_fault_weights(Random& random, bool stores) {
+  FaultWeights weights{};
   for (std::size_t& weight : weights) weight = random.index(3) == 0 ? 0 : 1 + random.index(5);
   weights[0] += 1;
   if (!stores) weights[static_cast<std::size_t>(FaultKind::kFillDisk)] = 0;
   return weights;
 }
 
-FaultKind draw_kind(Random& random, const std::array<std::size_t, kFaultKinds>& weights) {
+FaultKind draw_kind(Random& random, const FaultWeights& weights) {
   std::size_t all = 0;
   for (const std::size_t weight : weights) all += weight;
   std::size_t draw = random.index(all);
@@ -44,35 +44,33 @@ FaultKind draw_kind(Random& random, const std::array<std::size_t, kFaultKinds>& 
   return static_cast<FaultKind>(kind);
 }
 
-}  // namespace
-
-const char* name_of(FaultKind kind) {
-  static constexpr std::array<const char*, kFaultKinds> kNames{
-      "kill",       "stop",      "pause",   "cut",    "cut one way", "part",
-      "step clock", "fill disk", "replace", "rename", "reconfigure"};
-  return kNames.at(static_cast<std::size_t>(kind));
+// The usual shares, changed at random; some kinds do not occur. Without frames there is nothing to
+// do.
+void draw_operations(Random& random, Plan& plan) {
+  constexpr std::array<double, kOperationKinds> kUsual{30, 25, 20, 17, 8, 10, 3};
+  for (std::size_t kind = 0; kind < kOperationKinds; ++kind) {
+    const double share = kUsual.at(kind) * random.uniform(0.2, 2);
+    plan.weights.at(kind) = random.index(5) == 0 ? 0 : share;
+  }
+  double& adds = plan.weights.at(static_cast<std::size_t>(OperationKind::kAdd));
+  adds = std::max(adds, 5.0);
 }
 
-Plan draw_plan(std::uint64_t seed) {
-  Random random(seed);
-  Plan plan;
-  plan.seed = seed;
-  // Small ones fail as large ones do, and are faster.
-  plan.owners = random.index(20) == 0 ? 5 + random.index(20) : 2 + random.index(3);
-  plan.clients = random.index(20) == 0 ? 1 + random.index(5) : 1 + random.index(2);
-  plan.storm = between(random, milliseconds(3000), milliseconds(12000));
-  plan.loss = random.index(3) == 0 ? 0 : random.uniform(0, 0.3);
-  plan.repeats = random.index(2) == 0 ? 0 : random.uniform(0, 0.2);
-  plan.delay = random.index(4) == 0 ? between(random, milliseconds(2), milliseconds(40))
-                                    : std::chrono::microseconds(200);
-  plan.disk =
-      random.index(4) == 0 ? between(random, milliseconds(5), milliseconds(200)) : milliseconds(1);
-  plan.contest = random.index(3) == 0 ? 0 : random.uniform(0, 0.5);
-  plan.stores = random.index(8) != 0;
-  plan.wild_stores = plan.stores && random.index(2) == 0;
-  const auto weights = draw_weights(random, plan.stores);
-  plan.lost = plan.owners > 2 && random.index(4) == 0 ? random.index(plan.owners) : plan.owners;
-  plan.loss_after = random.index(2) == 0 ? 0 : random.uniform(0, 0.02);
+void draw_clocks(Random& random, Plan& plan) {
+  switch (random.index(4)) {
+    case 0:
+      break;
+    case 1:
+      plan.offset = between(random, milliseconds(0), std::chrono::minutes(60));
+      break;
+    default:
+      plan.offset = between(random, milliseconds(0), milliseconds(100));
+  }
+  plan.drift = random.index(3) == 0 ? 0 : random.index(2) == 0 ? 1e-4 : random.uniform(0, 0.05);
+}
+
+void draw_faults(Random& random, Plan& plan) {
+  const auto weights = draw_fault_weights(random, plan.stores);
   const double harshness = random.uniform(0.2, 1.5);  // faults per second
   for (Instant at = milliseconds(1500); at < plan.storm;
        at += between(random, milliseconds(0), milliseconds(static_cast<int>(2000 / harshness)))) {
@@ -84,58 +82,95 @@ Plan draw_plan(std::uint64_t seed) {
     fault.other = (fault.target + 1 + random.index(plan.owners - 1)) % plan.owners;
     const auto reach = random.index(2) == 0 ? 7'200'000 : 3'000;
     fault.step = milliseconds(static_cast<int>(random.uniform(-reach, reach)));
+    if (fault.kind == FaultKind::kStepClock && random.index(3) == 0) {
+      fault.target = plan.owners + random.index(plan.clients);
+    }
     plan.faults.push_back(fault);
   }
-  plan.followers = random.index(2);
-  return plan;
 }
 
-Plan shrink(Plan plan, const std::function<bool(const Plan&)>& fails) {
-  const auto try_it = [&](Plan milder) {
-    if (!fails(milder)) return false;
-    plan = std::move(milder);
-    return true;
-  };
-  for (std::size_t i = plan.faults.size(); i-- > 0;) {
-    Plan less = plan;
-    less.faults.erase(less.faults.begin() + static_cast<std::ptrdiff_t>(i));
-    (void)try_it(std::move(less));
+// What stays broken. One daemon is left out of it, so that some can agree.
+void draw_lasting(Random& random, Plan& plan) {
+  if (plan.owners < 3 || random.index(3) != 0) return;
+  std::vector<std::size_t> targets(plan.owners);
+  for (std::size_t i = 0; i < plan.owners; ++i) targets[i] = i;
+  std::shuffle(targets.begin(), targets.end(), random.engine());
+  targets.resize(1 + random.index(plan.owners - 1));
+  targets.resize(std::min<std::size_t>(targets.size(), 3));
+  plan.forgets = random.index(2) == 0;
+  while (!targets.empty()) {
+    constexpr std::array kKinds{FaultKind::kKill, FaultKind::kPause,    FaultKind::kCut,
+                                FaultKind::kMute, FaultKind::kFillDisk, FaultKind::kPart};
+    Fault fault;
+    fault.kind = kKinds.at(random.index(kKinds.size()));
+    fault.begin = plan.storm;
+    fault.end = Instant::max();
+    fault.target = targets.back();
+    targets.pop_back();
+    if (fault.kind == FaultKind::kFillDisk && !plan.stores_of(fault.target)) continue;
+    if (fault.kind == FaultKind::kPart) {
+      if (targets.empty()) break;
+      fault.other = targets.back();
+      targets.pop_back();
+    }
+    plan.lasting.push_back(fault);
   }
-  const std::vector<std::function<void(Plan&)>> milder{
-      [](Plan& one) { one.loss = one.loss_after = 0; },
-      [](Plan& one) { one.repeats = 0; },
-      [](Plan& one) { one.delay = std::chrono::microseconds(200); },
-      [](Plan& one) { one.disk = milliseconds(1); },
-      [](Plan& one) { one.contest = 0; },
-      [](Plan& one) { one.clients = 1; },
-      [](Plan& one) { one.followers = 0; },
-      [](Plan& one) { one.lost = one.owners; }};
-  for (const auto& change : milder) {
-    Plan one = plan;
-    change(one);
-    (void)try_it(std::move(one));
-  }
-  return plan;
 }
 
-std::string Plan::text() const {
-  std::ostringstream out;
-  const auto ms = [](Instant instant) {
-    return std::chrono::duration<double, std::milli>(instant).count();
-  };
-  out << "seed " << seed << ": " << owners << " owners, " << clients << " clients, " << followers
-      << " followers, storm " << ms(storm) << " ms, loss " << loss << ", repeats " << repeats
-      << ", delay " << ms(delay) << " ms, disk " << ms(disk) << " ms, contest " << contest
-      << (stores ? ", stored" : ", not stored") << (wild_stores ? "" : " (the last is not)");
-  if (lost < owners) out << ", owner " << lost << " lost for good";
-  for (std::size_t i = 0; i < faults.size(); ++i) {
-    const Fault& fault = faults[i];
-    out << "\n  fault " << i << ": " << ms(fault.begin) << " to " << ms(fault.end)
-        << " ms: " << name_of(fault.kind) << " " << fault.target;
-    if (fault.kind == FaultKind::kPart) out << " and " << fault.other;
-    if (fault.kind == FaultKind::kStepClock) out << " by " << fault.step.count() << " ms";
-  }
-  return out.str();
+}  // namespace
+
+const char* name_of(FaultKind kind) {
+  static constexpr std::array<const char*, kFaultKinds> kNames{
+      "kill", "stop",       "power loss", "pause",   "cut",    "mute",       "deafen",
+      "part", "step clock", "fill disk",  "replace", "rename", "reconfigure"};
+  return kNames.at(static_cast<std::size_t>(kind));
+}
+
+const char* name_of(OperationKind kind) {
+  static constexpr std::array<const char*, kOperationKinds> kNames{
+      "lookup", "update", "add", "move", "remove", "joint", "forget"};
+  return kNames.at(static_cast<std::size_t>(kind));
+}
+
+std::uint64_t Plan::seed_of(std::size_t actor, std::size_t operation) const {
+  return (seed * 31 + actor) * 1'000'003 + operation;
+}
+
+bool Plan::leaves_out(std::size_t actor, std::size_t operation) const {
+  return operation < kOperationsEach && left_out.count(number_of(actor, operation)) > 0;
+}
+
+bool Plan::may_lose_power() const {
+  return stores && !sync && std::any_of(faults.begin(), faults.end(), [](const Fault& fault) {
+           return fault.kind == FaultKind::kPowerLoss && !fault.left_out;
+         });
+}
+
+Plan draw_plan(std::uint64_t seed) {
+  Random random(seed);
+  Plan plan;
+  plan.seed = seed;
+  // Small ones fail as large ones do, and are faster.
+  plan.owners = random.index(20) == 0 ? 5 + random.index(20) : 2 + random.index(3);
+  plan.clients = random.index(20) == 0 ? 1 + random.index(5) : 1 + random.index(2);
+  plan.followers = random.index(2) == 0 ? 0 : 1 + random.index(3);
+  plan.storm = between(random, milliseconds(3000), milliseconds(12000));
+  plan.loss = random.index(3) == 0 ? 0 : random.uniform(0, 0.3);
+  plan.repeats = random.index(2) == 0 ? 0 : random.uniform(0, 0.2);
+  plan.delay = random.index(4) == 0 ? between(random, milliseconds(2), milliseconds(40))
+                                    : std::chrono::microseconds(200);
+  plan.disk =
+      random.index(4) == 0 ? between(random, milliseconds(5), milliseconds(200)) : milliseconds(1);
+  plan.sync = random.index(3) == 0;
+  plan.contest = random.index(3) == 0 ? 0 : random.uniform(0, 0.5);
+  plan.stores = random.index(8) != 0;
+  plan.wild_stores = plan.stores && random.index(2) == 0;
+  plan.loss_after = random.index(2) == 0 ? 0 : random.uniform(0, 0.02);
+  draw_clocks(random, plan);
+  draw_operations(random, plan);
+  draw_faults(random, plan);
+  draw_lasting(random, plan);
+  return plan;
 }
 
 }  // namespace tfdude::simulation

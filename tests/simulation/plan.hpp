@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -13,17 +15,19 @@ namespace tfdude::simulation {
 enum class FaultKind {
   kKill,         ///< kills a daemon; it is restarted at the end, from its stored state
   kStop,         ///< the same, but the daemon announces its end
+  kPowerLoss,    ///< the same, but what was not synced may be lost, from some change on
   kPause,        ///< pauses a daemon
   kCut,          ///< cuts a computer off from all others
-  kCutOneWay,    ///< others do not hear a computer, but it hears them
+  kMute,         ///< others do not hear a computer, but it hears them
+  kDeafen,       ///< a computer does not hear others, but they hear it
   kPart,         ///< separates two computers
-  kStepClock,    ///< sets the clock of a daemon, permanently
+  kStepClock,    ///< sets the clock of a computer, permanently
   kFillDisk,     ///< fills the disk of a daemon
   kReplace,      ///< a daemon hangs, and another is started in its place; then the first continues
   kRename,       ///< kills a daemon, and starts another partition with its configuration
   kReconfigure,  ///< kills a daemon, and restarts it with one more frame, or without that frame
 };
-inline constexpr std::size_t kFaultKinds = 11;
+inline constexpr std::size_t kFaultKinds = 13;
 [[nodiscard]] const char* name_of(FaultKind kind);
 
 struct Fault {
@@ -33,7 +37,21 @@ struct Fault {
   std::size_t target = 0;
   std::size_t other = 0;
   milliseconds step{};  ///< of the clock
+  bool left_out = false;
 };
+
+/// What authors do.
+enum class OperationKind {
+  kLookup,
+  kUpdate,
+  kAdd,
+  kMove,
+  kRemove,
+  kJoint,   ///< moves a joint, and the one that follows it
+  kForget,  ///< forgets a partition that is not reachable
+};
+inline constexpr std::size_t kOperationKinds = 7;
+[[nodiscard]] const char* name_of(OperationKind kind);
 
 /// The parameters of a run; all of them are determined by its seed.
 struct Plan {
@@ -46,26 +64,59 @@ struct Plan {
   double repeats = 0;         ///< share of datagrams that arrive twice
   Instant delay{};            ///< mean delay of the network
   Instant disk{};             ///< maximum time of storing
+  bool sync = false;          ///< each stored change survives a power loss
+  Instant offset{};           ///< maximum by which a clock is wrong from the start
+  double drift = 0;           ///< maximum by which a clock is too fast or too slow
   double contest = 0;         ///< share of changes of frames that all clients change
-  bool stores = true;         ///< daemons store their frames
+  /// Weights of the kinds of operations; some do not occur.
+  std::array<double, kOperationKinds> weights{};
+  bool stores = true;  ///< daemons store their frames
   bool wild_stores =
       true;  ///< and so does the last, which may be renamed and replaced, and nobody relies on
-  /// Killed as the storm ends, for good: the others have to agree without it. The number of owners:
-  /// nobody.
-  std::size_t lost = 0;
-  double loss_after = 0;      ///< of datagrams, after the phase with faults
-  std::vector<Fault> faults;  ///< in the order in which they begin
+  double loss_after = 0;       ///< of datagrams, after the phase with faults
+  std::vector<Fault> faults;   ///< in the order in which they begin
+  std::vector<Fault> lasting;  ///< begin after the others, and do not end
+  bool forgets = false;        ///< a partition that such a fault keeps away is forgotten
+  /// The numbers of decisions and of operations that are left out.
+  std::set<std::size_t> left_out;
 
   [[nodiscard]] bool stores_of(std::size_t owner) const {
     return owner + 1 == owners ? wild_stores : stores;
   }
+  [[nodiscard]] double weight(OperationKind kind) const {
+    return weights.at(static_cast<std::size_t>(kind));
+  }
+
+  /// How many make operations that are counted.
+  [[nodiscard]] std::size_t actors() const { return clients + followers; }
+  /// For the random numbers of one operation.
+  [[nodiscard]] std::uint64_t seed_of(std::size_t actor, std::size_t operation) const;
+  [[nodiscard]] bool leaves_out(std::size_t actor, std::size_t operation) const;
+  /// Whether stored changes may be lost.
+  [[nodiscard]] bool may_lose_power() const;
 
   [[nodiscard]] std::string text() const;
 };
 
 [[nodiscard]] Plan draw_plan(std::uint64_t seed);
 
-/// A plan with fewer faults and milder parameters, for which `fails` is still true.
-[[nodiscard]] Plan shrink(Plan plan, const std::function<bool(const Plan&)>& fails);
+/// Something that was drawn, and that may be left out.
+struct Decision {
+  std::string text;
+  std::function<void(Plan&)> leave_out;
+};
+
+/// The decisions of a plan, by their numbers. Operations have greater ones.
+[[nodiscard]] std::vector<Decision> decisions_of(const Plan& plan);
+
+/// The number of an operation, counted by actor; each has at most so many that can be left out.
+inline constexpr std::size_t kOperationsEach = 1000;
+[[nodiscard]] constexpr std::size_t number_of(std::size_t actor, std::size_t operation) {
+  return (actor + 1) * kOperationsEach + operation;
+}
+
+/// The plan of a seed without these decisions, and with a phase of faults of at most this length.
+[[nodiscard]] Plan plan_without(std::uint64_t seed, const std::set<std::size_t>& numbers,
+                                Instant storm);
 
 }  // namespace tfdude::simulation

@@ -5,12 +5,14 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "partition/claiming.hpp"
 #include "partition/member.hpp"
+#include "simulation/clock.hpp"
 #include "simulation/disk.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/network.hpp"
@@ -31,6 +33,9 @@ struct Surroundings {
   std::function<void(const std::string&)> trace;  ///< each step, so that two runs can be compared
   Violation violation;
   std::function<void(const std::string&)> count;  ///< counts states that should occur sometimes
+  /// An actor makes its operation of this number now.
+  std::function<void(std::size_t actor, std::size_t operation)> did;
+  std::set<std::string> forgotten;  ///< partitions that somebody has forgotten
   Steps& steps;
   Invariants& invariants;
 };
@@ -48,8 +53,8 @@ class Process : public std::enable_shared_from_this<Process> {
     std::uint64_t id = 0;   ///< unique in a run
     std::string partition;  ///< empty: a client
     std::vector<FrameSpec> configured;
-    Disk* disk = nullptr;                        ///< null: nothing is stored
-    const milliseconds* clock_offset = nullptr;  ///< how far the clock of its computer is ahead
+    Disk* disk = nullptr;          ///< null: nothing is stored
+    const Clock* clock = nullptr;  ///< of its computer
   };
 
   Process(Surroundings& world, Setting setting);
@@ -81,6 +86,8 @@ class Process : public std::enable_shared_from_this<Process> {
   /// @param what  for people
   void begin(const std::string& what, const std::shared_ptr<Operation>& operation);
   [[nodiscard]] Reply answer(const Request& request);
+  /// Forgets an unreachable partition itself.
+  [[nodiscard]] Result<void> forget(const std::string& partition);
   /// Reports when all earlier changes are stored, and whether that succeeded.
   void when_stored(std::function<void(const Result<void>&)> then);
   [[nodiscard]] std::uint32_t next_sequence() { return ++sequence_; }
@@ -106,11 +113,12 @@ class Process : public std::enable_shared_from_this<Process> {
   [[nodiscard]] Directory& directory() { return directory_; }
   [[nodiscard]] Member& member() { return member_; }
   [[nodiscard]] Surroundings& world() { return world_; }
+  [[nodiscard]] Time wall() const { return setting_.clock->at(world_.timeline.now()); }
   /// Counts what has changed it.
   [[nodiscard]] std::uint64_t inputs() const { return inputs_; }
   /// The epoch of the stored structure; the greatest: nothing is stored.
   [[nodiscard]] std::uint64_t stored_epoch() const {
-    return setting_.disk != nullptr ? setting_.disk->epoch : ~0ULL;
+    return setting_.disk != nullptr ? setting_.disk->epoch() : ~0ULL;
   }
   /// Calls that have not ended, and changes that wait to be stored.
   [[nodiscard]] std::size_t open_calls() const;
@@ -134,7 +142,6 @@ class Process : public std::enable_shared_from_this<Process> {
     }
   };
 
-  [[nodiscard]] Time wall() const;
   void answer_watch(std::uint64_t from, const Request& request);
   void look_at_leases();
   void push(const PushedValues& pushed);

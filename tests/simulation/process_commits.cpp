@@ -8,6 +8,8 @@ namespace tfdude::simulation {
 namespace {
 
 constexpr Instant kRetryStoring = milliseconds(200);
+// Checkpoints that sync all, by how many commits on average.
+constexpr std::size_t kCheckpointEvery = 32;
 
 }  // namespace
 
@@ -48,7 +50,8 @@ void Process::perform(const Ready& ready) {
   if (ready.refused) {
     stored = tl::unexpected(*ready.refused);
   } else if (setting_.disk != nullptr) {
-    stored = setting_.disk->save(ready.rows);
+    stored = setting_.disk->save(ready.rows, world_.timeline.now());
+    if (world_.random.index(kCheckpointEvery) == 0) setting_.disk->checkpoint();
     failure_ = stored ? std::nullopt : std::optional<Error>(stored.error());
   }
   if (stored || ready.refused) {
@@ -79,10 +82,13 @@ void Process::save_values() {
     return;
   }
   later("values", kSaveValuesEvery, [this] { save_values(); });
-  if (setting_.disk->full) return;
+  if (setting_.disk->full()) return;
   auto [edges, commit] = forest_.changed_since(saved_commit_);
   saved_commit_ = commit;
-  (void)setting_.disk->store.save_values(member_.storable(std::move(edges)), {});
+  edges = member_.storable(std::move(edges));
+  const auto joints =
+      edges.empty() ? std::vector<StoredJoint>() : member_.partition()->take_changed_joints();
+  setting_.disk->save_values(edges, joints, world_.timeline.now());
 }
 
 void Process::announce(const std::optional<Presence>& presence) {

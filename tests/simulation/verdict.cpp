@@ -1,13 +1,13 @@
 #include "simulation/verdict.hpp"
 
 #include <algorithm>
+#include <map>
 #include <set>
 
 namespace tfdude::simulation {
 namespace {
 
 using faults::base_of;
-using faults::partition_name;
 
 // A call asks a few times, and the replies to it are kept until the next one.
 constexpr std::size_t kRepliesPerClient = 8;
@@ -38,19 +38,6 @@ bool stands(Process& process, const faults::Model& model, FrameInfo frame) {
 
 }  // namespace
 
-std::string extra_of(std::size_t owner) { return "extra_" + std::to_string(owner); }
-
-std::string Cast::name_of_daemon(std::size_t owner) const {
-  return owner == wild && renamed % 2 == 1 ? "renamed" : partition_name(owner);
-}
-
-Process* Cast::find_daemon(const std::string& partition) const {
-  for (const auto& daemon : daemons) {
-    if (daemon && daemon->partition() == partition) return daemon.get();
-  }
-  return nullptr;
-}
-
 void Verdict::violation(const std::string& kind, const std::string& what) {
   agreed_ = false;
   calls_.violation(kind, what);
@@ -58,16 +45,21 @@ void Verdict::violation(const std::string& kind, const std::string& what) {
 
 void Verdict::check() {
   std::vector<Process*> all;
-  for (const auto& daemon : cast_.daemons) {
-    if (daemon) all.push_back(daemon.get());
+  for (std::size_t i = 0; i < plan_.owners; ++i) {
+    const bool core = cast_.standings[i] == Cast::Standing::kCore;
+    if (core && cast_.daemons[i]) all.push_back(cast_.daemons[i].get());
   }
   std::vector<Author*> authors;
   for (const auto& author : cast_.authors) {
-    if (!passes_over_one(author->process())) authors.push_back(author.get());
+    Process& client = author->process();
+    if (!passes_over_one(client) && !lacks_one(client)) authors.push_back(author.get());
   }
   for (Author* author : authors) all.push_back(&author->process());
   const auto expected = all.back()->structure();
   for (Process* one : all) check_replica(*one, expected);
+  for (Process* one : all) {
+    for (const std::string& partition : forgotten()) check_forgotten(*one, partition);
+  }
   check_owners(*all.back());
   for (Author* author : authors) check_author(*author);
   for (const auto& follower : cast_.followers) check_follower(*follower);
@@ -82,7 +74,7 @@ void Verdict::check_kept(Process& one) {
   const auto grows = [&](const std::string& what) { violation("something grows", who + what); };
   if (one.open_calls() > 0) grows(" has " + std::to_string(one.open_calls()) + " open calls");
   for (const Absent& absent : one.directory().absent()) {
-    if (cast_.serves(absent.partition))
+    if (cast_.standing(absent.partition) == Cast::Standing::kCore)
       grows(" has not forgotten the absence of " + absent.partition);
     if (absent.kind == Absent::Kind::kSilent) grows(" takes " + absent.partition + " for silent");
   }
@@ -99,26 +91,46 @@ void Verdict::check_kept_by_owner(Process& owner) {
   if (partition->kept_replies() > kRepliesPerClient * clients) {
     grows(" keeps " + std::to_string(partition->kept_replies()) + " replies");
   }
-  std::set<std::string> frames;
+  std::map<std::string, std::string> listed;  // parents
   std::set<std::string> tombstones;
   for (const Sample& sample : owner.published()) {
     const auto* page = std::get_if<Page>(&sample);
     if (page == nullptr) continue;
-    for (const PageEntry& entry : page->entries) frames.insert(entry.id);
-    for (const Tombstone& tombstone : page->tombstones) tombstones.insert(tombstone.id);
+    for (const PageEntry& entry : page->entries) listed.emplace(entry.id, entry.parent);
+    for (const Tombstone& tombstone : page->tombstones) {
+      if (tombstone.kind != Tombstone::Kind::kUnhung) tombstones.insert(tombstone.id);
+    }
   }
-  if (frames.size() + tombstones.size() > named_) {
-    grows(" lists " + std::to_string(frames.size()) + " frames and " +
+  for (const auto& [id, parent] : listed) {
+    const auto frame = owner.forest().info(id);
+    if (frame && frame->owner == kHeldHere && frame->parent == parent) continue;
+    violation("an owner's pages are not its frames",
+              owner.partition() + " has published " + id + " under " + parent);
+  }
+  if (listed.size() + tombstones.size() > named_) {
+    grows(" lists " + std::to_string(listed.size()) + " frames and " +
           std::to_string(tombstones.size()) + " tombstones of " + std::to_string(named_));
   }
   for (const std::string& id : tombstones) {
-    if (frames.count(id) > 0) grows(" lists " + id + " and its tombstone");
+    if (listed.count(id) > 0) grows(" lists " + id + " and its tombstone");
   }
   std::set<std::uint64_t> watched;
   for (const auto& follower : cast_.followers) watched.merge(follower->groups());
   for (const std::uint64_t group : owner.pushed_groups()) {
     if (watched.count(group) == 0) grows(" pushes to a group that nobody watches");
   }
+}
+
+// A client cannot tell a partition that its pages were dropped: it has forgotten the partition, or
+// they came from a process without a file whose clock is behind. They are not sent again.
+bool Verdict::lacks_one(Process& client) const {
+  const std::string* lacked = client.directory().incomplete();
+  if (lacked == nullptr) return false;
+  if (client.world().forgotten.count(*lacked) > 0) return true;
+  for (std::size_t i = 0; i < plan_.owners; ++i) {
+    if (cast_.name_of_daemon(i) == *lacked) return !plan_.stores_of(i);
+  }
+  return false;
 }
 
 void Verdict::check_replica(Process& one, const std::vector<std::string>& expected) {
@@ -130,6 +142,12 @@ void Verdict::check_replica(Process& one, const std::vector<std::string>& expect
     violation("replicas differ", who + " sees " + difference(one.structure(), expected));
   }
   if (!one.member().pending_yields().empty()) violation("a yield is pending", who);
+  for (const auto& daemon : cast_.daemons) {
+    if (!daemon || daemon.get() == &one) continue;
+    if (cast_.standing(daemon->partition()) != Cast::Standing::kCore) continue;
+    if (one.directory().serving(daemon->partition())) continue;
+    violation("presences differ", who + " does not know " + daemon->partition());
+  }
   for (const PartitionInfo& partition : one.directory().partitions()) {
     if (partition.reachable != cast_.serves(partition.name)) {
       violation("presences differ",
@@ -138,7 +156,31 @@ void Verdict::check_replica(Process& one, const std::vector<std::string>& expect
   }
 }
 
-// A process without a file whose clock is behind that of its predecessor is ignored by a client
+// Those that were forgotten after their last process was heard.
+std::vector<std::string> Verdict::forgotten() const {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < plan_.owners; ++i) {
+    const std::string name = cast_.name_of_daemon(i);
+    const bool out = plan_.forgets && cast_.standings[i] == Cast::Standing::kOut;
+    if (out && cast_.authors.front()->has_forgotten(name, plan_.storm + kForgetAfter))
+      names.push_back(name);
+  }
+  return names;
+}
+
+void Verdict::check_forgotten(Process& one, const std::string& partition) {
+  const std::string who = one.partition().empty() ? "a client" : one.partition();
+  for (const PartitionInfo& known : one.directory().partitions()) {
+    if (known.name == partition)
+      violation("a forgotten partition is known", who + " lists " + partition);
+  }
+  for (const FrameInfo& frame : one.forest().frames()) {
+    if (one.directory().name(frame.owner) != partition) continue;
+    violation("a forgotten partition is known", who + " sees " + frame.id + " of " + partition);
+  }
+}
+
+// A process without a file whose clock is behind that of its predecessor is not heard by a client
 // that has met that one: a client cannot tell it, and no daemon may be left that could.
 bool Verdict::passes_over_one(Process& client) const {
   for (std::size_t i = 0; i < plan_.owners; ++i) {
@@ -149,14 +191,19 @@ bool Verdict::passes_over_one(Process& client) const {
   return false;
 }
 
+Process* Verdict::find_core(const std::string& partition) const {
+  const bool core = cast_.standing(partition) == Cast::Standing::kCore;
+  return core ? cast_.find_daemon(partition) : nullptr;
+}
+
 // Long after the last write it shows the values of the owners.
 void Verdict::check_follower(Follower& follower) {
-  Process* const owner = cast_.find_daemon(follower.partition());
+  Process* const owner = find_core(follower.partition());
   const auto arm = owner ? owner->forest().info(follower.arm()) : std::nullopt;
   if (!follower.watches() || !arm) return;
   Process& process = follower.process();
   const auto base = process.forest().info(arm->parent);
-  Process* const below = base ? cast_.find_daemon(process.directory().name(base->owner)) : nullptr;
+  Process* const below = base ? find_core(process.directory().name(base->owner)) : nullptr;
   if (below == nullptr || base->parent != "world") return;
   const auto X_WB = below->forest().lookup("world", base->id);
   const auto X_BT = owner->forest().lookup(base->id, follower.tip());
@@ -174,7 +221,7 @@ void Verdict::check_follower(Follower& follower) {
 // configured frames.
 void Verdict::check_owners(Process& one) {
   for (std::size_t i = 0; i < plan_.owners; ++i) {
-    if (i == plan_.lost) continue;
+    if (cast_.standings[i] != Cast::Standing::kCore) continue;
     const auto frame = one.forest().info(base_of(i));
     const std::string owner = frame ? one.directory().name(frame->owner) : "nobody";
     if (owner != cast_.name_of_daemon(i)) {
@@ -202,10 +249,17 @@ void Verdict::check_author(Author& author) {
   for (const auto* models : {&author.model().frames(), &author.model().removed()}) {
     for (const auto& [id, model] : *models) {
       if (!cast_.serves(model.partition)) continue;
+      // With a full disk it cannot go on as a later process, after it was forgotten.
+      const bool silent = !process.directory().serving(model.partition);
+      if (silent && cast_.standing(model.partition) == Cast::Standing::kAside) continue;
       const auto there = process.forest().info(id);
-      // No participant is left that could tell its owner about the removal.
-      const bool untold = std::any_of(model.removed_by.begin(), model.removed_by.end(),
-                                      [&](const auto& one) { return !cast_.serves(one); });
+      // Maybe no participant is left that could tell its owner about the removal, or it cannot be
+      // stored.
+      const auto cannot = [&](const std::string& one) {
+        return cast_.standing(one) != Cast::Standing::kCore || author.has_lost_power(one);
+      };
+      const bool untold = cast_.standing(model.partition) != Cast::Standing::kCore ||
+                          std::any_of(model.removed_by.begin(), model.removed_by.end(), cannot);
       if (there && untold && !model.may_be_there()) continue;
       Frame seen;
       if (there) {

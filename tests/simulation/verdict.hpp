@@ -6,35 +6,14 @@
 #include <utility>
 #include <vector>
 
-#include "simulation/author.hpp"
-#include "simulation/follower.hpp"
+#include "simulation/cast.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/plan.hpp"
-#include "simulation/process.hpp"
 
 namespace tfdude::simulation {
 
-/// The participants of a run.
-struct Cast {
-  explicit Cast(const Plan& plan)
-      : daemons(plan.owners), wild(plan.owners - 1), has_extra(plan.owners, false) {}
-
-  std::vector<std::shared_ptr<Process>> daemons;  ///< by owner; null: it is down
-  const std::size_t wild;       ///< the last owner, which may be renamed and replaced
-  int renamed = 0;              ///< how often
-  std::vector<bool> has_extra;  ///< by owner, whether its configuration has one more frame
-  std::vector<std::shared_ptr<Author>> authors;
-  std::vector<std::shared_ptr<Follower>> followers;
-
-  [[nodiscard]] std::string name_of_daemon(std::size_t owner) const;
-  [[nodiscard]] bool serves(const std::string& partition) const {
-    return find_daemon(partition) != nullptr;
-  }
-  [[nodiscard]] Process* find_daemon(const std::string& partition) const;
-};
-
-/// The frame that a configuration may have besides the base.
-[[nodiscard]] std::string extra_of(std::size_t owner);
+/// How long after the faults somebody forgets who does not return.
+inline constexpr Instant kForgetAfter = milliseconds(4000);
 
 /// Checks what must be true after the remaining participants have had time to agree.
 class Verdict {
@@ -53,8 +32,13 @@ class Verdict {
 
  private:
   void violation(const std::string& kind, const std::string& what);
+  [[nodiscard]] std::vector<std::string> forgotten() const;
   [[nodiscard]] bool passes_over_one(Process& client) const;
+  [[nodiscard]] bool lacks_one(Process& client) const;
   void check_replica(Process& one, const std::vector<std::string>& expected);
+  /// Null: no daemon serves it, or it has a lasting fault.
+  [[nodiscard]] Process* find_core(const std::string& partition) const;
+  void check_forgotten(Process& one, const std::string& partition);
   void check_follower(Follower& follower);
   void check_owners(Process& one);
   [[nodiscard]] bool is_left_over(const FrameInfo& frame, Process& seen_by) const;

@@ -14,12 +14,14 @@ namespace tfdude::simulation {
 struct Failure {
   std::string kind;  ///< two runs with the same one fail in the same way
   std::string what;
+  Instant when{};
 };
 
 /// The result of a run.
 struct Run {
   std::vector<Failure> failures;  ///< the first ones
   Steps steps;
+  std::vector<std::size_t> operations;        ///< the numbers of those that were made
   std::map<std::string, std::size_t> counts;  ///< of outcomes, faults, and rare states
   Instant duration{};
 };

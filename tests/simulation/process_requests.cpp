@@ -1,0 +1,130 @@
+#include <algorithm>
+#include <utility>
+
+#include "simulation/process.hpp"
+
+// What a process answers, pushes and asks for.
+namespace tfdude::simulation {
+namespace {
+
+constexpr Instant kLookAtLeases = milliseconds(1000);
+// How much later than its deadline a call may end.
+constexpr Instant kEndsWithin = milliseconds(20);
+
+}  // namespace
+
+void Process::on_request(std::uint64_t from, const Request& request) {
+  if (!serving_) return;
+  world_.steps.mix((from << 32U) + request.sequence);
+  const PeerId peer = peer_of(from);
+  const auto reply_now = [&](const Reply& reply) {
+    world_.network.send(*this, from, [reply](Process& there) { there.on_reply(reply); });
+  };
+  if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
+    return reply_now(member_.partition()->answer_lookup(request.sequence, *lookup));
+  }
+  if (std::holds_alternative<WatchRequest>(request.body)) return answer_watch(from, request);
+  const auto reply = member_.on_request(peer, request, failure_, wall());
+  if (reply) reply_now(*reply);
+  react();
+}
+
+void Process::on_reply(const Reply& reply) {
+  world_.steps.mix(reply.epoch + reply.sequence);
+  const auto operations = operations_;
+  for (const auto& one : operations) one->on_reply(reply);
+  for (const auto& one : watches_) {
+    if (const auto watch = one.lock()) watch->on_reply(reply);
+  }
+}
+
+void Process::answer_watch(std::uint64_t from, const Request& request) {
+  const auto& body = std::get<WatchRequest>(request.body);
+  const std::uint64_t group = watch_group(partition(), member_.presence().incarnation, body);
+  if (pushes_.groups().empty()) later("leases", kLookAtLeases, [this] { look_at_leases(); });
+  auto pushed = pushes_.watch(group, body, world_.timeline.now());
+  Reply reply{request.sequence, 0, Done{}};
+  if (pushed) {
+    reply.body = *std::move(pushed);
+  } else {
+    reply.body = std::move(pushed.error());
+  }
+  world_.network.send(*this, from, [reply](Process& there) { there.on_reply(reply); });
+}
+
+// Groups that are not renewed end even if nothing is written.
+void Process::look_at_leases() {
+  pushes_.push_due(world_.timeline.now());
+  if (!pushes_.groups().empty()) later("leases", kLookAtLeases, [this] { look_at_leases(); });
+}
+
+void Process::push(const PushedValues& pushed) {
+  const std::uint64_t number = ++pushed_;
+  for (const std::uint64_t peer : world_.network.met_by(*this)) {
+    if (peers_.count(peer) > 0) continue;  // an owner, none of which watches
+    world_.network.send(*this, peer, [from = id(), number, pushed](Process& there) {
+      there.on_pushed(from, number, pushed);
+    });
+  }
+}
+
+void Process::on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed) {
+  world_.steps.mix(pushed.group + pushed.commit);
+  for (const auto& one : watches_) {
+    if (const auto watch = one.lock()) watch->on_pushed(from, number, pushed);
+  }
+}
+
+void Process::on_watcher(std::uint64_t group) { pushes_.tell_all(group); }
+
+void Process::listen(const std::string& partition, std::uint64_t group) {
+  each_server(partition, [this, group](std::uint64_t peer) {
+    world_.network.send(*this, peer, [group](Process& there) { there.on_watcher(group); });
+  });
+}
+
+void Process::begin(const std::string& what, const std::shared_ptr<Operation>& operation) {
+  operations_.push_back(operation);
+  world_.invariants.called(shared_from_this(), operation, what,
+                           world_.timeline.now() + Operation::kTimeout + kEndsWithin);
+  operation->start();
+}
+
+Reply Process::answer(const Request& request) {
+  if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
+    return member_.partition()->answer_lookup(request.sequence, *lookup);
+  }
+  Reply reply = member_.answer(request, failure_, wall());
+  react();
+  return reply;
+}
+
+Result<void> Process::forget(const std::string& partition) {
+  world_.forgotten.insert(partition);
+  auto forgotten = member_.forget(partition, wall());
+  react();
+  return forgotten;
+}
+
+void Process::send(const std::string& partition, const Request& request) {
+  Request sent = request;
+  std::uint32_t first = request.sequence;
+  for (const auto& one : operations_) first = std::min(first, one->first_sequence());
+  sent.awaits_from = first;
+  each_server(partition, [&](std::uint64_t peer) {
+    world_.network.send(*this, peer,
+                        [from = id(), sent](Process& there) { there.on_request(from, sent); });
+  });
+}
+
+void Process::each_server(const std::string& partition,
+                          const std::function<void(std::uint64_t)>& tell) {
+  for (const std::uint64_t peer : world_.network.met_by(*this)) {
+    const auto known = peers_.find(peer);
+    const bool serves = known != peers_.end() && known->second.said &&
+                        known->second.said->partition == partition && known->second.said->serving;
+    if (serves) tell(peer);
+  }
+}
+
+}  // namespace tfdude::simulation
