@@ -94,7 +94,7 @@ void run_twice(const Remains& remains, bool trace, Total& total) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Runs whole systems in simulated time, each drawn from a seed and run twice.");
+  CLI::App app("Runs whole systems in simulated time, each generated from a seed and run twice.");
   Remains remains{1, {}, Instant::max()};
   std::uint64_t count = 1;
   std::string without;

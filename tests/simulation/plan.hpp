@@ -100,7 +100,7 @@ struct Plan {
 
 [[nodiscard]] Plan draw_plan(std::uint64_t seed);
 
-/// Something that was drawn, and that may be left out.
+/// Something that the seed decided, and that may be left out.
 struct Decision {
   std::string text;
   std::function<void(Plan&)> leave_out;
