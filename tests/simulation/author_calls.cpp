@@ -58,8 +58,9 @@ void Author::move() {
       "move " + id + " under " + parent,
       [this, id, parent, X_PC] {
         const MoveRequest move{parent, X_PC ? PartialTransform(*X_PC) : PartialTransform()};
-        return route_move(process_->forest(), process_->directory(), id, move)
-            .map([](Part part) { return std::vector<Part>{std::move(part)}; });
+        return route_move(process_->forest(), process_->directory(), id, move).map([](Part part) {
+          return std::vector<Part>{std::move(part)};
+        });
       },
       [this, id, parent, X_PC](const Result<void>& moved) {
         const bool refused = !moved && denies(moved.error().code);
