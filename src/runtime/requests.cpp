@@ -23,11 +23,11 @@ void Requests::await_change(const Part& part, const Reply& reply, const Deadline
   const std::uint64_t epoch = reply.epoch;
   Lock lock(structure_.mutex);
   structure_.directory.saw_lamport_time(reply.lamport_time);
-  const auto settled = [&]() TFDUDE_REQUIRES(structure_.mutex) {
+  const auto arrived_or_gone = [&]() TFDUDE_REQUIRES(structure_.mutex) {
     return structure_.directory.epoch(part.owner) >= epoch ||
            !structure_.directory.reachable(part.owner);
   };
-  const bool arrived = structure_.changed.wait_until(lock, deadline.at(), settled);
+  const bool arrived = structure_.changed.wait_until(lock, deadline.at(), arrived_or_gone);
   structure_.directory.told_of(part.owner, epoch);
   if (arrived) return;
   discovery_.fell_behind();

@@ -32,8 +32,8 @@ void Reclaimer::collect(Frames& frames) {
   const std::uint64_t below = epoch::safe_below();
   held_pool_.collect(below);
   remote_pool_.collect(below);
-  rings_.collect(tag, below);
-  ties_.collect(tag, below);
+  histories_.collect(tag, below);
+  correlations_.collect(tag, below);
   frames.collect_names(tag, below);
 }
 

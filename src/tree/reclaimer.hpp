@@ -26,8 +26,10 @@ class Reclaimer {
 
   // Takes an object superseded by the current commit, or by an earlier one. Ignores null.
   void supersede(Version* version) { versions_.push_back(version); }
-  void supersede(SampleHistory* samples) { rings_.superseded.emplace_back(samples); }
-  void supersede(EdgeCorrelation* correlation) { ties_.superseded.emplace_back(correlation); }
+  void supersede(SampleHistory* samples) { histories_.superseded.emplace_back(samples); }
+  void supersede(EdgeCorrelation* correlation) {
+    correlations_.superseded.emplace_back(correlation);
+  }
 
   /// Whether collect() is due.
   [[nodiscard]] bool is_due() const { return versions_.size() > kCollectAt; }
@@ -52,8 +54,8 @@ class Reclaimer {
   VersionPool<HeldVersion> held_pool_;
   VersionPool<Version> remote_pool_;
   std::vector<Version*> versions_;  // superseded since the readers were last checked
-  Waiting<SampleHistory> rings_;
-  Waiting<EdgeCorrelation> ties_;
+  Waiting<SampleHistory> histories_;
+  Waiting<EdgeCorrelation> correlations_;
 };
 
 }  // namespace tfdude

@@ -28,11 +28,11 @@ class Member {
     auto qos = profiles_.participant();
     // As of our participants: with a short one Fast DDS 2.9 may wait for itself as it ends.
     qos.wire_protocol().builtin.discovery_config.leaseDuration = {30, 0};
-    DiscoveryGate entrance(gate_);
-    entrance.prepare(qos, domain, false);
+    DiscoveryGate discovery_gate(gate_);
+    discovery_gate.prepare(qos, domain, false);
     participant_ = factory().create_participant(domain, qos);
     REQUIRE(participant_ != nullptr);
-    entrance.open();
+    discovery_gate.open();
     edds::TypeSupport type(new PresenceType);
     type.register_type(participant_);
     topic_ =

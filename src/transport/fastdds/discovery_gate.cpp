@@ -22,7 +22,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
 
   Flag open;
   std::shared_ptr<Gate> gate;
-  std::shared_ptr<SendThrottle> reach = std::make_shared<SendThrottle>();
+  std::shared_ptr<SendThrottle> throttle = std::make_shared<SendThrottle>();
 };
 
 // The address if it is another computer, otherwise 0: multicast groups need no ARP, and this
@@ -53,12 +53,12 @@ class GatedTransport final : public SendFilter {
   [[nodiscard]] bool may_send(const ertps::Locator_t& to) const override {
     if (!descriptor_.open->load(std::memory_order_relaxed)) return false;
     const std::uint32_t host = host_of(to);
-    return host == 0 || descriptor_.reach->may_send(host, to.port, SendThrottle::Clock::now());
+    return host == 0 || descriptor_.throttle->may_send(host, to.port, SendThrottle::Clock::now());
   }
 
   void heard(const ertps::Locator_t& from) const override {
     const std::uint32_t host = host_of(from);
-    if (host != 0) descriptor_.reach->heard(host, SendThrottle::Clock::now());
+    if (host != 0) descriptor_.throttle->heard(host, SendThrottle::Clock::now());
   }
 
   GatedDescriptor descriptor_;

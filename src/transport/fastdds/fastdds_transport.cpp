@@ -64,15 +64,15 @@ Result<void> FastDdsTransport::create_participant() {
   if (!options_.discovery_server.empty()) {
     if (auto used = use_discovery_server(qos, options_.discovery_server); !used) return used;
   }
-  DiscoveryGate entrance(gate_);
-  entrance.prepare(qos, options_.domain, options_.partition.empty());
+  DiscoveryGate discovery_gate(gate_);
+  discovery_gate.prepare(qos, options_.domain, options_.partition.empty());
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
       options_.domain, qos, &participant_listener_, edds::StatusMask::none());
   if (participant_ == nullptr) {
     return fail(Errc::kTransport,
                 "Fast DDS could not join domain " + std::to_string(options_.domain));
   }
-  entrance.open();
+  discovery_gate.open();
   self_ = peer_of(participant_->guid().guidPrefix);
   topics_.presence = create_topic(kPresenceTopic, edds::TypeSupport(new PresenceType));
   topics_.beat = create_topic(kBeatTopic, edds::TypeSupport(new PresenceType));
