@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint64_t kMany = 1000;
 constexpr const char* kRare[] = {"a process gave its partition up",
                                  "a process overtook its predecessor",
-                                 "an older process was passed over",
+                                 "an older process was ignored",
                                  "a frame was taken over",
                                  "a conflict was told",
                                  "fault kill",

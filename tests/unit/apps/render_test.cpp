@@ -129,7 +129,9 @@ TEST_CASE("a partition as JSON says who and where") {
   info.pid = 7;
   info.frames = 3;
   info.reachable = true;
-  json said{{"name", "arms"}, {"host", "tower"}, {"pid", 7}, {"frames", 3}, {"reachable", true}};
+  info.program = "0.1.0";
+  json said{{"name", "arms"},    {"host", "tower"},    {"pid", 7},         {"frames", 3},
+            {"reachable", true}, {"program", "0.1.0"}, {"protocol", "1.0"}};
   CHECK(partition_json(info) == said);
   info.reachable = false;
   said["reachable"] = false;
@@ -137,6 +139,10 @@ TEST_CASE("a partition as JSON says who and where") {
   CHECK(partition_json(info) == said);
   info.stopped = true;
   said["reason"] = "stopped";
+  CHECK(partition_json(info) == said);
+  info.protocol = {2, 0};
+  said["protocol"] = "2.0";
+  said["reason"] = "incompatible";
   CHECK(partition_json(info) == said);
 }
 

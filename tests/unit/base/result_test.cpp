@@ -37,6 +37,8 @@ constexpr Named kCodes[] = {
     {Errc::kStampTaken, 19, "stamp_taken"},
     {Errc::kChangedMeanwhile, 20, "changed_meanwhile"},
     {Errc::kUnknownJoint, 21, "unknown_joint"},
+    {Errc::kIncompatible, 22, "incompatible"},
+    {Errc::kUnsupported, 23, "unsupported"},
 };
 
 TEST_CASE("codes keep their numbers and names") {

@@ -287,7 +287,7 @@ TEST_CASE("a directory is complete when all pages of all reachable partitions ha
 }
 
 TEST_CASE(
-    "of two claims of one age the alphabetically first wins; the other one wins once that is "
+    "of two claims of one age the alphabetically first wins, the other one wins once that is "
     "gone") {
   const Page of_arms = page_of("arms", {{"hand", "arm"}});
   const Page of_legs = page_of("legs", {{"hand", "foot"}});

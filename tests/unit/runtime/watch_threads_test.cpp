@@ -210,8 +210,10 @@ TEST_CASE("a path is read on where its new route has no instant that all edges h
   const auto path = robot.client->watch("world", "gripper", options);
   REQUIRE(path);
   Reader reader(*path, [&](const StampedTransform& X) -> std::string {
+    // The last sample of the tool may come before that of the base: then they have 5 s in common.
     const double x = X.pose.translation().x();
-    const bool legal = X.stamp == (x == 11 ? Time(1s) : Time(6s)) && (x == 11 || x == 22);
+    const bool legal = (x == 11 && X.stamp == Time(1s)) || (x == 21 && X.stamp == Time(5s)) ||
+                       (x == 22 && X.stamp == Time(6s));
     return legal ? "" : std::to_string(x);
   });
   REQUIRE(robot.client->move("tool", "right"));
