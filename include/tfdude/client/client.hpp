@@ -84,7 +84,7 @@ class TFDUDE_EXPORT Client {
   /// touched; if it is started again, it counts as new. Thread-safe; takes at most `timeout`, plus
   /// discovery.
   /// @return kUnknownPartition; kPartitionTaken if this participant, or another that was told, can
-  ///   reach the partition.
+  ///   reach the partition; kUnreachable if nobody is reachable who could remember it.
   [[nodiscard]] Result<void> forget(const std::string& partition);
 
   /// Sets the value of the edge from a frame's parent to the frame; the owner acknowledges it. For
