@@ -5,7 +5,7 @@
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_correlation.hpp"
 
-// Converts the structure from the network.
+// Converts the structure for the network, and from it.
 namespace tfdude::fastdds {
 namespace {
 
@@ -98,6 +98,63 @@ Result<Presence> from_wire(const wire::Presence& sample) {
     }
   }
   return presence;
+}
+
+wire::Page to_wire(const Page& page) {
+  wire::Page sample;
+  sample.partition(page.partition);
+  sample.number(page.number);
+  sample.incarnation(page.incarnation);
+  sample.epoch(page.epoch);
+  sample.entries().resize(page.entries.size());
+  for (std::size_t i = 0; i < page.entries.size(); ++i) {
+    sample.entries()[i].id(page.entries[i].id);
+    sample.entries()[i].parent(page.entries[i].parent);
+    sample.entries()[i].lamport_time(page.entries[i].lamport_time);
+  }
+  sample.tombstones().resize(page.tombstones.size());
+  for (std::size_t i = 0; i < page.tombstones.size(); ++i) {
+    sample.tombstones()[i].id(page.tombstones[i].id);
+    sample.tombstones()[i].lamport_time(page.tombstones[i].lamport_time);
+    sample.tombstones()[i].kind(static_cast<std::uint8_t>(page.tombstones[i].kind));
+    sample.tombstones()[i].rival(page.tombstones[i].rival);
+  }
+  sample.others().resize(page.others.size());
+  for (std::size_t i = 0; i < page.others.size(); ++i) {
+    sample.others()[i].number(page.others[i].number);
+    sample.others()[i].epoch(page.others[i].epoch);
+  }
+  sample.joints().resize(page.joints.size());
+  for (std::size_t i = 0; i < page.joints.size(); ++i) {
+    sample.joints()[i].name(page.joints[i].name);
+    sample.joints()[i].follows(page.joints[i].follows);
+  }
+  return sample;
+}
+
+wire::Presence to_wire(const Presence& presence) {
+  wire::Presence sample;
+  sample.partition(presence.partition);
+  sample.incarnation(presence.incarnation);
+  sample.host(presence.host);
+  sample.pid(presence.pid);
+  sample.pages(presence.pages);
+  sample.serving(presence.serving);
+  sample.absent().resize(presence.absent.size());
+  for (std::size_t i = 0; i < presence.absent.size(); ++i) {
+    sample.absent()[i].partition(presence.absent[i].partition);
+    sample.absent()[i].since(presence.absent[i].since);
+    sample.absent()[i].kind(static_cast<std::uint8_t>(presence.absent[i].kind));
+    sample.absent()[i].incarnation(presence.absent[i].incarnation);
+  }
+  sample.taken(presence.taken ? 1 : 0);
+  sample.stopped(presence.stopped ? 1 : 0);
+  sample.ticket(presence.ticket);
+  sample.major_version(presence.protocol.major);
+  sample.minor_version(presence.protocol.minor);
+  sample.program(presence.program);
+  if (presence.clock) sample.clock({nanoseconds(*presence.clock)});
+  return sample;
 }
 
 }  // namespace tfdude::fastdds

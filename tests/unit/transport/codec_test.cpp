@@ -1,9 +1,6 @@
 #include "transport/fastdds/codec.hpp"
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
@@ -225,63 +222,6 @@ TEST_CASE("pages and presences arrive as they were sent") {
   }
 }
 
-// ---- what travels, but has no meaning here yet
-
-TEST_CASE("an unspecified covariance takes no bytes, and is refused by name") {
-  wire::Update update = to_wire(Update{{{"hand", {}}}});
-  const auto whole = testing::serialized<UpdateType>(update).size();
-  update.edges()[0].x_pc().resize(7);
-  CHECK(testing::serialized<UpdateType>(update).size() == whole - 21 * sizeof(double));
-  const auto read = from_wire(travelled<UpdateType>(update), [](std::string_view) { return true; });
-  REQUIRE_FALSE(read);
-  CHECK(read.error().code == Errc::kUnsupported);
-  CHECK(read.error().message ==
-        "frame 'hand': its covariance is unspecified, which this version does not support");
-
-  wire::Joints joints = to_wire(JointUpdate{{{"elbow", 0.5, 1e-4}}});
-  const auto both = testing::serialized<JointsType>(joints).size();
-  joints.positions()[0].numbers().resize(1);
-  CHECK(testing::serialized<JointsType>(joints).size() == both - sizeof(double));
-  const auto position =
-      from_wire(travelled<JointsType>(joints), [](std::string_view) { return true; });
-  REQUIRE_FALSE(position);
-  CHECK(position.error().code == Errc::kUnsupported);
-  CHECK(position.error().message.find("joint 'elbow': its variance is unspecified") == 0);
-}
-
-TEST_CASE("a transform has 7 numbers or 28, and a position 1 or 2") {
-  for (const std::size_t count : {0U, 6U, 8U, 27U}) {
-    wire::Update update = to_wire(Update{{{"hand", {}}}});
-    update.edges()[0].x_pc().resize(count);
-    const auto read = from_wire(update, [](std::string_view) { return true; });
-    REQUIRE_FALSE(read);
-    CHECK(read.error().message ==
-          "frame 'hand': a transform of " + std::to_string(count) + " numbers");
-  }
-  wire::Joints joints = to_wire(JointUpdate{{{"elbow", 0.5, 1e-4}}});
-  joints.positions()[0].numbers().clear();
-  const auto read = from_wire(joints, [](std::string_view) { return true; });
-  REQUIRE_FALSE(read);
-  CHECK(read.error().message == "joint 'elbow' without a position");
-}
-
-TEST_CASE("no stamp is another than the stamp zero") {
-  const auto stamp_of = [](std::int64_t stamp) {
-    wire::Update update = to_wire(Update{{{"hand", {}}}});
-    update.stamp(stamp);
-    return from_wire(travelled<UpdateType>(update), [](std::string_view) { return true; });
-  };
-  CHECK(stamp_of(-1)->stamp == std::nullopt);
-  CHECK(stamp_of(0)->stamp == time_of(0));
-  CHECK(stamp_of(INT64_MAX)->stamp == time_of(INT64_MAX));
-  for (const std::int64_t bad : {std::int64_t{-2}, INT64_MIN}) {
-    const auto read = stamp_of(bad);
-    REQUIRE_FALSE(read);
-    CHECK(read.error().message ==
-          "the stamp of an update of " + std::to_string(bad) + " ns is negative");
-  }
-}
-
 // ---- values that are rejected
 
 struct BadValue {
@@ -404,43 +344,6 @@ TEST_CASE("a presence with a bad name is refused") {
   check_refused(from_wire(to_wire(Presence{"robot", 1, "", 1, 1, true})), "host", "empty");
   check_refused(from_wire(to_wire(Presence{"robot", 1, "a\033[2J", 1, 1, true})), "host",
                 "control character");
-}
-
-// ---- what was recorded before
-
-template <class Type, class Sample>
-void check_recorded(const std::filesystem::path& folder) {
-  int count = 0;
-  for (const auto& file : std::filesystem::directory_iterator(folder)) {
-    INFO(file.path());
-    std::ifstream in(file.path(), std::ios::binary);
-    const testing::Bytes recorded{std::istreambuf_iterator<char>(in), {}};
-    Sample sample;
-    REQUIRE(testing::deserialized<Type>(recorded, sample));
-    CHECK(testing::take<Type, Sample>(recorded));
-    const testing::Bytes again = testing::serialized<Type>(sample);
-    REQUIRE(again.size() >= recorded.size());
-    CHECK(std::equal(recorded.begin(), recorded.end(), again.begin()));
-    ++count;
-  }
-  CHECK(count > 0);
-}
-
-TEST_CASE("recorded messages are read, and sent on with the same bytes") {
-  int versions = 0;
-  for (const auto& version : std::filesystem::directory_iterator(TFDUDE_RECORDED)) {
-    if (!version.is_directory()) continue;
-    const std::filesystem::path& folder = version.path();
-    check_recorded<RequestType, wire::Request>(folder / "request");
-    check_recorded<ReplyType, wire::Reply>(folder / "reply");
-    check_recorded<UpdateType, wire::Update>(folder / "update");
-    check_recorded<JointsType, wire::Joints>(folder / "joint");
-    check_recorded<StateType, wire::State>(folder / "state");
-    check_recorded<PageType, wire::Page>(folder / "page");
-    check_recorded<PresenceType, wire::Presence>(folder / "presence");
-    ++versions;
-  }
-  CHECK(versions > 0);
 }
 
 }  // namespace
