@@ -118,8 +118,7 @@ TEST_CASE("versions: a request that only a later minor version knows is refused 
   CHECK(reply.sequence == 77);
   REQUIRE(std::holds_alternative<Error>(reply.body));
   CHECK(std::get<Error>(reply.body).code == Errc::kUnsupported);
-  CHECK(std::get<Error>(reply.body).message ==
-        "requests of kind 200 are not known to protocol 1.0");
+  CHECK(std::get<Error>(reply.body).message == "this kind of request is not known to protocol 1.0");
 }
 
 TEST_CASE("versions: a daemon of a later minor version is one of us") {

@@ -110,9 +110,8 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
       return {};
     }
     default:
-      return fail(Errc::kUnsupported, "replies of kind " + std::to_string(body._d()) +
-                                          " are not known to protocol " +
-                                          to_string(kProtocolVersion));
+      return fail(Errc::kUnsupported,
+                  "this kind of reply is not known to protocol " + to_string(kProtocolVersion));
   }
 }
 

@@ -167,8 +167,7 @@ TEST_CASE("bodies of kinds that a later version may have are read up to their ki
     const auto read = from_wire(sample);
     REQUIRE_FALSE(read);
     CHECK(read.error().code == Errc::kUnsupported);
-    CHECK(read.error().message ==
-          "requests of kind " + std::to_string(kind) + " are not known to protocol 1.0");
+    CHECK(read.error().message == "this kind of request is not known to protocol 1.0");
   }
   for (unsigned kind = 0; kind < 256; ++kind) {
     if (kind >= 1 && kind <= kLastReplyKind) continue;
