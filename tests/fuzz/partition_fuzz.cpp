@@ -321,8 +321,7 @@ class World {
       for (const FrameInfo& other : replica.forest.frames()) {
         const auto plan = route_lookup(replica.forest, replica.directory, frame.id, other.id);
         if (!plan) demand_printable(plan.error());
-        const auto moved =
-            route_move(replica.forest, replica.directory, frame.id, {other.id, {}});
+        const auto moved = route_move(replica.forest, replica.directory, frame.id, {other.id, {}});
         demand(!moved || moved->owner == frame.owner, "a frame's owner moves it");
       }
     }

@@ -142,7 +142,8 @@ TEST_CASE("a frame says how its error is correlated with others'") {
   refused("sources: {'': [[1, 2, 3, 4, 5, 6]]}", "source");
   refused("sources: {s: [[1, 2, 3, 4, 5, 6]], s: [[1, 2, 3, 4, 5, 6]]}",
           "sources: s is given twice");
-  refused("sources: {'observed:1': [[1, 2, 3, 4, 5, 6]]}", "source 'observed:1': names with this prefix");
+  refused("sources: {'observed:1': [[1, 2, 3, 4, 5, 6]]}",
+          "source 'observed:1': names with this prefix");
 }
 
 TEST_CASE("how much history is kept is said for the file and for each frame") {
