@@ -29,23 +29,23 @@ std::uint8_t write_parts(const PartialTransform& parts, Numbers& out) {
 }
 
 Result<PartialTransform> read_parts(std::uint8_t given, const Numbers& in, std::string_view frame) {
-  const std::string place = "frame " + quote(frame);
+  const auto at_frame = [&](const Error& error) { return fail_at("frame " + quote(frame), error); };
   if (in.size() < kPoseNumbers) {
-    return fail(Errc::kInvalidInput,
-                place + ": a transform of " + std::to_string(in.size()) + " numbers");
+    return at_frame(
+        {Errc::kInvalidInput, "a transform of " + std::to_string(in.size()) + " numbers"});
   }
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   if ((given & kRotation) != 0) rotation = Eigen::Quaterniond(in[3], in[0], in[1], in[2]);
   if ((given & kTranslation) != 0) translation = {in[4], in[5], in[6]};
   const auto pose = Pose::create(rotation, translation);
-  if (!pose) return fail_at(place, pose.error());
+  if (!pose) return at_frame(pose.error());
   PartialTransform parts;
   if ((given & kRotation) != 0) parts.rotation = pose->rotation();
   if ((given & kTranslation) != 0) parts.translation = pose->translation();
   if ((given & kCovariance) == 0) return parts;
-  const auto covariance = read_covariance({in.begin() + kPoseNumbers, in.end()}, place);
-  if (!covariance) return tl::unexpected(covariance.error());
+  const auto covariance = read_covariance(in, kPoseNumbers);
+  if (!covariance) return at_frame(covariance.error());
   parts.covariance = *covariance;
   return parts;
 }

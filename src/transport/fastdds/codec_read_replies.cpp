@@ -13,7 +13,10 @@ namespace tfdude::fastdds {
 namespace {
 
 Result<Covariance> read_process_noise(const Numbers& numbers) {
-  return numbers.empty() ? Covariance() : read_covariance(numbers, "process noise");
+  if (numbers.empty()) return Covariance();
+  auto noise = read_covariance(numbers, 0);
+  if (!noise) return fail_at("process noise", noise.error());
+  return noise;
 }
 
 Result<std::vector<Transform>> read_values(const std::vector<Numbers>& body) {

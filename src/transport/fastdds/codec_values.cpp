@@ -40,13 +40,14 @@ Numbers numbers_of(const Transform& X) {
 bool is_pose_only(const Numbers& in) { return in.size() == kPoseNumbers; }
 
 Result<Transform> read_transform(const Numbers& in, std::string_view frame) {
-  const std::string place = "frame " + quote(frame);
-  if (auto ok = check_size(in); !ok) return fail_at(place, ok.error());
+  // Names the place only where something is wrong: most transforms are right.
+  const auto at_frame = [&](const Error& error) { return fail_at("frame " + quote(frame), error); };
+  if (auto ok = check_size(in); !ok) return at_frame(ok.error());
   const auto pose =
       Pose::create(Eigen::Quaterniond(in[3], in[0], in[1], in[2]), {in[4], in[5], in[6]});
-  if (!pose) return fail_at(place, pose.error());
-  const auto covariance = read_covariance({in.begin() + kPoseNumbers, in.end()}, place);
-  if (!covariance) return tl::unexpected(covariance.error());
+  if (!pose) return at_frame(pose.error());
+  const auto covariance = read_covariance(in, kPoseNumbers);
+  if (!covariance) return at_frame(covariance.error());
   return Transform{*pose, *covariance};
 }
 
@@ -63,16 +64,14 @@ Result<Transform> read_computed_pose(const Numbers& in) {
   return computed_from(flat);
 }
 
-Result<Covariance> read_covariance(const Numbers& upper, const std::string& what) {
-  Covariance::Upper numbers{};
-  if (upper.size() != numbers.size()) {
-    return fail(Errc::kInvalidInput,
-                what + ": a covariance of " + std::to_string(upper.size()) + " numbers");
+Result<Covariance> read_covariance(const Numbers& in, std::size_t first) {
+  Covariance::Upper upper{};
+  const std::size_t count = in.size() - std::min(first, in.size());
+  if (count != upper.size()) {
+    return fail(Errc::kInvalidInput, "a covariance of " + std::to_string(count) + " numbers");
   }
-  std::copy(upper.begin(), upper.end(), numbers.begin());
-  const auto covariance = Covariance::from_upper(numbers);
-  if (!covariance) return fail_at(what, covariance.error());
-  return *covariance;
+  std::copy_n(in.end() - Covariance::kSize, Covariance::kSize, upper.begin());
+  return Covariance::from_upper(upper);
 }
 
 }  // namespace tfdude::fastdds

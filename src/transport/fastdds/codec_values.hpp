@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -37,7 +36,7 @@ void write_pose(const Pose& pose, Numbers& out);
 /// The same of a pose without its covariance, which is zero in the result.
 [[nodiscard]] Result<Transform> read_computed_pose(const Numbers& in);
 
-/// @param what  names the place in an error
-[[nodiscard]] Result<Covariance> read_covariance(const Numbers& upper, const std::string& what);
+/// The covariance of which these are the numbers from `first` on.
+[[nodiscard]] Result<Covariance> read_covariance(const Numbers& in, std::size_t first);
 
 }  // namespace tfdude::fastdds
