@@ -18,13 +18,15 @@ void Absences::limit() {
   }));
 }
 
-void Absences::went(const std::string& partition, std::uint64_t incarnation, bool stopped,
-                    Time now) {
+void Absences::went(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now,
+                    std::chrono::nanoseconds early) {
   const Absent::Kind then = stopped ? Absent::Kind::kStopped : Absent::Kind::kLost;
   // An earlier absence that is not resolved stays unresolved.
   const auto before = missed_.find(partition);
   const bool again = before != missed_.end() && before->second.absent.kind == Absent::Kind::kBack;
   put(partition, incarnation, now, again ? then : Absent::Kind::kSilent, then);
+  if (const auto there = missed_.find(partition); there != missed_.end())
+    there->second.early = early;
 }
 
 void Absences::told(const Absent& absent, const std::string& teller) {
@@ -102,7 +104,10 @@ Absences::Looked Absences::look(Steady now) {
       missed.teller.clear();
       looked.counts = true;
     }
-    if (missed.absent.kind == Absent::Kind::kSilent || now - *missed.noticed < kTakeover) continue;
+    if (missed.absent.kind == Absent::Kind::kSilent ||
+        now - *missed.noticed < kTakeover + missed.early) {
+      continue;
+    }
     missed.pending = false;
     looked.gone.push_back(name);
   }

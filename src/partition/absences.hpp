@@ -34,7 +34,10 @@ class Absences {
   static constexpr std::size_t kMost = 256;
 
   /// A partition no longer sends, or has announced its stop.
-  void went(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now);
+  /// @param early  by how much later others may notice it. It counts as gone that much later, so
+  ///   that all know of the absence by then
+  void went(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now,
+            std::chrono::nanoseconds early = {});
 
   /// Another participant, `teller`, misses a partition that was not discovered here. Hearsay counts
   /// only after kGrace: otherwise a process that has hung, and hears late what others reported
@@ -88,6 +91,7 @@ class Absences {
     std::optional<Steady> noticed;  // of a silence
     std::string teller{};           // of hearsay, which is not passed on
     bool pending = false;           // until it counts as gone
+    std::chrono::nanoseconds early{};
   };
   void put(const std::string& partition, std::uint64_t incarnation, Time now, Absent::Kind kind,
            Absent::Kind then);

@@ -43,8 +43,10 @@ class Directory {
   void apply(const Page& page);
 
   /// The partition's participant is lost; its structure is kept.
+  /// @param early  as of Absences::went()
   /// @return false if this was known
-  bool lost(std::string_view partition, std::uint64_t incarnation, Time now);
+  bool lost(std::string_view partition, std::uint64_t incarnation, Time now,
+            std::chrono::nanoseconds early = {});
 
   /// Evaluates silences: a partition silent for Absences::kGrace counts as absent. After kTakeover
   /// it counts as gone, and frames that others also claim go to them. Call again while
@@ -219,7 +221,8 @@ class Directory {
   void hear_of_itself(const std::vector<Absent>& absent);
   bool drop_outdated(Known& partition, std::uint64_t incarnation);
   void came_back(Known& partition, Owner owner);
-  void went(Known& partition, Owner owner, bool stopped, Time now);
+  void went(Known& partition, Owner owner, bool stopped, Time now,
+            std::chrono::nanoseconds early = {});
   void drop_structure(Known& partition, Owner owner);
   void resolve_returns();
   void tell_claims();

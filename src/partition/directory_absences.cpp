@@ -38,11 +38,12 @@ void Directory::came_back(Known& partition, Owner owner) {
   if (missed) tell_claims();
 }
 
-void Directory::went(Known& partition, Owner owner, bool stopped, Time now) {
+void Directory::went(Known& partition, Owner owner, bool stopped, Time now,
+                     std::chrono::nanoseconds early) {
   partition.info.reachable = false;
   partition.info.stopped = stopped;
   partition.info.since = now;
-  absences_.went(partition.info.name, partition.live, stopped, now);
+  absences_.went(partition.info.name, partition.live, stopped, now, early);
   absences_.told_all({}, partition.info.name);
   changes_.partition_down(partition.info.name, stopped);
   const auto missed = absences_.find(partition.info.name);
@@ -54,12 +55,13 @@ void Directory::went(Known& partition, Owner owner, bool stopped, Time now) {
   }
 }
 
-bool Directory::lost(std::string_view partition, std::uint64_t incarnation, Time now) {
+bool Directory::lost(std::string_view partition, std::uint64_t incarnation, Time now,
+                     std::chrono::nanoseconds early) {
   const auto number = number_of(partition);
   if (!number || *number == kHeldHere) return false;
   Known& gone = partitions_[*number];
   if (gone.live != incarnation || !gone.info.reachable) return false;
-  went(gone, *number, false, now);
+  went(gone, *number, false, now, early);
   return true;
 }
 

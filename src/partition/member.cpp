@@ -50,10 +50,11 @@ void Member::on_own_presence(const Presence& presence) {
   if (is_later) give_up(presence);
 }
 
-void Member::on_lost(const std::string& partition, std::uint64_t incarnation, Time now) {
+void Member::on_lost(const std::string& partition, std::uint64_t incarnation, Time now,
+                     std::chrono::nanoseconds early) {
   outcome_.heard = true;
   if (partition == name_) claim_.lost(incarnation);
-  if (!directory_.lost(partition, incarnation, now)) return;
+  if (!directory_.lost(partition, incarnation, now, early)) return;
   outcome_.lost = partition;
   outcome_.others = outcome_.routes = outcome_.look_for_gone = true;
   if (partition_ != nullptr) outcome_.to_commit = true;

@@ -36,7 +36,9 @@ class Member {
 
   void on_page(const Page& page);
   void on_presence(const Presence& presence, Time now);
-  void on_lost(const std::string& partition, std::uint64_t incarnation, Time now);
+  /// @param early  as of Absences::went()
+  void on_lost(const std::string& partition, std::uint64_t incarnation, Time now,
+               std::chrono::nanoseconds early = {});
   /// Call at least twice per Absences::kGrace while a partition is silent.
   void on_time(Steady now);
 

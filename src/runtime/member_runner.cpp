@@ -126,8 +126,9 @@ void MemberRunner::on_presence(const Presence& presence) {
   input([&](Member& member) { member.on_presence(presence, wall_clock()); });
 }
 
-void MemberRunner::on_lost(const std::string& partition, std::uint64_t incarnation) {
-  input([&](Member& member) { member.on_lost(partition, incarnation, wall_clock()); });
+void MemberRunner::on_lost(const std::string& partition, std::uint64_t incarnation,
+                           std::chrono::nanoseconds early) {
+  input([&](Member& member) { member.on_lost(partition, incarnation, wall_clock(), early); });
 }
 
 std::optional<Reply> MemberRunner::on_request(const PeerId& from, const Request& request) {

@@ -56,7 +56,8 @@ class MemberRunner final : private CommitLoop::Effects {
 
   void on_page(const Page& page);
   void on_presence(const Presence& presence);
-  void on_lost(const std::string& partition, std::uint64_t incarnation);
+  void on_lost(const std::string& partition, std::uint64_t incarnation,
+               std::chrono::nanoseconds early);
   /// A request of a peer. @return the reply to send at once; empty if it follows after its changes
   /// are stored
   [[nodiscard]] std::optional<Reply> on_request(const PeerId& from, const Request& request);

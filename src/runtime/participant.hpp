@@ -67,8 +67,9 @@ class Participant final : public TransportHandler {
   void on_watcher(std::uint64_t group) override { pushing_.on_watcher(group); }
   void on_page(const Page& page) override { member_.on_page(page); }
   void on_presence(const Presence& presence) override { member_.on_presence(presence); }
-  void on_lost(const std::string& partition, std::uint64_t incarnation) override {
-    member_.on_lost(partition, incarnation);
+  void on_lost(const std::string& partition, std::uint64_t incarnation,
+               std::chrono::nanoseconds early) override {
+    member_.on_lost(partition, incarnation, early);
   }
   [[nodiscard]] bool owns(std::string_view id) const override {
     return structure_.forest.holds(id);

@@ -47,7 +47,9 @@ class TransportHandler {
   /// Another participant's presence.
   virtual void on_presence(const Presence& presence) = 0;
   /// The participant that announced this partition has stopped or is lost.
-  virtual void on_lost(const std::string& partition, std::uint64_t incarnation) = 0;
+  /// @param early  by how much later others may notice it
+  virtual void on_lost(const std::string& partition, std::uint64_t incarnation,
+                       std::chrono::nanoseconds early) = 0;
   /// Whether a frame is owned here: filters requests and updates. Must be quick and take no lock.
   [[nodiscard]] virtual bool owns(std::string_view id) const = 0;
   /// The same for a joint.

@@ -30,7 +30,7 @@ class Owner final : public TransportHandler {
   void on_pushed(const PushedValues&) override {}
   void on_page(const Page&) override {}
   void on_presence(const Presence&) override {}
-  void on_lost(const std::string&, std::uint64_t) override {}
+  void on_lost(const std::string&, std::uint64_t, std::chrono::nanoseconds) override {}
   [[nodiscard]] bool owns(std::string_view id) const override { return id == "hand" || id == "x"; }
   [[nodiscard]] bool owns_joint(std::string_view name) const override { return name == "hand"; }
 };

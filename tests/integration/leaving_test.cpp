@@ -28,7 +28,7 @@ class Member {
     auto qos = profiles_.participant();
     // As of our participants: with a short one Fast DDS 2.9 may wait for itself as it ends.
     qos.wire_protocol().builtin.discovery_config.leaseDuration = {30, 0};
-    DiscoveryGate discovery_gate(gate_);
+    DiscoveryGate discovery_gate(gate_, std::make_shared<LifeSigns>());
     discovery_gate.prepare(qos, domain, false);
     participant_ = factory().create_participant(domain, qos);
     REQUIRE(participant_ != nullptr);

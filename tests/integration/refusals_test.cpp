@@ -41,7 +41,7 @@ class MutePartition final : public TransportHandler {
   void on_pushed(const PushedValues&) override {}
   void on_page(const Page&) override {}
   void on_presence(const Presence&) override {}
-  void on_lost(const std::string&, std::uint64_t) override {}
+  void on_lost(const std::string&, std::uint64_t, std::chrono::nanoseconds) override {}
   [[nodiscard]] bool owns(std::string_view) const override { return true; }
   [[nodiscard]] bool owns_joint(std::string_view) const override { return true; }
 

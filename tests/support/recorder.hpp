@@ -113,7 +113,8 @@ class Recorder final : public TransportHandler {
     record([&] { heard_.presences.push_back(presence); });
     if (greet) greet();
   }
-  void on_lost(const std::string& partition, std::uint64_t incarnation) override {
+  void on_lost(const std::string& partition, std::uint64_t incarnation,
+               std::chrono::nanoseconds) override {
     record([&] { heard_.lost.emplace_back(partition, incarnation); });
   }
   [[nodiscard]] bool owns(std::string_view id) const override { return frames.count(id) != 0; }

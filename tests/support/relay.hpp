@@ -62,8 +62,9 @@ class Relay : public Transport, protected TransportHandler {
   void on_watcher(std::uint64_t group) override { handler_->on_watcher(group); }
   void on_page(const Page& page) override { handler_->on_page(page); }
   void on_presence(const Presence& presence) override { handler_->on_presence(presence); }
-  void on_lost(const std::string& partition, std::uint64_t incarnation) override {
-    handler_->on_lost(partition, incarnation);
+  void on_lost(const std::string& partition, std::uint64_t incarnation,
+               std::chrono::nanoseconds early) override {
+    handler_->on_lost(partition, incarnation, early);
   }
   bool owns(std::string_view id) const override { return handler_->owns(id); }
   bool owns_joint(std::string_view name) const override { return handler_->owns_joint(name); }

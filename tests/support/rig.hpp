@@ -73,7 +73,7 @@ class Rig {
   void on_page(const Page& page) { member.on_page(page); }
   void on_presence(const Presence& presence) { member.on_presence(presence); }
   void on_lost(const std::string& partition, std::uint64_t incarnation) {
-    member.on_lost(partition, incarnation);
+    member.on_lost(partition, incarnation, {});
   }
 
   const Options options;
@@ -108,7 +108,8 @@ class Rig {
     }
     void on_page(const Page& page) override { rig_.on_page(page); }
     void on_presence(const Presence& presence) override { rig_.on_presence(presence); }
-    void on_lost(const std::string& partition, std::uint64_t incarnation) override {
+    void on_lost(const std::string& partition, std::uint64_t incarnation,
+                 std::chrono::nanoseconds) override {
       rig_.on_lost(partition, incarnation);
     }
     [[nodiscard]] bool owns(std::string_view id) const override {

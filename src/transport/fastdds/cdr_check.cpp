@@ -209,6 +209,7 @@ void request_body(CdrWalk& walk) {
       break;
     case kHistory:
     case kConsistency:
+    case kProbe:
       walk.octet();
       break;
     case kJointStates:
@@ -249,6 +250,7 @@ bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
       walk.transforms();
       break;
     case kDoneReply:
+    case kAlive:
       walk.octet();
       break;
     case kStamped:

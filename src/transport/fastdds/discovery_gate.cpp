@@ -13,15 +13,17 @@ using Flag = std::shared_ptr<std::atomic<bool>>;
 
 struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   GatedDescriptor(std::shared_ptr<etransport::TransportDescriptorInterface> guarded, Flag flag,
-                  std::shared_ptr<Gate> inward)
+                  std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
-        gate(std::move(inward)) {}
+        gate(std::move(inward)),
+        life_signs(std::move(signs)) {}
 
   [[nodiscard]] etransport::TransportInterface* create_transport() const override;
 
   Flag open;
   std::shared_ptr<Gate> gate;
+  std::shared_ptr<LifeSigns> life_signs;
   std::shared_ptr<SendThrottle> throttle = std::make_shared<SendThrottle>();
 };
 
@@ -46,7 +48,9 @@ class GatedTransport final : public SendFilter {
                std::uint32_t size, const ertps::Locator_t& local,
                const ertps::Locator_t& remote) override {
     const Gate::Pass pass(*descriptor_.gate);
-    if (pass) SendFilter::receive(next, bytes, size, local, remote);
+    if (!pass) return;
+    descriptor_.life_signs->heard(bytes, size, LifeSigns::Clock::now());
+    SendFilter::receive(next, bytes, size, local, remote);
   }
 
  private:
@@ -85,28 +89,37 @@ void hear_by_unicast_only(edds::DomainParticipantQos& qos, std::uint32_t domain)
   builtin.initialPeersList.push_back(group);
 }
 
-// A client announces itself often, so that it need not wait long for its next announcement. There
-// are few clients at a time, and not for long, while each server's announcement is heard by all.
+// A client's first announcements follow each other soon, so that it need not wait long for the next
+// one. There are few new clients at a time, while servers often start all at once.
 void announce_eagerly(edds::DomainParticipantQos& qos) {
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.initial_announcements.period = {0, 2'000'000};
-  discovery.leaseDuration_announcementperiod = {0, 100'000'000};
+}
+
+bool is_udp(const std::shared_ptr<etransport::TransportDescriptorInterface>& transport) {
+  return std::dynamic_pointer_cast<etransport::UDPv4TransportDescriptor>(transport) != nullptr;
+}
+
+bool only_udp(const edds::DomainParticipantQos& qos) {
+  const auto& transports = qos.transport().user_transports;
+  return !qos.transport().use_builtin_transports &&
+         std::all_of(transports.begin(), transports.end(), is_udp);
 }
 
 }  // namespace
 
+bool DiscoveryGate::hears_announcements(const edds::DomainParticipantQos& qos) {
+  const auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  return discovery.discoveryProtocol == DiscoveryProtocol::SIMPLE && only_udp(qos);
+}
+
 void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain,
                             bool client) const {
-  const auto is_udp = [](const auto& transport) {
-    return std::dynamic_pointer_cast<etransport::UDPv4TransportDescriptor>(transport) != nullptr;
-  };
   if (client) announce_eagerly(qos);
-  auto& transports = qos.transport().user_transports;
-  const bool udp_only = !qos.transport().use_builtin_transports &&
-                        std::all_of(transports.begin(), transports.end(), is_udp);
-  if (client && udp_only) hear_by_unicast_only(qos, domain);
-  for (auto& transport : transports) {
-    if (is_udp(transport)) transport = std::make_shared<GatedDescriptor>(transport, open_, gate_);
+  if (client && only_udp(qos)) hear_by_unicast_only(qos, domain);
+  for (auto& transport : qos.transport().user_transports) {
+    if (!is_udp(transport)) continue;
+    transport = std::make_shared<GatedDescriptor>(transport, open_, gate_, life_signs_);
   }
 }
 

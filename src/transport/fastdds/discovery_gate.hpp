@@ -7,6 +7,7 @@
 
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/gate.hpp"
+#include "transport/fastdds/life_signs.hpp"
 
 namespace tfdude::fastdds {
 
@@ -22,22 +23,29 @@ namespace tfdude::fastdds {
 ///   another thread may be faster. So a client does not listen to multicast: all messages come to
 ///   one socket, in order. It then discovers later participants by its own announcements, and does
 ///   not discover other clients.
-/// - A client announces itself every 2 ms at first, later every 100 ms; a server as set in the
+/// - A client announces itself every 2 ms at first; later, and a server always, as set in the
 ///   profile.
 class DiscoveryGate {
  public:
   /// @param gate  all datagrams received over UDP pass it
-  explicit DiscoveryGate(std::shared_ptr<Gate> gate) : gate_(std::move(gate)) {}
+  /// @param life_signs  is told of each of them
+  DiscoveryGate(std::shared_ptr<Gate> gate, std::shared_ptr<LifeSigns> life_signs)
+      : gate_(std::move(gate)), life_signs_(std::move(life_signs)) {}
 
   /// Prepares the creation of a participant. Changes neither transports other than UDP, nor
   /// discovery settings that the profile overrides.
   void prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) const;
+
+  /// Whether participants with these settings hear each other's periodic announcements, and
+  /// LifeSigns sees them: discovery is the simple one, and all transports are UDP.
+  [[nodiscard]] static bool hears_announcements(const edds::DomainParticipantQos& qos);
 
   /// Lets the participant send: it has been created.
   void open() { open_->store(true, std::memory_order_relaxed); }
 
  private:
   const std::shared_ptr<Gate> gate_;
+  const std::shared_ptr<LifeSigns> life_signs_;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);
 };
 

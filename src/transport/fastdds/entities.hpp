@@ -63,6 +63,10 @@ class Writer final : public edds::DataWriterListener {
   /// or if no reader is left that could acknowledge.
   [[nodiscard]] bool flush(Deadline deadline);
 
+  /// Records that this participant depends on the readers now.
+  void use(Deadline now) { last_use_.store(now, std::memory_order_relaxed); }
+  [[nodiscard]] Deadline last_use() const { return last_use_.load(std::memory_order_relaxed); }
+
   /// Why a reader that was discovered does not match (mismatch_of()); empty: none was.
   [[nodiscard]] std::string mismatch() const;
 
@@ -82,8 +86,9 @@ class Writer final : public edds::DataWriterListener {
   std::atomic<int> readers_{0};                 // changed under mutex_
   std::atomic<std::uint64_t> written_{0};       // number of samples, counted once written
   std::atomic<std::uint64_t> acknowledged_{0};  // at least so many of them
-  std::recursive_mutex writing_;                // as Fast DDS's own
-  GrowingStamp source_stamp_;                   // under writing_
+  std::atomic<Deadline> last_use_{Deadline::min()};
+  std::recursive_mutex writing_;  // as Fast DDS's own
+  GrowingStamp source_stamp_;     // under writing_
 };
 
 /// A reader with its own subscriber, hence in its own DDS partition. It passes DDS samples on one

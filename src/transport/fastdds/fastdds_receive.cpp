@@ -2,6 +2,7 @@
 
 #include "base/log.hpp"
 #include "transport/fastdds/fastdds_transport.hpp"
+#include "transport/fastdds/kinds.hpp"
 #include "transport/fastdds/topics.hpp"
 
 // What becomes of samples that arrive.
@@ -10,6 +11,12 @@ namespace tfdude::fastdds {
 void FastDdsTransport::take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from) {
   if (peers_.is_incompatible(from)) return;
   const PeerId peer = peer_of(from);
+  if (sample.body()._d() == kProbe) {
+    wire::Reply alive;
+    alive.body().alive(0);
+    reply(peer, std::move(alive));
+    return;
+  }
   auto request = from_wire(sample);
   if (request) {
     handler_->on_request(peer, *request);
@@ -39,6 +46,7 @@ void FastDdsTransport::take_joints(const wire::Joints& sample) {
 }
 
 void FastDdsTransport::take_reply(const wire::Reply& sample) {
+  if (sample.body()._d() == kAlive) return;  // that it arrives says all
   auto reply = from_wire(sample);
   if (reply) {
     handler_->on_reply(*reply);
@@ -61,15 +69,16 @@ void FastDdsTransport::take_page(const wire::Page& sample, const ertps::GuidPref
   }
 }
 
-void FastDdsTransport::take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from,
-                                     bool beat) {
+void FastDdsTransport::take_presence(const wire::Presence& sample,
+                                     const ertps::GuidPrefix_t& from) {
   if (peer_of(from) == self_ || peers_.is_incompatible(from)) return;
   const auto presence = from_wire(sample);
   if (!presence) {
     log_refused(kPresenceTopic, presence.error());
     return;
   }
-  peers_.present(from, *presence, sample.peers(), beat);
+  peers_.present(from, *presence, sample.peers());
+  attention_.raise();
 }
 
 }  // namespace tfdude::fastdds

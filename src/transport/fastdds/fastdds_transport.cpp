@@ -19,17 +19,30 @@ namespace {
 
 constexpr std::chrono::seconds kLongLease{30};
 
-// DDS repeats a lost discovery message after a second; discovery by a server takes more steps.
-constexpr std::chrono::milliseconds kFirstBeat{1500};
-constexpr std::chrono::milliseconds kFirstBeatByServer{8000};
+// If so many announcements in a row are missing, their sender counts as lost. With 10 % packet loss
+// that happens to a living one once in days, for a moment.
+constexpr int kMissed = 6;
+
+// Where the announcements of DDS are not heard, presence is repeated in their place.
+constexpr std::chrono::milliseconds kRepeatEvery{800};
+constexpr std::chrono::milliseconds kSilenceOfRepetition{2100};
+
+// The number of servers that this one hears changes often just when there is most to do.
+constexpr std::chrono::milliseconds kCountEvery{200};
 
 constexpr std::uint32_t kMaxDomain = 232;  // beyond it the ports of RTPS 2.x run out
+
+// How often a call that waits for an owner checks whether it still can come.
+constexpr std::chrono::milliseconds kWaitStep{60};
 
 // Time for the other participants to hear that this one ends.
 constexpr std::chrono::milliseconds kLastWord{100};
 
-// If there are more servers than this, each sends its beat less often.
-constexpr std::uint32_t kMany = 12;
+// Of the type of Fast DDS, which has another name in each version.
+template <class Duration>
+std::chrono::nanoseconds nanoseconds_of(const Duration& duration) {
+  return std::chrono::seconds(duration.seconds) + std::chrono::nanoseconds(duration.nanosec);
+}
 
 tl::unexpected<Error> not_created(const char* what) {
   return fail(Errc::kTransport, std::string("Fast DDS could not create ") + what);
@@ -47,9 +60,11 @@ Result<void> FastDdsTransport::start(TransportHandler& handler) {
   if (!profiles) return tl::unexpected(std::move(profiles.error()));
   profiles_ = *std::move(profiles);
   worker_.emplace();
-  worker_->repeat(Peers::kSpeakEvery / 2, [this] { keep_in_touch(); });
+  attention_.start(*worker_);
   if (auto created = create_participant(); !created) return created;
-  return create_endpoints();
+  if (auto created = create_endpoints(); !created) return created;
+  worker_->repeat([this] { return keep_in_touch(); });
+  return {};
 }
 
 Result<void> FastDdsTransport::create_participant() {
@@ -60,11 +75,11 @@ Result<void> FastDdsTransport::create_participant() {
   // Fast DDS 3 announces type descriptions that Cyclone DDS takes for types other than its own.
   // Without them, it compares only the names.
   qos.properties().properties().emplace_back("fastdds.type_propagation", "disabled");
-  take_lease(qos);
+  take_times(qos);
   if (!options_.discovery_server.empty()) {
     if (auto used = use_discovery_server(qos, options_.discovery_server); !used) return used;
   }
-  DiscoveryGate discovery_gate(gate_);
+  DiscoveryGate discovery_gate(gate_, life_signs_);
   discovery_gate.prepare(qos, options_.domain, options_.partition.empty());
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
       options_.domain, qos, &participant_listener_, edds::StatusMask::none());
@@ -75,15 +90,14 @@ Result<void> FastDdsTransport::create_participant() {
   discovery_gate.open();
   self_ = peer_of(participant_->guid().guidPrefix);
   topics_.presence = create_topic(kPresenceTopic, edds::TypeSupport(new PresenceType));
-  topics_.beat = create_topic(kBeatTopic, edds::TypeSupport(new PresenceType));
   topics_.directory = create_topic(kDirectoryTopic, edds::TypeSupport(new PageType));
   topics_.reply = create_topic(kReplyTopic, edds::TypeSupport(new ReplyType));
   topics_.request = create_topic(kRequestTopic, edds::TypeSupport(new RequestType));
   topics_.update = create_topic(kUpdateTopic, edds::TypeSupport(new UpdateType));
   topics_.joint = create_topic(kJointTopic, edds::TypeSupport(new JointsType));
   topics_.state = create_topic(kStateTopic, edds::TypeSupport(new StateType));
-  for (const auto* topic : {topics_.presence, topics_.beat, topics_.directory, topics_.reply,
-                            topics_.request, topics_.update, topics_.joint, topics_.state}) {
+  for (const auto* topic : {topics_.presence, topics_.directory, topics_.reply, topics_.request,
+                            topics_.update, topics_.joint, topics_.state}) {
     if (topic == nullptr) return not_created("the topics");
   }
   return {};
@@ -91,14 +105,16 @@ Result<void> FastDdsTransport::create_participant() {
 
 // The profile's lease is used only to detect loss here; DDS itself keeps a match for longer (see
 // Peers).
-void FastDdsTransport::take_lease(edds::DomainParticipantQos& qos) {
-  auto& lease = qos.wire_protocol().builtin.discovery_config.leaseDuration;
-  const auto silence =
-      std::chrono::seconds(lease.seconds) + std::chrono::nanoseconds(lease.nanosec);
-  const bool by_server = !options_.discovery_server.empty();
-  peers_.configure(silence, by_server ? kFirstBeatByServer : kFirstBeat,
-                   !options_.partition.empty());
-  if (silence < kLongLease) lease = {static_cast<std::int32_t>(kLongLease.count()), 0};
+void FastDdsTransport::take_times(edds::DomainParticipantQos& qos) {
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  const auto lease = nanoseconds_of(discovery.leaseDuration);
+  const auto every = nanoseconds_of(discovery.leaseDuration_announcementperiod);
+  announced_by_dds_ = options_.discovery_server.empty() && DiscoveryGate::hears_announcements(qos);
+  peers_.configure(lease, announced_by_dds_ ? every * kMissed + every / 4 : kSilenceOfRepetition,
+                   Attention::kRarely, !options_.partition.empty());
+  if (lease < kLongLease) {
+    discovery.leaseDuration = {static_cast<std::int32_t>(kLongLease.count()), 0};
+  }
 }
 
 edds::Topic* FastDdsTransport::create_topic(const char* name, const edds::TypeSupport& type) {
@@ -114,16 +130,9 @@ Result<void> FastDdsTransport::create_endpoints() {
                           [this](std::uint64_t group) { handler_->on_watcher(group); }});
   presence_ = std::make_unique<Reader<wire::Presence>>(
       context(), *topics_.presence, std::string(), "presence_reader",
-      Reader<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
-                                      take_presence(sample, from, false);
-                                    },
-                                    nullptr});
-  beats_ = std::make_unique<Reader<wire::Presence>>(
-      context(), *topics_.beat, std::string(), "beat_reader",
-      Reader<wire::Presence>::Calls{[this](const wire::Presence& sample, const Prefix& from) {
-                                      take_presence(sample, from, true);
-                                    },
-                                    nullptr});
+      Reader<wire::Presence>::Calls{
+          [this](const wire::Presence& sample, const Prefix& from) { take_presence(sample, from); },
+          nullptr});
   pages_ = std::make_unique<Reader<wire::Page>>(
       context(), *topics_.directory, std::string(), "directory_reader",
       Reader<wire::Page>::Calls{
@@ -136,16 +145,15 @@ Result<void> FastDdsTransport::create_endpoints() {
                                    take_reply(sample);
                                  },
                                  nullptr});
-  if (!presence_->good() || !beats_->good() || !pages_->good() || !replies_->good()) {
+  if (!presence_->good() || !pages_->good() || !replies_->good()) {
     return not_created("the readers");
   }
   if (options_.partition.empty()) return {};
   presence_writer_ =
       std::make_unique<Writer>(context(), *topics_.presence, std::string(), "presence_writer");
-  beat_writer_ = std::make_unique<Writer>(context(), *topics_.beat, std::string(), "beat_writer");
   directory_writer_ =
       std::make_unique<Writer>(context(), *topics_.directory, std::string(), "directory_writer");
-  if (!presence_writer_->good() || !beat_writer_->good() || !directory_writer_->good()) {
+  if (!presence_writer_->good() || !directory_writer_->good()) {
     return not_created("the writers");
   }
   return {};
@@ -211,7 +219,6 @@ void FastDdsTransport::stop() {
   joints_.reset();
   replies_.reset();
   pages_.reset();
-  beats_.reset();
   presence_.reset();
   push_channels_.reset();
   reply_writers_.clear();
@@ -219,7 +226,6 @@ void FastDdsTransport::stop() {
   update_writers_.clear();
   joint_writers_.clear();
   directory_writer_.reset();
-  beat_writer_.reset();
   presence_writer_.reset();
   participant_->delete_contained_entities();
   edds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
@@ -232,22 +238,62 @@ void FastDdsTransport::announce(const Presence& presence) {
   const Lock lock(presence_mutex_);
   said_ = to_wire(presence);
   said_->peers(peers_.heard_count());
+  said_at_ = Peers::Clock::now();
   presence_writer_->write(&*said_);
 }
 
-// Each call checks who is silent. Every second call sends a beat, or every third among many
-// participants, since the traffic of all beats grows with the square. A beat may be lost, as the
-// next one follows. Only the beat says how many servers this one hears, because that number changes
-// often just when there is most to do.
-void FastDdsTransport::keep_in_touch() {
-  peers_.look_for_silent(Peers::Clock::now());
+// Looks who is silent: often while this participant depends on others, or has news for them.
+Milliseconds FastDdsTransport::keep_in_touch() {
+  attention_.lower();
+  const std::set<std::string> used = used_owners();
+  std::set<std::string> needed;
+  for (const std::string& partition : used) {
+    // Who only sends a stream has none yet.
+    const auto writer = request_writers_.open(partition);
+    if (writer->good() && writer->matched()) needed.insert(partition);
+  }
+  for (const std::string& partition :
+       peers_.look_for_silent(Peers::Clock::now(), next_look_, needed)) {
+    probe(partition);
+  }
+  const bool up_to_date = announce_count();
+  next_look_ = used.empty() && up_to_date ? Attention::kRarely : Attention::kOften;
+  return next_look_;
+}
+
+// The partitions to which something was sent recently.
+std::set<std::string> FastDdsTransport::used_owners() const {
+  const auto since = Peers::Clock::now() - Attention::kDependsFor;
+  std::set<std::string> owners;
+  for (const auto* writers : {&request_writers_, &update_writers_, &joint_writers_}) {
+    for (const auto& [partition, writer] : writers->all()) {
+      if (writer->last_use() > since) owners.insert(partition);
+    }
+  }
+  return owners;
+}
+
+void FastDdsTransport::probe(const std::string& partition) {
+  wire::Request sample;
+  sample.addressee(addressee_of(partition));
+  sample.body().probe(0);
+  request_writers_.open(partition)->write(&sample);
+}
+
+// A new participant knows by this number whether it has discovered all.
+// @return false if others must be told later
+bool FastDdsTransport::announce_count() {
   const auto heard = peers_.heard_count();
   const Lock lock(presence_mutex_);
-  if (++looks_ < (heard > kMany ? 3 : 2)) return;
-  looks_ = 0;
-  if (!said_) return;
+  if (!said_) return true;
+  const auto age = Peers::Clock::now() - said_at_;
+  const bool changed = said_->peers() != heard;
+  if (changed && age < kCountEvery) return false;
+  if (!changed && (announced_by_dds_ || age < kRepeatEvery)) return true;
   said_->peers(heard);
-  beat_writer_->write(&*said_);
+  said_at_ = Peers::Clock::now();
+  presence_writer_->write(&*said_);
+  return true;
 }
 
 void FastDdsTransport::publish(const Page& page) {
@@ -290,9 +336,10 @@ Result<void> FastDdsTransport::send(const std::string& partition, const JointUpd
 }
 
 Result<void> FastDdsTransport::send(Writer& writer, const std::string& partition, void* sample,
-                                    Deadline deadline) const {
+                                    Deadline deadline) {
   if (!writer.good()) return not_created("a writer");
-  while (!writer.wait_until_matched(std::min(deadline, Peers::Clock::now() + Peers::kSpeakEvery))) {
+  attention_.pay(writer);
+  while (!writer.wait_until_matched(std::min(deadline, Peers::Clock::now() + kWaitStep))) {
     if (peers_.silent(partition)) {
       return fail(Errc::kUnreachable,
                   "partition " + quote(partition) + " left before it was discovered");
@@ -334,7 +381,10 @@ void FastDdsTransport::open_reply_writer(const PeerId& peer) {
 }
 
 void FastDdsTransport::reply(const PeerId& to, const Reply& reply) {
-  wire::Reply sample = to_wire(reply);
+  this->reply(to, to_wire(reply));
+}
+
+void FastDdsTransport::reply(const PeerId& to, wire::Reply sample) {
   if (const auto writer = reply_writers_.find(to)) {
     if (writer->good()) writer->write(&sample);
     return;
@@ -350,6 +400,7 @@ void FastDdsTransport::met(const ertps::GuidPrefix_t& prefix, const std::string&
                            const std::vector<std::uint8_t>& user_data) {
   const Announcement said = read_announcement(name, user_data);
   peers_.met(prefix, said);
+  attention_.raise();
   if (!said.compatible()) return;
   worker_->post([this, peer = peer_of(prefix)] { there_.insert(peer); });
 }
@@ -358,6 +409,7 @@ void FastDdsTransport::met(const ertps::GuidPrefix_t& prefix, const std::string&
 // it.
 void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
   peers_.left(prefix);
+  attention_.raise();
   worker_->post([this, peer = peer_of(prefix)] {
     there_.erase(peer);
     const auto writer = reply_writers_.take(peer);

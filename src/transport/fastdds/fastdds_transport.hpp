@@ -9,6 +9,7 @@
 #include "tfdude/transport/fastdds.hpp"
 
 #include "base/mutex.hpp"
+#include "transport/fastdds/attention.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/owned_filter.hpp"
@@ -68,38 +69,41 @@ class FastDdsTransport final : public Transport {
     edds::Topic* state = nullptr;
     edds::Topic* directory = nullptr;
     edds::Topic* presence = nullptr;
-    edds::Topic* beat = nullptr;
   };
 
   Result<void> create_participant();
   Result<void> create_endpoints();
-  void take_lease(edds::DomainParticipantQos& qos);
+  void take_times(edds::DomainParticipantQos& qos);
   edds::Topic* create_topic(const char* name, const edds::TypeSupport& type);
   edds::ContentFilteredTopic* create_filtered(edds::Topic* topic, const std::string& partition);
 
-  void keep_in_touch();
+  Milliseconds keep_in_touch();
+  [[nodiscard]] std::set<std::string> used_owners() const;
+  void probe(const std::string& partition);
+  bool announce_count();
   [[nodiscard]] Context context() const { return {*participant_, *profiles_, *gate_, *counters_}; }
   /// A table whose writers are in the DDS partitions of their names.
   WriterTable<std::string> writers_of(edds::Topic*& topic, const char* profile);
   void open_reply_writer(const PeerId& peer);
-  Result<void> send(Writer& writer, const std::string& partition, void* sample,
-                    Deadline deadline) const;
+  void reply(const PeerId& to, wire::Reply sample);
+  Result<void> send(Writer& writer, const std::string& partition, void* sample, Deadline deadline);
 
   void take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from);
   void take_update(const wire::Update& sample);
   void take_joints(const wire::Joints& sample);
   void take_reply(const wire::Reply& sample);
   void take_page(const wire::Page& sample, const ertps::GuidPrefix_t& from);
-  void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from, bool beat);
+  void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from);
 
   const FastDdsOptions options_;
   const std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
   std::optional<Profiles> profiles_;
   const std::shared_ptr<FastDdsCounters> counters_;
   TransportHandler* handler_ = nullptr;
-  Peers peers_{[this](const Presence& presence) { handler_->on_presence(presence); },
-               [this](const Presence& presence) {
-                 handler_->on_lost(presence.partition, presence.incarnation);
+  const std::shared_ptr<LifeSigns> life_signs_ = std::make_shared<LifeSigns>();
+  Peers peers_{life_signs_, [this](const Presence& presence) { handler_->on_presence(presence); },
+               [this](const Presence& presence, std::chrono::nanoseconds early) {
+                 handler_->on_lost(presence.partition, presence.incarnation, early);
                }};
 
   ParticipantListener<FastDdsTransport> participant_listener_{*this};
@@ -108,9 +112,13 @@ class FastDdsTransport final : public Transport {
   Topics topics_;
 
   Mutex presence_mutex_{LockRank::kAnnouncing};
-  int looks_ TFDUDE_GUARDED_BY(presence_mutex_) = 0;  // since it last spoke
-  std::optional<wire::Presence> said_
-      TFDUDE_GUARDED_BY(presence_mutex_);  // what this participant serves, as last announced
+  // What this participant serves, as last announced, and when that was.
+  std::optional<wire::Presence> said_ TFDUDE_GUARDED_BY(presence_mutex_);
+  Peers::Clock::time_point said_at_ TFDUDE_GUARDED_BY(presence_mutex_);
+
+  Attention attention_;
+  Milliseconds next_look_{};      // only for the worker
+  bool announced_by_dds_ = true;  // participants hear the announcements of DDS; set at the start
 
   WriterTable<std::string> request_writers_{writers_of(topics_.request, "call_writer")};
   WriterTable<std::string> update_writers_{writers_of(topics_.update, "update_writer")};
@@ -123,7 +131,6 @@ class FastDdsTransport final : public Transport {
 
   std::unique_ptr<OwnedFilters> filters_;
   std::unique_ptr<Writer> presence_writer_;
-  std::unique_ptr<Writer> beat_writer_;
   std::unique_ptr<Writer> directory_writer_;
   std::unique_ptr<Reader<wire::Request>> requests_;
   std::unique_ptr<Reader<wire::Update>> updates_;
@@ -131,7 +138,6 @@ class FastDdsTransport final : public Transport {
   std::unique_ptr<Reader<wire::Reply>> replies_;
   std::unique_ptr<Reader<wire::Page>> pages_;
   std::unique_ptr<Reader<wire::Presence>> presence_;
-  std::unique_ptr<Reader<wire::Presence>> beats_;
   std::optional<PushChannels> push_channels_;
   std::optional<Worker> worker_;
 };

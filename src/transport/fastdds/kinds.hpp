@@ -22,7 +22,8 @@ enum RequestKind : std::uint8_t {
   kCorrelate = 14,
   kPartialUpdate = 15,
   kForget = 16,
-  kLastRequestKind = kForget
+  kProbe = 17,
+  kLastRequestKind = kProbe
 };
 
 enum ReplyKind : std::uint8_t {
@@ -35,7 +36,8 @@ enum ReplyKind : std::uint8_t {
   kCorrelated = 7,
   kConsistencies = 8,
   kJointInfos = 9,
-  kLastReplyKind = kJointInfos
+  kAlive = 10,
+  kLastReplyKind = kAlive
 };
 
 }  // namespace tfdude::fastdds

@@ -26,7 +26,7 @@ void Peers::met(const ertps::GuidPrefix_t& prefix, const Announcement& said) {
   const Lock lock(mutex_);
   last_met_ = Clock::now();
   if (said.compatible()) {
-    if (!said.partition.empty()) servers_.try_emplace(peer_of(prefix));
+    if (!said.partition.empty()) follow(peer_of(prefix));
     return;
   }
   IncompatiblePeer peer{said.partition, said.protocol, said.program,
@@ -36,6 +36,16 @@ void Peers::met(const ertps::GuidPrefix_t& prefix, const Announcement& said) {
   }
   incompatible_.insert_or_assign(peer_of(prefix), std::move(peer));
   any_incompatible_ = true;
+}
+
+Peers::Server& Peers::follow(const PeerId& peer) {
+  life_signs_->follow(peer);
+  return servers_[peer];
+}
+
+void Peers::hear(Server& server, Clock::time_point at) {
+  server.last_heard = at;
+  if (std::exchange(server.silent, false) && server.presence) there_(*server.presence);
 }
 
 std::vector<IncompatiblePeer> Peers::incompatible() const {
@@ -59,8 +69,9 @@ void Peers::left(const ertps::GuidPrefix_t& prefix) {
   incompatible_.erase(peer_of(prefix));
   const auto known = servers_.find(peer_of(prefix));
   if (known == servers_.end()) return;
+  life_signs_->forget(known->first);
   const Server& server = known->second;
-  if (server.said() != nullptr && !server.silent) gone_(*server.said());
+  if (server.said() != nullptr && !server.silent) gone_(*server.said(), {});
   servers_.erase(known);
 }
 
@@ -79,12 +90,11 @@ void Peers::sent_page(const ertps::GuidPrefix_t& prefix, const Page& page) {
   heard(prefix);
 }
 
-void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers,
-                    bool beat) {
+void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence,
+                    std::size_t peers) {
   const Lock lock(mutex_);
-  Server& server = servers_[peer_of(prefix)];
+  Server& server = follow(peer_of(prefix));
   server.peers = peers;
-  server.beats = server.beats || beat;
   server.last_heard = Clock::now();
   if (!std::exchange(server.silent, false) && server.presence == presence) return;
   server.presence = presence;
@@ -94,28 +104,47 @@ void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence,
 void Peers::heard(const ertps::GuidPrefix_t& prefix) {
   const Lock lock(mutex_);
   const auto known = servers_.find(peer_of(prefix));
-  if (known == servers_.end()) return;
-  Server& server = known->second;
-  server.last_heard = Clock::now();
-  if (std::exchange(server.silent, false) && server.presence) there_(*server.presence);
+  if (known != servers_.end()) hear(known->second, Clock::now());
 }
 
-void Peers::look_for_silent(Clock::time_point now) {
+std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::duration planned,
+                                                const std::set<std::string>& needed) {
+  std::vector<std::string> unheard;
   const Lock lock(mutex_);
-  const auto late = now - std::exchange(last_look_, now) - kSpeakEvery;
+  const auto late =
+      std::max(now - std::exchange(last_look_, now) - planned, Clock::duration::zero());
   for (auto& [id, server] : servers_) {
-    if (late > Clock::duration::zero()) server.last_heard += late;
+    server.last_heard += late;
+    if (const auto sign = life_signs_->last(id); sign && *sign > server.last_heard) {
+      hear(server, *sign);
+    }
     const Presence* said = server.said();
-    if (said == nullptr || server.silent || now - server.last_heard < patience(server)) continue;
-    server.silent = true;
-    gone_(*said);
+    if (said == nullptr) continue;
+    const bool is_needed = needed.count(said->partition) != 0;
+    if (!is_needed) {
+      server.needed_since.reset();
+    } else {
+      server.needed_since = server.needed_since ? *server.needed_since + late : now;
+    }
+    if (server.silent) continue;
+    const auto quiet =
+        now - std::max(server.last_heard, server.needed_since.value_or(Clock::time_point::min()));
+    if (quiet >= (is_needed ? needed_silence_ : silence_)) {
+      server.silent = true;
+      gone_(*said, std::max(all_notice_ - (now - server.last_heard), std::chrono::nanoseconds(0)));
+    } else if (is_needed && quiet >= kProbeAfter) {
+      unheard.push_back(said->partition);
+    }
   }
+  return unheard;
 }
 
 bool Peers::discovered() const {
   const Lock lock(mutex_);
-  return !servers_.empty() && Clock::now() - last_met_ >= kQuiet && all_present() &&
-         nobody_hears_more();
+  if (servers_.empty() || !all_present()) return false;
+  const auto [most, least] = unknown_here();
+  if (most > 0) return false;
+  return Clock::now() - last_met_ >= (least == 0 ? kAgreedQuiet : kQuiet);
 }
 
 std::uint32_t Peers::heard_count() const {
@@ -141,13 +170,19 @@ bool Peers::awaits_presence() const {
   return !all_present();
 }
 
-// Only beats say how many others a server hears: the number in its presence may be outdated.
-bool Peers::nobody_hears_more() const {
-  const std::size_t others = servers_.size() - 1 + (is_server_ ? 1 : 0);
-  return std::all_of(servers_.begin(), servers_.end(), [others](const auto& known) {
-    const Server& server = known.second;
-    return server.silent || (server.beats && server.peers <= others);
-  });
+std::pair<long, long> Peers::unknown_here() const {
+  const auto others = static_cast<long>(servers_.size()) - 1 + (is_server_ ? 1 : 0);
+  long most = 0;
+  long least = 0;
+  for (const auto& [id, server] : servers_) {
+    if (server.silent) continue;
+    // It announces its number as it begins to claim its partition, before it has met anybody.
+    if (!server.presence->serving) least = -1;
+    const long more = static_cast<long>(server.peers) - others;
+    most = std::max(most, more);
+    least = std::min(least, more);
+  }
+  return {most, least};
 }
 
 bool Peers::all_present() const {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -16,6 +17,7 @@
 #include "partition/messages.hpp"
 #include "transport/fastdds/announcement.hpp"
 #include "transport/fastdds/compat.hpp"
+#include "transport/fastdds/life_signs.hpp"
 #include "transport/port.hpp"
 
 namespace tfdude::fastdds {
@@ -30,39 +32,44 @@ namespace tfdude::fastdds {
 /// Thread-safe. The callbacks run under a lock, so that those about one peer come in order. So no
 /// function here may be called with a lock that the callbacks take (LockRank::kReporting).
 ///
-/// Each server announces reliably what it serves when that changes. It also repeats this
-/// periodically as a beat, which may be lost. Readers of beats have their own sockets, which no
-/// other traffic fills. Beats are not reliable because in a reliable stream a lost DDS sample also
-/// delays those after it. Leases of Fast DDS 2.9 are not used for this: a short lease of a
-/// participant ends the match only on the side that was starved, and the outdated acknowledgement
-/// count of the other side prevents its renewal; and liveliness of a topic is renewed by any
-/// participant (issue 4373 of Fast DDS).
+/// Any message shows that its sender lives (LifeSigns). DDS announces each participant
+/// periodically, so nothing else is sent while nobody depends on a server. Who depends on one is
+/// patient for a shorter time, and asks for a sign of life well before that time is over.
+///
+/// Leases of Fast DDS 2.9 are not used for this: a short lease of a participant ends the match only
+/// on the side that was starved, and the outdated acknowledgement count of the other side prevents
+/// its renewal; and liveliness of a topic is renewed by any participant (issue 4373 of Fast DDS).
 class Peers {
  public:
-  using Clock = std::chrono::steady_clock;
+  using Clock = LifeSigns::Clock;
   using Tell = std::function<void(const Presence&)>;
+  using TellGone = std::function<void(const Presence&, std::chrono::nanoseconds early)>;
 
   /// If nobody new was discovered for this long, usually all have answered a new participant.
   static constexpr std::chrono::milliseconds kQuiet{200};
+  /// The same if all servers hear exactly those that were discovered here.
+  static constexpr std::chrono::milliseconds kAgreedQuiet{40};
 
-  /// The period of a server's beats. Seven must be lost before it counts as lost after the usual
-  /// 450 ms.
-  static constexpr std::chrono::milliseconds kSpeakEvery{60};
+  /// A server that is needed and was not heard for this long is asked for a sign of life.
+  static constexpr std::chrono::milliseconds kProbeAfter{100};
 
   /// @param there  a peer announced what it serves, or is heard again
   /// @param gone   a peer that had announced this, or sent a page, has left or is silent; if it
-  ///               sent only pages, the presence contains what these say of it
-  Peers(Tell there, Tell gone) : there_(std::move(there)), gone_(std::move(gone)) {}
+  ///               sent only pages, the presence contains what these say of it. `early`: by how
+  ///               much later those may notice it that do not need it
+  Peers(std::shared_ptr<LifeSigns> life_signs, Tell there, TellGone gone)
+      : life_signs_(std::move(life_signs)), there_(std::move(there)), gone_(std::move(gone)) {}
 
   /// Call before anybody is discovered.
-  /// @param silence     a peer that was not heard for this long counts as lost
-  /// @param first_beat  how long a peer's first beat may take: DDS may still be matching its
-  ///                    endpoints when the presence has already arrived
-  /// @param is_server   the others count this participant, too
-  void configure(std::chrono::nanoseconds silence, std::chrono::nanoseconds first_beat,
-                 bool is_server) {
-    silence_ = silence;
-    first_beat_ = std::max(silence, first_beat);
+  /// @param needed_silence  a needed server that was not heard for this long counts as lost
+  /// @param silence    any other server
+  /// @param look_every  how often others look at the latest
+  /// @param is_server  the others count this participant, too
+  void configure(std::chrono::nanoseconds needed_silence, std::chrono::nanoseconds silence,
+                 std::chrono::nanoseconds look_every, bool is_server) {
+    needed_silence_ = needed_silence;
+    silence_ = std::max(silence, needed_silence);
+    all_notice_ = silence_ + look_every;
     is_server_ = is_server;
   }
 
@@ -70,17 +77,20 @@ class Peers {
   void met(const ertps::GuidPrefix_t& prefix, const Announcement& said);
   void left(const ertps::GuidPrefix_t& prefix);
   /// @param peers  number of other servers that the sender hears
-  /// @param beat   whether this is repeated periodically
-  void present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers,
-               bool beat);
+  void present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers);
   /// A server sent a page, which may arrive before its presence.
   void sent_page(const ertps::GuidPrefix_t& prefix, const Page& page);
   /// A server sent another message: it is alive, even if its presence is late.
   void heard(const ertps::GuidPrefix_t& prefix);
 
-  /// Reports the peers that became silent since the last call. A late call means that this process
-  /// was prevented from receiving, too, so that delay is not counted as silence of the others.
-  void look_for_silent(Clock::time_point now);
+  /// Reports the peers that became silent since the last call, and those that are heard again.
+  /// @param planned  when this call should have come, after the last one. If it comes later, this
+  ///   process was prevented from receiving, too, so the delay is not counted as silence
+  /// @param needed  partitions whose owners this participant depends on, and can ask
+  /// @return those of them that must be asked for a sign of life now
+  [[nodiscard]] std::vector<std::string> look_for_silent(Clock::time_point now,
+                                                         Clock::duration planned,
+                                                         const std::set<std::string>& needed);
 
   /// The servers that were discovered and speak another major version.
   [[nodiscard]] std::vector<IncompatiblePeer> incompatible() const;
@@ -94,24 +104,21 @@ class Peers {
   /// Whether the server of this partition is silent.
   [[nodiscard]] bool silent(const std::string& partition) const;
 
-  /// Whether some server was discovered, nobody new for kQuiet, all servers have announced what
-  /// they serve, and none hears more others than this participant knows.
+  /// Whether some server was discovered, nobody new for kQuiet or kAgreedQuiet, all servers have
+  /// announced what they serve, and none hears more others than this participant knows.
   [[nodiscard]] bool discovered() const;
 
   /// Whether some server was discovered that has not announced yet what it serves. A server that
-  /// has sent a page, and then nothing for as long as a first beat may take, is not waited for.
+  /// has sent a page and then become silent is not waited for.
   [[nodiscard]] bool awaits_presence() const;
 
  private:
-  [[nodiscard]] bool all_present() const TFDUDE_REQUIRES(mutex_);
-  [[nodiscard]] bool nobody_hears_more() const TFDUDE_REQUIRES(mutex_);
-
   struct Server {
     std::optional<Presence> presence;
     std::optional<Presence> by_page;  // from its pages, until a presence as new arrives
     std::size_t peers = 0;
-    Clock::time_point last_heard;
-    bool beats = false;
+    Clock::time_point last_heard = Clock::now();
+    std::optional<Clock::time_point> needed_since;
     bool silent = false;
 
     [[nodiscard]] const Presence* said() const {
@@ -121,13 +128,16 @@ class Peers {
     }
   };
 
-  /// How long this one may be silent.
-  [[nodiscard]] std::chrono::nanoseconds patience(const Server& server) const {
-    return server.beats ? silence_ : first_beat_;
-  }
+  Server& follow(const PeerId& peer) TFDUDE_REQUIRES(mutex_);
+  void hear(Server& server, Clock::time_point at) TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool all_present() const TFDUDE_REQUIRES(mutex_);
+  /// The largest number of servers that one of them hears beyond those known here, and the
+  /// smallest: negative if it hears fewer.
+  [[nodiscard]] std::pair<long, long> unknown_here() const TFDUDE_REQUIRES(mutex_);
 
+  const std::shared_ptr<LifeSigns> life_signs_;
   const Tell there_;
-  const Tell gone_;
+  const TellGone gone_;
   mutable Mutex mutex_{LockRank::kReporting};  // also while reporting, to keep the order
   std::map<PeerId, Server> servers_ TFDUDE_GUARDED_BY(mutex_);
   std::map<PeerId, IncompatiblePeer> incompatible_ TFDUDE_GUARDED_BY(mutex_);
@@ -136,8 +146,9 @@ class Peers {
   Clock::time_point last_met_ TFDUDE_GUARDED_BY(mutex_){};
   Clock::time_point last_look_ TFDUDE_GUARDED_BY(mutex_) = Clock::now();
   // Set once, before anybody is discovered.
+  std::chrono::nanoseconds needed_silence_{};
   std::chrono::nanoseconds silence_{};
-  std::chrono::nanoseconds first_beat_{};
+  std::chrono::nanoseconds all_notice_{};  // after such a silence all have noticed it
   bool is_server_ = false;
 };
 

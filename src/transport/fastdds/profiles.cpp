@@ -120,10 +120,6 @@ edds::DataReaderQos Profiles::reader(edds::Subscriber& subscriber, const std::st
     return subscriber.get_datareader_qos_from_profile(profile, qos);
   });
   qos.endpoint().history_memory_policy = kMemoryPolicy;
-  // Its own socket, which other traffic does not fill: otherwise live servers would seem lost.
-  if (name == "beat_reader") {
-    qos.properties().properties().emplace_back("fastdds.unique_network_flows", "");
-  }
   return qos;
 }
 

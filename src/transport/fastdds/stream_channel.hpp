@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "transport/fastdds/attention.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/entities.hpp"
 #include "transport/port.hpp"
@@ -13,16 +14,19 @@ namespace tfdude::fastdds {
 template <class Message, class Sample>
 class StreamChannel final : public Channel<Message> {
  public:
-  explicit StreamChannel(std::shared_ptr<Writer> writer) : writer_(std::move(writer)) {}
+  StreamChannel(std::shared_ptr<Writer> writer, Attention& attention)
+      : writer_(std::move(writer)), attention_(attention) {}
 
   bool try_send(const Message& message) override {
     if (!writer_->good() || !writer_->matched()) return false;
+    attention_.pay(*writer_);
     write_wire(message, sample_);
     return writer_->write(&sample_);
   }
 
  private:
   const std::shared_ptr<Writer> writer_;
+  Attention& attention_;
   Sample sample_;
 };
 

@@ -15,7 +15,6 @@ inline constexpr const char* kJointTopic = "tfdude/joint";
 inline constexpr const char* kStateTopic = "tfdude/state";
 inline constexpr const char* kDirectoryTopic = "tfdude/directory";
 inline constexpr const char* kPresenceTopic = "tfdude/presence";
-inline constexpr const char* kBeatTopic = "tfdude/beat";
 
 using RequestType = CheckedType<wire::RequestPubSubType, well_formed_request>;
 using ReplyType = CheckedType<wire::ReplyPubSubType, well_formed_reply>;

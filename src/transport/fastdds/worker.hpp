@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <deque>
 #include <functional>
@@ -26,13 +27,22 @@ class Worker {
     changed_.notify_one();
   }
 
-  /// Runs a job once per period from now on, between other jobs. There can be only one such job.
-  void repeat(std::chrono::milliseconds period, std::function<void()> job) {
-    post([this, period, job = std::move(job)]() mutable {
-      period_ = period;
-      repeated_ = std::move(job);
-      due_ = Clock::now() + period_;
-    });
+  /// Runs a job periodically from now on, between other jobs. It returns the time until it is due
+  /// again. There can be only one such job.
+  void repeat(std::function<std::chrono::milliseconds()> job) {
+    const Lock lock(mutex_);
+    repeated_ = std::move(job);
+    due_ = Clock::now();
+    changed_.notify_one();
+  }
+
+  /// The repeated job is due again in this time at the latest. Does not allocate.
+  void hurry(std::chrono::milliseconds time) {
+    const Lock lock(mutex_);
+    const auto due = Clock::now() + time;
+    if (due >= due_) return;
+    due_ = due;
+    changed_.notify_one();
   }
 
   /// Finishes the current job and drops the others.
@@ -51,23 +61,25 @@ class Worker {
   void run() {
     Lock lock(mutex_);
     while (true) {
-      // By a copy, which the jobs may not change while it is waited for.
+      // By a copy, which others may not change while it is waited for. Who changes it notifies.
       const Clock::time_point due = due_;
-      changed_.wait_until(lock, due,
-                          [this]() TFDUDE_REQUIRES(mutex_) { return stopping_ || !jobs_.empty(); });
+      changed_.wait_until(lock, due, [this, due]() TFDUDE_REQUIRES(mutex_) {
+        return stopping_ || !jobs_.empty() || due_ != due;
+      });
       if (stopping_) return;
-      std::function<void()> job;
       if (!jobs_.empty()) {
-        job = std::move(jobs_.front());
+        const std::function<void()> job = std::move(jobs_.front());
         jobs_.pop_front();
+        lock.unlock();
+        job();
+        lock.lock();
       }
+      if (!repeated_ || Clock::now() < due_) continue;
+      due_ = Clock::time_point::max();  // what hurries meanwhile is kept
       lock.unlock();
-      if (job) job();
-      if (repeated_ && Clock::now() >= due_) {
-        due_ = Clock::now() + period_;
-        repeated_();
-      }
+      const auto next = Clock::now() + repeated_();
       lock.lock();
+      due_ = std::min(due_, next);
     }
   }
 
@@ -75,10 +87,8 @@ class Worker {
   Condition changed_;
   std::deque<std::function<void()>> jobs_ TFDUDE_GUARDED_BY(mutex_);
   bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
-  // Of the thread alone.
-  std::chrono::milliseconds period_{};
-  std::function<void()> repeated_;
-  Clock::time_point due_ = Clock::now() + std::chrono::hours(1);
+  std::function<std::chrono::milliseconds()> repeated_;  // set once, before it is due
+  Clock::time_point due_ TFDUDE_GUARDED_BY(mutex_) = Clock::now() + std::chrono::hours(1);
   std::thread thread_;
 };
 

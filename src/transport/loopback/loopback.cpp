@@ -93,7 +93,7 @@ class LoopbackNetwork::Hub {
     const Lock telling(telling_mutex_);
     deliver([](const Member&) { return true; },
             [&](TransportHandler& handler) {
-              handler.on_lost(member->presence->partition, member->presence->incarnation);
+              handler.on_lost(member->presence->partition, member->presence->incarnation, {});
             });
   }
 

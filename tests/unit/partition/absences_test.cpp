@@ -62,6 +62,23 @@ TEST_CASE(
               "as a root"});
 }
 
+TEST_CASE("who notices a loss early waits for the others before frames are routed to another") {
+  constexpr milliseconds kEarly{600};
+  Witness base;
+  base.hear("left_arm", 1, 20);
+  REQUIRE(base.directory.lost("arm", 1, kNow, kEarly));
+  // That it was missed counts no later.
+  for (auto time = milliseconds(0); time < Absences::kTakeover + kEarly;
+       time += milliseconds(100)) {
+    (void)base.directory.look_for_gone(kStart + time);
+    CHECK(base.directory.absent()[0].kind ==
+          (time < Absences::kGrace ? Kind::kSilent : Kind::kLost));
+    CHECK(base.owner_of("hand") == "arm");
+  }
+  CHECK(base.directory.look_for_gone(kStart + Absences::kTakeover + kEarly));
+  CHECK(base.owner_of("hand") == "left_arm");
+}
+
 TEST_CASE("who returns yields before what it had is routed to another") {
   Witness base;
   base.hear("left_arm", 1, 20);

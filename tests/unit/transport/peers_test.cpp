@@ -1,7 +1,11 @@
 #include "transport/fastdds/peers.hpp"
 
+#include <array>
 #include <chrono>
 #include <cstdint>
+#include <memory>
+#include <set>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -9,6 +13,8 @@
 
 namespace tfdude::fastdds {
 namespace {
+
+constexpr std::chrono::milliseconds kRarely{200};
 
 ertps::GuidPrefix_t prefix_of(unsigned char number) {
   ertps::GuidPrefix_t prefix;
@@ -24,12 +30,53 @@ Announcement serving(const std::string& partition, ProtocolVersion protocol = kP
   return {partition, protocol, "9.8.7"};
 }
 
+// The datagram of a participant, as far as it is looked at.
+void hear(LifeSigns& signs, unsigned char number, Peers::Clock::time_point at) {
+  const std::array<std::uint8_t, 20> datagram{'R', 'T', 'P', 'S', 2, 3, 1, 15, number};
+  signs.heard(datagram.data(), datagram.size(), at);
+}
+
+// A participant's peers, and what it was told of them.
+struct Observer {
+  std::shared_ptr<LifeSigns> signs = std::make_shared<LifeSigns>();
+  std::vector<std::string> told;
+  Peers peers{signs, [this](const Presence& one) { told.push_back("+" + one.partition); },
+              [this](const Presence& one, std::chrono::nanoseconds sooner) {
+                told.push_back("-" + one.partition);
+                early = sooner;
+              }};
+  std::chrono::nanoseconds early{};  // of the last one
+  Peers::Clock::time_point now = Peers::Clock::now();
+
+  explicit Observer(bool is_server = false) {
+    peers.configure(std::chrono::milliseconds(450), std::chrono::seconds(2), kRarely, is_server);
+  }
+
+  void meet(unsigned char number, const std::string& partition, std::size_t others = 0) {
+    peers.met(prefix_of(number), serving(partition));
+    peers.present(prefix_of(number), presence_of(partition), others);
+  }
+
+  // Looks in time, for so long.
+  // @return how often somebody was to be asked for a sign of life
+  std::size_t look(std::chrono::milliseconds span, const std::set<std::string>& needed = {}) {
+    constexpr std::chrono::milliseconds kEvery{30};
+    std::size_t probes = 0;
+    for (const auto end = now + span; now < end; now += kEvery) {
+      probes += peers.look_for_silent(now, kEvery, needed).size();
+    }
+    return probes;
+  }
+};
+
 }  // namespace
 
 TEST_CASE("who speaks another major version is named, and counts as nobody") {
   int told = 0;
-  Peers peers([&](const Presence&) { ++told; }, [&](const Presence&) { ++told; });
-  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), false);
+  Peers peers(
+      std::make_shared<LifeSigns>(), [&](const Presence&) { ++told; },
+      [&](const Presence&, std::chrono::nanoseconds) { ++told; });
+  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), kRarely, false);
   peers.met(prefix_of(1), serving("arms", {2, 0}));
   peers.met(prefix_of(2), serving("", {2, 0}));
   peers.met(prefix_of(3), serving("head"));
@@ -41,7 +88,7 @@ TEST_CASE("who speaks another major version is named, and counts as nobody") {
   CHECK(peers.incompatible()[0].text() ==
         "partition 'arms' (tf-dude 9.8.7) speaks protocol 2.0, but this program (tf-dude " +
             program_version() + ") speaks 1.0; update the older one");
-  peers.present(prefix_of(3), presence_of("head"), 0, true);
+  peers.present(prefix_of(3), presence_of("head"), 0);
   CHECK_FALSE(peers.awaits_presence());
   told = 0;
   peers.left(prefix_of(1));
@@ -50,34 +97,124 @@ TEST_CASE("who speaks another major version is named, and counts as nobody") {
   CHECK(told == 0);
 }
 
-TEST_CASE("who was met counts as all there are only once its beats say how many it hears") {
-  Peers peers([](const Presence&) {}, [](const Presence&) {});
-  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), false);
-  peers.met(prefix_of(1), serving("arms"));
-  // As it was when it was written, before the sender had met anybody.
-  peers.present(prefix_of(1), presence_of("arms"), 0, false);
-  std::this_thread::sleep_for(Peers::kQuiet);
-  REQUIRE_FALSE(peers.awaits_presence());
-  CHECK_FALSE(peers.discovered());
-  SECTION("none") {
-    peers.present(prefix_of(1), presence_of("arms"), 0, true);
-    CHECK(peers.discovered());
+TEST_CASE("a new participant has discovered all when all hear as many as it does") {
+  Observer one;
+  SECTION("one that hears none") {
+    one.meet(1, "arms");
+    CHECK_FALSE(one.peers.discovered());  // another may answer yet
+    std::this_thread::sleep_for(Peers::kAgreedQuiet);
+    CHECK(one.peers.discovered());
   }
-  SECTION("another, who is to be met first") {
-    peers.present(prefix_of(1), presence_of("arms"), 1, true);
-    CHECK_FALSE(peers.discovered());
-    peers.met(prefix_of(2), serving("head"));
-    peers.present(prefix_of(2), presence_of("head"), 1, true);
+  SECTION("another one must be met first") {
+    one.meet(1, "arms", 1);
     std::this_thread::sleep_for(Peers::kQuiet);
-    CHECK(peers.discovered());
+    CHECK_FALSE(one.peers.awaits_presence());
+    CHECK_FALSE(one.peers.discovered());
+    one.meet(2, "head", 1);
+    std::this_thread::sleep_for(Peers::kAgreedQuiet);
+    CHECK(one.peers.discovered());
   }
+  SECTION("who hears fewer may say so late") {
+    one.meet(1, "arms", 1);
+    one.meet(2, "head", 0);
+    std::this_thread::sleep_for(Peers::kAgreedQuiet);
+    CHECK_FALSE(one.peers.discovered());
+    std::this_thread::sleep_for(Peers::kQuiet);
+    CHECK(one.peers.discovered());
+  }
+  SECTION("who claims its name may not have met anybody yet") {
+    one.peers.met(prefix_of(1), serving("arms"));
+    Presence claim = presence_of("arms");
+    claim.serving = false;
+    one.peers.present(prefix_of(1), claim, 0);
+    std::this_thread::sleep_for(Peers::kAgreedQuiet);
+    CHECK_FALSE(one.peers.discovered());
+    std::this_thread::sleep_for(Peers::kQuiet);
+    CHECK(one.peers.discovered());
+  }
+}
+
+TEST_CASE("servers count the participant that asks, too") {
+  Observer server(true);
+  server.meet(1, "arms", 1);
+  std::this_thread::sleep_for(Peers::kAgreedQuiet);
+  CHECK(server.peers.discovered());
+}
+
+TEST_CASE("a server that nobody needs counts as lost when its announcements are missing") {
+  Observer one;
+  one.meet(1, "arms");
+  one.told.clear();
+  CHECK(one.look(std::chrono::milliseconds(1900)) == 0);
+  CHECK(one.told.empty());
+  hear(*one.signs, 1, one.now);
+  one.look(std::chrono::milliseconds(1900));
+  CHECK(one.told.empty());
+  one.look(std::chrono::milliseconds(200));
+  CHECK(one.told == std::vector<std::string>{"-arms"});
+  CHECK(one.peers.silent("arms"));
+  SECTION("and is there again with its first datagram") {
+    hear(*one.signs, 1, one.now);
+    one.look(std::chrono::milliseconds(30));
+    CHECK(one.told == std::vector<std::string>{"-arms", "+arms"});
+    CHECK_FALSE(one.peers.silent("arms"));
+  }
+  SECTION("the datagrams of others do not count") {
+    hear(*one.signs, 2, one.now);
+    one.look(std::chrono::milliseconds(30));
+    CHECK(one.peers.silent("arms"));
+  }
+}
+
+TEST_CASE("a server that is needed is asked for a sign of life, and lost after its lease") {
+  Observer one;
+  one.meet(1, "arms");
+  one.meet(2, "head");
+  one.told.clear();
+  // That it was silent before it was needed does not count.
+  one.look(std::chrono::milliseconds(900));
+  SECTION("it does not answer") {
+    CHECK(one.look(std::chrono::milliseconds(420), {"arms"}) >= 10);
+    CHECK(one.told.empty());
+    one.look(std::chrono::milliseconds(60), {"arms"});
+    CHECK(one.told == std::vector<std::string>{"-arms"});
+    // Others do not need it: they notice after 2.2 s at the latest, counted from its last message.
+    CHECK(one.early > std::chrono::milliseconds(700));
+    CHECK(one.early < std::chrono::milliseconds(2200 - 450));
+  }
+  SECTION("it answers") {
+    for (int i = 0; i < 10; ++i) {
+      CHECK(one.look(std::chrono::milliseconds(120), {"arms"}) <= 1);
+      hear(*one.signs, 1, one.now);
+    }
+    CHECK(one.told == std::vector<std::string>{"-head"});  // which nobody needed
+  }
+  SECTION("it sends other messages") {
+    for (int i = 0; i < 10; ++i) {
+      hear(*one.signs, 1, one.now);
+      CHECK(one.look(std::chrono::milliseconds(90), {"arms"}) == 0);
+    }
+  }
+}
+
+TEST_CASE("the time in which a process could not receive is no silence of others") {
+  Observer one;
+  one.meet(1, "arms");
+  one.told.clear();
+  one.look(std::chrono::milliseconds(60), {"arms"});
+  one.now += std::chrono::seconds(10);
+  one.look(std::chrono::milliseconds(300), {"arms"});
+  CHECK(one.told.empty());
+  one.look(std::chrono::milliseconds(300), {"arms"});
+  CHECK(one.told == std::vector<std::string>{"-arms"});
 }
 
 TEST_CASE("who sends a page and then nothing is gone, and not waited for") {
   std::vector<std::uint64_t> gone;
-  Peers peers([](const Presence&) {},
-              [&](const Presence& one) { gone.push_back(one.incarnation); });
-  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), false);
+  Peers peers(
+      std::make_shared<LifeSigns>(), [](const Presence&) {},
+      [&](const Presence& one, std::chrono::nanoseconds) { gone.push_back(one.incarnation); });
+  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), kRarely, false);
   peers.met(prefix_of(1), serving("arms"));
   Page page;
   page.partition = "arms";
@@ -85,17 +222,17 @@ TEST_CASE("who sends a page and then nothing is gone, and not waited for") {
   peers.sent_page(prefix_of(1), page);
   CHECK(peers.awaits_presence());
   // Looked at in time, until it has been silent for too long.
+  constexpr std::chrono::milliseconds kEvery{60};
   const auto start = Peers::Clock::now();
-  for (auto late = Peers::kSpeakEvery; late < std::chrono::seconds(62);
-       late += Peers::kSpeakEvery) {
-    peers.look_for_silent(start + late);
+  for (auto late = kEvery; late < std::chrono::seconds(62); late += kEvery) {
+    CHECK(peers.look_for_silent(start + late, kEvery, {}).empty());
   }
   CHECK_FALSE(peers.awaits_presence());
   CHECK(gone == std::vector<std::uint64_t>{7});
   SECTION("it has only been slow") {
     Presence late = presence_of("arms");
     late.incarnation = 8;
-    peers.present(prefix_of(1), late, 0, true);
+    peers.present(prefix_of(1), late, 0);
     peers.left(prefix_of(1));
     CHECK(gone == std::vector<std::uint64_t>{7, 8});
   }
@@ -108,12 +245,13 @@ TEST_CASE("who sends a page and then nothing is gone, and not waited for") {
 TEST_CASE(
     "who sends a page of a later process than it has said, and then leaves, is gone as that") {
   std::vector<std::uint64_t> gone;
-  Peers peers([](const Presence&) {},
-              [&](const Presence& one) { gone.push_back(one.incarnation); });
-  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), false);
+  Peers peers(
+      std::make_shared<LifeSigns>(), [](const Presence&) {},
+      [&](const Presence& one, std::chrono::nanoseconds) { gone.push_back(one.incarnation); });
+  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), kRarely, false);
   peers.met(prefix_of(1), serving("arms"));
   // While it claims its name; it serves under another number.
-  peers.present(prefix_of(1), presence_of("arms"), 0, false);
+  peers.present(prefix_of(1), presence_of("arms"), 0);
   Page page;
   page.partition = "arms";
   page.incarnation = 7;
@@ -123,14 +261,30 @@ TEST_CASE(
 }
 
 TEST_CASE("who was met and has told nothing yet is waited for") {
-  Peers peers([](const Presence&) {}, [](const Presence&) {});
-  peers.configure(std::chrono::seconds(1), std::chrono::seconds(1), false);
-  peers.met(prefix_of(1), serving("arms"));
-  const auto start = Peers::Clock::now();
-  for (auto late = Peers::kSpeakEvery; late < std::chrono::seconds(9); late += Peers::kSpeakEvery) {
-    peers.look_for_silent(start + late);
-  }
-  CHECK(peers.awaits_presence());
+  Observer one;
+  one.peers.met(prefix_of(1), serving("arms"));
+  one.look(std::chrono::seconds(9));
+  CHECK(one.peers.awaits_presence());
+}
+
+TEST_CASE("signs of life are read from the header of RTPS alone") {
+  LifeSigns signs;
+  PeerId peer{};
+  peer[0] = 5;
+  const auto now = LifeSigns::Clock::now();
+  hear(signs, 5, now);
+  CHECK_FALSE(signs.last(peer));  // not followed
+  signs.follow(peer);
+  CHECK_FALSE(signs.last(peer));
+  std::array<std::uint8_t, 20> other{'R', 'T', 'P', 'X', 2, 3, 1, 15, 5};
+  signs.heard(other.data(), other.size(), now);
+  other[3] = 'S';
+  signs.heard(other.data(), other.size() - 1, now);
+  CHECK_FALSE(signs.last(peer));
+  signs.heard(other.data(), other.size(), now);
+  CHECK(signs.last(peer) == now);
+  signs.forget(peer);
+  CHECK_FALSE(signs.last(peer));
 }
 
 }  // namespace tfdude::fastdds
