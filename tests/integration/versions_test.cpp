@@ -102,7 +102,7 @@ TEST_CASE("versions: a request that only a later minor version knows is refused 
   const Options options = local(domain.number());
   auto base = Node::open(transport_of(options, "base"), "base", {{"world", "", {}}}, options);
   REQUIRE(base);
-  ForeignWriter later(domain.number(), fastdds::kRequestTopic,
+  ForeignWriter later(domain.number(), kRequestTopic,
                       fastdds::edds::TypeSupport(new RawType("tfdude::wire::Request", false)),
                       "base", false, {"tfdude client", "tfdude-protocol 1 7 0.9.0"});
   const auto replies = later.read_replies();
@@ -126,7 +126,7 @@ TEST_CASE("versions: a daemon of a later minor version is one of us") {
   const Options options = local(domain.number());
   auto client = Client::open(options);
   REQUIRE(client);
-  ForeignWriter later(domain.number(), fastdds::kPresenceTopic,
+  ForeignWriter later(domain.number(), kPresenceTopic,
                       fastdds::edds::TypeSupport(new RawType("tfdude::wire::Presence", true)), "",
                       true, {"tfdude serving arm", "tfdude-protocol 1 7 0.9.0"});
   later.await_readers(1);

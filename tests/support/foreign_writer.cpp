@@ -107,8 +107,8 @@ ForeignWriter::~ForeignWriter() {
 std::shared_ptr<const Replies> ForeignWriter::read_replies() {
   const edds::TypeSupport type(new fastdds::ReplyType);
   type.register_type(participant_);
-  edds::Topic* topic = participant_->create_topic(fastdds::kReplyTopic, type.get_type_name(),
-                                                  edds::TOPIC_QOS_DEFAULT);
+  edds::Topic* topic =
+      participant_->create_topic(kReplyTopic, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
   edds::SubscriberQos subscriber_qos;
   const auto self = fastdds::peer_of(participant_->guid().guidPrefix);
   subscriber_qos.partition().push_back(fastdds::reply_partition(self).c_str());

@@ -4,17 +4,10 @@
 
 #include "transport/fastdds/cdr_check.hpp"
 #include "transport/fastdds/compat.hpp"
+#include "types/topic_names.hpp"
 
-// The topics by name and type, and the handling of rejected DDS samples.
+// The types of the topics, and the handling of rejected DDS samples.
 namespace tfdude::fastdds {
-
-inline constexpr const char* kRequestTopic = "tfdude/request";
-inline constexpr const char* kReplyTopic = "tfdude/reply";
-inline constexpr const char* kUpdateTopic = "tfdude/update";
-inline constexpr const char* kJointTopic = "tfdude/joint";
-inline constexpr const char* kStateTopic = "tfdude/state";
-inline constexpr const char* kDirectoryTopic = "tfdude/directory";
-inline constexpr const char* kPresenceTopic = "tfdude/presence";
 
 using RequestType = CheckedType<wire::RequestPubSubType, well_formed_request>;
 using ReplyType = CheckedType<wire::ReplyPubSubType, well_formed_reply>;

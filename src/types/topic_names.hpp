@@ -1,0 +1,14 @@
+#pragma once
+
+// The names of the DDS topics. They are not with the transport, because permissions name them, too.
+namespace tfdude {
+
+inline constexpr const char* kRequestTopic = "tfdude/request";
+inline constexpr const char* kReplyTopic = "tfdude/reply";
+inline constexpr const char* kUpdateTopic = "tfdude/update";
+inline constexpr const char* kJointTopic = "tfdude/joint";
+inline constexpr const char* kStateTopic = "tfdude/state";
+inline constexpr const char* kDirectoryTopic = "tfdude/directory";
+inline constexpr const char* kPresenceTopic = "tfdude/presence";
+
+}  // namespace tfdude
