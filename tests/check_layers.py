@@ -13,8 +13,8 @@ import sys
 import tempfile
 import unittest
 
-LAYERS = ["base", "math", "types", "tree", "partition", "description", "store", "transport", "runtime",
-          "client", "apps"]
+LAYERS = ["base", "math", "types", "tree", "partition", "description", "store", "keys", "transport",
+          "runtime", "client", "apps"]
 SUFFIXES = {".hpp", ".cpp", ".h", ".cc", ".ipp"}
 DDS_FOLDER = "src/transport/fastdds/"
 
@@ -25,8 +25,9 @@ CONFINED = [
     ("DDS", r"(fastdds|fastrtps|fastcdr)/", [DDS_FOLDER]),
     ("yaml-cpp", r"yaml-cpp/", ["src/description/"]),
     ("urdfdom", r"(urdf_(model|parser|exception)|console_bridge)/", ["src/description/"]),
-    ("tinyxml2", r"tinyxml2\.h$", ["src/description/", "src/transport/fastdds/"]),
+    ("tinyxml2", r"tinyxml2\.h$", ["src/description/", "src/keys/", "src/transport/fastdds/"]),
     ("SQLite", r"sqlite3\.h$", ["src/store/"]),
+    ("OpenSSL", r"openssl/", ["src/keys/"]),
     ("CLI11", r"CLI/", ["apps/"]),
     ("nlohmann", r"nlohmann/", ["apps/"]),
 ]
@@ -37,7 +38,7 @@ BARRED = [
     ("input and output", r"(iostream|fstream|spdlog/.*)$", ["math", "types", "tree", "partition"]),
 ]
 CLOCK = re.compile(r"::\s*now\s*\(|\b(clock_gettime|gettimeofday)\b|\btime\s*\(\s*(nullptr|NULL|0)\s*\)")
-CLOCKLESS = ["base", "math", "types", "tree", "partition", "description", "store"]
+CLOCKLESS = ["base", "math", "types", "tree", "partition", "description", "store", "keys"]
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 COMMENT_OR_LITERAL = re.compile(
@@ -212,6 +213,7 @@ class SelfTest(unittest.TestCase):
         ("confined", "apps/tfdude/a.cpp", "#include <urdf_parser/urdf_parser.h>\n"),
         ("confined", "src/store/a.cpp", "#include <tinyxml2.h>\n"),
         ("confined", "src/client/a.cpp", "#include <sqlite3.h>\n"),
+        ("confined", "src/transport/a.cpp", "#include <openssl/x509.h>\n"),
         ("arrow", "src/store/a.cpp", '#include "tfdude/transport/port.hpp"\n'),
         ("confined", "src/client/a.cpp", "#include <nlohmann/json.hpp>\n"),
         ("math", "src/math/a.cpp", "#include <tl/expected.hpp>\n"),
