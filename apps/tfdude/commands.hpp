@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -7,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/keys/key_store.hpp"
 #include "tfdude/math/transform_spec.hpp"
 
 namespace tfdude::cli {
@@ -19,6 +21,17 @@ inline constexpr int kNoAnswer = 3;
 
 /// Number of values of `correlate --source`: the source's name, and one column of the loading.
 inline constexpr int kSourceSize = 7;
+
+/// What is given to the commands of `keys`.
+struct KeysArguments {
+  std::string directory;  ///< a key store, or the directory of an identity
+  std::string name;       ///< of an identity
+  std::string partition;  ///< of a daemon
+  Roles roles;
+  bool sign = false;
+  std::vector<std::uint32_t> domains{0, 232};  ///< first and last
+  Days lifetime{0};                            ///< zero: the default
+};
 
 /// The command line.
 struct Arguments {
@@ -39,14 +52,15 @@ struct Arguments {
   double wait_ms = 0;
   bool composed = false;
   bool once = false;
+  bool unknown = false;  ///< correlation
   int order = 2;
   ObserveOptions observe;
-  bool unknown = false;              ///< correlation
   std::vector<std::string> sources;  ///< for each column: its source's name and 6 numbers
   std::string out;                   ///< the picture's file
   int samples = 0;
   double position = 0;      ///< of a joint [rad or m]
   double joint_stddev = 0;  ///< of this position [rad or m]
+  KeysArguments keys;
 };
 
 [[nodiscard]] Time wall_clock();

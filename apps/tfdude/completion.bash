@@ -27,15 +27,41 @@ _tfdude_names() {
   timeout 0.5 tfdude "${common[@]}" --json "$1" 2>/dev/null | grep -o '"name":"[^"]*"' | cut -d'"' -f4
 }
 
+# The commands of keys, their options, and directories.
+_tfdude_keys() {
+  local words=
+  case $word in
+    -*)
+      words="--help --json --days"
+      case " ${COMP_WORDS[*]} " in
+        *" init "*) words+=" --sign --domains" ;;
+        *" daemon "*) words+=" --name --look --move --stream --observe" ;;
+        *" client "*) words+=" --look --move --stream --observe" ;;
+      esac
+      mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
+      ;;
+    *)
+      case $previous in
+        keys) mapfile -t COMPREPLY < <(compgen -W "init daemon client renew revoke check" -- "$word") ;;
+        *) mapfile -t COMPREPLY < <(compgen -d -- "$word") ;;
+      esac
+      ;;
+  esac
+}
+
 _tfdude() {
   local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command words common
   local commands="tree frames partitions roots parent children exists lookup watch echo history monitor plot graph"
-  commands+=" events joints joint observe fuse correlate add update remove forget move"
+  commands+=" events joints joint observe fuse correlate add update remove forget move keys"
   local of_frames=" parent children exists lookup watch echo plot history observe fuse correlate update remove move "
   local pose="--xyz --rpy --quat --stddev --cov"
   COMPREPLY=()
   command=$(_tfdude_command)
   mapfile -t common < <(_tfdude_common)
+  if [[ $command == keys ]]; then
+    _tfdude_keys
+    return
+  fi
   case $previous in
     --profile | --out) mapfile -t COMPREPLY < <(compgen -f -- "$word"); return ;;
     --domain | --discovery-server | --timeout | --rate | --at | --at-b | --stamp | --gate | --source) return ;;

@@ -19,6 +19,7 @@
 #include "../network_options.hpp"
 #include "../numbers.hpp"
 #include "commands.hpp"
+#include "keys_commands.hpp"
 
 namespace {
 
@@ -287,7 +288,8 @@ void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen)
   add_pose_options(*move, arguments);
 }
 
-int run(const Arguments& arguments, const Command& command) {
+int run(const Arguments& arguments, const Command& command, const cli::LocalCommand& local) {
+  if (local) return local(arguments);
   auto client = Client::open(arguments.options);
   if (!client) {
     (void)cli::report(client.error(), arguments);
@@ -317,6 +319,8 @@ int main(int argc, char** argv) {
   add_correlate_command(app, arguments, command);
   add_picture_commands(app, arguments, command);
   add_joint_commands(app, arguments, command);
+  cli::LocalCommand local;
+  cli::add_keys_commands(app, arguments.keys, local);
   cli::require_numbers(app);
   try {
     app.name(argv[0]);
@@ -349,7 +353,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand(name)) pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
   }
   log_fastdds_to_standard_error();
-  const int status = run(arguments, command);
+  const int status = run(arguments, command, local);
   const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
   if (!written) std::perror("tfdude: standard output");
   // Fast DDS's static destructors would sleep 100 ms.
