@@ -111,6 +111,17 @@ int writers_of(edds::DataReader* reader) {
   return status.current_count;
 }
 
+bool arrives(edds::DataWriter& writer, edds::DataReader& reader) {
+  return eventually([&] {
+    wire::Presence sent;
+    sent.partition("arm");
+    wire::Presence received;
+    edds::SampleInfo info;
+    return write(writer, &sent) && ok(reader.take_next_sample(&received, &info)) &&
+           received.partition() == "arm";
+  });
+}
+
 // By then, those that match have matched; so others that do not are rejected, not late.
 void wait_longer() { std::this_thread::sleep_for(std::chrono::seconds(3)); }
 
@@ -136,6 +147,7 @@ TEST_CASE("keys in DDS: identities of one authority match, strangers do not") {
     auto* clients = client.read(kPresenceTopic, "*");
     REQUIRE((others != nullptr && opens != nullptr && clients != nullptr));
     CHECK(eventually([&] { return writers_of(clients) == 1 && readers_of(writer) == 1; }));
+    CHECK(arrives(*writer, *clients));
     wait_longer();
     CHECK(readers_of(writer) == 1);
     CHECK(writers_of(others) == 0);
