@@ -205,7 +205,7 @@ TEST_CASE("key store: a damaged authority is named, and nothing changes") {
     const std::string good = content_of(path);
     const std::string strange = content_of(other.path("authority/") + file);
     for (const std::string& bad : {std::string("damaged\n"), strange}) {
-      if (bad.empty()) continue;
+      if (bad.empty()) continue;  // no certificates were issued there
       std::ofstream(path) << bad;
       const auto before = files_below(store.path());
       const auto added = add_identity(store.path(), "base", daemon_of("base"), kDay, kKeysTime);
