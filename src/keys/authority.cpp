@@ -91,17 +91,14 @@ Result<Authority> open_authority(const std::string& store, Time now) {
   if (X509_check_private_key(certificate->get(), key->get()) != 1) {
     return wrong("is not that of key.pem");
   }
-  auto governance = read_text(directory + kGovernanceFile);
-  if (!governance) return tl::unexpected(governance.error());
   const auto settings = parse_file(directory + kGovernanceFile, [&](const std::string& text) {
     return verify_document(*certificate, text).and_then(read_governance);
   });
   if (!settings) return tl::unexpected(settings.error());
   auto issued = parse_file(directory + kIssuedFile, read_issued);
   if (!issued) return tl::unexpected(issued.error());
-  return Authority{store,     Pair{*std::move(key), *std::move(certificate)},
-                   *validity, *std::move(governance),
-                   *settings, *std::move(issued)};
+  return Authority{store, Pair{*std::move(key), *std::move(certificate)}, *validity, *settings,
+                   *std::move(issued)};
 }
 
 Result<void> store_issued(const Authority& authority) {

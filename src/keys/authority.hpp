@@ -26,7 +26,6 @@ struct Authority {
   std::string store;
   Pair pair;
   Validity validity;
-  std::string governance;  ///< as signed
   KeySettings settings;
   std::vector<Issued> issued;  ///< all certificates ever
 };

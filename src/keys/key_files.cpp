@@ -104,11 +104,9 @@ Result<void> read_documents(KeyFiles& files, const Certificates& certificates) {
     return wrong(files.permissions, "is for the certificate " + quote(grant->subject) +
                                         ", not for " + printable(files.certificate));
   }
-  if (keys::governance_of(*settings) != *governance ||
-      keys::permissions_of(*grant) != *permissions) {
-    return wrong(files.permissions,
-                 "is not what this version gives to these roles; renew it: tfdude keys renew");
-  }
+  const std::string other = "is not what this version writes; renew it: tfdude keys renew";
+  if (keys::governance_of(*settings) != *governance) return wrong(files.governance, other);
+  if (keys::permissions_of(*grant) != *permissions) return wrong(files.permissions, other);
   files.settings = *settings;
   files.roles = grant->roles;
   return {};

@@ -67,12 +67,15 @@ Result<std::string> write_identity(const Authority& authority, const std::string
   if (!issuer) return tl::unexpected(issuer.error());
   const auto revoked = keys::revoked_list(authority, now);
   if (!revoked) return tl::unexpected(revoked.error());
+  const auto governance =
+      keys::sign_document(authority.pair, keys::governance_of(authority.settings));
+  if (!governance) return tl::unexpected(governance.error());
   const KeyFiles files = keys::files_in(beside);
   for (const Named& one : {Named{files.key, keys::text_of(*key)},
                            {files.certificate, *certificate},
                            {files.authority, *issuer},
                            {files.revoked, *revoked},
-                           {files.governance, authority.governance},
+                           {files.governance, *governance},
                            {files.permissions, permissions}}) {
     if (auto ok = write_secret(one.file, one.content); !ok) return tl::unexpected(ok.error());
   }

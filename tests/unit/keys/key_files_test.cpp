@@ -108,32 +108,36 @@ TEST_CASE("keys: files of others are rejected") {
     INFO(file);
     const std::string path = store.path("eye/") + file;
     const std::string good = content_of(path);
-    const bool same = content_of(store.path("arm/") + file) == good;
+    const std::string name = file;
+    const bool own = name == "key.pem" || name == "certificate.pem" || name == "permissions.p7s";
     write(path, content_of(store.path("arm/") + file));
-    CHECK(find_keys(store.path("eye"), kKeysTime).has_value() ==
-          (same || std::string(file) == "revoked.pem"));
+    CHECK(find_keys(store.path("eye"), kKeysTime).has_value() == !own);
     write(path, content_of(elsewhere.path("arm/") + file));
     CHECK_FALSE(find_keys(store.path("eye"), kKeysTime));
     write(path, good);
   }
 }
 
-// A document with the authority's signature that this version would not write.
-TEST_CASE("keys: permissions of another version are not explained, but renewed") {
+// Documents with the authority's signature that this version would not write.
+TEST_CASE("keys: documents of another version are not explained, but renewed") {
   const TestKeys store;
   const KeyFiles files = store.add("eye", looking());
-  keys::Pair authority{
+  const keys::Pair authority{
       *keys::read_key(content_of(store.path("authority/key.pem"))),
       *keys::read_certificate(content_of(store.path("authority/certificate.pem")))};
-  auto text = keys::verify_document(authority.certificate, content_of(files.permissions));
-  REQUIRE(text);
-  const std::string deny = "<default>DENY</default>";
-  text->replace(text->find(deny), deny.size(), "<default>ALLOW</default>");
-  write(files.permissions, *keys::sign_document(authority, *text));
-  CHECK_THAT(error_at(store.path("eye")), ContainsSubstring("is not what this version gives"));
-  const auto renewed = renew_identity(store.path(), "eye", Days(1), kKeysTime);
-  REQUIRE(renewed);
-  CHECK(renewed->roles == looking());
+  for (const std::string& path : {files.permissions, files.governance}) {
+    auto text = keys::verify_document(authority.certificate, content_of(path));
+    REQUIRE(text);
+    const bool permissions = path == files.permissions;
+    const std::string part = permissions ? ">DENY<" : ">true<";
+    text->replace(text->find(part), part.size(), permissions ? ">ALLOW<" : ">false<");
+    write(path, *keys::sign_document(authority, *text));
+    CHECK_THAT(error_at(store.path("eye")),
+               ContainsSubstring(path + ": is not what this version writes"));
+    const auto renewed = renew_identity(store.path(), "eye", Days(1), kKeysTime);
+    REQUIRE(renewed);
+    CHECK(renewed->roles == looking());
+  }
 }
 
 TEST_CASE("keys: an identity cannot sign permissions for itself") {
