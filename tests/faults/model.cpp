@@ -31,9 +31,9 @@ std::vector<std::string> way_down(const State& state, const std::string& id) {
   std::vector<std::string> way;
   for (std::string at = id; !at.empty();) {
     const auto frame = state.find(at);
-    if (frame == state.end() || !frame->second || way.size() > state.size()) return {};
+    if (frame == state.end() || !*frame->second || way.size() > state.size()) return {};
     way.insert(way.begin(), at);
-    at = frame->second->parent;
+    at = (*frame->second)->parent;
   }
   return way;
 }
@@ -186,7 +186,7 @@ void Model::note(const std::string& id, const std::string& line) {
   const auto found = frames_.find(id);
   auto& history = (found != frames_.end() ? found->second : removed_.at(id)).history;
   history.push_back(line);
-  if (history.size() > kHistoryKept) history.pop_front();
+  if (history.size() > kHistoryKept) history.erase(history.begin());
 }
 
 std::vector<std::string> Model::ids(const std::string& prefix, bool anchored) const {
@@ -268,10 +268,10 @@ std::vector<std::string> Model::closure(const std::string& a, const std::string&
 void Model::each_state(const std::vector<std::string>& ids,
                        const std::function<void(const State&)>& see) const {
   std::vector<std::size_t> chosen(ids.size(), 0);
+  State state;
   while (true) {
-    State state;
     for (std::size_t i = 0; i < ids.size(); ++i) {
-      state[ids[i]] = frames_.at(ids[i]).possible[chosen[i]];
+      state[ids[i]] = &frames_.at(ids[i]).possible[chosen[i]];
     }
     see(state);
     std::size_t digit = 0;
@@ -299,7 +299,10 @@ std::string Model::judge(const std::string& a, const std::string& b,
     if (connected && X_AB) {
       testing::Oracle oracle;
       for (const auto* way : {&to_a, &to_b}) {
-        for (const std::string& id : *way) oracle.add(id, state.at(id)->parent, state.at(id)->X_PC);
+        for (const std::string& id : *way) {
+          const Place& place = **state.at(id);
+          oracle.add(id, place.parent, place.X_PC);
+        }
       }
       difference = testing::transform_diff(*X_AB, oracle.between(a, b), kTolerance);
     } else if (connected != X_AB.has_value()) {
@@ -310,7 +313,7 @@ std::string Model::judge(const std::string& a, const std::string& b,
       return;
     }
     agrees = true;
-    for (const std::string& id : ids) insert(left[id], state.at(id));
+    for (const std::string& id : ids) insert(left[id], *state.at(id));
   });
   if (!agrees) return "lookup of " + b + " in " + a + expected;
   // A denial may come from a replica that is not up to date; an answer comes from the owners.

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <deque>
 #include <functional>
 #include <map>
 #include <optional>
@@ -38,7 +37,7 @@ class Model {
     bool may_move_late = false;
     /// The state that its owner shows may not be stored: it is undone if the owner is killed.
     bool unsaved = false;
-    std::deque<std::string> history;
+    std::vector<std::string> history;
 
     [[nodiscard]] bool may_be_there() const;
     [[nodiscard]] bool may_be_gone() const;
@@ -96,7 +95,7 @@ class Model {
   /// The frames on all paths that a frame may have up to another one, with both ends.
   [[nodiscard]] std::set<std::string> ways_up(const std::string& id,
                                               const std::string& ancestor) const;
-  using State = std::map<std::string, std::optional<Place>>;
+  using State = std::map<std::string, const std::optional<Place>*>;
 
   [[nodiscard]] std::vector<std::string> closure(const std::string& a, const std::string& b) const;
   void each_state(const std::vector<std::string>& ids,
