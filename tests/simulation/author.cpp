@@ -35,7 +35,7 @@ void Author::next() {
   if (stopped_) return;
   random_ = testing::Random(process_->world().plan.seed_of(actor_, ++steps_));
   const Instant pause = std::chrono::microseconds(random_.index(40'000));
-  process_->later("author", pause, [self = shared_from_this()] {
+  process_->later("author", pause + std::exchange(rest_, Instant(0)), [self = shared_from_this()] {
     if (!self->stopped_) self->step();
   });
 }
@@ -107,22 +107,61 @@ bool Author::may_be_lost(Instant since) const {
 
 // ---- calls
 
-void Author::begin(const std::string& what, Operation::Route route,
-                   std::function<void(const Result<void>&)> then) {
+// Some changes are made by a Node in the process of the owner, once it has heard of the author's
+// changes: nothing orders those of two who know nothing of each other.
+void Author::change(const std::string& what, const std::string& owner, const RouteOf& route,
+                    Then then) {
+  if (random_.index(5) == 0) {
+    const auto node = process_->world().serving(owner);
+    const bool heard = node && node->directory().latest_lamport_time() >=
+                                   process_->directory().latest_lamport_time();
+    const auto parts = heard ? route(*node) : Result<std::vector<Part>>();
+    if (parts && parts->size() == 1 && parts->front().owner == kHeldHere) {
+      return change_here(node, "node-" + what, parts->front().request, then);
+    }
+  }
+  begin(
+      what, [this, route] { return route(*process_); }, std::move(then));
+}
+
+// The process sees the change at once. Others learn of it when it is stored.
+void Author::change_here(const std::shared_ptr<Process>& node, const std::string& what,
+                         const Request& request, const Then& then) {
   began_ = process_->world().timeline.now();
+  by_node_ = true;
+  auto over = std::make_shared<bool>(false);
+  const auto end = [self = shared_from_this(), what, then, over](const Result<void>& outcome) {
+    if (!std::exchange(*over, true)) self->conclude(what, outcome, then);
+  };
+  const Reply reply = node->answer(request);
+  process_->directory().saw_lamport_time(node->directory().latest_lamport_time());
+  if (const auto* error = std::get_if<Error>(&reply.body)) return end(tl::unexpected(*error));
+  node->when_stored(end);
+  // Its process may end before.
+  process_->later("node", Operation::kTimeout, [end] { end(fail(Errc::kTimeout, "not stored")); });
+}
+
+void Author::begin(const std::string& what, Operation::Route route, Then then) {
+  began_ = process_->world().timeline.now();
+  by_node_ = false;
   process_->begin(
-      what, std::make_shared<Operation>(
-                *process_, std::move(route),
-                [self = shared_from_this(), what, then](const Result<void>& outcome, const auto&) {
-                  Surroundings& world = self->process_->world();
-                  const std::string code =
-                      outcome ? "done" : std::string(to_string(outcome.error().code));
-                  ++self->outcomes_[what.substr(0, what.find(' ')) + " " + code];
-                  world.trace(self->prefix_ + " " + what + ": " + code);
-                  then(outcome);
-                  self->remember();
-                  self->next();
-                }));
+      what, std::make_shared<Operation>(*process_, std::move(route),
+                                        [self = shared_from_this(), what, then = std::move(then)](
+                                            const Result<void>& outcome, const auto&) {
+                                          self->conclude(what, outcome, then);
+                                        }));
+}
+
+void Author::conclude(const std::string& what, const Result<void>& outcome, const Then& then) {
+  Surroundings& world = process_->world();
+  const std::string code = outcome ? "done" : std::string(to_string(outcome.error().code));
+  ++outcomes_[what.substr(0, what.find(' ')) + " " + code];
+  world.trace(prefix_ + " " + what + ": " + code);
+  then(outcome);
+  // What was sent without an answer arrives before what is sent next, or is lost.
+  if (!outcome) rest_ = world.network.longest_delay();
+  remember();
+  next();
 }
 
 std::vector<std::string> Author::own(bool anchored) const { return model_.ids(prefix_, anchored); }
@@ -142,7 +181,7 @@ void Author::check_seen(const std::string& id, const std::string& parent) {
   Process& process = *process_;
   const auto frame = process.forest().info(id);
   const auto owner = process.directory().owner(model_.frame(id).partition);
-  const bool excused = !owner || !process.directory().reachable(*owner) ||
+  const bool excused = by_node_ || !owner || !process.directory().reachable(*owner) ||
                        process.directory().behind() != nullptr ||
                        may_be_lost(model_.frame(id).partition, began_);
   if (excused || (frame && frame->parent == parent)) return;

@@ -65,8 +65,15 @@ class Author : public std::enable_shared_from_this<Author> {
   void set_joint();
   void forget_one();
   void contest();
-  void begin(const std::string& what, Operation::Route route,
-             std::function<void(const Result<void>&)> then);
+  using RouteOf = std::function<Result<std::vector<Part>>(Process& caller)>;
+  using Then = std::function<void(const Result<void>&)>;
+
+  void change(const std::string& what, const std::string& owner, const RouteOf& route, Then then);
+  void change_here(const std::shared_ptr<Process>& node, const std::string& what,
+                   const Request& request, const Then& then);
+  void begin(const std::string& what, Operation::Route route, Then then);
+  void conclude(const std::string& what, const Result<void>& outcome, const Then& then);
+  void stream_joint(double position);
   [[nodiscard]] OperationKind draw_kind();
   void remember();
   /// Whether a partition, or any, may have lost what it has acknowledged since then.
@@ -92,7 +99,9 @@ class Author : public std::enable_shared_from_this<Author> {
   std::deque<std::pair<Instant, faults::Model>> known_;
   std::map<std::string, Instant> losses_;  // the last power loss, by partition
   std::map<std::string, Instant> forgotten_;
-  Instant began_{};  // of the current operation
+  Instant began_{};       // of the current operation
+  bool by_node_ = false;  // it was made by its owner's Node
+  Instant rest_{};        // before the next one
   std::size_t steps_ = 0;
   std::size_t added_ = 0;
   bool stopped_ = false;

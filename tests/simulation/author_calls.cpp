@@ -19,6 +19,14 @@ using faults::Place;
 
 constexpr std::size_t kFrames = 12;  // of one author at the same time
 
+std::vector<Part> alone(Part part) { return {std::move(part)}; }
+
+std::vector<SegmentValues> values_of(const std::vector<Answer>& answers) {
+  std::vector<SegmentValues> values;
+  for (const Answer& answer : answers) values.push_back(std::get<SegmentValues>(answer.reply.body));
+  return values;
+}
+
 }  // namespace
 
 void Author::add() {
@@ -28,12 +36,12 @@ void Author::add() {
   const std::string partition =
       random_.index(2) == 0 ? partition_name(random_.index(owners_)) : std::string();
   const std::string owner = partition.empty() ? model_.frame(place.parent).partition : partition;
-  begin(
-      "add " + id + " in " + owner + " under " + place.parent,
-      [this, id, place, partition] {
-        return route_add(process_->forest(), process_->directory(), id, {place.parent, place.X_PC},
+  change(
+      "add " + id + " in " + owner + " under " + place.parent, owner,
+      [id, place, partition](Process& caller) {
+        return route_add(caller.forest(), caller.directory(), id, {place.parent, place.X_PC},
                          partition)
-            .map([](Part part) { return std::vector<Part>{std::move(part)}; });
+            .map(alone);
       },
       [this, id, place, owner](const Result<void>& added) {
         // No other client adds it.
@@ -54,13 +62,11 @@ void Author::move() {
   if (model_.may_be_below(parent, id)) return next();
   std::optional<Transform> X_PC;
   if (random_.index(2) == 0) X_PC = random_.transform();
-  begin(
-      "move " + id + " under " + parent,
-      [this, id, parent, X_PC] {
+  change(
+      "move " + id + " under " + parent, model_.frame(id).partition,
+      [id, parent, X_PC](Process& caller) {
         const MoveRequest move{parent, X_PC ? PartialTransform(*X_PC) : PartialTransform()};
-        return route_move(process_->forest(), process_->directory(), id, move).map([](Part part) {
-          return std::vector<Part>{std::move(part)};
-        });
+        return route_move(caller.forest(), caller.directory(), id, move).map(alone);
       },
       [this, id, parent, X_PC](const Result<void>& moved) {
         const bool refused = !moved && denies(moved.error().code);
@@ -107,11 +113,11 @@ void Author::remove() {
   if (ids.empty()) return next();
   const std::string id = any(ids);
   auto asked_before = std::make_shared<bool>(false);
-  begin(
-      "remove " + id,
-      [this, id, asked_before]() -> Result<std::vector<Part>> {
-        if (!process_->discovered()) return fail(Errc::kUnknownFrame, "not all is known");
-        auto parts = route_remove(process_->forest(), process_->directory(), id);
+  change(
+      "remove " + id, model_.frame(id).partition,
+      [id, asked_before](Process& caller) -> Result<std::vector<Part>> {
+        if (!caller.discovered()) return fail(Errc::kUnknownFrame, "not all is known");
+        auto parts = route_remove(caller.forest(), caller.directory(), id);
         *asked_before = *asked_before || parts.has_value();
         return parts;
       },
@@ -138,6 +144,7 @@ void Author::remove() {
 // All owners of a joint get the update, so all must be known.
 void Author::set_joint() {
   const double position = random_.uniform(-5, 5);
+  if (random_.index(3) == 0) return stream_joint(position);
   const JointUpdate update{{{moved_[0].joint, position, 0}}, {}};
   auto asked = std::make_shared<std::set<std::string>>();
   begin(
@@ -162,6 +169,24 @@ void Author::set_joint() {
           doubt_unless_stored(one.frame, set);
         }
       });
+}
+
+// Each owner that is known to have the joint is sent the position, and nobody replies.
+void Author::stream_joint(double position) {
+  const JointUpdate update{{{moved_[0].joint, position, 0}}, {}};
+  const auto parts = route_joints(process_->directory(), update);
+  process_->world().trace(prefix_ + " streams joint " + std::to_string(position));
+  for (const Part& part : parts ? *parts : std::vector<Part>()) {
+    process_->stream(part.partition, std::get<JointUpdate>(part.request.body));
+    for (const MovedFrame& one : moved_) {
+      if (partition_name(one.owner) != part.partition) continue;
+      model_.update(one.frame, one.value(position), false);
+      model_.doubt(one.frame);
+    }
+  }
+  rest_ = process_->world().network.longest_delay();
+  remember();
+  next();
 }
 
 void Author::forget_one() {
@@ -210,14 +235,11 @@ void Author::look_up(const std::string& a, const std::string& b, bool quiet) {
             return plan->parts;
           },
           [self = shared_from_this(), a, b, plan, quiet, began = process_->world().timeline.now()](
-              const Result<void>& outcome, const std::vector<Reply>& replies) {
+              const Result<void>& outcome, const std::vector<Answer>& answers) {
             Surroundings& world = self->process_->world();
             Result<StampedTransform> X_AB = fail(Errc::kTimeout, "");
             if (outcome) {
-              std::vector<SegmentValues> answers;
-              for (const Reply& reply : replies)
-                answers.push_back(std::get<SegmentValues>(reply.body));
-              X_AB = assemble(*plan, answers);
+              X_AB = assemble(*plan, values_of(answers));
             } else {
               X_AB = tl::unexpected(outcome.error());
             }
@@ -250,7 +272,6 @@ void Author::contest() {
   const std::size_t owners = process_->world().plan.owners;
   const std::string parent = random_.index(2) == 0 ? other : base_of(random_.index(owners));
   const auto nothing = [](const Result<void>&) {};
-  const auto alone = [](Part part) { return std::vector<Part>{std::move(part)}; };
   Forest& forest = process_->forest();
   Directory& directory = process_->directory();
   switch (random_.index(4)) {
@@ -261,7 +282,7 @@ void Author::contest() {
     case 1:
       return begin(
           "contested-move " + id,
-          [&forest, &directory, id, parent, alone] {
+          [&forest, &directory, id, parent] {
             return route_move(forest, directory, id, {parent, {}}).map(alone);
           },
           nothing);
@@ -269,7 +290,7 @@ void Author::contest() {
       const std::string partition = partition_name(random_.index(owners));
       return begin(
           "contested-add " + id,
-          [&forest, &directory, id, parent, partition, alone] {
+          [&forest, &directory, id, parent, partition] {
             return route_add(forest, directory, id, {parent, base_edge(0)}, partition).map(alone);
           },
           nothing);

@@ -9,6 +9,7 @@
 #include "simulation/follower.hpp"
 #include "simulation/plan.hpp"
 #include "simulation/process.hpp"
+#include "simulation/sampler.hpp"
 
 namespace tfdude::simulation {
 
@@ -34,6 +35,7 @@ struct Cast {
   std::vector<bool> has_extra;  ///< by owner, whether its configuration has one more frame
   std::vector<std::shared_ptr<Author>> authors;
   std::vector<std::shared_ptr<Follower>> followers;
+  std::vector<std::shared_ptr<Sampler>> samplers;
 
   [[nodiscard]] std::string name_of_daemon(std::size_t owner) const;
   /// Null: no running daemon is to serve it.

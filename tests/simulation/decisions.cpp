@@ -58,6 +58,7 @@ std::vector<Decision> decisions_of(const Plan& plan) {
   all.push_back(
       {with("clients, all but the first of", plan.clients), [](Plan& one) { one.clients = 1; }});
   all.push_back({with("followers", plan.followers), [](Plan& one) { one.followers = 0; }});
+  all.push_back({with("samplers", plan.samplers), [](Plan& one) { one.samplers = 0; }});
   all.push_back(
       {with("forgets who is lost:", plan.forgets), [](Plan& one) { one.forgets = false; }});
   for (std::size_t i = 0; i < kOperationKinds; ++i) {

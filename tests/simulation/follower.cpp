@@ -1,5 +1,6 @@
 #include "simulation/follower.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -39,9 +40,10 @@ void Follower::next() {
   if (stopped_) return;
   random_ = testing::Random(process_->world().plan.seed_of(actor_, ++steps_));
   const Instant pause = std::chrono::microseconds(random_.index(60'000));
-  process_->later("follower", pause, [self = shared_from_this()] {
-    if (!self->stopped_) self->step();
-  });
+  process_->later("follower", pause + std::exchange(rest_, Instant(0)),
+                  [self = shared_from_this()] {
+                    if (!self->stopped_) self->step();
+                  });
 }
 
 void Follower::step() {
@@ -64,6 +66,8 @@ void Follower::begin(const std::string& what, Operation::Route route,
                       outcome ? "done" : std::string(to_string(outcome.error().code));
                   self->process_->world().trace(self->tip() + ": " + what + ": " + code);
                   ++self->outcomes_["follower: " + what.substr(0, what.find(' ')) + " " + code];
+                  // What was sent without an answer arrives before what is sent next, or is lost.
+                  if (!outcome) self->rest_ = self->process_->world().network.longest_delay();
                   then(outcome);
                   self->next();
                 }));
@@ -79,7 +83,8 @@ void Follower::restart() {
   written_ = {{bases_}};
   newest_read_ = 0;
   incarnation_ = 0;
-  may_go_back_ = false;
+  may_go_back_ = stored_later_ = false;
+  mixed_below_ = 0;
   begin(
       "add the arm",
       [this, base, id = arm()] {
@@ -107,22 +112,64 @@ void Follower::add_tip() {
       });
 }
 
+std::vector<EdgeUpdate> Follower::both(std::size_t value) const {
+  return {{arm(), first_edge(value)}, {tip(), second_edge(value)}};
+}
+
 void Follower::write() {
   const std::size_t value = written_.size();
   written_.push_back({bases_});
-  const std::vector<EdgeUpdate> both{{arm(), first_edge(value)}, {tip(), second_edge(value)}};
+  switch (random_.index(4)) {
+    case 0:
+      return stream(value);
+    case 1:
+      return write_here(value);
+    default:
+      return request(value);
+  }
+}
+
+void Follower::request(std::size_t value) {
   begin(
       "write " + std::to_string(value),
-      [this, both] {
-        return route_update(process_->forest(), process_->directory(), both, std::nullopt);
+      [this, value] {
+        return route_update(process_->forest(), process_->directory(), both(value), std::nullopt);
       },
       [this, value](const Result<void>& updated) {
         if (updated && !may_be_lost()) {
-          for (std::size_t i = 0; i < value; ++i) written_[i].replaced = true;
+          written(value);
         } else if (!updated && denies(updated.error().code)) {
           watch_.reset();
         }
       });
+}
+
+void Follower::written(std::size_t value) {
+  for (std::size_t i = 0; i < value; ++i) written_[i].replaced = true;
+}
+
+void Follower::stream(std::size_t value) {
+  process_->world().trace(tip() + ": streams value " + std::to_string(value));
+  const auto parts = route_publish(process_->forest(), process_->directory(), both(value));
+  for (const Part& part : parts ? *parts : std::vector<Part>()) {
+    process_->stream(part.partition, Update{std::get<UpdateRequest>(part.request.body).edges});
+  }
+  stored_later_ = true;
+  rest_ = process_->world().network.longest_delay();
+  next();
+}
+
+// A Node in the process of the owner asks nobody.
+void Follower::write_here(std::size_t value) {
+  const auto node = process_->world().serving(partition_);
+  if (node == nullptr) return request(value);
+  if (node->forest().update(both(value))) {
+    process_->world().trace(tip() + ": a node writes value " + std::to_string(value));
+    process_->world().count("a node wrote a watched value");
+    stored_later_ = true;
+    written(value);
+  }
+  next();
 }
 
 void Follower::moving_to(std::size_t base) {
@@ -175,8 +222,16 @@ void Follower::lost_power(const std::string& partition) {
   may_be_older();
 }
 
+// A value that no request waited for is stored later, but that of a moved frame with the move.
+bool Follower::may_be_mixed(double first, double second) const {
+  const auto whole = [](double number) { return std::abs(number - std::round(number)) < 1e-9; };
+  return whole(first) && whole(second) && std::min(first, second) > -1e-9 &&
+         std::max(first, second) < static_cast<double>(mixed_below_) - 0.5;
+}
+
 void Follower::may_be_older() {
   may_go_back_ = true;
+  if (std::exchange(stored_later_, false)) mixed_below_ = written_.size();
   for (Written& one : written_) {
     one.replaced = false;
     one.bases.insert(bases_.begin(), bases_.end());
@@ -192,6 +247,9 @@ void Follower::judge(const StampedTransform& X) {
   const std::string what = tip() + " was seen at (" + std::to_string(at.x()) + ", " +
                            std::to_string(at.y()) + ", " + std::to_string(at.z()) + ")";
   const double value = at.y() - of_base.y();
+  if (may_be_mixed(value, value - (at.z() - of_base.z())) && std::abs(at.z() - of_base.z()) > 0.5) {
+    return world.count("a restart mixed two commits");
+  }
   if (std::abs(at.x() - of_base.x()) > 1e-9 || std::abs(at.z() - of_base.z()) > 1e-9) {
     return world.violation("half a commit", what + ", half of what was written");
   }

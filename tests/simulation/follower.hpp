@@ -13,7 +13,8 @@
 
 namespace tfdude::simulation {
 
-/// A client that writes two edges of its own in one commit, moves them from base to base, and
+/// A client that writes two edges of its own in one commit, by a request, a stream, or a Node of
+/// their owner, moves them from base to base, and
 /// continuously reads them by a watched path. Each value must be one that was written, of one
 /// commit, in a place where the frames were, and never older than an earlier value while their
 /// owner lives.
@@ -57,11 +58,17 @@ class Follower : public std::enable_shared_from_this<Follower> {
   void restart();
   void add_tip();
   void write();
+  void request(std::size_t value);
+  void stream(std::size_t value);
+  void write_here(std::size_t value);
+  void written(std::size_t value);
+  [[nodiscard]] std::vector<EdgeUpdate> both(std::size_t value) const;
   void move();
   void begin(const std::string& what, Operation::Route route,
              std::function<void(const Result<void>&)> then);
   void look();
   void judge(const StampedTransform& X);
+  [[nodiscard]] bool may_be_mixed(double first, double second) const;
   void forget_order_after_restart();
   void may_be_older();
   void moving_to(std::size_t base);
@@ -83,7 +90,10 @@ class Follower : public std::enable_shared_from_this<Follower> {
   std::size_t newest_read_ = 0;
   std::uint64_t incarnation_ = 0;  // of the owner
   bool may_go_back_ = false;       // once, since the owner was started again
+  bool stored_later_ = false;      // its process has values that no request waited for
+  std::size_t mixed_below_ = 0;    // the value from which on commits are whole again
   Instant began_{};                // of the current operation
+  Instant rest_{};                 // before the next one
   Instant lost_{-1};               // when its owner last lost changes
   std::size_t steps_ = 0;
   std::map<std::string, std::size_t> outcomes_;

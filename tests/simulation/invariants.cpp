@@ -72,15 +72,21 @@ void Invariants::check_heard(Process& one, Known& known) {
 
 void Invariants::check_structure(Process& one) {
   const auto frames = one.forest().frames();
-  std::unordered_map<std::string_view, const FrameInfo*> by_id;
-  for (const FrameInfo& frame : frames) by_id.emplace(frame.id, &frame);
+  std::unordered_map<std::string_view, std::size_t> by_id;
+  by_id.reserve(frames.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) by_id.emplace(frames[i].id, i);
+  std::vector<std::size_t> seen_from(frames.size(), frames.size());
   std::size_t held = 0;
-  for (const FrameInfo& frame : frames) {
-    held += frame.owner == kHeldHere ? 1 : 0;
-    std::size_t steps = 0;
-    for (auto at = by_id.find(frame.id); at != by_id.end(); at = by_id.find(at->second->parent)) {
-      if (++steps <= frames.size()) continue;
-      violation_("a cycle of frames", name_of(one) + " sees " + frame.id + " below itself");
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].owner == kHeldHere) ++held;
+    // Up to the root, or to a frame from which an earlier walk has reached it.
+    for (std::size_t at = i; seen_from[at] == frames.size();) {
+      seen_from[at] = i;
+      const auto parent = by_id.find(frames[at].parent);
+      if (parent == by_id.end()) break;
+      at = parent->second;
+      if (seen_from[at] != i) continue;
+      violation_("a cycle of frames", name_of(one) + " sees " + frames[i].id + " below itself");
       return;
     }
   }
@@ -112,6 +118,31 @@ void Invariants::replies(const Process& one, const Reply& reply) {
   violation_("something is acknowledged that is not stored",
              name_of(one) + " acknowledges epoch " + std::to_string(reply.epoch) +
                  ", and has stored " + std::to_string(one.stored_epoch()));
+}
+
+void Invariants::answered(const Process& one, const Request& request, const Reply& reply) {
+  if (std::holds_alternative<Error>(reply.body)) return;
+  const auto frame = one.forest().info(request.id);
+  bool seen = true;
+  if (const auto* add = std::get_if<AddRequest>(&request.body)) {
+    seen = frame && frame->parent == add->parent;
+  } else if (const auto* move = std::get_if<MoveRequest>(&request.body)) {
+    seen = frame && frame->parent == move->parent;
+  } else if (const auto* removed = std::get_if<RemoveRequest>(&request.body)) {
+    seen = std::none_of(removed->tops.begin(), removed->tops.end(),
+                        [&](const std::string& top) { return one.forest().exists(top); });
+  }
+  if (!seen) violation_("a node does not see its change", name_of(one) + ": " + request.id);
+}
+
+void Invariants::streamed(const Process& one, const Update& update) {
+  if (update.stamp) return;
+  for (const EdgeUpdate& edge : update.edges) {
+    if (!one.forest().holds(edge.id)) continue;
+    const auto X_PC = one.forest().value(edge.id);
+    if (X_PC && X_PC->pose.matrix() == edge.X_PC.pose.matrix()) continue;
+    violation_("a streamed value is not applied", name_of(one) + ": " + edge.id);
+  }
 }
 
 void Invariants::called(const std::shared_ptr<Process>& caller,

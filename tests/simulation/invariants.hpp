@@ -26,6 +26,9 @@ using Violation = std::function<void(const std::string& kind, const std::string&
 /// - What a process knows of a partition that it hears only grows: incarnation and epoch.
 /// - No frame is below itself, and an owner publishes exactly the frames that it holds.
 /// - Nobody hears of what is not stored: no page, and no reply to a change.
+/// - A Node sees its changes at once.
+/// - A streamed value that arrives at the owner of its edge is the edge's value, unless it has a
+///   stamp.
 /// - Each call ends by its deadline.
 class Invariants {
  public:
@@ -42,6 +45,10 @@ class Invariants {
 
   /// What a process is about to publish.
   void publishes(const Process& one, const Sample& sample);
+  /// A process has answered a request of its Node.
+  void answered(const Process& one, const Request& request, const Reply& reply);
+  /// A process has got these streamed values.
+  void streamed(const Process& one, const Update& update);
   /// What a process is about to reply to a request that may have changed something.
   void replies(const Process& one, const Reply& reply);
 

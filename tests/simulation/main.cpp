@@ -52,7 +52,20 @@ constexpr const char* kRare[] = {"a process gave its partition up",
                                  "somebody forgets who is lost",
                                  "a watched path took another route",
                                  "the owner of a watched path was started again",
-                                 "watched paths checked"};
+                                 "watched paths checked",
+                                 "a node wrote a watched value",
+                                 "node-add done",
+                                 "node-move done",
+                                 "node-remove done",
+                                 "a streamed value was applied",
+                                 "a streamed joint was moved",
+                                 "a streamed sample was seen",
+                                 "a late sample was taken",
+                                 "a sample was looked up at an instant",
+                                 "the clock of a source jumped back",
+                                 "sampler: sample too_old",
+                                 "a history was restarted",
+                                 "sampled edges checked"};
 
 using namespace tfdude::simulation;
 
@@ -101,6 +114,7 @@ int main(int argc, char** argv) {
   std::int64_t storm = 0;
   bool trace = false;
   bool shrunk = false;
+  bool first_only = false;
   app.add_option("--seed", remains.seed, "the first seed")->capture_default_str();
   app.add_option("--count", count, "how many seeds, one after the other")->capture_default_str();
   app.add_option("--without", without, "leave out decisions and operations: 3,7,1000-1016");
@@ -108,6 +122,7 @@ int main(int argc, char** argv) {
   app.add_flag("--trace", trace, "print each step");
   app.add_flag("--shrink", shrunk,
                "of a seed that fails, look for a smaller run that fails in the same way");
+  app.add_flag("--first", first_only, "ends at the first seed that fails");
   CLI11_PARSE(app, argc, argv);
   tfdude::log().set_level(spdlog::level::off);
   remains.without = numbers_of(without);
@@ -115,6 +130,7 @@ int main(int argc, char** argv) {
   Total total;
   const std::uint64_t first = remains.seed;
   for (; remains.seed < first + count; ++remains.seed) {
+    if (first_only && total.failed > 0) return EXIT_FAILURE;
     const std::uint64_t failed = total.failed;
     run_twice(remains, trace && !shrunk, total);
     if (shrunk && total.failed > failed) print_shrunk(remains, trace);

@@ -10,6 +10,8 @@ namespace {
 
 // The delay until lost data are sent again.
 constexpr milliseconds kRepeat{100};
+// The share of delays that are longer than the longest, which are left out.
+constexpr double kLeast = 1e-6;
 
 bool same_key(const Sample& a, const Sample& b) {
   const auto* page = std::get_if<Page>(&a);
@@ -34,7 +36,11 @@ bool Network::reaches(std::size_t from, std::size_t to) const {
 
 Instant Network::delay() {
   const double mean = static_cast<double>(plan_.delay.count());
-  return Instant(static_cast<std::int64_t>(-mean * std::log(random_.uniform(1e-6, 1))));
+  return Instant(static_cast<std::int64_t>(-mean * std::log(random_.uniform(kLeast, 1))));
+}
+
+Instant Network::longest_delay() const {
+  return std::chrono::duration_cast<Instant>(-std::log(kLeast) * plan_.delay) + milliseconds(1);
 }
 
 void Network::join(const std::shared_ptr<Process>& process) {
@@ -62,6 +68,7 @@ void Network::meet(std::uint64_t a, std::uint64_t b) {
 void Network::open(const Process& from, std::uint64_t to) {
   const Way way{from.id(), to};
   if (!channels_.try_emplace(way).second) return;
+  backwards_.emplace(to, from.id());
   if (from.serves_or_claims()) find(to)->met(from.id());
   for (const Sample& sample : from.published()) put(channels_[way], sample);
   move(way);
@@ -69,8 +76,9 @@ void Network::open(const Process& from, std::uint64_t to) {
 
 std::vector<std::uint64_t> Network::met_by(const Process& one) const {
   std::vector<std::uint64_t> all;
-  for (const auto& [way, channel] : channels_) {
-    if (way.second == one.id() && find(way.first)) all.push_back(way.first);
+  for (auto way = backwards_.lower_bound({one.id(), 0});
+       way != backwards_.end() && way->first == one.id(); ++way) {
+    if (find(way->second)) all.push_back(way->second);
   }
   return all;
 }
@@ -85,10 +93,10 @@ void Network::put(Channel& channel, const Sample& sample) {
 }
 
 void Network::publish(const Process& from, const Sample& sample) {
-  for (auto& [way, channel] : channels_) {
-    if (way.first != from.id()) continue;
-    put(channel, sample);
-    move(way);
+  for (auto channel = channels_.lower_bound({from.id(), 0});
+       channel != channels_.end() && channel->first.first == from.id(); ++channel) {
+    put(channel->second, sample);
+    move(channel->first);
   }
 }
 
@@ -106,6 +114,7 @@ void Network::arrive(const Way& way) {
   const auto to = find(way.second);
   if (!from || !to) {
     channels_.erase(way);
+    backwards_.erase({way.second, way.first});
     return;
   }
   Channel& channel = channels_[way];

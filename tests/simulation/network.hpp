@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -45,6 +46,9 @@ class Network {
   /// Whose samples reach that process.
   [[nodiscard]] std::vector<std::uint64_t> met_by(const Process& one) const;
 
+  /// A datagram that has not arrived by then is lost, or waits for a process that hangs.
+  [[nodiscard]] Instant longest_delay() const;
+
   // Faults; counted, as several may concern one link.
   void cut_in(std::size_t host, int change) { hosts_[host].deaf += change; }
   void cut_out(std::size_t host, int change) { hosts_[host].mute += change; }
@@ -82,6 +86,7 @@ class Network {
   std::map<std::pair<std::size_t, std::size_t>, int> parted_;
   std::map<std::uint64_t, std::weak_ptr<Process>> processes_;
   std::map<Way, Channel> channels_;
+  std::set<Way> backwards_;  // the same ways, by receiver
 };
 
 }  // namespace tfdude::simulation

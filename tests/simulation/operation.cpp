@@ -26,8 +26,8 @@ void Operation::start() {
     if (self->phase_ == Phase::kPlan) {
       self->finish(fail(Errc::kTimeout, "not all is known"));
     } else if (self->phase_ == Phase::kAsk) {
-      for (auto& reply : self->replies_) {
-        if (!reply) reply = Reply{0, 0, Error{Errc::kTimeout, "no answer"}};
+      for (auto& answer : self->answers_) {
+        if (!answer) answer = Answer{{0, 0, Error{Errc::kTimeout, "no answer"}}};
       }
       self->take_if_answered();
     } else {
@@ -61,12 +61,12 @@ void Operation::plan() {
 void Operation::ask(std::vector<Part> parts) {
   phase_ = Phase::kAsk;
   parts_ = std::move(parts);
-  replies_.assign(parts_.size(), std::nullopt);
+  answers_.assign(parts_.size(), std::nullopt);
   stored_ = true;
   ++round_;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     if (parts_[i].owner == kHeldHere) {
-      replies_[i] = caller_.answer(parts_[i].request);
+      answers_[i] = Answer{caller_.answer(parts_[i].request), caller_.id()};
     } else {
       parts_[i].request.sequence = caller_.next_sequence();
     }
@@ -78,18 +78,18 @@ void Operation::ask(std::vector<Part> parts) {
 void Operation::send(Instant pause, int round) {
   if (over_ || phase_ != Phase::kAsk || round != round_) return;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    if (!replies_[i]) caller_.send(parts_[i].partition, parts_[i].request);
+    if (!answers_[i]) caller_.send(parts_[i].partition, parts_[i].request);
   }
   caller_.later("repeat", pause, [self = shared_from_this(), pause, round] {
     self->send(std::min<Instant>(2 * pause, milliseconds(160)), round);
   });
 }
 
-void Operation::on_reply(const Reply& reply) {
+void Operation::on_reply(std::uint64_t from, const Reply& reply) {
   if (over_ || phase_ != Phase::kAsk) return;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const bool mine = parts_[i].owner != kHeldHere && parts_[i].request.sequence == reply.sequence;
-    if (mine && !replies_[i]) replies_[i] = reply;
+    if (mine && !answers_[i]) answers_[i] = Answer{reply, from};
   }
   take_if_answered();
 }
@@ -97,15 +97,15 @@ void Operation::on_reply(const Reply& reply) {
 void Operation::on_lost(const std::string& partition) {
   if (over_ || phase_ != Phase::kAsk) return;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    if (replies_[i] || parts_[i].partition != partition) continue;
-    replies_[i] = Reply{0, 0, Error{Errc::kUnreachable, "it left before it replied"}};
+    if (answers_[i] || parts_[i].partition != partition) continue;
+    answers_[i] = Answer{{0, 0, Error{Errc::kUnreachable, "it left before it replied"}}};
   }
   take_if_answered();
 }
 
 void Operation::take_if_answered() {
-  const bool all = std::all_of(replies_.begin(), replies_.end(),
-                               [](const auto& reply) { return reply.has_value(); });
+  const bool all = std::all_of(answers_.begin(), answers_.end(),
+                               [](const auto& answer) { return answer.has_value(); });
   if (!over_ && phase_ == Phase::kAsk && all) answered();
 }
 
@@ -113,7 +113,7 @@ void Operation::answered() {
   phase_ = Phase::kConfirm;
   outcome_ = {};
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    const auto* error = std::get_if<Error>(&replies_[i]->body);
+    const auto* error = std::get_if<Error>(&answers_[i]->reply.body);
     if (error != nullptr && (outcome_ || error->code == Errc::kState)) {
       outcome_ = tl::unexpected(*error);
     }
@@ -134,14 +134,15 @@ void Operation::look_again() {
   Directory& directory = caller_.directory();
   bool confirmed = stored_;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    const bool done = !std::holds_alternative<Error>(replies_[i]->body);
+    const Reply& reply = answers_[i]->reply;
+    const bool done = !std::holds_alternative<Error>(reply.body);
     const Owner owner = parts_[i].owner;
-    if (done && owner != kHeldHere) directory.saw_lamport_time(replies_[i]->lamport_time);
+    if (done && owner != kHeldHere) directory.saw_lamport_time(reply.lamport_time);
     const bool reads = std::holds_alternative<LookupRequest>(parts_[i].request.body);
     if (!done || owner == kHeldHere || reads) continue;
-    const bool here = directory.epoch(owner) >= replies_[i]->epoch || !directory.reachable(owner);
+    const bool here = directory.epoch(owner) >= reply.epoch || !directory.reachable(owner);
     confirmed = confirmed && here;
-    if (here || now() >= deadline_) directory.told_of(owner, replies_[i]->epoch);
+    if (here || now() >= deadline_) directory.told_of(owner, reply.epoch);
   }
   if (!confirmed && now() < deadline_) return;
   if (!stored_ && outcome_) outcome_ = fail(Errc::kTimeout, "changed, but not stored in time");
@@ -172,10 +173,10 @@ void Operation::await_change(Instant until, bool stale) {
 
 void Operation::finish(Result<void> outcome) {
   over_ = true;
-  std::vector<Reply> replies;
-  for (auto& reply : replies_) replies.push_back(reply ? *reply : Reply{});
+  std::vector<Answer> answers;
+  for (auto& answer : answers_) answers.push_back(answer ? std::move(*answer) : Answer{});
   // The callback may own the process that owns this.
-  std::exchange(then_, nullptr)(outcome, std::move(replies));
+  std::exchange(then_, nullptr)(outcome, answers);
 }
 
 }  // namespace tfdude::simulation

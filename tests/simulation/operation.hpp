@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -14,12 +15,18 @@ namespace tfdude::simulation {
 
 class Process;
 
+/// A reply, and the process that gave it.
+struct Answer {
+  Reply reply;
+  std::uint64_t by = 0;
+};
+
 /// One call of a client in steps, as Requests makes it: it is planned, sent until it is answered,
 /// planned again if the structure has changed meanwhile, and ends at its deadline at the latest.
 class Operation : public std::enable_shared_from_this<Operation> {
  public:
   using Route = std::function<Result<std::vector<Part>>()>;
-  using Then = std::function<void(const Result<void>&, std::vector<Reply>)>;
+  using Then = std::function<void(const Result<void>&, const std::vector<Answer>&)>;
 
   static constexpr milliseconds kTimeout{1000};
 
@@ -27,7 +34,7 @@ class Operation : public std::enable_shared_from_this<Operation> {
   Operation(Process& caller, Route route, Then then);
 
   void start();
-  void on_reply(const Reply& reply);
+  void on_reply(std::uint64_t from, const Reply& reply);
   void on_lost(const std::string& partition);
   /// Something has changed for which it may wait.
   void look_again();
@@ -54,7 +61,7 @@ class Operation : public std::enable_shared_from_this<Operation> {
   Instant deadline_{};
   Phase phase_ = Phase::kPlan;
   std::vector<Part> parts_;
-  std::vector<std::optional<Reply>> replies_;
+  std::vector<std::optional<Answer>> answers_;
   Result<void> outcome_;
   int attempts_ = 0;
   int round_ = 0;  // of asking

@@ -170,6 +170,7 @@ Plan draw_plan(std::uint64_t seed) {
   draw_operations(random, plan);
   draw_faults(random, plan);
   draw_lasting(random, plan);
+  plan.samplers = random.index(2);
   return plan;
 }
 

@@ -59,6 +59,7 @@ struct Plan {
   std::size_t owners = 2;
   std::size_t clients = 1;    ///< clients that own no frames
   std::size_t followers = 0;  ///< clients that read watched paths
+  std::size_t samplers = 0;   ///< clients that write stamped samples
   Instant storm{};            ///< duration of the phase with faults
   double loss = 0;            ///< of datagrams, and of samples that are repeated then
   double repeats = 0;         ///< share of datagrams that arrive twice
@@ -88,7 +89,7 @@ struct Plan {
   }
 
   /// How many make operations that are counted.
-  [[nodiscard]] std::size_t actors() const { return clients + followers; }
+  [[nodiscard]] std::size_t actors() const { return clients + followers + samplers; }
   /// For the random numbers of one operation.
   [[nodiscard]] std::uint64_t seed_of(std::size_t actor, std::size_t operation) const;
   [[nodiscard]] bool leaves_out(std::size_t actor, std::size_t operation) const;

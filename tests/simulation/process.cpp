@@ -260,12 +260,12 @@ void Process::yield() {
   const auto asked = ask_all();
   begin("yield",
         std::make_shared<Operation>(
-            *this, ask_all, [this, due, asked](const Result<void>& outcome, const auto& replies) {
-              bool current = outcome.has_value() && replies.size() == asked->size();
-              for (std::size_t i = 0; current && i < replies.size(); ++i) {
+            *this, ask_all, [this, due, asked](const Result<void>& outcome, const auto& answers) {
+              bool current = outcome.has_value() && answers.size() == asked->size();
+              for (std::size_t i = 0; current && i < answers.size(); ++i) {
                 const Owner owner = (*asked)[i].owner;
-                current =
-                    directory_.epoch(owner) >= replies[i].epoch || !directory_.reachable(owner);
+                current = directory_.epoch(owner) >= answers[i].reply.epoch ||
+                          !directory_.reachable(owner);
               }
               yielding_ = false;
               member_.yield(due, current, wall());

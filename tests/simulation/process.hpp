@@ -24,6 +24,8 @@
 
 namespace tfdude::simulation {
 
+class Process;
+
 /// The data that all processes of a run share.
 struct Surroundings {
   Timeline& timeline;
@@ -35,6 +37,8 @@ struct Surroundings {
   std::function<void(const std::string&)> count;  ///< counts states that should occur sometimes
   /// An actor makes its operation of this number now.
   std::function<void(std::size_t actor, std::size_t operation)> did;
+  /// The process that serves a partition, for its Node; null: there is none, or it hangs.
+  std::function<std::shared_ptr<Process>(const std::string& partition)> serving;
   std::set<std::string> forgotten;  ///< partitions that somebody has forgotten
   Steps& steps;
   Invariants& invariants;
@@ -76,9 +80,12 @@ class Process : public std::enable_shared_from_this<Process> {
   void met(std::uint64_t peer) { peers_.try_emplace(peer); }
   void hear(std::uint64_t from, const Sample& sample);
   void on_request(std::uint64_t from, const Request& request);
-  void on_reply(const Reply& reply);
+  void on_reply(std::uint64_t from, const Reply& reply);
   /// @param number  the sender counts what it pushes
   void on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed);
+  /// Values of a stream.
+  void on_update(const Update& update);
+  void on_update(const JointUpdate& update);
   /// A participant listens to a group of watchers.
   void on_watcher(std::uint64_t group);
 
@@ -92,6 +99,13 @@ class Process : public std::enable_shared_from_this<Process> {
   void when_stored(std::function<void(const Result<void>&)> then);
   [[nodiscard]] std::uint32_t next_sequence() { return ++sequence_; }
   void send(const std::string& partition, const Request& request);
+  /// Sends values without a reply.
+  template <class Values>
+  void stream(const std::string& partition, const Values& update) {
+    each_server(partition, [&](std::uint64_t peer) {
+      world_.network.send(*this, peer, [update](Process& there) { there.on_update(update); });
+    });
+  }
   /// From now on it gets the input for watched paths.
   void watch(const std::shared_ptr<Watch>& watch) { watches_.push_back(watch); }
   /// Tells the owner of a partition that a group of watchers has one more member.
@@ -110,6 +124,7 @@ class Process : public std::enable_shared_from_this<Process> {
   [[nodiscard]] bool ended() const { return ended_; }
   [[nodiscard]] std::vector<Sample> published() const;
   [[nodiscard]] Forest& forest() { return forest_; }
+  [[nodiscard]] const Forest& forest() const { return forest_; }
   [[nodiscard]] Directory& directory() { return directory_; }
   [[nodiscard]] Member& member() { return member_; }
   [[nodiscard]] Surroundings& world() { return world_; }
@@ -142,6 +157,7 @@ class Process : public std::enable_shared_from_this<Process> {
     }
   };
 
+  void reply_to(std::uint64_t peer, const Reply& reply);
   void answer_watch(std::uint64_t from, const Request& request);
   void look_at_leases();
   void push(const PushedValues& pushed);

@@ -69,8 +69,7 @@ void Process::perform(const Ready& ready) {
     Reply reply = pending.reply;
     if (!stored) reply.body = stored.error();
     world_.invariants.replies(*this, reply);
-    world_.network.send(*this, process_of(pending.to),
-                        [reply](Process& there) { there.on_reply(reply); });
+    reply_to(process_of(pending.to), reply);
   }
   react();
 }

@@ -16,23 +16,24 @@ constexpr Instant kEndsWithin = milliseconds(20);
 void Process::on_request(std::uint64_t from, const Request& request) {
   if (!serving_) return;
   world_.steps.mix((from << 32U) + request.sequence);
-  const PeerId peer = peer_of(from);
-  const auto reply_now = [&](const Reply& reply) {
-    world_.network.send(*this, from, [reply](Process& there) { there.on_reply(reply); });
-  };
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
-    return reply_now(member_.partition()->answer_lookup(request.sequence, *lookup));
+    return reply_to(from, member_.partition()->answer_lookup(request.sequence, *lookup));
   }
   if (std::holds_alternative<WatchRequest>(request.body)) return answer_watch(from, request);
-  const auto reply = member_.on_request(peer, request, failure_, wall());
-  if (reply) reply_now(*reply);
+  const auto reply = member_.on_request(peer_of(from), request, failure_, wall());
+  if (reply) reply_to(from, *reply);
   react();
 }
 
-void Process::on_reply(const Reply& reply) {
+void Process::reply_to(std::uint64_t peer, const Reply& reply) {
+  world_.network.send(*this, peer,
+                      [from = id(), reply](Process& there) { there.on_reply(from, reply); });
+}
+
+void Process::on_reply(std::uint64_t from, const Reply& reply) {
   world_.steps.mix(reply.epoch + reply.sequence);
   const auto operations = operations_;
-  for (const auto& one : operations) one->on_reply(reply);
+  for (const auto& one : operations) one->on_reply(from, reply);
   for (const auto& one : watches_) {
     if (const auto watch = one.lock()) watch->on_reply(reply);
   }
@@ -49,7 +50,20 @@ void Process::answer_watch(std::uint64_t from, const Request& request) {
   } else {
     reply.body = std::move(pushed.error());
   }
-  world_.network.send(*this, from, [reply](Process& there) { there.on_reply(reply); });
+  reply_to(from, reply);
+}
+
+void Process::on_update(const Update& update) {
+  if (!serving_) return;
+  world_.steps.mix(update.edges.size());
+  if (member_.partition()->apply(update) > 0) world_.count("a streamed value was applied");
+  world_.invariants.streamed(*this, update);
+}
+
+void Process::on_update(const JointUpdate& update) {
+  if (!serving_) return;
+  world_.steps.mix(update.joints.size());
+  if (member_.partition()->apply(update)) world_.count("a streamed joint was moved");
 }
 
 // Groups that are not renewed end even if nothing is written.
@@ -95,6 +109,7 @@ Reply Process::answer(const Request& request) {
     return member_.partition()->answer_lookup(request.sequence, *lookup);
   }
   Reply reply = member_.answer(request, failure_, wall());
+  world_.invariants.answered(*this, request, reply);
   react();
   return reply;
 }

@@ -1,6 +1,7 @@
 #include "simulation/steps.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 namespace tfdude::simulation {
 namespace {
@@ -32,8 +33,13 @@ void Steps::mix(std::uint64_t value) {
 }
 
 void Steps::mix(std::string_view text) {
-  std::uint64_t& hash = steps_.back().hash;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * kPrime;
+  while (!text.empty()) {
+    const std::string_view word = text.substr(0, sizeof(std::uint64_t));
+    std::uint64_t value = 0;
+    std::memcpy(&value, word.data(), word.size());
+    mix(value);
+    text.remove_prefix(word.size());
+  }
 }
 
 std::optional<std::string> first_difference(const Steps& one, const Steps& other) {

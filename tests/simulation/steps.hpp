@@ -14,6 +14,8 @@ namespace tfdude::simulation {
 /// the same.
 class Steps {
  public:
+  Steps() { steps_.reserve(1U << 15U); }
+
   struct Step {
     std::uint64_t hash = 0;
     Instant when{};

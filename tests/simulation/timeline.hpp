@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <tuple>
@@ -41,8 +42,15 @@ class Timeline {
   }
 
   void at(Instant when, Touch touch, std::function<void()> what) {
-    events_.push_back({std::max(when, now_), order_.engine()(), ++count_, touch, std::move(what)});
-    std::push_heap(events_.begin(), events_.end());
+    if (free_.empty()) {
+      free_.push_back(events_.size());
+      events_.emplace_back();
+    }
+    const std::size_t place = free_.back();
+    free_.pop_back();
+    events_[place] = {touch, std::move(what)};
+    due_.push_back({std::max(when, now_), order_.engine()(), place});
+    std::push_heap(due_.begin(), due_.end());
   }
   void after(Instant wait, Touch touch, std::function<void()> what) {
     at(now_ + wait, touch, std::move(what));
@@ -50,14 +58,15 @@ class Timeline {
 
   /// The next event, if it is due by then. @return whether there was one
   bool step(Instant until) {
-    if (events_.empty() || events_.front().when > until) {
+    if (due_.empty() || due_.front().when > until) {
       now_ = until;
       return false;
     }
-    std::pop_heap(events_.begin(), events_.end());
-    const Event next = std::move(events_.back());
-    events_.pop_back();
-    now_ = next.when;
+    std::pop_heap(due_.begin(), due_.end());
+    now_ = due_.back().when;
+    const Event next = std::exchange(events_[due_.back().place], {});
+    free_.push_back(due_.back().place);
+    due_.pop_back();
     if (before_) before_(next.touch);
     next.what();
     if (after_) after_(next.touch);
@@ -66,20 +75,24 @@ class Timeline {
 
  private:
   struct Event {
-    Instant when;
-    std::uint64_t order;
-    std::uint64_t number;
     Touch touch;
     std::function<void()> what;
-    bool operator<(const Event& other) const {
-      return std::tie(when, order, number) > std::tie(other.when, other.order, other.number);
+  };
+  // Small, because a heap moves its elements around.
+  struct Due {
+    Instant when;
+    std::uint64_t order;
+    std::size_t place;  // of the event
+    bool operator<(const Due& other) const {
+      return std::tie(when, order) > std::tie(other.when, other.order);
     }
   };
 
   testing::Random order_;
   Instant now_{0};
-  std::uint64_t count_ = 0;
-  std::vector<Event> events_;  // a heap, the next one first
+  std::vector<Due> due_;  // a heap, the next one first
+  std::vector<Event> events_;
+  std::vector<std::size_t> free_;  // places without an event
   Watcher before_;
   Watcher after_;
 };

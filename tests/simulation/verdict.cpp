@@ -11,6 +11,7 @@ using faults::base_of;
 
 // A call asks a few times, and the replies to it are kept until the next one.
 constexpr std::size_t kRepliesPerClient = 8;
+constexpr milliseconds kPoll{50};
 
 std::string difference(const std::vector<std::string>& a, const std::vector<std::string>& b) {
   std::string text;
@@ -62,8 +63,14 @@ void Verdict::check() {
   }
   check_owners(*all.back());
   for (Author* author : authors) check_author(*author);
+  if (agreed_) {
+    for (Author* author : authors) look_up_all(*author);
+  }
   for (const auto& follower : cast_.followers) check_follower(*follower);
+  check_samplers();
+  await_calls();
   for (const auto& follower : cast_.followers) all.push_back(&follower->process());
+  for (const auto& sampler : cast_.samplers) all.push_back(&sampler->process());
   for (Process* one : all) check_kept(*one);
 }
 
@@ -87,7 +94,7 @@ void Verdict::check_kept_by_owner(Process& owner) {
   };
   const Partition* partition = owner.member().partition();
   if (partition == nullptr) return;
-  const std::size_t clients = cast_.authors.size() + cast_.followers.size();
+  const std::size_t clients = cast_.authors.size() + cast_.followers.size() + cast_.samplers.size();
   if (partition->kept_replies() > kRepliesPerClient * clients) {
     grows(" keeps " + std::to_string(partition->kept_replies()) + " replies");
   }
@@ -217,6 +224,29 @@ void Verdict::check_follower(Follower& follower) {
   }
 }
 
+// The owner still has each sample that it has taken.
+void Verdict::check_samplers() {
+  for (const auto& sampler : cast_.samplers) {
+    Process* const owner = find_core(sampler->partition());
+    const auto frame = owner ? owner->forest().info(sampler->frame()) : std::nullopt;
+    const auto base = frame ? sampler->process().forest().info(frame->parent) : std::nullopt;
+    if (!base || passes_over_one(sampler->process()) || lacks_one(sampler->process())) continue;
+    sampler->look_back();
+    calls_.count("sampled edges checked", 1);
+  }
+}
+
+void Verdict::await_calls() {
+  const auto open = [](const auto& actor) { return actor->process().open_calls() > 0; };
+  for (Instant waited{0}; waited < 2 * Operation::kTimeout; waited += kPoll) {
+    calls_.wait(kPoll);
+    if (std::none_of(cast_.authors.begin(), cast_.authors.end(), open) &&
+        std::none_of(cast_.samplers.begin(), cast_.samplers.end(), open)) {
+      return;
+    }
+  }
+}
+
 // A reachable daemon owns the frame that it is configured with; an unreachable one owns none of the
 // configured frames.
 void Verdict::check_owners(Process& one) {
@@ -269,7 +299,10 @@ void Verdict::check_author(Author& author) {
       if (!wrong.empty()) violation("an acknowledged change is lost", wrong);
     }
   }
-  if (!agreed_) return;
+}
+
+void Verdict::look_up_all(Author& author) {
+  Process& process = author.process();
   // Before the lookups, which change the model.
   std::vector<std::pair<std::string, std::string>> edges;
   for (const auto& [id, model] : author.model().frames()) {
@@ -278,7 +311,6 @@ void Verdict::check_author(Author& author) {
       edges.emplace_back(frame->parent, id);
   }
   for (const auto& [parent, id] : edges) author.look_up(parent, id, true);
-  calls_.wait(2 * Operation::kTimeout);
   calls_.count("values checked", edges.size());
 }
 

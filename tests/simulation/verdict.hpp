@@ -40,9 +40,12 @@ class Verdict {
   [[nodiscard]] Process* find_core(const std::string& partition) const;
   void check_forgotten(Process& one, const std::string& partition);
   void check_follower(Follower& follower);
+  void check_samplers();
   void check_owners(Process& one);
   [[nodiscard]] bool is_left_over(const FrameInfo& frame, Process& seen_by) const;
   void check_author(Author& author);
+  void look_up_all(Author& author);
+  void await_calls();
   void check_kept(Process& one);
   void check_kept_by_owner(Process& owner);
 

@@ -21,15 +21,18 @@ void Watch::attend() {
 
 void Watch::look() {
   path_.collect();
+  const Instant now = process_.world().timeline.now();
+  if (routed_by_ == process_.inputs() && now < renew_at_ && path_.up_to_date()) return;
   auto route = watch_route(process_.forest(), process_.directory(), path_.a(), path_.b(), false,
                            std::chrono::nanoseconds(0), 0);
   if (!route) {
     const bool goes_on =
         path_.live() && !path_.is_gone(route.error(), process_.world().timeline.steady());
     if (!goes_on) path_.interrupt(std::move(route.error()));
+    routed_by_.reset();
     return;
   }
-  const Instant now = process_.world().timeline.now();
+  routed_by_ = process_.inputs();
   if (!path_.follows(*route)) {
     if (path_.live()) process_.world().count("a watched path took another route");
     (void)path_.prepare(*route);

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -51,6 +52,7 @@ class Watch : public std::enable_shared_from_this<Watch> {
   std::map<std::uint32_t, std::uint64_t> asked_;   // groups, by the numbers of requests
   std::map<std::uint64_t, std::uint64_t> newest_;  // numbers of what was pushed, by process
   Instant renew_at_{};
+  std::optional<std::uint64_t> routed_by_;  // the inputs of the process by which its route is known
 };
 
 }  // namespace tfdude::simulation

@@ -35,6 +35,7 @@ class World {
                           run_.operations.push_back(number_of(actor, operation));
                         }
                       },
+                      [this](const std::string& partition) { return serving(partition); },
                       {},
                       run_.steps,
                       invariants_},
@@ -56,6 +57,7 @@ class World {
     daemons_.start();
     for (std::size_t i = 0; i < plan_.clients; ++i) start_author(i);
     for (std::size_t i = 0; i < plan_.followers; ++i) start_follower(i);
+    for (std::size_t i = 0; i < plan_.samplers; ++i) start_sampler(i);
     for (const Fault& fault : plan_.faults) {
       timeline_.at(fault.begin, {"fault"}, [this, &fault] { daemons_.begin(fault); });
       timeline_.at(fault.end, {"end of fault"}, [this, &fault] { daemons_.end(fault); });
@@ -63,6 +65,7 @@ class World {
     advance(plan_.storm);
     for (const auto& author : cast_.authors) author->stop();
     for (const auto& follower : cast_.followers) follower->stop();
+    for (const auto& sampler : cast_.samplers) sampler->stop();
     network_.set_loss(plan_.loss_after);
     for (const Fault& fault : plan_.lasting) daemons_.begin(fault);
     if (plan_.forgets) {
@@ -79,12 +82,9 @@ class World {
     if (const Process* replaced = daemons_.replaced()) {
       violation("one that was replaced serves on", replaced->partition());
     }
-    for (const auto& author : cast_.authors) {
-      for (const auto& [what, count] : author->outcomes()) run_.counts[what] += count;
-    }
-    for (const auto& follower : cast_.followers) {
-      for (const auto& [what, count] : follower->outcomes()) run_.counts[what] += count;
-    }
+    for (const auto& author : cast_.authors) add_outcomes(*author);
+    for (const auto& follower : cast_.followers) add_outcomes(*follower);
+    for (const auto& sampler : cast_.samplers) add_outcomes(*sampler);
     run_.duration = timeline_.now();
     return std::move(run_);
   }
@@ -121,12 +121,25 @@ class World {
                              timeline_.now()});
   }
 
+  [[nodiscard]] std::shared_ptr<Process> serving(const std::string& partition) const {
+    Process* const daemon = cast_.find_daemon(partition);
+    const bool runs =
+        daemon != nullptr && daemon->serves() && !daemon->paused() && !daemon->ended();
+    return runs ? daemon->shared_from_this() : nullptr;
+  }
+
   // How many frames anybody has tried to add, including those of the configurations.
   [[nodiscard]] std::size_t frames_named() const {
     std::size_t named = 1 + 2 * plan_.owners + kContested + 2 * plan_.clients;
     for (const auto& author : cast_.authors) named += author->added();
     for (const auto& follower : cast_.followers) named += follower->added();
+    for (const auto& sampler : cast_.samplers) named += sampler->added();
     return named;
+  }
+
+  template <class Actor>
+  void add_outcomes(const Actor& actor) {
+    for (const auto& [what, count] : actor.outcomes()) run_.counts[what] += count;
   }
 
   void forget_who_is_lost() {
@@ -158,6 +171,12 @@ class World {
     cast_.followers.push_back(
         std::make_shared<Follower>(start_client(), number, actors_++, cast_.wild));
     cast_.followers.back()->start();
+  }
+
+  void start_sampler(std::size_t number) {
+    cast_.samplers.push_back(
+        std::make_shared<Sampler>(start_client(), number, actors_++, cast_.wild));
+    cast_.samplers.back()->start();
   }
 
   void lost_power(const std::string& partition, Instant first) {

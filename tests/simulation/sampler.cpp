@@ -1,0 +1,201 @@
+#include "simulation/sampler.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "faults/frames.hpp"
+
+namespace tfdude::simulation {
+namespace {
+
+using faults::base_of;
+using faults::denies;
+using faults::partition_name;
+using std::chrono::nanoseconds;
+
+// How late a sample may be; far less than the span of a history.
+constexpr milliseconds kLatest{2000};
+
+Transform value_of(std::size_t number) {
+  return {Pose::trusted(Eigen::Quaterniond::Identity(), {0, static_cast<double>(number), 0}), {}};
+}
+
+}  // namespace
+
+Sampler::Sampler(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
+                 std::size_t owners)
+    : process_(std::move(process)), number_(number), actor_(actor), owners_(owners), random_(0) {}
+
+std::string Sampler::frame() const {
+  return "s" + std::to_string(number_) + "_" + std::to_string(generation_);
+}
+
+void Sampler::next() {
+  if (stopped_) return;
+  random_ = testing::Random(process_->world().plan.seed_of(actor_, ++steps_));
+  const Instant pause = std::chrono::microseconds(random_.index(40'000));
+  process_->later("sampler", pause + std::exchange(rest_, Instant(0)), [self = shared_from_this()] {
+    if (!self->stopped_) self->step();
+  });
+}
+
+void Sampler::step() {
+  if (process_->world().plan.leaves_out(actor_, steps_)) return next();
+  process_->world().did(actor_, steps_);
+  if (!added_) return add();
+  if (random_.index(30) == 0) {
+    samples_.jump_back();
+    process_->world().count("the clock of a source jumped back");
+  }
+  if (random_.index(3) != 0) return write();
+  if (samples_.size() == 1 || random_.index(4) == 0) return look_up(std::nullopt, false);
+  look_up(any_instant(), false);
+}
+
+void Sampler::begin(const std::string& what, Operation::Route route, Then then) {
+  process_->begin(
+      what, std::make_shared<Operation>(
+                *process_, std::move(route),
+                [self = shared_from_this(), what, then](const Result<void>& outcome,
+                                                        const std::vector<Answer>& answers) {
+                  Surroundings& world = self->process_->world();
+                  const std::string code =
+                      outcome ? "done" : std::string(to_string(outcome.error().code));
+                  world.trace(self->frame() + ": " + what + ": " + code);
+                  ++self->outcomes_["sampler: " + what.substr(0, what.find(' ')) + " " + code];
+                  // What was sent without an answer arrives before what is sent next, or is lost.
+                  if (!outcome) self->rest_ = world.network.longest_delay();
+                  then(outcome, answers);
+                  if (!outcome && denies(outcome.error().code)) self->added_ = false;
+                }));
+}
+
+void Sampler::check(const Samples::Broken& broken) {
+  if (!broken.empty()) process_->world().violation(broken.kind, frame() + ": " + broken.what);
+}
+
+// Uses a new name, because the state of the former frame is not known.
+void Sampler::add() {
+  ++generation_;
+  samples_ = {};
+  streamed_.clear();
+  base_ = base_of(random_.index(owners_));
+  partition_ = partition_name(random_.index(owners_));
+  begin(
+      "add",
+      [this, id = frame()] {
+        return route_add(process_->forest(), process_->directory(), id,
+                         AddRequest{base_, value_of(0)}, partition_)
+            .map([](Part part) { return std::vector<Part>{std::move(part)}; });
+      },
+      [this](const Result<void>& added, const auto&) {
+        added_ = added.has_value();
+        next();
+      });
+}
+
+std::vector<EdgeUpdate> Sampler::edge(std::size_t number) const {
+  return {{frame(), value_of(number)}};
+}
+
+void Sampler::write() {
+  // Of samples that are older than the history, only those in order make it restart.
+  const bool late = samples_.era_is_taken() && random_.index(4) == 0;
+  Time stamp = samples_.clock(process_->world().timeline.now());
+  if (late)
+    stamp -= nanoseconds(static_cast<nanoseconds::rep>(
+        random_.uniform(0, static_cast<double>(nanoseconds(kLatest).count()))));
+  const std::size_t number = samples_.send(stamp);
+  late_ = late;
+  if (random_.index(3) == 0) return stream(number);
+  request(number);
+}
+
+void Sampler::stream(std::size_t number) {
+  auto parts = route_publish(process_->forest(), process_->directory(), edge(number),
+                             samples_.stamp(number));
+  streamed_.insert(number);
+  process_->world().trace(frame() + ": streams sample " + std::to_string(number));
+  if (parts) {
+    for (const Part& part : *parts) {
+      process_->stream(part.partition, Update{edge(number), samples_.stamp(number)});
+    }
+  }
+  rest_ = process_->world().network.longest_delay();
+  next();
+}
+
+void Sampler::request(std::size_t number) {
+  begin(
+      "sample " + std::to_string(number),
+      [this, number] {
+        return route_update(process_->forest(), process_->directory(), edge(number),
+                            samples_.stamp(number));
+      },
+      [this, number](const Result<void>& updated, const std::vector<Answer>& answers) {
+        if (!answers.empty()) {
+          const std::uint64_t by = answers.front().by;
+          const std::size_t before = samples_.restarts();
+          check(updated ? samples_.taken(number, by)
+                        : samples_.rejected(number, by, updated.error()));
+          if (samples_.restarts() > before) process_->world().count("a history was restarted");
+          if (updated && late_) process_->world().count("a late sample was taken");
+        }
+        next();
+      });
+}
+
+Time Sampler::any_instant() {
+  const std::size_t number = 1 + random_.index(samples_.size() - 1);
+  const Time stamp = samples_.stamp(number);
+  if (random_.index(4) == 0) return stamp;
+  return stamp + nanoseconds(static_cast<nanoseconds::rep>(random_.uniform(-1e8, 1e8)));
+}
+
+void Sampler::look_up(std::optional<Time> at, bool last) {
+  auto plan = std::make_shared<LookupPlan>();
+  begin(
+      at ? "lookup-at " + to_string(*at) : std::string("lookup"),
+      [this, at, plan]() -> Result<std::vector<Part>> {
+        Query query;
+        query.at = at;
+        auto planned =
+            route_lookup(process_->forest(), process_->directory(), base_, frame(), query);
+        if (!planned) return tl::unexpected(planned.error());
+        *plan = *std::move(planned);
+        return plan->parts;
+      },
+      [this, at, plan, last](const Result<void>& outcome, const std::vector<Answer>& answers) {
+        Result<StampedTransform> X = fail(Errc::kTimeout, "");
+        if (outcome) {
+          X = assemble(*plan, {std::get<SegmentValues>(answers.front().reply.body)});
+        } else {
+          X = tl::unexpected(outcome.error());
+        }
+        const std::uint64_t by = answers.empty() ? 0 : answers.front().by;
+        if (by != 0) check(samples_.answered(at, by, X));
+        if (X && X->stamp && !at) see(X->pose.translation().y());
+        if (X && X->stamp && at) process_->world().count("a sample was looked up at an instant");
+        const bool answered =
+            X || X.error().code == Errc::kTooOld || X.error().code == Errc::kNotYet;
+        if (last && !answered) {
+          process_->world().violation("a sampled edge is not found",
+                                      frame() + ": " + X.error().message);
+        }
+        if (!last) next();
+      });
+}
+
+void Sampler::see(double value) {
+  const auto number = static_cast<std::size_t>(std::lround(value));
+  if (streamed_.count(number) > 0) process_->world().count("a streamed sample was seen");
+}
+
+void Sampler::look_back() {
+  look_up(std::nullopt, true);
+  for (std::size_t number = 1; number < samples_.size(); ++number) {
+    look_up(samples_.stamp(number), true);
+  }
+}
+
+}  // namespace tfdude::simulation
