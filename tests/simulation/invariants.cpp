@@ -48,13 +48,12 @@ void Invariants::check_incarnation(Process& one, Known& known) {
 
 void Invariants::check_heard(Process& one, Known& known) {
   const Directory& directory = one.directory();
-  std::map<std::string, Heard> others;
+  std::vector<Heard> others;
   for (const Owner owner : directory.reachable_owners()) {
     const std::string& name = directory.name(owner);
     Heard now{directory.latest_incarnation(name), directory.epoch(owner)};
-    const auto before = known.others.find(name);
-    if (before != known.others.end()) {
-      const Heard& then = before->second;
+    if (owner < known.others.size() && known.others[owner].incarnation != 0) {
+      const Heard& then = known.others[owner];
       const bool same = now.incarnation == then.incarnation;
       const bool falls = now.epoch < then.epoch;
       if (now.incarnation < then.incarnation || (same && falls && !then.may_fall)) {
@@ -65,7 +64,8 @@ void Invariants::check_heard(Process& one, Known& known) {
       }
       now.may_fall = !same || (then.may_fall && !falls);
     }
-    others.emplace(name, now);
+    others.resize(owner + 1);
+    others[owner] = now;
   }
   known.others = std::move(others);
 }

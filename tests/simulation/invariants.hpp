@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "partition/messages.hpp"
 #include "simulation/network.hpp"
@@ -54,7 +55,7 @@ class Invariants {
 
  private:
   struct Heard {
-    std::uint64_t incarnation = 0;
+    std::uint64_t incarnation = 0;  // 0: it is not heard
     std::uint64_t epoch = 0;
     bool may_fall = true;  // once: when the pages of this incarnation replace those before
   };
@@ -62,7 +63,7 @@ class Invariants {
     std::uint64_t inputs = ~0ULL;
     std::uint64_t structure = ~0ULL;
     std::uint64_t incarnation = 0;
-    std::map<std::string, Heard> others;               // that are reachable
+    std::vector<Heard> others;                         // by their numbers
     std::map<std::uint32_t, std::uint64_t> published;  // epochs, by page
   };
   struct Call {

@@ -121,7 +121,11 @@ def main():
             with tempfile.TemporaryDirectory() as name:
                 good = apply(patch, pathlib.Path(name)) is not None and good
         else:
-            good = find(patch, options.seeds) and good
+            try:
+                good = find(patch, options.seeds) and good
+            except subprocess.CalledProcessError:
+                print(f"{patch.stem}: does not compile")
+                good = False
     print(f"{len(patches)} mutations: {'all' if good else 'not all'} {'apply' if options.check else 'were found'}")
     return 0 if good else 1
 

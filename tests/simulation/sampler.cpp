@@ -1,5 +1,6 @@
 #include "simulation/sampler.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -15,6 +16,9 @@ using std::chrono::nanoseconds;
 
 // How late a sample may be; far less than the span of a history.
 constexpr milliseconds kLatest{2000};
+
+// How many samples are looked up in the end.
+constexpr std::size_t kLookedBack = 60;
 
 Transform value_of(std::size_t number) {
   return {Pose::trusted(Eigen::Quaterniond::Identity(), {0, static_cast<double>(number), 0}), {}};
@@ -193,7 +197,8 @@ void Sampler::see(double value) {
 
 void Sampler::look_back() {
   look_up(std::nullopt, true);
-  for (std::size_t number = 1; number < samples_.size(); ++number) {
+  const std::size_t first = std::max<std::size_t>(samples_.size(), kLookedBack) - kLookedBack;
+  for (std::size_t number = std::max<std::size_t>(first, 1); number < samples_.size(); ++number) {
     look_up(samples_.stamp(number), true);
   }
 }

@@ -35,7 +35,7 @@ class Sampler : public std::enable_shared_from_this<Sampler> {
   /// The owner of the frame; empty: it has none.
   [[nodiscard]] const std::string& partition() const { return partition_; }
   [[nodiscard]] std::string frame() const;
-  /// Looks at the newest value, and at each sample, in the end. There must be an answer.
+  /// Looks at the newest value, and at the last samples, in the end. There must be an answer.
   void look_back();
 
  private:
