@@ -4,6 +4,8 @@
 #include <set>
 #include <utility>
 
+#include <Eigen/Core>
+
 #include "support/oracle.hpp"
 #include "support/pose_diff.hpp"
 
@@ -57,7 +59,7 @@ std::optional<Transform> between(const State& state, const std::string& a, const
 bool agree(const std::optional<Transform>& actual, const std::optional<Transform>& expected) {
   if (!actual || !expected) return !actual && !expected;
   // Usually they are far apart, and a description of the difference takes long.
-  const auto apart = actual->pose.translation() - expected->pose.translation();
+  const Eigen::Vector3d apart = actual->pose.translation() - expected->pose.translation();
   return !(apart.norm() > kTolerance * 10) &&
          testing::transform_diff(*actual, *expected, kTolerance).empty();
 }
