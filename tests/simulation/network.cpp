@@ -142,7 +142,7 @@ void Network::send(const Process& from, std::uint64_t to, std::function<void(Pro
   }
 }
 
-bool Network::beats(std::uint64_t from, const Process& to) {
+bool Network::shows_life(std::uint64_t from, const Process& to) {
   const auto there = find(from);
   return there && !there->paused() && reaches(there->host(), to.host()) &&
          random_.uniform(0, 1) >= loss_;

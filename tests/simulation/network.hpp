@@ -41,8 +41,8 @@ class Network {
   /// To all who are met.
   void publish(const Process& from, const Sample& sample);
 
-  /// Whether a beat of that process is heard now.
-  [[nodiscard]] bool beats(std::uint64_t from, const Process& to);
+  /// Whether a sign of life of that process is heard now.
+  [[nodiscard]] bool shows_life(std::uint64_t from, const Process& to);
   /// Whose samples reach that process.
   [[nodiscard]] std::vector<std::uint64_t> met_by(const Process& one) const;
 

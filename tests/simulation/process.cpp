@@ -11,8 +11,15 @@ namespace {
 
 constexpr Instant kMeeting = milliseconds(300);  // time of discovery
 constexpr Instant kSearchTime = milliseconds(1000);
-constexpr Instant kSilence = milliseconds(450);
-constexpr Instant kBeat = milliseconds(60);
+// As Attention and Peers do: a peer that is needed is asked for a sign of life at each look; all
+// others are heard by their announcements, and looked at rarely.
+constexpr Instant kLook = milliseconds(60);
+constexpr Instant kNeededFor = milliseconds(2000);
+constexpr Instant kNeededSilence = milliseconds(450);
+constexpr Instant kSilence = milliseconds(1875);
+constexpr Instant kAllNotice = kSilence + milliseconds(200);
+constexpr std::uint64_t kLooksPerAnnouncement = 5;
+constexpr std::uint64_t kLooksPerRareLook = 3;
 constexpr Instant kLookForGone = milliseconds(50);
 constexpr Instant kYieldEvery = milliseconds(100);
 constexpr Instant kPushAfter = std::chrono::microseconds(20);
@@ -47,7 +54,7 @@ Process::Process(Surroundings& world, Setting setting)
 }
 
 void Process::start() {
-  born_ = ticked_ = world_.timeline.now();
+  born_ = looked_ = world_.timeline.now();
   tick();
   if (!serves_or_claims()) return;
   member_.claim("host" + std::to_string(host()), static_cast<std::uint32_t>(id()), wall(),
@@ -145,30 +152,45 @@ void Process::later(const char* kind, Instant wait, std::function<void()> what) 
 
 void Process::tick() {
   look_for_silent();
-  later("tick", kBeat, [this] { tick(); });
+  later("tick", kLook, [this] { tick(); });
 }
 
-// As Peers does.
 void Process::look_for_silent() {
   const Instant now = world_.timeline.now();
-  const Instant late = std::max(Instant(0), now - std::exchange(ticked_, now) - kBeat);
+  const Instant late = std::max(Instant(0), now - std::exchange(looked_, now) - kLook);
+  ++looks_;
   for (auto& [peer, known] : peers_) {
     known.heard += late;
-    const Presence* said = known.known();
-    if (world_.network.beats(peer, *this)) {
-      known.heard = now;
-      if (known.silent && known.said) {
-        known.silent = false;
-        member_.on_presence(*known.said, wall());
-        react();
-      }
-      continue;
-    }
-    if (said == nullptr || known.silent || now - known.heard < kSilence) continue;
-    known.silent = true;
-    member_.on_lost(said->partition, said->incarnation, wall());
-    react();
+    if (known.needed_since) *known.needed_since += late;
+    look_at(peer, known);
   }
+}
+
+void Process::look_at(std::uint64_t peer, Peer& known) {
+  const Instant now = world_.timeline.now();
+  const bool needed = known.used && now - *known.used < kNeededFor;
+  if (!needed) known.needed_since.reset();
+  if (needed && !known.needed_since) known.needed_since = now;
+  const bool announces = (looks_ + peer) % kLooksPerAnnouncement == 0;
+  if ((needed || announces) && world_.network.shows_life(peer, *this)) {
+    known.heard = now;
+    if (known.silent && known.said) {
+      known.silent = false;
+      member_.on_presence(*known.said, wall());
+      react();
+    }
+    return;
+  }
+  const Presence* said = known.known();
+  if (said == nullptr || known.silent) return;
+  if (!needed && looks_ % kLooksPerRareLook != 0) return;
+  const Instant since = std::max(known.heard, known.needed_since.value_or(known.heard));
+  if (now - since < (needed ? kNeededSilence : kSilence)) return;
+  known.silent = true;
+  world_.count(needed ? "a loss was noticed by who needs it" : "a loss was noticed late");
+  member_.on_lost(said->partition, said->incarnation, wall(),
+                  std::max(Instant(0), kAllNotice - (now - known.heard)));
+  react();
 }
 
 void Process::hear(std::uint64_t from, const Sample& sample) {

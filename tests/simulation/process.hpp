@@ -149,6 +149,8 @@ class Process : public std::enable_shared_from_this<Process> {
     std::optional<Presence> said;
     std::optional<Presence> by_page;
     Instant heard{};
+    std::optional<Instant> used{};          // something was sent to it
+    std::optional<Instant> needed_since{};  // it was used recently
     bool silent = false;
     [[nodiscard]] const Presence* known() const {
       const bool later = by_page && said && by_page->incarnation > said->incarnation;
@@ -164,6 +166,7 @@ class Process : public std::enable_shared_from_this<Process> {
   void each_server(const std::string& partition, const std::function<void(std::uint64_t)>& tell);
   void tick();
   void look_for_silent();
+  void look_at(std::uint64_t peer, Peer& known);
   void react();
   void count(const Outcome& outcome);
   void step_claim();
@@ -196,7 +199,8 @@ class Process : public std::enable_shared_from_this<Process> {
   std::uint64_t saved_commit_ = 0;
   std::uint32_t sequence_ = 0;
   Instant born_{};
-  Instant ticked_{};
+  Instant looked_{};
+  std::uint64_t looks_ = 0;
   Instant resumed_{-1};
   std::uint64_t inputs_ = 0;
   int pauses_ = 0;

@@ -127,6 +127,7 @@ void Process::send(const std::string& partition, const Request& request) {
   for (const auto& one : operations_) first = std::min(first, one->first_sequence());
   sent.awaits_from = first;
   each_server(partition, [&](std::uint64_t peer) {
+    peers_[peer].used = world_.timeline.now();
     world_.network.send(*this, peer,
                         [from = id(), sent](Process& there) { there.on_request(from, sent); });
   });
