@@ -61,7 +61,7 @@ std::string difference(const Frames& a, const Frames& b) {
 
 struct Misplaced {
   std::string what;
-  std::deque<std::string> history;
+  std::vector<std::string> history;
 };
 
 std::vector<Misplaced> all_misplaced(const Frames& frames, const Workers& workers) {

@@ -24,7 +24,7 @@ void Journal::fault(const std::string& what) {
   if (faults_.size() > kFaultsKept) faults_.pop_front();
 }
 
-void Journal::violation(const std::string& what, const std::deque<std::string>& history) {
+void Journal::violation(const std::string& what, const std::vector<std::string>& history) {
   if (++violations_ > kViolationsTold) return;
   const std::lock_guard lock(mutex_);
   std::printf("VIOLATION at %s s: %s\n", seconds(now()).c_str(), what.c_str());

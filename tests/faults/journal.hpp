@@ -31,7 +31,7 @@ class Journal {
   /// A fault, or its end.
   void fault(const std::string& what);
   /// Prints it at once, with its history and the faults before it.
-  void violation(const std::string& what, const std::deque<std::string>& history = {});
+  void violation(const std::string& what, const std::vector<std::string>& history = {});
 
   [[nodiscard]] std::size_t violations() const { return violations_; }
   /// A line for each operation, with its outcomes.
