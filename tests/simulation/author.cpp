@@ -134,7 +134,10 @@ void Author::change_here(const std::shared_ptr<Process>& node, const std::string
     if (!std::exchange(*over, true)) self->conclude(what, outcome, then);
   };
   const Reply reply = node->answer(request);
-  process_->directory().saw_lamport_time(node->directory().latest_lamport_time());
+  // The author knows of the change, so its process has to hear of it before it removes frames.
+  Directory& directory = process_->directory();
+  directory.saw_lamport_time(node->directory().latest_lamport_time());
+  if (const auto owner = directory.owner(node->partition())) directory.told_of(*owner, reply.epoch);
   if (const auto* error = std::get_if<Error>(&reply.body)) return end(tl::unexpected(*error));
   node->when_stored(end);
   // Its process may end before.
