@@ -27,6 +27,9 @@ constexpr int kMissed = 6;
 constexpr std::chrono::milliseconds kRepeatEvery{800};
 constexpr std::chrono::milliseconds kSilenceOfRepetition{2100};
 
+// Discovery by a server takes several steps, each of which it may repeat after a second.
+constexpr std::chrono::milliseconds kFirstSilenceByServer{8000};
+
 // The number of servers that this one hears changes often just when there is most to do.
 constexpr std::chrono::milliseconds kCountEvery{200};
 
@@ -110,8 +113,10 @@ void FastDdsTransport::take_times(edds::DomainParticipantQos& qos) {
   const auto lease = nanoseconds_of(discovery.leaseDuration);
   const auto every = nanoseconds_of(discovery.leaseDuration_announcementperiod);
   announced_by_dds_ = options_.discovery_server.empty() && DiscoveryGate::hears_announcements(qos);
-  peers_.configure(lease, announced_by_dds_ ? every * kMissed + every / 4 : kSilenceOfRepetition,
-                   Attention::kRarely, !options_.partition.empty());
+  Peers::Patience patience{lease, kSilenceOfRepetition, {}, Attention::kRarely};
+  if (announced_by_dds_) patience.others = every * kMissed + every / 4;
+  if (!options_.discovery_server.empty()) patience.first = kFirstSilenceByServer;
+  peers_.configure(patience, !options_.partition.empty());
   if (lease < kLongLease) {
     discovery.leaseDuration = {static_cast<std::int32_t>(kLongLease.count()), 0};
   }
@@ -141,7 +146,7 @@ Result<void> FastDdsTransport::create_endpoints() {
   replies_ = std::make_unique<Reader<wire::Reply>>(
       context(), *topics_.reply, reply_partition(self_), "call_reader",
       Reader<wire::Reply>::Calls{[this](const wire::Reply& sample, const Prefix& from) {
-                                   peers_.heard(from);
+                                   peers_.replied(from);
                                    take_reply(sample);
                                  },
                                  nullptr});

@@ -76,18 +76,16 @@ void Peers::left(const ertps::GuidPrefix_t& prefix) {
 }
 
 void Peers::sent_page(const ertps::GuidPrefix_t& prefix, const Page& page) {
-  {
-    const Lock lock(mutex_);
-    const auto known = servers_.find(peer_of(prefix));
-    if (known == servers_.end()) return;
-    Server& server = known->second;
-    if (!server.presence || server.presence->incarnation < page.incarnation) {
-      server.by_page.emplace();
-      server.by_page->partition = page.partition;
-      server.by_page->incarnation = page.incarnation;
-    }
+  const Lock lock(mutex_);
+  const auto known = servers_.find(peer_of(prefix));
+  if (known == servers_.end()) return;
+  Server& server = known->second;
+  if (!server.presence || server.presence->incarnation < page.incarnation) {
+    server.by_page.emplace();
+    server.by_page->partition = page.partition;
+    server.by_page->incarnation = page.incarnation;
   }
-  heard(prefix);
+  hear(server, Clock::now());
 }
 
 void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence,
@@ -101,10 +99,12 @@ void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence,
   there_(presence);
 }
 
-void Peers::heard(const ertps::GuidPrefix_t& prefix) {
+void Peers::replied(const ertps::GuidPrefix_t& prefix) {
   const Lock lock(mutex_);
   const auto known = servers_.find(peer_of(prefix));
-  if (known != servers_.end()) hear(known->second, Clock::now());
+  if (known == servers_.end()) return;
+  known->second.replies = true;
+  hear(known->second, Clock::now());
 }
 
 std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::duration planned,
@@ -129,9 +129,10 @@ std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::du
     if (server.silent) continue;
     const auto quiet =
         now - std::max(server.last_heard, server.needed_since.value_or(Clock::time_point::min()));
-    if (quiet >= (is_needed ? needed_silence_ : silence_)) {
+    if (quiet >= patience(server)) {
       server.silent = true;
-      gone_(*said, std::max(all_notice_ - (now - server.last_heard), std::chrono::nanoseconds(0)));
+      const auto early = patience_.others + patience_.look_every - (now - server.last_heard);
+      gone_(*said, std::max<std::chrono::nanoseconds>(early, {}));
     } else if (is_needed && quiet >= kProbeAfter) {
       unheard.push_back(said->partition);
     }

@@ -60,16 +60,21 @@ class Peers {
   Peers(std::shared_ptr<LifeSigns> life_signs, Tell there, TellGone gone)
       : life_signs_(std::move(life_signs)), there_(std::move(there)), gone_(std::move(gone)) {}
 
+  /// How long a server may be silent before it counts as lost.
+  struct Patience {
+    std::chrono::nanoseconds needed;  ///< one that is needed, and has replied before
+    std::chrono::nanoseconds others;  ///< any other; before its first reply, DDS may be matching it
+    std::chrono::nanoseconds first;   ///< one whose presence has not come yet
+    /// How often participants look at the latest.
+    std::chrono::nanoseconds look_every;
+  };
+
   /// Call before anybody is discovered.
-  /// @param needed_silence  a needed server that was not heard for this long counts as lost
-  /// @param silence    any other server
-  /// @param look_every  how often others look at the latest
   /// @param is_server  the others count this participant, too
-  void configure(std::chrono::nanoseconds needed_silence, std::chrono::nanoseconds silence,
-                 std::chrono::nanoseconds look_every, bool is_server) {
-    needed_silence_ = needed_silence;
-    silence_ = std::max(silence, needed_silence);
-    all_notice_ = silence_ + look_every;
+  void configure(const Patience& patience, bool is_server) {
+    patience_ = patience;
+    patience_.others = std::max(patience.others, patience.needed);
+    patience_.first = std::max(patience.first, patience_.others);
     is_server_ = is_server;
   }
 
@@ -80,8 +85,8 @@ class Peers {
   void present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers);
   /// A server sent a page, which may arrive before its presence.
   void sent_page(const ertps::GuidPrefix_t& prefix, const Page& page);
-  /// A server sent another message: it is alive, even if its presence is late.
-  void heard(const ertps::GuidPrefix_t& prefix);
+  /// A server has replied: from now on replies reach this participant.
+  void replied(const ertps::GuidPrefix_t& prefix);
 
   /// Reports the peers that became silent since the last call, and those that are heard again.
   /// @param planned  when this call should have come, after the last one. If it comes later, this
@@ -119,6 +124,7 @@ class Peers {
     std::size_t peers = 0;
     Clock::time_point last_heard = Clock::now();
     std::optional<Clock::time_point> needed_since;
+    bool replies = false;
     bool silent = false;
 
     [[nodiscard]] const Presence* said() const {
@@ -127,6 +133,12 @@ class Peers {
       return by_page ? &*by_page : nullptr;
     }
   };
+
+  /// How long this one may be silent.
+  [[nodiscard]] std::chrono::nanoseconds patience(const Server& server) const {
+    if (server.needed_since && server.replies) return patience_.needed;
+    return server.presence ? patience_.others : patience_.first;
+  }
 
   Server& follow(const PeerId& peer) TFDUDE_REQUIRES(mutex_);
   void hear(Server& server, Clock::time_point at) TFDUDE_REQUIRES(mutex_);
@@ -146,9 +158,7 @@ class Peers {
   Clock::time_point last_met_ TFDUDE_GUARDED_BY(mutex_){};
   Clock::time_point last_look_ TFDUDE_GUARDED_BY(mutex_) = Clock::now();
   // Set once, before anybody is discovered.
-  std::chrono::nanoseconds needed_silence_{};
-  std::chrono::nanoseconds silence_{};
-  std::chrono::nanoseconds all_notice_{};  // after such a silence all have noticed it
+  Patience patience_{};
   bool is_server_ = false;
 };
 

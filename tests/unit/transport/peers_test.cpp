@@ -15,6 +15,8 @@ namespace tfdude::fastdds {
 namespace {
 
 constexpr std::chrono::milliseconds kRarely{200};
+constexpr std::chrono::seconds kMinute{60};
+const Peers::Patience kPatient{kMinute, kMinute, kMinute, kRarely};
 
 ertps::GuidPrefix_t prefix_of(unsigned char number) {
   ertps::GuidPrefix_t prefix;
@@ -49,7 +51,8 @@ struct Observer {
   Peers::Clock::time_point now = Peers::Clock::now();
 
   explicit Observer(bool is_server = false) {
-    peers.configure(std::chrono::milliseconds(450), std::chrono::seconds(2), kRarely, is_server);
+    peers.configure({std::chrono::milliseconds(450), std::chrono::seconds(2), {}, kRarely},
+                    is_server);
   }
 
   void meet(unsigned char number, const std::string& partition, std::size_t others = 0) {
@@ -76,7 +79,7 @@ TEST_CASE("who speaks another major version is named, and counts as nobody") {
   Peers peers(
       std::make_shared<LifeSigns>(), [&](const Presence&) { ++told; },
       [&](const Presence&, std::chrono::nanoseconds) { ++told; });
-  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), kRarely, false);
+  peers.configure(kPatient, false);
   peers.met(prefix_of(1), serving("arms", {2, 0}));
   peers.met(prefix_of(2), serving("", {2, 0}));
   peers.met(prefix_of(3), serving("head"));
@@ -170,6 +173,7 @@ TEST_CASE("a server that is needed is asked for a sign of life, and lost after i
   Observer one;
   one.meet(1, "arms");
   one.meet(2, "head");
+  one.peers.replied(prefix_of(1));
   one.told.clear();
   // That it was silent before it was needed does not count.
   one.look(std::chrono::milliseconds(900));
@@ -197,9 +201,20 @@ TEST_CASE("a server that is needed is asked for a sign of life, and lost after i
   }
 }
 
+TEST_CASE("a server that has never replied is given the time of the others") {
+  Observer one;
+  one.meet(1, "arms");
+  one.told.clear();
+  CHECK(one.look(std::chrono::milliseconds(1900), {"arms"}) >= 50);
+  CHECK(one.told.empty());
+  one.look(std::chrono::milliseconds(200), {"arms"});
+  CHECK(one.told == std::vector<std::string>{"-arms"});
+}
+
 TEST_CASE("the time in which a process could not receive is no silence of others") {
   Observer one;
   one.meet(1, "arms");
+  one.peers.replied(prefix_of(1));
   one.told.clear();
   one.look(std::chrono::milliseconds(60), {"arms"});
   one.now += std::chrono::seconds(10);
@@ -214,7 +229,7 @@ TEST_CASE("who sends a page and then nothing is gone, and not waited for") {
   Peers peers(
       std::make_shared<LifeSigns>(), [](const Presence&) {},
       [&](const Presence& one, std::chrono::nanoseconds) { gone.push_back(one.incarnation); });
-  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), kRarely, false);
+  peers.configure(kPatient, false);
   peers.met(prefix_of(1), serving("arms"));
   Page page;
   page.partition = "arms";
@@ -248,7 +263,7 @@ TEST_CASE(
   Peers peers(
       std::make_shared<LifeSigns>(), [](const Presence&) {},
       [&](const Presence& one, std::chrono::nanoseconds) { gone.push_back(one.incarnation); });
-  peers.configure(std::chrono::seconds(60), std::chrono::seconds(60), kRarely, false);
+  peers.configure(kPatient, false);
   peers.met(prefix_of(1), serving("arms"));
   // While it claims its name; it serves under another number.
   peers.present(prefix_of(1), presence_of("arms"), 0);
