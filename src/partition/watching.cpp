@@ -71,6 +71,7 @@ std::uint64_t watch_group(std::string_view partition, std::uint64_t incarnation,
 }
 
 Result<void> check_watch(const WatchRequest& request) {
+  if (request.segments.empty()) return fail(Errc::kInvalidInput, "a watch of no edges");
   constexpr std::chrono::nanoseconds kLongest = kMaxWatchPeriod;
   if (request.period >= std::chrono::nanoseconds(0) && request.period <= kLongest) return {};
   return fail(Errc::kInvalidInput, "the period of a watch must be within 0 and " +
@@ -172,6 +173,12 @@ PushedValues WatchedGroup::changed(const Forest& forest) {
 Result<PushedValues> WatchedGroup::composed(const Forest& forest, std::optional<Time> from) const {
   auto found = forest.lookup_segments(request_.segments);
   if (!found) return tl::unexpected(std::move(found.error()));
+  if (forest.have_noise(request_.segments)) {
+    const PathEnds& first = request_.segments.front();
+    return fail(Errc::kInvalidInput,
+                "the path from " + quote(first.from) + " to " + quote(first.to) +
+                    " cannot be sent as one transform: an edge of it has process noise");
+  }
   PushedValues pushed{id_, entries_of(*found), 0, found->commit};
   if (from && found->stamp && *from < *found->stamp) {
     Query query;
@@ -189,21 +196,34 @@ Result<PushedValues> WatchedGroup::composed(const Forest& forest, std::optional<
   return pushed;
 }
 
+bool WatchedGroup::is_new(const PushedValue& entry) const {
+  const auto& sent = sent_[entry.index];
+  return !sent || entry.history != sent->history || entry.stamp != sent->stamp ||
+         !(entry.correlation == sent->correlation) || !same(entry.X, sent->X);
+}
+
 PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
   PushedValues pushed{id_, {}, told_, told_};
-  const auto found = forest.lookup_segments(request_.segments);
-  if (!found) return pushed;
-  pushed.commit = found->commit;
-  for (PushedValue& entry : entries_of(*found)) {
-    auto& sent = sent_[entry.index];
-    const bool begins = !sent || entry.history != sent->history;
-    const bool again = !begins && entry.stamp == sent->stamp &&
-                       entry.correlation == sent->correlation &&
-                       (entry.stamp || same(entry.X, sent->X));
-    if (again) continue;
-    sent = entry;
-    if (begins) entry.process_noise = Covariance();
-    pushed.entries.push_back(std::move(entry));
+  const auto& before = sent_.front();
+  SeenSegments seen{told_, Time::min(), !before || request_.period > std::chrono::nanoseconds(0)};
+  if (before && before->stamp) seen.until = *before->stamp;
+  const auto all =
+      forest.segments_since(request_.segments, seen, kMaxItems / request_.segments.size());
+  if (!all) return pushed;
+  pushed.commit = all->back().commit;
+  for (const SegmentValues& found : *all) {
+    for (PushedValue& entry : entries_of(found)) {
+      auto& sent = sent_[entry.index];
+      if (&found != &all->back()) {
+        if (sent && entry.history == sent->history) pushed.entries.push_back(std::move(entry));
+        continue;
+      }
+      if (!is_new(entry)) continue;
+      const bool begins = !sent || entry.history != sent->history;
+      sent = entry;
+      if (begins) entry.process_noise = Covariance();
+      pushed.entries.push_back(std::move(entry));
+    }
   }
   if (!pushed.entries.empty()) told_ = pushed.commit;
   return pushed;

@@ -64,7 +64,9 @@ class WatchedGroup {
   /// All watched values as of now; does not change what next_push() returns.
   /// @param from  as WatchRequest::from; if there are more samples than fit a message, only the
   ///   newest are sent
-  /// @return kNotOwner (naming the frame) if an edge is not held, or has another parent.
+  /// @return kNotOwner (naming the frame) if an edge is not held, or has another parent;
+  ///   kInvalidInput for a composed segment that has process noise: its covariance would be too
+  ///   small between samples.
   [[nodiscard]] Result<PushedValues> snapshot(const Forest& forest, std::optional<Time> from) const;
 
   /// Values written since the last call: all samples, or the newest of each edge if the watchers
@@ -76,6 +78,7 @@ class WatchedGroup {
   [[nodiscard]] std::vector<EdgeCursor> fresh_cursors() const;
   [[nodiscard]] Result<PushedValues> composed(const Forest& forest, std::optional<Time> from) const;
   [[nodiscard]] Result<PushedValues> all(const Forest& forest, std::optional<Time> from) const;
+  [[nodiscard]] bool is_new(const PushedValue& entry) const;
   [[nodiscard]] PushedValues next_composed_push(const Forest& forest);
   [[nodiscard]] PushedValues changed(const Forest& forest);
 

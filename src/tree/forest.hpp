@@ -206,6 +206,15 @@ class Forest {
                                                       std::optional<Time> hint = std::nullopt,
                                                       bool edges = false) const;
 
+  /// The values of such segments at their newest common instant, after those at earlier instants
+  /// at which an edge has a sample, and that are not known from `seen`. All are of one commit.
+  /// @param most  of the earlier instants, the newest
+  [[nodiscard]] Result<std::vector<SegmentValues>> segments_since(
+      const std::vector<PathEnds>& segments, const SeenSegments& seen, std::size_t most) const;
+
+  /// Whether an edge of these segments has process noise.
+  [[nodiscard]] bool have_noise(const std::vector<PathEnds>& segments) const;
+
   /// The path from a to b as runs of edges by owner, in order; empty if a is b.
   /// @return kUnknownStart, kUnknownEnd, kNotConnected.
   [[nodiscard]] Result<std::vector<Segment>> segments(std::string_view a, std::string_view b) const;

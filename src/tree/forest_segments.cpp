@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "tree/epoch.hpp"
@@ -60,20 +61,91 @@ Result<std::vector<Reached>> newest_values(const std::vector<Ends>& segments, Or
   return values_at(segments, met.limiting->stamp, query, met);
 }
 
-// The newest history among the edges of these segments.
-std::uint64_t newest_history(const std::vector<Ends>& segments) {
-  std::uint64_t newest = 0;
+template <class Visit>
+void for_each_held(const std::vector<Ends>& segments, Visit visit) {
   for (const Ends& ends : segments) {
     const Version* a = ends.a;
     const Version* b = ends.b;
     while (a != b) {
       const Version*& here = a->depth >= b->depth ? a : b;
       if (here->above == nullptr) break;
-      if (here->held()) newest = std::max(newest, static_cast<const HeldVersion*>(here)->history);
+      if (here->held()) visit(static_cast<const HeldVersion&>(*here));
       here = Frames::at(*here->above, ends.commit);
     }
   }
+}
+
+// The newest history among the edges of these segments.
+std::uint64_t newest_history(const std::vector<Ends>& segments) {
+  std::uint64_t newest = 0;
+  for_each_held(segments,
+                [&](const HeldVersion& edge) { newest = std::max(newest, edge.history); });
   return newest;
+}
+
+void describe(const std::vector<Ends>& segments, SegmentValues& found) {
+  if (!segments.empty()) found.commit = segments.front().commit;
+  found.history = newest_history(segments);
+}
+
+// Instants, including both; none if first > last.
+struct Span {
+  std::int64_t first = std::numeric_limits<std::int64_t>::max();
+  std::int64_t last = kAlways;
+
+  void add(std::int64_t t) {
+    first = std::min(first, t);
+    last = std::max(last, t);
+  }
+};
+
+constexpr Span kAllInstants{kAlways, std::numeric_limits<std::int64_t>::max()};
+
+// Adds the instants, up to the last one for which the edge was looked up at that commit, for which
+// it has another value now: those between a new sample and its neighbours. Samples that follow the
+// last instant change nothing.
+void add_changed(const HeldVersion& edge, std::uint64_t since, std::int64_t until, Span& changed) {
+  const SampleHistory& samples = *edge.samples;
+  if (samples.rewritten <= since) return;
+  std::int64_t after = kAllInstants.last;
+  for (std::uint64_t number = edge.number + 1; number-- > samples.oldest();) {
+    const HeldVersion* sample = samples.sample(number);
+    if (sample == nullptr) return;
+    const std::int64_t before = number > 0 ? samples.stamp(number - 1) : kAlways;
+    if (sample->commit > since && before < until) {
+      changed.add(before);
+      changed.add(after);
+    }
+    after = sample->stamp;
+  }
+}
+
+// The stamps of samples for which these segments have other values than were known from `seen`,
+// sorted.
+std::vector<std::int64_t> changed_instants(const std::vector<Ends>& segments,
+                                           const SeenSegments& seen) {
+  const std::int64_t until = nanoseconds(seen.until);
+  Span changed;
+  for_each_held(segments, [&](const HeldVersion& edge) {
+    if (edge.moving()) {
+      add_changed(edge, seen.commit, until, changed);
+    } else if (edge.commit > seen.commit) {
+      changed = kAllInstants;
+    }
+  });
+  std::vector<std::int64_t> instants;
+  for_each_held(segments, [&](const HeldVersion& edge) {
+    if (!edge.moving()) return;
+    for (std::uint64_t number = edge.number + 1; number-- > edge.samples->oldest();) {
+      const std::int64_t stamp = edge.samples->stamp(number);
+      if (stamp == kAlways || (stamp <= until && stamp < changed.first)) break;
+      const bool wanted = stamp > until ? !seen.newest_only : stamp <= changed.last;
+      if (wanted) instants.push_back(stamp);
+    }
+  });
+  std::sort(instants.begin(), instants.end());
+  instants.erase(std::unique(instants.begin(), instants.end()), instants.end());
+  return instants;
 }
 
 // Correlations are reported if any segment has some.
@@ -100,6 +172,32 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
   }
 }
 
+Result<SegmentValues> segments_at(const std::vector<Ends>& segments, std::int64_t t,
+                                  const Query& query) {
+  PathLookup::Met met;
+  auto values = values_at(segments, t, query, met);
+  if (!values) return tl::unexpected(std::move(values.error()));
+  SegmentValues found;
+  tell(*std::move(values), found.values, found.correlations);
+  if (met.moving) found.stamp = time_of(t);
+  return found;
+}
+
+Result<SegmentValues> newest_segments(const std::vector<Ends>& segments, const Query& query) {
+  PathLookup::Met met;
+  auto values = newest_values(segments, query.order, met);
+  if (!values) return tl::unexpected(std::move(values.error()));
+  SegmentValues found;
+  tell(*std::move(values), found.values, found.correlations);
+  const HeldVersion* limiting = met.limiting;
+  if (limiting == nullptr) return found;
+  found.stamp = time_of(limiting->stamp);
+  const std::int64_t before =
+      limiting->number > 0 ? limiting->samples->stamp(limiting->number - 1) : kAlways;
+  if (before != kAlways) found.period = std::chrono::nanoseconds(limiting->stamp - before);
+  return found;
+}
+
 }  // namespace
 
 Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
@@ -108,35 +206,59 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
   const epoch::Guard guard;
   const auto ends = all_ends(impl_->frames_, segments);
   if (!ends) return tl::unexpected(ends.error());
-  SegmentValues found;
-  if (!ends->empty()) found.commit = ends->front().commit;
-  found.history = newest_history(*ends);
-  PathLookup::Met met;
-  auto t = query.at;
-  if (!t) {
-    auto newest = newest_values(*ends, query.order, met);
-    if (!newest) return tl::unexpected(std::move(newest.error()));
-    tell(*std::move(newest), found.values, found.correlations);
-    if (const HeldVersion* limiting = met.limiting) {
-      found.stamp = time_of(limiting->stamp);
-      const std::int64_t before =
-          limiting->number > 0 ? limiting->samples->stamp(limiting->number - 1) : kAlways;
-      if (before != kAlways) found.period = std::chrono::nanoseconds(limiting->stamp - before);
-      if (query.age_noise_until) t = found.stamp;
+  Result<SegmentValues> found =
+      query.at ? segments_at(*ends, nanoseconds(*query.at), query) : newest_segments(*ends, query);
+  if (found && !query.at && found->stamp && query.age_noise_until) {
+    const std::chrono::nanoseconds period = found->period;
+    found = segments_at(*ends, nanoseconds(*found->stamp), query);
+    if (found) found->period = period;
+  }
+  if (!found) return found;
+  describe(*ends, *found);
+  if (edges) tell_observed_with(*ends, *found);
+  if (hint && found->stamp && hint != found->stamp) {
+    auto at_hint = segments_at(*ends, nanoseconds(*hint), query);
+    if (at_hint) {
+      found->at_hint = std::move(at_hint->values);
+      found->correlations_at_hint = std::move(at_hint->correlations);
     }
   }
-  if (t) {
-    auto values = values_at(*ends, nanoseconds(*t), query, met);
-    if (!values) return tl::unexpected(std::move(values.error()));
-    found.correlations.clear();
-    tell(*std::move(values), found.values, found.correlations);
-    if (met.moving) found.stamp = t;
+  return found;
+}
+
+Result<std::vector<SegmentValues>> Forest::segments_since(const std::vector<PathEnds>& segments,
+                                                          const SeenSegments& seen,
+                                                          std::size_t most) const {
+  const epoch::Guard guard;
+  const auto ends = all_ends(impl_->frames_, segments);
+  if (!ends) return tl::unexpected(ends.error());
+  auto newest = newest_segments(*ends, {});
+  if (!newest) return tl::unexpected(std::move(newest.error()));
+  std::vector<SegmentValues> all;
+  if (newest->stamp) {
+    const auto instants = changed_instants(*ends, seen);
+    const auto end =
+        std::lower_bound(instants.begin(), instants.end(), nanoseconds(*newest->stamp));
+    const auto count = std::min(static_cast<std::size_t>(end - instants.begin()), most);
+    for (auto t = end - static_cast<std::ptrdiff_t>(count); t != end; ++t) {
+      auto then = segments_at(*ends, *t, {});
+      // Another edge may have begun later.
+      if (then) all.push_back(*std::move(then));
+    }
   }
-  if (edges) tell_observed_with(*ends, found);
-  if (hint && found.stamp && hint != found.stamp) {
-    auto values = values_at(*ends, nanoseconds(*hint), query, met);
-    if (values) tell(*std::move(values), found.at_hint, found.correlations_at_hint);
-  }
+  all.push_back(*std::move(newest));
+  for (SegmentValues& found : all) describe(*ends, found);
+  return all;
+}
+
+bool Forest::have_noise(const std::vector<PathEnds>& segments) const {
+  const epoch::Guard guard;
+  const auto ends = all_ends(impl_->frames_, segments);
+  bool found = false;
+  if (!ends) return found;
+  for_each_held(*ends, [&](const HeldVersion& edge) {
+    found = found || (edge.samples != nullptr && edge.samples->has_noise());
+  });
   return found;
 }
 

@@ -49,6 +49,14 @@ struct SegmentValues {
   std::uint64_t incarnation = 0;  ///< of the owner that counts the commits; see Partition
 };
 
+/// What was seen of segments: their values at a commit, at instants up to their newest one. Late
+/// samples, and new values of edges without samples, have changed these since.
+struct SeenSegments {
+  std::uint64_t commit = 0;
+  Time until{};
+  bool newest_only = false;  ///< of the later instants
+};
+
 /// Information about one frame, without its value.
 struct FrameInfo {
   std::string id;

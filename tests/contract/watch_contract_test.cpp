@@ -136,6 +136,49 @@ TEST_CASE("watch: late samples and process noise are what lookups see, too") {
   }
 }
 
+TEST_CASE("watch: late samples and static edges change composed segments as they change lookups") {
+  Random random(1602);
+  INFO("seed " << random.seed());
+  Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
+  WatchOptions options;
+  options.composed = true;
+  const auto path = robot.client->watch("world", "hand", options);
+  REQUIRE(path);
+  const std::vector<int> stamps{1000, 3000, 2000, 4000, 1500, 3990};
+  for (const int t : stamps) {
+    REQUIRE(robot.arm->update("hand", random.transform(), ms(t)));
+    // From here on all is pushed.
+    if (t == 1000) {
+      REQUIRE(eventually([&] { return path->latest() && path->latest()->stamp == ms(1000); }));
+    }
+  }
+  const auto agree = [&] {
+    return std::all_of(stamps.begin(), stamps.end(), [&](int t) {
+      Query query;
+      query.at = ms(t);
+      const auto expected = robot.client->lookup("world", "hand", query);
+      const auto watched = path->at(ms(t));
+      return expected && watched && testing::transform_diff(*watched, *expected, 1e-9).empty();
+    });
+  };
+  CHECK(eventually(agree));
+  REQUIRE(robot.arm->update("arm", random.transform()));
+  CHECK(eventually(agree));
+}
+
+TEST_CASE("watch: a segment with process noise cannot be watched composed") {
+  EdgeTiming noisy;
+  noisy.process_noise = *Covariance::from_stddev({0.1, 0.1, 0.1, 0.1, 0.1, 0.1});
+  Robot robot(joined_by(GENERATE(from_range(testing::networks()))), noisy);
+  REQUIRE(robot.arm->update("hand", along_x(1), ms(1)));
+  WatchOptions options;
+  options.composed = true;
+  const auto path = robot.client->watch("world", "hand", options);
+  REQUIRE(outcome(path) == "invalid_input");
+  CHECK(path.error().message.find("process noise") != std::string::npos);
+  CHECK(robot.client->watch("world", "hand"));
+}
+
 TEST_CASE("watch: a value for all times that is set as a watch begins arrives at once") {
   Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   for (int i = 1; i <= 20; ++i) {

@@ -61,7 +61,8 @@ struct WatchOptions {
   /// Maximum rate at which an owner sends changes [Hz]: from once an hour to 1e6; 0: every sample.
   double rate = 0;
   /// Send one composed transform for each partition on the path instead of all its edges: fewer
-  /// bytes, but the segment is interpolated as a whole between samples.
+  /// bytes, but the segment is interpolated as a whole between samples. kInvalidInput if it has
+  /// process noise.
   bool composed = false;
   /// How much history is kept here. Process noise is taken from the edge's owner, if it has one.
   EdgeTiming timing{};

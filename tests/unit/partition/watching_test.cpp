@@ -156,6 +156,7 @@ TEST_CASE("how often watchers may want values has an end") {
   CHECK(outcome(check_watch({{kArm}, false, kMaxWatchPeriod + 1ns})) == "invalid_input");
   CHECK(outcome(check_watch({{kArm}, false, std::chrono::nanoseconds::max()})) == "invalid_input");
   CHECK(outcome(check_watch({{kArm}, false, -1ns})) == "invalid_input");
+  CHECK(outcome(check_watch({})) == "invalid_input");
 }
 
 TEST_CASE("at a lower rate only the newest is told") {
@@ -190,6 +191,66 @@ TEST_CASE("a segment may be told as one transform") {
   CHECK(listed(after) == "0@-=3 1@-=0 ");
   CHECK(after.entries.at(0).history > before);
   CHECK(after.entries.at(0).process_noise);
+}
+
+TEST_CASE("a composed segment is sent again where late samples and static edges change it") {
+  Arm arm;
+  WatchedGroup group(7, {{{"base", "hand"}}, true});
+  for (const int t : {10, 20, 30}) {
+    REQUIRE(arm.forest.update("arm", along_x(t), ms(t)));
+    const std::string stamp = std::to_string(t);
+    CHECK(listed(group.next_push(arm.forest)) == "0@" + stamp + "=1" + stamp + " ");
+  }
+  REQUIRE(arm.forest.update("arm", along_x(26), ms(25)));
+  CHECK(listed(group.next_push(arm.forest)) == "0@20=120 0@25=126 ");
+  REQUIRE(arm.forest.update("arm", along_x(40), ms(40)));
+  CHECK(listed(group.next_push(arm.forest)) == "0@40=140 ");
+  REQUIRE(arm.forest.update("arm", along_x(5), ms(5)));
+  CHECK(listed(group.next_push(arm.forest)) == "0@5=105 0@10=110 ");
+  REQUIRE(arm.forest.update("hand", along_x(200)));
+  CHECK(listed(group.next_push(arm.forest)) ==
+        "0@5=205 0@10=210 0@20=220 0@25=226 0@30=230 0@40=240 ");
+  CHECK(listed(group.next_push(arm.forest)).empty());
+}
+
+TEST_CASE("a late sample changes composed values at the stamps of other edges, too") {
+  Arm arm;
+  WatchedGroup group(7, {{{"base", "hand"}}, true});
+  REQUIRE(arm.forest.update({{"arm", along_x(10)}, {"hand", along_x(100)}}, ms(10)));
+  REQUIRE(arm.forest.update("arm", along_x(20), ms(20)));
+  REQUIRE(arm.forest.update("arm", along_x(30), ms(30)));
+  REQUIRE(arm.forest.update("hand", along_x(300), ms(30)));
+  CHECK(listed(group.next_push(arm.forest)) == "0@30=330 ");
+  REQUIRE(arm.forest.update("hand", along_x(250), ms(15)));
+  CHECK(listed(group.next_push(arm.forest)) == "0@10=110 0@15=265 0@20=287 ");
+  // Of what is later than the last common instant, nothing was sent.
+  REQUIRE(arm.forest.update("arm", along_x(50), ms(50)));
+  REQUIRE(arm.forest.update("arm", along_x(45), ms(45)));
+  CHECK(listed(group.next_push(arm.forest)).empty());
+  REQUIRE(arm.forest.update("hand", along_x(460), ms(46)));
+  CHECK(listed(group.next_push(arm.forest)) == "0@45=495 0@46=506 ");
+  // Of several samples between two pushes each is sent, unless the watchers want a lower rate.
+  WatchedGroup slow(8, {{{"base", "hand"}}, true, 10ms});
+  REQUIRE(listed(slow.next_push(arm.forest)) == "0@46=506 ");
+  for (const int t : {60, 70}) {
+    REQUIRE(arm.forest.update({{"arm", along_x(t)}, {"hand", along_x(t)}}, ms(t)));
+  }
+  // At 50 the hand is on its way from 460 to 60.
+  CHECK(listed(group.next_push(arm.forest)) == "0@50=396 0@60=120 0@70=140 ");
+  CHECK(listed(slow.next_push(arm.forest)) == "0@70=140 ");
+}
+
+TEST_CASE("a segment with process noise is not sent as one transform") {
+  EdgeTiming noisy;
+  noisy.process_noise = *Covariance::from_stddev({0.1, 0.1, 0.1, 0.1, 0.1, 0.1});
+  Forest forest;
+  REQUIRE(forest.add("arm", "base", along_x(1), Forest::MissingParent::kAllow));
+  REQUIRE(forest.set_timing("arm", noisy));
+  REQUIRE(forest.update("arm", along_x(1), ms(1)));
+  const auto refused = WatchedGroup(7, {{{"base", "arm"}}, true}).snapshot(forest, {});
+  REQUIRE(outcome(refused) == "invalid_input");
+  CHECK(refused.error().message.find("'base' to 'arm'") != std::string::npos);
+  CHECK(WatchedGroup(7, {{{"base", "arm"}}}).snapshot(forest, {}));
 }
 
 TEST_CASE("who watches what is not owned here is told so, and of half a path nothing") {
