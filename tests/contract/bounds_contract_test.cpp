@@ -41,20 +41,20 @@ struct FirstLookup {
 
 }  // namespace
 
-TEST_CASE("bounds: alone in the domain a lookup waits no longer than it may") {
+TEST_CASE("bounds: alone in the domain a lookup ends at its maximum wait") {
   const int transport = GENERATE(from_range(testing::networks()));
   const FirstLookup alone(joined_by(transport), "tool", 50ms);
   INFO(alone.message);
   CHECK(alone.took >= 50ms);
   CHECK(alone.took < 70ms);
-  // Nobody can come unseen in one process.
+  // Inside one process all participants are discovered at once.
   CHECK(alone.what == (transport == 0 ? "unknown_start" : "timeout"));
   if (transport == 0) return;
   CHECK_THAT(alone.message, testing::ContainsSubstring("no participant was discovered yet"));
   CHECK_THAT(alone.message, testing::ContainsSubstring("'world'"));
 }
 
-TEST_CASE("bounds: alone in the domain every call says after a while what it knows") {
+TEST_CASE("bounds: alone in the domain every call returns a definite answer") {
   auto client = *Client::open(joined_by(GENERATE(from_range(testing::networks())))(""));
   CHECK(client.frames()->empty());
   CHECK(client.partitions()->empty());
@@ -64,7 +64,7 @@ TEST_CASE("bounds: alone in the domain every call says after a while what it kno
   CHECK(outcome(client.lookup("world", "tool", {}, 1ms)) == "unknown_start");
 }
 
-TEST_CASE("bounds: the first lookup of a client waits no longer than it may") {
+TEST_CASE("bounds: the first lookup of a client ends at its maximum wait") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const auto node = *Node::open(join("robot"), "robot", {{"world", "", {}}, {"tool", "world", {}}});
   const FirstLookup there(join, "tool", 20'000ms);

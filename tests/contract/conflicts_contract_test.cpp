@@ -108,7 +108,7 @@ bool is_conflict(const Change& change) { return change.kind == ChangeKind::kConf
 
 }  // namespace
 
-TEST_CASE("an id that two partitions add at once is one's everywhere, and the other says so") {
+TEST_CASE("two partitions add one id at once: one wins everywhere and a conflict is reported") {
   const int transport = GENERATE(from_range(testing::networks()));
   Pair p(joined_by(transport));
   std::vector<Client*> all{&p.arms, &p.head, &p.client};
@@ -132,7 +132,7 @@ TEST_CASE("an id that two partitions add at once is one's everywhere, and the ot
   CHECK(p.client.lookup("arm", id).has_value() != p.client.lookup("neck", id).has_value());
 }
 
-TEST_CASE("two moves at once that make a cycle end as one of them everywhere") {
+TEST_CASE("two moves at once form a cycle: one move wins everywhere and a conflict is reported") {
   const int transport = GENERATE(from_range(testing::networks()));
   Pair p(joined_by(transport));
   Listener client(p.client);
@@ -156,7 +156,7 @@ TEST_CASE("two moves at once that make a cycle end as one of them everywhere") {
   CHECK(p.client.lookup("arm", "neck"));
 }
 
-TEST_CASE("a listener may use the client, and ends with its subscription") {
+TEST_CASE("a listener may call the client and hears nothing after its subscription ends") {
   const int transport = GENERATE(from_range(testing::networks()));
   Pair p(joined_by(transport));
   std::mutex mutex;
@@ -185,7 +185,7 @@ TEST_CASE("a listener may use the client, and ends with its subscription") {
   CHECK(seen.size() == 2);
 }
 
-TEST_CASE("an owner hears of its own changes, too") {
+TEST_CASE("an owner receives events of changes to its own frames") {
   const int transport = GENERATE(from_range(testing::networks()));
   Pair p(joined_by(transport));
   Listener arms(p.arms);
@@ -199,7 +199,7 @@ TEST_CASE("an owner hears of its own changes, too") {
   CHECK(arms.hears(of(ChangeKind::kFrameRemoved)));
 }
 
-TEST_CASE("a claim that was taken back costs nobody a frame, however late that is heard") {
+TEST_CASE("a withdrawn claim takes no frame from others even if the withdrawal arrives late") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   auto late_transport = std::make_unique<testing::LatePages>(join("head"));
   testing::LatePages& late = *late_transport;

@@ -68,7 +68,7 @@ struct Robot {
   std::optional<Client> client;
 };
 
-TEST_CASE("joints: positions reach all owners, and those who follow in other partitions") {
+TEST_CASE("joints: published positions reach the owners of joints and of those that mimic them") {
   Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   REQUIRE(robot.client->publish_joints({"turn", "shoulder", "elbow"}, {0.1, 0.2, 0.4},
                                        {1e-4, 4e-4, 9e-4}));
@@ -84,7 +84,7 @@ TEST_CASE("joints: positions reach all owners, and those who follow in other par
   CHECK(X_WH->basis.sources == Names{"joint elbow"});
 }
 
-TEST_CASE("joints: what was sent arrives though its client ends at once") {
+TEST_CASE("joints: published positions arrive although the client ends at once") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Robot robot(join);
   for (int run = 1; run <= 5; ++run) {
@@ -102,7 +102,7 @@ TEST_CASE("joints: what was sent arrives though its client ends at once") {
   }
 }
 
-TEST_CASE("joints: what is updated is there when the call returns, or refused by name") {
+TEST_CASE("joints: an update is visible when the call returns and bad input is rejected") {
   Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   Client& client = *robot.client;
   CHECK(outcome(client.update_joints({"turn", "elbow"}, {0.5, 0.25}, {0, 0})) == "ok");
@@ -128,7 +128,7 @@ TEST_CASE("joints: what is updated is there when the call returns, or refused by
   CHECK(outcome(robot.tool->correlate("hand", {})) == "invalid_input");
 }
 
-TEST_CASE("joints: of one stamp lookups at an instant see all, whoever owns them") {
+TEST_CASE("joints: a lookup sees all positions of one stamp also over several owners") {
   Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   const Time start = wall_clock();
   std::atomic<bool> stop{false};
@@ -155,7 +155,7 @@ TEST_CASE("joints: of one stamp lookups at an instant see all, whoever owns them
   controller.join();
 }
 
-TEST_CASE("joints: one owner that is not there keeps no other from its share") {
+TEST_CASE("joints: reachable owners get their positions although another owner is unreachable") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Robot robot(join);
   REQUIRE(robot.client->publish_joints({"turn", "elbow"}, {0.1, 0.1}, {0, 0}));
@@ -177,7 +177,7 @@ TEST_CASE("joints: one owner that is not there keeps no other from its share") {
   CHECK(outcome(robot.client->update_joints({"elbow"}, {0.5}, {0})) == "unreachable");
 }
 
-TEST_CASE("joints: who has just come tells all owners, or says who it is that nobody knows") {
+TEST_CASE("joints: a new client reaches all owners at once and names an unknown joint") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Robot robot(join);
   for (int i = 1; i <= 5; ++i) {
@@ -196,7 +196,7 @@ TEST_CASE("joints: who has just come tells all owners, or says who it is that no
       [&] { return std::abs(yaw(robot.client->lookup("fore", "hand")) + 0.75) < 1e-12; }));
 }
 
-TEST_CASE("joints: a node that is opened again has its joints where they were") {
+TEST_CASE("joints: a node that is reopened has its stored joint positions") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const testing::TemporaryDirectory directory;
   Options options;
@@ -222,7 +222,7 @@ TEST_CASE("joints: a node that is opened again has its joints where they were") 
 }
 
 }  // namespace
-TEST_CASE("joints: an owner lists more of them than one reply holds") {
+TEST_CASE("joints: an owner lists more joints than fit into one reply") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   constexpr std::size_t kAll = 4100;  // a reply holds 4,096
   std::vector<FrameSpec> frames{{"base", "", {}}};

@@ -56,7 +56,7 @@ class Kept {
   std::optional<Client> client;
 
  private:
-  // With its own part; of the sources it is told as others would be.
+  // Only the first edge has its common errors in the configuration.
   static FrameSpec entry(const ObservedChain& chain, std::size_t edge) {
     const Belief& X = chain.edges()[edge].X_PC;
     FrameSpec spec{frame(edge + 1), frame(edge), {X.pose, X.own}};
@@ -104,7 +104,7 @@ double difference(Client& client, const ObservedChain& chain, const Eigen::Matri
 
 }  // namespace
 
-TEST_CASE("kept: owners that restart between observations know what one dense filter would") {
+TEST_CASE("kept: owners that restart between observations agree with one dense filter") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(0x4e97);
   INFO("seed " << random.seed());
@@ -137,9 +137,7 @@ TEST_CASE("kept: owners that restart between observations know what one dense fi
   }
 }
 
-TEST_CASE(
-    "kept: what was said of correlation by request is there after a restart, and can be taken "
-    "back") {
+TEST_CASE("kept: a correlation set by request survives a restart and can be removed") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(0x4e98);
   INFO("seed " << random.seed());
@@ -162,7 +160,7 @@ TEST_CASE(
   CHECK_FALSE(bound());
 }
 
-TEST_CASE("kept: what nobody may say of correlation is refused, whoever owns the edge") {
+TEST_CASE("kept: an invalid correlation of another owner's edge is rejected") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(0x4e99);
   INFO("seed " << random.seed());

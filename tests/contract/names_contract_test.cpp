@@ -72,7 +72,7 @@ std::size_t served(const Join& join, const std::string& name) {
 
 // An owner that does not get the name waits for 1.5 s. So many pairs try at the same time; within
 // one process each pair has its own network.
-TEST_CASE("of two who claim a name at once exactly one serves") {
+TEST_CASE("of two processes that claim a name at once exactly one serves it") {
   const int transport = GENERATE(from_range(testing::networks()));
   const int beside = transport == 0 ? 50 : 2;
   const int tries = transport == 0 ? 20 : 5;
@@ -94,7 +94,7 @@ TEST_CASE("of two who claim a name at once exactly one serves") {
   CHECK(counts == std::map<std::size_t, int>{{1, beside * tries}});
 }
 
-TEST_CASE("an orderly end is told apart from a loss, and its frames are those of who serves them") {
+TEST_CASE("a stopped partition is reported as stopped and another can take over its frames") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node base = *Node::open(join("base"), "base", {{"world", "", {}}});
   Client client = *Client::open(join(""));
@@ -129,7 +129,7 @@ TEST_CASE("an orderly end is told apart from a loss, and its frames are those of
   CHECK(comes([&] { return told(ChangeKind::kFrameTakenOver, "left_arm"); }));
 }
 
-TEST_CASE("a partition that is gone is forgotten by all, and only then") {
+TEST_CASE("a partition can be forgotten only when it is unreachable and then by all") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node base = *Node::open(join("base"), "base", {{"world", "", {}}});
   Node head = *Node::open(join("head"), "head", {{"neck", "world", {}}});

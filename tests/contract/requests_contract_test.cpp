@@ -36,7 +36,7 @@ Options patient() {
 
 }  // namespace
 
-TEST_CASE("a change of which many sendings are lost is made once, while other threads go on") {
+TEST_CASE("a change whose request is lost many times is applied while other threads continue") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   constexpr int kThreads = 3;
   constexpr int kLost =
@@ -54,7 +54,7 @@ TEST_CASE("a change of which many sendings are lost is made once, while other th
   std::vector<std::thread> threads;
   for (int i = 0; i < kThreads; ++i) {
     threads.emplace_back([&] {
-      // Fewer than the owner keeps replies: of more it says that it does not know any more.
+      // Fewer than the replies that the owner keeps; beyond that it may answer with a time-out.
       while (!done && others < 20'000) {
         others += client.update("arm", ahead(1)).has_value() ? 1 : 0;
       }
@@ -69,7 +69,7 @@ TEST_CASE("a change of which many sendings are lost is made once, while other th
   CHECK(owner.lookup("arm", "slow")->pose.translation().x() == 5);
 }
 
-TEST_CASE("what an owner has added is not denied while its structure has not come") {
+TEST_CASE("a frame that its owner has added is not called unknown before its page arrives") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const Node arms = *Node::open(join("arms"), "arms", {{"arm", "", {}}});
   auto late_transport = std::make_unique<testing::LatePages>(join(""));
@@ -91,7 +91,7 @@ TEST_CASE("what an owner has added is not denied while its structure has not com
   CHECK(client.lookup("arm", "tool").error().code == Errc::kUnknownEnd);
 }
 
-TEST_CASE("parts of a value are changed at its owner, the rest stays") {
+TEST_CASE("a partial update changes the given parts at the owner and keeps the others") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(0x9a75);
   const Transform X_PC = random.transform();
@@ -114,7 +114,7 @@ TEST_CASE("parts of a value are changed at its owner, the rest stays") {
   CHECK(testing::transform_diff(hand(), all, 1e-12) == "");
 }
 
-TEST_CASE("a sample of the future is refused by its owner, who counts it") {
+TEST_CASE("an owner rejects and counts a sample from the future") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   auto owner = *Node::open(join("arms"), "arms", {{"arm", "", {}}, {"hand", "arm", {}}}, patient());
   auto client = *Client::open(join(""), patient());

@@ -28,7 +28,7 @@ using testing::outcome;
 
 }  // namespace
 
-TEST_CASE("publish: of three owners the two that live get theirs, the error names the third") {
+TEST_CASE("publish: reachable owners get their edges and the error names the unreachable one") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   Node b = open_with_tip(join, "b");
@@ -53,7 +53,7 @@ TEST_CASE("publish: of three owners the two that live get theirs, the error name
   CHECK(eventually([&] { return is_at(b, "b_base", "b_tip", 2); }));
 }
 
-TEST_CASE("publish: what was sent arrives though the client ends at once") {
+TEST_CASE("publish: sent values arrive although the client ends at once") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   for (int run = 1; run <= 10; ++run) {
@@ -67,7 +67,7 @@ TEST_CASE("publish: what was sent arrives though the client ends at once") {
   }
 }
 
-TEST_CASE("flush: says whether all was acknowledged") {
+TEST_CASE("flush: succeeds when all owners have acknowledged") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   auto client = *Client::open(join(""));

@@ -67,7 +67,7 @@ struct Loop {
 
 }  // namespace
 
-TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waited for") {
+TEST_CASE("streams: an edge is followed from owner to owner and no call waits") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   auto client = *Client::open(join(""));
   Loop loop{*client.stream({"gone_tip", "a_tip"}), {}};
@@ -100,12 +100,12 @@ TEST_CASE("streams: an edge is followed from owner to owner, and nobody is waite
   CHECK(loop.slower_than(Milliseconds(20)) < 3);
 }
 
-TEST_CASE("streams: stamps are those of the source, of all edges the same") {
+TEST_CASE("streams: all edges of a sample get the stamp of the source") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   Node b = open_with_tip(join, "b");
   REQUIRE(eventually([&] { return b.exists("a_tip"); }));
-  // One of another, one of its own.
+  // One edge of another owner and one of its own.
   auto stream = *b.stream({"a_tip", "b_tip"});
   auto stamp = std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
   REQUIRE(eventually([&] {
@@ -122,7 +122,7 @@ TEST_CASE("streams: stamps are those of the source, of all edges the same") {
   CHECK(text(stream.try_publish({along_x(7), along_x(8)}, stamp)) == "1 stamp_taken b");
 }
 
-TEST_CASE("streams: of what is invalid nothing is sent") {
+TEST_CASE("streams: nothing of a sample is sent if one value is invalid") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   auto client = *Client::open(join(""));
@@ -142,7 +142,7 @@ TEST_CASE("streams: of what is invalid nothing is sent") {
   CHECK(client.stream({})->try_publish({}).empty());
 }
 
-TEST_CASE("streams: positions of joints reach all who have them, and who is missing is named") {
+TEST_CASE("streams: joint positions reach all owners and missing ones are named") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   JointSpec elbow = revolute_named("elbow");
   elbow.coupled = true;
@@ -175,7 +175,7 @@ TEST_CASE("streams: positions of joints reach all who have them, and who is miss
   CHECK(std::abs(yaw(arm.lookup("world", "upper")) - 0.5) < 1e-12);
 }
 
-TEST_CASE("streams: one that outlives its client sends nothing any more") {
+TEST_CASE("streams: a stream that outlives its client sends nothing") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
   std::optional<Client> client = *Client::open(join(""));

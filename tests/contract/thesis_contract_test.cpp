@@ -48,7 +48,7 @@ const Transform kX{exp((Twist() << 0.1, -0.2, 0.3, 0.4, 0.5, -0.6).finished()),
 
 }  // namespace
 
-TEST_CASE("everybody looks up every pair as one tree would") {
+TEST_CASE("every participant looks up every pair of frames as one tree would") {
   const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   Forest oracle;
@@ -100,7 +100,7 @@ TEST_CASE("frames are added, updated and moved from anywhere") {
   }
 }
 
-TEST_CASE("what is not finite is refused before it is sent") {
+TEST_CASE("a value that is not finite is rejected before it is sent") {
   const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   const Transform bad{Pose::trusted(Eigen::Quaterniond::Identity(), {NAN, 0, 0}), {}};
@@ -119,7 +119,7 @@ TEST_CASE("what is not finite is refused before it is sent") {
   }
 }
 
-TEST_CASE("an answer that is semi-definite but for rounding arrives") {
+TEST_CASE("a lookup whose covariance is semi-definite only up to rounding succeeds") {
   // An edge without translation seen from its child: the variances of the translation are zero,
   // except for rounding errors of the variances of rotation over a lever.
   const int transport = GENERATE(from_range(testing::networks()));
@@ -148,7 +148,7 @@ TEST_CASE("an answer that is semi-definite but for rounding arrives") {
   }
 }
 
-TEST_CASE("a removal takes all below it, and an emptied partition lives on") {
+TEST_CASE("a removal removes all frames below and an emptied partition stays usable") {
   const int transport = GENERATE(from_range(testing::networks()));
   Robot r(joined_by(transport));
   REQUIRE(r.arms->remove("robot_2"));

@@ -116,7 +116,7 @@ class Source {
 
 }  // namespace
 
-TEST_CASE("an owner's event says that a history starts again") {
+TEST_CASE("an owner reports that a history was restarted") {
   Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   std::mutex mutex;
   std::vector<Change> heard;
@@ -139,7 +139,7 @@ TEST_CASE("an owner's event says that a history starts again") {
   CHECK(heard[0].partition == "arm");
 }
 
-TEST_CASE("a stamp before 1970, or none that is one, is refused wherever its edge is") {
+TEST_CASE("a stamp that is zero or negative is rejected whoever owns the edge") {
   Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   REQUIRE(outcome(chain.arm->update("hand", along_x(1), ms(1000))) == "ok");
   const Time stamp = GENERATE(ms(0), ms(-1), Time::min());
@@ -192,9 +192,7 @@ TEST_CASE("all partitions answer for the same instant") {
   CHECK(chain.client->history("arm")->at(0).refused_equal == 1);
 }
 
-TEST_CASE(
-    "of partitions in motion every answer is the motion at its stamp, unlike that of each one's "
-    "newest") {
+TEST_CASE("a lookup over dynamic edges of several owners is the motion at its stamp") {
   Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   Motion motion(4242, wall_clock());
   INFO("seed " << motion.seed());
@@ -234,7 +232,7 @@ TEST_CASE(
   CHECK(base.failed() + arm.failed() + tool.failed() == 0);
 }
 
-TEST_CASE("a lookup waits for its data, no longer than it may, and not for what is gone") {
+TEST_CASE("a lookup waits for new samples up to its limit but not for dropped ones") {
   Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   REQUIRE(chain.arm->update("arm", along_x(1), ms(1000)));
   REQUIRE(chain.arm->update("arm", along_x(2), ms(2000)));
@@ -277,7 +275,7 @@ TEST_CASE("a lookup waits for its data, no longer than it may, and not for what 
   CHECK(calls == 0);
 }
 
-TEST_CASE("a watched path is read without asking, and follows what its owners write") {
+TEST_CASE("a watched path follows what its owners write") {
   Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   REQUIRE(chain.base->update("base", along_x(1000), ms(1000)));
   for (Client* caller : std::vector<Client*>{&*chain.client, &*chain.arm}) {
@@ -302,7 +300,7 @@ TEST_CASE("a watched path is read without asking, and follows what its owners wr
   CHECK(outcome(chain.client->watch("world", "tool", options)) == "invalid_input");
 }
 
-TEST_CASE("a watched path finds its new way when frames are moved, removed and added again") {
+TEST_CASE("a watched path finds its new route after frames are moved or removed and added") {
   Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   std::atomic<int> told{0};
   WatchOptions options;
@@ -321,7 +319,7 @@ TEST_CASE("a watched path finds its new way when frames are moved, removed and a
   CHECK(testing::eventually([&] { return told >= 3; }));
 }
 
-TEST_CASE("a watched path goes on when an owner returns") {
+TEST_CASE("a watched path continues when an owner returns") {
   const auto join = joined_by(GENERATE(from_range(testing::networks())));
   Chain chain(join);
   auto path = chain.client->watch("world", "tool");
@@ -338,7 +336,7 @@ TEST_CASE("a watched path goes on when an owner returns") {
   REQUIRE(testing::eventually([&] { return x_of(path->latest()) == 7; }));
 }
 
-TEST_CASE("segments may be pushed composed, and no more often than wanted") {
+TEST_CASE("a watch with composed segments gets no more messages than its rate allows") {
   Chain chain(joined_by(GENERATE(from_range(testing::networks()))));
   WatchOptions options;
   options.composed = true;

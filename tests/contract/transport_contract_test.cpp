@@ -28,7 +28,7 @@ Request request(std::uint32_t sequence) { return {sequence, "hand", RemoveReques
 
 // ---- presence and pages
 
-TEST_CASE("what is announced and published reaches all, also those that come later") {
+TEST_CASE("presences and pages reach all participants and those that join later") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Listener early(join);
   Server arms(join, "arms", 7);
@@ -73,7 +73,7 @@ TEST_CASE("what is announced and published reaches all, also those that come lat
   for (const Presence& presence : by_arms.presences) CHECK(presence.partition == "legs");
 }
 
-TEST_CASE("who comes late hears the last state of each page and presence, not the former ones") {
+TEST_CASE("a participant that joins later receives only the last version of each page") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Server arms(join, "arms");
   for (std::uint64_t epoch = 1; epoch <= 20; ++epoch) {
@@ -102,7 +102,7 @@ TEST_CASE("a new participant that has discovered all others knows all partitions
 
 // ---- requests, replies, updates
 
-TEST_CASE("a request reaches the partition that it is sent to, the reply who asked") {
+TEST_CASE("a request reaches only its partition and a reply only the participant that asked") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Server arms(join, "arms", 7);
   Server legs(join, "legs", 8);
@@ -128,7 +128,7 @@ TEST_CASE("a request reaches the partition that it is sent to, the reply who ask
   CHECK(heard.requests.empty());
 }
 
-TEST_CASE("an update reaches the partition that it is sent to, and brings what is owned there") {
+TEST_CASE("an update reaches only the partition that it is sent to") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(0x7a45);
   const Server arms(join, "arms", 1, {"arm", "hand"});
@@ -149,7 +149,7 @@ TEST_CASE("an update reaches the partition that it is sent to, and brings what i
   CHECK(sender.heard().updates.empty());
 }
 
-TEST_CASE("joints reach the partition that they are sent to") {
+TEST_CASE("joint positions reach only the partition that they are sent to") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const Server arms(join, "arms", 1, {}, {"elbow"});
   const Server legs(join, "legs", 1, {}, {"knee"});
@@ -165,7 +165,7 @@ TEST_CASE("joints reach the partition that they are sent to") {
   CHECK(legs.heard().joints.empty());
 }
 
-TEST_CASE("what is sent to a partition that nobody serves times out, naming it") {
+TEST_CASE("sending to a partition that nobody serves times out and names it") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const Server arms(join, "arms");
   const Listener sender(join);
@@ -180,7 +180,7 @@ TEST_CASE("what is sent to a partition that nobody serves times out, naming it")
   check_timeout(sender.transport->send("wings", request(1), Transport::Deadline{}));
 }
 
-TEST_CASE("what is sent waits for a partition that is not served yet") {
+TEST_CASE("a request waits until its partition is served") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Listener asker(join);
   bool answered = false;
@@ -195,7 +195,7 @@ TEST_CASE("what is sent waits for a partition that is not served yet") {
   CHECK(answered);
 }
 
-TEST_CASE("a reply to nobody harms nobody") {
+TEST_CASE("a reply to an unknown peer has no effect") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Server arms(join, "arms");
   Listener asker(join);
@@ -206,7 +206,7 @@ TEST_CASE("a reply to nobody harms nobody") {
 
 // ---- leaving
 
-TEST_CASE("when a server has gone all others hear of it, and those who come later nothing of it") {
+TEST_CASE("the loss of a server reaches all and new participants never hear of that server") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Server arms(join, "arms", 7);
   const Server legs(join, "legs", 8);
@@ -242,7 +242,7 @@ TEST_CASE("a partition can be served again after its server has gone") {
   CHECK_FALSE(client.heard().loss("arms", 2));
 }
 
-TEST_CASE("a transport is stopped any number of times, also before it was started") {
+TEST_CASE("a transport can be stopped repeatedly and before it was started") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const auto idle = join("");
   idle->stop();
@@ -292,7 +292,7 @@ TEST_CASE("messages of the largest size arrive whole") {
   CHECK(std::get<UpdateRequest>(by_arms.requests.at(0).body).edges.size() == 4096);
 }
 
-TEST_CASE("pages of one sender arrive in order, and the last of each arrives") {
+TEST_CASE("pages of one sender arrive in order and the last version of each arrives") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const Listener client(join);
   Server arms(join, "arms");

@@ -49,7 +49,7 @@ class Repeating {
   std::thread thread_;  // last: uses the others
 };
 
-TEST_CASE("each of many askers of many servers gets its own replies") {
+TEST_CASE("each participant gets its own replies while several ask several servers") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   constexpr std::uint32_t kAskers = 3;
   constexpr std::uint32_t kThreads = 2;
@@ -85,7 +85,7 @@ TEST_CASE("each of many askers of many servers gets its own replies") {
   for (const std::uint32_t sequence : by_arms) CHECK(sequence % 2 == 0);
 }
 
-TEST_CASE("nothing reaches a server that has stopped, and nobody else misses it") {
+TEST_CASE("a stopped server receives nothing and the others still answer") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Listener asker(join);
   const Server legs(join, "legs");
@@ -132,7 +132,7 @@ TEST_CASE("nothing reaches a listener that has stopped") {
   CHECK(staying.hears([before](const Heard& h) { return h.pages.size() > before; }));
 }
 
-TEST_CASE("who stops waits for the calls that are under way") {
+TEST_CASE("stop waits for the calls that are being handled") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   std::atomic<bool> stopping{false};
   std::atomic<bool> under_way{false};
@@ -161,7 +161,7 @@ TEST_CASE("who stops waits for the calls that are under way") {
   asking.join();
 }
 
-TEST_CASE("who joins while pages are published hears no older page after a newer one") {
+TEST_CASE("a participant that joins during publishing receives no older page after a newer one") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Server arms(join, "arms");
   const Repeating publishing([&](std::uint32_t round) { arms.publish(round % 3, round); });

@@ -102,7 +102,7 @@ TEST_CASE("uncertainty: a source that edges of several owners share is counted o
   CHECK(covariance_diff(X->covariance, independent.covariance, 1e-3) != "");
 }
 
-TEST_CASE("uncertainty: a source cancels exactly over owners") {
+TEST_CASE("uncertainty: opposite errors of one source cancel exactly over two owners") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(662);
   INFO("seed " << random.seed());
@@ -123,7 +123,7 @@ TEST_CASE("uncertainty: a source cancels exactly over owners") {
   CHECK(to_arm->covariance.matrix().cwiseAbs().maxCoeff() < 1e-30);
 }
 
-TEST_CASE("uncertainty: unknown correlation over owners is bounded, and told") {
+TEST_CASE("uncertainty: unknown correlation over owners gives a bound and is reported") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(663);
   INFO("seed " << random.seed());
@@ -147,7 +147,7 @@ TEST_CASE("uncertainty: unknown correlation over owners is bounded, and told") {
   CHECK_FALSE(independent->basis.bound);
 }
 
-TEST_CASE("uncertainty: the order of a lookup counts with all owners") {
+TEST_CASE("uncertainty: all owners use the order of the lookup") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(664);
   INFO("seed " << random.seed());
@@ -171,7 +171,7 @@ TEST_CASE("uncertainty: the order of a lookup counts with all owners") {
   CHECK(of_fourth < 0.2 * of_second);
 }
 
-TEST_CASE("uncertainty: a watched path knows what its edges share") {
+TEST_CASE("uncertainty: a watched path has the correlation of its edges") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const bool composed_by_owners = GENERATE(false, true);
   Random random(665);
@@ -194,7 +194,7 @@ TEST_CASE("uncertainty: a watched path knows what its edges share") {
   CHECK(eventually(as_looked_up));
 }
 
-TEST_CASE("uncertainty: a measurement over owners makes all paths as sure as one filter would") {
+TEST_CASE("uncertainty: a measurement of a path over owners gives the fused covariance") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(666);
   INFO("seed " << random.seed());
@@ -217,8 +217,7 @@ TEST_CASE("uncertainty: a measurement over owners makes all paths as sure as one
   CHECK(testing::pose_diff(after->pose, fused->X.pose, 1e-4) == "");
   CHECK(covariance_diff(after->covariance, fused->X.covariance, 0.02) == "");
   CHECK(after->basis.sources.size() == 1);
-  // The same again, from the other end: half the error of the measurement is left, none of the
-  // edges is surer for it.
+  // The same measurement again, from the other end, counts as a second, independent one.
   const auto again = robot.arm->observe("tool", "world", inverse(Z));
   REQUIRE(again);
   const auto twice = robot.client->lookup("world", "tool");
@@ -237,7 +236,7 @@ TEST_CASE("uncertainty: a measurement over owners makes all paths as sure as one
   CHECK(transform_diff(*fresh, robot.X_base_arm, 1e-9) == "");
 }
 
-TEST_CASE("uncertainty: what the gate refuses changes nothing, and is counted") {
+TEST_CASE("uncertainty: a measurement that the gate rejects changes nothing and is counted") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(667);
   INFO("seed " << random.seed());
@@ -265,7 +264,7 @@ TEST_CASE("uncertainty: what the gate refuses changes nothing, and is counted") 
   CHECK_FALSE(robot.client->consistency("nobody"));
 }
 
-TEST_CASE("uncertainty: two who observe one path at once both count, and count once") {
+TEST_CASE("uncertainty: concurrent measurements of one path by two clients each count once") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(671);
   INFO("seed " << random.seed());
@@ -298,7 +297,7 @@ TEST_CASE("uncertainty: two who observe one path at once both count, and count o
   CHECK(covariance_diff(after->covariance, fused->X.covariance, 0.02) == "");
 }
 
-TEST_CASE("uncertainty: an edge is fused with a measurement of it, whoever owns it") {
+TEST_CASE("uncertainty: fuse combines another owner's edge with a measurement of it") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Random random(668);
   INFO("seed " << random.seed());
@@ -344,7 +343,7 @@ TEST_CASE("uncertainty: dynamic edges are corrected by a sample with the measure
     query.at = at(ms);
     const auto then = robot.client->lookup("world", "tool", query);
     REQUIRE(then);
-    // To within what the measurement is sure of, and no surer than that.
+    // The path agrees with the measurement, within the measurement's covariance.
     const Twist e = log(then->pose.inverse() * Z.pose);
     CHECK(squared_distance(e, Z.covariance.matrix()) < 25.0);
     REQUIRE(robot.client->update({{"base", robot.X_world_base}, {"hand", robot.X_arm_hand}}));
@@ -354,7 +353,7 @@ TEST_CASE("uncertainty: dynamic edges are corrected by a sample with the measure
   CHECK(late.error().code == Errc::kNotYet);
 }
 
-TEST_CASE("uncertainty: over 100 robots and two observed paths all owners stay consistent") {
+TEST_CASE("uncertainty: covariances stay consistent over 100 robots with two observed paths") {
   Random random(670);
   INFO("seed " << random.seed());
   double sum = 0;

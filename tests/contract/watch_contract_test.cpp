@@ -56,7 +56,7 @@ struct Robot {
   std::optional<Client> client;
 };
 
-// Each has a group of its own.
+// A rate that no other watch has, so that each watch has its own group.
 WatchOptions one_more() {
   static int count = 0;
   WatchOptions options;
@@ -65,7 +65,7 @@ WatchOptions one_more() {
 }
 
 #ifndef __SANITIZE_THREAD__
-// DDS over the loopback interface, whose writers are counted of one partition.
+// DDS over the loopback interface. The writers of one partition are counted.
 class CountedDomain {
  public:
   TransportPtr join(const std::string& partition, bool counted = false) {
@@ -82,12 +82,12 @@ class CountedDomain {
 
 }  // namespace
 
-TEST_CASE("watch: a lookup that waits is looked at again as soon as its path is pushed") {
+TEST_CASE("watch: a waiting lookup is answered as soon as its path is pushed") {
   Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   const auto watched = robot.client->watch("arm", "hand");
   REQUIRE(watched);
   std::vector<double> late;
-  // So far ahead that the owner is asked only each 50 ms.
+  // The stamps are so far ahead that the owner is asked only every 50 ms.
   const auto now = std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
   REQUIRE(robot.arm->update("hand", along_x(0), now));
   for (int i = 1; i <= 15; ++i) {
@@ -109,7 +109,7 @@ TEST_CASE("watch: a lookup that waits is looked at again as soon as its path is 
   CHECK(late[late.size() / 2] < 10);
 }
 
-TEST_CASE("watch: late samples and process noise are what lookups see, too") {
+TEST_CASE("watch: late samples and process noise give the same values as a lookup") {
   Random random(1601);
   INFO("seed " << random.seed());
   EdgeTiming noisy;
@@ -179,7 +179,7 @@ TEST_CASE("watch: a segment with process noise cannot be watched composed") {
   CHECK(robot.client->watch("world", "hand"));
 }
 
-TEST_CASE("watch: a value for all times that is set as a watch begins arrives at once") {
+TEST_CASE("watch: a static value that is set as a watch begins arrives at once") {
   Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   for (int i = 1; i <= 20; ++i) {
     const auto path = robot.client->watch("world", "hand", one_more());
@@ -191,7 +191,7 @@ TEST_CASE("watch: a value for all times that is set as a watch begins arrives at
   }
 }
 
-TEST_CASE("watch: it begins with an instant that all edges have in common") {
+TEST_CASE("watch: a new watch starts at the latest common time of its edges") {
   Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   for (int t = 1; t <= 50; ++t) {
     REQUIRE(robot.base->update("base", along_x(t), ms(10 * t)));
@@ -224,7 +224,7 @@ TEST_CASE("watch: it begins with an instant that all edges have in common") {
   CHECK(outcome(path->latest()) == "ok");
 }
 
-TEST_CASE("watch: a path is read without a break while an owner starts again") {
+TEST_CASE("watch: a path is read without a break while an owner restarts") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Robot robot(join);
   const auto path = robot.client->watch("world", "hand");
@@ -247,7 +247,7 @@ TEST_CASE("watch: a path is read without a break while an owner starts again") {
   CHECK(wrong == "");
 }
 
-TEST_CASE("watch: a rate that is no rate is refused") {
+TEST_CASE("watch: an invalid rate is rejected") {
   Robot robot(joined_by(0));
   for (const double rate : {-1.0, 1e-4, 1e-300, 2e6, std::numeric_limits<double>::infinity(),
                             std::numeric_limits<double>::quiet_NaN()}) {
@@ -262,7 +262,7 @@ TEST_CASE("watch: a rate that is no rate is refused") {
 
 #ifndef __SANITIZE_THREAD__  // ThreadSanitizer does not see the locks of Fast DDS
 // Not more, because each costs milliseconds; pusher_test.cpp has 1,000 watches.
-TEST_CASE("watch: as many writers are there after watches and clients as before") {
+TEST_CASE("watch: no writer is left after watches and clients have ended") {
   CountedDomain domain;
   auto base = *Node::open(domain.join("base", true), "base",
                           {{"world", "", {}}, {"base", "world", {}}, {"spare", "world", {}}});
@@ -272,7 +272,7 @@ TEST_CASE("watch: as many writers are there after watches and clients as before"
   const std::uint64_t before = domain.writers();
   for (int i = 0; i < 200; ++i) REQUIRE(client.watch("world", "base", one_more()));
   for (int i = 0; i < 20; ++i) {
-    // One whose frame goes, so that it cannot be renewed. The client may hear late that it is back.
+    // Its frame is removed, so it cannot be renewed. The client may see the new frame late.
     std::optional<PathWatch> path;
     REQUIRE(eventually([&] {
       auto watched = client.watch("world", "spare", one_more());
@@ -289,7 +289,7 @@ TEST_CASE("watch: as many writers are there after watches and clients as before"
   CHECK(eventually([&] { return domain.writers() == before; }));
 }
 
-TEST_CASE("watch: a reply to a peer that has left makes no writer") {
+TEST_CASE("watch: a reply to a peer that has left creates no writer") {
   CountedDomain domain;
   testing::Recorder owner;
   owner.frames = {"hand"};

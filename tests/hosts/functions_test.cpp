@@ -26,7 +26,7 @@ std::string maps(const Process& process) {
 
 }  // namespace
 
-TEST_CASE("hosts: a client on a fourth host uses what three others own") {
+TEST_CASE("hosts: a client on a fourth host uses the frames of three others") {
   if (testing::skip_without_hosts()) return;
   const bool by_server = GENERATE(false, true);
   RobotHosts r(by_server);
@@ -66,7 +66,7 @@ TEST_CASE("hosts: a client on a fourth host uses what three others own") {
   }
 }
 
-TEST_CASE("hosts: a discovery server may come late, end, and come again") {
+TEST_CASE("hosts: a discovery server may start late and restart") {
   if (testing::skip_without_hosts()) return;
   RobotHosts r(true);
   r.start_daemons();

@@ -24,9 +24,8 @@ inline const Transform kX{exp((Twist() << 0.1, -0.2, 0.3, 0.4, 0.5, -0.6).finish
 inline const Transform kY{exp((Twist() << -0.4, 0.1, 0.2, -0.7, 0.1, 0.9).finished()),
                           *Covariance::from_stddev({6e-3, 1e-3, 2e-3, 1e-3, 3e-3, 2e-3})};
 
-/// The thesis's robot on several hosts, each partition on one of its own: robot, arms and a third,
-/// whose tool is in the left hand. The test's own process is on another, and so is the discovery
-/// server where there is one.
+/// The thesis's robot, with each partition on its own host: robot, arms, and a third with a tool in
+/// the left hand. The test's process has its own host, and so has the discovery server, if any.
 class RobotHosts {
  public:
   static constexpr std::size_t kOwn = 0;
@@ -54,7 +53,7 @@ class RobotHosts {
     server.emplace(start_discovery_server(hosts, kServer, kept));
   }
 
-  /// As suddenly as those who have met it can bear.
+  /// Kills the server if it can read its backup afterwards; else it ends in order.
   void end_server() {
     if (discovery_server_reads_backup()) return server->kill();
     server->signal(SIGINT);
