@@ -66,8 +66,8 @@ struct Robot {
 
 }  // namespace
 
-TEST_CASE("absences: three seconds after a death its frames are those of one that serves them") {
-  // The least of some tries, as the computer may be busy.
+TEST_CASE("absences: another daemon owns the frames of a dead one within three seconds") {
+  // The shortest of several attempts, because the computer may be busy.
   auto least = Clock::duration::max();
   for (int attempt = 0; attempt < 3 && least > std::chrono::seconds(3); ++attempt) {
     Robot robot;
@@ -82,7 +82,7 @@ TEST_CASE("absences: three seconds after a death its frames are those of one tha
   CHECK(least < std::chrono::seconds(3));
 }
 
-TEST_CASE("absences: frames of a dead daemon are those of one that serves them, and stay so") {
+TEST_CASE("absences: a daemon keeps the frames that it took over when their first owner returns") {
   Robot robot;
   auto client = *Client::open(robot.domain.options());
   REQUIRE(client.lookup("world", "hand"));
@@ -117,7 +117,7 @@ TEST_CASE("absences: frames of a dead daemon are those of one that serves them, 
   CHECK(eventually([&] {
     return told({ChangeKind::kFrameTakenOver, "left_arm", {}, {}, "arm", {}, {}});
   }));
-  // What is acknowledged meanwhile outlives the return of the one that was away.
+  // Changes that were acknowledged in the meantime survive the return of the first owner.
   REQUIRE(client.update("hand", along_x(77)));
   REQUIRE(client.add("tool", "hand", along_x(5)));
   robot.arm.emplace(robot.start(robot.arm_config));
@@ -133,7 +133,7 @@ TEST_CASE("absences: frames of a dead daemon are those of one that serves them, 
   CHECK(owner_of(late, "hand") == "left_arm");
 }
 
-TEST_CASE("absences: a daemon that hung while another took its frames yields to that") {
+TEST_CASE("absences: a daemon that hung yields its frames to the one that took them over") {
   Robot robot;
   auto client = *Client::open(robot.domain.options());
   REQUIRE(client.lookup("world", "hand"));
@@ -153,7 +153,7 @@ TEST_CASE("absences: a daemon that hung while another took its frames yields to 
   CHECK(x_of(client.lookup("world", "hand")) == 78);
 }
 
-TEST_CASE("absences: what is forgotten stays so for a daemon that was away") {
+TEST_CASE("absences: a daemon that was away learns that a partition was forgotten") {
   Robot robot;
   const auto refused = robot.domain.cli({"forget", "arm"});
   CHECK(refused.status != 0);
@@ -177,7 +177,7 @@ TEST_CASE("absences: what is forgotten stays so for a daemon that was away") {
   CHECK_FALSE(client.exists("hand"));
 }
 
-TEST_CASE("absences: a daemon whose clock is behind that of its dead predecessor is heard") {
+TEST_CASE("absences: a daemon is accepted although its clock is behind that of its predecessor") {
   const std::string fake = TFDUDE_FAKETIME;
   if (!std::filesystem::exists(fake)) {
     WARN("SKIPPED: needs the package faketime");

@@ -74,7 +74,7 @@ class Count final : public fastdds::edds::LogConsumer {
 
 }  // namespace
 
-TEST_CASE("beside: each client of a process has the sockets that its own profile says") {
+TEST_CASE("beside: each client of a process has the sockets of its own profile") {
   const testing::DomainLease lease;
   const bool confined_first = GENERATE(true, false);
   const auto open_confined = [&] { return *Client::open(options_of(lease.number())); };
@@ -118,7 +118,7 @@ TEST_CASE("beside: an edited profile file is read again") {
   CHECK(addresses_since(between).count(kAnyAddress) > 0);
 }
 
-TEST_CASE("beside: the host's log consumers and its delivery inside the process stay") {
+TEST_CASE("beside: a client keeps the process's log consumers and intraprocess delivery") {
   const testing::DomainLease lease;
   const auto entries = std::make_shared<std::atomic<int>>(0);
   fastdds::edds::Log::ClearConsumers();
@@ -134,7 +134,7 @@ TEST_CASE("beside: the host's log consumers and its delivery inside the process 
   testing::set_intraprocess(testing::kIntraprocessFull);
 }
 
-TEST_CASE("beside: two nodes of a process ask each other, whatever delivery inside it is set") {
+TEST_CASE("beside: two nodes of one process call each other with any intraprocess delivery") {
   const auto delivery = GENERATE(testing::kIntraprocessFull, testing::kIntraprocessUserData,
                                  testing::kIntraprocessOff);
   testing::set_intraprocess(delivery);

@@ -23,13 +23,13 @@ using testing::ContainsSubstring;
 using testing::ThesisDaemons;
 using Clock = std::chrono::steady_clock;
 
-TEST_CASE("bounds: beside a daemon that hangs a lookup waits no longer than it may") {
+TEST_CASE("bounds: a lookup ends at its maximum wait although a daemon hangs") {
   ThesisDaemons d;
   auto client = *Client::open(d.domain.options());
   REQUIRE(client.lookup("world", "hand_left"));
-  // Until it counts as gone, and then.
+  // Some before the daemon counts as lost, and some after.
   const std::vector<std::chrono::milliseconds> waits{50ms, 50ms, 200ms, 500ms, 50ms};
-  // Of each wait the least of some runs, as the computer may be busy.
+  // The shortest of several runs of each wait, because the computer may be busy.
   std::vector<Clock::duration> beyond(waits.size(), Clock::duration::max());
   for (int i = 0; i < 4; ++i) {
     d.arms->freeze();
@@ -50,7 +50,7 @@ TEST_CASE("bounds: beside a daemon that hangs a lookup waits no longer than it m
   }
 }
 
-TEST_CASE("bounds: beside a daemon that hangs a flush says who has not acknowledged") {
+TEST_CASE("bounds: a flush names the daemon that hangs and has not acknowledged") {
   ThesisDaemons d;
   auto client = *Client::open(d.domain.options());
   const std::vector<EdgeUpdate> edge{{"hand_left", testing::along_x(1)}};
@@ -68,7 +68,7 @@ TEST_CASE("bounds: beside a daemon that hangs a flush says who has not acknowled
     const auto found = client.lookup("world", "hand_left");
     return !found && found.error().code == Errc::kUnreachable;
   }));
-  // Who counts as gone is not waited for.
+  // A flush does not wait for a lost owner.
   const auto gone = Clock::now();
   const auto later = client.flush(20'000ms);
   CHECK(Clock::now() - gone < 10s);
@@ -78,7 +78,7 @@ TEST_CASE("bounds: beside a daemon that hangs a flush says who has not acknowled
   CHECK(testing::eventually([&] { return client.flush(100ms).has_value(); }));
 }
 
-TEST_CASE("bounds: no flush says that all is acknowledged while another still waits for that") {
+TEST_CASE("bounds: no flush succeeds while another one still waits for an acknowledgement") {
   ThesisDaemons d;
   auto client = *Client::open(d.domain.options());
   REQUIRE(client.publish({{"hand_left", testing::along_x(1)}}));
@@ -95,9 +95,9 @@ TEST_CASE("bounds: no flush says that all is acknowledged while another still wa
   CHECK_FALSE(first.get());
 }
 
-TEST_CASE("bounds: a client that has streamed to a daemon that hangs ends all the same") {
+TEST_CASE("bounds: a client that has streamed to a hanging daemon still ends") {
   ThesisDaemons d;
-  // What it has streamed gets 100 ms, or as much as is wished, but never more than the time-out.
+  // The end waits 100 ms for streamed values, or as long as `linger` says, up to the time-out.
   Options options = d.domain.options();
   const bool wished = GENERATE(false, true);
   if (wished) {
@@ -120,7 +120,7 @@ TEST_CASE("bounds: a client that has streamed to a daemon that hangs ends all th
   CHECK(took < 2s);
 }
 
-TEST_CASE("bounds: a lookup without end goes on once the daemon does") {
+TEST_CASE("bounds: a lookup without a limit succeeds when the daemon resumes") {
   ThesisDaemons d;
   auto client = *Client::open(d.domain.options());
   REQUIRE(client.lookup("world", "hand_left"));

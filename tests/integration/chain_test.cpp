@@ -125,7 +125,7 @@ void change_something(Five& five, Random& random, int number) {
 
 }  // namespace
 
-TEST_CASE("five: paths begin and end in any of a chain or a star of partitions") {
+TEST_CASE("five: every pair of frames is looked up in a chain and in a star of partitions") {
   const bool star = GENERATE(false, true);
   const int here = GENERATE(0, 2, 4);
   Random random(20261121);
@@ -148,7 +148,7 @@ TEST_CASE("five: a path through all partitions of a chain names each once") {
   }
 }
 
-TEST_CASE("five: random changes of all partitions' frames from two processes") {
+TEST_CASE("five: all participants agree after random changes from two processes") {
   const bool star = GENERATE(false, true);
   Random random(star ? 4711 : 815);
   INFO("seed " << random.seed() << (star ? ", star" : ", chain"));
@@ -160,7 +160,7 @@ TEST_CASE("five: random changes of all partitions' frames from two processes") {
   five.check_all();
 }
 
-TEST_CASE("five: a removal in the middle empties what hangs below, which can be attached again") {
+TEST_CASE("five: a removal in the middle empties partitions below and they can be attached again") {
   const bool star = GENERATE(false, true);
   Random random(99);
   INFO("seed " << random.seed() << (star ? ", star" : ", chain"));

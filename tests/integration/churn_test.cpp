@@ -58,7 +58,7 @@ class Load {
 
 }  // namespace
 
-TEST_CASE("churn: fifty daemons and clients come and go under load, and nobody minds") {
+TEST_CASE("churn: fifty daemons and clients come and go under load without an error") {
   testing::Random random(50);
   INFO("seed " << random.seed());
   testing::ThesisDaemons d;

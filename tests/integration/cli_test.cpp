@@ -54,7 +54,7 @@ std::vector<std::string> commands_of(const std::string& help) {
 
 }  // namespace
 
-TEST_CASE("cli: questions are answered for people") {
+TEST_CASE("cli: queries are answered as text") {
   const ThesisDaemons d;
   CHECK(text(d, {"tree"}) ==
         "world  [robot]\n"
@@ -89,7 +89,7 @@ TEST_CASE("cli: questions are answered for people") {
              ContainsSubstring("\ncovariance "));
 }
 
-TEST_CASE("cli: questions are answered for programs") {
+TEST_CASE("cli: queries are answered as JSON") {
   const ThesisDaemons d;
   const json frames = object(d, {"frames"}).at("frames");
   REQUIRE(frames.size() == 9);

@@ -21,7 +21,7 @@ struct Refusal {
 
 }  // namespace
 
-TEST_CASE("daemon: what it cannot serve it refuses by name, without being ready") {
+TEST_CASE("daemon: wrong arguments and configurations are rejected and named") {
   const TestDomain domain;
   const TemporaryDirectory directory;
   const auto config = [&directory](const std::string& name, const std::string& text) {
@@ -65,7 +65,7 @@ TEST_CASE("daemon: what it cannot serve it refuses by name, without being ready"
   }
 }
 
-TEST_CASE("daemon: it says how many frames it serves, which may be none") {
+TEST_CASE("daemon: it prints how many frames it serves and may serve none") {
   const TestDomain domain;
   const TemporaryDirectory directory;
   testing::Process legs = domain.start_daemon({"--partition", "legs"});

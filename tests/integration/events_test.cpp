@@ -24,12 +24,12 @@ using testing::ThesisDaemons;
 
 }  // namespace
 
-TEST_CASE("events: the command line tells what happens, a line each") {
+TEST_CASE("events: the command line prints each change as one line") {
   ThesisDaemons d;
   Process events = d.domain.start_cli({"--json", "events"});
   auto client = *Client::open(d.domain.options());
   REQUIRE(client.exists("hand_left"));
-  // It listens once it tells of a change; those before are its own affair.
+  // Repeats a change until the command prints it: only then does it listen.
   REQUIRE(eventually([&] {
     (void)client.move("camera", "robot_1");
     (void)client.move("camera", "world");
@@ -58,7 +58,7 @@ TEST_CASE("events: the command line tells what happens, a line each") {
   CHECK(finish(events).status == 0);
 }
 
-TEST_CASE("events: where nobody answers, commands that run until interrupted say so") {
+TEST_CASE("events: commands that run until interrupted say that no partition answers") {
   const testing::TestDomain domain;
   const auto start = [&](const std::string& command) {
     return Process({TFDUDE_CLI, "--local", "--domain", std::to_string(domain.number()), "--timeout",
@@ -73,7 +73,7 @@ TEST_CASE("events: where nobody answers, commands that run until interrupted say
   }));
 }
 
-TEST_CASE("events: a daemon that hung while its name was taken gives it up") {
+TEST_CASE("events: a daemon whose name was taken while it hung ends and names its successor") {
   ThesisDaemons d;
   auto client = *Client::open(d.domain.options());
   REQUIRE(client.exists("hand_left"));

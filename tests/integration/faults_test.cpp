@@ -56,7 +56,7 @@ std::string host() {
 
 }  // namespace
 
-TEST_CASE("faults: who needs a killed daemon is told at once, and others do not notice") {
+TEST_CASE("faults: calls that need a killed daemon fail early and others succeed") {
   ThesisDaemons d;
   auto client = *Client::open(d.domain.options(kPatience));
   REQUIRE(client.lookup("world", "hand_left"));
@@ -70,7 +70,7 @@ TEST_CASE("faults: who needs a killed daemon is told at once, and others do not 
   CHECK(partitions[1].reachable);
 }
 
-TEST_CASE("faults: who comes after a daemon was killed is told by the others what is missing") {
+TEST_CASE("faults: a client that joins after a daemon was killed learns that it is unreachable") {
   ThesisDaemons d;
   d.arms->kill();
   auto joiner = *Client::open(d.domain.options(kPatience));
@@ -80,7 +80,7 @@ TEST_CASE("faults: who comes after a daemon was killed is told by the others wha
   check_arms_missing(joiner);
 }
 
-TEST_CASE("faults: a longer lease in the profile moves the time of a loss") {
+TEST_CASE("faults: a longer lease in the profile delays the loss of a daemon") {
   testing::TestDomain domain;
   std::ifstream patient(TFDUDE_PATIENT_PROFILE);
   std::string text{std::istreambuf_iterator<char>(patient), {}};
@@ -95,8 +95,7 @@ TEST_CASE("faults: a longer lease in the profile moves the time of a loss") {
   REQUIRE(eventually([&] { return client.lookup("arm_1", "hand_left").has_value(); }));
   arms.kill();
   const auto killed = testing::Clock::now();
-  // Instead of 450 ms, from when it was last heard.
-  // By who asks it.
+  // A client that uses the daemon notices after the lease of the profile, instead of 450 ms.
   REQUIRE(eventually([&] {
     const auto asked = client.lookup("arm_1", "hand_left");
     return !asked && asked.error().code == Errc::kUnreachable;
@@ -104,7 +103,7 @@ TEST_CASE("faults: a longer lease in the profile moves the time of a loss") {
   CHECK(testing::Clock::now() - killed > std::chrono::milliseconds(1500));
 }
 
-TEST_CASE("faults: an owner is told of a killed daemon, and goes on with its own frames") {
+TEST_CASE("faults: an owner reports a killed daemon and continues with its own frames") {
   testing::TestDomain domain;
   Process arms = domain.serve(kArmsFile);
   auto robot =
@@ -119,7 +118,7 @@ TEST_CASE("faults: an owner is told of a killed daemon, and goes on with its own
   CHECK(robot.add("tool", "robot_1", {}));
 }
 
-TEST_CASE("faults: a killed daemon that is started again is asked again") {
+TEST_CASE("faults: a killed daemon answers again after a restart") {
   ThesisDaemons d;
   auto client = *Client::open(d.domain.options());
   for (int round = 0; round < 3; ++round) {
@@ -128,7 +127,7 @@ TEST_CASE("faults: a killed daemon that is started again is asked again") {
     REQUIRE(client.add("tool", "hand_left", {}));
     d.arms->kill();
     d.arms.emplace(d.domain.serve(kArmsFile));
-    // What was added to the predecessor is gone with it.
+    // The added frame is lost with its daemon.
     REQUIRE(eventually([&] { return client.exists("hand_left") && !client.exists("tool"); }));
     const auto after = client.lookup("world", "hand_left");
     INFO((after ? "" : after.error().message));
@@ -141,9 +140,9 @@ TEST_CASE("faults: a killed daemon that is started again is asked again") {
   }
 }
 
-TEST_CASE("faults: a hanging partition costs its caller the time-out, and recovers") {
+TEST_CASE("faults: a call to a hanging daemon times out and succeeds when it resumes") {
   ThesisDaemons d;
-  // Shorter than it takes to notice that a partition is gone.
+  // Shorter than the time until a partition counts as lost.
   auto client = *Client::open(d.domain.options(Milliseconds(50)));
   REQUIRE(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
   const auto frozen = std::chrono::steady_clock::now();
@@ -151,7 +150,7 @@ TEST_CASE("faults: a hanging partition costs its caller the time-out, and recove
   const auto late = client.lookup("world", "hand_left");
   const bool quick = std::chrono::steady_clock::now() - frozen < std::chrono::milliseconds(250);
   REQUIRE_FALSE(late);
-  // A computer that is busy enough has noticed meanwhile.
+  // On a busy computer the loss may have been noticed in the meantime.
   const Errc code = late.error().code;
   CHECK((code == Errc::kTimeout || (!quick && code == Errc::kUnreachable)));
   CHECK_THAT(late.error().message, ContainsSubstring("'arms'"));
@@ -163,7 +162,7 @@ TEST_CASE("faults: a hanging partition costs its caller the time-out, and recove
   CHECK(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
 }
 
-TEST_CASE("faults: a partition that DDS had given up is met again") {
+TEST_CASE("faults: a daemon that DDS had lost is discovered again") {
   ThesisDaemons d;
   auto client = *Client::open(d.domain.options(kPatience));
   for (int round = 0; round < 3; ++round) {
@@ -180,7 +179,7 @@ TEST_CASE("faults: a partition that DDS had given up is met again") {
   CHECK(client.exists("tool"));
 }
 
-TEST_CASE("faults: a second daemon of the same name is refused") {
+TEST_CASE("faults: a second daemon of the same name is rejected") {
   ThesisDaemons d;
   Process second = d.domain.start_daemon({"--config", kArmsFile});
   const auto result = finish(second);
@@ -193,7 +192,7 @@ TEST_CASE("faults: a second daemon of the same name is refused") {
   CHECK(d.domain.cli({"lookup", "world", "hand_left"}).status == 0);
 }
 
-TEST_CASE("faults: of two daemons of one name at the same instant exactly one serves") {
+TEST_CASE("faults: of two daemons of one name that start at once exactly one serves") {
   for (int round = 0; round < 4; ++round) {
     testing::TestDomain domain;
     std::vector<Process> daemons;
@@ -214,7 +213,7 @@ TEST_CASE("faults: of two daemons of one name at the same instant exactly one se
   }
 }
 
-TEST_CASE("faults: a daemon that is told to stop says goodbye and exits well") {
+TEST_CASE("faults: a daemon that gets SIGINT or SIGTERM announces its end and exits with 0") {
   const int signal = GENERATE(2, 15);  // SIGINT, SIGTERM
   ThesisDaemons d;
   auto client = *Client::open(d.domain.options(kPatience));

@@ -75,7 +75,7 @@ bool moved(Node& node, const std::string& frame) {
 
 }  // namespace
 
-TEST_CASE("a plain writer in partition * reaches the owner, and the others only to their filters") {
+TEST_CASE("an update of a plain DDS writer to all partitions passes only the owner's filter") {
   const testing::DomainLease domain;
   Counted owner(domain.number(), "owner", "a");
   Counted other(domain.number(), "other", "b");
@@ -91,9 +91,9 @@ TEST_CASE("a plain writer in partition * reaches the owner, and the others only 
   CHECK_FALSE(moved(other.node, "b"));
 }
 
-// What stays of a killed process: a page that cannot be read before an earlier one, of a clock that
-// was ahead.
-TEST_CASE("a page that waits for a lost one keeps out no page of another process") {
+// A killed process whose clock was ahead has left a page that DDS holds back until an earlier one
+// comes.
+TEST_CASE("a page that waits for a lost one does not block pages of another process") {
   const testing::DomainLease domain;
   const auto transport =
       *make_fastdds_transport({domain.number(), TFDUDE_LOOPBACK_PROFILE, "", {}});
@@ -136,7 +136,7 @@ TEST_CASE("a page that waits for a lost one keeps out no page of another process
   transport->stop();
 }
 
-TEST_CASE("joints of a plain writer move the edges of who has them") {
+TEST_CASE("joint positions of a plain DDS writer move the edges of their owner") {
   const testing::DomainLease domain;
   const auto counters = std::make_shared<FastDdsCounters>();
   const auto transport = [&](const char* partition) {
@@ -164,7 +164,7 @@ TEST_CASE("joints of a plain writer move the edges of who has them") {
   std::uint64_t written = 0;
   for (wire::Joints* joints : {&of_others, &bad, &good}) {
     writer.write(joints);
-    // It keeps one sample only, which the next one replaces before it has come.
+    // The writer keeps only one sample, so the next one must not be written before this arrives.
     ++written;
     CHECK(eventually([&] { return counters->updates_arrived == written; }));
   }
@@ -176,7 +176,7 @@ TEST_CASE("joints of a plain writer move the edges of who has them") {
   CHECK(counters->updates_passed == 2);
 }
 
-TEST_CASE("requests that are sent to all reach only the owner of their frame") {
+TEST_CASE("requests that are sent to all partitions reach only the owner of their frame") {
   const testing::DomainLease domain;
   Counted owner(domain.number(), "owner", "a");
   Counted other(domain.number(), "other", "b");
@@ -196,7 +196,7 @@ TEST_CASE("requests that are sent to all reach only the owner of their frame") {
   CHECK(other.counters->requests_passed == 0);
 }
 
-TEST_CASE("a participant whose profile has another reliability is told which, and where") {
+TEST_CASE("an error names the topic and QoS in which the profiles of two participants differ") {
   const testing::DomainLease domain;
   Counted owner(domain.number(), "owner", "a");
   const testing::TemporaryDirectory directory;
@@ -257,7 +257,7 @@ std::vector<Bytes> malformed(testing::Random& random) {
 
 }  // namespace
 
-TEST_CASE("malformed samples are counted, and change nothing") {
+TEST_CASE("malformed samples are counted and change nothing") {
   testing::Random random(20261121);
   INFO("seed " << random.seed());
   const testing::DomainLease domain;

@@ -85,7 +85,7 @@ struct Robot {
 
 }  // namespace
 
-TEST_CASE("joints: one URDF over two daemons is one robot") {
+TEST_CASE("joints: two daemons serve one robot from one URDF") {
   const Robot robot;
   const json path = robot.answered({"lookup", "world", "tool0"});
   CHECK(path.at("partitions") == json({"base", "arm"}));
@@ -100,7 +100,7 @@ TEST_CASE("joints: one URDF over two daemons is one robot") {
   CHECK(robot.turn("arm_mount", "shoulder_link") == Approx(-0.25));
 }
 
-TEST_CASE("joints: wrong input is refused by name, and changes nothing") {
+TEST_CASE("joints: wrong input is rejected by name and changes nothing") {
   const Robot robot;
   CHECK_THAT(robot.refused({"joint", "knee", "1"}), ContainsSubstring("no joint 'knee'"));
   CHECK_THAT(robot.refused({"joint", "elbow_joint", "nan"}),
@@ -115,7 +115,7 @@ TEST_CASE("joints: wrong input is refused by name, and changes nothing") {
   CHECK_FALSE(robot.joint("elbow_joint").at("measured").get<bool>());
 }
 
-TEST_CASE("joints: positions outside the limits show in monitor, unless they are refused") {
+TEST_CASE("joints: positions outside the limits are counted or with strict limits rejected") {
   SECTION("applied") {
     const Robot robot;
     robot.answered({"joint", "elbow_joint", "3.5"});
@@ -123,7 +123,7 @@ TEST_CASE("joints: positions outside the limits show in monitor, unless they are
     CHECK_THAT(robot.domain.cli({"monitor", "--once"}).out,
                ContainsSubstring("joint outside limits") && ContainsSubstring("elbow_joint"));
   }
-  SECTION("refused") {
+  SECTION("rejected") {
     const Robot robot({"--strict-limits"});
     CHECK_THAT(robot.refused({"joint", "elbow_joint", "3.5"}),
                ContainsSubstring("outside its limits"));
@@ -132,7 +132,7 @@ TEST_CASE("joints: positions outside the limits show in monitor, unless they are
   }
 }
 
-TEST_CASE("joints: a daemon that is killed comes back with its joints") {
+TEST_CASE("joints: a killed daemon has its joint positions after a restart") {
   Robot robot;
   robot.answered({"joint", "elbow_joint", "1.25", "--stddev", "0.01"});
   robot.arm->kill();
@@ -146,7 +146,7 @@ TEST_CASE("joints: a daemon that is killed comes back with its joints") {
   CHECK(robot.turn("upper_arm_link", "forearm_link") == Approx(1.5));
 }
 
-TEST_CASE("joints: a path of joints that begin to move is watched without an error") {
+TEST_CASE("joints: a path whose joints begin to move is watched without an error") {
   const Robot robot;
   Process watch = robot.domain.start_cli({"watch", "world", "tool0", "--rate", "200"});
   REQUIRE(watch.wait_for_line("translation", in_time()));
@@ -159,7 +159,7 @@ TEST_CASE("joints: a path of joints that begin to move is watched without an err
   CHECK(watch.err().empty());
 }
 
-TEST_CASE("joints: the example's controller drives the arm, and outlives a killed daemon") {
+TEST_CASE("joints: the example's controller drives the arm also after a daemon was killed") {
   Robot robot;
   Process controller({TFDUDE_CONTROLLER, "--seconds", "60", "--domain",
                       std::to_string(robot.domain.number()), "--profile", TFDUDE_LOOPBACK_PROFILE});

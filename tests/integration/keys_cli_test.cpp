@@ -59,7 +59,7 @@ struct Store {
 
 }  // namespace
 
-TEST_CASE("keys command: makes keys, and says what they allow") {
+TEST_CASE("keys command: creates keys and prints what they allow") {
   const Store store;
   const CliResult said = keys({"check", store.path});
   CHECK(said.status == 0);

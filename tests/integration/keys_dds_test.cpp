@@ -122,12 +122,12 @@ bool arrives(edds::DataWriter& writer, edds::DataReader& reader) {
   });
 }
 
-// By then, those that match have matched; so others that do not are rejected, not late.
+// Participants that match have matched by then, so one that has not is rejected, not late.
 void wait_longer() { std::this_thread::sleep_for(std::chrono::seconds(3)); }
 
 }  // namespace
 
-TEST_CASE("keys in DDS: identities of one authority match, strangers do not") {
+TEST_CASE("keys in DDS: only identities of one authority match") {
   for (const bool encrypt : {true, false}) {
     const testing::DomainLease domain;
     const TestKeys keys(now(), {encrypt, {0, 232}});
@@ -181,7 +181,7 @@ TEST_CASE("keys in DDS: an endpoint without permission cannot be created") {
   CHECK(client.write("another/topic", "arm") == nullptr);
 }
 
-TEST_CASE("keys in DDS: a revoked identity matches nobody who knows the list") {
+TEST_CASE("keys in DDS: participants that know the list do not match a revoked identity") {
   const testing::DomainLease domain;
   const TestKeys keys(now());
   const KeyFiles arm = keys.add("arm", daemon_of("arm"));
@@ -207,8 +207,7 @@ TEST_CASE("keys in DDS: a revoked identity matches nobody who knows the list") {
   CHECK(readers_of(writer) == 1);
 }
 
-TEST_CASE(
-    "keys in DDS: no participant with an expired certificate, or one that it knows is revoked") {
+TEST_CASE("keys in DDS: an expired or revoked certificate creates no participant") {
   const testing::DomainLease domain;
   const Time before = now() - Days(10);
   const TestKeys keys(before);
@@ -227,7 +226,7 @@ TEST_CASE(
   CHECK_FALSE(Participant(domain.number(), &files).good());
 }
 
-TEST_CASE("keys in DDS: nobody can sign permissions for himself") {
+TEST_CASE("keys in DDS: permissions that a participant signed itself are rejected") {
   const testing::DomainLease domain;
   const TestKeys keys(now());
   const KeyFiles thief = keys.add("thief", looking());

@@ -75,7 +75,7 @@ class Member {
 
 }  // namespace
 
-TEST_CASE("leaving: nothing is handled while an endpoint is deleted") {
+TEST_CASE("leaving: deleting an endpoint waits for the callback that runs") {
   const testing::DomainLease lease;
   Member leaver(lease.number());
   Member other(lease.number());
@@ -103,7 +103,7 @@ TEST_CASE("leaving: nothing is handled while an endpoint is deleted") {
 // Best effort: where a reliable writer goes as its first sample is being acknowledged, and the
 // participant is to announce itself just then, Fast DDS (2.9 and 3.1) waits for itself for ever.
 // Here that would happen within seconds.
-TEST_CASE("leaving: 5,000 readers go while writers come and go") {
+TEST_CASE("leaving: 5000 readers are deleted while writers come and go") {
   const testing::DomainLease lease;
   Member leaver(lease.number());
   Member joiner(lease.number());

@@ -81,7 +81,7 @@ std::string content(const std::string& file) {
 
 }  // namespace
 
-TEST_CASE("persistence: what was acknowledged survives a kill at any instant") {
+TEST_CASE("persistence: acknowledged changes survive a kill at any instant") {
   Keeper arms(kArms);
   auto client = *Client::open(arms.domain.options());
   Random random(0x9e51);
@@ -89,7 +89,7 @@ TEST_CASE("persistence: what was acknowledged survives a kill at any instant") {
   int next = 0;
   std::vector<std::string> there;
   for (int round = 0; round < 5; ++round) {
-    // The kill falls into a call of another thread's, whose outcome nobody knows.
+    // The kill interrupts a call of another thread; the result of that call is unknown.
     auto other = std::async(std::launch::async, [domain = &arms.domain, round] {
       auto caller = *Client::open(domain->options(Milliseconds(300)));
       for (int i = 0; i < 1000; ++i) {
@@ -124,7 +124,7 @@ TEST_CASE("persistence: what was acknowledged survives a kill at any instant") {
   }
 }
 
-TEST_CASE("persistence: streamed values are stored after a while") {
+TEST_CASE("persistence: streamed values are stored and survive a kill") {
   Keeper arms(kArms);
   arms.daemon->kill();
   arms.start({"--save-every", "50"});
@@ -139,7 +139,7 @@ TEST_CASE("persistence: streamed values are stored after a while") {
   CHECK(x_of(client.lookup("arm", "hand")) == 77);
 }
 
-TEST_CASE("persistence: frames are there for others all the time while their daemon restarts") {
+TEST_CASE("persistence: others see the frames all the time while their daemon restarts") {
   Keeper arms(kArms);
   auto client = *Client::open(arms.domain.options());
   REQUIRE(client.exists("hand"));
@@ -165,7 +165,7 @@ TEST_CASE("persistence: frames are there for others all the time while their dae
   CHECK(missing == 0);
 }
 
-TEST_CASE("persistence: an edited configuration counts, the rest is as it was left") {
+TEST_CASE("persistence: edited entries of a configuration override the stored state") {
   Keeper arms(kArms);
   {
     auto client = *Client::open(arms.domain.options());
@@ -186,7 +186,7 @@ frames:
   CHECK(client.exists("eye"));
 }
 
-TEST_CASE("persistence: a state that cannot be read stops the daemon and stays as it is") {
+TEST_CASE("persistence: a state that cannot be read stops the daemon and is not changed") {
   Keeper arms(kArms);
   // At an orderly end all is in the one file.
   arms.daemon->signal(SIGTERM);
@@ -215,7 +215,7 @@ TEST_CASE("persistence: a state that cannot be read stops the daemon and stays a
   CHECK(content(arms.file()) == before);
 }
 
-TEST_CASE("persistence: a removal that was missed is made up for at the return") {
+TEST_CASE("persistence: an owner that missed a removal removes its frames when it returns") {
   Keeper arms(kArms);
   const std::string tools =
       arms.directory.write("tools.yaml",
@@ -230,12 +230,12 @@ TEST_CASE("persistence: a removal that was missed is made up for at the return")
   REQUIRE(eventually([&] { return !client.partitions()->at(1).reachable; }));
   REQUIRE(client.remove("hand"));
   bool gone = true;
-  SECTION("in any order of the returns") {
+  SECTION("although the other owner restarted meanwhile") {
     arms.restart();
     const auto lost = client.lookup("arm", "finger");
     REQUIRE_FALSE(lost);
   }
-  SECTION("unless the parent is there again") {
+  SECTION("unless the parent exists again") {
     REQUIRE(client.add("hand", "arm", along_x(5)));
     gone = false;
   }

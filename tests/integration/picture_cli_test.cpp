@@ -86,7 +86,7 @@ json answered(const ThesisDaemons& d, Arguments arguments, int status = 0) {
 
 }  // namespace
 
-TEST_CASE("pictures: a path is drawn in each format") {
+TEST_CASE("pictures: plot draws a path as SVG and PNG") {
   const ThesisDaemons d;
   const TemporaryDirectory directory;
   const std::string svg = directory.path() + "/hand.svg";
@@ -121,7 +121,7 @@ TEST_CASE("pictures: a path is drawn in each format") {
   CHECK(files_in(directory) == 2);
 }
 
-TEST_CASE("pictures: a path is drawn of an instant") {
+TEST_CASE("pictures: plot draws a path at an instant") {
   const ThesisDaemons d;
   const TemporaryDirectory directory;
   const std::string file = directory.path() + "/a.svg";
@@ -139,7 +139,7 @@ TEST_CASE("pictures: a path is drawn of an instant") {
   CHECK(read(file) == before);
 }
 
-TEST_CASE("pictures: points say what they do not know") {
+TEST_CASE("pictures: sampled points name what they ignore") {
   const testing::TestDomain domain;
   std::vector<Process> daemons;
   for (const char* name : {"base", "arm"}) {
@@ -153,7 +153,7 @@ TEST_CASE("pictures: points say what they do not know") {
   CHECK_THAT(texts_of(file), ContainsSubstring("take edges as independent"));
 }
 
-TEST_CASE("pictures: the forest is drawn in each format") {
+TEST_CASE("pictures: graph draws the forest as DOT and SVG and PNG") {
   const ThesisDaemons d;
   const TemporaryDirectory directory;
   const std::string dot = directory.path() + "/all.dot";
@@ -212,7 +212,7 @@ TEST_CASE("pictures: their commands have help with an example") {
   }
 }
 
-TEST_CASE("pictures: what cannot be drawn is refused, and nothing is written") {
+TEST_CASE("pictures: wrong arguments are rejected and no file is written") {
   const ThesisDaemons d;
   const TemporaryDirectory directory;
   const std::string file = directory.path() + "/a";
@@ -239,7 +239,7 @@ TEST_CASE("pictures: what cannot be drawn is refused, and nothing is written") {
   CHECK(files_in(directory) == 0);
 }
 
-TEST_CASE("pictures: a file that cannot be written is named, and nothing is left of it") {
+TEST_CASE("pictures: a file that cannot be written is named and left unwritten") {
   const ThesisDaemons d;
   const TemporaryDirectory directory;
   const std::string nowhere = directory.path() + "/none/a.svg";
@@ -254,7 +254,7 @@ TEST_CASE("pictures: a file that cannot be written is named, and nothing is left
   CHECK(files_in(directory) == 1);
 }
 
-TEST_CASE("pictures: a program that is missing, or fails, is named") {
+TEST_CASE("pictures: a program that is missing or fails is named") {
   const ThesisDaemons d;
   const TemporaryDirectory directory;
   const TemporaryDirectory programs;
@@ -276,14 +276,14 @@ TEST_CASE("pictures: a program that is missing, or fails, is named") {
   CHECK_THAT(refused({"graph", "--out", file + ".svg"}),
              ContainsSubstring("'dot' failed: no fonts"));
   CHECK(files_in(directory) == 0);
-  // These need nobody.
+  // These formats need no other program.
   CHECK(run_with_path(d, programs.path(), {"graph", "--out", file + ".dot"}).status == 0);
   CHECK(run_with_path(d, programs.path(), {"plot", "world", "camera", "--out", file + ".svg"})
             .status == 0);
   CHECK(files_in(directory) == 2);
 }
 
-TEST_CASE("pictures: who does not answer is grey, and nobody waits for it") {
+TEST_CASE("pictures: an unreachable partition is grey and graph does not wait for it") {
   ThesisDaemons d;
   const TemporaryDirectory directory;
   const std::string file = directory.path() + "/a.dot";

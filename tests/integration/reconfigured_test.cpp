@@ -67,7 +67,7 @@ struct Arms {
 
 }  // namespace
 
-TEST_CASE("reconfigured: a daemon without a configuration has its state as it was") {
+TEST_CASE("reconfigured: a daemon without a configuration restores its whole state") {
   Arms arms;
   auto client = *Client::open(arms.domain.options());
   REQUIRE(client.add("tool", "hand", along_x(100)));
@@ -81,9 +81,7 @@ TEST_CASE("reconfigured: a daemon without a configuration has its state as it wa
   REQUIRE(eventually([&] { return x_of(client.lookup("arm", "tool")) == 120; }));
 }
 
-TEST_CASE(
-    "reconfigured: an entry that is gone takes its frame, and nothing below it, whoever owns "
-    "that") {
+TEST_CASE("reconfigured: a deleted entry removes its frame and no frame below it") {
   Arms arms;
   const std::string tools = arms.directory.write(
       "tools.yaml", "partition: tools\nframes:\n  - {id: gripper, parent: hand}\n");
@@ -134,7 +132,7 @@ TEST_CASE(
   CHECK(eventually([&] { return client.lookup("arm", "gripper").has_value(); }));
 }
 
-TEST_CASE("reconfigured: what a configuration would change is said beforehand, and done") {
+TEST_CASE("reconfigured: --check prints what a configuration would change and changes nothing") {
   Arms arms;
   auto client = *Client::open(arms.domain.options());
   REQUIRE(client.add("tool", "hand", along_x(100)));
@@ -154,7 +152,7 @@ TEST_CASE("reconfigured: what a configuration would change is said beforehand, a
   const CliResult fresh = arms.check(
       {"--config", arms.directory.write("legs.yaml", "partition: legs\nframes:\n  - {id: leg}\n")});
   CHECK_THAT(fresh.out, ContainsSubstring("legs.sqlite: frames=0\nframe 'leg': added as a root\n"));
-  // A frame that was hung below another meanwhile cannot be above it.
+  // The configuration puts `hand` below `wrist`, which is now below `hand`: a cycle.
   REQUIRE(client.move("hand", ""));
   REQUIRE(client.add("wrist", "hand", {}));
   const CliResult cycle =
@@ -168,7 +166,7 @@ frames:
   CHECK(client.exists("wrist"));
 }
 
-TEST_CASE("reconfigured: what observations and requests have said of correlation survives a kill") {
+TEST_CASE("reconfigured: correlations from observations and requests survive a kill") {
   Arms arms;
   auto client = *Client::open(arms.domain.options());
   const Covariance some = *Covariance::from_stddev({0.01, 0.01, 0.01, 0.01, 0.01, 0.01});

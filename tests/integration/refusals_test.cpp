@@ -141,7 +141,7 @@ void check_wrong_usage(const TestDomain& domain, const std::vector<Refusal>& wro
 
 }  // namespace
 
-TEST_CASE("cli: what breaks a rule is refused by name and changes nothing") {
+TEST_CASE("cli: input that breaks a rule is rejected by name and changes nothing") {
   const ThesisDaemons d;
   auto client = *Client::open(d.domain.options());
   const std::string before = snapshot(client);
@@ -160,7 +160,7 @@ TEST_CASE("cli: what breaks a rule is refused by name and changes nothing") {
   CHECK(snapshot(client) == before);
 }
 
-TEST_CASE("cli: wrong usage is 2") {
+TEST_CASE("cli: wrong usage exits with 2") {
   const ThesisDaemons d;
   const TemporaryDirectory directory;
   check_wrong_usage(
@@ -193,7 +193,7 @@ TEST_CASE("cli: wrong usage is 2") {
       });
 }
 
-TEST_CASE("cli: no option takes an empty text for a number") {
+TEST_CASE("cli: no option accepts an empty text as a number") {
   const ThesisDaemons d;
   check_wrong_usage(
       d.domain,
@@ -228,7 +228,7 @@ TEST_CASE("cli: no option takes an empty text for a number") {
       });
 }
 
-TEST_CASE("cli: no answer is 3") {
+TEST_CASE("cli: commands exit with 3 if no partition answers") {
   const TestDomain domain;
   const std::vector<Arguments> commands = {
       {"tree"},        {"frames"},           {"partitions"},
@@ -246,7 +246,7 @@ TEST_CASE("cli: no answer is 3") {
   CHECK(json::parse(program.out).at("error").at("code") == "unreachable");
 }
 
-TEST_CASE("cli: a partition that does not answer is 3 and named") {
+TEST_CASE("cli: commands exit with 3 and name the partition that does not answer") {
   const TestDomain domain;
   const MutePartition mute(domain, "mute", "statue");
   const std::vector<Arguments> commands = {{"update", "statue"},

@@ -1,4 +1,4 @@
-// That a request wakes its owner only: counted below the readers, before the filters.
+// A request wakes only its owner. Counts requests below the readers, before the filters.
 
 #include <memory>
 #include <string>
@@ -25,7 +25,7 @@ struct Counted {
 
 }  // namespace
 
-TEST_CASE("who does not own the frame receives nothing") {
+TEST_CASE("a participant that does not own the frame receives no request") {
   const testing::DomainLease lease;
   const std::uint32_t domain = lease.number();
   Counted owner(domain, "owner", "a");

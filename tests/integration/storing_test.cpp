@@ -90,7 +90,7 @@ Clock::duration longest_silence(Client& client, const std::atomic<bool>& stop) {
 
 }  // namespace
 
-TEST_CASE("storing: of what a full disk does not take nothing is called done, or seen by others") {
+TEST_CASE("storing: changes that a full disk does not take are neither confirmed nor visible") {
   const SmallDisk disk(400);
   if (!disk.mounted()) {
     WARN("SKIPPED: " << disk.missing());
@@ -114,26 +114,26 @@ TEST_CASE("storing: of what a full disk does not take nothing is called done, or
   CHECK(outcome(client.remove("kept")) == "state");
   CHECK(outcome(client.move("kept", "arm")) == "state");
   CHECK(outcome(client.update("kept", along_x(3))) == "state");
-  // Nobody has seen it, so nobody is told that it is there.
+  // The frame is not visible to anybody, so adding it again does not report that it exists.
   CHECK(outcome(client.add(refused, "hand", {})) == "state");
   auto joiner = *Client::open(domain.options());
   CHECK_FALSE(joiner.exists(refused));
   CHECK(joiner.exists("kept"));
 
-  SECTION("it is stored, told and done once there is room") {
+  SECTION("they are stored and published once there is room") {
     disk.make_room();
     CHECK(eventually([&] { return joiner.exists(refused); }));
     CHECK(eventually([&] { return client.remove("kept").has_value(); }));
     there.push_back(refused);
   }
-  SECTION("until then it is lost with the process, and nothing else is") { disk.make_room(); }
+  SECTION("they are lost if the process ends before and nothing else is") { disk.make_room(); }
   arms.restart();
   for (const std::string& id : there) CHECK(eventually([&] { return client.exists(id); }));
   auto fresh = *Client::open(domain.options());
   CHECK_FALSE(fresh.exists("gone"));
 }
 
-TEST_CASE("storing: a removal that was refused has not happened after a kill") {
+TEST_CASE("storing: a rejected removal has not happened after a kill") {
   const SmallDisk disk(400);
   if (!disk.mounted()) {
     WARN("SKIPPED: " << disk.missing());
@@ -184,7 +184,7 @@ Process start_on_slow_disk(const TestDomain& domain, const TemporaryDirectory& f
 }
 #endif
 
-TEST_CASE("storing: with --sync a change is acknowledged when the disk has it") {
+TEST_CASE("storing: with --sync a change is acknowledged after the disk has synced it") {
 #ifndef TFDUDE_SLOW_SYNC
   WARN("SKIPPED: a library cannot be preloaded into a program with sanitizers");
 #else
@@ -202,7 +202,7 @@ TEST_CASE("storing: with --sync a change is acknowledged when the disk has it") 
 #endif
 }
 
-TEST_CASE("storing: lookups and streams go on while the disk takes a second for a sync") {
+TEST_CASE("storing: lookups and streams continue while the disk takes a second for a sync") {
 #ifndef TFDUDE_SLOW_SYNC
   WARN("SKIPPED: a library cannot be preloaded into a program with sanitizers");
 #else

@@ -34,7 +34,8 @@ const Transform kX{exp((Twist() << 0.1, -0.2, 0.3, 0.4, 0.5, -0.6).finished()),
 const Transform kY{exp((Twist() << -0.4, 0.1, 0.2, -0.7, 0.1, 0.9).finished()),
                    *Covariance::from_stddev({6e-3, 1e-3, 2e-3, 1e-3, 3e-3, 2e-3})};
 
-// Who calls: the owner of either partition, with the other in a daemon, or a third process.
+// Which process calls: the owner of one of the partitions (the other is in a daemon), or a third
+// process.
 constexpr int kRobotCalls = 0;
 constexpr int kArmsCall = 1;
 constexpr int kThirdCalls = 2;
@@ -89,7 +90,7 @@ void check_refused(Robot& r, const Result<void>& result, Errc code,
 
 }  // namespace
 
-TEST_CASE("the oracle knows what a lever does to an uncertain heading") {
+TEST_CASE("the oracle propagates an uncertain heading over a lever") {
   Oracle oracle;
   oracle.add("world", "", {});
   oracle.add("turret", "world", {Pose(), *Covariance::from_stddev({0, 0, 0, 0, 0, 0.1})});
@@ -149,7 +150,7 @@ TEST_CASE("processes: frames are added from their owner's process and from other
         "arms");
 }
 
-TEST_CASE("processes: a frame cannot be added below what is not there") {
+TEST_CASE("processes: a frame cannot be added below a parent that does not exist") {
   const int who = GENERATE(0, 1, 2);
   Robot r(who);
   check_refused(r, r.caller().add("tool", "missing", kX), Errc::kUnknownParent,
@@ -161,7 +162,7 @@ TEST_CASE("processes: a frame cannot be added below what is not there") {
   r.check_agreement();
 }
 
-TEST_CASE("processes: a removal takes all below it") {
+TEST_CASE("processes: a removal removes all frames below") {
   const int who = GENERATE(0, 1, 2);
   Robot r(who);
   REQUIRE(r.caller().remove("robot_2"));
@@ -175,7 +176,7 @@ TEST_CASE("processes: a removal takes all below it") {
   check_refused(r, r.caller().remove("arm_left"), Errc::kUnknownFrame, {"arm_left"});
 }
 
-TEST_CASE("processes: a partition that lost all its frames lives on") {
+TEST_CASE("processes: a partition that lost all its frames continues and gets new ones") {
   const int who = GENERATE(0, 1, 2);
   Robot r(who);
   REQUIRE(r.caller().remove("robot_1"));
@@ -238,7 +239,7 @@ TEST_CASE("processes: own, others' and connecting edges are updated") {
                 {"nowhere"});
 }
 
-TEST_CASE("processes: on what one owner confirmed the other can build at once") {
+TEST_CASE("processes: an owner can build at once on what another owner confirmed") {
   const int who = GENERATE(0, 1, 2);
   Robot r(who);
   for (int i = 0; i < 50; ++i) {

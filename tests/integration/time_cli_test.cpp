@@ -69,7 +69,7 @@ TEST_CASE("time: samples are stamped, and looked up at an instant") {
   CHECK(travelled.at("translation").at(0).get<double>() == testing::Approx(1.0));
 }
 
-TEST_CASE("time: negative stamps are before now") {
+TEST_CASE("time: a negative stamp counts back from now") {
   const ThesisDaemons d;
   sample(d, "arm_1", "5", "-2");
   sample(d, "arm_1", "5", "-1");
@@ -83,7 +83,7 @@ TEST_CASE("time: negative stamps are before now") {
   CHECK(std::chrono::steady_clock::now() - start >= std::chrono::milliseconds(300));
 }
 
-TEST_CASE("time: what is no stamp is refused before anything is sent") {
+TEST_CASE("time: an invalid stamp is rejected before anything is sent") {
   const ThesisDaemons d;
   for (const char* stamp : {"", "x", "1.2.3", "--", "99999999999", "0", "1 2"}) {
     INFO(stamp);
@@ -95,7 +95,7 @@ TEST_CASE("time: what is no stamp is refused before anything is sent") {
   CHECK_THAT(text(d, {"history", "arm_1"}), ContainsSubstring("arm_1 is static"));
 }
 
-TEST_CASE("time: histories and rates are shown, with what was refused") {
+TEST_CASE("time: histories and rates are shown with the rejected samples") {
   const ThesisDaemons d;
   for (int i = 0; i < 5; ++i) sample(d, "arm_1", "1", std::to_string(100 + i));
   CHECK(answered(d, {"update", "arm_1", "--stamp", "102"}, 1).at("error").at("code") ==
@@ -128,7 +128,7 @@ TEST_CASE("time: histories and rates are shown, with what was refused") {
   CHECK_THAT(text(d, {"partitions"}), ContainsSubstring(" 5      2.0 KiB"));
 }
 
-TEST_CASE("time: a source whose clock jumps back starts its history again, and the log says so") {
+TEST_CASE("time: a clock that jumps back restarts the history and the daemon logs it") {
   ThesisDaemons d;
   for (const char* stamp : {"1000", "1001", "1002"}) sample(d, "arm_1", "1", stamp);
   // The fifth in a row is believed.
@@ -147,7 +147,7 @@ TEST_CASE("time: a source whose clock jumps back starts its history again, and t
                  ContainsSubstring("jumped back"));
 }
 
-TEST_CASE("time: a watched path shows what is written, and finds its way after a move") {
+TEST_CASE("time: watch shows what is written and follows a frame that is moved") {
   const ThesisDaemons d;
   Process watch = d.domain.start_cli({"--json", "watch", "world", "hand_left", "--rate", "100"});
   REQUIRE(watch.wait_for_line("{\"basis", in_time()));

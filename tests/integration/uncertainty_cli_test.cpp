@@ -20,7 +20,7 @@ using testing::Process;
 using testing::TestDomain;
 using Arguments = std::vector<std::string>;
 
-// Two edges share a source, the third is of unknown correlation; each has an owner of its own.
+// Three edges with an owner each. Two share a source, the third has unknown correlation.
 class Robot {
  public:
   Robot() {
@@ -57,7 +57,7 @@ Arguments with(Arguments arguments, const Arguments& more) {
 
 }  // namespace
 
-TEST_CASE("uncertainty: configured sources and unknown correlation show in lookups over owners") {
+TEST_CASE("uncertainty: lookups over owners use configured sources and unknown correlation") {
   const Robot robot;
   const json to_base = robot.answered({"lookup", "world", "base"});
   CHECK(to_base.at("basis").at("sources") == json({"calibration"}));
@@ -77,7 +77,7 @@ TEST_CASE("uncertainty: configured sources and unknown correlation show in looku
   CHECK(robot.run({"lookup", "world", "arm", "--order", "3"}).status == 2);
 }
 
-TEST_CASE("uncertainty: measurements correct, are gated, and are counted") {
+TEST_CASE("uncertainty: a measurement corrects or is rejected by the gate and is counted") {
   const Robot robot;
   const double before = stddev(robot.answered({"lookup", "world", "arm"}), 0);
   const json observed =
@@ -114,7 +114,7 @@ TEST_CASE("uncertainty: measurements correct, are gated, and are counted") {
   CHECK_THAT(robot.run({"monitor", "--once"}).out, ContainsSubstring("too small"));
 }
 
-TEST_CASE("uncertainty: measurements that cannot be meant are refused") {
+TEST_CASE("uncertainty: invalid measurements are rejected") {
   const Robot robot;
   const CliResult exact = robot.run({"observe", "world", "arm", "--xyz", "1", "1", "0"});
   CHECK(exact.status == 1);

@@ -23,7 +23,7 @@ std::string ready(const TestDomain& domain, const std::vector<std::string>& argu
 
 }  // namespace
 
-TEST_CASE("daemon: it serves robots of URDFs, each with its options") {
+TEST_CASE("daemon: it serves several URDFs each with its own options") {
   const TestDomain domain;
   CHECK(ready(domain, {"--partition", "a", "--urdf", kArm}) == "ready partition=a frames=8");
   CHECK(ready(domain, {"--partition", "b", "--urdf", kArm, "--prefix", "b_", "--urdf", kArm,
@@ -36,7 +36,7 @@ TEST_CASE("daemon: it serves robots of URDFs, each with its options") {
                        "two/", "--strict-limits"}) == "ready partition=c frames=37");
 }
 
-TEST_CASE("daemon: parts of one robot are owned by several") {
+TEST_CASE("daemon: two daemons own the parts of one robot") {
   const TestDomain domain;
   testing::Process body = domain.start_daemon({"--partition", "body", "--urdf", kTwoArms, "--links",
                                                "base_link..left_arm_0_link..right_arm_0_link"});
@@ -51,7 +51,7 @@ TEST_CASE("daemon: parts of one robot are owned by several") {
   CHECK_THAT(result.out, ContainsSubstring("0.100000  0.983325  1.183325"));
 }
 
-TEST_CASE("daemon: options of no URDF, and URDFs that cannot be served, are wrong usage") {
+TEST_CASE("daemon: wrong URDF options and URDFs that cannot be served exit with 2") {
   const TestDomain domain;
   const auto refused = [&](std::vector<std::string> arguments, const std::string& why) {
     arguments.insert(arguments.begin(), {"--partition", "legs"});

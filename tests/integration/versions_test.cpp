@@ -36,8 +36,7 @@ TransportPtr transport_of(const Options& options, const std::string& partition) 
 
 }  // namespace
 
-TEST_CASE(
-    "versions: a daemon of a later major version is named, and nothing is exchanged with it") {
+TEST_CASE("versions: a daemon of a later major version is listed but not used") {
   const testing::DomainLease domain;
   const Options options = local(domain.number());
   auto base = Node::open(transport_of(options, "base"), "base",
@@ -46,7 +45,7 @@ TEST_CASE(
   auto client = Client::open(options);
   REQUIRE(client);
   REQUIRE(client->lookup("world", "mount"));
-  // Of its topics it needs none: who it is stands in DDS's discovery.
+  // It needs none of our topics, because its name and version are announced in DDS's discovery.
   const ForeignWriter later(domain.number(), "tfdude/later",
                             fastdds::edds::TypeSupport(new RawType("later", false)), "", false,
                             {"tfdude serving arm", kLater});
@@ -97,7 +96,7 @@ TEST_CASE("versions: messages of a later major version are ignored") {
   CHECK_FALSE(base->exists("hand"));
 }
 
-TEST_CASE("versions: a request that only a later minor version knows is refused by name") {
+TEST_CASE("versions: a request that only a later minor version knows is rejected by name") {
   const testing::DomainLease domain;
   const Options options = local(domain.number());
   auto base = Node::open(transport_of(options, "base"), "base", {{"world", "", {}}}, options);
@@ -121,7 +120,7 @@ TEST_CASE("versions: a request that only a later minor version knows is refused 
   CHECK(std::get<Error>(reply.body).message == "this kind of request is not known to protocol 1.0");
 }
 
-TEST_CASE("versions: a daemon of a later minor version is one of us") {
+TEST_CASE("versions: a daemon of a later minor version is accepted") {
   const testing::DomainLease domain;
   const Options options = local(domain.number());
   auto client = Client::open(options);
