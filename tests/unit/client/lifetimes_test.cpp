@@ -36,7 +36,7 @@ struct Pair {
   std::unique_ptr<Client> client;
 };
 
-/// Runs something on a thread of its own, and tells whether it has ended.
+/// Runs an action on its own thread, and says whether it has ended.
 class Aside {
  public:
   explicit Aside(const std::function<void()>& action)
@@ -49,7 +49,7 @@ class Aside {
   std::future<void> ended_;
 };
 
-/// A callback that stays where it is until it is let go on.
+/// A callback that waits until it is released.
 struct Held {
   std::atomic<bool> runs{false};
   std::promise<void> go;
@@ -64,7 +64,7 @@ struct Held {
 
 }  // namespace
 
-TEST_CASE("lifetimes: no listener runs once its client has gone, whatever waits to be told") {
+TEST_CASE("lifetimes: no listener runs after its client has ended even if changes wait") {
   Pair pair;
   std::atomic<int> called{0};
   Held held;
@@ -86,7 +86,7 @@ TEST_CASE("lifetimes: no listener runs once its client has gone, whatever waits 
   listening = Subscription();
 }
 
-TEST_CASE("lifetimes: a listener may end its subscription, also after its client has gone") {
+TEST_CASE("lifetimes: a listener may end its client and its subscription") {
   Pair pair;
   std::optional<Subscription> listening;
   std::atomic<int> called{0};
@@ -106,7 +106,7 @@ TEST_CASE("lifetimes: a listener may end its subscription, also after its client
   CHECK(called == 1);
 }
 
-TEST_CASE("lifetimes: after a subscription has ended its listener holds nothing any more") {
+TEST_CASE("lifetimes: an ended subscription releases what its listener holds") {
   Pair pair;
   const auto thing = std::make_shared<int>(0);
   std::atomic<bool> heard{false};
@@ -120,7 +120,7 @@ TEST_CASE("lifetimes: after a subscription has ended its listener holds nothing 
   CHECK(thing.use_count() == 1);
 }
 
-TEST_CASE("lifetimes: who cancels a lookup waits for its callback, and so does the client's end") {
+TEST_CASE("lifetimes: cancelling a lookup and ending its client wait for the callback") {
   Pair pair;
   Held held;
   auto pending =
@@ -133,7 +133,7 @@ TEST_CASE("lifetimes: who cancels a lookup waits for its callback, and so does t
     REQUIRE(cancelling.ended_within(30s));
     CHECK(held.over);
   }
-  // Also where it has cancelled itself before.
+  // Also if the callback has cancelled itself before.
   Held after;
   PendingLookup self;
   std::promise<void> assigned;
@@ -151,7 +151,7 @@ TEST_CASE("lifetimes: who cancels a lookup waits for its callback, and so does t
   CHECK(after.over);
 }
 
-TEST_CASE("lifetimes: the client's end calls off what waits, and answers futures") {
+TEST_CASE("lifetimes: the end of a client drops callbacks and answers futures") {
   Pair pair;
   std::atomic<int> called{0};
   const auto thing = std::make_shared<int>(0);
@@ -167,7 +167,7 @@ TEST_CASE("lifetimes: the client's end calls off what waits, and answers futures
   CHECK(called == 0);
 }
 
-TEST_CASE("lifetimes: a callback may end the client that it is of") {
+TEST_CASE("lifetimes: a callback may end its own client") {
   for (int round = 0; round < 20; ++round) {
     Pair pair;
     std::promise<void> assigned;
@@ -184,7 +184,7 @@ TEST_CASE("lifetimes: a callback may end the client that it is of") {
     done.get_future().wait();
     CHECK(pair.client == nullptr);
   }
-  // What a callback holds goes with it, even the client.
+  // A callback is destroyed with all that it holds, even with the client.
   Pair pair;
   std::shared_ptr<Client> shared = std::move(pair.client);
   const std::weak_ptr<Client> alive = shared;
@@ -195,7 +195,7 @@ TEST_CASE("lifetimes: a callback may end the client that it is of") {
   CHECK(eventually([&] { return alive.expired(); }));
 }
 
-TEST_CASE("lifetimes: callbacks come, go and end each other at any time") {
+TEST_CASE("lifetimes: callbacks start and end each other concurrently") {
   // For ThreadSanitizer and AddressSanitizer.
   for (int round = 0; round < 30; ++round) {
     Pair pair;

@@ -13,7 +13,7 @@
 
 namespace tfdude {
 
-TEST_CASE("node: the name of its partition stays where it is as others appear") {
+TEST_CASE("node: the name of its partition keeps its address as others appear") {
   LoopbackNetwork network;
   const auto node = *Node::open(network.join(), "a_name_that_no_string_holds_in_place");
   const std::string& name = node.partition();
@@ -27,7 +27,7 @@ TEST_CASE("node: the name of its partition stays where it is as others appear") 
   CHECK(node.partition().data() == characters);
 }
 
-TEST_CASE("node: requests that come as it starts are stored beside what it stores itself") {
+TEST_CASE("node: requests during the start are stored together with the configured frames") {
   const testing::TemporaryDirectory directory;
   Options options;
   options.state = directory.path();

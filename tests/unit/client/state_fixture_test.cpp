@@ -1,4 +1,4 @@
-// What versions before this one have stored, of which nothing may be lost.
+// States that earlier versions have stored. Nothing of them may be lost.
 
 #include <algorithm>
 #include <cmath>
@@ -41,7 +41,7 @@ std::vector<double> deviations(const Transform& X) {
 
 }  // namespace
 
-TEST_CASE("a state of format 2 has all that was stored in it") {
+TEST_CASE("a stored state of format 2 has all its content") {
   const TemporaryDirectory directory;
   const auto store = open_sqlite_store(copy_into(directory), "arms");
   REQUIRE(store);
@@ -64,7 +64,7 @@ TEST_CASE("a state of format 2 has all that was stored in it") {
   CHECK(state->joints[0].variance == Approx(0.003 * 0.003));
 }
 
-TEST_CASE("a state and a configuration of format 2 open with all that they had, repeatedly") {
+TEST_CASE("a node opens a state and a configuration of format 2 repeatedly") {
   const TemporaryDirectory directory;
   copy_into(directory);
   Options options;

@@ -1,4 +1,4 @@
-// What a real-time thread sends is not allocated for, down to the transport.
+// Sending from a real-time thread allocates nothing, down to the transport.
 
 #include <memory>
 #include <string>
@@ -24,7 +24,7 @@ using testing::moved_by;
 using testing::Relay;
 using testing::revolute_named;
 
-// Ends where the transport begins.
+// Counts messages in place of the transport.
 struct Port {
   int sent = 0;
   bool takes = true;
@@ -57,7 +57,7 @@ class PortTransport final : public Relay {
   Port& port_;
 };
 
-// Past what fits into a std::string itself.
+// Longer than what a std::string stores without allocation.
 std::string long_name(const std::string& kind, int i) {
   return "the " + kind + " with quite a long name, number " + std::to_string(i);
 }
@@ -75,7 +75,7 @@ std::vector<FrameSpec> frames_of(const std::string& partition) {
 
 }  // namespace
 
-TEST_CASE("try_publish does not allocate before the transport, whatever becomes of it") {
+TEST_CASE("try_publish does not allocate before the transport whatever its result") {
   LoopbackNetwork network;
   Port port;
   Node far = *Node::open(network.join(), "far", frames_of("far"));
@@ -120,7 +120,7 @@ TEST_CASE("try_publish does not allocate before the transport, whatever becomes 
   CHECK(port.sent - before == (takes ? 2000 : 0));
 }
 
-TEST_CASE("try_publish does not allocate while a value is invalid, or when its client has gone") {
+TEST_CASE("try_publish does not allocate for an invalid value or after its client has ended") {
   LoopbackNetwork network;
   Node far = *Node::open(network.join(), "far", frames_of("far"));
   auto client = std::make_unique<Client>(*Client::open(network.join()));

@@ -15,7 +15,7 @@ namespace {
 
 using testing::eventually;
 
-/// As whoever posts has to.
+/// Looks after the callbacks until the condition holds, as the thread that posts must.
 bool looked_after(Callbacks& callbacks, const std::function<bool()>& done) {
   return eventually([&] {
     (void)callbacks.look_after(Callbacks::Clock::now());
@@ -23,7 +23,7 @@ bool looked_after(Callbacks& callbacks, const std::function<bool()>& done) {
   });
 }
 
-TEST_CASE("callbacks: many quick ones are run in order by one thread") {
+TEST_CASE("callbacks: many quick callbacks run in order on one thread") {
   Callbacks callbacks;
   std::mutex mutex;
   std::vector<int> order;
@@ -44,7 +44,7 @@ TEST_CASE("callbacks: many quick ones are run in order by one thread") {
   CHECK_FALSE(callbacks.look_after(Callbacks::Clock::now()));
 }
 
-TEST_CASE("callbacks: those that take long keep no other from being run") {
+TEST_CASE("callbacks: slow callbacks do not keep others from running") {
   Callbacks callbacks;
   std::promise<void> held;
   const auto until = held.get_future().share();
@@ -68,7 +68,7 @@ TEST_CASE("callbacks: those that take long keep no other from being run") {
   CHECK(ended == kSlow);
 }
 
-TEST_CASE("callbacks: after the end none runs, nor what had not begun") {
+TEST_CASE("callbacks: after the end no callback runs and waiting ones are dropped") {
   Callbacks callbacks;
   std::promise<void> begun;
   std::promise<void> held;
@@ -97,7 +97,7 @@ TEST_CASE("callbacks: after the end none runs, nor what had not begun") {
   CHECK(others == 0);
 }
 
-TEST_CASE("callbacks: one of them may end all of them, and go on") {
+TEST_CASE("callbacks: a callback may destroy the queue that runs it") {
   auto callbacks = std::make_unique<Callbacks>();
   std::promise<void> done;
   std::promise<void> ready;

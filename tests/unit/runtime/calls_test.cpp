@@ -21,7 +21,7 @@ std::string error_of(const Calls::Entry& entry) {
   return error == nullptr ? "ok" : std::string(to_string(error->code)) + ": " + error->message;
 }
 
-TEST_CASE("every request of every call has a number of its own, counted from one") {
+TEST_CASE("calls: every request has its own number counted from one") {
   Calls calls;
   const Calls::Call first(calls, {"a", "b"});
   const Calls::Call second(calls, {"a"});
@@ -32,7 +32,7 @@ TEST_CASE("every request of every call has a number of its own, counted from one
   CHECK(first.entries()[1].partition == "b");
 }
 
-TEST_CASE("a call tells from which number on replies are awaited") {
+TEST_CASE("calls: a call knows the lowest number whose reply is still expected") {
   Calls calls;
   auto first = std::make_unique<Calls::Call>(calls, std::vector<std::string>{"a", "b"});
   CHECK(first->awaits_from() == 1);
@@ -43,7 +43,7 @@ TEST_CASE("a call tells from which number on replies are awaited") {
   CHECK(Calls::Call(calls, {"a"}).awaits_from() == 3);
 }
 
-TEST_CASE("a call is complete when every partition has replied, in any order") {
+TEST_CASE("calls: a call is complete when every partition has replied in any order") {
   Calls calls;
   Calls::Call call(calls, {"a", "b"});
   CHECK_FALSE(call.wait_until(kOver));
@@ -57,13 +57,13 @@ TEST_CASE("a call is complete when every partition has replied, in any order") {
   CHECK(call.entries()[1].reply->epoch == 20);
 }
 
-TEST_CASE("a call of nobody is complete at once") {
+TEST_CASE("calls: a call without partitions is complete at once") {
   Calls calls;
   Calls::Call call(calls, {});
   CHECK(call.wait_until(kOver));
 }
 
-TEST_CASE("repeated and unknown replies are dropped") {
+TEST_CASE("calls: repeated and unknown replies are dropped") {
   Calls calls;
   Calls::Call call(calls, {"a"});
   calls.on_reply({0, 99, Done{}});
@@ -74,7 +74,7 @@ TEST_CASE("repeated and unknown replies are dropped") {
   CHECK(call.entries()[0].reply->epoch == 1);
 }
 
-TEST_CASE("a reply that comes after its call is over reaches nobody") {
+TEST_CASE("calls: a reply that comes after its call has ended is dropped") {
   Calls calls;
   Calls::Entry over;
   {
@@ -87,7 +87,7 @@ TEST_CASE("a reply that comes after its call is over reaches nobody") {
   CHECK(next.waits(0));
 }
 
-TEST_CASE("what is given up has its error, unless the reply has come") {
+TEST_CASE("calls: a request that is given up gets its error unless the reply has come") {
   Calls calls;
   Calls::Call call(calls, {"a", "b"});
   calls.on_reply(reply_to(call.entries()[0], 1));
@@ -101,7 +101,7 @@ TEST_CASE("what is given up has its error, unless the reply has come") {
   CHECK(call.wait_until(kOver));
 }
 
-TEST_CASE("the loss of a partition fails what waits for it, in all calls, and nothing else") {
+TEST_CASE("calls: the loss of a partition fails only the requests that wait for it") {
   Calls calls;
   Calls::Call first(calls, {"a", "b", "a"});
   Calls::Call second(calls, {"b", "c"});

@@ -11,7 +11,7 @@ namespace {
 // Far enough that it is only reached where a reply got lost.
 Calls::Clock::time_point far() { return Calls::Clock::now() + std::chrono::seconds(60); }
 
-TEST_CASE("a waiting call is woken by its last reply") {
+TEST_CASE("calls: a waiting call is woken by its last reply") {
   Calls calls;
   Calls::Call call(calls, {"a", "b"});
   std::thread replier([&calls, &entries = call.entries()] {
@@ -21,7 +21,7 @@ TEST_CASE("a waiting call is woken by its last reply") {
   replier.join();
 }
 
-TEST_CASE("a waiting call is woken by the loss of the last partition it waits for") {
+TEST_CASE("calls: a waiting call is woken by the loss of the last partition it waits for") {
   Calls calls;
   Calls::Call call(calls, {"a"});
   std::thread loser([&calls] { calls.on_lost("a"); });
@@ -29,7 +29,7 @@ TEST_CASE("a waiting call is woken by the loss of the last partition it waits fo
   loser.join();
 }
 
-TEST_CASE("many calls at once each get their own replies") {
+TEST_CASE("calls: many concurrent calls each get their own replies") {
   constexpr std::uint32_t kCalls = 2000;
   constexpr std::uint32_t kCallers = 3;
   Calls calls;

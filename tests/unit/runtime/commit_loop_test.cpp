@@ -22,7 +22,7 @@ using testing::in_time;
 
 constexpr std::chrono::milliseconds kNever{3600000};
 
-// What was done, in order, by whichever thread.
+// What any thread did, in order.
 class Log {
  public:
   void add(const std::string& line) {
@@ -43,13 +43,13 @@ class Log {
   std::vector<std::string> lines_;
 };
 
-// A disk that may be full, or stand still.
+// A disk that may be full, or block.
 struct Disk {
   std::mutex mutex;
   std::condition_variable changed;
   bool full = false;
   bool stands_still = false;
-  std::atomic<int> writes{0};  // begun, the one of the start among them
+  std::atomic<int> writes{0};  // begun, including the one at the start
 
   void set(bool Disk::*what, bool value) {
     {
@@ -91,7 +91,7 @@ class FakeStore final : public StateStore {
   Log& log_;
 };
 
-// One who has changed frames, each of which has a page of its own.
+// An owner of changed frames. Each frame has its own page.
 class Changer final : public CommitLoop::Effects {
  public:
   explicit Changer(Log& log) : log_(log) {}
@@ -196,8 +196,7 @@ TEST_CASE("commit loop: stores, then publishes, then replies") {
   CHECK(owner.done() == std::vector<std::string>{"store hand", "publish hand", "reply 1: done"});
 }
 
-TEST_CASE(
-    "commit loop: what comes while the disk stands still waits together, and holds nobody up") {
+TEST_CASE("commit loop: changes that come while the disk blocks are stored together") {
   Running owner;
   owner.disk.set(&Disk::stands_still, true);
   owner.change("a", 1);
@@ -214,7 +213,7 @@ TEST_CASE(
   CHECK(stored == 2);
 }
 
-TEST_CASE("commit loop: of what could not be stored nothing is published or called done") {
+TEST_CASE("commit loop: changes that could not be stored are neither published nor confirmed") {
   Running owner;
   owner.disk.set(&Disk::full, true);
   owner.change("hand", 1);
@@ -227,7 +226,7 @@ TEST_CASE("commit loop: of what could not be stored nothing is published or call
   CHECK(flushed.error().code == Errc::kState);
   CHECK_THAT(flushed.error().message, ContainsSubstring("the disk is full"));
 
-  // A rejection rests on what is not stored as well.
+  // A rejection may depend on a change that is not stored, so it is not sent either.
   owner.ask(Reply{2, 0, Error{Errc::kAlreadyExists, "it exists"}});
   REQUIRE(eventually([&] { return owner.replied(2, "the disk is full"); }));
 
@@ -238,7 +237,7 @@ TEST_CASE("commit loop: of what could not be stored nothing is published or call
   CHECK(eventually([&] { return !owner.loop.failure(); }));
 }
 
-TEST_CASE("commit loop: what could not be stored is tried again by itself") {
+TEST_CASE("commit loop: changes that could not be stored are retried without a request") {
   Running owner({std::chrono::milliseconds(1), kNever, std::chrono::milliseconds(5)});
   owner.disk.set(&Disk::full, true);
   SECTION("changes") {
@@ -257,7 +256,7 @@ TEST_CASE("commit loop: what could not be stored is tried again by itself") {
   CHECK(owner.log.has("publish hand"));
 }
 
-TEST_CASE("commit loop: values are stored from time to time, and at the end") {
+TEST_CASE("commit loop: values are stored periodically and at the end") {
   Log log;
   Disk disk;
   Changer changer(log);
@@ -272,7 +271,7 @@ TEST_CASE("commit loop: values are stored from time to time, and at the end") {
   CHECK(log.has("store 1 values"));
 }
 
-TEST_CASE("commit loop: whoever waits longer than its time is told so, and not that it is done") {
+TEST_CASE("commit loop: a flush times out while the disk blocks") {
   Running owner;
   owner.disk.set(&Disk::stands_still, true);
   owner.changer.change("hand");
@@ -281,7 +280,7 @@ TEST_CASE("commit loop: whoever waits longer than its time is told so, and not t
   CHECK(flushed.error().code == Errc::kTimeout);
 }
 
-TEST_CASE("commit loop: whoever has given up stores nothing, and says so") {
+TEST_CASE("commit loop: an owner that lost its partition stores nothing and says so") {
   Running owner;
   owner.changer.give_up();
   owner.change("hand", 1);

@@ -10,7 +10,7 @@ using Clock = Deadline::Clock;
 
 const Clock::time_point kNow{1000s};
 
-TEST_CASE("deadline: it is over when the wait is, and a negative wait is over at once") {
+TEST_CASE("deadline: it ends after the wait and at once for a negative wait") {
   const Deadline deadline(50ms, kNow);
   CHECK(deadline.at() == kNow + 50ms);
   CHECK_FALSE(deadline.over(kNow + 49ms));
@@ -20,7 +20,7 @@ TEST_CASE("deadline: it is over when the wait is, and a negative wait is over at
   CHECK(Deadline(Milliseconds::min(), kNow).at() == kNow);
 }
 
-TEST_CASE("deadline: a wait beyond the clock's range has no end, at any time") {
+TEST_CASE("deadline: a wait beyond the clock's range has no end") {
   for (const Clock::time_point now :
        {Clock::time_point(), kNow, Clock::time_point::max() - 1ms, Clock::time_point::max()}) {
     CHECK(Deadline(Milliseconds::max(), now).at() == Clock::time_point::max());
@@ -30,7 +30,7 @@ TEST_CASE("deadline: a wait beyond the clock's range has no end, at any time") {
   CHECK_FALSE(Deadline(Milliseconds::max()).over());
 }
 
-TEST_CASE("deadline: what is within another is never later than that") {
+TEST_CASE("deadline: a deadline within another one never ends later") {
   const Deadline call(50ms, kNow);
   CHECK(call.within(20ms, kNow).at() == kNow + 20ms);
   CHECK(call.within(20ms, kNow).text() == "20 ms");

@@ -1,4 +1,4 @@
-// Whether what a new participant does not know is known not to exist.
+// When a new participant may say that something unknown does not exist.
 
 #include "runtime/discovery.hpp"
 
@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 using testing::ContainsSubstring;
 using testing::quick;
 
-/// Somebody may still be discovered.
+/// A transport that may not have discovered all participants yet.
 class Meeting final : public testing::Relay {
  public:
   using Relay::Relay;
@@ -48,7 +48,7 @@ Result<int> missing() { return fail(Errc::kUnknownFrame, "no frame 'hand'"); }
 
 }  // namespace
 
-TEST_CASE("discovery: without other participants, it is complete after the discovery time") {
+TEST_CASE("discovery: without other participants it is complete after the discovery time") {
   Joiner joiner;
   const auto before = Deadline::Clock::now();
   CHECK_FALSE(joiner.rig.discovery.complete());
@@ -79,8 +79,9 @@ TEST_CASE("discovery: no negative answer before all participants are discovered"
   CHECK(joiner.rig.discovery.await(soon));
 }
 
-// A transport may hold one lock here and where it reports a presence, which takes the structure's.
-TEST_CASE("discovery: the transport is asked without the lock of the structure") {
+// A transport may take the same lock for this call and when it reports a presence, and the latter
+// takes the structure's lock.
+TEST_CASE("discovery: the transport is called without the lock of the structure") {
   Options options = quick();
   options.discovery = 10s;
   Joiner joiner(options);
@@ -124,7 +125,7 @@ TEST_CASE("discovery: an operation is repeated until its missing frame has arriv
   CHECK(tries > 1);
 }
 
-TEST_CASE("discovery: an error that is not of what is unknown is returned at once") {
+TEST_CASE("discovery: an error that more discovery cannot change is returned at once") {
   Joiner joiner;
   int tries = 0;
   const auto found =
@@ -136,7 +137,7 @@ TEST_CASE("discovery: an error that is not of what is unknown is returned at onc
   CHECK(tries == 1);
 }
 
-TEST_CASE("discovery: a change that an owner has told of and has not come is waited for") {
+TEST_CASE("discovery: it waits for a change that an owner has announced but that has not arrived") {
   Joiner joiner;
   joiner.meeting.met_all = true;
   joiner.rig.on_presence(testing::presence_of("arm", 1, 1));

@@ -49,7 +49,7 @@ class Heard {
   bool held_ = false;
 };
 
-TEST_CASE("each listener hears each change, in order, from when it listens") {
+TEST_CASE("events: each listener gets each change in order from when it subscribes") {
   Heard first;
   Heard second;
   Events events;
@@ -64,7 +64,7 @@ TEST_CASE("each listener hears each change, in order, from when it listens") {
   CHECK(second.frames() == std::vector<std::string>{"c"});
 }
 
-TEST_CASE("who has ended its subscription is not called any more, nor under way") {
+TEST_CASE("events: unsubscribing waits for the listener that runs and ends all calls to it") {
   Heard heard;
   Events events;
   const auto subscriber = events.subscribe(heard.callback());
@@ -87,7 +87,7 @@ TEST_CASE("who has ended its subscription is not called any more, nor under way"
   CHECK(heard.frames() == before);
 }
 
-TEST_CASE("a listener may end its own subscription") {
+TEST_CASE("events: a listener may end its own subscription") {
   Events events;
   std::uint64_t self = 0;
   std::atomic<int> calls{0};
@@ -102,7 +102,7 @@ TEST_CASE("a listener may end its own subscription") {
   CHECK(calls == 1);
 }
 
-TEST_CASE("of changes beyond what may wait the number is told") {
+TEST_CASE("events: a listener is told the number of changes that were dropped") {
   Heard heard;
   Events events;
   (void)events.subscribe(heard.callback());

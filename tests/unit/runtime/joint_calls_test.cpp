@@ -1,4 +1,4 @@
-// Positions of joints, to who has them and from others.
+// Positions of joints: sent to their owners, and received.
 
 #include "runtime/joint_calls.hpp"
 
@@ -34,7 +34,7 @@ std::vector<FrameSpec> arm() {
 
 }  // namespace
 
-TEST_CASE("joints: an update and a sample reach who has the joint") {
+TEST_CASE("joints: an update and a sample reach the owner of the joint") {
   LoopbackNetwork network;
   ScriptedOwner owner(network, "arm", arm());
   Mover mover(network);
@@ -48,7 +48,7 @@ TEST_CASE("joints: an update and a sample reach who has the joint") {
   CHECK(listed->front().position == 0.25);
 }
 
-TEST_CASE("joints: of one that nobody has that is said, and the others are sent") {
+TEST_CASE("joints: an unknown joint is reported and the others are published") {
   LoopbackNetwork network;
   ScriptedOwner owner(network, "arm", arm());
   Mover mover(network);
@@ -59,7 +59,7 @@ TEST_CASE("joints: of one that nobody has that is said, and the others are sent"
   CHECK(owner.node().joints("arm")->at(0).position == 0.25);
 }
 
-TEST_CASE("joints: an owner that is gone gets nothing, and is named") {
+TEST_CASE("joints: an unreachable owner is named and gets nothing") {
   LoopbackNetwork network;
   ScriptedOwner owner(network, "arm", arm());
   Mover mover(network);
@@ -71,7 +71,7 @@ TEST_CASE("joints: an owner that is gone gets nothing, and is named") {
   CHECK(outcome(mover.calls.update({{{"elbow", 0.25}}, {}})) == "unreachable");
 }
 
-TEST_CASE("joints: a list that is longer than one reply is asked for in parts") {
+TEST_CASE("joints: a list that is longer than one reply is requested in parts") {
   constexpr std::size_t kAll = kMaxItems + 904;
   LoopbackNetwork network;
   ScriptedOwner owner(
@@ -93,7 +93,7 @@ TEST_CASE("joints: a list that is longer than one reply is asked for in parts") 
   CHECK(listed->back().name == std::to_string(10000 + kAll - 1));
 }
 
-TEST_CASE("joints: a list that does not go on is not asked for without end") {
+TEST_CASE("joints: a list that does not advance is not requested without end") {
   LoopbackNetwork network;
   ScriptedOwner owner(network, "arm", arm(),
                       [](Transport& transport, const PeerId& from, const Request& request) {

@@ -1,4 +1,4 @@
-// Where one frame is seen from another: what is known here, and what the owners answer.
+// Lookups: local edges, and the answers of owners.
 
 #include "runtime/lookups.hpp"
 
@@ -41,7 +41,7 @@ const std::vector<FrameSpec> kArm{{"arm", "mount", along_x(2)}, {"hand", "arm", 
 
 }  // namespace
 
-TEST_CASE("lookups: all owners of a path are asked at once, each once") {
+TEST_CASE("lookups: each owner of a path is asked exactly once") {
   LoopbackNetwork network;
   const ScriptedOwner base(network, "base", kBase);
   const ScriptedOwner arm(network, "arm", kArm);
@@ -49,7 +49,7 @@ TEST_CASE("lookups: all owners of a path are asked at once, each once") {
   CHECK(x_of(seeker.lookups.lookup<std::string_view>("world", "hand")) == 7);
   CHECK(base.asked() == 1);
   CHECK(arm.asked() == 1);
-  // What is of one owner is that owner's alone.
+  // For edges of one owner only that owner is asked.
   CHECK(x_of(seeker.lookups.lookup<std::string_view>("arm", "hand")) == 4);
   CHECK(base.asked() == 1);
   const auto world = seeker.structure.forest.find("world");
@@ -70,7 +70,7 @@ TEST_CASE("lookups: an owner that does not answer is named at the deadline") {
   CHECK_THAT(found.error().message, ContainsSubstring("'arm'"));
 }
 
-TEST_CASE("lookups: one that waits is answered when the frame has come") {
+TEST_CASE("lookups: a waiting lookup is answered when the frame has arrived") {
   LoopbackNetwork network;
   const ScriptedOwner base(network, "base", kBase);
   Seeker seeker(network);
@@ -82,7 +82,7 @@ TEST_CASE("lookups: one that waits is answered when the frame has come") {
   CHECK(x_of(seeker.lookups.wait("world", "hand", Query{}, 20s)) == 7);
 }
 
-TEST_CASE("lookups: a wait that is over says what is missing") {
+TEST_CASE("lookups: a lookup whose wait is over names what is missing") {
   LoopbackNetwork network;
   const ScriptedOwner base(network, "base", kBase);
   Seeker seeker(network);
@@ -91,7 +91,7 @@ TEST_CASE("lookups: a wait that is over says what is missing") {
   CHECK_THAT(found.error().message, ContainsSubstring("'hand'"));
 }
 
-TEST_CASE("lookups: one that is cancelled calls nobody") {
+TEST_CASE("lookups: a cancelled lookup does not run its callback") {
   LoopbackNetwork network;
   const ScriptedOwner base(network, "base", kBase);
   Seeker seeker(network);

@@ -1,4 +1,4 @@
-// Measurements of paths over owners that refuse, write meanwhile, or leave.
+// Measurements of paths over owners that reject, write in the meantime, or leave.
 
 #include "runtime/observations.hpp"
 
@@ -55,7 +55,7 @@ TEST_CASE("observations: a measurement corrects the edges of all owners of its p
   CHECK(consistency->size() == 1);
 }
 
-TEST_CASE("observations: one whose edge was written meanwhile is made once more") {
+TEST_CASE("observations: an observation is repeated if an edge was written in the meantime") {
   LoopbackNetwork network;
   std::atomic<int> revisions{0};
   ScriptedOwner arm(
@@ -72,7 +72,7 @@ TEST_CASE("observations: one whose edge was written meanwhile is made once more"
   CHECK(revisions == 2);
 }
 
-TEST_CASE("observations: where one owner has applied its part and another refuses, that is said") {
+TEST_CASE("observations: the error says how many owners have applied their part") {
   LoopbackNetwork network;
   const ScriptedOwner arm(network, "arm", kArm);
   const ScriptedOwner base(
@@ -89,7 +89,7 @@ TEST_CASE("observations: where one owner has applied its part and another refuse
                  ContainsSubstring("1 of 2 partitions have applied their part"));
 }
 
-TEST_CASE("observations: what is no measurement is refused before anybody is asked") {
+TEST_CASE("observations: an invalid measurement is rejected before any owner is asked") {
   LoopbackNetwork network;
   const ScriptedOwner base(network, "base", kBase);
   const ScriptedOwner arm(network, "arm", kArm);

@@ -11,14 +11,14 @@ const OpenGroups::Clock::time_point kStart{};
 
 }  // namespace
 
-TEST_CASE("open groups: one that is used stays open") {
+TEST_CASE("open groups: a group that is used stays open") {
   OpenGroups open;
   open.insert(1, kStart);
   CHECK(open.take_unused({1}, kStart + 1h).empty());
   CHECK(open.contains(1));
 }
 
-TEST_CASE("open groups: one that is not used any more stays open for a while") {
+TEST_CASE("open groups: an unused group stays open for a while") {
   OpenGroups open;
   open.insert(1, kStart);
   CHECK(open.take_unused({1}, kStart + 1h).empty());
@@ -29,7 +29,7 @@ TEST_CASE("open groups: one that is not used any more stays open for a while") {
   CHECK(open.take_unused({}, kStart + 2h).empty());
 }
 
-TEST_CASE("open groups: of many unused ones the longest unused are closed first") {
+TEST_CASE("open groups: too many unused groups are closed starting with the longest unused") {
   OpenGroups open;
   const std::uint64_t count = OpenGroups::kMostUnused + 2;
   for (std::uint64_t group = 0; group < count; ++group) {

@@ -1,4 +1,4 @@
-// Owners that keep their state, and clients, all at once in one process: for ThreadSanitizer.
+// Owners with a store and clients, all concurrent in one process: for ThreadSanitizer.
 
 #include <algorithm>
 #include <atomic>
@@ -33,8 +33,8 @@ std::vector<std::string> structure(Client& client) {
   return lines;
 }
 
-// What one caller does: to its own frames, so that it knows what must succeed, and to one that all
-// fight over.
+// The work of one caller: on its own frames, where every call must succeed, and on a frame that all
+// callers change.
 void work(Client& client, const std::string& name, std::uint64_t seed, std::string& wrong) {
   Random random(seed);
   const auto expect = [&wrong](const auto& result) {
@@ -58,7 +58,7 @@ void work(Client& client, const std::string& name, std::uint64_t seed, std::stri
 
 }  // namespace
 
-TEST_CASE("owners that store and tell, and clients that change everything, agree at the end") {
+TEST_CASE("threads: owners with a store and clients agree after concurrent changes") {
   const TemporaryDirectory directory;
   Options options;
   options.state = directory.path();

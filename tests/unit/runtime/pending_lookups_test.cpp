@@ -1,4 +1,4 @@
-// Lookups that wait for what is not there yet.
+// Lookups that wait for frames or samples.
 
 #include <algorithm>
 #include <atomic>
@@ -48,7 +48,7 @@ std::size_t threads() {
   return static_cast<std::size_t>(std::distance(begin(all), end(all)));
 }
 
-/// How long it takes at best, of some times: on a busy machine any may take longer.
+/// The shortest time of several runs, because any run may take longer on a busy machine.
 template <class Action>
 Clock::duration quickest(Action action) {
   auto best = Clock::duration::max();
@@ -100,7 +100,7 @@ struct Robot {
 
 }  // namespace
 
-TEST_CASE("lookups: a thousand that wait need one thread, and all are answered") {
+TEST_CASE("lookups: a thousand waiting lookups need one thread and all are answered") {
   Robot robot;
   const std::size_t before = threads();
   std::vector<std::future<Result<StampedTransform>>> futures;
@@ -121,7 +121,7 @@ TEST_CASE("lookups: a thousand that wait need one thread, and all are answered")
   CHECK(eventually([&] { return threads() <= before + 2; }));
 }
 
-TEST_CASE("lookups: what the own process writes ends the wait, without asking anybody") {
+TEST_CASE("lookups: a write of the own process answers a waiting lookup") {
   Robot robot;
   REQUIRE(robot.base->update("base", along_x(1), Time(1s)));
   auto own = robot.base->lookup_async("world", "base", at(2000), kForEver);
@@ -130,13 +130,13 @@ TEST_CASE("lookups: what the own process writes ends the wait, without asking an
   CHECK(own.get()->pose.translation().x() == Approx(2));
 }
 
-TEST_CASE("lookups: who has not what is wanted is asked less and less often") {
+TEST_CASE("lookups: an owner without the requested sample is asked less and less often") {
   Robot robot;
   REQUIRE(robot.arm->update("arm", along_x(1), Time(1s)));
   REQUIRE(robot.arm->update("hand", along_x(1), Time(1s)));
   const int before = robot.ear->requests;
   CHECK(outcome(robot.client->lookup("arm", "hand", at(2000), 1000ms)) == "not_yet");
-  // 1 ms after each other at first, 50 ms at last; each asked again where the reply is late.
+  // Every 1 ms at first and every 50 ms at last. A request is repeated if its reply is late.
   const int asked = robot.ear->requests - before;
   CHECK(asked > 10);
   CHECK(asked < 100);
@@ -145,7 +145,7 @@ TEST_CASE("lookups: who has not what is wanted is asked less and less often") {
   CHECK(later.get()->pose.translation().x() == Approx(2));
 }
 
-TEST_CASE("lookups: a wait that is over is over, whoever does not answer") {
+TEST_CASE("lookups: a lookup ends at its maximum wait although an owner does not respond") {
   Options options;
   options.timeout = Milliseconds(20000);
   Robot robot(options);
@@ -163,7 +163,7 @@ TEST_CASE("lookups: a wait that is over is over, whoever does not answer") {
           REQUIRE(outcome(found) == "timeout");
         }) < 70ms);
   CHECK_THAT(found.error().message, ContainsSubstring("did not answer within 50 ms"));
-  // Also where the call may take longer than one attempt to ask.
+  // Also if the wait is longer than the time-out of one request.
   options.timeout = Milliseconds(20);
   Robot hasty(options);
   hasty.ear->deaf = true;
@@ -176,7 +176,7 @@ TEST_CASE("lookups: a wait that is over is over, whoever does not answer") {
   CHECK(waits.get());
 }
 
-TEST_CASE("lookups: before all were met a frame is not called unknown") {
+TEST_CASE("lookups: a frame is not called unknown before all participants are discovered") {
   Robot robot;
   robot.ear->met_all = false;
   Result<StampedTransform> found;
@@ -192,7 +192,7 @@ TEST_CASE("lookups: before all were met a frame is not called unknown") {
   CHECK(outcome(robot.client->lookup("world", "nobody", {}, 50ms)) == "unknown_end");
 }
 
-TEST_CASE("lookups: a call without a wait has a bound, too, and says what it lacked") {
+TEST_CASE("lookups: every call without a wait times out and never reports unknown too early") {
   Options options;
   options.timeout = Milliseconds(50);
   options.discovery = Milliseconds(0);
@@ -243,7 +243,7 @@ TEST_CASE("lookups: a call without a wait has a bound, too, and says what it lac
   CHECK(deaf([&](Client& c) { return c.update_partial(raised); }) == "timeout");
   CHECK(deaf([](Client& c) { return c.lookup("world", Query{}, "hand", Query{}, "arm"); }) ==
         "timeout");
-  // Three time-outs after discovery what is known has to do.
+  // Three time-outs after the start, the client answers from what it knows.
   Robot robot(options);
   robot.ear->met_all = false;
   CHECK_FALSE(robot.client->exists("nobody"));
@@ -251,7 +251,7 @@ TEST_CASE("lookups: a call without a wait has a bound, too, and says what it lac
   CHECK(outcome(robot.client->lookup("world", "nobody")) == "unknown_end");
 }
 
-TEST_CASE("lookups: to cancel one takes no time, and it is not answered") {
+TEST_CASE("lookups: cancelling takes no time and the callback does not run") {
   Robot robot;
   robot.ear->deaf = true;
   std::atomic<int> called{0};
@@ -268,7 +268,7 @@ TEST_CASE("lookups: to cancel one takes no time, and it is not answered") {
   CHECK(called == 0);
 }
 
-TEST_CASE("lookups: a callback that takes long delays no other lookup") {
+TEST_CASE("lookups: a slow callback does not delay other lookups") {
   Robot robot;
   std::promise<void> held;
   const auto until = held.get_future().share();
@@ -289,7 +289,7 @@ TEST_CASE("lookups: a callback that takes long delays no other lookup") {
   held.set_value();
 }
 
-TEST_CASE("lookups: a handle of one client is that of no frame to another") {
+TEST_CASE("lookups: a handle of one client is invalid for another") {
   Robot robot;
   for (Client* client : std::vector<Client*>{&*robot.base, &*robot.arm, &*robot.client}) {
     for (Client* other : std::vector<Client*>{&*robot.base, &*robot.arm, &*robot.client}) {

@@ -52,7 +52,7 @@ Request watch_hand() {
 
 }  // namespace
 
-TEST_CASE("watcher: a watched path follows what its owner writes, without another request") {
+TEST_CASE("watcher: a watched path follows what its owner writes") {
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", kArm);
   WatchingRig rig(network);
@@ -67,7 +67,7 @@ TEST_CASE("watcher: a watched path follows what its owner writes, without anothe
   CHECK(rig.watcher.on_pushed({}));
 }
 
-TEST_CASE("watcher: rates that no owner could keep are refused") {
+TEST_CASE("watcher: a rate outside the limits is rejected") {
   LoopbackNetwork network;
   const ScriptedOwner arm(network, "arm", kArm);
   WatchingRig rig(network);
@@ -79,7 +79,7 @@ TEST_CASE("watcher: rates that no owner could keep are refused") {
   CHECK(arm.asked() == 0);
 }
 
-TEST_CASE("watcher: a path of which an owner pushes nothing is not live by the deadline") {
+TEST_CASE("watcher: a watch times out and names the owner that does not answer") {
   LoopbackNetwork network;
   const ScriptedOwner arm(network, "arm", kArm,
                           [](Transport&, const PeerId&, const Request&) { return true; });
@@ -90,7 +90,7 @@ TEST_CASE("watcher: a path of which an owner pushes nothing is not live by the d
   CHECK(outcome(rig.watcher.watch("arm", "foot", {})) == "unknown_end");
 }
 
-TEST_CASE("watcher: a path is followed where its frame has moved to") {
+TEST_CASE("watcher: a watched path follows a frame that is moved") {
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", kArm);
   WatchingRig rig(network);
@@ -102,7 +102,7 @@ TEST_CASE("watcher: a path is followed where its frame has moved to") {
   CHECK(eventually([&] { return seen(**path) == 2; }));
 }
 
-TEST_CASE("pushing: who watches is answered with all values, and told what is written") {
+TEST_CASE("pushing: a watcher gets all values in the reply and later ones pushed") {
   LoopbackNetwork network;
   std::atomic<double> pushed{0};
   Rig owner(network.join(), "arm");

@@ -46,7 +46,7 @@ struct PushingOwner {
   Forest forest;
   std::mutex mutex;
   std::map<std::uint64_t, std::vector<std::optional<Time>>> pushed;
-  std::set<std::uint64_t> open;  // for which the transport would have a writer
+  std::set<std::uint64_t> open;  // groups for which the transport would have a writer
   std::set<std::uint64_t> writers() {
     const std::lock_guard lock(mutex);
     return open;
@@ -60,11 +60,11 @@ struct PushingOwner {
 
 }  // namespace
 
-TEST_CASE("nothing is pushed that nobody watches, and every sample that somebody does") {
+TEST_CASE("pusher: every sample of a watched edge is pushed and nothing of other edges") {
   PushingOwner owner;
   for (int t = 1; t <= 100; ++t) REQUIRE(owner.forest.update("hand", along_x(t), ms(t)));
   REQUIRE(owner.pusher.watch(1, {{kHand}}));
-  // The newest, as those before were written for nobody.
+  // Only the newest: nobody watched when the earlier ones were written.
   REQUIRE(eventually([&] { return owner.count(1) == 1; }));
   CHECK(owner.pushed[1].at(0) == ms(100));
   for (int t = 101; t <= 200; ++t) REQUIRE(owner.forest.update("hand", along_x(t), ms(t)));
@@ -80,7 +80,7 @@ TEST_CASE("nothing is pushed that nobody watches, and every sample that somebody
   CHECK(owner.count(1) == 101);
 }
 
-TEST_CASE("a rate is kept, and the newest comes in the end") {
+TEST_CASE("pusher: a group is pushed no faster than its rate and ends with the newest sample") {
   PushingOwner owner;
   REQUIRE(owner.pusher.watch(1, {{kHand}, false, 50ms}));
   REQUIRE(eventually([&] { return owner.count(1) == 1; }));
@@ -98,7 +98,7 @@ TEST_CASE("a rate is kept, and the newest comes in the end") {
   CHECK(owner.count(1) <= static_cast<std::size_t>(over / 50ms) + 3);
 }
 
-TEST_CASE("who asks for a frame that is not owned is refused, and costs nothing") {
+TEST_CASE("pusher: a watch of an edge that is not owned is rejected and opens no group") {
   PushingOwner owner;
   CHECK(outcome(owner.pusher.watch(1, {{{"arm", "nobody"}}})) == "not_owner");
   REQUIRE(owner.forest.update("hand", along_x(1), ms(1)));
@@ -107,7 +107,7 @@ TEST_CASE("who asks for a frame that is not owned is refused, and costs nothing"
   CHECK(owner.count(1) == 0);
 }
 
-TEST_CASE("a group whose frame has gone is ended, also while it is pushed to") {
+TEST_CASE("pusher: a group ends with its frame even while it is being pushed to") {
   PushingOwner owner;
   for (int i = 0; i < 100; ++i) {
     REQUIRE(owner.pusher.watch(1, {{kHand}}));
@@ -119,7 +119,7 @@ TEST_CASE("a group whose frame has gone is ended, also while it is pushed to") {
   }
 }
 
-TEST_CASE("of a thousand groups that nobody renews no writer is left") {
+TEST_CASE("pusher: no writer is left of a thousand groups that nobody renews") {
   PushingOwner owner;
   for (std::uint64_t group = 1; group <= 1000; ++group) {
     REQUIRE(owner.pusher.watch(group, {{kHand}}));
@@ -128,17 +128,17 @@ TEST_CASE("of a thousand groups that nobody renews no writer is left") {
   REQUIRE(eventually([&] { return owner.writers().empty(); }));
 }
 
-TEST_CASE("who begins to listen late is told all once more") {
+TEST_CASE("pusher: a watcher that matches late gets all values again") {
   PushingOwner owner;
   REQUIRE(owner.pusher.watch(1, {{kArm, kHand}}));
   REQUIRE(eventually([&] { return owner.count(1) == 2; }));
   owner.pusher.tell_all(1);
-  owner.pusher.tell_all(2);  // of nobody
+  owner.pusher.tell_all(2);  // a group that does not exist
   REQUIRE(eventually([&] { return owner.count(1) == 4; }));
   CHECK(owner.count(2) == 0);
 }
 
-TEST_CASE("a period without an end is refused") {
+TEST_CASE("pusher: a period above the maximum is rejected") {
   PushingOwner owner;
   CHECK(outcome(owner.pusher.watch(1, {{kHand}, false, std::chrono::nanoseconds::max()})) ==
         "invalid_input");

@@ -1,4 +1,4 @@
-// What is known of frames and partitions besides their values.
+// Queries about frames and partitions, except for their values.
 
 #include "runtime/queries.hpp"
 
@@ -26,7 +26,7 @@ struct Asker : Rig {
 
 }  // namespace
 
-TEST_CASE("queries: frames, their parents, children and owners") {
+TEST_CASE("queries: frames have their parents and children and owners") {
   LoopbackNetwork network;
   const ScriptedOwner base(network, "base", {{"world", "", {}}, {"mount", "world", {}}});
   const ScriptedOwner arm(network, "arm", {{"hand", "mount", {}}});
@@ -49,7 +49,7 @@ TEST_CASE("queries: frames, their parents, children and owners") {
   CHECK(asker.queries.own_frames() == 0);
 }
 
-TEST_CASE("queries: what is not there is denied once all are known, and not before") {
+TEST_CASE("queries: a frame is called unknown only after all owners are known") {
   LoopbackNetwork network;
   const ScriptedOwner base(network, "base", {{"world", "", {}}});
   Asker asker(network);
@@ -57,14 +57,14 @@ TEST_CASE("queries: what is not there is denied once all are known, and not befo
   CHECK(outcome(asker.queries.find("hand")) == "unknown_frame");
   CHECK(outcome(asker.queries.path("world", "hand")) == "unknown_end");
   CHECK(outcome(asker.queries.history("hand")) == "unknown_frame");
-  // One that has said that it has two pages, of which none has come.
+  // It has announced two pages, and none has arrived.
   asker.on_presence({"arm", 1, "host", 1, 2, true});
   Asker joiner(network);
   joiner.on_presence({"arm", 1, "host", 1, 2, true});
   CHECK(outcome(joiner.queries.info("hand", Deadline(10ms))) == "timeout");
 }
 
-TEST_CASE("queries: partitions, and what is kept of history") {
+TEST_CASE("queries: partitions and histories are listed") {
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", {{"arm", "", {}}, {"hand", "arm", {}}});
   REQUIRE(arm.node().update("hand", along_x(1), Time(1s)));

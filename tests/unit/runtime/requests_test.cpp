@@ -43,7 +43,7 @@ Result<void> add_finger(Rig& rig, const Deadline& deadline) {
 
 }  // namespace
 
-TEST_CASE("requests: one is sent again until its reply comes, and applied once") {
+TEST_CASE("requests: a request is sent until its reply comes and applied once") {
   LoopbackNetwork network;
   int lost = 0;
   ScriptedOwner arm(network, "arm", kArm,
@@ -56,7 +56,7 @@ TEST_CASE("requests: one is sent again until its reply comes, and applied once")
   CHECK(arm.node().own_frames() == 3);
 }
 
-TEST_CASE("requests: who does not answer is named with how often it was asked") {
+TEST_CASE("requests: a time-out names the owner and how often it was asked") {
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", kArm,
                     [](Transport&, const PeerId&, const Request&) { return true; });
@@ -69,7 +69,7 @@ TEST_CASE("requests: who does not answer is named with how often it was asked") 
                                         ContainsSubstring("asked " + std::to_string(arm.asked())));
 }
 
-TEST_CASE("requests: an owner that dies meanwhile is not waited for") {
+TEST_CASE("requests: a request fails at once if its owner leaves") {
   LoopbackNetwork network;
   ScriptedOwner* owner = nullptr;
   std::thread leaving;
@@ -84,7 +84,7 @@ TEST_CASE("requests: an owner that dies meanwhile is not waited for") {
   CHECK(outcome(added) == "unreachable");
 }
 
-TEST_CASE("requests: who is not the owner any more is asked so often, and then that is said") {
+TEST_CASE("requests: a request fails with not_owner after a limited number of attempts") {
   LoopbackNetwork network;
   ScriptedOwner arm(
       network, "arm", kArm, [](Transport& transport, const PeerId& from, const Request& request) {
@@ -96,7 +96,7 @@ TEST_CASE("requests: who is not the owner any more is asked so often, and then t
   CHECK(arm.asked() == Requests::kAttempts);
 }
 
-TEST_CASE("requests: an owner that has not heard of a change yet is asked until it has") {
+TEST_CASE("requests: an owner that does not know a parent yet is asked until it does") {
   LoopbackNetwork network;
   std::set<std::uint32_t> denied;  // each perhaps more than once
   ScriptedOwner arm(
@@ -111,7 +111,7 @@ TEST_CASE("requests: an owner that has not heard of a change yet is asked until 
   CHECK(denied.size() == 4);
 }
 
-TEST_CASE("requests: what is acknowledged and does not come is a warning, and is not denied") {
+TEST_CASE("requests: a change that is acknowledged but does not arrive is not denied") {
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", kArm,
                     [](Transport& transport, const PeerId& from, const Request& request) {
@@ -127,7 +127,7 @@ TEST_CASE("requests: what is acknowledged and does not come is a warning, and is
         })) == "timeout");
 }
 
-TEST_CASE("requests: a process that has given its partition up plans nothing") {
+TEST_CASE("requests: a process that lost its partition sends no requests") {
   LoopbackNetwork network;
   const ScriptedOwner arm(network, "arm", kArm);
   Rig rig(network.join());
@@ -136,7 +136,7 @@ TEST_CASE("requests: a process that has given its partition up plans nothing") {
   CHECK(arm.asked() == 0);
 }
 
-TEST_CASE("requests: what an owner lists is handed on, and so is why it does not") {
+TEST_CASE("requests: a list of an owner is returned and so is its error") {
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", kArm);
   REQUIRE(arm.node().update("hand", along_x(1), Time(1s)));

@@ -1,4 +1,4 @@
-// How a participant becomes the owner of its partition, and what it gives up.
+// How a participant becomes the owner of its partition, and which frames it yields.
 
 #include "runtime/serving.hpp"
 
@@ -53,7 +53,7 @@ struct OwnerRig : Rig {
 
 const std::vector<FrameSpec> kArm{{"arm", "", {}}, {"hand", "arm", along_x(4)}};
 
-/// A disk that may stand still.
+/// A disk that may block.
 struct Disk {
   std::mutex mutex;
   std::condition_variable changed;
@@ -98,7 +98,7 @@ class SlowStore final : public StateStore {
   Disk& disk_;
 };
 
-/// What is logged while it exists; no other thread may log as it begins and ends.
+/// Captures the log while it exists. No other thread may log when it begins or ends.
 class CapturedLog {
  public:
   CapturedLog() { log().sinks().push_back(sink_); }
@@ -121,7 +121,7 @@ class CapturedLog {
 
 }  // namespace
 
-TEST_CASE("serving: what is configured is owned, stored nowhere, and told") {
+TEST_CASE("serving: the configured frames are owned and published") {
   LoopbackNetwork network;
   OwnerRig owner(network.join());
   REQUIRE(owner.serve(kArm));
@@ -133,7 +133,7 @@ TEST_CASE("serving: what is configured is owned, stored nowhere, and told") {
   CHECK_FALSE(other.structure.directory.serving("arm"));
 }
 
-TEST_CASE("serving: a name that is taken is refused, and its owner named") {
+TEST_CASE("serving: a name that is taken is rejected and the error names its owner") {
   LoopbackNetwork network;
   const ScriptedOwner first(network, "arm", kArm);
   OwnerRig second(network.join());
@@ -144,7 +144,7 @@ TEST_CASE("serving: a name that is taken is refused, and its owner named") {
                  ContainsSubstring("by process " + std::to_string(getpid())));
 }
 
-TEST_CASE("serving: a frame that cannot be is named, and nothing is served") {
+TEST_CASE("serving: an invalid frame is named and nothing is served") {
   LoopbackNetwork network;
   OwnerRig owner(network.join());
   const auto served = owner.serve({{"arm", "", {}}, {"arm", "", {}}});
@@ -154,7 +154,7 @@ TEST_CASE("serving: a frame that cannot be is named, and nothing is served") {
   CHECK_FALSE(other.structure.forest.exists("arm"));
 }
 
-TEST_CASE("member runner: the parts are told of others that come and go") {
+TEST_CASE("member runner: arrivals and losses of others are passed to the other parts") {
   LoopbackNetwork network;
   Rig rig(network.join());
   rig.on_presence(presence_of("leg", 7, 1));
@@ -167,7 +167,7 @@ TEST_CASE("member runner: the parts are told of others that come and go") {
   CHECK(rig.others == 2);
 }
 
-TEST_CASE("member runner: listeners hear of changes in order, until they are dropped") {
+TEST_CASE("member runner: a listener gets changes in order until it unsubscribes") {
   LoopbackNetwork network;
   Rig rig(network.join());
   std::mutex mutex;
@@ -191,7 +191,7 @@ TEST_CASE("member runner: listeners hear of changes in order, until they are dro
   CHECK(heard.front() == ChangeKind::kPartitionUp);
 }
 
-TEST_CASE("member runner: a participant without a partition stores nothing and refuses nothing") {
+TEST_CASE("member runner: a participant without a partition stores and rejects nothing") {
   LoopbackNetwork network;
   Rig rig(network.join());
   CHECK(rig.member.partition() == nullptr);
@@ -201,7 +201,7 @@ TEST_CASE("member runner: a participant without a partition stores nothing and r
   CHECK(rig.member.unless_unsaved(error, "hand").message == error.message);
 }
 
-TEST_CASE("member runner: the owner's own updates wait for no disk") {
+TEST_CASE("member runner: an owner's own updates do not wait for the disk") {
   const bool structural = GENERATE(false, true);
   LoopbackNetwork network;
   Disk disk;
@@ -243,7 +243,7 @@ TEST_CASE("member runner: the owner's own updates wait for no disk") {
   if (structural) CHECK(outcome(change.get()) == "ok");
 }
 
-TEST_CASE("member runner: of a process whose messages are ignored that is logged once") {
+TEST_CASE("member runner: ignored messages of a process are logged once") {
   const CapturedLog logged;
   LoopbackNetwork network;
   Rig rig(network.join());
@@ -259,10 +259,10 @@ TEST_CASE("member runner: of a process whose messages are ignored that is logged
   CHECK(logged.count("are ignored") == 2);
 }
 
-TEST_CASE("yielding: a frame is given up once its other owner has confirmed its older claim") {
+TEST_CASE("yielding: a frame is yielded only after the other owner has confirmed its older claim") {
   LoopbackNetwork network;
   std::atomic<bool> silent{true};
-  // It has claimed the hand first, which the second owner has not heard of as it claims it.
+  // It claimed the hand first, but the second owner does not know that when it claims the hand.
   ScriptedOwner first(network, "first", {{"arm", "", {}}},
                       [&](Transport&, const PeerId&, const Request& request) {
                         return silent && std::holds_alternative<RemoveRequest>(request.body);
@@ -272,12 +272,12 @@ TEST_CASE("yielding: a frame is given up once its other owner has confirmed its 
   REQUIRE(second.structure.forest.holds("hand"));
   const auto firsts = second.structure.directory.serving("first");
   REQUIRE(firsts);
-  // By a page of the first one, with a claim that is older than any.
+  // A page of the first owner brings a claim that is older than any other.
   const std::uint64_t epoch =
       second.structure.directory.epoch(*second.structure.directory.owner("first"));
   second.on_page(
       Page{"first", 0, firsts->incarnation, epoch + 1, {{"arm", "", 1}, {"hand", "arm", 1}}});
-  // Not as long as the first one has not answered how far it is.
+  // The second keeps the frame until the first has answered.
   REQUIRE(eventually([&] { return first.asked() > 0; }));
   CHECK(second.structure.forest.holds("hand"));
   silent = false;

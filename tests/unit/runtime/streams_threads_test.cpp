@@ -1,4 +1,4 @@
-// Streams that are sent from one thread while others change where they go to: for ThreadSanitizer.
+// Streams that are sent from one thread while others change their owners: for ThreadSanitizer.
 
 #include <atomic>
 #include <memory>
@@ -33,7 +33,7 @@ std::vector<FrameSpec> frames_of(const std::string& name) {
 
 }  // namespace
 
-TEST_CASE("mailbox: the user has the newest, and the maker gets all back") {
+TEST_CASE("mailbox: the reader gets the newest item and the writer gets all old ones back") {
   auto alive = std::make_shared<int>();
   {
     Mailbox<std::pair<int, std::shared_ptr<int>>> mailbox;
@@ -61,7 +61,7 @@ TEST_CASE("mailbox: the user has the newest, and the maker gets all back") {
   CHECK(alive.use_count() == 1);
 }
 
-TEST_CASE("streams: owners come and go, edges move, and the client leaves while they are sent") {
+TEST_CASE("streams: two streams are sent while owners come and go and the client ends") {
   LoopbackNetwork network;
   Node a = *Node::open(network.join(), "a", frames_of("a"));
   std::optional<Client> client = *Client::open(network.join());

@@ -59,13 +59,13 @@ struct Watched {
 
 }  // namespace
 
-TEST_CASE("watch mirror: it is complete when all owners have told their values") {
+TEST_CASE("watch mirror: it is complete when all owners have sent their values") {
   WatchMirror mirror("world", "tool", route(), {});
   CHECK(mirror.lacks());
   CHECK(mirror.take({kArms, {entry(0, 1, 1), entry(1, 10, 2)}, 0, 5}));
   CHECK_FALSE(mirror.complete());
   CHECK_FALSE(mirror.take({99, {entry(0, 7, 1)}, 0, 9}));  // of another route
-  // What is told of unknown edges is no value; what it builds on must be asked for.
+  // A push that follows an unknown commit has no value for an unknown edge: it must be requested.
   CHECK_FALSE(mirror.take({kTools, {entry(0, 200, 1, false)}, 3, 4}));
   CHECK_FALSE(mirror.complete());
   CHECK(mirror.take({kTools, {entry(0, 100, 1)}, 0, 3}));
@@ -76,7 +76,7 @@ TEST_CASE("watch mirror: it is complete when all owners have told their values")
   CHECK(mirror.lookup({})->pose.translation().x() == 211);
 }
 
-TEST_CASE("watch mirror: a value never regresses, whichever way it comes") {
+TEST_CASE("watch mirror: an older reply or push never replaces a newer value") {
   Watched watched;
   CHECK(watched.mirror.take({kArms, {entry(0, 2, 1, false)}, 5, 6}));
   CHECK(watched.x() == 112);
@@ -85,16 +85,16 @@ TEST_CASE("watch mirror: a value never regresses, whichever way it comes") {
   CHECK_FALSE(watched.mirror.take({kArms, {entry(0, 3, 1, false)}, 5, 6}));
   CHECK(watched.x() == 112);
   CHECK_FALSE(watched.mirror.lacks());
-  // Samples that the reply has left out come all the same.
+  // Earlier samples that the reply left out are still accepted.
   CHECK(watched.mirror.take({kTools, {sample(0, 30, 3, 4, true)}, 0, 9}));
   CHECK_FALSE(watched.mirror.take({kTools, {sample(0, 20, 2, 4), sample(0, 30, 7, 4)}, 3, 9}));
   CHECK(watched.mirror.lookup(at(20))->pose.translation().x() == 14);
   CHECK(watched.mirror.lookup(at(30))->pose.translation().x() == 15);
 }
 
-TEST_CASE("watch mirror: after a loss nothing is shown by half") {
+TEST_CASE("watch mirror: after a lost push no half of a commit is visible") {
   Watched watched;
-  // A commit of both was lost, and one of them was written again.
+  // A commit of both edges was lost, and one of the edges was written again.
   CHECK(watched.mirror.take({kArms, {entry(1, 30, 2, false)}, 6, 7}));
   CHECK(watched.x() == 111);
   CHECK(watched.mirror.lacks());
@@ -103,14 +103,14 @@ TEST_CASE("watch mirror: after a loss nothing is shown by half") {
   CHECK(watched.mirror.take({kArms, {entry(0, 2, 1), entry(1, 30, 2)}, 0, 8}));
   CHECK(watched.x() == 132);
   CHECK_FALSE(watched.mirror.lacks());
-  // A sample tells where the edge was, whatever else was lost.
+  // A sample is valid for its instant, whatever else was lost.
   CHECK(watched.mirror.take({kTools, {sample(0, 10, 100, 1)}, 3, 4}));
   CHECK(watched.mirror.take({kTools, {sample(0, 30, 300, 1)}, 5, 6}));
   CHECK(watched.x() == 332);
   CHECK(watched.mirror.lacks());
 }
 
-TEST_CASE("watch mirror: a covariance that was pushed before is not sent again") {
+TEST_CASE("watch mirror: a covariance that was pushed before is reused by its number") {
   const auto uncertain = [](PushedValue value, double stddev, std::uint32_t number, bool known) {
     const Covariance covariance =
         *Covariance::from_stddev({stddev, stddev, stddev, stddev, stddev, stddev});
@@ -141,7 +141,7 @@ TEST_CASE("watch mirror: a covariance that was pushed before is not sent again")
   CHECK(stddev() == Approx(0.2));
 }
 
-TEST_CASE("watch mirror: values in pieces are shown when the last of them has come") {
+TEST_CASE("watch mirror: values in several messages become visible with the last of them") {
   Watched watched;
   CHECK_FALSE(watched.mirror.take({kArms, {entry(0, 2, 1, false)}, 5, 6, 0, 2}));
   CHECK(watched.x() == 111);
@@ -149,7 +149,7 @@ TEST_CASE("watch mirror: values in pieces are shown when the last of them has co
   CHECK(watched.x() == 122);
 }
 
-TEST_CASE("watch mirror: of an edge's histories the newest is shown") {
+TEST_CASE("watch mirror: the newest history of an edge is visible") {
   Watched watched;
   CHECK(watched.mirror.take({kTools, {sample(0, 10, 100, 1), sample(0, 20, 200, 1)}, 3, 4}));
   CHECK(watched.mirror.take({kTools, {entry(0, 500, 5)}, 4, 5}));
@@ -159,7 +159,7 @@ TEST_CASE("watch mirror: of an edge's histories the newest is shown") {
   CHECK(watched.x() == 511);
 }
 
-TEST_CASE("watch mirror: another route takes over what it has in common with the one before") {
+TEST_CASE("watch mirror: a new route takes over the samples of the edges it shares") {
   Watched watched;
   for (int t = 1; t <= 9; ++t) {
     const auto commit = static_cast<std::uint64_t>(t + 3);
@@ -191,7 +191,7 @@ TEST_CASE("watch mirror: another route takes over what it has in common with the
   CHECK(outcome(restarted.lookup(at(45))) == "not_yet");
 }
 
-TEST_CASE("watch mirror: it knows from when on it lacks samples") {
+TEST_CASE("watch mirror: it knows from which instant on it lacks samples") {
   Watched watched;
   CHECK_FALSE(watched.mirror.lacks_history());
   CHECK(watched.mirror.take({kTools, {sample(0, 30, 100, 1)}, 3, 4}));

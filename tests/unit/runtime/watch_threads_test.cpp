@@ -1,5 +1,4 @@
-// What readers of a watched path see while it changes under them: one of its legal transforms,
-// always.
+// Readers of a watched path always see one of its legal transforms while it changes.
 
 #include <atomic>
 #include <chrono>
@@ -26,14 +25,14 @@ using namespace std::chrono_literals;
 using testing::along_x;
 using testing::eventually;
 
-// `x` ahead, with that variance.
+// A translation by `x` with that variance.
 Transform uncertain(double x, double variance) {
   Transform X = along_x(x);
   X.covariance = Covariance::from_stddev({std::sqrt(variance), 0, 0, 0, 0, 0}).value();
   return X;
 }
 
-// Reads a path until it is destroyed; keeps what was wrong first.
+// Reads a path until it is destroyed, and keeps the first error.
 class Reader {
  public:
   using Judge = std::function<std::string(const StampedTransform&)>;
@@ -100,7 +99,8 @@ struct Robot {
   std::optional<Client> client;
 };
 
-// Step k is below the left where it is even, with x = k and the variance 10 + k.
+// Even steps are below the left frame, odd ones below the right. Step k has x = k and the variance
+// 10 + k.
 std::string judge_step(const StampedTransform& X, double& last) {
   const double x = X.pose.translation().x();
   const bool left = x < 15'000;
@@ -116,7 +116,7 @@ std::string judge_step(const StampedTransform& X, double& last) {
 
 }  // namespace
 
-TEST_CASE("a path that is rerouted is always one of those that it was, and never goes back") {
+TEST_CASE("watch: a rerouted path always reads a transform that existed and never goes back") {
   const bool composed = GENERATE(false, true);
   Robot robot;
   WatchOptions options;
@@ -133,7 +133,7 @@ TEST_CASE("a path that is rerouted is always one of those that it was, and never
     if (move % 3 == 0) one.await_reads();
     k += 2;
     REQUIRE(robot.tool->update("tool", uncertain(k, 10 + k)));
-    // Some are followed by the next at once.
+    // Most steps do not wait until the path has the value.
     if (move % 10 == 0) {
       REQUIRE(eventually([&] { return path->latest()->covariance.matrix()(0, 0) > 10 + k; }));
     }
@@ -142,7 +142,7 @@ TEST_CASE("a path that is rerouted is always one of those that it was, and never
   CHECK(two.end() == "");
 }
 
-TEST_CASE("a path is read on while an owner starts again") {
+TEST_CASE("watch: a path stays readable while an owner restarts") {
   Robot robot;
   const auto path = robot.client->watch("world", "tool");
   REQUIRE(path);
@@ -158,7 +158,7 @@ TEST_CASE("a path is read on while an owner starts again") {
   CHECK(reader.end() == "");
 }
 
-TEST_CASE("a path is read on while an edge's first sample is ahead of the others") {
+TEST_CASE("watch: a path stays readable while the first sample of an edge is ahead of the others") {
   Robot robot;
   const auto move_left = [&](std::int64_t k) {
     return robot.base->update("left", along_x(static_cast<double>(k)), Time(k * 10ms));
@@ -197,7 +197,7 @@ TEST_CASE("a path is read on while an edge's first sample is ahead of the others
   CHECK(reader.end() == "");
 }
 
-TEST_CASE("a path is read on where its new route has no instant that all edges have") {
+TEST_CASE("watch: a path stays readable while its new route has no common instant") {
   Robot robot;
   REQUIRE(robot.tool->add("gripper", "tool", {}));
   REQUIRE(robot.tool->update("gripper", along_x(1), Time(1s)));
@@ -229,7 +229,7 @@ TEST_CASE("a path is read on where its new route has no instant that all edges h
   CHECK(reader.end() == "");
 }
 
-TEST_CASE("what is updated in one call is read in one piece") {
+TEST_CASE("watch: edges that are updated in one call are read in one commit") {
   Robot robot;
   const auto path = robot.client->watch("left", "hand");
   REQUIRE(path);
@@ -239,7 +239,7 @@ TEST_CASE("what is updated in one call is read in one piece") {
   Reader reader(*path, in_one_piece);
   int step = 0;
   const auto start = std::chrono::steady_clock::now();
-  // Beyond a renewal.
+  // Longer than the period of a renewal.
   while (std::chrono::steady_clock::now() - start < 1500ms) {
     ++step;
     REQUIRE(robot.base->update({{"arm", along_x(step)}, {"hand", along_x(-step)}}));
@@ -248,8 +248,7 @@ TEST_CASE("what is updated in one call is read in one piece") {
   CHECK(reader.end() == "");
 }
 
-TEST_CASE(
-    "a value that is set as a watch begins arrives at once, and renewals bring no older one") {
+TEST_CASE("watch: renewals never bring an older value and a late value arrives at once") {
   Robot robot;
   std::atomic<bool> stop{false};
   std::atomic<int> step{0};
@@ -298,7 +297,7 @@ TEST_CASE(
   writer.join();
 }
 
-TEST_CASE("who is told of another route may watch, look up and stop watching") {
+TEST_CASE("watch: a route callback may watch and look up and end its watch") {
   Robot robot;
   std::mutex mutex;
   std::vector<std::string> outcomes;
@@ -323,7 +322,7 @@ TEST_CASE("who is told of another route may watch, look up and stop watching") {
   CHECK(outcomes.at(0) == "ok ok");
 }
 
-TEST_CASE("nobody is told of another route once the client has gone, which a callback may end") {
+TEST_CASE("watch: no route callback runs after the client has ended") {
   Robot robot;
   std::atomic<int> told{0};
   std::atomic<bool> ended{false};

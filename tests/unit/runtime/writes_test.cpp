@@ -1,4 +1,4 @@
-// What a participant changes of frames, its own and those of others.
+// Changes that a participant makes to its own frames and to those of others.
 
 #include "runtime/writes.hpp"
 
@@ -30,7 +30,7 @@ struct Writer : Rig {
 const std::vector<FrameSpec> kArm{{"arm", "", {}}, {"hand", "arm", {}}};
 const std::vector<FrameSpec> kLeg{{"leg", "", {}}, {"foot", "leg", {}}};
 
-/// Two owners of which one is never met, and the other one only after a while.
+/// One of two owners is never discovered, the other one only after a while.
 class Unmet final : public testing::Relay {
  public:
   Unmet(TransportPtr real, std::string never, Deadline met)
@@ -62,7 +62,7 @@ class Unmet final : public testing::Relay {
 
 }  // namespace
 
-TEST_CASE("writes: no share waits for an owner that is not met, whichever comes first") {
+TEST_CASE("writes: reachable owners get their part while another is not discovered") {
   const bool as_request = GENERATE(false, true);
   for (const std::string never : {"arm", "leg"}) {
     LoopbackNetwork network;
@@ -91,7 +91,7 @@ TEST_CASE("writes: no share waits for an owner that is not met, whichever comes 
   }
 }
 
-TEST_CASE("writes: frames of others are added, moved and removed where they are owned") {
+TEST_CASE("writes: frames of others are added and moved and removed at their owner") {
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", kArm);
   Writer writer(network);
@@ -106,7 +106,7 @@ TEST_CASE("writes: frames of others are added, moved and removed where they are 
   CHECK(outcome(writer.writes.add("toe", {"foot", {}}, "")) == "unknown_parent");
 }
 
-TEST_CASE("writes: a removal that somebody else has made meanwhile is done") {
+TEST_CASE("writes: a removal succeeds if another participant has just removed the frame") {
   LoopbackNetwork network;
   ScriptedOwner* owner = nullptr;
   std::thread other;
@@ -125,7 +125,7 @@ TEST_CASE("writes: a removal that somebody else has made meanwhile is done") {
   CHECK(arm.asked() == 1);
 }
 
-TEST_CASE("writes: of an update of several owners each applies its part") {
+TEST_CASE("writes: each owner applies its part of an update") {
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", kArm);
   ScriptedOwner leg(network, "leg", kLeg);
@@ -141,7 +141,7 @@ TEST_CASE("writes: of an update of several owners each applies its part") {
   CHECK(x_of(leg.node().lookup("leg", "foot")) == 2);
 }
 
-TEST_CASE("writes: of what is published the living get theirs, and the error names the dead") {
+TEST_CASE("writes: reachable owners get published values and the error names the lost one") {
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", kArm);
   ScriptedOwner leg(network, "leg", kLeg);
@@ -157,7 +157,7 @@ TEST_CASE("writes: of what is published the living get theirs, and the error nam
   CHECK(x_of(arm.node().lookup("arm", "hand")) == 3);
 }
 
-TEST_CASE("writes: correlation is set at the owner, once it is known to be sound") {
+TEST_CASE("writes: a correlation is checked before it is sent to the owner") {
   LoopbackNetwork network;
   const ScriptedOwner arm(network, "arm", kArm);
   Writer writer(network);
@@ -173,7 +173,7 @@ TEST_CASE("writes: correlation is set at the owner, once it is known to be sound
   CHECK(arm.asked() == asked);
 }
 
-TEST_CASE("writes: a partition is forgotten once it is not there, at all who are") {
+TEST_CASE("writes: an unreachable partition is forgotten by all reachable participants") {
   LoopbackNetwork network;
   ScriptedOwner arm(network, "arm", kArm);
   ScriptedOwner leg(network, "leg", kLeg);
@@ -185,7 +185,7 @@ TEST_CASE("writes: a partition is forgotten once it is not there, at all who are
   REQUIRE(writer.writes.forget("leg"));
   CHECK_FALSE(writer.structure.forest.exists("foot"));
   CHECK_FALSE(arm.node().exists("foot"));
-  // Nobody is left who could tell a partition that returns.
+  // No other participant is left that could tell the partition when it returns.
   arm.leave();
   CHECK(outcome(writer.writes.forget("arm")) == "unreachable");
   CHECK(writer.structure.forest.exists("hand"));
