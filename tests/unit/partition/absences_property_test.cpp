@@ -1,6 +1,6 @@
-// All participants that hear the same messages agree on the owner of a frame, and a reachable owner
-// keeps its frames, whatever partitions die, hang, return and are forgotten, and in whatever order
-// that is heard.
+// All participants that receive the same messages agree on the owner of a frame, and a reachable
+// owner keeps its frames. This holds for any deaths, hangs and returns of partitions, for forgotten
+// partitions, and for any order of messages.
 
 #include <algorithm>
 #include <array>
@@ -210,7 +210,7 @@ class World {
     say_to_all(who, Silence{name(who), owners_[who]->presence.incarnation});
   }
 
-  // Is not heard for a moment.
+  // Is silent for a moment.
   void blink(std::size_t who) {
     if (owners_[who]->hangs) return;
     say_to_all(who, Silence{name(who), owners_[who]->presence.incarnation});
@@ -224,7 +224,7 @@ class World {
     const bool hung = there(who);
     if (hung) {
       owners_[who]->hangs = false;
-      // Whoever came meanwhile it hears now, and it is heard.
+      // It receives the messages of owners that came in the meantime, and they receive its own.
       for (std::size_t other = 0; other < kOwners; ++other) {
         if (other == who || !serves(other)) continue;
         say({other, who}, owners_[other]->presence);
@@ -237,7 +237,7 @@ class World {
     }
     drain();
     for (const auto& [id, owner] : before) {
-      // One that has hung yields to those who know that it was gone, or a witness has told them.
+      // A partition that hung yields only to owners that know of its absence.
       if (hung && knew_.count(owner) == 0) continue;
       INFO("frame " << id << " of " << name(owner) << ", and " << name(who)
                     << (hung ? " hung" : " was dead"));
@@ -247,7 +247,7 @@ class World {
     knew_.clear();
   }
 
-  // What those who serve have, and the one who is to come back claims, too.
+  // The frames of serving owners that the returning one claims, too.
   std::vector<std::pair<std::string, std::size_t>> claims_of_others(std::size_t who) {
     std::set<std::string> theirs;
     if (there(who)) {
@@ -261,11 +261,11 @@ class World {
     std::vector<std::pair<std::string, std::size_t>> claims;
     for (std::size_t other = 0; other < kOwners; ++other) {
       if (other == who || !serves(other)) continue;
-      // Of two who both say that they have outlived the other the older claim holds.
+      // If both report the other as lost, the older claim wins.
       const bool mutual = there(who) && misses(who, other);
       if (misses(other, who) && !mutual) knew_.insert(other);
       for (const std::string& id : theirs) {
-        // Below what its partition has removed meanwhile it may have to go for another reason.
+        // Only roots: a frame below a removed one may disappear for another reason.
         const auto info = owners_[other]->replica.forest.info(id);
         if (info && info->owner == kHeldHere && info->parent.empty())
           claims.emplace_back(id, other);
@@ -420,9 +420,7 @@ class World {
   Absences::Steady steady_{};
 };
 
-TEST_CASE(
-    "a reachable partition has its frames, all agree on that, and it keeps them when others "
-    "return") {
+TEST_CASE("reachable partitions keep their frames and all agree through deaths and returns") {
   Random random(0xab5e);
   INFO("seed " << random.seed());
   Counts counts;
@@ -437,7 +435,7 @@ TEST_CASE(
     world.return_all();
     world.demand_agreement();
   }
-  // Else it has shown nothing.
+  // Otherwise the test has shown nothing.
   CHECK(counts.kept > 100);
   CHECK(counts.inherited > 100);
   CHECK(counts.forgotten > 100);

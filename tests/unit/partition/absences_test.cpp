@@ -1,5 +1,4 @@
-// Unreachable partitions: the effect on frames that others claim, too, and what is stored about
-// them.
+// Unreachable partitions: the effect on frames that others claim, too, and what is known of them.
 
 #include "partition/absences.hpp"
 
@@ -26,7 +25,7 @@ using Lines = std::vector<std::string>;
 using Kind = Absent::Kind;
 using std::chrono::milliseconds;
 
-TEST_CASE("a short silence changes nothing but who is reachable") {
+TEST_CASE("a short silence changes only whether the partition is reachable") {
   Witness base;
   base.hear("left_arm", 1, 20);
   base.lose("arm", 1);
@@ -42,15 +41,14 @@ TEST_CASE("a short silence changes nothing but who is reachable") {
   CHECK(base.owner_of("hand") == "arm");
 }
 
-TEST_CASE(
-    "a frame of a partition that is gone is that of one that is there, and everybody hears of it") {
+TEST_CASE("a frame of an unreachable partition goes to a reachable one and this is reported") {
   Witness base;
   base.hear("left_arm", 1, 20);
   SECTION("lost") {
     base.lose("arm", 1);
     base.wait();
   }
-  SECTION("stopped, which is certain at once") {
+  SECTION("stopped which takes effect at once") {
     Presence last = presence_of("arm", 1, 1);
     last.serving = false;
     last.stopped = true;
@@ -62,12 +60,12 @@ TEST_CASE(
               "as a root"});
 }
 
-TEST_CASE("who notices a loss early waits for the others before frames are routed to another") {
+TEST_CASE("a loss that is noticed early delays the takeover by as much") {
   constexpr milliseconds kEarly{600};
   Witness base;
   base.hear("left_arm", 1, 20);
   REQUIRE(base.directory.lost("arm", 1, kNow, kEarly));
-  // That it was missed counts no later.
+  // The absence itself is reported without that delay.
   for (auto time = milliseconds(0); time < Absences::kTakeover + kEarly;
        time += milliseconds(100)) {
     (void)base.directory.look_for_gone(kStart + time);
@@ -79,7 +77,7 @@ TEST_CASE("who notices a loss early waits for the others before frames are route
   CHECK(base.owner_of("hand") == "left_arm");
 }
 
-TEST_CASE("who returns yields before what it had is routed to another") {
+TEST_CASE("frames of a lost partition are routed to another only after the takeover time") {
   Witness base;
   base.hear("left_arm", 1, 20);
   base.lose("arm", 1);
@@ -88,7 +86,7 @@ TEST_CASE("who returns yields before what it had is routed to another") {
   CHECK(base.directory.absent()[0].kind == Kind::kLost);
   CHECK(base.directory.any_pending());
   CHECK(base.owner_of("hand") == "arm");
-  SECTION("it hears so as it returns") {
+  SECTION("it returns before") {
     base.directory.apply(presence_of("arm", 1, 2), kNow);
     CHECK(base.directory.absent()[0].kind == Kind::kBack);
     CHECK_FALSE(base.directory.any_pending());
@@ -101,13 +99,13 @@ TEST_CASE("who returns yields before what it had is routed to another") {
     CHECK(base.owner_of("hand") == "left_arm");
     CHECK_FALSE(base.directory.any_pending());
   }
-  SECTION("who hung meanwhile cannot say") {
+  SECTION("the time in which this process hung does not count") {
     CHECK_FALSE(base.directory.look_for_gone(kStart + 3 * Absences::kGrace));
     CHECK(base.owner_of("hand") == "arm");
   }
 }
 
-TEST_CASE("one that comes later has the frame at once") {
+TEST_CASE("a partition that claims a frame after the takeover time owns it at once") {
   Witness base;
   base.lose("arm", 1);
   base.wait();
@@ -116,15 +114,15 @@ TEST_CASE("one that comes later has the frame at once") {
   CHECK(base.owner_of("hand") == "left_arm");
 }
 
-TEST_CASE("who has hung itself has outlived nobody of whom it then hears late") {
+TEST_CASE("a silence during which this process hung does not count") {
   Witness base;
   base.lose("arm", 1);
-  SECTION("a silence during which it hung is not long") {
+  SECTION("the partition is silent") {
     CHECK_FALSE(base.directory.look_for_gone(kStart + 20 * Absences::kGrace));
     REQUIRE(base.directory.absent().size() == 1);
     CHECK(base.directory.absent()[0].kind == Kind::kSilent);
   }
-  SECTION("nor does one count that stopped and started again meanwhile") {
+  SECTION("the partition stopped and restarted in the meantime") {
     base.hear("arm", 1, 10);
     Presence last = presence_of("arm", 1, 1);
     last.stopped = true;
@@ -136,7 +134,7 @@ TEST_CASE("who has hung itself has outlived nobody of whom it then hears late") 
   }
 }
 
-TEST_CASE("a stop is told apart from a death") {
+TEST_CASE("a stop is distinguished from a loss") {
   Witness base;
   Presence last = presence_of("arm", 1, 1);
   last.stopped = true;
@@ -144,7 +142,7 @@ TEST_CASE("a stop is told apart from a death") {
     const auto changes = base.directory.changes().take();
     return changes.back();
   };
-  SECTION("a stop") {
+  SECTION("stopped") {
     base.directory.apply(last, kNow);
     CHECK(down().stopped);
     CHECK(base.directory.absent()[0].kind == Kind::kSilent);
@@ -158,7 +156,7 @@ TEST_CASE("a stop is told apart from a death") {
     CHECK_FALSE(base.directory.partitions()[0].reachable);
     CHECK(base.directory.partitions()[0].stopped);
   }
-  SECTION("a death") {
+  SECTION("lost") {
     base.lose("arm", 1);
     CHECK_FALSE(down().stopped);
     CHECK_FALSE(base.directory.partitions()[0].stopped);
@@ -168,7 +166,7 @@ TEST_CASE("a stop is told apart from a death") {
   CHECK_FALSE(base.directory.partitions()[0].stopped);
 }
 
-TEST_CASE("who returns without having ended yields to who says that it has outlived it") {
+TEST_CASE("a partition that returns without a restart yields to one that reports it as lost") {
   Witness base;
   base.lose("arm", 1);
   base.wait();
@@ -191,7 +189,7 @@ TEST_CASE("who returns without having ended yields to who says that it has outli
   CHECK(late.structure() == Lines{"hand <  @ left_arm"});
 }
 
-TEST_CASE("of two that both say they have outlived the other the older claim holds") {
+TEST_CASE("of two partitions that report each other as lost the older claim wins") {
   Witness base;
   base.hear("left_arm", 1, 20, {{"arm", 0, Kind::kLost, 1}});
   CHECK(base.owner_of("hand") == "left_arm");
@@ -199,14 +197,14 @@ TEST_CASE("of two that both say they have outlived the other the older claim hol
   CHECK(base.owner_of("hand") == "arm");
 }
 
-TEST_CASE("who holds what one claims who is away keeps it when that returns") {
+TEST_CASE("an owner keeps a frame that an unreachable partition claims when that returns") {
   Replica replica("left_arm");
   Partition partition("left_arm", 1, replica.forest, replica.directory);
   Presence base = presence_of("base", 1, 0);
   base.absent = {{"arm", 0, Kind::kLost, 7}};
   replica.directory.apply(base, kNow);
   REQUIRE(partition.load({{"hand", "", along_x(1)}}, kNow));
-  // It says so itself once that has been so for a while.
+  // It reports the absence itself after some time.
   CHECK(replica.directory.absent().empty());
   CHECK_FALSE(replica.directory.look_for_gone(kStart));
   CHECK_FALSE(replica.directory.look_for_gone(kStart + Absences::kGrace / 2));
@@ -218,13 +216,13 @@ TEST_CASE("who holds what one claims who is away keeps it when that returns") {
   CHECK(partition.pending_yields().empty());
   REQUIRE(replica.directory.absent().size() == 1);
   CHECK(replica.directory.absent()[0].kind == Kind::kBack);
-  // Until that has yielded.
+  // Until the returning partition has yielded.
   replica.directory.apply(page_of("arm", {}, 7));
   CHECK(replica.directory.absent().empty());
   CHECK(replica.forest.holds("hand"));
 }
 
-TEST_CASE("a silence that others tell of counts from their first word") {
+TEST_CASE("a reported silence counts from the first report") {
   Replica replica("left_arm");
   Presence base = presence_of("base", 1, 0);
   const auto told = [&](std::vector<Absent> absent) {
@@ -234,7 +232,7 @@ TEST_CASE("a silence that others tell of counts from their first word") {
   told({{"arm", 0, Kind::kSilent, 7}});
   CHECK_FALSE(replica.directory.look_for_gone(kStart));
   CHECK_FALSE(replica.directory.look_for_gone(kStart + Absences::kGrace / 2));
-  SECTION("once they say that it has lasted") {
+  SECTION("and becomes a loss when it is reported as one") {
     CHECK_FALSE(replica.directory.look_for_gone(kStart + Absences::kGrace));
     told({{"arm", 0, Kind::kLost, 7}});
     CHECK(replica.directory.absent().empty());
@@ -242,19 +240,19 @@ TEST_CASE("a silence that others tell of counts from their first word") {
     REQUIRE(replica.directory.absent().size() == 1);
     CHECK(replica.directory.absent()[0].kind == Kind::kLost);
   }
-  SECTION("until they say that it is over") {
+  SECTION("and ends when it is no longer reported") {
     told({});
     CHECK_FALSE(replica.directory.any_pending());
     CHECK_FALSE(replica.directory.awaits_silent());
     CHECK_FALSE(replica.directory.look_for_gone(kStart + Absences::kGrace));
   }
-  SECTION("until they fall silent themselves") {
+  SECTION("and ends when the reporter falls silent") {
     CHECK(replica.directory.lost("base", 1, kNow));
     CHECK_FALSE(replica.directory.awaits_silent());
   }
 }
 
-TEST_CASE("nothing is given up for one who is silent") {
+TEST_CASE("no frame is yielded to a silent partition") {
   Replica replica("left_arm");
   Partition partition("left_arm", 1, replica.forest, replica.directory);
   REQUIRE(partition.load({{"hand", "", along_x(1)}}, kNow));
@@ -263,11 +261,11 @@ TEST_CASE("nothing is given up for one who is silent") {
   CHECK(partition.pending_yields().size() == 1);
   CHECK(replica.directory.lost("arm", 7, kNow));
   CHECK(partition.pending_yields().empty());
-  SECTION("it is there again") {
+  SECTION("it returns") {
     replica.directory.apply(presence_of("arm", 7, 1), kNow);
     CHECK(partition.pending_yields().size() == 1);
   }
-  SECTION("it is gone") {
+  SECTION("it is lost") {
     (void)replica.directory.look_for_gone(kStart);
     (void)replica.directory.look_for_gone(kStart + Absences::kGrace / 2);
     CHECK(replica.directory.look_for_gone(kStart + Absences::kGrace));
@@ -277,13 +275,13 @@ TEST_CASE("nothing is given up for one who is silent") {
   }
 }
 
-TEST_CASE("who is told of a silence waits for its end") {
+TEST_CASE("a participant that is told of a silence waits for its end") {
   Replica replica;
   Presence base = presence_of("base", 1, 0);
   base.absent = {{"arm", 0, Kind::kSilent, 7}};
   replica.directory.apply(base, kNow);
   CHECK(replica.directory.awaits_silent());
-  SECTION("it is gone, and has been for long enough that it yields to this process") {
+  SECTION("the partition is lost for so long that it must yield to this process") {
     base.absent[0].kind = Kind::kLost;
     replica.directory.apply(base, kNow);
     for (int quarter = 0; quarter <= 4; ++quarter) {
@@ -291,24 +289,24 @@ TEST_CASE("who is told of a silence waits for its end") {
       (void)replica.directory.look_for_gone(kStart + quarter * Absences::kGrace / 4);
     }
   }
-  SECTION("it is there") { replica.directory.apply(presence_of("arm", 7, 1), kNow); }
+  SECTION("the partition returns") { replica.directory.apply(presence_of("arm", 7, 1), kNow); }
   replica.directory.apply(base, kNow);
   CHECK_FALSE(replica.directory.awaits_silent());
 }
 
-TEST_CASE("who has hung itself has outlived nobody of whose absence it is told late") {
+TEST_CASE("an absence that is reported late is dropped if the partition is back already") {
   Witness arms("arms");
   Presence head = presence_of("head", 1, 0);
   head.absent = {{"leg", 0, Kind::kStopped, 4}};
   arms.directory.apply(head, kNow);
   CHECK(arms.directory.any_pending());
-  // All of this it hears at once.
+  // The return is received right after the report.
   arms.directory.apply(presence_of("leg", 5, 0), kNow);
   CHECK(arms.directory.absent().empty());
   CHECK_FALSE(arms.directory.any_pending());
 }
 
-TEST_CASE("in a cycle, a reachable partition keeps its parent, a lost one does not") {
+TEST_CASE("in a cycle a reachable partition keeps its parent and a lost one does not") {
   Replica base("base");
   base.directory.apply(presence_of("arm", 1, 1), kNow);
   base.directory.apply(page_of("arm", {{"hand", "tool", 10}}));
@@ -324,7 +322,7 @@ TEST_CASE("in a cycle, a reachable partition keeps its parent, a lost one does n
   CHECK(base.structure() == Lines{"hand < tool @ arm, attached", "tool <  @ bench"});
 }
 
-TEST_CASE("a conflict that a returning partition resolves is reported to who has known it") {
+TEST_CASE("a conflict that a returning partition resolves is reported to those that knew it") {
   Witness base;
   base.lose("arm", 1);
   base.wait();

@@ -1,5 +1,4 @@
-// All replicas become equal, whatever owners do at the same time, and whichever owners die and
-// return meanwhile.
+// All replicas become equal after any concurrent changes of owners, and any deaths and returns.
 
 #include <algorithm>
 #include <array>
@@ -73,13 +72,13 @@ class World {
  private:
   static std::string name(std::size_t who) { return "p" + std::to_string(who); }
 
-  // Clocks that are up to a second apart, where an hour of events takes some seconds.
+  // Clocks that are up to a second apart. Events are a millisecond apart.
   Time now(std::size_t who) { return Time(std::chrono::milliseconds(++clock_ + 300 * who)); }
 
   void start(std::size_t who) {
     auto owner = std::make_unique<Owning>(name(who), ++lives_);
     for (const auto& other : owners_) {
-      if (!other || random_.index(4) == 0) continue;  // some are heard of only later
+      if (!other || random_.index(4) == 0) continue;  // some are discovered only later
       owner->replica.directory.apply(other->presence, now(who));
       for (const auto& [number, page] : other->published) owner->replica.directory.apply(page);
     }
@@ -89,7 +88,7 @@ class World {
     owners_[who] = std::move(owner);
     for (std::size_t other = 0; other < kOwners; ++other) {
       if (other == who || !owners_[other]) continue;
-      // Whatever was not heard at the start is heard like all that comes.
+      // What it did not receive at the start arrives as all other messages do.
       say({other, who}, owners_[other]->presence);
       for (const auto& [number, page] : owners_[other]->published) say({other, who}, page);
     }
@@ -172,7 +171,7 @@ class World {
   std::size_t orphans_ = 0;
 };
 
-TEST_CASE("after any history of changes, deaths and returns all replicas are equal") {
+TEST_CASE("all replicas become equal after any history of changes and deaths and returns") {
   Random random(0xc0f1);
   INFO("seed " << random.seed());
   std::size_t conflicts = 0;
@@ -189,7 +188,7 @@ TEST_CASE("after any history of changes, deaths and returns all replicas are equ
       REQUIRE(lines_diff(world.structure(who), world.structure(kSpectator)) == "");
     }
   }
-  // Else it has shown nothing.
+  // Otherwise the test has shown nothing.
   CHECK(conflicts > 100);
   CHECK(orphans > 100);
 }

@@ -63,12 +63,12 @@ void add_in_former_life(MemoryStore& store, const std::string& id) {
   REQUIRE(arms.ask(id, AddRequest{"", along_x(1)}) == "ok");
 }
 
-TEST_CASE("of two partitions that add one id the later yields, and says so") {
+TEST_CASE("of two partitions that add one id the one with the later claim yields and reports it") {
   Owning arms("arms");
   REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
   REQUIRE(arms.ask("lens", AddRequest{"camera", along_x(1)}) == "ok");
   (void)arms.partition.take_pages();
-  SECTION("where the other was earlier") {
+  SECTION("the other claim is older") {
     arms.directory.apply(page_of("head", {{"camera", "", 900}}));
     CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ arms, attached"});
     CHECK(arms.yield());
@@ -81,7 +81,7 @@ TEST_CASE("of two partitions that add one id the later yields, and says so") {
     CHECK(pages[0].tombstones[0].rival == "head");
     CHECK(pages[0].entries.size() == 1);
   }
-  SECTION("where the other was later") {
+  SECTION("the other claim is younger") {
     arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
     CHECK_FALSE(arms.yield());
     CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ arms, attached"});
@@ -89,17 +89,17 @@ TEST_CASE("of two partitions that add one id the later yields, and says so") {
   }
 }
 
-TEST_CASE("a claim that is taken back costs nobody a frame") {
+TEST_CASE("a withdrawn claim takes away no frame") {
   Owning arms("arms");
   REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
   arms.directory.apply(page_of("head", {{"camera", "", 900}}));
   const std::set<PendingYield> found = arms.partition.pending_yields();
   REQUIRE(found.size() == 1);
-  SECTION("at all") {
+  SECTION("withdrawn for good") {
     arms.directory.apply(page_of("head", {}));
     CHECK_FALSE(arms.partition.yield(found, kNow));
   }
-  SECTION("and made again for another frame of that name") {
+  SECTION("withdrawn and made again for a new frame") {
     REQUIRE(arms.ask("camera", RemoveRequest{{"camera"}}) == "ok");
     arms.directory.apply(page_of("head", {}));
     REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
@@ -109,7 +109,7 @@ TEST_CASE("a claim that is taken back costs nobody a frame") {
   CHECK(arms.forest.holds("camera"));
 }
 
-TEST_CASE("who watches hears of a conflict from the tombstone of who yielded, once") {
+TEST_CASE("a conflict is reported once from the tombstone of the partition that yielded") {
   Replica watcher;
   watcher.directory.changes().watch();
   watcher.directory.apply(presence_of("arms", 1, 1), kNow);
@@ -126,18 +126,18 @@ TEST_CASE("who watches hears of a conflict from the tombstone of who yielded, on
   CHECK(changes[0].rival == "head");
 }
 
-TEST_CASE("of two moves that make a cycle the later is undone to a root") {
+TEST_CASE("of two moves that form a cycle the later one is undone and leaves a root") {
   Owning arms("arms");
   arms.directory.apply(page_of("head", {{"neck", "", 10}}));
   REQUIRE(arms.ask("hand", AddRequest{"", along_x(1)}) == "ok");
   REQUIRE(arms.ask("hand", MoveRequest{"neck", {}}, Time(std::chrono::nanoseconds(2000))) == "ok");
-  SECTION("the own one") {
+  SECTION("the own move") {
     arms.directory.apply(page_of("head", {{"neck", "hand", 1500}}));
     CHECK(arms.yield());
     CHECK(arms.structure() == Lines{"hand <  @ arms", "neck < hand @ head, attached"});
     CHECK(arms.conflicts().size() == 1);
   }
-  SECTION("the other's, who is to say so") {
+  SECTION("the move of the other partition") {
     arms.directory.apply(page_of("head", {{"neck", "hand", 2500}}));
     CHECK_FALSE(arms.yield());
     CHECK(arms.structure() == Lines{"hand < neck @ arms, attached", "neck <  @ head"});
@@ -157,20 +157,20 @@ TEST_CASE("a cycle through a frame of an unreachable partition undoes no move") 
   REQUIRE(arms.directory.lost("legs", 1, kNow));
   CHECK_FALSE(arms.yield());
   CHECK(arms.conflicts().empty());
-  SECTION("which has moved it away") {
+  SECTION("the partition has moved its frame away") {
     arms.directory.apply(page_of("legs", {{"leg", "", 600}}));
     CHECK_FALSE(arms.yield());
     CHECK(arms.structure() ==
           Lines{"hand < neck @ arms, attached", "leg <  @ legs", "neck < leg @ head, attached"});
   }
-  SECTION("which has not") {
+  SECTION("the partition returns unchanged") {
     arms.directory.apply(presence_of("legs", 1, 1), kNow);
     CHECK(arms.yield());
     CHECK(arms.conflicts().size() == 1);
   }
 }
 
-TEST_CASE("a cycle that is there only while a page is read undoes nothing") {
+TEST_CASE("a cycle that exists only while a page is applied undoes nothing") {
   Owning arms("arms");
   arms.directory.apply(page_of("head", {{"a", "", 10}, {"b", "a", 20}}));
   REQUIRE(arms.ask("hand", AddRequest{"b", along_x(1)}) == "ok");
@@ -180,7 +180,7 @@ TEST_CASE("a cycle that is there only while a page is read undoes nothing") {
         Lines{"a < hand @ head, attached", "b <  @ head", "hand < b @ arms, attached"});
 }
 
-TEST_CASE("what was yielded may bring the next cycle, of which the youngest is undone") {
+TEST_CASE("yielding may close another cycle whose youngest move is undone") {
   Owning arms("arms");
   arms.directory.apply(page_of("head", {{"a", "", 10}}));
   REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
@@ -192,7 +192,7 @@ TEST_CASE("what was yielded may bring the next cycle, of which the youngest is u
         Lines{"a < hand @ head, attached", "camera < a @ head, attached", "hand <  @ arms"});
 }
 
-TEST_CASE("a move that makes a cycle with one that was undone is undone itself") {
+TEST_CASE("a move that forms a cycle with an undone move is undone itself") {
   Owning arms("arms");
   arms.directory.apply(page_of("head", {{"a", "", 10}, {"c", "a", 10}}));
   REQUIRE(arms.ask("hand", AddRequest{"a", along_x(1)}) == "ok");
@@ -206,7 +206,7 @@ TEST_CASE("a move that makes a cycle with one that was undone is undone itself")
   CHECK(arms.conflicts().size() == 1);
 }
 
-TEST_CASE("who moves a frame that another claims, too, has the later claim to it") {
+TEST_CASE("moving a contested frame makes its claim the later one") {
   Owning arms("arms");
   REQUIRE(arms.ask("camera", AddRequest{"", along_x(1)}) == "ok");
   arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
@@ -217,7 +217,7 @@ TEST_CASE("who moves a frame that another claims, too, has the later claim to it
   CHECK(arms.conflicts().size() == 1);
 }
 
-TEST_CASE("a Lamport time is later than all that were stored") {
+TEST_CASE("a Lamport time is later than all stored ones") {
   MemoryStore store;
   {
     Owning arms("arms", &store);
@@ -230,7 +230,7 @@ TEST_CASE("a Lamport time is later than all that were stored") {
   CHECK(arms.directory.next_lamport_time(kNow) > 9000);
 }
 
-TEST_CASE("a Lamport time is later than all that were seen, however wrong a clock is") {
+TEST_CASE("a Lamport time is later than all received ones even if the clock is behind") {
   Replica replica;
   const std::uint64_t first = replica.directory.next_lamport_time(kNow);
   CHECK(first == 1000);
@@ -239,7 +239,7 @@ TEST_CASE("a Lamport time is later than all that were seen, however wrong a cloc
   CHECK(replica.directory.next_lamport_time(kNow) > 5000);
 }
 
-TEST_CASE("a partition has back what it stored") {
+TEST_CASE("a partition restores what it stored") {
   MemoryStore store;
   {
     Owning arms("arms", &store);
@@ -250,26 +250,26 @@ TEST_CASE("a partition has back what it stored") {
     REQUIRE(arms.ask("lamp", RemoveRequest{{"lamp"}}) == "ok");
   }
   Owning arms("arms", &store);
-  SECTION("under the same configuration") {
+  SECTION("with the same configuration") {
     arms.start({{"arm", "", along_x(1)}, {"hand", "arm", along_x(10)}});
     CHECK(arms.structure() ==
           Lines{"arm <  @ arms", "hand < arm @ arms, attached", "tool < hand @ arms, attached"});
     CHECK(x_of(arms.forest.lookup("arm", "tool")) == 120);
   }
-  SECTION("a changed entry of the configuration counts") {
+  SECTION("with an edited entry") {
     arms.start({{"arm", "", along_x(1)}, {"hand", "", along_x(30)}, {"eye", "arm", along_x(2)}});
     CHECK(arms.structure() == Lines{"arm <  @ arms", "eye < arm @ arms, attached", "hand <  @ arms",
                                     "tool < hand @ arms, attached"});
     CHECK(x_of(arms.forest.value("hand")) == 30);
   }
-  SECTION("a bad frame in it stops all") {
+  SECTION("with an invalid configuration") {
     const auto state = store.load();
     CHECK(outcome(arms.partition.restore(*state, {{"a", "b", {}}, {"b", "a", {}}}, kNow)) ==
           "cycle");
   }
 }
 
-TEST_CASE("a frame whose parent was removed while its owner was away goes when it returns") {
+TEST_CASE("a frame whose parent was removed while its owner was away is removed on return") {
   MemoryStore store;
   {
     Owning tools("tools", &store);
@@ -280,31 +280,31 @@ TEST_CASE("a frame whose parent was removed while its owner was away goes when i
   }
   const Page removed = page_of("arms", {}, {{"flange", 2000, Tombstone::Kind::kRemoved, {}}});
   Owning tools("tools", &store);
-  SECTION("heard before the return") {
+  SECTION("the removal is received before the return") {
     tools.directory.apply(removed);
     tools.start();
     CHECK(tools.structure().empty());
   }
-  SECTION("heard after it") {
+  SECTION("the removal is received after the return") {
     tools.start();
     CHECK(tools.structure().size() == 2);
     tools.directory.apply(removed);
     CHECK(tools.yield());
     CHECK(tools.structure().empty());
   }
-  SECTION("not where the parent is there again") {
+  SECTION("not if the parent exists again") {
     tools.directory.apply(page_of("arms", {{"flange", "", 3000}}));
     tools.start();
     CHECK(tools.structure().size() == 3);
   }
-  SECTION("not where it was hung there later") {
+  SECTION("not if it was attached after the removal") {
     tools.directory.apply(page_of("arms", {}, {{"flange", 900, Tombstone::Kind::kRemoved, {}}}));
     tools.start();
     CHECK(tools.structure().size() == 2);
   }
 }
 
-TEST_CASE("a removal comes after all that its client knew of, whatever the owners' clocks say") {
+TEST_CASE("a removal has a later Lamport time than all that its client knew") {
   const Time ahead = kNow + std::chrono::seconds(3);
   MemoryStore store;
   Replica client;
@@ -341,26 +341,24 @@ void bury(Directory& directory, const std::string& partition) {
   REQUIRE(directory.look_for_gone(Absences::Steady{} + Absences::kTakeover));
 }
 
-TEST_CASE(
-    "a returning partition yields to a reachable one, even with an older claim, but not to a lost "
-    "one") {
+TEST_CASE("a returning partition yields to a reachable one but not to a lost one") {
   MemoryStore store;
   add_in_former_life(store, "camera");
   Owning arms("arms", &store);
-  SECTION("earlier") {
+  SECTION("the other claim is older") {
     arms.directory.apply(page_of("head", {{"camera", "", 900}}));
     arms.start();
     CHECK(arms.structure() == Lines{"camera <  @ head"});
     CHECK(arms.conflicts().size() == 1);
     CHECK(store.load()->frames.empty());
   }
-  SECTION("later") {
+  SECTION("the other claim is younger") {
     arms.directory.apply(page_of("head", {{"camera", "", 1100}}));
     arms.start();
     CHECK(arms.structure() == Lines{"camera <  @ head"});
     CHECK(arms.conflicts().size() == 1);
   }
-  SECTION("gone") {
+  SECTION("the other partition is lost") {
     arms.directory.apply(page_of("head", {{"camera", "", 900}}));
     bury(arms.directory, "head");
     arms.start();
@@ -369,21 +367,21 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("a configured frame of a partition that is gone is taken") {
+TEST_CASE("a configured frame is taken over from a lost partition") {
   Owning arms("arms");
   arms.directory.apply(page_of("head", {{"camera", "", 900}, {"lens", "camera", 900}}));
-  SECTION("not while that is there") {
+  SECTION("not while that is reachable") {
     CHECK_FALSE(arms.partition.load({{"lamp", "", along_x(1)}, {"camera", "", along_x(1)}}, kNow));
     CHECK(arms.structure() == Lines{"camera <  @ head", "lens < camera @ head, attached"});
   }
-  SECTION("else") {
+  SECTION("after it is lost") {
     bury(arms.directory, "head");
     REQUIRE(arms.partition.load({{"camera", "", along_x(1)}}, kNow));
     CHECK(arms.structure() == Lines{"camera <  @ arms", "lens < camera @ head, attached"});
   }
 }
 
-TEST_CASE("of a cycle that others made while a frame was away the youngest move is undone") {
+TEST_CASE("of a cycle that was made while a frame was away the youngest move is undone") {
   MemoryStore store;
   {
     Owning arms("arms", &store);
@@ -392,13 +390,13 @@ TEST_CASE("of a cycle that others made while a frame was away the youngest move 
     REQUIRE(arms.ask("hand", AddRequest{"neck", along_x(1)}) == "ok");
   }
   Owning arms("arms", &store);
-  SECTION("theirs") {
+  SECTION("the move of the other partition") {
     arms.directory.apply(page_of("head", {{"neck", "hand", 2000}}));
     arms.start();
     CHECK(arms.structure() == Lines{"hand < neck @ arms, attached", "neck <  @ head"});
     CHECK(arms.conflicts().empty());
   }
-  SECTION("the own one") {
+  SECTION("the own move") {
     arms.directory.apply(page_of("head", {{"neck", "hand", 500}}));
     arms.start();
     CHECK(arms.structure() == Lines{"hand <  @ arms", "neck < hand @ head, attached"});
@@ -406,7 +404,7 @@ TEST_CASE("of a cycle that others made while a frame was away the youngest move 
   }
 }
 
-TEST_CASE("others' frames hang where they belong once the frame that returns breaks their cycle") {
+TEST_CASE("frames of others return to their parents when a returning frame breaks their cycle") {
   MemoryStore store;
   add_in_former_life(store, "hand");
   Owning arms("arms", &store);

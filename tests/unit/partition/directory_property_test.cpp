@@ -57,7 +57,7 @@ std::vector<Said> lives_of_several(Random& random) {
 }
 
 struct Hearer : Replica {
-  // Holds some frames of the pool itself, if it has a name.
+  // Owns some frames of the pool itself, if it has a name.
   explicit Hearer(const std::string& own) : Replica(own) {
     for (std::size_t i = 0; i < (own.empty() ? 0 : kFrames); i += 5) {
       REQUIRE(forest.add(frame(i), i == 0 ? "" : frame(i - 1), along_x(1),
@@ -92,13 +92,13 @@ struct Hearer : Replica {
     for (const FrameInfo& info : forest.frames()) {
       if (info.owner != kHeldHere) continue;
       const auto removed = forest.remove(info.id);
-      if (!removed) continue;  // with one above it
+      if (!removed) continue;  // already removed with a frame above it
       for (const std::string& id : *removed) directory.released(id);
     }
   }
 };
 
-TEST_CASE("what a directory holds does not depend on the order of what it heard") {
+TEST_CASE("a directory does not depend on the order of messages") {
   const std::string own = GENERATE(as<std::string>{}, "", "bench");
   Random random(0xd12ec7);
   INFO("seed " << random.seed());
@@ -125,8 +125,8 @@ TEST_CASE("what a directory holds does not depend on the order of what it heard"
   }
 }
 
-// Owners change their structure at random; what they publish travels at its own pace, a later page
-// possibly instead of an earlier one of the same number.
+// Owners change their structure at random. Each message is delayed by a random time, and a page may
+// be replaced by a later one of the same number.
 class World {
  public:
   explicit World(Random& random) : random_(random) {
@@ -183,7 +183,7 @@ class World {
     std::string parent;
   };
 
-  // Only what is no cycle in truth: that two owners make one at the same time is another matter.
+  // Only changes that form no cycle in truth: cycles of concurrent changes have their own test.
   void change(std::size_t who) {
     const std::string id = frame(random_.index(kFrames));
     const std::string parent = random_.index(5) == 0 ? "" : frame(random_.index(kFrames));
@@ -201,7 +201,7 @@ class World {
     const bool removal = std::holds_alternative<RemoveRequest>(request.body);
     if (!removal && below(parent, id)) return;
     const Reply reply = owners_[who]->partition.answer(request, kNow);
-    if (!std::holds_alternative<Done>(reply.body)) return;  // its picture is behind the truth
+    if (!std::holds_alternative<Done>(reply.body)) return;  // its replica is behind the truth
     if (removal) {
       forget(who, id);
     } else {
@@ -249,7 +249,7 @@ class World {
   std::map<std::pair<std::size_t, std::size_t>, std::deque<Page>> queues_;  // by owner and hearer
 };
 
-TEST_CASE("all replicas come to hold what the owners own") {
+TEST_CASE("all replicas converge to the structure of the owners") {
   Random random(0x0a11);
   INFO("seed " << random.seed());
   for (int round = 0; round < 30; ++round) {

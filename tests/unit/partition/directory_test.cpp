@@ -18,13 +18,13 @@ using Lines = std::vector<std::string>;
 constexpr Time kNow{std::chrono::seconds(100)};
 constexpr Time kLater{std::chrono::seconds(200)};
 
-// Page 0 of a partition with one page an epoch; the incarnation is 1.
+// Page 0 of a partition with one page.
 Page page_of(const std::string& partition, std::vector<PageEntry> entries,
              std::uint64_t incarnation = 1) {
   return {partition, 0, incarnation, 1, std::move(entries)};
 }
 
-TEST_CASE("a directory knows its own partition, and nobody else at first") {
+TEST_CASE("a directory knows only its own partition at first") {
   const Replica robot("robot");
   CHECK(robot.directory.owner("robot") == kHeldHere);
   CHECK(robot.directory.name(kHeldHere) == "robot");
@@ -57,7 +57,7 @@ TEST_CASE("a presence tells who serves a partition, from where and since when") 
   CHECK(serving->serving);
 }
 
-TEST_CASE("who only claims a name yet serves nothing") {
+TEST_CASE("a process that only claims a name does not serve it") {
   Replica replica;
   Presence claim = presence_of("arms", 7, 0);
   claim.serving = false;
@@ -66,7 +66,7 @@ TEST_CASE("who only claims a name yet serves nothing") {
   CHECK(replica.directory.partitions().empty());
 }
 
-TEST_CASE("what others say of the own partition changes nothing") {
+TEST_CASE("messages about the own partition change nothing") {
   Replica robot("robot");
   robot.directory.apply(presence_of("robot", 99, 1), kNow);
   robot.directory.apply(page_of("robot", {{"world", ""}}, 99));
@@ -87,7 +87,7 @@ TEST_CASE("a page replaces what it listed before") {
   CHECK(replica.directory.info(*replica.directory.owner("arms")).frames == 2);
 }
 
-TEST_CASE("a frame that changes its page stays, whichever page comes first") {
+TEST_CASE("a frame that moves to another page stays whichever page comes first") {
   const Page old_page{"arms", 1, 1, 1, {{"hand", "arm", 1}}};
   const Page new_page{"arms", 0, 1, 1, {{"hand", "wrist", 2}}};
   const Page emptied{"arms", 1, 1, 2, {}};
@@ -101,14 +101,14 @@ TEST_CASE("a frame that changes its page stays, whichever page comes first") {
     replica.apply({old_page, emptied, new_page});
     CHECK(replica.structure() == moved);
   }
-  SECTION("the old page's last state is late") {
+  SECTION("the old page's last version is late") {
     replica.apply({new_page, old_page, emptied});
     CHECK(replica.structure() == moved);
   }
   CHECK(replica.directory.info(*replica.directory.owner("arms")).frames == 1);
 }
 
-TEST_CASE("an epoch is known once all that was changed for it has come") {
+TEST_CASE("an epoch is known when all pages that changed for it have arrived") {
   Replica replica;
   replica.directory.apply(Page{"arms", 0, 1, 2, {}});
   const Owner arms = *replica.directory.owner("arms");
@@ -129,7 +129,7 @@ TEST_CASE("an epoch never goes back") {
   CHECK(replica.directory.epoch(arms) == 4);
 }
 
-TEST_CASE("who comes too late to know a partition hears from others that it was there") {
+TEST_CASE("a participant that joins after a partition was lost learns of it from others") {
   Replica known;
   known.directory.apply(presence_of("arms", 1, 1), kNow);
   CHECK(known.directory.absent().empty());
@@ -144,10 +144,8 @@ TEST_CASE("who comes too late to know a partition hears from others that it was 
   CHECK(joiner.directory.only_heard_of()->since == kLater);
   CHECK_FALSE(joiner.directory.reachable(*joiner.directory.owner("arms")));
   CHECK(joiner.directory.complete());
-  SECTION("it does not tell so itself, or it would be told for ever") {
-    CHECK(joiner.directory.absent().empty());
-  }
-  SECTION("until it returns") {
+  SECTION("it does not report the partition itself") { CHECK(joiner.directory.absent().empty()); }
+  SECTION("until the partition returns") {
     joiner.directory.apply(presence_of("arms", 2, 1), kLater);
     CHECK_FALSE(joiner.directory.only_heard_of());
     CHECK(joiner.directory.reachable(*joiner.directory.owner("arms")));
@@ -156,7 +154,7 @@ TEST_CASE("who comes too late to know a partition hears from others that it was 
   }
 }
 
-TEST_CASE("a partition that went away keeps its structure and is marked") {
+TEST_CASE("a lost partition keeps its structure and is marked unreachable") {
   Replica replica;
   replica.directory.apply(presence_of("arms", 1, 1), kNow);
   replica.directory.apply(page_of("arms", {{"hand", ""}}));
@@ -167,15 +165,17 @@ TEST_CASE("a partition that went away keeps its structure and is marked") {
   CHECK(replica.directory.info(arms).since == kLater);
   CHECK_FALSE(replica.directory.serving("arms"));
   CHECK(replica.directory.complete());
-  SECTION("once is enough") { CHECK_FALSE(replica.directory.lost("arms", 1, kLater)); }
-  SECTION("it may come back as it was") {
+  SECTION("a second loss changes nothing") {
+    CHECK_FALSE(replica.directory.lost("arms", 1, kLater));
+  }
+  SECTION("it may return unchanged") {
     replica.directory.apply(presence_of("arms", 1, 1), kLater + std::chrono::seconds(1));
     CHECK(replica.directory.reachable(arms));
     CHECK(replica.directory.info(arms).since == kLater + std::chrono::seconds(1));
   }
 }
 
-TEST_CASE("the loss of somebody unknown, or of an earlier life, is no news") {
+TEST_CASE("the loss of an unknown partition or of an earlier incarnation is ignored") {
   Replica replica;
   CHECK_FALSE(replica.directory.lost("arms", 1, kNow));
   replica.directory.apply(presence_of("arms", 2, 0), kNow);
@@ -183,7 +183,7 @@ TEST_CASE("the loss of somebody unknown, or of an earlier life, is no news") {
   CHECK(replica.directory.reachable(*replica.directory.owner("arms")));
 }
 
-TEST_CASE("a new incarnation replaces the old one once all of it has come, whatever comes late") {
+TEST_CASE("a new incarnation replaces the old one when all its pages have arrived") {
   const Lines old{"hand <  @ arms", "tool < hand @ arms, attached"};
   Replica replica;
   replica.directory.apply(presence_of("arms", 1, 1), kNow);
@@ -219,7 +219,7 @@ TEST_CASE("a new incarnation replaces the old one once all of it has come, whate
   CHECK(replica.directory.serving("arms")->incarnation == 2);
 }
 
-TEST_CASE("what a restart does not change is there all the time") {
+TEST_CASE("a frame that a restart does not change exists all the time") {
   Replica replica;
   replica.directory.apply(presence_of("arms", 1, 1), kNow);
   replica.directory.apply(page_of("arms", {{"hand", ""}, {"tool", "hand"}}));
@@ -230,7 +230,7 @@ TEST_CASE("what a restart does not change is there all the time") {
   CHECK(replica.structure() == Lines{"hand <  @ arms"});
 }
 
-TEST_CASE("a directory is behind while a change that an owner has told of has not come") {
+TEST_CASE("a directory is behind until an announced change has arrived") {
   Replica replica;
   replica.directory.apply(presence_of("arms", 1, 1), kNow);
   replica.directory.apply(Page{"arms", 0, 1, 2, {}});
@@ -241,22 +241,22 @@ TEST_CASE("a directory is behind while a change that an owner has told of has no
   replica.directory.told_of(arms, 3);
   REQUIRE(replica.directory.behind() != nullptr);
   CHECK(*replica.directory.behind() == "arms");
-  SECTION("until it has") {
+  SECTION("the change arrives") {
     replica.directory.apply(Page{"arms", 0, 1, 3, {}});
     CHECK(replica.directory.behind() != nullptr);
     replica.directory.apply(Page{"arms", 0, 1, 4, {}});
   }
-  SECTION("until the owner has gone") { replica.directory.lost("arms", 1, kNow); }
+  SECTION("the owner is lost") { replica.directory.lost("arms", 1, kNow); }
   CHECK(replica.directory.behind() == nullptr);
 }
 
-TEST_CASE("who owns nothing hears an older process of a partition whose later one is gone") {
-  // A daemon that keeps nothing was started again after its clock had been set back.
+TEST_CASE("a client accepts an older process of a partition when the later one is lost") {
+  // A daemon without a state was restarted after its clock had been set back.
   const bool owns = GENERATE(false, true);
   Replica replica(owns ? "head" : "");
   replica.directory.apply(presence_of("arms", 9, 1), kNow);
   replica.directory.apply(Page{"arms", 0, 9, 9, {{"arm", "", 1}}});
-  // Half of one that came between.
+  // Half of the pages of a process between the two.
   replica.directory.apply(presence_of("arms", 10, 2), kNow);
   replica.directory.apply(Page{"arms", 0, 10, 11, {{"arm", "", 1}}});
   replica.directory.apply(presence_of("arms", 5, 1), kNow);
@@ -264,14 +264,14 @@ TEST_CASE("who owns nothing hears an older process of a partition whose later on
   replica.directory.lost("arms", 10, kNow);
   replica.directory.apply(presence_of("arms", 5, 1), kNow);
   replica.directory.apply(Page{"arms", 0, 5, 6, {{"arm", "", 1}, {"hand", "arm", 2}}});
-  // Whoever owns something says that it knows a later one, which goes on as one that is later
-  // still.
+  // An owner reports that it knows a later process, so the older one continues with an even later
+  // incarnation.
   CHECK(replica.directory.serving("arms").has_value() == !owns);
   CHECK(replica.forest.exists("hand") == !owns);
   CHECK(replica.directory.complete());
 }
 
-TEST_CASE("a directory is complete when all pages of all reachable partitions have come") {
+TEST_CASE("a directory is complete when all pages of all reachable partitions have arrived") {
   Replica replica;
   replica.directory.apply(presence_of("arms", 1, 2), kNow);
   CHECK_FALSE(replica.directory.complete());
@@ -286,9 +286,7 @@ TEST_CASE("a directory is complete when all pages of all reachable partitions ha
   CHECK(replica.directory.complete());
 }
 
-TEST_CASE(
-    "of two claims of one age the alphabetically first wins, the other one wins once that is "
-    "gone") {
+TEST_CASE("of two claims of the same age the alphabetically first partition wins") {
   const Page of_arms = page_of("arms", {{"hand", "arm"}});
   const Page of_legs = page_of("legs", {{"hand", "foot"}});
   const Page of_wings = page_of("wings", {{"hand", "tip"}});
@@ -301,7 +299,7 @@ TEST_CASE(
   CHECK(replica.structure() == Lines{"hand < arm @ arms"});
   replica.directory.apply(page_of("legs", {{"hand", "knee"}}));
   CHECK(replica.structure() == Lines{"hand < arm @ arms"});
-  SECTION("the claim in force goes first") {
+  SECTION("the claim in force is withdrawn first") {
     replica.directory.apply(page_of("arms", {}));
     CHECK(replica.structure() == Lines{"hand < knee @ legs"});
     replica.directory.apply(page_of("legs", {}));
@@ -309,7 +307,7 @@ TEST_CASE(
     replica.directory.apply(page_of("wings", {}));
     CHECK(replica.structure().empty());
   }
-  SECTION("the shadowed claims go first") {
+  SECTION("the shadowed claims are withdrawn first") {
     replica.directory.apply(page_of("legs", {}));
     replica.directory.apply(page_of("wings", {}));
     CHECK(replica.structure() == Lines{"hand < arm @ arms"});
@@ -318,7 +316,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("a frame held here is its holder's until it is released") {
+TEST_CASE("an own frame keeps its parent against another claim until it is released") {
   Replica robot("robot");
   REQUIRE(robot.forest.add("hand", "", along_x(1)));
   robot.directory.apply(page_of("arms", {{"hand", "arm"}}));
@@ -328,25 +326,25 @@ TEST_CASE("a frame held here is its holder's until it is released") {
   CHECK(robot.structure() == Lines{"hand < arm @ arms"});
 }
 
-TEST_CASE("frames that hung below each other meanwhile end up where they belong") {
-  // hand was moved away from below foot, then foot below hand; the second is heard of first.
+TEST_CASE("frames of others get the right parents after a cycle that existed only in transit") {
+  // First hand was moved away from foot, then foot below hand. The second move arrives first.
   const Page foot_moved = page_of("legs", {{"foot", "hand", 2}});
   const Page hand_moved = page_of("arms", {{"hand", ""}});
   const Lines both{"foot < hand @ legs, attached", "hand <  @ arms"};
   Replica replica;
   replica.directory.apply(page_of("legs", {{"foot", ""}}));
   replica.directory.apply(page_of("arms", {{"hand", "foot", 1}}));
-  SECTION("of two others") {
+  SECTION("both frames belong to others") {
     replica.directory.apply(foot_moved);
     CHECK(replica.structure() == Lines{"foot <  @ legs", "hand < foot @ arms, attached"});
-    SECTION("by a page") { replica.directory.apply(hand_moved); }
-    SECTION("by a new incarnation") {
+    SECTION("it ends with a page") { replica.directory.apply(hand_moved); }
+    SECTION("it ends with a new incarnation") {
       replica.directory.apply(presence_of("arms", 2, 1), kLater);
       replica.directory.apply(page_of("arms", {{"hand", ""}}, 2));
     }
     CHECK(replica.structure() == both);
   }
-  SECTION("while an alphabetically earlier name claims it") {
+  SECTION("an alphabetically earlier partition claims one frame for a while") {
     replica.directory.apply(foot_moved);
     replica.directory.apply(page_of("chest", {{"foot", "rib"}}));
     replica.directory.apply(hand_moved);
@@ -355,7 +353,7 @@ TEST_CASE("frames that hung below each other meanwhile end up where they belong"
   }
 }
 
-TEST_CASE("frames that hung below held ones meanwhile end up where they belong") {
+TEST_CASE("frames of others get their parents when an own frame leaves a cycle") {
   Replica arms("arms");
   arms.directory.apply(page_of("legs", {{"foot", ""}}));
   REQUIRE(arms.forest.add("hand", "foot", along_x(1)));

@@ -1,4 +1,4 @@
-// Partitions that are gone for good, and the number of absences that are kept.
+// Forgotten partitions, and the number of absences that are kept.
 
 #include <string>
 #include <vector>
@@ -17,7 +17,7 @@ using testing::presence_of;
 using testing::Witness;
 using Kind = Absent::Kind;
 
-TEST_CASE("what is forgotten is gone, for those as well who were away when it was said") {
+TEST_CASE("a forgotten partition is removed also by participants that were away") {
   Witness base;
   base.lose("arm", 1);
   base.wait();
@@ -39,7 +39,7 @@ TEST_CASE("what is forgotten is gone, for those as well who were away when it wa
   away.directory.apply(said, kNow);
   CHECK(away.structure().empty());
   CHECK_FALSE(away.directory.owner("arm"));
-  // It goes on saying so.
+  // It passes on that the partition is forgotten.
   REQUIRE(away.directory.absent().size() == 1);
   CHECK(away.directory.absent()[0].kind == Kind::kForgotten);
   // Its remaining messages are late; those of a new process are not.
@@ -51,7 +51,7 @@ TEST_CASE("what is forgotten is gone, for those as well who were away when it wa
   CHECK(base.directory.absent().empty());
 }
 
-TEST_CASE("two partitions that have forgotten each other learn of it from each other") {
+TEST_CASE("two partitions that have forgotten each other learn it from each other") {
   Witness base;
   base.lose("arm", 1);
   base.wait();
@@ -63,7 +63,7 @@ TEST_CASE("two partitions that have forgotten each other learn of it from each o
   CHECK(base.directory.hidden_by(1) == 1);
 }
 
-TEST_CASE("a client cannot tell a partition that it has forgotten it, so it hears it again") {
+TEST_CASE("a client that has forgotten a partition accepts it again") {
   Witness client("");
   client.lose("arm", 1);
   client.wait();
@@ -73,7 +73,7 @@ TEST_CASE("a client cannot tell a partition that it has forgotten it, so it hear
   CHECK(client.owner_of("hand") == "arm");
 }
 
-TEST_CASE("what was forgotten while it still seemed to be there is forgotten as that ends") {
+TEST_CASE("a partition that is forgotten while it seems reachable is removed when it is lost") {
   Witness base;
   Presence head = presence_of("head", 1, 0);
   head.absent = {{"arm", 0, Kind::kForgotten, 1}};
@@ -99,7 +99,7 @@ TEST_CASE("a reachable partition cannot be forgotten") {
   CHECK(base.owner_of("hand") == "arm");
 }
 
-TEST_CASE("absences are bounded") {
+TEST_CASE("the number of absences is bounded") {
   Absences absences;
   for (std::size_t i = 0; i < 2 * Absences::kMost; ++i) {
     absences.resume({"p" + std::to_string(i), static_cast<std::int64_t>(i), Kind::kLost, 1});

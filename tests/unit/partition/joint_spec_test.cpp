@@ -22,7 +22,7 @@ TEST_CASE("joints: types have names") {
   CHECK(std::string(to_string(JointType::kPrismatic)) == "prismatic");
 }
 
-TEST_CASE("joints: rest is the position within the limits that is nearest to zero") {
+TEST_CASE("joints: the rest position is the one within the limits that is nearest to zero") {
   CHECK(tfdude::rest_position(std::nullopt) == 0);
   CHECK(tfdude::rest_position(JointLimits{-1, 2}) == 0);
   CHECK(tfdude::rest_position(JointLimits{1, 2}) == 1);
@@ -30,7 +30,7 @@ TEST_CASE("joints: rest is the position within the limits that is nearest to zer
   CHECK(tfdude::rest_position(JointLimits{4, 4}) == 4);
 }
 
-TEST_CASE("joints: of an unmeasured position the mean square distance within the limits is known") {
+TEST_CASE("joints: an unmeasured position has the variance of a uniform one within the limits") {
   Random random(6);
   INFO("seed " << random.seed());
   constexpr int kSteps = 100000;
@@ -52,7 +52,7 @@ TEST_CASE("joints: of an unmeasured position the mean square distance within the
   CHECK(tfdude::unmeasured_variance(JointType::kPrismatic, JointLimits{2, 2}, 2) == 0);
 }
 
-TEST_CASE("joints: a coupled joint's own covariance is its origin's alone") {
+TEST_CASE("joints: a coupled joint's own covariance is only that of its origin") {
   JointSpec joint;
   joint.joint = tfdude::revolute_joint({{}, *tfdude::Covariance::from_stddev({1, 0, 0, 0, 0, 0})},
                                        Eigen::Vector3d::UnitX());

@@ -63,7 +63,7 @@ struct Arm : Replica {
   Partition partition;
 };
 
-TEST_CASE("before its first sample a joint is at rest, and as uncertain as its limits are wide") {
+TEST_CASE("before its first sample a joint is at rest with the variance of its limits") {
   Arm arm;
   arm.load();
   CHECK(pose_diff(arm.edge("base", "upper").pose, along_x(1).pose, 1e-15) == "");
@@ -94,7 +94,7 @@ TEST_CASE("positions move the joints' edges as one commit") {
         1e-12);
 }
 
-TEST_CASE("what follows a joint moves with it, and shares its error") {
+TEST_CASE("a mimic joint moves with its source joint and shares its error") {
   Arm arm;
   arm.load();
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.04}}, {}}));
@@ -106,7 +106,7 @@ TEST_CASE("what follows a joint moves with it, and shares its error") {
   REQUIRE(X);
   CHECK(std::abs(X->covariance.stddev()[5] - 0.5 * 0.2) < 1e-12);
   CHECK(X->basis.sources == std::vector<std::string>{"joint elbow"});
-  // Another variance is said with the value.
+  // A new variance changes the common error together with the value.
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.01}}, {}}));
   CHECK(std::abs(arm.forest.lookup("upper", "hand")->covariance.stddev()[5] - 0.5 * 0.1) < 1e-12);
   CHECK(std::abs(arm.forest.lookup("upper", "fore")->covariance.stddev()[5] - 0.1) < 1e-12);
@@ -135,7 +135,7 @@ TEST_CASE("values for a mimic joint are ignored") {
              ContainsSubstring("joint 'wrist' moves no frame"));
 }
 
-TEST_CASE("a position outside the limits is applied and counted, unless the joint is strict") {
+TEST_CASE("a position outside the limits is applied and counted unless the joint is strict") {
   Arm arm;
   auto frames = arm.frames();
   frames[1].joint->strict = true;
@@ -143,7 +143,7 @@ TEST_CASE("a position outside the limits is applied and counted, unless the join
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 2.5, 0.04}}, {}}));
   CHECK(arm.info("elbow").position == 2.5);
   CHECK(arm.info("elbow").outside == 1);
-  // The wrist's is -1.125, beyond its -1.
+  // The wrist's position is -1.125, below its lower limit of -1.
   CHECK(arm.info("wrist").outside == 1);
   const auto refused =
       arm.partition.apply(JointUpdate{{{"elbow", 0, 0}, {"shoulder", 2.01, 0}}, {}});
@@ -155,7 +155,7 @@ TEST_CASE("a position outside the limits is applied and counted, unless the join
   REQUIRE(arm.partition.apply(JointUpdate{{{"shoulder", 2, 0}}, {}}));
 }
 
-TEST_CASE("bad positions are refused by name, and change nothing") {
+TEST_CASE("invalid positions are rejected by name and change nothing") {
   Arm arm;
   arm.load();
   const double nan = std::nan("");
@@ -170,7 +170,7 @@ TEST_CASE("bad positions are refused by name, and change nothing") {
   CHECK(pose_diff(arm.edge("base", "upper").pose, along_x(1).pose, 1e-15) == "");
 }
 
-TEST_CASE("where a joint cannot follow, the one that it follows is refused") {
+TEST_CASE("a position that gives a mimic joint an invalid position is rejected") {
   Arm arm;
   auto frames = arm.frames();
   frames[3].joint->mimic->multiplier = 4;
@@ -181,7 +181,7 @@ TEST_CASE("where a joint cannot follow, the one that it follows is refused") {
   CHECK(arm.info("elbow").position == 0);
 }
 
-TEST_CASE("a joint that is named twice in one update is refused") {
+TEST_CASE("a joint that is named twice in one update is rejected") {
   Arm arm;
   arm.load();
   const JointUpdate twice{{{"elbow", 0.1, 0}, {"shoulder", 0.1, 0}, {"elbow", 0.2, 0}}, at(1)};
@@ -190,7 +190,7 @@ TEST_CASE("a joint that is named twice in one update is refused") {
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.2, 0}}, at(1)}));
 }
 
-TEST_CASE("descriptions of joints that cannot be meant are refused by frame and joint") {
+TEST_CASE("invalid descriptions of joints are rejected by frame and joint") {
   const auto refused = [](auto change) {
     Arm arm;
     auto frames = arm.frames();
@@ -213,7 +213,7 @@ TEST_CASE("descriptions of joints that cannot be meant are refused by frame and 
              ContainsSubstring("too long"));
 }
 
-TEST_CASE("samples that come late count for history, not for what is told now") {
+TEST_CASE("a late sample is added to the history and does not change the newest position") {
   Arm arm;
   arm.load();
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.04}}, at(1)}));
@@ -224,13 +224,13 @@ TEST_CASE("samples that come late count for history, not for what is told now") 
   CHECK(outcome(arm.partition.apply(JointUpdate{{{"elbow", 0.8, 0.01}}, at(3)})) == "stamp_taken");
 }
 
-TEST_CASE("a frame that is removed or moved by hand leaves its joint") {
+TEST_CASE("a frame that is removed or moved by request leaves its joint") {
   Arm arm;
   arm.load();
   SECTION("removed") {
     REQUIRE(std::holds_alternative<Done>(
         arm.partition.answer(Request{1, "hand", RemoveRequest{{"hand"}}}, kNow).body));
-    // Another of that name is another frame.
+    // A new frame of the same name has no joint.
     REQUIRE(std::holds_alternative<Done>(
         arm.partition.answer(Request{2, "hand", AddRequest{"fore", along_x(3)}}, kNow).body));
   }
@@ -245,7 +245,7 @@ TEST_CASE("a frame that is removed or moved by hand leaves its joint") {
                   1e-15) == "");
 }
 
-TEST_CASE("a partition comes back with its joints where they were") {
+TEST_CASE("a partition restores the positions of its joints") {
   testing::MemoryStore store;
   {
     Arm arm;
@@ -259,7 +259,7 @@ TEST_CASE("a partition comes back with its joints where they were") {
     REQUIRE(store.save_configured(arm.frames()));
   }
   Arm arm;
-  SECTION("the description is what it was") {
+  SECTION("with the same description") {
     REQUIRE(arm.partition.restore(*store.load(), arm.frames(), kNow));
     CHECK(arm.info("shoulder").position == 0.5);
     CHECK(arm.info("shoulder").measured);
@@ -267,13 +267,13 @@ TEST_CASE("a partition comes back with its joints where they were") {
     CHECK(std::abs(arm.edge("base", "upper").covariance.stddev()[5] - 0.01) < 1e-12);
     CHECK(std::abs(arm.info("wrist").position + 0.25) < 1e-15);
     CHECK(std::abs(arm.edge("upper", "hand").covariance.stddev()[5] - 0.1) < 1e-12);
-    // And goes on.
+    // Later samples are applied.
     CHECK(*arm.partition.apply(JointUpdate{{{"elbow", 0.25, 0.01}}, {}}) == 2);
   }
-  SECTION("the description has changed") {
+  SECTION("with a changed description") {
     auto frames = arm.frames();
-    // Seen at rest: another origin. Not seen at rest: an axis the other way round, and another
-    // multiplier.
+    // Another origin, which shows at rest. An opposite axis and another multiplier, which show only
+    // away from rest.
     JointSpec longer = *frames[1].joint;
     longer.joint = revolute_joint(along_x(2), {0, 0, 1});
     frames[1] = moved_by("upper", "base", longer);
@@ -290,7 +290,7 @@ TEST_CASE("a partition comes back with its joints where they were") {
     CHECK(arm.info("wrist").position == 2 * 0.75 + 0.125);
     CHECK(std::abs(arm.edge("upper", "hand").covariance.stddev()[5] - 0.2) < 1e-12);
   }
-  SECTION("limits have been narrowed: what is outside is kept, and counted") {
+  SECTION("with narrower limits: the position is kept and counted") {
     auto frames = arm.frames();
     frames[1].joint->limits = JointLimits{-0.25, 0.25};
     REQUIRE(arm.partition.restore(*store.load(), frames, kNow));
@@ -298,13 +298,12 @@ TEST_CASE("a partition comes back with its joints where they were") {
     CHECK(arm.info("shoulder").outside == 1);
     CHECK(arm.info("elbow").outside == 0);
   }
-  SECTION(
-      "a joint that turned slides now: its number is none of metres, nor that of its follower") {
+  SECTION("with another type of joint: the position is dropped") {
     auto frames = arm.frames();
     const FrameSpec before = frames[2];
     frames[2].joint->type = JointType::kPrismatic;
     frames[2].joint->joint = prismatic_joint(along_x(1), {0, 0, 1});
-    // Seen at rest or not.
+    // At the variance of its limits, or another one.
     frames[2].joint->variance = GENERATE(0.25, 0.09);
     const auto changes = configured_changes(*store.load(), frames);
     REQUIRE(changes.size() >= 2);
@@ -319,7 +318,7 @@ TEST_CASE("a partition comes back with its joints where they were") {
     CHECK_FALSE(arm.info("wrist").measured);
     CHECK(pose_diff(arm.edge("upper", "fore").pose, along_x(1).pose, 1e-15) == "");
     CHECK(arm.info("shoulder").position == 0.5);
-    // Its first sample is stored as what it is now.
+    // Its first sample is stored with the new type.
     REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.125, 1e-4}}, {}}));
     REQUIRE(store.save_values({}, arm.partition.take_changed_joints()));
     Arm next;
@@ -327,7 +326,7 @@ TEST_CASE("a partition comes back with its joints where they were") {
     CHECK(next.info("elbow").position == 0.125);
     CHECK(next.info("elbow").measured);
   }
-  SECTION("a revolute joint without limits is as good as one with them") {
+  SECTION("with a revolute joint that lost its limits: the position is kept") {
     auto frames = arm.frames();
     frames[1].joint->type = JointType::kContinuous;
     frames[1].joint->limits.reset();
@@ -337,7 +336,7 @@ TEST_CASE("a partition comes back with its joints where they were") {
   }
 }
 
-TEST_CASE("all who have a joint, or what follows it, are asked at once") {
+TEST_CASE("a position is sent to the owners of the joint and of its mimic joints") {
   Replica caller;
   const auto page = [](const std::string& name, std::vector<PageEntry> entries,
                        std::vector<PageJoint> joints) {
@@ -368,7 +367,7 @@ TEST_CASE("all who have a joint, or what follows it, are asked at once") {
   CHECK(routed({{"elbow", 2, 0}})->size() == 1);
 }
 
-TEST_CASE("an owner's pages say which joints move its frames, until they do not") {
+TEST_CASE("an owner's pages list the joints that move its frames") {
   Arm arm;
   arm.load();
   const auto joints = [&] {

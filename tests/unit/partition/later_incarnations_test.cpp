@@ -1,4 +1,4 @@
-// Processes of one partition, one after the other: which of them is heard.
+// Successive processes of one partition, and which of them is accepted.
 
 #include <string>
 #include <vector>
@@ -19,17 +19,17 @@ using testing::Witness;
 using Lines = std::vector<std::string>;
 using Kind = Absent::Kind;
 
-TEST_CASE("a process learns that others know of a later one of its partition") {
+TEST_CASE("a process learns that others know a later incarnation of its partition") {
   Replica arm("arm");
   Presence base = presence_of("base", 1, 0);
   CHECK_FALSE(arm.directory.hidden_by(5));
-  SECTION("missed") {
+  SECTION("a later one was lost") {
     base.absent = {{"arm", 0, Kind::kLost, 9}};
     arm.directory.apply(base, kNow);
     CHECK(arm.directory.hidden_by(5) == 9);
     CHECK_FALSE(arm.directory.hidden_by(9));
   }
-  SECTION("itself missed, and forgotten") {
+  SECTION("its own one was forgotten") {
     base.absent = {{"arm", 0, Kind::kForgotten, 5}};
     arm.directory.apply(base, kNow);
     CHECK(arm.directory.hidden_by(5) == 5);
@@ -37,7 +37,7 @@ TEST_CASE("a process learns that others know of a later one of its partition") {
   }
 }
 
-TEST_CASE("what is dropped for its age is reported, once an incarnation") {
+TEST_CASE("messages of an outdated incarnation are reported once") {
   Witness base;
   base.hear("arm", 9, 10);
   (void)base.directory.take_outdated();
@@ -53,7 +53,7 @@ TEST_CASE("what is dropped for its age is reported, once an incarnation") {
   CHECK(base.owner_of("hand") == "arm");
 }
 
-TEST_CASE("a number of which nobody can tell a partition any more hides it from nobody") {
+TEST_CASE("an incarnation known only from a lost participant hides no process") {
   Replica head("head");
   Presence base = presence_of("base", 1, 0);
   base.absent = {{"arm", 0, Kind::kSilent, 9}};
@@ -67,7 +67,7 @@ TEST_CASE("a number of which nobody can tell a partition any more hides it from 
   CHECK(head.structure() == Lines{"hand <  @ arm"});
 }
 
-TEST_CASE("a partition is told the highest number that hides it") {
+TEST_CASE("an absence has the highest incarnation that hides the partition") {
   Witness base;
   base.lose("arm", 1);
   Presence head = presence_of("head", 1, 0);
@@ -79,7 +79,7 @@ TEST_CASE("a partition is told the highest number that hides it") {
   CHECK(base.directory.absent()[0].incarnation == 9);
 }
 
-TEST_CASE("a process that goes on as a later one is heard again") {
+TEST_CASE("a process that continues with a later incarnation is accepted again") {
   Witness base;
   base.hear("arm", 9, 10);
   base.lose("arm", 9);
@@ -95,7 +95,7 @@ TEST_CASE("a process that goes on as a later one is heard again") {
   CHECK(base.structure() == Lines{"hand <  @ arm", "tool < hand @ arm, attached"});
 }
 
-TEST_CASE("who restarts misses whom its predecessor missed") {
+TEST_CASE("a restarted process restores the absences of its predecessor") {
   Replica replica("base");
   replica.directory.restore(
       {{"arm", 5, Kind::kBack, 7}, {"leg", 6, Kind::kForgotten, 8}, {"tail", 7, Kind::kSilent, 9}});

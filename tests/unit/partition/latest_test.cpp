@@ -29,7 +29,7 @@ double x_of(const SegmentValues& values) { return values.values.at(0).pose.trans
 
 }  // namespace
 
-TEST_CASE("answers of one instant, or of none, are taken as they are") {
+TEST_CASE("answers of one instant or of static edges are used as they are") {
   CHECK(one_instant({}, std::nullopt).answers.empty());
   CHECK_FALSE(one_instant({}, std::nullopt).ask_again);
   const auto fixed = one_instant({answer(std::nullopt, 1), answer(std::nullopt, 2)}, ms(5));
@@ -40,9 +40,7 @@ TEST_CASE("answers of one instant, or of none, are taken as they are") {
   CHECK(x_of(same.answers[2]) == 3);
 }
 
-TEST_CASE(
-    "of different instants that of the guess is taken where all have it and it is near the "
-    "newest") {
+TEST_CASE("the guessed instant is used if all owners have it and it is recent") {
   const auto ask = [](Time hint, std::optional<double> of_first = 11,
                       std::optional<double> of_last = 12) {
     return one_instant(
@@ -57,7 +55,7 @@ TEST_CASE(
     CHECK(x_of(found.answers[1]) == 12);
     CHECK(x_of(found.answers[2]) == 3);
   }
-  // That is the newest of the slowest itself.
+  // The guess is the newest instant of the slowest owner itself.
   CHECK(x_of(ask(ms(90), 11, std::nullopt).answers.at(1)) == 2);
   for (const auto& far :
        {ask(ms(69)), ask(ms(91)), ask(ms(80), std::nullopt), ask(ms(80), 11, {})}) {
@@ -67,7 +65,7 @@ TEST_CASE(
   CHECK(one_instant({answer(ms(1), 1), answer(ms(2), 2)}, std::nullopt).ask_again == ms(1));
 }
 
-TEST_CASE("a guess is a period behind what is to be expected of the slowest") {
+TEST_CASE("a guess is one period behind the expected newest sample of the slowest owner") {
   LatestHints hints;
   const Steady start{};
   CHECK_FALSE(hints.guess("a", "b", start));
@@ -75,7 +73,7 @@ TEST_CASE("a guess is a period behind what is to be expected of the slowest") {
   CHECK(hints.guess("a", "b", start) == ms(80));
   CHECK(hints.guess("a", "b", start + 25ms) == ms(105));
   CHECK_FALSE(hints.guess("b", "a", start));
-  // Where all have the same instant time after time there is nothing to guess.
+  // If all owners repeatedly have the same instant, there is nothing to guess.
   const std::vector<SegmentValues> same{answer(ms(130), 1), answer(ms(130), 2)};
   hints.note("c", "d", start, same);
   CHECK_FALSE(hints.guess("c", "d", start));
@@ -87,7 +85,7 @@ TEST_CASE("a guess is a period behind what is to be expected of the slowest") {
   CHECK(hints.guess("a", "b", start + 30ms) == ms(110));
 }
 
-TEST_CASE("where samples come as they did, one round trip is enough") {
+TEST_CASE("one round trip is enough if samples arrive at constant rates") {
   testing::Random random(31415);
   INFO("seed " << random.seed());
   LatestHints hints;

@@ -1,4 +1,4 @@
-// What a participant stores, publishes, replies and reports because of messages and requests.
+// What a participant stores, publishes, replies and reports after messages and requests.
 
 #include "partition/member.hpp"
 
@@ -50,7 +50,7 @@ const Error kFull{Errc::kState, "the disk is full"};
 
 }  // namespace
 
-TEST_CASE("member: one that owns nothing hears of others and has nothing to store or tell") {
+TEST_CASE("member: a participant without frames receives messages and stores nothing") {
   Replica replica;
   Member member(replica.forest, replica.directory, "");
   member.on_presence(presence_of("head", 1, 1), kNow);
@@ -66,7 +66,7 @@ TEST_CASE("member: one that owns nothing hears of others and has nothing to stor
   CHECK_FALSE(ready.presence);
 }
 
-TEST_CASE("member: the reply to a change follows with what it rests on, once") {
+TEST_CASE("member: a change is ready once with its rows and pages and reply") {
   Serving arms;
   CHECK_FALSE(arms.ask(1, "hand", AddRequest{"arm", along_x(1)}));
   CHECK(arms.member.take_outcome().to_reply);
@@ -83,14 +83,14 @@ TEST_CASE("member: the reply to a change follows with what it rests on, once") {
   CHECK(arms.member.take_ready().replies.empty());
 }
 
-TEST_CASE("member: an update of values is answered at once where nothing is stored") {
+TEST_CASE("member: an update of values is answered at once if nothing is stored") {
   Serving kept;
   CHECK_FALSE(kept.ask(1, "arm", UpdateRequest{{{"arm", along_x(2)}}}));
   Serving volatile_one(false);
   CHECK(volatile_one.ask(1, "arm", UpdateRequest{{{"arm", along_x(2)}}}));
 }
 
-TEST_CASE("member: what could not be stored is ready again, but for the replies") {
+TEST_CASE("member: changes that could not be stored are ready again without their replies") {
   Serving arms;
   const auto epoch = arms.ask(1, "arms", RemoveRequest{})->epoch;
   CHECK_FALSE(arms.ask(2, "hand", AddRequest{"arm", along_x(1)}));
@@ -107,7 +107,7 @@ TEST_CASE("member: what could not be stored is ready again, but for the replies"
   CHECK(again.pages.size() == 1);
 }
 
-TEST_CASE("member: one that serves nothing yet says nothing that it could not store") {
+TEST_CASE("member: it announces no loss that it could not store before it serves") {
   Replica replica("arms");
   Member member(replica.forest, replica.directory, "arms");
   member.claim("here", 42, kNow, 5);
@@ -119,8 +119,7 @@ TEST_CASE("member: one that serves nothing yet says nothing that it could not st
   CHECK_FALSE(member.not_stored(member.take_ready()));
 }
 
-TEST_CASE(
-    "member: it serves as a later process than it has claimed its name as, whatever its clock") {
+TEST_CASE("member: it serves under a later incarnation than its claim whatever the clock") {
   Replica replica("arms");
   Member member(replica.forest, replica.directory, "arms");
   member.claim("here", 42, kNow + std::chrono::hours(2), 5);
@@ -129,7 +128,7 @@ TEST_CASE(
   CHECK(member.introduce().incarnation > claimed);
 }
 
-TEST_CASE("member: a value is not stored where its frame was before") {
+TEST_CASE("member: a value is not stored before the move of its frame") {
   Serving arms;
   CHECK_FALSE(arms.ask(1, "hand", AddRequest{"arm", along_x(1)}));
   CHECK_FALSE(arms.ask(2, "foot", AddRequest{"", along_x(1)}));
@@ -142,7 +141,7 @@ TEST_CASE("member: a value is not stored where its frame was before") {
   CHECK(arms.member.storable({{"hand", along_x(2)}}).size() == 1);
 }
 
-TEST_CASE("member: who hears a later process of its partition gives it up, and says why") {
+TEST_CASE("member: it gives up its partition when a later process of it appears") {
   Serving arms;
   CHECK_FALSE(arms.ask(1, "hand", AddRequest{"arm", along_x(1)}));
   Presence later = presence_of("arms", arms.member.presence().incarnation + 1, 1);
@@ -163,7 +162,7 @@ TEST_CASE("member: who hears a later process of its partition gives it up, and s
   CHECK(std::get<Error>(arms.ask(2, "arm", RemoveRequest{})->body).code == Errc::kNotOwner);
 }
 
-TEST_CASE("member: others that know a later process are told of one that is later still") {
+TEST_CASE("member: it overtakes a later incarnation that others report") {
   Serving arms;
   const std::uint64_t own = arms.member.presence().incarnation;
   Presence head = presence_of("head", 1, 0);
@@ -181,7 +180,7 @@ TEST_CASE("member: others that know a later process are told of one that is late
 
 // ---- when a name is taken
 
-TEST_CASE("claiming: a name that nobody has is taken after the time to meet, then served") {
+TEST_CASE("claiming: a free name is taken after the discovery time and then served") {
   Presence own = presence_of("arms", 5, 0);
   own.ticket = 5;
   NameClaim claim(own);
@@ -196,22 +195,22 @@ TEST_CASE("claiming: a name that nobody has is taken after the time to meet, the
     CHECK(claiming.next(at(100), false) == Step::kTake);
     CHECK(claiming.next(at(101), false) == Step::kServe);
   }
-  SECTION("later where somebody has not said yet what it serves, and not for ever") {
+  SECTION("later if a participant has not announced yet what it serves") {
     CHECK(claiming.next(at(100), true) == Step::kWait);
     CHECK(claiming.next(at(3101), true) == Step::kTake);
   }
-  SECTION("not while another one serves, who may have died just now") {
+  SECTION("not while another process serves") {
     Presence other = presence_of("arms", 3, 1);
     other.ticket = 3;
     claim.hear(other);
     CHECK(claiming.next(at(100), false) == Step::kWait);
-    SECTION("who has") {
+    SECTION("which is then lost") {
       claim.lost(3);
       CHECK(claiming.next(at(500), false) == Step::kTake);
     }
-    SECTION("who has not") { CHECK(claiming.next(at(1601), false) == Step::kLeave); }
+    SECTION("which stays") { CHECK(claiming.next(at(1601), false) == Step::kLeave); }
   }
-  SECTION("by the one of two who came first") {
+  SECTION("not if an earlier claim takes it") {
     CHECK(claiming.next(at(100), false) == Step::kTake);
     Presence earlier = presence_of("arms", 3, 0);
     earlier.ticket = 3;

@@ -21,7 +21,7 @@ using Turn = NameClaim::Turn;
 
 Time at(std::int64_t nanoseconds) { return Time(std::chrono::nanoseconds(nanoseconds)); }
 
-TEST_CASE("an incarnation is above every one that was seen, whatever the clock") {
+TEST_CASE("an incarnation is above every known one whatever the clock") {
   IncarnationSource source;
   const std::uint64_t first = source.next(at(1'000'000'000'000'000), 7);
   source.saw(first);
@@ -32,18 +32,18 @@ TEST_CASE("an incarnation is above every one that was seen, whatever the clock")
       CHECK(source.next(at(clock), random) > first);
     }
   }
-  // Of equal knowledge the later clock has the greater.
+  // With equal knowledge, the later clock gives the greater incarnation.
   CHECK(source.next(at(3'000'000'000'000'000), 0) > source.next(at(2'000'000'000'000'000), ~0ULL));
 }
 
-TEST_CASE("what no clock could have given is not believed of an incarnation") {
+TEST_CASE("an incarnation that no clock could give is ignored") {
   IncarnationSource source;
   source.saw(~std::uint64_t{0});
   source.saw(IncarnationSource::kEnd);
   CHECK(source.next(at(0), 0) < 1ULL << 21U);
 }
 
-TEST_CASE("of processes that start at once, knowing the same, each has an incarnation of its own") {
+TEST_CASE("processes that start at the same instant get different incarnations") {
   Random random(0x1ca2);
   INFO("seed " << random.seed());
   std::set<std::uint64_t> all;
@@ -59,14 +59,14 @@ Presence claim_of(std::uint64_t ticket) {
   return claim;
 }
 
-TEST_CASE("who claims alone has the name") {
+TEST_CASE("a single claimant gets the name") {
   const NameClaim claim(claim_of(5));
   CHECK(claim.to_take() == Turn::kMine);
   CHECK(claim.to_serve() == Turn::kMine);
   CHECK_FALSE(claim.rival());
 }
 
-TEST_CASE("who serves keeps the name, until it is lost") {
+TEST_CASE("a process that serves keeps the name until it is lost") {
   NameClaim claim(claim_of(5));
   Presence server = claim_of(9);
   server.serving = true;
@@ -85,7 +85,7 @@ TEST_CASE("who serves keeps the name, until it is lost") {
   CHECK(claim.to_take() == Turn::kMine);
 }
 
-TEST_CASE("of two claims at once that of the lesser ticket counts") {
+TEST_CASE("of two concurrent claims the one with the smaller ticket wins") {
   NameClaim lesser(claim_of(5));
   NameClaim greater(claim_of(6));
   lesser.hear(claim_of(6));
@@ -94,7 +94,7 @@ TEST_CASE("of two claims at once that of the lesser ticket counts") {
   CHECK(greater.to_take() == Turn::kOthers);
 }
 
-TEST_CASE("equal tickets are told apart by host and process") {
+TEST_CASE("equal tickets are ordered by host and process") {
   Presence other = claim_of(5);
   other.pid = 2;
   NameClaim one(claim_of(5));
@@ -105,24 +105,25 @@ TEST_CASE("equal tickets are told apart by host and process") {
   CHECK(two.to_take() == Turn::kOthers);
 }
 
-TEST_CASE("who has taken the name waits for an earlier claim to be decided") {
+TEST_CASE("a process that has taken the name waits for an earlier claim") {
   NameClaim claim(claim_of(5));
   Presence earlier = claim_of(4);
   claim.hear(earlier);
   CHECK(claim.to_serve() == Turn::kWait);
-  SECTION("it takes the name, too") {
+  SECTION("which takes the name") {
     earlier.taken = true;
     claim.hear(earlier);
     CHECK(claim.to_serve() == Turn::kOthers);
   }
-  SECTION("it gives up") {
+  SECTION("which gives up") {
     earlier.stopped = true;
     claim.hear(earlier);
     CHECK(claim.to_serve() == Turn::kMine);
   }
 }
 
-// Processes that claim one name; what each says reaches the others in order, each at its own time.
+// Processes that claim one name. The messages of each reach every other in order, after a random
+// delay.
 class Contest {
  public:
   Contest(Random& random, std::size_t many) : random_(random) {
@@ -210,7 +211,7 @@ class Contest {
     one.said.serving = turn == Turn::kMine;
     one.said.stopped = turn == Turn::kOthers;
     if (turn == Turn::kMine && one.pause > 0) {
-      // Decided; the others hear that it serves later.
+      // It has decided to serve, and announces it later.
       --one.pause;
       return;
     }
@@ -224,7 +225,7 @@ class Contest {
   std::map<std::pair<std::size_t, std::size_t>, std::deque<Message>> ways_;
 };
 
-TEST_CASE("exactly one of those who claim a name at once serves, in any order of messages") {
+TEST_CASE("exactly one of several claimants serves in any order of messages") {
   Random random(0xc1a1);
   INFO("seed " << random.seed());
   for (int round = 0; round < 3000; ++round) {

@@ -62,7 +62,7 @@ std::vector<SegmentValues> answers_to(const ObservePlan& plan, Random& random) {
   return answers;
 }
 
-TEST_CASE("an observation asks each owner for the edges of the path, and those beside") {
+TEST_CASE("an observation asks each owner for the edges of the path and correlated ones") {
   Random random(0x0b51);
   const Known known(random);
   const auto down = route_observe(known.forest, known.directory, "world", "tool", {}, kNow);
@@ -84,7 +84,7 @@ TEST_CASE("an observation asks each owner for the edges of the path, and those b
         std::vector<std::string>{"hand up", "arm up", "leg down", "tool beside"});
 }
 
-TEST_CASE("an observation of nothing, or by who cannot be reached, is refused") {
+TEST_CASE("an observation of one frame or over an unreachable owner is rejected") {
   Random random(0x0b52);
   Known known(random);
   const auto refused = [&](const std::string& a, const std::string& b) {
@@ -99,7 +99,7 @@ TEST_CASE("an observation of nothing, or by who cannot be reached, is refused") 
   CHECK(refused("world", "tool") == Errc::kUnreachable);
 }
 
-TEST_CASE("answers are put together in the order of the edges, and name who is missing") {
+TEST_CASE("answers are assembled in the order of the edges and missing edges are named") {
   Random random(0x0b53);
   const Known known(random);
   const auto plan = route_observe(known.forest, known.directory, "tool", "world", {}, {});
@@ -119,7 +119,7 @@ TEST_CASE("answers are put together in the order of the edges, and name who is m
   CHECK(path->seen[1].commit == 8);
   CHECK(path->seen[1].incarnation == 77);
   CHECK_FALSE(path->torn);
-  // An observation that has reached one of its owners only.
+  // An observation that only one of its owners has applied.
   const CommonError common_error{"observed:other", true, Loading::Ones(6, 1)};
   answers[0].correlations[0].common_errors = {common_error};
   CHECK(observed_path(*plan, answers)->torn);
@@ -131,7 +131,7 @@ TEST_CASE("answers are put together in the order of the edges, and name who is m
   CHECK(short_of_one.error().code == Errc::kNotOwner);
 }
 
-TEST_CASE("each owner is told its part, and who has nothing to do is not asked") {
+TEST_CASE("only owners whose edges change get a part of an observation") {
   Random random(0x0b54);
   const Known known(random);
   const auto plan = route_observe(known.forest, known.directory, "world", "tool", {}, {});
@@ -156,7 +156,7 @@ TEST_CASE("each owner is told its part, and who has nothing to do is not asked")
         std::vector<std::string>{"arm", "hand"});
 }
 
-TEST_CASE("an owner applies its part once, counts it, and forgets what it counted with the frame") {
+TEST_CASE("an owner applies its part once and counts it until the frame is moved") {
   Random random(0x0b55);
   Known known(random);
   const auto seen = known.forest.lookup_segments({{"world", "arm"}}, {}, {}, true);
@@ -171,7 +171,7 @@ TEST_CASE("an owner applies its part once, counts it, and forgets what it counte
   CHECK(is_done(known.partition.answer(peer, request, kNow)));
   CHECK(testing::transform_diff(*known.forest.lookup_segments({{"world", "arm"}})->values.begin(),
                                 X, 1e-15) == "");
-  // The same from another is late.
+  // The same revision as another request is late.
   request.sequence = 2;
   const Reply late = known.partition.answer(peer, request, kNow);
   REQUIRE(std::holds_alternative<Error>(late.body));
@@ -191,7 +191,7 @@ TEST_CASE("an owner applies its part once, counts it, and forgets what it counte
   CHECK(counted().empty());
 }
 
-TEST_CASE("what an owner's predecessor was seen to have is not revised, whatever its commits") {
+TEST_CASE("an owner rejects a revision that is based on its predecessor") {
   Random random(0x0b56);
   Known known(random);
   const LookupRequest ask{{{"world", "arm"}}, {}, {}, true};

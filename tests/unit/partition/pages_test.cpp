@@ -56,7 +56,7 @@ TEST_CASE("a new structure has no pages and nothing to publish") {
   CHECK(pages.take_changed().empty());
 }
 
-TEST_CASE("a page says whose it is, of which life, and what is on it") {
+TEST_CASE("a page has its partition and incarnation and entries") {
   Pages pages("robot", kLife);
   pages.put("world", "", 0);
   pages.put("base", "world", 0);
@@ -96,7 +96,7 @@ TEST_CASE("only pages that changed since the last time are published") {
   CHECK(pages.take_changed().empty());
 }
 
-TEST_CASE("room on a page is used again, also after the page was empty") {
+TEST_CASE("room on a page is reused even after the page was empty") {
   Pages pages("robot", kLife);
   put_numbered(pages, 0, 2 * Pages::kPageSize);
   for (std::size_t i = 0; i < Pages::kPageSize; ++i) pages.erase("f" + std::to_string(i));
@@ -111,7 +111,7 @@ TEST_CASE("room on a page is used again, also after the page was empty") {
   CHECK(pages.count() == 3);
 }
 
-TEST_CASE("pages tell of those that were changed before them, or with them") {
+TEST_CASE("a page lists the pages that changed before it or with it") {
   Pages pages("robot", kLife);
   put_numbered(pages, 0, 2 * Pages::kPageSize);
   CHECK(pages.close_epoch() == kLife + 1);
@@ -134,13 +134,13 @@ TEST_CASE("pages tell of those that were changed before them, or with them") {
   CHECK(others_of(changed[0]) == std::vector<std::string>{"1: 10"});
 }
 
-TEST_CASE("of many pages that were changed at once each tells of some") {
+TEST_CASE("a page lists a limited number of pages that changed with it") {
   Pages pages("robot", kLife);
   put_numbered(pages, 0, 30 * Pages::kPageSize);
   for (const Page& page : pages.take_changed()) CHECK(page.others.size() == Pages::kOthers);
 }
 
-// Pages on a way on which a later one may take the place of an earlier one of the same number.
+// Pages in transit. A later page may replace an earlier one of the same number.
 class Way {
  public:
   void put(const Page& page) { pages_.push_back(page); }
@@ -160,7 +160,7 @@ class Way {
   std::deque<Page> pages_;
 };
 
-TEST_CASE("a replica fed with the pages in order has the owner's structure") {
+TEST_CASE("a replica that receives the pages in order has the owner's structure") {
   Random random(0x9a6e5);
   INFO("seed " << random.seed());
   Pages pages("robot", kLife);
@@ -172,8 +172,7 @@ TEST_CASE("a replica fed with the pages in order has the owner's structure") {
   int late_has_all = 0;
   constexpr int kSteps = 3000;
   for (int step = 0; step < kSteps; ++step) {
-    // Several changes at a time, some of the same frame: it may have left one page for another
-    // between.
+    // Several changes at a time, some of the same frame, which may change its page in between.
     std::string id = "f" + std::to_string(random.index(300));
     for (std::size_t changes = 1 + random.index(3); changes > 0; --changes) {
       if (random.index(3) > 0) id = "f" + std::to_string(random.index(300));

@@ -53,7 +53,7 @@ std::string said(const Reply& reply) {
 
 // ---- load
 
-TEST_CASE("a configuration's frames are taken in any order, with parents of others or of nobody") {
+TEST_CASE("a configuration may list frames in any order and with unknown parents") {
   Arms arms;
   REQUIRE(arms.partition.load(
       {{"tool", "hand", along_x(3)}, {"arm", "base", along_x(1)}, {"hand", "arm", along_x(2)}},
@@ -68,7 +68,7 @@ TEST_CASE("a configuration's frames are taken in any order, with parents of othe
   CHECK(arms.partition.page_count() == 1);
 }
 
-TEST_CASE("of a configuration with a bad frame nothing is taken, and the frame is named") {
+TEST_CASE("a configuration with a bad frame is rejected as a whole and the frame is named") {
   struct Bad {
     std::vector<FrameSpec> frames;
     std::string error;
@@ -93,12 +93,12 @@ TEST_CASE("of a configuration with a bad frame nothing is taken, and the frame i
     CHECK(arms.structure() == before);
     CHECK(arms.partition.frame_count() == 0);
     CHECK(arms.partition.take_pages().empty());
-    // What was taken back can be taken again.
+    // The frames can be loaded afterwards.
     CHECK(outcome(arms.partition.load({{"a", "", {}}, {"b", "a", {}}}, kNow)) == "ok");
   }
 }
 
-TEST_CASE("what is loaded is published once, as one epoch") {
+TEST_CASE("loaded frames are published once as one epoch") {
   Arms arms;
   std::vector<FrameSpec> frames;
   for (int i = 0; i < 100; ++i) frames.push_back({"f" + std::to_string(i), "arm", {}});
@@ -115,7 +115,7 @@ TEST_CASE("what is loaded is published once, as one epoch") {
 
 // ---- add
 
-TEST_CASE("a frame is added below an own one, another's one, or as a root") {
+TEST_CASE("a frame is added below an own frame or below another's or as a root") {
   Arms arms;
   arms.plant();
   CHECK(said(arms.ask("finger", AddRequest{"hand", along_x(5)})) == "ok");
@@ -125,7 +125,7 @@ TEST_CASE("a frame is added below an own one, another's one, or as a root") {
   CHECK(arms.partition.frame_count() == 7);
 }
 
-TEST_CASE("an add is refused with the frame and the reason") {
+TEST_CASE("an add is rejected with the frame and the reason") {
   Arms arms;
   arms.plant();
   const Lines before = arms.structure();
@@ -155,7 +155,7 @@ TEST_CASE("frames are removed with all that is owned below them") {
   CHECK(pages[0].entries[0].id == "arm");
 }
 
-TEST_CASE("of frames to remove those owned here go, and the first that is not is named") {
+TEST_CASE("a removal removes the owned frames and names the first that is not owned") {
   Arms arms;
   arms.plant();
   const std::uint64_t epoch = arms.ask("arm", UpdateRequest{{{"arm", {}}}}).epoch;
@@ -169,7 +169,7 @@ TEST_CASE("of frames to remove those owned here go, and the first that is not is
   CHECK(again.epoch == epoch + 1);
 }
 
-TEST_CASE("another's claim to a removed frame shows") {
+TEST_CASE("another claim to a removed frame comes into force") {
   Arms arms;
   arms.plant();
   arms.directory.apply(Page{"legs", 0, 1, 1, {{"tool", "foot"}}});
@@ -192,7 +192,7 @@ TEST_CASE("a frame is moved with or without a new value") {
   CHECK(arms.forest.roots() == Lines{"hand", "world"});
 }
 
-TEST_CASE("a move is refused with the frame and the reason") {
+TEST_CASE("a move is rejected with the frame and the reason") {
   Arms arms;
   arms.plant();
   const Lines before = arms.structure();
@@ -210,7 +210,7 @@ TEST_CASE("a move is refused with the frame and the reason") {
 
 // ---- update
 
-TEST_CASE("many edges are updated, or none, and the first frame that is not owned is named") {
+TEST_CASE("an update changes all edges or none and names the first frame that is not owned") {
   Arms arms;
   arms.plant();
   CHECK(said(arms.ask("arm", UpdateRequest{{{"arm", along_x(2)}, {"hand", along_x(3)}}})) == "ok");
@@ -223,7 +223,7 @@ TEST_CASE("many edges are updated, or none, and the first frame that is not owne
   CHECK(x_of(arms.forest.value("hand")) == 3);
 }
 
-TEST_CASE("of a stream those edges are applied that are owned here") {
+TEST_CASE("a streamed update changes the owned edges and ignores the others") {
   Arms arms;
   arms.plant();
   CHECK(arms.partition.apply(Update{{{"arm", along_x(5)}, {"hand", along_x(6)}}}) == 2);
@@ -237,7 +237,7 @@ TEST_CASE("of a stream those edges are applied that are owned here") {
 
 // ---- lookup
 
-TEST_CASE("a lookup is answered with a transform a segment") {
+TEST_CASE("a lookup is answered with one transform per segment") {
   Arms arms;
   arms.plant();
   const Reply reply = arms.ask(
@@ -254,7 +254,7 @@ TEST_CASE("a lookup is answered with a transform a segment") {
   CHECK((*transforms)[3].pose.translation().x() == 0);
 }
 
-TEST_CASE("a lookup over an edge that is not owned here is refused, naming the ends") {
+TEST_CASE("a lookup over an edge that is not owned is rejected and names the ends") {
   Arms arms;
   arms.plant();
   const std::string start = "not_owner: partition 'arms' does not own the path from ";
@@ -282,7 +282,7 @@ TEST_CASE("a repeated request is answered again but not applied again") {
   CHECK(second.sequence == 5);
   CHECK(second.epoch == first.epoch);
   CHECK_FALSE(arms.forest.exists("finger"));
-  // Of another peer, or by another number, it is another request.
+  // With another peer or another number it is another request.
   CHECK(said(arms.partition.answer(PeerId{2}, add, kNow)) == "ok");
   CHECK(arms.forest.exists("finger"));
   const Request repeated{6, "finger", AddRequest{"hand", along_x(1)}};
@@ -292,7 +292,7 @@ TEST_CASE("a repeated request is answered again but not applied again") {
   CHECK(said(arms.partition.answer(peer, repeated, kNow)) == refused);
 }
 
-TEST_CASE("parts of values are replaced by their owner, who names what it does not have") {
+TEST_CASE("a partial update is applied only if all its edges are owned") {
   Arms arms;
   arms.plant();
   const Eigen::Vector3d there(1, 2, 3);
@@ -309,7 +309,7 @@ TEST_CASE("parts of values are replaced by their owner, who names what it does n
   CHECK(arms.forest.lookup("arm", "hand")->pose.translation() == there);
 }
 
-TEST_CASE("a repeated lookup is answered with what holds now") {
+TEST_CASE("a repeated lookup is answered with the current value") {
   Arms arms;
   arms.plant();
   const PeerId peer{1};
@@ -323,7 +323,7 @@ TEST_CASE("a repeated lookup is answered with what holds now") {
   CHECK(x() == 20);
 }
 
-TEST_CASE("the epoch advances with the structure only, and pages carry it") {
+TEST_CASE("the epoch advances only with the structure") {
   Arms arms;
   arms.plant();
   CHECK(arms.ask("arm", UpdateRequest{{{"arm", {}}}}).epoch == kLife + 1);

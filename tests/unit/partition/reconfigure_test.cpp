@@ -24,7 +24,7 @@ constexpr Time kNow{std::chrono::nanoseconds(1000)};
 
 const Correlation kSupply{false, {{"supply", false, Loading::Ones(6, 1)}}, {}};
 
-// A life of the partition "arms", which ends with the object.
+// A process of the partition "arms", which ends with the object.
 struct Life : Replica {
   Life(MemoryStore& kept, const Specs& configured, std::uint64_t number)
       : Replica("arms"), partition("arms", number, forest, directory), store(kept) {
@@ -53,7 +53,7 @@ struct Life : Replica {
     }
     return lines;
   }
-  /// Has others hear of it.
+  /// Sends its presence and its pages to a replica.
   void tell(Replica& other, std::uint64_t number) {
     other.directory.apply(presence_of("arms", number, partition.page_count()), kNow);
     for (const Page& page : partition.take_pages()) other.directory.apply(page);
@@ -67,14 +67,14 @@ struct Life : Replica {
 const FrameSpec kArm{"arm", "", along_x(1)};
 const FrameSpec kHand{"hand", "arm", along_x(10)};
 
-// What a first life leaves, with a tool that was added below the hand.
+// The state that a first process leaves, with a tool that was added below the hand.
 void live(MemoryStore& store) {
   Life first(store, {kArm, kHand}, 1);
   first.ask("tool", AddRequest{"hand", along_x(100)});
   first.ask("hand", UpdateRequest{{{"hand", along_x(20)}}});
 }
 
-TEST_CASE("without a configuration all is as it was left") {
+TEST_CASE("without a configuration the whole state is restored") {
   MemoryStore store;
   live(store);
   {
@@ -84,18 +84,18 @@ TEST_CASE("without a configuration all is as it was left") {
     CHECK(x_of(second.forest.lookup("arm", "tool")) == 120);
     CHECK(second.described().empty());
   }
-  SECTION("and what the last one said is still known") {
+  SECTION("and the former configuration is still known") {
     Life third(store, {kArm, kHand}, 3);
     CHECK(x_of(third.forest.lookup("arm", "tool")) == 120);
     CHECK(third.described().empty());
   }
-  SECTION("and what the last one named may go by the next") {
+  SECTION("and the next configuration may delete its entries") {
     Life third(store, {kArm}, 3);
     CHECK(third.structure() == Lines{"arm <  @ arms", "tool < hand @ arms"});
   }
 }
 
-TEST_CASE("an entry that is gone takes its frame and nothing below it") {
+TEST_CASE("a deleted entry removes its frame and no frame below it") {
   MemoryStore store;
   live(store);
   {
@@ -108,13 +108,13 @@ TEST_CASE("an entry that is gone takes its frame and nothing below it") {
           Lines{"frame 'tool' of partition 'arms' waits for its parent 'hand', which the "
                 "configuration of partition 'arms' no longer contains"});
   }
-  SECTION("which stays so") {
+  SECTION("also after another restart") {
     Life third(store, {kArm}, 3);
     CHECK(third.structure() == Lines{"arm <  @ arms", "tool < hand @ arms"});
     CHECK(third.described().empty());
     CHECK(third.orphans().empty());
   }
-  SECTION("and putting it back connects that again") {
+  SECTION("until the entry is added again") {
     Life third(store, {kArm, kHand}, 3);
     CHECK(third.structure() ==
           Lines{"arm <  @ arms", "hand < arm @ arms, attached", "tool < hand @ arms, attached"});
@@ -123,14 +123,14 @@ TEST_CASE("an entry that is gone takes its frame and nothing below it") {
   }
 }
 
-TEST_CASE("what was added at run time is not taken away by any configuration") {
+TEST_CASE("no configuration removes a frame that was added by request") {
   MemoryStore store;
   live(store);
   Life second(store, {{"legs", "", along_x(1)}}, 2);
   CHECK(second.structure() == Lines{"legs <  @ arms", "tool < hand @ arms"});
 }
 
-TEST_CASE("an entry of a frame that was removed, or moved, at run time") {
+TEST_CASE("an entry of a frame that was removed or moved by request") {
   MemoryStore store;
   live(store);
   {
@@ -139,24 +139,24 @@ TEST_CASE("an entry of a frame that was removed, or moved, at run time") {
     second.ask("tool", RemoveRequest{{"tool"}});
     second.ask("arm", RemoveRequest{{"arm"}});
   }
-  SECTION("does not count where it is as it was") {
+  SECTION("has no effect while it is unchanged") {
     Life third(store, {kArm, kHand}, 3);
     CHECK(third.structure() == Lines{"hand <  @ arms"});
   }
-  SECTION("counts where it is edited") {
+  SECTION("takes effect when it is edited") {
     Life third(store, {{"arm", "", along_x(2)}, {"hand", "arm", along_x(11)}}, 3);
     CHECK(third.structure() == Lines{"arm <  @ arms", "hand < arm @ arms, attached"});
     CHECK(third.described() == Lines{"frame 'arm': added as a root",
                                      "frame 'hand': changed to its new entry, under 'arm'"});
   }
-  SECTION("takes what is left where it is gone") {
+  SECTION("removes the frame when it is deleted") {
     Life third(store, {kArm}, 3);
     CHECK(third.structure().empty());
     CHECK(third.described() == Lines{"frame 'hand': removed, because its entry was deleted"});
   }
 }
 
-TEST_CASE("of an entry of which only the correlation is edited the value stays") {
+TEST_CASE("an entry of which only the correlation is edited keeps the value") {
   MemoryStore store;
   live(store);
   FrameSpec hand = kHand;
@@ -168,18 +168,18 @@ TEST_CASE("of an entry of which only the correlation is edited the value stays")
     CHECK(x_of(second.forest.lookup("arm", "tool")) == 120);
     CHECK(second.forest.kept("hand")->correlation.said == kSupply);
   }
-  SECTION("and is kept") {
+  SECTION("and the correlation is restored") {
     Life third(store, {}, 3);
     CHECK(third.forest.kept("hand")->correlation.said == kSupply);
   }
-  SECTION("and goes again") {
+  SECTION("and the correlation can be removed again") {
     Life third(store, {kArm, kHand}, 3);
     CHECK(third.forest.kept("hand")->correlation.empty());
     CHECK(x_of(third.forest.lookup("arm", "tool")) == 120);
   }
 }
 
-TEST_CASE("others' frames below one that a configuration drops stay, and their owner says so") {
+TEST_CASE("frames of others below a deleted entry stay and their owner reports them") {
   MemoryStore store;
   live(store);
   Replica tools("tools");
@@ -205,7 +205,7 @@ TEST_CASE("others' frames below one that a configuration drops stay, and their o
   CHECK(orphans == Lines{"camera @ tools"});
 }
 
-TEST_CASE("who watches hears once of what waits for a frame that a configuration drops") {
+TEST_CASE("a frame that a deleted entry orphans is reported once") {
   MemoryStore store;
   live(store);
   Replica watcher;

@@ -24,7 +24,7 @@ Request request(std::uint32_t sequence, std::uint64_t awaits_from) {
   return {sequence, "hand", RemoveRequest{}, awaits_from};
 }
 
-/// An owner that only counts what it applies; replies are told apart by their epoch.
+/// An owner that only counts what it applies. The epoch of a reply is this count.
 class Owner {
  public:
   Reply answer(const PeerId& from, const Request& request, Time now = kNow) {
@@ -45,7 +45,7 @@ std::string refusal(const Reply& reply) {
   return error == nullptr ? "" : std::string(to_string(error->code)) + ": " + error->message;
 }
 
-TEST_CASE("a repeated request finds its reply as often as it is asked") {
+TEST_CASE("a repeated request finds its reply any number of times") {
   ReplyCache cache;
   CHECK_FALSE(cache.find(peer(1), request(1, 1), kNow));
   cache.put(peer(1), request(1, 1), {1, 10, Done{}});
@@ -63,7 +63,7 @@ TEST_CASE("a repeated request finds its reply as often as it is asked") {
   }
 }
 
-TEST_CASE("a request that was lost is applied once, however many of its peer went before") {
+TEST_CASE("a late request is applied once however many of its peer came before") {
   Owner owner;
   for (std::uint32_t i = 2; i <= 10'000; ++i) (void)owner.answer(peer(1), request(i, 1));
   CHECK(owner.applied() == 9'999);
@@ -75,7 +75,7 @@ TEST_CASE("a request that was lost is applied once, however many of its peer wen
   CHECK(owner.applied() == 10'000);
 }
 
-TEST_CASE("what nobody awaits is never applied again, in whatever order it comes") {
+TEST_CASE("a request that its peer has closed is never applied") {
   Owner owner;
   (void)owner.answer(peer(1), request(1, 1));
   (void)owner.answer(peer(1), request(7, 5));
@@ -92,7 +92,7 @@ TEST_CASE("what nobody awaits is never applied again, in whatever order it comes
   CHECK(owner.applied() == 3);
 }
 
-TEST_CASE("the counter of requests may restart") {
+TEST_CASE("the counter of requests may wrap around") {
   constexpr std::uint64_t kRound = std::uint64_t{1} << 32U;
   Owner owner;
   (void)owner.answer(peer(1), request(0xFFFFFFFF, kRound - 1));
@@ -101,7 +101,7 @@ TEST_CASE("the counter of requests may restart") {
   CHECK(owner.applied() == 3);
   CHECK(owner.answer(peer(1), request(0xFFFFFFFF, kRound - 1)).epoch == 1);
   CHECK(owner.answer(peer(1), request(0, kRound - 1)).epoch == 2);
-  // The peer has asked others for half a round and more meanwhile.
+  // In the meantime the peer has sent more than half a round of requests to others.
   (void)owner.answer(peer(1), request(0xF0000000, kRound + 0xF0000000));
   CHECK(owner.applied() == 4);
   CHECK_FALSE(refusal(owner.answer(peer(1), request(1, kRound - 1))).empty());
@@ -109,7 +109,7 @@ TEST_CASE("the counter of requests may restart") {
   CHECK(owner.applied() == 4);
 }
 
-TEST_CASE("where too many replies are awaited, what may have been applied before is refused") {
+TEST_CASE("a request that may have been applied is rejected if too many replies are expected") {
   Owner owner;
   for (std::uint32_t i = 2; i <= kReplies + 1; ++i) (void)owner.answer(peer(1), request(i, 1));
   CHECK(owner.answer(peer(1), request(2, 1)).epoch == 1);
@@ -121,7 +121,7 @@ TEST_CASE("where too many replies are awaited, what may have been applied before
   CHECK(owner.applied() == kReplies + 1);
 }
 
-TEST_CASE("no peer is forgotten that may still repeat a request") {
+TEST_CASE("a peer that may still repeat a request is not forgotten") {
   Owner owner;
   for (std::uint32_t i = 0; i < kPeers; ++i) (void)owner.answer(peer(i), request(1, 1));
   const std::uint64_t before = owner.applied();
@@ -129,7 +129,7 @@ TEST_CASE("no peer is forgotten that may still repeat a request") {
         "timeout: request 1 was rejected: more than 65536 clients have sent changes recently");
   (void)owner.answer(peer(0), request(1, 1));
   CHECK(owner.applied() == before);
-  SECTION("the one that was silent for longest goes first") {
+  SECTION("until it was silent for long enough") {
     const Time later = kNow + ReplyCache::kSilence;
     (void)owner.answer(peer(0), request(1, 1), later);
     CHECK(refusal(owner.answer(peer(kPeers), request(1, 1), later)).empty());
@@ -137,7 +137,7 @@ TEST_CASE("no peer is forgotten that may still repeat a request") {
     (void)owner.answer(peer(0), request(1, 1), later);
     CHECK(owner.applied() == before + 1);
   }
-  SECTION("a clock that was set back keeps nobody out") {
+  SECTION("unless the clock was set back") {
     CHECK(refusal(owner.answer(peer(kPeers), request(1, 1), time_of(1))).empty());
   }
 }

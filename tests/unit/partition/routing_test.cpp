@@ -83,7 +83,7 @@ constexpr const char* kLegsLost =
 
 // ---- add
 
-TEST_CASE("a new frame goes to its parent's owner, or to the partition that is named") {
+TEST_CASE("a new frame goes to its parent's owner or to the named partition") {
   const Known known;
   const auto by_parent = route_add(known.forest, known.directory, "nail", {"hand", {}}, "");
   REQUIRE(by_parent);
@@ -97,7 +97,7 @@ TEST_CASE("a new frame goes to its parent's owner, or to the partition that is n
   CHECK(text(*root) == "robot[moon]: add below ");
 }
 
-TEST_CASE("a root without a partition goes to the own one, if there is one") {
+TEST_CASE("a root without a partition goes to the own partition if there is one") {
   const Known arms("arms");
   const auto own = route_add(arms.forest, arms.directory, "moon", {"", {}}, "");
   REQUIRE(own);
@@ -129,7 +129,7 @@ TEST_CASE("an add that cannot succeed is not sent") {
 
 // ---- remove
 
-TEST_CASE("a removal tells each owner those subtrees that it owns, the frame's own first") {
+TEST_CASE("a removal tells each owner which subtrees to remove and starts with the frame's owner") {
   const Known known;
   const auto all = route_remove(known.forest, known.directory, "base");
   REQUIRE(all);
@@ -137,7 +137,7 @@ TEST_CASE("a removal tells each owner those subtrees that it owns, the frame's o
   CHECK(text((*all)[0]) == "robot[base]: remove base");
   for (const Part& part : *all) {
     if (part.partition == "arms") CHECK(text(part) == "arms[arm]: remove arm gem");
-    // Which of its two subtrees comes first is open.
+    // Its two subtrees may come in any order.
     if (part.partition == "legs") {
       const auto tops = std::get<RemoveRequest>(part.request.body).tops;
       CHECK(testing::sorted(tops) == Lines{"leg", "ring"});
@@ -149,20 +149,20 @@ TEST_CASE("a removal tells each owner those subtrees that it owns, the frame's o
   CHECK(texts(*leaf) == Lines{"legs[foot]: remove foot"});
 }
 
-TEST_CASE("a removal is refused where a frame or an owner is not there") {
+TEST_CASE("a removal is rejected if the frame is unknown or its owner unreachable") {
   Known known;
   const auto unknown = route_remove(known.forest, known.directory, "nobody");
   CHECK(outcome(unknown) == "unknown_frame");
   CHECK(message_of(unknown) == "no frame 'nobody'");
   known.lose("legs");
   CHECK(message_of(route_remove(known.forest, known.directory, "foot")) == kLegsLost);
-  // What hangs below finds out when it returns.
+  // The lost owner of frames below learns of the removal when it returns.
   const auto rest = route_remove(known.forest, known.directory, "hand");
   REQUIRE(rest);
   CHECK(std::none_of(rest->begin(), rest->end(),
                      [](const Part& part) { return part.partition == "legs"; }));
   CHECK(outcome(route_remove(known.forest, known.directory, "gem")) == "ok");
-  // It may have been moved away.
+  // The frame below may have been moved away.
   known.directory.told_of(*known.directory.owner("legs"), 5);
   CHECK(message_of(route_remove(known.forest, known.directory, "hand")) ==
         kLegsLost +
@@ -187,7 +187,7 @@ TEST_CASE("an update is split by owners") {
   CHECK(edges[1].X_PC.pose.translation().x() == 3);
 }
 
-TEST_CASE("an update is refused where a frame or an owner is not there") {
+TEST_CASE("an update is rejected if a frame is unknown or its owner unreachable") {
   Known known;
   const auto update = [&](const std::string& a, const std::string& b) {
     return message_of(route_update(known.forest, known.directory, {{a, {}}, {b, {}}}));
@@ -198,7 +198,7 @@ TEST_CASE("an update is refused where a frame or an owner is not there") {
   CHECK(update("hand", "arm") == "ok");
 }
 
-TEST_CASE("one request updates a limited number of edges, the own process any number") {
+TEST_CASE("the number of edges of one request is limited except in the own process") {
   const Known known("arms");
   std::vector<EdgeUpdate> edges(kMaxItems, EdgeUpdate{"foot", {}});
   CHECK(outcome(route_update(known.forest, known.directory, edges)) == "ok");
@@ -242,7 +242,7 @@ TEST_CASE("a move that cannot succeed is not sent") {
 
 // ---- lookup
 
-TEST_CASE("a lookup asks each owner on the path once, for its runs of edges") {
+TEST_CASE("a lookup asks each owner on the path once for all its segments") {
   const Known known;
   const auto plan = route_lookup(known.forest, known.directory, "foot", "gem");
   REQUIRE(plan);
@@ -263,7 +263,7 @@ TEST_CASE("a part is addressed by a frame that its owner owns") {
   }
 }
 
-TEST_CASE("from a frame to itself nobody is asked") {
+TEST_CASE("a lookup from a frame to itself asks no owner") {
   const Known known;
   const auto plan = route_lookup(known.forest, known.directory, "gem", "gem");
   REQUIRE(plan);
@@ -292,7 +292,7 @@ SegmentValues values(std::vector<Transform> transforms) {
   return {std::move(transforms), std::nullopt, {}, {}};
 }
 
-TEST_CASE("answers are put together in the order of the path") {
+TEST_CASE("answers are assembled in the order of the path") {
   const Known known;
   const auto plan = route_lookup(known.forest, known.directory, "foot", "gem");
   REQUIRE(plan);
@@ -304,7 +304,7 @@ TEST_CASE("answers are put together in the order of the path") {
   CHECK((X->pose.translation() - Eigen::Vector3d(1, 110, 0)).norm() < 1e-9);
 }
 
-TEST_CASE("answers with too few or too many transforms are refused, not put together") {
+TEST_CASE("answers with too few or too many transforms are rejected") {
   const Known known;
   const auto plan = route_lookup(known.forest, known.directory, "foot", "gem");
   REQUIRE(plan);

@@ -42,7 +42,7 @@ std::string listed(const PushedValues& pushed) {
 
 }  // namespace
 
-TEST_CASE("a group is told all, then what changes, once") {
+TEST_CASE("a group is pushed all values and then each change once") {
   Arm arm;
   WatchedGroup group(7, {{kArm, kHand}});
   CHECK(group.snapshot(arm.forest, {})->group == 7);
@@ -59,7 +59,7 @@ TEST_CASE("a group is told all, then what changes, once") {
   CHECK(group.next_push(arm.forest).entries.empty());
   CHECK(listed(*group.snapshot(arm.forest, {})) == "0@4=14 1@4=104 ");
   CHECK(listed(*group.snapshot(arm.forest, ms(3))) == "0@3=13 1@3=103 0@4=14 1@4=104 ");
-  // Late, and earlier than what was asked for.
+  // Late samples are pushed, too.
   REQUIRE(arm.forest.update({{"arm", along_x(9)}, {"hand", along_x(99)}}, Time(2500us)));
   CHECK(listed(group.next_push(arm.forest)) == "0@2=9 1@2=99 ");
 }
@@ -90,7 +90,7 @@ TEST_CASE("a covariance that stays the same is pushed once") {
   REQUIRE(arm.forest.update("hand", with_stddev(103, 0.2), ms(3)));
   CHECK(numbers(*group.snapshot(arm.forest, {})) == "1 0 ");  // its newest was not pushed yet
   CHECK(numbers(group.next_push(arm.forest)) == "2 (2) 3 ");
-  // Whoever begins to watch now has what the next push refers to.
+  // A snapshot has the covariances that the next push refers to.
   CHECK(numbers(*group.snapshot(arm.forest, {})) == "1 3 ");
   KnownCovariances known(2);
   auto all = *group.snapshot(arm.forest, {});
@@ -107,7 +107,7 @@ TEST_CASE("a covariance that stays the same is pushed once") {
   CHECK(next.entries.empty());
 }
 
-TEST_CASE("each push follows on from the one before, and the first begins with nothing") {
+TEST_CASE("each push names the commit of the previous one and the first names none") {
   Arm arm;
   WatchedGroup group(7, {{kArm, kHand}});
   const PushedValues first = group.next_push(arm.forest);
@@ -123,7 +123,7 @@ TEST_CASE("each push follows on from the one before, and the first begins with n
   CHECK(group.next_push(arm.forest).after == second.commit);
 }
 
-TEST_CASE("pushed values in pieces are whole again, if all of them come") {
+TEST_CASE("a push in several messages is reassembled when all have arrived") {
   PushedValues pushed{7, {}, 3, 5};
   for (std::uint32_t i = 0; i < 2 * kMaxItems + 1; ++i) {
     pushed.entries.push_back({i, ms(i + 1), along_x(i), {}, 1, {}});
@@ -135,7 +135,7 @@ TEST_CASE("pushed values in pieces are whole again, if all of them come") {
   CHECK_FALSE(together.add(pieces[2]));  // one is missing
   CHECK_FALSE(together.add(pieces[0]));
   CHECK_FALSE(together.add(pieces[1]));
-  CHECK(together.add({7, {}, 0, 4}));  // one for itself
+  CHECK(together.add({7, {}, 0, 4}));  // a push in one message
   const auto whole = together.add(pieces[2]);
   REQUIRE(whole);
   CHECK(listed(*whole) == listed(pushed));
@@ -150,7 +150,7 @@ TEST_CASE("pushed values in pieces are whole again, if all of them come") {
   CHECK(pieces_of({7, {}, 0, 5}).size() == 1);
 }
 
-TEST_CASE("how often watchers may want values has an end") {
+TEST_CASE("a watch without edges or with a period beyond the maximum is rejected") {
   CHECK(check_watch({{kArm}, false, kMaxWatchPeriod}));
   CHECK(check_watch({{kArm}}));
   CHECK(outcome(check_watch({{kArm}, false, kMaxWatchPeriod + 1ns})) == "invalid_input");
@@ -159,7 +159,7 @@ TEST_CASE("how often watchers may want values has an end") {
   CHECK(outcome(check_watch({})) == "invalid_input");
 }
 
-TEST_CASE("at a lower rate only the newest is told") {
+TEST_CASE("at a lower rate only the newest sample is pushed") {
   Arm arm;
   WatchedGroup group(7, {{kArm}, false, 10ms});
   REQUIRE(group.snapshot(arm.forest, {}));
@@ -171,7 +171,7 @@ TEST_CASE("at a lower rate only the newest is told") {
   }
 }
 
-TEST_CASE("a segment may be told as one transform") {
+TEST_CASE("a segment may be pushed as one transform") {
   Arm arm;
   WatchedGroup group(7, {{{"world", "hand"}, {"base", "base"}}, true});
   CHECK(listed(*group.snapshot(arm.forest, {})) == "0@-=111 1@-=0 ");
@@ -184,7 +184,7 @@ TEST_CASE("a segment may be told as one transform") {
   CHECK(listed(group.next_push(arm.forest)).empty());
   REQUIRE(arm.forest.update("arm", along_x(30), ms(7)));
   CHECK(listed(*group.snapshot(arm.forest, ms(6))) == "0@6=127 1@6=0 0@7=132 1@7=0 ");
-  // What lies between the ends hangs elsewhere now.
+  // The path between the ends has changed.
   const std::uint64_t before = group.next_push(arm.forest).entries.at(0).history;
   REQUIRE(arm.forest.move("hand", "base", along_x(1)));
   const PushedValues after = group.next_push(arm.forest);
@@ -213,7 +213,7 @@ TEST_CASE("a composed segment is sent again where late samples and static edges 
   CHECK(listed(group.next_push(arm.forest)).empty());
 }
 
-TEST_CASE("a late sample changes composed values at the stamps of other edges, too") {
+TEST_CASE("a late sample changes composed values also at the stamps of other edges") {
   Arm arm;
   WatchedGroup group(7, {{{"base", "hand"}}, true});
   REQUIRE(arm.forest.update({{"arm", along_x(10)}, {"hand", along_x(100)}}, ms(10)));
@@ -253,7 +253,7 @@ TEST_CASE("a segment with process noise is not sent as one transform") {
   CHECK(WatchedGroup(7, {{{"base", "arm"}}}).snapshot(forest, {}));
 }
 
-TEST_CASE("who watches what is not owned here is told so, and of half a path nothing") {
+TEST_CASE("a watch of an edge that is not owned is rejected and half a path is never pushed") {
   Arm arm;
   for (const char* id : {"far", "nobody", "world"}) {
     WatchedGroup group(7, {{kArm, {"", id}}});
@@ -272,7 +272,7 @@ TEST_CASE("who watches what is not owned here is told so, and of half a path not
   (void)group.next_push(arm.forest);
   REQUIRE(arm.forest.remove("hand"));
   REQUIRE(arm.forest.update("arm", along_x(3)));
-  // It could be half of what was written: of the hand's new place these watchers would not hear.
+  // Nothing, because these watchers would not get the hand's new edge: that is half of the changes.
   CHECK(listed(group.next_push(arm.forest)).empty());
   REQUIRE(arm.forest.add("hand", "base", along_x(4)));
   CHECK(listed(group.next_push(arm.forest)).empty());
@@ -280,7 +280,7 @@ TEST_CASE("who watches what is not owned here is told so, and of half a path not
   CHECK(listed(group.next_push(arm.forest)) == "0@-=3 1@-=5 ");
 }
 
-TEST_CASE("only who asks for the same of the same owner is in one group") {
+TEST_CASE("a group is shared only by equal requests to the same owner") {
   const WatchRequest edges{{kArm, kHand}};
   std::set<std::uint64_t> groups{
       watch_group("arms", 1, edges),
