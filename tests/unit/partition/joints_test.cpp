@@ -303,7 +303,7 @@ TEST_CASE("a partition restores the positions of its joints") {
     const FrameSpec before = frames[2];
     frames[2].joint->type = JointType::kPrismatic;
     frames[2].joint->joint = prismatic_joint(along_x(1), {0, 0, 1});
-    // At the variance of its limits, or another one.
+    // With the same variance at rest, or another one.
     frames[2].joint->variance = GENERATE(0.25, 0.09);
     const auto changes = configured_changes(*store.load(), frames);
     REQUIRE(changes.size() >= 2);
