@@ -48,7 +48,7 @@ Belief with(const Transform& X, std::vector<CommonError> common_errors) {
   return {X.pose, X.covariance, std::nullopt, std::move(common_errors)};
 }
 
-TEST_CASE("Lookups count a source once, whichever way they go") {
+TEST_CASE("A lookup counts a common source once in any direction") {
   Random random(651);
   INFO("seed " << random.seed());
   Robot robot(random);
@@ -80,7 +80,7 @@ TEST_CASE("Lookups count a source once, whichever way they go") {
   CHECK(transform_diff(*X_AB, robot.X_AB, 1e-12) == "");
 }
 
-TEST_CASE("Of unknown correlation a path is bounded, and says so") {
+TEST_CASE("A path with unknown correlation gets a bound and reports it") {
   Random random(652);
   INFO("seed " << random.seed());
   Robot robot(random);
@@ -99,7 +99,7 @@ TEST_CASE("Of unknown correlation a path is bounded, and says so") {
   CHECK(transform_diff(*independent, compose(robot.X_WA, robot.X_AB), 1e-12) == "");
 }
 
-TEST_CASE("A lookup to fourth order says so, and is that of the composed beliefs") {
+TEST_CASE("A lookup to fourth order composes the beliefs and reports its order") {
   Random random(653);
   INFO("seed " << random.seed());
   Forest forest;
@@ -120,7 +120,7 @@ TEST_CASE("A lookup to fourth order says so, and is that of the composed beliefs
   CHECK(covariance_diff(X_AB->covariance, second->covariance, 0.01) != "");
 }
 
-TEST_CASE("A source is counted at an instant between samples, too") {
+TEST_CASE("A source is counted also at an instant between samples") {
   Random random(654);
   INFO("seed " << random.seed());
   Robot robot(random);
@@ -142,8 +142,7 @@ TEST_CASE("A source is counted at an instant between samples, too") {
   CHECK(transform_diff(*newest, expected, 1e-9) == "");
 }
 
-TEST_CASE(
-    "Segments tell their correlation, by which the caller composes the path as one forest would") {
+TEST_CASE("Segments have their correlation so a caller can compose the whole path") {
   Random random(655);
   INFO("seed " << random.seed());
   Robot robot(random);
@@ -222,7 +221,7 @@ TEST_CASE("A revision of a dynamic edge is a sample, or replaces the one with it
   REQUIRE(robot.forest.update("a", X, at(200ms)));
 }
 
-TEST_CASE("What cannot be meant is refused, and changes nothing") {
+TEST_CASE("An invalid correlation or revision is rejected and changes nothing") {
   Random random(658);
   Robot robot(random);
   CommonError bad = common_error(random, "s");
@@ -238,7 +237,7 @@ TEST_CASE("What cannot be meant is refused, and changes nothing") {
   CHECK(transform_diff(*X_WA, robot.X_WA, 0) == "");
 }
 
-TEST_CASE("Values of an edge tell its correlation") {
+TEST_CASE("Pushed values of an edge have its correlation") {
   Random random(659);
   Robot robot(random);
   std::vector<EdgeCursor> cursors{{"a", robot.forest.info("a")->parent}};

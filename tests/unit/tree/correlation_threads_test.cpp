@@ -54,7 +54,7 @@ struct Reader {
   }
 };
 
-TEST_CASE("readers see the correlation of edges as one commit left it") {
+TEST_CASE("readers see the correlations of one commit") {
   Forest forest;
   REQUIRE(forest.add("world", "", {}));
   REQUIRE(forest.add("a", "world", {}));

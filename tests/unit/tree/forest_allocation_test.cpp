@@ -43,7 +43,7 @@ std::int64_t allocations_of(const Call& call) {
   return ok ? count : -1;
 }
 
-TEST_CASE("the guard sees what this thread allocates, in the test and in the library") {
+TEST_CASE("the guard counts the allocations of this thread in the test and in the library") {
   const AllocationGuard guard;
   CHECK(guard.allocations() == 0);
   const AllocationGuard fresh;
@@ -103,7 +103,7 @@ TEST_CASE("updates do not allocate") {
   CHECK(allocations_of([&] { return forest.update(batch_by_handle).has_value(); }) == 0);
 }
 
-TEST_CASE("with a history, too, neither updates nor lookups allocate") {
+TEST_CASE("updates and lookups with a history do not allocate") {
   Forest forest;
   plant_chain(forest);
   Random random(703);
@@ -144,13 +144,13 @@ std::int64_t growth_of_churn(Forest& forest) {
   return growth;
 }
 
-TEST_CASE("ids that come and go leave nothing behind") {
+TEST_CASE("ids that are added and removed leave no memory behind") {
   Forest forest;
   REQUIRE(forest.add("world", "", Transform()));
   CHECK(growth_of_churn(forest) < kFewBytes);
 }
 
-TEST_CASE("ids that come and go leave nothing behind while others read") {
+TEST_CASE("ids that are added and removed leave no memory behind while others read") {
   Forest forest;
   REQUIRE(forest.add("world", "", Transform()));
   std::atomic<bool> stop{false};
@@ -166,7 +166,7 @@ TEST_CASE("ids that come and go leave nothing behind while others read") {
   CHECK(growth_of_churn(forest) < kFewBytes);
 }
 
-TEST_CASE("updates reuse what they supersede") {
+TEST_CASE("updates reuse superseded versions") {
   Forest forest;
   plant_chain(forest);
   Random random(702);
@@ -181,7 +181,7 @@ TEST_CASE("updates reuse what they supersede") {
   CHECK(growth < kFewBytes);
 }
 
-TEST_CASE("a forest gives back all its memory") {
+TEST_CASE("a forest releases all its memory") {
   const AllocationGuard guard;
   {
     Forest forest;

@@ -116,7 +116,7 @@ TEST_CASE("errors name the frame they are about") {
 
 // ---- frames of others
 
-TEST_CASE("an edge of another partition on the path is not looked up here") {
+TEST_CASE("a lookup over an edge of another partition is rejected") {
   Forest forest;
   REQUIRE(forest.add("w", "", along_x(0)));
   REQUIRE(forest.put_remote("far", "w", 2));
@@ -130,7 +130,7 @@ TEST_CASE("an edge of another partition on the path is not looked up here") {
   CHECK(outcome(forest.value("far")) == "not_owner");
 }
 
-TEST_CASE("frames without a common root are not connected, whoever holds the edges") {
+TEST_CASE("frames without a common root are not connected whoever owns the edges") {
   Forest forest;
   REQUIRE(forest.put_remote("r", "", 1));
   REQUIRE(forest.put_remote("s", "r", 1));
@@ -142,7 +142,7 @@ TEST_CASE("frames without a common root are not connected, whoever holds the edg
   CHECK(outcome(forest.lookup("r", "a")) == "not_owner");
 }
 
-TEST_CASE("remote frames appear, change their owner and parent, and go") {
+TEST_CASE("remote frames appear and change their owner and parent and disappear") {
   Forest forest;
   REQUIRE(forest.add("w", "", along_x(0)));
   CHECK(outcome(forest.put_remote("far", "w", 1)) == "ok");
@@ -166,7 +166,7 @@ TEST_CASE("remote frames appear, change their owner and parent, and go") {
   CHECK(forest.holds("far"));
 }
 
-TEST_CASE("a held frame is not given away, and a remote one not without an owner") {
+TEST_CASE("an own frame cannot become remote and a remote frame needs an owner") {
   Forest forest;
   REQUIRE(forest.add("w", "", along_x(4)));
   CHECK(outcome(forest.put_remote("w", "", 1)) == "already_exists");
@@ -191,7 +191,7 @@ TEST_CASE("a remote frame that would close a cycle is kept as a root") {
 
 // ---- segments
 
-TEST_CASE("segments are the runs of one owner along the path") {
+TEST_CASE("segments are the runs of edges of one owner along the path") {
   Forest forest;
   REQUIRE(forest.add("w", "", along_x(0)));
   REQUIRE(forest.add("a", "w", along_x(1)));
@@ -213,7 +213,7 @@ TEST_CASE("segments are the runs of one owner along the path") {
   CHECK(runs(forest, "d", "g") == Ids{"d > c @0", "c > g @1"});
 }
 
-TEST_CASE("a segment may end at a frame that only held edges name") {
+TEST_CASE("a segment may end at a missing parent of own frames") {
   Forest forest;
   REQUIRE(forest.add("a", "missing", along_x(1), kAllow));
   REQUIRE(forest.add("b", "a", along_x(10)));
@@ -240,7 +240,7 @@ TEST_CASE("a segment may end at a frame that only held edges name") {
 
 // ---- what is there
 
-TEST_CASE("frames, roots, children and subtree tell the structure") {
+TEST_CASE("frames and roots and children and subtree describe the structure") {
   Forest forest;
   CHECK(forest.frames().empty());
   CHECK(forest.roots().empty());
@@ -264,7 +264,7 @@ TEST_CASE("frames, roots, children and subtree tell the structure") {
   CHECK(forest.subtree("never").empty());
 }
 
-TEST_CASE("info, value, holds, find and exists tell of one frame") {
+TEST_CASE("info and value and holds and find and exists describe one frame") {
   Forest forest;
   REQUIRE(forest.add("w", "", along_x(5)));
   REQUIRE(forest.add("q", "missing", along_x(6), kAllow));
@@ -286,7 +286,7 @@ TEST_CASE("info, value, holds, find and exists tell of one frame") {
   }
 }
 
-TEST_CASE("the structure version grows with the structure only") {
+TEST_CASE("the structure version grows only with the structure") {
   Forest forest;
   std::uint64_t last = forest.structure_version();
   const auto grew = [&] {
@@ -320,7 +320,7 @@ TEST_CASE("the structure version grows with the structure only") {
   CHECK(grew());
 }
 
-TEST_CASE("thousands of frames are found, each as its own") {
+TEST_CASE("thousands of frames are all found") {
   // Past the first segment of slots and several sizes of the table of ids.
   constexpr int kFrames = 5000;
   Forest forest;

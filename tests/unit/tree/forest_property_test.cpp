@@ -295,7 +295,7 @@ class Duel {
   std::size_t longest_ = 0;
 };
 
-TEST_CASE("any sequence of operations does what the naive forest does") {
+TEST_CASE("any sequence of operations has the result of the naive forest") {
   constexpr int kSteps = 6000;
   // Few ids collide and wait for each other all the time; many grow deep trees and the tables.
   const std::size_t ids = GENERATE(8U, 40U, 150U);

@@ -46,7 +46,7 @@ TEST_CASE("a frame is added as a root or under a parent") {
   CHECK(forest.roots() == Ids{"world"});
 }
 
-TEST_CASE("a frame under a missing parent is refused and leaves no trace") {
+TEST_CASE("a frame under a missing parent is rejected and leaves no trace") {
   Forest forest;
   CHECK(outcome(forest.add("base", "world", along_x(1))) == "unknown_parent");
   CHECK(forest.frames().empty());
@@ -67,7 +67,7 @@ TEST_CASE("a frame that may wait is a root until its parent appears") {
   CHECK(forest.roots() == Ids{"world"});
 }
 
-TEST_CASE("a parent that is waited for is still missing") {
+TEST_CASE("a parent that others wait for is still missing") {
   Forest forest;
   REQUIRE(forest.add("hand", "arm", along_x(1), kAllow));
   // Being waited for is not being there.
@@ -75,7 +75,7 @@ TEST_CASE("a parent that is waited for is still missing") {
   CHECK(outcome(forest.add("finger", "hand", along_x(1))) == "ok");
 }
 
-TEST_CASE("an id that is taken is refused, whoever took it") {
+TEST_CASE("an id that is taken by an own or a remote frame is rejected") {
   Forest forest;
   plant(forest);
   REQUIRE(forest.put_remote("far", "world", 1));
@@ -85,7 +85,7 @@ TEST_CASE("an id that is taken is refused, whoever took it") {
   CHECK(x_of(forest.lookup("base", "arm")) == 10);
 }
 
-TEST_CASE("bad ids are refused by every writer that could make a frame of them") {
+TEST_CASE("invalid ids are rejected by every call that could create a frame") {
   Forest forest;
   plant(forest);
   const std::uint64_t before = forest.structure_version();
@@ -114,7 +114,7 @@ TEST_CASE("a frame cannot be its own parent") {
   CHECK(x_of(forest.lookup("base", "arm")) == 10);
 }
 
-TEST_CASE("a cycle through a frame that is waited for is refused") {
+TEST_CASE("a cycle through a missing parent is rejected") {
   Forest forest;
   REQUIRE(forest.add("b", "a", along_x(1), kAllow));
   REQUIRE(forest.add("c", "b", along_x(1)));
@@ -127,7 +127,7 @@ TEST_CASE("a cycle through a frame that is waited for is refused") {
 
 // ---- remove
 
-TEST_CASE("remove takes all that is held below") {
+TEST_CASE("remove removes all owned frames below") {
   Forest forest;
   plant(forest);
   const auto removed = forest.remove("base");
@@ -141,7 +141,7 @@ TEST_CASE("remove takes all that is held below") {
   CHECK(outcome(forest.remove("")) == "unknown_frame");
 }
 
-TEST_CASE("remote frames below a removed one stay as roots, and what hangs on them stays") {
+TEST_CASE("remote frames below a removed one become roots and keep their children") {
   Forest forest;
   plant(forest);
   REQUIRE(forest.put_remote("far", "arm", 1));
@@ -166,7 +166,7 @@ TEST_CASE("a remote frame is not removed here") {
   CHECK(forest.exists("far"));
 }
 
-TEST_CASE("a removed id may be taken again elsewhere in the forest") {
+TEST_CASE("a removed id can be added again elsewhere") {
   Forest forest;
   plant(forest);
   REQUIRE(forest.remove("arm"));
@@ -206,7 +206,7 @@ TEST_CASE("a batch is applied as a whole or not at all") {
   CHECK(x_of(forest.value("arm")) == 2);
 }
 
-TEST_CASE("a value that is not finite is refused by frame and field") {
+TEST_CASE("a value that is not finite is rejected by frame and field") {
   Forest forest;
   plant(forest);
   const Transform before = *forest.value("arm");
@@ -323,7 +323,7 @@ TEST_CASE("move to no parent makes a root") {
   CHECK(x_of(forest.lookup("arm", "mast")) == 1102);
 }
 
-TEST_CASE("move refuses cycles, unknown frames and frames of others") {
+TEST_CASE("move rejects cycles and unknown frames and frames of others") {
   Forest forest;
   plant(forest);
   REQUIRE(forest.put_remote("far", "hand", 1));

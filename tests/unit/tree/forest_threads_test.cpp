@@ -105,7 +105,7 @@ bool all_saw(const ChainReader* readers) {
   return true;
 }
 
-TEST_CASE("no reader sees a part of a batch") {
+TEST_CASE("a reader never sees a part of a batch") {
   Forest forest;
   plant_chain(forest);
   ChainReader readers[kReaders];
@@ -245,7 +245,7 @@ void plant_churned(Forest& forest) {
   REQUIRE(forest.add("tip", "tool", along_x(7)));
 }
 
-TEST_CASE("readers see whole structures while frames come, go and move") {
+TEST_CASE("readers see consistent structures while frames are added and removed and moved") {
   Forest forest;
   plant_churned(forest);
   StructureReader readers[kReaders];
@@ -279,7 +279,7 @@ TEST_CASE("readers see whole structures while frames come, go and move") {
   }
 }
 
-TEST_CASE("threads that come and go read and write alike") {
+TEST_CASE("short-lived threads can read and write") {
   // Each thread takes the place of an earlier one among the readers.
   constexpr int kRounds = 200;
   Forest forest;

@@ -105,7 +105,7 @@ TEST_CASE("the latest common time is that of all dynamic edges of the path") {
   CHECK(arm.forest.lookup_pose("world", "hand")->translation().x() == Approx(531));
 }
 
-TEST_CASE("edges without a common instant have no newest one, and the younger is named") {
+TEST_CASE("edges without a common time are reported with the name of the younger one") {
   Arm arm;
   REQUIRE(arm.forest.add("tip", "hand", {}));
   REQUIRE(arm.forest.update("tip", along_x(1), at(2003)));
@@ -114,7 +114,7 @@ TEST_CASE("edges without a common instant have no newest one, and the younger is
   CHECK(says(message(X), {"'tip'", "3.000 ms later"}));
 }
 
-TEST_CASE("a sample may come late, but not twice and not after what is kept") {
+TEST_CASE("a late sample is added but not one with a taken stamp or one older than the history") {
   Arm arm;
   REQUIRE(arm.forest.update("hand", along_x(1000), at(1500)));
   CHECK(x_of(arm.forest.lookup("arm", "hand", query(1500))) == 1000);
@@ -137,7 +137,7 @@ TEST_CASE("a sample may come late, but not twice and not after what is kept") {
   CHECK(history.oldest == at(2000));
 }
 
-TEST_CASE("a batch is of one stamp, and taken as a whole or not at all") {
+TEST_CASE("a batch has one stamp and is applied as a whole or not at all") {
   Arm arm;
   REQUIRE(arm.forest.update({{"arm", along_x(30)}, {"hand", along_x(300)}}, at(3000)));
   CHECK(x_of(arm.hand({})) == 331);
@@ -152,7 +152,7 @@ TEST_CASE("a batch is of one stamp, and taken as a whole or not at all") {
   CHECK(arm.forest.histories("arm").at(0).samples == 5);
 }
 
-TEST_CASE("what is kept has limits of number and of time") {
+TEST_CASE("a history is limited in number and in time") {
   Arm arm;
   EdgeTiming timing;
   timing.count = 5;
@@ -176,7 +176,7 @@ TEST_CASE("what is kept has limits of number and of time") {
   CHECK(outcome(arm.forest.set_timing("nobody", {})) == "unknown_frame");
 }
 
-TEST_CASE("memory is bounded, however many samples come") {
+TEST_CASE("the memory of a history is bounded however many samples come") {
   Arm arm;
   EdgeTiming timing;
   timing.count = 100;
@@ -188,7 +188,7 @@ TEST_CASE("memory is bounded, however many samples come") {
   CHECK(bytes < 100 * 400);
 }
 
-TEST_CASE("beyond the newest sample there is an answer only where it is asked for") {
+TEST_CASE("a lookup beyond the newest sample needs permission to extrapolate") {
   Arm arm;
   CHECK(outcome(arm.hand(extrapolating(2100, 99ms))) == "not_yet");
   CHECK(says(message(arm.hand(extrapolating(2100, 99ms))), {"100.000 ms", "99.000 ms"}));
@@ -200,7 +200,7 @@ TEST_CASE("beyond the newest sample there is an answer only where it is asked fo
   CHECK(says(message(alone), {"'tip'", "the only one"}));
 }
 
-TEST_CASE("process noise is added between samples, beyond them, and with age where asked for") {
+TEST_CASE("process noise is added between samples and beyond them and with age if asked for") {
   Arm arm;
   EdgeTiming timing;
   timing.process_noise = *Covariance::from_stddev({2, 0, 0, 0, 0, 0});
@@ -220,9 +220,7 @@ TEST_CASE("process noise is added between samples, beyond them, and with age whe
   CHECK(variance({at(1500), 0ns, at(1400)}) == Approx(0.25 * 4));  // not younger than it is
 }
 
-TEST_CASE(
-    "an update without a stamp is of now where the edge is moving, and for all times where it is "
-    "not") {
+TEST_CASE("an update without a stamp is a sample of now only for a dynamic edge") {
   Arm arm;
   REQUIRE(arm.forest.update("arm", along_x(50)));
   CHECK(arm.forest.lookup("world", "arm", Query{})->stamp == at(5000));
@@ -246,7 +244,7 @@ TEST_CASE(
   CHECK(outcome(timeless.update("world", {}, at(-5))) == "invalid_input");
 }
 
-TEST_CASE("the partition's limits count where a frame has none of its own") {
+TEST_CASE("the partition's limits apply to frames without their own") {
   Forest forest([] { return at(1); });
   EdgeTiming timing;
   timing.count = 3;
@@ -258,7 +256,7 @@ TEST_CASE("the partition's limits count where a frame has none of its own") {
   CHECK(forest.histories("a").at(0).count_limit == 3);
 }
 
-TEST_CASE("who is moved or removed loses its history, which was that of another edge") {
+TEST_CASE("a frame that is moved or removed loses its history") {
   Arm arm;
   REQUIRE(arm.forest.move("hand", "base"));
   CHECK_FALSE(arm.forest.lookup("base", "hand", Query{})->stamp.has_value());
@@ -279,7 +277,7 @@ TEST_CASE("who is moved or removed loses its history, which was that of another 
   CHECK(arm.forest.histories("tip").at(0).samples == 3);
 }
 
-TEST_CASE("several segments are of one instant, and a hint is answered where it can be") {
+TEST_CASE("several segments are answered for one instant and for the hint if possible") {
   Arm arm;
   REQUIRE(arm.forest.update("arm", along_x(40), at(3000)));
   const std::vector<PathEnds> segments{{"base", "arm"}, {"arm", "hand"}, {"world", "base"}};
@@ -299,7 +297,7 @@ TEST_CASE("several segments are of one instant, and a hint is answered where it 
   CHECK(arm.forest.lookup_segments(segments, query(1250))->stamp == at(1250));
 }
 
-TEST_CASE("rate, gaps and jitter of what is kept") {
+TEST_CASE("a history reports rate and gaps and jitter") {
   Arm arm;
   for (const int ms : {2010, 2020, 2030, 2060}) REQUIRE(arm.forest.update("arm", {}, at(ms)));
   const auto history = arm.forest.histories("arm").at(0);
@@ -315,7 +313,7 @@ TEST_CASE("rate, gaps and jitter of what is kept") {
   CHECK(arm.forest.histories("nobody").empty());
 }
 
-TEST_CASE("values are told once, those of one stamp together") {
+TEST_CASE("each value is reported once and values of one stamp together") {
   Arm arm;
   std::vector<EdgeCursor> cursors;
   for (const char* id : {"base", "arm", "hand"}) {

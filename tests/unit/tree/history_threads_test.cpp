@@ -73,7 +73,7 @@ struct Reader {
 
 }  // namespace
 
-TEST_CASE("every answer is of one instant while ring buffers wrap round and late samples come") {
+TEST_CASE("every answer is of one instant while buffers wrap around and late samples come") {
   Forest forest;
   REQUIRE(forest.add("world", "", along_x(0)));
   EdgeTiming timing;
@@ -119,7 +119,7 @@ TEST_CASE("every answer is of one instant while ring buffers wrap round and late
   }
 }
 
-TEST_CASE("a history may go while it is read") {
+TEST_CASE("a history may be dropped while it is read") {
   Forest forest;
   REQUIRE(forest.add("world", "", {}));
   REQUIRE(forest.add("arm", "world", {}));

@@ -60,7 +60,7 @@ struct Followed {
 
 }  // namespace
 
-TEST_CASE("a mirror has late samples, replaced ones, and process noise") {
+TEST_CASE("a mirror has late samples and replaced ones and process noise") {
   Random random(901);
   INFO("seed " << random.seed());
   Followed robot;
@@ -81,7 +81,7 @@ TEST_CASE("a mirror has late samples, replaced ones, and process noise") {
   CHECK(robot.follow() == 0);
 }
 
-TEST_CASE("who has seen nothing is told the newest, or all since an instant") {
+TEST_CASE("a new watcher gets the newest values or all since an instant") {
   Followed robot;
   for (int t = 1; t <= 9; ++t) REQUIRE(robot.owner.update("arm", along_x(t), at(10 * t)));
   auto cursors = robot.cursors;
@@ -94,7 +94,7 @@ TEST_CASE("who has seen nothing is told the newest, or all since an instant") {
   CHECK(robot.owner.values_since(cursors, {false, at(1)}).values.empty());
 }
 
-TEST_CASE("a move, a removal and forgotten samples begin another history, whose number is higher") {
+TEST_CASE("a move or a removal or a reset begins a history with a higher number") {
   Followed robot;
   const auto history = [&] {
     auto cursors = robot.cursors;
@@ -122,7 +122,7 @@ TEST_CASE("a move, a removal and forgotten samples begin another history, whose 
   CHECK(is_another());
 }
 
-TEST_CASE("another history leaves nothing of the one before") {
+TEST_CASE("a new history leaves nothing of the previous one") {
   Followed robot;
   for (int t = 1; t <= 5; ++t) REQUIRE(robot.owner.update("hand", along_x(t), at(t)));
   REQUIRE(robot.follow({false, at(1)}) == 6);
@@ -137,7 +137,7 @@ TEST_CASE("another history leaves nothing of the one before") {
   for (int t = 1; t <= 7; ++t) CHECK(robot.difference(at(t)) == "");
 }
 
-TEST_CASE("what is told is one commit for all readers of the mirror") {
+TEST_CASE("readers of the mirror see each push as one commit") {
   Followed robot;
   robot.follow();
   REQUIRE(robot.owner.update({{"arm", along_x(1)}, {"hand", along_x(-1)}}));

@@ -29,7 +29,7 @@ struct Arm {
 
 }  // namespace
 
-TEST_CASE("parts of a value that are not given stay as they are") {
+TEST_CASE("a partial update keeps the parts that are not given") {
   Random random(0x9a71);
   INFO("seed " << random.seed());
   for (int parts = 0; parts < 8; ++parts) {
@@ -60,7 +60,7 @@ TEST_CASE("a partial update of a dynamic edge keeps the other parts of its newes
   CHECK(outcome(arm.forest.update_partial({{"arm", there}}, time_of(2000))) == "stamp_taken");
 }
 
-TEST_CASE("partial updates are one commit, in their order, and all or none") {
+TEST_CASE("partial updates are applied in order in one commit or not at all") {
   Random random(0x9a73);
   Arm arm(random);
   REQUIRE(arm.forest.add("hand", "arm", {}));
@@ -89,7 +89,7 @@ TEST_CASE("partial updates are one commit, in their order, and all or none") {
   CHECK_FALSE(check_parts({"arm", away}).has_value());
 }
 
-TEST_CASE("an edge that was observed keeps its whole covariance when only its place is given") {
+TEST_CASE("a partial update of an observed edge keeps its whole covariance") {
   Random random(0x9a74);
   Arm arm(random);
   Correlation observed;

@@ -55,7 +55,7 @@ EdgeTiming kept_for(std::chrono::nanoseconds span, std::size_t restart_after = 5
 
 }  // namespace
 
-TEST_CASE("a stamp from the future is refused, naming both times, and harms nothing") {
+TEST_CASE("a stamp from the future is rejected and the error names both times") {
   Arm arm;
   // Of an edge that is static still, too.
   const auto first = arm.sample(1, time_of(9'000'000'000'000'000'000));
@@ -79,7 +79,7 @@ TEST_CASE("a stamp from the future is refused, naming both times, and harms noth
   CHECK(arm.x() == 4);
 }
 
-TEST_CASE("how far ahead a stamp may be is the edge's, or without limit") {
+TEST_CASE("each edge limits how far ahead a stamp may be") {
   Arm arm;
   EdgeTiming timing;
   timing.max_ahead = 0ns;
@@ -98,7 +98,7 @@ TEST_CASE("how far ahead a stamp may be is the edge's, or without limit") {
   CHECK(plain.update("arm", {}, time_of(kLast)));
 }
 
-TEST_CASE("a clock that was set back is noticed") {
+TEST_CASE("a clock that is set back is noticed") {
   Arm arm;
   REQUIRE(arm.sample(0, kNow));
   arm.clock -= 1h;
@@ -107,14 +107,14 @@ TEST_CASE("a clock that was set back is noticed") {
   CHECK(taken < 64);
 }
 
-TEST_CASE("an observation's stamp from the future is refused") {
+TEST_CASE("an observation with a stamp from the future is rejected") {
   Arm arm;
   REQUIRE(arm.sample(1, kNow));
   CHECK_FALSE(arm.forest.revise({{"arm", along_x(2), {}}}, kNow + 1h, UINT64_MAX));
   CHECK(arm.x() == 1);
 }
 
-TEST_CASE("stamps and instants at the ends of the type are answered without overflow") {
+TEST_CASE("stamps at the ends of the type cause no overflow") {
   EdgeTiming timing = kept_for(std::chrono::nanoseconds::max());
   timing.max_ahead = std::chrono::nanoseconds::max();
   timing.process_noise = *Covariance::from_stddev({1, 1, 1, 1, 1, 1});
@@ -141,7 +141,7 @@ TEST_CASE("stamps and instants at the ends of the type are answered without over
   CHECK(outcome(arm.forest.update("arm", along_x(5))) == "stamp_taken");
 }
 
-TEST_CASE("a row of samples from a clock that has jumped back starts the history again") {
+TEST_CASE("consecutive samples from a clock that jumped back restart the history") {
   Arm arm(kept_for(10s));
   for (int i = 0; i < 100; ++i) REQUIRE(arm.sample(i, kNow + i * 10ms));
   const Time back = kNow - 1h;
@@ -166,36 +166,36 @@ TEST_CASE("a row of samples from a clock that has jumped back starts the history
   CHECK(arm.restarts.size() == 1);
 }
 
-TEST_CASE("stray samples never start a history again") {
+TEST_CASE("stray samples never restart a history") {
   Arm arm(kept_for(10s));
   REQUIRE(arm.sample(0, kNow));
   const Time back = kNow - 1h;
   double x = 0;  // of the newest sample
-  SECTION("of an old source beside one that goes on") {
+  SECTION("of an old source beside a current one") {
     for (int i = 1; i < 1000; ++i) {
       if (i % 4 == 0) REQUIRE(arm.sample(i, kNow + i * 1ms));
       CHECK_FALSE(arm.sample(-1, back + i * 1ms));
     }
     x = 996;
   }
-  SECTION("beside late ones that are kept") {
+  SECTION("beside late samples that are accepted") {
     for (int i = 1; i < 1000; ++i) {
       if (i % 4 == 0) REQUIRE(arm.sample(0, kNow - i * 1ms));
       CHECK_FALSE(arm.sample(-1, back + i * 1ms));
     }
   }
-  SECTION("that come in no order") {
+  SECTION("in random order") {
     for (int i = 1; i < 1000; ++i) CHECK_FALSE(arm.sample(-1, back - i * 1ms));
   }
-  SECTION("of one stamp, repeatedly") {
+  SECTION("of one stamp") {
     for (int i = 1; i < 1000; ++i) CHECK_FALSE(arm.sample(-1, back));
   }
-  SECTION("where that is switched off") {
+  SECTION("if restarts are switched off") {
     REQUIRE(arm.forest.set_timing("arm", kept_for(10s, 0)));
     REQUIRE(arm.sample(0, kNow));
     for (int i = 1; i < 1000; ++i) CHECK_FALSE(arm.sample(-1, back + i * 1ms));
   }
-  SECTION("of small jumps, which are within what is kept") {
+  SECTION("of small jumps within the history") {
     REQUIRE(arm.sample(0, kNow + 1s));
     for (int i = 1; i < 1000; ++i) REQUIRE(arm.sample(-1, kNow - 8s + i * 1ms));
   }
@@ -203,7 +203,7 @@ TEST_CASE("stray samples never start a history again") {
   CHECK(arm.restarts.empty());
 }
 
-TEST_CASE("edges that are updated together start again together") {
+TEST_CASE("edges that are updated together restart together") {
   Arm arm(kept_for(10s, 3));
   const std::vector<EdgeUpdate> both{{"arm", along_x(1)}, {"hand", along_x(2)}};
   REQUIRE(arm.forest.update(both, kNow));
@@ -219,7 +219,7 @@ TEST_CASE("edges that are updated together start again together") {
   CHECK(testing::x_of(arm.forest.lookup("world", "hand")) == 3);
 }
 
-TEST_CASE("a history starts again beside readers as often as its source does") {
+TEST_CASE("a history restarts as often as its source does") {
   Arm arm(kept_for(1s, 1));
   for (int round = 0; round < 200; ++round) {
     for (int i = 0; i < 20; ++i) REQUIRE(arm.sample(i, kNow - 1h + i * 200ms));
