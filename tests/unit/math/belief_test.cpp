@@ -34,7 +34,7 @@ Loading random_loading(Random& random, Eigen::Index columns, double metres, doub
   return loading;
 }
 
-TEST_CASE("Beliefs with nothing in common compose as transforms do") {
+TEST_CASE("Beliefs without common errors compose as transforms do") {
   Random random(611);
   INFO("seed " << random.seed());
   for (int i = 0; i < 200; ++i) {
@@ -46,8 +46,7 @@ TEST_CASE("Beliefs with nothing in common compose as transforms do") {
   }
 }
 
-TEST_CASE(
-    "A source that two edges share in full cancels on the way back, and doubles on the way on") {
+TEST_CASE("A shared source cancels on the way back and doubles on the way on") {
   Random random(612);
   INFO("seed " << random.seed());
   for (const Order order : {Order::kSecond, Order::kFourth}) {
@@ -64,7 +63,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("A source of fewer columns on one edge is as if the others were zero") {
+TEST_CASE("A source with fewer columns on one edge counts as if the others were zero") {
   Random random(613);
   CommonError two{"s", false, random_loading(random, 2, 0.1, 0.1)};
   CommonError one{"s", false, two.loading.leftCols(1)};
@@ -94,7 +93,7 @@ Matrix6d sampled_product(const Belief& X_AB, const Belief& X_BC, Random& random,
   });
 }
 
-TEST_CASE("Common errors propagate as samples show, and independence would not do") {
+TEST_CASE("Common errors propagate as samples show but independent ones would not") {
   Random random(614);
   INFO("seed " << random.seed());
   for (int i = 0; i < 3; ++i) {
@@ -110,7 +109,7 @@ TEST_CASE("Common errors propagate as samples show, and independence would not d
   }
 }
 
-TEST_CASE("Fourth order is nearer to samples than second, for independent and for common errors") {
+TEST_CASE("Fourth order is closer to samples than second for independent and common errors") {
   Random random(615);
   INFO("seed " << random.seed());
   for (const double shared : {0.0, 0.15}) {
@@ -137,7 +136,7 @@ TEST_CASE("Fourth order is nearer to samples than second, for independent and fo
   }
 }
 
-TEST_CASE("What is unknown is bounded, whatever the correlation") {
+TEST_CASE("The bound for unknown correlation covers any correlation") {
   Random random(616);
   INFO("seed " << random.seed());
   for (int i = 0; i < 200; ++i) {
@@ -158,9 +157,7 @@ TEST_CASE("What is unknown is bounded, whatever the correlation") {
   CHECK(covariance_diff(bound(A, A), Covariance::trusted(Matrix6d(4.0 * A.matrix())), 1e-12) == "");
 }
 
-TEST_CASE(
-    "A path with unknown parts dominates samples of correlated errors, and the independent sum "
-    "does not") {
+TEST_CASE("A path with unknown parts dominates samples and the independent sum does not") {
   Random random(617);
   INFO("seed " << random.seed());
   for (const double correlation : {1.0, 0.5, -0.5, -1.0}) {
@@ -186,9 +183,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE(
-    "Composed beliefs stay positive semi-definite, to fourth order and for errors of a radian, "
-    "too") {
+TEST_CASE("Composed beliefs stay positive semi-definite to fourth order and for a radian") {
   Random random(618);
   INFO("seed " << random.seed());
   for (const double size : {0.01, 0.3, 1.0}) {
@@ -202,7 +197,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("Common errors that make no sense are refused by name") {
+TEST_CASE("Invalid common errors are rejected by name") {
   Random random(619);
   const CommonError good{"s", false, random_loading(random, 2, 1, 1)};
   CHECK(check_common_errors({good}));

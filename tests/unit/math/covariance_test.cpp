@@ -135,7 +135,7 @@ TEST_CASE("from_stddev squares and stddev takes the roots") {
   }
 }
 
-TEST_CASE("from_stddev refuses by the name of the element") {
+TEST_CASE("from_stddev names the element that it rejects") {
   const std::size_t i = GENERATE(range<std::size_t>(0, 6));
   const double bad = GENERATE(as<double>{}, kNan, kInf, -kInf, -1e-300, -1.0, 1.0000001e9);
   CAPTURE(i, bad);
@@ -149,7 +149,7 @@ TEST_CASE("from_stddev refuses by the name of the element") {
 
 // ---- refusals
 
-TEST_CASE("what is not a finite number is refused wherever it stands") {
+TEST_CASE("a number that is not finite is rejected wherever it is") {
   const double bad = GENERATE(as<double>{}, kNan, kInf, -kInf);
   const int i = GENERATE(range(0, 6));
   const int j = GENERATE(range(0, 6));
@@ -161,7 +161,7 @@ TEST_CASE("what is not a finite number is refused wherever it stands") {
   CHECK(refusal(m) == name(std::min(i, j), std::max(i, j)) + " is not a finite number");
 }
 
-TEST_CASE("an asymmetric matrix is refused") {
+TEST_CASE("an asymmetric matrix is rejected") {
   const int i = GENERATE(range(0, 6));
   const int j = GENERATE(range(0, 6));
   if (i == j) return;
@@ -176,7 +176,7 @@ TEST_CASE("an asymmetric matrix is refused") {
   CHECK(sigma->matrix()(i, j) == 0.5e-10);
 }
 
-TEST_CASE("a negative variance is refused by its element") {
+TEST_CASE("a negative variance is rejected by its element") {
   const int i = GENERATE(range(0, 6));
   const double value = GENERATE(-1.0, -1e-3, -1e-9, -1e-11);
   CAPTURE(i, value);
@@ -197,7 +197,7 @@ TEST_CASE("a variance up to 1e18 is accepted") {
   CHECK(refusal(m) == name(2, 2) + " is beyond 1e18");
 }
 
-TEST_CASE("a correlation beyond one is refused") {
+TEST_CASE("a correlation beyond one is rejected") {
   const int i = GENERATE(range(0, 6));
   const int j = GENERATE(range(0, 6));
   if (i >= j) return;
@@ -214,7 +214,7 @@ TEST_CASE("a correlation beyond one is refused") {
   CHECK(refusal(m) == "");
 }
 
-TEST_CASE("a zero variance admits no covariance beyond rounding") {
+TEST_CASE("a zero variance allows no covariance beyond rounding") {
   const int i = GENERATE(range(0, 6));
   const int j = GENERATE(range(0, 6));
   if (i == j) return;
@@ -230,7 +230,7 @@ TEST_CASE("a zero variance admits no covariance beyond rounding") {
   CHECK(contains(refusal(m), "not positive semi-definite"));
 }
 
-TEST_CASE("a unit known exactly admits no covariance at all") {
+TEST_CASE("a unit known exactly allows no covariance at all") {
   Matrix6d m = Matrix6d::Identity();
   m.bottomRightCorner<3, 3>().setZero();
   CHECK(refusal(m) == "");
@@ -238,7 +238,7 @@ TEST_CASE("a unit known exactly admits no covariance at all") {
   CHECK(contains(refusal(m), name(1, 4)));
 }
 
-TEST_CASE("pairs may agree where the whole does not") {
+TEST_CASE("a matrix is rejected if only pairs of elements are consistent") {
   // Three errors each opposed to the others: every 2x2 minor is positive, the determinant is not.
   Matrix6d m = Matrix6d::Identity();
   m(0, 1) = m(1, 0) = m(0, 3) = m(3, 0) = m(1, 3) = m(3, 1) = -0.6;
@@ -262,7 +262,7 @@ TEST_CASE("a covariance of rank one is accepted") {
   }
 }
 
-TEST_CASE("metres and radians of very different size are judged alike") {
+TEST_CASE("metres and radians of very different size are judged equally") {
   const double metres = GENERATE(1e6, 1.0, 1e-6);
   const double radians = GENERATE(1.0, 1e-6, 1e-9);
   CAPTURE(metres, radians);
@@ -279,7 +279,7 @@ TEST_CASE("metres and radians of very different size are judged alike") {
   }
 }
 
-TEST_CASE("axes of different size are told apart down to rounding of the largest") {
+TEST_CASE("axes of different size are distinguished down to rounding of the largest") {
   // z is known 1e4 times better than x and y, and yet its correlation with the yaw counts.
   Matrix6d m = Matrix6d::Identity();
   m(2, 2) = 1e-8;
@@ -289,7 +289,7 @@ TEST_CASE("axes of different size are told apart down to rounding of the largest
   CHECK(refusal(m) != "");
 }
 
-TEST_CASE("decimal rounding is forgiven up to 1e-9 and refused beyond") {
+TEST_CASE("decimal rounding is accepted up to 1e-9 and rejected beyond") {
   // The tolerance: with every axis scaled to a variance of one, no eigenvalue below -1e-9. Rounding
   // to d digits moves each element by up to 5·10^-d of it, an eigenvalue by up to 6 times that:
   // twelve digits always pass, six may well be refused, and whatever passes comes out
@@ -335,7 +335,7 @@ TEST_CASE("transported is the dense product with the adjoint") {
   }
 }
 
-TEST_CASE("transported by a pose and its inverse cancels") {
+TEST_CASE("transport by a pose and then by its inverse cancels") {
   Random random(122);
   INFO("seed " << random.seed());
   const Covariance sigma = random.covariance();
@@ -347,7 +347,7 @@ TEST_CASE("transported by a pose and its inverse cancels") {
         "");
 }
 
-TEST_CASE("a rotation error moves what is far away sideways") {
+TEST_CASE("a rotation error moves a distant frame sideways") {
   // Known to 0.01 rad about z at B; seen from A, 10 m along x, B wavers 0.1 m along y.
   const auto sigma = Covariance::from_stddev({0, 0, 0, 0, 0, 0.01});
   REQUIRE(sigma);

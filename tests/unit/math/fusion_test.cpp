@@ -50,7 +50,7 @@ TEST_CASE("Fused estimates are consistent over 1,000 runs") {
   CHECK(sum / kRuns < high);
 }
 
-TEST_CASE("Fusion is at the least of the sum of squared errors") {
+TEST_CASE("Fusion minimizes the sum of squared errors") {
   Random random(622);
   INFO("seed " << random.seed());
   for (int i = 0; i < 50; ++i) {
@@ -75,7 +75,7 @@ TEST_CASE("Fusion is at the least of the sum of squared errors") {
   }
 }
 
-TEST_CASE("One estimate is what it was, and the order does not count") {
+TEST_CASE("Fusion of one estimate changes nothing and the order of estimates does not matter") {
   Random random(623);
   INFO("seed " << random.seed());
   const Transform A = random.transform();
@@ -90,7 +90,7 @@ TEST_CASE("One estimate is what it was, and the order does not count") {
   CHECK(transform_diff(ab->X, ba->X, 1e-9) == "");
 }
 
-TEST_CASE("What is known exactly stays, and contradictions are refused") {
+TEST_CASE("Exact estimates stay and contradicting ones are rejected") {
   Random random(624);
   const Transform exact{random.pose(), {}};
   const auto fused = fuse({estimate(exact.pose, random.covariance(), random), exact});
@@ -103,9 +103,7 @@ TEST_CASE("What is known exactly stays, and contradictions are refused") {
   CHECK_FALSE(fuse({}));
 }
 
-TEST_CASE(
-    "Covariance intersection dominates the error for any correlation, where fusion as independent "
-    "does not") {
+TEST_CASE("Covariance intersection dominates the error for any correlation") {
   Random random(625);
   INFO("seed " << random.seed());
   constexpr int kRuns = 20'000;
@@ -151,7 +149,7 @@ TEST_CASE(
   CHECK(transform_diff(kept->X, small, 0) == "");
 }
 
-TEST_CASE("Quantiles of the chi-squared distribution are those of the tables") {
+TEST_CASE("Quantiles of the chi-squared distribution are those of published tables") {
   CHECK(chi_squared_quantile(0.95, 1) == testing::Approx(3.841).epsilon(1e-3));
   CHECK(chi_squared_quantile(0.99, 6) == testing::Approx(16.812).epsilon(1e-4));
   CHECK(chi_squared_quantile(0.999, 6) == testing::Approx(22.458).epsilon(1e-4));

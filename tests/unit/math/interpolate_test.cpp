@@ -51,7 +51,7 @@ double largest_ratio(const Matrix6d& sampled, const Matrix6d& given) {
 
 }  // namespace
 
-TEST_CASE("interpolation begins at the one sample and ends at the other") {
+TEST_CASE("interpolation begins at one sample and ends at the other") {
   Random random(501);
   INFO("seed " << random.seed());
   for (const double angle : kAngles) {
@@ -76,7 +76,7 @@ TEST_CASE("interpolation is the same from either end") {
   }
 }
 
-TEST_CASE("motion with a constant twist is met exactly") {
+TEST_CASE("motion with a constant twist is interpolated exactly") {
   Random random(503);
   INFO("seed " << random.seed());
   for (const double angle : kAngles) {
@@ -92,7 +92,7 @@ TEST_CASE("motion with a constant twist is met exactly") {
   }
 }
 
-TEST_CASE("each sample's part of the covariance is that of the Jacobian, shared as a mean is") {
+TEST_CASE("the covariance weights each sample's Jacobian as a mean does") {
   Random random(504);
   INFO("seed " << random.seed());
   for (const double angle : kAngles) {
@@ -130,7 +130,7 @@ Matrix6d carrying(const Twist& xi, double s) {
   return sum / s;
 }
 
-TEST_CASE("extrapolation is right for every angle, however far it goes") {
+TEST_CASE("extrapolation is right for every angle and distance") {
   Random random(506);
   INFO("seed " << random.seed());
   for (const double angle : {0.0, 1e-12, 1e-8, 1e-6, 1e-5, 1e-4, 0.99e-3, 1.01e-3, 0.01, 0.05,
@@ -161,7 +161,7 @@ TEST_CASE("extrapolation is right for every angle, however far it goes") {
 }
 
 // Ten standard errors of a sample variance, √(2 / N), are 0.045.
-TEST_CASE("the covariance is no less than the sampled one, however the samples are correlated") {
+TEST_CASE("the covariance is no less than the sampled one for any correlation of the samples") {
   constexpr int kSamples = 100'000;
   Random random(505);
   INFO("seed " << random.seed());

@@ -47,7 +47,7 @@ TEST_CASE("joint: a revolute joint turns about its axis, a prismatic one shifts 
   }
 }
 
-TEST_CASE("joint: at zero the child stands at the origin") {
+TEST_CASE("joint: at zero the child has the pose of the origin") {
   Random random(2);
   INFO("seed " << random.seed());
   const Transform X_PJ = random.transform();
@@ -56,7 +56,7 @@ TEST_CASE("joint: at zero the child stands at the origin") {
   CHECK(difference(X.covariance.matrix(), X_PJ.covariance.matrix()) < 1e-17);
 }
 
-TEST_CASE("joint: the variance of the position is a covariance of rank one along the twist") {
+TEST_CASE("joint: the position's variance gives a covariance of rank one along the twist") {
   Random random(3);
   INFO("seed " << random.seed());
   for (int run = 0; run < 100; ++run) {
@@ -73,7 +73,7 @@ TEST_CASE("joint: the variance of the position is a covariance of rank one along
   }
 }
 
-TEST_CASE("joint: the origin's error is seen from the child") {
+TEST_CASE("joint: the origin's error is transported to the child") {
   Random random(4);
   INFO("seed " << random.seed());
   for (int run = 0; run < 100; ++run) {
@@ -88,7 +88,7 @@ TEST_CASE("joint: the origin's error is seen from the child") {
   }
 }
 
-TEST_CASE("joint: covariance is that of samples of position and origin") {
+TEST_CASE("joint: the covariance is that of samples of position and origin") {
   Random random(5);
   INFO("seed " << random.seed());
   constexpr int kSamples = 20000;

@@ -15,7 +15,7 @@ using testing::covariance_diff;
 using testing::pose_diff;
 using testing::Random;
 
-TEST_CASE("the portable kernel and that of this processor agree") {
+TEST_CASE("the portable kernel and that of this processor accumulate alike") {
   Random random(250);
   INFO("seed " << random.seed());
   std::vector<Transform> path;
@@ -59,7 +59,7 @@ TEST_CASE("the portable kernel and that of this processor interpolate alike") {
   }
 }
 
-TEST_CASE("columns keep the pose") {
+TEST_CASE("columns preserve the pose") {
   Random random(251);
   INFO("seed " << random.seed());
   for (int i = 0; i < 100; ++i) {

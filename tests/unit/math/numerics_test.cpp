@@ -123,7 +123,7 @@ TEST_CASE("numerics: a chain of 10,000 edges keeps its covariance") {
   CHECK(smallest > -1e-12);
 }
 
-TEST_CASE("numerics: millimetres at coordinates of a million metres") {
+TEST_CASE("numerics: poses and covariances stay precise at a million metres") {
   Random random(682);
   INFO("seed " << random.seed());
   double worst_pose = 0;
@@ -152,7 +152,7 @@ TEST_CASE("numerics: millimetres at coordinates of a million metres") {
   CHECK(smallest > -1e-12);
 }
 
-TEST_CASE("numerics: a covariance seen from a million metres away comes back") {
+TEST_CASE("numerics: a covariance transported over a million metres and back is the same") {
   Random random(683);
   INFO("seed " << random.seed());
   double worst = 0;
@@ -174,7 +174,7 @@ TEST_CASE("numerics: a covariance seen from a million metres away comes back") {
   CHECK(smallest > -1e-12);
 }
 
-TEST_CASE("numerics: near half turns poses and covariances are kept") {
+TEST_CASE("numerics: poses and covariances stay precise near half turns") {
   Random random(684);
   INFO("seed " << random.seed());
   double worst_log = 0;
@@ -214,7 +214,7 @@ TEST_CASE("numerics: near half turns poses and covariances are kept") {
   CHECK(smallest > -1e-12);
 }
 
-TEST_CASE("numerics: what observations leave is positive semi-definite, however precise they are") {
+TEST_CASE("numerics: covariances stay positive semi-definite after very precise observations") {
   Random random(685);
   INFO("seed " << random.seed());
   double smallest = 1;

@@ -80,7 +80,7 @@ std::vector<Consistency> simulate(Random& random, const std::vector<Ends>& obser
   return found;
 }
 
-TEST_CASE("After observations edges and paths are as sure as they say, over 1,000 runs") {
+TEST_CASE("After observations the errors of edges and paths match their covariance in 1000 runs") {
   Random random(631);
   INFO("seed " << random.seed());
   const std::vector<Ends> asked = {{0, 1}, {2, 3}, {3, 4}, {4, 5}, {0, 5}, {0, 3}, {2, 5}, {3, 0}};
@@ -96,8 +96,7 @@ TEST_CASE("After observations edges and paths are as sure as they say, over 1,00
   }
 }
 
-TEST_CASE(
-    "Without correlations between edges, a path that is observed repeatedly is overconfident") {
+TEST_CASE("Without correlation between edges repeated observation makes a path overconfident") {
   Random random(632);
   INFO("seed " << random.seed());
   const auto found = simulate(random, std::vector<Ends>(8, {0, 4}), {{0, 1}}, false);
@@ -105,8 +104,7 @@ TEST_CASE(
   CHECK(found[0].mean() > 1.5 * found[0].high());
 }
 
-TEST_CASE(
-    "The joint covariance is that of a dense filter, edges off the path and sources included") {
+TEST_CASE("The joint covariance equals that of a dense filter") {
   Random random(633);
   INFO("seed " << random.seed());
   for (int run = 0; run < 20; ++run) {
@@ -135,7 +133,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("What there is no room for makes the joint covariance larger, not smaller") {
+TEST_CASE("Columns that are dropped make the joint covariance larger and never smaller") {
   Random random(640);
   INFO("seed " << random.seed());
   ObservedChain chain(random, 9);
@@ -172,7 +170,7 @@ TEST_CASE("A measurement of one uncertain edge is fused with it") {
   }
 }
 
-TEST_CASE("The gate refuses what is too far, says how far, and changes nothing") {
+TEST_CASE("The gate rejects a distant measurement and reports the distance and changes nothing") {
   Random random(635);
   INFO("seed " << random.seed());
   ObservedChain chain(random, 3);
@@ -202,7 +200,7 @@ TEST_CASE("The gate refuses what is too far, says how far, and changes nothing")
   CHECK_FALSE(observe(chain.path(0, 3), {Z, R}, kSource, {std::nan(""), true}));
 }
 
-TEST_CASE("Edges that are known exactly stay as they are to the last bit") {
+TEST_CASE("Edges that are known exactly stay the same to the last bit") {
   Random random(636);
   ObservedChain chain(random, 4);
   chain.set_exact(1);
@@ -225,7 +223,7 @@ TEST_CASE("Edges that are known exactly stay as they are to the last bit") {
   CHECK_THAT(nothing.error().message, ContainsSubstring("all edges of the path are known exactly"));
 }
 
-TEST_CASE("An exact measurement far away is met exactly") {
+TEST_CASE("An exact measurement far away is reached exactly") {
   Random random(637);
   INFO("seed " << random.seed());
   for (int i = 0; i < 20; ++i) {
@@ -239,8 +237,7 @@ TEST_CASE("An exact measurement far away is met exactly") {
   }
 }
 
-TEST_CASE(
-    "What is of unknown correlation is observed without gaining from what may be the same twice") {
+TEST_CASE("An edge of unknown correlation gains nothing from the same measurement twice") {
   Random random(638);
   INFO("seed " << random.seed());
   const Transform X = random.transform(1.0, 0.1, 0.1);
@@ -276,9 +273,7 @@ TEST_CASE(
   CHECK(testing::domination(left, X.covariance.transported(known.pose.inverse()).matrix()) > -1e-9);
 }
 
-TEST_CASE(
-    "NormalizedInnovation is as expected where the covariance is right, and tells which edge's is "
-    "too small") {
+TEST_CASE("NormalizedInnovation finds the edge whose covariance is too small") {
   Random random(639);
   INFO("seed " << random.seed());
   for (const double lie : {1.0, 3.0}) {

@@ -54,7 +54,7 @@ const std::vector<Convention>& conventions() {
   return all;
 }
 
-TEST_CASE("A covariance in one convention is in each other what samples show") {
+TEST_CASE("A covariance converted between conventions is that of samples") {
   Random random(601);
   INFO("seed " << random.seed());
   for (const Convention& drawn : conventions()) {
@@ -89,7 +89,7 @@ TEST_CASE("Conversions between conventions are each other's inverse") {
   }
 }
 
-TEST_CASE("ROS's covariance of a camera that looks along x is told along the parent's axes") {
+TEST_CASE("ROS's covariance of a camera that looks along x is along the parent's axes") {
   // A quarter turn about z: the child's x is the parent's y.
   const Pose X = Pose::trusted(from_rpy(0, 0, M_PI / 2), {5, 0, 0});
   const auto along_x = Covariance::from_stddev({0.1, 0, 0, 0.01, 0, 0});

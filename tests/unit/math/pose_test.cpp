@@ -277,7 +277,7 @@ std::string refusal(const Quaterniond& rotation, const Vector3d& translation) {
   return X.error().message;
 }
 
-TEST_CASE("create refuses what is not a number by the name of its field") {
+TEST_CASE("create names the field that is not a finite number") {
   const double bad = GENERATE(as<double>{}, kNan, kInf, -kInf);
   const int i = GENERATE(range(0, 4));
   CAPTURE(bad, i);
@@ -306,7 +306,7 @@ TEST_CASE("create normalizes a rotation within 1e-3 of unit length") {
   }
 }
 
-TEST_CASE("create refuses a rotation that is not of unit length") {
+TEST_CASE("create rejects a rotation that is not of unit length") {
   Random random(42);
   INFO("seed " << random.seed());
   const Quaterniond q = random.pose().rotation();
@@ -317,7 +317,7 @@ TEST_CASE("create refuses a rotation that is not of unit length") {
   }
 }
 
-TEST_CASE("create takes translations up to 1e9 m") {
+TEST_CASE("create accepts translations up to 1e9 m") {
   const int i = GENERATE(range(0, 3));
   const double sign = GENERATE(1.0, -1.0);
   CAPTURE(i, sign);

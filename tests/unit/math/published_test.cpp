@@ -88,7 +88,7 @@ TEST_CASE("Two poses compose to fourth order by the formulas of Barfoot and Furg
   }
 }
 
-TEST_CASE("Two poses of Barfoot and Furgale: both orders are as far off as in the reference run") {
+TEST_CASE("Two poses of Barfoot and Furgale: both orders have the errors of the reference run") {
   Random random(701);
   INFO("seed " << random.seed());
   const auto errors = [&](double alpha) {
@@ -109,7 +109,7 @@ TEST_CASE("Two poses of Barfoot and Furgale: both orders are as far off as in th
   CHECK(fourth_s < 0.04);
 }
 
-TEST_CASE("Fourth order is no better than second beyond a radian, and at one if correlated") {
+TEST_CASE("Fourth order is no better than second beyond a radian or at one if correlated") {
   Random random(702);
   INFO("seed " << random.seed());
   const auto poses = testing::two_poses(3.0);
@@ -129,7 +129,7 @@ TEST_CASE("Fourth order is no better than second beyond a radian, and at one if 
 
 // ---- The chain
 
-TEST_CASE("A chain of steps has the covariance of the closed form, and of the paper") {
+TEST_CASE("A chain of steps has the covariance of the closed form and of the paper") {
   const double variance = testing::kChainYaw * testing::kChainYaw;
   for (const int K : {1, 2, 10, 100}) {
     CAPTURE(K);
@@ -146,7 +146,7 @@ TEST_CASE("A chain of steps has the covariance of the closed form, and of the pa
   CHECK(fourth(5, 5) == Approx(0.09));
 }
 
-TEST_CASE("A chain sampled at random spreads along its path as only fourth order predicts") {
+TEST_CASE("A sampled chain spreads along its path as only fourth order predicts") {
   constexpr int kChains = 30'000;
   Random random(703);
   INFO("seed " << random.seed());
@@ -189,7 +189,7 @@ Trials fuse_often(double alpha, double spread, int trials, Random& random) {
   return {mean.cost / fused, std::sqrt(mean.error / fused), mean.nees / fused};
 }
 
-TEST_CASE("Three estimates fuse at the cost that chance has, to the error that is claimed") {
+TEST_CASE("Three fused estimates have the expected cost and the claimed error") {
   constexpr int kTrials = 1500;
   Random random(704);
   INFO("seed " << random.seed());
@@ -203,7 +203,7 @@ TEST_CASE("Three estimates fuse at the cost that chance has, to the error that i
   CHECK(overconfident.nees > 6 + 2 * allowed_nees);
 }
 
-TEST_CASE("The error of fused estimates grows with theirs, and beyond half a radian is belittled") {
+TEST_CASE("The error of fused estimates grows with theirs and is too small beyond half a radian") {
   constexpr int kTrials = 1500;
   Random random(705);
   INFO("seed " << random.seed());
@@ -219,7 +219,7 @@ TEST_CASE("The error of fused estimates grows with theirs, and beyond half a rad
 
 // ---- Correlated poses, after the idea of Mangelson et al. 2020
 
-TEST_CASE("Correlated poses: a shared source agrees with what is drawn, independence does not") {
+TEST_CASE("Correlated poses: a shared source agrees with samples and independence does not") {
   Random random(706);
   INFO("seed " << random.seed());
   const TwoPoses poses = testing::two_poses(0.2);
@@ -240,7 +240,7 @@ TEST_CASE("Correlated poses: a shared source agrees with what is drawn, independ
   }
 }
 
-TEST_CASE("Two poses of one trajectory: what they have in common cancels, where it is known") {
+TEST_CASE("Two poses of one trajectory: a known common error cancels") {
   const testing::Trajectory t = testing::trajectory(100);
   const Transform way = collapse(compose(inverse(t.A()), t.B(), Order::kSecond));
   const Matrix6d right = t.X_AB.covariance.matrix();

@@ -82,7 +82,7 @@ TEST_CASE("quat is x and y and z and w") {
   CHECK(std::abs(X->pose.rotation().w() - 0.7) < 1e-15);
 }
 
-TEST_CASE("quat is normalized when close and refused when not") {
+TEST_CASE("quat is normalized when close to unit length and rejected otherwise") {
   TransformSpec spec;
   spec.quat = {0, 0, 0.7071, 0.7071};
   const auto X = spec.build();
@@ -115,7 +115,7 @@ TEST_CASE("cov is the upper triangle") {
   CHECK(X->covariance.upper() == sigma.upper());
 }
 
-TEST_CASE("two ways of saying the same are refused") {
+TEST_CASE("a second rotation or a second covariance is rejected") {
   TransformSpec spec;
   SECTION("rotations") {
     spec.rpy = {0, 0, 0};
@@ -129,7 +129,7 @@ TEST_CASE("two ways of saying the same are refused") {
   }
 }
 
-TEST_CASE("what is not a finite number is refused by its element") {
+TEST_CASE("a number that is not finite is rejected by its element") {
   const double bad = GENERATE(as<double>{}, kNan, kInf, -kInf);
   CAPTURE(bad);
   TransformSpec spec;
@@ -158,7 +158,7 @@ TEST_CASE("what is not a finite number is refused by its element") {
   CHECK(refusal(spec) == "covariance[2][4] is not a finite number");
 }
 
-TEST_CASE("values out of range are refused by their element") {
+TEST_CASE("values out of range are rejected by their element") {
   TransformSpec spec;
   SECTION("translation") {
     spec.xyz = {0, -1.1e9, 0};
@@ -189,7 +189,7 @@ TEST_CASE("values out of range are refused by their element") {
   }
 }
 
-TEST_CASE("large angles are taken as they are") {
+TEST_CASE("large angles are accepted") {
   TransformSpec spec;
   spec.rpy = {100.0, -7.0, 1e6};
   const auto X = spec.build();

@@ -92,7 +92,7 @@ TEST_CASE("between propagates by the Jacobians of the difference") {
 
 // ---- against dense formulas
 
-TEST_CASE("compose, inverse and between are the dense formulas") {
+TEST_CASE("compose and inverse and between equal the dense formulas") {
   Random random(211);
   INFO("seed " << random.seed());
   for (int i = 0; i < 100; ++i) {
@@ -135,7 +135,7 @@ TEST_CASE("compose is associative with its covariance") {
   }
 }
 
-TEST_CASE("the identity is neutral and adds the error of its side") {
+TEST_CASE("the identity is neutral") {
   Random random(222);
   INFO("seed " << random.seed());
   const Transform a = random.transform();
@@ -287,7 +287,7 @@ Transform planar_edge(Random& random, bool right_angles) {
   return {X, Covariance::from_stddev(stddev).value()};
 }
 
-TEST_CASE("every result is accepted as an input again") {
+TEST_CASE("every result is accepted as an input") {
   // Answers travel and become edges elsewhere: the checks at the door must not refuse them.
   Random random(251);
   INFO("seed " << random.seed());
