@@ -26,7 +26,7 @@ TEST_CASE("ids of ordinary text are accepted") {
   CHECK(refusal(id) == "");
 }
 
-TEST_CASE("the edges of the UTF-8 ranges are accepted") {
+TEST_CASE("the limits of the UTF-8 ranges are accepted") {
   // First and last code point of each length, and the neighbours of the surrogates.
   const std::string id = GENERATE(as<std::string>{}, "\x20", "\x7E", "\xC2\xA0", "\xDF\xBF",
                                   "\xE0\xA0\x80", "\xED\x9F\xBF", "\xEE\x80\x80", "\xEF\xBF\xBF",
@@ -35,11 +35,11 @@ TEST_CASE("the edges of the UTF-8 ranges are accepted") {
   CHECK(refusal(id) == "");
 }
 
-TEST_CASE("an empty id is refused by the name of its field") {
+TEST_CASE("an empty id is rejected by the name of its field") {
   CHECK(refusal("") == "child is empty");
 }
 
-TEST_CASE("an id holds 255 bytes and no more") {
+TEST_CASE("an id has at most 255 bytes") {
   CHECK(refusal(std::string(255, 'a')) == "");
   const std::string message = refusal(std::string(256, 'a'));
   CHECK(contains(message, "child"));
@@ -56,7 +56,7 @@ TEST_CASE("the limit counts bytes and not code points") {
   CHECK(refusal(id + "\xC3\xA9") != "");
 }
 
-TEST_CASE("every control character is refused wherever it stands") {
+TEST_CASE("every control character is rejected wherever it is") {
   const int value = GENERATE(range(0x00, 0x20), range(0x7F, 0xA0));
   std::string control;
   if (value < 0x80) {
@@ -70,7 +70,7 @@ TEST_CASE("every control character is refused wherever it stands") {
   CHECK(contains(refusal(control + "arm"), "control character"));
 }
 
-TEST_CASE("bytes that are not UTF-8 are refused") {
+TEST_CASE("bytes that are not UTF-8 are rejected") {
   const std::string bad = GENERATE(
       as<std::string>{}, "\x80", "\xBF",                           // a continuation without a lead
       "\xC0\xAF", "\xC1\xBF", "\xE0\x80\xAF", "\xE0\x9F\xBF",      // overlong
@@ -84,7 +84,7 @@ TEST_CASE("bytes that are not UTF-8 are refused") {
   CHECK(contains(refusal(bad + "arm"), "not valid UTF-8"));
 }
 
-TEST_CASE("a refusal shows the bytes escaped and names the field") {
+TEST_CASE("a rejection shows the bytes escaped and names the field") {
   CHECK(refusal("a\xFFz") == "child 'a\\xffz' is not valid UTF-8");
   CHECK(refusal("a\nz") == "child 'a\\x0az' holds a control character");
 }
@@ -101,7 +101,7 @@ TEST_CASE("a partition name is an id") {
   CHECK_FALSE(check_partition_name(std::string(256, 'a')));
 }
 
-TEST_CASE("a partition name holds nothing DDS would expand") {
+TEST_CASE("a partition name has no character that DDS would expand") {
   const char meant = GENERATE('*', '?', '[', ']', ',');
   CAPTURE(meant);
   const auto refused = check_partition_name(std::string("robot") + meant + "1");
@@ -113,12 +113,12 @@ TEST_CASE("a partition name holds nothing DDS would expand") {
   CHECK(check_id(std::string("robot") + meant + "1", "child"));
 }
 
-TEST_CASE("printable is quoted without the quotes") {
+TEST_CASE("printable is the same as quote but without the quotes") {
   CHECK(printable("").empty());
   CHECK(printable("'arm' \xE2\x82\xAC\n\xFF") == "'arm' \xE2\x82\xAC\\x0a\\xff");
 }
 
-TEST_CASE("quoted shows text as it is and escapes the rest") {
+TEST_CASE("quote keeps printable text and escapes the rest") {
   CHECK(quote("") == "''");
   CHECK(quote("arm_1") == "'arm_1'");
   CHECK(quote("\xE2\x82\xAC") == "'\xE2\x82\xAC'");
@@ -130,7 +130,7 @@ TEST_CASE("quoted shows text as it is and escapes the rest") {
   CHECK(quote("\xED\xA0\x80") == "'\\xed\\xa0\\x80'");
 }
 
-TEST_CASE("what quoted returns is always a printable line") {
+TEST_CASE("quote always returns a printable line") {
   const int lead = GENERATE(range(0, 256));
   for (int second = 0; second < 256; ++second) {
     const std::string text = {static_cast<char>(lead), static_cast<char>(second)};

@@ -24,7 +24,7 @@ bool aborts(const std::function<void()>& action) {
 
 }  // namespace
 
-TEST_CASE("locks: a thread waits only for locks of a later rank than those it holds") {
+TEST_CASE("locks: a thread may wait only for locks of a later rank than those it holds") {
   const auto waits = [](LockRank held, LockRank next) {
     return [held, next] {
       (void)signal(SIGABRT, SIG_DFL);
@@ -42,7 +42,7 @@ TEST_CASE("locks: a thread waits only for locks of a later rank than those it ho
   }));
 }
 
-TEST_CASE("locks: a build that checks the order ends a process that violates it") {
+TEST_CASE("locks: a build that checks the order aborts a process that violates it") {
   Mutex structure(LockRank::kStructure);
   Mutex leaf;
   const bool aborted = aborts([&] {

@@ -70,7 +70,7 @@ TEST_CASE("fail carries the code and the message") {
   CHECK(result.error().message == "arm is below hand");
 }
 
-TEST_CASE("fail_at puts the place in front and keeps the code") {
+TEST_CASE("fail_at prepends the place and keeps the code") {
   const Result<int> result = fail_at("frame 'arm'", Error{Errc::kTimeout, "no answer"});
   REQUIRE_FALSE(result);
   CHECK(result.error().code == Errc::kTimeout);

@@ -21,7 +21,7 @@ Correlation any_correlation(Random& random) {
       {"hand", std::string(255, 'o')}};
 }
 
-TEST_CASE("a correlation comes back as it was stored, to the last bit") {
+TEST_CASE("a correlation is stored and restored to the last bit") {
   Random random(0x7135);
   INFO("seed " << random.seed());
   for (int i = 0; i < 50; ++i) {
@@ -35,7 +35,7 @@ TEST_CASE("a correlation comes back as it was stored, to the last bit") {
   CHECK(none->empty());
 }
 
-TEST_CASE("a stored correlation that was cut short, or went on, is refused") {
+TEST_CASE("a stored correlation that is truncated or too long is rejected") {
   Random random(0x7136);
   INFO("seed " << random.seed());
   const std::string whole = to_blob(any_correlation(random));
@@ -46,7 +46,7 @@ TEST_CASE("a stored correlation that was cut short, or went on, is refused") {
   CHECK_FALSE(correlation_from(whole + '\0'));
 }
 
-TEST_CASE("a stored correlation that nobody can have said is refused") {
+TEST_CASE("an invalid stored correlation is rejected") {
   Correlation bad;
   SECTION("a loading that is not a number") {
     bad.common_errors.push_back({"supply", false, Loading::Constant(6, 1, std::nan(""))});
@@ -58,7 +58,7 @@ TEST_CASE("a stored correlation that nobody can have said is refused") {
   CHECK_FALSE(correlation_from(to_blob(bad)));
 }
 
-TEST_CASE("whatever bytes a correlation is read from, that ends") {
+TEST_CASE("reading a damaged correlation never crashes") {
   Random random(0x7137);
   INFO("seed " << random.seed());
   const std::string whole = to_blob(any_correlation(random));

@@ -57,7 +57,7 @@ std::string changed_by(const TemporaryDirectory& directory, const std::string& s
   return file;
 }
 
-TEST_CASE("a file with tables, triggers or views that no state has is refused as it is") {
+TEST_CASE("a file with foreign tables or triggers or views is rejected and not changed") {
   const TemporaryDirectory directory;
   const std::string sql = GENERATE(
       as<std::string>{}, "CREATE TRIGGER t AFTER INSERT ON frames BEGIN DELETE FROM notes; END",
@@ -71,8 +71,7 @@ TEST_CASE("a file with tables, triggers or views that no state has is refused as
   CHECK(content(file) == before);
 }
 
-TEST_CASE(
-    "a file of the format that knew no joints is read, and brought up to date by the first write") {
+TEST_CASE("a file of format 1 is read and updated by the first write") {
   const TemporaryDirectory directory;
   const std::string file = changed_by(directory,
                                       "DROP TABLE absent; DROP TABLE joints; DROP TABLE ties; DROP "
@@ -98,8 +97,7 @@ TEST_CASE(
   CHECK((*store)->load()->joints.size() == 1);
 }
 
-TEST_CASE(
-    "a file of the format that knew no correlation is brought up to date by the first write") {
+TEST_CASE("a file of format 2 is read and updated by the first write") {
   const TemporaryDirectory directory;
   const std::string file =
       changed_by(directory,
@@ -121,7 +119,7 @@ TEST_CASE(
   CHECK(state->frames[0].correlation == unknown);
 }
 
-TEST_CASE("a file with rows that no state has is refused as it is") {
+TEST_CASE("a file with invalid rows is rejected and not changed") {
   const TemporaryDirectory directory;
   const auto [sql, why] = GENERATE(table<std::string, std::string>({
       {"UPDATE frames SET id = CAST(id AS BLOB)", "another type in column id"},
@@ -161,7 +159,7 @@ TEST_CASE("a file with rows that no state has is refused as it is") {
   CHECK(content(file) == before);
 }
 
-TEST_CASE("a refused file keeps its log, too") {
+TEST_CASE("a rejected file keeps its write-ahead log") {
   const TemporaryDirectory directory;
   const std::string file = changed_by(directory, "DELETE FROM notes");
   const std::string copy = directory.path() + "/copy.sqlite";
@@ -179,7 +177,7 @@ TEST_CASE("a refused file keeps its log, too") {
   CHECK(content(copy + "-wal") == log);
 }
 
-TEST_CASE("what a file names cannot garble the message that refuses it") {
+TEST_CASE("control characters in a file do not reach the error message") {
   const TemporaryDirectory directory;
   const std::string file =
       changed_by(directory,

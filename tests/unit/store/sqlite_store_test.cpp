@@ -62,7 +62,7 @@ std::string content(const std::string& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-TEST_CASE("what was saved is there for the next process, to the last bit") {
+TEST_CASE("a saved state is restored to the last bit by the next process") {
   Random random(0x57a7e);
   INFO("seed " << random.seed());
   const TemporaryDirectory directory;
@@ -105,7 +105,7 @@ TEST_CASE("what was saved is there for the next process, to the last bit") {
   CHECK(to_flat(state->configured[0].X_PC) == to_flat(hand.X_PC));
 }
 
-TEST_CASE("whom a partition misses is kept as it was said last, by itself") {
+TEST_CASE("the last saved list of absences is restored") {
   const TemporaryDirectory directory;
   const std::string file = state_file(directory.path(), 7, "arms");
   const Absent lost{"head", -5, Absent::Kind::kLost, 7};
@@ -176,7 +176,7 @@ TEST_CASE("correlations are stored and removed with the values of their edges") 
   CHECK(state->frames[0].correlation.empty());
 }
 
-TEST_CASE("what was erased is not there") {
+TEST_CASE("erased frames and tombstones are not restored") {
   const TemporaryDirectory directory;
   const std::string file = state_file(directory.path(), 7, "arms");
   {
@@ -190,7 +190,7 @@ TEST_CASE("what was erased is not there") {
   CHECK(state->tombstones.empty());
 }
 
-TEST_CASE("what was saved survives a process that is killed right after") {
+TEST_CASE("a saved state survives a kill of its process") {
   const TemporaryDirectory directory;
   const std::string file = state_file(directory.path(), 7, "arms");
   const pid_t child = fork();
@@ -208,7 +208,7 @@ TEST_CASE("what was saved survives a process that is killed right after") {
   CHECK(opened(file)->load()->frames.size() == 200);
 }
 
-TEST_CASE("a state that is in use is refused") {
+TEST_CASE("a state that is in use is rejected") {
   const TemporaryDirectory directory;
   const std::string file = state_file(directory.path(), 7, "arms");
   const auto store = opened(file);
@@ -216,20 +216,20 @@ TEST_CASE("a state that is in use is refused") {
              ContainsSubstring("state: state file '" + file + "' is in use by another process"));
 }
 
-TEST_CASE("a file that cannot be this partition's state is refused and stays as it is") {
+TEST_CASE("a file that is not this partition's state is rejected and not changed") {
   const TemporaryDirectory directory;
   const std::string file = state_file(directory.path(), 7, "arms");
   REQUIRE(opened(file)->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
-  SECTION("no database") {
+  SECTION("not a database") {
     put(file, 0, "something else altogether");
     CHECK_THAT(refused(file),
                ContainsSubstring("is damaged (file is not a database (SQLite code 26)): move it"));
   }
-  SECTION("cut short") {
+  SECTION("truncated") {
     std::filesystem::resize_file(file, 5000);
     CHECK_THAT(refused(file), ContainsSubstring("is damaged"));
   }
-  SECTION("garbled within") {
+  SECTION("damaged inside") {
     for (std::streamoff at = 4096; at < 4096 * 4; at += 64) put(file, at, "garbage");
     CHECK_THAT(refused(file), ContainsSubstring("is damaged"));
   }
@@ -249,7 +249,7 @@ TEST_CASE("a file that cannot be this partition's state is refused and stays as 
   CHECK(content(file) == before);
 }
 
-TEST_CASE("a sound file in a directory that became read-only is not called damaged") {
+TEST_CASE("an intact file in a read-only directory is not called damaged") {
   const TemporaryDirectory directory;
   const std::string file = state_file(directory.path(), 7, "arms");
   REQUIRE(opened(file)->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
@@ -281,7 +281,7 @@ TEST_CASE("a sound file in a directory that became read-only is not called damag
   CHECK(opened(file)->load()->frames.size() == 1);
 }
 
-TEST_CASE("where the disk is full nothing is lost, and storing goes on once it is not") {
+TEST_CASE("a full disk loses nothing and storing continues once there is room") {
   testing::SmallDisk disk(300);
   if (!disk.mounted()) {
     WARN("SKIPPED: " << disk.missing());
@@ -307,8 +307,7 @@ TEST_CASE("where the disk is full nothing is lost, and storing goes on once it i
   CHECK(store->load()->frames.size() == static_cast<std::size_t>(kept) + 2);
 }
 
-TEST_CASE(
-    "a file of the format before that cannot be brought up to date stays as it is until it can") {
+TEST_CASE("a file that cannot be updated to the current format stays unchanged until it can") {
   testing::SmallDisk disk(300);
   if (!disk.mounted()) {
     WARN("SKIPPED: " << disk.missing());
@@ -341,11 +340,11 @@ TEST_CASE(
   CHECK(store->load()->frames.size() == 1);
 }
 
-TEST_CASE("a directory that cannot be made is named") {
+TEST_CASE("a directory that cannot be created is named") {
   CHECK_THAT(refused("/proc/nowhere/arms.sqlite"), ContainsSubstring("cannot be opened"));
 }
 
-TEST_CASE("each partition and domain has a file of its own, whatever the name") {
+TEST_CASE("each partition and domain has its own file whatever the name") {
   CHECK(state_file("/s", 7, "arms") == "/s/domain-7/arms.sqlite");
   CHECK(state_file("/s", 8, "left/arm") == "/s/domain-8/left%2farm.sqlite");
   CHECK(state_file("/s", 7, "..") == "/s/domain-7/%2e..sqlite");

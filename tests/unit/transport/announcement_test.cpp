@@ -7,7 +7,7 @@ namespace {
 
 std::vector<std::uint8_t> bytes(const std::string& text) { return {text.begin(), text.end()}; }
 
-TEST_CASE("a participant's own announcement says its partition and its versions") {
+TEST_CASE("a participant announces its partition and its versions") {
   const Announcement arm = read_announcement(participant_name("arm"), version_data());
   CHECK(arm.partition == "arm");
   CHECK(arm.protocol == kProtocolVersion);
@@ -29,7 +29,7 @@ TEST_CASE("only another major version is incompatible") {
   CHECK(said("tfdude-protocol 2 3 4.5.6 and more").program == "4.5.6");
 }
 
-TEST_CASE("a participant of tf-dude that says no version is from before there were any") {
+TEST_CASE("a participant of tf-dude without a version counts as incompatible") {
   for (const char* text : {"", "tfdude-protocol", "tfdude-protocol 1", "other 1 0",
                            "tfdude-protocol 70000 0", "tfdude-protocol x y"}) {
     CAPTURE(text);
@@ -40,7 +40,7 @@ TEST_CASE("a participant of tf-dude that says no version is from before there we
   }
 }
 
-TEST_CASE("other programs count as compatible, whatever they say") {
+TEST_CASE("other programs count as compatible whatever they announce") {
   const Announcement said = read_announcement("RTPSParticipant", bytes("\xff\x00 2 0"));
   CHECK(said.partition.empty());
   CHECK(said.compatible());

@@ -28,7 +28,7 @@ bool passes(const WireKind& kind, const Bytes& bytes) {
 
 // ---- samples of all kinds
 
-TEST_CASE("every kind of sample passes") {
+TEST_CASE("a valid sample of every kind passes") {
   Random random(0xcd1);
   INFO("seed " << random.seed());
   for (const WireKind& kind : wire_kinds(random)) {
@@ -38,7 +38,7 @@ TEST_CASE("every kind of sample passes") {
   }
 }
 
-TEST_CASE("every sample that is cut short is refused") {
+TEST_CASE("every truncated sample is rejected") {
   Random random(0xcd2);
   INFO("seed " << random.seed());
   for (const WireKind& kind : wire_kinds(random)) {
@@ -50,7 +50,7 @@ TEST_CASE("every sample that is cut short is refused") {
   }
 }
 
-TEST_CASE("of changed samples those that pass can be read") {
+TEST_CASE("a mutated sample that passes can be deserialized") {
   Random random(0xcd3);
   INFO("seed " << random.seed());
   const auto kinds = wire_kinds(random);
@@ -76,7 +76,7 @@ TEST_CASE("of changed samples those that pass can be read") {
   CHECK(refused > 1000);
 }
 
-TEST_CASE("random bytes pass at no topic, or can be read") {
+TEST_CASE("random bytes are rejected or can be deserialized") {
   Random random(0xcd4);
   INFO("seed " << random.seed());
   const auto kinds = wire_kinds(random);
@@ -100,7 +100,7 @@ TEST_CASE("random bytes pass at no topic, or can be read") {
 
 // ---- the header
 
-TEST_CASE("only plain CDR passes, of either byte order") {
+TEST_CASE("only plain CDR passes in both byte orders") {
   for (const bool big_endian : {false, true}) {
     Cdr cdr(big_endian);
     cdr.ulong(1).edge("hand").ulonglong(7);
@@ -124,7 +124,7 @@ TEST_CASE("only plain CDR passes, of either byte order") {
 
 // ---- strings
 
-TEST_CASE("an id has at most 255 bytes, its closing zero, and no other") {
+TEST_CASE("an id has at most 255 bytes and no zero but the last one") {
   const auto move = [](const Cdr& id) {
     Cdr cdr(id);
     return request(cdr.ulong(0).ulong(0).ulonglong(0).octet(4).string("arm").ulonglong(0));
@@ -157,7 +157,7 @@ TEST_CASE("the name of a host has at most 255 bytes") {
 
 // ---- kinds and booleans
 
-TEST_CASE("bodies of kinds that a later version may have are read up to their kind, and refused") {
+TEST_CASE("unknown kinds of later versions are read up to their kind and rejected") {
   for (unsigned kind = 0; kind < 256; ++kind) {
     if (kind >= 1 && kind <= kLastRequestKind) continue;
     const Cdr cdr = Cdr().head("hand").octet(kind).string("arm");
@@ -219,13 +219,13 @@ TEST_CASE("a filter reads the id and the addressee of a request of every kind") 
   }
 }
 
-TEST_CASE("partitions are addressed by their FNV-1a") {
+TEST_CASE("partitions are addressed by their FNV-1a hash") {
   CHECK(addressee_of("") == 0x811c9dc5U);
   CHECK(addressee_of("a") == 0xe40c292cU);
   CHECK(addressee_of("foobar") == 0xbf9cf968U);
 }
 
-TEST_CASE("a filter looks at the edges of an update until one is owned") {
+TEST_CASE("a filter reads the edges of an update until one is owned") {
   const Bytes bytes = Cdr().ulong(3).edge("a").edge("b").edge("c").ulonglong(0).bytes();
   std::string seen;
   const auto owned = [&](const std::string& own) {

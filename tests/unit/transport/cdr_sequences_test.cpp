@@ -144,7 +144,7 @@ Cdr absent(std::size_t count, std::uint64_t length) {
   return presence_end(cdr);
 }
 
-TEST_CASE("a sequence has at most 4096 elements, all of which are there") {
+TEST_CASE("a sequence has at most 4096 elements and all of them") {
   struct Sequence {
     const char* name;
     Cdr (*sample)(std::size_t count, std::uint64_t length);

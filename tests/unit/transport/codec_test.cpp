@@ -31,7 +31,7 @@ Sample travelled(const Sample& sample) {
   return arrived;
 }
 
-TEST_CASE("pushed values arrive as they were sent") {
+TEST_CASE("pushed values are decoded as they were encoded") {
   Random random(0xc0de7);
   INFO("seed " << random.seed());
   for (const PushedValues& one : testing::pushed_values(random)) {
@@ -41,7 +41,7 @@ TEST_CASE("pushed values arrive as they were sent") {
   }
 }
 
-TEST_CASE("requests arrive as they were sent") {
+TEST_CASE("requests are decoded as they were encoded") {
   Random random(0xc0de1);
   INFO("seed " << random.seed());
   for (const Request& one : testing::requests(random)) {
@@ -52,7 +52,7 @@ TEST_CASE("requests arrive as they were sent") {
   }
 }
 
-TEST_CASE("replies arrive as they were sent") {
+TEST_CASE("replies are decoded as they were encoded") {
   Random random(0xc0de2);
   INFO("seed " << random.seed());
   for (const Reply& one : testing::replies(random)) {
@@ -99,21 +99,21 @@ TEST_CASE("replies arrive as they were sent") {
   }
 }
 
-TEST_CASE("a message cannot do more to a terminal than be shown") {
+TEST_CASE("control characters in a message are escaped") {
   const Reply reply{1, 2, Error{Errc::kCycle, "\x1b[2J \xc3\xa4\n\xff"}};
   const auto arrived = from_wire(travelled<ReplyType>(to_wire(reply)));
   REQUIRE(arrived);
   CHECK(std::get<Error>(arrived->body).message == "\\x1b[2J \xc3\xa4\\x0a\\xff");
 }
 
-TEST_CASE("a message that is too long arrives cut") {
+TEST_CASE("a message that is too long is truncated") {
   const Reply reply{1, 2, Error{Errc::kCycle, std::string(10000, 'm')}};
   const auto arrived = from_wire(travelled<ReplyType>(to_wire(reply)));
   REQUIRE(arrived);
   CHECK(std::get<Error>(arrived->body).message == std::string(4096, 'm'));
 }
 
-TEST_CASE("updates arrive as they were sent, but for the edges that nobody wants") {
+TEST_CASE("updates are decoded with only the edges that are wanted") {
   Random random(0xc0de3);
   INFO("seed " << random.seed());
   for (const Update& one : testing::updates(random)) {
@@ -127,7 +127,7 @@ TEST_CASE("updates arrive as they were sent, but for the edges that nobody wants
   }
 }
 
-TEST_CASE("joints arrive as they were sent, but for those that nobody wants") {
+TEST_CASE("joint updates are decoded with only the joints that are wanted") {
   for (const JointUpdate& one : testing::joint_updates()) {
     const auto sample = travelled<JointsType>(to_wire(one));
     const auto all = from_wire(sample, [](std::string_view) { return true; });
@@ -141,7 +141,7 @@ TEST_CASE("joints arrive as they were sent, but for those that nobody wants") {
   }
 }
 
-TEST_CASE("a joint takes a few bytes of a sample, and its edge many more") {
+TEST_CASE("a joint takes few bytes and its edge takes many") {
   const auto bytes_of = [](const auto& kind, const auto& message) {
     return testing::serialized<std::decay_t<decltype(kind)>>(to_wire(message)).size();
   };
@@ -151,7 +151,7 @@ TEST_CASE("a joint takes a few bytes of a sample, and its edge many more") {
   CHECK(bytes_of(UpdateType(), Update{edges, time_of(1)}) > 6 * 240);
 }
 
-TEST_CASE("a pushed value whose covariance is known takes about the bytes of tf2's") {
+TEST_CASE("a pushed value with a known covariance takes at most the bytes of tf2") {
   // tf2's TransformStamped has a stamp, two strings of ten characters, and seven doubles.
   constexpr std::size_t kTf2 = 8 + 2 * (4 + 12) + 7 * 8;
   const auto bytes_of = [](std::size_t count) {
@@ -164,14 +164,14 @@ TEST_CASE("a pushed value whose covariance is known takes about the bytes of tf2
   CHECK(bytes_of(101) - bytes_of(1) <= 100 * kTf2);
 }
 
-TEST_CASE("a presence that misses what can be no partition is refused") {
+TEST_CASE("a presence with an invalid name of an absent partition is rejected") {
   const auto wire = to_wire(Presence{"robot", 1, "tower", 1, 1, true, {{"a,b", 1}}});
   const auto read = from_wire(wire);
   REQUIRE_FALSE(read);
   CHECK(read.error().message.find("'a,b'") != std::string::npos);
 }
 
-TEST_CASE("a page with a tombstone that means nothing is refused") {
+TEST_CASE("a page with an invalid tombstone is rejected") {
   const auto read = [](const Tombstone& tombstone) {
     const auto page = from_wire(to_wire(Page{"robot", 0, 1, 1, {}, {tombstone}}));
     return page ? "ok" : page.error().message;
@@ -184,7 +184,7 @@ TEST_CASE("a page with a tombstone that means nothing is refused") {
   CHECK(read({"hand", 1, Tombstone::Kind::kYielded, "arms,head"}) != "ok");
 }
 
-TEST_CASE("pages and presences arrive as they were sent") {
+TEST_CASE("pages and presences are decoded as they were encoded") {
   for (const Page& one : testing::pages()) {
     const auto arrived = from_wire(travelled<PageType>(to_wire(one)));
     REQUIRE(arrived);
@@ -278,7 +278,7 @@ void check_refused(const Result<T>& result, const std::string& place, const std:
   CHECK(result.error().message.find(field) != std::string::npos);
 }
 
-TEST_CASE("values that no transform has are refused, with frame and field") {
+TEST_CASE("invalid values of a transform are rejected by frame and field") {
   for (const BadValue& bad : kBadValues) {
     INFO("x_pc[" << bad.index << "] = " << bad.value);
     const Numbers x_pc = bad_transform(bad);
@@ -303,7 +303,7 @@ TEST_CASE("values that no transform has are refused, with frame and field") {
   }
 }
 
-TEST_CASE("a covariance that is not positive semi-definite as a whole is refused") {
+TEST_CASE("a covariance that is not positive semi-definite as a whole is rejected") {
   // Each pair of the three axes is possible, all together are not.
   Numbers x_pc(28);
   x_pc[3] = 1;
@@ -318,7 +318,7 @@ TEST_CASE("a covariance that is not positive semi-definite as a whole is refused
 
 // ---- names that are rejected
 
-TEST_CASE("a request for a frame that no frame can be called is refused") {
+TEST_CASE("a request with an invalid frame id is rejected") {
   for (const char* id : {"", "a\nb", "\xff"}) {
     check_refused(from_wire(to_wire(Request{1, id, RemoveRequest{}}, "robot")), "id", "");
   }
@@ -326,7 +326,7 @@ TEST_CASE("a request for a frame that no frame can be called is refused") {
                 "id '\\x01'", "control character");
 }
 
-TEST_CASE("a page with a bad name is refused") {
+TEST_CASE("a page with an invalid name is rejected") {
   const auto read = [](const std::string& partition, const PageEntry& entry) {
     return from_wire(to_wire(Page{partition, 0, 1, 1, {{"world", ""}, entry}}));
   };
@@ -338,7 +338,7 @@ TEST_CASE("a page with a bad name is refused") {
   check_refused(read("robot", {"base", "\xc3"}), "parent '\\xc3'", "UTF-8");
 }
 
-TEST_CASE("a presence with a bad name is refused") {
+TEST_CASE("a presence with an invalid name is rejected") {
   check_refused(from_wire(to_wire(Presence{"a,b", 1, "tower", 1, 1, true})), "partition 'a,b'",
                 "','");
   check_refused(from_wire(to_wire(Presence{"robot", 1, "", 1, 1, true})), "host", "empty");

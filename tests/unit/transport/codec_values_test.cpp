@@ -15,7 +15,7 @@ Sample travelled(const Sample& sample) {
   return arrived;
 }
 
-TEST_CASE("an unspecified covariance takes no bytes, and is refused by name") {
+TEST_CASE("an unspecified covariance takes no bytes and is rejected by name") {
   wire::Update update = to_wire(Update{{{"hand", {}}}});
   const auto whole = testing::serialized<UpdateType>(update).size();
   update.edges()[0].x_pc().resize(7);
@@ -37,7 +37,7 @@ TEST_CASE("an unspecified covariance takes no bytes, and is refused by name") {
   CHECK(position.error().message.find("joint 'elbow': its variance is unspecified") == 0);
 }
 
-TEST_CASE("a transform has 7 numbers or 28, and a position 1 or 2") {
+TEST_CASE("a transform has 7 or 28 numbers and a position 1 or 2") {
   for (const std::size_t count : {0U, 6U, 8U, 27U}) {
     wire::Update update = to_wire(Update{{{"hand", {}}}});
     update.edges()[0].x_pc().resize(count);
@@ -53,7 +53,7 @@ TEST_CASE("a transform has 7 numbers or 28, and a position 1 or 2") {
   CHECK(read.error().message == "joint 'elbow' without a position");
 }
 
-TEST_CASE("no stamp is another than the stamp zero") {
+TEST_CASE("no stamp differs from a stamp of zero") {
   const auto stamp_of = [](std::int64_t stamp) {
     wire::Update update = to_wire(Update{{{"hand", {}}}});
     update.stamp(stamp);

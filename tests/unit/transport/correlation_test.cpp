@@ -36,7 +36,7 @@ wire::CommonError common_error(std::size_t numbers, const std::string& source = 
   return common_error;
 }
 
-TEST_CASE("correlation: what is longer than its bound is not well formed") {
+TEST_CASE("correlation: a sequence above its bound is not well-formed") {
   wire::Correlation correlation;
   CHECK(well_formed(state_of(correlation)));
   CHECK(well_formed(state_of(correlation, kMaxCorrelated)));
@@ -61,7 +61,7 @@ TEST_CASE("correlation: what is longer than its bound is not well formed") {
   CHECK_FALSE(well_formed(state_of(correlation)));
 }
 
-TEST_CASE("correlation: what cannot be meant is refused when it is read") {
+TEST_CASE("correlation: an invalid correlation is rejected when it is read") {
   const auto refusal = [](const wire::Correlation& correlation) {
     const auto read = from_wire(state_of(correlation));
     REQUIRE_FALSE(read);
@@ -92,9 +92,7 @@ TEST_CASE("correlation: what cannot be meant is refused when it is read") {
   CHECK_THAT(read.error().message, ContainsSubstring("entry 1"));
 }
 
-TEST_CASE(
-    "correlation: a lookup of another order than 2 or 4, and an observation of nothing, are "
-    "refused") {
+TEST_CASE("correlation: an invalid order of a lookup or an invalid revision is rejected") {
   Random random(0x71e5);
   auto lookup = to_wire(Request{1, "hand", LookupRequest{{{"a", "b"}}, {}, time_of(5)}}, "arm");
   REQUIRE(from_wire(lookup));

@@ -13,7 +13,7 @@ TEST_CASE("discovery server: an address is a host and a port") {
   }
 }
 
-TEST_CASE("discovery server: what is no address is refused by name") {
+TEST_CASE("discovery server: an invalid address is rejected by name") {
   for (const std::string bad : {"robot", "robot:", ":11811", "robot:0", "robot:65536", "robot:-1",
                                 "robot:11811x", "two words:1", "[::1]:11811", "::1:11811"}) {
     INFO(bad);

@@ -27,7 +27,7 @@ constexpr milliseconds kShort{50};
 
 }  // namespace
 
-TEST_CASE("gate: a pause waits for what is inside, and who comes meanwhile for the pause") {
+TEST_CASE("gate: a pause waits for threads inside and lets new ones wait") {
   Gate gate;
   std::promise<void> inside;
   std::promise<void> go_on;
@@ -60,7 +60,7 @@ TEST_CASE("gate: a pause waits for what is inside, and who comes meanwhile for t
   CHECK(entered);
 }
 
-TEST_CASE("gate: once closed it lets nobody in, also those who were waiting") {
+TEST_CASE("gate: a closed gate lets nobody in and releases waiting threads") {
   Gate gate;
   std::atomic<bool> entered{true};
   std::future<void> waiting;
@@ -80,14 +80,14 @@ TEST_CASE("gate: once closed it lets nobody in, also those who were waiting") {
   const Gate::Pause still_works(gate);
 }
 
-TEST_CASE("gate: who is inside may pause it, as a callback does that deletes") {
+TEST_CASE("gate: a thread inside may pause the gate") {
   Gate gate;
   const Gate::Pass pass(gate);
   const Gate::Pause pause(gate);
   CHECK(pass);
 }
 
-TEST_CASE("gate: nobody is inside during a pause") {
+TEST_CASE("gate: no thread is inside during a pause") {
   Gate gate;
   std::atomic<bool> over{false};
   std::atomic<int> inside{0};

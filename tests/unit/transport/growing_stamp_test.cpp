@@ -4,7 +4,7 @@
 
 namespace tfdude::fastdds {
 
-TEST_CASE("source timestamps follow the clock, and grow where it is set back") {
+TEST_CASE("source timestamps follow the clock and grow even if it is set back") {
   GrowingStamp stamp;
   CHECK(stamp.next(5'000'000) == 5'000'000);
   CHECK(stamp.next(9'000'000) == 9'000'000);

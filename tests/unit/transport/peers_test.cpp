@@ -74,7 +74,7 @@ struct Observer {
 
 }  // namespace
 
-TEST_CASE("who speaks another major version is named, and counts as nobody") {
+TEST_CASE("a peer of another major version is reported and otherwise ignored") {
   int told = 0;
   Peers peers(
       std::make_shared<LifeSigns>(), [&](const Presence&) { ++told; },
@@ -100,15 +100,15 @@ TEST_CASE("who speaks another major version is named, and counts as nobody") {
   CHECK(told == 0);
 }
 
-TEST_CASE("a new participant has discovered all when all hear as many as it does") {
+TEST_CASE("discovery is complete when all peers know as many participants") {
   Observer one;
-  SECTION("one that hears none") {
+  SECTION("a peer that knows no other") {
     one.meet(1, "arms");
     CHECK_FALSE(one.peers.discovered());  // another may answer yet
     std::this_thread::sleep_for(Peers::kAgreedQuiet);
     CHECK(one.peers.discovered());
   }
-  SECTION("another one must be met first") {
+  SECTION("a peer that knows one that is not discovered yet") {
     one.meet(1, "arms", 1);
     std::this_thread::sleep_for(Peers::kQuiet);
     CHECK_FALSE(one.peers.awaits_presence());
@@ -117,7 +117,7 @@ TEST_CASE("a new participant has discovered all when all hear as many as it does
     std::this_thread::sleep_for(Peers::kAgreedQuiet);
     CHECK(one.peers.discovered());
   }
-  SECTION("who hears fewer may say so late") {
+  SECTION("a peer that knows fewer may report more late") {
     one.meet(1, "arms", 1);
     one.meet(2, "head", 0);
     std::this_thread::sleep_for(Peers::kAgreedQuiet);
@@ -125,7 +125,7 @@ TEST_CASE("a new participant has discovered all when all hear as many as it does
     std::this_thread::sleep_for(Peers::kQuiet);
     CHECK(one.peers.discovered());
   }
-  SECTION("who claims its name may not have met anybody yet") {
+  SECTION("a peer that claims its name may not have discovered others yet") {
     one.peers.met(prefix_of(1), serving("arms"));
     Presence claim = presence_of("arms");
     claim.serving = false;
@@ -137,14 +137,14 @@ TEST_CASE("a new participant has discovered all when all hear as many as it does
   }
 }
 
-TEST_CASE("servers count the participant that asks, too") {
+TEST_CASE("servers count also the participant that asks") {
   Observer server(true);
   server.meet(1, "arms", 1);
   std::this_thread::sleep_for(Peers::kAgreedQuiet);
   CHECK(server.peers.discovered());
 }
 
-TEST_CASE("a server that nobody needs counts as lost when its announcements are missing") {
+TEST_CASE("a server that is not needed counts as lost without announcements") {
   Observer one;
   one.meet(1, "arms");
   one.told.clear();
@@ -156,20 +156,20 @@ TEST_CASE("a server that nobody needs counts as lost when its announcements are 
   one.look(std::chrono::milliseconds(200));
   CHECK(one.told == std::vector<std::string>{"-arms"});
   CHECK(one.peers.silent("arms"));
-  SECTION("and is there again with its first datagram") {
+  SECTION("and returns with its first datagram") {
     hear(*one.signs, 1, one.now);
     one.look(std::chrono::milliseconds(30));
     CHECK(one.told == std::vector<std::string>{"-arms", "+arms"});
     CHECK_FALSE(one.peers.silent("arms"));
   }
-  SECTION("the datagrams of others do not count") {
+  SECTION("and does not return with datagrams of others") {
     hear(*one.signs, 2, one.now);
     one.look(std::chrono::milliseconds(30));
     CHECK(one.peers.silent("arms"));
   }
 }
 
-TEST_CASE("a server that is needed is asked for a sign of life, and lost after its lease") {
+TEST_CASE("a server that is needed is asked for a sign of life and lost after its lease") {
   Observer one;
   one.meet(1, "arms");
   one.meet(2, "head");
@@ -201,7 +201,7 @@ TEST_CASE("a server that is needed is asked for a sign of life, and lost after i
   }
 }
 
-TEST_CASE("a server that has never replied is given the time of the others") {
+TEST_CASE("a needed server that has never replied is lost only after the longer time") {
   Observer one;
   one.meet(1, "arms");
   one.told.clear();
@@ -211,7 +211,7 @@ TEST_CASE("a server that has never replied is given the time of the others") {
   CHECK(one.told == std::vector<std::string>{"-arms"});
 }
 
-TEST_CASE("the time in which a process could not receive is no silence of others") {
+TEST_CASE("the time in which this process could not receive is no silence of others") {
   Observer one;
   one.meet(1, "arms");
   one.peers.replied(prefix_of(1));
@@ -224,7 +224,7 @@ TEST_CASE("the time in which a process could not receive is no silence of others
   CHECK(one.told == std::vector<std::string>{"-arms"});
 }
 
-TEST_CASE("who sends a page and then nothing is gone, and not waited for") {
+TEST_CASE("a peer that sends a page and then nothing is lost and not waited for") {
   std::vector<std::uint64_t> gone;
   Peers peers(
       std::make_shared<LifeSigns>(), [](const Presence&) {},
@@ -251,14 +251,13 @@ TEST_CASE("who sends a page and then nothing is gone, and not waited for") {
     peers.left(prefix_of(1));
     CHECK(gone == std::vector<std::uint64_t>{7, 8});
   }
-  SECTION("it is told of once") {
+  SECTION("its loss is reported once") {
     peers.left(prefix_of(1));
     CHECK(gone.size() == 1);
   }
 }
 
-TEST_CASE(
-    "who sends a page of a later process than it has said, and then leaves, is gone as that") {
+TEST_CASE("a peer that sent a page of a later incarnation is lost under that incarnation") {
   std::vector<std::uint64_t> gone;
   Peers peers(
       std::make_shared<LifeSigns>(), [](const Presence&) {},
@@ -275,14 +274,14 @@ TEST_CASE(
   CHECK(gone == std::vector<std::uint64_t>{7});
 }
 
-TEST_CASE("who was met and has told nothing yet is waited for") {
+TEST_CASE("a discovered peer without a presence is waited for") {
   Observer one;
   one.peers.met(prefix_of(1), serving("arms"));
   one.look(std::chrono::seconds(9));
   CHECK(one.peers.awaits_presence());
 }
 
-TEST_CASE("signs of life are read from the header of RTPS alone") {
+TEST_CASE("signs of life are read only from the RTPS header") {
   LifeSigns signs;
   PeerId peer{};
   peer[0] = 5;

@@ -23,8 +23,7 @@ std::string participant(const std::string& transport) {
 
 }  // namespace
 
-TEST_CASE(
-    "profile text: names of profiles and transports get the ending, where they are used, too") {
+TEST_CASE("profile text: names of profiles and transports get the suffix wherever they are used") {
   const auto xml = with_own_names(
       std::string("<profiles>") + kDescribed + participant("wire") + "</profiles>", "@1");
   REQUIRE(xml);
@@ -39,7 +38,7 @@ TEST_CASE("profile text: a transport that another file describes keeps its name"
   CHECK(has(*xml, ">theirs<"));
 }
 
-TEST_CASE("profile text: what would hold for the whole process is left out") {
+TEST_CASE("profile text: settings for the whole process are removed") {
   const auto xml = with_own_names("<dds><log><use_default>false</use_default></log><profiles>" +
                                       participant("wire") +
                                       "</profiles><library_settings><intraprocess_delivery>OFF"
@@ -52,7 +51,7 @@ TEST_CASE("profile text: what would hold for the whole process is left out") {
   CHECK_FALSE(has(*xml, "is_default_profile"));
 }
 
-TEST_CASE("profile text: what is not XML or has no profiles is refused") {
+TEST_CASE("profile text: text that is not XML or has no profiles is rejected") {
   for (const char* bad : {"", "<profiles>", "<dds></dds>", "plain text", "<dds><types/></dds>"}) {
     INFO(bad);
     const auto xml = with_own_names(bad, "@1");

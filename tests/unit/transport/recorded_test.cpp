@@ -29,7 +29,7 @@ void check_recorded(const std::filesystem::path& folder) {
   CHECK(count > 0);
 }
 
-TEST_CASE("recorded messages are read, and sent on with the same bytes") {
+TEST_CASE("recorded messages are read and written again with the same bytes") {
   int versions = 0;
   for (const auto& version : std::filesystem::directory_iterator(TFDUDE_RECORDED)) {
     if (!version.is_directory()) continue;

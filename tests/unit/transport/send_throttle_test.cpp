@@ -15,7 +15,7 @@ constexpr std::uint32_t kOther = 0x0A4D0002;
 
 }  // namespace
 
-TEST_CASE("reach: who is silent is sent one datagram at a time, until heard again") {
+TEST_CASE("throttle: a silent host gets single datagrams until it is heard again") {
   const auto reach = std::make_unique<SendThrottle>();
   const auto start = SendThrottle::Clock::now();
   const auto after = [start](int ms) { return start + milliseconds(ms); };
@@ -32,7 +32,7 @@ TEST_CASE("reach: who is silent is sent one datagram at a time, until heard agai
   for (int i = 0; i < 3; ++i) CHECK(reach->may_send(kHost, kPort, after(1061)));
 }
 
-TEST_CASE("reach: a host that was never heard has its time to answer") {
+TEST_CASE("throttle: a host that was never heard gets the time to answer") {
   const auto reach = std::make_unique<SendThrottle>();
   const auto start = SendThrottle::Clock::now();
   for (int i = 0; i < 3; ++i) CHECK(reach->may_send(kHost, kPort, start + milliseconds(i)));
@@ -40,7 +40,7 @@ TEST_CASE("reach: a host that was never heard has its time to answer") {
   CHECK_FALSE(reach->may_send(kHost, kPort, start + milliseconds(601)));
 }
 
-TEST_CASE("reach: hosts beyond those it has room for are sent everything") {
+TEST_CASE("throttle: hosts beyond the capacity get all datagrams") {
   const auto reach = std::make_unique<SendThrottle>();
   const auto start = SendThrottle::Clock::now();
   for (std::uint32_t i = 0; i < 512; ++i) reach->heard(kHost + i, start);
