@@ -55,7 +55,7 @@ std::string fill(const std::string& node) {
                                                                                     : std::string();
 }
 
-TEST_CASE("beside an edge stand its age and what is large of its deviations") {
+TEST_CASE("the label of an edge has its age and its large deviations") {
   EdgeLabel edge = label(0.003, 0.4);
   CHECK(edge_text(edge, kNow) == "±3 mm ±0.4°");
   edge.newest = kNow - std::chrono::milliseconds(12);
@@ -78,14 +78,14 @@ TEST_CASE("beside an edge stand its age and what is large of its deviations") {
   }
 }
 
-TEST_CASE("names are written as DOT reads them") {
+TEST_CASE("names are escaped for DOT") {
   CHECK(dot_id("a\"b\\c") == "\"a\\\"b\\\\c\"");
   CHECK(dot_id("<b>&amp;") == "\"<b>&amp;\"");
   // \N would be the node's name, &amp; an ampersand.
   CHECK(dot_label("\\N & <i>\"") == "\"\\\\N &amp; &lt;i&gt;&quot;\"");
 }
 
-TEST_CASE("a forest is drawn with its owners, edges and what is missing") {
+TEST_CASE("a forest is drawn with its owners and edges and missing parents") {
   const std::string dot = draw_graph(example());
   CHECK(dot.rfind("digraph frames {\n", 0) == 0);
   CHECK(line(dot, "\"base\" -> ") == "\"base\" -> \"arm\" [label=\" 12 ms  ±3 mm ±0.4° \"]");
@@ -100,7 +100,7 @@ TEST_CASE("a forest is drawn with its owners, edges and what is missing") {
   CHECK_THAT(dot, ContainsSubstring("<TD BGCOLOR=\"" + arm + "\""));
 }
 
-TEST_CASE("what is not reachable is grey, and its edges are dashed") {
+TEST_CASE("an unreachable partition is grey and its edges are dashed") {
   Graph graph = example();
   const std::string before = draw_graph(graph);
   graph.partitions[0].reachable = false;
@@ -115,7 +115,7 @@ TEST_CASE("what is not reachable is grey, and its edges are dashed") {
   CHECK(fill(line(draw_graph(graph), "\"arm\" [")) == "#eceef1");
 }
 
-TEST_CASE("each partition has a colour of its own") {
+TEST_CASE("each partition has its own colour") {
   Graph graph;
   for (int i = 0; i < 40; ++i) {
     const std::string name = "p" + std::to_string(i);
@@ -131,11 +131,11 @@ TEST_CASE("each partition has a colour of its own") {
   CHECK(colours.count("") == 0);
 }
 
-TEST_CASE("a forest of nothing is a picture, too") {
+TEST_CASE("an empty forest is drawn") {
   CHECK_THAT(draw_graph({}), !ContainsSubstring("label=<") && ContainsSubstring("}\n"));
 }
 
-TEST_CASE("a long name is cut in the picture only") {
+TEST_CASE("a long name is shortened only in the picture") {
   Graph graph;
   graph.frames = {{std::string(255, 'w'), "", "p", false}};
   const std::string node = line(draw_graph(graph), "\"w");

@@ -49,7 +49,7 @@ TEST_CASE("an ellipse has the axes and the extent of its covariance") {
   }
 }
 
-TEST_CASE("a flat ellipse is a line, one of nothing a point") {
+TEST_CASE("a flat ellipse is a line and an empty one is a point") {
   Matrix2d covariance;
   covariance << 4, 4, 4, 4;
   double furthest = 0;
@@ -120,7 +120,7 @@ TEST_CASE("units make numbers easy to read") {
 
 // ---- the path
 
-TEST_CASE("a chain goes up and down the edges of its path") {
+TEST_CASE("a chain follows the edges of its path up and down") {
   Random random(33);
   INFO("seed " << random.seed());
   const Step up{random.transform(), true};
@@ -136,7 +136,7 @@ TEST_CASE("a chain goes up and down the edges of its path") {
   CHECK(chain_of({}).size() == 1);
 }
 
-TEST_CASE("points are spread as small covariances say") {
+TEST_CASE("sampled points have the spread of small covariances") {
   Random random(34);
   INFO("seed " << random.seed());
   constexpr int kPoints = 20000;
@@ -163,7 +163,7 @@ TEST_CASE("points are spread as small covariances say") {
   }
 }
 
-TEST_CASE("points of an uncertain turn lie on its circle, not on the tangent") {
+TEST_CASE("points of an uncertain rotation lie on its circle and not on the tangent") {
   const std::vector<Step> steps{
       {{Pose(), *Covariance::from_stddev({0, 0, 0, 0, 0, 1})}, false},
       {{*Pose::create(Eigen::Quaterniond::Identity(), {2, 0, 0}), {}}, false}};

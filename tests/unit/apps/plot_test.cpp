@@ -64,7 +64,7 @@ Transform at(double x, double y, double z, const std::array<double, 6>& stddev =
           *Covariance::from_stddev(stddev)};
 }
 
-TEST_CASE("a picture shows the path, and its end once more") {
+TEST_CASE("a plot shows the path in three panels and its end magnified") {
   const std::string svg =
       draw_plot(plot_of({{at(1, 0, 0, {0.01, 0.02, 0, 0, 0, 0}), false}, {at(1, 1, 0), false}}));
   CHECK(count(svg, "class=\"panel\"") == 6);
@@ -79,7 +79,7 @@ TEST_CASE("a picture shows the path, and its end once more") {
   CHECK_THAT(svg, !ContainsSubstring("points"));
 }
 
-TEST_CASE("each panel shows its plane of A, upright and to one scale") {
+TEST_CASE("each panel shows its plane of A upright and to the same scale") {
   const std::string svg = draw_plot(plot_of({{at(1, 2, 4), false}}));
   const std::regex circle("class=\"frame\" cx=\"(.*?)\" cy=\"(.*?)\"");
   std::vector<Vector2d> dots;
@@ -100,7 +100,7 @@ TEST_CASE("each panel shows its plane of A, upright and to one scale") {
   }
 }
 
-TEST_CASE("deviations are along the axes of A, though errors are along those of B") {
+TEST_CASE("deviations are along the axes of A although errors are along those of B") {
   Transform X = at(0, 0, 0, {0.01, 0.03, 0.002, 0, 0, 0});
   X.pose = *Pose::create(from_rpy(0, 0, 1.5707963267948966), {2, 1, 0.5});
   const std::string svg = draw_plot(plot_of({{X, false}}));
@@ -148,7 +148,7 @@ TEST_CASE("points beyond a panel are not drawn") {
   CHECK(dots < 3 * 20000);
 }
 
-TEST_CASE("where nothing is uncertain there is nothing to magnify") {
+TEST_CASE("nothing is magnified if nothing is uncertain") {
   for (const auto& steps : {std::vector<Step>{}, {{at(1, 2, 3), false}}}) {
     Plot plot = plot_of(steps);
     plot.samples = 10;
@@ -159,7 +159,7 @@ TEST_CASE("where nothing is uncertain there is nothing to magnify") {
   }
 }
 
-TEST_CASE("a picture says of when it is, and what its points do not know") {
+TEST_CASE("a plot has its stamp and says which correlation its points ignore") {
   Plot plot = plot_of({{at(1, 0, 0, {0.01, 0.01, 0.01, 0, 0, 0}), false}});
   plot.X_AB.stamp = time_of(1'700'000'000'250'000'000);
   plot.X_AB.basis.bound = true;
@@ -174,7 +174,7 @@ TEST_CASE("a picture says of when it is, and what its points do not know") {
   CHECK_THAT(draw_plot(plot), !ContainsSubstring("independent"));
 }
 
-TEST_CASE("names are escaped and cut to the room there is") {
+TEST_CASE("names are escaped and shortened") {
   Plot plot = plot_of({{at(1, 0, 0, {0.01, 0.01, 0.01, 0, 0, 0}), false}});
   plot.frames = {"<A&\"B\">", std::string(255, 'w')};
   const std::string svg = draw_plot(plot);
@@ -183,7 +183,7 @@ TEST_CASE("names are escaped and cut to the room there is") {
   CHECK(count(svg, std::string(255, 'w')) == 1);
 }
 
-TEST_CASE("nothing is drawn beyond the page, at any scale") {
+TEST_CASE("nothing is drawn beyond the page at any scale") {
   Random random(36);
   INFO("seed " << random.seed());
   const std::regex pair("[ML](-?[0-9.]+) (-?[0-9.]+)");
@@ -211,14 +211,14 @@ TEST_CASE("nothing is drawn beyond the page, at any scale") {
   }
 }
 
-TEST_CASE("a name keeps off the path") {
+TEST_CASE("a name does not overlap the path") {
   const std::string svg = draw_plot(plot_of({{at(1, 0, 0), false}, {at(1, 0, 0), false}}));
   const std::regex above("class=\"name middle\"[^>]*>a1<");
   CHECK(std::distance(std::sregex_iterator(svg.begin(), svg.end(), above), {}) ==
         3);  // from the side, all dots are one
 }
 
-TEST_CASE("no name lies over another, or beyond its panel") {
+TEST_CASE("no name overlaps another or leaves its panel") {
   Random random(37);
   INFO("seed " << random.seed());
   const std::regex name("class=\"name( [a-z]+)?\" x=\"([0-9.]+)\" y=\"([0-9.]+)\">(f[0-9]+)<");

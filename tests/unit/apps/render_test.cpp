@@ -30,9 +30,9 @@ std::vector<std::string> lines_of(const std::string& text) {
 
 // ---- draw_tree
 
-TEST_CASE("nothing draws as nothing") { CHECK(draw_tree({}, {}).empty()); }
+TEST_CASE("an empty forest is rendered as an empty text") { CHECK(draw_tree({}, {}).empty()); }
 
-TEST_CASE("a tree is drawn with its branches and owners") {
+TEST_CASE("a tree is rendered with its branches and owners") {
   const std::vector<Frame> frames{{"arm", "base", "arms", true},   {"base", "world", "robot", true},
                                   {"hand", "arm", "arms", true},   {"lamp", "world", "robot", true},
                                   {"mast", "base", "robot", true}, {"top", "mast", "robot", true},
@@ -47,7 +47,7 @@ TEST_CASE("a tree is drawn with its branches and owners") {
         "└─ lamp  [robot]\n");
 }
 
-TEST_CASE("who does not answer and what waits for its parent is marked") {
+TEST_CASE("unreachable partitions and frames that wait for a parent are marked") {
   const std::vector<Frame> frames{{"hand", "arm", "arms", false},
                                   {"ring", "hand", "legs", true},
                                   {"world", "", "robot", false}};
@@ -59,7 +59,7 @@ TEST_CASE("who does not answer and what waits for its parent is marked") {
 
 // ---- describe
 
-TEST_CASE("a transform is described in metres and degrees") {
+TEST_CASE("a transform is printed in metres and degrees") {
   CHECK(lines_of(describe(example(), false)) ==
         std::vector<std::string>{
             "translation  1.000000  -2.000000  3.000000  m",
@@ -68,7 +68,7 @@ TEST_CASE("a transform is described in metres and degrees") {
             "std dev      0.010000  0.020000  0.030000  m   1.0000  2.0000  3.0000  deg"});
 }
 
-TEST_CASE("a covariance follows as a matrix where it is asked for") {
+TEST_CASE("a covariance is printed as a matrix if asked for") {
   Transform X = example();
   Covariance::Upper upper = X.covariance.upper();
   upper[upper_index(0, 1)] = -1e-5;
@@ -88,7 +88,7 @@ TEST_CASE("a covariance follows as a matrix where it is asked for") {
   CHECK(lines[6].find("-1.00000e-05") != std::string::npos);
 }
 
-TEST_CASE("extreme values are written out in full") {
+TEST_CASE("extreme values are printed in full") {
   const Transform X{*Pose::create(Eigen::Quaterniond::Identity(), {-1e9, 1e9, 1e-9}),
                     *Covariance::from_stddev({1e9, 0, 0, 1e9, 0, 0})};
   const std::string text = describe(X, true);
@@ -122,7 +122,7 @@ TEST_CASE("a frame as JSON has null for no parent") {
   CHECK(frame_json({"hand", "arm", "arms", true})["parent"] == "arm");
 }
 
-TEST_CASE("a partition as JSON says who and where") {
+TEST_CASE("a partition as JSON has its process and state") {
   PartitionInfo info;
   info.name = "arms";
   info.host = "tower";
@@ -146,7 +146,7 @@ TEST_CASE("a partition as JSON says who and where") {
   CHECK(partition_json(info) == said);
 }
 
-TEST_CASE("JSON is one line, whatever the texts hold") {
+TEST_CASE("JSON is one line whatever the texts contain") {
   const std::string text = dump({{"message", "a\nb \xff \"c\" \xc3\xa4"}});
   CHECK(text == "{\"message\":\"a\\nb \xef\xbf\xbd \\\"c\\\" \xc3\xa4\"}");
 }

@@ -15,14 +15,14 @@ namespace {
 using testing::ContainsSubstring;
 using testing::Random;
 
-TEST_CASE("text for XML has neither markup nor what may not be there") {
+TEST_CASE("text for XML has no markup and no invalid characters") {
   CHECK(xml_escape("a<b> & \"c\" 'd'") == "a&lt;b&gt; &amp; &quot;c&quot; 'd'");
   CHECK(xml_escape("&lt;") == "&amp;lt;");
   CHECK(xml_escape("ä 漢 \xF0\x9F\xA4\x96") == "ä 漢 \xF0\x9F\xA4\x96");
   CHECK(xml_escape("x\xEF\xBF\xBEy\xEF\xBF\xBFz") == "x\xEF\xBF\xBDy\xEF\xBF\xBDz");
 }
 
-TEST_CASE("text that has room stays, other text keeps its ends") {
+TEST_CASE("long text keeps its beginning and its end") {
   CHECK(elide("arm_left", 12, 200) == "arm_left");
   const std::string name(200, 'x');
   const std::string cut = elide("first" + name + "last", 12, 120);
@@ -32,7 +32,7 @@ TEST_CASE("text that has room stays, other text keeps its ends") {
   CHECK(text_width(cut, 12) > 100);
 }
 
-TEST_CASE("text is never cut within a letter") {
+TEST_CASE("text is never cut within a character") {
   std::string name;
   for (int i = 0; i < 30; ++i) name += "aä漢\xF0\x9F\xA4\x96";
   for (int width = 0; width < 300; ++width) {
@@ -44,7 +44,7 @@ TEST_CASE("text is never cut within a letter") {
   }
 }
 
-TEST_CASE("boxes know what they meet") {
+TEST_CASE("a box knows what it contains and overlaps and what crosses it") {
   const Box box{10, 20, 30, 10};
   CHECK(box.contains({10, 20, 30, 10}));
   CHECK_FALSE(box.contains({10, 20, 31, 10}));
@@ -58,7 +58,7 @@ TEST_CASE("boxes know what they meet") {
   CHECK_FALSE(box.crosses({30, 0}, {60, 30}));
 }
 
-TEST_CASE("a line crosses a box where one of its points is within") {
+TEST_CASE("a line crosses a box if one of its points is inside") {
   Random random(4711);
   INFO("seed " << random.seed());
   const Box box{-1, -1, 2, 2};
@@ -79,7 +79,7 @@ TEST_CASE("a line crosses a box where one of its points is within") {
   CHECK(crossing > 50);
 }
 
-TEST_CASE("a picture is written element by element") {
+TEST_CASE("a picture has all its elements in order") {
   Svg svg(90, 45.5, "A & B", ".look { fill: none; }\n");
   svg.rect({1, 2, 3.125, 4}, "look");
   svg.line({0, 0}, {1.5, -0.001}, "look");

@@ -64,7 +64,7 @@ HistoryInfo history_of(const std::string& id) {
 
 }  // namespace
 
-TEST_CASE("tables: joints have a header, and fit 80 columns") {
+TEST_CASE("tables: joints have a header and fit 80 columns") {
   const std::string table = joint_table({shoulder()});
   CHECK(table ==
         "  joint              frame             position   std dev unit limits\n"
@@ -117,7 +117,7 @@ TEST_CASE("tables: observed edges fit 80 columns") {
   CHECK(width_of(consistency_table({edge})) <= 80);
 }
 
-TEST_CASE("tables: partitions have a header, and fit 80 columns") {
+TEST_CASE("tables: partitions have a header and fit 80 columns") {
   PartitionInfo base;
   base.name = "base";
   base.host = "robot";

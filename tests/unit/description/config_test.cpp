@@ -95,7 +95,7 @@ TEST_CASE("a configuration is read") {
   CHECK(config->frames[2].X_PC.covariance.matrix()(1, 0) == 0.5);
 }
 
-TEST_CASE("what a configuration may leave out") {
+TEST_CASE("optional entries of a configuration may be left out") {
   CHECK(tfdude::parse_config("partition: robot\n", "f")->frames.empty());
   CHECK(tfdude::parse_config("frames: []\n", "f")->partition.empty());
   CHECK(tfdude::parse_config("frames: [{id: a}, {id: b, parent: a}]", "f")->frames.size() == 2);
@@ -106,7 +106,7 @@ TEST_CASE("what a configuration may leave out") {
   CHECK(tfdude::parse_config("frames: [{id: größe ✓}]", "f")->frames[0].id == "größe ✓");
 }
 
-TEST_CASE("a frame says how its error is correlated with others'") {
+TEST_CASE("a frame may give the correlation of its error") {
   const auto config = tfdude::parse_config(
       "frames:\n"
       "  - {id: a}\n"
@@ -146,7 +146,7 @@ TEST_CASE("a frame says how its error is correlated with others'") {
           "source 'observed:1': names with this prefix");
 }
 
-TEST_CASE("how much history is kept is said for the file and for each frame") {
+TEST_CASE("limits of history are given for the file and for each frame") {
   const auto config = tfdude::parse_config(
       "history: {span: 2.5, count: 100, max_ahead: none}\n"
       "frames:\n"
@@ -207,7 +207,7 @@ TEST_CASE("anchors and aliases stand for their values") {
   check_refused_at("frames: *nowhere\n", "robot.yaml:1: not YAML: ");
 }
 
-TEST_CASE("a file of the wrong structure is refused") {
+TEST_CASE("a file of the wrong structure is rejected") {
   check_refused({"", Errc::kConfig, "robot.yaml: is empty"});
   check_refused({"# only a comment\n\n", Errc::kConfig, "robot.yaml: is empty"});
   check_refused({"---\n", Errc::kConfig, "robot.yaml: is empty"});
@@ -247,7 +247,7 @@ TEST_CASE("a file of the wrong structure is refused") {
                    "robot.yaml:1: not YAML: bad YAML version: 1.2\\xa5");
 }
 
-TEST_CASE("a bad frame is refused by name and line") {
+TEST_CASE("an invalid frame is rejected by name and line") {
   check_refused(
       {camera("    pos: [1, 2, 3]"), Errc::kConfig,
        "robot.yaml:4: frame 'camera': unknown key 'pos'; known are id, parent, xyz, rpy, quat, "
@@ -280,7 +280,7 @@ TEST_CASE("a bad frame is refused by name and line") {
                  "robot.yaml:4: frame 'camera': id is taken by the frame in line 3"});
 }
 
-TEST_CASE("a value that breaks its rule is refused by field") {
+TEST_CASE("an invalid value is rejected by field") {
   check_refused({camera("    stddev: [0, 0, -1, 0, 0, 0]"), Errc::kInvalidInput,
                  "robot.yaml:4: frame 'camera': stddev[2] is negative"});
   check_refused({camera("    xyz: [0, .nan, 0]"), Errc::kInvalidInput,
@@ -327,7 +327,7 @@ TEST_CASE("a value that breaks its rule is refused by field") {
              tfdude::testing::ContainsSubstring("has 256 bytes, at most 255"));
 }
 
-TEST_CASE("huge nesting is refused, not followed") {
+TEST_CASE("deep nesting is rejected") {
   for (const std::string bracket : {"[", "{", "- ", "? ", "&a [", "!!x ["}) {
     std::string text = "frames: ";
     if (bracket == "- " || bracket == "? ") text = "frames:\n  ";
@@ -344,7 +344,7 @@ TEST_CASE("huge nesting is refused, not followed") {
   check_refused_at(laughs, "robot.yaml:1: the file: unknown key 'a0'");
 }
 
-TEST_CASE("files that cannot be read are refused") {
+TEST_CASE("files that cannot be read are rejected") {
   const TemporaryFile file(kValid);
   REQUIRE(tfdude::load_config(file.path()).has_value());
   const TemporaryFile bad("frames: 7\n");
@@ -358,7 +358,7 @@ TEST_CASE("files that cannot be read are refused") {
   CHECK(tfdude::load_config("/dev/zero").error().message == "/dev/zero: is longer than 64 MiB");
 }
 
-TEST_CASE("random damage to a file neither crashes nor throws") {
+TEST_CASE("a damaged file is rejected without a crash or an exception") {
   constexpr std::uint32_t kSeed = 20240611;
   CAPTURE(kSeed);
   std::mt19937 random(kSeed);

@@ -8,7 +8,7 @@
 
 #include "support/catch.hpp"
 
-TEST_CASE("a joint's origin is read by its former name, too") {
+TEST_CASE("a joint's origin may have its former name mount") {
   for (const std::string key : {"origin", "mount"}) {
     INFO(key);
     const auto config =
@@ -22,7 +22,7 @@ TEST_CASE("a joint's origin is read by its former name, too") {
   }
 }
 
-TEST_CASE("a configuration names URDFs") {
+TEST_CASE("a configuration may include URDFs") {
   const auto config = tfdude::parse_config(
       "frames: [{id: world}]\n"
       "urdf:\n"
@@ -58,7 +58,7 @@ TEST_CASE("a configuration names URDFs") {
   CHECK_FALSE(config->frames[10].joint->strict);
 }
 
-TEST_CASE("what a bad configuration of URDFs has of control characters does not reach a terminal") {
+TEST_CASE("control characters of a configuration do not reach the error message") {
   for (const char* text : {"urdf:\n  - file: x\n    joints:\n      a\x96: {}\n      a\x96: {}\n",
                            "urdf: [{file: \"a\\e[2J\"}]\n"}) {
     const auto config = tfdude::parse_config(text, "f.yaml");
@@ -68,7 +68,7 @@ TEST_CASE("what a bad configuration of URDFs has of control characters does not 
   }
 }
 
-TEST_CASE("a bad entry of a URDF is refused by name and line") {
+TEST_CASE("an invalid entry for a URDF is rejected by name and line") {
   const std::string folder = TFDUDE_EXAMPLES "/robots/";
   const auto refused = [&](const std::string& text, const std::string& message) {
     CAPTURE(text);
@@ -119,7 +119,7 @@ TEST_CASE("a bad entry of a URDF is refused by name and line") {
               "ur5e.urdf: frame 'base_link': parent 'w' is the frame itself or lies below it");
 }
 
-TEST_CASE("two joints of one name are refused") {
+TEST_CASE("two joints of the same name are rejected") {
   const std::string text =
       "<robot><link name='X'/><link name='Y'/><joint name='elbow_joint' type='continuous'>"
       "<parent link='X'/><child link='Y'/></joint></robot>";

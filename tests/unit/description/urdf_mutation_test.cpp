@@ -129,7 +129,7 @@ bool is_finite(const tfdude::FrameSpec& frame) {
 
 }  // namespace
 
-TEST_CASE("urdf: mutated URDFs are read or refused, in silence") {
+TEST_CASE("urdf: mutated URDFs are read or rejected and nothing is printed") {
   Random random(20260);
   INFO("seed " << random.seed());
   int accepted = 0;

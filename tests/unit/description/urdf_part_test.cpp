@@ -32,7 +32,7 @@ const FrameSpec& named(const std::vector<FrameSpec>& frames, const std::string& 
 
 }  // namespace
 
-TEST_CASE("urdf: joints that mimic follow the last of their chain") {
+TEST_CASE("urdf: a chain of mimic joints is resolved to its first joint") {
   UrdfPart part = with_joint("f1", {0.25, 0.1, {}});
   part.prefix = "p_";
   const auto frames = frames_of(hand(), part);
@@ -67,7 +67,7 @@ TEST_CASE("urdf: joints that mimic follow the last of their chain") {
   CHECK(frames_of(hand(), with_links({"l1"}))[0].joint->coupled);
 }
 
-TEST_CASE("urdf: what cannot be mimicked is refused") {
+TEST_CASE("urdf: an invalid mimic joint is rejected") {
   const auto mimic = [](const std::string& type, const std::string& other,
                         const std::string& more = "") {
     return robot(
@@ -88,7 +88,7 @@ TEST_CASE("urdf: what cannot be mimicked is refused") {
   refused(large, "r.urdf:6: joint 'k': mimic: its multiplier or offset is beyond 1e9");
 }
 
-TEST_CASE("urdf: what joints of other parts mimic may be broken") {
+TEST_CASE("urdf: invalid mimic joints outside the part are ignored") {
   const std::string text =
       robot(link("a") + link("b") + link("c") + link("d") + joint("j", "continuous", "a", "b") +
             joint("k", "continuous", "b", "c", "<mimic joint=\"nothing\"/>") +
@@ -104,7 +104,7 @@ TEST_CASE("urdf: what joints of other parts mimic may be broken") {
   }
 }
 
-TEST_CASE("urdf: a prefix stands before the names of links and joints") {
+TEST_CASE("urdf: the prefix is added to the names of links and joints") {
   UrdfPart part{"r.urdf"};
   part.prefix = "left/";
   const auto frames = frames_of(tree(), part);
@@ -122,7 +122,7 @@ TEST_CASE("urdf: a prefix stands before the names of links and joints") {
   CHECK(frames_of(robot(link("abcde")), part).size() == 1);
 }
 
-TEST_CASE("urdf: the root link hangs where it is said to hang") {
+TEST_CASE("urdf: the root link is attached to the given frame") {
   UrdfPart part{"r.urdf"};
   part.root = "world";
   part.prefix = "p_";
@@ -143,7 +143,7 @@ TEST_CASE("urdf: the root link hangs where it is said to hang") {
   refused(tree(), part, "r.urdf: root 'a\\x0ab' holds a control character");
 }
 
-TEST_CASE("urdf: a part of the links is taken") {
+TEST_CASE("urdf: a part has only the selected links") {
   const auto of = [](const std::vector<std::string>& links) {
     return ids_of(frames_of(tree(), with_links(links)));
   };

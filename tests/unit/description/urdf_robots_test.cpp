@@ -169,7 +169,7 @@ TEST_CASE("robots: the two-armed robot has all its joints") {
   CHECK(described(load("two_arms.urdf")) == expected);
 }
 
-TEST_CASE("robots: the six-axis arm stands where its table of parameters says") {
+TEST_CASE("robots: the six-axis arm has the poses of its table of parameters") {
   Random random(4711);
   INFO("seed " << random.seed());
   const auto arm = load("ur5e.urdf");
@@ -185,7 +185,7 @@ TEST_CASE("robots: the six-axis arm stands where its table of parameters says") 
   }
 }
 
-TEST_CASE("robots: hands of the two-armed robot stand where lift, turn, and table say") {
+TEST_CASE("robots: hands of the two-armed robot have the poses of lift and turn and table") {
   Random random(4712);
   INFO("seed " << random.seed());
   const auto robot = load("two_arms.urdf");
@@ -226,7 +226,7 @@ TEST_CASE("robots: three revolute joints in a plane") {
   CHECK(tip.z() == 0);
 }
 
-TEST_CASE("robots: a degree in each joint moves the tip by what the figure says") {
+TEST_CASE("robots: one degree in each joint moves the tip as in the figure") {
   const auto robot = load("three_hinges.urdf");
   const Positions q{{"hinge_1", -kPi / 2}, {"hinge_2", -kPi / 3}, {"hinge_3", -kPi / 4}};
   Positions off = q;
@@ -238,7 +238,7 @@ TEST_CASE("robots: a degree in each joint moves the tip by what the figure says"
 }
 
 // By way of an owner, whose fingers share the error of the joint that both follow.
-TEST_CASE("robots: the covariance over fingers that follow each other is that of samples") {
+TEST_CASE("robots: the covariance between coupled fingers is that of samples") {
   Random random(4715);
   INFO("seed " << random.seed());
   const auto robot = load("two_arms.urdf");
@@ -304,7 +304,7 @@ TEST_CASE("robots: an arm's covariance is that of samples of its joints") {
   }
 }
 
-TEST_CASE("robots: parts together are the whole") {
+TEST_CASE("robots: the parts of a URDF together are the whole robot") {
   struct Split {
     std::string file;
     std::vector<std::vector<std::string>> parts;

@@ -29,7 +29,7 @@ using tfdude::testing::with_joint;
 
 }  // namespace
 
-TEST_CASE("urdf: a URDF's links are frames, and its joints move them") {
+TEST_CASE("urdf: links become frames and joints move them") {
   const auto frames = frames_of(tree());
   CHECK(ids_of(frames) == "base turn lift tool camera");
   CHECK(frames[0].parent.empty());
@@ -51,7 +51,7 @@ TEST_CASE("urdf: a URDF's links are frames, and its joints move them") {
   CHECK(plain[1].X_PC.pose.translation() == Eigen::Vector3d(1, 2, 3));
 }
 
-TEST_CASE("urdf: what does not concern frames may be broken") {
+TEST_CASE("urdf: elements that do not concern frames are ignored") {
   const std::string junk =
       "<inertial><mass value=\"heavy\"/><inertia ixx=\"\"/></inertial>"
       "<visual><geometry><mesh filename=\"nowhere.dae\" scale=\"big\"/></geometry>"
@@ -74,7 +74,7 @@ TEST_CASE("urdf: what does not concern frames may be broken") {
   CHECK(frames_of(pair("fixed", "<axis xyz=\"x\"/><limit lower=\"x\"/><mimic/>")).size() == 2);
 }
 
-TEST_CASE("urdf: an axis is made of unit length") {
+TEST_CASE("urdf: an axis is normalized") {
   const auto axis_of = [](const std::string& xyz) {
     const auto frames = frames_of(pair("continuous", "<axis xyz=\"" + xyz + "\"/>"));
     return Eigen::Vector3d(frames[1].joint->joint.S.tail<3>());
@@ -88,7 +88,7 @@ TEST_CASE("urdf: an axis is made of unit length") {
   refused(pair("continuous", "<axis/>"), "r.urdf:4: joint 'j': axis: has no direction");
 }
 
-TEST_CASE("urdf: what is no URDF is refused") {
+TEST_CASE("urdf: text that is not a URDF is rejected") {
   const auto bad = [](const std::string& text, const std::string& message) {
     refused(text, message, Errc::kConfig);
   };
@@ -122,7 +122,7 @@ TEST_CASE("urdf: what is no URDF is refused") {
   bad_number(limits("0", "1") + "<mimic joint=\"j\" offset=\"x\"/>", "offset value (x) is not a");
 }
 
-TEST_CASE("urdf: nothing is taken for a format of printf") {
+TEST_CASE("urdf: no text is used as a printf format") {
   const std::string format = "%n%s%1.5f";
   const auto number = [&](const std::string& name, const std::string& element) {
     refused(pair("revolute", element),
@@ -143,7 +143,7 @@ TEST_CASE("urdf: nothing is taken for a format of printf") {
              tfdude::testing::ContainsSubstring("Malformed axis element for joint [" + format));
 }
 
-TEST_CASE("urdf: links and joints that make no tree are refused") {
+TEST_CASE("urdf: links and joints that form no tree are rejected") {
   refused(robot(""), "r.urdf:1: has no links");
   refused(robot("<link/>\n"), "r.urdf:2: a link has no name");
   refused(robot(link("a") + "<joint type=\"fixed\"/>\n"), "r.urdf:3: a joint has no name");
@@ -175,7 +175,7 @@ TEST_CASE("urdf: links and joints that make no tree are refused") {
           "r.urdf:4: joint 'j': quat_xyzw is not known; give rpy");
 }
 
-TEST_CASE("urdf: values of joints that break their rules are refused") {
+TEST_CASE("urdf: invalid values of joints are rejected") {
   refused(pair("fixed", "<origin xyz=\"0 2e9 0\"/>"),
           "r.urdf:4: joint 'j': origin: translation.y is beyond 1e9 m");
   refused(pair("revolute", limits("1", "-1")),
@@ -198,7 +198,7 @@ TEST_CASE("urdf: values of joints that break their rules are refused") {
           with_joint("j", {9e8, {}, {}}), "r.urdf:4: joint 'j': translation.x is beyond 1e9 m");
 }
 
-TEST_CASE("urdf: a limit that no position can reach is none") {
+TEST_CASE("urdf: a limit that no position can reach is ignored") {
   const auto joint = [](const std::string& lower, const std::string& upper) {
     return *frames_of(pair("revolute", limits(lower, upper)), {"r.urdf"}).back().joint;
   };
@@ -214,7 +214,7 @@ TEST_CASE("urdf: a limit that no position can reach is none") {
   CHECK(half.variance == Approx(M_PI * M_PI / 3));
 }
 
-TEST_CASE("urdf: a joint's position before its first sample") {
+TEST_CASE("urdf: a joint has its given or default position before its first sample") {
   const auto at = [](const UrdfPart& part) {
     return *frames_of(pair("revolute", limits("1", "3")), part)[1].joint;
   };
@@ -241,7 +241,7 @@ TEST_CASE("urdf: a joint's position before its first sample") {
         Approx(6));
 }
 
-TEST_CASE("urdf: files that cannot be read are refused") {
+TEST_CASE("urdf: files that cannot be read are rejected") {
   const auto message = [](const std::string& path) {
     const auto frames = tfdude::load_urdf({path});
     REQUIRE_FALSE(frames.has_value());
@@ -255,7 +255,7 @@ TEST_CASE("urdf: files that cannot be read are refused") {
   CHECK(message("/dev/zero") == "/dev/zero: is longer than 64 MiB");
 }
 
-TEST_CASE("urdf: a chain of many links is no deep recursion") {
+TEST_CASE("urdf: a chain of many links causes no deep recursion") {
   std::string text;
   constexpr int kLinks = 100000;
   for (int i = 0; i < kLinks; ++i) {
@@ -269,7 +269,7 @@ TEST_CASE("urdf: a chain of many links is no deep recursion") {
   CHECK(frames_of(robot(text)).size() == kLinks);
 }
 
-TEST_CASE("urdf: the process's output of console_bridge is given back") {
+TEST_CASE("urdf: the output handler of console_bridge is restored") {
   class Silent final : public console_bridge::OutputHandler {
    public:
     void log(const std::string&, console_bridge::LogLevel, const char*, int) override {}

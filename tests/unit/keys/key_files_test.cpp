@@ -98,7 +98,7 @@ TEST_CASE("keys: changed permissions are found") {
   CHECK(find_keys(store.path("eye"), kKeysTime));
 }
 
-TEST_CASE("keys: files of others are rejected") {
+TEST_CASE("keys: files of another identity or authority are rejected") {
   const TestKeys store;
   (void)store.add("arm", daemon_of("arm"));
   (void)store.add("eye", looking());
@@ -119,7 +119,7 @@ TEST_CASE("keys: files of others are rejected") {
 }
 
 // Documents with the authority's signature that this version would not write.
-TEST_CASE("keys: documents of another version are not explained, but renewed") {
+TEST_CASE("keys: documents of another version are reported and can be renewed") {
   const TestKeys store;
   const KeyFiles files = store.add("eye", looking());
   const keys::Pair authority{

@@ -64,7 +64,7 @@ TEST_CASE("key store: only the owner can read its files") {
   for (const auto& [path, text] : files_below(store.path("arm"))) CHECK(text != secret);
 }
 
-TEST_CASE("key store: a directory that was copied is complete") {
+TEST_CASE("key store: a copied directory is complete") {
   const TestKeys store(kKeysTime, {false, {4, 6}});
   Roles roles = daemon_of("upper arm");
   roles.move = {"base"};
@@ -130,7 +130,7 @@ TEST_CASE("key store: permissions fit one certificate only") {
              ContainsSubstring("permissions.p7s: is for the certificate 'CN=arm "));
 }
 
-TEST_CASE("key store: a revoked identity is known as such") {
+TEST_CASE("key store: a revoked identity is rejected by all that have the list") {
   const TestKeys store;
   (void)store.add("arm", daemon_of("arm"));
   const KeyFiles base = store.add("base", daemon_of("base"));

@@ -124,7 +124,7 @@ TEST_CASE("permissions: a daemon serves its partition and looks at others") {
   }
 }
 
-TEST_CASE("permissions: who looks changes nothing") {
+TEST_CASE("permissions: a client that may look changes nothing") {
   const Decision client(looking());
   client.check_rules();
   CHECK(client.publishes(kRequestTopic, "arm"));
@@ -138,7 +138,7 @@ TEST_CASE("permissions: who looks changes nothing") {
   CHECK_FALSE(client.subscribes("another/topic", "*"));
 }
 
-TEST_CASE("permissions: who moves changes these partitions only") {
+TEST_CASE("permissions: a client that may move changes only its partitions") {
   Roles roles = moving("arm");
   roles.move.insert("base");
   const Decision client(roles);
@@ -152,7 +152,7 @@ TEST_CASE("permissions: who moves changes these partitions only") {
   CHECK_FALSE(client.publishes(kReplyTopic, "arm/0123"));
 }
 
-TEST_CASE("permissions: who streams sends no requests") {
+TEST_CASE("permissions: a client that may stream sends no requests") {
   const Decision client(streaming("arm"));
   client.check_rules();
   for (const char* topic : {kUpdateTopic, kJointTopic}) {
@@ -166,7 +166,7 @@ TEST_CASE("permissions: who streams sends no requests") {
   CHECK(client.subscribes(kDirectoryTopic, "*"));
 }
 
-TEST_CASE("permissions: who observes sends changes to all, and streams to none") {
+TEST_CASE("permissions: a client that may observe sends changes to all and streams to none") {
   const Decision client(observing());
   client.check_rules();
   for (const char* partition : {"arm", "base", "*"}) {
@@ -175,7 +175,7 @@ TEST_CASE("permissions: who observes sends changes to all, and streams to none")
   }
 }
 
-TEST_CASE("permissions: what is written is read") {
+TEST_CASE("permissions: written permissions are read back") {
   Roles odd = daemon_of(std::string(255, '&'));
   odd.move = {"<a> \"b'", "\\", "漢"};
   for (const Roles& roles : {all_roles(), odd, daemon_of("arm"), looking(), moving("arm"),
@@ -219,7 +219,7 @@ TEST_CASE("permissions: other documents are rejected") {
   }
 }
 
-TEST_CASE("governance: protects everything, in one of two ways") {
+TEST_CASE("governance: protects everything by encryption or signature") {
   for (const bool encrypt : {true, false}) {
     const KeySettings settings{encrypt, {5, 9}};
     const std::string text = keys::governance_of(settings);
