@@ -20,7 +20,7 @@ inline Page page_of(const std::string& partition, std::vector<PageEntry> entries
   return {partition, 0, incarnation, incarnation + 1, std::move(entries)};
 }
 
-// A participant that has heard of both who claim "hand"; that of "arm" is the older claim.
+// A participant that knows two claims to "hand". That of "arm" is the older one.
 struct Witness : Replica {
   explicit Witness(const std::string& own = "base") : Replica(own) {
     directory.changes().watch();

@@ -62,7 +62,7 @@ TEST_CASE("the label of an edge has its age and its large deviations") {
   CHECK(edge_text(edge, kNow) == "12 ms  ±3 mm ±0.4°");
   CHECK(edge_text(label(0.001, 0), kNow) == "±1 mm ±0°");
   CHECK(edge_text(label(0, 0.1), kNow) == "±0 mm ±0.1°");
-  // Of joints that nobody has measured.
+  // The deviations of unmeasured joints.
   CHECK(edge_text(label(0, 103.923), kNow) == "±0 mm ±104°");
   CHECK(edge_text(label(0, 99.7), kNow) == "±0 mm ±100°");
   CHECK(edge_text(label(0.0009, 0.09), kNow).empty());

@@ -179,7 +179,7 @@ TEST_CASE("names are escaped and shortened") {
   plot.frames = {"<A&\"B\">", std::string(255, 'w')};
   const std::string svg = draw_plot(plot);
   CHECK_THAT(svg, !ContainsSubstring("<A&") && ContainsSubstring("&lt;A&amp;&quot;B&quot;&gt;"));
-  // In full only where it is not drawn.
+  // The full name is only where it is not drawn.
   CHECK(count(svg, std::string(255, 'w')) == 1);
 }
 

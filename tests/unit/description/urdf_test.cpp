@@ -68,8 +68,7 @@ TEST_CASE("urdf: elements that do not concern frames are ignored") {
       "<transmission name=\"t\"><joint name=\"j\"/></transmission><sensor name=\"s\"/></robot>");
   CHECK(ids_of(frames) == "a b");
   CHECK(frames[1].joint->limits->lower == -1);
-  // Of a continuous joint limits say nothing, of one that does not move nothing but its origin
-  // does.
+  // Limits of a continuous joint are ignored, and everything but the origin of a fixed one.
   CHECK(frames_of(pair("continuous", "<limit effort=\"1\"/>"))[1].joint->limits == std::nullopt);
   CHECK(frames_of(pair("fixed", "<axis xyz=\"x\"/><limit lower=\"x\"/><mimic/>")).size() == 2);
 }

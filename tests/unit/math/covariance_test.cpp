@@ -49,8 +49,8 @@ Matrix6d scaled(const Matrix6d& unit, double metres, double radians) {
   return scale.asDiagonal() * unit * scale.asDiagonal();
 }
 
-// Smallest eigenvalue once metres and radians are scaled to variances of at most one: what the
-// rounding errors of both are to be measured by.
+// The smallest eigenvalue after metres and radians were scaled to variances of at most one, so that
+// rounding errors of both are comparable.
 double smallest_eigenvalue(const Matrix6d& sigma) {
   const double metres = std::sqrt(sigma.diagonal().head<3>().maxCoeff());
   const double radians = std::sqrt(sigma.diagonal().tail<3>().maxCoeff());
@@ -183,7 +183,7 @@ TEST_CASE("a negative variance is rejected by its element") {
   Matrix6d m = Matrix6d::Identity();
   m(i, i) = value;
   CHECK(refusal(m) == name(i, i) + " is a negative variance");
-  // With nothing else in its unit there is nothing it could be the rounding error of.
+  // A tiny negative variance cannot be a rounding error if all others are zero.
   m.setZero();
   m(i, i) = 1e-9 * value;
   CHECK(refusal(m) == name(i, i) + " is a negative variance");

@@ -183,7 +183,7 @@ TEST_CASE("the covariance is no less than the sampled one for any correlation of
       for (int k = 0; k < 6; ++k) first[k] = random.normal();
       for (int k = 0; k < 6; ++k) second[k] = random.normal();
       second = correlation * first + std::sqrt(1.0 - correlation * correlation) * second;
-      // Small, so that what is left out, of second order, is smaller than chance.
+      // Small, so that the neglected second order is smaller than the sampling error.
       const Transform Y0{X0.pose * exp(0.1 * root0 * first), {}};
       const Transform Y1{X1.pose * exp(0.1 * root1 * second), {}};
       const Twist e = 10.0 * log(between_inverse * interpolate(Y0, Y1, s).pose);

@@ -166,8 +166,7 @@ TEST_CASE("numerics: a covariance transported over a million metres and back is 
     const Matrix6d rest = back.matrix() - sigma.matrix();
     worst = std::max(worst, rest.cwiseAbs().maxCoeff());
   }
-  // What a lever of 1e6 m makes of 1 mrad is a variance of 1e6 m², of which the last bits are 1e-10
-  // m².
+  // A lever of 1e6 m turns 1 mrad into a variance of 1e6 m², whose last bits are 1e-10 m².
   report("there and back over a million metres [m²]", worst);
   report("seen from a million metres: smallest eigenvalue", smallest);
   CHECK(worst < 1e-8);

@@ -267,7 +267,7 @@ TEST_CASE("An edge of unknown correlation gains nothing from the same measuremen
   REQUIRE(mixed);
   CHECK_FALSE(mixed->edges[0].corrected);
   CHECK(mixed->edges[1].corrected);
-  // No better than what is between it and the measurement.
+  // It gets no better than the unknown edge between it and the measurement.
   const Matrix6d left = mixed->edges[1].X_PC.own.matrix();
   CHECK(left.trace() < known.own.matrix().trace());
   CHECK(testing::domination(left, X.covariance.transported(known.pose.inverse()).matrix()) > -1e-9);

@@ -17,7 +17,7 @@ using testing::Random;
 
 constexpr int kSamples = 100'000;
 
-// What is sampled by one convention and measured by another.
+// A convention by which errors are sampled or measured.
 struct Convention {
   const char* name;
   std::function<Pose(const Pose&, const Twist&)> perturb;

@@ -41,7 +41,7 @@ std::string refused(const std::string& file, const std::string& partition = "arm
   return state ? "ok" : std::string(to_string(state.error().code)) + ": " + state.error().message;
 }
 
-// As somebody who may only what the permissions say, on this thread.
+// Calls as a user without root's rights, on this thread.
 template <class Call>
 std::string as_nobody(Call call) {
   constexpr uid_t kNobody = 65534;
@@ -110,7 +110,7 @@ TEST_CASE("the last saved list of absences is restored") {
   const std::string file = state_file(directory.path(), 7, "arms");
   const Absent lost{"head", -5, Absent::Kind::kLost, 7};
   const Absent stopped{"base", 1'800'000'000'000'000'000, Absent::Kind::kStopped, 1};
-  // What nobody is to say can be said, and is not to make the file one that is refused.
+  // An incarnation that no process can have is stored, and the file stays readable.
   const Absent most{"far", 0, Absent::Kind::kForgotten, ~0ULL};
   {
     const auto store = opened(file);

@@ -61,7 +61,7 @@ TEST_CASE("a mutated sample that passes can be deserialized") {
   for (int i = 0; i < 60000; ++i) {
     const WireKind& kind = kinds[random.index(kinds.size())];
     Bytes bytes = kind.valid;
-    // Most of a sample is numbers of which all are well formed: rather change its head.
+    // Any number is well-formed, and most of a sample is numbers: half of the changes hit its head.
     const std::size_t reach =
         random.index(2) == 0 ? bytes.size() : std::min<std::size_t>(bytes.size(), 48);
     for (std::size_t changes = 1 + random.index(3); changes > 0; --changes) {

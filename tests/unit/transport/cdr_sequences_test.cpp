@@ -12,7 +12,7 @@ namespace {
 using testing::Cdr;
 using namespace testing::well_formed;  // NOLINT(google-build-using-namespace): short predicates
 
-// A sample of each sequence with as many elements, of which it says that there are `length`.
+// A sample of each sequence, with `count` elements and a length field of `length`.
 Cdr edges(std::size_t count, std::uint64_t length) {
   Cdr cdr;
   cdr.ulong(length);

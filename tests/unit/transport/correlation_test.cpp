@@ -1,5 +1,5 @@
-// Bounds of what is told of correlation: what exceeds them is rejected before it is deserialized,
-// or read.
+// Bounds of correlations in messages. A message beyond them is rejected before it is deserialized,
+// or when it is read.
 
 #include <limits>
 

@@ -38,7 +38,7 @@ void hear(LifeSigns& signs, unsigned char number, Peers::Clock::time_point at) {
   signs.heard(datagram.data(), datagram.size(), at);
 }
 
-// A participant's peers, and what it was told of them.
+// A participant's peers, and the reports about them.
 struct Observer {
   std::shared_ptr<LifeSigns> signs = std::make_shared<LifeSigns>();
   std::vector<std::string> told;

@@ -73,7 +73,7 @@ TEST_CASE("A lookup counts a common source once in any direction") {
   REQUIRE(X_exact);
   const Transform own = between(robot.X_WA, robot.X_WA);
   CHECK(covariance_diff(X_exact->covariance, own.covariance, 1e-12) == "");
-  // And none is said of paths without it.
+  // A path without the source does not list it.
   const auto X_AB = robot.forest.lookup("a", "b", Query{});
   REQUIRE(X_AB);
   CHECK(X_AB->basis.sources.empty());
@@ -184,7 +184,7 @@ TEST_CASE("A revision of static edges holds until their next update") {
   REQUIRE(after);
   CHECK(after->correlations[0].common_errors.size() == 2);
   CHECK(after->correlations[1].observed_with == std::vector<std::string>{"a", "b"});
-  // What was seen is old now.
+  // The edge has changed since it was looked up.
   const auto again = robot.forest.revise({{"a", robot.X_WA, now}}, std::nullopt, seen->commit);
   REQUIRE_FALSE(again);
   CHECK(again.error().code == Errc::kChangedMeanwhile);

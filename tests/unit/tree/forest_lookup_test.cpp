@@ -93,7 +93,7 @@ TEST_CASE("unknown start, unknown end and no common root are three errors") {
   }
   CHECK(outcome(forest.lookup("a", "b")) == "not_connected");
   CHECK(outcome(forest.segments("a", "b")) == "not_connected");
-  // A parent that is not there connects nobody, though both know its name.
+  // A missing parent connects no frames, although both name it.
   CHECK(outcome(forest.lookup("c", "d")) == "not_connected");
   CHECK(outcome(forest.segments("c", "d")) == "not_connected");
   REQUIRE(forest.add("missing", "a", along_x(1)));
@@ -233,12 +233,12 @@ TEST_CASE("a segment may end at a missing parent of own frames") {
   CHECK(outcome(testing::lookup_segment(forest, "a", "never")) == "unknown_end");
   REQUIRE(forest.put_remote("far", "missing", 1));
   CHECK(outcome(testing::lookup_segment(forest, "missing", "far")) == "not_owner");
-  // Nobody names it any more: it is forgotten.
+  // No frame names it any more, so it is forgotten.
   REQUIRE(forest.remove("d"));
   CHECK(outcome(testing::lookup_segment(forest, "a", "other")) == "unknown_end");
 }
 
-// ---- what is there
+// ---- the structure
 
 TEST_CASE("frames and roots and children and subtree describe the structure") {
   Forest forest;

@@ -126,7 +126,7 @@ class Duel {
     return "frame " + std::to_string(random_.index(ids_));
   }
 
-  // A frame that is there, most of the time: else few operations would succeed.
+  // Mostly a frame that exists, because otherwise few operations would succeed.
   std::string likely_id() {
     if (naive_.frames().empty() || random_.index(8) == 0) return any_id();
     auto frame = naive_.frames().begin();

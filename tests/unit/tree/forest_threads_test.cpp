@@ -200,7 +200,7 @@ struct StructureReader {
     (by_handle ? leaves : too_late).fetch_add(1, std::memory_order_relaxed);
     const auto info = forest.info(leaf_id(n) + " child");
     if (info && (info->parent != leaf_id(n) || !info->attached)) finding.note("child without leaf");
-    // Kept for a while, so that many are used after their frame has gone.
+    // Handles are kept for a while, so that many are used after their frame was removed.
     if (by_handle && n % 2 == 0) return;
     if (const auto handle = forest.find(leaf_id(n))) kept = {n, *handle};
   }

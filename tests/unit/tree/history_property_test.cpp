@@ -31,7 +31,7 @@ struct Edge {
   std::map<std::int64_t, Transform> samples;  // all that were taken
   Limits limits{};
 
-  // What is kept of them.
+  // The samples within the limits.
   std::map<std::int64_t, Transform> kept() const {
     std::map<std::int64_t, Transform> kept;
     for (auto one = samples.rbegin(); one != samples.rend() && kept.size() < limits.count; ++one) {

@@ -226,7 +226,7 @@ TEST_CASE("an update without a stamp is a sample of now only for a dynamic edge"
   CHECK(arm.forest.lookup("world", "arm", Query{})->stamp == at(5000));
   REQUIRE(arm.forest.update("base", along_x(3)));
   CHECK(arm.forest.histories("base").empty());
-  // The clock is set back: time goes on none the less.
+  // The clock is set back, but stamps still increase.
   arm.clock_ms = 3000;
   REQUIRE(arm.forest.update("arm", along_x(60)));
   CHECK(arm.forest.lookup("world", "arm", Query{})->stamp == at(5000) + 1ns);

@@ -130,7 +130,7 @@ TEST_CASE("a new history leaves nothing of the previous one") {
   REQUIRE(robot.owner.move("hand", "arm", along_x(50)));
   REQUIRE(robot.follow() == 1);
   CHECK(x_of(robot.mirror.lookup("world", "hand")) == 50);
-  // Several samples of a history that began while nobody looked.
+  // Several samples of a history that began since the last push.
   REQUIRE(robot.owner.move("hand", "arm", along_x(60)));
   for (int t = 3; t <= 6; ++t) REQUIRE(robot.owner.update("hand", along_x(-t), at(t)));
   REQUIRE(robot.follow() == 4);

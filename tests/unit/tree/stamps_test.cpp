@@ -57,7 +57,7 @@ EdgeTiming kept_for(std::chrono::nanoseconds span, std::size_t restart_after = 5
 
 TEST_CASE("a stamp from the future is rejected and the error names both times") {
   Arm arm;
-  // Of an edge that is static still, too.
+  // The edge is still static.
   const auto first = arm.sample(1, time_of(9'000'000'000'000'000'000));
   REQUIRE_FALSE(first);
   CHECK(first.error().code == Errc::kInvalidInput);
