@@ -80,17 +80,8 @@ int finish(Client& client, const Result<void>& changed, const Arguments& argumen
 }
 
 int refuse(Client& client, const Error& error, const Arguments& arguments) {
-  switch (error.code) {
-    case Errc::kUnknownFrame:
-    case Errc::kUnknownStart:
-    case Errc::kUnknownEnd:
-    case Errc::kUnknownParent:
-    case Errc::kUnknownPartition:
-    case Errc::kUnknownJoint:
-      if (const int status = none_there(client, arguments, false); status != kDone) return status;
-      break;
-    default:
-      break;
+  if (is_unknown(error.code)) {
+    if (const int status = none_there(client, arguments, false); status != kDone) return status;
   }
   return report(error, arguments);
 }
@@ -201,8 +192,7 @@ int run_update(Client& client, const Arguments& arguments) {
   if (!given) return refuse_pose(given.error(), arguments);
   const auto stamp = optional_stamp(arguments.stamp, wall_clock());
   if (!stamp) return report(stamp.error(), arguments);
-  const auto updated = client.update_partial(
-      {{arguments.id, given->translation, given->rotation, given->covariance}}, *stamp);
+  const auto updated = client.update_partial({{arguments.id, *given}}, *stamp);
   return finish(client, updated, arguments, "updated");
 }
 

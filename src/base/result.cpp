@@ -54,4 +54,18 @@ std::string_view to_string(Errc code) {
   return "unknown";
 }
 
+bool is_unknown(Errc code) {
+  switch (code) {
+    case Errc::kUnknownFrame:
+    case Errc::kUnknownStart:
+    case Errc::kUnknownEnd:
+    case Errc::kUnknownParent:
+    case Errc::kUnknownPartition:
+    case Errc::kUnknownJoint:
+      return true;
+    default:
+      return false;
+  }
+}
+
 }  // namespace tfdude

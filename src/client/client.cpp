@@ -94,7 +94,7 @@ Result<void> Client::update(const std::vector<HandleUpdate>& edges, std::optiona
 
 Result<void> Client::update_partial(const std::vector<PartialUpdate>& edges,
                                     std::optional<Time> stamp) {
-  return participant_->writes().update(edges, stamp);
+  return participant_->writes().update_partial(edges, stamp);
 }
 
 Result<void> Client::publish(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {

@@ -216,8 +216,7 @@ Result<Part> route_move(const Forest& forest, const Directory& directory, const 
                         const MoveRequest& request) {
   const auto frame = forest.info(id);
   if (!frame) return unknown_frame(id);
-  const PartialTransform& X_PC = request.X_PC;
-  if (auto ok = check_parts({id, X_PC.translation, X_PC.rotation, X_PC.covariance}); !ok) {
+  if (auto ok = check_parts({id, request.X_PC}); !ok) {
     return tl::unexpected(ok.error());
   }
   if (id == request.parent) {

@@ -26,20 +26,7 @@ Discovery::Discovery(Structure& structure, const Transport& transport, Milliseco
       met_by_(Deadline(search_time).at()),
       told_by_(Deadline::sum(met_by_, Deadline::sum(timeout, Deadline::sum(timeout, timeout)))) {}
 
-bool Discovery::may_appear(Errc code) {
-  switch (code) {
-    case Errc::kUnknownFrame:
-    case Errc::kUnknownStart:
-    case Errc::kUnknownEnd:
-    case Errc::kUnknownParent:
-    case Errc::kUnknownPartition:
-    case Errc::kUnknownJoint:
-    case Errc::kNotConnected:
-      return true;
-    default:
-      return false;
-  }
-}
+bool Discovery::may_appear(Errc code) { return is_unknown(code) || code == Errc::kNotConnected; }
 
 bool Discovery::complete() {
   if (complete_.load(std::memory_order_relaxed)) return true;

@@ -23,8 +23,7 @@ constexpr std::chrono::nanoseconds kShortestRest = std::chrono::microseconds(100
 constexpr std::chrono::nanoseconds kLongestRest = Milliseconds(10);
 
 bool is_structural(Errc code) {
-  return code == Errc::kUnknownStart || code == Errc::kUnknownEnd || code == Errc::kNotConnected ||
-         code == Errc::kUnreachable;
+  return is_unknown(code) || code == Errc::kNotConnected || code == Errc::kUnreachable;
 }
 
 }  // namespace

@@ -79,7 +79,7 @@ void WatchedPath::set_health(Result<void> health) {
 }
 
 bool WatchedPath::is_gone(const Error& error, Clock::time_point now) {
-  if (error.code == Errc::kUnknownStart || error.code == Errc::kUnknownEnd) return true;
+  if (is_unknown(error.code)) return true;
   const Lock lock(mutex_);
   if (error.code != Errc::kNotConnected) return false;
   if (!not_connected_since_) not_connected_since_ = now;

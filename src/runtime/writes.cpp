@@ -71,7 +71,8 @@ Result<void> Writes::update(const std::vector<EdgeUpdate>& edges, std::optional<
   return ask_to_update(edges, stamp);
 }
 
-Result<void> Writes::update(const std::vector<PartialUpdate>& edges, std::optional<Time> stamp) {
+Result<void> Writes::update_partial(const std::vector<PartialUpdate>& edges,
+                                    std::optional<Time> stamp) {
   return edges.empty() ? Result<void>() : ask_to_update(edges, stamp);
 }
 

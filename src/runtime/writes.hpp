@@ -24,8 +24,8 @@ class Writes {
   [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request);
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges,
                                     std::optional<Time> stamp);
-  [[nodiscard]] Result<void> update(const std::vector<PartialUpdate>& edges,
-                                    std::optional<Time> stamp);
+  [[nodiscard]] Result<void> update_partial(const std::vector<PartialUpdate>& edges,
+                                            std::optional<Time> stamp);
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
                                      std::optional<Time> stamp);
   [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);

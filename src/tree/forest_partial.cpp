@@ -6,13 +6,6 @@
 
 // Updates of parts of values.
 namespace tfdude {
-namespace {
-
-PartialTransform parts_of(const PartialUpdate& edge) {
-  return {edge.translation, edge.rotation, edge.covariance};
-}
-
-}  // namespace
 
 Result<Transform> with_parts(const Transform& X_PC, std::string_view id,
                              const PartialTransform& parts) {
@@ -23,7 +16,7 @@ Result<Transform> with_parts(const Transform& X_PC, std::string_view id,
 }
 
 Result<void> check_parts(const PartialUpdate& edge) {
-  return with_parts(Transform(), edge.id, parts_of(edge)).map([](const Transform&) {});
+  return with_parts(Transform(), edge.id, edge.X_PC).map([](const Transform&) {});
 }
 
 Result<std::vector<EdgeUpdate>> Forest::Impl::completed(
@@ -35,7 +28,7 @@ Result<std::vector<EdgeUpdate>> Forest::Impl::completed(
     const auto slot = frames_.held_slot(edge.id);
     if (!slot) return tl::unexpected(slot.error());
     Transform& X_PC = values.try_emplace(*slot, whole(frames_.newest_value(*slot))).first->second;
-    auto given = with_parts(X_PC, edge.id, parts_of(edge));
+    auto given = with_parts(X_PC, edge.id, edge.X_PC);
     if (!given) return tl::unexpected(std::move(given.error()));
     X_PC = *given;
     all.push_back({edge.id, X_PC});

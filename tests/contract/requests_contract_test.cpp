@@ -60,7 +60,7 @@ TEST_CASE("a change whose request is lost many times is applied while other thre
       }
     });
   }
-  const auto updated = client.update_partial({{"slow", Eigen::Vector3d(5, 0, 0)}});
+  const auto updated = client.update_partial({{"slow", {Eigen::Vector3d(5, 0, 0)}}});
   done = true;
   for (std::thread& thread : threads) thread.join();
   INFO((updated ? "" : updated.error().message) << ", others " << others);
@@ -100,15 +100,15 @@ TEST_CASE("a partial update changes the given parts at the owner and keeps the o
   auto client = *Client::open(join(""), patient());
   const auto hand = [&] { return *client.lookup("arm", "hand"); };
   const Eigen::Vector3d there(1, 2, 3);
-  REQUIRE(client.update_partial({{"hand", there}}));
+  REQUIRE(client.update_partial({{"hand", {there}}}));
   const Transform placed{*Pose::create(X_PC.pose.rotation(), there), X_PC.covariance};
   CHECK(testing::transform_diff(hand(), placed, 1e-12) == "");
   const Transform other = random.transform();
-  REQUIRE(client.update_partial({{"hand", {}, other.pose.rotation(), {}}}));
-  REQUIRE(owner.update_partial({{"hand", {}, {}, other.covariance}}));
+  REQUIRE(client.update_partial({{"hand", {{}, other.pose.rotation()}}}));
+  REQUIRE(owner.update_partial({{"hand", {{}, {}, other.covariance}}}));
   const Transform all{*Pose::create(other.pose.rotation(), there), other.covariance};
   CHECK(testing::transform_diff(hand(), all, 1e-12) == "");
-  const auto refused = client.update_partial({{"hand", Eigen::Vector3d(0, 2e9, 0)}});
+  const auto refused = client.update_partial({{"hand", {Eigen::Vector3d(0, 2e9, 0)}}});
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == Errc::kInvalidInput);
   CHECK(testing::transform_diff(hand(), all, 1e-12) == "");

@@ -88,10 +88,10 @@ bool take(const Bytes& bytes) {
 
 [[nodiscard]] inline PartialUpdateRequest partial_updates(Random& random) {
   const Transform X = random.transform();
-  return {{{"hand", X.pose.translation(), {}, {}},
-           {"arm", {}, X.pose.rotation(), {}},
-           {"x", {}, {}, X.covariance},
-           {std::string(255, 'i'), X.pose.translation(), X.pose.rotation(), X.covariance}},
+  return {{{"hand", {X.pose.translation()}},
+           {"arm", {{}, X.pose.rotation()}},
+           {"x", {{}, {}, X.covariance}},
+           {std::string(255, 'i'), {X.pose.translation(), X.pose.rotation(), X.covariance}}},
           time_of(INT64_MAX)};
 }
 

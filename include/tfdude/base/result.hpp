@@ -42,6 +42,9 @@ enum class Errc : std::uint8_t {
 /// The stable snake_case name of a code, as the command line prints it in JSON.
 [[nodiscard]] TFDUDE_EXPORT std::string_view to_string(Errc code);
 
+/// Whether the code says that something does not exist.
+[[nodiscard]] TFDUDE_EXPORT bool is_unknown(Errc code);
+
 /// An error for people: the message names the frame, the partition and the value concerned.
 struct Error {
   Errc code;

@@ -36,8 +36,10 @@ struct HandleUpdate {
 /// Parts of a transform. A whole transform converts to all of its parts.
 struct PartialTransform {
   PartialTransform() = default;
-  PartialTransform(std::optional<Eigen::Vector3d> p, std::optional<Eigen::Quaterniond> q,
-                   std::optional<Covariance> cov)
+  // NOLINTNEXTLINE(google-explicit-constructor): so that {translation} is one
+  PartialTransform(std::optional<Eigen::Vector3d> p,
+                   std::optional<Eigen::Quaterniond> q = std::nullopt,
+                   std::optional<Covariance> cov = std::nullopt)
       : translation(std::move(p)), rotation(std::move(q)), covariance(std::move(cov)) {}
   // NOLINTNEXTLINE(google-explicit-constructor): it is the whole, of the same meaning
   PartialTransform(const Transform& X)
@@ -54,9 +56,7 @@ struct PartialTransform {
 /// they are.
 struct PartialUpdate {
   std::string id;
-  std::optional<Eigen::Vector3d> translation{};  ///< [m]
-  std::optional<Eigen::Quaterniond> rotation{};
-  std::optional<Covariance> covariance{};
+  PartialTransform X_PC{};
 };
 
 /// How an edge behaves in time.

@@ -53,7 +53,7 @@ Result<PartialTransform> read_parts(std::uint8_t given, const Numbers& in, std::
 wire::PartialEdge wire_partial(const PartialUpdate& edge) {
   wire::PartialEdge out;
   out.id(edge.id);
-  out.parts(write_parts({edge.translation, edge.rotation, edge.covariance}, out.x_pc()));
+  out.parts(write_parts(edge.X_PC, out.x_pc()));
   return out;
 }
 
@@ -62,7 +62,7 @@ Result<PartialUpdate> read_partial(const wire::PartialEdge& in) {
   if (auto ok = check_id(id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
   auto parts = read_parts(in.parts(), in.x_pc(), id);
   if (!parts) return tl::unexpected(std::move(parts.error()));
-  return PartialUpdate{std::move(id), parts->translation, parts->rotation, parts->covariance};
+  return PartialUpdate{std::move(id), *std::move(parts)};
 }
 
 }  // namespace tfdude::fastdds

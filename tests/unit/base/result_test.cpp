@@ -63,6 +63,13 @@ TEST_CASE("the names of all codes are distinct") {
   CHECK(static_cast<int>(names.size()) == known);
 }
 
+TEST_CASE("codes that say that something does not exist have names that begin with unknown") {
+  for (const Named& one : kCodes) {
+    CAPTURE(one.name);
+    CHECK(is_unknown(one.code) == (one.name.substr(0, 8) == "unknown_"));
+  }
+}
+
 TEST_CASE("fail carries the code and the message") {
   const Result<int> result = fail(Errc::kCycle, "arm is below hand");
   REQUIRE_FALSE(result);

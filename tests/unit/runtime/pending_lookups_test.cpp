@@ -196,7 +196,7 @@ TEST_CASE("lookups: every call without a wait times out and never reports unknow
   Options options;
   options.timeout = Milliseconds(50);
   options.discovery = Milliseconds(0);
-  const std::vector<PartialUpdate> raised{{"hand", Eigen::Vector3d(0, 0, 1)}};
+  const std::vector<PartialUpdate> raised{{"hand", {Eigen::Vector3d(0, 0, 1)}}};
   const auto of_new_client = [&](bool met_all, auto call) {
     std::string what;
     auto best = Clock::duration::max();

@@ -136,8 +136,8 @@ TEST_CASE("writes: each owner applies its part of an update") {
   CHECK(x_of(leg.node().lookup("leg", "foot")) == 2);
   PartialUpdate rest;
   rest.id = "foot";
-  rest.covariance = Covariance::trusted(Matrix6d(0.01 * Matrix6d::Identity()));
-  REQUIRE(writer.writes.update(std::vector<PartialUpdate>{rest}, std::nullopt));
+  rest.X_PC.covariance = Covariance::trusted(Matrix6d(0.01 * Matrix6d::Identity()));
+  REQUIRE(writer.writes.update_partial({rest}, std::nullopt));
   CHECK(x_of(leg.node().lookup("leg", "foot")) == 2);
 }
 
