@@ -219,6 +219,7 @@ class Directory {
   void hear_absent(Owner from, const std::vector<Absent>& absent, Time now);
   void hear_of(const Absent& one, const std::string& teller, Time now);
   void hear_of_itself(const std::vector<Absent>& absent);
+  [[nodiscard]] std::optional<Absent> told_absence(const Known& partition) const;
   bool drop_outdated(Known& partition, std::uint64_t incarnation);
   void came_back(Known& partition, Owner owner);
   void went(Known& partition, Owner owner, bool stopped, Time now,

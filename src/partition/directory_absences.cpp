@@ -10,12 +10,18 @@ namespace tfdude {
 
 using Standing = Succession::Standing;
 
+// What this participant knows of an absent partition, if it tells others: one without a partition
+// cannot.
+std::optional<Absent> Directory::told_absence(const Known& partition) const {
+  const bool has_voice = !partitions_.front().info.name.empty();
+  return has_voice ? absences_.find(partition.info.name) : std::nullopt;
+}
+
 bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
   if (!partition.outdated(incarnation)) return false;
   // A participant that misses it, or has forgotten it, informs it, and it continues with a higher
-  // number. But a participant without a partition cannot inform it.
-  const bool has_voice = !partitions_.front().info.name.empty();
-  const bool is_told = has_voice && absences_.find(partition.info.name);
+  // number.
+  const bool is_told = told_absence(partition).has_value();
   if (!is_told && !partition.info.reachable) {
     partition.live = partition.heard_of = 0;
     partition.successor.reset();
@@ -33,7 +39,11 @@ void Directory::came_back(Known& partition, Owner owner) {
   partition.info.reachable = true;
   partition.info.stopped = false;
   partition.forgotten = false;
-  const bool missed = absences_.returned(partition.info.name);
+  // One that was forgotten is told so until it continues with a higher number.
+  const auto told = told_absence(partition);
+  const bool is_forgotten = told && told->kind == Absent::Kind::kForgotten;
+  const bool missed = !(is_forgotten && partition.live <= told->incarnation) &&
+                      absences_.returned(partition.info.name);
   claims_.set_standing(owner, Standing::kThere);
   if (missed) tell_claims();
 }
@@ -150,7 +160,9 @@ void Directory::restore(const std::vector<Absent>& absent) {
     if (told.kind == Absent::Kind::kBack) told.kind = Absent::Kind::kLost;
     const auto number = number_of(one.partition);
     const bool met = number && partitions_[*number].info.reachable;
-    if (!met && told.kind != Absent::Kind::kForgotten) absences_.resume(told);
+    const bool forgotten = told.kind == Absent::Kind::kForgotten;
+    const bool same = met && partitions_[*number].live <= one.incarnation;
+    if (forgotten ? same : !met) absences_.resume(told);
     hear_of(told, own, Time(std::chrono::nanoseconds(one.since)));
   }
 }

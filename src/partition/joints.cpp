@@ -93,16 +93,6 @@ bool Joints::is_coupled(std::string_view frame) const {
   });
 }
 
-std::vector<std::string> Joints::frames_of(std::string_view name) const {
-  std::vector<std::string> frames;
-  const auto found = by_name_.find(name);
-  if (found == by_name_.end()) return frames;
-  for (const std::size_t index : found->second) {
-    if (!movers_[index].let_go) frames.push_back(movers_[index].frame);
-  }
-  return frames;
-}
-
 // For removed frames; another frame with that id is a different one.
 void Joints::forget_removed() {
   for (Mover& mover : movers_) mover.let_go = mover.let_go || !forest_.info(mover.handle);

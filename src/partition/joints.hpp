@@ -58,9 +58,6 @@ class Joints {
   /// Sorted by name, starting after this one; at most kMaxItems.
   [[nodiscard]] std::vector<JointInfo> infos(std::string_view after = {}) const;
 
-  /// The frames moved by a joint of this name, and by those that follow it.
-  [[nodiscard]] std::vector<std::string> frames_of(std::string_view name) const;
-
   /// The joints with new positions since the last call.
   [[nodiscard]] std::vector<StoredJoint> take_changed();
   /// They could not be saved: the next take_changed() returns them again.

@@ -184,7 +184,7 @@ std::optional<Presence> Member::leave() {
 
 // ---- actions
 
-Ready Member::take_ready() {
+Ready Member::take_ready(bool values_due) {
   Ready ready;
   for (auto& [key, reply] : std::exchange(replies_, {})) ready.replies.push_back(std::move(reply));
   if (!given_up_.empty()) {
@@ -194,7 +194,7 @@ Ready Member::take_ready() {
   Presence current = presence_;
   if (partition_ != nullptr) {
     ready.pages = partition_->take_pages();
-    ready.rows = partition_->take_unsaved();
+    ready.rows = partition_->take_unsaved(values_due);
     current.pages = partition_->page_count();
     current.absent = directory_.absent();
   }
@@ -219,15 +219,10 @@ std::optional<Presence> Member::not_stored(const Ready& ready) {
   partition_->still_unsaved(ready.rows, ready.pages);
   // A partition that is not served yet announces nothing that it could not store.
   if (!ready.presence || !announced_.serving || !given_up_.empty()) return std::nullopt;
-  if (ready.presence->absent == presence_.absent) return std::nullopt;
+  if (ready.presence->absent == announced_.absent) return std::nullopt;
   presence_.absent = announced_.absent = ready.presence->absent;
-  return presence_;
-}
-
-std::vector<ChangedEdge> Member::storable(std::vector<ChangedEdge> edges) const {
-  const auto unsaved = [this](const ChangedEdge& edge) { return partition_->is_unsaved(edge.id); };
-  edges.erase(std::remove_if(edges.begin(), edges.end(), unsaved), edges.end());
-  return edges;
+  // An incarnation that is not stored is not announced either.
+  return announced_;
 }
 
 Outcome Member::take_outcome() {

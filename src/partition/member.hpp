@@ -83,18 +83,15 @@ class Member {
 
   // ---- actions
 
-  /// Everything to store or announce since the last call. Call stored() or not_stored() afterwards.
-  /// [joints]
-  [[nodiscard]] Ready take_ready();
+  /// Everything to store or announce since the last call, except for the values, which
+  /// Partition::add_values() adds. Call stored() or not_stored() afterwards. [joints]
+  /// @param values_due  as of Partition::take_unsaved()
+  [[nodiscard]] Ready take_ready(bool values_due = false);
   /// @return the presence to announce after the pages are published
   [[nodiscard]] std::optional<Presence> stored(const Ready& ready);
   /// The next take_ready() returns it again, without the replies. [joints]
   /// @return the presence to announce all the same: absences do not depend on what is stored
   [[nodiscard]] std::optional<Presence> not_stored(const Ready& ready);
-  /// Filters values that no request waits for to those that may be stored alone. If a frame has a
-  /// new parent that is not stored yet, its value is stored with that: otherwise it would be stored
-  /// for the old parent.
-  [[nodiscard]] std::vector<ChangedEdge> storable(std::vector<ChangedEdge> edges) const;
   [[nodiscard]] Outcome take_outcome();
 
   // ---- state

@@ -246,9 +246,7 @@ Result<void> Partition::update(const PartialUpdateRequest& request) {
 template <class Edge>
 Result<void> Partition::told_of(const std::vector<Edge>& edges, Result<void> updated) {
   if (updated) {
-    if (saved_) {
-      for (const Edge& edge : edges) updated_.insert(edge.id);
-    }
+    values_asked_ = true;
     return {};
   }
   const auto foreign = std::find_if(edges.begin(), edges.end(),
@@ -273,7 +271,7 @@ Result<void> Partition::revise(const ReviseRequest& request) {
     if (auto revised = forest_.revise(edges, request.stamp, request.seen); !revised) return revised;
   }
   for (const ReviseRequest::Edge& edge : request.edges) {
-    if (edge.revision && saved_) updated_.insert(edge.id);
+    if (edge.revision) values_asked_ = true;
     if (!(edge.innovation.expected > 0)) continue;
     EdgeConsistency& so_far = consistency_[edge.id];
     so_far.id = edge.id;
@@ -305,7 +303,7 @@ Result<void> Partition::correlate(const std::string& id, const Correlation& corr
   if (auto said = forest_.correlate(id, correlation); !said) {
     return tl::unexpected(at_home(std::move(said.error()), id));
   }
-  if (saved_) updated_.insert(id);
+  values_asked_ = true;
   return {};
 }
 
@@ -322,10 +320,7 @@ Result<void> Partition::set_joints(const JointUpdate& update) {
                                          " moves no frame: it follows another, or its frame was "
                                          "removed or moved");
   }
-  if (!saved_) return {};
-  for (const JointValue& joint : update.joints) {
-    for (std::string& frame : joints_.frames_of(joint.name)) updated_.insert(std::move(frame));
-  }
+  values_asked_ = true;
   return {};
 }
 

@@ -73,9 +73,6 @@ class Partition {
   /// Whether this partition owns a joint of that name, or one that follows it. Takes no lock.
   [[nodiscard]] bool moves(std::string_view joint) const { return joints_.moves(joint); }
 
-  /// The joints with new positions since the last call.
-  [[nodiscard]] std::vector<StoredJoint> take_changed_joints() { return joints_.take_changed(); }
-
   /// What would have to be yielded according to the directory's current state. O(contested frames).
   [[nodiscard]] std::set<PendingYield> pending_yields() const {
     return directory_.pending_yields();
@@ -99,21 +96,23 @@ class Partition {
   /// The number of replies kept for requests that may be repeated.
   [[nodiscard]] std::size_t kept_replies() const { return replies_.size(); }
 
-  /// The changes by requests since the last call that must be saved.
-  [[nodiscard]] StateChange take_unsaved();
+  /// Whatever must be saved, since the last call; but the values are left to add_values().
+  /// @param values_due  whether values that no request waits for must be saved, even if nothing
+  ///   else has changed
+  [[nodiscard]] StateChange take_unsaved(bool values_due = false);
+
+  /// Adds the values, as of when the change was taken. Needs no lock: there may be many. See
+  /// Forest::changed().
+  void add_values(StateChange& change) const {
+    if (change.commits.last > change.commits.after) change.values = forest_.changed(change.commits);
+  }
 
   /// The change could not be saved, and these pages were not published: both are returned again
   /// later.
-  void still_unsaved(const StateChange& change, const std::vector<Page>& pages) {
-    updated_.insert(change.erased.begin(), change.erased.end());
-    still_unsaved(change.joints);
-    if (change.absent) saved_absent_.reset();
-    pages_.still_changed(pages);
-  }
-  void still_unsaved(const std::vector<StoredJoint>& joints) { joints_.still_changed(joints); }
-  /// Whether take_unsaved() will return a change of the frame by request.
+  void still_unsaved(const StateChange& change, const std::vector<Page>& pages);
+  /// Whether a change of the frame's existence or place is not saved.
   [[nodiscard]] bool is_unsaved(const std::string& id) const {
-    return updated_.count(id) != 0 || pages_.is_touched(id);
+    return unsaved_.count(id) != 0 || pages_.is_touched(id);
   }
 
  private:
@@ -156,9 +155,12 @@ class Partition {
   ReplyCache replies_;
   std::map<std::string, EdgeConsistency> consistency_;  // of observed edges
   bool saved_ = false;
-  std::set<std::string> updated_;  // by requests, since the last take_unsaved()
+  bool values_asked_ = false;       // a request waits until its values are saved
+  std::uint64_t saved_commit_ = 0;  // up to which the values are
+  std::set<std::string> unsaved_;   // what could not be saved
   std::optional<std::vector<Absent>>
       saved_absent_;  // the partitions that this one misses, as last stored
+  std::optional<std::vector<FrameSpec>> configured_;  // until it is saved
 };
 
 }  // namespace tfdude

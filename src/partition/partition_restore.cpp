@@ -69,6 +69,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   pages_.resume(state.epoch);
   // Only later changes are not in the store.
   saved_ = true;
+  if (!configured.empty()) configured_ = configured;
   pages_.watch_ids();
   for (const StoredFrame* frame : contested) {
     yield_to(frame->id, directory_.holder(frame->id), now);
@@ -128,7 +129,6 @@ Result<void> Partition::reconfigure(const StoredState& state,
       case Kind::kCorrelate:
         if (!forest_.holds(id)) break;
         if (auto said = forest_.correlate(id, entries.at(id)->correlation); !said) return said;
-        updated_.insert(id);
         break;
       case Kind::kRemove:
         if (release(id)) dropped.push_back(id);
@@ -220,12 +220,12 @@ void Partition::tell_conflict(const Tombstone& tombstone) {
   directory_.changes().add(conflict_of(tombstone, name_));
 }
 
-StateChange Partition::take_unsaved() {
+StateChange Partition::take_unsaved(bool values_due) {
   StateChange change;
   change.epoch = pages_.epoch();
+  if (!saved_) return change;
   std::set<std::string> ids = pages_.take_touched();
-  ids.merge(updated_);
-  updated_.clear();
+  ids.merge(std::exchange(unsaved_, {}));
   for (const std::string& id : ids) {
     change.erased.push_back(id);
     if (auto tombstone = pages_.tombstone(id)) change.tombstones.push_back(*std::move(tombstone));
@@ -237,12 +237,28 @@ StateChange Partition::take_unsaved() {
   }
   // The first change of a process stores its incarnation, too, since the epoch is above it.
   auto absent = directory_.absent();
-  if (saved_ && saved_absent_ != absent) {
+  if (saved_absent_ != absent) {
     saved_absent_ = absent;
     change.absent = std::move(absent);
   }
-  if (!change.empty()) change.joints = joints_.take_changed();
+  change.configured = std::exchange(configured_, std::nullopt);
+  const bool values_asked = std::exchange(values_asked_, false);
+  change.commits = {saved_commit_, saved_commit_};
+  if (change.empty() && !values_due && !values_asked) return change;
+  change.joints = joints_.take_changed();
+  // After the frames, whose values may be older.
+  change.commits.last = saved_commit_ = forest_.newest_commit();
   return change;
+}
+
+void Partition::still_unsaved(const StateChange& change, const std::vector<Page>& pages) {
+  unsaved_.insert(change.erased.begin(), change.erased.end());
+  joints_.still_changed(change.joints);
+  if (change.absent) saved_absent_.reset();
+  if (change.configured) configured_ = change.configured;
+  values_asked_ = values_asked_ || change.commits.last > change.commits.after;
+  saved_commit_ = change.commits.after;
+  pages_.still_changed(pages);
 }
 
 }  // namespace tfdude

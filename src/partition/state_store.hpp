@@ -39,7 +39,8 @@ struct StoredState {
   std::vector<Absent> absent{};  ///< partitions that this one missed
 };
 
-/// A change of the stored state.
+/// A change of the stored state. With whatever is stored, the values of all edges are, as of the
+/// same moment: so a crash never leaves half of what one update has written.
 struct StateChange {
   std::uint64_t epoch = 0;
   std::vector<std::string> erased;  ///< frames and tombstones; applied before the rest
@@ -47,9 +48,14 @@ struct StateChange {
   std::vector<Tombstone> tombstones;
   std::vector<StoredJoint> joints{};  ///< new positions
   std::optional<std::vector<Absent>>
-      absent{};  ///< all partitions that this one misses, if that has changed
+      absent{};                       ///< all partitions that this one misses, if that has changed
+  std::vector<ChangedEdge> values{};  ///< of existing frames; applied after the frames
+  CommitRange commits{};              ///< which have written these values
+  std::optional<std::vector<FrameSpec>> configured{};  ///< the configuration, at the start
 
-  [[nodiscard]] bool empty() const { return erased.empty() && !absent; }
+  [[nodiscard]] bool empty() const {
+    return erased.empty() && joints.empty() && !absent && values.empty() && !configured;
+  }
 };
 
 /// The storage of a partition's state. Not thread-safe.
@@ -60,15 +66,10 @@ class StateStore {
   /// @return kState naming the file and a remedy, if it cannot be read.
   [[nodiscard]] virtual Result<StoredState> load() = 0;
 
-  /// Saves all of it or nothing. Saved changes survive the end of the process at any instant.
+  /// Saves all of it or nothing. Saved changes survive the end of the process at any instant; the
+  /// first change of a process survives a power loss, too.
   /// @return kState.
   [[nodiscard]] virtual Result<void> save(const StateChange& change) = 0;
-
-  /// New values of existing frames, and of joints; the others are unchanged.
-  [[nodiscard]] virtual Result<void> save_values(const std::vector<ChangedEdge>& edges,
-                                                 const std::vector<StoredJoint>& joints) = 0;
-
-  [[nodiscard]] virtual Result<void> save_configured(const std::vector<FrameSpec>& frames) = 0;
 };
 
 }  // namespace tfdude

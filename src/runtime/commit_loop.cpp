@@ -22,15 +22,11 @@ Error unsaved(const Reply& reply, const Error& why) {
 CommitLoop::CommitLoop(std::unique_ptr<StateStore> store, Effects& effects, Periods periods)
     : store_(std::move(store)), effects_(effects), periods_(periods) {}
 
-Result<void> CommitLoop::start(const std::vector<FrameSpec>& configured) {
-  const Ready ready = effects_.take();
+Result<void> CommitLoop::start() {
+  const Ready ready = effects_.take(false);
   const Result<void> stored = store(ready);
   tell(ready, stored);
   if (!stored) return stored;
-  // An empty configuration changes nothing: the last one stays valid.
-  if (store_ != nullptr && !configured.empty()) {
-    if (auto saved = store_->save_configured(configured); !saved) return saved;
-  }
   next_values_ = Clock::now() + periods_.values;
   thread_ = std::thread([this] { run(); });
   return {};
@@ -112,16 +108,13 @@ void CommitLoop::round() {
   const bool failed = failure_.has_value();
   mutex_.unlock();
   asked_.store(false);
-  const Ready ready = effects_.take();
+  const bool values_due = failed || Clock::now() >= next_values_;
+  const Ready ready = effects_.take(values_due);
   const Result<void> stored = store(ready);
   if (!stored) note(stored);
   tell(ready, stored);
-  Result<void> values;
-  if (store_ != nullptr && (failed || Clock::now() >= next_values_)) {
-    values = save_values();
-    next_values_ = Clock::now() + periods_.values;
-  }
-  note(stored ? values : stored);
+  if (stored) note(stored);
+  if (values_due) next_values_ = Clock::now() + periods_.values;
   mutex_.lock();
   next_commit_ = Clock::now() + (failure_ ? periods_.retry : periods_.publish);
   done_up_to_ = wanted;
@@ -146,14 +139,6 @@ void CommitLoop::tell(const Ready& ready, const Result<void>& stored) {
     if (!stored) reply.reply.body = unsaved(reply.reply, stored.error());
     effects_.reply(reply);
   }
-}
-
-Result<void> CommitLoop::save_values() {
-  const ChangedValues values = effects_.take_values();
-  if (values.edges.empty()) return {};
-  auto stored = store_->save_values(values.edges, values.joints);
-  if (!stored) effects_.take_back(values);
-  return stored;
 }
 
 // Logs only the start and the end of a failure, not each attempt. A rejected commit says nothing

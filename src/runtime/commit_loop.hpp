@@ -15,13 +15,6 @@
 
 namespace tfdude {
 
-/// Values of edges and joints that no request waits for.
-struct ChangedValues {
-  std::vector<ChangedEdge> edges{};
-  std::vector<StoredJoint> joints{};
-  std::uint64_t since = 0;  ///< the commit up to which earlier values were taken
-};
-
 /// Performs a member's Ready, in order: stores, publishes, replies. All on one thread, the only one
 /// that waits for the disk. Changes that have come meanwhile are stored together.
 ///
@@ -41,13 +34,12 @@ class CommitLoop {
    public:
     virtual ~Effects() = default;
     /// Everything to store or announce since the last call. publish() or take_back() follows.
-    [[nodiscard]] virtual Ready take() = 0;
+    /// @param values_due  as of Partition::take_unsaved()
+    [[nodiscard]] virtual Ready take(bool values_due) = 0;
     /// Publishes its pages and its presence.
     virtual void publish(const Ready& ready) = 0;
     /// It could not be stored: the next take() returns it again, without the replies.
     virtual void take_back(const Ready& ready) = 0;
-    [[nodiscard]] virtual ChangedValues take_values() = 0;
-    virtual void take_back(const ChangedValues& values) = 0;
     virtual void reply(const PendingReply& reply) = 0;
   };
 
@@ -63,10 +55,9 @@ class CommitLoop {
   CommitLoop(const CommitLoop&) = delete;
   CommitLoop& operator=(const CommitLoop&) = delete;
 
-  /// Stores and announces the current state, with its configuration, on the caller's thread; then
-  /// starts the loop.
+  /// Stores and announces the current state on the caller's thread; then starts the loop.
   /// @return kState; the loop has then not started.
-  [[nodiscard]] Result<void> start(const std::vector<FrameSpec>& configured);
+  [[nodiscard]] Result<void> start();
 
   /// Stores and announces pending changes, and ends the loop. Later changes are not processed.
   void stop();
@@ -92,7 +83,6 @@ class CommitLoop {
   void round() TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] Result<void> store(const Ready& ready);
   void tell(const Ready& ready, const Result<void>& stored);
-  [[nodiscard]] Result<void> save_values();
   void note(const Result<void>& stored);
 
   const std::unique_ptr<StateStore> store_;

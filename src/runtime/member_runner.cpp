@@ -1,13 +1,12 @@
 #include "runtime/member_runner.hpp"
 
-#include <tuple>
-
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
 #include "base/mutex.hpp"
 #include "partition/requests.hpp"
 #include "runtime/wall_clock.hpp"
+#include "tree/epoch.hpp"
 
 namespace tfdude {
 namespace {
@@ -191,10 +190,6 @@ Result<void> MemberRunner::serve(const StoredState* left,
   return served;
 }
 
-Result<void> MemberRunner::publish_all(const std::vector<FrameSpec>& configured) {
-  return commits_->start(configured);
-}
-
 void MemberRunner::introduce() {
   transport_.announce(with_rules([](Member& member) { return member.introduce(); }));
 }
@@ -247,10 +242,17 @@ std::shared_ptr<void> MemberRunner::on_change(Events::Callback listener) {
 
 // ---- interface of the commit loop
 
-Ready MemberRunner::take() {
-  const Lock lock(structure_.mutex);
-  const Lock joints(joints_mutex_);
-  return member_.take_ready();
+Ready MemberRunner::take(bool values_due) {
+  // The values of this moment are kept until they are copied, which may take long.
+  const epoch::Guard guard;
+  Ready ready;
+  {
+    const Lock lock(structure_.mutex);
+    const Lock joints(joints_mutex_);
+    ready = member_.take_ready(values_due);
+  }
+  if (partition_ != nullptr && !ready.refused) partition_->add_values(ready.rows);
+  return ready;
 }
 
 void MemberRunner::publish(const Ready& ready) {
@@ -266,25 +268,6 @@ void MemberRunner::take_back(const Ready& ready) {
     return member.not_stored(ready);
   });
   if (said) transport_.announce(*said);
-}
-
-ChangedValues MemberRunner::take_values() {
-  ChangedValues values;
-  if (out_) return values;
-  values.since = saved_commit_;
-  std::tie(values.edges, saved_commit_) = structure_.forest.changed_since(saved_commit_);
-  if (values.edges.empty()) return values;
-  const Lock lock(structure_.mutex);
-  values.edges = member_.storable(std::move(values.edges));
-  const Lock joints(joints_mutex_);
-  values.joints = partition_->take_changed_joints();
-  return values;
-}
-
-void MemberRunner::take_back(const ChangedValues& values) {
-  saved_commit_ = values.since;
-  const Lock lock(joints_mutex_);
-  partition_->still_unsaved(values.joints);
 }
 
 void MemberRunner::reply(const PendingReply& pending) {

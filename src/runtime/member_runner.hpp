@@ -81,7 +81,7 @@ class MemberRunner final : private CommitLoop::Effects {
   [[nodiscard]] Result<void> serve(const StoredState* left,
                                    const std::vector<FrameSpec>& configured);
   /// Stores, publishes and announces everything, on this thread. @return kState
-  [[nodiscard]] Result<void> publish_all(const std::vector<FrameSpec>& configured);
+  [[nodiscard]] Result<void> publish_all() { return commits_->start(); }
   /// Announces its current presence.
   void introduce();
   /// Announces its stop, if its presence was ever announced.
@@ -118,11 +118,9 @@ class MemberRunner final : private CommitLoop::Effects {
 
  private:
   // CommitLoop::Effects
-  [[nodiscard]] Ready take() override;
+  [[nodiscard]] Ready take(bool values_due) override;
   void publish(const Ready& ready) override;
   void take_back(const Ready& ready) override;
-  [[nodiscard]] ChangedValues take_values() override;
-  void take_back(const ChangedValues& values) override;
   void reply(const PendingReply& reply) override;
 
   /// Passes the rules to `input`, under the lock of the structure.
@@ -146,7 +144,6 @@ class MemberRunner final : private CommitLoop::Effects {
   std::atomic<bool> out_{false};
   const std::shared_ptr<Events> events_ = std::make_shared<Events>();
   Mutex joints_mutex_{LockRank::kJoints};  // guards the joints of partition_
-  std::uint64_t saved_commit_ = 0;         // of values; used by the thread of commits_
   // Both stop before the transport does.
   std::optional<CommitLoop> commits_;   // set once, before partition_
   Mutex gone_mutex_{LockRank::kParts};  // guards the following members

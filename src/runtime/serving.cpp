@@ -48,7 +48,7 @@ Result<void> Serving::serve(const std::vector<FrameSpec>& frames) {
   if (auto claimed = claim_name(); !claimed) return claimed;
   if (auto taken = take_frames(frames); !taken) return taken;
   if (auto serving = transport_.serve(member_.name()); !serving) return serving;
-  if (auto stored = member_.publish_all(frames); !stored) return stored;
+  if (auto stored = member_.publish_all(); !stored) return stored;
   member_.introduce();
   return {};
 }

@@ -41,9 +41,6 @@ class SqliteStore final : public StateStore {
 
   Result<StoredState> load() override;
   Result<void> save(const StateChange& change) override;
-  Result<void> save_values(const std::vector<ChangedEdge>& edges,
-                           const std::vector<StoredJoint>& joints) override;
-  Result<void> save_configured(const std::vector<FrameSpec>& frames) override;
 
  private:
   [[nodiscard]] tl::unexpected<Error> unusable(const std::string& why) const;
@@ -57,15 +54,17 @@ class SqliteStore final : public StateStore {
   Result<void> prepare_newer();
   Result<void> prepare(Statement& statement, const char* sql);
   Result<void> make_ready();
+  Result<void> save_frames(const StateChange& change);
+  Result<void> save_values(const std::vector<ChangedEdge>& edges);
   Result<void> save_joints(const std::vector<StoredJoint>& joints);
+  Result<void> save_configured(const std::vector<FrameSpec>& frames);
   Result<void> save_absent(const std::vector<Absent>& absent);
   Result<void> save_correlation(const std::string& id, const StoredCorrelation& correlation);
-  template <class Write>
-  Result<void> transaction(Write write);
 
   const std::string file_;
   const StoreSync sync_;
   std::optional<Database> database_;
+  bool ready_ = false;             // to be written to
   bool written_ = false;           // by this process
   std::int64_t format_ = kFormat;  // of the file as it is
   Statement set_epoch_;
@@ -250,48 +249,52 @@ Result<StoredState> SqliteStore::load() {
 }
 
 Result<void> SqliteStore::make_ready() {
-  if (written_) return {};
-  auto done = database_->run("PRAGMA journal_mode = WAL;");
-  if (done) {
-    done = database_->run(sync_ == StoreSync::kEachChange ? "PRAGMA synchronous = FULL;"
-                                                          : "PRAGMA synchronous = NORMAL;");
-  }
+  if (ready_) return {};
+  auto done = database_->run("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;");
   if (done) database_->tidy_up_at_close();
   if (done && format_ != kFormat) done = bring_up_to_date();
-  written_ = done.has_value();
+  ready_ = done.has_value();
   return done;
 }
 
-template <class Write>
-Result<void> SqliteStore::transaction(Write write) {
+Result<void> SqliteStore::save(const StateChange& change) {
   if (auto ready = make_ready(); !ready)
     return unusable("cannot be written: " + ready.error().message);
-  auto done = database_->atomically(write);
+  auto done = database_->atomically([&]() -> Result<void> {
+    Result<void> saved = save_frames(change);
+    if (saved && change.absent) saved = save_absent(*change.absent);
+    if (saved) saved = save_values(change.values);
+    if (saved) saved = save_joints(change.joints);
+    return saved && change.configured ? save_configured(*change.configured) : saved;
+  });
+  // The first change of a process is synced: it has the process's number, which others will know.
+  // After a power loss the clock may be behind it.
+  if (done && !written_ && sync_ == StoreSync::kAtCheckpoints) {
+    done = database_->run("PRAGMA synchronous = NORMAL;");
+  }
+  written_ = written_ || done;
   if (done) return {};
   return unusable("could not be written: " + done.error().message);
 }
 
-Result<void> SqliteStore::save(const StateChange& change) {
-  return transaction([&]() -> Result<void> {
-    Result<void> done = set_epoch_.run(change.epoch);
-    for (const std::string& id : change.erased) {
-      if (done) done = erase_frame_.run(id);
-      if (done) done = erase_correlation_.run(id);
-      if (done) done = erase_tombstone_.run(id);
-    }
-    for (const StoredFrame& frame : change.frames) {
-      if (done)
-        done = put_frame_.run(frame.id, frame.parent, to_flat(frame.X_PC), frame.lamport_time);
-      if (done) done = save_correlation(frame.id, frame.correlation);
-    }
-    for (const Tombstone& tombstone : change.tombstones) {
-      const auto kind = static_cast<std::uint64_t>(tombstone.kind);
-      if (done)
-        done = put_tombstone_.run(tombstone.id, tombstone.lamport_time, kind, tombstone.rival);
-    }
-    if (done && change.absent) done = save_absent(*change.absent);
-    return done ? save_joints(change.joints) : done;
-  });
+Result<void> SqliteStore::save_frames(const StateChange& change) {
+  Result<void> done = set_epoch_.run(change.epoch);
+  for (const std::string& id : change.erased) {
+    if (done) done = erase_frame_.run(id);
+    if (done) done = erase_correlation_.run(id);
+    if (done) done = erase_tombstone_.run(id);
+  }
+  for (const StoredFrame& frame : change.frames) {
+    if (done)
+      done = put_frame_.run(frame.id, frame.parent, to_flat(frame.X_PC), frame.lamport_time);
+    if (done) done = save_correlation(frame.id, frame.correlation);
+  }
+  for (const Tombstone& tombstone : change.tombstones) {
+    const auto kind = static_cast<std::uint64_t>(tombstone.kind);
+    if (done)
+      done = put_tombstone_.run(tombstone.id, tombstone.lamport_time, kind, tombstone.rival);
+  }
+  return done;
 }
 
 Result<void> SqliteStore::save_absent(const std::vector<Absent>& absent) {
@@ -324,28 +327,23 @@ Result<void> SqliteStore::save_correlation(const std::string& id,
   return put_correlation_.run(id, Blob{to_blob(correlation.said)}, observed);
 }
 
-Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges,
-                                      const std::vector<StoredJoint>& joints) {
-  return transaction([&]() -> Result<void> {
-    Result<void> done;
-    for (const ChangedEdge& edge : edges) {
-      if (done) done = set_value_.run(edge.id, to_flat(edge.X_PC));
-      if (done) done = save_correlation(edge.id, edge.correlation);
-    }
-    return done ? save_joints(joints) : done;
-  });
+Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges) {
+  Result<void> done;
+  for (const ChangedEdge& edge : edges) {
+    if (done) done = set_value_.run(edge.id, to_flat(edge.X_PC));
+    if (done) done = save_correlation(edge.id, edge.correlation);
+  }
+  return done;
 }
 
 Result<void> SqliteStore::save_configured(const std::vector<FrameSpec>& frames) {
-  return transaction([&]() -> Result<void> {
-    Result<void> done = database_->run("DELETE FROM configured; DELETE FROM configured_ties;");
-    for (const FrameSpec& frame : frames) {
-      if (done) done = put_configured_.run(frame.id, frame.parent, to_flat(value_of(frame)));
-      if (!done || frame.correlation.empty()) continue;
-      done = put_configured_correlation_.run(frame.id, Blob{to_blob(frame.correlation)});
-    }
-    return done;
-  });
+  Result<void> done = database_->run("DELETE FROM configured; DELETE FROM configured_ties;");
+  for (const FrameSpec& frame : frames) {
+    if (done) done = put_configured_.run(frame.id, frame.parent, to_flat(value_of(frame)));
+    if (!done || frame.correlation.empty()) continue;
+    done = put_configured_correlation_.run(frame.id, Blob{to_blob(frame.correlation)});
+  }
+  return done;
 }
 
 }  // namespace

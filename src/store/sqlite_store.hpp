@@ -16,7 +16,8 @@ namespace tfdude {
 
 /// When written data must have reached the disk (SQLite's "PRAGMA synchronous").
 enum class StoreSync {
-  /// NORMAL: if the computer stops, the last changes may be lost; the file stays intact.
+  /// NORMAL: if the computer stops, the last changes may be lost, except for the first one of each
+  /// process; the file stays intact.
   kAtCheckpoints,
   kEachChange,  ///< FULL: no change is lost; each waits for the disk
 };

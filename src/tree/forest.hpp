@@ -57,6 +57,12 @@ struct ChangedEdge {
   StoredCorrelation correlation{};
 };
 
+/// Commits of a forest.
+struct CommitRange {
+  std::uint64_t after = 0;  ///< the one before the first
+  std::uint64_t last = 0;
+};
+
 /// The coordinate frames that one process knows: a forest whose edges carry either a value (held
 /// here) or only the owner who holds it.
 ///
@@ -248,10 +254,13 @@ class Forest {
   /// Frames that name this missing frame as their parent. O(result).
   [[nodiscard]] std::vector<FrameInfo> waiting_for(std::string_view id) const;
 
-  /// All held edges written since that commit, and the commit up to which they were collected, to
-  /// pass in the next call. Takes no lock. O(slots).
-  [[nodiscard]] std::pair<std::vector<ChangedEdge>, std::uint64_t> changed_since(
-      std::uint64_t commit) const;
+  /// The number of the newest commit.
+  [[nodiscard]] std::uint64_t newest_commit() const;
+
+  /// All held edges that these commits have written, as of the last one. Takes no lock. O(slots).
+  /// If others write meanwhile, the calling thread must have had an epoch::Guard since before the
+  /// last one was the newest.
+  [[nodiscard]] std::vector<ChangedEdge> changed(const CommitRange& commits) const;
 
   /// The values written to held edges since the cursors, which it advances to its commit: samples,
   /// including late ones that follow later stamps, or the value that holds for all times. An edge

@@ -182,17 +182,17 @@ std::vector<FrameInfo> Forest::waiting_for(std::string_view id) const {
   return all;
 }
 
-std::pair<std::vector<ChangedEdge>, std::uint64_t> Forest::changed_since(
-    std::uint64_t commit) const {
+std::uint64_t Forest::newest_commit() const { return impl_->frames_.snapshot(); }
+
+std::vector<ChangedEdge> Forest::changed(const CommitRange& commits) const {
   const epoch::Guard guard;
-  const std::uint64_t now = impl_->frames_.snapshot();
   std::vector<ChangedEdge> changed;
   for (std::uint32_t slot = 0; slot < impl_->frames_.size(); ++slot) {
-    const Version* version = impl_->frames_.at(slot, now);
-    if (!version->held() || version->commit <= commit) continue;
+    const Version* version = impl_->frames_.at(slot, commits.last);
+    if (!version->held() || version->commit <= commits.after) continue;
     changed.push_back(Impl::kept(*static_cast<const HeldVersion*>(version)));
   }
-  return {std::move(changed), now};
+  return changed;
 }
 
 std::uint64_t Forest::structure_version() const {

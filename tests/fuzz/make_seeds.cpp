@@ -97,7 +97,9 @@ bool write_states(const std::filesystem::path& folder) {
     const auto store = opened(file);
     if (!store || !store->save(change)) return false;
     write(folder / "state", "log", state_of(1, file));
-    if (!store->save_configured({{"arm", "", {}}})) return false;
+    StateChange configuration{7};
+    configuration.configured = {{"arm", "", {}}};
+    if (!store->save(configuration)) return false;
   }
   write(folder / "state", "full", state_of(0, file));
   std::filesystem::remove(file);

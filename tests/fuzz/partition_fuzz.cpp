@@ -229,7 +229,7 @@ class World {
   }
 
   void publish() {
-    demand(store_.save(own_->partition.take_unsaved()).has_value(), "memory takes all");
+    demand(store_.save(testing::unsaved(own_->partition)).has_value(), "memory takes all");
     for (const Page& page : own_->partition.take_pages()) {
       hearer_.directory.apply(page);
       (void)all_.apply(page);

@@ -43,6 +43,7 @@ class Author : public std::enable_shared_from_this<Author> {
 
   [[nodiscard]] faults::Model& model() { return model_; }
   [[nodiscard]] Process& process() { return *process_; }
+  [[nodiscard]] const Surroundings& world() const { return process_->world(); }
   [[nodiscard]] const std::map<std::string, std::size_t>& outcomes() const { return outcomes_; }
 
   /// Forgets a partition that is not reachable.

@@ -20,17 +20,6 @@ Result<void> Disk::save(const StateChange& rows, Instant now) {
   return {};
 }
 
-void Disk::save_values(const std::vector<ChangedEdge>& edges,
-                       const std::vector<StoredJoint>& joints, Instant now) {
-  values_saved_ = now;
-  if (edges.empty() && joints.empty()) return;
-  put(now, [edges, joints](Disk& disk) { (void)disk.store_.save_values(edges, joints); });
-}
-
-void Disk::save_configured(const std::vector<FrameSpec>& frames, Instant now) {
-  put(now, [frames](Disk& disk) { (void)disk.store_.save_configured(frames); });
-}
-
 void Disk::checkpoint() {
   synced_ = store_;
   synced_epoch_ = epoch_;

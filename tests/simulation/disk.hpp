@@ -23,14 +23,9 @@ class Disk {
   [[nodiscard]] StoredState load() { return *store_.load(); }
   /// The epoch of the stored structure.
   [[nodiscard]] std::uint64_t epoch() const { return epoch_; }
-  /// When values that no request waits for were stored last.
-  [[nodiscard]] Instant values_saved() const { return values_saved_; }
 
   /// @return kState: it is full
   [[nodiscard]] Result<void> save(const StateChange& rows, Instant now);
-  void save_values(const std::vector<ChangedEdge>& edges, const std::vector<StoredJoint>& joints,
-                   Instant now);
-  void save_configured(const std::vector<FrameSpec>& frames, Instant now);
   /// All changes so far survive a power loss.
   void checkpoint();
 
@@ -49,7 +44,6 @@ class Disk {
   bool full_ = false;
   testing::MemoryStore store_;
   std::uint64_t epoch_ = 0;
-  Instant values_saved_{};
   // As of the last checkpoint.
   testing::MemoryStore synced_;
   std::uint64_t synced_epoch_ = 0;

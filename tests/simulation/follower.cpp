@@ -83,8 +83,8 @@ void Follower::restart() {
   written_ = {{bases_}};
   newest_read_ = 0;
   incarnation_ = 0;
-  may_go_back_ = stored_later_ = false;
-  mixed_below_ = 0;
+  may_go_back_ = false;
+  applied_ = stored_ = 0;
   begin(
       "add the arm",
       [this, base, id = arm()] {
@@ -138,6 +138,7 @@ void Follower::request(std::size_t value) {
       [this, value](const Result<void>& updated) {
         if (updated && !may_be_lost()) {
           written(value);
+          stored_ = applied_;
         } else if (!updated && denies(updated.error().code)) {
           watch_.reset();
         }
@@ -145,6 +146,7 @@ void Follower::request(std::size_t value) {
 }
 
 void Follower::written(std::size_t value) {
+  applied_ = value;
   for (std::size_t i = 0; i < value; ++i) written_[i].replaced = true;
 }
 
@@ -154,7 +156,6 @@ void Follower::stream(std::size_t value) {
   for (const Part& part : parts ? *parts : std::vector<Part>()) {
     process_->stream(part.partition, Update{std::get<UpdateRequest>(part.request.body).edges});
   }
-  stored_later_ = true;
   rest_ = process_->world().network.longest_delay();
   next();
 }
@@ -166,7 +167,6 @@ void Follower::write_here(std::size_t value) {
   if (node->forest().update(both(value))) {
     process_->world().trace(tip() + ": a node writes value " + std::to_string(value));
     process_->world().count("a node wrote a watched value");
-    stored_later_ = true;
     written(value);
   }
   next();
@@ -183,6 +183,7 @@ void Follower::moving_to(std::size_t base) {
 void Follower::move() {
   const std::size_t base = random_.index(owners_);
   moving_to(base);
+  forget_order_after_restart();
   begin(
       "move below " + base_of(base),
       [this, base, id = arm()] {
@@ -190,8 +191,12 @@ void Follower::move() {
                           MoveRequest{base_of(base), {}})
             .map([](Part part) { return std::vector<Part>{std::move(part)}; });
       },
-      [this, base](const Result<void>& moved) {
-        if (moved && !may_be_lost()) bases_ = {base};
+      [this, base, applied = applied_, incarnation = incarnation_](const Result<void>& moved) {
+        if (!moved || may_be_lost()) return;
+        bases_ = {base};
+        forget_order_after_restart();
+        // With the move, the same process has stored all values that it had.
+        if (incarnation_ == incarnation) stored_ = std::max(stored_, applied);
       });
 }
 
@@ -206,7 +211,7 @@ void Follower::look() {
 }
 
 // Values that were not stored yet are lost with their owner's process: the next process may have
-// older ones.
+// older ones, but none older than it has stored.
 void Follower::forget_order_after_restart() {
   const auto serving = process_->directory().serving(partition_);
   if (!serving || serving->incarnation == incarnation_) return;
@@ -219,22 +224,16 @@ void Follower::lost_power(const std::string& partition) {
   if (partition != partition_) return;
   lost_ = process_->world().timeline.now();
   bases_ = ever_;
+  stored_ = 0;
   may_be_older();
-}
-
-// A value that no request waited for is stored later, but that of a moved frame with the move.
-bool Follower::may_be_mixed(double first, double second) const {
-  const auto whole = [](double number) { return std::abs(number - std::round(number)) < 1e-9; };
-  return whole(first) && whole(second) && std::min(first, second) > -1e-9 &&
-         std::max(first, second) < static_cast<double>(mixed_below_) - 0.5;
 }
 
 void Follower::may_be_older() {
   may_go_back_ = true;
-  if (std::exchange(stored_later_, false)) mixed_below_ = written_.size();
-  for (Written& one : written_) {
-    one.replaced = false;
-    one.bases.insert(bases_.begin(), bases_.end());
+  applied_ = stored_;
+  for (std::size_t i = stored_; i < written_.size(); ++i) {
+    written_[i].replaced = false;
+    written_[i].bases.insert(bases_.begin(), bases_.end());
   }
 }
 
@@ -247,9 +246,6 @@ void Follower::judge(const StampedTransform& X) {
   const std::string what = tip() + " was seen at (" + std::to_string(at.x()) + ", " +
                            std::to_string(at.y()) + ", " + std::to_string(at.z()) + ")";
   const double value = at.y() - of_base.y();
-  if (may_be_mixed(value, value - (at.z() - of_base.z())) && std::abs(at.z() - of_base.z()) > 0.5) {
-    return world.count("a restart mixed two commits");
-  }
   if (std::abs(at.x() - of_base.x()) > 1e-9 || std::abs(at.z() - of_base.z()) > 1e-9) {
     return world.violation("half a commit", what + ", half of what was written");
   }
@@ -258,7 +254,7 @@ void Follower::judge(const StampedTransform& X) {
     return world.violation("a value that nobody wrote", what + ", which nobody has written");
   }
   // Values of the owner's former process may be shown until all pages of the next one have arrived.
-  if (number < newest_read_ && !std::exchange(may_go_back_, false)) {
+  if (number < newest_read_ && (number < stored_ || !std::exchange(may_go_back_, false))) {
     return world.violation("regress", what + ": value " + std::to_string(number) + " after " +
                                           std::to_string(newest_read_));
   }

@@ -68,7 +68,6 @@ class Follower : public std::enable_shared_from_this<Follower> {
              std::function<void(const Result<void>&)> then);
   void look();
   void judge(const StampedTransform& X);
-  [[nodiscard]] bool may_be_mixed(double first, double second) const;
   void forget_order_after_restart();
   void may_be_older();
   void moving_to(std::size_t base);
@@ -90,8 +89,8 @@ class Follower : public std::enable_shared_from_this<Follower> {
   std::size_t newest_read_ = 0;
   std::uint64_t incarnation_ = 0;  // of the owner
   bool may_go_back_ = false;       // once, since the owner was started again
-  bool stored_later_ = false;      // its process has values that no request waited for
-  std::size_t mixed_below_ = 0;    // the value from which on commits are whole again
+  std::size_t applied_ = 0;        // the newest value that the owner is known to have
+  std::size_t stored_ = 0;         // of these, the newest that it is known to have stored
   Instant began_{};                // of the current operation
   Instant rest_{};                 // before the next one
   Instant lost_{-1};               // when its owner last lost changes

@@ -146,6 +146,14 @@ bool Plan::may_lose_power() const {
          });
 }
 
+// One that replaces another has no state, and the other one continues with an older number.
+bool Plan::may_lack_state(std::size_t owner) const {
+  if (!stores_of(owner)) return true;
+  return owner + 1 == owners && std::any_of(faults.begin(), faults.end(), [](const Fault& fault) {
+           return fault.kind == FaultKind::kReplace && !fault.left_out;
+         });
+}
+
 Plan draw_plan(std::uint64_t seed) {
   Random random(seed);
   Plan plan;

@@ -84,6 +84,8 @@ struct Plan {
   [[nodiscard]] bool stores_of(std::size_t owner) const {
     return owner + 1 == owners ? wild_stores : stores;
   }
+  /// Whether a process of this owner may not have what its predecessor has stored.
+  [[nodiscard]] bool may_lack_state(std::size_t owner) const;
   [[nodiscard]] double weight(OperationKind kind) const {
     return weights.at(static_cast<std::size_t>(kind));
   }

@@ -11,13 +11,12 @@ namespace {
 
 constexpr Instant kMeeting = milliseconds(300);  // time of discovery
 constexpr Instant kSearchTime = milliseconds(1000);
-// As Attention and Peers do: a peer that is needed is asked for a sign of life at each look; all
-// others are heard by their announcements, and looked at rarely.
+// As Attention and Peers do: a peer that is needed is looked at often, and asked for a sign of
+// life; all others are heard by their announcements, and looked at rarely.
 constexpr Instant kLook = milliseconds(60);
 constexpr Instant kNeededFor = milliseconds(2000);
-constexpr Instant kNeededSilence = milliseconds(450);
-constexpr Instant kSilence = milliseconds(1875);
-constexpr Instant kAllNotice = kSilence + milliseconds(200);
+constexpr Patience kPatience{milliseconds(450), milliseconds(1875), milliseconds(1875),
+                             milliseconds(200)};
 constexpr std::uint64_t kLooksPerAnnouncement = 5;
 constexpr std::uint64_t kLooksPerRareLook = 3;
 constexpr Instant kLookForGone = milliseconds(50);
@@ -111,11 +110,11 @@ void Process::serve() {
                      partition() + " had stored epoch " + std::to_string(left->epoch) +
                          " and is served as " + std::to_string(member_.presence().incarnation));
   }
-  perform(member_.take_ready());
+  perform(take_ready());
   // A daemon that starts needs room on the disk, and ends if there is none.
   if (failure_) return leave();
-  if (setting_.disk != nullptr)
-    setting_.disk->save_configured(setting_.configured, world_.timeline.now());
+  // Its first change is synced.
+  if (setting_.disk != nullptr) setting_.disk->checkpoint();
   announce(member_.introduce());
   if (setting_.disk != nullptr) later("values", kSaveValuesEvery, [this] { save_values(); });
   react();
@@ -150,6 +149,10 @@ void Process::later(const char* kind, Instant wait, std::function<void()> what) 
 
 // ---- what it hears
 
+void Process::met(std::uint64_t peer) {
+  peers_.try_emplace(peer).first->second.heard.last = world_.timeline.steady();
+}
+
 void Process::tick() {
   look_for_silent();
   later("tick", kLook, [this] { tick(); });
@@ -160,43 +163,42 @@ void Process::look_for_silent() {
   const Instant late = std::max(Instant(0), now - std::exchange(looked_, now) - kLook);
   ++looks_;
   for (auto& [peer, known] : peers_) {
-    known.heard += late;
-    if (known.needed_since) *known.needed_since += late;
+    known.heard.pass_over(late);
     look_at(peer, known);
   }
 }
 
+void Process::show_life(Peer& known) {
+  known.heard.last = world_.timeline.steady();
+  if (!known.silent || !known.said) return;
+  known.silent = false;
+  member_.on_presence(*known.said, wall());
+  react();
+}
+
 void Process::look_at(std::uint64_t peer, Peer& known) {
-  const Instant now = world_.timeline.now();
-  const bool needed = known.used && now - *known.used < kNeededFor;
-  if (!needed) known.needed_since.reset();
-  if (needed && !known.needed_since) known.needed_since = now;
+  const bool needed = known.used && world_.timeline.now() - *known.used < kNeededFor;
+  known.heard.need(needed, world_.timeline.steady());
   const bool announces = (looks_ + peer) % kLooksPerAnnouncement == 0;
-  if ((needed || announces) && world_.network.shows_life(peer, *this)) {
-    known.heard = now;
-    if (known.silent && known.said) {
-      known.silent = false;
-      member_.on_presence(*known.said, wall());
-      react();
-    }
-    return;
-  }
+  if (announces && world_.network.shows_life(peer, *this)) return show_life(known);
   const Presence* said = known.known();
   if (said == nullptr || known.silent) return;
   if (!needed && looks_ % kLooksPerRareLook != 0) return;
-  const Instant since = std::max(known.heard, known.needed_since.value_or(known.heard));
-  if (now - since < (needed ? kNeededSilence : kSilence)) return;
+  const Silence silence = judge(known.heard, kPatience, world_.timeline.steady());
+  const bool asks = silence.kind == Silence::Kind::kAsk;
+  if (asks && world_.network.shows_life(peer, *this)) return show_life(known);
+  if (silence.kind != Silence::Kind::kLost) return;
   known.silent = true;
-  world_.count(needed ? "a loss was noticed by who needs it" : "a loss was noticed late");
-  member_.on_lost(said->partition, said->incarnation, wall(),
-                  std::max(Instant(0), kAllNotice - (now - known.heard)));
+  world_.count(known.heard.replied && needed ? "a loss was noticed by who needs it"
+                                             : "a loss was noticed late");
+  member_.on_lost(said->partition, said->incarnation, wall(), silence.early);
   react();
 }
 
 void Process::hear(std::uint64_t from, const Sample& sample) {
   Peer& peer = peers_[from];
   const bool was_silent = std::exchange(peer.silent, false);
-  peer.heard = world_.timeline.now();
+  peer.heard.last = world_.timeline.steady();
   if (const auto* page = std::get_if<Page>(&sample)) {
     world_.steps.mix(page->epoch + page->number);
     member_.on_page(*page);
@@ -210,6 +212,7 @@ void Process::hear(std::uint64_t from, const Sample& sample) {
     }
   } else {
     const auto& presence = std::get<Presence>(sample);
+    peer.heard.present = true;
     world_.steps.mix(presence.incarnation + presence.pages);
     if (was_silent || !peer.said || !(*peer.said == presence)) {
       peer.said = presence;
@@ -301,11 +304,12 @@ std::size_t Process::open_calls() const {
   return static_cast<std::size_t>(open) + waiting_.size();
 }
 
-std::vector<std::string> Process::structure() const {
+std::vector<std::string> Process::structure(const std::set<std::string>& except) const {
   std::vector<std::string> lines;
   for (const FrameInfo& frame : forest_.frames()) {
-    if (!directory_.reachable(frame.owner)) continue;
-    lines.push_back(frame.id + " < " + frame.parent + " @ " + directory_.name(frame.owner));
+    const std::string& owner = directory_.name(frame.owner);
+    if (!directory_.reachable(frame.owner) || except.count(owner) > 0) continue;
+    lines.push_back(frame.id + " < " + frame.parent + " @ " + owner);
   }
   std::sort(lines.begin(), lines.end());
   return lines;

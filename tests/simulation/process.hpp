@@ -20,6 +20,7 @@
 #include "simulation/pushes.hpp"
 #include "simulation/steps.hpp"
 #include "simulation/watch.hpp"
+#include "transport/silence.hpp"
 #include "tree/forest.hpp"
 
 namespace tfdude::simulation {
@@ -40,6 +41,8 @@ struct Surroundings {
   /// The process that serves a partition, for its Node; null: there is none, or it hangs.
   std::function<std::shared_ptr<Process>(const std::string& partition)> serving;
   std::set<std::string> forgotten;  ///< partitions that somebody has forgotten
+  /// By each of them, the partitions that have stored that.
+  std::map<std::string, std::set<std::string>> forgotten_by;
   Steps& steps;
   Invariants& invariants;
 };
@@ -77,7 +80,7 @@ class Process : public std::enable_shared_from_this<Process> {
   // ---- input from the network
   /// Runs now, or when the process is resumed.
   void run(std::function<void()> what);
-  void met(std::uint64_t peer) { peers_.try_emplace(peer); }
+  void met(std::uint64_t peer);
   void hear(std::uint64_t from, const Sample& sample);
   void on_request(std::uint64_t from, const Request& request);
   void on_reply(std::uint64_t from, const Reply& reply);
@@ -139,7 +142,8 @@ class Process : public std::enable_shared_from_this<Process> {
   [[nodiscard]] std::size_t open_calls() const;
   [[nodiscard]] std::vector<std::uint64_t> pushed_groups() const { return pushes_.groups(); }
   /// id, parent and partition of each frame whose owner is reachable; sorted.
-  [[nodiscard]] std::vector<std::string> structure() const;
+  /// @param except  partitions that are left out
+  [[nodiscard]] std::vector<std::string> structure(const std::set<std::string>& except) const;
 
  private:
   static constexpr Instant kPublishEvery = milliseconds(1);
@@ -148,9 +152,8 @@ class Process : public std::enable_shared_from_this<Process> {
   struct Peer {
     std::optional<Presence> said;
     std::optional<Presence> by_page;
-    Instant heard{};
-    std::optional<Instant> used{};          // something was sent to it
-    std::optional<Instant> needed_since{};  // it was used recently
+    Hearing heard{};
+    std::optional<Instant> used{};  // something was sent to it
     bool silent = false;
     [[nodiscard]] const Presence* known() const {
       const bool later = by_page && said && by_page->incarnation > said->incarnation;
@@ -167,11 +170,13 @@ class Process : public std::enable_shared_from_this<Process> {
   void tick();
   void look_for_silent();
   void look_at(std::uint64_t peer, Peer& known);
+  void show_life(Peer& known);
   void react();
   void count(const Outcome& outcome);
   void step_claim();
   void take_frames();
   void serve();
+  [[nodiscard]] Ready take_ready();
   void ask_commit(Instant wait);
   void commit();
   void perform(const Ready& ready);
@@ -196,7 +201,6 @@ class Process : public std::enable_shared_from_this<Process> {
   std::vector<std::function<void()>> backlog_;
   std::vector<std::function<void(const Result<void>&)>> waiting_;
   std::optional<Error> failure_;
-  std::uint64_t saved_commit_ = 0;
   std::uint32_t sequence_ = 0;
   Instant born_{};
   Instant looked_{};

@@ -28,11 +28,17 @@ void Process::ask_commit(Instant wait) {
   later("commit", wait, [this] { commit(); });
 }
 
+Ready Process::take_ready() {
+  Ready ready = member_.take_ready(std::exchange(values_due_, false) || failure_);
+  if (!ready.refused) member_.partition()->add_values(ready.rows);
+  return ready;
+}
+
 // Taken now, on the disk a moment later; a process that is killed meanwhile has stored it or not.
 void Process::commit() {
   commit_asked_ = false;
   const auto waiting = std::make_shared<decltype(waiting_)>(std::exchange(waiting_, {}));
-  const auto ready = std::make_shared<Ready>(member_.take_ready());
+  const auto ready = std::make_shared<Ready>(take_ready());
   const auto longest = static_cast<std::size_t>(world_.plan.disk.count());
   const Instant disk(setting_.disk != nullptr ? world_.random.index(longest + 1) : 0);
   later("disk", disk, [this, ready, waiting] {
@@ -40,7 +46,6 @@ void Process::commit() {
     const Result<void> stored = failure_ ? tl::unexpected(*failure_) : Result<void>();
     for (const auto& then : *waiting) then(stored);
     committing_ = false;
-    if (std::exchange(values_due_, false)) save_values();
     if (commit_asked_ || failure_) ask_commit(failure_ ? kRetryStoring : kPublishEvery);
   });
 }
@@ -53,6 +58,12 @@ void Process::perform(const Ready& ready) {
     stored = setting_.disk->save(ready.rows, world_.timeline.now());
     if (world_.random.index(kCheckpointEvery) == 0) setting_.disk->checkpoint();
     failure_ = stored ? std::nullopt : std::optional<Error>(stored.error());
+  }
+  if (stored && ready.rows.absent) {
+    for (const Absent& one : *ready.rows.absent) {
+      if (one.kind != Absent::Kind::kForgotten) continue;
+      world_.forgotten_by[one.partition].insert(partition());
+    }
   }
   if (stored || ready.refused) {
     const auto said = member_.stored(ready);
@@ -74,20 +85,10 @@ void Process::perform(const Ready& ready) {
   react();
 }
 
-// One thread does both.
 void Process::save_values() {
-  if (committing_) {
-    values_due_ = true;
-    return;
-  }
+  values_due_ = true;
+  ask_commit(Instant(0));
   later("values", kSaveValuesEvery, [this] { save_values(); });
-  if (setting_.disk->full()) return;
-  auto [edges, commit] = forest_.changed_since(saved_commit_);
-  saved_commit_ = commit;
-  edges = member_.storable(std::move(edges));
-  const auto joints =
-      edges.empty() ? std::vector<StoredJoint>() : member_.partition()->take_changed_joints();
-  setting_.disk->save_values(edges, joints, world_.timeline.now());
 }
 
 void Process::announce(const std::optional<Presence>& presence) {

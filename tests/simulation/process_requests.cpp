@@ -32,6 +32,10 @@ void Process::reply_to(std::uint64_t peer, const Reply& reply) {
 
 void Process::on_reply(std::uint64_t from, const Reply& reply) {
   world_.steps.mix(reply.epoch + reply.sequence);
+  if (const auto peer = peers_.find(from); peer != peers_.end()) {
+    peer->second.heard.replied = true;
+    show_life(peer->second);
+  }
   const auto operations = operations_;
   for (const auto& one : operations) one->on_reply(from, reply);
   for (const auto& one : watches_) {

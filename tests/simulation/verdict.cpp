@@ -52,11 +52,10 @@ void Verdict::check() {
   }
   std::vector<Author*> authors;
   for (const auto& author : cast_.authors) {
-    Process& client = author->process();
-    if (!passes_over_one(client) && !lacks_one(client)) authors.push_back(author.get());
+    if (hears_all(author->process())) authors.push_back(author.get());
   }
   for (Author* author : authors) all.push_back(&author->process());
-  const auto expected = all.back()->structure();
+  const auto expected = all.back()->structure(cannot_return());
   for (Process* one : all) check_replica(*one, expected);
   for (Process* one : all) {
     for (const std::string& partition : forgotten()) check_forgotten(*one, partition);
@@ -69,8 +68,11 @@ void Verdict::check() {
   for (const auto& follower : cast_.followers) check_follower(*follower);
   check_samplers();
   await_calls();
-  for (const auto& follower : cast_.followers) all.push_back(&follower->process());
-  for (const auto& sampler : cast_.samplers) all.push_back(&sampler->process());
+  const auto add = [&](const auto& actor) {
+    if (hears_all(actor->process())) all.push_back(&actor->process());
+  };
+  for (const auto& follower : cast_.followers) add(follower);
+  for (const auto& sampler : cast_.samplers) add(sampler);
   for (Process* one : all) check_kept(*one);
 }
 
@@ -133,9 +135,25 @@ void Verdict::check_kept_by_owner(Process& owner) {
 bool Verdict::lacks_one(Process& client) const {
   const std::string* lacked = client.directory().incomplete();
   if (lacked == nullptr) return false;
-  if (client.world().forgotten.count(*lacked) > 0) return true;
+  if (client.world().forgotten.count(*lacked) > 0) return !is_told_by_one(*lacked);
   for (std::size_t i = 0; i < plan_.owners; ++i) {
-    if (cast_.name_of_daemon(i) == *lacked) return !plan_.stores_of(i);
+    if (cast_.name_of_daemon(i) == *lacked) return plan_.may_lack_state(i);
+  }
+  return false;
+}
+
+// Whether some daemon must have told a partition that it was forgotten: this is in its file. Then
+// the partition has continued as a later process, whose pages all get.
+bool Verdict::is_told_by_one(const std::string& partition) const {
+  if (cast_.standing(partition) != Cast::Standing::kCore) return false;
+  const Author& author = *cast_.authors.front();
+  const auto& by = author.world().forgotten_by;
+  const auto who = by.find(partition);
+  for (std::size_t i = 0; who != by.end() && i < plan_.owners; ++i) {
+    const std::string name = cast_.name_of_daemon(i);
+    const bool keeps = !plan_.may_lack_state(i) && !author.has_lost_power(name);
+    const bool core = cast_.standings[i] == Cast::Standing::kCore;
+    if (core && keeps && who->second.count(name) > 0) return true;
   }
   return false;
 }
@@ -145,9 +163,8 @@ void Verdict::check_replica(Process& one, const std::vector<std::string>& expect
   if (!one.partition().empty() && !one.serves()) {
     violation("a daemon does not serve", who);
   }
-  if (one.structure() != expected) {
-    violation("replicas differ", who + " sees " + difference(one.structure(), expected));
-  }
+  const auto seen = one.structure(cannot_return());
+  if (seen != expected) violation("replicas differ", who + " sees " + difference(seen, expected));
   if (!one.member().pending_yields().empty()) violation("a yield is pending", who);
   for (const auto& daemon : cast_.daemons) {
     if (!daemon || daemon.get() == &one) continue;
@@ -161,6 +178,18 @@ void Verdict::check_replica(Process& one, const std::vector<std::string>& expect
                 who + (partition.reachable ? " still hears " : " misses ") + partition.name);
     }
   }
+}
+
+// With a full disk a partition cannot continue as a later process: those that have forgotten it do
+// not hear it, the others do.
+std::set<std::string> Verdict::cannot_return() const {
+  std::set<std::string> names;
+  for (const Fault& fault : plan_.lasting) {
+    if (fault.kind != FaultKind::kFillDisk || fault.left_out) continue;
+    const std::string name = cast_.name_of_daemon(fault.target);
+    if (cast_.authors.front()->world().forgotten.count(name) > 0) names.insert(name);
+  }
+  return names;
 }
 
 // Those that were forgotten after their last process was heard.
@@ -191,11 +220,15 @@ void Verdict::check_forgotten(Process& one, const std::string& partition) {
 // that has met that one: a client cannot tell it, and no daemon may be left that could.
 bool Verdict::passes_over_one(Process& client) const {
   for (std::size_t i = 0; i < plan_.owners; ++i) {
-    if (plan_.stores_of(i) || !cast_.daemons[i]) continue;
+    if (!plan_.may_lack_state(i) || !cast_.daemons[i]) continue;
     const std::uint64_t met = client.directory().latest_incarnation(cast_.daemons[i]->partition());
     if (met > cast_.daemons[i]->member().presence().incarnation) return true;
   }
   return false;
+}
+
+bool Verdict::hears_all(Process& client) const {
+  return !passes_over_one(client) && !lacks_one(client);
 }
 
 Process* Verdict::find_core(const std::string& partition) const {
@@ -207,8 +240,8 @@ Process* Verdict::find_core(const std::string& partition) const {
 void Verdict::check_follower(Follower& follower) {
   Process* const owner = find_core(follower.partition());
   const auto arm = owner ? owner->forest().info(follower.arm()) : std::nullopt;
-  if (!follower.watches() || !arm) return;
   Process& process = follower.process();
+  if (!follower.watches() || !arm || !hears_all(process)) return;
   const auto base = process.forest().info(arm->parent);
   Process* const below = base ? find_core(process.directory().name(base->owner)) : nullptr;
   if (below == nullptr || base->parent != "world") return;
@@ -230,7 +263,7 @@ void Verdict::check_samplers() {
     Process* const owner = find_core(sampler->partition());
     const auto frame = owner ? owner->forest().info(sampler->frame()) : std::nullopt;
     const auto base = frame ? sampler->process().forest().info(frame->parent) : std::nullopt;
-    if (!base || passes_over_one(sampler->process()) || lacks_one(sampler->process())) continue;
+    if (!base || !hears_all(sampler->process())) continue;
     sampler->look_back();
     calls_.count("sampled edges checked", 1);
   }

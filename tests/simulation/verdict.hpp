@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,8 +34,11 @@ class Verdict {
  private:
   void violation(const std::string& kind, const std::string& what);
   [[nodiscard]] std::vector<std::string> forgotten() const;
+  [[nodiscard]] std::set<std::string> cannot_return() const;
   [[nodiscard]] bool passes_over_one(Process& client) const;
   [[nodiscard]] bool lacks_one(Process& client) const;
+  [[nodiscard]] bool is_told_by_one(const std::string& partition) const;
+  [[nodiscard]] bool hears_all(Process& client) const;
   void check_replica(Process& one, const std::vector<std::string>& expected);
   /// Null: no daemon serves it, or it has a lasting fault.
   [[nodiscard]] Process* find_core(const std::string& partition) const;

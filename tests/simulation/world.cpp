@@ -37,6 +37,7 @@ class World {
                       },
                       [this](const std::string& partition) { return serving(partition); },
                       {},
+                      {},
                       run_.steps,
                       invariants_},
         cast_(plan),

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "partition/partition.hpp"
 #include "partition/state_store.hpp"
 
 namespace tfdude::testing {
@@ -30,21 +31,13 @@ class MemoryStore final : public StateStore {
     for (const StoredFrame& frame : change.frames) frames_[frame.id] = frame;
     for (const Tombstone& tombstone : change.tombstones) tombstones_[tombstone.id] = tombstone;
     for (const StoredJoint& joint : change.joints) joints_[joint.name] = joint;
-    return {};
-  }
-  Result<void> save_values(const std::vector<ChangedEdge>& edges,
-                           const std::vector<StoredJoint>& joints) override {
-    for (const StoredJoint& joint : joints) joints_[joint.name] = joint;
-    for (const ChangedEdge& edge : edges) {
+    if (change.configured) configured_ = *change.configured;
+    for (const ChangedEdge& edge : change.values) {
       const auto there = frames_.find(edge.id);
       if (there == frames_.end()) continue;
       there->second.X_PC = edge.X_PC;
       there->second.correlation = edge.correlation;
     }
-    return {};
-  }
-  Result<void> save_configured(const std::vector<FrameSpec>& frames) override {
-    configured_ = frames;
     return {};
   }
 
@@ -56,5 +49,13 @@ class MemoryStore final : public StateStore {
   std::vector<Absent> absent_;
   std::vector<FrameSpec> configured_;
 };
+
+/// All that a partition must save, with its values.
+/// @param values_due  as of Partition::take_unsaved()
+[[nodiscard]] inline StateChange unsaved(Partition& partition, bool values_due = false) {
+  StateChange change = partition.take_unsaved(values_due);
+  partition.add_values(change);
+  return change;
+}
 
 }  // namespace tfdude::testing

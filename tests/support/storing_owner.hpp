@@ -24,14 +24,13 @@ struct StoringOwner : Replica {
   template <class Body>
   std::string ask(const std::string& id, Body body, Time now = kNow) {
     const Reply reply = partition.answer(Request{0, id, std::move(body)}, now);
-    if (store != nullptr) REQUIRE(store->save(partition.take_unsaved()));
+    if (store != nullptr) REQUIRE(store->save(unsaved(partition)));
     const auto* error = std::get_if<Error>(&reply.body);
     return error == nullptr ? "ok" : error->message;
   }
   void start(const std::vector<FrameSpec>& configured = {}) {
     REQUIRE(partition.restore(*store->load(), configured, kNow));
-    REQUIRE(store->save(partition.take_unsaved()));
-    REQUIRE(store->save_configured(configured));
+    REQUIRE(store->save(unsaved(partition)));
   }
   bool yield() { return partition.yield(partition.pending_yields(), kNow); }
   std::vector<std::string> conflicts() {

@@ -46,8 +46,8 @@ struct Options {
   /// false, a power failure may lose the last acknowledged changes; the end of the process loses
   /// none.
   bool sync = false;
-  /// Minimum interval at which values that were streamed, or set by the Node's own process, are
-  /// stored.
+  /// Values that were streamed, or set by the Node's own process, are stored with the next other
+  /// change, or at this interval.
   Milliseconds save_every{1000};
   /// Default timing and history of a Node's edges, for frames without their own.
   EdgeTiming history{};

@@ -113,7 +113,7 @@ void FastDdsTransport::take_times(edds::DomainParticipantQos& qos) {
   const auto lease = nanoseconds_of(discovery.leaseDuration);
   const auto every = nanoseconds_of(discovery.leaseDuration_announcementperiod);
   announced_by_dds_ = options_.discovery_server.empty() && DiscoveryGate::hears_announcements(qos);
-  Peers::Patience patience{lease, kSilenceOfRepetition, {}, Attention::kRarely};
+  Patience patience{lease, kSilenceOfRepetition, {}, Attention::kRarely};
   if (announced_by_dds_) patience.others = every * kMissed + every / 4;
   if (!options_.discovery_server.empty()) patience.first = kFirstSilenceByServer;
   peers_.configure(patience, !options_.partition.empty());

@@ -44,7 +44,7 @@ Peers::Server& Peers::follow(const PeerId& peer) {
 }
 
 void Peers::hear(Server& server, Clock::time_point at) {
-  server.last_heard = at;
+  server.heard.last = at;
   if (std::exchange(server.silent, false) && server.presence) there_(*server.presence);
 }
 
@@ -93,7 +93,8 @@ void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence,
   const Lock lock(mutex_);
   Server& server = follow(peer_of(prefix));
   server.peers = peers;
-  server.last_heard = Clock::now();
+  server.heard.last = Clock::now();
+  server.heard.present = true;
   if (!std::exchange(server.silent, false) && server.presence == presence) return;
   server.presence = presence;
   there_(presence);
@@ -103,7 +104,7 @@ void Peers::replied(const ertps::GuidPrefix_t& prefix) {
   const Lock lock(mutex_);
   const auto known = servers_.find(peer_of(prefix));
   if (known == servers_.end()) return;
-  known->second.replies = true;
+  known->second.heard.replied = true;
   hear(known->second, Clock::now());
 }
 
@@ -114,28 +115,19 @@ std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::du
   const auto late =
       std::max(now - std::exchange(last_look_, now) - planned, Clock::duration::zero());
   for (auto& [id, server] : servers_) {
-    server.last_heard += late;
-    if (const auto sign = life_signs_->last(id); sign && *sign > server.last_heard) {
+    server.heard.pass_over(late);
+    if (const auto sign = life_signs_->last(id); sign && *sign > server.heard.last) {
       hear(server, *sign);
     }
     const Presence* said = server.said();
     if (said == nullptr) continue;
-    const bool is_needed = needed.count(said->partition) != 0;
-    if (!is_needed) {
-      server.needed_since.reset();
-    } else {
-      server.needed_since = server.needed_since ? *server.needed_since + late : now;
-    }
+    server.heard.need(needed.count(said->partition) != 0, now);
     if (server.silent) continue;
-    const auto quiet =
-        now - std::max(server.last_heard, server.needed_since.value_or(Clock::time_point::min()));
-    if (quiet >= patience(server)) {
-      server.silent = true;
-      const auto early = patience_.others + patience_.look_every - (now - server.last_heard);
-      gone_(*said, std::max<std::chrono::nanoseconds>(early, {}));
-    } else if (is_needed && quiet >= kProbeAfter) {
-      unheard.push_back(said->partition);
-    }
+    const Silence silence = judge(server.heard, patience_, now);
+    if (silence.kind == Silence::Kind::kAsk) unheard.push_back(said->partition);
+    if (silence.kind != Silence::Kind::kLost) continue;
+    server.silent = true;
+    gone_(*said, silence.early);
   }
   return unheard;
 }

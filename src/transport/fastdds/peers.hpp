@@ -19,6 +19,7 @@
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/life_signs.hpp"
 #include "transport/port.hpp"
+#include "transport/silence.hpp"
 
 namespace tfdude::fastdds {
 
@@ -50,24 +51,12 @@ class Peers {
   /// The same if all servers hear exactly those that were discovered here.
   static constexpr std::chrono::milliseconds kAgreedQuiet{40};
 
-  /// A server that is needed and was not heard for this long is asked for a sign of life.
-  static constexpr std::chrono::milliseconds kProbeAfter{100};
-
   /// @param there  a peer announced what it serves, or is heard again
   /// @param gone   a peer that had announced this, or sent a page, has left or is silent; if it
   ///               sent only pages, the presence contains what these say of it. `early`: by how
   ///               much later those may notice it that do not need it
   Peers(std::shared_ptr<LifeSigns> life_signs, Tell there, TellGone gone)
       : life_signs_(std::move(life_signs)), there_(std::move(there)), gone_(std::move(gone)) {}
-
-  /// How long a server may be silent before it counts as lost.
-  struct Patience {
-    std::chrono::nanoseconds needed;  ///< one that is needed, and has replied before
-    std::chrono::nanoseconds others;  ///< any other; before its first reply, DDS may be matching it
-    std::chrono::nanoseconds first;   ///< one whose presence has not come yet
-    /// How often participants look at the latest.
-    std::chrono::nanoseconds look_every;
-  };
 
   /// Call before anybody is discovered.
   /// @param is_server  the others count this participant, too
@@ -122,9 +111,7 @@ class Peers {
     std::optional<Presence> presence;
     std::optional<Presence> by_page;  // from its pages, until a presence as new arrives
     std::size_t peers = 0;
-    Clock::time_point last_heard = Clock::now();
-    std::optional<Clock::time_point> needed_since;
-    bool replies = false;
+    Hearing heard{Clock::now()};
     bool silent = false;
 
     [[nodiscard]] const Presence* said() const {
@@ -133,12 +120,6 @@ class Peers {
       return by_page ? &*by_page : nullptr;
     }
   };
-
-  /// How long this one may be silent.
-  [[nodiscard]] std::chrono::nanoseconds patience(const Server& server) const {
-    if (server.needed_since && server.replies) return patience_.needed;
-    return server.presence ? patience_.others : patience_.first;
-  }
 
   Server& follow(const PeerId& peer) TFDUDE_REQUIRES(mutex_);
   void hear(Server& server, Clock::time_point at) TFDUDE_REQUIRES(mutex_);

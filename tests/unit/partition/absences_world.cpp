@@ -244,7 +244,7 @@ void AbsencesWorld::publish(std::size_t who) {
   for (const Change& one : owner.replica.directory.changes().take()) {
     counts_.conflicts += one.kind == ChangeKind::kConflict ? 1 : 0;
   }
-  REQUIRE(stores_[who].save(owner.partition.take_unsaved()));
+  REQUIRE(stores_[who].save(testing::unsaved(owner.partition)));
   const auto pages = owner.partition.take_pages();
   for (const Page& page : pages) owner.published[page.number] = page;
   Presence presence = owner.presence;

@@ -108,7 +108,7 @@ class World {
     for (const Change& one : owner.replica.directory.changes().take()) {
       conflicts_ += one.kind == ChangeKind::kConflict ? 1 : 0;
     }
-    REQUIRE(stores_[who].save(owner.partition.take_unsaved()));
+    REQUIRE(stores_[who].save(testing::unsaved(owner.partition)));
     const auto pages = owner.partition.take_pages();
     for (const Page& page : pages) owner.published[page.number] = page;
     owner.presence.pages = owner.partition.page_count();

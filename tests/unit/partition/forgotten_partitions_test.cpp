@@ -85,6 +85,23 @@ TEST_CASE("a partition that is forgotten while it seems reachable is removed whe
   CHECK(base.forest.exists("hand") == lives_again);
 }
 
+TEST_CASE("an owner that restarts tells a returning partition that it was forgotten") {
+  // It has met the partition before it reads what its predecessor has stored.
+  Witness base;
+  base.directory.restore({{"arm", 0, Kind::kForgotten, 1}});
+  const auto told = [&] { return !base.directory.absent().empty(); };
+  CHECK(told());
+  CHECK(base.owner_of("hand") == "arm");
+  // As long as it may not have heard that.
+  base.hear("arm", 1, 10, {{"head", 0, Kind::kLost, 1}});
+  CHECK(told());
+  base.hear("arm", 2, 10);
+  CHECK_FALSE(told());
+  // Not of a later process.
+  base.directory.restore({{"arm", 0, Kind::kForgotten, 1}});
+  CHECK_FALSE(told());
+}
+
 TEST_CASE("a reachable partition cannot be forgotten") {
   Witness base;
   const auto refused = base.directory.forget("arm", 1, kNow);

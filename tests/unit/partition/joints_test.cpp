@@ -250,13 +250,10 @@ TEST_CASE("a partition restores the positions of its joints") {
   {
     Arm arm;
     REQUIRE(arm.partition.restore(*store.load(), arm.frames(), kNow));
-    (void)arm.partition.take_changed_joints();
+    REQUIRE(store.save(testing::unsaved(arm.partition, true)));
     REQUIRE(arm.partition.apply(JointUpdate{{{"shoulder", 0.5, 1e-4}, {"elbow", 0.75, 0.04}}, {}}));
-    REQUIRE(store.save(arm.partition.take_unsaved()));
-    const auto [edges, commit] = arm.forest.changed_since(0);
-    REQUIRE(store.save_values(edges, arm.partition.take_changed_joints()));
-    CHECK(arm.partition.take_changed_joints().empty());
-    REQUIRE(store.save_configured(arm.frames()));
+    REQUIRE(store.save(testing::unsaved(arm.partition, true)));
+    CHECK(arm.partition.take_unsaved(true).joints.empty());
   }
   Arm arm;
   SECTION("with the same description") {
@@ -320,7 +317,7 @@ TEST_CASE("a partition restores the positions of its joints") {
     CHECK(arm.info("shoulder").position == 0.5);
     // Its first sample is stored with the new type.
     REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.125, 1e-4}}, {}}));
-    REQUIRE(store.save_values({}, arm.partition.take_changed_joints()));
+    REQUIRE(store.save(testing::unsaved(arm.partition, true)));
     Arm next;
     REQUIRE(next.partition.restore(*store.load(), frames, kNow));
     CHECK(next.info("elbow").position == 0.125);

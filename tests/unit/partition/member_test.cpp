@@ -8,12 +8,16 @@
 #include "partition/claiming.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "support/memory_store.hpp"
+#include "support/pose_diff.hpp"
 #include "support/replica.hpp"
+#include "tree/epoch.hpp"
 
 namespace tfdude {
 namespace {
 
 using testing::along_x;
+using testing::pose_diff;
 using testing::presence_of;
 using testing::Replica;
 
@@ -128,17 +132,65 @@ TEST_CASE("member: it serves under a later incarnation than its claim whatever t
   CHECK(member.introduce().incarnation > claimed);
 }
 
-TEST_CASE("member: a value is not stored before the move of its frame") {
+TEST_CASE("member: all values are stored together with any row") {
   Serving arms;
+  testing::MemoryStore store;
+  const auto save = [&](const Ready& taken) {
+    Ready ready = taken;
+    arms.member.partition()->add_values(ready.rows);
+    REQUIRE(store.save(ready.rows));
+    (void)arms.member.stored(ready);
+  };
   CHECK_FALSE(arms.ask(1, "hand", AddRequest{"arm", along_x(1)}));
   CHECK_FALSE(arms.ask(2, "foot", AddRequest{"", along_x(1)}));
-  (void)arms.member.stored(arms.member.take_ready());
-  CHECK_FALSE(arms.ask(3, "hand", MoveRequest{"foot", along_x(2)}));
-  const auto storable = arms.member.storable({{"arm", along_x(3)}, {"hand", along_x(2)}});
-  REQUIRE(storable.size() == 1);
-  CHECK(storable.front().id == "arm");
-  (void)arms.member.stored(arms.member.take_ready());
-  CHECK(arms.member.storable({{"hand", along_x(2)}}).size() == 1);
+  save(arms.member.take_ready());
+  // Nothing waits for these two values, which one commit writes.
+  REQUIRE(arms.forest.update({{"hand", along_x(2)}, {"foot", along_x(2)}}));
+  CHECK(arms.member.take_ready().rows.empty());
+  SECTION("a frame moves") { CHECK_FALSE(arms.ask(3, "hand", MoveRequest{"foot", {}})); }
+  SECTION("a request writes another value") {
+    CHECK_FALSE(arms.ask(3, "arm", UpdateRequest{{{"arm", along_x(2)}}}));
+  }
+  SECTION("a change could not be stored before") {
+    CHECK_FALSE(arms.ask(3, "leg", AddRequest{"", along_x(1)}));
+    (void)arms.member.not_stored(arms.member.take_ready());
+  }
+  const epoch::Guard guard;
+  const Ready ready = arms.member.take_ready();
+  // Later ones are stored later.
+  REQUIRE(arms.forest.update({{"hand", along_x(3)}, {"foot", along_x(3)}}));
+  save(ready);
+  const auto check_stored = [&](double x) {
+    const auto state = store.load();
+    for (const StoredFrame& frame : state->frames) {
+      if (frame.id != "hand" && frame.id != "foot") continue;
+      INFO(frame.id);
+      CHECK(pose_diff(frame.X_PC.pose, along_x(x).pose, 1e-15) == "");
+    }
+  };
+  check_stored(2);
+  save(arms.member.take_ready(true));
+  check_stored(3);
+}
+
+TEST_CASE("member: an incarnation that could not be stored is not announced") {
+  Serving arms;
+  const std::uint64_t own = arms.member.presence().incarnation;
+  arms.member.on_presence(presence_of("base", 1, 0), kNow);
+  Presence head = presence_of("head", 1, 0);
+  head.absent = {{"arms", 1, Absent::Kind::kForgotten, own}};
+  arms.member.on_presence(head, kNow);
+  CHECK(arms.member.take_outcome().overtook);
+  arms.member.on_lost("base", 1, kNow);
+  // But whom it misses is.
+  const auto said = arms.member.not_stored(arms.member.take_ready());
+  REQUIRE(said);
+  CHECK(said->absent.size() == 1);
+  CHECK(said->incarnation == own);
+  const Ready again = arms.member.take_ready();
+  const auto later = arms.member.stored(again);
+  REQUIRE(later);
+  CHECK(later->incarnation > own);
 }
 
 TEST_CASE("member: it gives up its partition when a later process of it appears") {

@@ -31,15 +31,14 @@ struct Life : Replica {
     const auto state = store.load();
     changes = configured_changes(*state, configured);
     REQUIRE(partition.restore(*state, configured, kNow));
-    REQUIRE(store.save(partition.take_unsaved()));
-    if (!configured.empty()) REQUIRE(store.save_configured(configured));
+    REQUIRE(store.save(testing::unsaved(partition)));
   }
 
   template <class Body>
   void ask(const std::string& id, Body body) {
     const Reply reply = partition.answer(Request{0, id, std::move(body)}, kNow);
     REQUIRE(std::holds_alternative<Done>(reply.body));
-    REQUIRE(store.save(partition.take_unsaved()));
+    REQUIRE(store.save(testing::unsaved(partition)));
   }
   Lines described() const {
     Lines lines;

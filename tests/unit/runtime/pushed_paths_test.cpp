@@ -113,7 +113,7 @@ TEST_CASE("pushing: a watcher gets all values in the reply and later ones pushed
   owner.member.with_rules([](Member& member) { member.claim("here", 1, Time(1s), 1); });
   owner.member.open(nullptr, 1s);
   REQUIRE(owner.member.serve(nullptr, kArm));
-  REQUIRE(owner.member.publish_all(kArm));
+  REQUIRE(owner.member.publish_all());
 
   const Reply reply = pushing.answer(watch_hand());
   const auto* values = std::get_if<PushedValues>(&reply.body);

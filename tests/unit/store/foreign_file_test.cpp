@@ -90,7 +90,7 @@ TEST_CASE("a file of format 1 is read and updated by the first write") {
   {
     const auto store = open_sqlite_store(file, "arms");
     REQUIRE(store);
-    REQUIRE((*store)->save_values({}, {{"elbow", 0.5, 0}}));
+    REQUIRE((*store)->save({1, {}, {}, {}, {{"elbow", 0.5, 0}}}));
   }
   const auto store = open_sqlite_store(file, "arms");
   REQUIRE(store);
@@ -109,7 +109,7 @@ TEST_CASE("a file of format 2 is read and updated by the first write") {
     const auto store = open_sqlite_store(file, "arms");
     REQUIRE(store);
     REQUIRE((*store)->load());
-    REQUIRE((*store)->save_values({{"hand", {}, unknown}}, {}));
+    REQUIRE((*store)->save({1, {}, {}, {}, {}, {}, {{"hand", {}, unknown}}}));
   }
   const auto store = open_sqlite_store(file, "arms");
   REQUIRE(store);

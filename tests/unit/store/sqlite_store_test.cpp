@@ -77,10 +77,15 @@ TEST_CASE("a saved state is restored to the last bit by the next process") {
     CHECK(store->load()->frames.empty());
     CHECK(outcome(store->save({3, {"hand", "lamp"}, {hand}, {gone}})) == "ok");
     CHECK(outcome(store->save({4, {tool.id, "eye"}, {tool}, {lost}, {{"wrist", 1, 1}}})) == "ok");
-    CHECK(outcome(store->save_values(
-              {{"hand", later}, {"nobody", later}},
-              {{"elbow", 0.5, 1e-4, JointType::kPrismatic}, {"wrist", 3, 0}})) == "ok");
-    CHECK(outcome(store->save_configured({{"hand", "arm", hand.X_PC}})) == "ok");
+    CHECK(outcome(store->save({4,
+                               {},
+                               {},
+                               {},
+                               {{"elbow", 0.5, 1e-4, JointType::kPrismatic}, {"wrist", 3, 0}},
+                               {},
+                               {{"hand", later}, {"nobody", later}},
+                               {},
+                               {{{"hand", "arm", hand.X_PC}}}})) == "ok");
   }
   const auto state = opened(file)->load();
   REQUIRE(state);
@@ -153,9 +158,15 @@ TEST_CASE("correlations are stored and removed with the values of their edges") 
                           {"c", "", X, 1, {most, most}},
                           {"d", "", X, 1, {supply, seen}}},
                          {}}));
-    REQUIRE(
-        store->save_values({{"a", X, {supply, seen}}, {"d", X}, {"nobody", X, {supply, {}}}}, {}));
-    REQUIRE(store->save_configured({{"a", "", X, {}, supply}, {"b", "", X}}));
+    REQUIRE(store->save({1,
+                         {},
+                         {},
+                         {},
+                         {},
+                         {},
+                         {{"a", X, {supply, seen}}, {"d", X}, {"nobody", X, {supply, {}}}},
+                         {},
+                         {{{"a", "", X, {}, supply}, {"b", "", X}}}}));
   }
   {
     const auto store = opened(file);
@@ -326,16 +337,16 @@ TEST_CASE("a file that cannot be updated to the current format stays unchanged u
   const auto store = opened(file);
   REQUIRE(store->load());
   disk.fill();
-  const auto full = store->save_values({}, {{"elbow", 0.5, 0}});
+  const auto full = store->save({1, {}, {}, {}, {{"elbow", 0.5, 0}}});
   REQUIRE_FALSE(full);
   CHECK_THAT(full.error().message,
              ContainsSubstring("cannot be written: database or disk is full"));
   // No transaction was left open: the next attempt begins one.
-  const auto again = store->save_values({}, {{"elbow", 0.5, 0}});
+  const auto again = store->save({1, {}, {}, {}, {{"elbow", 0.5, 0}}});
   REQUIRE_FALSE(again);
   CHECK_THAT(again.error().message, ContainsSubstring("disk is full"));
   disk.make_room();
-  CHECK(outcome(store->save_values({}, {{"elbow", 0.5, 0}})) == "ok");
+  CHECK(outcome(store->save({1, {}, {}, {}, {{"elbow", 0.5, 0}}})) == "ok");
   CHECK(store->load()->joints.size() == 1);
   CHECK(store->load()->frames.size() == 1);
 }

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kRarely{200};
 constexpr std::chrono::seconds kMinute{60};
-const Peers::Patience kPatient{kMinute, kMinute, kMinute, kRarely};
+const Patience kPatient{kMinute, kMinute, kMinute, kRarely};
 
 ertps::GuidPrefix_t prefix_of(unsigned char number) {
   ertps::GuidPrefix_t prefix;
