@@ -196,10 +196,15 @@ Result<PushedValues> WatchedGroup::composed(const Forest& forest, std::optional<
   return pushed;
 }
 
+bool WatchedGroup::begins(const PushedValue& entry) const {
+  const auto& sent = sent_[entry.index];
+  return !sent || entry.history != sent->history;
+}
+
 bool WatchedGroup::is_new(const PushedValue& entry) const {
   const auto& sent = sent_[entry.index];
-  return !sent || entry.history != sent->history || entry.stamp != sent->stamp ||
-         !(entry.correlation == sent->correlation) || !same(entry.X, sent->X);
+  return begins(entry) || entry.stamp != sent->stamp || !(entry.correlation == sent->correlation) ||
+         !same(entry.X, sent->X);
 }
 
 PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
@@ -210,20 +215,19 @@ PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
   const auto all =
       forest.segments_since(request_.segments, seen, kMaxItems / request_.segments.size());
   if (!all) return pushed;
-  pushed.commit = all->back().commit;
-  for (const SegmentValues& found : *all) {
-    for (PushedValue& entry : entries_of(found)) {
-      auto& sent = sent_[entry.index];
-      if (&found != &all->back()) {
-        if (sent && entry.history == sent->history) pushed.entries.push_back(std::move(entry));
-        continue;
-      }
-      if (!is_new(entry)) continue;
-      const bool begins = !sent || entry.history != sent->history;
-      sent = entry;
-      if (begins) entry.process_noise = Covariance();
-      pushed.entries.push_back(std::move(entry));
+  const SegmentValues& newest = all->back();
+  pushed.commit = newest.commit;
+  for (auto earlier = all->begin(); earlier + 1 != all->end(); ++earlier) {
+    for (PushedValue& entry : entries_of(*earlier)) {
+      if (!begins(entry)) pushed.entries.push_back(std::move(entry));
     }
+  }
+  for (PushedValue& entry : entries_of(newest)) {
+    if (!is_new(entry)) continue;
+    const bool first = begins(entry);
+    sent_[entry.index] = entry;
+    if (first) entry.process_noise = Covariance();
+    pushed.entries.push_back(std::move(entry));
   }
   if (!pushed.entries.empty()) told_ = pushed.commit;
   return pushed;

@@ -78,6 +78,8 @@ class WatchedGroup {
   [[nodiscard]] std::vector<EdgeCursor> fresh_cursors() const;
   [[nodiscard]] Result<PushedValues> composed(const Forest& forest, std::optional<Time> from) const;
   [[nodiscard]] Result<PushedValues> all(const Forest& forest, std::optional<Time> from) const;
+  /// Whether nothing of its history was sent yet.
+  [[nodiscard]] bool begins(const PushedValue& entry) const;
   [[nodiscard]] bool is_new(const PushedValue& entry) const;
   [[nodiscard]] PushedValues next_composed_push(const Forest& forest);
   [[nodiscard]] PushedValues changed(const Forest& forest);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/mutex.hpp"
+#include "runtime/discovery.hpp"
 
 namespace tfdude {
 namespace {
@@ -22,9 +23,7 @@ constexpr int kRest = 3;
 constexpr std::chrono::nanoseconds kShortestRest = std::chrono::microseconds(100);
 constexpr std::chrono::nanoseconds kLongestRest = Milliseconds(10);
 
-bool is_structural(Errc code) {
-  return is_unknown(code) || code == Errc::kNotConnected || code == Errc::kUnreachable;
-}
+bool is_structural(Errc code) { return Discovery::may_appear(code) || code == Errc::kUnreachable; }
 
 }  // namespace
 

@@ -234,6 +234,7 @@ Result<std::vector<SegmentValues>> Forest::segments_since(const std::vector<Path
   if (!ends) return tl::unexpected(ends.error());
   auto newest = newest_segments(*ends, {});
   if (!newest) return tl::unexpected(std::move(newest.error()));
+  describe(*ends, *newest);
   std::vector<SegmentValues> all;
   if (newest->stamp) {
     const auto instants = changed_instants(*ends, seen);
@@ -242,12 +243,13 @@ Result<std::vector<SegmentValues>> Forest::segments_since(const std::vector<Path
     const auto count = std::min(static_cast<std::size_t>(end - instants.begin()), most);
     for (auto t = end - static_cast<std::ptrdiff_t>(count); t != end; ++t) {
       auto then = segments_at(*ends, *t, {});
-      // Another edge may have begun later.
-      if (then) all.push_back(*std::move(then));
+      if (!then) continue;  // another edge has begun later
+      then->commit = newest->commit;
+      then->history = newest->history;
+      all.push_back(*std::move(then));
     }
   }
   all.push_back(*std::move(newest));
-  for (SegmentValues& found : all) describe(*ends, found);
   return all;
 }
 

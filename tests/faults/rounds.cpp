@@ -2,12 +2,13 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <set>
+#include <sstream>
 
 #include "faults/cluster.hpp"
 #include "faults/journal.hpp"
 #include "faults/worker.hpp"
+#include "support/process.hpp"
 
 namespace tfdude::faults {
 namespace {
@@ -32,7 +33,7 @@ std::string list(const std::set<std::string>& names) {
 // nothing. faketime has its own there.
 std::set<std::string> shared_memory_of(pid_t process) {
   std::set<std::string> names;
-  std::ifstream maps("/proc/" + std::to_string(process) + "/maps");
+  std::istringstream maps(testing::maps_of(process));
   for (std::string line; std::getline(maps, line);) {
     const auto at = line.find("/dev/shm/");
     if (at != std::string::npos && line.find("faketime_", at) == std::string::npos) {

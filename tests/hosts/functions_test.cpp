@@ -18,12 +18,6 @@ void check_agreement(RobotHosts& r, Client& client) {
   CHECK(lookups_diff(client, r.oracle) == "");
 }
 
-/// Whatever a process has mapped, line by line.
-std::string maps(const Process& process) {
-  std::ifstream file("/proc/" + std::to_string(process.pid()) + "/maps");
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 }  // namespace
 
 TEST_CASE("hosts: a client on a fourth host uses the frames of three others") {
@@ -62,7 +56,7 @@ TEST_CASE("hosts: a client on a fourth host uses the frames of three others") {
   INFO(answer.err);
   CHECK(answer.status == 0);
   for (const Process* daemon : {&*r.robot, &*r.arms, &*r.tools}) {
-    CHECK_THAT(maps(*daemon), !testing::ContainsSubstring("/dev/shm"));
+    CHECK_THAT(testing::maps_of(daemon->pid()), !testing::ContainsSubstring("/dev/shm"));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <poll.h>
 #include <sched.h>
 #include <sys/prctl.h>
@@ -141,6 +142,11 @@ void Process::freeze() const {
   siginfo_t info{};
   // If the process has ended instead, wait() handles that.
   waitid(P_PID, static_cast<id_t>(pid_), &info, WSTOPPED | WEXITED | WNOWAIT);
+}
+
+std::string maps_of(pid_t process) {
+  std::ifstream file("/proc/" + std::to_string(process) + "/maps");
+  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 TemporaryDirectory::TemporaryDirectory() {

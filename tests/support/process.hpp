@@ -69,6 +69,9 @@ class Process {
   std::array<Stream, 2> streams_;  // standard output and error
 };
 
+/// Whatever a process has mapped into its memory, line by line.
+[[nodiscard]] std::string maps_of(pid_t process);
+
 /// A directory for generated files; the destructor removes it.
 class TemporaryDirectory {
  public:
