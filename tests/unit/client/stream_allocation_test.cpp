@@ -110,14 +110,21 @@ TEST_CASE("try_publish does not allocate before the transport whatever its resul
     if (edge_stream.try_publish(values).size() != missing) ++wrong;
     if (joint_stream.try_publish(positions, variances).size() != missing) ++wrong;
   };
-  for (int i = 0; i < 500; ++i) send();
+  const auto allocations_of_batch = [&] {
+    const AllocationGuard guard;
+    for (int i = 0; i < 500; ++i) send();
+    return guard.allocations();
+  };
+  allocations_of_batch();  // makes what the next ones reuse
   const int before = port.sent;
-  const AllocationGuard guard;
-  for (int i = 0; i < 1000; ++i) send();
-  const auto allocations = guard.allocations();
+  int batches = 1;
+  auto allocations = allocations_of_batch();
+  // A forest gets more memory if a reader, such as a thread of the library, is interrupted for
+  // longer than ever before while it reads. So one batch of own edges must be free of it.
+  for (; own && allocations != 0 && batches < 10; ++batches) allocations = allocations_of_batch();
   CHECK(allocations == 0);
   CHECK(wrong == 0);
-  CHECK(port.sent - before == (takes ? 2000 : 0));
+  CHECK(port.sent - before == (takes ? 1000 * batches : 0));
 }
 
 TEST_CASE("try_publish does not allocate for an invalid value or after its client has ended") {
