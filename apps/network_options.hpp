@@ -20,6 +20,8 @@ inline void add_network_options(CLI::App& app, Options& options) {
          "--local", [&options] { options.profile = kLocalProfile; },
          "this computer only, as --profile local: UDP over 127.0.0.1")
       ->excludes(profile);
+  app.add_option("--keys", options.keys,
+                 "directory of an identity, see tfdude keys (else $TFDUDE_KEYS)");
   app.add_option("--discovery-server", options.discovery_server,
                  "HOST:PORT of a Fast DDS discovery server")
       ->check([](const std::string& text) {

@@ -120,6 +120,17 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   app.add_option("--save-every", save_every_ms,
                  "shortest time between two stores of streamed values [ms]")
       ->check(CLI::Range(1, 86'400'000));
+  PartitionLimits& limits = arguments.options.limits;
+  constexpr std::size_t kMost = std::size_t{1} << 40U;
+  app.add_option("--max-frames", limits.frames, "frames that requests can add up to")
+      ->capture_default_str()
+      ->check(CLI::Range(std::size_t{1}, kMost));
+  app.add_option("--max-watches", limits.watches, "groups of watchers with different paths")
+      ->capture_default_str()
+      ->check(CLI::Range(std::size_t{1}, kMost));
+  app.add_option("--max-history", limits.history_bytes, "memory of all histories [bytes]")
+      ->capture_default_str()
+      ->check(CLI::Range(std::size_t{1}, kMost));
   cli::require_numbers(app);
   try {
     app.name(argv[0]);

@@ -36,6 +36,7 @@ class Bare {
     read<wire::Reply, ReplyType>(kReplyTopic, "call_reader");
     if (!owner) return;
     read<wire::Request, RequestType>(kRequestTopic, "call_reader");
+    read<wire::Request, RequestType>(kChangeTopic, "call_reader");
     read<wire::Update, UpdateType>(kUpdateTopic, "update_reader");
     read<wire::Joints, JointsType>(kJointTopic, "update_reader");
     write<PresenceType>(kPresenceTopic, "presence_writer");
@@ -56,7 +57,7 @@ class Bare {
   void read(const char* name, const char* profile) {
     readers_.push_back(std::make_shared<Reader<Sample>>(
         context(), topic<Type>(name), "", profile,
-        typename Reader<Sample>::Calls{[](const Sample&, const ertps::GuidPrefix_t&) {}, nullptr}));
+        typename Reader<Sample>::Calls{[](const Sample&, const ertps::GUID_t&) {}, nullptr}));
   }
   template <class Type>
   void write(const char* name, const char* profile) {

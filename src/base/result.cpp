@@ -50,6 +50,10 @@ std::string_view to_string(Errc code) {
       return "incompatible";
     case Errc::kUnsupported:
       return "unsupported";
+    case Errc::kNotPermitted:
+      return "not_permitted";
+    case Errc::kTooMuch:
+      return "too_much";
   }
   return "unknown";
 }

@@ -34,7 +34,7 @@ Client::~Client() = default;
 
 Result<Client> Client::open(const Options& options) {
   auto transport = make_fastdds_transport(
-      {options.domain, options.profile, {}, nullptr, options.discovery_server});
+      {options.domain, options.profile, {}, nullptr, options.discovery_server, options.keys});
   if (!transport) return tl::unexpected(std::move(transport.error()));
   return open(*std::move(transport), options);
 }

@@ -9,8 +9,8 @@ namespace tfdude {
 Result<Node> Node::open(const std::string& partition, const std::vector<FrameSpec>& frames,
                         const Options& options) {
   if (auto ok = check_partition_name(partition); !ok) return tl::unexpected(std::move(ok.error()));
-  auto transport = make_fastdds_transport(
-      {options.domain, options.profile, partition, nullptr, options.discovery_server});
+  auto transport = make_fastdds_transport({options.domain, options.profile, partition, nullptr,
+                                           options.discovery_server, options.keys});
   if (!transport) return tl::unexpected(std::move(transport.error()));
   return open(*std::move(transport), partition, frames, options);
 }
@@ -28,6 +28,8 @@ Result<Node> Node::open(TransportPtr transport, const std::string& partition,
 }
 
 std::size_t Node::own_frames() const { return participant_->queries().own_frames(); }
+
+RefusedCounts Node::refused() const { return participant_->refused(); }
 
 const std::string& Node::partition() const { return participant_->member().name(); }
 

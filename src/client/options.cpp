@@ -24,4 +24,6 @@ std::uint32_t domain_of_environment() {
 
 std::string profile_of_environment() { return std::string(environment("TFDUDE_PROFILE")); }
 
+std::string keys_of_environment() { return std::string(environment("TFDUDE_KEYS")); }
+
 }  // namespace tfdude

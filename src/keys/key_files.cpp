@@ -73,6 +73,7 @@ Result<Certificates> read_certificates(KeyFiles& files, Time now) {
   if (!until) return tl::unexpected(until.error());
   files.until = *until;
   files.identity = keys::identity_of(*own);
+  files.authority_name = keys::name_of(*authority);
   if (auto ok = keys::verify(*authority, *revoked, *own, now); !ok) {
     return fail_at(printable(files.certificate), ok.error());
   }

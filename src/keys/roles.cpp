@@ -3,17 +3,18 @@
 #include "tfdude/base/id.hpp"
 
 namespace tfdude {
-namespace {
 
 // The DDS partitions of replies and pushed values are named PARTITION/RECEIVER, so the partition
 // 'a' could publish in those of 'a/b'. A space at an end can get lost in XML.
-Result<void> check_partition(const std::string& name) {
+Result<void> check_partition_with_keys(const std::string& name) {
   if (auto ok = check_partition_name(name); !ok) return ok;
   const std::string rejected = "partition " + quote(name) + " cannot have keys: it ";
   if (name.find('/') != std::string::npos) return fail(Errc::kInvalidInput, rejected + "holds '/'");
   if (name.front() != ' ' && name.back() != ' ') return {};
   return fail(Errc::kInvalidInput, rejected + "begins or ends with a space");
 }
+
+namespace {
 
 std::string listed(const std::set<std::string>& partitions) {
   std::string text = partitions.size() == 1 ? "partition" : "partitions";
@@ -29,11 +30,11 @@ std::string listed(const std::set<std::string>& partitions) {
 
 Result<Roles> complete(Roles roles) {
   if (roles.serves) {
-    if (auto ok = check_partition(*roles.serves); !ok) return tl::unexpected(ok.error());
+    if (auto ok = check_partition_with_keys(*roles.serves); !ok) return tl::unexpected(ok.error());
   }
   for (const auto* partitions : {&roles.move, &roles.stream}) {
     for (const std::string& partition : *partitions) {
-      if (auto ok = check_partition(partition); !ok) return tl::unexpected(ok.error());
+      if (auto ok = check_partition_with_keys(partition); !ok) return tl::unexpected(ok.error());
     }
   }
   if (roles.serves || !roles.move.empty() || roles.observe) roles.look = true;

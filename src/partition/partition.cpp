@@ -172,6 +172,11 @@ Result<void> Partition::apply(const Request& request, Time now) {
 }
 
 Result<void> Partition::add(const std::string& id, const AddRequest& request, Time now) {
+  if (frame_count() >= max_frames_) {
+    ++refused_frames_;
+    return fail(Errc::kTooMuch, "frame " + quote(id) + " is not added: partition " + quote(name_) +
+                                    " has " + std::to_string(frame_count()) + " frames, its limit");
+  }
   directory_.saw_lamport_time(request.lamport_time);
   const std::uint64_t lamport_time = directory_.next_lamport_time(now);
   auto added =

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
@@ -31,6 +32,11 @@ class Partition {
   Partition(std::string name, std::uint64_t incarnation, Forest& forest, Directory& directory);
 
   [[nodiscard]] const std::string& name() const { return name_; }
+
+  /// Limits the frames that requests can add; more are rejected with kTooMuch.
+  void limit_frames(std::size_t frames) { max_frames_ = frames; }
+  /// How many were rejected for that.
+  [[nodiscard]] std::uint64_t refused_frames() const { return refused_frames_; }
 
   /// Loads the frames of a configuration, in any order; parents may be missing. All or none.
   /// @return the error of the first invalid frame: an invalid or repeated id, a cycle.
@@ -153,6 +159,8 @@ class Partition {
   Pages pages_;
   Joints joints_;
   ReplyCache replies_;
+  std::size_t max_frames_ = SIZE_MAX;
+  std::uint64_t refused_frames_ = 0;
   std::map<std::string, EdgeConsistency> consistency_;  // of observed edges
   bool saved_ = false;
   bool values_asked_ = false;       // a request waits until its values are saved

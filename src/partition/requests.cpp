@@ -18,6 +18,10 @@ bool is_read_only(const Request& request) {
   return is_one_of<LookupRequest, HistoryRequest, JointsRequest, ConsistencyRequest>(request);
 }
 
+bool is_change(const Request& request) {
+  return !is_read_only(request) && !std::holds_alternative<WatchRequest>(request.body);
+}
+
 bool is_of_structure(const Request& request) {
   return is_one_of<AddRequest, RemoveRequest, ForgetRequest, MoveRequest>(request);
 }
@@ -39,6 +43,21 @@ std::string describe(const Request& request) {
     what = "move frame " + quote(request.id) + " under " + quote(move->parent);
   }
   return what;
+}
+
+std::string attempt_of(const Request& request) {
+  const std::string frame = " frame " + quote(request.id);
+  if (const auto* forget = std::get_if<ForgetRequest>(&request.body)) {
+    return "forget partition " + quote(forget->partition);
+  }
+  if (!is_change(request)) return "look";
+  if (std::holds_alternative<AddRequest>(request.body)) return "add" + frame;
+  if (std::holds_alternative<RemoveRequest>(request.body)) return "remove" + frame;
+  if (std::holds_alternative<MoveRequest>(request.body)) return "move" + frame;
+  if (std::holds_alternative<ReviseRequest>(request.body)) return "observe" + frame;
+  if (std::holds_alternative<CorrelateRequest>(request.body)) return "correlate" + frame;
+  if (std::holds_alternative<JointUpdate>(request.body)) return "move joints";
+  return "update" + frame;
 }
 
 }  // namespace tfdude

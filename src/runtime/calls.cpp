@@ -52,7 +52,7 @@ void Calls::Call::give_up(std::size_t entry, Error error) {
   entries_[entry].reply = Reply{entries_[entry].sequence, 0, std::move(error)};
 }
 
-void Calls::on_reply(const Reply& reply) {
+void Calls::on_reply(const std::string& from, const Reply& reply) {
   Signal* arrived = nullptr;
   std::function<void()> tell;
   {
@@ -61,7 +61,7 @@ void Calls::on_reply(const Reply& reply) {
     if (waiting == waiting_.end()) return;
     const Call& call = *waiting->second.call;
     auto& entry = waiting->second.call->entries_[waiting->second.entry];
-    if (entry.reply) return;
+    if (entry.reply || entry.partition != from) return;
     entry.reply = reply;
     if (call.complete()) {
       arrived = call.arrived_;

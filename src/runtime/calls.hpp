@@ -63,8 +63,8 @@ class Calls {
     const std::function<void()> tell_;
   };
 
-  /// A reply has come; unknown and repeated ones are dropped.
-  void on_reply(const Reply& reply);
+  /// A reply has come. Dropped if it is unknown, repeated, or of another partition than was asked.
+  void on_reply(const std::string& from, const Reply& reply);
 
   /// A partition is lost: calls that wait for it fail now.
   void on_lost(const std::string& partition);

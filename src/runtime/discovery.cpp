@@ -60,7 +60,15 @@ Result<void> Discovery::await(const Deadline& deadline) {
     if (deadline.over()) return tl::unexpected(undecided("not all frames are known", deadline));
     wait_for_change(deadline);
   }
-  return {};
+  return nobody_but_excluded();
+}
+
+Result<void> Discovery::nobody_but_excluded() const {
+  const auto excluded = transport_.excluded();
+  if (excluded.empty()) return {};
+  const Lock lock(structure_.mutex);
+  if (!structure_.directory.partitions().empty()) return {};
+  return fail(Errc::kNotPermitted, "no partition answers: " + excluded.front());
 }
 
 Error Discovery::last_word(Error error, const Deadline& deadline) {
@@ -79,10 +87,14 @@ Error Discovery::explained(Error error) {
     return {Errc::kIncompatible,
             error.message + ", as far as is known: " + strangers.front().text()};
   }
+  const auto excluded = transport_.excluded();
+  const std::string about_keys = excluded.empty() ? "" : "; " + excluded.front();
   const Lock lock(structure_.mutex);
   if (structure_.directory.partitions().empty()) {
+    if (!excluded.empty()) return {Errc::kNotPermitted, error.message + about_keys};
     return {error.code, error.message + "; no partition answers: " + kHint};
   }
+  error.message += about_keys;
   const auto missed = structure_.directory.only_heard_of();
   if (!missed || error.code == Errc::kUnknownPartition) return error;
   return {Errc::kUnreachable, error.message + "; it may belong to partition " +
@@ -97,6 +109,8 @@ Error Discovery::undecided(const std::string& what, const Deadline& deadline) {
   const bool awaits_presence = transport_.awaits_presence();
   if (const auto strangers = transport_.incompatible(); !strangers.empty()) {
     missing = strangers.front().text();
+  } else if (const auto excluded = transport_.excluded(); !excluded.empty()) {
+    missing = excluded.front();
   }
   {
     const Lock lock(structure_.mutex);

@@ -44,7 +44,8 @@ class Discovery {
   /// Whether the cause of an error may still be resolved by discovery.
   [[nodiscard]] static bool may_appear(Errc code);
 
-  /// Waits until complete(). @return kTimeout, naming what was missing.
+  /// Waits until complete(). @return kTimeout, naming what was missing; kNotPermitted if keys
+  /// exclude all partitions that were discovered.
   [[nodiscard]] Result<void> await(const Deadline& deadline);
 
   /// Runs an operation that may fail due to incomplete knowledge, and repeats it until the result
@@ -69,6 +70,7 @@ class Discovery {
   void wait_for_change(const Deadline& deadline = Deadline(Milliseconds::max()));
 
  private:
+  [[nodiscard]] Result<void> nobody_but_excluded() const;
   /// Explains an error about something missing, if others know more.
   [[nodiscard]] Error explained(Error error);
   /// Why the result is not certain: kTimeout.

@@ -29,7 +29,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
                 [](const Member& member) { return member.presence().incarnation; });
           },
           options.timeout),
-      pushing_(structure_, *transport_, member_, watcher_),
+      pushing_(structure_, *transport_, member_, watcher_, options.limits.watches),
       lookups_(structure_, discovery_, requests_, *transport_, watcher_, options.timeout),
       streams_(edge_links(structure_, *transport_, member_),
                joint_links(structure_, *transport_, member_)) {}
@@ -87,6 +87,16 @@ std::optional<Reply> Participant::answer_query(const Request& request) {
   }
   if (std::holds_alternative<WatchRequest>(request.body)) return pushing_.answer(request);
   return std::nullopt;
+}
+
+RefusedCounts Participant::refused() {
+  RefusedCounts counts;
+  counts.watches = pushing_.refused();
+  counts.samples = structure_.forest.refused_samples();
+  counts.messages = transport_->dropped();
+  const Lock lock(structure_.mutex);
+  if (const Partition* own = member_.partition()) counts.frames = own->refused_frames();
+  return counts;
 }
 
 void Participant::on_request(const PeerId& from, const Request& request) {

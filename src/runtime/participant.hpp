@@ -6,6 +6,7 @@
 
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/options.hpp"
+#include "tfdude/types/refused.hpp"
 
 #include "runtime/discovery.hpp"
 #include "runtime/joint_calls.hpp"
@@ -58,9 +59,14 @@ class Participant final : public TransportHandler {
     return transport_->flush(Deadline(wait).at());
   }
 
+  /// What limits have rejected.
+  [[nodiscard]] RefusedCounts refused();
+
   // TransportHandler
   void on_request(const PeerId& from, const Request& request) override;
-  void on_reply(const Reply& reply) override { requests_.calls().on_reply(reply); }
+  void on_reply(const std::string& from, const Reply& reply) override {
+    requests_.calls().on_reply(from, reply);
+  }
   void on_update(const Update& update) override;
   void on_joints(const JointUpdate& update) override { joints_.on_joints(update); }
   void on_pushed(const PushedValues& pushed) override;

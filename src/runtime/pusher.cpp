@@ -7,8 +7,12 @@
 
 namespace tfdude {
 
-Pusher::Pusher(Forest& forest, Push push, End end)
-    : forest_(forest), push_(std::move(push)), end_(std::move(end)), thread_([this] { run(); }) {}
+Pusher::Pusher(Forest& forest, std::size_t max_groups, Push push, End end)
+    : forest_(forest),
+      max_groups_(max_groups),
+      push_(std::move(push)),
+      end_(std::move(end)),
+      thread_([this] { run(); }) {}
 
 void Pusher::stop() {
   forest_.on_commit(nullptr);
@@ -28,6 +32,11 @@ Result<PushedValues> Pusher::watch(std::uint64_t group, const WatchRequest& requ
     const bool first = groups_.empty();
     auto known = groups_.find(group);
     if (known == groups_.end()) {
+      if (groups_.size() >= max_groups_) {
+        ++refused_;
+        return fail(Errc::kTooMuch, "there are " + std::to_string(groups_.size()) +
+                                        " groups of watchers with different paths, the limit");
+      }
       known = groups_.emplace(group, Group{WatchedGroup(group, request), {}, Clock::now(), false})
                   .first;
     }

@@ -26,7 +26,8 @@ class Pusher {
   /// @param push  gets values, or a piece of them
   /// @param end   frees the resources of pushing to a group. Both are called from the thread,
   ///   without a lock.
-  Pusher(Forest& forest, Push push, End end);
+  /// @param max_groups  watch() rejects further ones with kTooMuch
+  Pusher(Forest& forest, std::size_t max_groups, Push push, End end);
   ~Pusher() { stop(); }
   Pusher(const Pusher&) = delete;
   Pusher& operator=(const Pusher&) = delete;
@@ -35,8 +36,11 @@ class Pusher {
   void stop();
 
   /// Starts to push to a group, or renews its lease. @return all current values; kNotOwner,
-  /// kInvalidInput.
+  /// kInvalidInput, kTooMuch.
   [[nodiscard]] Result<PushedValues> watch(std::uint64_t group, const WatchRequest& request);
+
+  /// How many groups were rejected.
+  [[nodiscard]] std::uint64_t refused() const { return refused_; }
 
   /// Pushes all values to a group: a watcher has only now been matched.
   void tell_all(std::uint64_t group);
@@ -58,6 +62,8 @@ class Pusher {
                                                    std::optional<Clock::time_point>& next);
 
   Forest& forest_;
+  const std::size_t max_groups_;
+  std::atomic<std::uint64_t> refused_{0};
   const Push push_;
   const End end_;
   Mutex groups_mutex_{LockRank::kParts};

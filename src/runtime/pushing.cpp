@@ -23,7 +23,7 @@ Pusher* Pushing::pusher() {
   if (stopped_) return nullptr;
   if (pusher_ == nullptr) {
     pusher_ = std::make_unique<Pusher>(
-        structure_.forest,
+        structure_.forest, max_groups_,
         [this](const PushedValues& pushed) {
           transport_.push(pushed);
           watcher_.on_pushed(pushed);
@@ -43,13 +43,21 @@ Reply Pushing::answer(const Request& request) {
   const std::uint64_t incarnation =
       member_.with_rules([](const Member& member) { return member.presence().incarnation; });
   auto pushed = pusher->watch(watch_group(member_.name(), incarnation, watch), watch);
-  if (!pushed) return {request.sequence, 0, std::move(pushed.error())};
+  if (!pushed) {
+    if (pushed.error().code == Errc::kTooMuch) pushed = fail_at(who, pushed.error());
+    return {request.sequence, 0, std::move(pushed.error())};
+  }
   if (correlated_entries(*pushed) > kMaxCorrelated) {
     return {request.sequence, 0,
             Error{Errc::kInvalidInput, who + " has more than " + std::to_string(kMaxCorrelated) +
                                            " edges of the path that are correlated with others"}};
   }
   return {request.sequence, 0, *std::move(pushed)};
+}
+
+std::uint64_t Pushing::refused() {
+  const Lock lock(mutex_);
+  return pusher_ != nullptr ? pusher_->refused() : 0;
 }
 
 void Pushing::on_watcher(std::uint64_t group) {

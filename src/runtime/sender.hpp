@@ -165,10 +165,7 @@ class Sender final : public PlannedSender {
 
   std::optional<Errc> hand_over(Share& share) {
     if (!share.reachable) return Errc::kUnreachable;
-    if (share.channel != nullptr) {
-      return share.channel->try_send(share.message) ? std::nullopt
-                                                    : std::optional<Errc>(Errc::kTimeout);
-    }
+    if (share.channel != nullptr) return share.channel->try_send(share.message);
     const auto applied = links_.apply_here(share.message);
     return applied ? std::nullopt : std::optional<Errc>(applied.error().code);
   }

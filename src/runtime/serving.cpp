@@ -110,6 +110,11 @@ Result<void> Serving::take_frames(const std::vector<FrameSpec>& frames) {
   while (any && Clock::now() < discovery_.met_by() && incomplete()) discovery_.wait_for_change();
   if (any) await_gone();
   if (auto taken = member_.serve(kept ? &state : nullptr, frames); !taken) return taken;
+  structure_.forest.limit_history(options_.limits.history_bytes);
+  {
+    const Lock lock(structure_.mutex);
+    member_.partition()->limit_frames(options_.limits.frames);
+  }
   log_configured(state, frames);
   return set_timings(frames);
 }

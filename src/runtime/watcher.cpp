@@ -61,7 +61,9 @@ Watches& Watcher::watches() {
     watches_ = std::make_unique<Watches>(Watches::Links{
         [this](const WatchedPath& path) { return plan(path); },
         [this](std::vector<Part>& parts) { return requests_.ask(parts, Deadline(timeout_)); },
-        [this](std::uint64_t group) { return transport_.watch(group); },
+        [this](const std::string& owner, std::uint64_t group) {
+          return transport_.watch(owner, group);
+        },
         [this](std::uint64_t group) { transport_.unwatch(group); }});
     watching_.store(watches_.get());
   }

@@ -126,7 +126,7 @@ bool Watches::attend(const Path& path, bool renew) {
     return true;
   }
   for (const WatchRoute::Source& source : route->sources) {
-    if (!open_.contains(source.group) && links_.open(source.group)) {
+    if (!open_.contains(source.group) && links_.open(source.partition, source.group)) {
       open_.insert(source.group, Clock::now());
     }
   }

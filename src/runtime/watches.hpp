@@ -24,7 +24,7 @@ class Watches {
     /// The current route of the path. @return as Client::lookup()
     std::function<Result<WatchRoute>(const WatchedPath&)> plan;
     std::function<std::vector<Reply>(std::vector<Part>&)> ask;
-    std::function<Result<void>(std::uint64_t group)> open;
+    std::function<Result<void>(const std::string& owner, std::uint64_t group)> open;
     std::function<void(std::uint64_t group)> close;
   };
 

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -36,7 +37,8 @@ class TransportHandler {
   virtual ~TransportHandler() = default;
 
   virtual void on_request(const PeerId& from, const Request& request) = 0;
-  virtual void on_reply(const Reply& reply) = 0;
+  /// @param from  the partition whose owner has sent it
+  virtual void on_reply(const std::string& from, const Reply& reply) = 0;
   virtual void on_update(const Update& update) = 0;
   virtual void on_joints(const JointUpdate& update) = 0;
   /// Values pushed to a group that is watched here.
@@ -63,9 +65,9 @@ class Channel {
  public:
   virtual ~Channel() = default;
 
-  /// Like Transport::send(), but at once or not at all. @return false if the partition cannot be
-  /// reached, or the message cannot be sent now
-  [[nodiscard]] virtual bool try_send(const Message& message) = 0;
+  /// Like Transport::send(), but at once or not at all. @return nothing if it was sent; kTimeout if
+  /// the partition cannot be reached, or the message cannot be sent now; kNotPermitted
+  [[nodiscard]] virtual std::optional<Errc> try_send(const Message& message) = 0;
 };
 
 /// How participants reach each other, independent of any IPC.
@@ -99,7 +101,8 @@ class Transport {
   virtual void prepare(const std::string& partition) = 0;
 
   /// Sends once the partition can be reached.
-  /// @return kTimeout, naming the partition, at the deadline
+  /// @return kTimeout, naming the partition, at the deadline; kNotPermitted, naming also the
+  ///   identity and what was tried, if the keys of this participant do not allow it
   [[nodiscard]] virtual Result<void> send(const std::string& partition, const Request& request,
                                           Deadline deadline) = 0;
   [[nodiscard]] virtual Result<void> send(const std::string& partition, const Update& update,
@@ -122,8 +125,9 @@ class Transport {
 
   virtual void reply(const PeerId& to, const Reply& reply) = 0;
 
-  /// Starts or stops receiving the values pushed to a group of watchers.
-  [[nodiscard]] virtual Result<void> watch(std::uint64_t group) = 0;
+  /// Starts or stops receiving the values that an owner pushes to a group of watchers.
+  /// @return also kNotPermitted
+  [[nodiscard]] virtual Result<void> watch(const std::string& owner, std::uint64_t group) = 0;
   virtual void unwatch(std::uint64_t group) = 0;
 
   /// Sends to the watchers of the group (may be lost), or releases the resources for that.
@@ -139,6 +143,13 @@ class Transport {
 
   /// The owners of partitions that were discovered and cannot be understood.
   [[nodiscard]] virtual std::vector<IncompatiblePeer> incompatible() const { return {}; }
+
+  /// The owners of partitions that were discovered, and with which nothing is exchanged because of
+  /// keys: a sentence about each.
+  [[nodiscard]] virtual std::vector<std::string> excluded() const { return {}; }
+
+  /// How many messages of senders that took more than their share were dropped unread.
+  [[nodiscard]] virtual std::uint64_t dropped() const { return 0; }
 
   /// How long a new participant needs to discover all others, by experience.
   [[nodiscard]] virtual Milliseconds discovery_time() const = 0;

@@ -146,6 +146,12 @@ class Forest {
   /// Sets the timing of all edges without their own, from their first sample on.
   [[nodiscard]] Result<void> set_default_timing(const EdgeTiming& timing);
 
+  /// Limits the memory of all histories together. Once it is reached, a new sample takes the place
+  /// of the edge's oldest one, and an edge without two samples gets none: kTooMuch.
+  void limit_history(std::size_t bytes);
+  /// How many samples were refused for that.
+  [[nodiscard]] std::uint64_t refused_samples() const;
+
   /// Sets how an edge's error is correlated with those of others, from now on and for all its
   /// history. Updates do not change it.
   /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the source).

@@ -45,6 +45,7 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
     const std::int64_t stamp = nanoseconds(*given);
     for (std::size_t i = 0; i < count; ++i) {
       auto ok = check_ahead(frames_.newest_value(slots[i]), stamp);
+      if (ok) ok = check_room(frames_.newest_value(slots[i]));
       if (!ok) return tl::unexpected(std::move(ok.error()));
     }
     return stamp;
@@ -57,12 +58,25 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
     newest = std::max(newest, edge.stamp);
   }
   if (!moving) return kAlways;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto ok = check_room(frames_.newest_value(slots[i]));
+    if (!ok) return tl::unexpected(std::move(ok.error()));
+  }
   if (!clock_.is_there()) {
     return fail(Errc::kInvalidInput, "frame " + quote(frames_.newest_value(slots[0]).name->text) +
                                          " is dynamic: its update needs a stamp");
   }
   // If the clock was set back, time advances as little as possible.
   return newest == kAlways ? clock_.now() : std::max(clock_.now(), saturating_add(newest, 1));
+}
+
+Result<void> Forest::Impl::check_room(const HeldVersion& edge) {
+  const bool replaces = edge.samples != nullptr && edge.samples->count() >= 2;
+  if (kept_samples_ < max_samples_ || replaces) return {};
+  refused_samples_.fetch_add(1, std::memory_order_relaxed);
+  return fail(Errc::kTooMuch, "frame " + quote(edge.name->text) +
+                                  ": there is no room for its history. All histories have " +
+                                  std::to_string(kept_samples_) + " samples, the limit");
 }
 
 Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t stamp) {
@@ -112,6 +126,7 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_P
   fresh.number = samples->next();
   fresh.kept = true;
   samples->append(&fresh, stamp);
+  ++kept_samples_;
   drop_samples(*samples);
 }
 
@@ -124,6 +139,7 @@ void Forest::Impl::restart_history(const HeldVersion& newest, const Transform& X
   fresh.number = fresh.samples->next();
   fresh.kept = true;
   fresh.samples->append(&fresh, stamp);
+  ++kept_samples_;
   newest.name->refused.behind = {};
   if (restart_listener_) restart_listener_(restart);
 }
@@ -152,18 +168,24 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_P
   HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
   fresh.samples = samples;
   fresh.number = samples->next() - 1;
+  ++kept_samples_;
   drop_samples(*samples);
 }
 
 void Forest::Impl::drop_oldest(SampleHistory& samples) {
   HeldVersion* dropped = samples.drop_oldest();
   dropped->kept = false;
+  --kept_samples_;
   reclaimer_.supersede(dropped);
 }
 
 void Forest::Impl::drop_samples(SampleHistory& samples) {
   const std::int64_t limit = samples.stamp(samples.next() - 1) - samples.timing().span.count();
-  while (samples.count() > samples.timing().count || samples.stamp(samples.oldest()) < limit) {
+  const auto beyond = [&]() TFDUDE_REQUIRES(mutex_) {
+    return samples.count() > samples.timing().count || samples.stamp(samples.oldest()) < limit ||
+           (kept_samples_ > max_samples_ && samples.count() > 2);
+  };
+  while (beyond()) {
     drop_oldest(samples);
   }
 }
@@ -171,6 +193,7 @@ void Forest::Impl::drop_samples(SampleHistory& samples) {
 void Forest::Impl::give_back(SampleHistory* samples, std::uint32_t slot) {
   if (samples == nullptr) return;
   const Version* head = &frames_.newest(slot);
+  kept_samples_ -= static_cast<std::int64_t>(samples->count());
   for (std::uint64_t number = samples->oldest(); number < samples->next(); ++number) {
     HeldVersion* sample = samples->sample(number);
     sample->kept = false;
@@ -199,6 +222,16 @@ Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   fresh.samples = new SampleHistory(timing);
   impl_->commit();
   return {};
+}
+
+void Forest::limit_history(std::size_t bytes) {
+  constexpr std::size_t kSampleBytes = sizeof(HeldVersion) + 2 * sizeof(std::int64_t);
+  const Writing lock(impl_->mutex_);
+  impl_->max_samples_ = static_cast<std::int64_t>(bytes / kSampleBytes);
+}
+
+std::uint64_t Forest::refused_samples() const {
+  return impl_->refused_samples_.load(std::memory_order_relaxed);
 }
 
 Result<void> Forest::set_default_timing(const EdgeTiming& timing) {

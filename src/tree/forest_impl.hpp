@@ -88,6 +88,8 @@ class Forest::Impl {
   ///   it
   [[nodiscard]] Result<void> check_ahead(const HeldVersion& edge, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
+  /// @return kTooMuch if the edge has no history, and there is no room for one; counts it
+  [[nodiscard]] Result<void> check_room(const HeldVersion& edge) TFDUDE_REQUIRES(mutex_);
   /// Pushes a checked update: a sample if the edge is dynamic or becomes so, otherwise the value
   /// for all times.
   void push_value(std::uint32_t slot, const Transform& X_PC, std::int64_t stamp)
@@ -136,6 +138,9 @@ class Forest::Impl {
 
   Frames frames_;
   EdgeTiming default_timing_ TFDUDE_GUARDED_BY(mutex_);
+  std::int64_t kept_samples_ TFDUDE_GUARDED_BY(mutex_) = 0;  // of all histories
+  std::int64_t max_samples_ TFDUDE_GUARDED_BY(mutex_) = INT64_MAX;
+  std::atomic<std::uint64_t> refused_samples_{0};
   /// With the owner of each.
   std::vector<std::pair<const void*, std::function<void()>>> commit_listeners_
       TFDUDE_GUARDED_BY(mutex_);

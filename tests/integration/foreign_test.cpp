@@ -112,8 +112,8 @@ TEST_CASE("a page that waits for a lost one does not block pages of another proc
     return made;
   };
   const auto type = [] { return fastdds::edds::TypeSupport(new wire::PagePubSubType); };
-  ForeignWriter killed(domain.number(), "tfdude/directory", type(), "", true);
-  ForeignWriter successor(domain.number(), "tfdude/directory", type(), "", true);
+  ForeignWriter killed(domain.number(), "tfdude/directory", type(), "arm", true);
+  ForeignWriter successor(domain.number(), "tfdude/directory", type(), "arm", true);
   killed.await_readers(1);
   successor.await_readers(1);
   const auto hears = [&](std::uint32_t number) {
@@ -134,6 +134,48 @@ TEST_CASE("a page that waits for a lost one does not block pages of another proc
   CHECK(hears(1));
   CHECK_FALSE(reader.heard().page("arm", 1, 1));
   transport->stop();
+}
+
+TEST_CASE("pages of a partition are accepted only from the DDS partition of its name") {
+  const std::string partition = GENERATE("leg", "*", "a*");
+  const testing::DomainLease domain;
+  const auto transport =
+      *make_fastdds_transport({domain.number(), TFDUDE_LOOPBACK_PROFILE, "", {}});
+  testing::Recorder reader;
+  REQUIRE(transport->start(reader));
+  const auto type = [] { return fastdds::edds::TypeSupport(new wire::PagePubSubType); };
+  ForeignWriter other(domain.number(), "tfdude/directory", type(), partition, true);
+  ForeignWriter arm(domain.number(), "tfdude/directory", type(), "arm", true);
+  other.await_readers(1);
+  arm.await_readers(1);
+  wire::Page forged = fastdds::to_wire(Page{"arm", 0, 9, 9, {{"forged", ""}}});
+  wire::Page page = fastdds::to_wire(Page{"arm", 1, 9, 9, {{"hand", ""}}});
+  other.write(&forged);
+  arm.write(&page);
+  CHECK(reader.hears([](const auto& heard) { return heard.page("arm", 1, 9); }));
+  CHECK_FALSE(reader.heard().page("arm", 0, 9));
+  transport->stop();
+}
+
+TEST_CASE("a change that is sent to the topic of questions is rejected") {
+  const testing::DomainLease domain;
+  Counted owner(domain.number(), "owner", "a");
+  ForeignWriter writer(domain.number(), "tfdude/request",
+                       fastdds::edds::TypeSupport(new wire::RequestPubSubType), "owner");
+  const auto replies = writer.read_replies();
+  writer.await_readers(1);
+  const Transform X{*Pose::create(Eigen::Quaterniond::Identity(), {1, 0, 0}), {}};
+  wire::Request request =
+      fastdds::to_wire(Request{1, "a_tip", UpdateRequest{{{"a_tip", X}}, {}}}, "owner");
+  REQUIRE(eventually([&] {
+    writer.write(&request);
+    return replies->last().has_value();
+  }));
+  const Reply reply = *replies->last();
+  const auto* error = std::get_if<Error>(&reply.body);
+  REQUIRE(error != nullptr);
+  CHECK(error->code == Errc::kNotPermitted);
+  CHECK_FALSE(moved(owner.node, "a"));
 }
 
 TEST_CASE("joint positions of a plain DDS writer move the edges of their owner") {
@@ -223,6 +265,7 @@ struct Stranger {
 
 constexpr Stranger kStrangers[] = {
     {"tfdude/request", "tfdude::wire::Request", false},
+    {"tfdude/change", "tfdude::wire::Request", false},
     {"tfdude/update", "tfdude::wire::Update", false},
     {"tfdude/joint", "tfdude::wire::Joints", false},
     {"tfdude/reply", "tfdude::wire::Reply", false},
@@ -267,15 +310,13 @@ TEST_CASE("malformed samples are counted and change nothing") {
   for (const Stranger& stranger : kStrangers) {
     INFO("topic " << stranger.topic);
     const bool durable = stranger.keyed;
-    // Requests, updates and replies are read in DDS partitions of their own, the others in the
-    // default one.
     ForeignWriter writer(domain.number(), stranger.topic,
                          fastdds::edds::TypeSupport(new RawType(stranger.type, stranger.keyed)),
-                         stranger.keyed ? "" : "*", durable);
+                         "*", durable);
     writer.await_readers(2);
     for (Bytes sample : samples) writer.write(&sample);
   }
-  // Of five readers of each participant all counted something, and each answers as before.
+  // Of all readers of each participant all counted something, and each answers as before.
   CHECK(eventually([&] { return owner.counters->malformed > 0 && other.counters->malformed > 0; }));
   CHECK(other.node.lookup("a", "a_tip"));
   REQUIRE(other.node.update("a_tip", {}));

@@ -10,6 +10,7 @@
 #include "keys/certificates.hpp"
 #include "keys/permissions.hpp"
 #include "support/catch.hpp"
+#include "support/dds_participant.hpp"
 #include "support/domain_lease.hpp"
 #include "support/key_store.hpp"
 #include "support/process.hpp"
@@ -22,6 +23,9 @@ namespace fs = std::filesystem;
 
 using testing::content_of;
 using testing::daemon_of;
+using testing::readers_of;
+using testing::writers_of;
+using Participant = testing::DdsParticipant;
 using testing::eventually;
 using testing::looking;
 using testing::moving;
@@ -29,86 +33,6 @@ using testing::TestKeys;
 
 Time now() {
   return std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
-}
-
-edds::DomainParticipantFactory& factory() {
-  return *edds::DomainParticipantFactory::get_instance();
-}
-
-/// A participant on this computer. Without keys it has no security.
-class Participant {
- public:
-  explicit Participant(std::uint32_t domain, const KeyFiles* keys = nullptr) {
-    edds::DomainParticipantQos qos;
-    factory().load_XML_profiles_file(TFDUDE_LOOPBACK_PROFILE);  // loading it twice is harmless
-    factory().get_participant_qos_from_profile("tfdude_participant", qos);
-    // The handshake takes longer than the lease of the profile.
-    qos.wire_protocol().builtin.discovery_config.leaseDuration = {30, 0};
-    if (keys != nullptr) secure(qos, *keys);
-    participant_ = factory().create_participant(domain, qos);
-    if (participant_ != nullptr) type_.register_type(participant_);
-  }
-  ~Participant() {
-    if (participant_ == nullptr) return;
-    participant_->delete_contained_entities();
-    factory().delete_participant(participant_);
-  }
-  Participant(const Participant&) = delete;
-  Participant& operator=(const Participant&) = delete;
-
-  [[nodiscard]] bool good() const { return participant_ != nullptr; }
-
-  /// @return null if it is not allowed
-  [[nodiscard]] edds::DataWriter* write(const char* topic, const char* partition) {
-    edds::PublisherQos qos;
-    qos.partition().push_back(partition);
-    return participant_->create_publisher(qos)->create_datawriter(topic_of(topic),
-                                                                  edds::DATAWRITER_QOS_DEFAULT);
-  }
-  [[nodiscard]] edds::DataReader* read(const char* topic, const char* partition) {
-    edds::SubscriberQos qos;
-    qos.partition().push_back(partition);
-    return participant_->create_subscriber(qos)->create_datareader(topic_of(topic),
-                                                                   edds::DATAREADER_QOS_DEFAULT);
-  }
-
- private:
-  static void secure(edds::DomainParticipantQos& qos, const KeyFiles& keys) {
-    const auto set = [&](const std::string& name, const std::string& value) {
-      qos.properties().properties().emplace_back("dds.sec." + name, value);
-    };
-    set("auth.plugin", "builtin.PKI-DH");
-    set("auth.builtin.PKI-DH.identity_ca", "file://" + keys.authority);
-    set("auth.builtin.PKI-DH.identity_certificate", "file://" + keys.certificate);
-    set("auth.builtin.PKI-DH.private_key", "file://" + keys.key);
-    set("auth.builtin.PKI-DH.identity_crl", "file://" + keys.revoked);
-    set("access.plugin", "builtin.Access-Permissions");
-    set("access.builtin.Access-Permissions.permissions_ca", "file://" + keys.authority);
-    set("access.builtin.Access-Permissions.governance", "file://" + keys.governance);
-    set("access.builtin.Access-Permissions.permissions", "file://" + keys.permissions);
-    set("crypto.plugin", "builtin.AES-GCM-GMAC");
-  }
-
-  edds::Topic* topic_of(const char* name) {
-    auto* known = participant_->lookup_topicdescription(name);
-    if (known != nullptr) return dynamic_cast<edds::Topic*>(known);
-    return participant_->create_topic(name, type_.get_type_name(), edds::TOPIC_QOS_DEFAULT);
-  }
-
-  edds::TypeSupport type_{new PresenceType};
-  edds::DomainParticipant* participant_ = nullptr;
-};
-
-int readers_of(edds::DataWriter* writer) {
-  edds::PublicationMatchedStatus status;
-  writer->get_publication_matched_status(status);
-  return status.current_count;
-}
-
-int writers_of(edds::DataReader* reader) {
-  edds::SubscriptionMatchedStatus status;
-  reader->get_subscription_matched_status(status);
-  return status.current_count;
 }
 
 bool arrives(edds::DataWriter& writer, edds::DataReader& reader) {

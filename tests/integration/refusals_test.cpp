@@ -35,7 +35,7 @@ class MutePartition final : public TransportHandler {
   }
 
   void on_request(const PeerId&, const Request&) override {}
-  void on_reply(const Reply&) override {}
+  void on_reply(const std::string&, const Reply&) override {}
   void on_update(const Update&) override {}
   void on_joints(const JointUpdate&) override {}
   void on_pushed(const PushedValues&) override {}

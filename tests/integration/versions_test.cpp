@@ -81,14 +81,14 @@ TEST_CASE("versions: messages of a later major version are ignored") {
   REQUIRE(base);
   // It writes a page that this version could read.
   ForeignWriter later(domain.number(), "tfdude/directory",
-                      fastdds::edds::TypeSupport(new wire::PagePubSubType), "", true,
+                      fastdds::edds::TypeSupport(new wire::PagePubSubType), "arm", true,
                       {"tfdude serving arm", kLater});
   later.await_readers(1);
   wire::Page page = fastdds::to_wire(Page{"arm", 0, 1, 2, {{"hand", "world"}}});
   later.write(&page);
   // A page of the same kind from a program without a version of ours arrives, later than that one.
   ForeignWriter other(domain.number(), "tfdude/directory",
-                      fastdds::edds::TypeSupport(new wire::PagePubSubType), "", true);
+                      fastdds::edds::TypeSupport(new wire::PagePubSubType), "leg", true);
   other.await_readers(1);
   wire::Page marker = fastdds::to_wire(Page{"leg", 0, 1, 2, {{"foot", "world"}}});
   other.write(&marker);
@@ -126,8 +126,8 @@ TEST_CASE("versions: a daemon of a later minor version is accepted") {
   auto client = Client::open(options);
   REQUIRE(client);
   ForeignWriter later(domain.number(), kPresenceTopic,
-                      fastdds::edds::TypeSupport(new RawType("tfdude::wire::Presence", true)), "",
-                      true, {"tfdude serving arm", "tfdude-protocol 1 7 0.9.0"});
+                      fastdds::edds::TypeSupport(new RawType("tfdude::wire::Presence", true)),
+                      "arm", true, {"tfdude serving arm", "tfdude-protocol 1 7 0.9.0"});
   later.await_readers(1);
   Presence presence{"arm", 5, "tower", 4711, 0, true};
   presence.protocol = {1, 7};

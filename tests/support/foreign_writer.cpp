@@ -111,7 +111,7 @@ std::shared_ptr<const Replies> ForeignWriter::read_replies() {
       participant_->create_topic(kReplyTopic, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
   edds::SubscriberQos subscriber_qos;
   const auto self = fastdds::peer_of(participant_->guid().guidPrefix);
-  subscriber_qos.partition().push_back(fastdds::reply_partition(self).c_str());
+  subscriber_qos.partition().push_back(fastdds::reply_partition("*", self).c_str());
   edds::Subscriber* subscriber = participant_->create_subscriber(subscriber_qos);
   edds::DataReaderQos qos;
   qos.data_sharing().off();

@@ -94,7 +94,7 @@ class Recorder final : public TransportHandler {
     record([&] { heard_.requests.push_back(request); });
     if (answer) answer(from, request);
   }
-  void on_reply(const Reply& reply) override {
+  void on_reply(const std::string&, const Reply& reply) override {
     record([&] { heard_.replies.push_back(reply); });
   }
   void on_update(const Update& update) override {

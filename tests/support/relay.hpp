@@ -43,7 +43,9 @@ class Relay : public Transport, protected TransportHandler {
   }
   Result<void> flush(Transport::Deadline deadline) override { return real_->flush(deadline); }
   void reply(const PeerId& to, const Reply& reply) override { real_->reply(to, reply); }
-  Result<void> watch(std::uint64_t group) override { return real_->watch(group); }
+  Result<void> watch(const std::string& owner, std::uint64_t group) override {
+    return real_->watch(owner, group);
+  }
   void unwatch(std::uint64_t group) override { real_->unwatch(group); }
   void push(const PushedValues& pushed) override { real_->push(pushed); }
   void end_pushing(std::uint64_t group) override { real_->end_pushing(group); }
@@ -55,7 +57,9 @@ class Relay : public Transport, protected TransportHandler {
   void on_request(const PeerId& from, const Request& request) override {
     handler_->on_request(from, request);
   }
-  void on_reply(const Reply& reply) override { handler_->on_reply(reply); }
+  void on_reply(const std::string& from, const Reply& reply) override {
+    handler_->on_reply(from, reply);
+  }
   void on_update(const Update& update) override { handler_->on_update(update); }
   void on_joints(const JointUpdate& update) override { handler_->on_joints(update); }
   void on_pushed(const PushedValues& pushed) override { handler_->on_pushed(pushed); }

@@ -100,7 +100,9 @@ class Rig {
     void on_request(const PeerId& from, const Request& request) override {
       if (auto reply = rig_.member.on_request(from, request)) rig_.transport->reply(from, *reply);
     }
-    void on_reply(const Reply& reply) override { rig_.requests.calls().on_reply(reply); }
+    void on_reply(const std::string& from, const Reply& reply) override {
+      rig_.requests.calls().on_reply(from, reply);
+    }
     void on_update(const Update&) override {}
     void on_joints(const JointUpdate&) override {}
     void on_pushed(const PushedValues& values) override {

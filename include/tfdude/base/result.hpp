@@ -37,6 +37,8 @@ enum class Errc : std::uint8_t {
   kUnknownJoint = 21,      ///< no joint of that name
   kIncompatible = 22,      ///< a participant speaks another major version of the protocol
   kUnsupported = 23,       ///< an earlier version does not know what was sent to it
+  kNotPermitted = 24,      ///< the keys of this participant, or the lack of keys, do not allow it
+  kTooMuch = 25,           ///< a limit of the partition is reached; the message names it
 };
 
 /// The stable snake_case name of a code, as the command line prints it in JSON.

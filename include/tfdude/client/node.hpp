@@ -8,6 +8,7 @@
 #include "tfdude/base/result.hpp"
 #include "tfdude/client/client.hpp"
 #include "tfdude/types/frame.hpp"
+#include "tfdude/types/refused.hpp"
 
 namespace tfdude {
 
@@ -44,6 +45,8 @@ class TFDUDE_EXPORT Node : public Client {
   [[nodiscard]] const std::string& partition() const;
   /// The number of frames of the partition.
   [[nodiscard]] std::size_t own_frames() const;
+  /// What limits have rejected since the start.
+  [[nodiscard]] RefusedCounts refused() const;
 
  private:
   using Client::Client;

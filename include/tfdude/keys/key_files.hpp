@@ -15,7 +15,8 @@ struct KeyFiles {
   std::string identity;  ///< its name
   Roles roles;
   KeySettings settings;
-  Time until;  ///< its certificate expires then
+  Time until;                  ///< its certificate expires then
+  std::string authority_name;  ///< with a random number, so others have other names
 
   // Paths.
   std::string key;

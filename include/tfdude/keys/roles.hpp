@@ -25,6 +25,10 @@ struct Roles {
   }
 };
 
+/// Checks whether a partition of this name can have keys.
+/// @return kInvalidInput naming it: '/' in it, or a space at an end
+[[nodiscard]] TFDUDE_EXPORT Result<void> check_partition_with_keys(const std::string& name);
+
 /// Checks the partitions, and resolves what roles include: a daemon, and whoever changes something,
 /// may look; who may move may also stream.
 /// @return kInvalidInput naming the partition; also if nothing is allowed

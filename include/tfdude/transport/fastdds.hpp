@@ -30,6 +30,7 @@ struct FastDdsOptions {
   std::shared_ptr<FastDdsCounters> counters;  ///< updated if given
   /// HOST:PORT of a Fast DDS discovery server with id 0; empty: discovery by multicast.
   std::string discovery_server = {};
+  std::string keys = {};  ///< directory of an identity (tfdude keys); empty: no keys
 };
 
 /// Checks the address of a discovery server: HOST:PORT, with a name or an IPv4 address. Does not
@@ -47,7 +48,8 @@ TFDUDE_EXPORT void log_fastdds_to_standard_error();
 /// share, and has its own profile. Intra-process delivery, which calls handlers under the writer's
 /// locks, is always off.
 /// @return kInvalidInput (domain, discovery server). start() may fail with kConfig (profile),
-///   kTransport, and kInvalidInput if the discovery server's host has no IPv4 address.
+///   kTransport, kInvalidInput if the discovery server's host has no IPv4 address, and, for the
+///   keys, as find_keys() and kNotPermitted if they are not those of the partition's daemon.
 [[nodiscard]] TFDUDE_EXPORT Result<TransportPtr> make_fastdds_transport(
     const FastDdsOptions& options);
 

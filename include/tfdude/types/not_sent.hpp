@@ -13,6 +13,7 @@ struct NotSent {
   /// - kUnknownFrame, kUnknownJoint: this process knows no owner (yet).
   /// - kUnreachable: the owner is known to be down.
   /// - kTimeout: the owner was not discovered yet, or cannot be sent the value at once.
+  /// - kNotPermitted: the keys of this process do not allow it.
   /// - kInvalidInput: not a number, out of range, or not one value per edge or joint.
   /// - kPartitionTaken: this Node has lost its partition.
   /// - kTransport: the Client was destroyed.

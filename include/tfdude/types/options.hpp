@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -21,6 +22,16 @@ inline constexpr std::uint32_t kNoDomain = UINT32_MAX;
 [[nodiscard]] TFDUDE_EXPORT std::uint32_t domain_of_environment();
 /// The profile in the environment's TFDUDE_PROFILE, else empty.
 [[nodiscard]] TFDUDE_EXPORT std::string profile_of_environment();
+/// The directory of keys in the environment's TFDUDE_KEYS, else empty.
+[[nodiscard]] TFDUDE_EXPORT std::string keys_of_environment();
+
+/// How much others can make a Node keep. What would exceed it is rejected with kTooMuch.
+struct PartitionLimits {
+  std::size_t frames = 200'000;  ///< that the partition owns
+  /// Groups of watchers. Those that watch the same edges of the partition in the same way are one.
+  std::size_t watches = 1000;
+  std::size_t history_bytes = std::size_t{1} << 30U;  ///< of the samples of all its edges
+};
 
 /// How a participant joins a domain. Participants discover each other only in the same domain and
 /// with the same profile.
@@ -32,6 +43,9 @@ struct Options {
   std::string profile = profile_of_environment();
   /// HOST:PORT of a Fast DDS discovery server with id 0; empty: discovery by multicast.
   std::string discovery_server;
+  /// Directory of an identity, made by `tfdude keys`; empty: no keys. All participants need keys of
+  /// the same authority, or none has any.
+  std::string keys = keys_of_environment();
   Milliseconds timeout{1000};  ///< time limit of a call, see Client
   /// Maximum time that a new participant searches for others before it reports a frame as unknown.
   /// It waits this long only if it discovers nobody. If it has discovered a participant that has
@@ -51,6 +65,8 @@ struct Options {
   Milliseconds save_every{1000};
   /// Default timing and history of a Node's edges, for frames without their own.
   EdgeTiming history{};
+  /// Limits of a Node.
+  PartitionLimits limits{};
   /// Maximum time that the destructor of a client waits until the values it has streamed (publish,
   /// publish_joints) are acknowledged, as flush() does; at most `timeout`.
   Milliseconds linger{100};

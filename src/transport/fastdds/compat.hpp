@@ -102,7 +102,9 @@ inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps:
   discovery.m_DiscoveryServers = {server};
 }
 
-/// Reports participants: met(guid prefix, name, user data) and left(guid prefix).
+/// Reports participants: met(guid prefix, name, user data), left(guid prefix), authenticated(guid
+/// prefix, verified); and writers: writer_found(guid, DDS partitions), writer_lost(guid). A writer
+/// is reported before it is matched.
 template <class Observer>
 class ParticipantListener final : public edds::DomainParticipantListener {
  public:
@@ -115,6 +117,22 @@ class ParticipantListener final : public edds::DomainParticipantListener {
                     info.info.m_userData.data_vec());
     } else if (info.status != ParticipantInfo::CHANGED_QOS_PARTICIPANT) {
       observer_.left(prefix);
+    }
+  }
+
+  void onParticipantAuthentication(edds::DomainParticipant*,
+                                   ertps::ParticipantAuthenticationInfo&& info) override {
+    observer_.authenticated(
+        info.guid.guidPrefix,
+        info.status == ertps::ParticipantAuthenticationInfo::AUTHORIZED_PARTICIPANT);
+  }
+
+  void on_publisher_discovery(edds::DomainParticipant*,
+                              ertps::WriterDiscoveryInfo&& info) override {
+    if (info.status == ertps::WriterDiscoveryInfo::DISCOVERED_WRITER) {
+      observer_.writer_found(info.info.guid(), info.info.m_qos.m_partition.getNames());
+    } else if (info.status == ertps::WriterDiscoveryInfo::REMOVED_WRITER) {
+      observer_.writer_lost(info.info.guid());
     }
   }
 
@@ -186,6 +204,22 @@ class ParticipantListener final : public edds::DomainParticipantListener {
       observer_.met(prefix, info.participant_name.to_string(), info.user_data.data_vec());
     } else if (reason != ertps::ParticipantDiscoveryStatus::CHANGED_QOS_PARTICIPANT) {
       observer_.left(prefix);
+    }
+  }
+
+  void onParticipantAuthentication(edds::DomainParticipant*,
+                                   ertps::ParticipantAuthenticationInfo&& info) override {
+    observer_.authenticated(
+        info.guid.guidPrefix,
+        info.status == ertps::ParticipantAuthenticationInfo::AUTHORIZED_PARTICIPANT);
+  }
+
+  void on_data_writer_discovery(edds::DomainParticipant*, ertps::WriterDiscoveryStatus reason,
+                                const edds::PublicationBuiltinTopicData& info, bool&) override {
+    if (reason == ertps::WriterDiscoveryStatus::DISCOVERED_WRITER) {
+      observer_.writer_found(info.guid, info.partition.getNames());
+    } else if (reason == ertps::WriterDiscoveryStatus::REMOVED_WRITER) {
+      observer_.writer_lost(info.guid);
     }
   }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "transport/fastdds/fair_share.hpp"
 #include "transport/fastdds/send_throttle.hpp"
 
 namespace tfdude::fastdds {
@@ -49,8 +50,11 @@ class GatedTransport final : public SendFilter {
                const ertps::Locator_t& remote) override {
     const Gate::Pass pass(*descriptor_.gate);
     if (!pass) return;
-    descriptor_.life_signs->heard(bytes, size, LifeSigns::Clock::now());
+    const auto now = LifeSigns::Clock::now();
+    descriptor_.life_signs->heard(bytes, size, now);
+    FairShare::begin(now);
     SendFilter::receive(next, bytes, size, local, remote);
+    FairShare::end(FairShare::Clock::now());
   }
 
  private:

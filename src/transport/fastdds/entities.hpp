@@ -96,10 +96,10 @@ class Writer final : public edds::DataWriterListener {
 template <class Sample>
 class Reader : public edds::DataReaderListener {
  public:
-  /// What to call. A writer is named by its participant; +1: matched; -1: no more.
+  /// What to call. +1: a writer was matched; -1: no more.
   struct Calls {
-    std::function<void(const Sample&, const ertps::GuidPrefix_t& from)> on_sample;
-    std::function<void(const ertps::GuidPrefix_t& writer, int change)> on_matched;
+    std::function<void(const Sample&, const ertps::GUID_t& writer)> on_sample;
+    std::function<void(const ertps::GUID_t& writer, int change)> on_matched;
   };
 
   Reader(const Context& context, edds::TopicDescription& topic, const std::string& partition,
@@ -142,7 +142,7 @@ class Reader : public edds::DataReaderListener {
       return a.info.sample_identity.sequence_number() < b.info.sample_identity.sequence_number();
     });
     for (auto one = batch_.begin(); one != end; ++one) {
-      calls_.on_sample(one->sample, one->info.sample_identity.writer_guid().guidPrefix);
+      calls_.on_sample(one->sample, one->info.sample_identity.writer_guid());
     }
   }
 
@@ -154,7 +154,7 @@ class Reader : public edds::DataReaderListener {
   void on_subscription_matched(edds::DataReader*,
                                const edds::SubscriptionMatchedStatus& status) override {
     if (!calls_.on_matched || status.current_count_change == 0) return;
-    calls_.on_matched(ertps::iHandle2GUID(status.last_publication_handle).guidPrefix,
+    calls_.on_matched(ertps::iHandle2GUID(status.last_publication_handle),
                       status.current_count_change);
   }
 

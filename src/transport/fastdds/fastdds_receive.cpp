@@ -1,6 +1,9 @@
 #include <utility>
 
+#include "tfdude/base/id.hpp"
+
 #include "base/log.hpp"
+#include "partition/requests.hpp"
 #include "transport/fastdds/fastdds_transport.hpp"
 #include "transport/fastdds/kinds.hpp"
 #include "transport/fastdds/topics.hpp"
@@ -8,7 +11,8 @@
 // What becomes of samples that arrive.
 namespace tfdude::fastdds {
 
-void FastDdsTransport::take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from) {
+void FastDdsTransport::take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from,
+                                    bool may_change) {
   if (peers_.is_incompatible(from)) return;
   const PeerId peer = peer_of(from);
   if (sample.body()._d() == kProbe) {
@@ -18,6 +22,11 @@ void FastDdsTransport::take_request(const wire::Request& sample, const ertps::Gu
     return;
   }
   auto request = from_wire(sample);
+  if (request && is_change(*request) && !may_change) {
+    request = fail(Errc::kNotPermitted, "only requests of topic " + std::string(kChangeTopic) +
+                                            " may " + attempt_of(*request) + " in partition " +
+                                            quote(options_.partition));
+  }
   if (request) {
     handler_->on_request(peer, *request);
     return;
@@ -45,39 +54,53 @@ void FastDdsTransport::take_joints(const wire::Joints& sample) {
   }
 }
 
-void FastDdsTransport::take_reply(const wire::Reply& sample) {
+// A reply is believed only from whom was asked: it names the owner whose partition it came through.
+void FastDdsTransport::take_reply(const wire::Reply& sample, const ertps::GUID_t& writer) {
+  peers_.replied(writer.guidPrefix);
   if (sample.body()._d() == kAlive) return;  // that it arrives says all
+  const std::string owner = owner_of_replies(writer_partitions_.of(writer));
   auto reply = from_wire(sample);
   if (reply) {
-    handler_->on_reply(*reply);
+    handler_->on_reply(owner, *reply);
   } else {
     // Who awaits it gets the error; if nobody does, a stranger has sent it.
     if (reply.error().code != Errc::kUnsupported) log_refused(kReplyTopic, reply.error());
-    handler_->on_reply(Reply{sample.sequence_number(), sample.epoch(), std::move(reply.error())});
+    handler_->on_reply(owner,
+                       Reply{sample.sequence_number(), sample.epoch(), std::move(reply.error())});
   }
 }
 
 // Before Fast DDS 2.10 nothing but this keeps a participant from hearing itself.
-void FastDdsTransport::take_page(const wire::Page& sample, const ertps::GuidPrefix_t& from) {
-  if (peer_of(from) == self_ || peers_.is_incompatible(from)) return;
-  const auto page = from_wire(sample);
-  if (page) {
-    handler_->on_page(*page);
-    peers_.sent_page(from, *page);
-  } else {
-    log_refused(kDirectoryTopic, page.error());
-  }
+bool FastDdsTransport::ignores(const ertps::GUID_t& writer) const {
+  return peer_of(writer.guidPrefix) == self_ || peers_.is_incompatible(writer.guidPrefix);
 }
 
-void FastDdsTransport::take_presence(const wire::Presence& sample,
-                                     const ertps::GuidPrefix_t& from) {
-  if (peer_of(from) == self_ || peers_.is_incompatible(from)) return;
+// Whether a message about a partition was written in the DDS partition of that name.
+bool FastDdsTransport::is_of(const std::string& partition, const ertps::GUID_t& writer,
+                             const char* topic) const {
+  const std::string written_in = writer_partitions_.of(writer);
+  if (written_in == partition) return true;
+  log_refused(topic, Error{Errc::kNotPermitted, "it is about partition " + quote(partition) +
+                                                    ", but was written in the DDS partition " +
+                                                    quote(written_in)});
+  return false;
+}
+
+void FastDdsTransport::take_page(const wire::Page& sample, const ertps::GUID_t& writer) {
+  if (ignores(writer)) return;
+  const auto page = from_wire(sample);
+  if (!page) return log_refused(kDirectoryTopic, page.error());
+  if (!is_of(page->partition, writer, kDirectoryTopic)) return;
+  handler_->on_page(*page);
+  peers_.sent_page(writer.guidPrefix, *page);
+}
+
+void FastDdsTransport::take_presence(const wire::Presence& sample, const ertps::GUID_t& writer) {
+  if (ignores(writer)) return;
   const auto presence = from_wire(sample);
-  if (!presence) {
-    log_refused(kPresenceTopic, presence.error());
-    return;
-  }
-  peers_.present(from, *presence, sample.peers());
+  if (!presence) return log_refused(kPresenceTopic, presence.error());
+  if (!is_of(presence->partition, writer, kPresenceTopic)) return;
+  peers_.present(writer.guidPrefix, *presence, sample.peers());
   attention_.raise();
 }
 

@@ -9,21 +9,28 @@
 #include "tfdude/transport/fastdds.hpp"
 
 #include "base/mutex.hpp"
+#include "transport/fastdds/access.hpp"
+#include "transport/fastdds/admission.hpp"
 #include "transport/fastdds/attention.hpp"
 #include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/contact.hpp"
 #include "transport/fastdds/entities.hpp"
+#include "transport/fastdds/fair_share.hpp"
 #include "transport/fastdds/owned_filter.hpp"
 #include "transport/fastdds/peers.hpp"
 #include "transport/fastdds/push_channels.hpp"
+#include "transport/fastdds/senders.hpp"
+#include "transport/fastdds/topics.hpp"
 #include "transport/fastdds/worker.hpp"
+#include "transport/fastdds/writer_partitions.hpp"
 #include "transport/fastdds/writer_table.hpp"
 #include "transport/port.hpp"
 
 namespace tfdude::fastdds {
 
-/// Requests and updates are sent in the DDS partition named like the tf-dude partition, replies in
-/// one of the peer's own, presence and directory in the default one. A sender keeps a writer for
-/// each partition, and an owner one for each peer, so messages reach only those concerned.
+/// What is sent to or by the owner of partition P is in the DDS partition P, but replies are in
+/// P/PEER and pushed values in P/GROUP. A sender keeps a writer for each owner, and an owner one
+/// for each peer, so messages reach only those concerned. Presence and structure are read from all.
 class FastDdsTransport final : public Transport {
  public:
   explicit FastDdsTransport(FastDdsOptions options);
@@ -36,22 +43,41 @@ class FastDdsTransport final : public Transport {
   Result<void> serve(const std::string& partition) override;
   void announce(const Presence& presence) override;
   void publish(const Page& page) override;
-  void prepare(const std::string& partition) override;
+  void prepare(const std::string& partition) override { senders_->prepare(partition); }
   Result<void> send(const std::string& partition, const Request& request,
-                    Deadline deadline) override;
-  Result<void> send(const std::string& partition, const Update& update, Deadline deadline) override;
+                    Deadline deadline) override {
+    return senders_->send(partition, request, deadline);
+  }
+  Result<void> send(const std::string& partition, const Update& update,
+                    Deadline deadline) override {
+    return senders_->send(partition, update, deadline);
+  }
   Result<void> send(const std::string& partition, const JointUpdate& update,
-                    Deadline deadline) override;
-  std::unique_ptr<Channel<Update>> update_channel(const std::string& partition) override;
-  std::unique_ptr<Channel<JointUpdate>> joint_channel(const std::string& partition) override;
-  Result<void> flush(Deadline deadline) override;
+                    Deadline deadline) override {
+    return senders_->send(partition, update, deadline);
+  }
+  std::unique_ptr<Channel<Update>> update_channel(const std::string& partition) override {
+    return senders_->update_channel(partition);
+  }
+  std::unique_ptr<Channel<JointUpdate>> joint_channel(const std::string& partition) override {
+    return senders_->joint_channel(partition);
+  }
+  Result<void> flush(Deadline deadline) override {
+    return senders_ ? senders_->flush(deadline) : Result<void>();  // also if it did not start
+  }
   void reply(const PeerId& to, const Reply& reply) override;
-  Result<void> watch(std::uint64_t group) override { return push_channels_->watch(group); }
+  Result<void> watch(const std::string& owner, std::uint64_t group) override;
   void unwatch(std::uint64_t group) override { push_channels_->unwatch(group); }
   void push(const PushedValues& pushed) override { push_channels_->push(pushed); }
   void end_pushing(std::uint64_t group) override { push_channels_->end_pushing(group); }
-  bool discovered() const override { return peers_.discovered(); }
-  bool awaits_presence() const override { return peers_.awaits_presence(); }
+  bool discovered() const override {
+    return peers_.discovered() && !admission_.awaits_authentication();
+  }
+  bool awaits_presence() const override {
+    return peers_.awaits_presence() || admission_.awaits_authentication();
+  }
+  std::vector<std::string> excluded() const override { return admission_.excluded(); }
+  std::uint64_t dropped() const override { return fair_share_.dropped(); }
   std::vector<IncompatiblePeer> incompatible() const override { return peers_.incompatible(); }
   Milliseconds discovery_time() const override;
 
@@ -59,41 +85,44 @@ class FastDdsTransport final : public Transport {
   void met(const ertps::GuidPrefix_t& prefix, const std::string& name,
            const std::vector<std::uint8_t>& user_data);
   void left(const ertps::GuidPrefix_t& prefix);
+  void authenticated(const ertps::GuidPrefix_t& prefix, bool verified);
+  void writer_found(const ertps::GUID_t& writer, const std::vector<std::string>& partitions) {
+    writer_partitions_.found(writer, partitions);
+  }
+  void writer_lost(const ertps::GUID_t& writer) { writer_partitions_.lost(writer); }
 
  private:
-  struct Topics {
-    edds::Topic* request = nullptr;
-    edds::Topic* reply = nullptr;
-    edds::Topic* update = nullptr;
-    edds::Topic* joint = nullptr;
-    edds::Topic* state = nullptr;
-    edds::Topic* directory = nullptr;
-    edds::Topic* presence = nullptr;
-  };
-
   Result<void> create_participant();
   Result<void> create_endpoints();
   void take_times(edds::DomainParticipantQos& qos);
-  edds::Topic* create_topic(const char* name, const edds::TypeSupport& type);
   edds::ContentFilteredTopic* create_filtered(edds::Topic* topic, const std::string& partition);
-
-  Milliseconds keep_in_touch();
-  [[nodiscard]] std::set<std::string> used_owners() const;
-  void probe(const std::string& partition);
-  bool announce_count();
+  std::unique_ptr<Reader<wire::Request>> request_reader(edds::Topic* topic,
+                                                        const std::string& partition,
+                                                        bool may_change);
   [[nodiscard]] Context context() const { return {*participant_, *profiles_, *gate_, *counters_}; }
-  /// A table whose writers are in the DDS partitions of their names.
-  WriterTable<std::string> writers_of(edds::Topic*& topic, const char* profile);
   void open_reply_writer(const PeerId& peer);
   void reply(const PeerId& to, wire::Reply sample);
-  Result<void> send(Writer& writer, const std::string& partition, void* sample, Deadline deadline);
 
-  void take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from);
+  /// A reader's callback that accounts the time it takes to the sender.
+  template <class Take>
+  auto accounted(Take take) {
+    return [this, take](const auto& sample, const ertps::GUID_t& writer) {
+      const auto begin = FairShare::Clock::now();
+      take(sample, writer);
+      const auto end = FairShare::Clock::now();
+      fair_share_.spent(peer_of(writer.guidPrefix), end - begin, end);
+    };
+  }
+  void admit(const PeerId& peer, const Announcement& said);
+  void take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from, bool may_change);
   void take_update(const wire::Update& sample);
   void take_joints(const wire::Joints& sample);
-  void take_reply(const wire::Reply& sample);
-  void take_page(const wire::Page& sample, const ertps::GuidPrefix_t& from);
-  void take_presence(const wire::Presence& sample, const ertps::GuidPrefix_t& from);
+  void take_reply(const wire::Reply& sample, const ertps::GUID_t& writer);
+  void take_page(const wire::Page& sample, const ertps::GUID_t& writer);
+  void take_presence(const wire::Presence& sample, const ertps::GUID_t& writer);
+  [[nodiscard]] bool ignores(const ertps::GUID_t& writer) const;
+  [[nodiscard]] bool is_of(const std::string& partition, const ertps::GUID_t& writer,
+                           const char* topic) const;
 
   const FastDdsOptions options_;
   const std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
@@ -111,21 +140,18 @@ class FastDdsTransport final : public Transport {
   PeerId self_{};
   Topics topics_;
 
-  Mutex presence_mutex_{LockRank::kAnnouncing};
-  // What this participant serves, as last announced, and when that was.
-  std::optional<wire::Presence> said_ TFDUDE_GUARDED_BY(presence_mutex_);
-  Peers::Clock::time_point said_at_ TFDUDE_GUARDED_BY(presence_mutex_);
-
+  Access access_;
+  Admission admission_{[this](const PeerId& peer, const Announcement& said) { admit(peer, said); }};
+  WriterPartitions writer_partitions_;
+  FairShare fair_share_;
   Attention attention_;
-  Milliseconds next_look_{};      // only for the worker
   bool announced_by_dds_ = true;  // participants hear the announcements of DDS; set at the start
+  std::optional<Senders> senders_;
+  std::optional<Contact> contact_;
 
-  WriterTable<std::string> request_writers_{writers_of(topics_.request, "call_writer")};
-  WriterTable<std::string> update_writers_{writers_of(topics_.update, "update_writer")};
-  WriterTable<std::string> joint_writers_{writers_of(topics_.joint, "update_writer")};
   WriterTable<PeerId> reply_writers_{[this](const PeerId& peer) {
-    return std::make_shared<Writer>(context(), *topics_.reply, reply_partition(peer),
-                                    "call_writer");
+    return std::make_shared<Writer>(context(), *topics_.reply,
+                                    reply_partition(options_.partition, peer), "call_writer");
   }};
   std::set<PeerId> there_;  // peers that were discovered and have not left; only for the worker
 
@@ -133,6 +159,7 @@ class FastDdsTransport final : public Transport {
   std::unique_ptr<Writer> presence_writer_;
   std::unique_ptr<Writer> directory_writer_;
   std::unique_ptr<Reader<wire::Request>> requests_;
+  std::unique_ptr<Reader<wire::Request>> changes_;
   std::unique_ptr<Reader<wire::Update>> updates_;
   std::unique_ptr<Reader<wire::Joints>> joints_;
   std::unique_ptr<Reader<wire::Reply>> replies_;

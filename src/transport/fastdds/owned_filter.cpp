@@ -3,16 +3,23 @@
 #include <string_view>
 
 #include "transport/fastdds/cdr_check.hpp"
+#include "transport/fastdds/peers.hpp"
 #include "transport/fastdds/topics.hpp"
 
 namespace tfdude::fastdds {
 
 OwnedFilters::OwnedFilters(const std::string& partition, const TransportHandler& handler,
-                           FastDdsCounters& counters)
-    : view_{addressee_of(partition), handler, counters} {}
+                           FastDdsCounters& counters, FairShare& fair_share)
+    : view_{addressee_of(partition), handler, counters, fair_share} {}
 
-bool OwnedFilters::Requests::evaluate(const SerializedPayload& payload, const FilterSampleInfo&,
-                                      const GUID_t&) const {
+bool OwnedFilters::View::admits(const edds::IContentFilter::FilterSampleInfo& info) const {
+  return fair_share.admits(peer_of(info.sample_identity.writer_guid().guidPrefix),
+                           FairShare::Clock::now());
+}
+
+bool OwnedFilters::Requests::evaluate(const SerializedPayload& payload,
+                                      const FilterSampleInfo& info, const GUID_t&) const {
+  if (!view_.admits(info)) return false;
   view_.counters.requests_arrived.fetch_add(1, std::memory_order_relaxed);
   RequestHead head;
   if (!read_request_head(payload.data, payload.length, head)) {
@@ -24,8 +31,9 @@ bool OwnedFilters::Requests::evaluate(const SerializedPayload& payload, const Fi
   return passes;
 }
 
-bool OwnedFilters::Joints::evaluate(const SerializedPayload& payload, const FilterSampleInfo&,
+bool OwnedFilters::Joints::evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
                                     const GUID_t&) const {
+  if (!view_.admits(info)) return false;
   view_.counters.updates_arrived.fetch_add(1, std::memory_order_relaxed);
   if (!well_formed_joints(payload.data, payload.length)) {
     count_malformed(view_.counters, kJointTopic);
@@ -38,8 +46,9 @@ bool OwnedFilters::Joints::evaluate(const SerializedPayload& payload, const Filt
   return passes;
 }
 
-bool OwnedFilters::Updates::evaluate(const SerializedPayload& payload, const FilterSampleInfo&,
+bool OwnedFilters::Updates::evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
                                      const GUID_t&) const {
+  if (!view_.admits(info)) return false;
   view_.counters.updates_arrived.fetch_add(1, std::memory_order_relaxed);
   if (!well_formed_update(payload.data, payload.length)) {
     count_malformed(view_.counters, kUpdateTopic);

@@ -5,6 +5,7 @@
 #include "tfdude/transport/fastdds.hpp"
 
 #include "transport/fastdds/compat.hpp"
+#include "transport/fastdds/fair_share.hpp"
 #include "transport/port.hpp"
 
 // The library's interfaces have no virtual destructor; the classes here are final and never deleted
@@ -16,16 +17,17 @@ namespace tfdude::fastdds {
 
 /// The filters of a partition's readers. They pass messages about a frame or joint that the
 /// partition owns, and requests addressed to it by name. They drop messages that are not well
-/// formed. They are evaluated at the reader, on the bytes, against the current set of owned frames:
-/// the announced expression, the partition's name, never changes.
+/// formed, and those of senders that flood it. They are evaluated at the reader, on the bytes,
+/// against the current set of owned frames: the announced expression, the partition's name, never
+/// changes.
 class OwnedFilters final : public edds::IContentFilterFactory {
  public:
   /// The name under which the class is registered and announced.
   static constexpr const char* kClassName = "tfdude.owned";
 
-  /// The handler and the counters outlive this.
+  /// The handler, the counters and the shares outlive this.
   OwnedFilters(const std::string& partition, const TransportHandler& handler,
-               FastDdsCounters& counters);
+               FastDdsCounters& counters, FairShare& fair_share);
 
   ReturnCode create_content_filter(const char* filter_class_name, const char* type_name,
                                    const edds::TopicDataType* data_type, const char* expression,
@@ -40,6 +42,10 @@ class OwnedFilters final : public edds::IContentFilterFactory {
     std::uint32_t addressee;
     const TransportHandler& handler;
     FastDdsCounters& counters;
+    FairShare& fair_share;
+
+    /// Whether the sender has not taken too much time already.
+    [[nodiscard]] bool admits(const edds::IContentFilter::FilterSampleInfo& info) const;
   };
 
   class Requests final : public edds::IContentFilter {

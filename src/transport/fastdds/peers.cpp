@@ -12,9 +12,9 @@ PeerId peer_of(const ertps::GuidPrefix_t& prefix) {
   return peer;
 }
 
-std::string reply_partition(const PeerId& peer) {
+std::string reply_partition(const std::string& owner, const PeerId& peer) {
   constexpr const char* kDigits = "0123456789abcdef";
-  std::string name = "tfdude-peer-";
+  std::string name = owner + "/";
   for (const std::uint8_t byte : peer) {
     name += kDigits[byte >> 4U];
     name += kDigits[byte & 15U];
@@ -22,19 +22,24 @@ std::string reply_partition(const PeerId& peer) {
   return name;
 }
 
-void Peers::met(const ertps::GuidPrefix_t& prefix, const Announcement& said) {
+std::string owner_of_replies(const std::string& partition) {
+  const auto end = partition.rfind('/');
+  return end != std::string::npos ? partition.substr(0, end) : std::string();
+}
+
+void Peers::met(const PeerId& peer, const Announcement& said) {
   const Lock lock(mutex_);
   last_met_ = Clock::now();
   if (said.compatible()) {
-    if (!said.partition.empty()) follow(peer_of(prefix));
+    if (!said.partition.empty()) follow(peer);
     return;
   }
-  IncompatiblePeer peer{said.partition, said.protocol, said.program,
-                        std::chrono::system_clock::now()};
-  if (logged_.insert(peer.text()).second) {
-    log().error("{}: no messages are exchanged with it", peer.text());
+  IncompatiblePeer stranger{said.partition, said.protocol, said.program,
+                            std::chrono::system_clock::now()};
+  if (logged_.insert(stranger.text()).second) {
+    log().error("{}: no messages are exchanged with it", stranger.text());
   }
-  incompatible_.insert_or_assign(peer_of(prefix), std::move(peer));
+  incompatible_.insert_or_assign(peer, std::move(stranger));
   any_incompatible_ = true;
 }
 

@@ -26,8 +26,11 @@ namespace tfdude::fastdds {
 /// The participant's part of a DDS identity: unique in the domain, new at every start.
 [[nodiscard]] PeerId peer_of(const ertps::GuidPrefix_t& prefix);
 
-/// The DDS partition in which a peer reads its replies.
-[[nodiscard]] std::string reply_partition(const PeerId& peer);
+/// The DDS partition of the replies of an owner to a peer. The peer reads those of all: owner "*".
+[[nodiscard]] std::string reply_partition(const std::string& owner, const PeerId& peer);
+
+/// The owner of such a partition; empty if it is none.
+[[nodiscard]] std::string owner_of_replies(const std::string& partition);
 
 /// The participants that were discovered, what each announced that it serves, and which are silent.
 /// Thread-safe. The callbacks run under a lock, so that those about one peer come in order. So no
@@ -68,7 +71,7 @@ class Peers {
   }
 
   /// A participant that speaks another major version is logged once and otherwise ignored.
-  void met(const ertps::GuidPrefix_t& prefix, const Announcement& said);
+  void met(const PeerId& peer, const Announcement& said);
   void left(const ertps::GuidPrefix_t& prefix);
   /// @param peers  number of other servers that the sender hears
   void present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers);

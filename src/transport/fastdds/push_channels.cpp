@@ -8,17 +8,19 @@
 namespace tfdude::fastdds {
 namespace {
 
-std::string partition_of(std::uint64_t group) { return "watch " + std::to_string(group); }
+std::string partition_of(const std::string& owner, std::uint64_t group) {
+  return owner + "/" + std::to_string(group);
+}
 
 }  // namespace
 
-Result<void> PushChannels::watch(std::uint64_t group) {
+Result<void> PushChannels::watch(const std::string& owner, std::uint64_t group) {
   const Lock lock(mutex_);
   auto& reader = readers_[group];
   if (reader != nullptr) return {};
   reader = std::make_unique<Reader<wire::State>>(
-      context_, topic_, partition_of(group), "update_reader",
-      Reader<wire::State>::Calls{[this](const wire::State& sample, const ertps::GuidPrefix_t&) {
+      context_, topic_, partition_of(owner, group), "update_reader",
+      Reader<wire::State>::Calls{[this](const wire::State& sample, const ertps::GUID_t&) {
                                    if (const auto pushed = from_wire(sample)) {
                                      calls_.on_pushed(*pushed);
                                    } else {
@@ -47,9 +49,9 @@ void PushChannels::push(const PushedValues& pushed) {
     const Lock lock(mutex_);
     auto& entry = writers_[pushed.group];
     if (entry == nullptr) {
-      entry =
-          std::make_shared<Writer>(context_, topic_, partition_of(pushed.group), "update_writer",
-                                   [this, group = pushed.group] { calls_.on_watcher(group); });
+      entry = std::make_shared<Writer>(context_, topic_, partition_of(own_, pushed.group),
+                                       "update_writer",
+                                       [this, group = pushed.group] { calls_.on_watcher(group); });
     }
     writer = entry;
   }

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <string>
 
 #include "base/mutex.hpp"
 #include "partition/messages.hpp"
@@ -11,8 +12,9 @@
 
 namespace tfdude::fastdds {
 
-/// Values pushed to watchers. Each group of watchers has its own DDS partition, so others are sent
-/// nothing, and those that watch the same edges share one writer. Thread-safe.
+/// Values pushed to watchers. Each group of watchers of an owner has its own DDS partition,
+/// OWNER/GROUP, so others are sent nothing, and those that watch the same edges share one writer.
+/// Thread-safe.
 class PushChannels {
  public:
   struct Calls {
@@ -20,10 +22,11 @@ class PushChannels {
     std::function<void(std::uint64_t group)> on_watcher;
   };
 
-  PushChannels(const Context& context, edds::Topic& topic, Calls calls)
-      : context_(context), topic_(topic), calls_(std::move(calls)) {}
+  /// @param own  the partition that this participant serves; empty: none, so it pushes nothing
+  PushChannels(const Context& context, edds::Topic& topic, std::string own, Calls calls)
+      : context_(context), topic_(topic), own_(std::move(own)), calls_(std::move(calls)) {}
 
-  [[nodiscard]] Result<void> watch(std::uint64_t group);
+  [[nodiscard]] Result<void> watch(const std::string& owner, std::uint64_t group);
   void unwatch(std::uint64_t group);
   void push(const PushedValues& pushed);
   void end_pushing(std::uint64_t group);
@@ -31,6 +34,7 @@ class PushChannels {
  private:
   const Context context_;
   edds::Topic& topic_;
+  const std::string own_;
   const Calls calls_;
   Mutex mutex_{LockRank::kChannels};
   std::map<std::uint64_t, std::unique_ptr<Reader<wire::State>>> readers_ TFDUDE_GUARDED_BY(mutex_);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "transport/fastdds/attention.hpp"
@@ -14,14 +15,16 @@ namespace tfdude::fastdds {
 template <class Message, class Sample>
 class StreamChannel final : public Channel<Message> {
  public:
+  /// @param writer  null: this participant may not stream there
   StreamChannel(std::shared_ptr<Writer> writer, Attention& attention)
       : writer_(std::move(writer)), attention_(attention) {}
 
-  bool try_send(const Message& message) override {
-    if (!writer_->good() || !writer_->matched()) return false;
+  std::optional<Errc> try_send(const Message& message) override {
+    if (writer_ == nullptr) return Errc::kNotPermitted;
+    if (!writer_->good() || !writer_->matched()) return Errc::kTimeout;
     attention_.pay(*writer_);
     write_wire(message, sample_);
-    return writer_->write(&sample_);
+    return writer_->write(&sample_) ? std::nullopt : std::optional<Errc>(Errc::kTimeout);
   }
 
  private:

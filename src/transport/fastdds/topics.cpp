@@ -4,6 +4,24 @@
 
 namespace tfdude::fastdds {
 
+bool create_topics(edds::DomainParticipant& participant, Topics& topics) {
+  const auto create = [&](const char* name, const edds::TypeSupport& type) -> edds::Topic* {
+    if (!ok(type.register_type(&participant))) return nullptr;
+    return participant.create_topic(name, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
+  };
+  topics.presence = create(kPresenceTopic, edds::TypeSupport(new PresenceType));
+  topics.directory = create(kDirectoryTopic, edds::TypeSupport(new PageType));
+  topics.reply = create(kReplyTopic, edds::TypeSupport(new ReplyType));
+  topics.request = create(kRequestTopic, edds::TypeSupport(new RequestType));
+  topics.change = create(kChangeTopic, edds::TypeSupport(new RequestType));
+  topics.update = create(kUpdateTopic, edds::TypeSupport(new UpdateType));
+  topics.joint = create(kJointTopic, edds::TypeSupport(new JointsType));
+  topics.state = create(kStateTopic, edds::TypeSupport(new StateType));
+  return topics.presence != nullptr && topics.directory != nullptr && topics.reply != nullptr &&
+         topics.request != nullptr && topics.change != nullptr && topics.update != nullptr &&
+         topics.joint != nullptr && topics.state != nullptr;
+}
+
 void count_malformed(FastDdsCounters& counters, const char* topic) {
   const std::uint64_t before = counters.malformed.fetch_add(1, std::memory_order_relaxed);
   const std::uint64_t count = before + 1;

@@ -17,6 +17,21 @@ using StateType = CheckedType<wire::StatePubSubType, well_formed_state>;
 using PageType = CheckedType<wire::PagePubSubType, well_formed_page>;
 using PresenceType = CheckedType<wire::PresencePubSubType, well_formed_presence>;
 
+/// The topics of a participant.
+struct Topics {
+  edds::Topic* request = nullptr;
+  edds::Topic* change = nullptr;
+  edds::Topic* reply = nullptr;
+  edds::Topic* update = nullptr;
+  edds::Topic* joint = nullptr;
+  edds::Topic* state = nullptr;
+  edds::Topic* directory = nullptr;
+  edds::Topic* presence = nullptr;
+};
+
+/// Registers their types and creates them. @return false if one could not be created
+[[nodiscard]] bool create_topics(edds::DomainParticipant& participant, Topics& topics);
+
 /// Counts a sample that was dropped as not well formed, and logs the 1st, 2nd, 4th, 8th...
 void count_malformed(FastDdsCounters& counters, const char* topic);
 

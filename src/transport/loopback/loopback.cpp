@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <utility>
 #include <variant>
@@ -143,9 +144,11 @@ class LoopbackChannel final : public Channel<Message> {
   LoopbackChannel(std::shared_ptr<Hub> hub, std::string partition, Take take)
       : hub_(std::move(hub)), partition_(std::move(partition)), take_(take) {}
 
-  bool try_send(const Message& message) override {
-    return hub_->deliver([&](const auto& member) { return member.serves == partition_; },
-                         [&](TransportHandler& handler) { (handler.*take_)(message); }) > 0;
+  std::optional<Errc> try_send(const Message& message) override {
+    const auto reached =
+        hub_->deliver([&](const auto& member) { return member.serves == partition_; },
+                      [&](TransportHandler& handler) { (handler.*take_)(message); });
+    return reached > 0 ? std::nullopt : std::optional<Errc>(Errc::kTimeout);
   }
 
  private:
@@ -177,6 +180,7 @@ class LoopbackTransport final : public Transport {
   }
 
   Result<void> serve(const std::string& partition) override {
+    served_ = partition;
     hub_->serve(*self_, partition);
     return {};
   }
@@ -230,10 +234,10 @@ class LoopbackTransport final : public Transport {
   Result<void> flush(Deadline /*deadline*/) override { return {}; }
   void reply(const PeerId& to, const Reply& reply) override {
     hub_->deliver([&](const auto& member) { return member.id == to; },
-                  [&](TransportHandler& handler) { handler.on_reply(reply); });
+                  [&](TransportHandler& handler) { handler.on_reply(served_, reply); });
   }
 
-  Result<void> watch(std::uint64_t group) override {
+  Result<void> watch(const std::string&, std::uint64_t group) override {
     const Lock lock(hub_->members_mutex_);
     self_->watches.insert(group);
     return {};
@@ -278,6 +282,7 @@ class LoopbackTransport final : public Transport {
 
   std::shared_ptr<LoopbackNetwork::Hub> hub_;
   std::shared_ptr<Member> self_;
+  std::string served_;  // set before requests can come
 };
 
 LoopbackNetwork::LoopbackNetwork() : hub_(std::make_shared<Hub>()) {}

@@ -39,6 +39,8 @@ constexpr Named kCodes[] = {
     {Errc::kUnknownJoint, 21, "unknown_joint"},
     {Errc::kIncompatible, 22, "incompatible"},
     {Errc::kUnsupported, 23, "unsupported"},
+    {Errc::kNotPermitted, 24, "not_permitted"},
+    {Errc::kTooMuch, 25, "too_much"},
 };
 
 TEST_CASE("codes keep their numbers and names") {

@@ -34,9 +34,9 @@ template <class Message>
 class PortChannel final : public Channel<Message> {
  public:
   explicit PortChannel(Port& port) : port_(port) {}
-  bool try_send(const Message&) override {
+  std::optional<Errc> try_send(const Message&) override {
     port_.sent += port_.takes ? 1 : 0;
-    return port_.takes;
+    return port_.takes ? std::nullopt : std::optional<Errc>(Errc::kTimeout);
   }
 
  private:

@@ -15,6 +15,10 @@ Reply reply_to(const Calls::Entry& entry, std::uint64_t epoch) {
   return {entry.sequence, epoch, Done{}};
 }
 
+void answer(Calls& calls, const Calls::Entry& entry, std::uint64_t epoch) {
+  calls.on_reply(entry.partition, reply_to(entry, epoch));
+}
+
 std::string error_of(const Calls::Entry& entry) {
   if (!entry.reply) return "waits";
   const auto* error = std::get_if<Error>(&entry.reply->body);
@@ -47,11 +51,11 @@ TEST_CASE("calls: a call is complete when every partition has replied in any ord
   Calls calls;
   Calls::Call call(calls, {"a", "b"});
   CHECK_FALSE(call.wait_until(kOver));
-  calls.on_reply(reply_to(call.entries()[1], 20));
+  answer(calls, call.entries()[1], 20);
   CHECK_FALSE(call.wait_until(kOver));
   CHECK(call.waits(0));
   CHECK_FALSE(call.waits(1));
-  calls.on_reply(reply_to(call.entries()[0], 10));
+  answer(calls, call.entries()[0], 10);
   CHECK(call.wait_until(kOver));
   CHECK(call.entries()[0].reply->epoch == 10);
   CHECK(call.entries()[1].reply->epoch == 20);
@@ -66,12 +70,22 @@ TEST_CASE("calls: a call without partitions is complete at once") {
 TEST_CASE("calls: repeated and unknown replies are dropped") {
   Calls calls;
   Calls::Call call(calls, {"a"});
-  calls.on_reply({0, 99, Done{}});
-  calls.on_reply({77, 99, Done{}});
+  calls.on_reply("a", {0, 99, Done{}});
+  calls.on_reply("a", {77, 99, Done{}});
   CHECK(call.waits(0));
-  calls.on_reply(reply_to(call.entries()[0], 1));
-  calls.on_reply(reply_to(call.entries()[0], 2));
+  answer(calls, call.entries()[0], 1);
+  answer(calls, call.entries()[0], 2);
   CHECK(call.entries()[0].reply->epoch == 1);
+}
+
+TEST_CASE("calls: a reply of another partition than the one asked is dropped") {
+  Calls calls;
+  Calls::Call call(calls, {"a", "b"});
+  calls.on_reply("b", reply_to(call.entries()[0], 1));
+  calls.on_reply("", reply_to(call.entries()[0], 2));
+  CHECK(call.waits(0));
+  calls.on_reply("a", reply_to(call.entries()[0], 3));
+  CHECK(call.entries()[0].reply->epoch == 3);
 }
 
 TEST_CASE("calls: a reply that comes after its call has ended is dropped") {
@@ -82,7 +96,7 @@ TEST_CASE("calls: a reply that comes after its call has ended is dropped") {
     over = call.entries()[0];
   }
   Calls::Call next(calls, {"a"});
-  calls.on_reply(reply_to(over, 1));
+  answer(calls, over, 1);
   calls.on_lost("nobody");
   CHECK(next.waits(0));
 }
@@ -90,13 +104,13 @@ TEST_CASE("calls: a reply that comes after its call has ended is dropped") {
 TEST_CASE("calls: a request that is given up gets its error unless the reply has come") {
   Calls calls;
   Calls::Call call(calls, {"a", "b"});
-  calls.on_reply(reply_to(call.entries()[0], 1));
+  answer(calls, call.entries()[0], 1);
   call.give_up(0, Error{Errc::kTimeout, "too late"});
   call.give_up(1, Error{Errc::kTimeout, "no answer"});
   CHECK(error_of(call.entries()[0]) == "ok");
   CHECK(error_of(call.entries()[1]) == "timeout: no answer");
   CHECK(call.entries()[1].reply->sequence == call.entries()[1].sequence);
-  calls.on_reply(reply_to(call.entries()[1], 1));
+  answer(calls, call.entries()[1], 1);
   CHECK(error_of(call.entries()[1]) == "timeout: no answer");
   CHECK(call.wait_until(kOver));
 }
@@ -105,7 +119,7 @@ TEST_CASE("calls: the loss of a partition fails only the requests that wait for 
   Calls calls;
   Calls::Call first(calls, {"a", "b", "a"});
   Calls::Call second(calls, {"b", "c"});
-  calls.on_reply(reply_to(first.entries()[0], 1));
+  answer(calls, first.entries()[0], 1);
   calls.on_lost("a");
   const std::string lost = "unreachable: partition 'a' left before it replied";
   CHECK(error_of(first.entries()[0]) == "ok");

@@ -15,7 +15,9 @@ TEST_CASE("calls: a waiting call is woken by its last reply") {
   Calls calls;
   Calls::Call call(calls, {"a", "b"});
   std::thread replier([&calls, &entries = call.entries()] {
-    for (const Calls::Entry& entry : entries) calls.on_reply({entry.sequence, 0, Done{}});
+    for (const Calls::Entry& entry : entries) {
+      calls.on_reply(entry.partition, {entry.sequence, 0, Done{}});
+    }
   });
   CHECK(call.wait_until(far()));
   replier.join();
@@ -54,7 +56,8 @@ TEST_CASE("calls: many concurrent calls each get their own replies") {
   std::thread replier([&] {
     while (running > 0) {
       for (std::uint32_t n = 1; n <= 2 * kCallers * kCalls && running > 0; ++n) {
-        calls.on_reply({n, n, Done{}});
+        calls.on_reply("a", {n, n, Done{}});
+        calls.on_reply("b", {n, n, Done{}});
       }
     }
   });

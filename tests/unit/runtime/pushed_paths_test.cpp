@@ -109,7 +109,7 @@ TEST_CASE("pushing: a watcher gets all values in the reply and later ones pushed
   Watcher own(
       owner.structure, owner.discovery, owner.requests, *owner.transport,
       [] { return std::uint64_t{0}; }, 1s);
-  Pushing pushing(owner.structure, *owner.transport, owner.member, own);
+  Pushing pushing(owner.structure, *owner.transport, owner.member, own, 1000);
   owner.member.with_rules([](Member& member) { member.claim("here", 1, Time(1s), 1); });
   owner.member.open(nullptr, 1s);
   REQUIRE(owner.member.serve(nullptr, kArm));
@@ -124,7 +124,7 @@ TEST_CASE("pushing: a watcher gets all values in the reply and later ones pushed
   listener.pushed = [&](const PushedValues& told) {
     for (const PushedValue& one : told.entries) pushed = one.X.pose.translation().x();
   };
-  REQUIRE(listener.transport->watch(values->group));
+  REQUIRE(listener.transport->watch("here", values->group));
   pushing.on_watcher(values->group);
   CHECK(eventually([&] { return pushed == 4; }));
   REQUIRE(owner.structure.forest.update("hand", along_x(6), std::nullopt));

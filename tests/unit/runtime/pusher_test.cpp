@@ -51,7 +51,7 @@ struct PushingOwner {
     const std::lock_guard lock(mutex);
     return open;
   }
-  Pusher pusher{forest, [this](const PushedValues& values) { push(values); },
+  Pusher pusher{forest, 1000, [this](const PushedValues& values) { push(values); },
                 [this](std::uint64_t group) {
                   const std::lock_guard lock(mutex);
                   open.erase(group);

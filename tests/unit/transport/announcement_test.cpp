@@ -8,14 +8,23 @@ namespace {
 std::vector<std::uint8_t> bytes(const std::string& text) { return {text.begin(), text.end()}; }
 
 TEST_CASE("a participant announces its partition and its versions") {
-  const Announcement arm = read_announcement(participant_name("arm"), version_data());
+  const Announcement arm = read_announcement(participant_name("arm"), user_data(""));
   CHECK(arm.partition == "arm");
   CHECK(arm.protocol == kProtocolVersion);
   CHECK(arm.program == program_version());
   CHECK(arm.compatible());
-  const Announcement client = read_announcement(participant_name(""), version_data());
+  const Announcement client = read_announcement(participant_name(""), user_data(""));
   CHECK(client.partition.empty());
   CHECK(client.compatible());
+}
+
+TEST_CASE("a participant with keys says whose") {
+  const Announcement arm = read_announcement(participant_name("arm"), user_data("3fe2"));
+  CHECK(arm.authority == "3fe2");
+  CHECK(arm.program == program_version());
+  CHECK(read_announcement(participant_name("arm"), user_data("")).authority.empty());
+  CHECK(read_announcement("tfdude serving arm", bytes("tfdude-protocol 1 0 1 keys")).authority ==
+        "");
 }
 
 TEST_CASE("only another major version is incompatible") {

@@ -29,7 +29,7 @@ Presence presence_of(const std::string& partition) {
 }
 
 Announcement serving(const std::string& partition, ProtocolVersion protocol = kProtocolVersion) {
-  return {partition, protocol, "9.8.7"};
+  return {true, partition, protocol, "9.8.7", {}};
 }
 
 // The datagram of a participant, as far as it is looked at.
@@ -56,7 +56,7 @@ struct Observer {
   }
 
   void meet(unsigned char number, const std::string& partition, std::size_t others = 0) {
-    peers.met(prefix_of(number), serving(partition));
+    peers.met(peer_of(prefix_of(number)), serving(partition));
     peers.present(prefix_of(number), presence_of(partition), others);
   }
 
@@ -80,9 +80,9 @@ TEST_CASE("a peer of another major version is reported and otherwise ignored") {
       std::make_shared<LifeSigns>(), [&](const Presence&) { ++told; },
       [&](const Presence&, std::chrono::nanoseconds) { ++told; });
   peers.configure(kPatient, false);
-  peers.met(prefix_of(1), serving("arms", {2, 0}));
-  peers.met(prefix_of(2), serving("", {2, 0}));
-  peers.met(prefix_of(3), serving("head"));
+  peers.met(peer_of(prefix_of(1)), serving("arms", {2, 0}));
+  peers.met(peer_of(prefix_of(2)), serving("", {2, 0}));
+  peers.met(peer_of(prefix_of(3)), serving("head"));
   CHECK(peers.is_incompatible(prefix_of(1)));
   CHECK(peers.is_incompatible(prefix_of(2)));
   CHECK_FALSE(peers.is_incompatible(prefix_of(3)));
@@ -126,7 +126,7 @@ TEST_CASE("discovery is complete when all peers know as many participants") {
     CHECK(one.peers.discovered());
   }
   SECTION("a peer that claims its name may not have discovered others yet") {
-    one.peers.met(prefix_of(1), serving("arms"));
+    one.peers.met(peer_of(prefix_of(1)), serving("arms"));
     Presence claim = presence_of("arms");
     claim.serving = false;
     one.peers.present(prefix_of(1), claim, 0);
@@ -230,7 +230,7 @@ TEST_CASE("a peer that sends a page and then nothing is lost and not waited for"
       std::make_shared<LifeSigns>(), [](const Presence&) {},
       [&](const Presence& one, std::chrono::nanoseconds) { gone.push_back(one.incarnation); });
   peers.configure(kPatient, false);
-  peers.met(prefix_of(1), serving("arms"));
+  peers.met(peer_of(prefix_of(1)), serving("arms"));
   Page page;
   page.partition = "arms";
   page.incarnation = 7;
@@ -263,7 +263,7 @@ TEST_CASE("a peer that sent a page of a later incarnation is lost under that inc
       std::make_shared<LifeSigns>(), [](const Presence&) {},
       [&](const Presence& one, std::chrono::nanoseconds) { gone.push_back(one.incarnation); });
   peers.configure(kPatient, false);
-  peers.met(prefix_of(1), serving("arms"));
+  peers.met(peer_of(prefix_of(1)), serving("arms"));
   // While it claims its name; it serves under another number.
   peers.present(prefix_of(1), presence_of("arms"), 0);
   Page page;
@@ -276,7 +276,7 @@ TEST_CASE("a peer that sent a page of a later incarnation is lost under that inc
 
 TEST_CASE("a discovered peer without a presence is waited for") {
   Observer one;
-  one.peers.met(prefix_of(1), serving("arms"));
+  one.peers.met(peer_of(prefix_of(1)), serving("arms"));
   one.look(std::chrono::seconds(9));
   CHECK(one.peers.awaits_presence());
 }

@@ -1,0 +1,70 @@
+#include "transport/fastdds/admission.hpp"
+
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+
+#include "base/log.hpp"
+
+namespace tfdude::fastdds {
+
+std::string Admission::reason_against(const Announcement& said) const {
+  if (said.authority == authority_) return {};
+  if (authority_.empty()) {
+    return "needs keys, and this participant has none (option --keys or TFDUDE_KEYS)";
+  }
+  if (said.authority.empty()) return "has no keys, and this participant has some";
+  return "has keys of another authority (" + quote(said.authority) + ") than this participant (" +
+         quote(authority_) + ")";
+}
+
+void Admission::discovered(const PeerId& peer, const Announcement& said) {
+  const Lock lock(mutex_);
+  // Other participants of DDS write streams; whether they may is decided by DDS.
+  std::string reason = said.is_ours ? reason_against(said) : std::string();
+  if (reason.empty() && (authority_.empty() || verified_.count(peer) != 0)) return met_(peer, said);
+  candidates_.insert_or_assign(peer, Candidate{said, std::move(reason)});
+}
+
+void Admission::authenticated(const PeerId& peer, bool verified) {
+  const Lock lock(mutex_);
+  const auto known = candidates_.find(peer);
+  if (verified) {
+    verified_.insert(peer);
+    if (known == candidates_.end()) return;
+    const Announcement said = known->second.said;
+    candidates_.erase(known);
+    met_(peer, said);
+  } else if (known != candidates_.end() && known->second.excluded_because.empty()) {
+    known->second.excluded_because =
+        "and this participant do not accept each other's keys: one of them is expired or revoked";
+    log().warn("partition {} {}", quote(known->second.said.partition),
+               known->second.excluded_because);
+  }
+}
+
+void Admission::left(const PeerId& peer) {
+  const Lock lock(mutex_);
+  candidates_.erase(peer);
+  verified_.erase(peer);
+}
+
+bool Admission::awaits_authentication() const {
+  const Lock lock(mutex_);
+  return std::any_of(candidates_.begin(), candidates_.end(), [](const auto& candidate) {
+    return !candidate.second.said.partition.empty() && candidate.second.excluded_because.empty();
+  });
+}
+
+std::vector<std::string> Admission::excluded() const {
+  std::vector<std::string> sentences;
+  const Lock lock(mutex_);
+  for (const auto& [peer, candidate] : candidates_) {
+    if (candidate.said.partition.empty() || candidate.excluded_because.empty()) continue;
+    sentences.push_back("partition " + quote(candidate.said.partition) + " " +
+                        candidate.excluded_because);
+  }
+  return sentences;
+}
+
+}  // namespace tfdude::fastdds

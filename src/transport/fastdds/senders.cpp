@@ -1,0 +1,140 @@
+#include "transport/fastdds/senders.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "partition/requests.hpp"
+#include "transport/fastdds/cdr_check.hpp"
+#include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/stream_channel.hpp"
+
+namespace tfdude::fastdds {
+namespace {
+
+// How often a call that waits for an owner checks whether it still can come.
+constexpr std::chrono::milliseconds kWaitStep{60};
+
+}  // namespace
+
+WriterTable<std::string> Senders::writers_of(edds::Topic* topic, const char* profile) const {
+  return WriterTable<std::string>([this, topic, profile](const std::string& partition) {
+    return std::make_shared<Writer>(parts_.context, *topic, partition, profile);
+  });
+}
+
+// Changes are rarer: their writer is created with the first one.
+void Senders::prepare(const std::string& partition) {
+  if (parts_.access.may_look()) (void)requests_.open(partition);
+}
+
+Result<void> Senders::send(const std::string& partition, const Request& request,
+                           Deadline deadline) {
+  if (auto ok = parts_.access.check(partition, request); !ok) return ok;
+  const auto to = (is_change(request) ? changes_ : requests_).open(partition);
+  thread_local wire::Request sample;
+  write_wire(request, partition, sample);
+  return send(*to, partition, &sample, deadline);
+}
+
+Result<void> Senders::send(const std::string& partition, const Update& update, Deadline deadline) {
+  if (auto ok = parts_.access.check_stream(partition); !ok) return ok;
+  wire::Update sample = to_wire(update);
+  return send(*updates_.open(partition), partition, &sample, deadline);
+}
+
+Result<void> Senders::send(const std::string& partition, const JointUpdate& update,
+                           Deadline deadline) {
+  if (auto ok = parts_.access.check_stream(partition); !ok) return ok;
+  wire::Joints sample = to_wire(update);
+  return send(*joints_.open(partition), partition, &sample, deadline);
+}
+
+Error Senders::undiscovered(const std::string& partition) const {
+  return {Errc::kTimeout, "partition " + quote(partition) +
+                              " was not discovered in time in domain " +
+                              std::to_string(parts_.domain)};
+}
+
+Result<void> Senders::send(Writer& writer, const std::string& partition, void* sample,
+                           Deadline deadline) {
+  if (!writer.good()) return fail(Errc::kTransport, "Fast DDS could not create a writer");
+  parts_.attention.pay(writer);
+  while (!writer.wait_until_matched(std::min(deadline, Peers::Clock::now() + kWaitStep))) {
+    if (parts_.peers.silent(partition)) {
+      return fail(Errc::kUnreachable,
+                  "partition " + quote(partition) + " left before it was discovered");
+    }
+    if (const std::string mismatch = writer.mismatch(); !mismatch.empty()) {
+      return fail(Errc::kConfig, "partition " + quote(partition) + ": " + mismatch);
+    }
+    if (Peers::Clock::now() >= deadline) return tl::unexpected(undiscovered(partition));
+  }
+  if (!writer.write(sample)) {
+    return fail(Errc::kTimeout, "partition " + quote(partition) + " cannot be sent more data now");
+  }
+  return {};
+}
+
+template <class Message, class Sample>
+std::unique_ptr<Channel<Message>> Senders::channel(WriterTable<std::string>& writers,
+                                                   const std::string& partition) {
+  const bool may = parts_.access.check_stream(partition).has_value();
+  return std::make_unique<StreamChannel<Message, Sample>>(may ? writers.open(partition) : nullptr,
+                                                          parts_.attention);
+}
+
+std::unique_ptr<Channel<Update>> Senders::update_channel(const std::string& partition) {
+  return channel<Update, wire::Update>(updates_, partition);
+}
+
+std::unique_ptr<Channel<JointUpdate>> Senders::joint_channel(const std::string& partition) {
+  return channel<JointUpdate, wire::Joints>(joints_, partition);
+}
+
+Result<void> Senders::flush(Deadline deadline) {
+  auto streams = updates_.all();
+  for (auto& stream : joints_.all()) streams.push_back(std::move(stream));
+  Result<void> outcome;
+  for (const auto& [partition, stream] : streams) {
+    // A silent peer is not waited for; what it has acknowledged before still counts.
+    const bool silent = parts_.peers.silent(partition);
+    if (stream->flush(silent ? Deadline() : deadline) || !outcome) continue;
+    outcome =
+        fail(silent ? Errc::kUnreachable : Errc::kTimeout,
+             "partition " + quote(partition) + " has not acknowledged all that was streamed to it");
+  }
+  return outcome;
+}
+
+std::set<std::string> Senders::used_owners() const {
+  const auto since = Peers::Clock::now() - Attention::kDependsFor;
+  std::set<std::string> owners;
+  for (const auto* writers : {&requests_, &changes_, &updates_, &joints_}) {
+    for (const auto& [partition, writer] : writers->all()) {
+      if (writer->last_use() > since) owners.insert(partition);
+    }
+  }
+  return owners;
+}
+
+std::set<std::string> Senders::askable(const std::set<std::string>& partitions) {
+  std::set<std::string> askable;
+  if (!parts_.access.may_look()) return askable;
+  for (const std::string& partition : partitions) {
+    // Who only sends a stream has none yet.
+    const auto writer = requests_.open(partition);
+    if (writer->good() && writer->matched()) askable.insert(partition);
+  }
+  return askable;
+}
+
+void Senders::probe(const std::string& partition) {
+  wire::Request sample;
+  sample.addressee(addressee_of(partition));
+  sample.body().probe(0);
+  requests_.open(partition)->write(&sample);
+}
+
+}  // namespace tfdude::fastdds

@@ -1,0 +1,73 @@
+#include "transport/fastdds/fair_share.hpp"
+
+#include "support/catch.hpp"
+
+namespace tfdude::fastdds {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr PeerId kFlood{1};
+constexpr PeerId kOther{2};
+
+/// A thread that handles messages one after the other, each of which takes so long.
+struct Thread {
+  // Later than in other tests: the load is of the thread of the test.
+  FairShare::Clock::time_point now = last += std::chrono::hours(1);
+  static inline FairShare::Clock::time_point last{};
+  FairShare shares;
+
+  bool handle(const PeerId& sender, std::chrono::microseconds time, std::chrono::microseconds gap) {
+    now += gap;
+    FairShare::begin(now);
+    const bool admitted = shares.admits(sender, now);
+    if (admitted) {
+      now += time;
+      shares.spent(sender, time, now);
+    } else {
+      now += 2us;
+    }
+    FairShare::end(now);
+    return admitted;
+  }
+};
+
+TEST_CASE("fair share: a sender may use all of a thread that is idle in between") {
+  Thread thread;
+  for (int i = 0; i < 20'000; ++i) CHECK(thread.handle(kFlood, 20us, 20us));
+  CHECK(thread.shares.dropped() == 0);
+}
+
+TEST_CASE("fair share: a flood gets half of the time, and others are never dropped") {
+  Thread thread;
+  const auto start = thread.now;
+  auto spent = 0us;
+  for (int i = 0; i < 100'000; ++i) {
+    if (thread.handle(kFlood, 20us, 1us)) spent += 20us;
+    if (i % 100 == 0) CHECK(thread.handle(kOther, 20us, 1us));
+  }
+  const double share = std::chrono::duration<double>(spent) / (thread.now - start);
+  CHECK(share > 0.3);
+  CHECK(share < 0.6);
+  CHECK(thread.shares.dropped() > 0);
+}
+
+TEST_CASE("fair share: a lone sender may use all of a thread") {
+  Thread thread;
+  for (int i = 0; i < 20'000; ++i) CHECK(thread.handle(kFlood, 20us, 1us));
+  CHECK(thread.shares.dropped() == 0);
+}
+
+TEST_CASE("fair share: a flood that ends is forgotten") {
+  Thread thread;
+  for (int i = 0; i < 100'000; ++i) {
+    (void)thread.handle(kFlood, 20us, 1us);
+    if (i % 1000 == 0) (void)thread.handle(kOther, 20us, 1us);
+  }
+  CHECK_FALSE(thread.handle(kFlood, 20us, 1us));
+  thread.now += 500ms;
+  for (int i = 0; i < 100; ++i) CHECK(thread.handle(kFlood, 20us, 1us));
+}
+
+}  // namespace
+}  // namespace tfdude::fastdds
