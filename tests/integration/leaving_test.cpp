@@ -52,9 +52,8 @@ class Member {
       const std::string& profile = "presence_reader") {
     return std::make_unique<Beats>(
         Context{*participant_, profiles_, *gate_, counters_}, *topic_, "", profile,
-        Beats::Calls{
-            [on_sample](const wire::Presence&, const ertps::GUID_t&) { on_sample(); },
-            [&matches](const ertps::GUID_t&, int) { ++matches; }});
+        Beats::Calls{[on_sample](const wire::Presence&, const ertps::GUID_t&) { on_sample(); },
+                     [&matches](const ertps::GUID_t&, int) { ++matches; }});
   }
   [[nodiscard]] std::unique_ptr<Writer> write(const std::string& profile = "presence_writer") {
     return std::make_unique<Writer>(Context{*participant_, profiles_, *gate_, counters_}, *topic_,
