@@ -28,6 +28,7 @@ class Packet:
     rtps_bytes: int
     payload_bytes: int = 0  # of its DATA submessages: CDR with its header of four bytes
     vendor_bytes: int = 0   # of Fast DDS's own submessages, for statistics
+    payloads: list = dataclasses.field(default_factory=list)  # of its DATA submessages, whole
     kinds: list = dataclasses.field(default_factory=list)    # of its submessages, in order
     writers: list = dataclasses.field(default_factory=list)  # (participant, entity) they are about
 
@@ -118,6 +119,7 @@ class Capture:
                 packet.writers.append((sender, entity))
                 payload = _payload_of(body, flags, order)
                 packet.payload_bytes += len(payload)
+                packet.payloads.append(payload)
                 if entity in SEDP_WRITERS and kind == DATA:
                     self._learn(payload)
             elif kind in (HEARTBEAT, GAP):

@@ -110,13 +110,26 @@ def capturing(file, domain, kept=0):
         raise RuntimeError(f"the capture is not complete: {summary}")
 
 
+def is_sign_of_life(topic, packet):
+    """Whether a packet asks for a sign of life, or gives it. That happens 100 ms after an operation and later."""
+    body = {"tfdude/request": (28, 17), "tfdude/reply": (24, 10)}  # where its case is, in bytes, and which one
+    if topic not in body or not packet.payloads:
+        return False
+    at, case = body[topic]
+    payload = packet.payloads[0]
+    is_of_no_frame = topic == "tfdude/reply" or payload[4:9] == b"\1\0\0\0\0"
+    return is_of_no_frame and len(payload) > at and payload[at] == case
+
+
 def part_of(capture, packet):
     """request, reply or other; None for packets that are also sent without an operation."""
     topic = capture.topic(packet)
-    if topic is None or not topic.startswith("tfdude/") or topic in ("tfdude/presence", "tfdude/beat"):
+    if topic is None or not topic.startswith("tfdude/") or topic == "tfdude/presence":
+        return None
+    if is_sign_of_life(topic, packet):
         return None
     if rtps.DATA in packet.kinds or rtps.DATA_FRAG in packet.kinds:
-        if topic in ("tfdude/request", "tfdude/update", "tfdude/joint"):
+        if topic in ("tfdude/request", "tfdude/change", "tfdude/update", "tfdude/joint"):
             return "request"
         if topic == "tfdude/reply":
             return "reply"

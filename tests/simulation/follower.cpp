@@ -84,7 +84,7 @@ void Follower::restart() {
   newest_read_ = 0;
   incarnation_ = 0;
   may_go_back_ = false;
-  applied_ = stored_ = 0;
+  applied_ = stored_ = floor_ = 0;
   begin(
       "add the arm",
       [this, base, id = arm()] {
@@ -136,6 +136,7 @@ void Follower::request(std::size_t value) {
         return route_update(process_->forest(), process_->directory(), both(value), std::nullopt);
       },
       [this, value](const Result<void>& updated) {
+        forget_order_after_restart();
         if (updated && !may_be_lost()) {
           written(value);
           stored_ = applied_;
@@ -230,7 +231,7 @@ void Follower::lost_power(const std::string& partition) {
 
 void Follower::may_be_older() {
   may_go_back_ = true;
-  applied_ = stored_;
+  applied_ = floor_ = stored_;
   for (std::size_t i = stored_; i < written_.size(); ++i) {
     written_[i].replaced = false;
     written_[i].bases.insert(bases_.begin(), bases_.end());
@@ -254,7 +255,7 @@ void Follower::judge(const StampedTransform& X) {
     return world.violation("a value that nobody wrote", what + ", which nobody has written");
   }
   // Values of the owner's former process may be shown until all pages of the next one have arrived.
-  if (number < newest_read_ && (number < stored_ || !std::exchange(may_go_back_, false))) {
+  if (number < newest_read_ && (number < floor_ || !std::exchange(may_go_back_, false))) {
     return world.violation("regress", what + ": value " + std::to_string(number) + " after " +
                                           std::to_string(newest_read_));
   }

@@ -91,6 +91,7 @@ class Follower : public std::enable_shared_from_this<Follower> {
   bool may_go_back_ = false;       // once, since the owner was started again
   std::size_t applied_ = 0;        // the newest value that the owner is known to have
   std::size_t stored_ = 0;         // of these, the newest that it is known to have stored
+  std::size_t floor_ = 0;          // what it had stored when it was last started again
   Instant began_{};                // of the current operation
   Instant rest_{};                 // before the next one
   Instant lost_{-1};               // when its owner last lost changes

@@ -55,11 +55,7 @@ tl::unexpected<Error> Access::refuse(const std::string& partition,
 }
 
 Result<void> Access::check(const std::string& partition, const Request& request) const {
-  if (!keys_) return {};
-  const Roles& roles = keys_->roles;
-  const bool may =
-      is_change(request) ? roles.observe || roles.move.count(partition) > 0 : roles.look;
-  if (may) return {};
+  if (is_change(request) ? may_change(partition) : may_look()) return {};
   return refuse(partition, attempt_of(request));
 }
 

@@ -35,6 +35,9 @@ class Access {
   }
 
   [[nodiscard]] bool may_look() const { return !keys_ || keys_->roles.look; }
+  [[nodiscard]] bool may_change(const std::string& partition) const {
+    return !keys_ || keys_->roles.observe || keys_->roles.move.count(partition) > 0;
+  }
 
   // @return kNotPermitted naming the identity, the partition and what was tried
   [[nodiscard]] Result<void> check(const std::string& partition, const Request& request) const;
