@@ -2,6 +2,7 @@
 // changes nothing and disturbs nobody.
 
 #include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -265,6 +266,32 @@ TEST_CASE("keys: encrypted messages show no frame's name") {
     CHECK(bytes.find("RTPS") != std::string::npos);
     CHECK((bytes.find("secret_forearm") != std::string::npos) == !encrypt);
   }
+}
+
+// All that is left is then one participant that is not authenticated.
+TEST_CASE("keys: a daemon lives on when all others but a stranger have left") {
+  SecuredRobot robot;
+  std::vector<Process> strangers;
+  for (const std::string name : {"left", "right"}) {
+    const std::string config = "partition: " + name + "\nframes:\n  - {id: " + name + "}\n";
+    strangers.push_back(
+        robot.domain.start_daemon({"--config", robot.files.write(name + ".yaml", config)}));
+    testing::await_ready(strangers.back());
+  }
+  CHECK(robot.as("eye", {"lookup", "base", "secret_forearm"}).status == 0);
+  for (Process* leaving : {&*robot.base, &strangers.front()}) {
+    leaving->signal(SIGTERM);
+    CHECK(testing::finish(*leaving).status == 0);
+  }
+  // Longer than the time between two announcements.
+  const auto until = std::chrono::steady_clock::now() + 1s;
+  bool both_run = true;
+  CHECK(eventually([&] {
+    both_run = both_run && robot.arm->runs() && strangers.back().runs();
+    return std::chrono::steady_clock::now() > until;
+  }));
+  CHECK(both_run);
+  CHECK(robot.as("eye", {"tree"}).status == 0);
 }
 
 TEST_CASE("keys: several processes may use one identity, and a daemon may restart") {

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <string>
 
 #include "tfdude/keys/key_files.hpp"
 
 #include "support/process.hpp"
 #include "transport/fastdds/access.hpp"
+#include "transport/fastdds/discovery_gate.hpp"
 #include "transport/fastdds/topics.hpp"
 
 namespace tfdude::testing {
@@ -25,7 +27,12 @@ class DdsParticipant {
     // The handshake takes longer than the lease of the profile.
     qos.wire_protocol().builtin.discovery_config.leaseDuration = {30, 0};
     if (keys != nullptr) fastdds::Access(*keys).secure(qos);
+    // Otherwise an assertion of Fast DDS may end the process (SendFilter in compat.hpp).
+    fastdds::DiscoveryGate gate(std::make_shared<fastdds::Gate>(),
+                                std::make_shared<fastdds::LifeSigns>());
+    gate.prepare(qos, domain, false);
     participant_ = factory().create_participant(domain, qos);
+    gate.open();
   }
   ~DdsParticipant() {
     if (participant_ == nullptr) return;

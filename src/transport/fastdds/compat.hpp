@@ -63,6 +63,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -267,6 +268,13 @@ class SendFilter : public etransport::ChainingTransport {
  public:
   using ChainingTransport::ChainingTransport;
 
+  bool OpenOutputChannel(etransport::SendResourceList& resources,
+                         const ertps::Locator_t& to) override {
+    if (!ChainingTransport::OpenOutputChannel(resources, to)) return false;
+    opened_.insert(to);
+    return true;
+  }
+
 #if TFDUDE_FASTDDS_MAJOR == 2
   bool send(ertps::SenderResource* through, const ertps::octet* bytes, std::uint32_t size,
             ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
@@ -298,17 +306,31 @@ class SendFilter : public etransport::ChainingTransport {
 
   // A datagram that may not be sent counts as sent, like one that is lost on the way.
   template <class Send>
-  bool send_to(ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end, Send send) const {
+  bool send_to(ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end, Send send) {
     thread_local std::vector<ertps::Locator_t> destinations;  // kept for its memory
     destinations.clear();
     for (auto& at = *begin; at != *end; ++at) {
-      if (may_send(*at)) destinations.push_back(*at);
+      if (may_send(*at) && is_open(*at)) destinations.push_back(*at);
     }
     if (destinations.empty()) return true;
     etransport::Locators from(destinations.cbegin());
     etransport::Locators to(destinations.cend());
     return send(&from, &to);
   }
+
+  // Fast DDS (2.9 and 3.1) opens the destinations of its announcements when it discovers a
+  // participant: the multicast address only, if several participants have it. When all but one have
+  // left, it sends to the unicast address of the last one. If nothing else has opened that, as with
+  // a participant that is not authenticated, an assertion in its statistics ends the process. The
+  // sockets exist already.
+  bool is_open(const ertps::Locator_t& to) {
+    if (opened_.count(to) != 0) return true;
+    etransport::SendResourceList none;
+    return OpenOutputChannel(none, to);
+  }
+
+  // Fast DDS opens and sends with a lock of the participant held.
+  std::set<ertps::Locator_t> opened_;
 };
 
 }  // namespace tfdude::fastdds
