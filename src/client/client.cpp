@@ -25,6 +25,16 @@ Result<JointUpdate> joint_update(const std::vector<std::string>& names,
   return update;
 }
 
+Result<void> check_follow(const Options& options) {
+  if (!options.follow) return {};
+  for (const std::string& one : *options.follow) {
+    if (auto ok = check_id(one, "follow"); !ok) return ok;
+  }
+  if (options.follow->size() <= kMaxItems) return {};
+  return fail(Errc::kInvalidInput, "follow has " + std::to_string(options.follow->size()) +
+                                       " entries, of at most " + std::to_string(kMaxItems));
+}
+
 }  // namespace
 
 Client::Client(std::unique_ptr<Participant> participant) : participant_(std::move(participant)) {}
@@ -33,6 +43,7 @@ Client& Client::operator=(Client&&) noexcept = default;
 Client::~Client() = default;
 
 Result<Client> Client::open(const Options& options) {
+  if (auto ok = check_follow(options); !ok) return tl::unexpected(std::move(ok.error()));
   auto transport = make_fastdds_transport(
       {options.domain, options.profile, {}, nullptr, options.discovery_server, options.keys});
   if (!transport) return tl::unexpected(std::move(transport.error()));
@@ -40,6 +51,7 @@ Result<Client> Client::open(const Options& options) {
 }
 
 Result<Client> Client::open(TransportPtr transport, const Options& options) {
+  if (auto ok = check_follow(options); !ok) return tl::unexpected(std::move(ok.error()));
   auto participant = std::make_unique<Participant>(std::move(transport), std::string(), options);
   if (auto started = participant->start(); !started)
     return tl::unexpected(std::move(started.error()));
@@ -102,13 +114,17 @@ Result<void> Client::publish(const std::vector<EdgeUpdate>& edges, std::optional
 }
 
 Result<EdgeStream> Client::stream(const std::vector<std::string>& edges) {
-  return participant_->streams().edges(edges).map(
-      [](std::shared_ptr<Sender<Update>> sender) { return EdgeStream(std::move(sender)); });
+  return participant_->streams()
+      .and_then([&](Streams* streams) { return streams->edges(edges); })
+      .map([](std::shared_ptr<Sender<Update>> sender) { return EdgeStream(std::move(sender)); });
 }
 
 Result<JointStream> Client::stream_joints(const std::vector<std::string>& names) {
-  return participant_->streams().joints(names).map(
-      [](std::shared_ptr<Sender<JointUpdate>> sender) { return JointStream(std::move(sender)); });
+  return participant_->streams()
+      .and_then([&](Streams* streams) { return streams->joints(names); })
+      .map([](std::shared_ptr<Sender<JointUpdate>> sender) {
+        return JointStream(std::move(sender));
+      });
 }
 
 Result<void> Client::flush(Milliseconds wait) { return participant_->flush(wait); }

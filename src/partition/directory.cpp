@@ -321,6 +321,12 @@ std::optional<Owner> Directory::number_of(std::string_view partition) const {
   return entry->second;
 }
 
+Owner Directory::refer_to(const std::string& partition) {
+  Owner owner = kHeldHere;
+  (void)known(partition, owner);
+  return owner;
+}
+
 std::vector<Owner> Directory::reachable_owners() const {
   std::vector<Owner> all;
   for (Owner owner = 1; owner < partitions_.size(); ++owner) {
@@ -330,15 +336,26 @@ std::vector<Owner> Directory::reachable_owners() const {
 }
 
 const std::string* Directory::incomplete() const {
+  if (without_pages_) return nullptr;
   const auto found = std::find_if(
       partitions_.begin(), partitions_.end(),
       [](const Known& partition) { return partition.info.reachable && !partition.complete(); });
   return found != partitions_.end() ? &found->info.name : nullptr;
 }
 
-void Directory::told_of(Owner owner, std::uint64_t epoch) {
+bool Directory::told_of(Owner owner, std::uint64_t epoch) {
   std::uint64_t& told = partitions_[owner].told_epoch;
-  told = std::max(told, epoch);
+  if (epoch <= told) return false;
+  told = epoch;
+  return true;
+}
+
+std::vector<SeenEpoch> Directory::told() const {
+  std::vector<SeenEpoch> all;
+  for (const Known& partition : partitions_) {
+    if (partition.told_epoch > 0) all.push_back({partition.info.name, partition.told_epoch});
+  }
+  return all;
 }
 
 const std::string* Directory::behind() const {

@@ -34,6 +34,9 @@ class Directory {
   Directory(const Directory&) = delete;
   Directory& operator=(const Directory&) = delete;
 
+  /// From now on no pages come (AskedFrames): what is not here is not missing.
+  void do_without_pages() { without_pages_ = true; }
+
   /// A partition is served, or stops. A later incarnation replaces an earlier one.
   void apply(const Presence& presence, Time now);
 
@@ -133,6 +136,8 @@ class Directory {
 
   /// The forest's owner number of a partition; kHeldHere for the own one.
   [[nodiscard]] std::optional<Owner> owner(std::string_view partition) const;
+  /// The same for a partition that is only mentioned, and may be unknown: it gets a number.
+  [[nodiscard]] Owner refer_to(const std::string& partition);
   [[nodiscard]] const std::string& name(Owner owner) const { return partitions_[owner].info.name; }
   [[nodiscard]] bool reachable(Owner owner) const { return partitions_[owner].info.reachable; }
   [[nodiscard]] const PartitionInfo& info(Owner owner) const { return partitions_[owner].info; }
@@ -145,11 +150,14 @@ class Directory {
   /// The name of a reachable partition with missing pages; null: none.
   [[nodiscard]] const std::string* incomplete() const;
 
-  /// An owner has announced a change that its structure shows in this epoch.
-  void told_of(Owner owner, std::uint64_t epoch);
+  /// An owner has announced a change that its structure shows in this epoch. @return whether it is
+  /// the latest
+  bool told_of(Owner owner, std::uint64_t epoch);
+  /// All such changes: the latest of each owner.
+  [[nodiscard]] std::vector<SeenEpoch> told() const;
   /// Whether that change has not come yet.
   [[nodiscard]] bool owes_change(Owner owner) const {
-    return partitions_[owner].epoch < partitions_[owner].told_epoch;
+    return !without_pages_ && partitions_[owner].epoch < partitions_[owner].told_epoch;
   }
   /// The name of a reachable partition with an announced change that has not come yet; null: none.
   [[nodiscard]] const std::string* behind() const;
@@ -253,6 +261,7 @@ class Directory {
   std::uint64_t own_heard_of_ = 0;
   std::uint64_t own_forgotten_ = 0;  // the latest one that others have forgotten
   std::vector<Outdated> outdated_;
+  bool without_pages_ = false;
 };
 
 }  // namespace tfdude

@@ -142,6 +142,24 @@ struct HistoryRequest {
   bool all = false;
 };
 
+/// A change of a partition's structure that a participant knows of.
+struct SeenEpoch {
+  std::string partition;
+  std::uint64_t epoch = 0;
+};
+
+/// Asks an owner, each of which knows the frames of all others, for frames with all that are above
+/// them. The request's id is the name of the partition asked.
+struct FramesRequest {
+  std::vector<std::string> ids;
+  /// Frames with all below them; or, ending with kAnyName, all frames whose ids begin so.
+  std::vector<std::string> trees{};
+  std::vector<SeenEpoch> seen{};  ///< the answer must not be older
+};
+
+/// The last character of an entry of FramesRequest::trees that is the beginning of ids.
+inline constexpr char kAnyName = '*';
+
 /// A request to one partition.
 struct Request {
   /// Counts the requests of one peer. A repeated number is answered again but not applied again.
@@ -151,7 +169,7 @@ struct Request {
   std::string id;
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
                HistoryRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
-               PartialUpdateRequest, CorrelateRequest, ForgetRequest>
+               PartialUpdateRequest, CorrelateRequest, ForgetRequest, FramesRequest>
       body;
   /// The sender awaits no replies to requests with lower numbers, in whatever order they come. Not
   /// greater than the full number of this request, of which `sequence` has the lower half.
@@ -172,6 +190,14 @@ struct PushedValues {
 /// The number of correlated entries; a message has at most kMaxCorrelated of them.
 [[nodiscard]] std::size_t correlated_entries(const PushedValues& pushed);
 
+/// A frame and its owner. A FramesRequest is answered with a list of them, parents before children:
+/// requested frames that are not in it do not exist.
+struct KnownFrame {
+  std::string id;
+  std::string parent;  ///< empty: a root; otherwise the frame is only attached if it exists
+  std::string partition;
+};
+
 struct Done {};
 
 struct Reply {
@@ -181,7 +207,7 @@ struct Reply {
   std::uint64_t epoch = 0;
   /// Done, the error, or the requested data.
   std::variant<Done, Error, SegmentValues, PushedValues, std::vector<HistoryInfo>,
-               std::vector<EdgeConsistency>, std::vector<JointInfo>>
+               std::vector<EdgeConsistency>, std::vector<JointInfo>, std::vector<KnownFrame>>
       body;
   /// For a change: the latest time known to the owner, for the next change of the requester.
   LamportTime lamport_time = 0;

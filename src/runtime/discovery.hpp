@@ -66,13 +66,14 @@ class Discovery {
   /// The final error of an operation that failed and is not repeated.
   [[nodiscard]] Error last_word(Error error, const Deadline& deadline);
 
+  /// Explains an error about something missing, if others know more.
+  [[nodiscard]] Error explained(Error error);
+
   /// Waits until something has changed, or for a short time.
   void wait_for_change(const Deadline& deadline = Deadline(Milliseconds::max()));
 
  private:
   [[nodiscard]] Result<void> nobody_but_excluded() const;
-  /// Explains an error about something missing, if others know more.
-  [[nodiscard]] Error explained(Error error);
   /// Why the result is not certain: kTimeout.
   [[nodiscard]] Error undecided(const std::string& what, const Deadline& deadline);
 

@@ -26,6 +26,7 @@ void JointCalls::on_joints(const JointUpdate& update) {
 // All owners of a joint get the update, so all must be known.
 Result<void> JointCalls::update(const JointUpdate& update) {
   if (update.joints.empty()) return {};
+  if (auto ok = requests_.check_keeps_all("move joints"); !ok) return ok;
   const Deadline deadline = discovery_.call_deadline();
   if (auto all = discovery_.await(deadline); !all) return all;
   return requests_.retry_on_stale_route(
@@ -41,6 +42,7 @@ Result<void> JointCalls::update(const JointUpdate& update) {
 
 Result<void> JointCalls::publish(const JointUpdate& update) {
   if (update.joints.empty()) return {};
+  if (auto ok = requests_.check_keeps_all("move joints"); !ok) return ok;
   const Deadline deadline = discovery_.call_deadline();
   if (auto all = discovery_.await(deadline); !all) return all;
   if (auto ok = member_.still_in(); !ok) return ok;

@@ -8,6 +8,11 @@
 namespace tfdude {
 namespace {
 
+// Of a client that asks for frames: how old the route of a lookup that waits may be, and how long
+// other waiting lookups may be delayed by asking for it.
+constexpr Milliseconds kMaxAge{1000};
+constexpr Milliseconds kPatience{200};
+
 Error not_asked_yet(const std::string& a, const std::string& b) {
   return {Errc::kTimeout, "no time to look " + quote(b) + " up in " + quote(a)};
 }
@@ -34,15 +39,19 @@ PendingLookups::Links Lookups::links(Transport& transport, const Watcher& watche
             return watcher.can_answer(wanted.a, wanted.b, wanted.query);
           },
           [this](Error last, const Deadline& deadline) {
-            return discovery_.last_word(std::move(last), deadline);
+            return requests_.last_word(std::move(last), deadline);
           },
           wall_clock,
-          timeout_};
+          timeout_,
+          requests_.on_demand() != nullptr};
 }
 
 Result<Gathering> Lookups::plan(const PendingLookups::Wanted& wanted) {
   if (auto ok = requests_.still_in(); !ok) return tl::unexpected(std::move(ok.error()));
   const auto& [a, b, query] = wanted;
+  if (auto ok = requests_.know({a, b}, kMaxAge, Deadline(kPatience)); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
   const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
   const Lock lock(structure_.mutex);
   return route_lookup(structure_.forest, structure_.directory, a, b, query, hint)
@@ -56,6 +65,9 @@ Result<StampedTransform> Lookups::elsewhere(std::string_view a, std::string_view
   const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
   return requests_.retry_on_stale_route(
       deadline,
+      [&] {
+        return std::vector<std::string>{start, end};
+      },
       [&](const Directory& directory) {
         return route_lookup(structure_.forest, directory, start, end, query, hint);
       },

@@ -95,8 +95,13 @@ Result<Observed> Observations::observe(const std::string& a, const std::string& 
   int torn = 0;
   for (int attempt = 0; attempt < kObserveAttempts; ++attempt) {
     ObservePlan used;
+    const auto names = [&] {
+      std::vector<std::string> all{a, b};
+      all.insert(all.end(), beside.begin(), beside.end());
+      return all;
+    };
     auto path = requests_.retry_on_stale_route(
-        deadline,
+        deadline, names,
         [&](const Directory& directory) {
           return route_observe(structure_.forest, directory, a, b, beside, stamp);
         },
@@ -106,6 +111,9 @@ Result<Observed> Observations::observe(const std::string& a, const std::string& 
           return found;
         });
     if (!path) return tl::unexpected(std::move(path.error()));
+    if (auto ok = requests_.know(path->missing, OnDemand::kAnyAge, deadline); !ok) {
+      return tl::unexpected(std::move(ok.error()));
+    }
     const auto there = [this](const std::string& id) { return structure_.forest.exists(id); };
     if (std::any_of(path->missing.begin(), path->missing.end(), there)) {
       beside.insert(beside.end(), path->missing.begin(), path->missing.end());

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "tfdude/base/id.hpp"
+
 #include "base/log.hpp"
 #include "runtime/stream_links.hpp"
 #include "runtime/wall_clock.hpp"
@@ -15,7 +17,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       transport_(std::move(transport)),
       discovery_(structure_, *transport_, options.discovery, options.timeout),
       member_(structure_, *transport_, std::move(partition), parts()),
-      requests_(structure_, discovery_, *transport_, own()),
+      requests_(structure_, discovery_, *transport_, own(), follow()),
       yielding_(structure_, requests_, member_, options.timeout),
       serving_(structure_, discovery_, *transport_, member_, options_),
       queries_(structure_, discovery_, requests_, member_, *transport_),
@@ -32,7 +34,10 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       pushing_(structure_, *transport_, member_, watcher_, options.limits.watches),
       lookups_(structure_, discovery_, requests_, *transport_, watcher_, options.timeout),
       streams_(edge_links(structure_, *transport_, member_),
-               joint_links(structure_, *transport_, member_)) {}
+               joint_links(structure_, *transport_, member_)) {
+  const Lock lock(structure_.mutex);
+  if (!wants_pages()) structure_.directory.do_without_pages();
+}
 
 MemberRunner::Parts Participant::parts() {
   return {[this] {
@@ -42,6 +47,19 @@ MemberRunner::Parts Participant::parts() {
           [this] { lookups_.look_again(); },
           [this](const std::string& partition) { requests_.calls().on_lost(partition); },
           [this] { yielding_.ask(); }};
+}
+
+std::optional<Requests::Follow> Participant::follow() {
+  if (!options_.follow) return std::nullopt;
+  return Requests::Follow{*options_.follow, parts().on_routes};
+}
+
+// A stream learns of new owners by pages only.
+Result<Streams*> Participant::streams() {
+  if (auto ok = requests_.check_keeps_all("open streams"); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  return &streams_;
 }
 
 Requests::Own Participant::own() {
@@ -86,7 +104,27 @@ std::optional<Reply> Participant::answer_query(const Request& request) {
     return member_.partition()->answer_history(request);
   }
   if (std::holds_alternative<WatchRequest>(request.body)) return pushing_.answer(request);
+  if (std::holds_alternative<FramesRequest>(request.body)) return answer_frames(request);
   return std::nullopt;
+}
+
+// What it does not know must not exist.
+Reply Participant::answer_frames(const Request& request) {
+  Reply reply{request.sequence, 0, Done{}};
+  if (member_.out() || !discovery_.complete()) {
+    reply.body = Error{Errc::kNotYet,
+                       "partition " + quote(member_.name()) + " has not discovered all others yet"};
+    return reply;
+  }
+  const Lock lock(structure_.mutex);
+  auto known =
+      known_frames(structure_.forest, structure_.directory, std::get<FramesRequest>(request.body));
+  if (known) {
+    reply.body = *std::move(known);
+  } else {
+    reply.body = std::move(known.error());
+  }
+  return reply;
 }
 
 RefusedCounts Participant::refused() {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -52,7 +53,8 @@ class Participant final : public TransportHandler {
   [[nodiscard]] Observations& observations() { return observations_; }
   [[nodiscard]] Watcher& watcher() { return watcher_; }
   [[nodiscard]] Lookups& lookups() { return lookups_; }
-  [[nodiscard]] Streams& streams() { return streams_; }
+  /// @return kInvalidInput in a client that follows only some frames
+  [[nodiscard]] Result<Streams*> streams();
 
   /// Waits until data sent on reliable streams is acknowledged. @return kTimeout, kTransport
   [[nodiscard]] Result<void> flush(Milliseconds wait) {
@@ -71,7 +73,10 @@ class Participant final : public TransportHandler {
   void on_joints(const JointUpdate& update) override { joints_.on_joints(update); }
   void on_pushed(const PushedValues& pushed) override;
   void on_watcher(std::uint64_t group) override { pushing_.on_watcher(group); }
-  void on_page(const Page& page) override { member_.on_page(page); }
+  void on_page(const Page& page) override {
+    if (wants_pages()) member_.on_page(page);
+  }
+  [[nodiscard]] bool wants_pages() const override { return !options_.follow.has_value(); }
   void on_presence(const Presence& presence) override { member_.on_presence(presence); }
   void on_lost(const std::string& partition, std::uint64_t incarnation,
                std::chrono::nanoseconds early) override {
@@ -85,6 +90,8 @@ class Participant final : public TransportHandler {
  private:
   [[nodiscard]] MemberRunner::Parts parts();
   [[nodiscard]] Requests::Own own();
+  [[nodiscard]] std::optional<Requests::Follow> follow();
+  [[nodiscard]] Reply answer_frames(const Request& request);
   /// The reply to a request that changes nothing; empty for other requests.
   [[nodiscard]] std::optional<Reply> answer_query(const Request& request);
 

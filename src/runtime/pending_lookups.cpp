@@ -183,7 +183,7 @@ bool PendingLookups::attempt(Lookup& lookup) {
       here || here.error().code == Errc::kNotYet || here.error().code == Errc::kTooOld;
   if (all_held) return judge(lookup, std::move(here), false);
   auto plan = links_.plan(wanted);
-  if (!plan) return judge(lookup, tl::unexpected(std::move(plan.error())), false);
+  if (!plan) return judge(lookup, tl::unexpected(std::move(plan.error())), links_.plan_asks);
   if (lookup.deadline.over()) return judge(lookup, tl::unexpected(lookup.last), true);
   lookup.gathering = *std::move(plan);
   lookup.until = lookup.deadline.within(links_.timeout);

@@ -41,7 +41,7 @@ class PendingLookups {
     Query query;
   };
 
-  /// What it needs of the participant. None of these functions may wait.
+  /// What it needs of the participant. None of these functions may wait, except as stated.
   struct Links {
     /// The owners to ask, according to the current structure. @return as Client::lookup()
     std::function<Result<Gathering>(const Wanted&)> plan;
@@ -57,6 +57,9 @@ class PendingLookups {
     std::function<Time()> clock;
     /// Maximum wait for the owners, for each request.
     Milliseconds timeout;
+    /// Whether plan() asks others for frames, and may wait shortly: nothing here tells when missing
+    /// ones appear.
+    bool plan_asks = false;
   };
 
   PendingLookups(Forest& forest, Calls& calls, SharedHints& hints, Links links);

@@ -1,6 +1,7 @@
 #include "runtime/queries.hpp"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -20,26 +21,52 @@ Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_v
     }
     return path;
   };
-  return requests_.planned(discovery_.call_deadline(), route);
+  const auto names = [&] { return std::vector<std::string>{std::string(a), std::string(b)}; };
+  return requests_.after_asking(discovery_.call_deadline(), names, OnDemand::kFresh, [&] {
+    const Lock lock(structure_.mutex);
+    return route(structure_.directory);
+  });
 }
 
 Result<Handle> Queries::find(std::string_view id) {
-  return requests_.after_discovery(discovery_.call_deadline(), [&]() -> Result<Handle> {
+  const auto names = [&] { return std::vector<std::string>{std::string(id)}; };
+  const auto find = [&]() -> Result<Handle> {
     const auto handle = structure_.forest.find(id);
     if (!handle) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
     return *handle;
-  });
+  };
+  return requests_.after_asking(discovery_.call_deadline(), names, OnDemand::kFresh, find);
 }
 
 Result<FrameInfo> Queries::info(const std::string& id, const Deadline& deadline) {
-  return requests_.after_discovery(deadline, [&]() -> Result<FrameInfo> {
+  const auto names = [&] { return std::vector<std::string>{id}; };
+  const auto find = [&]() -> Result<FrameInfo> {
     auto info = structure_.forest.info(id);
     if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
     return *std::move(info);
-  });
+  };
+  return requests_.after_asking(deadline, names, OnDemand::kFresh, find);
+}
+
+// Each is listed after its parent.
+Result<std::vector<Frame>> Queries::followed() {
+  auto known = requests_.on_demand()->followed(discovery_.call_deadline());
+  if (!known) return tl::unexpected(std::move(known.error()));
+  std::set<std::string> there;
+  std::vector<Frame> frames;
+  for (KnownFrame& frame : *known) {
+    const bool attached = there.count(frame.parent) != 0;
+    there.insert(frame.id);
+    frames.push_back(
+        {std::move(frame.id), std::move(frame.parent), std::move(frame.partition), attached});
+  }
+  std::sort(frames.begin(), frames.end(),
+            [](const Frame& a, const Frame& b) { return a.id < b.id; });
+  return frames;
 }
 
 Result<std::vector<Frame>> Queries::frames() {
+  if (requests_.on_demand() != nullptr) return followed();
   if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
   std::vector<FrameInfo> infos = structure_.forest.frames();
   std::vector<Frame> frames;
@@ -55,11 +82,17 @@ Result<std::vector<Frame>> Queries::frames() {
 }
 
 Result<std::vector<std::string>> Queries::children(std::string_view id) {
+  if (auto ok = requests_.check_keeps_all("list children of frame " + quote(id)); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
   if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
   return structure_.forest.children(id);
 }
 
 Result<std::vector<std::string>> Queries::roots() {
+  if (auto ok = requests_.check_keeps_all("list roots"); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
   if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
   return structure_.forest.roots();
 }
@@ -87,7 +120,7 @@ std::size_t Queries::own_frames() {
 Result<std::vector<HistoryInfo>> Queries::history(const std::string& id) {
   const Deadline deadline = discovery_.call_deadline();
   return requests_.retry_on_stale_route(
-      deadline,
+      deadline, [&] { return std::vector<std::string>{id}; },
       [&](const Directory& directory) -> Result<Part> {
         const auto info = structure_.forest.info(id);
         if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));

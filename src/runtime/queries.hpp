@@ -43,6 +43,7 @@ class Queries {
   [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition);
 
  private:
+  [[nodiscard]] Result<std::vector<Frame>> followed();
   [[nodiscard]] Result<void> all_known() { return discovery_.await(discovery_.call_deadline()); }
 
   Structure& structure_;

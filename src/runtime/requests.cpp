@@ -9,6 +9,38 @@
 
 namespace tfdude {
 
+Requests::Requests(Structure& structure, Discovery& discovery, Transport& transport, Own own,
+                   std::optional<Follow> follow)
+    : structure_(structure),
+      discovery_(discovery),
+      transport_(transport),
+      own_(std::move(own)),
+      on_demand_(!follow
+                     ? nullptr
+                     : std::make_unique<OnDemand>(
+                           structure, discovery, std::move(follow->trees),
+                           OnDemand::Links{[this](std::vector<Part>& parts, const Deadline& by) {
+                                             return ask(parts, by);
+                                           },
+                                           std::move(follow->on_routes)})) {}
+
+Result<void> Requests::know(const std::vector<std::string>& ids, Milliseconds max_age,
+                            const Deadline& deadline) {
+  if (on_demand_ == nullptr) return {};
+  return on_demand_->know(ids, max_age, deadline).map([](OnDemand::Asked) {});
+}
+
+Result<void> Requests::check_keeps_all(const std::string& what) const {
+  if (on_demand_ == nullptr) return {};
+  return fail(Errc::kInvalidInput,
+              "a client that follows only some frames (Options::follow) cannot " + what);
+}
+
+Error Requests::last_word(Error error, const Deadline& deadline) {
+  if (on_demand_ == nullptr) return discovery_.last_word(std::move(error), deadline);
+  return Discovery::may_appear(error.code) ? discovery_.explained(std::move(error)) : error;
+}
+
 bool Requests::denies_plan(Errc code) {
   return code == Errc::kAlreadyExists || code == Errc::kUnknownParent || code == Errc::kCycle;
 }
@@ -23,6 +55,10 @@ void Requests::await_change(const Part& part, const Reply& reply, const Deadline
   const std::uint64_t epoch = reply.epoch;
   Lock lock(structure_.mutex);
   structure_.directory.saw_lamport_time(reply.lamport_time);
+  if (on_demand_ != nullptr) {
+    lock.unlock();
+    return on_demand_->changed(part.owner, epoch);
+  }
   const auto arrived_or_gone = [&]() TFDUDE_REQUIRES(structure_.mutex) {
     return structure_.directory.epoch(part.owner) >= epoch ||
            !structure_.directory.reachable(part.owner);

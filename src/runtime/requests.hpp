@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <numeric>
 #include <string>
 #include <thread>
@@ -15,6 +16,7 @@
 #include "partition/routing.hpp"
 #include "runtime/calls.hpp"
 #include "runtime/discovery.hpp"
+#include "runtime/on_demand.hpp"
 #include "runtime/structure.hpp"
 #include "transport/port.hpp"
 
@@ -50,8 +52,15 @@ class Requests {
     std::function<Result<void>()> still_in;
   };
 
-  Requests(Structure& structure, Discovery& discovery, Transport& transport, Own own)
-      : structure_(structure), discovery_(discovery), transport_(transport), own_(std::move(own)) {}
+  /// For a participant that does not keep all frames.
+  struct Follow {
+    std::vector<std::string> trees;   ///< as Options::follow
+    std::function<void()> on_routes;  ///< as OnDemand::Links
+  };
+
+  /// @param follow  absent: the structure of all partitions is kept here
+  Requests(Structure& structure, Discovery& discovery, Transport& transport, Own own,
+           std::optional<Follow> follow = {});
 
   /// The calls that wait for replies: for whoever receives these, and for waiting lookups.
   [[nodiscard]] Calls& calls() { return calls_; }
@@ -59,6 +68,17 @@ class Requests {
   [[nodiscard]] Reply answer_here(const Request& request) const { return own_.answer(request); }
   /// @return kPartitionTaken if this process has given up its partition.
   [[nodiscard]] Result<void> still_in() const { return own_.still_in(); }
+
+  /// Null: all frames are kept here.
+  [[nodiscard]] OnDemand* on_demand() const { return on_demand_.get(); }
+  /// As OnDemand::know(); does nothing if all frames are kept here.
+  [[nodiscard]] Result<void> know(const std::vector<std::string>& ids, Milliseconds max_age,
+                                  const Deadline& deadline);
+  /// @param what  a verb and its object
+  /// @return kInvalidInput if only some frames are kept here
+  [[nodiscard]] Result<void> check_keeps_all(const std::string& what) const;
+  /// As Discovery::last_word().
+  [[nodiscard]] Error last_word(Error error, const Deadline& deadline);
 
   /// Runs an operation that may fail due to incomplete knowledge, and repeats it until the result
   /// is certain.
@@ -75,10 +95,20 @@ class Requests {
   template <class Route>
   auto planned(const Deadline& deadline, Route route)
       -> std::invoke_result_t<Route, const Directory&> {
-    return after_discovery(deadline, [&] {
-      const Lock lock(structure_.mutex);
-      return route(structure_.directory);
-    });
+    return after_discovery(deadline, [&] { return locked(route); });
+  }
+
+  /// As after_discovery(), about certain frames, which are asked for if they are not kept here.
+  /// @param names  returns their ids
+  /// @param max_age  as OnDemand::know()
+  template <class Names, class Operation>
+  auto after_asking(const Deadline& deadline, Names names, Milliseconds max_age,
+                    Operation operation) -> decltype(operation()) {
+    if (on_demand_ == nullptr) return after_discovery(deadline, operation);
+    if (auto ok = know(names(), max_age, deadline); !ok) {
+      return tl::unexpected(std::move(ok.error()));
+    }
+    return once(deadline, operation);
   }
 
   /// Plans, asks, and plans again if the structure has changed meanwhile: the owner knows a newer
@@ -103,6 +133,35 @@ class Requests {
       } else {
         return result;
       }
+    }
+  }
+
+  /// As above, about certain frames, which are asked for if they are not kept here.
+  /// @param names  returns their ids
+  template <class Names, class Route, class Ask,
+            class Plan = typename std::invoke_result_t<Route, const Directory&>::value_type>
+  std::invoke_result_t<Ask, Plan&> retry_on_stale_route(const Deadline& deadline, Names names,
+                                                        Route route, Ask ask) {
+    if (on_demand_ == nullptr) return retry_on_stale_route(deadline, route, ask);
+    Milliseconds pause{5};
+    Milliseconds max_age = OnDemand::kAnyAge;
+    while (true) {
+      const auto asked = on_demand_->know(names(), max_age, deadline);
+      if (!asked) return tl::unexpected(asked.error());
+      // Whatever failed with an earlier answer may succeed with a fresh one.
+      const bool fresh = *asked == OnDemand::Asked::kForAll;
+      max_age = OnDemand::kFresh;
+      auto plan = once(deadline, [&] { return locked(route); });
+      if (!plan && !fresh && !deadline.over()) continue;
+      if (!plan) return tl::unexpected(std::move(plan.error()));
+      auto result = ask(*plan);
+      if (result) return result;
+      const Errc code = result.error().code;
+      const bool outdated = code == Errc::kNotOwner && pause <= kStructureDelay;
+      if (!(outdated || denies_plan(code)) || deadline.over(Clock::now() + pause)) return result;
+      if (!fresh) continue;
+      std::this_thread::sleep_for(pause);
+      pause *= 2;
     }
   }
 
@@ -174,6 +233,23 @@ class Requests {
   void await_change(const Part& part, const Reply& reply, const Deadline& deadline);
 
  private:
+  template <class Route>
+  auto locked(Route& route) {
+    const Lock lock(structure_.mutex);
+    return route(structure_.directory);
+  }
+
+  /// An operation with what others have answered, which is certain about frames, but not about
+  /// partitions.
+  template <class Operation>
+  auto once(const Deadline& deadline, Operation operation) -> decltype(operation()) {
+    if (auto ok = own_.still_in(); !ok) return tl::unexpected(std::move(ok.error()));
+    auto result = operation();
+    if (result || !Discovery::may_appear(result.error().code)) return result;
+    if (result.error().code == Errc::kUnknownPartition) return after_discovery(deadline, operation);
+    return tl::unexpected(discovery_.explained(std::move(result.error())));
+  }
+
   template <class Message, class Apply>
   [[nodiscard]] Result<void> publish_share(const Part& part, const Message& share,
                                            const Deadline& deadline, Apply apply_here) {
@@ -192,6 +268,7 @@ class Requests {
   Transport& transport_;
   const Own own_;
   Calls calls_;
+  const std::unique_ptr<OnDemand> on_demand_;
 };
 
 }  // namespace tfdude

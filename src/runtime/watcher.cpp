@@ -33,8 +33,9 @@ Result<std::shared_ptr<WatchedPath>> Watcher::watch(const std::string& a, const 
                                                     const WatchOptions& options) {
   if (auto ok = check_rate(options.rate); !ok) return tl::unexpected(std::move(ok.error()));
   const Deadline deadline = discovery_.call_deadline();
-  auto known = requests_.planned(
-      deadline, [&](const Directory&) { return structure_.forest.segments(a, b); });
+  const auto names = [&] { return std::vector<std::string>{a, b}; };
+  auto known = requests_.after_asking(deadline, names, OnDemand::kFresh,
+                                      [&] { return structure_.forest.segments(a, b); });
   if (!known) return tl::unexpected(std::move(known.error()));
   auto path = watches().watch(a, b, options);
   auto live = path->wait_until_live(deadline.at());
@@ -73,9 +74,13 @@ Watches& Watcher::watches() {
 Result<WatchRoute> Watcher::plan(const WatchedPath& path) {
   const WatchOptions& options = path.options();
   const std::uint64_t own_incarnation = incarnation_();
+  // If nobody can say whether the route is still right, the known one must do.
+  const auto known = requests_.know({path.a(), path.b()}, OnDemand::kFresh, Deadline(timeout_));
   const Lock lock(structure_.mutex);
-  return watch_route(structure_.forest, structure_.directory, path.a(), path.b(), options.composed,
-                     period_of(options.rate), own_incarnation);
+  auto route = watch_route(structure_.forest, structure_.directory, path.a(), path.b(),
+                           options.composed, period_of(options.rate), own_incarnation);
+  if (!route && !known) return tl::unexpected(known.error());
+  return route;
 }
 
 bool Watcher::on_pushed(const PushedValues& pushed) {

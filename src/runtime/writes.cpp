@@ -5,6 +5,20 @@
 #include "tfdude/base/id.hpp"
 
 namespace tfdude {
+namespace {
+
+// A streamed value has no reply that says that its owner has changed.
+constexpr Milliseconds kMaxAge{1000};
+
+template <class Edge>
+std::vector<std::string> ids_of(const std::vector<Edge>& edges) {
+  std::vector<std::string> ids;
+  ids.reserve(edges.size());
+  for (const Edge& edge : edges) ids.push_back(edge.id);
+  return ids;
+}
+
+}  // namespace
 
 Result<void> Writes::change(Part part, const Deadline& deadline) {
   std::vector<Part> parts{std::move(part)};
@@ -14,8 +28,9 @@ Result<void> Writes::change(Part part, const Deadline& deadline) {
 Result<void> Writes::add(const std::string& id, const AddRequest& request,
                          const std::string& partition) {
   const Deadline deadline = discovery_.call_deadline();
+  const auto names = [&] { return std::vector<std::string>{request.parent, id}; };
   auto added = requests_.retry_on_stale_route(
-      deadline,
+      deadline, names,
       [&](const Directory& directory) {
         return route_add(structure_.forest, directory, id, request, partition);
       },
@@ -25,6 +40,7 @@ Result<void> Writes::add(const std::string& id, const AddRequest& request,
 }
 
 Result<void> Writes::remove(const std::string& id) {
+  if (auto ok = requests_.check_keeps_all("remove frame " + quote(id)); !ok) return ok;
   const Deadline deadline = discovery_.call_deadline();
   // All frames below it are removed by name, so all must be known.
   if (auto all = discovery_.await(deadline); !all) return all;
@@ -45,8 +61,9 @@ Result<void> Writes::remove(const std::string& id) {
 
 Result<void> Writes::move(const std::string& id, const MoveRequest& request) {
   const Deadline deadline = discovery_.call_deadline();
+  const auto names = [&] { return std::vector<std::string>{id, request.parent}; };
   return requests_.retry_on_stale_route(
-      deadline,
+      deadline, names,
       [&](const Directory& directory) {
         return route_move(structure_.forest, directory, id, request);
       },
@@ -57,7 +74,7 @@ template <class Edge>
 Result<void> Writes::ask_to_update(const std::vector<Edge>& edges, std::optional<Time> stamp) {
   const Deadline deadline = discovery_.call_deadline();
   return requests_.retry_on_stale_route(
-      deadline,
+      deadline, [&] { return ids_of(edges); },
       [&](const Directory& directory) {
         return route_update(structure_.forest, directory, edges, stamp);
       },
@@ -81,9 +98,12 @@ Result<void> Writes::publish(const std::vector<EdgeUpdate>& edges, std::optional
   auto updated = structure_.forest.update(edges, stamp);
   if (updated || !is_elsewhere(updated.error())) return updated;
   const Deadline deadline = discovery_.call_deadline();
-  auto parts = requests_.planned(deadline, [&](const Directory& directory) {
-    return route_publish(structure_.forest, directory, edges, stamp);
-  });
+  auto parts = requests_.after_asking(
+      deadline, [&] { return ids_of(edges); }, kMaxAge,
+      [&] {
+        const Lock lock(structure_.mutex);
+        return route_publish(structure_.forest, structure_.directory, edges, stamp);
+      });
   if (!parts) return tl::unexpected(std::move(parts.error()));
   std::vector<Update> shares;
   for (Part& part : *parts) {
@@ -98,7 +118,7 @@ Result<void> Writes::publish(const std::vector<EdgeUpdate>& edges, std::optional
 Result<void> Writes::correlate(const std::string& id, const Correlation& correlation) {
   const Deadline deadline = discovery_.call_deadline();
   return requests_.retry_on_stale_route(
-      deadline,
+      deadline, [&] { return std::vector<std::string>{id}; },
       [&](const Directory& directory) -> Result<Part> {
         const auto frame = structure_.forest.info(id);
         if (!frame) return fail(Errc::kUnknownFrame, "no frame " + quote(id));

@@ -46,6 +46,8 @@ class TransportHandler {
   /// One more watcher of a group can be reached: from now on pushed values arrive there.
   virtual void on_watcher(std::uint64_t) {}
   virtual void on_page(const Page& page) = 0;
+  /// Whether pages are needed. Constant.
+  [[nodiscard]] virtual bool wants_pages() const { return true; }
   /// Another participant's presence.
   virtual void on_presence(const Presence& presence) = 0;
   /// The participant that announced this partition has stopped or is lost.

@@ -65,6 +65,7 @@ class Relay : public Transport, protected TransportHandler {
   void on_pushed(const PushedValues& pushed) override { handler_->on_pushed(pushed); }
   void on_watcher(std::uint64_t group) override { handler_->on_watcher(group); }
   void on_page(const Page& page) override { handler_->on_page(page); }
+  bool wants_pages() const override { return handler_->wants_pages(); }
   void on_presence(const Presence& presence) override { handler_->on_presence(presence); }
   void on_lost(const std::string& partition, std::uint64_t incarnation,
                std::chrono::nanoseconds early) override {

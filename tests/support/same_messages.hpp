@@ -82,6 +82,26 @@ inline std::string listed(const JointUpdate& update) {
 }
 
 // All fields in one text.
+inline std::string listed(const FramesRequest& asked) {
+  std::string text;
+  for (const std::string& id : asked.ids) text += id + ' ';
+  for (const std::string& tree : asked.trees) text += "tree " + tree + ' ';
+  for (const SeenEpoch& seen : asked.seen) {
+    text += seen.partition + ' ' + std::to_string(seen.epoch) + ' ';
+  }
+  return text;
+}
+
+// All fields in one text.
+inline std::string listed(const std::vector<KnownFrame>& frames) {
+  std::string text;
+  for (const KnownFrame& frame : frames) {
+    text += frame.id + " < " + frame.parent + " @ " + frame.partition + ' ';
+  }
+  return text;
+}
+
+// All fields in one text.
 inline std::string listed(const JointInfo& joint) {
   std::ostringstream text;
   text.precision(17);
@@ -163,6 +183,8 @@ inline void check_same(const Request& actual, const Request& expected) {
   } else if (const auto* forget = std::get_if<ForgetRequest>(&expected.body)) {
     CHECK(std::get<ForgetRequest>(actual.body).partition == forget->partition);
     CHECK(std::get<ForgetRequest>(actual.body).incarnation == forget->incarnation);
+  } else if (const auto* frames = std::get_if<FramesRequest>(&expected.body)) {
+    CHECK(listed(std::get<FramesRequest>(actual.body)) == listed(*frames));
   } else if (const auto* joints = std::get_if<JointUpdate>(&expected.body)) {
     CHECK(listed(std::get<JointUpdate>(actual.body)) == listed(*joints));
   }

@@ -133,6 +133,9 @@ bool take(const Bytes& bytes) {
       {21, "arm", partial_updates(random)},
       {22, "arm", CorrelateRequest{correlation(random)}},
       {30, "base", ForgetRequest{"arm", 18446744073709551615ULL}},
+      {31, "base", FramesRequest{{"hand", std::string(255, 'i')}}},
+      {32, "base",
+       FramesRequest{{}, {"arm", "left_*"}, {{"arms", 18446744073709551615ULL}, {"legs", 1}}}},
       {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), {}},
        18446744073709551610ULL}};
 }
@@ -189,25 +192,28 @@ bool take(const Bytes& bytes) {
 }
 
 [[nodiscard]] inline std::vector<Reply> replies(Random& random) {
-  return {{1, 10, Done{}, 1ULL << 62U},
-          {2, 18446744073709551615ULL, Error{Errc::kCycle, "no, \xc3\xa4 \x07 \xff"}},
-          {3, 0, Error{Errc::kTransport, ""}},
-          {4, 30, SegmentValues{}},
-          {5, 40, SegmentValues{{random.transform(), Transform(), random.transform()}, {}, {}, {}}},
-          {6, 40,
-           SegmentValues{{random.transform()},
-                         time_of(1'700'000'000'000'000'001),
-                         std::chrono::nanoseconds(5),
-                         {random.transform()}}},
-          {7, 1, PushedValues{1, {}}},
-          {8, 1,
-           PushedValues{18446744073709551615ULL,
-                        {{0, std::nullopt, random.transform()}, {7, time_of(5), Transform()}}}},
-          {9, 1, std::vector<HistoryInfo>{}},
-          {11, 1, correlated_values(random)},
-          {12, 1, std::vector<EdgeConsistency>{{"hand", 7, 3, {1.5, 2.5, 3.5}}, {}}},
-          {13, 1, joint_infos()},
-          {10, 1, std::vector<HistoryInfo>{history_info("hand"), HistoryInfo{}}}};
+  return {
+      {1, 10, Done{}, 1ULL << 62U},
+      {2, 18446744073709551615ULL, Error{Errc::kCycle, "no, \xc3\xa4 \x07 \xff"}},
+      {3, 0, Error{Errc::kTransport, ""}},
+      {4, 30, SegmentValues{}},
+      {5, 40, SegmentValues{{random.transform(), Transform(), random.transform()}, {}, {}, {}}},
+      {6, 40,
+       SegmentValues{{random.transform()},
+                     time_of(1'700'000'000'000'000'001),
+                     std::chrono::nanoseconds(5),
+                     {random.transform()}}},
+      {7, 1, PushedValues{1, {}}},
+      {8, 1,
+       PushedValues{18446744073709551615ULL,
+                    {{0, std::nullopt, random.transform()}, {7, time_of(5), Transform()}}}},
+      {9, 1, std::vector<HistoryInfo>{}},
+      {11, 1, correlated_values(random)},
+      {12, 1, std::vector<EdgeConsistency>{{"hand", 7, 3, {1.5, 2.5, 3.5}}, {}}},
+      {13, 1, joint_infos()},
+      {14, 1,
+       std::vector<KnownFrame>{{"world", "", "base"}, {"hand", "world", std::string(255, 'p')}}},
+      {10, 1, std::vector<HistoryInfo>{history_info("hand"), HistoryInfo{}}}};
 }
 
 [[nodiscard]] inline std::vector<PushedValues> pushed_values(Random& random) {

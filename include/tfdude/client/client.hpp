@@ -37,6 +37,15 @@ class Participant;
 /// Each process has a replica of the structure. So missing frames are known without a request, and
 /// requests go straight to the owners.
 ///
+/// @par Following only some frames  With Options::follow, a client has no replica. It asks an
+///   owner, which has one, for the frames that it needs, and keeps the answers. So the first call
+///   about a frame takes one more round trip. If a call fails with a kept answer, it asks again.
+///   find(), path(), parent() and exists() ask each time, and so does frames(), which lists what is
+///   followed and all frames above. A watched path takes a new route, and publish() notices a new
+///   owner, up to a second after the change. remove(), children(), roots(), and all that moves
+///   joints or opens streams fail with kInvalidInput, because they need all frames. partitions()
+///   gives no numbers of frames; on_change() reports partitions only. Every function may also fail
+///   with kUnsupported (all owners are of an earlier version) or kNotPermitted (keys).
 /// @par Thread safety  All functions may be called from any thread. Each waits for its own answer
 ///   only.
 /// @par Errors  Every function may also fail with kUnreachable (a partition concerned is known to

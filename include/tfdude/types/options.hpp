@@ -3,7 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "tfdude/base/export.hpp"
 #include "tfdude/base/time.hpp"
@@ -52,6 +54,13 @@ struct Options {
   /// not announced its structure, calls fail with kTimeout, for up to three times Options::timeout
   /// more.
   Milliseconds discovery{1000};
+  /// What a client follows, instead of all frames. Absent: it receives the structure of all
+  /// partitions, and keeps it. Otherwise it keeps only the frames that it follows or has been asked
+  /// about, each with all frames above it. It asks an owner for them, at the first use: one more
+  /// round trip. See Client for what is different then. An entry is the id of a frame, for it and
+  /// all frames below it; or the beginning of ids, followed by '*'. No entries: it only asks. Not
+  /// for a Node, which needs all frames.
+  std::optional<std::vector<std::string>> follow{};
   /// Directory in which a Node stores its partition's frames, from which its next process restores
   /// them; empty: nothing is stored. Changes requested by others are stored before they are
   /// acknowledged.

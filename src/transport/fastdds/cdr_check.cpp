@@ -215,6 +215,14 @@ void request_body(CdrWalk& walk) {
     case kJointStates:
       walk.id();
       break;
+    case kFrames:
+      walk.sequence([&] { walk.id(); });
+      walk.sequence([&] { walk.id(); });
+      walk.sequence([&] {
+        walk.skip(8, 8);
+        walk.id();
+      });
+      break;
     default:
       change_body(walk, kind);
   }
@@ -288,6 +296,13 @@ bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
         walk.id();
         walk.id();
         walk.numbers(1);
+      });
+      break;
+    case kKnownFrames:
+      walk.sequence([&] {
+        walk.id();
+        walk.id();
+        walk.id();
       });
       break;
     default:;  // a reply of a later version, which is rejected by name

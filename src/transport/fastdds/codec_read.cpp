@@ -6,6 +6,7 @@
 #include "partition/watching.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_correlation.hpp"
+#include "transport/fastdds/codec_frames.hpp"
 #include "transport/fastdds/codec_partial.hpp"
 #include "transport/fastdds/codec_values.hpp"
 #include "transport/fastdds/kinds.hpp"
@@ -209,6 +210,8 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
       return take(request, read_correlate(request.id, body.correlate()));
     case kForget:
       return as(ForgetRequest{string_of(body.forget().partition()), body.forget().incarnation()});
+    case kFrames:
+      return take(request, read_frames(body.structure()));
     default:
       // Which one it is, is not known either: Fast DDS 3 replaces the number.
       return fail(Errc::kUnsupported,

@@ -4,6 +4,7 @@
 
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_correlation.hpp"
+#include "transport/fastdds/codec_frames.hpp"
 #include "transport/fastdds/codec_infos.hpp"
 #include "transport/fastdds/codec_values.hpp"
 #include "transport/fastdds/kinds.hpp"
@@ -112,6 +113,8 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
       reply.body = std::move(joints);
       return {};
     }
+    case kKnownFrames:
+      return put<std::vector<KnownFrame>>(reply, read_frames(body.structure()));
     default:
       return fail(Errc::kUnsupported,
                   "this kind of reply is not known to protocol " + to_string(kProtocolVersion));

@@ -2,6 +2,7 @@
 
 #include "transport/fastdds/cdr_check.hpp"
 #include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/codec_frames.hpp"
 #include "transport/fastdds/codec_partial.hpp"
 #include "transport/fastdds/codec_values.hpp"
 #include "transport/fastdds/kinds.hpp"
@@ -172,6 +173,7 @@ struct BodyWriter {
     out.forget(std::move(body));
   }
   void operator()(const ConsistencyRequest& asked) { out.consistency(asked.all ? 1 : 0); }
+  void operator()(const FramesRequest& asked) { out.structure(write_frames(asked)); }
 };
 
 }  // namespace
@@ -298,6 +300,7 @@ struct ReplyWriter {
       body.push_back(wire_joint(joints[i]));
     out.joint_states(std::move(body));
   }
+  void operator()(const std::vector<KnownFrame>& known) { out.structure(write_frames(known)); }
 };
 
 }  // namespace

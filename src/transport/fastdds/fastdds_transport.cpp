@@ -130,17 +130,19 @@ Result<void> FastDdsTransport::create_endpoints() {
       Reader<wire::Presence>::Calls{
           [this](const wire::Presence& sample, const Guid& from) { take_presence(sample, from); },
           nullptr});
-  pages_ = std::make_unique<Reader<wire::Page>>(
-      context(), *topics_.directory, kAllOwners, "directory_reader",
-      Reader<wire::Page>::Calls{
-          [this](const wire::Page& sample, const Guid& from) { take_page(sample, from); },
-          nullptr});
+  if (handler_->wants_pages()) {
+    pages_ = std::make_unique<Reader<wire::Page>>(
+        context(), *topics_.directory, kAllOwners, "directory_reader",
+        Reader<wire::Page>::Calls{
+            [this](const wire::Page& sample, const Guid& from) { take_page(sample, from); },
+            nullptr});
+  }
   replies_ = std::make_unique<Reader<wire::Reply>>(
       context(), *topics_.reply, reply_partition(kAllOwners, self_), "call_reader",
       Reader<wire::Reply>::Calls{
           [this](const wire::Reply& sample, const Guid& from) { take_reply(sample, from); },
           nullptr});
-  if (!presence_->good() || !pages_->good() || !replies_->good()) {
+  if (!presence_->good() || (pages_ != nullptr && !pages_->good()) || !replies_->good()) {
     return not_created("the readers");
   }
   const std::string& own = options_.partition;

@@ -23,7 +23,8 @@ enum RequestKind : std::uint8_t {
   kPartialUpdate = 15,
   kForget = 16,
   kProbe = 17,
-  kLastRequestKind = kProbe
+  kFrames = 18,
+  kLastRequestKind = kFrames
 };
 
 enum ReplyKind : std::uint8_t {
@@ -37,7 +38,8 @@ enum ReplyKind : std::uint8_t {
   kConsistencies = 8,
   kJointInfos = 9,
   kAlive = 10,
-  kLastReplyKind = kAlive
+  kKnownFrames = 11,
+  kLastReplyKind = kKnownFrames
 };
 
 }  // namespace tfdude::fastdds

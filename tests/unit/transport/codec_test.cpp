@@ -95,6 +95,8 @@ TEST_CASE("replies are decoded as they were encoded") {
       const auto& came = std::get<std::vector<JointInfo>>(arrived->body);
       REQUIRE(came.size() == joints->size());
       for (std::size_t i = 0; i < came.size(); ++i) CHECK(listed(came[i]) == listed((*joints)[i]));
+    } else if (const auto* frames = std::get_if<std::vector<KnownFrame>>(&one.body)) {
+      CHECK(listed(std::get<std::vector<KnownFrame>>(arrived->body)) == listed(*frames));
     }
   }
 }

@@ -1,0 +1,114 @@
+#include "partition/asked_frames.hpp"
+
+#include <algorithm>
+#include <string_view>
+#include <unordered_set>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+
+std::vector<std::string> AskedFrames::lacking(const std::vector<std::string>& ids,
+                                              Steady since) const {
+  std::vector<std::string> lacking;
+  std::unordered_set<std::string_view> seen;
+  for (const std::string& id : ids) {
+    // No frame has an invalid id.
+    if (!seen.insert(id).second || !check_id(id, "id")) continue;
+    const auto known = as_of_.find(id);
+    if (known == as_of_.end() || known->second < since) lacking.push_back(id);
+  }
+  return lacking;
+}
+
+FramesRequest AskedFrames::request(std::vector<std::string> ids,
+                                   std::vector<std::string> trees) const {
+  return {std::move(ids), std::move(trees), directory_.told()};
+}
+
+// Each frame comes after its parent, so none gets a parent that is still below it here.
+void AskedFrames::take(const FramesRequest& request, const std::vector<KnownFrame>& answer,
+                       Steady asked) {
+  std::unordered_set<std::string_view> there;
+  for (const KnownFrame& frame : answer) {
+    if (!frame.parent.empty() && there.count(frame.parent) == 0) drop(frame.parent);
+    there.insert(frame.id);
+    (void)forest_.put_remote(frame.id, frame.parent, directory_.refer_to(frame.partition));
+    as_of_[frame.id] = asked;
+  }
+  for (const std::string& id : request.ids) {
+    if (there.count(id) == 0) drop(id);
+  }
+}
+
+void AskedFrames::drop(const std::string& id) {
+  as_of_.erase(id);
+  if (const auto frame = forest_.info(id)) forest_.drop_remote(id, frame->owner);
+}
+
+namespace {
+
+/// Frames, each after its parent and only once.
+class Collection {
+ public:
+  Collection(const Forest& forest, const Directory& directory)
+      : forest_(forest), directory_(directory) {}
+
+  /// Adds the frame and all above it, if it exists.
+  void add(const std::string& id) {
+    std::vector<FrameInfo> above;
+    auto frame = forest_.info(id);
+    for (; frame && taken_.insert(frame->id).second; frame = forest_.info(frame->parent)) {
+      above.push_back(*frame);
+    }
+    for (auto one = above.rbegin(); one != above.rend(); ++one) {
+      known_.push_back({std::move(one->id), std::move(one->parent), directory_.name(one->owner)});
+    }
+  }
+
+  void add_tree(const std::string& tree) {
+    if (tree.back() != kAnyName) {
+      for (const FrameInfo& frame : forest_.subtree(tree)) add(frame.id);
+      return;
+    }
+    const std::string_view prefix(tree.data(), tree.size() - 1);
+    for (const FrameInfo& frame : forest_.frames()) {
+      if (frame.id.compare(0, prefix.size(), prefix) == 0) add(frame.id);
+    }
+  }
+
+  [[nodiscard]] std::vector<KnownFrame>& known() { return known_; }
+
+ private:
+  const Forest& forest_;
+  const Directory& directory_;
+  std::vector<KnownFrame> known_;
+  std::unordered_set<std::string> taken_;
+};
+
+}  // namespace
+
+Result<std::vector<KnownFrame>> known_frames(const Forest& forest, const Directory& directory,
+                                             const FramesRequest& request) {
+  for (const SeenEpoch& seen : request.seen) {
+    const auto owner = directory.owner(seen.partition);
+    const bool comes = !owner || (*owner != kHeldHere && directory.reachable(*owner) &&
+                                  directory.epoch(*owner) < seen.epoch);
+    if (!comes) continue;
+    return fail(Errc::kNotYet, "the last change of partition " + quote(seen.partition) +
+                                   " has not arrived at partition " +
+                                   quote(directory.name(kHeldHere)) + " yet");
+  }
+  Collection found(forest, directory);
+  for (const std::string& id : request.ids) found.add(id);
+  for (const std::string& tree : request.trees) found.add_tree(tree);
+  if (const std::size_t count = found.known().size(); count > kMaxItems) {
+    return fail(Errc::kTooMuch, "the requested trees have " + std::to_string(count) +
+                                    " frames, with those above them, of at most " +
+                                    std::to_string(kMaxItems));
+  }
+  return std::move(found.known());
+}
+
+}  // namespace tfdude

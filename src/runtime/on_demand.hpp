@@ -1,0 +1,73 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/mutex.hpp"
+#include "partition/asked_frames.hpp"
+#include "partition/routing.hpp"
+#include "runtime/deadline.hpp"
+#include "runtime/discovery.hpp"
+#include "runtime/structure.hpp"
+
+namespace tfdude {
+
+/// Asks owners for the frames that this participant needs, and does not keep (Options::follow).
+/// Each owner knows all frames, so any of them may answer.
+/// @par Thread safety  All functions are thread-safe, for callers that hold no lock.
+class OnDemand {
+ public:
+  using Clock = Deadline::Clock;
+
+  /// An answer of any age will do, or none.
+  static constexpr Milliseconds kAnyAge = Milliseconds::max();
+  static constexpr Milliseconds kFresh{0};
+
+  struct Links {
+    /// @return a reply for each part
+    std::function<std::vector<Reply>(std::vector<Part>&, const Deadline&)> ask;
+    /// Frames have appeared, disappeared or moved, as far as they are known here.
+    std::function<void()> on_routes;
+  };
+
+  /// @param follow  as Options::follow
+  OnDemand(Structure& structure, Discovery& discovery, std::vector<std::string> follow,
+           Links links);
+
+  /// For how many of some frames others were asked just now.
+  enum class Asked { kForNone, kForSome, kForAll };
+
+  /// Asks for those of the frames that are not known well enough. Afterwards the forest shows them
+  /// as the answer did; that some do not exist is not an error.
+  /// @param max_age  of the answers that are used
+  /// @return also kTimeout, kUnreachable, kUnsupported, kNotPermitted
+  [[nodiscard]] Result<Asked> know(const std::vector<std::string>& ids, Milliseconds max_age,
+                                   const Deadline& deadline);
+
+  /// All frames that are followed, and those above them, as of now. @return as know(); kTooMuch
+  [[nodiscard]] Result<std::vector<KnownFrame>> followed(const Deadline& deadline);
+
+  /// An owner has acknowledged a change, which its structure shows in this epoch.
+  void changed(Owner owner, std::uint64_t epoch);
+
+ private:
+  [[nodiscard]] Result<std::vector<KnownFrame>> ask(const FramesRequest& request,
+                                                    const Deadline& deadline);
+  [[nodiscard]] Result<std::vector<KnownFrame>> ask_one(Owner owner, const FramesRequest& request,
+                                                        const Deadline& deadline);
+  [[nodiscard]] Result<std::vector<KnownFrame>> nobody(const FramesRequest& request);
+  void take(const FramesRequest& request, const std::vector<KnownFrame>& answer,
+            Clock::time_point asked);
+  void await_owners(const std::vector<KnownFrame>& answer, const Deadline& deadline);
+
+  Structure& structure_;
+  Discovery& discovery_;
+  const std::vector<std::string> follow_;
+  const Links links_;
+  AskedFrames asked_ TFDUDE_GUARDED_BY(structure_.mutex);
+  bool follows_ TFDUDE_GUARDED_BY(structure_.mutex) = false;  // what it follows was asked for once
+};
+
+}  // namespace tfdude
