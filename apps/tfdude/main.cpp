@@ -61,6 +61,11 @@ CLI::App* add_command(CLI::App& app, const char* name, const char* help, const c
   return command;
 }
 
+// A command about one or two frames asks for them, instead of receiving all frames.
+void ask_only(CLI::App* command, Arguments& arguments) {
+  command->parse_complete_callback([&arguments] { arguments.options.follow.emplace(); });
+}
+
 void add_id(CLI::App* command, Arguments& arguments) {
   command->add_option("ID", arguments.id, "the frame")->required();
 }
@@ -95,6 +100,7 @@ void add_rate(CLI::App* command, double& rate, const char* help) {
 void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen) {
   auto* lookup = add_command(app, "lookup", "pose of B in A, with its uncertainty",
                              "lookup world hand_left --cov", cli::run_lookup, chosen);
+  ask_only(lookup, arguments);
   add_ends(lookup, arguments);
   lookup->add_flag("--cov", arguments.covariance, "print the full covariance");
   add_stamp(lookup, "--at", arguments.stamp,
@@ -149,9 +155,10 @@ void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
   add_id(add_command(app, "children", "a frame's children", "children arm_1", cli::run_children,
                      chosen),
          arguments);
-  add_id(add_command(app, "exists", "whether a frame exists", "exists camera", cli::run_exists,
-                     chosen),
-         arguments);
+  auto* exists = add_command(app, "exists", "whether a frame exists", "exists camera",
+                             cli::run_exists, chosen);
+  ask_only(exists, arguments);
+  add_id(exists, arguments);
   add_lookup_command(app, arguments, chosen);
 }
 
