@@ -241,7 +241,7 @@ TEST_CASE("on demand: an observation corrects edges") {
   const auto observed = client->observe("world", "hand", measured);
   REQUIRE(observed);
   CHECK(observed->corrected == Names{"hand"});
-  CHECK(x_of(client->lookup("world", "hand")) == Approx(2.25));
+  CHECK(x_of(client->lookup("world", "hand")) == testing::Approx(2.25));
 }
 
 TEST_CASE("on demand: an owner of an earlier version is passed over") {
