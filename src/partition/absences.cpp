@@ -41,7 +41,8 @@ void Absences::told(const Absent& absent, const std::string& teller) {
 
 void Absences::told_all(const std::vector<Absent>& absent, const std::string& teller) {
   for (auto it = missed_.begin(); it != missed_.end();) {
-    const auto& [name, missed] = *it;
+    const std::string& name = it->first;
+    const Missed& missed = it->second;
     const bool retracted = missed.teller == teller && missed.then == Absent::Kind::kSilent &&
                            std::none_of(absent.begin(), absent.end(),
                                         [&](const Absent& one) { return one.partition == name; });

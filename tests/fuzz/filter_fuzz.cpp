@@ -92,7 +92,8 @@ class Filters {
 
   Owner owner_;
   FastDdsCounters counters_;
-  fastdds::OwnedFilters filters_{kPartition, owner_, counters_};
+  fastdds::FairShare fair_share_;
+  fastdds::OwnedFilters filters_{kPartition, owner_, counters_, fair_share_};
   fastdds::edds::IContentFilter* requests_ = nullptr;
   fastdds::edds::IContentFilter* updates_ = nullptr;
   fastdds::edds::IContentFilter* joints_ = nullptr;

@@ -98,7 +98,7 @@ bool write_states(const std::filesystem::path& folder) {
     if (!store || !store->save(change)) return false;
     write(folder / "state", "log", state_of(1, file));
     StateChange configuration{7};
-    configuration.configured = {{"arm", "", {}}};
+    configuration.configured = std::vector<FrameSpec>{{"arm", "", {}}};
     if (!store->save(configuration)) return false;
   }
   write(folder / "state", "full", state_of(0, file));
