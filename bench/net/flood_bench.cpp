@@ -17,6 +17,7 @@
 #include "tfdude/transport/fastdds.hpp"
 
 #include "net/harness.hpp"
+#include "support/deaf_handler.hpp"
 #include "transport/port.hpp"
 
 namespace {
@@ -26,24 +27,9 @@ using bench::must;
 
 constexpr const char* kOwner = "robot";
 
-/// Hears nothing: the replies are of no interest.
-class Deaf final : public TransportHandler {
- public:
-  void on_request(const PeerId&, const Request&) override {}
-  void on_reply(const std::string&, const Reply&) override {}
-  void on_update(const Update&) override {}
-  void on_joints(const JointUpdate&) override {}
-  void on_pushed(const PushedValues&) override {}
-  void on_page(const Page&) override {}
-  void on_presence(const Presence&) override {}
-  void on_lost(const std::string&, std::uint64_t, std::chrono::nanoseconds) override {}
-  [[nodiscard]] bool owns(std::string_view) const override { return false; }
-  [[nodiscard]] bool owns_joint(std::string_view) const override { return false; }
-};
-
 [[noreturn]] void flood(const bench::Arguments& arguments, std::size_t segments) {
   const Options options = arguments.options("domain");
-  Deaf deaf;
+  testing::DeafHandler deaf;  // the replies are of no interest
   auto transport = must(make_fastdds_transport({options.domain, options.profile, {}, {}}), "it");
   bench::check(transport->start(deaf), "start");
   Request request;

@@ -9,6 +9,11 @@
 
 namespace tfdude {
 
+bool AskedFrames::knows(const std::string& id, Steady since) const {
+  const auto known = as_of_.find(id);
+  return known != as_of_.end() && known->second >= since;
+}
+
 std::vector<std::string> AskedFrames::lacking(const std::vector<std::string>& ids,
                                               Steady since) const {
   std::vector<std::string> lacking;
@@ -16,8 +21,7 @@ std::vector<std::string> AskedFrames::lacking(const std::vector<std::string>& id
   for (const std::string& id : ids) {
     // No frame has an invalid id.
     if (!seen.insert(id).second || !check_id(id, "id")) continue;
-    const auto known = as_of_.find(id);
-    if (known == as_of_.end() || known->second < since) lacking.push_back(id);
+    if (!knows(id, since)) lacking.push_back(id);
   }
   return lacking;
 }

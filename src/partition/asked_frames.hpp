@@ -24,8 +24,10 @@ class AskedFrames {
   /// Writes to the forest, which must not contain frames of other origin.
   AskedFrames(Forest& forest, Directory& directory) : forest_(forest), directory_(directory) {}
 
-  /// Those of the ids that are not known from an answer that was requested at this time or later.
-  /// Missing frames are never known.
+  /// Whether a frame is known from an answer that was requested at this time or later. Missing
+  /// frames are never known.
+  [[nodiscard]] bool knows(const std::string& id, Steady since) const;
+  /// Those of the ids that are not.
   [[nodiscard]] std::vector<std::string> lacking(const std::vector<std::string>& ids,
                                                  Steady since) const;
 

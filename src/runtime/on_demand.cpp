@@ -39,22 +39,23 @@ OnDemand::OnDemand(Structure& structure, Discovery& discovery, std::vector<std::
       links_(std::move(links)),
       asked_(structure.forest, structure.directory) {}
 
-Result<OnDemand::Asked> OnDemand::know(const std::vector<std::string>& ids, Milliseconds max_age,
-                                       const Deadline& deadline) {
+Result<bool> OnDemand::know(const std::vector<std::string>& ids, Milliseconds max_age,
+                            const Deadline& deadline) {
   const auto since = max_age == kAnyAge ? Clock::time_point::min() : Clock::now() - max_age;
   FramesRequest request;
-  bool all = false;
+  bool some_known = false;
   {
     const Lock lock(structure_.mutex);
     auto lacking = asked_.lacking(ids, since);
-    if (lacking.empty()) return Asked::kForNone;
-    all = lacking.size() == asked_.lacking(ids, Clock::time_point::max()).size();
+    if (lacking.empty()) return false;
+    some_known = std::any_of(ids.begin(), ids.end(),
+                             [&](const std::string& id) { return asked_.knows(id, since); });
     request = asked_.request(std::move(lacking), follows_ ? std::vector<std::string>() : follow_);
   }
   if (auto answer = ask(request, deadline); !answer) {
     return tl::unexpected(std::move(answer.error()));
   }
-  return all ? Asked::kForAll : Asked::kForSome;
+  return !some_known;
 }
 
 Result<std::vector<KnownFrame>> OnDemand::followed(const Deadline& deadline) {

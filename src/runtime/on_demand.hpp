@@ -36,15 +36,13 @@ class OnDemand {
   OnDemand(Structure& structure, Discovery& discovery, std::vector<std::string> follow,
            Links links);
 
-  /// For how many of some frames others were asked just now.
-  enum class Asked { kForNone, kForSome, kForAll };
-
   /// Asks for those of the frames that are not known well enough. Afterwards the forest shows them
   /// as the answer did; that some do not exist is not an error.
   /// @param max_age  of the answers that are used
-  /// @return also kTimeout, kUnreachable, kUnsupported, kNotPermitted
-  [[nodiscard]] Result<Asked> know(const std::vector<std::string>& ids, Milliseconds max_age,
-                                   const Deadline& deadline);
+  /// @return whether it has just asked for all of them; also kTimeout, kUnreachable, kUnsupported,
+  ///   kNotPermitted
+  [[nodiscard]] Result<bool> know(const std::vector<std::string>& ids, Milliseconds max_age,
+                                  const Deadline& deadline);
 
   /// All frames that are followed, and those above them, as of now. @return as know(); kTooMuch
   [[nodiscard]] Result<std::vector<KnownFrame>> followed(const Deadline& deadline);

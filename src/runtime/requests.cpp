@@ -27,7 +27,7 @@ Requests::Requests(Structure& structure, Discovery& discovery, Transport& transp
 Result<void> Requests::know(const std::vector<std::string>& ids, Milliseconds max_age,
                             const Deadline& deadline) {
   if (on_demand_ == nullptr) return {};
-  return on_demand_->know(ids, max_age, deadline).map([](OnDemand::Asked) {});
+  return on_demand_->know(ids, max_age, deadline).map([](bool) {});
 }
 
 Result<void> Requests::check_keeps_all(const std::string& what) const {

@@ -146,20 +146,19 @@ class Requests {
     Milliseconds pause{5};
     Milliseconds max_age = OnDemand::kAnyAge;
     while (true) {
-      const auto asked = on_demand_->know(names(), max_age, deadline);
-      if (!asked) return tl::unexpected(asked.error());
+      const auto fresh = on_demand_->know(names(), max_age, deadline);
+      if (!fresh) return tl::unexpected(fresh.error());
       // Whatever failed with an earlier answer may succeed with a fresh one.
-      const bool fresh = *asked == OnDemand::Asked::kForAll;
       max_age = OnDemand::kFresh;
       auto plan = once(deadline, [&] { return locked(route); });
-      if (!plan && !fresh && !deadline.over()) continue;
+      if (!plan && !*fresh && !deadline.over()) continue;
       if (!plan) return tl::unexpected(std::move(plan.error()));
       auto result = ask(*plan);
       if (result) return result;
       const Errc code = result.error().code;
       const bool outdated = code == Errc::kNotOwner && pause <= kStructureDelay;
       if (!(outdated || denies_plan(code)) || deadline.over(Clock::now() + pause)) return result;
-      if (!fresh) continue;
+      if (!*fresh) continue;
       std::this_thread::sleep_for(pause);
       pause *= 2;
     }

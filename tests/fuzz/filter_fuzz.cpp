@@ -10,6 +10,7 @@
 
 #include "base/log.hpp"
 #include "fuzz/demand.hpp"
+#include "support/deaf_handler.hpp"
 #include "support/samples.hpp"
 #include "transport/fastdds/owned_filter.hpp"
 
@@ -21,16 +22,8 @@ using testing::Bytes;
 // Not the partition to which the seeds are addressed, so that the frame's owner matters.
 constexpr const char* kPartition = "legs";
 
-class Owner final : public TransportHandler {
+class Owner final : public testing::DeafHandler {
  public:
-  void on_request(const PeerId&, const Request&) override {}
-  void on_reply(const std::string&, const Reply&) override {}
-  void on_update(const Update&) override {}
-  void on_joints(const JointUpdate&) override {}
-  void on_pushed(const PushedValues&) override {}
-  void on_page(const Page&) override {}
-  void on_presence(const Presence&) override {}
-  void on_lost(const std::string&, std::uint64_t, std::chrono::nanoseconds) override {}
   [[nodiscard]] bool owns(std::string_view id) const override { return id == "hand" || id == "x"; }
   [[nodiscard]] bool owns_joint(std::string_view name) const override { return name == "hand"; }
 };

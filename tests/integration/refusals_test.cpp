@@ -8,6 +8,7 @@
 #include "tfdude/transport/fastdds.hpp"
 
 #include "support/catch.hpp"
+#include "support/deaf_handler.hpp"
 #include "support/thesis.hpp"
 #include "transport/port.hpp"
 
@@ -23,7 +24,7 @@ using testing::ThesisDaemons;
 using Arguments = std::vector<std::string>;
 
 /// A participant that seems to serve a partition, and never answers.
-class MutePartition final : public TransportHandler {
+class MutePartition final : public testing::DeafHandler {
  public:
   MutePartition(const TestDomain& domain, const std::string& name, const std::string& frame)
       : transport_(
@@ -34,14 +35,6 @@ class MutePartition final : public TransportHandler {
     transport_->announce({name, 1, "here", 1, 1, true});
   }
 
-  void on_request(const PeerId&, const Request&) override {}
-  void on_reply(const std::string&, const Reply&) override {}
-  void on_update(const Update&) override {}
-  void on_joints(const JointUpdate&) override {}
-  void on_pushed(const PushedValues&) override {}
-  void on_page(const Page&) override {}
-  void on_presence(const Presence&) override {}
-  void on_lost(const std::string&, std::uint64_t, std::chrono::nanoseconds) override {}
   [[nodiscard]] bool owns(std::string_view) const override { return true; }
   [[nodiscard]] bool owns_joint(std::string_view) const override { return true; }
 

@@ -1,5 +1,8 @@
 #include "transport/fastdds/contact.hpp"
 
+#include <set>
+#include <string>
+
 namespace tfdude::fastdds {
 namespace {
 
@@ -20,10 +23,10 @@ void Contact::announce(Writer& writer, const Presence& presence) {
 
 std::chrono::milliseconds Contact::look() {
   attention_.lower();
-  const std::set<std::string> used = owners_.used();
+  const std::set<std::string> used = senders_.used_owners();
   for (const std::string& partition :
-       peers_.look_for_silent(Peers::Clock::now(), next_look_, owners_.askable(used))) {
-    owners_.probe(partition);
+       peers_.look_for_silent(Peers::Clock::now(), next_look_, senders_.askable(used))) {
+    senders_.probe(partition);
   }
   const bool up_to_date = announce_count();
   next_look_ = used.empty() && up_to_date ? Attention::kRarely : Attention::kOften;

@@ -1,15 +1,15 @@
 #pragma once
 
-#include <functional>
+#include <chrono>
+#include <cstdint>
 #include <optional>
-#include <set>
-#include <string>
 
 #include "base/mutex.hpp"
 #include "transport/fastdds/attention.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/peers.hpp"
+#include "transport/fastdds/senders.hpp"
 
 namespace tfdude::fastdds {
 
@@ -18,18 +18,9 @@ namespace tfdude::fastdds {
 /// @par Thread safety  announce() is thread-safe; look() is for the worker.
 class Contact {
  public:
-  /// What it needs of the writers to owners.
-  struct Owners {
-    /// The partitions to which something was sent recently.
-    std::function<std::set<std::string>()> used;
-    /// Those of them that can be asked for a sign of life.
-    std::function<std::set<std::string>(const std::set<std::string>&)> askable;
-    std::function<void(const std::string& partition)> probe;
-  };
-
   /// @param repeats  whether presence is repeated, because others do not hear DDS's announcements
-  Contact(Peers& peers, Attention& attention, Owners owners, bool repeats)
-      : peers_(peers), attention_(attention), owners_(std::move(owners)), repeats_(repeats) {}
+  Contact(Peers& peers, Attention& attention, Senders& senders, bool repeats)
+      : peers_(peers), attention_(attention), senders_(senders), repeats_(repeats) {}
 
   /// Announces what this participant serves from now on.
   /// @param writer  outlives the use of this
@@ -45,7 +36,7 @@ class Contact {
 
   Peers& peers_;
   Attention& attention_;
-  const Owners owners_;
+  Senders& senders_;
   const bool repeats_;
   std::chrono::milliseconds next_look_{};
 

@@ -116,11 +116,7 @@ Result<void> FastDdsTransport::create_endpoints() {
   using Guid = ertps::GUID_t;
   senders_.emplace(
       Senders::Parts{context(), topics_, peers_, attention_, access_, options_.domain});
-  contact_.emplace(peers_, attention_,
-                   Contact::Owners{[this] { return senders_->used_owners(); },
-                                   [this](const auto& used) { return senders_->askable(used); },
-                                   [this](const auto& partition) { senders_->probe(partition); }},
-                   !announced_by_dds_);
+  contact_.emplace(peers_, attention_, *senders_, !announced_by_dds_);
   push_channels_.emplace(
       context(), *topics_.state, options_.partition,
       PushChannels::Calls{[this](const PushedValues& pushed) { handler_->on_pushed(pushed); },

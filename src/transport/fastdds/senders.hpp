@@ -46,9 +46,11 @@ class Senders {
   [[nodiscard]] std::unique_ptr<Channel<JointUpdate>> joint_channel(const std::string& partition);
   [[nodiscard]] Result<void> flush(Deadline deadline);
 
-  // For Contact.
+  /// The partitions to which something was sent recently.
   [[nodiscard]] std::set<std::string> used_owners() const;
+  /// Those of them that can be asked for a sign of life.
   [[nodiscard]] std::set<std::string> askable(const std::set<std::string>& partitions);
+  /// Asks for a sign of life.
   void probe(const std::string& partition);
 
  private:

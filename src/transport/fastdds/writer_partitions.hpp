@@ -1,7 +1,7 @@
 #pragma once
 
+#include <map>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "base/mutex.hpp"
@@ -37,18 +37,8 @@ class WriterPartitions {
   }
 
  private:
-  struct Hash {
-    std::size_t operator()(const ertps::GUID_t& guid) const {
-      std::size_t hash = 14695981039346656037U;  // FNV-1a
-      const auto add = [&hash](std::uint8_t byte) { hash = (hash ^ byte) * 1099511628211U; };
-      for (const auto byte : guid.guidPrefix.value) add(byte);
-      for (const auto byte : guid.entityId.value) add(byte);
-      return hash;
-    }
-  };
-
   mutable Mutex mutex_;
-  std::unordered_map<ertps::GUID_t, std::string, Hash> partitions_ TFDUDE_GUARDED_BY(mutex_);
+  std::map<ertps::GUID_t, std::string> partitions_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 }  // namespace tfdude::fastdds
