@@ -26,6 +26,7 @@ void Member::on_presence(const Presence& presence, Time now) {
   outcome_.heard = true;
   if (presence.partition == name_) {
     on_own_presence(presence);
+    overtake(now);
     return;
   }
   const bool before = directory_.serving(presence.partition).has_value();
@@ -53,7 +54,10 @@ void Member::on_own_presence(const Presence& presence) {
 void Member::on_lost(const std::string& partition, std::uint64_t incarnation, Time now,
                      std::chrono::nanoseconds early) {
   outcome_.heard = true;
-  if (partition == name_) claim_.lost(incarnation);
+  if (partition == name_) {
+    claim_.lost(incarnation);
+    overtake(now);
+  }
   if (!directory_.lost(partition, incarnation, now, early)) return;
   outcome_.lost = partition;
   outcome_.others = outcome_.routes = outcome_.look_for_gone = true;
@@ -137,7 +141,8 @@ void Member::give_up(const Presence& rival) {
 }
 
 // Others know a later incarnation of this partition, so they ignore this one: a predecessor with a
-// different clock, or this process itself, which they have forgotten.
+// different clock, or this process itself, which they have forgotten. While a rival serves, one of
+// the two has to give up first.
 void Member::overtake(Time now) {
   const auto latest = directory_.hidden_by(presence_.incarnation);
   if (partition_ == nullptr || !given_up_.empty() || !latest || claim_.served()) return;

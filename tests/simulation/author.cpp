@@ -179,13 +179,19 @@ std::string Author::any_anchor() {
   return any(anchored);
 }
 
-// A client sees its own changes, unless the owner is unreachable or known to be late.
+// A client sees its own changes, unless the owner is unreachable, or another owner's change that
+// the client was told of has not come: without it, a move may seem to close a cycle.
 void Author::check_seen(const std::string& id, const std::string& parent) {
   Process& process = *process_;
   const auto frame = process.forest().info(id);
-  const auto owner = process.directory().owner(model_.frame(id).partition);
-  const bool excused = by_node_ || !owner || !process.directory().reachable(*owner) ||
-                       process.directory().behind() != nullptr ||
+  const Directory& directory = process.directory();
+  const auto owner = directory.owner(model_.frame(id).partition);
+  const auto told = directory.told();
+  const bool late = std::any_of(told.begin(), told.end(), [&](const SeenEpoch& one) {
+    const auto number = directory.owner(one.partition);  // none if it was forgotten
+    return number && directory.owes_change(*number);
+  });
+  const bool excused = by_node_ || !owner || !directory.reachable(*owner) || late ||
                        may_be_lost(model_.frame(id).partition, began_);
   if (excused || (frame && frame->parent == parent)) return;
   process.world().violation("an author does not see its change",

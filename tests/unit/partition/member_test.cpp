@@ -230,6 +230,26 @@ TEST_CASE("member: it overtakes a later incarnation that others report") {
   CHECK(ready.pages.size() == 1);
 }
 
+TEST_CASE("member: it overtakes what others report as soon as no rival serves") {
+  Serving arms;
+  const std::uint64_t own = arms.member.presence().incarnation;
+  Presence rival = presence_of("arms", own - 1, 1);
+  arms.member.on_presence(rival, kNow);
+  Presence head = presence_of("head", 1, 0);
+  head.absent = {{"arms", 1, Absent::Kind::kForgotten, own}};
+  arms.member.on_presence(head, kNow);
+  CHECK_FALSE(arms.member.take_outcome().overtook);
+  SECTION("the rival is lost") { arms.member.on_lost("arms", rival.incarnation, kNow); }
+  SECTION("the rival stops") {
+    rival.serving = false;
+    rival.stopped = true;
+    arms.member.on_presence(rival, kNow);
+  }
+  const Outcome outcome = arms.member.take_outcome();
+  REQUIRE(outcome.overtook);
+  CHECK(*outcome.overtook > own);
+}
+
 // ---- when a name is taken
 
 TEST_CASE("claiming: a free name is taken after the discovery time and then served") {
