@@ -18,6 +18,7 @@
 #include "fuzz/plain_claims.hpp"
 #include "fuzz/plain_owner.hpp"
 #include "partition/partition.hpp"
+#include "partition/requests.hpp"
 #include "partition/routing.hpp"
 #include "support/memory_store.hpp"
 #include "support/replica.hpp"
@@ -80,6 +81,7 @@ class Choices {
     return request;
   }
   [[nodiscard]] std::uint64_t lamport_time() { return upto<std::uint64_t>(20); }
+  [[nodiscard]] std::uint64_t incarnation() { return 1 + upto<std::uint64_t>(2); }
   [[nodiscard]] Time time() { return Time(std::chrono::nanoseconds(upto<std::uint64_t>(20))); }
   [[nodiscard]] Tombstone tombstone() {
     const auto kind = static_cast<Tombstone::Kind>(1 + upto<std::uint8_t>(3));
@@ -87,7 +89,7 @@ class Choices {
             kind == Tombstone::Kind::kRemoved || kind == Tombstone::Kind::kDropped ? "" : other()};
   }
   [[nodiscard]] Page page() {
-    Page page{other(), upto<std::uint32_t>(2), upto<std::uint64_t>(3), upto<std::uint64_t>(9), {}};
+    Page page{other(), upto<std::uint32_t>(2), incarnation(), upto<std::uint64_t>(9), {}};
     page.entries = several<PageEntry>(5, [this] {
       return PageEntry{id(), parent(), lamport_time()};
     });
@@ -95,7 +97,7 @@ class Choices {
     return page;
   }
   [[nodiscard]] Presence presence() {
-    return {other(), upto<std::uint64_t>(3), "tower",
+    return {other(), incarnation(),          "tower",
             4711,    upto<std::uint32_t>(3), upto<std::uint8_t>(7) > 0};
   }
   [[nodiscard]] PeerId peer() { return PeerId{upto<std::uint8_t>(1)}; }
@@ -144,7 +146,7 @@ class World {
         if (choices.upto<std::uint8_t>(1) == 0) {
           stream({choices.edges()});
         } else {
-          lose(choices.other(), choices.upto<std::uint64_t>(3));
+          lose(choices.other(), choices.incarnation());
         }
         break;
       default:
@@ -184,7 +186,7 @@ class World {
       demand(owner_.answer(request, others) == (error == nullptr), "what can be done is granted");
       yield(now);
       owner_.yield(others, {});
-      answered_.push_back({peer, request, reply});
+      if (!is_read_only(request)) answered_.push_back({peer, request, reply});
     }
     owner_.demand_held(own_->replica.forest, latest);
     publish();

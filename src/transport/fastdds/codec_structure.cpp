@@ -24,6 +24,11 @@ Result<Tombstone> read_tombstone(const wire::Tombstone& sample) {
   return tombstone;
 }
 
+Result<void> check_incarnation(std::uint64_t incarnation, const std::string& partition) {
+  if (incarnation != 0) return {};
+  return fail(Errc::kInvalidInput, "incarnation 0 of partition " + quote(partition));
+}
+
 }  // namespace
 
 Result<Page> from_wire(const wire::Page& sample) {
@@ -36,6 +41,9 @@ Result<Page> from_wire(const wire::Page& sample) {
             {},
             {}};
   if (auto ok = check_partition_name(page.partition); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  if (auto ok = check_incarnation(page.incarnation, page.partition); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
   page.entries.reserve(sample.entries().size());
@@ -82,6 +90,9 @@ Result<Presence> from_wire(const wire::Presence& sample) {
                     {sample.major_version(), sample.minor_version()},
                     printable(sample.program().c_str())};
   if (auto ok = check_partition_name(presence.partition); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  if (auto ok = check_incarnation(presence.incarnation, presence.partition); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
   if (auto ok = check_id(presence.host, "host"); !ok) return tl::unexpected(std::move(ok.error()));

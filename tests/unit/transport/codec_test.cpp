@@ -173,6 +173,15 @@ TEST_CASE("a presence with an invalid name of an absent partition is rejected") 
   CHECK(read.error().message.find("'a,b'") != std::string::npos);
 }
 
+TEST_CASE("a page or presence without an incarnation is rejected") {
+  const auto page = from_wire(to_wire(Page{"robot", 0, 0, 1, {}}));
+  REQUIRE_FALSE(page);
+  CHECK(page.error().message == "incarnation 0 of partition 'robot'");
+  const auto presence = from_wire(to_wire(Presence{"robot", 0, "tower", 1, 1, true}));
+  REQUIRE_FALSE(presence);
+  CHECK(presence.error().message == "incarnation 0 of partition 'robot'");
+}
+
 TEST_CASE("a page with an invalid tombstone is rejected") {
   const auto read = [](const Tombstone& tombstone) {
     const auto page = from_wire(to_wire(Page{"robot", 0, 1, 1, {}, {tombstone}}));
