@@ -116,7 +116,7 @@ struct Serving {
   std::uint64_t incarnation;
   testing::Replica replica;
   Partition partition;
-  PlainClaims others;
+  PlainClaims others{true};
 };
 
 class World {
@@ -271,6 +271,7 @@ class World {
     const std::uint64_t latest = latest_known();
     const auto left = store_.load();
     demand(own_->partition.restore(*left, {}, now).has_value(), "what was left is taken");
+    owner_.returns(own_->others.oldest());
     owner_.yield(own_->others.oldest(), tombstones);
     owner_.demand_held(own_->replica.forest, latest);
     publish();
@@ -284,6 +285,8 @@ class World {
       demand(!newly_lost || !replica->directory.serving(name), "who is lost is not there");
       if (newly_lost && replica == &own_->replica) owner_.misses(name);
     }
+    own_->others.lose(name, incarnation);
+    all_.lose(name, incarnation);
   }
 
   void stream(const Update& update) {
@@ -295,7 +298,7 @@ class World {
   // A participant that joins late, and hears the others in reverse order, must get the same result.
   void demand_late_joiner() const {
     testing::Replica late;
-    PlainClaims said;
+    PlainClaims said(false);
     auto pages = all_.pages();
     for (auto page = pages.rbegin(); page != pages.rend(); ++page) {
       late.directory.apply(*page);
@@ -340,7 +343,7 @@ class World {
   std::unique_ptr<Serving> own_;
   PlainOwner owner_{kOwn};
   testing::Replica hearer_;
-  PlainClaims all_;
+  PlainClaims all_{false};
   std::uint32_t sequence_ = 0;
   std::vector<Answered> answered_;
 };

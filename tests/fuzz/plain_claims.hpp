@@ -108,24 +108,40 @@ class PlainPartition {
  public:
   [[nodiscard]] const PlainLife& life() const { return life_; }
 
+  /// @param tells  whether the participant tells others which partitions it misses
   /// @return the tombstones that are new by it
-  std::vector<Tombstone> apply(const Page& page) {
-    if (page.incarnation < life_.incarnation) return {};
+  std::vector<Tombstone> apply(const Page& page, bool tells) {
+    const bool current = !life_.pages.empty() && page.incarnation == life_.incarnation;
+    if (!current && drops(page.incarnation, tells)) return {};
+    reachable_ = reachable_ || page.incarnation > latest_;
     PlainLife* said = life_of(page.incarnation);
     if (said == nullptr) return {};
     said->apply(page);
     return said == &life_ ? page.tombstones : replace_if_complete();
   }
 
-  std::vector<Tombstone> apply(const Presence& presence) {
-    if (!presence.serving || presence.incarnation < latest_) return {};
+  std::vector<Tombstone> apply(const Presence& presence, bool tells) {
+    if (!presence.serving || drops(presence.incarnation, tells)) return {};
+    reachable_ = true;
     PlainLife* said = life_of(presence.incarnation);
     if (said == nullptr) return {};
     said->page_count = presence.pages;
     return said == &life_ ? std::vector<Tombstone>() : replace_if_complete();
   }
 
+  void lose(std::uint64_t incarnation) { reachable_ = reachable_ && incarnation != latest_; }
+
  private:
+  // An earlier process than the one known is dropped, and continues with a later number as soon as
+  // it is told so. A participant that cannot tell it believes it once the known one is lost.
+  [[nodiscard]] bool drops(std::uint64_t incarnation, bool tells) {
+    if (incarnation >= latest_) return false;
+    if (tells || reachable_) return true;
+    latest_ = 0;
+    next_.reset();
+    return false;
+  }
+
   // Null for one that has been overtaken by a later.
   PlainLife* life_of(std::uint64_t incarnation) {
     latest_ = std::max(latest_, incarnation);
@@ -160,15 +176,23 @@ class PlainPartition {
   PlainLife life_;
   std::optional<PlainLife> next_;
   std::uint64_t latest_ = 0;
+  bool reachable_ = false;
 };
 
 /// The messages of all partitions to one participant.
 class PlainClaims {
  public:
+  /// @param tells  whether it has a partition, so that others hear which partitions it misses
+  explicit PlainClaims(bool tells) : tells_(tells) {}
+
   /// A page or a presence. @return the tombstones that are new by it
   template <class Said>
   std::vector<Tombstone> apply(const Said& said) {
-    return partitions_[said.partition].apply(said);
+    return partitions_[said.partition].apply(said, tells_);
+  }
+
+  void lose(const std::string& partition, std::uint64_t incarnation) {
+    partitions_[partition].lose(incarnation);
   }
 
   [[nodiscard]] std::vector<Page> pages() const {
@@ -221,6 +245,7 @@ class PlainClaims {
   }
 
  private:
+  bool tells_;
   std::map<std::string, PlainPartition> partitions_;
 };
 

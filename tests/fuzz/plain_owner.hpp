@@ -75,6 +75,13 @@ class PlainOwner {
   void hears(const std::string& partition) { silent_.erase(partition); }
   void hears_all() { silent_.clear(); }
 
+  /// A process that restarts leaves frames to partitions that serve them meanwhile.
+  void returns(const Picture& others) {
+    for (const auto& [id, theirs] : others) {
+      if (places_.erase(id) != 0) words_[id] = {Tombstone::Kind::kYielded, theirs.owner};
+    }
+  }
+
   /// Gives up frames that others claim with more right.
   /// @param tombstones  what is new of what others removed
   void yield(const Picture& others, const std::vector<Tombstone>& tombstones) {
