@@ -48,8 +48,7 @@ Result<bool> OnDemand::know(const std::vector<std::string>& ids, Milliseconds ma
     const Lock lock(structure_.mutex);
     auto lacking = asked_.lacking(ids, since);
     if (lacking.empty()) return false;
-    some_known = std::any_of(ids.begin(), ids.end(),
-                             [&](const std::string& id) { return asked_.knows(id, since); });
+    for (const std::string& id : ids) some_known = some_known || asked_.knows(id, since);
     request = asked_.request(std::move(lacking), follows_ ? std::vector<std::string>() : follow_);
   }
   if (auto answer = ask(request, deadline); !answer) {
@@ -165,10 +164,11 @@ void OnDemand::take(const FramesRequest& request, const std::vector<KnownFrame>&
 void OnDemand::await_owners(const std::vector<KnownFrame>& answer, const Deadline& deadline) {
   const auto all_there = [&] {
     const Lock lock(structure_.mutex);
-    return std::all_of(answer.begin(), answer.end(), [&](const KnownFrame& frame) {
+    for (const KnownFrame& frame : answer) {
       const auto owner = structure_.directory.owner(frame.partition);
-      return owner && structure_.directory.reachable(*owner);
-    });
+      if (!owner || !structure_.directory.reachable(*owner)) return false;
+    }
+    return true;
   };
   while (!all_there() && !discovery_.complete() && !deadline.over()) {
     discovery_.wait_for_change(deadline);
