@@ -242,7 +242,7 @@ bool take(const Bytes& bytes) {
 [[nodiscard]] inline std::vector<Page> pages() {
   return {{"robot", 0, 1, 2, {}},
           {"robot", 7, 18446744073709551615ULL, 3, {{"world", ""}, {"base", "world"}}},
-          {std::string(255, 'r'), 4294967295U, 0, 0, {{std::string(255, 'i'), "p"}}},
+          {std::string(255, 'r'), 4294967295U, 1, 0, {{std::string(255, 'i'), "p"}}},
           {"robot",
            1,
            1,
