@@ -180,13 +180,13 @@ void Process::look_at(std::uint64_t peer, Peer& known) {
   const bool needed = known.used && world_.timeline.now() - *known.used < kNeededFor;
   known.heard.need(needed, world_.timeline.steady());
   const bool announces = (looks_ + peer) % kLooksPerAnnouncement == 0;
-  if (announces && world_.network.shows_life(peer, *this)) return show_life(known);
+  if (announces && world_.network.announces(peer, *this)) return show_life(known);
   const Presence* said = known.known();
   if (said == nullptr || known.silent) return;
   if (!needed && looks_ % kLooksPerRareLook != 0) return;
   const Silence silence = judge(known.heard, kPatience, world_.timeline.steady());
   const bool asks = silence.kind == Silence::Kind::kAsk;
-  if (asks && world_.network.shows_life(peer, *this)) return show_life(known);
+  if (asks && world_.network.answers(peer, *this)) return show_life(known);
   if (silence.kind != Silence::Kind::kLost) return;
   known.silent = true;
   world_.count(known.heard.replied && needed ? "a loss was noticed by who needs it"

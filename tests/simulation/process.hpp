@@ -106,7 +106,8 @@ class Process : public std::enable_shared_from_this<Process> {
   template <class Values>
   void stream(const std::string& partition, const Values& update) {
     each_server(partition, [&](std::uint64_t peer) {
-      world_.network.send(*this, peer, [update](Process& there) { there.on_update(update); });
+      world_.network.send(*this, peer, &update,
+                          [update](Process& there) { there.on_update(update); });
     });
   }
   /// From now on it gets the input for watched paths.
