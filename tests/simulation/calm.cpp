@@ -17,9 +17,11 @@ namespace {
 
 constexpr Instant kLook = milliseconds(100);
 constexpr Instant kPatience = milliseconds(30'000);
+// Longer than owners wait to tell how many others they hear.
+constexpr Instant kSettle = milliseconds(1'000);
 // Longer than participants ask somebody for signs of life whom they have sent something.
 constexpr Instant kQuiet = milliseconds(2'500);
-constexpr Instant kIdle = milliseconds(3'000);
+constexpr Instant kIdle = milliseconds(1'500);
 constexpr Instant kBetween = milliseconds(20);
 constexpr std::size_t kMostChanges = 10;  // of each kind
 constexpr std::size_t kChildren = 10;     // of a frame
@@ -98,16 +100,18 @@ class Calm {
 
   Result<CalmRun> run() {
     CalmRun run;
-    start();
+    for (std::size_t i = 0; i < size_.partitions; ++i) start(i, configuration(i));
     run.served_s = until([](Process& one) { return one.serves(); });
     run.known_s = until([this](Process& one) { return knows_all(one); });
-    if (!failure_) advance(kQuiet);
+    if (!failure_) advance(kSettle);
     run.start = spent(1);
     if (!failure_) advance(kIdle);
     run.idle = spent(seconds(kIdle));
     run.add = each({"add", add_to});
+    frames_ += changes();
     run.update = each({"update", update_of});
     run.lookup = each({"lookup", lookup_in});
+    run.join = join();
     if (failure_) return tl::unexpected(*failure_);
     return run;
   }
@@ -118,6 +122,7 @@ class Calm {
     plan.seed = 1;
     plan.owners = size.partitions;
     plan.delay = std::chrono::microseconds(100);
+    plan.tells_count = true;
     return plan;
   }
 
@@ -145,26 +150,25 @@ class Calm {
     return frames;
   }
 
-  void start() {
-    for (std::size_t i = 0; i < size_.partitions; ++i) {
-      Process::Setting setting;
-      setting.host = i % Network::kMostHosts;
-      setting.id = i;
-      setting.partition = "p" + std::to_string(i);
-      setting.configured = configuration(i);
-      setting.clock = &clock_;
-      processes_.push_back(std::make_shared<Process>(surroundings_, setting));
-      network_.join(processes_.back());
-      processes_.back()->start();
-    }
+  void start(std::size_t partition, std::vector<FrameSpec> frames) {
+    Process::Setting setting;
+    setting.host = partition % Network::kMostHosts;
+    setting.id = partition;
+    setting.partition = "p" + std::to_string(partition);
+    frames_ += frames.size();
+    setting.configured = std::move(frames);
+    setting.clock = &clock_;
+    processes_.push_back(std::make_shared<Process>(surroundings_, setting));
+    network_.join(processes_.back());
+    processes_.back()->start();
   }
 
   [[nodiscard]] bool knows_all(Process& one) const {
     const auto others = one.directory().reachable_owners();
-    if (!one.serves() || others.size() + 1 != size_.partitions) return false;
+    if (!one.serves() || others.size() + 1 != processes_.size()) return false;
     std::size_t frames = one.member().partition()->frame_count();
     for (const Owner owner : others) frames += one.directory().info(owner).frames;
-    return one.directory().complete() && frames == size_.frames;
+    return one.directory().complete() && frames == frames_;
   }
 
   // The time when this holds for all.
@@ -174,8 +178,9 @@ class Calm {
       return std::find_if_not(processes_.begin(), processes_.end(),
                               [&](const auto& one) { return holds(*one); });
     };
+    const Instant begin = timeline_.now();
     for (auto one = missing(); one != processes_.end() && !failure_; one = missing()) {
-      if (timeline_.now() > kPatience) {
+      if (timeline_.now() > begin + kPatience) {
         fail_with({Errc::kState, (*one)->partition() + " does not serve or know all frames"});
       }
       advance(kLook);
@@ -186,21 +191,23 @@ class Calm {
   // What was sent and received since the last call.
   Spent spent(double by) {
     std::vector<Load> loads = traffic_.take();
-    loads.resize(size_.partitions);
+    loads.resize(processes_.size());
     Spent spent;
     for (Load& load : loads) {
       load = divided(load, by);
       spent.all = combined(spent.all, load, std::plus<>());
       spent.most = combined(spent.most, load, [](double a, double b) { return std::max(a, b); });
     }
-    spent.mean = divided(spent.all, static_cast<double>(size_.partitions));
+    spent.mean = divided(spent.all, static_cast<double>(loads.size()));
     return spent;
   }
+
+  [[nodiscard]] std::size_t changes() const { return std::min(kMostChanges, size_.partitions); }
 
   // Some participants make a change, or a lookup, one after the other.
   Spent each(const Kind& kind) {
     if (failure_) return {};
-    const std::size_t count = std::min(kMostChanges, size_.partitions);
+    const std::size_t count = changes();
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t owner = i * size_.partitions / count;
       const auto caller = processes_[(owner + 1) % size_.partitions];
@@ -208,17 +215,26 @@ class Calm {
                     std::make_shared<Operation>(
                         *caller, [kind, caller, owner] { return kind.route(*caller, owner); },
                         [this](const Result<void>& outcome, const std::vector<Answer>&) {
-                          if (!outcome) fail_with(outcome.error());
                           ++done_;
+                          if (!outcome) fail_with(outcome.error());
                         }));
       advance(kBetween);
     }
     advance(kQuiet);
-    if (std::exchange(done_, 0) != count) fail_with({Errc::kState, "a change does not end"});
+    if (done_ != count) fail_with({Errc::kState, "a change does not end"});
+    done_ = 0;
     Spent spent = this->spent(1);
     spent.all = divided(spent.all, static_cast<double>(count));
     spent.mean = divided(spent.mean, static_cast<double>(count));
     return spent;
+  }
+
+  Spent join() {
+    const std::size_t partition = processes_.size();
+    start(partition, {{frame_of(partition, 0), frame_of(partition - 1, 0), {}}});
+    (void)until([this](Process& one) { return knows_all(one); });
+    if (!failure_) advance(kSettle);
+    return spent(1);
   }
 
   const CalmSize size_;
@@ -232,6 +248,7 @@ class Calm {
   Surroundings surroundings_;
   const Clock clock_;
   std::vector<std::shared_ptr<Process>> processes_;
+  std::size_t frames_ = 0;  // of all configurations, and those that were added
   std::size_t done_ = 0;
   std::optional<Error> failure_;
 };

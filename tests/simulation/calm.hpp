@@ -17,7 +17,7 @@ struct CalmSize {
 struct Spent {
   Load all;   ///< the sum
   Load mean;  ///< of one participant
-  Load most;  ///< the greatest of each number
+  Load most;  ///< the greatest of each number, over all changes of a kind
 };
 
 /// What a system costs in which nothing fails and nothing is lost.
@@ -31,6 +31,7 @@ struct CalmRun {
   Spent add;
   Spent update;
   Spent lookup;
+  Spent join;  ///< one more owner starts, with one frame
 };
 
 /// Simulates owners that all start at once, are idle, and then make a few changes. Each has its

@@ -19,6 +19,7 @@ constexpr Patience kPatience{milliseconds(450), milliseconds(1875), milliseconds
                              milliseconds(200)};
 constexpr std::uint64_t kLooksPerAnnouncement = 5;
 constexpr std::uint64_t kLooksPerRareLook = 3;
+constexpr Instant kTellCountEvery = milliseconds(200);
 constexpr Instant kLookForGone = milliseconds(50);
 constexpr Instant kYieldEvery = milliseconds(100);
 constexpr Instant kPushAfter = std::chrono::microseconds(20);
@@ -162,10 +163,22 @@ void Process::look_for_silent() {
   const Instant now = world_.timeline.now();
   const Instant late = std::max(Instant(0), now - std::exchange(looked_, now) - kLook);
   ++looks_;
+  std::size_t heard = 0;
   for (auto& [peer, known] : peers_) {
     known.heard.pass_over(late);
     look_at(peer, known);
+    if (known.said && !known.silent) ++heard;
   }
+  if (world_.plan.tells_count) tell_count(heard);
+}
+
+// As Contact does: a new participant knows by this number whether it has discovered all.
+void Process::tell_count(std::size_t heard) {
+  const Instant now = world_.timeline.now();
+  if (!presence_ || heard == told_count_ || now - told_count_at_ < kTellCountEvery) return;
+  told_count_ = heard;
+  told_count_at_ = now;
+  announce(presence_);
 }
 
 void Process::show_life(Peer& known) {

@@ -1,4 +1,4 @@
-// Prints what calm systems cost in simulated time: simulated_scale [--sizes PARTITIONS:FRAMES,...].
+// Prints what a calm system costs in simulated time, as a line of JSON: simulated_scale PARTITIONS FRAMES.
 #include <chrono>
 #include <cstdlib>
 #include <iostream>
@@ -20,16 +20,20 @@ using Json = nlohmann::ordered_json;
 Json json_of(const Load& load) {
   return {{"written", load.written.messages},   {"written_bytes", load.written.bytes},
           {"sent", load.sent.messages},         {"sent_bytes", load.sent.bytes},
-          {"received", load.received.messages}, {"received_bytes", load.received.bytes},
-          {"announcements", load.heard},        {"probes", load.probes}};
+          {"received", load.received.messages}, {"received_bytes", load.received.bytes}};
 }
 
 Json json_of(const Spent& spent) {
-  return {
-      {"all", json_of(spent.all)}, {"mean", json_of(spent.mean)}, {"most", json_of(spent.most)}};
+  return {{"mean", json_of(spent.mean)}, {"most", json_of(spent.most)}};
 }
 
-// The program runs each size in a process of its own, for its greatest memory.
+Json of_change(const Spent& spent) {
+  return {{"all", json_of(spent.all)},
+          {"mean", json_of(spent.mean)},
+          {"most", json_of(spent.most)},
+          {"probes", spent.all.probes}};
+}
+
 int print_row(const CalmSize& size) {
   const auto begin = std::chrono::steady_clock::now();
   const auto run = run_calm(size);
@@ -46,9 +50,11 @@ int print_row(const CalmSize& size) {
       {"known_s", run->known_s},
       {"start", json_of(run->start)},
       {"idle_s", json_of(run->idle)},
-      {"add", json_of(run->add)},
-      {"update", json_of(run->update)},
-      {"lookup", json_of(run->lookup)},
+      {"idle_announcements_s", run->idle.mean.heard},
+      {"add", of_change(run->add)},
+      {"update", of_change(run->update)},
+      {"lookup", of_change(run->lookup)},
+      {"join", json_of(run->join)},
       {"run_s", std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count()},
       {"rss_kib", usage.ru_maxrss}};
   std::cout << row.dump() << std::endl;
@@ -59,9 +65,9 @@ int print_row(const CalmSize& size) {
 
 int main(int argc, char** argv) {
   CLI::App app("Prints what a system costs in simulated time, in which nothing fails.");
-  CalmSize size{10, 10'000};
-  app.add_option("partitions", size.partitions)->capture_default_str();
-  app.add_option("frames", size.frames, "of all partitions")->capture_default_str();
+  CalmSize size;
+  app.add_option("partitions", size.partitions)->required();
+  app.add_option("frames", size.frames, "of all partitions together")->required();
   CLI11_PARSE(app, argc, argv);
   tfdude::log().set_level(spdlog::level::off);
   return print_row(size);
