@@ -4,9 +4,9 @@
 
   simulated.py [--bin DIR] [--sizes PARTITIONS:FRAMES,...]
 
-For each size it prints the messages and bytes of one participant, their mean and the greatest of each: when all start at
-once, while all are idle, for each change of each kind, and when one more owner starts. 1,000 partitions with 10,000
-frames take about five minutes and 5 GB of memory.
+For each size it prints a line of JSON with the messages and bytes of one participant, the mean of all and the greatest:
+when all start at once, per second while all are idle, for each change of each kind, and when one more owner starts.
+1,000 partitions with 10,000 frames take several minutes and 5 GB of memory.
 """
 
 import argparse

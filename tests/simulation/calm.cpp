@@ -1,10 +1,10 @@
 #include "simulation/calm.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <functional>
 #include <memory>
-#include <numeric>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>

@@ -1,4 +1,5 @@
-// Prints what a calm system costs in simulated time, as a line of JSON: simulated_scale PARTITIONS FRAMES.
+// Prints what a calm system costs in simulated time, as a line of JSON:
+// simulated_scale PARTITIONS FRAMES.
 #include <chrono>
 #include <cstdlib>
 #include <iostream>
