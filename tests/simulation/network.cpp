@@ -13,6 +13,10 @@ constexpr milliseconds kRepeat{100};
 // The share of delays that are longer than the longest, which are left out.
 constexpr double kLeast = 1e-6;
 
+Message message_of(const Sample& sample) {
+  return std::visit([](const auto& one) -> Message { return &one; }, sample);
+}
+
 bool same_key(const Sample& a, const Sample& b) {
   const auto* page = std::get_if<Page>(&a);
   const auto* other = std::get_if<Page>(&b);
@@ -93,6 +97,7 @@ void Network::put(Channel& channel, const Sample& sample) {
 }
 
 void Network::publish(const Process& from, const Sample& sample) {
+  if (traffic_ != nullptr) traffic_->wrote(from.id(), message_of(sample));
   for (auto channel = channels_.lower_bound({from.id(), 0});
        channel != channels_.end() && channel->first.first == from.id(); ++channel) {
     put(channel->second, sample);
@@ -126,20 +131,42 @@ void Network::arrive(const Way& way) {
   }
   Sample sample = std::move(channel.waiting.front());
   channel.waiting.pop_front();
+  if (traffic_ != nullptr) {
+    const std::size_t bytes = traffic_->sent(way.first, message_of(sample));
+    traffic_->received(way.second, bytes);
+  }
   to->run([to = to.get(), id = way.first, sample = std::move(sample)] { to->hear(id, sample); });
   move(way);
 }
 
-void Network::send(const Process& from, std::uint64_t to, std::function<void(Process&)> arrival) {
+void Network::send(const Process& from, std::uint64_t to, const Message& message,
+                   std::function<void(Process&)> arrival) {
+  std::size_t bytes = 0;
+  if (traffic_ != nullptr) {
+    traffic_->wrote(from.id(), message);
+    bytes = traffic_->sent(from.id(), message);
+  }
   const int copies = random_.uniform(0, 1) < plan_.repeats ? 2 : 1;
   for (int i = 0; i < copies; ++i) {
     if (random_.uniform(0, 1) < loss_) continue;
-    timeline_.after(delay(), {"datagram", to}, [this, host = from.host(), to, arrival] {
+    timeline_.after(delay(), {"datagram", to}, [this, host = from.host(), to, bytes, arrival] {
       const auto there = find(to);
       if (!there || !reaches(host, there->host())) return;
+      if (traffic_ != nullptr) traffic_->received(to, bytes);
       there->run([there = there.get(), arrival] { arrival(*there); });
     });
   }
+}
+
+bool Network::announces(std::uint64_t from, const Process& to) {
+  const bool heard = shows_life(from, to);
+  if (heard && traffic_ != nullptr) traffic_->heard_announcement(to.id());
+  return heard;
+}
+
+bool Network::answers(std::uint64_t from, const Process& to) {
+  if (traffic_ != nullptr) traffic_->asked_for_life(to.id());
+  return shows_life(from, to);
 }
 
 bool Network::shows_life(std::uint64_t from, const Process& to) {

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <functional>
+#include <list>
 #include <map>
 #include <memory>
 #include <set>
@@ -13,6 +13,7 @@
 #include "partition/messages.hpp"
 #include "simulation/plan.hpp"
 #include "simulation/timeline.hpp"
+#include "simulation/traffic.hpp"
 
 namespace tfdude::simulation {
 
@@ -32,17 +33,23 @@ class Network {
         random_(plan.seed ^ 0x6e657477U),
         hosts_(kMostHosts) {}
 
+  /// From now on what is sent is counted.
+  void count(Traffic& traffic) { traffic_ = &traffic; }
+
   void join(const std::shared_ptr<Process>& process);
   /// Null: it has ended.
   [[nodiscard]] std::shared_ptr<Process> find(std::uint64_t process) const;
 
   /// Sends a datagram, which may be lost, arrive twice, or be overtaken.
-  void send(const Process& from, std::uint64_t to, std::function<void(Process&)> arrival);
+  void send(const Process& from, std::uint64_t to, const Message& message,
+            std::function<void(Process&)> arrival);
   /// To all who are met.
   void publish(const Process& from, const Sample& sample);
 
-  /// Whether a sign of life of that process is heard now.
-  [[nodiscard]] bool shows_life(std::uint64_t from, const Process& to);
+  /// Whether an announcement of that process is heard now.
+  [[nodiscard]] bool announces(std::uint64_t from, const Process& to);
+  /// Whether that process, asked for a sign of life, gives one.
+  [[nodiscard]] bool answers(std::uint64_t from, const Process& to);
   /// Whose samples reach that process.
   [[nodiscard]] std::vector<std::uint64_t> met_by(const Process& one) const;
 
@@ -65,12 +72,13 @@ class Network {
     int mute = 0;
   };
   struct Channel {
-    std::deque<Sample> waiting;
+    std::list<Sample> waiting;
     bool moving = false;
   };
   using Way = std::pair<std::uint64_t, std::uint64_t>;
 
   [[nodiscard]] bool reaches(std::size_t from, std::size_t to) const;
+  [[nodiscard]] bool shows_life(std::uint64_t from, const Process& to);
   [[nodiscard]] Instant delay();
   void meet(std::uint64_t a, std::uint64_t b);
   void open(const Process& from, std::uint64_t to);
@@ -87,6 +95,7 @@ class Network {
   std::map<std::uint64_t, std::weak_ptr<Process>> processes_;
   std::map<Way, Channel> channels_;
   std::set<Way> backwards_;  // the same ways, by receiver
+  Traffic* traffic_ = nullptr;
 };
 
 }  // namespace tfdude::simulation

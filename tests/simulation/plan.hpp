@@ -77,7 +77,9 @@ struct Plan {
   double loss_after = 0;       ///< of datagrams, after the phase with faults
   std::vector<Fault> faults;   ///< in the order in which they begin
   std::vector<Fault> lasting;  ///< begin after the others, and do not end
-  bool forgets = false;        ///< a partition that such a fault keeps away is forgotten
+  /// Owners tell how many others they hear. In runs with faults they do not: no rule depends on it.
+  bool tells_count = false;
+  bool forgets = false;  ///< a partition that such a fault keeps away is forgotten
   /// The numbers of decisions and of operations that are left out.
   std::set<std::size_t> left_out;
 

@@ -19,6 +19,7 @@ constexpr Patience kPatience{milliseconds(450), milliseconds(1875), milliseconds
                              milliseconds(200)};
 constexpr std::uint64_t kLooksPerAnnouncement = 5;
 constexpr std::uint64_t kLooksPerRareLook = 3;
+constexpr Instant kTellCountEvery = milliseconds(200);
 constexpr Instant kLookForGone = milliseconds(50);
 constexpr Instant kYieldEvery = milliseconds(100);
 constexpr Instant kPushAfter = std::chrono::microseconds(20);
@@ -162,10 +163,22 @@ void Process::look_for_silent() {
   const Instant now = world_.timeline.now();
   const Instant late = std::max(Instant(0), now - std::exchange(looked_, now) - kLook);
   ++looks_;
+  std::size_t heard = 0;
   for (auto& [peer, known] : peers_) {
     known.heard.pass_over(late);
     look_at(peer, known);
+    if (known.said && !known.silent) ++heard;
   }
+  if (world_.plan.tells_count) tell_count(heard);
+}
+
+// As Contact does: a new participant knows by this number whether it has discovered all.
+void Process::tell_count(std::size_t heard) {
+  const Instant now = world_.timeline.now();
+  if (!presence_ || heard == told_count_ || now - told_count_at_ < kTellCountEvery) return;
+  told_count_ = heard;
+  told_count_at_ = now;
+  announce(presence_);
 }
 
 void Process::show_life(Peer& known) {
@@ -180,13 +193,13 @@ void Process::look_at(std::uint64_t peer, Peer& known) {
   const bool needed = known.used && world_.timeline.now() - *known.used < kNeededFor;
   known.heard.need(needed, world_.timeline.steady());
   const bool announces = (looks_ + peer) % kLooksPerAnnouncement == 0;
-  if (announces && world_.network.shows_life(peer, *this)) return show_life(known);
+  if (announces && world_.network.announces(peer, *this)) return show_life(known);
   const Presence* said = known.known();
   if (said == nullptr || known.silent) return;
   if (!needed && looks_ % kLooksPerRareLook != 0) return;
   const Silence silence = judge(known.heard, kPatience, world_.timeline.steady());
   const bool asks = silence.kind == Silence::Kind::kAsk;
-  if (asks && world_.network.shows_life(peer, *this)) return show_life(known);
+  if (asks && world_.network.answers(peer, *this)) return show_life(known);
   if (silence.kind != Silence::Kind::kLost) return;
   known.silent = true;
   world_.count(known.heard.replied && needed ? "a loss was noticed by who needs it"

@@ -106,7 +106,8 @@ class Process : public std::enable_shared_from_this<Process> {
   template <class Values>
   void stream(const std::string& partition, const Values& update) {
     each_server(partition, [&](std::uint64_t peer) {
-      world_.network.send(*this, peer, [update](Process& there) { there.on_update(update); });
+      world_.network.send(*this, peer, &update,
+                          [update](Process& there) { there.on_update(update); });
     });
   }
   /// From now on it gets the input for watched paths.
@@ -169,6 +170,7 @@ class Process : public std::enable_shared_from_this<Process> {
   void each_server(const std::string& partition, const std::function<void(std::uint64_t)>& tell);
   void tick();
   void look_for_silent();
+  void tell_count(std::size_t heard);
   void look_at(std::uint64_t peer, Peer& known);
   void show_life(Peer& known);
   void react();
@@ -205,6 +207,8 @@ class Process : public std::enable_shared_from_this<Process> {
   Instant born_{};
   Instant looked_{};
   std::uint64_t looks_ = 0;
+  std::size_t told_count_ = 0;  // of others that are heard, with the presence
+  Instant told_count_at_{};
   Instant resumed_{-1};
   std::uint64_t inputs_ = 0;
   int pauses_ = 0;

@@ -26,7 +26,7 @@ void Process::on_request(std::uint64_t from, const Request& request) {
 }
 
 void Process::reply_to(std::uint64_t peer, const Reply& reply) {
-  world_.network.send(*this, peer,
+  world_.network.send(*this, peer, &reply,
                       [from = id(), reply](Process& there) { there.on_reply(from, reply); });
 }
 
@@ -80,7 +80,7 @@ void Process::push(const PushedValues& pushed) {
   const std::uint64_t number = ++pushed_;
   for (const std::uint64_t peer : world_.network.met_by(*this)) {
     if (peers_.count(peer) > 0) continue;  // an owner, none of which watches
-    world_.network.send(*this, peer, [from = id(), number, pushed](Process& there) {
+    world_.network.send(*this, peer, &pushed, [from = id(), number, pushed](Process& there) {
       there.on_pushed(from, number, pushed);
     });
   }
@@ -97,7 +97,7 @@ void Process::on_watcher(std::uint64_t group) { pushes_.tell_all(group); }
 
 void Process::listen(const std::string& partition, std::uint64_t group) {
   each_server(partition, [this, group](std::uint64_t peer) {
-    world_.network.send(*this, peer, [group](Process& there) { there.on_watcher(group); });
+    world_.network.send(*this, peer, {}, [group](Process& there) { there.on_watcher(group); });
   });
 }
 
@@ -132,7 +132,7 @@ void Process::send(const std::string& partition, const Request& request) {
   sent.awaits_from = first;
   each_server(partition, [&](std::uint64_t peer) {
     peers_[peer].used = world_.timeline.now();
-    world_.network.send(*this, peer,
+    world_.network.send(*this, peer, &sent,
                         [from = id(), sent](Process& there) { there.on_request(from, sent); });
   });
 }
