@@ -1,6 +1,7 @@
 // Endpoints that are deleted while others are matched with them: Fast DDS may then call a listener
 // that was removed meanwhile.
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <functional>
@@ -12,6 +13,7 @@
 
 #include "support/catch.hpp"
 #include "support/domain_lease.hpp"
+#include "support/process.hpp"
 #include "transport/fastdds/discovery_gate.hpp"
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/topics.hpp"
@@ -19,6 +21,7 @@
 namespace tfdude::fastdds {
 namespace {
 
+using namespace std::chrono_literals;
 using Beats = Reader<wire::Presence>;
 
 // A participant as ours, with one topic.
@@ -47,17 +50,19 @@ class Member {
   Member(const Member&) = delete;
   Member& operator=(const Member&) = delete;
 
+  void tidy() { announced_.writers.tidy(); }
+
   [[nodiscard]] std::unique_ptr<Beats> read(
       std::atomic<int>& matches, std::function<void()> on_sample = [] {},
       const std::string& profile = "presence_reader") {
     return std::make_unique<Beats>(
-        Context{*participant_, profiles_, *gate_, counters_}, *topic_, "", profile,
+        Context{*participant_, profiles_, *gate_, counters_, announced_}, *topic_, "", profile,
         Beats::Calls{[on_sample](const wire::Presence&, const ertps::GUID_t&) { on_sample(); },
                      [&matches](const ertps::GUID_t&, int) { ++matches; }});
   }
   [[nodiscard]] std::unique_ptr<Writer> write(const std::string& profile = "presence_writer") {
-    return std::make_unique<Writer>(Context{*participant_, profiles_, *gate_, counters_}, *topic_,
-                                    "", profile);
+    return std::make_unique<Writer>(
+        Context{*participant_, profiles_, *gate_, counters_, announced_}, *topic_, "", profile);
   }
 
  private:
@@ -65,6 +70,7 @@ class Member {
     return *edds::DomainParticipantFactory::get_instance();
   }
 
+  Announced announced_;
   FastDdsCounters counters_;
   const Profiles profiles_ = *Profiles::load(TFDUDE_LOOPBACK_PROFILE);
   const std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
@@ -124,6 +130,27 @@ TEST_CASE("leaving: 5000 readers are deleted while writers come and go") {
   over = true;
   others.join();
   CHECK(matches > 100);
+}
+
+TEST_CASE("leaving: who has deleted many endpoints is discovered without a delay") {
+  const testing::DomainLease lease;
+  Member old(lease.number());
+  const auto first = old.write();
+  for (int i = 0; i < 700; ++i) (void)old.write();
+  const auto last = old.write();
+  old.tidy();
+  // Without that, a new participant waits for the next heartbeat, which comes once a second. The
+  // computer may be busy, so only the fastest counts.
+  auto quickest = std::chrono::steady_clock::duration::max();
+  for (int i = 0; i < 5 && quickest > 400ms; ++i) {
+    Member fresh(lease.number());
+    std::atomic<int> matches{0};
+    const auto begin = std::chrono::steady_clock::now();
+    const auto reader = fresh.read(matches);
+    CHECK(testing::eventually([&] { return matches == 2; }));
+    quickest = std::min(quickest, std::chrono::steady_clock::now() - begin);
+  }
+  CHECK(quickest < 400ms);
 }
 
 }  // namespace tfdude::fastdds

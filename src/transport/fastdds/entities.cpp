@@ -27,6 +27,8 @@ void log_mismatch(const std::string& mismatch) {
   if (logged.insert(mismatch).second) log().error("{}", mismatch);
 }
 
+void log_not_announced() { log().warn("Fast DDS did not announce an endpoint again"); }
+
 Writer::Writer(const Context& context, edds::Topic& topic, const std::string& partition,
                const std::string& profile, std::function<void()> on_reader)
     : context_(context), on_reader_(std::move(on_reader)) {
@@ -36,10 +38,13 @@ Writer::Writer(const Context& context, edds::Topic& topic, const std::string& pa
   if (publisher_ == nullptr) return;
   writer_ =
       publisher_->create_datawriter(&topic, context.profiles.writer(*publisher_, profile), this);
-  if (writer_ != nullptr) ++context_.counters.writers;
+  if (writer_ == nullptr) return;
+  ++context_.counters.writers;
+  number_ = context.announced.writers.created([this] { announce_again(*writer_); });
 }
 
 Writer::~Writer() {
+  context_.announced.writers.deleted(number_);
   const Gate::Pause pause(context_.gate);
   if (writer_ != nullptr && ok(publisher_->delete_datawriter(writer_))) --context_.counters.writers;
   if (publisher_ != nullptr) context_.participant.delete_publisher(publisher_);

@@ -9,11 +9,14 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "tfdude/transport/fastdds.hpp"
 
 #include "base/mutex.hpp"
 #include "transport/fastdds/compat.hpp"
+#include "transport/fastdds/endpoint_numbers.hpp"
 #include "transport/fastdds/gate.hpp"
 #include "transport/fastdds/growing_stamp.hpp"
 #include "transport/fastdds/profiles.hpp"
@@ -29,7 +32,19 @@ struct Context {
   const Profiles& profiles;
   Gate& gate;  ///< shut while one of them is deleted, so that none may be in a callback
   FastDdsCounters& counters;
+  Announced& announced;
 };
+
+void log_not_announced();
+
+/// Gives an endpoint that exists other user data, so that DDS announces it again.
+template <class Endpoint>
+void announce_again(Endpoint& endpoint) {
+  auto qos = endpoint.get_qos();
+  auto& data = qos.user_data();
+  data.data_vec(data.empty() ? std::vector<std::uint8_t>{1} : std::vector<std::uint8_t>());
+  if (!ok(endpoint.set_qos(qos))) log_not_announced();
+}
 
 /// Why a writer and a reader of a topic do not match: the setting, and what each side has.
 [[nodiscard]] std::string mismatch_of(const std::string& topic, edds::QosPolicyId_t policy);
@@ -80,6 +95,7 @@ class Writer final : public edds::DataWriterListener {
   const std::function<void()> on_reader_;
   edds::Publisher* publisher_ = nullptr;
   edds::DataWriter* writer_ = nullptr;
+  EndpointNumbers::Id number_ = 0;
   mutable Mutex mutex_;
   std::string mismatch_ TFDUDE_GUARDED_BY(mutex_);
   Condition matched_;
@@ -111,6 +127,8 @@ class Reader : public edds::DataReaderListener {
     if (subscriber_ == nullptr) return;
     reader_ = subscriber_->create_datareader(&topic, context.profiles.reader(*subscriber_, profile),
                                              this);
+    if (reader_ == nullptr) return;
+    number_ = context.announced.readers.created([this] { announce_again(*reader_); });
   }
 
   ~Reader() override { close(); }
@@ -120,6 +138,7 @@ class Reader : public edds::DataReaderListener {
   [[nodiscard]] bool good() const { return reader_ != nullptr; }
 
   void close() {
+    context_.announced.readers.deleted(std::exchange(number_, 0));
     const Gate::Pause pause(context_.gate);
     if (reader_ != nullptr) subscriber_->delete_datareader(reader_);
     if (subscriber_ != nullptr) context_.participant.delete_subscriber(subscriber_);
@@ -170,6 +189,7 @@ class Reader : public edds::DataReaderListener {
   std::deque<Taken> batch_ TFDUDE_GUARDED_BY(mutex_);  // kept, for their memory
   edds::Subscriber* subscriber_ = nullptr;
   edds::DataReader* reader_ = nullptr;
+  EndpointNumbers::Id number_ = 0;
 };
 
 }  // namespace tfdude::fastdds

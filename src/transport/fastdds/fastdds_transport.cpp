@@ -66,7 +66,11 @@ Result<void> FastDdsTransport::start(TransportHandler& handler) {
   attention_.start(*worker_);
   if (auto created = create_participant(); !created) return created;
   if (auto created = create_endpoints(); !created) return created;
-  worker_->repeat([this] { return contact_->look(); });
+  worker_->repeat([this] {
+    announced_.writers.tidy();
+    announced_.readers.tidy();
+    return contact_->look();
+  });
   return {};
 }
 

@@ -99,7 +99,9 @@ class FastDdsTransport final : public Transport {
   std::unique_ptr<Reader<wire::Request>> request_reader(edds::Topic* topic,
                                                         const std::string& partition,
                                                         bool may_change);
-  [[nodiscard]] Context context() const { return {*participant_, *profiles_, *gate_, *counters_}; }
+  [[nodiscard]] Context context() {
+    return {*participant_, *profiles_, *gate_, *counters_, announced_};
+  }
   void open_reply_writer(const PeerId& peer);
   void reply(const PeerId& to, wire::Reply sample);
 
@@ -145,6 +147,7 @@ class FastDdsTransport final : public Transport {
   WriterPartitions writer_partitions_;
   FairShare fair_share_;
   Attention attention_;
+  Announced announced_;
   bool announced_by_dds_ = true;  // participants hear the announcements of DDS; set at the start
   std::optional<Senders> senders_;
   std::optional<Contact> contact_;
