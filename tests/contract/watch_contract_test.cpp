@@ -23,6 +23,7 @@
 #include "support/process.hpp"
 #include "support/random.hpp"
 #include "support/recorder.hpp"
+#include "support/thread_sanitizer.hpp"
 
 namespace tfdude {
 namespace {
@@ -64,7 +65,7 @@ WatchOptions one_more() {
   return options;
 }
 
-#ifndef __SANITIZE_THREAD__
+#ifndef TFDUDE_THREAD_SANITIZER
 // DDS over the loopback interface. The writers of one partition are counted.
 class CountedDomain {
  public:
@@ -260,7 +261,7 @@ TEST_CASE("watch: an invalid rate is rejected") {
   CHECK(robot.client->watch("world", "hand", options));
 }
 
-#ifndef __SANITIZE_THREAD__  // ThreadSanitizer does not see the locks of Fast DDS
+#ifndef TFDUDE_THREAD_SANITIZER  // ThreadSanitizer does not see the locks of Fast DDS
 // Not more, because each costs milliseconds; pusher_test.cpp has 1,000 watches.
 TEST_CASE("watch: no writer is left after watches and clients have ended") {
   CountedDomain domain;

@@ -10,6 +10,7 @@
 #include "tfdude/transport/loopback.hpp"
 
 #include "support/domain_lease.hpp"
+#include "support/thread_sanitizer.hpp"
 
 // The networks that contract tests run over. Needs TFDUDE_LOOPBACK_PROFILE.
 namespace tfdude::testing {
@@ -37,7 +38,7 @@ using Join = std::function<TransportPtr(const std::string& partition)>;
 
 /// The values for joined_by(). ThreadSanitizer does not see the locks of Fast DDS.
 [[nodiscard]] inline std::vector<int> networks() {
-#ifdef __SANITIZE_THREAD__
+#ifdef TFDUDE_THREAD_SANITIZER
   return {0};
 #else
   return {0, 1};
