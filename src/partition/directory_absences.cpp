@@ -23,6 +23,9 @@ bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
   // number.
   const bool is_told = told_absence(partition).has_value();
   if (!is_told && !partition.info.reachable) {
+    // Others may not say again that they have forgotten it.
+    if (partition.forgotten)
+      partition.to_forget = std::max(partition.to_forget, partition.heard_of);
     partition.live = partition.heard_of = 0;
     partition.successor.reset();
     return false;

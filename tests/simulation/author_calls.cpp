@@ -115,10 +115,11 @@ void Author::remove() {
   auto asked_before = std::make_shared<bool>(false);
   change(
       "remove " + id, model_.frame(id).partition,
-      [id, asked_before](Process& caller) -> Result<std::vector<Part>> {
+      [this, id, asked_before](Process& caller) -> Result<std::vector<Part>> {
         if (!caller.discovered()) return fail(Errc::kUnknownFrame, "not all is known");
         auto parts = route_remove(caller.forest(), caller.directory(), id);
-        *asked_before = *asked_before || parts.has_value();
+        const bool asks = &caller == process_.get();  // else the owner's own process may do it
+        *asked_before = *asked_before || (asks && parts.has_value());
         return parts;
       },
       [this, id, asked_before](Result<void> removed) {

@@ -63,7 +63,7 @@ TEST_CASE("two partitions that have forgotten each other learn it from each othe
   CHECK(base.directory.hidden_by(1) == 1);
 }
 
-TEST_CASE("a client that has forgotten a partition accepts it again") {
+TEST_CASE("a client that has forgotten a partition accepts it again until it is lost") {
   Witness client("");
   client.lose("arm", 1);
   client.wait();
@@ -71,6 +71,13 @@ TEST_CASE("a client that has forgotten a partition accepts it again") {
   CHECK_FALSE(client.directory.owner("arm"));
   client.hear("arm", 1, 10);
   CHECK(client.owner_of("hand") == "arm");
+  CHECK(client.directory.lost("arm", 1, kNow));
+  CHECK_FALSE(client.directory.owner("arm"));
+  SECTION("unless it continues as a later process") {
+    client.hear("arm", 2, 10);
+    CHECK(client.directory.lost("arm", 2, kNow));
+    CHECK(client.owner_of("hand") == "arm");
+  }
 }
 
 TEST_CASE("a partition that is forgotten while it seems reachable is removed when it is lost") {
