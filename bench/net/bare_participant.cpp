@@ -63,10 +63,11 @@ class Bare {
   void write(const char* name, const char* profile) {
     writers_.push_back(std::make_unique<Writer>(context(), topic<Type>(name), "", profile));
   }
-  Context context() { return {*participant_, profiles_, *gate_, counters_}; }
+  Context context() { return {*participant_, profiles_, *gate_, counters_, announced_}; }
 
   const Profiles profiles_;
   const std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
+  Announced announced_;
   FastDdsCounters counters_;
   edds::DomainParticipant* participant_ = nullptr;
   std::vector<std::shared_ptr<void>> readers_;
