@@ -1,6 +1,7 @@
 #include "faults/nemesis.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <thread>
 
 #include "faults/worker.hpp"
@@ -10,6 +11,8 @@ namespace {
 
 // The interval of checking the daemons.
 constexpr double kLookEvery = 0.02;
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
 
 std::string name_of(FaultKind kind) {
   switch (kind) {
@@ -54,15 +57,21 @@ void Nemesis::run(const std::vector<Fault>& faults, double seconds) {
   const auto now = [&] { return journal_.now() - begin_at; };
   auto next = faults.begin();
   while (now() < seconds || !endings_.empty()) {
-    while (next != faults.end() && next->begin <= now()) {
-      begin(*next);
-      endings_.emplace(next->end, *next);
-      ++next;
-    }
-    while (!endings_.empty() && endings_.begin()->first <= now()) {
-      const Fault fault = endings_.begin()->second;
-      endings_.erase(endings_.begin());
-      end(fault);
+    // In their order, also if this thread comes late: a host may be cut off again just after it was
+    // not.
+    while (true) {
+      const double ends = endings_.empty() ? kNever : endings_.begin()->first;
+      const double begins = next == faults.end() ? kNever : next->begin;
+      if (std::min(ends, begins) > now()) break;
+      if (begins < ends) {
+        begin(*next);
+        endings_.emplace(next->end, *next);
+        ++next;
+      } else {
+        const Fault fault = endings_.begin()->second;
+        endings_.erase(endings_.begin());
+        end(fault);
+      }
     }
     watch();
     double wake = now() + kLookEvery;
