@@ -183,7 +183,7 @@ Result<PartialTransform> given_parts(const TransformSpec& spec) {
   PartialTransform given;
   if (spec.xyz) given.translation = X_PC->pose.translation();
   if (spec.rpy || spec.quat) given.rotation = X_PC->pose.rotation();
-  if (spec.stddev || spec.cov) given.covariance = X_PC->covariance;
+  if (spec.gives_covariance()) given.covariance = X_PC->covariance;
   return given;
 }
 

@@ -118,7 +118,8 @@ std::string edge_text(const EdgeLabel& edge, Time now) {
   constexpr double kTurn = 0.1;  // [°]
   std::string text = edge.newest ? age_text(now - *edge.newest) : "";
   if (!edge.covariance) return text;
-  const auto s = edge.covariance->stddev();
+  if (!edge.covariance->complete()) return text + (text.empty() ? "" : "  ") + "±?";
+  const auto s = edge.covariance->of_specified().stddev();
   const double metres = *std::max_element(s.begin(), s.begin() + 3);
   const double turn = *std::max_element(s.begin() + 3, s.end()) * kDegrees;
   // A value read from decimal text may be a little smaller, due to rounding.

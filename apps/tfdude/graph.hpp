@@ -13,7 +13,7 @@ namespace tfdude::cli {
 
 /// The edge from a frame's parent to the frame, as far as it is known.
 struct EdgeLabel {
-  std::optional<Covariance> covariance;
+  std::optional<StatedCovariance> covariance;
   std::optional<Time> newest;  ///< of its samples
 };
 
@@ -25,7 +25,8 @@ struct Graph {
 };
 
 /// The label of an edge: the age of its newest sample, and its largest standard deviations of
-/// position and rotation, if one is at least a millimetre or a tenth of a degree.
+/// position and rotation, if one is at least a millimetre or a tenth of a degree; "±?" if they are
+/// unspecified.
 [[nodiscard]] std::string edge_text(const EdgeLabel& edge, Time now);
 
 /// A name in quotes, as DOT reads it.

@@ -44,6 +44,9 @@ void add_pose_options(CLI::App& command, Arguments& arguments) {
   command.add_option("--cov", spec.cov, "upper triangle of the covariance row by row")
       ->type_name("21 NUMBERS")
       ->excludes(stddev);
+  command.add_option("--covariance", spec.covariance, "instead of numbers: unspecified or exact")
+      ->check(CLI::IsMember({"unspecified", "exact"}))
+      ->excludes(stddev);
 }
 
 void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {

@@ -8,6 +8,7 @@
 
 #include "format.hpp"
 #include "plot_names.hpp"
+#include "render.hpp"
 #include "svg.hpp"
 
 namespace tfdude::cli {
@@ -107,7 +108,7 @@ double reach_of(const std::vector<Vector3d>& points) {
 
 Scene scene_of(const Plot& plot) {
   Scene scene{plot, chain_of(plot.steps), {}, plot.X_AB.pose.translation(), {}, {}, 0, 0};
-  scene.covariance = ros_covariance(plot.X_AB).matrix().topLeftCorner<3, 3>();
+  scene.covariance = ros_covariance(plot.X_AB).of_specified().matrix().topLeftCorner<3, 3>();
   const Vector3d outer = kOuter * scene.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   Vector3d low = scene.mean - outer;
   Vector3d high = scene.mean + outer;
@@ -126,12 +127,14 @@ Scene scene_of(const Plot& plot) {
 }
 
 // A coordinate with its deviation, with decimals down to a tenth of the deviation.
-std::string position_text(double metres, double stddev, const Unit& unit) {
+// @param least  the deviation is only that of some edges
+std::string position_text(double metres, double stddev, const Unit& unit, bool least) {
   constexpr int kExactly = 4;
   const double tenth = 1 - std::log10(stddev / unit.metres);
   const int decimals = stddev > 0 ? std::clamp(static_cast<int>(std::ceil(tenth)), 0, 9) : kExactly;
-  return number_text(metres / unit.metres, decimals) + " " + unit.name + " ± " +
-         (stddev > 0 ? length_text(stddev) : "0");
+  const std::string value = number_text(metres / unit.metres, decimals) + " " + unit.name + " ± ";
+  if (stddev > 0) return value + (least ? "more than " : "") + length_text(stddev);
+  return value + (least ? "?" : "0");
 }
 
 void draw_header(Svg& svg, const Scene& scene) {
@@ -151,14 +154,17 @@ void draw_header(Svg& svg, const Scene& scene) {
            "title");
   const Vector3d stddev = scene.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   const Unit unit = text_unit_for(std::max(scene.mean.cwiseAbs().maxCoeff(), stddev.maxCoeff()));
+  const bool least = !plot.X_AB.covariance.complete();
   for (int axis = 0; axis < 3; ++axis) {
     svg.text({kLeft + axis * (kPanel + kGap), 60},
-             kAxes[axis] + (" = " + position_text(scene.mean[axis], stddev[axis], unit)), "value");
+             kAxes[axis] + (" = " + position_text(scene.mean[axis], stddev[axis], unit, least)),
+             "value");
   }
-  const auto s = plot.X_AB.covariance.stddev();
+  const auto s = plot.X_AB.covariance.of_specified().stddev();
   svg.text({kLeft, 80},
-           "rotation ± " + angle_text(s[3] * kDegrees, 3) + "°, " + angle_text(s[4] * kDegrees, 3) +
-               "°, " + angle_text(s[5] * kDegrees, 3) + "° about the axes of " +
+           std::string("rotation ± ") + (least ? "more than " : "") +
+               angle_text(s[3] * kDegrees, 3) + "°, " + angle_text(s[4] * kDegrees, 3) + "°, " +
+               angle_text(s[5] * kDegrees, 3) + "° about the axes of " +
                elide(to, kLabelSize, 300) + "; ± is one standard deviation",
            "");
 }
@@ -303,9 +309,15 @@ void draw_row(Svg& svg, const Scene& scene, bool zoomed, double top) {
   }
 }
 
-// A note that the points ignore correlation, if that makes a difference.
+// A note on edges that are left out, or else that the points ignore correlation, if that makes a
+// difference.
 std::string note_of(const Plot& plot) {
   const Basis& basis = plot.X_AB.basis;
+  if (!plot.X_AB.covariance.complete()) {
+    return elide(
+        "± and ellipses are those of the other edges: " + unspecified_text(basis.unspecified),
+        kLabelSize, kWidth - kLeft - kRight);
+  }
   if (plot.samples == 0 || (!basis.bound && basis.sources.empty())) return "";
   return std::string("The points take edges as independent; the ellipses do not, since ") +
          (basis.bound ? "the correlation of some is unknown." : "some share sources.");

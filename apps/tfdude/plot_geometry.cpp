@@ -143,7 +143,7 @@ std::vector<Eigen::Vector3d> sample_ends(const std::vector<Step>& steps, int cou
                                          std::uint64_t seed) {
   std::vector<Matrix6d> roots;
   roots.reserve(steps.size());
-  for (const Step& step : steps) roots.push_back(root_of(step.X_PC.covariance));
+  for (const Step& step : steps) roots.push_back(root_of(step.X_PC.covariance.of_specified()));
   std::mt19937_64 engine(seed);
   std::normal_distribution<double> normal;
   std::vector<Eigen::Vector3d> ends;

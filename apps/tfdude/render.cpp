@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include "tfdude/base/id.hpp"
+
 #include "format.hpp"
 #include "table.hpp"
 
@@ -92,26 +94,40 @@ std::string partition_table(const std::vector<PartitionRow>& rows) {
   return text;
 }
 
-std::string describe(const Transform& X_AB, bool with_covariance) {
+std::string unspecified_text(const std::vector<std::string>& edges) {
+  std::string text = "unspecified";
+  for (const std::string& edge : edges) {
+    text += (&edge == &edges.front() ? " for " : ", ") + printable(edge);
+  }
+  return text;
+}
+
+std::string describe(const Transform& X_AB, bool with_covariance,
+                     const std::vector<std::string>& unspecified) {
   const Eigen::Vector3d t = X_AB.pose.translation();
   const Eigen::Quaterniond q = X_AB.pose.rotation();
   const Eigen::Vector3d rpy = (to_rpy(q) * kDegrees).unaryExpr([](double angle) {
     return std::abs(angle) < 0.5e-4 ? 0.0 : angle;  // not "-0.0000"
   });
-  const auto s = X_AB.covariance.stddev();
+  const auto s = X_AB.covariance.of_specified().stddev();
   std::string text = format("translation  %.6f  %.6f  %.6f  m\n", t.x(), t.y(), t.z());
   text += format("quaternion   %.6f  %.6f  %.6f  %.6f  (x y z w)\n", q.x(), q.y(), q.z(), q.w());
   text += format("rpy          %.4f  %.4f  %.4f  deg\n", rpy.x(), rpy.y(), rpy.z());
-  const std::string deviations = format("std dev      %.6f  %.6f  %.6f  m", s[0], s[1], s[2]);
+  const bool complete = X_AB.covariance.complete();
+  if (!complete) text += "std dev      " + unspecified_text(unspecified) + "\n";
+  const std::string deviations =
+      format(complete ? "std dev      %.6f  %.6f  %.6f  m" : "  of others  %.6f  %.6f  %.6f  m",
+             s[0], s[1], s[2]);
   const std::string angles =
       format("%.4f  %.4f  %.4f  deg", s[3] * kDegrees, s[4] * kDegrees, s[5] * kDegrees);
   const bool fits = deviations.size() + 3 + angles.size() <= 80;
   text += deviations + (fits ? "   " : "\n             ") + angles + "\n";
   if (!with_covariance) return text;
-  text += "covariance   (translation first, of the right perturbation; m, rad)\n";
+  text += complete ? "covariance   (translation first, of the right perturbation; m, rad)\n"
+                   : "covariance   of the others (translation first, right perturbation; m, rad)\n";
   for (const char* axis : {"x", "y", "z", "rx", "ry", "rz"}) text += format(" %12s", axis);
   text += "\n";
-  const Matrix6d sigma = X_AB.covariance.matrix();
+  const Matrix6d sigma = X_AB.covariance.of_specified().matrix();
   for (int row = 0; row < 6; ++row) {
     for (int column = 0; column < 6; ++column) text += format(" % .5e", sigma(row, column));
     text += "\n";
@@ -123,19 +139,22 @@ nlohmann::json lookup_json(const std::string& a, const std::string& b, const Tra
                            const std::vector<std::string>& partitions) {
   const Eigen::Vector3d t = X_AB.pose.translation();
   const Eigen::Quaterniond q = X_AB.pose.rotation();
-  const Matrix6d sigma = X_AB.covariance.matrix();
+  const Matrix6d sigma = X_AB.covariance.of_specified().matrix();
   nlohmann::json rows = nlohmann::json::array();
   for (int row = 0; row < 6; ++row) {
     nlohmann::json line = nlohmann::json::array();
     for (int column = 0; column < 6; ++column) line.push_back(sigma(row, column));
     rows.push_back(std::move(line));
   }
-  return {{"from", a},
-          {"to", b},
-          {"translation", {t.x(), t.y(), t.z()}},
-          {"rotation", {q.x(), q.y(), q.z(), q.w()}},
-          {"covariance", std::move(rows)},
-          {"partitions", partitions}};
+  nlohmann::json json = {{"from", a},
+                         {"to", b},
+                         {"translation", {t.x(), t.y(), t.z()}},
+                         {"rotation", {q.x(), q.y(), q.z(), q.w()}},
+                         {"covariance", nullptr},
+                         {"partitions", partitions}};
+  // Under another key if it is not all, so that nobody takes it for that.
+  json[X_AB.covariance.complete() ? "covariance" : "covariance_of_specified"] = std::move(rows);
+  return json;
 }
 
 nlohmann::json frame_json(const Frame& frame) {

@@ -25,7 +25,12 @@ struct PartitionRow {
 };
 [[nodiscard]] std::string partition_table(const std::vector<PartitionRow>& rows);
 
-[[nodiscard]] std::string describe(const Transform& X_AB, bool with_covariance);
+/// @param unspecified  the edges whose covariance is unspecified
+[[nodiscard]] std::string describe(const Transform& X_AB, bool with_covariance,
+                                   const std::vector<std::string>& unspecified = {});
+
+/// "unspecified for odom, base"
+[[nodiscard]] std::string unspecified_text(const std::vector<std::string>& edges);
 
 [[nodiscard]] nlohmann::json lookup_json(const std::string& a, const std::string& b,
                                          const Transform& X_AB,

@@ -147,7 +147,7 @@ Result<std::optional<Time>> optional_stamp(const std::string& text, Time now) {
 int run_lookup(Client& client, const Arguments& arguments) {
   const auto X_AB = look_up(client, arguments);
   if (!X_AB) return refuse(client, X_AB.error(), arguments);
-  std::string text = describe(*X_AB, arguments.covariance);
+  std::string text = describe(*X_AB, arguments.covariance, X_AB->basis.unspecified);
   if (X_AB->stamp) text += describe_stamp(X_AB->stamp, wall_clock());
   text += describe(X_AB->basis);
   return answer(arguments, arguments.json ? json_of(client, arguments, *X_AB) : nlohmann::json(),
@@ -156,7 +156,7 @@ int run_lookup(Client& client, const Arguments& arguments) {
 
 int run_watch(Client& client, const Arguments& arguments) {
   return follow(client, arguments, [&](const StampedTransform& X_AB) {
-    std::string text = describe(X_AB, arguments.covariance);
+    std::string text = describe(X_AB, arguments.covariance, X_AB.basis.unspecified);
     if (X_AB.stamp) text += describe_stamp(X_AB.stamp, wall_clock());
     (void)answer(arguments, arguments.json ? json_of(client, arguments, X_AB) : nlohmann::json(),
                  text);

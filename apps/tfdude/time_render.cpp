@@ -1,6 +1,7 @@
 #include "time_render.hpp"
 
 #include "format.hpp"
+#include "render.hpp"
 #include "table.hpp"
 
 namespace tfdude::cli {
@@ -103,11 +104,16 @@ std::string echo_lines(const std::string& a, const std::string& b, const Stamped
                        Time now) {
   const Eigen::Vector3d t = X_AB.pose.translation();
   const Eigen::Vector3d rpy = to_rpy(X_AB.pose.rotation()) * kDegrees;
-  const auto s = X_AB.covariance.stddev();
+  const auto s = X_AB.covariance.of_specified().stddev();
   std::string text = shortened(b, 34) + " seen from " + shortened(a, 34) + "\n";
   text += format("position  %12.6f %12.6f %12.6f m\n", t.x(), t.y(), t.z());
   text += format("rpy       %12.4f %12.4f %12.4f deg\n", rpy.x(), rpy.y(), rpy.z());
-  text += format("std dev   %12.6f %12.6f %12.6f m\n", s[0], s[1], s[2]);
+  const bool complete = X_AB.covariance.complete();
+  if (!complete) {
+    text += "std dev   " + shortened(unspecified_text(X_AB.basis.unspecified), 70) + "\n";
+  }
+  text += (complete ? "std dev   " : "of others ") +
+          format("%12.6f %12.6f %12.6f m\n", s[0], s[1], s[2]);
   text += format("          %12.4f %12.4f %12.4f deg\n", s[3] * kDegrees, s[4] * kDegrees,
                  s[5] * kDegrees);
   return text + "age       " + (X_AB.stamp ? ago(*X_AB.stamp, now) : "none (static)") + "\n";

@@ -47,8 +47,10 @@ std::string describe(const Basis& basis) {
 }
 
 nlohmann::json basis_json(const Basis& basis) {
-  return {
-      {"order", static_cast<int>(basis.order)}, {"bound", basis.bound}, {"sources", basis.sources}};
+  return {{"order", static_cast<int>(basis.order)},
+          {"bound", basis.bound},
+          {"sources", basis.sources},
+          {"unspecified", basis.unspecified}};
 }
 
 std::string describe(const Observed& observed) {

@@ -34,7 +34,8 @@ tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
     if (!loaded) return loaded;
     config = *std::move(loaded);
   }
-  for (const tfdude::UrdfPart& part : arguments.urdfs) {
+  for (tfdude::UrdfPart part : arguments.urdfs) {
+    part.origins = config.covariance;
     if (auto ok = tfdude::add_urdf(config, part); !ok) return tl::unexpected(ok.error());
   }
   if (config.partition.empty()) config.partition = arguments.partition;

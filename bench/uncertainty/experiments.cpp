@@ -116,8 +116,8 @@ Json share_within(const std::vector<Pose>& poses, int dimensions, const Distance
 Json shares_of_chains(const DrawnChains& drawn, const Transform& second, const Transform& fourth) {
   const Pose back = second.pose.inverse();
   const Eigen::Matrix2d of_second =
-      bench::planar(second.covariance).bottomRightCorner<2, 2>().inverse();
-  const Eigen::Matrix3d of_fourth = bench::planar(fourth.covariance).inverse();
+      bench::planar(second.covariance.of_specified()).bottomRightCorner<2, 2>().inverse();
+  const Eigen::Matrix3d of_fourth = bench::planar(fourth.covariance.of_specified()).inverse();
   const Eigen::Matrix2d of_drawn = drawn.covariance.inverse();
   const auto error = [&](const Pose& X) {
     const Twist xi = log(back * X);
@@ -155,14 +155,14 @@ Json chain() {
     outlines["moments"].push_back(bench::ellipse(drawn.mean, drawn.covariance, sigmas));
   }
   return {{"samples", kChains},
-          {"second", elements(left_covariance(second).matrix())},
-          {"fourth", elements(left_covariance(fourth).matrix())},
+          {"second", elements(left_covariance(second).of_specified().matrix())},
+          {"fourth", elements(left_covariance(fourth).of_specified().matrix())},
           {"drawn", elements(drawn.left)},
           {"mean", {drawn.mean.x(), drawn.mean.y()}},
           {"linear",
            {{"x", second.pose.translation().x()},
-            {"stddev_x", std::sqrt(ros_covariance(second).matrix()(0, 0))},
-            {"stddev_y", std::sqrt(ros_covariance(second).matrix()(1, 1))}}},
+            {"stddev_x", std::sqrt(ros_covariance(second).of_specified().matrix()(0, 0))},
+            {"stddev_y", std::sqrt(ros_covariance(second).of_specified().matrix()(1, 1))}}},
           {"within", shares_of_chains(drawn, second, fourth)},
           {"points", points},
           {"outlines", outlines}};
@@ -185,7 +185,7 @@ Json fuse_often(double alpha, testing::Random& random) {
     const Transform& X = result->X;
     for (const Transform& one : estimates) cost += testing::squared_distance(one, X.pose);
     squares += log(truth * X.pose.inverse()).squaredNorm();
-    claimed += left_covariance(X).matrix().trace();
+    claimed += left_covariance(X).of_specified().matrix().trace();
     distance += testing::squared_distance(X, truth);
   }
   return {{"alpha", alpha},
@@ -232,25 +232,26 @@ Json correlation() {
 Json way_after(int steps, testing::Random& random) {
   const testing::Trajectory t = testing::trajectory(steps);
   const auto way = [](const Belief& X_WA, const Belief& X_WB, Order order) {
-    return collapse(compose(inverse(X_WA), X_WB, order)).covariance.matrix();
+    return collapse(compose(inverse(X_WA), X_WB, order)).covariance.of_specified().matrix();
   };
   const auto unknown = [](const Belief& X) {
-    return Belief{X.pose, {}, collapse(X).covariance, {}};
+    return Belief{X.pose, {}, collapse(X).covariance.of_specified(), {}};
   };
   const Belief A = t.A();
   const Belief B = t.B();
   // B is composed of A and of the way: to fourth order by an error of B that contains both.
-  const Belief X_AB{t.X_AB.pose, t.X_AB.covariance, std::nullopt, {}};
+  const Belief X_AB{t.X_AB.pose, t.X_AB.covariance.of_specified(), std::nullopt, {}};
   const Matrix6d second = way(A, compose(A, X_AB, Order::kSecond), Order::kSecond);
   const Matrix6d fourth = way(A, compose(A, X_AB, Order::kFourth), Order::kFourth);
   const Matrix6d joint = testing::sampled_way(t, random, kCorrelated);
-  const Matrix6d driven = t.X_AB.covariance.matrix();
+  const Matrix6d driven = t.X_AB.covariance.of_specified().matrix();
   return {{"steps", steps},
-          {"metres_A", metres(collapse(A).covariance.matrix())},
-          {"radians_A", radians(collapse(A).covariance.matrix())},
+          {"metres_A", metres(collapse(A).covariance.of_specified().matrix())},
+          {"radians_A", radians(collapse(A).covariance.of_specified().matrix())},
           {"joint", beside(joint, joint)},
           {"driven", beside(driven, driven)},
-          {"independent", beside(between(collapse(A), collapse(B)).covariance.matrix(), joint)},
+          {"independent",
+           beside(between(collapse(A), collapse(B)).covariance.of_specified().matrix(), joint)},
           {"second", beside(way(A, B, Order::kSecond), joint)},
           {"fourth", beside(way(A, B, Order::kFourth), joint)},
           {"second_driven", beside(second, driven)},

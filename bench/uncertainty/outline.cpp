@@ -61,7 +61,8 @@ Eigen::Matrix3d planar(const tfdude::Covariance& covariance) {
 }
 
 Outline mapped_ellipse(const Transform& X, double sigmas) {
-  const Eigen::Matrix2d root = planar(X.covariance).bottomRightCorner<2, 2>().llt().matrixL();
+  const Eigen::Matrix2d root =
+      planar(X.covariance.of_specified()).bottomRightCorner<2, 2>().llt().matrixL();
   Outline outline;
   for (int i = 0; i <= kAround; ++i) {
     const double angle = 2.0 * M_PI * i / kAround;
@@ -73,7 +74,7 @@ Outline mapped_ellipse(const Transform& X, double sigmas) {
 }
 
 Outline mapped_ellipsoid(const Transform& X, double sigmas) {
-  const Eigen::Matrix3d sigma = planar(X.covariance);
+  const Eigen::Matrix3d sigma = planar(X.covariance.of_specified());
   const Within within(sigma, sigmas);
   const Eigen::Vector2d mean = X.pose.translation().head<2>();
   const double far_y = kBeyond * sigmas * std::sqrt(sigma(1, 1));

@@ -185,7 +185,12 @@ Result<StampedTransform> Client::lookup(std::string_view a, const Query& at_a, s
   if (!X_FA) return tl::unexpected(X_FA.error());
   const auto X_FB = participant_->lookups().lookup(fixed, b, at_b, deadline);
   if (!X_FB) return tl::unexpected(X_FB.error());
-  return StampedTransform{between(*X_FA, *X_FB), X_FB->stamp};
+  StampedTransform X_AB{between(*X_FA, *X_FB), X_FB->stamp};
+  std::vector<std::string>& unspecified = X_AB.basis.unspecified;
+  unspecified.assign(X_FA->basis.unspecified.rbegin(), X_FA->basis.unspecified.rend());
+  unspecified.insert(unspecified.end(), X_FB->basis.unspecified.begin(),
+                     X_FB->basis.unspecified.end());
+  return X_AB;
 }
 
 PendingLookup Client::lookup_async(const std::string& a, const std::string& b, const Query& query,

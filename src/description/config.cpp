@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/math/transform_spec.hpp"
 
 #include "description/config_frames.hpp"
 #include "description/config_urdf.hpp"
@@ -20,9 +21,11 @@
 namespace tfdude {
 namespace {
 
-constexpr std::array<std::string_view, 4> kFileKeys = {"partition", "history", "frames", "urdf"};
-constexpr std::array<std::string_view, 10> kFrameKeys = {
-    "id", "parent", "xyz", "rpy", "quat", "stddev", "cov", "history", "correlation", "sources"};
+constexpr std::array<std::string_view, 5> kFileKeys = {"partition", "covariance", "history",
+                                                       "frames", "urdf"};
+constexpr std::array<std::string_view, 11> kFrameKeys = {
+    "id",  "parent",     "xyz",     "rpy",         "quat",   "stddev",
+    "cov", "covariance", "history", "correlation", "sources"};
 constexpr std::array<std::string_view, 6> kHistoryKeys = {"span",   "count",     "process_noise",
                                                           "moving", "max_ahead", "restart_after"};
 
@@ -42,8 +45,7 @@ class Reader : public YamlFields {
                                                 const std::string& place) const;
   [[nodiscard]] Result<CommonError> common_error(const std::string& source, const Field& field,
                                                  const std::string& place) const;
-  [[nodiscard]] Result<FrameSpec> frame(const YAML::Node& node, std::size_t index,
-                                        const EdgeTiming& timing) const;
+  [[nodiscard]] Result<FrameSpec> frame(const YAML::Node& node, const Config& config) const;
   [[nodiscard]] Result<void> frames(const Field& field, Config& config) const;
   [[nodiscard]] Result<void> urdfs(const Field& field, Config& config) const;
 };
@@ -163,9 +165,9 @@ Result<Correlation> Reader::correlation(const Fields& entries, const std::string
   return correlation;
 }
 
-Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index,
-                                const EdgeTiming& timing) const {
-  const std::string nth = "frames[" + std::to_string(index) + "]";
+// `config` has the defaults, and the frames read so far.
+Result<FrameSpec> Reader::frame(const YAML::Node& node, const Config& config) const {
+  const std::string nth = "frames[" + std::to_string(config.frames.size()) + "]";
   // Messages about a bad key also name the frame, if its id can be read.
   const auto is_id = [](const auto& entry) {
     return entry.first.IsScalar() && entry.first.Scalar() == "id";
@@ -191,11 +193,11 @@ Result<FrameSpec> Reader::frame(const YAML::Node& node, std::size_t index,
     if (!parent) return tl::unexpected(parent.error());
     spec.parent = *std::move(parent);
   }
-  auto X_PC = transform(node, *entries, place);
+  auto X_PC = transform(node, *entries, place, config.covariance);
   if (!X_PC) return tl::unexpected(X_PC.error());
   spec.X_PC = *X_PC;
   if (const auto found = entries->find("history"); found != entries->end()) {
-    auto own = history(found->second, place, timing);
+    auto own = history(found->second, place, config.history);
     if (!own) return tl::unexpected(own.error());
     spec.timing = *own;
   }
@@ -217,6 +219,13 @@ Result<Config> Reader::config(const YAML::Node& root) const {
     }
     config.partition = *std::move(name);
   }
+  if (const auto found = entries->find("covariance"); found != entries->end()) {
+    const auto word = text(found->second, "covariance");
+    if (!word) return tl::unexpected(word.error());
+    const auto stated = covariance_named(*word);
+    if (!stated) return error(stated.error().code, found->second.mark, stated.error().message);
+    config.covariance = *stated;
+  }
   if (const auto found = entries->find("history"); found != entries->end()) {
     auto timing = history(found->second, "the file", config.history);
     if (!timing) return tl::unexpected(timing.error());
@@ -236,7 +245,7 @@ Result<void> Reader::frames(const Field& field, Config& config) const {
   if (!list.IsSequence()) return error(Errc::kConfig, field.mark, "frames is not a list");
   std::unordered_map<std::string, int> line_of;
   for (const YAML::Node& node : list) {
-    auto spec = frame(node, config.frames.size(), config.history);
+    auto spec = frame(node, config);
     if (!spec) return tl::unexpected(spec.error());
     const auto [known, fresh] = line_of.emplace(spec->id, node.Mark().line + 1);
     if (!fresh) {
@@ -253,7 +262,8 @@ Result<void> Reader::frames(const Field& field, Config& config) const {
 Result<void> Reader::urdfs(const Field& field, Config& config) const {
   const YAML::Node& list = field.value;
   if (!list.IsSequence()) return error(Errc::kConfig, field.mark, "urdf is not a list");
-  const UrdfFields reader(name(), std::filesystem::path(name()).parent_path().string());
+  const UrdfFields reader(name(), std::filesystem::path(name()).parent_path().string(),
+                          config.covariance);
   for (std::size_t i = 0; i < list.size(); ++i) {
     const YAML::Node node = list[i];
     const std::string nth = "urdf[" + std::to_string(i) + "]";

@@ -8,15 +8,16 @@
 namespace tfdude {
 namespace {
 
-constexpr std::array<std::string_view, 11> kUrdfKeys = {"file",  "root",          "xyz",   "rpy",
-                                                        "quat",  "stddev",        "cov",   "prefix",
-                                                        "links", "strict_limits", "joints"};
-constexpr std::array<std::string_view, 5> kRootKeys = {"xyz", "rpy", "quat", "stddev", "cov"};
+constexpr std::array<std::string_view, 12> kUrdfKeys = {
+    "file", "root",       "xyz",    "rpy",   "quat",          "stddev",
+    "cov",  "covariance", "prefix", "links", "strict_limits", "joints"};
+constexpr std::array<std::string_view, 6> kRootKeys = {"xyz",    "rpy", "quat",
+                                                       "stddev", "cov", "covariance"};
 constexpr std::array<std::string_view, 3> kJointKeys = {"position", "stddev", "origin"};
 // The key in files of earlier versions.
 constexpr const char* kFormerOrigin = "mount";
 constexpr std::array<std::string_view, 3> kFormerJointKeys = {"position", "stddev", kFormerOrigin};
-constexpr std::array<std::string_view, 2> kOriginKeys = {"stddev", "cov"};
+constexpr std::array<std::string_view, 3> kOriginKeys = {"stddev", "cov", "covariance"};
 
 }  // namespace
 
@@ -36,7 +37,7 @@ Result<void> UrdfFields::stand(const YAML::Node& node, const Fields& entries,
   auto root = id(entries, "root", place);
   if (!root) return tl::unexpected(std::move(root.error()));
   part.root = *std::move(root);
-  const auto X_root = transform(node, entries, place);
+  const auto X_root = transform(node, entries, place, covariance_);
   if (!X_root) return tl::unexpected(X_root.error());
   part.X_root = *X_root;
   return {};
@@ -74,7 +75,7 @@ Result<UrdfJoint> UrdfFields::joint(const YAML::Node& node, const std::string& p
   const std::string what = place + ": " + key;
   const auto said = fields(origin->second.value, kOriginKeys, what);
   if (!said) return tl::unexpected(said.error());
-  const auto error_of = transform(origin->second.value, *said, what);
+  const auto error_of = transform(origin->second.value, *said, what, covariance_);
   if (!error_of) return tl::unexpected(error_of.error());
   joint.origin = error_of->covariance;
   return joint;
@@ -85,6 +86,7 @@ Result<UrdfPart> UrdfFields::part(const YAML::Node& node, const std::string& pla
   if (!entries) return tl::unexpected(entries.error());
   const auto given = [&](std::string_view key) { return entries->find(key); };
   UrdfPart part;
+  part.origins = covariance_;
   if (given("file") == entries->end()) {
     return error(Errc::kConfig, node.Mark(), place + ": file is missing");
   }

@@ -10,8 +10,9 @@ namespace tfdude {
 class UrdfFields : public YamlFields {
  public:
   /// @param folder  the YAML file's folder; relative paths start there
-  UrdfFields(std::string name, std::string folder)
-      : YamlFields(std::move(name)), folder_(std::move(folder)) {}
+  /// @param covariance  where none is given
+  UrdfFields(std::string name, std::string folder, const StatedCovariance& covariance)
+      : YamlFields(std::move(name)), folder_(std::move(folder)), covariance_(covariance) {}
 
   [[nodiscard]] Result<UrdfPart> part(const YAML::Node& node, const std::string& place) const;
 
@@ -23,6 +24,7 @@ class UrdfFields : public YamlFields {
   [[nodiscard]] Result<UrdfJoint> joint(const YAML::Node& node, const std::string& place) const;
 
   std::string folder_;
+  StatedCovariance covariance_;
 };
 
 }  // namespace tfdude

@@ -105,7 +105,7 @@ Result<void> EdgeReader::read(Index i) {
   if (!pose) return tree_.joint_error(i, "origin: " + pose.error().message);
   edges_[i].X_PJ.pose = *pose;
   const UrdfJoint& said = said_of(i);
-  edges_[i].X_PJ.covariance = said.origin;
+  edges_[i].X_PJ.covariance = said.origin.value_or(part_.origins);
   const auto type = moving_type(urdf);
   if (!type) {
     if (!said.position && !said.stddev) return {};

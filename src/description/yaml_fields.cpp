@@ -19,7 +19,8 @@ std::string_view blamed_key(const std::string& message, const TransformSpec& spe
   if (starts("rpy")) return "rpy";
   if (starts("rotation")) return "quat";
   if (starts("stddev")) return "stddev";
-  if (starts("covariance")) return spec.cov ? "cov" : "stddev";
+  if (starts("cov and")) return "cov";
+  if (starts("covariance")) return spec.cov ? "cov" : spec.stddev ? "stddev" : "covariance";
   return {};
 }
 
@@ -128,7 +129,8 @@ Result<std::string> YamlFields::id(const Fields& fields, std::string_view key,
 }
 
 Result<Transform> YamlFields::transform(const YAML::Node& node, const Fields& fields,
-                                        const std::string& place) const {
+                                        const std::string& place,
+                                        const StatedCovariance& otherwise) const {
   TransformSpec spec;
   const auto read = numbers(fields, "xyz", place, spec.xyz)
                         .and_then([&] { return numbers(fields, "rpy", place, spec.rpy); })
@@ -136,12 +138,17 @@ Result<Transform> YamlFields::transform(const YAML::Node& node, const Fields& fi
                         .and_then([&] { return numbers(fields, "stddev", place, spec.stddev); })
                         .and_then([&] { return numbers(fields, "cov", place, spec.cov); });
   if (!read) return tl::unexpected(read.error());
-  auto X_PC = spec.build();
+  if (const auto found = fields.find("covariance"); found != fields.end()) {
+    auto word = text(found->second, place + ": covariance");
+    if (!word) return tl::unexpected(std::move(word.error()));
+    spec.covariance = *std::move(word);
+  }
+  auto X_PC = spec.build(otherwise);
   if (X_PC) return X_PC;
   const std::string& message = X_PC.error().message;
   const std::string_view key = blamed_key(message, spec);
   const auto field = fields.find(key);
-  const bool named = message.rfind(std::string(key) + "[", 0) == 0 ||
+  const bool named = message.rfind(std::string(key) + "[", 0) == 0 || key == "covariance" ||
                      message.find("both given") != std::string::npos;
   return error(X_PC.error().code, field == fields.end() ? node.Mark() : field->second.mark,
                place + ": " + (named ? "" : std::string(key) + ": ") + message);

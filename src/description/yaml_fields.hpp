@@ -64,10 +64,12 @@ class YamlFields {
   /// The id under `key`, which must exist.
   [[nodiscard]] Result<std::string> id(const Fields& fields, std::string_view key,
                                        const std::string& place) const;
-  /// The transform given by xyz, rpy or quat, and stddev or cov. Missing keys mean identity and
-  /// zero covariance.
+  /// The transform given by xyz, rpy or quat, and stddev, cov or covariance. Missing keys mean the
+  /// identity.
+  /// @param otherwise  the covariance if none is given
   [[nodiscard]] Result<Transform> transform(const YAML::Node& node, const Fields& fields,
-                                            const std::string& place) const;
+                                            const std::string& place,
+                                            const StatedCovariance& otherwise) const;
 
  private:
   [[nodiscard]] Result<Fields> fields(const YAML::Node& map,

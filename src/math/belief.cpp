@@ -114,6 +114,7 @@ Belief inverse(const Belief& X_AB) {
   if (X_AB.unknown) X_BA.unknown = X_AB.unknown->transported(X_AB.pose);
   if (!X_AB.common_errors.empty())
     X_BA.common_errors = product(-adjoint(X_AB.pose), X_AB.common_errors);
+  X_BA.unspecified = X_AB.unspecified;
   return X_BA;
 }
 
@@ -133,6 +134,7 @@ Belief compose(const Belief& X_AB, const Belief& X_BC, Order order) {
   if (X_BC.unknown) {
     X_AC.unknown = X_AC.unknown ? bound(*X_AC.unknown, *X_BC.unknown) : *X_BC.unknown;
   }
+  X_AC.unspecified = X_AB.unspecified || X_BC.unspecified;
   return X_AC;
 }
 
@@ -142,7 +144,9 @@ Transform collapse(const Belief& X_AB) {
     known = Covariance::trusted(
         nearest_semidefinite(X_AB.own.matrix() + second_moment(X_AB.common_errors)));
   }
-  return {X_AB.pose, X_AB.unknown ? bound(known, *X_AB.unknown) : known};
+  StatedCovariance stated = X_AB.unknown ? bound(known, *X_AB.unknown) : known;
+  stated.set_complete(!X_AB.unspecified);
+  return {X_AB.pose, stated};
 }
 
 Covariance bound(const Covariance& A, const Covariance& B) {

@@ -9,11 +9,11 @@
 
 namespace tfdude {
 
-/// Whether the sum of all numbers is finite; it is for everything that the checked constructors
+/// Whether the sum of all 28 numbers is finite; it is for everything that the checked constructors
 /// accept. Inline and in pairs, since every update of an own edge calls it: 2 ns instead of 6 for a
 /// function that checks one number after the other.
 inline bool is_finite(const Transform& X) {
-  static_assert(sizeof(Transform) == 28 * sizeof(double));
+  static_assert(sizeof(Pose) == 7 * sizeof(double) && sizeof(Transform) == 29 * sizeof(double));
   using Pair = double __attribute__((vector_size(16)));
   // Copied, since a transform is not aligned for pairs; the compiler loads them directly.
   const auto pair = [&X](std::size_t i) {

@@ -10,7 +10,7 @@ Flat to_flat(const Transform& X) {
   const Eigen::Vector3d p = X.pose.translation();
   std::copy_n(q.coeffs().data(), 4, flat.begin());
   std::copy_n(p.data(), 3, flat.begin() + 4);
-  std::copy_n(X.covariance.upper().begin(), Covariance::kSize, flat.begin() + 7);
+  std::copy_n(X.covariance.of_specified().upper().begin(), Covariance::kSize, flat.begin() + 7);
   return flat;
 }
 

@@ -8,7 +8,7 @@
 namespace tfdude {
 
 /// A transform as sent and stored: x, y, z, w of the unit quaternion; x, y, z [m]; upper triangle
-/// of the covariance, row by row.
+/// of the covariance, row by row. Does not say whether that is complete.
 using Flat = std::array<double, 28>;
 
 [[nodiscard]] Flat to_flat(const Transform& X);

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
+#include <utility>
 
 #include <boost/math/distributions/chi_squared.hpp>
 
@@ -27,7 +29,7 @@ struct Gaussian {
 Gaussian seen_from(const Pose& X, const Transform& estimate) {
   const Twist e = log(estimate.pose.inverse() * X);
   const Matrix6d J = right_jacobian(e);
-  return {-e, J * estimate.covariance.matrix() * J.transpose()};
+  return {-e, J * estimate.covariance.of_specified().matrix() * J.transpose()};
 }
 
 // Product of two Gaussians by the gain, which needs no inverse of either. False if they contradict
@@ -46,13 +48,23 @@ bool merge(Gaussian& sum, const Gaussian& more) {
 }
 
 Transform weighted(const Transform& X, double weight) {
-  return {X.pose, Covariance::trusted(Matrix6d(X.covariance.matrix() / weight))};
+  return {X.pose, Covariance::trusted(Matrix6d(X.covariance.of_specified().matrix() / weight))};
+}
+
+Result<void> check_complete(const std::vector<Transform>& estimates) {
+  for (std::size_t k = 0; k < estimates.size(); ++k) {
+    if (estimates[k].covariance.complete()) continue;
+    return fail(Errc::kInvalidInput, "the covariance of estimate " + std::to_string(k) +
+                                         " is unspecified: it cannot be weighed");
+  }
+  return {};
 }
 
 }  // namespace
 
 Result<Fused> fuse(const std::vector<Transform>& estimates) {
   if (estimates.empty()) return fail(Errc::kInvalidInput, "no estimate to fuse");
+  if (auto ok = check_complete(estimates); !ok) return tl::unexpected(std::move(ok.error()));
   Pose X = estimates.front().pose;
   for (int iteration = 1; iteration <= kMostIterations; ++iteration) {
     Gaussian sum = seen_from(X, estimates.front());
@@ -74,10 +86,12 @@ Result<Fused> fuse(const std::vector<Transform>& estimates) {
 }
 
 Result<Fused> intersect(const Transform& A, const Transform& B) {
-  const Twist unit = units_of(A.covariance.matrix().diagonal() + B.covariance.matrix().diagonal());
-  const auto size_of = [&](const Transform& X) {
-    return unit.dot(X.covariance.matrix().diagonal());
+  if (auto ok = check_complete({A, B}); !ok) return tl::unexpected(std::move(ok.error()));
+  const auto variances = [](const Transform& X) -> Twist {
+    return X.covariance.of_specified().matrix().diagonal();
   };
+  const Twist unit = units_of(variances(A) + variances(B));
+  const auto size_of = [&](const Transform& X) { return unit.dot(variances(X)); };
   const auto fused_at = [&](double omega) {
     return fuse({weighted(A, omega), weighted(B, 1.0 - omega)});
   };

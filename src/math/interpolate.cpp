@@ -77,18 +77,33 @@ double* numbers(Value& X) {
   return reinterpret_cast<double*>(&X);
 }
 
+// Both with the covariance of the one that is not complete.
+struct Alike {
+  Transform X0;
+  Transform X1;
+};
+Alike alike(const Transform& X0, const Transform& X1) {
+  const StatedCovariance& covariance = X0.covariance.complete() ? X1.covariance : X0.covariance;
+  return {{X0.pose, covariance}, {X1.pose, covariance}};
+}
+
 }  // namespace
 
 void interpolate(const Transform& X0, const Transform& X1, double s, Transform& X) {
+  if (X0.covariance.complete() != X1.covariance.complete()) {
+    const Alike both = alike(X0, X1);
+    return interpolate(both.X0, both.X1, s, X);
+  }
   kernel::Blend one{numbers(X0), numbers(X1), s, numbers(X)};
   kernel::functions().blend_with_covariance(&one, 1);
   if (!one.near) interpolate_far(X0, X1, s, X);
+  X.covariance.set_complete(X0.covariance.complete());
 }
 
 void interpolate_far(const Transform& X0, const Transform& X1, double s, Transform& X) {
   const Twist xi = log(X0.pose.inverse() * X1.pose);
-  const Matrix6d sigma =
-      carried(X0.covariance, -xi, 1.0 - s, 1.0 - s) + carried(X1.covariance, xi, s, s);
+  const Matrix6d sigma = carried(X0.covariance.of_specified(), -xi, 1.0 - s, 1.0 - s) +
+                         carried(X1.covariance.of_specified(), xi, s, s);
   X = {X0.pose * exp(s * xi), Covariance::trusted(sigma)};
 }
 
@@ -113,11 +128,18 @@ Pose extrapolate(const Pose& X0, const Pose& X1, double s) {
 }
 
 Transform extrapolate(const Transform& X0, const Transform& X1, double s) {
+  if (X0.covariance.complete() != X1.covariance.complete()) {
+    const Alike both = alike(X0, X1);
+    return extrapolate(both.X0, both.X1, s);
+  }
   const Twist xi = log(X0.pose.inverse() * X1.pose);
   const double beyond = s - 1.0;
-  const Matrix6d sigma = carried(X0.covariance, -xi, -beyond, beyond * (s + beyond)) +
-                         carried(X1.covariance, xi, s, s * (s + beyond));
-  return {X0.pose * exp(s * xi), Covariance::trusted(sigma)};
+  const Matrix6d sigma =
+      carried(X0.covariance.of_specified(), -xi, -beyond, beyond * (s + beyond)) +
+      carried(X1.covariance.of_specified(), xi, s, s * (s + beyond));
+  Transform X{X0.pose * exp(s * xi), Covariance::trusted(sigma)};
+  X.covariance.set_complete(X0.covariance.complete());
+  return X;
 }
 
 }  // namespace tfdude

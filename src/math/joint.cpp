@@ -9,13 +9,6 @@ Joint along(const Transform& X_PJ, const Eigen::Vector3d& shift, const Eigen::Ve
   return joint;
 }
 
-bool is_exact(const Covariance& covariance) {
-  for (const double element : covariance.upper()) {
-    if (element != 0) return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 Joint revolute_joint(const Transform& X_PJ, const Eigen::Vector3d& axis) {
@@ -38,7 +31,9 @@ Transform joint_transform(const Joint& joint, double position, double variance) 
   }
   Transform X_PC{joint.X_PJ.pose * X_JC, Covariance::trusted(upper)};
   // Most origins are exact, since URDF gives no uncertainty.
-  if (!is_exact(joint.X_PJ.covariance)) {
+  if (!joint.X_PJ.covariance.complete()) {
+    X_PC.covariance = StatedCovariance::unspecified();
+  } else if (joint.X_PJ.covariance != StatedCovariance()) {
     X_PC.covariance += joint.X_PJ.covariance.transported(X_JC.inverse());
   }
   return X_PC;

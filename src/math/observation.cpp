@@ -60,7 +60,7 @@ class Update {
         prior_(edges),
         xi_(edges.size(), Twist::Zero()),
         linear_(linearize(edges, xi_, Z_AB)),
-        R_(Z_AB.covariance.matrix()),
+        R_(Z_AB.covariance.of_specified().matrix()),
         independent_(options.independent) {}
 
   Result<Observation> run() {
@@ -87,7 +87,7 @@ class Update {
       if (all_[k].X_PC.unknown && !all_[k].X_PC.unknown->matrix().isZero(0)) unknown.push_back(k);
     }
     if (!prior_.edges().empty()) {
-      Covariance R = Z_AB_.covariance;
+      Covariance R = Z_AB_.covariance.of_specified();
       for (const std::size_t k : unknown) {
         const Matrix6d& H = linear_.H[k];
         R = bound(
@@ -234,6 +234,89 @@ class Update {
   bool independent_;
 };
 
+// The only unspecified edge of a path. It takes what the measurement says: the pose with which the
+// path agrees with it, and an error that follows from those of the measurement and of the other
+// edges, whatever its value was before.
+class Unspecified {
+ public:
+  Unspecified(const std::vector<ObservedEdge>& edges, std::size_t index, const Transform& Z_AB,
+              const ObserveOptions& options)
+      : edges_(edges), index_(index), Z_AB_(Z_AB), options_(options) {
+    Belief& X_PC = edges_[index].X_PC;
+    independent_ = options.independent && !X_PC.unknown;
+    X_PC.pose = agreeing();
+    X_PC.unknown.reset();
+    X_PC.own = {};
+    X_PC.unspecified = false;
+  }
+
+  Result<Observation> run(const std::string& source) {
+    const Linear linear =
+        linearize(edges_, std::vector<Twist>(edges_.size(), Twist::Zero()), Z_AB_);
+    const JointPrior others(edges_);
+    Covariance S = Z_AB_.covariance.of_specified();
+    const auto add = [&](const Covariance& more) { S = independent_ ? S + more : bound(S, more); };
+    for (std::size_t k = 0; k < edges_.size(); ++k) {
+      if (edges_[k].way == ObservedEdge::Way::kBeside || !edges_[k].X_PC.unknown) continue;
+      independent_ = false;
+      add(seen(linear.H[k], edges_[k].X_PC.unknown->matrix()));
+    }
+    if (!others.edges().empty()) add(Covariance::trusted(others.moments(linear.H).of_path));
+    const Matrix6d from_path = linear.H[index_].inverse();
+    if (independent_ && !others.edges().empty()) {
+      edges_[index_].X_PC.own = seen(kWide * from_path, S.matrix());
+      auto found = Update(edges_, Z_AB_, source, options_).run();
+      if (found) compared_with_nothing(*found);
+      return found;
+    }
+    Observation found;
+    compared_with_nothing(found);
+    for (const ObservedEdge& edge : edges_) found.edges.push_back({edge.X_PC, false, {}});
+    ObservedResult& result = found.edges[index_];
+    result.corrected = true;
+    (independent_ ? result.X_PC.own : result.X_PC.unknown.emplace()) = seen(from_path, S.matrix());
+    return found;
+  }
+
+ private:
+  // The standard deviations of the error before the measurement, by those after it: so wide that it
+  // hardly matters (a millionth of the variance), and narrow enough for the correlation between the
+  // edges to be exact.
+  static constexpr double kWide = 1e3;
+
+  static Covariance seen(const Matrix6d& H, const Matrix6d& sigma) {
+    return Covariance::trusted(nearest_semidefinite(H * sigma * H.transpose()));
+  }
+
+  // The edge's pose with which the path is Z_AB.
+  [[nodiscard]] Pose agreeing() const {
+    Pose before;
+    Pose after;
+    for (std::size_t k = 0; k < edges_.size(); ++k) {
+      if (k == index_ || edges_[k].way == ObservedEdge::Way::kBeside) continue;
+      const Pose& X_PC = edges_[k].X_PC.pose;
+      Pose& side = k < index_ ? before : after;
+      side = side * (edges_[k].way == ObservedEdge::Way::kUp ? X_PC.inverse() : X_PC);
+    }
+    const Pose along = before.inverse() * Z_AB_.pose * after.inverse();
+    return edges_[index_].way == ObservedEdge::Way::kUp ? along.inverse() : along;
+  }
+
+  static void compared_with_nothing(Observation& found) {
+    found.distance_squared = 0;
+    found.dimensions = 0;
+    found.limit = std::numeric_limits<double>::infinity();
+    found.accepted = true;
+    for (ObservedResult& result : found.edges) result.innovation = {};
+  }
+
+  std::vector<ObservedEdge> edges_;
+  std::size_t index_;
+  const Transform& Z_AB_;
+  const ObserveOptions& options_;
+  bool independent_ = true;
+};
+
 }  // namespace
 
 Result<Observation> observe(const std::vector<ObservedEdge>& edges, const Transform& Z_AB,
@@ -242,7 +325,22 @@ Result<Observation> observe(const std::vector<ObservedEdge>& edges, const Transf
     return fail(Errc::kInvalidInput,
                 "gate must be above 0 and no more than 1, not " + std::to_string(options.gate));
   }
-  return Update(edges, Z_AB, source, options).run();
+  if (!Z_AB.covariance.complete()) {
+    return fail(Errc::kInvalidInput,
+                "the covariance of the measurement is unspecified: it cannot be weighed");
+  }
+  std::vector<std::size_t> unspecified;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    const bool on_path = edges[k].way != ObservedEdge::Way::kBeside;
+    if (on_path && edges[k].X_PC.unspecified) unspecified.push_back(k);
+  }
+  if (unspecified.empty()) return Update(edges, Z_AB, source, options).run();
+  if (unspecified.size() == 1) {
+    return Unspecified(edges, unspecified.front(), Z_AB, options).run(source);
+  }
+  return fail(Errc::kInvalidInput, "the covariance of " + std::to_string(unspecified.size()) +
+                                       " edges of the path is unspecified: it is undetermined "
+                                       "which of them to correct");
 }
 
 }  // namespace tfdude

@@ -1,5 +1,6 @@
 #include "math/path_accumulation.hpp"
 
+#include <cstddef>
 #include <type_traits>
 
 #include "tfdude/math/interpolate.hpp"
@@ -11,7 +12,8 @@ namespace tfdude {
 
 // The layout in which the kernel reads an edge: quaternion, translation, upper triangle.
 static_assert(std::is_standard_layout_v<Pose> && sizeof(Pose) == 7 * sizeof(double));
-static_assert(std::is_standard_layout_v<Transform> && sizeof(Transform) == 28 * sizeof(double));
+static_assert(std::is_standard_layout_v<Transform> && sizeof(Transform) == 29 * sizeof(double));
+static_assert(offsetof(Transform, covariance) == 7 * sizeof(double));
 
 template <class Value>
 void PathAccumulation<Value>::up_between(const Value& X0, const Value& X1, double s) {
@@ -33,12 +35,22 @@ void PathAccumulation<Value>::blend() {
   }
   for (std::size_t i = 0; i < blend_count_; ++i) {
     const kernel::Blend& one = blends_[i];
-    if (one.near) continue;
     // NOLINTBEGIN(cppcoreguidelines-pro-type-reinterpret-cast): what they were before
-    interpolate_far(*reinterpret_cast<const Value*>(one.X0),
-                    *reinterpret_cast<const Value*>(one.X1), one.s,
-                    *reinterpret_cast<Value*>(one.X));
+    const auto& X0 = *reinterpret_cast<const Value*>(one.X0);
+    const auto& X1 = *reinterpret_cast<const Value*>(one.X1);
+    auto& X = *reinterpret_cast<Value*>(one.X);
     // NOLINTEND(cppcoreguidelines-pro-type-reinterpret-cast)
+    if constexpr (std::is_same_v<Value, Transform>) {
+      const bool complete = X0.covariance.complete();
+      if (complete != X1.covariance.complete()) {
+        interpolate(X0, X1, one.s, X);
+        continue;
+      }
+      if (!one.near) interpolate_far(X0, X1, one.s, X);
+      X.covariance.set_complete(complete);
+    } else {
+      if (!one.near) interpolate_far(X0, X1, one.s, X);
+    }
   }
   blend_count_ = 0;
 }
@@ -48,6 +60,10 @@ void PathAccumulation<Value>::compute() {
   if (blend_count_ > 0) blend();
   if constexpr (std::is_same_v<Value, Transform>) {
     kernel::functions().accumulate_with_covariance(X_SH_, left_, pending_.data(), count_);
+    for (std::size_t i = 0; i < count_; ++i) {
+      // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): what it was before
+      complete_ &= reinterpret_cast<const Value*>(pending_[i])->covariance.complete();
+    }
   } else {
     kernel::functions().accumulate(X_SH_, pending_.data(), count_);
   }
@@ -69,7 +85,8 @@ Value join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b) {
   if constexpr (std::is_same_v<Value, Transform>) {
     const kernel::Columns X_BA = compute.quotient(from_b.X_SH_, from_a.X_SH_);
     compute.add_transported(X_BA, kernel::upper_of(from_a.left_).data(), from_b.left_);
-    return {X_AB, Covariance::trusted(kernel::upper_of(from_b.left_))};
+    return {X_AB, StatedCovariance::trusted(kernel::upper_of(from_b.left_),
+                                            from_a.complete_ && from_b.complete_)};
   } else {
     return X_AB;
   }
@@ -78,7 +95,8 @@ Value join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b) {
 void PathAccumulation<Belief>::up(const Transform& X_PC) {
   Belief edge;
   edge.pose = X_PC.pose;
-  (unknown_ ? edge.unknown.emplace() : edge.own) = X_PC.covariance;
+  (unknown_ ? edge.unknown.emplace() : edge.own) = X_PC.covariance.of_specified();
+  edge.unspecified = !X_PC.covariance.complete();
   if (common_errors_ != nullptr) edge.common_errors = *common_errors_;
   X_HS_ = compose(edge, X_HS_, order_);
 }

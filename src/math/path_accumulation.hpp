@@ -56,6 +56,7 @@ class PathAccumulation {
   };
   std::size_t count_ = 0;
   std::size_t blend_count_ = 0;
+  bool complete_ = true;  // the covariances of the edges
 };
 
 template <class Value>

@@ -10,17 +10,17 @@ Pose turning(const Eigen::Quaterniond& rotation) {
 
 }  // namespace
 
-Covariance left_covariance(const Transform& X) { return X.covariance.transported(X.pose); }
+StatedCovariance left_covariance(const Transform& X) { return X.covariance.transported(X.pose); }
 
-Transform from_left_covariance(const Pose& X, const Covariance& left) {
+Transform from_left_covariance(const Pose& X, const StatedCovariance& left) {
   return {X, left.transported(X.inverse())};
 }
 
-Covariance ros_covariance(const Transform& X) {
+StatedCovariance ros_covariance(const Transform& X) {
   return X.covariance.transported(turning(X.pose.rotation()));
 }
 
-Transform from_ros_covariance(const Pose& X, const Covariance& ros) {
+Transform from_ros_covariance(const Pose& X, const StatedCovariance& ros) {
   return {X, ros.transported(turning(X.rotation().conjugate()))};
 }
 

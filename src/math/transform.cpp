@@ -7,7 +7,7 @@ Result<void> check_finite(const Transform& X) {
   if (is_finite(X)) return {};
   const auto pose = Pose::create(X.pose.rotation(), X.pose.translation());
   if (!pose) return tl::unexpected(pose.error());
-  const auto covariance = Covariance::from_upper(X.covariance.upper());
+  const auto covariance = Covariance::from_upper(X.covariance.of_specified().upper());
   if (!covariance) return tl::unexpected(covariance.error());
   return {};
 }

@@ -23,24 +23,35 @@ Result<Eigen::Quaterniond> rotation_of(const TransformSpec& spec) {
   return from_rpy((*spec.rpy)[0], (*spec.rpy)[1], (*spec.rpy)[2]);
 }
 
-Result<Covariance> covariance_of(const TransformSpec& spec) {
-  if (spec.stddev && spec.cov) {
-    return fail(Errc::kInvalidInput, "stddev and cov are both given, one is enough");
-  }
-  if (spec.stddev) return Covariance::from_stddev(*spec.stddev);
-  if (spec.cov) return Covariance::from_upper(*spec.cov);
-  return Covariance();
+Result<StatedCovariance> covariance_of(const TransformSpec& spec,
+                                       const StatedCovariance& otherwise) {
+  const auto both = [](const char* fields) {
+    return fail(Errc::kInvalidInput, std::string(fields) + " are both given, one is enough");
+  };
+  if (spec.stddev && spec.cov) return both("stddev and cov");
+  if (spec.stddev && spec.covariance) return both("stddev and covariance");
+  if (spec.cov && spec.covariance) return both("cov and covariance");
+  const auto stated = [](const Covariance& sigma) { return StatedCovariance(sigma); };
+  if (spec.stddev) return Covariance::from_stddev(*spec.stddev).map(stated);
+  if (spec.cov) return Covariance::from_upper(*spec.cov).map(stated);
+  return spec.covariance ? covariance_named(*spec.covariance) : otherwise;
 }
 
 }  // namespace
 
-Result<Transform> TransformSpec::build() const {
+Result<StatedCovariance> covariance_named(std::string_view word) {
+  if (word == "unspecified") return StatedCovariance::unspecified();
+  if (word == "exact") return StatedCovariance();
+  return fail(Errc::kInvalidInput, "covariance must be unspecified or exact");
+}
+
+Result<Transform> TransformSpec::build(const StatedCovariance& otherwise) const {
   const auto rotation = rotation_of(*this);
   if (!rotation) return tl::unexpected(rotation.error());
   const auto t = xyz.value_or(std::array<double, 3>{});
   const auto pose = Pose::create(*rotation, {t[0], t[1], t[2]});
   if (!pose) return tl::unexpected(pose.error());
-  const auto covariance = covariance_of(*this);
+  const auto covariance = covariance_of(*this, otherwise);
   if (!covariance) return tl::unexpected(covariance.error());
   return Transform{*pose, *covariance};
 }

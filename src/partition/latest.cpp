@@ -35,6 +35,7 @@ bool take_hint(std::vector<SegmentValues>& answers, Time hint) {
     if (!answer.stamp || *answer.stamp == hint) continue;
     answer.values = std::move(answer.at_hint);
     answer.correlations = std::move(answer.correlations_at_hint);
+    answer.unspecified = std::move(answer.unspecified_at_hint);
     answer.stamp = hint;
   }
   return true;

@@ -171,6 +171,7 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
       const Belief& X = result.X_PC;
       edge.revision =
           Revision{edge.id, {X.pose, X.unknown ? *X.unknown : X.own}, correlation_of(X, together)};
+      edge.revision->X_PC.covariance.set_complete(!X.unspecified);
     }
     std::get<ReviseRequest>(parts[part].request.body).edges.push_back(std::move(edge));
   }

@@ -20,7 +20,7 @@ constexpr double kSameRotation = 1e-14;
 bool same_edge(const FrameSpec& a, const FrameSpec& b) {
   const Transform X = value_of(a);
   const Transform Y = value_of(b);
-  return a.parent == b.parent && X.covariance.upper() == Y.covariance.upper() &&
+  return a.parent == b.parent && X.covariance == Y.covariance &&
          X.pose.translation() == Y.pose.translation() &&
          X.pose.rotation().coeffs().isApprox(Y.pose.rotation().coeffs(), kSameRotation);
 }

@@ -341,6 +341,17 @@ StampedTransform composed(const LookupPlan& plan, const std::vector<SegmentValue
   return X_AB;
 }
 
+std::vector<std::string> unspecified_edges(const LookupPlan& plan,
+                                           const std::vector<SegmentValues>& answers) {
+  std::vector<std::string> ids;
+  each_segment(plan, [&](std::size_t i, std::size_t k) {
+    for (const UnspecifiedEdge& edge : answers[i].unspecified) {
+      if (edge.segment == k) ids.push_back(edge.id);
+    }
+  });
+  return ids;
+}
+
 }  // namespace
 
 Result<StampedTransform> assemble(const LookupPlan& plan,
@@ -356,7 +367,9 @@ Result<StampedTransform> assemble(const LookupPlan& plan,
                                      std::to_string(answers[i].values.size()) + " transforms for " +
                                      std::to_string(asked.size()) + " segments");
   }
-  return composed(plan, answers);
+  StampedTransform X_AB = composed(plan, answers);
+  if (!X_AB.covariance.complete()) X_AB.basis.unspecified = unspecified_edges(plan, answers);
+  return X_AB;
 }
 
 }  // namespace tfdude

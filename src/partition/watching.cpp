@@ -32,20 +32,25 @@ void set_correlation(PushedValue& entry, const PathCorrelation& correlation) {
   entry.correlation.common_errors = correlation.common_errors;
   if (!correlation.unknown) return;
   entry.correlation.unknown = true;
-  entry.X.covariance = bound(entry.X.covariance, *correlation.unknown);
+  const bool complete = entry.X.covariance.complete();
+  entry.X.covariance = bound(entry.X.covariance.of_specified(), *correlation.unknown);
+  entry.X.covariance.set_complete(complete);
 }
 
 std::vector<PushedValue> entries_of(const SegmentValues& found) {
   std::vector<PushedValue> entries;
   for (std::uint32_t i = 0; i < found.values.size(); ++i) {
     entries.push_back({i, found.stamp, found.values[i], {}, found.history, {}});
+    // As for an edge: if one edge of a segment is unspecified, the segment is.
+    StatedCovariance& covariance = entries.back().X.covariance;
+    if (!covariance.complete()) covariance = StatedCovariance::unspecified();
     if (!found.correlations.empty()) set_correlation(entries.back(), found.correlations[i]);
   }
   return entries;
 }
 
 bool same(const Transform& a, const Transform& b) {
-  return a.pose.matrix() == b.pose.matrix() && a.covariance.upper() == b.covariance.upper();
+  return a.pose.matrix() == b.pose.matrix() && a.covariance == b.covariance;
 }
 
 }  // namespace
@@ -80,16 +85,20 @@ Result<void> check_watch(const WatchRequest& request) {
 }
 
 void CovarianceNumbers::push(PushedValue& value) {
+  if (!value.X.covariance.complete()) return;
   Told& told = told_[value.index];
-  const Covariance::Upper& covariance = value.X.covariance.upper();
+  const Covariance::Upper& covariance = value.X.covariance.of_specified().upper();
   value.covariance_known = told.number != 0 && told.covariance == covariance;
   if (!value.covariance_known) told = {std::max(told.number + 1, 1U), covariance};
   value.covariance_number = told.number;
 }
 
 void CovarianceNumbers::label(PushedValue& value) const {
+  if (!value.X.covariance.complete()) return;
   const Told& told = told_[value.index];
-  if (told.covariance == value.X.covariance.upper()) value.covariance_number = told.number;
+  if (told.covariance == value.X.covariance.of_specified().upper()) {
+    value.covariance_number = told.number;
+  }
 }
 
 bool KnownCovariances::fill_in(std::vector<PushedValue>& values) {
@@ -108,7 +117,7 @@ bool KnownCovariances::fill_in(PushedValue& value) {
   if (value.covariance_number == 0 || value.index >= known_.size()) return !value.covariance_known;
   Known& known = known_[value.index];
   if (!value.covariance_known) {
-    known = {value.covariance_number, value.X.covariance};
+    known = {value.covariance_number, value.X.covariance.of_specified()};
     return true;
   }
   if (known.number != value.covariance_number) return false;

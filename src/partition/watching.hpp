@@ -15,7 +15,8 @@ namespace tfdude {
 [[nodiscard]] Result<void> check_watch(const WatchRequest& request);
 
 /// An owner's side of the numbers that stand for covariances which a group was sent before: an edge
-/// whose covariance stays the same costs a quarter of the bytes.
+/// whose covariance stays the same costs a quarter of the bytes. One that is not complete has no
+/// number.
 class CovarianceNumbers {
  public:
   explicit CovarianceNumbers(std::size_t edges) : told_(edges) {}

@@ -27,8 +27,7 @@ Result<FrameSpec> read_frame(const sqlite::Statement& row, const std::string& be
   if (!frame.parent.empty()) {
     if (auto ok = check_id(frame.parent, "parent"); !ok) return tl::unexpected(ok.error());
   }
-  const auto flat = row.flat(2);
-  auto X_PC = flat ? computed_from(*flat) : tl::unexpected(flat.error());
+  const auto X_PC = row.transform(2);
   if (!X_PC) return fail_at("frame " + quote(frame.id), X_PC.error());
   frame.X_PC = *X_PC;
   return frame;

@@ -25,7 +25,8 @@ constexpr std::array<const char*, kFormat> kSchemas{R"(
   CREATE TABLE joint_types(name TEXT PRIMARY KEY, type INTEGER NOT NULL) WITHOUT ROWID;
   CREATE TABLE absent(partition TEXT PRIMARY KEY, since INTEGER NOT NULL, kind INTEGER NOT NULL,
                       incarnation INTEGER NOT NULL) WITHOUT ROWID;
-)"};
+)",
+                                                    ""};
 
 }  // namespace
 

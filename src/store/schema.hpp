@@ -8,11 +8,12 @@ namespace tfdude {
 
 inline constexpr std::int64_t kApplication = 0x74666475;  // "tfdu"
 
-// The first formats with joints; with joint types and correlations; with absent partitions.
+// The first formats with joints; with joint types and correlations; with absent partitions. The
+// tables of format 4 are those of format 3, but a transform without covariance is unspecified.
 inline constexpr std::int64_t kJointsFormat = 2;
 inline constexpr std::int64_t kCorrelationFormat = 3;
 inline constexpr std::int64_t kAbsentFormat = 3;
-inline constexpr std::int64_t kFormat = 3;
+inline constexpr std::int64_t kFormat = 4;
 
 /// The SQL that creates the tables of a format, or only those that an older format lacks. A file
 /// whose schema has other words than these is refused, so each change of them needs a new format.

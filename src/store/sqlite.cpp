@@ -5,12 +5,17 @@
 #include <system_error>
 #include <utility>
 
+#include "math/flat.hpp"
+
 namespace tfdude::sqlite {
 namespace {
 
 // Longer than any row that is ever written: the correlation of an edge may have 128 common errors
 // of 36 columns, twice.
 constexpr int kLongestRow = 1024 * 1024;
+
+// Of a transform of unspecified covariance.
+constexpr std::size_t kPoseBytes = 7 * sizeof(double);
 
 // SQLite's message with its error code, which its documentation explains; and the system's message
 // if the system is the cause.
@@ -155,15 +160,17 @@ std::uint64_t Statement::number(int column) const {
   return static_cast<std::uint64_t>(sqlite3_column_int64(handle_.get(), column));
 }
 
-Result<Flat> Statement::flat(int column) const {
+Result<Transform> Statement::transform(int column) const {
   Flat flat{};
   const void* blob = sqlite3_column_blob(handle_.get(), column);
-  const int size = sqlite3_column_bytes(handle_.get(), column);
-  if (blob == nullptr || static_cast<std::size_t>(size) != sizeof flat) {
+  const auto size = static_cast<std::size_t>(sqlite3_column_bytes(handle_.get(), column));
+  if (blob == nullptr || (size != sizeof flat && size != kPoseBytes)) {
     return fail(Errc::kState, "a transform of " + std::to_string(size) + " bytes");
   }
-  std::memcpy(flat.data(), blob, sizeof flat);
-  return flat;
+  std::memcpy(flat.data(), blob, size);
+  auto X = computed_from(flat);
+  if (X) X->covariance.set_complete(size == sizeof flat);
+  return X;
 }
 
 void Statement::bind(int at, const std::string& text) {
@@ -177,8 +184,10 @@ void Statement::bind(int at, std::uint64_t number) {
 
 void Statement::bind(int at, double number) { sqlite3_bind_double(handle_.get(), at, number); }
 
-void Statement::bind(int at, const Flat& flat) {
-  sqlite3_bind_blob(handle_.get(), at, flat.data(), sizeof flat, SQLITE_TRANSIENT);
+void Statement::bind(int at, const Transform& X) {
+  const Flat flat = to_flat(X);
+  const std::size_t size = X.covariance.complete() ? sizeof flat : kPoseBytes;
+  sqlite3_bind_blob(handle_.get(), at, flat.data(), static_cast<int>(size), SQLITE_TRANSIENT);
 }
 
 void Statement::bind(int at, const Blob& blob) {

@@ -9,8 +9,7 @@
 #include <string_view>
 
 #include "tfdude/base/result.hpp"
-
-#include "math/flat.hpp"
+#include "tfdude/math/transform.hpp"
 
 namespace tfdude::sqlite {
 
@@ -91,14 +90,14 @@ class Statement {
   [[nodiscard]] double real(int column) const;
   /// All bytes of a text or a blob.
   [[nodiscard]] std::string bytes(int column) const { return text(column); }
-  /// @return kState if the column does not have the size of a flat transform
-  [[nodiscard]] Result<Flat> flat(int column) const;
+  /// @return kState if the column does not have the size of a transform; as computed_from()
+  [[nodiscard]] Result<Transform> transform(int column) const;
 
  private:
   void bind(int at, const std::string& text);
   void bind(int at, std::uint64_t number);
   void bind(int at, double number);
-  void bind(int at, const Flat& flat);
+  void bind(int at, const Transform& X);
   void bind(int at, const Blob& blob);
 
   struct Finalize {

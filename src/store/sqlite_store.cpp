@@ -285,8 +285,7 @@ Result<void> SqliteStore::save_frames(const StateChange& change) {
     if (done) done = erase_tombstone_.run(id);
   }
   for (const StoredFrame& frame : change.frames) {
-    if (done)
-      done = put_frame_.run(frame.id, frame.parent, to_flat(frame.X_PC), frame.lamport_time);
+    if (done) done = put_frame_.run(frame.id, frame.parent, frame.X_PC, frame.lamport_time);
     if (done) done = save_correlation(frame.id, frame.correlation);
   }
   for (const Tombstone& tombstone : change.tombstones) {
@@ -330,7 +329,7 @@ Result<void> SqliteStore::save_correlation(const std::string& id,
 Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges) {
   Result<void> done;
   for (const ChangedEdge& edge : edges) {
-    if (done) done = set_value_.run(edge.id, to_flat(edge.X_PC));
+    if (done) done = set_value_.run(edge.id, edge.X_PC);
     if (done) done = save_correlation(edge.id, edge.correlation);
   }
   return done;
@@ -339,7 +338,7 @@ Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges) {
 Result<void> SqliteStore::save_configured(const std::vector<FrameSpec>& frames) {
   Result<void> done = database_->run("DELETE FROM configured; DELETE FROM configured_ties;");
   for (const FrameSpec& frame : frames) {
-    if (done) done = put_configured_.run(frame.id, frame.parent, to_flat(value_of(frame)));
+    if (done) done = put_configured_.run(frame.id, frame.parent, value_of(frame));
     if (!done || frame.correlation.empty()) continue;
     done = put_configured_correlation_.run(frame.id, Blob{to_blob(frame.correlation)});
   }

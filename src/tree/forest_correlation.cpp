@@ -10,7 +10,8 @@
 namespace tfdude {
 
 Belief belief_of(const Transform& X, const PathCorrelation& correlation) {
-  return {X.pose, X.covariance, correlation.unknown, correlation.common_errors};
+  return {X.pose, X.covariance.of_specified(), correlation.unknown, correlation.common_errors,
+          !X.covariance.complete()};
 }
 
 StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> stamp) {
@@ -138,7 +139,7 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_
 }
 
 Transform Forest::Impl::whole(const Transform& X_PC, const Correlation& correlation) {
-  Belief observed{X_PC.pose, X_PC.covariance, std::nullopt, {}};
+  Belief observed = belief_of(X_PC, {});
   std::copy_if(correlation.common_errors.begin(), correlation.common_errors.end(),
                std::back_inserter(observed.common_errors), is_observed);
   return collapse(observed);

@@ -6,7 +6,7 @@ namespace tfdude {
 namespace {
 
 bool same(const Transform& a, const Transform& b) {
-  return a.pose.matrix() == b.pose.matrix() && a.covariance.upper() == b.covariance.upper();
+  return a.pose.matrix() == b.pose.matrix() && a.covariance == b.covariance;
 }
 
 }  // namespace

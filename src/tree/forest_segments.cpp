@@ -4,6 +4,7 @@
 
 #include "tree/epoch.hpp"
 #include "tree/forest_impl.hpp"
+#include "tree/unspecified_edges.hpp"
 
 // Lookups of segments that another participant asks for.
 namespace tfdude {
@@ -148,14 +149,22 @@ std::vector<std::int64_t> changed_instants(const std::vector<Ends>& segments,
   return instants;
 }
 
-// Correlations are reported if any segment has some.
-void tell(std::vector<Reached>&& from, std::vector<Transform>& values,
-          std::vector<PathCorrelation>& correlations) {
-  values.clear();
-  for (const auto& one : from) values.push_back(one.X);
+// What was reached on the segments, at an instant. Correlations are reported if any segment has
+// some.
+SegmentValues values_of(const std::vector<Ends>& segments, std::vector<Reached>&& from,
+                        std::int64_t t) {
+  SegmentValues found;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    found.values.push_back(from[i].X);
+    if (from[i].X.covariance.complete()) continue;
+    for (std::string& id : unspecified_edges(segments[i], t)) {
+      found.unspecified.push_back({i, std::move(id)});
+    }
+  }
   const auto none = [](const auto& one) { return one.correlation.empty(); };
-  if (std::all_of(from.begin(), from.end(), none)) return;
-  for (auto& one : from) correlations.push_back(std::move(one.correlation));
+  if (std::all_of(from.begin(), from.end(), none)) return found;
+  for (auto& one : from) found.correlations.push_back(std::move(one.correlation));
+  return found;
 }
 
 // Adds the edges that each single edge was observed with.
@@ -177,8 +186,7 @@ Result<SegmentValues> segments_at(const std::vector<Ends>& segments, std::int64_
   PathLookup::Met met;
   auto values = values_at(segments, t, query, met);
   if (!values) return tl::unexpected(std::move(values.error()));
-  SegmentValues found;
-  tell(*std::move(values), found.values, found.correlations);
+  SegmentValues found = values_of(segments, *std::move(values), t);
   if (met.moving) found.stamp = time_of(t);
   return found;
 }
@@ -187,9 +195,9 @@ Result<SegmentValues> newest_segments(const std::vector<Ends>& segments, const Q
   PathLookup::Met met;
   auto values = newest_values(segments, query.order, met);
   if (!values) return tl::unexpected(std::move(values.error()));
-  SegmentValues found;
-  tell(*std::move(values), found.values, found.correlations);
   const HeldVersion* limiting = met.limiting;
+  SegmentValues found =
+      values_of(segments, *std::move(values), limiting != nullptr ? limiting->stamp : kAlways);
   if (limiting == nullptr) return found;
   found.stamp = time_of(limiting->stamp);
   const std::int64_t before =
@@ -221,6 +229,7 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
     if (at_hint) {
       found->at_hint = std::move(at_hint->values);
       found->correlations_at_hint = std::move(at_hint->correlations);
+      found->unspecified_at_hint = std::move(at_hint->unspecified);
     }
   }
   return found;

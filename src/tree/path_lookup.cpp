@@ -11,6 +11,7 @@
 #include "base/saturating.hpp"
 #include "math/path_accumulation.hpp"
 #include "tree/epoch.hpp"
+#include "tree/unspecified_edges.hpp"
 
 namespace tfdude {
 namespace {
@@ -32,8 +33,9 @@ double seconds(std::int64_t nanoseconds) { return static_cast<double>(nanosecond
 
 void add_noise(Pose&, const HeldVersion&, double) {}
 void add_noise(Transform& X, const HeldVersion& edge, double seconds) {
+  if (!X.covariance.complete()) return;
   const Covariance::Upper& rate = edge.samples->timing().process_noise.upper();
-  Covariance::Upper sum = X.covariance.upper();
+  Covariance::Upper sum = X.covariance.of_specified().upper();
   for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += seconds * rate[i];
   X.covariance = Covariance::trusted(sum);
 }
@@ -226,7 +228,9 @@ Result<Value> PathLookup::walk_at(const Ends& ends, Absent absent, std::int64_t 
 namespace {
 
 Reached reached_of(Belief&& X) {
-  return {{X.pose, X.own}, {std::move(X.unknown), std::move(X.common_errors), {}}};
+  Reached reached{{X.pose, X.own}, {std::move(X.unknown), std::move(X.common_errors), {}}};
+  reached.X.covariance.set_complete(!X.unspecified);
+  return reached;
 }
 
 }  // namespace
@@ -287,8 +291,15 @@ Result<StampedTransform> PathLookup::look_up(Name a, Name b, const Query& query)
   }
   if (!X_AB) return tl::unexpected(std::move(X_AB.error()));
   if (!met.moving) at.reset();
-  if (X_AB->correlation.empty()) return StampedTransform{X_AB->X, at, {query.order, false, {}}};
-  return collapsed(belief_of(X_AB->X, X_AB->correlation), query.order, at);
+  const bool complete = X_AB->X.covariance.complete();
+  if (X_AB->correlation.empty() && complete) {
+    return StampedTransform{X_AB->X, at, {query.order, false, {}}};
+  }
+  StampedTransform answer = collapsed(belief_of(X_AB->X, X_AB->correlation), query.order, at);
+  if (!complete) {
+    answer.basis.unspecified = unspecified_edges(*found, at ? nanoseconds(*at) : kAlways);
+  }
+  return answer;
 }
 
 // For a frame's id, and for its handle.

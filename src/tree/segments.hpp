@@ -32,6 +32,12 @@ struct Segment {
   std::string to;
 };
 
+/// An edge of a segment whose covariance is unspecified.
+struct UnspecifiedEdge {
+  std::size_t segment = 0;
+  std::string id;
+};
+
 /// The values of one owner's part of a path: all from one commit and for one instant.
 struct SegmentValues {
   std::vector<Transform> values;  ///< one per segment
@@ -44,6 +50,9 @@ struct SegmentValues {
   /// correlated.
   std::vector<PathCorrelation> correlations{};
   std::vector<PathCorrelation> correlations_at_hint{};
+  /// Of the segments whose covariance is not complete, in the order of the path.
+  std::vector<UnspecifiedEdge> unspecified{};
+  std::vector<UnspecifiedEdge> unspecified_at_hint{};
   std::uint64_t commit = 0;       ///< the commit of the values; see revise()
   std::uint64_t history = 0;      ///< the newest history of their edges; see PushedValue
   std::uint64_t incarnation = 0;  ///< of the owner that counts the commits; see Partition

@@ -96,7 +96,8 @@ double difference(Client& client, const ObservedChain& chain, const Eigen::Matri
       const Matrix6d expected = of_path(chain, P, from, to);
       const auto X = client.lookup(frame(from), frame(to));
       if (!X) return std::numeric_limits<double>::infinity();
-      worst = std::max(worst, (X->covariance.matrix() - expected).norm() / expected.norm());
+      worst = std::max(worst,
+                       (X->covariance.of_specified().matrix() - expected).norm() / expected.norm());
     }
   }
   return worst;

@@ -57,7 +57,7 @@ struct Robot {
 };
 
 Belief with(const Transform& X, std::vector<CommonError> common_errors = {}) {
-  return {X.pose, X.covariance, std::nullopt, std::move(common_errors)};
+  return {X.pose, X.covariance.of_specified(), std::nullopt, std::move(common_errors)};
 }
 
 CommonError common_error(Random& random, const std::string& source) {
@@ -119,8 +119,8 @@ TEST_CASE("uncertainty: opposite errors of one source cancel exactly over two ow
   const auto to_base = robot.client->lookup("world", "base");
   REQUIRE(to_arm);
   REQUIRE(to_base);
-  CHECK(to_base->covariance.stddev()[5] == testing::Approx(0.05));
-  CHECK(to_arm->covariance.matrix().cwiseAbs().maxCoeff() < 1e-30);
+  CHECK(to_base->covariance.of_specified().stddev()[5] == testing::Approx(0.05));
+  CHECK(to_arm->covariance.of_specified().matrix().cwiseAbs().maxCoeff() < 1e-30);
 }
 
 TEST_CASE("uncertainty: unknown correlation over owners gives a bound and is reported") {
@@ -136,12 +136,13 @@ TEST_CASE("uncertainty: unknown correlation over owners gives a bound and is rep
   // The worst case: both errors are the same one, in the tool.
   const Pose X_tool_base =
       (robot.X_base_arm.pose * robot.X_arm_hand.pose * robot.X_hand_tool.pose).inverse();
-  const Matrix6d of_base = robot.X_world_base.covariance.transported(X_tool_base).matrix();
-  const Matrix6d of_tool = robot.X_hand_tool.covariance.matrix();
+  const Matrix6d of_base =
+      robot.X_world_base.covariance.transported(X_tool_base).of_specified().matrix();
+  const Matrix6d of_tool = robot.X_hand_tool.covariance.of_specified().matrix();
   const Matrix6d root_base = cholesky_root(of_base);
   const Matrix6d root_tool = cholesky_root(of_tool);
   const Matrix6d sum = root_base + root_tool;
-  CHECK(testing::domination(X->covariance.matrix(), sum * sum.transpose()) > 0);
+  CHECK(testing::domination(X->covariance.of_specified().matrix(), sum * sum.transpose()) > 0);
   const auto independent = robot.client->lookup("base", "hand", Query{});
   REQUIRE(independent);
   CHECK_FALSE(independent->basis.bound);
@@ -164,9 +165,9 @@ TEST_CASE("uncertainty: all owners use the order of the lookup") {
                                                 with(robot.X_arm_hand), with(robot.X_hand_tool)},
                                                Order::kFourth));
   // Owners compose their segments first, which differs in sixth order.
-  const Matrix6d exact = expected.covariance.matrix();
-  const double of_fourth = (fourth->covariance.matrix() - exact).norm();
-  const double of_second = (second->covariance.matrix() - exact).norm();
+  const Matrix6d exact = expected.covariance.of_specified().matrix();
+  const double of_fourth = (fourth->covariance.of_specified().matrix() - exact).norm();
+  const double of_second = (second->covariance.of_specified().matrix() - exact).norm();
   INFO("differ by " << of_fourth << " and " << of_second << " of " << exact.norm());
   CHECK(of_fourth < 0.2 * of_second);
 }
@@ -227,7 +228,8 @@ TEST_CASE("uncertainty: a measurement of a path over owners gives the fused cova
   CHECK(covariance_diff(twice->covariance, thrice_fused->X.covariance, 0.02) == "");
   const auto edge = robot.client->lookup("base", "arm");
   REQUIRE(edge);
-  CHECK(testing::domination(robot.X_base_arm.covariance.matrix(), edge->covariance.matrix()) > 0);
+  CHECK(testing::domination(robot.X_base_arm.covariance.of_specified().matrix(),
+                            edge->covariance.of_specified().matrix()) > 0);
   // A new value is not correlated with it.
   REQUIRE(robot.client->update("arm", robot.X_base_arm));
   const auto fresh = robot.client->lookup("base", "arm", Query{});
@@ -345,7 +347,7 @@ TEST_CASE("uncertainty: dynamic edges are corrected by a sample with the measure
     REQUIRE(then);
     // The path agrees with the measurement, within the measurement's covariance.
     const Twist e = log(then->pose.inverse() * Z.pose);
-    CHECK(squared_distance(e, Z.covariance.matrix()) < 25.0);
+    CHECK(squared_distance(e, Z.covariance.of_specified().matrix()) < 25.0);
     REQUIRE(robot.client->update({{"base", robot.X_world_base}, {"hand", robot.X_arm_hand}}));
   }
   const auto late = robot.client->observe("world", "tool", Z, at(30));
@@ -378,7 +380,7 @@ TEST_CASE("uncertainty: covariances stay consistent over 100 robots with two obs
     const auto X = robot.client->lookup("world", "tool");
     REQUIRE(X);
     const Twist e = log(X->pose.inverse() * tool);
-    sum += e.dot(pseudo_inverse(X->covariance.matrix()) * e);
+    sum += e.dot(pseudo_inverse(X->covariance.of_specified().matrix()) * e);
   }
   INFO("mean " << sum / kRuns);
   CHECK(sum > chi_squared_quantile(0.005, 6 * kRuns));

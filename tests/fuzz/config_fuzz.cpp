@@ -33,7 +33,7 @@ void demand_served(const Config& config) {
     demand(ids.insert(frame.id).second, "an id is given once");
     const auto info = replica.forest.info(frame.id);
     demand(info && info->parent == frame.parent, "a frame hangs where it was to");
-    demand(frame.X_PC.covariance.matrix().allFinite(), "a covariance is finite");
+    demand(frame.X_PC.covariance.of_specified().matrix().allFinite(), "a covariance is finite");
   }
   demand(replica.forest.frames().size() == ids.size(), "all frames are there");
 }

@@ -94,7 +94,7 @@ inline void demand_same(const fastdds::Numbers& a, const fastdds::Numbers& b, To
     demand(near(a[i], b[i], tolerance.rotation), "a rotation stays what it is");
   }
   demand(std::equal(a.begin() + 4, a.begin() + 7, b.begin() + 4), "a translation stays what it is");
-  if (underflows(a)) return;
+  if (a.size() == kSigma || underflows(a)) return;  // unspecified
   const auto judged = judged_stddev(a);
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = i; j < 6; ++j) {

@@ -24,7 +24,7 @@ int main() {
   const auto X_BT = client->lookup("base", "tip");
   if (!X_BT) return EXIT_FAILURE;
   const double x = X_BT->pose.translation().x();
-  const double variance = X_BT->covariance.upper()[0];
+  const double variance = X_BT->covariance.of_specified().upper()[0];
   std::printf("x = %g m, variance = %g m2\n", x, variance);
   const bool right = x == 2.0 && variance > 0.1799 && variance < 0.1801;
   // Over DDS the same calls are made; joining a domain that does not exist is enough to link it.

@@ -107,7 +107,8 @@ std::string snapshot(Client& client) {
     REQUIRE(X_PC);
     const Eigen::IOFormat exact(17);
     std::ostringstream value;
-    value << X_PC->pose.matrix().format(exact) << X_PC->covariance.matrix().format(exact);
+    value << X_PC->pose.matrix().format(exact)
+          << X_PC->covariance.of_specified().matrix().format(exact);
     all += value.str();
   }
   return all;

@@ -95,13 +95,14 @@ TEST_CASE("the oracle propagates an uncertain heading over a lever") {
   oracle.add("world", "", {});
   oracle.add("turret", "world", {Pose(), *Covariance::from_stddev({0, 0, 0, 0, 0, 0.1})});
   oracle.add("muzzle", "turret", {Pose::trusted({1, 0, 0, 0}, {2, 0, 0}), {}});
-  const Matrix6d sigma = oracle.between("world", "muzzle").covariance.matrix();
+  const Matrix6d sigma = oracle.between("world", "muzzle").covariance.of_specified().matrix();
   CHECK(sigma(1, 1) == testing::Approx(0.04));  // 2 m times 0.1 rad, sideways
   CHECK(sigma(1, 5) == testing::Approx(0.02));
   CHECK(sigma(5, 5) == testing::Approx(0.01));
   CHECK(sigma(0, 0) == testing::Approx(0.0));
   // Seen from the muzzle, the turret's own place is sure but for the heading.
-  CHECK(oracle.between("muzzle", "world").covariance.matrix()(5, 5) == testing::Approx(0.01));
+  CHECK(oracle.between("muzzle", "world").covariance.of_specified().matrix()(5, 5) ==
+        testing::Approx(0.01));
   CHECK(oracle.between("muzzle", "world").pose.translation().x() == testing::Approx(-2.0));
 }
 

@@ -114,6 +114,31 @@ TEST_CASE("uncertainty: a measurement corrects or is rejected by the gate and is
   CHECK_THAT(robot.run({"monitor", "--once"}).out, ContainsSubstring("too small"));
 }
 
+TEST_CASE("uncertainty: an unspecified edge is named until a measurement determines it") {
+  const Robot robot;
+  const Arguments lookup = {"lookup", "world", "wrist"};
+  CHECK(robot.run({"add", "wrist", "--parent", "arm", "--covariance", "unspecified"}).status == 0);
+  CHECK_THAT(robot.run(lookup).out, ContainsSubstring("std dev      unspecified for wrist\n"));
+  const json before = robot.answered(lookup);
+  CHECK(before.at("covariance").is_null());
+  CHECK(before.at("covariance_of_specified").size() == 6);
+  CHECK(before.at("basis").at("unspecified") == json({"wrist"}));
+  const json observed =
+      robot.answered(with({"observe", "world", "wrist", "--xyz", "5", "6", "7"}, kSure));
+  CHECK(observed.at("accepted").get<bool>());
+  CHECK(observed.at("dimensions") == 0);
+  const json after = robot.answered(lookup);
+  CHECK(after.at("basis").at("unspecified") == json::array());
+  CHECK(after.at("translation").at(2).get<double>() == testing::Approx(7));
+  CHECK(stddev(after, 2) == testing::Approx(0.001).epsilon(0.01));
+  CHECK(robot.run({"update", "wrist", "--covariance", "unspecified"}).status == 0);
+  CHECK(robot.answered(lookup).at("covariance").is_null());
+  CHECK(robot.answered(lookup).at("translation").at(2).get<double>() == testing::Approx(7));
+  CHECK(robot.run({"update", "wrist", "--covariance", "exact"}).status == 0);
+  CHECK_FALSE(robot.answered(lookup).at("covariance").is_null());
+  CHECK(robot.run({"update", "wrist", "--covariance", "none"}).status == 2);
+}
+
 TEST_CASE("uncertainty: invalid measurements are rejected") {
   const Robot robot;
   const CliResult exact = robot.run({"observe", "world", "arm", "--xyz", "1", "1", "0"});

@@ -66,7 +66,7 @@ TEST_CASE("versions: a daemon of a later major version is listed but not used") 
   REQUIRE_FALSE(looked_up);
   CHECK(looked_up.error().code == Errc::kIncompatible);
   CAPTURE(looked_up.error().message);
-  for (const char* part : {"'hand'", "'arm'", "9.8.7", "2.0", "1.0"}) {
+  for (const char* part : {"'hand'", "'arm'", "9.8.7", "2.0", "1.1"}) {
     CHECK(looked_up.error().message.find(part) != std::string::npos);
   }
   // The others go on.
@@ -117,7 +117,7 @@ TEST_CASE("versions: a request that only a later minor version knows is rejected
   CHECK(reply.sequence == 77);
   REQUIRE(std::holds_alternative<Error>(reply.body));
   CHECK(std::get<Error>(reply.body).code == Errc::kUnsupported);
-  CHECK(std::get<Error>(reply.body).message == "this kind of request is not known to protocol 1.0");
+  CHECK(std::get<Error>(reply.body).message == "this kind of request is not known to protocol 1.1");
 }
 
 TEST_CASE("versions: a daemon of a later minor version is accepted") {

@@ -19,7 +19,8 @@ class ObservedChain {
   ObservedChain(Random& random, std::size_t edges) {
     for (std::size_t i = 0; i < edges; ++i) {
       const Transform X = random.transform(1.0, 0.003, 0.003);
-      edges_.push_back({{X.pose, X.covariance, std::nullopt, {}}, ObservedEdge::Way::kDown});
+      edges_.push_back(
+          {{X.pose, X.covariance.of_specified(), std::nullopt, {}}, ObservedEdge::Way::kDown});
       cluster_.push_back(i);
       truth_.push_back(X.pose);
     }
@@ -102,7 +103,7 @@ class ObservedChain {
   /// The covariance if edges were independent.
   void forget_common_errors() {
     for (ObservedEdge& edge : edges_) {
-      edge.X_PC.own = collapse(edge.X_PC).covariance;
+      edge.X_PC.own = collapse(edge.X_PC).covariance.of_specified();
       edge.X_PC.common_errors.clear();
     }
     for (std::size_t i = 0; i < edges_.size(); ++i) cluster_[i] = i;

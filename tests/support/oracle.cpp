@@ -28,7 +28,7 @@ Oracle::Value Oracle::value_of(const Transform& X) {
   Value value;
   value.X.topLeftCorner<3, 3>() = X.pose.rotation().toRotationMatrix();
   value.X.topRightCorner<3, 1>() = X.pose.translation();
-  const Covariance::Upper& upper = X.covariance.upper();
+  const Covariance::Upper& upper = X.covariance.of_specified().upper();
   std::size_t next = 0;
   for (int row = 0; row < 6; ++row) {
     for (int column = row; column < 6; ++column) {

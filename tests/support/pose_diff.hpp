@@ -51,10 +51,11 @@ namespace tfdude::testing {
 /// Empty if no element differs by more than `tol` relative to the largest variances of its rows:
 /// metres are judged by metres and radians by radians, whatever the axes. A NaN is always a
 /// difference.
-[[nodiscard]] inline std::string covariance_diff(const Covariance& actual,
-                                                 const Covariance& expected, double tol) {
-  const Matrix6d a = actual.matrix();
-  const Matrix6d e = expected.matrix();
+[[nodiscard]] inline std::string covariance_diff(const StatedCovariance& actual,
+                                                 const StatedCovariance& expected, double tol) {
+  if (actual.complete() != expected.complete()) return "only one of the covariances is complete";
+  const Matrix6d a = actual.of_specified().matrix();
+  const Matrix6d e = expected.of_specified().matrix();
   const double metres = std::sqrt(e.diagonal().head<3>().maxCoeff());
   const double radians = std::sqrt(e.diagonal().tail<3>().maxCoeff());
   for (int i = 0; i < 6; ++i) {
@@ -65,8 +66,8 @@ namespace tfdude::testing {
       std::ostringstream out;
       out << "covariances differ in [" << i << "][" << j << "] by " << difference << ", tolerance "
           << tol << " x " << scale << "\nactual\n"
-          << describe(actual) << "\nexpected\n"
-          << describe(expected);
+          << describe(actual.of_specified()) << "\nexpected\n"
+          << describe(expected.of_specified());
       return out.str();
     }
   }

@@ -33,7 +33,8 @@ struct LeftGaussian {
   Covariance covariance;
 
   [[nodiscard]] Belief belief() const {
-    return {mean, from_left_covariance(mean, covariance).covariance, std::nullopt, {}};
+    return {
+        mean, from_left_covariance(mean, covariance).covariance.of_specified(), std::nullopt, {}};
   }
 };
 
@@ -81,6 +82,7 @@ struct TwoPoses {
 /// The covariance of the left perturbation of the product of both poses, with independent errors.
 [[nodiscard]] inline Matrix6d composed(const TwoPoses& poses, Order order) {
   return left_covariance(collapse(compose(poses.first.belief(), poses.second.belief(), order)))
+      .of_specified()
       .matrix();
 }
 
@@ -133,7 +135,8 @@ inline constexpr double kChainYaw = 0.03;  // rad, standard deviation of a step
 /// (Log(X̄⁻¹ X))ᵀ Σ⁻¹ Log(X̄⁻¹ X): the squared distance of a pose from an estimate, in units of the
 /// estimate's standard deviations.
 [[nodiscard]] inline double squared_distance(const Transform& estimate, const Pose& X) {
-  return squared_distance(Twist(log(estimate.pose.inverse() * X)), estimate.covariance.matrix());
+  return squared_distance(Twist(log(estimate.pose.inverse() * X)),
+                          estimate.covariance.of_specified().matrix());
 }
 
 // ---- Correlated errors, after the idea of Mangelson et al. 2020; the parameters are ours
@@ -176,7 +179,7 @@ struct Trajectory {
   }
   [[nodiscard]] Belief B() const {
     return {X_WA.pose * X_AB.pose,
-            X_AB.covariance,
+            X_AB.covariance.of_specified(),
             std::nullopt,
             {{"up to A", false, Loading(seen_from_B() * root_A)}}};
   }
@@ -190,7 +193,7 @@ struct Trajectory {
   Trajectory t;
   for (int k = 0; k < steps; ++k) t.X_WA = k == 0 ? step : compose(t.X_WA, step);
   for (int k = 0; k < 10; ++k) t.X_AB = k == 0 ? step : compose(t.X_AB, step);
-  t.root_A = cholesky_root(t.X_WA.covariance.matrix());
+  t.root_A = cholesky_root(t.X_WA.covariance.of_specified().matrix());
   return t;
 }
 

@@ -14,7 +14,7 @@ namespace tfdude::testing {
 // Unit quaternions are normalized again on arrival; everything else is exact.
 inline void check_same(const Transform& actual, const Transform& expected) {
   CHECK(pose_diff(actual.pose, expected.pose, 1e-15) == "");
-  CHECK(actual.covariance.upper() == expected.covariance.upper());
+  CHECK(actual.covariance == expected.covariance);
 }
 
 inline void check_same(const std::vector<EdgeUpdate>& actual,
@@ -70,6 +70,15 @@ inline void check_same(const std::vector<PathCorrelation>& actual,
   }
 }
 
+inline void check_same(const std::vector<UnspecifiedEdge>& actual,
+                       const std::vector<UnspecifiedEdge>& expected) {
+  REQUIRE(actual.size() == expected.size());
+  for (std::size_t i = 0; i < actual.size(); ++i) {
+    CHECK(actual[i].segment == expected[i].segment);
+    CHECK(actual[i].id == expected[i].id);
+  }
+}
+
 // All fields in one text.
 inline std::string listed(const JointUpdate& update) {
   std::ostringstream text;
@@ -121,7 +130,7 @@ inline void check_same(const PartialTransform& actual, const PartialTransform& e
   REQUIRE(actual.rotation.has_value() == expected.rotation.has_value());
   if (actual.rotation) CHECK(actual.rotation->isApprox(*expected.rotation, 1e-15));
   REQUIRE(actual.covariance.has_value() == expected.covariance.has_value());
-  if (actual.covariance) CHECK(actual.covariance->upper() == expected.covariance->upper());
+  if (actual.covariance) CHECK(*actual.covariance == *expected.covariance);
 }
 
 inline void check_same(const PartialUpdateRequest& actual, const PartialUpdateRequest& expected) {

@@ -95,6 +95,10 @@ bool take(const Bytes& bytes) {
           time_of(INT64_MAX)};
 }
 
+[[nodiscard]] inline Transform unspecified(Random& random) {
+  return {random.pose(), StatedCovariance::unspecified()};
+}
+
 [[nodiscard]] inline std::vector<Request> requests(Random& random) {
   const auto edge = [&](const std::string& id) { return EdgeUpdate{id, random.transform()}; };
   return {
@@ -136,6 +140,12 @@ bool take(const Bytes& bytes) {
       {31, "base", FramesRequest{{"hand", std::string(255, 'i')}}},
       {32, "base",
        FramesRequest{{}, {"arm", "left_*"}, {{"arms", 18446744073709551615ULL}, {"legs", 1}}}},
+      {40, "hand", AddRequest{"arm", unspecified(random), 1}},
+      {41, "hand",
+       UpdateRequest{{{"hand", unspecified(random)}, {"arm", unspecified(random)}}, time_of(1)}},
+      {42, "hand", MoveRequest{"arm", unspecified(random), 1}},
+      {43, "hand",
+       PartialUpdateRequest{{{"hand", {{}, {}, StatedCovariance::unspecified()}}}, time_of(1)}},
       {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), {}},
        18446744073709551610ULL}};
 }
@@ -151,6 +161,21 @@ bool take(const Bytes& bytes) {
   found.correlations_at_hint = {{random.covariance(), {}, {}}, {}};
   found.commit = 77;
   found.incarnation = 78;
+  return found;
+}
+
+[[nodiscard]] inline SegmentValues incomplete_values(Random& random, bool correlated) {
+  SegmentValues found;
+  if (correlated) {
+    found = correlated_values(random);
+  } else {
+    found.values = {random.transform(), random.transform()};
+    found.at_hint = {random.transform(), random.transform()};
+  }
+  found.unspecified = {{1, "hand"}, {1, std::string(255, 'u')}};
+  found.values[1].covariance.set_complete(false);
+  found.unspecified_at_hint = {{0, "arm"}, {1, "hand"}};
+  for (Transform& X : found.at_hint) X.covariance.set_complete(false);
   return found;
 }
 
@@ -213,7 +238,9 @@ bool take(const Bytes& bytes) {
       {13, 1, joint_infos()},
       {14, 1,
        std::vector<KnownFrame>{{"world", "", "base"}, {"hand", "world", std::string(255, 'p')}}},
-      {10, 1, std::vector<HistoryInfo>{history_info("hand"), HistoryInfo{}}}};
+      {10, 1, std::vector<HistoryInfo>{history_info("hand"), HistoryInfo{}}},
+      {15, 1, incomplete_values(random, false)},
+      {16, 1, incomplete_values(random, true)}};
 }
 
 [[nodiscard]] inline std::vector<PushedValues> pushed_values(Random& random) {
@@ -223,13 +250,14 @@ bool take(const Bytes& bytes) {
           {2, {{0, std::nullopt, Transform()}, {1, time_of(1), random.transform()}}},
           {4,
            {{0, {}, random.transform(), {}, 18446744073709551615ULL, Covariance()},
-            {1, time_of(7), Transform(), {}, 3, random.transform().covariance},
+            {1, time_of(7), Transform(), {}, 3, random.transform().covariance.of_specified()},
             {1, time_of(8), Transform(), {}, 3, {}, 4294967295U},
             {1, time_of(9), Transform(), {}, 3, {}, 4294967295U, true}},
            5,
            18446744073709551615ULL,
            1,
-           4294967295U}};
+           4294967295U},
+          {5, {{0, time_of(7), unspecified(random)}, {1, {}, unspecified(random)}}}};
 }
 
 [[nodiscard]] inline std::vector<Update> updates(Random& random) {

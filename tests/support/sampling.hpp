@@ -29,8 +29,8 @@ namespace tfdude::testing {
 class Gaussian {
  public:
   explicit Gaussian(const Eigen::MatrixXd& covariance);
-  explicit Gaussian(const Covariance& covariance)
-      : Gaussian(Eigen::MatrixXd(covariance.matrix())) {}
+  explicit Gaussian(const StatedCovariance& covariance)
+      : Gaussian(Eigen::MatrixXd(covariance.of_specified().matrix())) {}
 
   [[nodiscard]] Eigen::VectorXd operator()(Random& random) const;
 

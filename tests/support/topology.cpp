@@ -31,7 +31,7 @@ std::string PartitionSpec::yaml() const {
     const Eigen::Vector4d q = frame.X_PC.pose.rotation().coeffs();  // x, y, z, w
     write_list(out, "xyz", t);
     write_list(out, "quat", q);
-    write_list(out, "cov", frame.X_PC.covariance.upper());
+    write_list(out, "cov", frame.X_PC.covariance.of_specified().upper());
   }
   return out.str();
 }

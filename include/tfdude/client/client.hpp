@@ -184,7 +184,8 @@ class TFDUDE_EXPORT Client {
   /// X_AB, the pose of frame b in frame a, with the covariance of its right perturbation, expressed
   /// in b. The instant is the newest for which all dynamic edges on the path have data. Covariance
   /// is propagated to second order. Correlations are those that the owners state (Correlation);
-  /// other edges count as independent.
+  /// other edges count as independent. If the covariance of an edge is unspecified, the answer's is
+  /// not complete (StatedCovariance); a lookup with a Query names such edges (Basis).
   ///
   /// A path of own edges of a Node uses no network, no lock and no allocation. Other paths take one
   /// round trip, however many partitions they cross, or two if the partitions have no common

@@ -25,9 +25,10 @@ class TFDUDE_EXPORT PathWatch {
   explicit PathWatch(std::shared_ptr<WatchedPath> path) : path_(std::move(path)) {}
 
   /// X_AB at the newest instant that all dynamic edges of the path have received. No network, lock
-  /// or allocation. The result is always a consistent transform of the path: an atomic update of
-  /// one owner is seen whole or not at all. While the path changes its route, an owner restarts, or
-  /// the edges have no instant in common, the last transform before that is returned.
+  /// or allocation, except for the names of unspecified edges. The result is always a consistent
+  /// transform of the path: an atomic update of one owner is seen whole or not at all. While the
+  /// path changes its route, an owner restarts, or the edges have no instant in common, the last
+  /// transform before that is returned.
   /// @return as Client::lookup(); the reason, if the path no longer exists or is not known
   ///   yet.
   [[nodiscard]] Result<StampedTransform> latest() const { return lookup({}); }

@@ -14,6 +14,8 @@ namespace tfdude {
 struct Config {
   std::string partition;  ///< empty if the file names none
   EdgeTiming history;     ///< default for frames without their own
+  /// Of edges for which the file gives none, and of joints' origins: unspecified, or zero.
+  StatedCovariance covariance{};
   std::vector<FrameSpec> frames;
   std::vector<std::string> places;  ///< where each of the frames is described, for messages
 };

@@ -55,6 +55,7 @@ struct Belief {
   Covariance own;                     ///< of η, which is independent of everything else
   std::optional<Covariance> unknown;  ///< of u, which may be correlated with anything; absent: none
   std::vector<CommonError> common_errors;  ///< each source at most once per sign
+  bool unspecified = false;  ///< there are edges whose own part is not known, and not part of `own`
 };
 
 /// X_BA. Exact: Exp(e)⁻¹ = Exp(-e), transported to the other side.

@@ -20,8 +20,9 @@ struct Fused {
 /// variance) is taken from it. The covariance is that of the linearised problem: an eighth too
 /// small for errors of half a radian. O(estimates · iterations).
 /// @param estimates  at least one
-/// @return kInvalidInput: no estimates; two of them contradict each other in a part that both know
-///   exactly; or they differ so much, towards half a turn, that the iteration does not converge.
+/// @return kInvalidInput: no estimates; one of unspecified covariance; two of them contradict each
+///   other in a part that both know exactly; or they differ so much, towards half a turn, that the
+///   iteration does not converge.
 [[nodiscard]] TFDUDE_EXPORT Result<Fused> fuse(const std::vector<Transform>& estimates);
 
 /// Fuses two estimates whose errors may be correlated in any way, by covariance intersection: (ω

@@ -17,6 +17,8 @@ namespace tfdude {
 ///
 /// If the samples are less than 0.1 rad apart and have the same covariance, that covariance is
 /// returned unchanged, as long as the omitted term is below a millionth: s (1-s)/4 ad(ξ) Σ ad(ξ)ᵀ.
+///
+/// If one of both is not complete, neither is the result, and its numbers are those of that one.
 /// @param s  position in [0, 1]: 0 gives X0, 1 gives X1
 /// @note If the two rotations are half a turn apart, the path between them is one of two.
 [[nodiscard]] TFDUDE_EXPORT Transform interpolate(const Transform& X0, const Transform& X1,

@@ -27,7 +27,7 @@ struct Joint {
 
 /// X_PC(q). An error of q moves C along S for any q, since Exp(S (q + δ)) = Exp(S q) Exp(S δ). So
 /// q's variance gives the covariance S Sᵀ σ² of rank one, without approximation. The origin's
-/// covariance, transported to C, is added.
+/// covariance, transported to C, is added. If the origin's is unspecified, so is that of the edge.
 /// @param position  q [rad or m]
 /// @param variance  of q [rad² or m²]
 [[nodiscard]] TFDUDE_EXPORT Transform joint_transform(const Joint& joint, double position,

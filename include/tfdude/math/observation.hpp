@@ -72,13 +72,19 @@ struct Observation {
 /// Parts of unknown correlation count as part of the measurement's error, which is then not
 /// independent of the rest. If such an edge is the only uncertain one, it is corrected by
 /// covariance intersection.
+///
+/// An edge of unspecified covariance takes what the measurement says, whatever its value was: the
+/// distance is then zero, of no dimensions. Its error is correlated with those of the other edges
+/// accordingly; if the measurement or an edge is of unknown correlation, so is this edge from then
+/// on.
 /// O(edges · columns²).
 /// @param edges  the edges of the path in order, and, at any place among them, all others that
 ///   share a source created by an observation with them
 /// @param Z_AB  the measurement
 /// @param source  the name of the new source: kObservedPrefix and a suffix unique to this
 ///   observation
-/// @return kInvalidInput: no edge is uncertain; several edges are of unknown correlation and no
+/// @return kInvalidInput: the covariance of the measurement, or of several edges of the path, is
+///   unspecified; no edge is uncertain; several edges are of unknown correlation and no
 ///   other is uncertain; a gate outside (0, 1]; no convergence.
 [[nodiscard]] TFDUDE_EXPORT Result<Observation> observe(const std::vector<ObservedEdge>& edges,
                                                         const Transform& Z_AB,

@@ -10,10 +10,11 @@ namespace tfdude {
 /// Covariance of the left perturbation X = Exp(ξ) · X̄, expressed in the parent frame: Ad(X̄) Σ
 /// Ad(X̄)ᵀ. Exact, since X̄ · Exp(ξ) = Exp(Ad(X̄) ξ) · X̄. The convention of Barfoot & Furgale
 /// 2014.
-[[nodiscard]] TFDUDE_EXPORT Covariance left_covariance(const Transform& X);
+[[nodiscard]] TFDUDE_EXPORT StatedCovariance left_covariance(const Transform& X);
 
 /// The inverse of left_covariance().
-[[nodiscard]] TFDUDE_EXPORT Transform from_left_covariance(const Pose& X, const Covariance& left);
+[[nodiscard]] TFDUDE_EXPORT Transform from_left_covariance(const Pose& X,
+                                                           const StatedCovariance& left);
 
 /// Covariance as in ROS's geometry_msgs/PoseWithCovariance: of the child's origin p = p̄ + δp along
 /// the parent's axes [m], and of a rotation R = Exp(δθ) · R̄ about axes parallel to the parent's
@@ -21,10 +22,11 @@ namespace tfdude {
 /// ..., δp = R̄ ρ and δθ = R̄ θ.
 /// @note This is not the covariance of the numbers roll, pitch and yaw, which is equal only near
 ///   the identity.
-[[nodiscard]] TFDUDE_EXPORT Covariance ros_covariance(const Transform& X);
+[[nodiscard]] TFDUDE_EXPORT StatedCovariance ros_covariance(const Transform& X);
 
 /// The inverse of ros_covariance().
-[[nodiscard]] TFDUDE_EXPORT Transform from_ros_covariance(const Pose& X, const Covariance& ros);
+[[nodiscard]] TFDUDE_EXPORT Transform from_ros_covariance(const Pose& X,
+                                                          const StatedCovariance& ros);
 
 /// Jr(ξ), with Exp(ξ + δ) = Exp(ξ) · Exp(Jr(ξ) δ) for small δ; for any angle. Uses its power
 /// series, Solà et al., arXiv:1812.01537, Eqs. 67 and 179. Jl(ξ) = Jr(-ξ).

@@ -1,16 +1,17 @@
 #pragma once
 
 #include "tfdude/base/export.hpp"
-#include "tfdude/math/covariance.hpp"
 #include "tfdude/math/pose.hpp"
+#include "tfdude/math/stated_covariance.hpp"
 
 namespace tfdude {
 
 /// A pose X_AB with the covariance of its right perturbation, expressed in B: the value of an edge
-/// and the answer to a lookup. 28 doubles, trivially copyable; always valid, since its parts are.
+/// and the answer to a lookup. 28 doubles and a flag, trivially copyable; always valid, since its
+/// parts are.
 struct Transform {
   Pose pose;
-  Covariance covariance;
+  StatedCovariance covariance;
 };
 
 /// Checks values that did not pass the checked constructors, for example the result of a
@@ -19,7 +20,8 @@ struct Transform {
 [[nodiscard]] TFDUDE_EXPORT Result<void> check_finite(const Transform& X);
 
 /// X_AC of X_AB and X_BC with independent errors, first order: Σ_AC = Ad(X_BC⁻¹) Σ_AB Ad(X_BC⁻¹)ᵀ +
-/// Σ_BC. Barfoot & Furgale 2014, Eq. 40 to second order, written for the right perturbation.
+/// Σ_BC. Unspecified covariances add nothing to the numbers; the result then is not complete.
+/// Barfoot & Furgale 2014, Eq. 40 to second order, written for the right perturbation.
 [[nodiscard]] TFDUDE_EXPORT Transform compose(const Transform& X_AB, const Transform& X_BC);
 
 /// X_BA of X_AB, first order (and exact for the perturbation's distribution): Σ_BA = Ad(X_AB) Σ_AB

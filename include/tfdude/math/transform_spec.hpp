@@ -2,6 +2,8 @@
 
 #include <array>
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
@@ -9,20 +11,27 @@
 
 namespace tfdude {
 
+/// The covariance that people name by a word: "unspecified", or "exact" for zero.
+/// @return kInvalidInput: another word.
+[[nodiscard]] TFDUDE_EXPORT Result<StatedCovariance> covariance_named(std::string_view word);
+
 /// A transform as people write it, in a configuration file or on the command line. Omitted parts
-/// are identity or zero.
+/// are identity.
 struct TFDUDE_EXPORT TransformSpec {
   std::optional<std::array<double, 3>> xyz;     ///< translation [m]
   std::optional<std::array<double, 3>> rpy;     ///< fixed axes X, Y, Z as in URDF [rad]
   std::optional<std::array<double, 4>> quat;    ///< x, y, z, w
   std::optional<std::array<double, 6>> stddev;  ///< three [m], three [rad]
   std::optional<Covariance::Upper> cov;         ///< upper triangle row by row
+  std::optional<std::string> covariance;        ///< instead of both: see covariance_named()
 
-  [[nodiscard]] bool empty() const { return !xyz && !rpy && !quat && !stddev && !cov; }
+  [[nodiscard]] bool gives_covariance() const { return stddev || cov || covariance; }
+  [[nodiscard]] bool empty() const { return !xyz && !rpy && !quat && !gives_covariance(); }
 
-  /// @return kInvalidInput naming the field: both rpy and quat, both stddev and cov, or a field
-  ///   that Pose::create() or Covariance rejects.
-  [[nodiscard]] Result<Transform> build() const;
+  /// @param otherwise  the covariance if none is given
+  /// @return kInvalidInput naming the field: both rpy and quat, two of stddev, cov and covariance,
+  ///   or a field that Pose::create(), Covariance or covariance_named() rejects.
+  [[nodiscard]] Result<Transform> build(const StatedCovariance& otherwise = {}) const;
 };
 
 }  // namespace tfdude

@@ -39,7 +39,7 @@ struct PartialTransform {
   // NOLINTNEXTLINE(google-explicit-constructor): so that {translation} is one
   PartialTransform(std::optional<Eigen::Vector3d> p,
                    std::optional<Eigen::Quaterniond> q = std::nullopt,
-                   std::optional<Covariance> cov = std::nullopt)
+                   std::optional<StatedCovariance> cov = std::nullopt)
       : translation(std::move(p)), rotation(std::move(q)), covariance(std::move(cov)) {}
   // NOLINTNEXTLINE(google-explicit-constructor): it is the whole, of the same meaning
   PartialTransform(const Transform& X)
@@ -49,7 +49,7 @@ struct PartialTransform {
 
   std::optional<Eigen::Vector3d> translation;  ///< [m]
   std::optional<Eigen::Quaterniond> rotation;
-  std::optional<Covariance> covariance;
+  std::optional<StatedCovariance> covariance;
 };
 
 /// Parts of a new value X_PC for the edge, which is named by the child's id. Absent parts stay as

@@ -33,6 +33,10 @@ struct Basis {
   bool bound = false;
   /// Error sources that edges of the path share, including those of observations.
   std::vector<std::string> sources;
+  /// The edges whose covariance is unspecified, named by their child frames, in the order of the
+  /// path. The covariance is that of all others. A watched path that is sent composed names the
+  /// frame at the end of a segment for all of its edges.
+  std::vector<std::string> unspecified{};
 };
 
 /// A transform and its instant. Without a stamp it holds for all times: all edges are static.

@@ -19,7 +19,7 @@ struct ProtocolVersion {
 };
 
 /// The version that this library speaks.
-inline constexpr ProtocolVersion kProtocolVersion{1, 0};
+inline constexpr ProtocolVersion kProtocolVersion{1, 1};
 
 /// As in "1.0".
 [[nodiscard]] TFDUDE_EXPORT std::string to_string(ProtocolVersion version);

@@ -74,6 +74,8 @@ class CdrWalk {
   void path_ends();
   void transforms();
   void correlation();
+  void correlated_transforms();
+  void unspecified_edges();
   void revised_edge();
   void state();
   std::string_view edge();

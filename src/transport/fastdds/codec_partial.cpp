@@ -44,6 +44,10 @@ Result<PartialTransform> read_parts(std::uint8_t given, const Numbers& in, std::
   if ((given & kRotation) != 0) parts.rotation = pose->rotation();
   if ((given & kTranslation) != 0) parts.translation = pose->translation();
   if ((given & kCovariance) == 0) return parts;
+  if (is_pose_only(in)) {
+    parts.covariance = StatedCovariance::unspecified();
+    return parts;
+  }
   const auto covariance = read_covariance(in, kPoseNumbers);
   if (!covariance) return at_frame(covariance.error());
   parts.covariance = *covariance;

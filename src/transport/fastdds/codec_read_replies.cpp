@@ -68,6 +68,35 @@ Result<SegmentValues> read_correlated(const wire::CorrelatedTransforms& body) {
   return found;
 }
 
+// Marks the values as not complete.
+Result<std::vector<UnspecifiedEdge>> read_unspecified(const std::vector<wire::UnspecifiedEdge>& in,
+                                                      std::vector<Transform>& values) {
+  std::vector<UnspecifiedEdge> edges;
+  edges.reserve(in.size());
+  for (const wire::UnspecifiedEdge& one : in) {
+    if (one.value() >= values.size()) {
+      return fail(Errc::kInvalidInput, "a reply: an unspecified edge of value " +
+                                           std::to_string(one.value()) + ", of " +
+                                           std::to_string(values.size()));
+    }
+    values[one.value()].covariance.set_complete(false);
+    edges.push_back({one.value(), string_of(one.id())});
+  }
+  return edges;
+}
+
+Result<SegmentValues> read_incomplete(const wire::IncompleteTransforms& body) {
+  auto found = read_correlated(body.found());
+  if (!found) return found;
+  auto edges = read_unspecified(body.unspecified(), found->values);
+  if (!edges) return tl::unexpected(std::move(edges.error()));
+  found->unspecified = *std::move(edges);
+  edges = read_unspecified(body.unspecified_at_hint(), found->at_hint);
+  if (!edges) return tl::unexpected(std::move(edges.error()));
+  found->unspecified_at_hint = *std::move(edges);
+  return found;
+}
+
 template <class Body, class Read>
 Result<void> put(Reply& reply, Result<Read> read) {
   if (!read) return tl::unexpected(std::move(read.error()));
@@ -100,6 +129,8 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
     }
     case kCorrelated:
       return put<SegmentValues>(reply, read_correlated(body.correlated()));
+    case kIncomplete:
+      return put<SegmentValues>(reply, read_incomplete(body.incomplete()));
     case kConsistencies: {
       std::vector<EdgeConsistency> all;
       for (const wire::EdgeConsistency& one : body.consistency())
@@ -144,8 +175,9 @@ Result<PushedValues> from_wire(const wire::State& sample) {
     const auto stamp = stamp_from_wire(entry.stamp(), "the stamp of a pushed value");
     if (!stamp) return tl::unexpected(stamp.error());
     const bool known = entry.covariance() != 0 && is_pose_only(entry.x());
-    auto X = known ? read_computed_pose(entry.x()) : read_computed(entry.x());
+    auto X = read_computed(entry.x());
     if (!X) return fail_at("pushed values", X.error());
+    if (known) X->covariance = {};
     pushed.entries.push_back(
         {entry.index(), *stamp, *X, {}, entry.history(), {}, entry.covariance(), known});
   }

@@ -11,17 +11,18 @@ namespace tfdude::fastdds {
 namespace {
 
 Result<void> check_size(const Numbers& in) {
-  if (in.size() == std::tuple_size_v<Flat>) return {};
-  if (is_pose_only(in)) {
-    return fail(Errc::kUnsupported,
-                "its covariance is unspecified, which this version does not support");
-  }
+  if (in.size() == std::tuple_size_v<Flat> || is_pose_only(in)) return {};
   return fail(Errc::kInvalidInput, "a transform of " + std::to_string(in.size()) + " numbers");
 }
 
 }  // namespace
 
 void write_transform(const Transform& X, Numbers& out) {
+  if (!X.covariance.complete()) return write_pose(X.pose, out);
+  write_numbers(X, out);
+}
+
+void write_numbers(const Transform& X, Numbers& out) {
   const Flat flat = to_flat(X);
   out.assign(flat.begin(), flat.end());
 }
@@ -29,12 +30,6 @@ void write_transform(const Transform& X, Numbers& out) {
 void write_pose(const Pose& pose, Numbers& out) {
   const Flat flat = to_flat({pose, Covariance()});
   out.assign(flat.begin(), flat.begin() + kPoseNumbers);
-}
-
-Numbers numbers_of(const Transform& X) {
-  Numbers out;
-  write_transform(X, out);
-  return out;
 }
 
 bool is_pose_only(const Numbers& in) { return in.size() == kPoseNumbers; }
@@ -46,6 +41,7 @@ Result<Transform> read_transform(const Numbers& in, std::string_view frame) {
   const auto pose =
       Pose::create(Eigen::Quaterniond(in[3], in[0], in[1], in[2]), {in[4], in[5], in[6]});
   if (!pose) return at_frame(pose.error());
+  if (is_pose_only(in)) return Transform{*pose, StatedCovariance::unspecified()};
   const auto covariance = read_covariance(in, kPoseNumbers);
   if (!covariance) return at_frame(covariance.error());
   return Transform{*pose, *covariance};
@@ -55,13 +51,9 @@ Result<Transform> read_computed(const Numbers& in) {
   if (auto ok = check_size(in); !ok) return tl::unexpected(std::move(ok.error()));
   Flat flat{};
   std::copy(in.begin(), in.end(), flat.begin());
-  return computed_from(flat);
-}
-
-Result<Transform> read_computed_pose(const Numbers& in) {
-  Flat flat{};
-  std::copy_n(in.begin(), std::min(in.size(), kPoseNumbers), flat.begin());
-  return computed_from(flat);
+  auto X = computed_from(flat);
+  if (X) X->covariance.set_complete(!is_pose_only(in));
+  return X;
 }
 
 Result<Covariance> read_covariance(const Numbers& in, std::size_t first) {

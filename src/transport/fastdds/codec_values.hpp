@@ -15,26 +15,24 @@ using Numbers = std::vector<double>;
 
 inline constexpr std::size_t kPoseNumbers = 7;
 
-/// All 28 numbers. Does not allocate where the vector has held as many before.
+/// All 28 numbers, or seven if the covariance is not complete. Does not allocate where the vector
+/// has held as many before.
 void write_transform(const Transform& X, Numbers& out);
+/// All 28 numbers. That the covariance is not complete must be said elsewhere.
+void write_numbers(const Transform& X, Numbers& out);
 /// The first seven, without the covariance.
 void write_pose(const Pose& pose, Numbers& out);
-
-[[nodiscard]] Numbers numbers_of(const Transform& X);
 
 /// Whether the covariance is absent.
 [[nodiscard]] bool is_pose_only(const Numbers& in);
 
 /// A transform that a user has given.
-/// @return kInvalidInput naming the frame and what is wrong; kUnsupported if the covariance is
-///   unspecified
+/// @return kInvalidInput naming the frame and what is wrong
 [[nodiscard]] Result<Transform> read_transform(const Numbers& in, std::string_view frame);
 
 /// A transform that was computed (computed_from()).
-/// @return kInvalidInput; kUnsupported if the covariance is unspecified
+/// @return kInvalidInput
 [[nodiscard]] Result<Transform> read_computed(const Numbers& in);
-/// The same of a pose without its covariance, which is zero in the result.
-[[nodiscard]] Result<Transform> read_computed_pose(const Numbers& in);
 
 /// The covariance of which these are the numbers from `first` on.
 [[nodiscard]] Result<Covariance> read_covariance(const Numbers& in, std::size_t first);

@@ -195,9 +195,35 @@ wire::Request to_wire(const Request& request, std::string_view partition) {
 namespace {
 
 std::vector<Numbers> wire_values(const std::vector<Transform>& values) {
-  std::vector<Numbers> body;
-  body.reserve(values.size());
-  for (const Transform& X : values) body.push_back(numbers_of(X));
+  std::vector<Numbers> body(values.size());
+  for (std::size_t i = 0; i < body.size(); ++i) write_numbers(values[i], body[i]);
+  return body;
+}
+
+wire::CorrelatedTransforms wire_correlated(const SegmentValues& found) {
+  wire::CorrelatedTransforms body;
+  body.stamp(wire_stamp(found.stamp));
+  body.period(found.period.count());
+  body.seen(found.commit);
+  body.incarnation(found.incarnation);
+  body.values(wire_values(found.values));
+  body.at_hint(wire_values(found.at_hint));
+  body.correlations(wire_correlation(found.correlations));
+  body.correlations_at_hint(wire_correlation(found.correlations_at_hint));
+  return body;
+}
+
+// If there are too many, only the first of each value, without which it would count as complete.
+std::vector<wire::UnspecifiedEdge> wire_unspecified(const std::vector<UnspecifiedEdge>& edges) {
+  const bool all = edges.size() <= kMaxItems;
+  std::vector<wire::UnspecifiedEdge> body;
+  for (const UnspecifiedEdge& edge : edges) {
+    const auto value = static_cast<std::uint32_t>(edge.segment);
+    if (!all && !body.empty() && body.back().value() == value) continue;
+    body.emplace_back();
+    body.back().value(value);
+    body.back().id(edge.id);
+  }
   return body;
 }
 
@@ -251,17 +277,16 @@ struct ReplyWriter {
     out.error(std::move(body));
   }
   void operator()(const SegmentValues& found) {
+    if (!found.unspecified.empty() || !found.unspecified_at_hint.empty()) {
+      wire::IncompleteTransforms body;
+      body.found(wire_correlated(found));
+      body.unspecified(wire_unspecified(found.unspecified));
+      body.unspecified_at_hint(wire_unspecified(found.unspecified_at_hint));
+      out.incomplete(std::move(body));
+      return;
+    }
     if (!found.correlations.empty() || !found.correlations_at_hint.empty()) {
-      wire::CorrelatedTransforms body;
-      body.stamp(wire_stamp(found.stamp));
-      body.period(found.period.count());
-      body.seen(found.commit);
-      body.incarnation(found.incarnation);
-      body.values(wire_values(found.values));
-      body.at_hint(wire_values(found.at_hint));
-      body.correlations(wire_correlation(found.correlations));
-      body.correlations_at_hint(wire_correlation(found.correlations_at_hint));
-      out.correlated(std::move(body));
+      out.correlated(wire_correlated(found));
       return;
     }
     if (!found.stamp && found.at_hint.empty()) {

@@ -39,7 +39,8 @@ enum ReplyKind : std::uint8_t {
   kJointInfos = 9,
   kAlive = 10,
   kKnownFrames = 11,
-  kLastReplyKind = kKnownFrames
+  kIncomplete = 12,
+  kLastReplyKind = kIncomplete
 };
 
 }  // namespace tfdude::fastdds

@@ -67,6 +67,8 @@ TEST_CASE("the label of an edge has its age and its large deviations") {
   CHECK(edge_text(label(0, 99.7), kNow) == "±0 mm ±100°");
   CHECK(edge_text(label(0.0009, 0.09), kNow).empty());
   CHECK(edge_text({}, kNow).empty());
+  EdgeLabel unspecified{StatedCovariance::unspecified(), edge.newest};
+  CHECK(edge_text(unspecified, kNow) == "12 ms  ±?");
   edge = label(0, 0);
   for (const auto& [seconds, text] : {std::pair(-0.5, "-500 ms"),
                                       {3.44, "3.4 s"},

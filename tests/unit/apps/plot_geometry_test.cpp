@@ -146,7 +146,8 @@ TEST_CASE("sampled points have the spread of small covariances") {
   }
   Transform X_AB;
   for (const Step& step : steps) X_AB = compose(X_AB, step.up ? inverse(step.X_PC) : step.X_PC);
-  const Eigen::Matrix3d expected = ros_covariance(X_AB).matrix().topLeftCorner<3, 3>();
+  const Eigen::Matrix3d expected =
+      ros_covariance(X_AB).of_specified().matrix().topLeftCorner<3, 3>();
   Vector3d mean = Vector3d::Zero();
   Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
   for (const Vector3d& p : sample_ends(steps, kPoints, random.seed())) {

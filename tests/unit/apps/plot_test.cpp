@@ -174,6 +174,18 @@ TEST_CASE("a plot has its stamp and says which correlation its points ignore") {
   CHECK_THAT(draw_plot(plot), !ContainsSubstring("independent"));
 }
 
+TEST_CASE("a plot says which edges have no uncertainty") {
+  Plot plot = plot_of({{at(1, 0, 0, {0.01, 0.01, 0.01, 0, 0, 0}), false}});
+  plot.X_AB.covariance.set_complete(false);
+  plot.X_AB.basis.unspecified = {"odom"};
+  CHECK_THAT(draw_plot(plot), ContainsSubstring("the other edges: unspecified for odom") &&
+                                  ContainsSubstring("± more than 10 mm"));
+  plot = plot_of({{at(1, 0, 0), false}});
+  plot.X_AB.covariance = StatedCovariance::unspecified();
+  plot.X_AB.basis.unspecified = {"odom"};
+  CHECK_THAT(draw_plot(plot), ContainsSubstring("± ?") && !ContainsSubstring("± 0"));
+}
+
 TEST_CASE("names are escaped and shortened") {
   Plot plot = plot_of({{at(1, 0, 0, {0.01, 0.01, 0.01, 0, 0, 0}), false}});
   plot.frames = {"<A&\"B\">", std::string(255, 'w')};

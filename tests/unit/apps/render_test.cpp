@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/uncertainty_render.hpp"
+
 #include "support/catch.hpp"
 
 namespace tfdude::cli {
@@ -70,7 +72,7 @@ TEST_CASE("a transform is printed in metres and degrees") {
 
 TEST_CASE("a covariance is printed as a matrix if asked for") {
   Transform X = example();
-  Covariance::Upper upper = X.covariance.upper();
+  Covariance::Upper upper = X.covariance.of_specified().upper();
   upper[upper_index(0, 1)] = -1e-5;
   X.covariance = *Covariance::from_upper(upper);
   const auto lines = lines_of(describe(X, true));
@@ -81,11 +83,25 @@ TEST_CASE("a covariance is printed as a matrix if asked for") {
     for (int column = 0; column < 6; ++column) {
       double value = -1;
       REQUIRE(in >> value);
-      const double expected = X.covariance.matrix()(static_cast<int>(row), column);
+      const double expected = X.covariance.of_specified().matrix()(static_cast<int>(row), column);
       CHECK(std::abs(value - expected) <= 1e-5 * std::abs(expected));
     }
   }
   CHECK(lines[6].find("-1.00000e-05") != std::string::npos);
+}
+
+TEST_CASE("a covariance that is not complete is printed as that of the other edges") {
+  Transform X = example();
+  X.covariance.set_complete(false);
+  CHECK(lines_of(describe(X, false, {"odom", "a\nb"})) ==
+        std::vector<std::string>{
+            "translation  1.000000  -2.000000  3.000000  m",
+            "quaternion   0.183013  -0.061628  0.704416  0.683013  (x y z w)",
+            "rpy          10.0000  -20.0000  90.0000  deg",
+            "std dev      unspecified for odom, a\\x0ab",
+            "  of others  0.010000  0.020000  0.030000  m   1.0000  2.0000  3.0000  deg"});
+  const std::string text = describe(X, true, {"odom"});
+  CHECK(text.find("covariance   of the others") != std::string::npos);
 }
 
 TEST_CASE("extreme values are printed in full") {
@@ -111,9 +127,24 @@ TEST_CASE("a lookup as JSON has all digits") {
   REQUIRE(answer["covariance"].size() == 6);
   for (std::size_t i = 0; i < 36; ++i) {
     CHECK(answer["covariance"][i / 6][i % 6] ==
-          X.covariance.upper()[upper_index(std::min(i / 6, i % 6), std::max(i / 6, i % 6))]);
+          X.covariance.of_specified()
+              .upper()[upper_index(std::min(i / 6, i % 6), std::max(i / 6, i % 6))]);
   }
   CHECK(lookup_json("a", "a", Transform(), {})["partitions"] == json::array());
+}
+
+TEST_CASE("JSON has no covariance if it is not complete") {
+  Transform X = example();
+  CHECK_FALSE(lookup_json("a", "b", X, {}).contains("covariance_of_specified"));
+  X.covariance.set_complete(false);
+  const json answer = lookup_json("a", "b", X, {});
+  CHECK(answer["covariance"].is_null());
+  REQUIRE(answer["covariance_of_specified"].size() == 6);
+  CHECK(answer["covariance_of_specified"][0][0] ==
+        X.covariance.of_specified().upper()[upper_index(0, 0)]);
+  Basis basis;
+  basis.unspecified = {"odom"};
+  CHECK(basis_json(basis)["unspecified"] == json({"odom"}));
 }
 
 TEST_CASE("a frame as JSON has null for no parent") {
@@ -131,7 +162,7 @@ TEST_CASE("a partition as JSON has its process and state") {
   info.reachable = true;
   info.program = "0.1.0";
   json said{{"name", "arms"},    {"host", "tower"},    {"pid", 7},         {"frames", 3},
-            {"reachable", true}, {"program", "0.1.0"}, {"protocol", "1.0"}};
+            {"reachable", true}, {"program", "0.1.0"}, {"protocol", "1.1"}};
   CHECK(partition_json(info) == said);
   info.reachable = false;
   said["reachable"] = false;

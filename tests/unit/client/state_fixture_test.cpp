@@ -23,17 +23,18 @@ using testing::Approx;
 using testing::TemporaryDirectory;
 
 const std::string kFixture = TFDUDE_FIXTURES "/format_2";
+const std::string kFormat3 = TFDUDE_FIXTURES "/format_3";
 
 // A copy of the state, where a Node of domain 0 looks for it.
-std::string copy_into(const TemporaryDirectory& directory) {
+std::string copy_into(const TemporaryDirectory& directory, const std::string& fixture = kFixture) {
   const std::string file = state_file(directory.path(), 0, "arms");
   std::filesystem::create_directories(std::filesystem::path(file).parent_path());
-  std::filesystem::copy_file(kFixture + "/arms.sqlite", file);
+  std::filesystem::copy_file(fixture + "/arms.sqlite", file);
   return file;
 }
 
 std::vector<double> deviations(const Transform& X) {
-  const auto covariance = X.covariance.matrix();
+  const auto covariance = X.covariance.of_specified().matrix();
   std::vector<double> all;
   for (int i = 0; i < 6; ++i) all.push_back(std::sqrt(covariance(i, i)));
   return all;
@@ -62,6 +63,7 @@ TEST_CASE("a stored state of format 2 has all its content") {
   CHECK(state->joints[0].position == 0.25);
   CHECK_FALSE(state->joints[0].type);
   CHECK(state->joints[0].variance == Approx(0.003 * 0.003));
+  for (const StoredFrame& frame : state->frames) CHECK(frame.X_PC.covariance.complete());
 }
 
 TEST_CASE("a node opens a state and a configuration of format 2 repeatedly") {
@@ -100,6 +102,31 @@ TEST_CASE("a node opens a state and a configuration of format 2 repeatedly") {
     CHECK(moved->position == 0.25);
     CHECK(moved->measured);
   }
+}
+
+TEST_CASE("zeros of a state of format 3 stay exact until its entry is changed") {
+  const TemporaryDirectory directory;
+  const std::string file = copy_into(directory, kFormat3);
+  Options options;
+  options.state = directory.path();
+  options.discovery = Milliseconds(0);
+  auto config = load_config(kFormat3 + "/arms.yaml");
+  REQUIRE(config);
+  const auto check_hand = [&](const StatedCovariance& expected) {
+    LoopbackNetwork network;
+    auto node = Node::open(network.join(), config->partition, config->frames, options);
+    INFO((node ? "" : node.error().message));
+    REQUIRE(node);
+    const auto X = node->lookup("arm", "hand");
+    REQUIRE(X);
+    CHECK(X->covariance == expected);
+    CHECK(X->pose.translation().x() == (expected.complete() ? 4 : 1));
+    CHECK(deviations(*node->lookup("hand", "tool"))[2] == Approx(0.3));
+  };
+  for (int round = 0; round < 2; ++round) check_hand(StatedCovariance());
+  REQUIRE(config->frames[1].id == "hand");
+  config->frames[1].X_PC.covariance = StatedCovariance::unspecified();
+  for (int round = 0; round < 2; ++round) check_hand(StatedCovariance::unspecified());
 }
 
 }  // namespace tfdude

@@ -83,16 +83,16 @@ TEST_CASE("a configuration is read") {
   CHECK(world.id == "world");
   CHECK(world.parent.empty());
   CHECK(world.X_PC.pose.matrix().isIdentity(0));
-  CHECK(world.X_PC.covariance.matrix().isZero(0));
+  CHECK(world.X_PC.covariance.of_specified().matrix().isZero(0));
 
   const auto& camera = config->frames[1];
   CHECK(camera.parent == "world");
   CHECK(camera.X_PC.pose.translation() == Eigen::Vector3d(1, -2.5, 0.3));
   CHECK(camera.X_PC.pose.rotation().angularDistance(tfdude::from_rpy(0.1, 0.2, 0.3)) < 1e-15);
-  CHECK(camera.X_PC.covariance.stddev()[2] == tfdude::testing::Approx(0.01));
-  CHECK(camera.X_PC.covariance.stddev()[5] == tfdude::testing::Approx(0.001));
+  CHECK(camera.X_PC.covariance.of_specified().stddev()[2] == tfdude::testing::Approx(0.01));
+  CHECK(camera.X_PC.covariance.of_specified().stddev()[5] == tfdude::testing::Approx(0.001));
 
-  CHECK(config->frames[2].X_PC.covariance.matrix()(1, 0) == 0.5);
+  CHECK(config->frames[2].X_PC.covariance.of_specified().matrix()(1, 0) == 0.5);
 }
 
 TEST_CASE("optional entries of a configuration may be left out") {
@@ -200,7 +200,7 @@ TEST_CASE("anchors and aliases stand for their values") {
       "frames:\n  - {id: a, stddev: &joint [1, 1, 1, 1, 1, 1]}\n  - {id: b, stddev: *joint}\n",
       "f");
   REQUIRE(config.has_value());
-  CHECK(config->frames[1].X_PC.covariance.upper()[0] == 1);
+  CHECK(config->frames[1].X_PC.covariance.of_specified().upper()[0] == 1);
   check_refused_at("frames: &a [*a]\n", "robot.yaml:1: ");
   check_refused_at("frames: &a {id: *a}\n", "robot.yaml:1: ");
   check_refused_at("&a [*a, *a]\n", "robot.yaml:1: ");
@@ -211,12 +211,12 @@ TEST_CASE("a file of the wrong structure is rejected") {
   check_refused({"", Errc::kConfig, "robot.yaml: is empty"});
   check_refused({"# only a comment\n\n", Errc::kConfig, "robot.yaml: is empty"});
   check_refused({"---\n", Errc::kConfig, "robot.yaml: is empty"});
-  check_refused(
-      {"hello", Errc::kConfig,
-       "robot.yaml:1: the file is not a mapping with the keys partition, history, frames, urdf"});
-  check_refused(
-      {"partition: a\nframe: []\n", Errc::kConfig,
-       "robot.yaml:2: the file: unknown key 'frame'; known are partition, history, frames, urdf"});
+  check_refused({"hello", Errc::kConfig,
+                 "robot.yaml:1: the file is not a mapping with the keys partition, covariance, "
+                 "history, frames, urdf"});
+  check_refused({"partition: a\nframe: []\n", Errc::kConfig,
+                 "robot.yaml:2: the file: unknown key 'frame'; known are partition, covariance, "
+                 "history, frames, urdf"});
   check_refused({"partition: a\npartition: a\n", Errc::kConfig,
                  "robot.yaml:2: the file: partition is given twice"});
   check_refused({"partition: [a]\n", Errc::kConfig, "robot.yaml:1: partition is not text"});
@@ -231,7 +231,7 @@ TEST_CASE("a file of the wrong structure is rejected") {
   check_refused(
       {"frames:\n  - world\n", Errc::kConfig,
        "robot.yaml:2: frames[0] is not a mapping with the keys id, parent, xyz, rpy, quat, "
-       "stddev, cov, history, correlation, sources"});
+       "stddev, cov, covariance, history, correlation, sources"});
   check_refused({"frames:\n  - {id: a}\n  - parent: a\n", Errc::kConfig,
                  "robot.yaml:3: frames[1]: id is missing"});
   check_refused({"partition: a\x04\nframes: []\n", Errc::kConfig,
@@ -251,7 +251,7 @@ TEST_CASE("an invalid frame is rejected by name and line") {
   check_refused(
       {camera("    pos: [1, 2, 3]"), Errc::kConfig,
        "robot.yaml:4: frame 'camera': unknown key 'pos'; known are id, parent, xyz, rpy, quat, "
-       "stddev, cov, history, correlation, sources"});
+       "stddev, cov, covariance, history, correlation, sources"});
   check_refused({camera("    parent: world\n    xyz: [1, 2, 3]\n    xyz: [1, 2, 3]"), Errc::kConfig,
                  "robot.yaml:6: frame 'camera': xyz is given twice"});
   check_refused({camera("    xyz: [1, 2]"), Errc::kConfig,

@@ -18,7 +18,7 @@ TEST_CASE("a joint's origin may have its former name mount") {
     REQUIRE(config.has_value());
     const auto& elbow = *config->frames.at(3).joint;
     CHECK(elbow.name == "elbow_joint");
-    CHECK(elbow.joint.X_PJ.covariance.stddev()[2] == tfdude::testing::Approx(0.2));
+    CHECK(elbow.joint.X_PJ.covariance.of_specified().stddev()[2] == tfdude::testing::Approx(0.2));
   }
 }
 
@@ -44,13 +44,13 @@ TEST_CASE("a configuration may include URDFs") {
   CHECK(base.id == "a_base_link");
   CHECK(base.parent == "world");
   CHECK(base.X_PC.pose.translation() == Eigen::Vector3d(1, 2, 3));
-  CHECK(base.X_PC.covariance.stddev()[0] == tfdude::testing::Approx(0.1));
+  CHECK(base.X_PC.covariance.of_specified().stddev()[0] == tfdude::testing::Approx(0.1));
   const auto& elbow = *config->frames[4].joint;
   CHECK(elbow.name == "a_elbow_joint");
   CHECK(elbow.position == 0.5);
   CHECK(elbow.variance == tfdude::testing::Approx(1e-4));
   CHECK(elbow.strict);
-  CHECK(elbow.joint.X_PJ.covariance.stddev()[2] == tfdude::testing::Approx(0.2));
+  CHECK(elbow.joint.X_PJ.covariance.of_specified().stddev()[2] == tfdude::testing::Approx(0.2));
   CHECK(config->frames[9].id == "b_base_link");
   CHECK(config->frames[9].parent.empty());
   CHECK(config->frames[13].id == "b_tool0");
@@ -84,8 +84,8 @@ TEST_CASE("an invalid entry for a URDF is rejected by name and line") {
   refused("urdf: [{file: x.urdf}]\n",
           "1: urdf[0]: " + folder + "x.urdf: cannot be opened: No such file or directory");
   entry("spam: 1",
-        ": unknown key 'spam'; known are file, root, xyz, rpy, quat, stddev, cov, prefix, links, "
-        "strict_limits, joints");
+        ": unknown key 'spam'; known are file, root, xyz, rpy, quat, stddev, cov, covariance, "
+        "prefix, links, strict_limits, joints");
   entry("rpy: [0, 0, 0]", ": rpy needs root: it places the root link in that frame");
   entry("root: ''", ": root is empty");
   entry("root: w, xyz: [1, 2]", ": xyz has 2, not 3 numbers");
@@ -104,7 +104,7 @@ TEST_CASE("an invalid entry for a URDF is rejected by name and line") {
   entry("joints: {elbow_joint: {position: up}}",
         ": joint 'elbow_joint': position is 'up', which is not a number");
   entry("joints: {elbow_joint: {origin: {xyz: [0, 0, 0]}}}",
-        ": joint 'elbow_joint': origin: unknown key 'xyz'; known are stddev, cov");
+        ": joint 'elbow_joint': origin: unknown key 'xyz'; known are stddev, cov, covariance");
   entry("joints: {elbow_joint: {origin: {stddev: [-1, 0, 0, 0, 0, 0]}}}",
         ": joint 'elbow_joint': origin: stddev[0] is negative");
   const std::string arm = folder + "ur5e.urdf";

@@ -54,8 +54,9 @@ TEST_CASE("urdf: a chain of mimic joints is resolved to its first joint") {
   CHECK(third.position == Approx(-6 * 0.25 + 1.75));
   CHECK(third.variance == Approx(36 * 0.01));
   // The errors of coupled joints are common errors, and no part of the edges' own covariance.
-  CHECK(named(frames, "p_l3").X_PC.covariance.upper() == tfdude::Covariance().upper());
-  CHECK(named(frames, "p_l4").X_PC.covariance.upper()[0] > 0);
+  CHECK(named(frames, "p_l3").X_PC.covariance.of_specified().upper() ==
+        tfdude::Covariance().upper());
+  CHECK(named(frames, "p_l4").X_PC.covariance.of_specified().upper()[0] > 0);
   CHECK(named(frames, "p_l3").correlation.empty());
 
   // Also where the other one is outside the part.
@@ -131,7 +132,7 @@ TEST_CASE("urdf: the root link is attached to the given frame") {
   const auto frames = frames_of(tree(), part);
   CHECK(frames[0].parent == "world");
   CHECK(frames[0].X_PC.pose.translation() == Eigen::Vector3d(1, 2, 3));
-  CHECK(frames[0].X_PC.covariance.upper()[0] == 1);
+  CHECK(frames[0].X_PC.covariance.of_specified().upper()[0] == 1);
   part.links = {"turn"};
   refused(tree(), part,
           "r.urdf: root 'world' is given, but the part is without the root link 'base'");

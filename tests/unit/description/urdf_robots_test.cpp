@@ -256,7 +256,7 @@ TEST_CASE("robots: the covariance between coupled fingers is that of samples") {
   // Both fingers move by one number, away from each other.
   const auto X_12 = replica.forest.lookup("left_finger_1", "left_finger_2");
   REQUIRE(X_12.has_value());
-  CHECK(X_12->covariance.stddev()[1] == tfdude::testing::Approx(2 * kSigma));
+  CHECK(X_12->covariance.of_specified().stddev()[1] == tfdude::testing::Approx(2 * kSigma));
   for (const auto& [a, b] :
        {std::pair("left_finger_1", "right_finger_2"), std::pair("right_finger_2", "left_hand")}) {
     CAPTURE(a, b);
@@ -275,7 +275,8 @@ TEST_CASE("robots: the covariance between coupled fingers is that of samples") {
       return tfdude::log(X_AB->pose.inverse() * pose(at));
     };
     const auto sampled = tfdude::testing::second_moment(kSamples, sample);
-    CHECK(tfdude::testing::moment_diff(sampled, X_AB->covariance.matrix(), kSamples, 1e-3) == "");
+    CHECK(tfdude::testing::moment_diff(sampled, X_AB->covariance.of_specified().matrix(), kSamples,
+                                       1e-3) == "");
   }
 }
 
@@ -300,7 +301,9 @@ TEST_CASE("robots: an arm's covariance is that of samples of its joints") {
     };
     // Beside the standard errors: terms of second order in angles of up to some sigma.
     const auto sampled = tfdude::testing::second_moment(kSamples, sample);
-    CHECK(tfdude::testing::moment_diff(sampled, X.covariance.matrix(), kSamples, 1e-4).empty());
+    CHECK(
+        tfdude::testing::moment_diff(sampled, X.covariance.of_specified().matrix(), kSamples, 1e-4)
+            .empty());
   }
 }
 
@@ -327,7 +330,8 @@ TEST_CASE("robots: the parts of a URDF together are the whole robot") {
         ++count;
         CHECK(one.parent == same.parent);
         CHECK(one.X_PC.pose.matrix() == same.X_PC.pose.matrix());
-        CHECK(one.X_PC.covariance.upper() == same.X_PC.covariance.upper());
+        CHECK(one.X_PC.covariance.of_specified().upper() ==
+              same.X_PC.covariance.of_specified().upper());
         REQUIRE(one.joint.has_value() == same.joint.has_value());
         if (!one.joint) continue;
         CHECK(one.joint->coupled == same.joint->coupled);

@@ -230,14 +230,15 @@ TEST_CASE("urdf: a joint has its given or default position before its first samp
   tfdude::UrdfJoint with_origin{2.0, 0.0, *tfdude::Covariance::from_stddev({1, 2, 3, 4, 5, 6})};
   const auto frame =
       frames_of(pair("revolute", limits("1", "3")), with_joint("j", with_origin)).at(1);
-  CHECK(frame.joint->joint.X_PJ.covariance.stddev()[1] == Approx(2));
+  CHECK(frame.joint->joint.X_PJ.covariance.of_specified().stddev()[1] == Approx(2));
   const auto X_PC = tfdude::value_at(*frame.joint, 2.0, 0.0);
-  CHECK(frame.X_PC.covariance.upper() == X_PC.covariance.upper());
+  CHECK(frame.X_PC.covariance.of_specified().upper() == X_PC.covariance.of_specified().upper());
   CHECK(frame.X_PC.pose.matrix() == X_PC.pose.matrix());
   with_origin.position.reset();
   with_origin.stddev.reset();
-  CHECK(frames_of(pair("fixed"), with_joint("j", with_origin))[1].X_PC.covariance.stddev()[5] ==
-        Approx(6));
+  CHECK(frames_of(pair("fixed"), with_joint("j", with_origin))[1]
+            .X_PC.covariance.of_specified()
+            .stddev()[5] == Approx(6));
 }
 
 TEST_CASE("urdf: files that cannot be read are rejected") {

@@ -21,7 +21,7 @@ using testing::transform_diff;
 constexpr int kSamples = 100'000;
 
 Belief belief(const Transform& X, std::vector<CommonError> common_errors = {}) {
-  return {X.pose, X.covariance, std::nullopt, std::move(common_errors)};
+  return {X.pose, X.covariance.of_specified(), std::nullopt, std::move(common_errors)};
 }
 
 Loading random_loading(Random& random, Eigen::Index columns, double metres, double radians) {
@@ -55,7 +55,7 @@ TEST_CASE("A shared source cancels on the way back and doubles on the way on") {
     const Belief X_AB = belief(exact, {common_error});
     const Transform there_and_back = collapse(compose(X_AB, inverse(X_AB), order));
     CHECK(testing::pose_diff(there_and_back.pose, {}, 1e-12) == "");
-    CHECK(there_and_back.covariance.matrix().cwiseAbs().maxCoeff() < 1e-18);
+    CHECK(there_and_back.covariance.of_specified().matrix().cwiseAbs().maxCoeff() < 1e-18);
     const Belief still{Pose(), {}, std::nullopt, {common_error}};
     const Transform twice = collapse(compose(still, still, Order::kSecond));
     const Matrix6d expected = 4.0 * common_error.loading * common_error.loading.transpose();
@@ -103,9 +103,11 @@ TEST_CASE("Common errors propagate as samples show but independent ones would no
                                {{"s", false, random_loading(random, 2, 0.01, 0.01)}});
     const Matrix6d sampled = sampled_product(X_AB, X_BC, random, kSamples);
     const Transform shared = collapse(compose(X_AB, X_BC, Order::kSecond));
-    CHECK(testing::moment_diff(sampled, shared.covariance.matrix(), kSamples, 5e-3) == "");
+    CHECK(testing::moment_diff(sampled, shared.covariance.of_specified().matrix(), kSamples,
+                               5e-3) == "");
     const Transform as_if = compose(collapse(X_AB), collapse(X_BC));
-    CHECK(testing::moment_diff(sampled, as_if.covariance.matrix(), kSamples, 5e-3) != "");
+    CHECK(testing::moment_diff(sampled, as_if.covariance.of_specified().matrix(), kSamples, 5e-3) !=
+          "");
   }
 }
 
@@ -125,7 +127,8 @@ TEST_CASE("Fourth order is closer to samples than second for independent and com
       }
       const Matrix6d sampled = sampled_product(X_AB, X_BC, random, 400'000);
       const auto error = [&](Order order) {
-        return (collapse(compose(X_AB, X_BC, order)).covariance.matrix() - sampled).norm() /
+        return (collapse(compose(X_AB, X_BC, order)).covariance.of_specified().matrix() - sampled)
+                   .norm() /
                sampled.norm();
       };
       second += error(Order::kSecond);
@@ -176,10 +179,10 @@ TEST_CASE("A path with unknown parts dominates samples and the independent sum d
       return log(mean_inverse * (X_AB.pose * exp(root_1 * s)) * (X_BC.pose * exp(e_2)));
     });
     const Transform bounded = collapse(compose(X_AB, X_BC, Order::kSecond));
-    CHECK(testing::domination(bounded.covariance.matrix(), sampled) > -0.01);
+    CHECK(testing::domination(bounded.covariance.of_specified().matrix(), sampled) > -0.01);
     const Transform independent =
         compose(Transform{X_AB.pose, *X_AB.unknown}, Transform{X_BC.pose, *X_BC.unknown});
-    CHECK(testing::domination(independent.covariance.matrix(), sampled) < -0.05);
+    CHECK(testing::domination(independent.covariance.of_specified().matrix(), sampled) < -0.05);
   }
 }
 
@@ -192,7 +195,7 @@ TEST_CASE("Composed beliefs stay positive semi-definite to fourth order and for 
       for (int k = 0; k < 10; ++k) {
         X = compose(X, belief(random.transform(1.0, size, size)), Order::kFourth);
       }
-      CHECK(is_semidefinite(collapse(X).covariance.matrix()));
+      CHECK(is_semidefinite(collapse(X).covariance.of_specified().matrix()));
     }
   }
 }

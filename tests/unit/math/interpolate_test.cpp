@@ -38,8 +38,8 @@ Samples samples(Random& random, double angle, double reach = 2.0) {
   return {{X0, random.covariance()}, {X0 * exp(random.twist(angle, reach)), random.covariance()}};
 }
 
-Covariance propagated(const Matrix6d& J, const Covariance& sigma) {
-  return Covariance::trusted(Matrix6d(J * sigma.matrix() * J.transpose()));
+Covariance propagated(const Matrix6d& J, const StatedCovariance& sigma) {
+  return Covariance::trusted(Matrix6d(J * sigma.of_specified().matrix() * J.transpose()));
 }
 
 // The largest ratio of variances in any direction.
@@ -108,11 +108,11 @@ TEST_CASE("the covariance weights each sample's Jacobian as a mean does") {
       const Matrix6d J1 = numeric_jacobian([&, s = s](const Twist& e) {
         return interpolate({a, {}}, {b * exp(e), {}}, s).pose;
       });
-      const Covariance from0 = interpolate(X0, {b, {}}, s).covariance;
-      const Covariance from1 = interpolate({a, {}}, X1, s).covariance;
-      CHECK(covariance_diff(Covariance::trusted(Matrix6d((1 - s) * from0.matrix())),
+      const StatedCovariance from0 = interpolate(X0, {b, {}}, s).covariance;
+      const StatedCovariance from1 = interpolate({a, {}}, X1, s).covariance;
+      CHECK(covariance_diff(Covariance::trusted(Matrix6d((1 - s) * from0.of_specified().matrix())),
                             propagated(J0, X0.covariance), 1e-6) == "");
-      CHECK(covariance_diff(Covariance::trusted(Matrix6d(s * from1.matrix())),
+      CHECK(covariance_diff(Covariance::trusted(Matrix6d(s * from1.of_specified().matrix())),
                             propagated(J1, X1.covariance), 1e-6) == "");
     }
   }
@@ -146,9 +146,9 @@ TEST_CASE("extrapolation is right for every angle and distance") {
       Matrix6d B0 = Matrix6d::Zero();
       if (beyond > 0) B0 = carrying(xi, beyond) * adjoint(exp(-xi));
       const Matrix6d expected =
-          beyond * (s + beyond) * B0 * X0.covariance.matrix() * B0.transpose() +
-          s * (s + beyond) * B1 * X1.covariance.matrix() * B1.transpose();
-      const Matrix6d given = extrapolate(X0, X1, s).covariance.matrix();
+          beyond * (s + beyond) * B0 * X0.covariance.of_specified().matrix() * B0.transpose() +
+          s * (s + beyond) * B1 * X1.covariance.of_specified().matrix() * B1.transpose();
+      const Matrix6d given = extrapolate(X0, X1, s).covariance.of_specified().matrix();
       // Relative in all directions, so that no variance is too small either.
       const Matrix6d root = cholesky_root(expected);
       const Matrix6d whitened =
@@ -167,8 +167,8 @@ TEST_CASE("the covariance is no less than the sampled one for any correlation of
   INFO("seed " << random.seed());
   for (const double correlation : {0.0, 0.5, 1.0}) {
     const auto [X0, X1] = samples(random, 0.7);
-    const Matrix6d root0 = cholesky_root(X0.covariance.matrix());
-    const Matrix6d root1 = cholesky_root(X1.covariance.matrix());
+    const Matrix6d root0 = cholesky_root(X0.covariance.of_specified().matrix());
+    const Matrix6d root1 = cholesky_root(X1.covariance.of_specified().matrix());
     const double s = random.uniform(0.3, 0.7);
     const double beyond = random.uniform(1.1, 2.0);
     const Transform between = interpolate(X0, X1, s);
@@ -192,11 +192,12 @@ TEST_CASE("the covariance is no less than the sampled one for any correlation of
       sampled_after += e_after * e_after.transpose() / kSamples;
     }
     INFO("correlation " << correlation << ", part " << s << " and " << beyond);
-    CHECK(largest_ratio(sampled, between.covariance.matrix()) < 1.045);
-    CHECK(largest_ratio(sampled_after, after.covariance.matrix()) < 1.045);
+    CHECK(largest_ratio(sampled, between.covariance.of_specified().matrix()) < 1.045);
+    CHECK(largest_ratio(sampled_after, after.covariance.of_specified().matrix()) < 1.045);
     // As if the samples were independent.
-    const Matrix6d naive = (1 - s) * interpolate(X0, {X1.pose, {}}, s).covariance.matrix() +
-                           s * interpolate({X0.pose, {}}, X1, s).covariance.matrix();
+    const Matrix6d naive =
+        (1 - s) * interpolate(X0, {X1.pose, {}}, s).covariance.of_specified().matrix() +
+        s * interpolate({X0.pose, {}}, X1, s).covariance.of_specified().matrix();
     CHECK((largest_ratio(sampled, naive) < 1.045) == (correlation == 0.0));
   }
 }

@@ -53,7 +53,8 @@ TEST_CASE("joint: at zero the child has the pose of the origin") {
   const Transform X_PJ = random.transform();
   const auto X = tfdude::joint_transform(revolute_joint(X_PJ, random.direction()), 0, 0);
   CHECK((X.pose.matrix() - X_PJ.pose.matrix()).cwiseAbs().maxCoeff() < 1e-15);
-  CHECK(difference(X.covariance.matrix(), X_PJ.covariance.matrix()) < 1e-17);
+  CHECK(difference(X.covariance.of_specified().matrix(), X_PJ.covariance.of_specified().matrix()) <
+        1e-17);
 }
 
 TEST_CASE("joint: the position's variance gives a covariance of rank one along the twist") {
@@ -64,7 +65,8 @@ TEST_CASE("joint: the position's variance gives a covariance of rank one along t
     const double q = random.uniform(-4, 4);
     const Transform X_PJ = exact(random.transform());
     for (const Joint& joint : {revolute_joint(X_PJ, axis), prismatic_joint(X_PJ, axis)}) {
-      const Matrix6d sigma = tfdude::joint_transform(joint, q, 0.25).covariance.matrix();
+      const Matrix6d sigma =
+          tfdude::joint_transform(joint, q, 0.25).covariance.of_specified().matrix();
       REQUIRE(difference(sigma, 0.25 * joint.S * joint.S.transpose()) < 1e-16);
       const Twist eigen = tfdude::testing::eigenvalues(sigma);
       REQUIRE(eigen[5] == tfdude::testing::Approx(0.25));
@@ -84,7 +86,8 @@ TEST_CASE("joint: the origin's error is transported to the child") {
     const Transform X_JC =
         tfdude::joint_transform(revolute_joint(Transform(), joint.S.tail<3>()), q, 0.01);
     const Transform composed = tfdude::compose(X_PJ, X_JC);
-    REQUIRE(difference(X.covariance.matrix(), composed.covariance.matrix()) < 1e-15);
+    REQUIRE(difference(X.covariance.of_specified().matrix(),
+                       composed.covariance.of_specified().matrix()) < 1e-15);
   }
 }
 
@@ -107,7 +110,8 @@ TEST_CASE("joint: the covariance is that of samples of position and origin") {
       return tfdude::log(X.pose.inverse() * X_off.pose);
     };
     const Matrix6d sampled = tfdude::testing::second_moment(kSamples, sample);
-    const auto wrong = tfdude::testing::moment_diff(sampled, X.covariance.matrix(), kSamples, 1e-4);
+    const auto wrong =
+        tfdude::testing::moment_diff(sampled, X.covariance.of_specified().matrix(), kSamples, 1e-4);
     CHECK(wrong == "");
   }
 }

@@ -29,7 +29,7 @@ TEST_CASE("the portable kernel and that of this processor accumulate alike") {
     kernel::Blocks sum;
     functions.accumulate_with_covariance(X_SH, sum, edges.data(), edges.size());
     functions.add_transported(functions.quotient(X_SH, kernel::Columns()),
-                              path[0].covariance.upper().data(), sum);
+                              path[0].covariance.of_specified().upper().data(), sum);
     return Transform{kernel::pose_of(X_SH), Covariance::trusted(kernel::upper_of(sum))};
   };
   const Transform here = accumulated(kernel::functions());

@@ -21,7 +21,7 @@ constexpr int kSamples = 100'000;
 class Sampler {
  public:
   explicit Sampler(const Transform& X)
-      : mean_(X.pose), root_(testing::cholesky_root(X.covariance.matrix())) {}
+      : mean_(X.pose), root_(testing::cholesky_root(X.covariance.of_specified().matrix())) {}
 
   Pose operator()(Random& random) const {
     Twist unit;
@@ -93,18 +93,20 @@ TEST_CASE("sampled products have the composed covariance") {
     const Pose sampled_AB = sample_AB(random);
     return sampled_AB * sample_BC(random);
   });
-  const Matrix6d sigma = X_AC.covariance.matrix();
-  const Matrix6d from_BC = X_BC.covariance.matrix();
+  const Matrix6d sigma = X_AC.covariance.of_specified().matrix();
+  const Matrix6d from_BC = X_BC.covariance.of_specified().matrix();
   const double second_order = allowance(sigma - from_BC, from_BC);
   require_small(second_order, sigma);
   CHECK(disagreement(S, sigma, second_order) == "");
 
   // The same check turns down what a wrong propagation would have given.
-  const Matrix6d untransported = X_AB.covariance.matrix() + from_BC;
+  const Matrix6d untransported = X_AB.covariance.of_specified().matrix() + from_BC;
   CHECK(disagreement(S, untransported, second_order) != "");
-  const Matrix6d wrong_way = X_AB.covariance.transported(X_BC.pose).matrix() + from_BC;
+  const Matrix6d wrong_way =
+      X_AB.covariance.transported(X_BC.pose).of_specified().matrix() + from_BC;
   CHECK(disagreement(S, wrong_way, second_order) != "");
-  const Matrix6d left = X_AB.covariance.matrix() + X_BC.covariance.transported(X_AB.pose).matrix();
+  const Matrix6d left = X_AB.covariance.of_specified().matrix() +
+                        X_BC.covariance.transported(X_AB.pose).of_specified().matrix();
   CHECK(disagreement(S, left, second_order) != "");
   CHECK(disagreement(S, 1.05 * sigma, second_order) != "");
 }
@@ -117,10 +119,10 @@ TEST_CASE("sampled inverses have the inverted covariance") {
   const Sampler sample_AB(X_AB);
   const Matrix6d S = sample_covariance(X_BA.pose, [&] { return sample_AB(random).inverse(); });
   // Exact: (X̄ Exp(ξ))⁻¹ = X̄⁻¹ Exp(-Ad(X̄) ξ), nothing to allow for.
-  CHECK(disagreement(S, X_BA.covariance.matrix(), 0.0) == "");
+  CHECK(disagreement(S, X_BA.covariance.of_specified().matrix(), 0.0) == "");
 
-  CHECK(disagreement(S, X_AB.covariance.matrix(), 0.0) != "");
-  CHECK(disagreement(S, X_AB.covariance.transported(X_BA.pose).matrix(), 0.0) != "");
+  CHECK(disagreement(S, X_AB.covariance.of_specified().matrix(), 0.0) != "");
+  CHECK(disagreement(S, X_AB.covariance.transported(X_BA.pose).of_specified().matrix(), 0.0) != "");
 }
 
 TEST_CASE("sampled differences have the covariance of between") {
@@ -135,14 +137,15 @@ TEST_CASE("sampled differences have the covariance of between") {
     const Pose sampled_WA = sample_WA(random);
     return sampled_WA.inverse() * sample_WB(random);
   });
-  const Matrix6d sigma = X_AB.covariance.matrix();
-  const Matrix6d from_WB = X_WB.covariance.matrix();
+  const Matrix6d sigma = X_AB.covariance.of_specified().matrix();
+  const Matrix6d from_WB = X_WB.covariance.of_specified().matrix();
   const double second_order = allowance(sigma - from_WB, from_WB);
   require_small(second_order, sigma);
   CHECK(disagreement(S, sigma, second_order) == "");
 
-  CHECK(disagreement(S, X_WA.covariance.matrix() + from_WB, second_order) != "");
-  const Matrix6d wrong_way = X_WA.covariance.transported(X_AB.pose).matrix() + from_WB;
+  CHECK(disagreement(S, X_WA.covariance.of_specified().matrix() + from_WB, second_order) != "");
+  const Matrix6d wrong_way =
+      X_WA.covariance.transported(X_AB.pose).of_specified().matrix() + from_WB;
   CHECK(disagreement(S, wrong_way, second_order) != "");
   CHECK(disagreement(S, sigma - 2.0 * from_WB, second_order) != "");
 }
@@ -168,12 +171,12 @@ TEST_CASE("sampled paths have the joined covariance") {
     const Pose sampled_HA = sampled_HP * sample_PA(random);
     return sampled_HA.inverse() * sample_HB(random);
   });
-  const Matrix6d sigma = X_AB.covariance.matrix();
+  const Matrix6d sigma = X_AB.covariance.of_specified().matrix();
   // Three parts: no pair of them exceeds the product of the whole with itself.
   const double second_order = allowance(sigma, sigma);
   require_small(second_order, sigma);
   CHECK(disagreement(S, sigma, second_order) == "");
-  CHECK(disagreement(S, sigma - X_HB.covariance.matrix(), second_order) != "");
+  CHECK(disagreement(S, sigma - X_HB.covariance.of_specified().matrix(), second_order) != "");
 }
 
 }  // namespace

@@ -28,8 +28,8 @@ using Matrix6r = Eigen::Matrix<Real, 6, 6>;
 
 // The smallest eigenvalue, in units of the axes' own deviations, where the largest is of the order
 // of one.
-double smallest_eigenvalue(const Covariance& covariance) {
-  const Matrix6d sigma = covariance.matrix();
+double smallest_eigenvalue(const StatedCovariance& covariance) {
+  const Matrix6d sigma = covariance.of_specified().matrix();
   const Twist unit = sigma.diagonal().unaryExpr(
       [](double variance) { return variance > 0 ? 1.0 / std::sqrt(variance) : 0.0; });
   const Matrix6d scaled = unit.asDiagonal() * sigma * unit.asDiagonal();
@@ -60,14 +60,15 @@ struct Exact {
     edge.R = q.toRotationMatrix();
     edge.t = X.pose.translation().cast<Real>();
     const Matrix6r ad = edge.adjoint_of_inverse();
-    sigma = (ad * sigma * ad.transpose()).eval() + X.covariance.matrix().cast<Real>();
+    sigma =
+        (ad * sigma * ad.transpose()).eval() + X.covariance.of_specified().matrix().cast<Real>();
     t += R * edge.t;
     R = (R * edge.R).eval();
   }
   // The largest difference of an element, in units of its axes' deviations.
-  double error_of(const Covariance& covariance) const {
+  double error_of(const StatedCovariance& covariance) const {
     double largest = 0;
-    const Matrix6d other = covariance.matrix();
+    const Matrix6d other = covariance.of_specified().matrix();
     for (int i = 0; i < 6; ++i) {
       for (int j = 0; j < 6; ++j) {
         const Real unit = std::sqrt(sigma(i, i) * sigma(j, j));
@@ -103,7 +104,7 @@ TEST_CASE("numerics: a chain of 10,000 edges keeps its covariance") {
   Belief fourth;
   for (const Transform& edge : edges) {
     exact.append(edge);
-    const Belief X{edge.pose, edge.covariance, std::nullopt, {}};
+    const Belief X{edge.pose, edge.covariance.of_specified(), std::nullopt, {}};
     second = compose(second, X, Order::kSecond);
     fourth = compose(fourth, X, Order::kFourth);
   }
@@ -115,7 +116,7 @@ TEST_CASE("numerics: a chain of 10,000 edges keeps its covariance") {
   CHECK(exact.error_of(looked_up.covariance) < 1e-11);
   CHECK(exact.error_of(collapse(second).covariance) < 1e-11);
   double smallest = 1;
-  for (const Covariance& one :
+  for (const StatedCovariance& one :
        {looked_up.covariance, collapse(second).covariance, collapse(fourth).covariance}) {
     smallest = std::min(smallest, smallest_eigenvalue(one));
   }
@@ -194,7 +195,7 @@ TEST_CASE("numerics: poses and covariances stay precise near half turns") {
       // A path that is itself half a turn, observed where it is thought to be and a little beside.
       const Transform Z{X * exp(0.005 * random.twist(1.0, 1.0)), random.covariance(0.01, 0.01)};
       const auto observed =
-          observe({{{X, X_AB.covariance, std::nullopt, {}}, {}}}, Z, "observed:1");
+          observe({{{X, X_AB.covariance.of_specified(), std::nullopt, {}}, {}}}, Z, "observed:1");
       const auto fused = fuse({X_AB, Z});
       REQUIRE(observed);
       REQUIRE(fused);
@@ -224,7 +225,8 @@ TEST_CASE("numerics: covariances stay positive semi-definite after very precise 
       Pose X_AB;
       for (int i = 0; i < 6; ++i) {
         const Transform X = random.transform(1.0, 0.01, 0.01);
-        edges.push_back({{X.pose, X.covariance, std::nullopt, {}}, ObservedEdge::Way::kDown});
+        edges.push_back(
+            {{X.pose, X.covariance.of_specified(), std::nullopt, {}}, ObservedEdge::Way::kDown});
         X_AB = X_AB * X.pose;
       }
       const Covariance R = random.covariance(precision, precision);
@@ -242,7 +244,7 @@ TEST_CASE("numerics: covariances stay positive semi-definite after very precise 
         }
       }
       // Three of one measurement: a third of its covariance.
-      const Matrix6d left = collapse(whole).covariance.matrix() - R.matrix() / 3.0;
+      const Matrix6d left = collapse(whole).covariance.of_specified().matrix() - R.matrix() / 3.0;
       const double rest = left.cwiseAbs().maxCoeff() / R.matrix().cwiseAbs().maxCoeff();
       worst = std::max(worst, rest);
     }

@@ -33,7 +33,7 @@ class Consistency {
   void add(const Belief& X, const Pose& truth) {
     const Twist e = log(X.pose.inverse() * truth);
     int rank = 0;
-    const Matrix6d inverse = pseudo_inverse(collapse(X).covariance.matrix(), &rank);
+    const Matrix6d inverse = pseudo_inverse(collapse(X).covariance.of_specified().matrix(), &rank);
     sum_ += e.dot(inverse * e);
     dimensions_ += rank;
     ++runs_;
@@ -161,7 +161,8 @@ TEST_CASE("A measurement of one uncertain edge is fused with it") {
     const Transform X = random.transform(2.0, 0.1, 0.1);
     const Transform Z{X.pose * exp(0.1 * random.twist(1.0, 1.0)), random.covariance(0.1, 0.1)};
     const auto observed =
-        observe({{{X.pose, X.covariance, std::nullopt, {}}, kDown}}, Z, kSource, {1.0, true});
+        observe({{{X.pose, X.covariance.of_specified(), std::nullopt, {}}, kDown}}, Z, kSource,
+                {1.0, true});
     const auto fused = fuse({X, Z});
     REQUIRE(observed);
     REQUIRE(fused);
@@ -241,7 +242,7 @@ TEST_CASE("An edge of unknown correlation gains nothing from the same measuremen
   Random random(638);
   INFO("seed " << random.seed());
   const Transform X = random.transform(1.0, 0.1, 0.1);
-  const Belief alone{X.pose, {}, X.covariance, {}};
+  const Belief alone{X.pose, {}, X.covariance.of_specified(), {}};
   const Transform Z{X.pose, random.covariance(0.01, 0.01)};
   // By covariance intersection: the same again tells nothing more.
   const auto once = observe({{alone, kDown}}, Z, kSource);
@@ -255,7 +256,8 @@ TEST_CASE("An edge of unknown correlation gains nothing from the same measuremen
   CHECK(twice->edges[0].X_PC.unknown->matrix().trace() > 0.99 * after.unknown->matrix().trace());
   const auto as_if = fuse({X, Z, Z});
   REQUIRE(as_if);
-  CHECK(as_if->X.covariance.matrix().trace() < 0.7 * after.unknown->matrix().trace());
+  CHECK(as_if->X.covariance.of_specified().matrix().trace() <
+        0.7 * after.unknown->matrix().trace());
 
   const auto both = observe({{alone, kDown}, {alone, kUp}}, Z, kSource);
   REQUIRE_FALSE(both);
@@ -270,7 +272,8 @@ TEST_CASE("An edge of unknown correlation gains nothing from the same measuremen
   // It gets no better than the unknown edge between it and the measurement.
   const Matrix6d left = mixed->edges[1].X_PC.own.matrix();
   CHECK(left.trace() < known.own.matrix().trace());
-  CHECK(testing::domination(left, X.covariance.transported(known.pose.inverse()).matrix()) > -1e-9);
+  CHECK(testing::domination(
+            left, X.covariance.transported(known.pose.inverse()).of_specified().matrix()) > -1e-9);
 }
 
 TEST_CASE("NormalizedInnovation finds the edge whose covariance is too small") {

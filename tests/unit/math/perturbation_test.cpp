@@ -22,8 +22,8 @@ struct Convention {
   const char* name;
   std::function<Pose(const Pose&, const Twist&)> perturb;
   std::function<Twist(const Pose&, const Pose&)> error;
-  std::function<Covariance(const Transform&)> of_right;
-  std::function<Transform(const Pose&, const Covariance&)> to_right;
+  std::function<StatedCovariance(const Transform&)> of_right;
+  std::function<Transform(const Pose&, const StatedCovariance&)> to_right;
 };
 
 const std::vector<Convention>& conventions() {
@@ -31,7 +31,7 @@ const std::vector<Convention>& conventions() {
       {"right", [](const Pose& X, const Twist& xi) { return X * exp(xi); },
        [](const Pose& mean, const Pose& X) { return log(mean.inverse() * X); },
        [](const Transform& X) { return X.covariance; },
-       [](const Pose& X, const Covariance& S) {
+       [](const Pose& X, const StatedCovariance& S) {
          return Transform{X, S};
        }},
       {"left", [](const Pose& X, const Twist& xi) { return exp(xi) * X; },
@@ -66,7 +66,7 @@ TEST_CASE("A covariance converted between conventions is that of samples") {
       const Matrix6d sampled = testing::second_moment(
           kSamples, [&] { return measured.error(mean, drawn.perturb(mean, gaussian(random))); });
       const Transform right = drawn.to_right(mean, given);
-      const Matrix6d computed = measured.of_right(right).matrix();
+      const Matrix6d computed = measured.of_right(right).of_specified().matrix();
       CHECK(testing::moment_diff(sampled, computed, kSamples, 1e-3) == "");
       // The samples tell conventions apart: of another, the same numbers do not pass.
       if (drawn.name != measured.name) {
@@ -94,7 +94,7 @@ TEST_CASE("ROS's covariance of a camera that looks along x is along the parent's
   const Pose X = Pose::trusted(from_rpy(0, 0, M_PI / 2), {5, 0, 0});
   const auto along_x = Covariance::from_stddev({0.1, 0, 0, 0.01, 0, 0});
   REQUIRE(along_x);
-  const auto ros = ros_covariance({X, *along_x}).stddev();
+  const auto ros = ros_covariance({X, *along_x}).of_specified().stddev();
   CHECK(ros[0] == testing::Approx(0).margin(1e-12));
   CHECK(ros[1] == testing::Approx(0.1));
   CHECK(ros[3] == testing::Approx(0).margin(1e-12));

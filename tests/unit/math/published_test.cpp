@@ -66,7 +66,7 @@ Matrix6d brackets(const Matrix6d& sigma_1, const Matrix6d& sigma_2) {
 }
 
 Matrix6d left_of_product(const testing::SharedPair& pair, Order order) {
-  return left_covariance(collapse(compose(pair.first, pair.second, order))).matrix();
+  return left_covariance(collapse(compose(pair.first, pair.second, order))).of_specified().matrix();
 }
 
 // Of the left perturbation of X1 X2, to fourth order.
@@ -133,13 +133,15 @@ TEST_CASE("A chain of steps has the covariance of the closed form and of the pap
   const double variance = testing::kChainYaw * testing::kChainYaw;
   for (const int K : {1, 2, 10, 100}) {
     CAPTURE(K);
-    const Matrix6d second = left_covariance(testing::chain(K, Order::kSecond)).matrix();
+    const Matrix6d second =
+        left_covariance(testing::chain(K, Order::kSecond)).of_specified().matrix();
     CHECK(second(0, 0) == 0);
     CHECK(second(1, 1) == Approx(variance * K * (K - 1) * (2 * K - 1) / 6));
     CHECK(second(1, 5) == Approx(-variance * K * (K - 1) / 2));
     CHECK(second(5, 5) == Approx(variance * K));
   }
-  const Matrix6d fourth = left_covariance(testing::chain(100, Order::kFourth)).matrix();
+  const Matrix6d fourth =
+      left_covariance(testing::chain(100, Order::kFourth)).of_specified().matrix();
   CHECK(fourth(0, 0) == Approx(1.678).margin(0.001));
   CHECK(fourth(1, 1) == Approx(294.4).margin(0.05));
   CHECK(fourth(1, 5) == Approx(-4.455));
@@ -175,7 +177,8 @@ Trials fuse_often(double alpha, double spread, int trials, Random& random) {
   for (int i = 0; i < trials; ++i) {
     std::vector<Transform> estimates = testing::drawn_estimates(alpha * spread * spread, random);
     for (Transform& X : estimates) {
-      X.covariance = Covariance::trusted(Matrix6d(X.covariance.matrix() / (spread * spread)));
+      X.covariance =
+          Covariance::trusted(Matrix6d(X.covariance.of_specified().matrix() / (spread * spread)));
     }
     const auto result = fuse(estimates);
     if (!result) continue;
@@ -243,10 +246,10 @@ TEST_CASE("Correlated poses: a shared source agrees with samples and independenc
 TEST_CASE("Two poses of one trajectory: a known common error cancels") {
   const testing::Trajectory t = testing::trajectory(100);
   const Transform way = collapse(compose(inverse(t.A()), t.B(), Order::kSecond));
-  const Matrix6d right = t.X_AB.covariance.matrix();
-  CHECK((way.covariance.matrix() - right).norm() < 1e-9 * right.norm());
-  const auto position = [](const Covariance& sigma) {
-    return std::sqrt(sigma.matrix().topLeftCorner<3, 3>().trace());
+  const Matrix6d right = t.X_AB.covariance.of_specified().matrix();
+  CHECK((way.covariance.of_specified().matrix() - right).norm() < 1e-9 * right.norm());
+  const auto position = [](const StatedCovariance& sigma) {
+    return std::sqrt(sigma.of_specified().matrix().topLeftCorner<3, 3>().trace());
   };
   const Transform independent = between(collapse(t.A()), collapse(t.B()));
   CHECK(position(independent.covariance) > 30 * position(t.X_AB.covariance));
@@ -258,8 +261,8 @@ TEST_CASE("Two poses jointly Gaussian in their tangent spaces need fourth order"
   const testing::Trajectory t = testing::trajectory(100);
   const Matrix6d sampled = testing::sampled_way(t, random, kSamples);
   const auto error = [&](Order order) {
-    const Covariance sigma = collapse(compose(inverse(t.A()), t.B(), order)).covariance;
-    return (sigma.matrix() - sampled).norm() / sampled.norm();
+    const StatedCovariance sigma = collapse(compose(inverse(t.A()), t.B(), order)).covariance;
+    return (sigma.of_specified().matrix() - sampled).norm() / sampled.norm();
   };
   const double second = error(Order::kSecond);
   const double fourth = error(Order::kFourth);

@@ -23,10 +23,10 @@ using testing::transform_diff;
 constexpr double kPi = 3.14159265358979323846;
 
 static_assert(std::is_trivially_copyable_v<Transform>);
-static_assert(sizeof(Transform) == 28 * sizeof(double));
+static_assert(sizeof(Transform) == 29 * sizeof(double));
 
-Matrix6d propagated(const Matrix6d& jacobian, const Covariance& sigma) {
-  return jacobian * sigma.matrix() * jacobian.transpose();
+Matrix6d propagated(const Matrix6d& jacobian, const StatedCovariance& sigma) {
+  return jacobian * sigma.of_specified().matrix() * jacobian.transpose();
 }
 
 // Poses whose Jacobians differ in kind: identity, tiny, half turns, anything.
@@ -99,14 +99,15 @@ TEST_CASE("compose and inverse and between equal the dense formulas") {
     const Transform a = random.transform(5.0, 0.1, 0.02);
     const Transform b = random.transform(5.0, 0.01, 0.1);
     const Matrix6d to_b = adjoint(b.pose.inverse());
-    const Matrix6d composed = propagated(to_b, a.covariance) + b.covariance.matrix();
+    const Matrix6d composed = propagated(to_b, a.covariance) + b.covariance.of_specified().matrix();
     CHECK(transform_diff(compose(a, b), {a.pose * b.pose, Covariance::trusted(composed)}, 1e-14) ==
           "");
     const Matrix6d inverted = propagated(adjoint(a.pose), a.covariance);
     CHECK(transform_diff(inverse(a), {a.pose.inverse(), Covariance::trusted(inverted)}, 1e-14) ==
           "");
     const Matrix6d to_b_from_a = adjoint(b.pose.inverse() * a.pose);
-    const Matrix6d both = propagated(to_b_from_a, a.covariance) + b.covariance.matrix();
+    const Matrix6d both =
+        propagated(to_b_from_a, a.covariance) + b.covariance.of_specified().matrix();
     const Transform expected{a.pose.inverse() * b.pose, Covariance::trusted(both)};
     CHECK(transform_diff(between(a, b), expected, 1e-14, 1e-12) == "");
   }
@@ -117,9 +118,9 @@ TEST_CASE("exact transforms stay exact") {
   INFO("seed " << random.seed());
   const Transform a{random.pose(), {}};
   const Transform b{random.pose(), {}};
-  CHECK(compose(a, b).covariance.matrix() == Matrix6d::Zero());
-  CHECK(inverse(a).covariance.matrix() == Matrix6d::Zero());
-  CHECK(between(a, b).covariance.matrix() == Matrix6d::Zero());
+  CHECK(compose(a, b).covariance.of_specified().matrix() == Matrix6d::Zero());
+  CHECK(inverse(a).covariance.of_specified().matrix() == Matrix6d::Zero());
+  CHECK(between(a, b).covariance.of_specified().matrix() == Matrix6d::Zero());
 }
 
 // ---- laws
@@ -237,8 +238,8 @@ TEST_CASE("a join of empty paths is the identity known exactly") {
 
 // ---- long chains
 
-double relative_smallest_eigenvalue(const Covariance& sigma) {
-  const Eigen::VectorXd values = eigenvalues(sigma.matrix());
+double relative_smallest_eigenvalue(const StatedCovariance& sigma) {
+  const Eigen::VectorXd values = eigenvalues(sigma.of_specified().matrix());
   return values[0] / values[5];
 }
 
@@ -260,7 +261,7 @@ TEST_CASE("a chain of 1000 edges stays symmetric and positive semi-definite") {
   for (const Transform& X_PC : path.edges) X_RS = compose(X_PC, X_RS);
   const Transform X_SR = join(accumulated(path), PathAccumulation<Transform>());
   for (const Transform& X : {X_RS, X_SR}) {
-    CHECK(X.covariance.matrix() == X.covariance.matrix().transpose());
+    CHECK(X.covariance.of_specified().matrix() == X.covariance.of_specified().matrix().transpose());
     CHECK(relative_smallest_eigenvalue(X.covariance) >= -1e-12);
     CHECK(std::abs(X.pose.rotation().norm() - 1.0) < 1e-15);
   }
@@ -299,8 +300,9 @@ TEST_CASE("every result is accepted as an input") {
       const Transform edge = planar_edge(random, right_angles);
       X = random.index(2) == 0 ? compose(X, edge) : between(edge, X);
     }
-    const auto again = Covariance::from_upper(X.covariance.upper());
-    if (!again) FAIL(again.error().message << "\n" << testing::describe(X.covariance));
+    const auto again = Covariance::from_upper(X.covariance.of_specified().upper());
+    if (!again)
+      FAIL(again.error().message << "\n" << testing::describe(X.covariance.of_specified()));
     if (covariance_diff(*again, X.covariance, 1e-12) != "") {
       FAIL(covariance_diff(*again, X.covariance, 1e-12));
     }

@@ -67,7 +67,7 @@ TEST_CASE("before its first sample a joint is at rest with the variance of its l
   Arm arm;
   arm.load();
   CHECK(pose_diff(arm.edge("base", "upper").pose, along_x(1).pose, 1e-15) == "");
-  CHECK(arm.edge("base", "upper").covariance.stddev()[5] == 0.5);
+  CHECK(arm.edge("base", "upper").covariance.of_specified().stddev()[5] == 0.5);
   CHECK_FALSE(arm.info("shoulder").measured);
   CHECK(arm.info("shoulder").frame == "upper");
 }
@@ -82,9 +82,9 @@ TEST_CASE("positions move the joints' edges as one commit") {
   const Transform upper = arm.edge("base", "upper");
   CHECK(upper.pose.rotation().angularDistance(
             Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ()))) < 1e-15);
-  CHECK(upper.covariance.stddev()[5] == 0.01);
+  CHECK(upper.covariance.of_specified().stddev()[5] == 0.01);
   CHECK(arm.edge("base", "cart").pose.translation().y() == -0.25);
-  CHECK(arm.edge("base", "cart").covariance.stddev()[1] == 0.002);
+  CHECK(arm.edge("base", "cart").covariance.of_specified().stddev()[1] == 0.002);
   CHECK(arm.info("shoulder").position == 0.5);
   CHECK(arm.info("shoulder").measured);
   REQUIRE(arm.partition.apply(JointUpdate{{{"shoulder", 0.7, 1e-4}}, at(3)}));
@@ -104,12 +104,14 @@ TEST_CASE("a mimic joint moves with its source joint and shares its error") {
   // of squares.
   const auto X = arm.forest.lookup("upper", "hand", Query{});
   REQUIRE(X);
-  CHECK(std::abs(X->covariance.stddev()[5] - 0.5 * 0.2) < 1e-12);
+  CHECK(std::abs(X->covariance.of_specified().stddev()[5] - 0.5 * 0.2) < 1e-12);
   CHECK(X->basis.sources == std::vector<std::string>{"joint elbow"});
   // A new variance changes the common error together with the value.
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.01}}, {}}));
-  CHECK(std::abs(arm.forest.lookup("upper", "hand")->covariance.stddev()[5] - 0.5 * 0.1) < 1e-12);
-  CHECK(std::abs(arm.forest.lookup("upper", "fore")->covariance.stddev()[5] - 0.1) < 1e-12);
+  CHECK(std::abs(arm.forest.lookup("upper", "hand")->covariance.of_specified().stddev()[5] -
+                 0.5 * 0.1) < 1e-12);
+  CHECK(std::abs(arm.forest.lookup("upper", "fore")->covariance.of_specified().stddev()[5] - 0.1) <
+        1e-12);
   // And a certain joint shares nothing.
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0}}, {}}));
   CHECK(arm.forest.lookup("upper", "hand", Query{})->basis.sources.empty());
@@ -220,7 +222,8 @@ TEST_CASE("a late sample is added to the history and does not change the newest 
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.9, 0.01}}, at(5)}));
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.7, 0.09}}, at(3)}));
   CHECK(arm.info("elbow").position == 0.9);
-  CHECK(std::abs(arm.forest.lookup("upper", "fore")->covariance.stddev()[5] - 0.1) < 1e-12);
+  CHECK(std::abs(arm.forest.lookup("upper", "fore")->covariance.of_specified().stddev()[5] - 0.1) <
+        1e-12);
   CHECK(outcome(arm.partition.apply(JointUpdate{{{"elbow", 0.8, 0.01}}, at(3)})) == "stamp_taken");
 }
 
@@ -261,9 +264,9 @@ TEST_CASE("a partition restores the positions of its joints") {
     CHECK(arm.info("shoulder").position == 0.5);
     CHECK(arm.info("shoulder").measured);
     CHECK_FALSE(arm.info("rail").measured);
-    CHECK(std::abs(arm.edge("base", "upper").covariance.stddev()[5] - 0.01) < 1e-12);
+    CHECK(std::abs(arm.edge("base", "upper").covariance.of_specified().stddev()[5] - 0.01) < 1e-12);
     CHECK(std::abs(arm.info("wrist").position + 0.25) < 1e-15);
-    CHECK(std::abs(arm.edge("upper", "hand").covariance.stddev()[5] - 0.1) < 1e-12);
+    CHECK(std::abs(arm.edge("upper", "hand").covariance.of_specified().stddev()[5] - 0.1) < 1e-12);
     // Later samples are applied.
     CHECK(*arm.partition.apply(JointUpdate{{{"elbow", 0.25, 0.01}}, {}}) == 2);
   }
@@ -285,7 +288,7 @@ TEST_CASE("a partition restores the positions of its joints") {
     CHECK(pose_diff(arm.edge("upper", "fore").pose, joint_transform(reversed.joint, 0.75, 0).pose,
                     1e-15) == "");
     CHECK(arm.info("wrist").position == 2 * 0.75 + 0.125);
-    CHECK(std::abs(arm.edge("upper", "hand").covariance.stddev()[5] - 0.2) < 1e-12);
+    CHECK(std::abs(arm.edge("upper", "hand").covariance.of_specified().stddev()[5] - 0.2) < 1e-12);
   }
   SECTION("with narrower limits: the position is kept and counted") {
     auto frames = arm.frames();

@@ -100,7 +100,7 @@ TEST_CASE("a covariance that stays the same is pushed once") {
   CHECK(numbers(next) == "(3) ");
   for (PushedValue& entry : next.entries) entry.X.covariance = Covariance();  // as it travels
   REQUIRE(known.fill_in(next.entries));
-  CHECK(next.entries.front().X.covariance.stddev()[0] == testing::Approx(0.2));
+  CHECK(next.entries.front().X.covariance.of_specified().stddev()[0] == testing::Approx(0.2));
   KnownCovariances stranger(2);
   next.entries.front().covariance_known = true;
   CHECK_FALSE(stranger.fill_in(next.entries));

@@ -120,7 +120,9 @@ TEST_CASE("watch mirror: a covariance that was pushed before is reused by its nu
     return value;
   };
   Watched watched;
-  const auto stddev = [&] { return watched.mirror.lookup({})->covariance.stddev()[0]; };
+  const auto stddev = [&] {
+    return watched.mirror.lookup({})->covariance.of_specified().stddev()[0];
+  };
   CHECK(watched.mirror.take({kTools, {uncertain(entry(0, 100, 1, false), 0.1, 4, false)}, 3, 4}));
   CHECK(stddev() == Approx(0.1));
   CHECK(watched.mirror.take({kTools, {uncertain(entry(0, 200, 1, false), 0, 4, true)}, 4, 5}));

@@ -105,10 +105,11 @@ std::string judge_step(const StampedTransform& X, double& last) {
   const double x = X.pose.translation().x();
   const bool left = x < 15'000;
   const double k = x - (left ? 10'000 : 20'000);
-  const std::string what =
-      "x " + std::to_string(x) + " with variance " + std::to_string(X.covariance.matrix()(0, 0));
+  const std::string what = "x " + std::to_string(x) + " with variance " +
+                           std::to_string(X.covariance.of_specified().matrix()(0, 0));
   if (k != std::floor(k) || (static_cast<std::int64_t>(k) % 2 == 0) != left) return what;
-  if (std::abs(X.covariance.matrix()(0, 0) - (left ? 1 : 2) - (10 + k)) > 1e-9) return what;
+  if (std::abs(X.covariance.of_specified().matrix()(0, 0) - (left ? 1 : 2) - (10 + k)) > 1e-9)
+    return what;
   if (k < last) return what + ", after " + std::to_string(last);
   last = k;
   return "";
@@ -135,7 +136,8 @@ TEST_CASE("watch: a rerouted path always reads a transform that existed and neve
     REQUIRE(robot.tool->update("tool", uncertain(k, 10 + k)));
     // Most steps do not wait until the path has the value.
     if (move % 10 == 0) {
-      REQUIRE(eventually([&] { return path->latest()->covariance.matrix()(0, 0) > 10 + k; }));
+      REQUIRE(eventually(
+          [&] { return path->latest()->covariance.of_specified().matrix()(0, 0) > 10 + k; }));
     }
   }
   CHECK(one.end() == "");
@@ -265,7 +267,7 @@ TEST_CASE("watch: renewals never bring an older value and a late value arrives a
     double last = -1;
     Reader reader(*path, [&](const StampedTransform& X) -> std::string {
       const double k = X.pose.translation().x() - 10'000;
-      const double variance = X.covariance.matrix()(0, 0);
+      const double variance = X.covariance.of_specified().matrix()(0, 0);
       if (k < last || std::abs(variance - (11 + k)) > 1e-9 * variance) {
         return std::to_string(k) + " with variance " + std::to_string(variance) + ", after " +
                std::to_string(last);

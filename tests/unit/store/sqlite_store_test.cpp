@@ -110,6 +110,30 @@ TEST_CASE("a saved state is restored to the last bit by the next process") {
   CHECK(to_flat(state->configured[0].X_PC) == to_flat(hand.X_PC));
 }
 
+TEST_CASE("an unspecified covariance is restored and differs from zero") {
+  const TemporaryDirectory directory;
+  const std::string file = state_file(directory.path(), 7, "arms");
+  const Transform zero{Pose(), Covariance()};
+  const Transform nothing{Pose(), StatedCovariance::unspecified()};
+  {
+    const auto store = opened(file);
+    CHECK(outcome(store->save({1, {}, {{"a", "", zero, 1}, {"b", "", nothing, 2}}, {}})) == "ok");
+    StateChange change{2, {}, {{"c", "", zero, 3}}, {}};
+    change.values = {{"c", nothing}};
+    change.configured = std::vector<FrameSpec>{{"a", "", zero}, {"b", "", nothing}};
+    CHECK(outcome(store->save(change)) == "ok");
+  }
+  const auto state = opened(file)->load();
+  REQUIRE(state);
+  REQUIRE(state->frames.size() == 3);
+  CHECK(state->frames[0].X_PC.covariance == StatedCovariance());
+  CHECK(state->frames[1].X_PC.covariance == StatedCovariance::unspecified());
+  CHECK(state->frames[2].X_PC.covariance == StatedCovariance::unspecified());
+  REQUIRE(state->configured.size() == 2);
+  CHECK(state->configured[0].X_PC.covariance == StatedCovariance());
+  CHECK(state->configured[1].X_PC.covariance == StatedCovariance::unspecified());
+}
+
 TEST_CASE("the last saved list of absences is restored") {
   const TemporaryDirectory directory;
   const std::string file = state_file(directory.path(), 7, "arms");
@@ -245,8 +269,8 @@ TEST_CASE("a file that is not this partition's state is rejected and not changed
     CHECK_THAT(refused(file), ContainsSubstring("is damaged"));
   }
   SECTION("of a newer format") {
-    put(file, 60, std::string("\0\0\0\4", 4));
-    CHECK_THAT(refused(file), ContainsSubstring("has format 4; this version reads formats 1 to 3"));
+    put(file, 60, std::string("\0\0\0\5", 4));
+    CHECK_THAT(refused(file), ContainsSubstring("has format 5; this version reads formats 1 to 4"));
   }
   SECTION("of another program") {
     put(file, 68, std::string("\0\0\0\2", 4));

@@ -167,7 +167,7 @@ TEST_CASE("unknown kinds of later versions are read up to their kind and rejecte
     const auto read = from_wire(sample);
     REQUIRE_FALSE(read);
     CHECK(read.error().code == Errc::kUnsupported);
-    CHECK(read.error().message == "this kind of request is not known to protocol 1.0");
+    CHECK(read.error().message == "this kind of request is not known to protocol 1.1");
   }
   for (unsigned kind = 0; kind < 256; ++kind) {
     if (kind >= 1 && kind <= kLastReplyKind) continue;

@@ -74,6 +74,8 @@ TEST_CASE("replies are decoded as they were encoded") {
       check_same(came.at_hint, values->at_hint);
       check_same(came.correlations, values->correlations);
       check_same(came.correlations_at_hint, values->correlations_at_hint);
+      check_same(came.unspecified, values->unspecified);
+      check_same(came.unspecified_at_hint, values->unspecified_at_hint);
       CHECK(came.commit == values->commit);
     } else if (const auto* pushed = std::get_if<PushedValues>(&one.body)) {
       check_same(std::get<PushedValues>(arrived->body), *pushed);

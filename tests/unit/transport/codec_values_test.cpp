@@ -1,4 +1,4 @@
-// What messages can say and this version does not support yet, and numbers that are missing.
+// Numbers that are missing: covariances that are unspecified, and what is not supported yet.
 
 #include <string>
 
@@ -15,16 +15,15 @@ Sample travelled(const Sample& sample) {
   return arrived;
 }
 
-TEST_CASE("an unspecified covariance takes no bytes and is rejected by name") {
-  wire::Update update = to_wire(Update{{{"hand", {}}}});
-  const auto whole = testing::serialized<UpdateType>(update).size();
-  update.edges()[0].x_pc().resize(7);
-  CHECK(testing::serialized<UpdateType>(update).size() == whole - 21 * sizeof(double));
+TEST_CASE("an unspecified covariance takes no bytes, and an unspecified variance is rejected") {
+  const Transform nothing{Pose(), StatedCovariance::unspecified()};
+  const wire::Update whole = to_wire(Update{{{"hand", Transform{Pose(), Covariance()}}}});
+  const wire::Update update = to_wire(Update{{{"hand", nothing}}});
+  CHECK(testing::serialized<UpdateType>(update).size() ==
+        testing::serialized<UpdateType>(whole).size() - 21 * sizeof(double));
   const auto read = from_wire(travelled<UpdateType>(update), [](std::string_view) { return true; });
-  REQUIRE_FALSE(read);
-  CHECK(read.error().code == Errc::kUnsupported);
-  CHECK(read.error().message ==
-        "frame 'hand': its covariance is unspecified, which this version does not support");
+  REQUIRE(read);
+  CHECK(read->edges[0].X_PC.covariance == StatedCovariance::unspecified());
 
   wire::Joints joints = to_wire(JointUpdate{{{"elbow", 0.5, 1e-4}}});
   const auto both = testing::serialized<JointsType>(joints).size();
@@ -35,6 +34,44 @@ TEST_CASE("an unspecified covariance takes no bytes and is rejected by name") {
   REQUIRE_FALSE(position);
   CHECK(position.error().code == Errc::kUnsupported);
   CHECK(position.error().message.find("joint 'elbow': its variance is unspecified") == 0);
+}
+
+TEST_CASE("a pushed value without covariance has the one before or none") {
+  const Transform X{Pose(), StatedCovariance::unspecified()};
+  PushedValue numbered{0, {}, X, {}, 1};
+  numbered.covariance_number = 3;
+  numbered.covariance_known = true;
+  const PushedValues pushed{1, {{0, {}, X, {}, 1}, numbered}};
+  const auto arrived = from_wire(travelled<StateType>(to_wire(pushed)));
+  REQUIRE(arrived);
+  CHECK_FALSE(arrived->entries[0].covariance_known);
+  CHECK_FALSE(arrived->entries[0].X.covariance.complete());
+  CHECK(arrived->entries[1].covariance_known);
+}
+
+TEST_CASE("a reply whose unspecified edges belong to no value is rejected") {
+  SegmentValues found;
+  found.values = {{Pose(), StatedCovariance::unspecified()}};
+  found.unspecified = {{0, "hand"}};
+  wire::Reply reply = to_wire(Reply{1, 2, found});
+  REQUIRE(from_wire(reply));
+  reply.body().incomplete().unspecified()[0].value(1);
+  const auto read = from_wire(reply);
+  REQUIRE_FALSE(read);
+  CHECK(read.error().message == "a reply: an unspecified edge of value 1, of 1");
+}
+
+TEST_CASE("a reply of too many unspecified edges still says which values are not complete") {
+  SegmentValues found;
+  found.values.assign(2, {Pose(), StatedCovariance::unspecified()});
+  for (std::size_t i = 0; i < kMaxItems; ++i) found.unspecified.push_back({0, std::to_string(i)});
+  found.unspecified.push_back({1, "hand"});
+  const auto read = from_wire(travelled<ReplyType>(to_wire(Reply{1, 2, found})));
+  REQUIRE(read);
+  const auto& values = std::get<SegmentValues>(read->body);
+  CHECK_FALSE(values.values[0].covariance.complete());
+  CHECK_FALSE(values.values[1].covariance.complete());
+  CHECK(values.unspecified.size() == 2);
 }
 
 TEST_CASE("a transform has 7 or 28 numbers and a position 1 or 2") {

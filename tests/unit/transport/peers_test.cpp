@@ -90,7 +90,7 @@ TEST_CASE("a peer of another major version is reported and otherwise ignored") {
   CHECK(peers.incompatible()[0].partition == "arms");
   CHECK(peers.incompatible()[0].text() ==
         "partition 'arms' (tf-dude 9.8.7) speaks protocol 2.0, but this program (tf-dude " +
-            program_version() + ") speaks 1.0; update the older one");
+            program_version() + ") speaks 1.1; update the older one");
   peers.present(prefix_of(3), presence_of("head"), 0);
   CHECK_FALSE(peers.awaits_presence());
   told = 0;

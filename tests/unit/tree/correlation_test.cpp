@@ -45,7 +45,7 @@ class Robot {
 };
 
 Belief with(const Transform& X, std::vector<CommonError> common_errors) {
-  return {X.pose, X.covariance, std::nullopt, std::move(common_errors)};
+  return {X.pose, X.covariance.of_specified(), std::nullopt, std::move(common_errors)};
 }
 
 TEST_CASE("A lookup counts a common source once in any direction") {
@@ -89,8 +89,10 @@ TEST_CASE("A path with unknown correlation gets a bound and reports it") {
   const auto X_WB = robot.forest.lookup("world", "b", Query{});
   REQUIRE(X_WB);
   CHECK(X_WB->basis.bound);
-  const Covariance moved = robot.X_WA.covariance.transported(robot.X_AB.pose.inverse());
-  CHECK(covariance_diff(X_WB->covariance, bound(moved, robot.X_AB.covariance), 1e-12) == "");
+  const Covariance moved =
+      robot.X_WA.covariance.of_specified().transported(robot.X_AB.pose.inverse());
+  CHECK(covariance_diff(X_WB->covariance, bound(moved, robot.X_AB.covariance.of_specified()),
+                        1e-12) == "");
   REQUIRE(robot.forest.correlate("a", {}));
   REQUIRE(robot.forest.correlate("b", {}));
   const auto independent = robot.forest.lookup("world", "b", Query{});

@@ -45,7 +45,7 @@ struct Reader {
         finding = whole.error().message;
         return;
       }
-      const double twice = whole->covariance.stddev()[0];
+      const double twice = whole->covariance.of_specified().stddev()[0];
       if (std::abs(std::remainder(twice, 2.0)) > 1e-9) {
         finding = "a deviation of " + std::to_string(twice);
       }

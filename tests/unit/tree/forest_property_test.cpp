@@ -33,7 +33,9 @@ std::string joined(const Ids& ids) {
   return text;
 }
 
-NaiveTransform dense(const Transform& X) { return {X.pose.matrix(), X.covariance.matrix()}; }
+NaiveTransform dense(const Transform& X) {
+  return {X.pose.matrix(), X.covariance.of_specified().matrix()};
+}
 
 // Covariance relative to the largest metres and radians: each block is judged in its own unit.
 bool same_value(const Transform& actual, const NaiveTransform& expected) {
@@ -42,7 +44,9 @@ bool same_value(const Transform& actual, const NaiveTransform& expected) {
   scale << Eigen::Vector3d::Constant(std::sqrt(expected.sigma.diagonal().head<3>().maxCoeff())),
       Eigen::Vector3d::Constant(std::sqrt(expected.sigma.diagonal().tail<3>().maxCoeff()));
   const Matrix6d bound = kTolerance * scale * scale.transpose();
-  return ((actual.covariance.matrix() - expected.sigma).cwiseAbs().array() <= bound.array()).all();
+  return ((actual.covariance.of_specified().matrix() - expected.sigma).cwiseAbs().array() <=
+          bound.array())
+      .all();
 }
 
 /// The forest and the oracle, doing the same. Each step returns what differs, "" if nothing.

@@ -44,7 +44,7 @@ Transform saying(int k) {
 int one_saying(const Transform& X, int edges) {
   const Eigen::Vector3d sum = X.pose.translation();
   const bool one = edges * sum.z() == sum.x() * sum.x() &&
-                   X.covariance.upper()[upper_index(0, 0)] == std::abs(sum.x());
+                   X.covariance.of_specified().upper()[upper_index(0, 0)] == std::abs(sum.x());
   const double k = sum.x() / edges;
   return one && k == std::floor(k) ? static_cast<int>(k) : -1;
 }

@@ -209,7 +209,7 @@ TEST_CASE("process noise is added between samples and beyond them and with age i
     REQUIRE(arm.forest.update("hand", along_x(100 * second), at(1000 * second)));
   }
   const auto variance = [&](const Query& when) {
-    return arm.forest.lookup("arm", "hand", when)->covariance.upper()[0];
+    return arm.forest.lookup("arm", "hand", when)->covariance.of_specified().upper()[0];
   };
   CHECK(variance(query(2000)) == 0);
   CHECK(variance(query(1500)) == Approx(0.25 * 4));

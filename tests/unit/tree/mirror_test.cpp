@@ -65,7 +65,7 @@ TEST_CASE("a mirror has late samples and replaced ones and process noise") {
   INFO("seed " << random.seed());
   Followed robot;
   EdgeTiming noisy;
-  noisy.process_noise = random.transform().covariance;
+  noisy.process_noise = random.transform().covariance.of_specified();
   REQUIRE(robot.owner.set_timing("hand", noisy));
   REQUIRE(robot.follow() == 2);
   for (const int t : {1000, 2000, 1500, 3000, 1200, 2999}) {

@@ -1,0 +1,204 @@
+// Edges whose covariance is unspecified, over each transport: what callers elsewhere learn of them.
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
+
+#include "support/catch.hpp"
+#include "support/networks.hpp"
+#include "support/pose_diff.hpp"
+#include "support/process.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ContainsSubstring;
+using testing::eventually;
+using testing::Join;
+using testing::joined_by;
+using testing::Random;
+using testing::TemporaryDirectory;
+using testing::transform_diff;
+using Names = std::vector<std::string>;
+
+Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
+
+Transform unspecified(const Pose& X) { return {X, StatedCovariance::unspecified()}; }
+
+// world ─ odom ─ base of one owner, arm ─ hand of another one. The edges of odom and hand are
+// unspecified.
+struct Robot {
+  explicit Robot(Join joined, Random& random, const std::string& state = {})
+      : join(std::move(joined)),
+        odom(unspecified(random.pose())),
+        base(random.transform(1.0, 0.01, 0.01)),
+        arm(random.transform(1.0, 0.01, 0.01)),
+        hand(unspecified(random.pose())) {
+    Options options;
+    options.state = state;
+    robot.emplace(*Node::open(join("robot"), "robot",
+                              {{"world", "", {}}, {"odom", "world", odom}, {"base", "odom", base}},
+                              options));
+    arms.emplace(
+        *Node::open(join("arms"), "arms", {{"arm", "base", arm}, {"hand", "arm", hand}}, options));
+    client.emplace(*Client::open(join("")));
+  }
+  // The path from the world to the hand, as if edges without covariance were exact.
+  [[nodiscard]] Transform to_hand() const {
+    return compose(compose(odom, base), compose(arm, hand));
+  }
+
+  Join join;
+  Transform odom;
+  Transform base;
+  Transform arm;
+  Transform hand;
+  std::optional<Node> robot;
+  std::optional<Node> arms;
+  std::optional<Client> client;
+};
+
+Names unspecified_of(const Result<StampedTransform>& X) {
+  REQUIRE(X);
+  CHECK(X->covariance.complete() == X->basis.unspecified.empty());
+  return X->basis.unspecified;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "unspecified: a lookup names the edges of all owners and has the covariance of the rest") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Random random(831);
+  INFO("seed " << random.seed());
+  Robot robot(join, random);
+  for (Client* who : {&*robot.client, static_cast<Client*>(&*robot.robot)}) {
+    const auto X = who->lookup("world", "hand", Query{});
+    CHECK(unspecified_of(X) == Names{"odom", "hand"});
+    CHECK(transform_diff(*X, robot.to_hand(), 1e-12) == "");
+    CHECK_FALSE(who->lookup("world", "hand")->covariance.complete());
+    CHECK(unspecified_of(who->lookup("hand", "world", Query{})) == Names{"hand", "odom"});
+    CHECK(unspecified_of(who->lookup("odom", "arm", Query{})).empty());
+    const auto fixed = who->lookup("hand", {}, "arm", {}, "world");
+    CHECK(unspecified_of(fixed) == Names{"hand", "odom", "odom"});
+  }
+}
+
+TEST_CASE("unspecified: covariances are taken away and given by each kind of request") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Random random(832);
+  INFO("seed " << random.seed());
+  Robot robot(join, random);
+  Client& client = *robot.client;
+  const auto is_complete = [&](const std::string& from, const std::string& to) {
+    const auto X = client.lookup(from, to);
+    REQUIRE(X);
+    return X->covariance.complete();
+  };
+  CHECK(is_complete("base", "arm"));
+  REQUIRE(client.update("arm", unspecified(random.pose())));
+  CHECK_FALSE(is_complete("base", "arm"));
+  REQUIRE(client.update({{"arm", robot.arm}, {"base", unspecified(random.pose())}}));
+  CHECK(is_complete("base", "arm"));
+  CHECK_FALSE(is_complete("odom", "base"));
+  REQUIRE(client.update_partial({{"base", {{}, {}, robot.base.covariance}}}));
+  CHECK(is_complete("odom", "base"));
+  REQUIRE(client.update_partial({{"base", {{}, {}, StatedCovariance::unspecified()}}}));
+  CHECK_FALSE(is_complete("odom", "base"));
+  REQUIRE(client.add("tool", "hand", unspecified(random.pose())));
+  CHECK_FALSE(is_complete("hand", "tool"));
+  REQUIRE(client.move("tool", "arm", {{}, {}, StatedCovariance()}));
+  CHECK(is_complete("arm", "tool"));
+  REQUIRE(client.publish({{"tool", unspecified(random.pose())}}));
+  CHECK(eventually([&] { return !client.lookup("arm", "tool")->covariance.complete(); }));
+}
+
+TEST_CASE("unspecified: a watched path shows it, also between samples") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Random random(833);
+  INFO("seed " << random.seed());
+  Robot robot(join, random);
+  const auto path = robot.client->watch("world", "hand");
+  REQUIRE(path);
+  CHECK(unspecified_of(path->latest()) == Names{"odom", "hand"});
+  CHECK(transform_diff(*path->latest(), robot.to_hand(), 1e-12) == "");
+  REQUIRE(robot.arms->update("hand", random.transform(), ms(1000)));
+  CHECK(eventually([&] { return unspecified_of(path->latest()) == Names{"odom"}; }));
+  REQUIRE(robot.arms->update("hand", unspecified(random.pose()), ms(1100)));
+  CHECK(eventually([&] { return unspecified_of(path->latest()) == Names{"odom", "hand"}; }));
+  CHECK(unspecified_of(path->at(ms(1050))) == Names{"odom", "hand"});
+  CHECK(unspecified_of(path->at(ms(1000))) == Names{"odom"});
+  // The same covariance as before, of which only the number is sent.
+  REQUIRE(robot.robot->update("odom", {robot.odom.pose, robot.base.covariance}));
+  CHECK(eventually([&] { return unspecified_of(path->latest()) == Names{"hand"}; }));
+  REQUIRE(robot.robot->update("odom", robot.odom));
+  CHECK(eventually([&] { return unspecified_of(path->latest()) == Names{"odom", "hand"}; }));
+  REQUIRE(robot.robot->update("odom", {robot.odom.pose, robot.base.covariance}));
+  CHECK(eventually([&] { return unspecified_of(path->latest()) == Names{"hand"}; }));
+}
+
+TEST_CASE("unspecified: a segment that is pushed composed counts as a whole") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Random random(834);
+  Robot robot(join, random);
+  WatchOptions options;
+  options.composed = true;
+  const auto path = robot.client->watch("odom", "hand", options);
+  REQUIRE(path);
+  CHECK(unspecified_of(path->latest()) == Names{"hand"});
+  CHECK(path->latest()->covariance.of_specified().upper() != Covariance::Upper{});
+  REQUIRE(robot.arms->update("hand", random.transform()));
+  CHECK(eventually([&] { return unspecified_of(path->latest()).empty(); }));
+}
+
+TEST_CASE("unspecified: an observed edge takes what the measurement says") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Random random(835);
+  INFO("seed " << random.seed());
+  Robot robot(join, random);
+  Client& client = *robot.client;
+  const Transform Z{random.pose(), random.covariance(0.01, 0.01)};
+  const auto both = client.observe("world", "hand", Z);
+  REQUIRE_FALSE(both);
+  CHECK_THAT(both.error().message,
+             ContainsSubstring("the covariance of 2 edges of the path is unspecified"));
+  const auto observed = client.observe("world", "arm", Z);
+  REQUIRE(observed);
+  CHECK(observed->accepted);
+  CHECK(observed->dimensions == 0);
+  const auto after = client.lookup("world", "arm", Query{});
+  CHECK(unspecified_of(after).empty());
+  CHECK(transform_diff(*after, Z, 1e-9, 1e-3) == "");
+  // A second measurement weighs both.
+  const auto again = client.observe("world", "arm", Z);
+  REQUIRE(again);
+  CHECK(again->dimensions == 6);
+  const double once = after->covariance.of_specified().matrix().trace();
+  CHECK(client.lookup("world", "arm")->covariance.of_specified().matrix().trace() < 0.6 * once);
+  const auto fused = client.fuse("hand", Z);
+  REQUIRE(fused);
+  CHECK(transform_diff(*client.lookup("arm", "hand"), Z, 1e-9) == "");
+}
+
+TEST_CASE("unspecified: a restarted owner still says so") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Random random(836);
+  const TemporaryDirectory directory;
+  Robot robot(join, random, directory.path());
+  REQUIRE(robot.client->update("arm", unspecified(robot.arm.pose)));
+  robot.arms.reset();
+  Options options;
+  options.state = directory.path();
+  auto again = Node::open(join("arms"), "arms",
+                          {{"arm", "base", robot.arm}, {"hand", "arm", robot.hand}}, options);
+  REQUIRE(again);
+  CHECK(unspecified_of(again->lookup("base", "hand", Query{})) == Names{"arm", "hand"});
+}
+
+}  // namespace tfdude
