@@ -212,7 +212,9 @@ Json correlation() {
   testing::Random random(kSeed + 3);
   const auto poses = testing::two_poses(kCorrelatedAlpha);
   const auto product = [](const testing::SharedPair& pair, Order order) {
-    return left_covariance(collapse(compose(pair.first, pair.second, order))).matrix();
+    return left_covariance(collapse(compose(pair.first, pair.second, order)))
+        .of_specified()
+        .matrix();
   };
   const Matrix6d independent = testing::composed(poses, Order::kFourth);
   const Matrix6d bounded = product(testing::unknown_pair(poses), Order::kSecond);
