@@ -58,8 +58,8 @@ struct Arguments {
   std::vector<std::string> sources;  ///< for each column: its source's name and 6 numbers
   std::string out;                   ///< the picture's file
   int samples = 0;
-  double position = 0;      ///< of a joint [rad or m]
-  double joint_stddev = 0;  ///< of this position [rad or m]
+  double position = 0;                 ///< of a joint [rad or m]
+  std::optional<double> joint_stddev;  ///< of this position [rad or m]
   KeysArguments keys;
 };
 

@@ -7,9 +7,9 @@ namespace tfdude::cli {
 int run_joint(Client& client, const Arguments& arguments) {
   const auto stamp = optional_stamp(arguments.stamp, wall_clock());
   if (!stamp) return report(stamp.error(), arguments);
-  const double variance = arguments.joint_stddev * arguments.joint_stddev;
-  const auto updated =
-      client.update_joints({arguments.id}, {arguments.position}, {variance}, *stamp);
+  JointValue joint{arguments.id, arguments.position};
+  if (const auto stddev = arguments.joint_stddev) joint.variance = *stddev * *stddev;
+  const auto updated = client.update_joints({joint}, *stamp);
   return finish(client, updated, arguments, "moved");
 }
 

@@ -56,8 +56,8 @@ std::string joint_table(const std::vector<JointInfo>& joints) {
   std::string text = row("joint", "frame", "position", "std dev", "unit", "limits");
   for (const JointInfo& joint : joints) {
     text += row(joint.name, joint.frame, number(in_unit(joint, joint.position), 3, 10),
-                number(in_unit(joint, std::sqrt(joint.variance)), 3, 9), unit_of(joint),
-                limits_of(joint)) +
+                joint.variance ? number(in_unit(joint, std::sqrt(*joint.variance)), 3, 9) : "?",
+                unit_of(joint), limits_of(joint)) +
             remarks_of(joint);
   }
   return text;
@@ -86,12 +86,13 @@ nlohmann::json joint_json(const JointInfo& joint) {
                       {"frame", joint.frame},
                       {"type", to_string(joint.type)},
                       {"position", joint.position},
-                      {"variance", joint.variance},
+                      {"variance", nullptr},
                       {"measured", joint.measured},
                       {"outside", joint.outside},
                       {"refused", joint.refused},
                       {"limits", nullptr},
                       {"mimic", nullptr}};
+  if (joint.variance) json["variance"] = *joint.variance;
   if (joint.limits) json["limits"] = {joint.limits->lower, joint.limits->upper};
   if (joint.mimic) {
     json["mimic"] = {{"joint", joint.mimic->joint},

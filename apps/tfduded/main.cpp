@@ -35,7 +35,7 @@ tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
     config = *std::move(loaded);
   }
   for (tfdude::UrdfPart part : arguments.urdfs) {
-    part.origins = config.covariance;
+    part.fixed = config.covariance;
     if (auto ok = tfdude::add_urdf(config, part); !ok) return tl::unexpected(ok.error());
   }
   if (config.partition.empty()) config.partition = arguments.partition;

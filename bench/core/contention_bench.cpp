@@ -42,7 +42,7 @@ bench::Tree chain() {
   tree.frames.push_back({"frame_0", "", {}});
   for (std::size_t i = 1; i <= kJoints; ++i) {
     tree.frames.push_back(
-        {"frame_" + std::to_string(i), "frame_" + std::to_string(i - 1), Transform()});
+        {"frame_" + std::to_string(i), "frame_" + std::to_string(i - 1), Transform::exact({})});
   }
   tree.from = "frame_0";
   tree.to = "frame_" + std::to_string(kDepth);
@@ -57,7 +57,7 @@ class Ours {
  public:
   Ours() : node_(*Node::open(LoopbackNetwork().join(), "bench", chain().frames)) {
     for (std::size_t i = 1; i <= kJoints; ++i) {
-      batch_.push_back({*node_.find("frame_" + std::to_string(i)), Transform()});
+      batch_.push_back({*node_.find("frame_" + std::to_string(i)), Transform::exact({})});
     }
   }
 

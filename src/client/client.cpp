@@ -13,14 +13,16 @@ namespace {
 Result<JointUpdate> joint_update(const std::vector<std::string>& names,
                                  const std::vector<double>& positions,
                                  const std::vector<double>& variances, std::optional<Time> stamp) {
-  if (positions.size() != names.size() || variances.size() != names.size()) {
+  if (positions.size() != names.size() ||
+      (!variances.empty() && variances.size() != names.size())) {
     return fail(Errc::kInvalidInput, std::to_string(names.size()) + " joints, but " +
                                          std::to_string(positions.size()) + " positions and " +
                                          std::to_string(variances.size()) + " variances");
   }
   JointUpdate update{{}, stamp};
   for (std::size_t i = 0; i < names.size(); ++i) {
-    update.joints.push_back({names[i], positions[i], variances[i]});
+    update.joints.push_back({names[i], positions[i]});
+    if (!variances.empty()) update.joints.back().variance = variances[i];
   }
   return update;
 }
@@ -138,6 +140,10 @@ Result<void> Client::publish_joints(const std::vector<std::string>& names,
   return participant_->joints().publish(*update);
 }
 
+Result<void> Client::publish_joints(std::vector<JointValue> joints, std::optional<Time> stamp) {
+  return participant_->joints().publish({std::move(joints), stamp});
+}
+
 Result<void> Client::update_joints(const std::vector<std::string>& names,
                                    const std::vector<double>& positions,
                                    const std::vector<double>& variances,
@@ -145,6 +151,10 @@ Result<void> Client::update_joints(const std::vector<std::string>& names,
   auto update = joint_update(names, positions, variances, stamp);
   if (!update) return tl::unexpected(std::move(update.error()));
   return participant_->joints().update(*update);
+}
+
+Result<void> Client::update_joints(std::vector<JointValue> joints, std::optional<Time> stamp) {
+  return participant_->joints().update({std::move(joints), stamp});
 }
 
 Result<std::vector<JointInfo>> Client::joints(const std::string& partition) {

@@ -30,16 +30,18 @@ JointStream::~JointStream() = default;
 const std::vector<NotSent>& JointStream::try_publish(const std::vector<double>& positions,
                                                      const std::vector<double>& variances,
                                                      std::optional<Time> stamp) {
-  if (positions.size() != sender_->size() || variances.size() != sender_->size() ||
+  const bool specified = !variances.empty();
+  if (positions.size() != sender_->size() || (specified && variances.size() != sender_->size()) ||
       !is_stamp(stamp)) {
     return sender_->refuse(Errc::kInvalidInput);
   }
-  return sender_->send(
-      stamp, [&](std::size_t i) { return is_position(positions[i]) && is_variance(variances[i]); },
-      [&](JointValue& joint, std::size_t i) {
-        joint.position = positions[i];
-        joint.variance = variances[i];
-      });
+  const auto is_valid = [&](std::size_t i) {
+    return is_position(positions[i]) && (!specified || is_variance(variances[i]));
+  };
+  return sender_->send(stamp, is_valid, [&](JointValue& joint, std::size_t i) {
+    joint.position = positions[i];
+    joint.variance = specified ? std::optional<double>(variances[i]) : std::nullopt;
+  });
 }
 
 }  // namespace tfdude

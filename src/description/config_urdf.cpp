@@ -86,7 +86,7 @@ Result<UrdfPart> UrdfFields::part(const YAML::Node& node, const std::string& pla
   if (!entries) return tl::unexpected(entries.error());
   const auto given = [&](std::string_view key) { return entries->find(key); };
   UrdfPart part;
-  part.origins = covariance_;
+  part.fixed = covariance_;
   if (given("file") == entries->end()) {
     return error(Errc::kConfig, node.Mark(), place + ": file is missing");
   }

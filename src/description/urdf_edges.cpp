@@ -105,8 +105,8 @@ Result<void> EdgeReader::read(Index i) {
   if (!pose) return tree_.joint_error(i, "origin: " + pose.error().message);
   edges_[i].X_PJ.pose = *pose;
   const UrdfJoint& said = said_of(i);
-  edges_[i].X_PJ.covariance = said.origin.value_or(part_.origins);
   const auto type = moving_type(urdf);
+  edges_[i].X_PJ.covariance = said.origin.value_or(type ? StatedCovariance::exact() : part_.fixed);
   if (!type) {
     if (!said.position && !said.stddev) return {};
     return tree_.joint_error(i, "has no position: it does not move by one number");
@@ -246,7 +246,7 @@ Result<void> EdgeReader::couple(Index i) {
   joint->position = mimic.position(other.position);
   joint->variance = mimic.variance(other.variance);
   if (auto ok = check_joint(*joint); !ok) return tree_.joint_error(i, ok.error().message);
-  if (is_sane(joint->position) && joint->variance <= kMaxVariance) return {};
+  if (is_sane(joint->position) && joint->variance.value_or(0) <= kMaxVariance) return {};
   return tree_.joint_error(i, "mimic: its position or the variance of that is too large");
 }
 

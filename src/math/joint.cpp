@@ -19,21 +19,20 @@ Joint prismatic_joint(const Transform& X_PJ, const Eigen::Vector3d& axis) {
   return along(X_PJ, axis, Eigen::Vector3d::Zero());
 }
 
-Transform joint_transform(const Joint& joint, double position, double variance) {
+Transform joint_transform(const Joint& joint, double position, std::optional<double> variance) {
   const Pose X_JC = exp(joint.S * position);
   Covariance::Upper upper{};
   for (std::size_t row = 0; row < 6; ++row) {
     for (std::size_t column = row; column < 6; ++column) {
       const auto i = static_cast<Eigen::Index>(row);
       const auto k = static_cast<Eigen::Index>(column);
-      upper[upper_index(row, column)] = variance * joint.S[i] * joint.S[k];
+      upper[upper_index(row, column)] = variance.value_or(0) * joint.S[i] * joint.S[k];
     }
   }
   Transform X_PC{joint.X_PJ.pose * X_JC, Covariance::trusted(upper)};
-  // Most origins are exact, since URDF gives no uncertainty.
-  if (!joint.X_PJ.covariance.complete()) {
+  if (!variance || !joint.X_PJ.covariance.complete()) {
     X_PC.covariance = StatedCovariance::unspecified();
-  } else if (joint.X_PJ.covariance != StatedCovariance()) {
+  } else if (joint.X_PJ.covariance != StatedCovariance::exact()) {
     X_PC.covariance += joint.X_PJ.covariance.transported(X_JC.inverse());
   }
   return X_PC;

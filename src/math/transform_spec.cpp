@@ -41,7 +41,7 @@ Result<StatedCovariance> covariance_of(const TransformSpec& spec,
 
 Result<StatedCovariance> covariance_named(std::string_view word) {
   if (word == "unspecified") return StatedCovariance::unspecified();
-  if (word == "exact") return StatedCovariance();
+  if (word == "exact") return StatedCovariance::exact();
   return fail(Errc::kInvalidInput, "covariance must be unspecified or exact");
 }
 

@@ -11,9 +11,9 @@ namespace tfdude {
 namespace {
 
 // The error that the edge shares with those of coupled joints: the error of one number.
-Correlation shared_error(const JointSpec& spec, double variance) {
-  if (variance == 0) return {};
-  Loading loading = spec.joint.S * std::sqrt(variance);
+Correlation shared_error(const JointSpec& spec, std::optional<double> variance) {
+  if (variance.value_or(0) == 0) return {};
+  Loading loading = spec.joint.S * std::sqrt(*variance);
   // The sign of the leader's error.
   if (spec.mimic && spec.mimic->multiplier < 0) loading = -loading;
   return {false, {{shared_source(leader_of(spec)), false, std::move(loading)}}, {}};
@@ -108,7 +108,7 @@ Result<void> Joints::plan(const JointValue& value) {
     const JointSpec& spec = mover.spec;
     const Mimic mimic = spec.mimic.value_or(Mimic{});
     Step step{index, mimic.position(value.position), mimic.variance(value.variance)};
-    if (!is_position(step.position) || !is_variance(step.variance)) {
+    if (!is_position(step.position) || (step.variance && !is_variance(*step.variance))) {
       return check_value({spec.name, step.position, step.variance});
     }
     if (std::exchange(mover.planned, plans_) == plans_) {

@@ -69,7 +69,7 @@ class Joints {
     Handle handle;
     JointSpec spec;
     double position = 0;
-    double variance = 0;
+    std::optional<double> variance{};
     std::optional<Time> stamp{};  // of the newest sample
     bool measured = false;
     bool changed = false;
@@ -79,13 +79,13 @@ class Joints {
     std::uint64_t planned = 0;  // number of the last update that moved it
     // The error set for a coupled joint, and its variance.
     Correlation said{};
-    double said_variance = -1;
+    std::optional<double> said_variance{};
   };
   // The effect of a sample on a mover.
   struct Step {
     std::size_t mover = 0;
     double position = 0;
-    double variance = 0;
+    std::optional<double> variance{};
     bool outside = false;
   };
 

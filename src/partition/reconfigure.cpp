@@ -17,17 +17,22 @@ using Kind = ConfiguredChange::Kind;
 // A stored rotation is normalized again when read, which may change its last digit.
 constexpr double kSameRotation = 1e-14;
 
-bool same_edge(const FrameSpec& a, const FrameSpec& b) {
-  const Transform X = value_of(a);
-  const Transform Y = value_of(b);
-  return a.parent == b.parent && X.covariance == Y.covariance &&
+// @param omitted_was_exact  see StoredState
+bool same_edge(const FrameSpec& was, const FrameSpec& entry, bool omitted_was_exact) {
+  const Transform X = value_of(was);
+  const Transform Y = value_of(entry);
+  const bool omitted = omitted_was_exact && X.covariance == StatedCovariance::exact() &&
+                       Y.covariance == StatedCovariance::unspecified();
+  return was.parent == entry.parent && (omitted || X.covariance == Y.covariance) &&
          X.pose.translation() == Y.pose.translation() &&
          X.pose.rotation().coeffs().isApprox(Y.pose.rotation().coeffs(), kSameRotation);
 }
 
 // @param was  the entry of the previous configuration; null: none
-std::optional<Kind> effect(const FrameSpec& entry, const FrameSpec* was, bool is_there) {
-  if (was == nullptr || !same_edge(*was, entry)) return is_there ? Kind::kReplace : Kind::kAdd;
+std::optional<Kind> effect(const FrameSpec& entry, const FrameSpec* was, bool omitted_was_exact,
+                           bool is_there) {
+  if (was == nullptr || !same_edge(*was, entry, omitted_was_exact))
+    return is_there ? Kind::kReplace : Kind::kAdd;
   if (is_there && !(was->correlation == entry.correlation)) return Kind::kCorrelate;
   return std::nullopt;
 }
@@ -96,7 +101,8 @@ std::vector<ConfiguredChange> configured_changes(const StoredState& state,
     }
     const auto was = before.find(entry.id);
     const bool is_there = parents.count(entry.id) != 0;
-    const auto kind = effect(entry, was != before.end() ? was->second : nullptr, is_there);
+    const auto kind = effect(entry, was != before.end() ? was->second : nullptr,
+                             state.omitted_was_exact, is_there);
     if (was != before.end()) before.erase(was);
     if (!kind) continue;
     if (*kind != Kind::kCorrelate) parents[entry.id] = entry.parent;

@@ -331,7 +331,7 @@ StampedTransform composed(const LookupPlan& plan, const std::vector<SegmentValue
     });
     return collapsed(X_AB, order, stamp);
   }
-  StampedTransform X_AB{{}, stamp, {}};
+  StampedTransform X_AB{Transform::exact({}), stamp, {}};
   bool first = true;
   each_segment(plan, [&](std::size_t i, std::size_t k) {
     const Transform& X = answers[i].values[k];

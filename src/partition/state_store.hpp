@@ -24,8 +24,8 @@ struct StoredFrame {
 struct StoredJoint {
   std::string name;
   double position = 0;
-  double variance = 0;
-  std::optional<JointType> type{};  ///< at that time; absent: not stored
+  std::optional<double> variance{};  ///< absent: unspecified
+  std::optional<JointType> type{};   ///< at that time; absent: not stored
 };
 
 /// The stored state of a partition.
@@ -35,6 +35,8 @@ struct StoredState {
   std::vector<Tombstone> tombstones;
   /// The configuration that was last loaded. Differences from the current one are edits.
   std::vector<FrameSpec> configured;
+  /// Of an earlier version, for which an entry without a covariance was exact.
+  bool omitted_was_exact = false;
   std::vector<StoredJoint> joints{};
   std::vector<Absent> absent{};  ///< partitions that this one missed
 };

@@ -68,8 +68,8 @@ Result<void> load_tombstones(const Database& database, std::int64_t /*format*/,
   return loaded;
 }
 
-Result<void> load_configured(const Database& database, std::int64_t /*format*/,
-                             StoredState& state) {
+Result<void> load_configured(const Database& database, std::int64_t format, StoredState& state) {
+  state.omitted_was_exact = format < kUnspecifiedFormat;
   const char* sql = "SELECT id, parent, x_pc FROM configured ORDER BY id";
   return each_row(database, sql, [&](const Statement& row) -> Result<void> {
     auto ok = row.check_types({SQLITE_TEXT, SQLITE_TEXT, SQLITE_BLOB});

@@ -4,6 +4,7 @@
 
 #include "partition/joints.hpp"
 #include "store/correlation_blob.hpp"
+#include "store/schema.hpp"
 
 namespace tfdude {
 namespace {
@@ -79,6 +80,7 @@ Result<StoredJoint> read_joint(const sqlite::Statement& row) {
     return tl::unexpected(std::move(ok.error()));
   }
   StoredJoint joint{row.text(0), row.real(1), row.real(2)};
+  if (*joint.variance == kUnspecifiedVariance) joint.variance.reset();
   auto ok = check_id(joint.name, "joint");
   if (ok) ok = check_value({joint.name, joint.position, joint.variance});
   if (!ok) return tl::unexpected(std::move(ok.error()));

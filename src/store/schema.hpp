@@ -13,7 +13,11 @@ inline constexpr std::int64_t kApplication = 0x74666475;  // "tfdu"
 inline constexpr std::int64_t kJointsFormat = 2;
 inline constexpr std::int64_t kCorrelationFormat = 3;
 inline constexpr std::int64_t kAbsentFormat = 3;
+inline constexpr std::int64_t kUnspecifiedFormat = 4;
 inline constexpr std::int64_t kFormat = 4;
+
+// Of a joint, instead of a variance; since format 4.
+inline constexpr double kUnspecifiedVariance = -1;
 
 /// The SQL that creates the tables of a format, or only those that an older format lacks. A file
 /// whose schema has other words than these is refused, so each change of them needs a new format.

@@ -312,7 +312,8 @@ Result<void> SqliteStore::save_joints(const std::vector<StoredJoint>& joints) {
   Result<void> done;
   for (const StoredJoint& joint : joints) {
     const auto type = joint.type ? static_cast<std::uint64_t>(*joint.type) : kNoType;
-    if (done) done = put_joint_.run(joint.name, joint.position, joint.variance);
+    const double variance = joint.variance.value_or(kUnspecifiedVariance);
+    if (done) done = put_joint_.run(joint.name, joint.position, variance);
     if (done) done = put_joint_type_.run(joint.name, type);
   }
   return done;

@@ -30,7 +30,7 @@ Result<void> check_value(const JointValue& joint) {
   const char* what = nullptr;
   if (!is_position(joint.position))
     what = ": position is not a number, or beyond 1e9";
-  else if (!is_variance(joint.variance))
+  else if (joint.variance && !is_variance(*joint.variance))
     what = ": variance is not a number within 0 to 1e18";
   if (what == nullptr) return {};
   return fail(Errc::kInvalidInput, "joint " + quote(joint.name) + what);
@@ -55,18 +55,20 @@ Result<void> check_joint(const JointSpec& joint) {
 
 std::string shared_source(const std::string& leader) { return "joint " + leader; }
 
-Transform value_at(const JointSpec& joint, double position, double variance) {
-  return joint_transform(joint.joint, position, joint.coupled ? 0.0 : variance);
+Transform value_at(const JointSpec& joint, double position, std::optional<double> variance) {
+  if (variance && joint.coupled) variance = 0;
+  return joint_transform(joint.joint, position, variance);
 }
 
 double rest_position(const std::optional<JointLimits>& limits) {
   return limits ? std::clamp(0.0, limits->lower, limits->upper) : 0.0;
 }
 
-double unmeasured_variance(JointType type, const std::optional<JointLimits>& limits,
-                           double position) {
+std::optional<double> unmeasured_variance(JointType type, const std::optional<JointLimits>& limits,
+                                          double position) {
   constexpr double kPi = 3.14159265358979323846;
-  if (!limits) return type == JointType::kPrismatic ? 0.0 : kPi * kPi / 3.0;
+  if (!limits && type == JointType::kPrismatic) return std::nullopt;
+  if (!limits) return kPi * kPi / 3.0;
   const double range = limits->upper - limits->lower;
   const double off = 0.5 * (limits->upper + limits->lower) - position;
   return range * range / 12.0 + off * off;

@@ -102,6 +102,22 @@ TEST_CASE("joints: published positions arrive although the client ends at once")
   }
 }
 
+TEST_CASE("joints: positions without a variance make a lookup name the edges") {
+  Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
+  REQUIRE(robot.client->update_joints({"shoulder", "elbow"}, {0.2, 0.4}));
+  const auto X = robot.client->lookup("world", "fore", Query{});
+  REQUIRE(X);
+  CHECK(X->basis.unspecified == Names{"upper", "fore"});
+  REQUIRE(robot.client->update_joints(
+      std::vector<JointValue>{{"shoulder", 0.2, 1e-4}, {"elbow", 0.4}}));
+  const auto Y = robot.client->lookup("world", "fore", Query{});
+  REQUIRE(Y);
+  CHECK(Y->basis.unspecified == Names{"fore"});
+  for (const JointInfo& joint : *robot.client->joints("arm")) {
+    CHECK(joint.variance.has_value() == (joint.name == "shoulder"));
+  }
+}
+
 TEST_CASE("joints: an update is visible when the call returns and bad input is rejected") {
   Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   Client& client = *robot.client;

@@ -113,7 +113,7 @@ TEST_CASE("unspecified: covariances are taken away and given by each kind of req
   CHECK_FALSE(is_complete("odom", "base"));
   REQUIRE(client.add("tool", "hand", unspecified(random.pose())));
   CHECK_FALSE(is_complete("hand", "tool"));
-  REQUIRE(client.move("tool", "arm", {{}, {}, StatedCovariance()}));
+  REQUIRE(client.move("tool", "arm", {{}, {}, StatedCovariance::exact()}));
   CHECK(is_complete("arm", "tool"));
   REQUIRE(client.publish({{"tool", unspecified(random.pose())}}));
   CHECK(eventually([&] { return !client.lookup("arm", "tool")->covariance.complete(); }));

@@ -45,10 +45,12 @@ double x_of(const Result<StampedTransform>& X) {
 // world -> base -> arm -> hand, of two partitions and a client without frames.
 struct Robot {
   explicit Robot(Join joined, const EdgeTiming& of_hand = {}) : join(std::move(joined)) {
-    base.emplace(*Node::open(join("base"), "base", {{"world", "", {}}, {"base", "world", {}}}));
-    FrameSpec hand{"hand", "arm", {}};
+    const Transform exact = Transform::exact({});
+    base.emplace(
+        *Node::open(join("base"), "base", {{"world", "", exact}, {"base", "world", exact}}));
+    FrameSpec hand{"hand", "arm", exact};
     hand.timing = of_hand;
-    arm.emplace(*Node::open(join("arm"), "arm", {{"arm", "base", {}}, hand}));
+    arm.emplace(*Node::open(join("arm"), "arm", {{"arm", "base", exact}, hand}));
     client.emplace(*Client::open(join("")));
   }
   Join join;

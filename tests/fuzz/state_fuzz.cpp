@@ -88,7 +88,8 @@ std::vector<std::string> lines_of(const StoredState& state) {
   }
   for (const StoredJoint& joint : state.joints) {
     lines.push_back("joint " + joint.name + ", " + std::to_string(joint.position) + ", " +
-                    std::to_string(joint.variance) + (joint.type ? to_string(*joint.type) : ""));
+                    std::to_string(joint.variance.value_or(-1)) +
+                    (joint.type ? to_string(*joint.type) : ""));
   }
   std::sort(lines.begin(), lines.end());
   return lines;

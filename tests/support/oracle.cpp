@@ -26,6 +26,7 @@ Matrix6 adjoint_of(const Eigen::Matrix4d& X) {
 
 Oracle::Value Oracle::value_of(const Transform& X) {
   Value value;
+  value.complete = X.covariance.complete();
   value.X.topLeftCorner<3, 3>() = X.pose.rotation().toRotationMatrix();
   value.X.topRightCorner<3, 1>() = X.pose.translation();
   const Covariance::Upper& upper = X.covariance.of_specified().upper();
@@ -41,13 +42,14 @@ Oracle::Value Oracle::value_of(const Transform& X) {
 // X̄ Exp(ξ) inverted is Exp(-ξ) X̄⁻¹ = X̄⁻¹ Exp(-Ad(X̄) ξ).
 Oracle::Value Oracle::inverse(const Value& X_AB) {
   const Matrix6 Ad = adjoint_of(X_AB.X);
-  return {X_AB.X.inverse(), Ad * X_AB.sigma * Ad.transpose()};
+  return {X_AB.X.inverse(), Ad * X_AB.sigma * Ad.transpose(), X_AB.complete};
 }
 
 // X̄ Exp(ξ) Ȳ Exp(η) = X̄ Ȳ Exp(Ad(Ȳ⁻¹) ξ) Exp(η), to first order the sum of both.
 Oracle::Value Oracle::compose(const Value& X_AB, const Value& X_BC) {
   const Matrix6 Ad = adjoint_of(X_BC.X.inverse());
-  return {X_AB.X * X_BC.X, Ad * X_AB.sigma * Ad.transpose() + X_BC.sigma};
+  return {X_AB.X * X_BC.X, Ad * X_AB.sigma * Ad.transpose() + X_BC.sigma,
+          X_AB.complete && X_BC.complete};
 }
 
 void Oracle::add(const std::string& id, const std::string& parent, const Transform& X_PC) {
@@ -100,7 +102,9 @@ Transform Oracle::between(const std::string& a, const std::string& b) const {
   for (const std::string& id : from_b) X_AB = compose(X_AB, frames_.at(id).X_PC);
   const Eigen::Matrix3d R = X_AB.X.topLeftCorner<3, 3>();
   const Eigen::Vector3d t = X_AB.X.topRightCorner<3, 1>();
-  return {Pose::trusted(Eigen::Quaterniond(R).normalized(), t), Covariance::trusted(X_AB.sigma)};
+  const auto sigma = Covariance::trusted(X_AB.sigma);
+  return {Pose::trusted(Eigen::Quaterniond(R).normalized(), t),
+          StatedCovariance::trusted(sigma.upper(), X_AB.complete)};
 }
 
 }  // namespace tfdude::testing

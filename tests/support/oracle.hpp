@@ -36,6 +36,7 @@ class Oracle {
   struct Value {
     Eigen::Matrix4d X = Eigen::Matrix4d::Identity();
     Eigen::Matrix<double, 6, 6> sigma = Eigen::Matrix<double, 6, 6>::Zero();
+    bool complete = true;  // no edge is unspecified
   };
   struct Frame {
     std::string parent;

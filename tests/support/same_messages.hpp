@@ -84,7 +84,7 @@ inline std::string listed(const JointUpdate& update) {
   std::ostringstream text;
   text.precision(17);
   for (const JointValue& joint : update.joints) {
-    text << joint.name << ' ' << joint.position << ' ' << joint.variance << ' ';
+    text << joint.name << ' ' << joint.position << ' ' << joint.variance.value_or(-1) << ' ';
   }
   text << (update.stamp ? nanoseconds(*update.stamp) : 0);
   return text.str();
@@ -115,7 +115,7 @@ inline std::string listed(const JointInfo& joint) {
   std::ostringstream text;
   text.precision(17);
   text << joint.name << ' ' << joint.frame << ' ' << to_string(joint.type) << ' ' << joint.position
-       << ' ' << joint.variance << ' ' << joint.measured << ' ' << joint.outside << ' '
+       << ' ' << joint.variance.value_or(-1) << ' ' << joint.measured << ' ' << joint.outside << ' '
        << joint.refused;
   if (joint.limits) text << " limits " << joint.limits->lower << ' ' << joint.limits->upper;
   if (joint.mimic) {

@@ -222,7 +222,8 @@ bool take(const Bytes& bytes) {
       {2, 18446744073709551615ULL, Error{Errc::kCycle, "no, \xc3\xa4 \x07 \xff"}},
       {3, 0, Error{Errc::kTransport, ""}},
       {4, 30, SegmentValues{}},
-      {5, 40, SegmentValues{{random.transform(), Transform(), random.transform()}, {}, {}, {}}},
+      {5, 40,
+       SegmentValues{{random.transform(), Transform::exact({}), random.transform()}, {}, {}, {}}},
       {6, 40,
        SegmentValues{{random.transform()},
                      time_of(1'700'000'000'000'000'001),
@@ -230,8 +231,9 @@ bool take(const Bytes& bytes) {
                      {random.transform()}}},
       {7, 1, PushedValues{1, {}}},
       {8, 1,
-       PushedValues{18446744073709551615ULL,
-                    {{0, std::nullopt, random.transform()}, {7, time_of(5), Transform()}}}},
+       PushedValues{
+           18446744073709551615ULL,
+           {{0, std::nullopt, random.transform()}, {7, time_of(5), Transform::exact({})}}}},
       {9, 1, std::vector<HistoryInfo>{}},
       {11, 1, correlated_values(random)},
       {12, 1, std::vector<EdgeConsistency>{{"hand", 7, 3, {1.5, 2.5, 3.5}}, {}}},
@@ -244,26 +246,27 @@ bool take(const Bytes& bytes) {
 }
 
 [[nodiscard]] inline std::vector<PushedValues> pushed_values(Random& random) {
-  return {{},
-          {1, {{4294967295U, time_of(INT64_MAX), random.transform()}}},
-          {3, {{1, {}, random.transform(), correlation(random)}, {2, {}, random.transform()}}},
-          {2, {{0, std::nullopt, Transform()}, {1, time_of(1), random.transform()}}},
-          {4,
-           {{0, {}, random.transform(), {}, 18446744073709551615ULL, Covariance()},
-            {1, time_of(7), Transform(), {}, 3, random.transform().covariance.of_specified()},
-            {1, time_of(8), Transform(), {}, 3, {}, 4294967295U},
-            {1, time_of(9), Transform(), {}, 3, {}, 4294967295U, true}},
-           5,
-           18446744073709551615ULL,
-           1,
-           4294967295U},
-          {5, {{0, time_of(7), unspecified(random)}, {1, {}, unspecified(random)}}}};
+  return {
+      {},
+      {1, {{4294967295U, time_of(INT64_MAX), random.transform()}}},
+      {3, {{1, {}, random.transform(), correlation(random)}, {2, {}, random.transform()}}},
+      {2, {{0, std::nullopt, Transform::exact({})}, {1, time_of(1), random.transform()}}},
+      {4,
+       {{0, {}, random.transform(), {}, 18446744073709551615ULL, Covariance()},
+        {1, time_of(7), Transform::exact({}), {}, 3, random.transform().covariance.of_specified()},
+        {1, time_of(8), Transform::exact({}), {}, 3, {}, 4294967295U},
+        {1, time_of(9), Transform{}, {}, 3, {}, 4294967295U, true}},
+       5,
+       18446744073709551615ULL,
+       1,
+       4294967295U},
+      {5, {{0, time_of(7), unspecified(random)}, {1, {}, unspecified(random)}}}};
 }
 
 [[nodiscard]] inline std::vector<Update> updates(Random& random) {
   return {{},
           {{{"hand", random.transform()}}},
-          {{{"a", random.transform()}, {"ab", Transform()}, {"abc", random.transform()}}},
+          {{{"a", random.transform()}, {"ab", Transform::exact({})}, {"abc", random.transform()}}},
           {{{"hand", random.transform()}}, time_of(1'700'000'000'000'000'000)}};
 }
 

@@ -52,7 +52,8 @@ std::vector<PartitionSpec> five_partitions(Random& random, bool star) {
         parent = any(partitions[star ? 0 : i - 1]);
       }
       const std::string id = partition.name + "_" + std::string(1, static_cast<char>('a' + k));
-      partition.frames.push_back({id, parent, parent.empty() ? Transform() : random.transform()});
+      partition.frames.push_back(
+          {id, parent, parent.empty() ? Transform::exact({}) : random.transform()});
     }
     partitions.push_back(std::move(partition));
   }

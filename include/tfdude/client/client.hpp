@@ -152,12 +152,16 @@ class TFDUDE_EXPORT Client {
   /// mimic another move with it. All samples have the same stamp, as for update(). If one owner
   /// cannot be reached, the others get their shares all the same.
   /// @param positions  one per name [rad or m]
-  /// @param variances  of the positions [rad² or m²]
+  /// @param variances  of the positions [rad² or m²]; none: unspecified, as those of the edges then
+  ///   are
   /// @return kUnknownJoint, kInvalidInput (naming the joint: not a number, a negative variance; or
   ///   not one of each per name).
   [[nodiscard]] Result<void> publish_joints(const std::vector<std::string>& names,
                                             const std::vector<double>& positions,
-                                            const std::vector<double>& variances,
+                                            const std::vector<double>& variances = {},
+                                            std::optional<Time> stamp = std::nullopt);
+  /// The same, for joints of which some have no variance.
+  [[nodiscard]] Result<void> publish_joints(std::vector<JointValue> joints,
                                             std::optional<Time> stamp = std::nullopt);
 
   /// As publish_joints(), acknowledged by the owners.
@@ -165,7 +169,9 @@ class TFDUDE_EXPORT Client {
   ///   joint moves a frame; kTooOld, kStampTaken.
   [[nodiscard]] Result<void> update_joints(const std::vector<std::string>& names,
                                            const std::vector<double>& positions,
-                                           const std::vector<double>& variances,
+                                           const std::vector<double>& variances = {},
+                                           std::optional<Time> stamp = std::nullopt);
+  [[nodiscard]] Result<void> update_joints(std::vector<JointValue> joints,
                                            std::optional<Time> stamp = std::nullopt);
 
   /// The joints of a partition and their positions, sorted by name. One round trip per kMaxItems of

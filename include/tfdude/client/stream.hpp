@@ -71,7 +71,7 @@ class TFDUDE_EXPORT JointStream {
 
   /// As EdgeStream::try_publish().
   /// @param positions  one per joint, in the order in which the stream was opened [rad or m]
-  /// @param variances  of the positions [rad² or m²]
+  /// @param variances  of the positions [rad² or m²]; none: unspecified
   [[nodiscard]] const std::vector<NotSent>& try_publish(const std::vector<double>& positions,
                                                         const std::vector<double>& variances,
                                                         std::optional<Time> stamp = std::nullopt);

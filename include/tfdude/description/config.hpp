@@ -14,7 +14,7 @@ namespace tfdude {
 struct Config {
   std::string partition;  ///< empty if the file names none
   EdgeTiming history;     ///< default for frames without their own
-  /// Of edges for which the file gives none, and of joints' origins: unspecified, or zero.
+  /// Of edges for which the file gives none: unspecified, or exact.
   StatedCovariance covariance{};
   std::vector<FrameSpec> frames;
   std::vector<std::string> places;  ///< where each of the frames is described, for messages

@@ -18,7 +18,9 @@ struct UrdfJoint {
   std::optional<double> position{};
   /// Of the position [rad or m]; absent: the root of unmeasured_variance().
   std::optional<double> stddev{};
-  std::optional<StatedCovariance> origin{};  ///< of the joint's origin; also for a fixed joint
+  /// Of the joint's origin. Absent: exact for a joint that moves, as its error is that of its
+  /// position; UrdfPart::fixed for one that does not.
+  std::optional<StatedCovariance> origin{};
 };
 
 /// A URDF file, or a part of it, and its place among the other frames.
@@ -31,7 +33,7 @@ struct UrdfPart {
   /// all below it, but nothing below a TO). Empty: all links.
   std::vector<std::string> links{};
   bool strict_limits = false;
-  StatedCovariance origins{};  ///< of joints' origins without their own
+  StatedCovariance fixed{};  ///< of joints that do not move, without their own
   /// By the name in the file, without the prefix; for all joints of the robot, since a joint of the
   /// part may mimic one outside it.
   std::map<std::string, UrdfJoint> joints{};

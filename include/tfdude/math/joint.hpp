@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include <Eigen/Core>
 
 #include "tfdude/base/export.hpp"
@@ -27,10 +29,10 @@ struct Joint {
 
 /// X_PC(q). An error of q moves C along S for any q, since Exp(S (q + δ)) = Exp(S q) Exp(S δ). So
 /// q's variance gives the covariance S Sᵀ σ² of rank one, without approximation. The origin's
-/// covariance, transported to C, is added. If the origin's is unspecified, so is that of the edge.
+/// covariance, transported to C, is added. If one of both is unspecified, so is that of the edge.
 /// @param position  q [rad or m]
-/// @param variance  of q [rad² or m²]
+/// @param variance  of q [rad² or m²]; absent: unspecified
 [[nodiscard]] TFDUDE_EXPORT Transform joint_transform(const Joint& joint, double position,
-                                                      double variance);
+                                                      std::optional<double> variance);
 
 }  // namespace tfdude

@@ -14,16 +14,19 @@ namespace tfdude {
 ///   them shows it. So there is no access that leaves the question open: if_complete() has a result
 ///   only if nothing is missing, and of_specified() says in its name what it leaves out. This is a
 ///   type of its own, and not a flag beside a Covariance, because a flag can be overlooked.
-/// @par Writing  A Covariance converts to it, and is complete: a zero was meant as known exactly.
+/// @par Writing  A Covariance converts to it, and is complete. What nobody gives is unspecified:
+///   zero means known exactly, and has to be said (exact()).
 class StatedCovariance {
  public:
-  /// Zero: known exactly.
+  /// Nothing is known.
   StatedCovariance() = default;
   // NOLINTNEXTLINE(google-explicit-constructor): it is one, of the same meaning
-  StatedCovariance(const Covariance& complete) : of_specified_(complete) {}
+  StatedCovariance(const Covariance& complete) : of_specified_(complete), incomplete_(0) {}
 
-  /// Nothing is known.
-  [[nodiscard]] static StatedCovariance unspecified() { return incomplete(Covariance()); }
+  /// Nothing is known, as by default.
+  [[nodiscard]] static StatedCovariance unspecified() { return {}; }
+  /// Zero: known exactly.
+  [[nodiscard]] static StatedCovariance exact() { return Covariance(); }
   /// That of the edges which have one; others have none.
   [[nodiscard]] static StatedCovariance incomplete(const Covariance& of_specified) {
     StatedCovariance sigma = of_specified;
@@ -73,7 +76,7 @@ class StatedCovariance {
 
   Covariance of_specified_;
   // 1 or 0; as wide as a number, so that a copy need not wait for a narrower store.
-  std::uint64_t incomplete_ = 0;
+  std::uint64_t incomplete_ = 1;
 };
 
 [[nodiscard]] inline StatedCovariance operator+(StatedCovariance a, const StatedCovariance& b) {

@@ -10,8 +10,13 @@ namespace tfdude {
 /// and the answer to a lookup. 28 doubles and a flag, trivially copyable; always valid, since its
 /// parts are.
 struct Transform {
+  /// A pose that is known exactly.
+  [[nodiscard]] static Transform exact(const Pose& X_AB) {
+    return {X_AB, StatedCovariance::exact()};
+  }
+
   Pose pose;
-  StatedCovariance covariance;
+  StatedCovariance covariance;  ///< unspecified, unless given
 };
 
 /// Checks values that did not pass the checked constructors, for example the result of a

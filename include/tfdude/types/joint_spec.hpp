@@ -34,8 +34,9 @@ struct Mimic {
 
   /// Position and variance of the mimic joint.
   [[nodiscard]] double position(double of_other) const { return multiplier * of_other + offset; }
-  [[nodiscard]] double variance(double of_other) const {
-    return multiplier * multiplier * of_other;
+  [[nodiscard]] std::optional<double> variance(std::optional<double> of_other) const {
+    if (of_other) *of_other *= multiplier * multiplier;
+    return of_other;
   }
 };
 
@@ -48,9 +49,9 @@ struct JointSpec {
   std::optional<Mimic> mimic;
   /// The joint follows another one, or others follow it: they share one error.
   bool coupled = false;
-  bool strict = false;  ///< positions outside the limits are rejected
-  double position = 0;  ///< before the first sample [rad or m]
-  double variance = 0;  ///< of the position [rad² or m²]
+  bool strict = false;               ///< positions outside the limits are rejected
+  double position = 0;               ///< before the first sample [rad or m]
+  std::optional<double> variance{};  ///< of the position [rad² or m²]; absent: unspecified
 };
 
 /// A joint and its state.
@@ -60,8 +61,8 @@ struct JointInfo {
   JointType type = JointType::kRevolute;
   std::optional<JointLimits> limits;
   std::optional<Mimic> mimic;
-  double position = 0;    ///< [rad or m]
-  double variance = 0;    ///< [rad² or m²]
+  double position = 0;               ///< [rad or m]
+  std::optional<double> variance{};  ///< [rad² or m²]; absent: unspecified
   bool measured = false;  ///< true: by a sample, of this process or the one before; false: assumed
   std::uint64_t outside = 0;  ///< applied positions outside the limits
   std::uint64_t refused = 0;  ///< rejected positions outside the limits
@@ -75,8 +76,8 @@ struct JointInfo {
 /// A joint's position and its variance.
 struct JointValue {
   std::string name;
-  double position = 0;  ///< [rad or m]
-  double variance = 0;  ///< of the position [rad² or m²]
+  double position = 0;               ///< [rad or m]
+  std::optional<double> variance{};  ///< of the position [rad² or m²]; absent: unspecified
 };
 
 /// @return kInvalidInput naming the joint and the field: not a number, too large, a negative
@@ -96,7 +97,7 @@ struct JointValue {
 /// The edge's value at a joint position. The error of a coupled joint is not part of the
 /// covariance, but a common error.
 [[nodiscard]] TFDUDE_EXPORT Transform value_at(const JointSpec& joint, double position,
-                                               double variance);
+                                               std::optional<double> variance);
 
 /// The source of the error that a joint shares with those that follow it.
 [[nodiscard]] TFDUDE_EXPORT std::string shared_source(const std::string& leader);
@@ -107,9 +108,8 @@ struct JointValue {
 /// The variance to assume for an unknown position: its mean squared deviation from `position`, if
 /// all positions within the limits are equally likely. A revolute joint without limits is uniform
 /// over one turn.
-/// @return 0 for a prismatic joint without limits, for which nothing is known
-[[nodiscard]] TFDUDE_EXPORT double unmeasured_variance(JointType type,
-                                                       const std::optional<JointLimits>& limits,
-                                                       double position);
+/// @return nothing for a prismatic joint without limits, for which nothing is known
+[[nodiscard]] TFDUDE_EXPORT std::optional<double> unmeasured_variance(
+    JointType type, const std::optional<JointLimits>& limits, double position);
 
 }  // namespace tfdude

@@ -259,15 +259,12 @@ Result<JointUpdate> from_wire(const wire::Joints& sample,
       return tl::unexpected(std::move(ok.error()));
     }
     const Numbers& numbers = joint.numbers();
-    if (numbers.size() != 2) {
-      const bool unspecified = numbers.size() == 1;
-      return fail(unspecified ? Errc::kUnsupported : Errc::kInvalidInput,
-                  "joint " + quote(text(joint.id())) +
-                      (unspecified ? ": its variance is unspecified, which this version does not "
-                                     "support"
-                                   : " without a position"));
+    if (numbers.empty() || numbers.size() > 2) {
+      return fail(Errc::kInvalidInput, "joint " + quote(text(joint.id())) + " without a position");
     }
-    update.joints.push_back({string_of(joint.id()), numbers[0], numbers[1]});
+    JointValue value{string_of(joint.id()), numbers[0]};
+    if (numbers.size() == 2) value.variance = numbers[1];
+    update.joints.push_back(std::move(value));
   }
   return update;
 }

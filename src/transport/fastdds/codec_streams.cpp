@@ -23,9 +23,10 @@ void write_wire(const JointUpdate& update, wire::Joints& sample) {
   for (std::size_t i = 0; i < update.joints.size(); ++i) {
     sample.positions()[i].id(update.joints[i].name);
     auto& numbers = sample.positions()[i].numbers();
-    numbers.resize(2);
+    const auto& variance = update.joints[i].variance;
+    numbers.resize(variance ? 2 : 1);
     numbers[0] = update.joints[i].position;
-    numbers[1] = update.joints[i].variance;
+    if (variance) numbers[1] = *variance;
   }
   sample.stamp(wire_stamp(update.stamp));
 }

@@ -250,7 +250,7 @@ wire::JointState wire_joint(const JointInfo& joint) {
   const Mimic mimic = joint.mimic.value_or(Mimic{});
   wire::JointState body;
   body.position(joint.position);
-  body.variance({joint.variance});
+  if (joint.variance) body.variance({*joint.variance});
   body.lower(limits.lower);
   body.upper(limits.upper);
   body.multiplier(mimic.multiplier);

@@ -31,7 +31,7 @@ Plot plot_of(const std::vector<Step>& steps) {
   Plot plot;
   plot.steps = steps;
   plot.frames.push_back("a0");
-  Transform X;
+  Transform X = Transform::exact({});
   for (const Step& step : steps) {
     X = compose(X, step.up ? inverse(step.X_PC) : step.X_PC);
     plot.frames.push_back("a" + std::to_string(plot.frames.size()));

@@ -62,7 +62,7 @@ TEST_CASE("a stored state of format 2 has all its content") {
   CHECK(state->joints[0].name == "r_hinge_2");
   CHECK(state->joints[0].position == 0.25);
   CHECK_FALSE(state->joints[0].type);
-  CHECK(state->joints[0].variance == Approx(0.003 * 0.003));
+  CHECK(*state->joints[0].variance == Approx(0.003 * 0.003));
   for (const StoredFrame& frame : state->frames) CHECK(frame.X_PC.covariance.complete());
 }
 
@@ -112,7 +112,7 @@ TEST_CASE("zeros of a state of format 3 stay exact until its entry is changed") 
   options.discovery = Milliseconds(0);
   auto config = load_config(kFormat3 + "/arms.yaml");
   REQUIRE(config);
-  const auto check_hand = [&](const StatedCovariance& expected) {
+  const auto check_hand = [&](const StatedCovariance& expected, double x) {
     LoopbackNetwork network;
     auto node = Node::open(network.join(), config->partition, config->frames, options);
     INFO((node ? "" : node.error().message));
@@ -120,13 +120,16 @@ TEST_CASE("zeros of a state of format 3 stay exact until its entry is changed") 
     const auto X = node->lookup("arm", "hand");
     REQUIRE(X);
     CHECK(X->covariance == expected);
-    CHECK(X->pose.translation().x() == (expected.complete() ? 4 : 1));
+    CHECK(X->pose.translation().x() == x);
     CHECK(deviations(*node->lookup("hand", "tool"))[2] == Approx(0.3));
   };
-  for (int round = 0; round < 2; ++round) check_hand(StatedCovariance());
+  for (int round = 0; round < 2; ++round) check_hand(StatedCovariance::exact(), 4);
   REQUIRE(config->frames[1].id == "hand");
+  CHECK_FALSE(config->frames[1].X_PC.covariance.complete());  // the file says nothing
+  config->frames[1].X_PC.covariance = StatedCovariance::exact();
+  for (int round = 0; round < 2; ++round) check_hand(StatedCovariance::exact(), 1);
   config->frames[1].X_PC.covariance = StatedCovariance::unspecified();
-  for (int round = 0; round < 2; ++round) check_hand(StatedCovariance::unspecified());
+  for (int round = 0; round < 2; ++round) check_hand(StatedCovariance::unspecified(), 1);
 }
 
 }  // namespace tfdude

@@ -29,7 +29,7 @@ TEST_CASE("a frame says that its covariance is unspecified or exact") {
       "  - {id: arm, stddev: [1, 1, 1, 1, 1, 1]}\n");
   REQUIRE(config);
   CHECK(config->frames[0].X_PC.covariance == kNothing);
-  CHECK(config->frames[1].X_PC.covariance == StatedCovariance());
+  CHECK(config->frames[1].X_PC.covariance == StatedCovariance::exact());
   CHECK(config->frames[2].X_PC.covariance.complete());
   CHECK(message_of("frames:\n  - id: odom\n    covariance: none\n") ==
         "robot.yaml:3: frame 'odom': covariance must be unspecified or exact");
@@ -58,22 +58,32 @@ TEST_CASE("a file gives the covariance of frames without their own") {
         "robot.yaml:2: covariance must be unspecified or exact");
 }
 
-TEST_CASE("a file gives the covariance of the origins of a robot's joints") {
+TEST_CASE("a frame without a covariance is unspecified") {
+  const auto config = parsed("frames:\n  - {id: odom, xyz: [1, 0, 0]}\n");
+  REQUIRE(config);
+  CHECK(config->frames[0].X_PC.covariance == kNothing);
+}
+
+TEST_CASE("a file gives the covariance of a robot's joints that do not move") {
   const std::string urdf = TFDUDE_FIXTURES "/format_2/robot.urdf";
-  const auto unspecified_in = [&](const std::string& head) {
+  const auto check_fixed = [&](const std::string& head, bool complete) {
     const auto config = parsed(head + "urdf:\n  - file: " + urdf + "\n    root: world\n");
     INFO((config ? "" : config.error().message));
     REQUIRE(config);
-    int count = 0;
+    int fixed = 0;
     for (const FrameSpec& frame : config->frames) {
-      if (!frame.X_PC.covariance.complete()) ++count;
-      if (!frame.joint) continue;
-      CHECK(frame.joint->joint.X_PJ.covariance.complete() == frame.X_PC.covariance.complete());
+      if (frame.joint) {
+        CHECK(frame.X_PC.covariance.complete());  // it has the variance of the joint's position
+        continue;
+      }
+      ++fixed;
+      CHECK(frame.X_PC.covariance.complete() == complete);
     }
-    return count == 0 ? "none" : count == static_cast<int>(config->frames.size()) ? "all" : "some";
+    CHECK(fixed > 0);
   };
-  CHECK(unspecified_in("covariance: exact\n") == std::string("none"));
-  CHECK(unspecified_in("covariance: unspecified\n") == std::string("all"));
+  check_fixed("covariance: exact\n", true);
+  check_fixed("covariance: unspecified\n", false);
+  check_fixed("", false);
 }
 
 }  // namespace tfdude

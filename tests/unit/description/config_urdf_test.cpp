@@ -48,7 +48,7 @@ TEST_CASE("a configuration may include URDFs") {
   const auto& elbow = *config->frames[4].joint;
   CHECK(elbow.name == "a_elbow_joint");
   CHECK(elbow.position == 0.5);
-  CHECK(elbow.variance == tfdude::testing::Approx(1e-4));
+  CHECK(*elbow.variance == tfdude::testing::Approx(1e-4));
   CHECK(elbow.strict);
   CHECK(elbow.joint.X_PJ.covariance.of_specified().stddev()[2] == tfdude::testing::Approx(0.2));
   CHECK(config->frames[9].id == "b_base_link");

@@ -121,7 +121,8 @@ bool is_finite(const tfdude::FrameSpec& frame) {
   if (!frame.joint) return true;
   const auto& joint = *frame.joint;
   bool good = is_finite(joint.joint.X_PJ) && joint.joint.S.allFinite() &&
-              std::isfinite(joint.position) && std::isfinite(joint.variance) && joint.variance >= 0;
+              std::isfinite(joint.position) && std::isfinite(joint.variance.value_or(0)) &&
+              joint.variance.value_or(0) >= 0;
   if (joint.limits) good = good && std::isfinite(joint.limits->lower + joint.limits->upper);
   if (joint.mimic) good = good && std::isfinite(joint.mimic->multiplier + joint.mimic->offset);
   return good;

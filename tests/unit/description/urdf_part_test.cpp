@@ -44,7 +44,7 @@ TEST_CASE("urdf: a chain of mimic joints is resolved to its first joint") {
   CHECK(second.mimic->joint == "p_f1");
   CHECK(second.mimic->multiplier == -2);
   CHECK(second.position == Approx(0.0).margin(1e-15));
-  CHECK(second.variance == Approx(4 * 0.01));
+  CHECK(*second.variance == Approx(4 * 0.01));
   const auto& third = *named(frames, "p_l3").joint;
   CHECK(third.coupled);
   CHECK(third.name == "p_f3");
@@ -52,7 +52,7 @@ TEST_CASE("urdf: a chain of mimic joints is resolved to its first joint") {
   CHECK(third.mimic->multiplier == -6);
   CHECK(third.mimic->offset == Approx(3 * 0.5 + 0.25));
   CHECK(third.position == Approx(-6 * 0.25 + 1.75));
-  CHECK(third.variance == Approx(36 * 0.01));
+  CHECK(*third.variance == Approx(36 * 0.01));
   // The errors of coupled joints are common errors, and no part of the edges' own covariance.
   CHECK(named(frames, "p_l3").X_PC.covariance.of_specified().upper() ==
         tfdude::Covariance().upper());

@@ -204,13 +204,13 @@ TEST_CASE("urdf: a limit that no position can reach is ignored") {
   const auto rotor = joint("-1e16", "1e16");
   CHECK_FALSE(rotor.limits.has_value());
   CHECK(rotor.position == 0);
-  CHECK(rotor.variance == Approx(M_PI * M_PI / 3));
+  CHECK(*rotor.variance == Approx(M_PI * M_PI / 3));
   const auto half = joint("0.5", "1e16");
   REQUIRE(half.limits.has_value());
   CHECK(half.limits->lower == 0.5);
   CHECK(half.limits->contain(1e9));
   CHECK(half.position == 0.5);
-  CHECK(half.variance == Approx(M_PI * M_PI / 3));
+  CHECK(*half.variance == Approx(M_PI * M_PI / 3));
 }
 
 TEST_CASE("urdf: a joint has its given or default position before its first sample") {
@@ -218,11 +218,11 @@ TEST_CASE("urdf: a joint has its given or default position before its first samp
     return *frames_of(pair("revolute", limits("1", "3")), part)[1].joint;
   };
   CHECK(at({"r.urdf"}).position == 1);
-  CHECK(at({"r.urdf"}).variance == Approx(4.0 / 12 + 1));
+  CHECK(*at({"r.urdf"}).variance == Approx(4.0 / 12 + 1));
   CHECK_FALSE(at({"r.urdf"}).strict);
   const auto said = at(with_joint("j", {2.5, 0.1, {}}));
   CHECK(said.position == 2.5);
-  CHECK(said.variance == Approx(0.01));
+  CHECK(*said.variance == Approx(0.01));
   UrdfPart strict{"r.urdf"};
   strict.strict_limits = true;
   CHECK(at(strict).strict);

@@ -92,12 +92,12 @@ TEST_CASE("Fusion of one estimate changes nothing and the order of estimates doe
 
 TEST_CASE("Exact estimates stay and contradicting ones are rejected") {
   Random random(624);
-  const Transform exact{random.pose(), {}};
+  const Transform exact = Transform::exact(random.pose());
   const auto fused = fuse({estimate(exact.pose, random.covariance(), random), exact});
   REQUIRE(fused);
   CHECK(testing::pose_diff(fused->X.pose, exact.pose, 1e-9) == "");
   CHECK(fused->X.covariance.of_specified().matrix().cwiseAbs().maxCoeff() < 1e-30);
-  const auto both = fuse({exact, Transform{exact.pose * exp(0.1 * Twist::Unit(2)), {}}});
+  const auto both = fuse({exact, Transform::exact(exact.pose * exp(0.1 * Twist::Unit(2)))});
   REQUIRE_FALSE(both);
   CHECK_THAT(both.error().message, ContainsSubstring("contradicts"));
   CHECK_FALSE(fuse({}));

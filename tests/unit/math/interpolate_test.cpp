@@ -82,7 +82,7 @@ TEST_CASE("motion with a constant twist is interpolated exactly") {
   for (const double angle : kAngles) {
     const Pose start = random.pose();
     const Twist xi = random.twist(angle);
-    const auto at = [&](double t) { return Transform{start * exp(t * xi), {}}; };
+    const auto at = [&](double t) { return Transform::exact(start * exp(t * xi)); };
     for (const double s : kParts) {
       INFO("angle " << angle << ", part " << s);
       CHECK(pose_diff(interpolate(at(0), at(1), s).pose, at(s).pose, 1e-8) == "");
@@ -103,13 +103,13 @@ TEST_CASE("the covariance weights each sample's Jacobian as a mean does") {
     for (const double s : {0.25, 0.5, 0.9}) {
       INFO("angle " << angle << ", part " << s);
       const Matrix6d J0 = numeric_jacobian([&, s = s](const Twist& e) {
-        return interpolate({a * exp(e), {}}, {b, {}}, s).pose;
+        return interpolate(Transform::exact(a * exp(e)), Transform::exact(b), s).pose;
       });
       const Matrix6d J1 = numeric_jacobian([&, s = s](const Twist& e) {
-        return interpolate({a, {}}, {b * exp(e), {}}, s).pose;
+        return interpolate(Transform::exact(a), Transform::exact(b * exp(e)), s).pose;
       });
-      const StatedCovariance from0 = interpolate(X0, {b, {}}, s).covariance;
-      const StatedCovariance from1 = interpolate({a, {}}, X1, s).covariance;
+      const StatedCovariance from0 = interpolate(X0, Transform::exact(b), s).covariance;
+      const StatedCovariance from1 = interpolate(Transform::exact(a), X1, s).covariance;
       CHECK(covariance_diff(Covariance::trusted(Matrix6d((1 - s) * from0.of_specified().matrix())),
                             propagated(J0, X0.covariance), 1e-6) == "");
       CHECK(covariance_diff(Covariance::trusted(Matrix6d(s * from1.of_specified().matrix())),
@@ -184,8 +184,8 @@ TEST_CASE("the covariance is no less than the sampled one for any correlation of
       for (int k = 0; k < 6; ++k) second[k] = random.normal();
       second = correlation * first + std::sqrt(1.0 - correlation * correlation) * second;
       // Small, so that the neglected second order is smaller than the sampling error.
-      const Transform Y0{X0.pose * exp(0.1 * root0 * first), {}};
-      const Transform Y1{X1.pose * exp(0.1 * root1 * second), {}};
+      const Transform Y0 = Transform::exact(X0.pose * exp(0.1 * root0 * first));
+      const Transform Y1 = Transform::exact(X1.pose * exp(0.1 * root1 * second));
       const Twist e = 10.0 * log(between_inverse * interpolate(Y0, Y1, s).pose);
       const Twist e_after = 10.0 * log(after_inverse * extrapolate(Y0, Y1, beyond).pose);
       sampled += e * e.transpose() / kSamples;
@@ -196,8 +196,8 @@ TEST_CASE("the covariance is no less than the sampled one for any correlation of
     CHECK(largest_ratio(sampled_after, after.covariance.of_specified().matrix()) < 1.045);
     // As if the samples were independent.
     const Matrix6d naive =
-        (1 - s) * interpolate(X0, {X1.pose, {}}, s).covariance.of_specified().matrix() +
-        s * interpolate({X0.pose, {}}, X1, s).covariance.of_specified().matrix();
+        (1 - s) * interpolate(X0, Transform::exact(X1.pose), s).covariance.of_specified().matrix() +
+        s * interpolate(Transform::exact(X0.pose), X1, s).covariance.of_specified().matrix();
     CHECK((largest_ratio(sampled, naive) < 1.045) == (correlation == 0.0));
   }
 }

@@ -84,7 +84,7 @@ TEST_CASE("joint: the origin's error is transported to the child") {
     const double q = random.uniform(-4, 4);
     const Transform X = tfdude::joint_transform(joint, q, 0.01);
     const Transform X_JC =
-        tfdude::joint_transform(revolute_joint(Transform(), joint.S.tail<3>()), q, 0.01);
+        tfdude::joint_transform(revolute_joint(Transform::exact({}), joint.S.tail<3>()), q, 0.01);
     const Transform composed = tfdude::compose(X_PJ, X_JC);
     REQUIRE(difference(X.covariance.of_specified().matrix(),
                        composed.covariance.of_specified().matrix()) < 1e-15);
@@ -118,7 +118,7 @@ TEST_CASE("joint: the covariance is that of samples of position and origin") {
 
 TEST_CASE("joint: a position's error is exact however large it is") {
   const Eigen::Vector3d axis = Eigen::Vector3d(1, 2, 2) / 3;
-  const Joint joint = revolute_joint(Transform(), axis);
+  const Joint joint = revolute_joint(Transform::exact({}), axis);
   const auto off = tfdude::joint_transform(joint, 0.5, 0).pose.inverse() *
                    tfdude::joint_transform(joint, 3.0, 0).pose;
   CHECK((tfdude::log(off) - 2.5 * joint.S).norm() < 1e-14);

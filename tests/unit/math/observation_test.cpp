@@ -230,7 +230,7 @@ TEST_CASE("An exact measurement far away is reached exactly") {
   for (int i = 0; i < 20; ++i) {
     ObservedChain chain(random, 4);
     const Pose Z = chain.believed(0, 4).pose * exp(random.twist(0.8, 1.0));
-    const auto observed = observe(chain.path(0, 4), {Z, {}}, kSource, {1.0, true});
+    const auto observed = observe(chain.path(0, 4), Transform::exact(Z), kSource, {1.0, true});
     REQUIRE(observed);
     Pose X;
     for (const ObservedResult& edge : observed->edges) X = X * edge.X_PC.pose;

@@ -32,12 +32,14 @@ bool contains(const std::string& text, std::string_view part) {
 
 Covariance::Upper identity_upper() { return Covariance::trusted(Matrix6d::Identity()).upper(); }
 
-TEST_CASE("an empty spec is the identity known exactly") {
+TEST_CASE("an empty spec is the identity of unspecified covariance") {
   const TransformSpec spec;
   CHECK(spec.empty());
   const auto X = spec.build();
   REQUIRE(X);
-  CHECK(transform_diff(*X, Transform(), 0.0) == "");
+  CHECK(transform_diff(*X, Transform{}, 0.0) == "");
+  CHECK_FALSE(X->covariance.complete());
+  CHECK(transform_diff(*spec.build(StatedCovariance::exact()), Transform::exact({}), 0.0) == "");
 }
 
 TEST_CASE("a spec with any field is not empty") {
@@ -48,9 +50,9 @@ TEST_CASE("a spec with any field is not empty") {
   SECTION("stddev") { spec.stddev.emplace(); }
   SECTION("cov") { spec.cov.emplace(); }
   CHECK_FALSE(spec.empty());
-  const auto X = spec.build();
+  const auto X = spec.build(StatedCovariance::exact());
   REQUIRE(X);
-  CHECK(transform_diff(*X, Transform(), 0.0) == "");
+  CHECK(transform_diff(*X, Transform::exact({}), 0.0) == "");
 }
 
 TEST_CASE("xyz alone is a translation") {

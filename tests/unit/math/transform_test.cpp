@@ -116,8 +116,8 @@ TEST_CASE("compose and inverse and between equal the dense formulas") {
 TEST_CASE("exact transforms stay exact") {
   Random random(212);
   INFO("seed " << random.seed());
-  const Transform a{random.pose(), {}};
-  const Transform b{random.pose(), {}};
+  const Transform a = Transform::exact(random.pose());
+  const Transform b = Transform::exact(random.pose());
   CHECK(compose(a, b).covariance.of_specified().matrix() == Matrix6d::Zero());
   CHECK(inverse(a).covariance.of_specified().matrix() == Matrix6d::Zero());
   CHECK(between(a, b).covariance.of_specified().matrix() == Matrix6d::Zero());
@@ -140,8 +140,8 @@ TEST_CASE("the identity is neutral") {
   Random random(222);
   INFO("seed " << random.seed());
   const Transform a = random.transform();
-  CHECK(transform_diff(compose(a, Transform()), a, 1e-15) == "");
-  CHECK(transform_diff(compose(Transform(), a), a, 1e-15) == "");
+  CHECK(transform_diff(compose(a, Transform::exact({})), a, 1e-15) == "");
+  CHECK(transform_diff(compose(Transform::exact({}), a), a, 1e-15) == "");
 }
 
 TEST_CASE("inverse is its own inverse") {
@@ -193,9 +193,9 @@ PathAccumulation<Transform> accumulated(const Path& path) {
 
 // Up from A edge by edge and down to B, with compose and inverse only.
 Transform walked(const Path& from_a, const Path& from_b) {
-  Transform X_AH;
+  Transform X_AH = Transform::exact({});
   for (const Transform& X_PC : from_a.edges) X_AH = compose(X_AH, inverse(X_PC));
-  Transform X_HB;
+  Transform X_HB = Transform::exact({});
   for (const Transform& X_PC : from_b.edges) X_HB = compose(X_PC, X_HB);
   return compose(X_AH, X_HB);
 }
@@ -233,7 +233,7 @@ TEST_CASE("poses accumulate to the pose of the accumulated transforms") {
 
 TEST_CASE("a join of empty paths is the identity known exactly") {
   CHECK(transform_diff(join(PathAccumulation<Transform>(), PathAccumulation<Transform>()),
-                       Transform(), 0.0) == "");
+                       Transform::exact({}), 0.0) == "");
 }
 
 // ---- long chains
@@ -257,7 +257,7 @@ TEST_CASE("a chain of 1000 edges stays symmetric and positive semi-definite") {
     for (Transform& edge : path.edges) edge.covariance = Covariance();
     path.edges[0].covariance = path.edges[999].covariance = *one_axis;
   }
-  Transform X_RS;
+  Transform X_RS = Transform::exact({});
   for (const Transform& X_PC : path.edges) X_RS = compose(X_PC, X_RS);
   const Transform X_SR = join(accumulated(path), PathAccumulation<Transform>());
   for (const Transform& X : {X_RS, X_SR}) {

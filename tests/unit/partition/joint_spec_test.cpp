@@ -43,12 +43,13 @@ TEST_CASE("joints: an unmeasured position has the variance of a uniform one with
       const double share = (i + 0.5) / kSteps;
       sum += std::pow(limits.lower + share * (limits.upper - limits.lower) - at, 2);
     }
-    const double variance = tfdude::unmeasured_variance(JointType::kRevolute, limits, at);
-    REQUIRE(variance == Approx(sum / kSteps).epsilon(1e-6).margin(1e-12));
+    const auto variance = tfdude::unmeasured_variance(JointType::kRevolute, limits, at);
+    REQUIRE(variance);
+    REQUIRE(*variance == Approx(sum / kSteps).epsilon(1e-6).margin(1e-12));
   }
   const double turn = std::pow(std::acos(-1.0), 2) / 3;  // of -π to π
-  CHECK(tfdude::unmeasured_variance(JointType::kContinuous, std::nullopt, 5) == Approx(turn));
-  CHECK(tfdude::unmeasured_variance(JointType::kPrismatic, std::nullopt, 5) == 0);
+  CHECK(*tfdude::unmeasured_variance(JointType::kContinuous, std::nullopt, 5) == Approx(turn));
+  CHECK_FALSE(tfdude::unmeasured_variance(JointType::kPrismatic, std::nullopt, 5));
   CHECK(tfdude::unmeasured_variance(JointType::kPrismatic, JointLimits{2, 2}, 2) == 0);
 }
 

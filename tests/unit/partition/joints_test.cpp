@@ -94,12 +94,29 @@ TEST_CASE("positions move the joints' edges as one commit") {
         1e-12);
 }
 
+TEST_CASE("a position without a variance leaves the edges that it moves unspecified") {
+  Arm arm;
+  arm.load();
+  REQUIRE(arm.partition.apply(JointUpdate{{{"shoulder", 0.5}, {"elbow", 0.25}}, {}}));
+  for (const auto& [parent, id] :
+       {std::pair{"base", "upper"}, {"upper", "fore"}, {"fore", "hand"}}) {
+    INFO(id);
+    CHECK_FALSE(arm.edge(parent, id).covariance.complete());
+  }
+  CHECK(arm.edge("base", "cart").covariance.complete());
+  for (const char* name : {"shoulder", "elbow", "wrist"}) CHECK_FALSE(arm.info(name).variance);
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.25, 0.04}}, {}}));
+  CHECK(arm.edge("upper", "fore").covariance.complete());
+  CHECK(arm.edge("fore", "hand").covariance.complete());
+  CHECK(arm.info("wrist").variance == 0.25 * 0.04);
+}
+
 TEST_CASE("a mimic joint moves with its source joint and shares its error") {
   Arm arm;
   arm.load();
   REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.04}}, {}}));
   CHECK(std::abs(arm.info("wrist").position - (-0.5 * 0.5 + 0.125)) < 1e-15);
-  CHECK(std::abs(arm.info("wrist").variance - 0.25 * 0.04) < 1e-15);
+  CHECK(std::abs(*arm.info("wrist").variance - 0.25 * 0.04) < 1e-15);
   // About one axis, the error of both is (1 - 0.5) times that of the elbow: not the root of the sum
   // of squares.
   const auto X = arm.forest.lookup("upper", "hand", Query{});

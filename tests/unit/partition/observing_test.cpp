@@ -137,7 +137,7 @@ TEST_CASE("only owners whose edges change get a part of an observation") {
   const auto plan = route_observe(known.forest, known.directory, "world", "tool", {}, {});
   REQUIRE(plan);
   auto answers = answers_to(*plan, random);
-  answers[1].values[0].covariance = {};
+  answers[1].values[0].covariance = StatedCovariance::exact();
   const auto path = observed_path(*plan, answers);
   REQUIRE(path);
   Pose X_AB;

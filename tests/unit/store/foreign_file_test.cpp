@@ -137,7 +137,7 @@ TEST_CASE("a file with invalid rows is rejected and not changed") {
       {"DELETE FROM about", "it contains 0 partitions"},
       {"INSERT INTO joints VALUES('elbow', 'much', 0)", "another type in column position"},
       {"INSERT INTO joints VALUES('elbow', 1e10, 0)", "position is not a number, or beyond 1e9"},
-      {"INSERT INTO joints VALUES('elbow', 0, -1)", "variance is not a number within"},
+      {"INSERT INTO joints VALUES('elbow', 0, -2)", "variance is not a number within"},
       {"INSERT INTO joints VALUES('elbow', 0, 0); INSERT INTO joint_types VALUES('elbow', 4)",
        "joint 'elbow' of type 4"},
       {"INSERT INTO joints VALUES('elbow', 0, 0); INSERT INTO joint_types VALUES('elbow', 'hinge')",

@@ -81,7 +81,7 @@ TEST_CASE("a saved state is restored to the last bit by the next process") {
                                {},
                                {},
                                {},
-                               {{"elbow", 0.5, 1e-4, JointType::kPrismatic}, {"wrist", 3, 0}},
+                               {{"elbow", 0.5, 1e-4, JointType::kPrismatic}, {"wrist", 3}},
                                {},
                                {{"hand", later}, {"nobody", later}},
                                {},
@@ -106,6 +106,7 @@ TEST_CASE("a saved state is restored to the last bit by the next process") {
   CHECK(state->joints[0].type == JointType::kPrismatic);
   CHECK(state->joints[1].position == 3);
   CHECK_FALSE(state->joints[1].type);
+  CHECK_FALSE(state->joints[1].variance);
   REQUIRE(state->configured.size() == 1);
   CHECK(to_flat(state->configured[0].X_PC) == to_flat(hand.X_PC));
 }
@@ -126,11 +127,11 @@ TEST_CASE("an unspecified covariance is restored and differs from zero") {
   const auto state = opened(file)->load();
   REQUIRE(state);
   REQUIRE(state->frames.size() == 3);
-  CHECK(state->frames[0].X_PC.covariance == StatedCovariance());
+  CHECK(state->frames[0].X_PC.covariance == StatedCovariance::exact());
   CHECK(state->frames[1].X_PC.covariance == StatedCovariance::unspecified());
   CHECK(state->frames[2].X_PC.covariance == StatedCovariance::unspecified());
   REQUIRE(state->configured.size() == 2);
-  CHECK(state->configured[0].X_PC.covariance == StatedCovariance());
+  CHECK(state->configured[0].X_PC.covariance == StatedCovariance::exact());
   CHECK(state->configured[1].X_PC.covariance == StatedCovariance::unspecified());
 }
 

@@ -150,7 +150,7 @@ TEST_CASE("a joint takes few bytes and its edge takes many") {
     return testing::serialized<std::decay_t<decltype(kind)>>(to_wire(message)).size();
   };
   const std::vector<JointValue> six(6, {"shoulder_1", 0.1, 1e-6});
-  const std::vector<EdgeUpdate> edges(6, {"shoulder_1", {}});
+  const std::vector<EdgeUpdate> edges(6, {"shoulder_1", Transform::exact({})});
   CHECK(bytes_of(JointsType(), JointUpdate{six, time_of(1)}) < 6 * 44);
   CHECK(bytes_of(UpdateType(), Update{edges, time_of(1)}) > 6 * 240);
 }
@@ -161,7 +161,7 @@ TEST_CASE("a pushed value with a known covariance takes at most the bytes of tf2
   const auto bytes_of = [](std::size_t count) {
     PushedValues pushed;
     for (std::uint32_t i = 0; i < count; ++i) {
-      pushed.entries.push_back({i, time_of(1), Transform(), {}, 1, {}, 1, true});
+      pushed.entries.push_back({i, time_of(1), Transform::exact({}), {}, 1, {}, 1, true});
     }
     return testing::serialized<StateType>(to_wire(pushed)).size();
   };
@@ -272,9 +272,10 @@ std::vector<wire::Request> requests_with(const Numbers& bad) {
   const auto of = [](const std::string& id, auto body) {
     return to_wire(Request{1, id, std::move(body)}, "robot");
   };
-  std::vector<wire::Request> all{
-      of("culprit", AddRequest{"hand", {}}), of("culprit", MoveRequest{"hand", Transform()}),
-      of("culprit", UpdateRequest{{{"culprit", {}}}}), of("hand", UpdateRequest{edges})};
+  std::vector<wire::Request> all{of("culprit", AddRequest{"hand", {}}),
+                                 of("culprit", MoveRequest{"hand", Transform::exact({})}),
+                                 of("culprit", UpdateRequest{{{"culprit", {}}}}),
+                                 of("hand", UpdateRequest{edges})};
   all[0].body().add().x_pc(bad);
   all[1].body().move_and_update().x_pc(bad);
   all[2].body().update().x_pc(bad);

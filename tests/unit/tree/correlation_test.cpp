@@ -129,7 +129,7 @@ TEST_CASE("A source is counted also at an instant between samples") {
   const CommonError s = common_error(random, "s");
   REQUIRE(robot.forest.correlate("a", shared(s)));
   REQUIRE(robot.forest.correlate("b", shared(s)));
-  const Transform still{robot.X_WA.pose, {}};
+  const Transform still = Transform::exact(robot.X_WA.pose);
   REQUIRE(robot.forest.update("a", still, at(0ms)));
   REQUIRE(robot.forest.update("a", still, at(10ms)));
   REQUIRE(robot.forest.update("b", still, at(3ms)));

@@ -25,7 +25,7 @@ std::string deep_id(int i) { return "a frame with quite a long id, number " + st
 
 void plant_chain(Forest& forest) {
   Random random(700);
-  REQUIRE(forest.add("world", "", Transform()));
+  REQUIRE(forest.add("world", "", Transform::exact({})));
   for (int i = 0; i < kDepth; ++i) {
     REQUIRE(forest.add(deep_id(i), i == 0 ? "world" : deep_id(i - 1), random.transform()));
   }
@@ -140,7 +140,7 @@ constexpr std::int64_t kFewBytes = 256 * 1024;
 std::int64_t growth_of_churn(Forest& forest) {
   const auto cycle = [&](int i) {
     const std::string id = "a passing frame with a long id, " + std::to_string(i);
-    return forest.add(id, "world", Transform()) && forest.remove(id);
+    return forest.add(id, "world", Transform::exact({})) && forest.remove(id);
   };
   int refused = 0;
   for (int i = 0; i < 1000; ++i) refused += cycle(i) ? 0 : 1;
@@ -153,13 +153,13 @@ std::int64_t growth_of_churn(Forest& forest) {
 
 TEST_CASE("ids that are added and removed leave no memory behind") {
   Forest forest;
-  REQUIRE(forest.add("world", "", Transform()));
+  REQUIRE(forest.add("world", "", Transform::exact({})));
   CHECK(growth_of_churn(forest) < kFewBytes);
 }
 
 TEST_CASE("ids that are added and removed leave no memory behind while others read") {
   Forest forest;
-  REQUIRE(forest.add("world", "", Transform()));
+  REQUIRE(forest.add("world", "", Transform::exact({})));
   std::atomic<bool> stop{false};
   std::atomic<int> wrong{0};
   std::thread reader([&] {
@@ -194,13 +194,13 @@ TEST_CASE("a forest releases all its memory") {
     Forest forest;
     plant_chain(forest);
     for (int i = 0; i < 500; ++i) {
-      REQUIRE(forest.add(std::to_string(i), "world", Transform()));
+      REQUIRE(forest.add(std::to_string(i), "world", Transform::exact({})));
       if (i % 3 != 0) REQUIRE(forest.remove(std::to_string(i)));
     }
     for (int i = 0; i < 30; ++i) {
       for (int t = 1; t < 300; ++t)
-        REQUIRE(forest.update(deep_id(i), Transform(), time_of(10 * t)));
-      REQUIRE(forest.update(deep_id(i), Transform(), time_of(15)));
+        REQUIRE(forest.update(deep_id(i), Transform::exact({}), time_of(10 * t)));
+      REQUIRE(forest.update(deep_id(i), Transform::exact({}), time_of(15)));
     }
     REQUIRE(forest.move(deep_id(5), "world"));
     REQUIRE(forest.remove(deep_id(10)));

@@ -54,7 +54,7 @@ TEST_CASE("a lookup goes up, down, across and to itself") {
   CHECK(transform_diff(*forest.lookup("c", "b"), between(X_WC, X_WB), 1e-13) == "");
   CHECK(transform_diff(*forest.lookup("b", "c"), between(X_WB, X_WC), 1e-13) == "");
   for (const char* id : {"w", "a", "b", "c"}) {
-    CHECK(transform_diff(*forest.lookup(id, id), Transform(), 0.0) == "");
+    CHECK(transform_diff(*forest.lookup(id, id), Transform::exact({}), 0.0) == "");
   }
   const auto handle = [&](const char* id) { return forest.find(id).value(); };
   CHECK(transform_diff(*forest.lookup(handle("c"), handle("b")), *forest.lookup("c", "b"), 0.0) ==
@@ -65,7 +65,7 @@ TEST_CASE("a lookup of the pose alone gives the pose of the lookup") {
   Random random(102);
   INFO("seed " << random.seed());
   Forest forest;
-  REQUIRE(forest.add("w", "", Transform()));
+  REQUIRE(forest.add("w", "", Transform::exact({})));
   REQUIRE(forest.add("a", "w", random.transform()));
   REQUIRE(forest.add("b", "w", random.transform()));
   REQUIRE(forest.put_remote("r", "w", 1));

@@ -101,8 +101,8 @@ class Oracle {
         when = std::min(when.value_or(INT64_MAX), samples.rbegin()->first);
       }
     }
-    Transform X_MA;
-    Transform X_MB;
+    Transform X_MA = Transform::exact({});
+    Transform X_MB = X_MA;
     for (auto* half : {&up, &down}) {
       Transform& X = half == &up ? X_MA : X_MB;
       for (auto id = half->rbegin(); id != half->rend(); ++id) {
@@ -172,7 +172,7 @@ TEST_CASE("100,000 lookups at random instants agree with an oracle that keeps ev
       if (random.index(4) > 0) when = now - static_cast<std::int64_t>(random.index(2500));
       Query query;
       if (when) query.at = time_of(*when);
-      Transform X_AB;
+      Transform X_AB = Transform::exact({});
       const std::string code = oracle.lookup(a, b, when, X_AB);
       const auto found = forest.lookup(a, b, query);
       INFO(a << " to " << b << " at " << (when ? std::to_string(*when) : "the newest") << ": "

@@ -126,8 +126,8 @@ TEST_CASE("an update makes an edge unspecified and specified") {
   // A part that is not given stays what it is.
   REQUIRE(pair.forest.update_partial({{"e", {Eigen::Vector3d(1, 2, 3)}}}));
   CHECK_FALSE(pair.forest.lookup("d", "e")->covariance.complete());
-  REQUIRE(pair.forest.update_partial({{"e", {{}, {}, StatedCovariance()}}}));
-  CHECK(pair.forest.lookup("d", "e")->covariance == StatedCovariance());
+  REQUIRE(pair.forest.update_partial({{"e", {{}, {}, StatedCovariance::exact()}}}));
+  CHECK(pair.forest.lookup("d", "e")->covariance == StatedCovariance::exact());
   REQUIRE(pair.forest.move("e", "a", {{}, {}, StatedCovariance::unspecified()}));
   CHECK(pair.forest.lookup("a", "e", Query{})->basis.unspecified == Names{"e"});
 }
@@ -175,8 +175,8 @@ TEST_CASE("a sample is unspecified at its instant and between its neighbours") {
 TEST_CASE("process noise is not added to an unspecified sample") {
   Random random(824);
   Forest forest([] { return at(0ms); });
-  REQUIRE(forest.add("world", "", Transform()));
-  REQUIRE(forest.add("a", "world", Transform()));
+  REQUIRE(forest.add("world", "", Transform::exact({})));
+  REQUIRE(forest.add("a", "world", Transform::exact({})));
   EdgeTiming noisy;
   noisy.process_noise = random.covariance();
   REQUIRE(forest.set_timing("a", noisy));
@@ -230,7 +230,7 @@ TEST_CASE("values that are pushed to another forest stay unspecified there") {
   Forest owner([] { return at(0ms); });
   Forest watcher([] { return at(0ms); });
   for (Forest* forest : {&owner, &watcher}) {
-    REQUIRE(forest->add("world", "", Transform()));
+    REQUIRE(forest->add("world", "", Transform::exact({})));
     REQUIRE(forest->add("a", "world", random.transform()));
   }
   const std::vector<Handle> edges{*watcher.find("a")};
@@ -243,7 +243,7 @@ TEST_CASE("values that are pushed to another forest stay unspecified there") {
   CHECK_FALSE(watcher.lookup("world", "a")->covariance.complete());
   REQUIRE(owner.update("a", {same, Covariance()}));
   push();
-  CHECK(watcher.lookup("world", "a")->covariance == StatedCovariance());
+  CHECK(watcher.lookup("world", "a")->covariance == StatedCovariance::exact());
   REQUIRE(owner.update("a", unspecified(same), at(100ms)));
   push();
   CHECK(watcher.lookup("world", "a", Query{})->basis.unspecified == Names{"a"});
