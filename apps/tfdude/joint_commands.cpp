@@ -5,7 +5,7 @@
 namespace tfdude::cli {
 
 int run_joint(Client& client, const Arguments& arguments) {
-  const auto stamp = optional_stamp(arguments.stamp, wall_clock());
+  const auto stamp = optional_stamp(client, arguments.stamp);
   if (!stamp) return report(stamp.error(), arguments);
   const double variance = arguments.joint_stddev * arguments.joint_stddev;
   const auto updated =

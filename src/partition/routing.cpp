@@ -11,8 +11,6 @@
 namespace tfdude {
 namespace {
 
-constexpr Time kFirstInstant{std::chrono::nanoseconds(1)};
-
 tl::unexpected<Error> unknown_frame(std::string_view id) {
   return fail(Errc::kUnknownFrame, "no frame " + quote(id));
 }
@@ -243,15 +241,13 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
                                 std::optional<Time> hint) {
   auto segments = forest.segments(a, b);
   if (!segments) return tl::unexpected(segments.error());
-  LookupPlan plan{*std::move(segments), {}};
+  LookupPlan plan{*std::move(segments), {}, query.at && *query.at < Time{}};
   for (const Segment& segment : plan.segments) {
     auto& body =
         body_for<LookupRequest>(plan.parts, directory, segment.owner, owned_end(forest, segment));
     body.segments.push_back({segment.from, segment.to});
     body.query = query;
-    // In a message zero means the latest instant. So an instant up to zero becomes the first valid
-    // one: there are no samples before that either.
-    if (query.at) body.query.at = std::max(*query.at, kFirstInstant);
+    if (plan.before_all) body.query.at = Time{};
     body.hint = hint;
   }
   if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
@@ -368,6 +364,9 @@ Result<StampedTransform> assemble(const LookupPlan& plan,
                                      std::to_string(asked.size()) + " segments");
   }
   StampedTransform X_AB = composed(plan, answers);
+  if (plan.before_all && X_AB.stamp) {
+    return fail(Errc::kTooOld, "there is no data for a negative time");
+  }
   if (!X_AB.covariance.complete()) X_AB.basis.unspecified = unspecified_edges(plan, answers);
   return X_AB;
 }

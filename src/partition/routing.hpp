@@ -27,6 +27,9 @@ struct Part {
 struct LookupPlan {
   std::vector<Segment> segments;  ///< in the order of the path; empty if it starts where it ends
   std::vector<Part> parts;        ///< each with its owner's segments in the order of the path
+  /// The instant is negative. No sample is so early, and no message can name it, so the parts ask
+  /// for zero instead.
+  bool before_all = false;
 };
 
 /// A request to one owner. @return kUnreachable.
@@ -97,7 +100,8 @@ struct WatchPlan {
 
 /// X_AB from the answers to a plan's parts (same order); the identity if the plan has none. The
 /// values must be at one instant (one_instant()).
-/// @return kNotOwner if the number of transforms in an answer does not match the request.
+/// @return kNotOwner if the number of transforms in an answer does not match the request; kTooOld if
+///   the instant is negative, and an edge is dynamic.
 [[nodiscard]] Result<StampedTransform> assemble(const LookupPlan& plan,
                                                 const std::vector<SegmentValues>& answers);
 

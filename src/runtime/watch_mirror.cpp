@@ -91,7 +91,7 @@ void WatchMirror::inherit(const WatchMirror& before) {
       continue;
     }
     std::vector<EdgeCursor> nothing{{own.id, own.parent}};
-    for (PushedValue& value : before.forest_.values_since(nothing, {false, time_of(1)}).values) {
+    for (PushedValue& value : before.forest_.values_since(nothing, {false, time_of(0)}).values) {
       value.index = i;
       values.push_back(std::move(value));
     }
@@ -111,13 +111,14 @@ std::optional<PushedValue> WatchMirror::admitted(const Source& source, PushedVal
   if (entry.history < edge.history || (begins && !entry.process_noise)) return std::nullopt;
   // A sample gives the edge's value at its stamp. But a value without a stamp may be half of a
   // commit.
-  if (!follows_on && !entry.stamp) return std::nullopt;
+  if (!follows_on && !entry.stamp && !entry.cleared) return std::nullopt;
   if (begins) {
     edge.newest.reset();
   } else {
     entry.process_noise.reset();
   }
   edge.history = entry.history;
+  if (entry.cleared) edge.newest.reset();
   if (entry.stamp && (!edge.newest || *entry.stamp > *edge.newest)) edge.newest = entry.stamp;
   return entry;
 }

@@ -133,6 +133,10 @@ void WatchedPath::remember_newest() {
   if (newest) {
     newest_ = *std::move(newest);
     hold(nullptr);
+  } else if (newest.error().code == Errc::kNotYet) {
+    // A history was cleared: what was before does not hold any more.
+    newest_.reset();
+    hold(nullptr);
   } else if (lacks_common(newest) && newest_ && holder_ == nullptr) {
     hold(std::make_unique<const StampedTransform>(*newest_));
   }

@@ -125,6 +125,9 @@ Result<void> FastDdsTransport::create_endpoints() {
       context(), *topics_.state, options_.partition,
       PushChannels::Calls{[this](const PushedValues& pushed) { handler_->on_pushed(pushed); },
                           [this](std::uint64_t group) { handler_->on_watcher(group); }});
+  std::function<void(Time)> on_clock;
+  if (handler_->wants_clock()) on_clock = [this](Time now) { handler_->on_clock(now); };
+  clock_.emplace(context(), *topics_.clock, std::move(on_clock));
   presence_ = std::make_unique<Reader<wire::Presence>>(
       context(), *topics_.presence, kAllOwners, "presence_reader",
       Reader<wire::Presence>::Calls{
@@ -142,7 +145,8 @@ Result<void> FastDdsTransport::create_endpoints() {
       Reader<wire::Reply>::Calls{
           [this](const wire::Reply& sample, const Guid& from) { take_reply(sample, from); },
           nullptr});
-  if (!presence_->good() || (pages_ != nullptr && !pages_->good()) || !replies_->good()) {
+  if (!presence_->good() || (pages_ != nullptr && !pages_->good()) || !replies_->good() ||
+      !clock_->good()) {
     return not_created("the readers");
   }
   const std::string& own = options_.partition;
@@ -232,6 +236,7 @@ void FastDdsTransport::stop() {
   pages_.reset();
   presence_.reset();
   push_channels_.reset();
+  clock_.reset();
   reply_writers_.clear();
   senders_.reset();
   directory_writer_.reset();
@@ -257,6 +262,11 @@ void FastDdsTransport::publish(const Page& page) {
 Result<void> FastDdsTransport::watch(const std::string& owner, std::uint64_t group) {
   if (auto ok = access_.check_watch(owner); !ok) return ok;
   return push_channels_->watch(owner, group);
+}
+
+Result<void> FastDdsTransport::publish_clock(Time now) {
+  if (auto ok = access_.check_clock(); !ok) return ok;
+  return clock_->publish(now);
 }
 
 // --- replying ---
