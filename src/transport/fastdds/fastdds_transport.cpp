@@ -88,7 +88,9 @@ Result<void> FastDdsTransport::create_participant() {
     if (auto used = use_discovery_server(qos, options_.discovery_server); !used) return used;
   }
   DiscoveryGate discovery_gate(gate_, life_signs_);
-  discovery_gate.prepare(qos, options_.domain, options_.partition.empty());
+  // The time may be published by a client.
+  const bool owners_only = options_.partition.empty() && !handler_->wants_clock();
+  discovery_gate.prepare(qos, options_.domain, owners_only);
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
       options_.domain, qos, &participant_listener_, edds::StatusMask::none());
   if (participant_ == nullptr) {
