@@ -90,6 +90,14 @@ inline bool write(edds::DataWriter& writer, void* data, ertps::WriteParams& para
 
 inline std::string name_of(const edds::TopicDataType& type) { return type.getName(); }
 
+/// Plain CDR of XCDR1 only, as ROS 2 has it.
+inline void use_plain_cdr(edds::DataWriterQos& qos) {
+  qos.representation().m_value = {edds::XCDR_DATA_REPRESENTATION};
+}
+inline void use_plain_cdr(edds::DataReaderQos& qos) {
+  qos.type_consistency().representation.m_value = {edds::XCDR_DATA_REPRESENTATION};
+}
+
 /// Elements of XML profiles that have another name in this version than in profiles/tfdude.xml.
 inline constexpr std::array<std::pair<const char*, const char*>, 0> kRenamedElements{};
 
@@ -177,6 +185,13 @@ inline bool write(edds::DataWriter& writer, void* data, ertps::WriteParams& para
 }
 
 inline std::string name_of(const edds::TopicDataType& type) { return type.get_name(); }
+
+inline void use_plain_cdr(edds::DataWriterQos& qos) {
+  qos.representation().m_value = {edds::XCDR_DATA_REPRESENTATION};
+}
+inline void use_plain_cdr(edds::DataReaderQos& qos) {
+  qos.representation().m_value = {edds::XCDR_DATA_REPRESENTATION};
+}
 
 inline constexpr std::array<std::pair<const char*, const char*>, 6> kRenamedElements{{
     {"initialHeartbeatDelay", "initial_heartbeat_delay"},

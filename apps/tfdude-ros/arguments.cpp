@@ -1,0 +1,47 @@
+#include "arguments.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+
+#include <CLI/CLI.hpp>
+
+#include "tfdude/types/version.hpp"
+
+#include "../network_options.hpp"
+#include "../numbers.hpp"
+
+namespace tfdude::ros {
+namespace {
+
+std::string variable(const char* name) {
+  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): no other threads yet
+  return value == nullptr ? std::string() : std::string(value);
+}
+
+}  // namespace
+
+std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
+  if (const auto read = read_environment(variable, settings); !read) {
+    std::fprintf(stderr, "tfdude-ros: %s\n", read.error().message.c_str());
+    return kWrongUsage;
+  }
+  CLI::App app{"tfdude-ros: connects the frames of ROS 2 and of tf-dude"};
+  app.footer("Example: tfdude-ros --domain 7 --ros-domain 0");
+  app.set_version_flag("--version", version_line());
+  app.add_option("--partition", settings.partition, "partition for the frames of /tf")
+      ->capture_default_str();
+  app.add_option("--ros-domain", settings.ros_domain,
+                 "ROS domain, 0 to 232 (else $ROS_DOMAIN_ID, else 0)")
+      ->check(CLI::Range(0, 232));
+  cli::add_network_options(app, settings.options);
+  cli::require_numbers(app);
+  try {
+    app.name(argv[0]);
+    app.parse(cli::arguments_of(argc, argv));
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kWrongUsage;
+  }
+  return std::nullopt;
+}
+
+}  // namespace tfdude::ros

@@ -1,0 +1,62 @@
+#include "bridge.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tfdude::ros {
+namespace {
+
+bool is_marked(const PartitionInfo& partition, const BridgeMark& mark) {
+  return partition.name == mark.partition && partition.host == mark.host &&
+         partition.pid == mark.pid;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Bridge>> Bridge::open(const Settings& settings) {
+  Options options = settings.options;
+  // Stamps may be those of a simulation. The import notices itself when time jumps back.
+  options.history.max_ahead = std::chrono::nanoseconds::max();
+  auto node = Node::open(settings.partition, {}, options);
+  if (!node) return tl::unexpected(std::move(node.error()));
+  std::unique_ptr<Bridge> bridge(new Bridge(*std::move(node)));
+  if (auto started = bridge->start(settings); !started) return tl::unexpected(started.error());
+  return bridge;
+}
+
+Bridge::~Bridge() {
+  changes_ = {};
+  ros_ = nullptr;
+  if (frames_in_) frames_in_->stop();
+}
+
+Result<void> Bridge::start(const Settings& settings) {
+  auto self = own_mark();
+  if (!self) return tl::unexpected(std::move(self.error()));
+  auto ros = join_ros_domain({settings.ros_domain, settings.range, *std::move(self)});
+  if (!ros) return tl::unexpected(std::move(ros.error()));
+  ros_ = *std::move(ros);
+  if (settings.import) frames_in_.emplace(node_, *settings.import);
+  changes_ = node_.on_change([this](const Change& change) {
+    if (frames_in_) frames_in_->on_change(change);
+  });
+  if (!frames_in_) return {};
+  return frames_in_->start(*ros_, [this](const BridgeMark& mark) { return is_neighbour(mark); });
+}
+
+Result<BridgeMark> Bridge::own_mark() {
+  const auto partitions = node_.partitions();
+  if (!partitions) return tl::unexpected(partitions.error());
+  for (const PartitionInfo& one : *partitions) {
+    if (one.name == node_.partition()) return BridgeMark{one.name, one.host, one.pid};
+  }
+  return fail(Errc::kTransport, "this process does not see its own partition");
+}
+
+bool Bridge::is_neighbour(const BridgeMark& bridge) {
+  const auto partitions = node_.partitions();
+  return partitions && std::any_of(partitions->begin(), partitions->end(),
+                                   [&](const auto& one) { return is_marked(one, bridge); });
+}
+
+}  // namespace tfdude::ros

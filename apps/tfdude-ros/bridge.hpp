@@ -1,0 +1,41 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "tfdude/client/node.hpp"
+
+#include "parts/frames_in.hpp"
+#include "ros_domain.hpp"
+#include "settings.hpp"
+
+namespace tfdude::ros {
+
+/// A node of tf-dude and a participant of ROS, and what passes data between them.
+class Bridge {
+ public:
+  /// @return errors of Node::open(), kTransport.
+  [[nodiscard]] static Result<std::unique_ptr<Bridge>> open(const Settings& settings);
+  ~Bridge();
+  Bridge(const Bridge&) = delete;
+  Bridge& operator=(const Bridge&) = delete;
+
+  [[nodiscard]] Node& node() { return node_; }
+
+ private:
+  explicit Bridge(Node node) : node_(std::move(node)) {}
+
+  [[nodiscard]] Result<void> start(const Settings& settings);
+  /// How this process appears to others in tf-dude's domain.
+  [[nodiscard]] Result<BridgeMark> own_mark();
+  /// Whether another bridge is in the same domain of tf-dude.
+  [[nodiscard]] bool is_neighbour(const BridgeMark& bridge);
+
+  Node node_;
+  std::optional<FramesIn> frames_in_;
+  // After the parts: it is destroyed first, so that it calls none that is gone.
+  std::unique_ptr<RosDomain> ros_;
+  Subscription changes_;
+};
+
+}  // namespace tfdude::ros
