@@ -215,6 +215,13 @@ Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
   });
 }
 
+Result<EdgesWatch> Client::watch_edges(const std::vector<std::string>& ids,
+                                       const WatchOptions& options) {
+  return participant_->watcher().watch_edges(ids, options).map([](auto edges) {
+    return EdgesWatch(edges);
+  });
+}
+
 Result<Velocity> Client::velocity(const std::string& a, const std::string& b,
                                   const VelocityQuery& query) {
   return participant_->velocities().velocity(a, b, query,

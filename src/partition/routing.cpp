@@ -259,6 +259,15 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
   return plan;
 }
 
+static Result<WatchPlan> checked(const Directory& directory, WatchPlan plan) {
+  if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
+  for (const Part& part : plan.parts) {
+    const std::size_t edges = std::get<WatchRequest>(part.request.body).segments.size();
+    if (auto ok = check_size(part, edges, "edges"); !ok) return tl::unexpected(ok.error());
+  }
+  return plan;
+}
+
 Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
                               const std::string& a, const std::string& b, bool composed,
                               std::chrono::nanoseconds period) {
@@ -285,12 +294,25 @@ Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
     }
     plan.edges = *std::move(edges);
   }
-  if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
-  for (const Part& part : plan.parts) {
-    const std::size_t edges = std::get<WatchRequest>(part.request.body).segments.size();
-    if (auto ok = check_size(part, edges, "edges"); !ok) return tl::unexpected(ok.error());
+  return checked(directory, std::move(plan));
+}
+
+Result<WatchPlan> route_watch_edges(const Forest& forest, const Directory& directory,
+                                    const std::vector<std::string>& ids,
+                                    std::chrono::nanoseconds period) {
+  WatchPlan plan;
+  for (const std::string& id : ids) {
+    auto edge = forest.info(id);
+    if (!edge) return unknown_frame(id);
+    if (edge->parent.empty()) {
+      return fail(Errc::kInvalidInput, "frame " + quote(id) + " is a root: it has no edge");
+    }
+    auto& body = body_for<WatchRequest>(plan.parts, directory, edge->owner, id);
+    body.period = period;
+    body.segments.push_back({edge->parent, id});
+    plan.edges.push_back(*std::move(edge));
   }
-  return plan;
+  return checked(directory, std::move(plan));
 }
 
 namespace {

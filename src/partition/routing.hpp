@@ -98,6 +98,12 @@ struct WatchPlan {
                                             const std::string& a, const std::string& b,
                                             bool composed, std::chrono::nanoseconds period);
 
+/// As route_watch(), for the edges of these frames, in their order.
+/// @return kUnknownFrame, kUnreachable, kInvalidInput (a root; too many edges).
+[[nodiscard]] Result<WatchPlan> route_watch_edges(const Forest& forest, const Directory& directory,
+                                                  const std::vector<std::string>& ids,
+                                                  std::chrono::nanoseconds period);
+
 /// X_AB from the answers to a plan's parts (same order); the identity if the plan has none. The
 /// values must be at one instant (one_instant()).
 /// @return kNotOwner if the number of transforms in an answer does not match the request; kTooOld

@@ -247,6 +247,14 @@ class TFDUDE_EXPORT Client {
   [[nodiscard]] Result<PathWatch> watch(const std::string& a, const std::string& b,
                                         const WatchOptions& options = {});
 
+  /// As watch(), for the edges of these frames, wherever they are: to follow many edges. While an
+  /// owner is unreachable or an edge does not exist, the others get nothing new for more than
+  /// seconds either, so watch the edges of each owner separately.
+  /// @return kUnknownFrame; kInvalidInput (no edges, a root, more than kMaxItems of one owner,
+  ///   `composed`).
+  [[nodiscard]] Result<EdgesWatch> watch_edges(const std::vector<std::string>& ids,
+                                               const WatchOptions& options = {});
+
   /// The mean velocity of frame b in frame a over an interval: the difference of its poses at both
   /// ends, divided by the length. The counterpart of tf2's lookupVelocity(b, a, time, interval):
   /// expressed in a's axes, at the origin of b.
