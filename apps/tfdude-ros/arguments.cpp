@@ -2,6 +2,8 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -33,6 +35,11 @@ std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
   app.add_option("--ros-domain", settings.ros_domain,
                  "ROS domain, 0 to 232 (else $ROS_DOMAIN_ID, else 0)")
       ->check(CLI::Range(0, 232));
+  std::vector<std::string> exported;
+  app.add_option("--export", exported,
+                 "send the frames of this partition to /tf; '*' stands for any characters; may be "
+                 "repeated")
+      ->allow_extra_args(false);
   cli::add_network_options(app, settings.options);
   cli::require_numbers(app);
   try {
@@ -40,6 +47,10 @@ std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
     app.parse(cli::arguments_of(argc, argv));
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kWrongUsage;
+  }
+  if (!exported.empty()) {
+    settings.frames_out.emplace();
+    settings.frames_out->partitions = Patterns(std::move(exported));
   }
   return std::nullopt;
 }

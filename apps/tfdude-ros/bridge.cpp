@@ -26,6 +26,7 @@ Result<std::unique_ptr<Bridge>> Bridge::open(const Settings& settings) {
 
 Bridge::~Bridge() {
   changes_ = {};
+  if (frames_out_) frames_out_->stop();
   ros_ = nullptr;
   if (frames_in_) frames_in_->stop();
 }
@@ -36,12 +37,18 @@ Result<void> Bridge::start(const Settings& settings) {
   auto ros = join_ros_domain({settings.ros_domain, settings.range, *std::move(self)});
   if (!ros) return tl::unexpected(std::move(ros.error()));
   ros_ = *std::move(ros);
-  if (settings.import) frames_in_.emplace(node_, *settings.import);
+  if (settings.frames_in) frames_in_.emplace(node_, *settings.frames_in);
+  if (settings.frames_out) frames_out_.emplace(node_, *settings.frames_out);
   changes_ = node_.on_change([this](const Change& change) {
     if (frames_in_) frames_in_->on_change(change);
+    if (frames_out_) frames_out_->on_change();
   });
-  if (!frames_in_) return {};
-  return frames_in_->start(*ros_, [this](const BridgeMark& mark) { return is_neighbour(mark); });
+  if (frames_in_) {
+    const auto is_own = [this](const BridgeMark& mark) { return is_neighbour(mark); };
+    if (auto started = frames_in_->start(*ros_, is_own); !started) return started;
+  }
+  if (!frames_out_) return {};
+  return frames_out_->start(*ros_, [this] { return partitions_from_ros(); });
 }
 
 Result<BridgeMark> Bridge::own_mark() {
@@ -57,6 +64,14 @@ bool Bridge::is_neighbour(const BridgeMark& bridge) {
   const auto partitions = node_.partitions();
   return partitions && std::any_of(partitions->begin(), partitions->end(),
                                    [&](const auto& one) { return is_marked(one, bridge); });
+}
+
+std::set<std::string> Bridge::partitions_from_ros() {
+  std::set<std::string> names{node_.partition()};
+  for (const BridgeMark& bridge : ros_->bridges()) {
+    if (is_neighbour(bridge)) names.insert(bridge.partition);
+  }
+  return names;
 }
 
 }  // namespace tfdude::ros

@@ -2,10 +2,13 @@
 
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
 
 #include "tfdude/client/node.hpp"
 
 #include "parts/frames_in.hpp"
+#include "parts/frames_out.hpp"
 #include "ros_domain.hpp"
 #include "settings.hpp"
 
@@ -30,9 +33,12 @@ class Bridge {
   [[nodiscard]] Result<BridgeMark> own_mark();
   /// Whether another bridge is in the same domain of tf-dude.
   [[nodiscard]] bool is_neighbour(const BridgeMark& bridge);
+  /// The partitions with frames that a bridge of tf-dude's domain has taken from this ROS domain.
+  [[nodiscard]] std::set<std::string> partitions_from_ros();
 
   Node node_;
   std::optional<FramesIn> frames_in_;
+  std::optional<FramesOut> frames_out_;
   // After the parts: it is destroyed first, so that it calls none that is gone.
   std::unique_ptr<RosDomain> ros_;
   Subscription changes_;

@@ -6,6 +6,7 @@
 
 #include "tfdude/types/options.hpp"
 
+#include "logic/tf_export.hpp"
 #include "logic/tf_import.hpp"
 #include "ros_domain.hpp"
 
@@ -17,7 +18,8 @@ struct Settings {
   Options options;                ///< of tf-dude's domain
   std::uint32_t ros_domain = 0;
   Range range = Range::kNetwork;
-  std::optional<ImportSettings> import = ImportSettings();  ///< none: /tf is not read
+  std::optional<ImportSettings> frames_in = ImportSettings();  ///< none: /tf is not read
+  std::optional<ExportSettings> frames_out;                    ///< none: /tf is not written
 };
 
 /// What ROS's environment says: ROS_DOMAIN_ID, ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE.

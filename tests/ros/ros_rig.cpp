@@ -49,22 +49,44 @@ void RosPeer::publish(const std::string& topic, const std::string& message) {
   obey("publish " + topic + ' ' + message);
 }
 
+std::optional<std::string> RosPeer::try_next(const std::string& beginning) {
+  (void)process_->runs();  // reads its output
+  const std::string& out = process_->out();
+  for (std::size_t end = out.find('\n', read_); end != std::string::npos;
+       end = out.find('\n', read_)) {
+    const std::string line = out.substr(read_, end - read_);
+    read_ = end + 1;
+    if (line.compare(0, beginning.size(), beginning) == 0) return line.substr(beginning.size());
+  }
+  return std::nullopt;
+}
+
 std::string RosPeer::next(const std::string& beginning) {
   const Deadline deadline = in_time();
   while (true) {
-    const std::string& out = process_->out();
-    const std::size_t end = out.find('\n', read_);
-    if (end != std::string::npos) {
-      const std::string line = out.substr(read_, end - read_);
-      read_ = end + 1;
-      if (line.compare(0, beginning.size(), beginning) == 0) return line.substr(beginning.size());
-      continue;
-    }
+    if (auto line = try_next(beginning)) return *std::move(line);
     if (Clock::now() > deadline || !process_->runs()) {
       throw std::runtime_error("the peer printed no line '" + beginning + "': " + process_->err());
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
+}
+
+std::vector<ReceivedTransform> parse_tf(const std::string& line) {
+  std::istringstream text(line);
+  std::vector<ReceivedTransform> transforms;
+  std::int64_t stamp = 0;
+  while (text >> stamp) {
+    ReceivedTransform one;
+    one.stamp = time_of(stamp);
+    double numbers[7];
+    text >> one.parent >> one.child;
+    for (double& number : numbers) text >> number;
+    one.X_PC = *Pose::create(Eigen::Quaterniond(numbers[6], numbers[3], numbers[4], numbers[5]),
+                             Eigen::Vector3d(numbers[0], numbers[1], numbers[2]));
+    transforms.push_back(std::move(one));
+  }
+  return transforms;
 }
 
 std::string tf_message(Time stamp, const std::vector<RosTransform>& transforms) {

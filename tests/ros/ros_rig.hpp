@@ -27,6 +27,8 @@ class RosPeer {
 
   /// The rest of the next line that begins with this. @throws std::runtime_error if none comes.
   [[nodiscard]] std::string next(const std::string& beginning);
+  /// The same if it was printed already.
+  [[nodiscard]] std::optional<std::string> try_next(const std::string& beginning);
 
   Process& process() { return *process_; }
 
@@ -43,6 +45,12 @@ struct RosTransform {
   std::string child;
   Pose X_PC;
 };
+
+/// The same as received.
+struct ReceivedTransform : RosTransform {
+  Time stamp;
+};
+[[nodiscard]] std::vector<ReceivedTransform> parse_tf(const std::string& line);
 
 /// A message for RosPeer::publish().
 [[nodiscard]] std::string tf_message(Time stamp, const std::vector<RosTransform>& transforms);
