@@ -40,6 +40,14 @@ std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
                  "send the frames of this partition to /tf; '*' stands for any characters; may be "
                  "repeated")
       ->allow_extra_args(false);
+  std::vector<std::string> exported_frames;
+  app.add_option("--export-frame", exported_frames, "the same for single frames")
+      ->allow_extra_args(false);
+  double rate = ExportSettings().rate;
+  app.add_option("--rate", rate,
+                 "send an edge to /tf at most so many times a second [Hz]; 0: every sample")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1e6));
   cli::add_network_options(app, settings.options);
   cli::require_numbers(app);
   try {
@@ -48,9 +56,11 @@ std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kWrongUsage;
   }
-  if (!exported.empty()) {
+  if (!exported.empty() || !exported_frames.empty()) {
     settings.frames_out.emplace();
     settings.frames_out->partitions = Patterns(std::move(exported));
+    settings.frames_out->frames = Patterns(std::move(exported_frames));
+    settings.frames_out->rate = rate;
   }
   return std::nullopt;
 }

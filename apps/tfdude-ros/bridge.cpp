@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include <spdlog/spdlog.h>
+
 namespace tfdude::ros {
 namespace {
 
@@ -27,6 +29,9 @@ Result<std::unique_ptr<Bridge>> Bridge::open(const Settings& settings) {
 Bridge::~Bridge() {
   changes_ = {};
   if (frames_out_) frames_out_->stop();
+  if (ros_ != nullptr && ros_->malformed() > 0) {
+    spdlog::warn("malformed messages of ROS: {}", ros_->malformed());
+  }
   ros_ = nullptr;
   if (frames_in_) frames_in_->stop();
 }

@@ -7,22 +7,21 @@
 #include <unistd.h>
 
 namespace tfdude::testing {
-namespace {
 
-// On the loopback interface, as the bridge is.
-const std::string kLoopback =
-    "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces>"
-    "<NetworkInterface address=\"127.0.0.1\" multicast=\"true\"/>"
-    "</Interfaces></General></Domain></CycloneDDS>";
-
-}  // namespace
+const std::string& cyclone_on_loopback() {
+  static const std::string variable =
+      "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces>"
+      "<NetworkInterface address=\"127.0.0.1\" multicast=\"true\"/>"
+      "</Interfaces></General></Domain></CycloneDDS>";
+  return variable;
+}
 
 RosPeer::RosPeer(std::uint32_t domain, bool typed) {
   const std::string path = directory_.path() + "/commands";
   if (mkfifo(path.c_str(), 0600) != 0) throw std::runtime_error("cannot create " + path);
   // Read and write: opening it does not wait for the peer.
   commands_ = open(path.c_str(), O_RDWR | O_CLOEXEC);
-  process_.emplace(std::vector<std::string>{"/usr/bin/env", kLoopback,
+  process_.emplace(std::vector<std::string>{"/usr/bin/env", cyclone_on_loopback(),
                                             typed ? TFDUDE_TYPED_ROS_PEER : TFDUDE_ROS_PEER,
                                             std::to_string(domain), path});
 }

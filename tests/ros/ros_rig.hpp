@@ -55,6 +55,9 @@ struct ReceivedTransform : RosTransform {
 /// A message for RosPeer::publish().
 [[nodiscard]] std::string tf_message(Time stamp, const std::vector<RosTransform>& transforms);
 
+/// The environment by which programs of Cyclone DDS stay on this computer.
+[[nodiscard]] const std::string& cyclone_on_loopback();
+
 /// The bridge, in a domain of tf-dude and one of ROS.
 class RosRig {
  public:

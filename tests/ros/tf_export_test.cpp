@@ -101,6 +101,20 @@ TEST_CASE("ros export: with a prefix only frames that have it have a name in ROS
   CHECK(text(plan_export(settings, all, kAll)) == "[r1/arm ] base>arm; ");
 }
 
+TEST_CASE("ros export: an edge over a joint is not sent before its first sample") {
+  ExportView view = kAll;
+  view.moved_by_joints = {"elbow"};
+  const auto groups = plan_export(frames({"base", "shoulder", "tool"}), robot(), view);
+  REQUIRE(groups.size() == 1);
+  REQUIRE(groups[0].edges.size() == 2);
+  CHECK(!groups[0].edges[0].moves);
+  CHECK(groups[0].edges[1].moves);
+  SentFrames sent;
+  CHECK(sent.set_static(1, groups[0].edges, {value(1, std::nullopt), value(2, std::nullopt)}));
+  CHECK(sent.all_static(at(1)).size() == 1);
+  CHECK(sent.changed(groups[0].edges, {value(1, at(1)), value(2, at(1))}).size() == 2);
+}
+
 TEST_CASE("ros export: a dynamic edge is sent once for each stamp, also if time jumps back") {
   SentFrames sent;
   const std::vector<ExportEdge> edges{{"a", "b", "a", "b"}, {"b", "c", "b", "c"}};

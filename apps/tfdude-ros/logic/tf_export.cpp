@@ -47,9 +47,11 @@ class Planner {
     std::vector<std::string> path;
     std::set<std::string> partitions;
     const Frame* at = &child;
+    bool moves = false;
     do {
       if (view_.reachable.count(at->partition) == 0) return;
       path.push_back(at->id);
+      moves = moves || view_.moved_by_joints.count(at->id) != 0;
       partitions.insert(at->partition);
       const auto above = frames_.find(at->parent);
       if (above == frames_.end()) return;
@@ -57,7 +59,7 @@ class Planner {
     } while (!is_known_to_ros(*at));
     ExportGroup& group = group_of(partitions);
     group.watched.insert(group.watched.end(), path.begin(), path.end());
-    group.edges.push_back({at->id, child.id, *name_of(*at), *name_of(child)});
+    group.edges.push_back({at->id, child.id, *name_of(*at), *name_of(child), moves});
   }
 
   // The group of these partitions; joins their groups if they have several.
@@ -119,7 +121,8 @@ bool SentFrames::set_static(std::size_t group, const std::vector<ExportEdge>& ed
                             const Values& values) {
   TfMessage fixed;
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    if (values[i] && !values[i]->stamp) fixed.push_back(message_of(edges[i], *values[i]));
+    if (!values[i] || values[i]->stamp || edges[i].moves) continue;
+    fixed.push_back(message_of(edges[i], *values[i]));
   }
   if (fixed.empty()) return erase_static(group);
   TfMessage& known = static_[group];

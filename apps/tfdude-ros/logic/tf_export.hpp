@@ -31,10 +31,13 @@ struct ExportEdge {
   std::string child;
   std::string ros_parent;
   std::string ros_child;
+  /// It leads over a joint. Before its first sample it is not sent: a listener of tf2 that has met
+  /// an edge on /tf_static takes it for static from then on.
+  bool moves = false;
 
   friend bool operator==(const ExportEdge& a, const ExportEdge& b) {
     return a.parent == b.parent && a.child == b.child && a.ros_parent == b.ros_parent &&
-           a.ros_child == b.ros_child;
+           a.ros_child == b.ros_child && a.moves == b.moves;
   }
 };
 
@@ -51,9 +54,10 @@ struct ExportGroup {
 
 /// What a plan depends on, besides the frames.
 struct ExportView {
-  std::set<std::string> reachable;  ///< partitions
+  std::set<std::string> reachable{};  ///< partitions
   /// Partitions with frames that a bridge has taken from this domain of ROS: ROS knows them.
-  std::set<std::string> from_ros;
+  std::set<std::string> from_ros{};
+  std::set<std::string> moved_by_joints{};  ///< frames
 };
 
 /// Frames whose edge leads over a partition that is not reachable are left out.

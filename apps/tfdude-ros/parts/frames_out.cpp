@@ -121,6 +121,13 @@ ExportView FramesOut::view() {
     }
   }
   known_since_ = std::move(known_since);
+  for (const std::string& partition : view.reachable) {
+    const auto joints = node_.joints(partition);
+    if (!joints) incomplete_ = true;
+    for (const JointInfo& joint : joints ? *joints : std::vector<JointInfo>()) {
+      view.moved_by_joints.insert(joint.frame);
+    }
+  }
   return view;
 }
 
