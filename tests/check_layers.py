@@ -23,6 +23,8 @@ DDS_FOLDERS = (DDS_FOLDER, ROS_DDS_FOLDER)
 # What a program may include of the library's private parts. Its own build compiles what it needs of them.
 SHARED = {
     ROS_DDS_FOLDER: ("src/transport/fastdds/compat.hpp", "src/transport/fastdds/cdr_check.hpp"),
+    "apps/tfdude-ros/config/": ("src/description/file_text.hpp", "src/description/yaml_fields.hpp",
+                                "src/description/yaml_quirks.hpp"),
 }
 
 # (what, pattern of the include, folders or files that may include it)
@@ -30,7 +32,7 @@ CONFINED = [
     ("Boost", r"boost/(?!math/)", ["src/tree/graph.hpp"]),
     ("Boost.Math", r"boost/math/", ["src/math/fusion.cpp"]),
     ("DDS", r"(fastdds|fastrtps|fastcdr)/", list(DDS_FOLDERS)),
-    ("yaml-cpp", r"yaml-cpp/", ["src/description/"]),
+    ("yaml-cpp", r"yaml-cpp/", ["src/description/", "apps/tfdude-ros/config/"]),
     ("urdfdom", r"(urdf_(model|parser|exception)|console_bridge)/", ["src/description/"]),
     ("tinyxml2", r"tinyxml2\.h$", ["src/description/", "src/keys/", "src/transport/fastdds/"]),
     ("SQLite", r"sqlite3\.h$", ["src/store/"]),

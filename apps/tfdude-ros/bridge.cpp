@@ -8,6 +8,9 @@
 namespace tfdude::ros {
 namespace {
 
+// How long frames of /tf wait for a description.
+constexpr std::chrono::seconds kDescriptionFirst{2};
+
 bool is_marked(const PartitionInfo& partition, const BridgeMark& mark) {
   return partition.name == mark.partition && partition.host == mark.host &&
          partition.pid == mark.pid;
@@ -26,14 +29,21 @@ Result<std::unique_ptr<Bridge>> Bridge::open(const Settings& settings) {
   return bridge;
 }
 
+// First those who write to ROS, then ROS itself, which calls those who read from it.
 Bridge::~Bridge() {
   changes_ = {};
   if (frames_out_) frames_out_->stop();
+  if (joints_out_) joints_out_->stop();
+  poses_out_.clear();
+  description_out_ = nullptr;
   if (ros_ != nullptr && ros_->malformed() > 0) {
     spdlog::warn("malformed messages of ROS: {}", ros_->malformed());
   }
   ros_ = nullptr;
   if (frames_in_) frames_in_->stop();
+  if (joints_in_) joints_in_->stop();
+  for (const auto& observer : poses_in_) observer->stop();
+  if (description_in_) description_in_->stop();
 }
 
 Result<void> Bridge::start(const Settings& settings) {
@@ -48,12 +58,53 @@ Result<void> Bridge::start(const Settings& settings) {
     if (frames_in_) frames_in_->on_change(change);
     if (frames_out_) frames_out_->on_change();
   });
+  if (auto started = start_in(settings); !started) return started;
+  return start_out(settings);
+}
+
+Result<void> Bridge::start_in(const Settings& settings) {
+  const auto is_own = [this](const BridgeMark& mark) { return is_neighbour(mark); };
+  if (settings.description_in) {
+    description_in_.emplace(*settings.description_in, settings.options);
+    if (auto started = description_in_->start(*ros_, is_own); !started) return started;
+    // A node that publishes the same frames on /tf would otherwise be first.
+    if (frames_in_) (void)description_in_->wait_until_served(kDescriptionFirst);
+  }
   if (frames_in_) {
-    const auto is_own = [this](const BridgeMark& mark) { return is_neighbour(mark); };
     if (auto started = frames_in_->start(*ros_, is_own); !started) return started;
   }
-  if (!frames_out_) return {};
-  return frames_out_->start(*ros_, [this] { return partitions_from_ros(); });
+  if (settings.joints_in) {
+    joints_in_.emplace(node_, *settings.joints_in);
+    if (auto started = joints_in_->start(*ros_, is_own); !started) return started;
+  }
+  for (const PoseIn& one : settings.poses_in) {
+    poses_in_.push_back(std::make_unique<PoseObserver>(node_, one));
+    if (auto started = poses_in_.back()->start(*ros_, is_own); !started) return started;
+  }
+  return {};
+}
+
+Result<void> Bridge::start_out(const Settings& settings) {
+  if (frames_out_) {
+    const auto from_ros = [this] { return partitions_from_ros(); };
+    if (auto started = frames_out_->start(*ros_, from_ros); !started) return started;
+  }
+  if (settings.joints_out) {
+    joints_out_.emplace(node_, *settings.joints_out);
+    const auto is_own = [this](const BridgeMark& mark) { return is_neighbour(mark); };
+    if (auto started = joints_out_->start(*ros_, is_own); !started) return started;
+  }
+  if (!settings.description_out.empty()) {
+    auto published = publish_description(*ros_, settings.description_out);
+    if (!published) return tl::unexpected(std::move(published.error()));
+    description_out_ = *std::move(published);
+  }
+  for (const PoseOut& one : settings.poses_out) {
+    auto sender = PoseSender::start(node_, *ros_, one);
+    if (!sender) return tl::unexpected(std::move(sender.error()));
+    poses_out_.push_back(*std::move(sender));
+  }
+  return {};
 }
 
 Result<BridgeMark> Bridge::own_mark() {

@@ -4,11 +4,15 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "tfdude/client/node.hpp"
 
+#include "parts/description.hpp"
 #include "parts/frames_in.hpp"
 #include "parts/frames_out.hpp"
+#include "parts/joints.hpp"
+#include "parts/poses.hpp"
 #include "ros_domain.hpp"
 #include "settings.hpp"
 
@@ -29,6 +33,8 @@ class Bridge {
   explicit Bridge(Node node) : node_(std::move(node)) {}
 
   [[nodiscard]] Result<void> start(const Settings& settings);
+  [[nodiscard]] Result<void> start_in(const Settings& settings);
+  [[nodiscard]] Result<void> start_out(const Settings& settings);
   /// How this process appears to others in tf-dude's domain.
   [[nodiscard]] Result<BridgeMark> own_mark();
   /// Whether another bridge is in the same domain of tf-dude.
@@ -37,9 +43,14 @@ class Bridge {
   [[nodiscard]] std::set<std::string> partitions_from_ros();
 
   Node node_;
+  std::optional<DescriptionIn> description_in_;
   std::optional<FramesIn> frames_in_;
   std::optional<FramesOut> frames_out_;
-  // After the parts: it is destroyed first, so that it calls none that is gone.
+  std::optional<JointsIn> joints_in_;
+  std::optional<JointsOut> joints_out_;
+  std::vector<std::unique_ptr<PoseObserver>> poses_in_;
+  std::vector<std::unique_ptr<PoseSender>> poses_out_;
+  std::unique_ptr<Publisher> description_out_;
   std::unique_ptr<RosDomain> ros_;
   Subscription changes_;
 };

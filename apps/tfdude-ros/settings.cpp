@@ -15,6 +15,16 @@ tl::unexpected<Error> bad(const char* name, const std::string& value, const char
 
 }  // namespace
 
+void set_prefix(const std::string& prefix, Settings& settings) {
+  if (settings.frames_in) settings.frames_in->prefix = prefix;
+  if (settings.frames_out) settings.frames_out->prefix = prefix;
+  if (settings.joints_in) settings.joints_in->prefix = prefix;
+  if (settings.joints_out) settings.joints_out->prefix = prefix;
+  if (settings.description_in) settings.description_in->part.prefix = prefix;
+  for (PoseIn& one : settings.poses_in) one.prefix = prefix;
+  for (PoseOut& one : settings.poses_out) one.prefix = prefix;
+}
+
 Result<void> read_environment(const std::function<std::string(const char* name)>& variable,
                               Settings& settings) {
   constexpr const char* kDomain = "ROS_DOMAIN_ID";

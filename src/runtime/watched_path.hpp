@@ -18,9 +18,10 @@
 
 namespace tfdude {
 
-/// One watched path, or several edges that are watched together. It shows the mirror of one route, which readers find by one load. If the path
-/// takes another route, that has its own mirror, which is shown once it has all values; readers of
-/// the previous one keep it until they are done (epoch.hpp). While the shown mirror has no instant
+/// One watched path, or several edges that are watched together. It shows the mirror of one route,
+/// which readers find by one load. If the path takes another route, that has its own mirror, which
+/// is shown once it has all values; readers of the previous one keep it until they are done
+/// (epoch.hpp). While the shown mirror has no instant
 /// that all its edges have, its last transform is shown instead.
 class WatchedPath {
  public:
@@ -39,8 +40,8 @@ class WatchedPath {
   /// No lock or allocation, except while the path is not followed, and at the moment when its edges
   /// lose or regain their common instant.
   [[nodiscard]] Result<StampedTransform> lookup(const Query& query) const;
-  /// Between two frames at the ends of watched edges. Without a lock, except while the edges are not
-  /// followed.
+  /// Between two frames at the ends of watched edges. Without a lock, except while the edges are
+  /// not followed.
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                 const Query& query) const;
   /// Whether the pushed values suffice for this query.

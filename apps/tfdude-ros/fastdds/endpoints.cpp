@@ -64,6 +64,7 @@ class Listener final : public edds::DataReaderListener {
     while (fastdds::ok(reader->take_next_sample(&sample, &info))) {
       if (!info.valid_data) continue;
       const auto& guid = info.sample_identity.writer_guid();
+      if (guid.guidPrefix == reader->guid().guidPrefix) continue;  // its own message
       take_(plain(sample), Source{text_of(guid), find_bridge_(guid.guidPrefix)});
     }
   }

@@ -75,7 +75,6 @@ Result<void> FastDdsRosDomain::create(const RosSettings& settings) {
   edds::DomainParticipantQos qos;
   qos.name("tfdude-ros");
   qos.user_data().data_vec(user_data_of(settings.self));
-  qos.properties().properties().emplace_back("fastdds.ignore_local_endpoints", "true");
   // Fast DDS 3 announces descriptions of types that others take for other types than their own.
   qos.properties().properties().emplace_back("fastdds.type_propagation", "disabled");
   set_network(settings.range, qos);
