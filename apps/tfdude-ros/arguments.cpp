@@ -49,6 +49,11 @@ class Options {
                   ->check(CLI::Range(0.0, 1e9));
     app.add_flag("--description", description_,
                  "serve the robot of /robot_description as the partition 'robot'");
+    clock_ =
+        app.add_option("--clock", clock_kind_,
+                       "the clock of stamps: system, external (as the option of all programs), "
+                       "or ros: an external one that this program sets by /clock")
+            ->check(CLI::IsMember({"system", "external", "ros"}));
     prefix_ = app.add_option("--prefix", text_, "what all names here have before those of ROS");
   }
 
@@ -71,6 +76,10 @@ class Options {
       settings.joints_in->stddev = stddev_;
     }
     if (description_ && !settings.description_in) settings.description_in.emplace();
+    if (clock_->count() > 0) {
+      settings.passes_clock = clock_kind_ == "ros";
+      settings.options.clock = clock_kind_ == "system" ? ClockKind::kSystem : ClockKind::kExternal;
+    }
     if (prefix_->count() > 0) set_prefix(text_, settings);
     return {};
   }
@@ -80,6 +89,7 @@ class Options {
   ExportSettings out_;
   std::string config_;
   std::string text_;
+  std::string clock_kind_;
   std::vector<std::string> partitions_;
   std::vector<std::string> frames_;
   double stddev_ = 0;
@@ -89,6 +99,7 @@ class Options {
   CLI::Option* domain_;
   CLI::Option* rate_;
   CLI::Option* joints_;
+  CLI::Option* clock_;
   CLI::Option* prefix_;
 };
 

@@ -44,6 +44,7 @@ Bridge::~Bridge() {
   if (joints_in_) joints_in_->stop();
   for (const auto& observer : poses_in_) observer->stop();
   if (description_in_) description_in_->stop();
+  if (clock_in_) clock_in_->stop();
 }
 
 Result<void> Bridge::start(const Settings& settings) {
@@ -64,6 +65,10 @@ Result<void> Bridge::start(const Settings& settings) {
 
 Result<void> Bridge::start_in(const Settings& settings) {
   const auto is_own = [this](const BridgeMark& mark) { return is_neighbour(mark); };
+  if (settings.passes_clock) {
+    clock_in_.emplace(node_);
+    if (auto started = clock_in_->start(*ros_, is_own); !started) return started;
+  }
   if (settings.description_in) {
     description_in_.emplace(*settings.description_in, settings.options);
     if (auto started = description_in_->start(*ros_, is_own); !started) return started;

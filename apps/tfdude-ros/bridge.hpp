@@ -8,6 +8,7 @@
 
 #include "tfdude/client/node.hpp"
 
+#include "parts/clock_in.hpp"
 #include "parts/description.hpp"
 #include "parts/frames_in.hpp"
 #include "parts/frames_out.hpp"
@@ -43,6 +44,7 @@ class Bridge {
   [[nodiscard]] std::set<std::string> partitions_from_ros();
 
   Node node_;
+  std::optional<ClockIn> clock_in_;
   std::optional<DescriptionIn> description_in_;
   std::optional<FramesIn> frames_in_;
   std::optional<FramesOut> frames_out_;

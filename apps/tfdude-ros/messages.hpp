@@ -49,10 +49,13 @@ struct PoseWithCovariance {
   std::array<double, 36> covariance{};
 };
 
-/// nav_msgs/Odometry without the twist.
+/// nav_msgs/Odometry.
 struct Odometry {
   PoseWithCovariance pose;
   std::string child;
+  std::array<double, 3> linear{};   ///< in the child's axes [m/s]
+  std::array<double, 3> angular{};  ///< [rad/s]
+  std::array<double, 36> twist_covariance{};
 };
 
 /// rosgraph_msgs/Clock.

@@ -35,6 +35,8 @@ struct Settings {
   std::optional<JointExportSettings> joints_out{};
   std::optional<DescriptionSettings> description_in{};
   std::string description_out{};  ///< a URDF file
+  /// The time of /clock is passed on to all who have an external clock.
+  bool passes_clock = false;
   std::vector<PoseIn> poses_in{};
   std::vector<PoseOut> poses_out{};
 };

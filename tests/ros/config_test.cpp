@@ -35,6 +35,7 @@ TEST_CASE("ros config: every key") {
   const auto read = parse_config(R"(
 partition: from_ros
 ros_domain: 7
+clock: ros
 prefix: r1/
 tf_in: {frames: ["odom", "base*"], except: [base_old], covariance: exact}
 tf_out: {partitions: [arm], frames: [tool], rate: 30}
@@ -48,6 +49,7 @@ poses_in:
   - {topic: /odom, type: odometry}
 poses_out:
   - {topic: /tool, frame: world, child: tool, rate: 5}
+  - {topic: /tool_odometry, type: odometry, frame: world, child: tool}
 )",
                                  "/etc/bridge.yaml", settings);
   REQUIRE(read);
@@ -71,8 +73,12 @@ poses_out:
   CHECK(settings.poses_in[0].options.gate == 0.99);
   CHECK(!settings.poses_in[0].options.independent);
   CHECK(settings.poses_in[1].odometry);
-  REQUIRE(settings.poses_out.size() == 1);
+  REQUIRE(settings.poses_out.size() == 2);
   CHECK(settings.poses_out[0].rate == 5);
+  CHECK(!settings.poses_out[0].odometry);
+  CHECK(settings.poses_out[1].odometry);
+  CHECK(settings.passes_clock);
+  CHECK(settings.options.clock == ClockKind::kExternal);
 }
 
 TEST_CASE("ros config: what is left out stays as it is") {
@@ -100,6 +106,7 @@ TEST_CASE("ros config: mistakes are named with their line") {
   CHECK_THAT(error_of("description_in: {partition: 'a,b'}\n"), ContainsSubstring("description_in"));
   CHECK_THAT(error_of("tf_in: {covariance: large}\n"), ContainsSubstring("covariance"));
   CHECK_THAT(error_of("a: [\n"), ContainsSubstring("not YAML"));
+  CHECK_THAT(error_of("clock: sundial\n"), ContainsSubstring("bridge.yaml:1: clock must be"));
   CHECK_THAT(error_of(""), ContainsSubstring("is empty"));
 }
 

@@ -90,6 +90,25 @@ TEST_CASE("ros poses: a path with an unspecified edge is not sent") {
   CHECK(!message_of(kOut, X, Time()));
 }
 
+TEST_CASE("ros poses: odometry has the velocity in the axes of the child") {
+  StampedTransform X = example();
+  X.pose = *Pose::create(from_rpy(0, 0, std::acos(-1.0) / 2), Eigen::Vector3d(1, 0, 0));
+  Velocity velocity;
+  velocity.linear = {0, 2, 0};  // the child's x points along the frame's y
+  velocity.angular = {0, 0, 3};
+  velocity.covariance = *Covariance::from_stddev({1, 2, 3, 4, 5, 6});
+  const auto message = message_of(kOut, X, velocity, Time());
+  REQUIRE(message);
+  CHECK(message->child == "tool");
+  CHECK(message->linear[0] == Approx(2));
+  CHECK(message->angular[2] == Approx(3));
+  CHECK(message->twist_covariance[0] == Approx(4));
+  CHECK(message->twist_covariance[7] == Approx(1));
+  CHECK(message->twist_covariance[21] == Approx(25));
+  velocity.covariance = StatedCovariance::unspecified();
+  CHECK(!message_of(kOut, X, velocity, Time()));
+}
+
 TEST_CASE("ros poses: a static path has the time of the message") {
   StampedTransform X = example();
   X.stamp.reset();

@@ -214,4 +214,53 @@ TEST_CASE("ros robot: poses and odometry are observed, and the gate's answers ar
   CHECK_THAT(bridge.err(), ContainsSubstring("/odom: accepted=1"));
 }
 
+TEST_CASE("ros robot: the clock of ROS is that of those who have an external clock") {
+  const RosRig rig;
+  const auto bridge = rig.start_bridge({"--clock", "ros"});
+  auto options = rig.dude().options(Milliseconds(200));
+  options.clock = ClockKind::kExternal;
+  Node node = *Node::open("sim", {{"a", "", {}}, {"b", "a", {}}}, options);
+  RosPeer peer(rig.ros_domain());
+  peer.advertise("/clock", "clock", "best_effort");
+  const auto await = [&](std::int64_t ns) {
+    return eventually([&] {
+      peer.publish("/clock", std::to_string(ns));
+      return node.now() == time_of(ns);
+    });
+  };
+  REQUIRE(await(5'000'000'000));
+  REQUIRE(node.update("b", {}, time_of(5'000'000'000)));
+  CHECK(node.history("b")->front().samples == 1);
+  // A jump back clears what comes later.
+  REQUIRE(await(1'000'000'000));
+  CHECK(eventually(
+      [&] { return node.history("b")->empty() || node.history("b")->front().samples == 0; }));
+}
+
+TEST_CASE("ros robot: odometry of a moving frame is sent with its velocity") {
+  const RosRig rig;
+  const Covariance small = *Covariance::from_stddev({1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4});
+  Node node =
+      *Node::open("base", {{"odom", "", {}}, {"base", "odom", {{}, small}}}, rig.dude().options());
+  const testing::TemporaryDirectory files;
+  const auto bridge = rig.start_bridge(
+      {"--config",
+       files.write(
+           "b.yaml",
+           "poses_out: [{topic: /odom, type: odometry, frame: odom, child: base, rate: 0}]\n")});
+  RosPeer peer(rig.ros_domain());
+  peer.obey("listen /odom odometry reliable");
+  int i = 0;
+  std::string line;
+  REQUIRE(eventually([&] {
+    ++i;  // 0.5 m/s
+    const Pose X = *Pose::create(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.05 * i, 0, 0));
+    REQUIRE(node.update("base", {X, small}, time_of(100'000'000LL * i)));
+    const auto printed = peer.try_next("/odom ");
+    line = printed.value_or("");
+    return printed.has_value();
+  }));
+  CHECK_THAT(line, ContainsSubstring(" odom base "));
+}
+
 }  // namespace tfdude

@@ -11,7 +11,7 @@
 
 namespace tfdude::testing {
 
-/// A foreign node of ROS: tests/ros/peer.c, which obeys lines.
+/// A foreign node of ROS: examples/ros/peer.c, which obeys lines.
 class RosPeer {
  public:
   /// @param typed  whether it announces descriptions of its types

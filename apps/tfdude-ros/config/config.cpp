@@ -48,6 +48,8 @@ class Reader : public YamlFields {
   [[nodiscard]] Result<void> within(const Fields& fields, std::string_view key,
                                     const std::string& place, double least, double most,
                                     double& out) const;
+  [[nodiscard]] Result<void> is_odometry(const YAML::Node& node, const std::string& place,
+                                         const std::string& type, bool& out) const;
   /// An entry that must be there.
   [[nodiscard]] Result<void> require(const YAML::Node& node, const Fields& fields,
                                      std::string_view key, const std::string& place) const;
@@ -226,6 +228,13 @@ Result<void> Reader::description_out(const YAML::Node& node, Settings& settings)
   return {};
 }
 
+Result<void> Reader::is_odometry(const YAML::Node& node, const std::string& place,
+                                 const std::string& type, bool& out) const {
+  out = type == "odometry";
+  if (out || type == "pose") return {};
+  return error(Errc::kInvalidInput, node.Mark(), place + ": type is neither pose nor odometry");
+}
+
 Result<void> Reader::poses_in(const YAML::Node& node, Settings& settings) const {
   if (!node.IsSequence()) return error(Errc::kConfig, node.Mark(), "poses_in is not a list");
   constexpr std::array<Keys, 5> kKeys = {"topic", "type", "child", "gate", "correlated"};
@@ -244,11 +253,7 @@ Result<void> Reader::poses_in(const YAML::Node& node, Settings& settings) const 
             .and_then([&] { return within(*entries, "gate", what, 1e-9, 1, in.options.gate); })
             .and_then([&] { return flag(*entries, "correlated", what, correlated); });
     if (!ok) return ok;
-    if (type != "pose" && type != "odometry") {
-      return error(Errc::kInvalidInput, node[i].Mark(),
-                   what + ": type is neither pose nor odometry");
-    }
-    in.odometry = type == "odometry";
+    if (ok = is_odometry(node[i], what, type, in.odometry); !ok) return ok;
     in.options.independent = !correlated;
     if (in.odometry == in.child.empty()) {
       settings.poses_in.push_back(std::move(in));
@@ -263,12 +268,13 @@ Result<void> Reader::poses_in(const YAML::Node& node, Settings& settings) const 
 
 Result<void> Reader::poses_out(const YAML::Node& node, Settings& settings) const {
   if (!node.IsSequence()) return error(Errc::kConfig, node.Mark(), "poses_out is not a list");
-  constexpr std::array<Keys, 4> kKeys = {"topic", "frame", "child", "rate"};
+  constexpr std::array<Keys, 5> kKeys = {"topic", "type", "frame", "child", "rate"};
   for (std::size_t i = 0; i < node.size(); ++i) {
     const std::string what = "poses_out[" + std::to_string(i) + "]";
     const auto entries = fields(node[i], kKeys, what);
     if (!entries) return tl::unexpected(entries.error());
     PoseOut out;
+    std::string type = "pose";
     auto ok = require(node[i], *entries, "topic", what)
                   .and_then([&] { return require(node[i], *entries, "frame", what); })
                   .and_then([&] { return require(node[i], *entries, "child", what); })
@@ -276,6 +282,8 @@ Result<void> Reader::poses_out(const YAML::Node& node, Settings& settings) const
                   .and_then([&] { return words(*entries, "frame", what, out.frame); })
                   .and_then([&] { return words(*entries, "child", what, out.child); })
                   .and_then([&] { return within(*entries, "rate", what, 0, kMaxRate, out.rate); });
+    if (ok) ok = words(*entries, "type", what, type);
+    if (ok) ok = is_odometry(node[i], what, type, out.odometry);
     if (!ok) return ok;
     settings.poses_out.push_back(std::move(out));
   }
@@ -293,18 +301,26 @@ Result<void> Reader::read(const YAML::Node& root, Settings& settings) const {
       {"poses_in", &Reader::poses_in},
       {"poses_out", &Reader::poses_out},
   }};
-  constexpr std::array<Keys, 11> kKeys = {
-      "partition",  "ros_domain",     "prefix",          "tf_in",    "tf_out",   "joints_in",
-      "joints_out", "description_in", "description_out", "poses_in", "poses_out"};
+  constexpr std::array<Keys, 12> kKeys = {
+      "partition", "clock",      "ros_domain",     "prefix",          "tf_in",    "tf_out",
+      "joints_in", "joints_out", "description_in", "description_out", "poses_in", "poses_out"};
   const std::string place = "the file";
   const auto entries = fields(root, kKeys, place);
   if (!entries) return tl::unexpected(entries.error());
   double domain = settings.ros_domain;
   std::string prefix;
+  std::string clock = "system";
   auto ok = words(*entries, "partition", place, settings.partition)
                 .and_then([&] { return within(*entries, "ros_domain", place, 0, 232, domain); })
-                .and_then([&] { return words(*entries, "prefix", place, prefix); });
+                .and_then([&] { return words(*entries, "prefix", place, prefix); })
+                .and_then([&] { return words(*entries, "clock", place, clock); });
   if (!ok) return ok;
+  if (clock != "system" && clock != "external" && clock != "ros") {
+    return error(Errc::kInvalidInput, entries->find("clock")->second.mark,
+                 "clock must be system, external or ros, not " + tfdude::quote(clock));
+  }
+  if (clock != "system") settings.options.clock = ClockKind::kExternal;
+  settings.passes_clock = clock == "ros";
   settings.ros_domain = static_cast<std::uint32_t>(domain);
   for (const auto& [key, section] : kSections) {
     const auto found = entries->find(key);

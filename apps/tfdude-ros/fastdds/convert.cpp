@@ -26,11 +26,16 @@ RosPose plain_pose(const Vector& p, const Quaternion& q) {
   return {{p.x_(), p.y_(), p.z_()}, {q.x_(), q.y_(), q.z_(), q.w_()}};
 }
 
+template <class Vector>
+void set_vector(const std::array<double, 3>& numbers, Vector& out) {
+  out.x_(numbers[0]);
+  out.y_(numbers[1]);
+  out.z_(numbers[2]);
+}
+
 template <class Vector, class Quaternion>
 void set_pose(const RosPose& pose, Vector& p, Quaternion& q) {
-  p.x_(pose.xyz[0]);
-  p.y_(pose.xyz[1]);
-  p.z_(pose.xyz[2]);
+  set_vector(pose.xyz, p);
   q.x_(pose.quat[0]);
   q.y_(pose.quat[1]);
   q.z_(pose.quat[2]);
@@ -83,7 +88,12 @@ Text plain(wire::String& message) { return {std::move(message.data_())}; }
 PoseWithCovariance plain(wire::Pose& message) { return plain_stamped(message); }
 
 Odometry plain(wire::Odometry& message) {
-  return {plain_stamped(message), std::move(message.child_frame_id_())};
+  const auto& twist = message.twist_().twist_();
+  return {plain_stamped(message),
+          std::move(message.child_frame_id_()),
+          {twist.linear_().x_(), twist.linear_().y_(), twist.linear_().z_()},
+          {twist.angular_().x_(), twist.angular_().y_(), twist.angular_().z_()},
+          message.twist_().covariance_()};
 }
 
 ClockTime plain(wire::Clock& message) { return {plain_time(message.now_())}; }
@@ -124,6 +134,9 @@ wire::Odometry generated(const Odometry& message) {
   wire::Odometry out;
   set_stamped(message.pose, out);
   out.child_frame_id_(message.child);
+  set_vector(message.linear, out.twist_().twist_().linear_());
+  set_vector(message.angular, out.twist_().twist_().angular_());
+  out.twist_().covariance_(message.twist_covariance);
   return out;
 }
 

@@ -24,6 +24,23 @@ std::optional<PoseWithCovariance> message_of(const PoseOut& out, const StampedTr
   return message;
 }
 
+std::optional<Odometry> message_of(const PoseOut& out, const StampedTransform& X,
+                                   const Velocity& velocity, Time now) {
+  auto pose = message_of(out, X, now);
+  const Covariance* covariance = velocity.covariance.if_complete();
+  auto child = ros_name_of(out.child, out.prefix);
+  if (!pose || covariance == nullptr || !child) return std::nullopt;
+  Odometry message{*std::move(pose), *std::move(child)};
+  const Eigen::Matrix3d R_CA = X.pose.rotation().conjugate().toRotationMatrix();
+  Eigen::Map<Eigen::Vector3d>(message.linear.data()) = R_CA * velocity.linear;
+  Eigen::Map<Eigen::Vector3d>(message.angular.data()) = R_CA * velocity.angular;
+  Matrix6d T = Matrix6d::Zero();
+  T.topLeftCorner<3, 3>() = R_CA;
+  T.bottomRightCorner<3, 3>() = R_CA;
+  Eigen::Map<RowMajor>(message.twist_covariance.data()) = T * covariance->matrix() * T.transpose();
+  return message;
+}
+
 Result<Measurement> measurement_of(const PoseIn& in, const PoseWithCovariance& message,
                                    const std::string& child) {
   auto a = id_of(message.frame, in.prefix);

@@ -20,7 +20,8 @@ struct PoseOut {
   std::string frame;
   std::string child;
   std::string prefix{};
-  double rate = 10;  ///< at most [Hz]; 0: every change
+  double rate = 10;       ///< at most [Hz]; 0: every change
+  bool odometry = false;  ///< nav_msgs/Odometry: with the velocity
 };
 
 /// A topic whose messages are measurements.
@@ -36,6 +37,11 @@ struct PoseIn {
 /// @return none if an edge of the path is unspecified: ROS cannot say that
 [[nodiscard]] std::optional<PoseWithCovariance> message_of(const PoseOut& out,
                                                            const StampedTransform& X, Time now);
+
+/// The same with the mean velocity, which ROS has in the axes of the child.
+/// @return none also if the velocity depends on an unspecified edge
+[[nodiscard]] std::optional<Odometry> message_of(const PoseOut& out, const StampedTransform& X,
+                                                 const Velocity& velocity, Time now);
 
 /// A measurement as Client::observe() takes it.
 struct Measurement {

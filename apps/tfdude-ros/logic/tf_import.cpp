@@ -54,16 +54,6 @@ TfImport::Changes TfImport::retry(SteadyTime now, const WhoHolds& who_holds) {
   return changes;
 }
 
-TfImport::Changes TfImport::restart() {
-  Changes changes;
-  for (auto& [id, entry] : entries_) {
-    if (entry.is_static || entry.parent.empty()) continue;
-    entry.newest = Time();
-    changes.edits.push_back({Kind::kClear, id, entry.parent});
-  }
-  return changes;
-}
-
 std::optional<std::string> TfImport::rejected(const std::string& id, const Error& error) {
   ++counts_.rejected;
   if (error.code == Errc::kTooOld || error.code == Errc::kStampTaken) return std::nullopt;
@@ -178,9 +168,8 @@ bool TfImport::may_write(const Checked& one, const std::string& writer, SteadyTi
 std::optional<Kind> TfImport::edit_for(const Checked& one, const Entry& entry, bool jumped) {
   // A frame that is the parent of others exists already, as a root.
   if (entry.parent.empty()) return entry.exists ? Kind::kMove : Kind::kAdd;
-  if (entry.parent != one.parent) return Kind::kMove;
-  if (jumped || (one.is_static && !entry.is_static)) return Kind::kClear;
-  return std::nullopt;
+  if (entry.parent != one.parent || (one.is_static && !entry.is_static)) return Kind::kMove;
+  return jumped ? std::optional<Kind>(Kind::kClear) : std::nullopt;
 }
 
 void TfImport::apply(const Checked& one, const std::string& writer, SteadyTime now, Entry& entry,

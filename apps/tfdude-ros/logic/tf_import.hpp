@@ -59,8 +59,8 @@ class TfImport {
     enum class Kind : std::uint8_t {
       kAddRoot,  ///< a parent that no message has described
       kAdd,
-      kMove,   ///< has another parent now
-      kClear,  ///< keeps its parent; its samples are dropped, as time has jumped back
+      kMove,   ///< has another parent now, or has become static
+      kClear,  ///< time has jumped back: its samples are dropped
     };
     Kind kind = Kind::kAdd;
     std::string id;
@@ -90,9 +90,6 @@ class TfImport {
   /// Static transforms come only once. Takes those again that were not taken because of their
   /// owner. Call when the structure has changed.
   [[nodiscard]] Changes retry(SteadyTime now, const WhoHolds& who_holds);
-
-  /// The clock of ROS has jumped back: drops all samples.
-  [[nodiscard]] Changes restart();
 
   /// The partition did not apply a change of this frame. Unless only a stamp was wrong, it starts
   /// over with the next message.

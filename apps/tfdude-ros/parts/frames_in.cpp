@@ -45,10 +45,6 @@ void FramesIn::on_change(const Change& change) {
   });
 }
 
-void FramesIn::on_time_jump() {
-  worker_.post([this] { apply(import_.restart()); });
-}
-
 void FramesIn::take(const TfMessage& message, const std::string& writer, bool is_static) {
   apply(import_.take(message, writer, is_static, Worker::Clock::now(),
                      [this](const std::string& id) { return structure_.holding(id); }));
@@ -67,9 +63,10 @@ void FramesIn::apply(const Edit& edit) {
         return node_.add(edit.id, {}, Transform(), node_.partition());
       case Edit::Kind::kAdd:
         return node_.add(edit.id, edit.parent, *edit.X_PC, node_.partition());
-      default:  // a move to the same parent drops the samples
-        return node_.move(edit.id, edit.parent,
-                          edit.X_PC ? PartialTransform(*edit.X_PC) : PartialTransform());
+      case Edit::Kind::kClear:
+        return node_.clear_history(edit.id);
+      default:  // also to the same parent: without samples it is static
+        return node_.move(edit.id, edit.parent, *edit.X_PC);
     }
   }();
   if (!done) rejected(edit.id, done.error());

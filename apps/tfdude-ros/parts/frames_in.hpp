@@ -28,8 +28,6 @@ class FramesIn {
 
   /// The structure of tf-dude's domain has changed. Thread-safe.
   void on_change(const Change& change);
-  /// The clock of ROS has jumped back. Thread-safe.
-  void on_time_jump();
 
  private:
   void take(const TfMessage& message, const std::string& writer, bool is_static);

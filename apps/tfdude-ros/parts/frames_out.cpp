@@ -26,8 +26,6 @@ EdgeTiming short_history() {
   return timing;
 }
 
-Time wall_clock() { return std::chrono::system_clock::now(); }
-
 }  // namespace
 
 /// Edges that are watched together, and the thread that sends their changes.
@@ -186,7 +184,8 @@ void FramesOut::forget(std::size_t group) {
 }
 
 void FramesOut::send_static() {
-  if (tf_static_ != nullptr) tf_static_->publish(sent_.all_static(wall_clock()));
+  // Listeners do not need this stamp.
+  if (tf_static_ != nullptr) tf_static_->publish(sent_.all_static(node_.now().value_or(Time())));
 }
 
 }  // namespace tfdude::ros

@@ -61,7 +61,9 @@ void JointsOut::send() {
     if (const auto joints = node_.joints(one.name)) export_.add(*joints, message);
   }
   if (message.names.empty()) return;
-  message.stamp = std::chrono::system_clock::now();
+  const auto now = node_.now();
+  if (!now) return;
+  message.stamp = *now;
   publisher_->publish(std::move(message));
 }
 

@@ -18,7 +18,8 @@ constexpr std::chrono::milliseconds kPatience{100};
 
 Result<std::unique_ptr<PoseSender>> PoseSender::start(Node& node, RosDomain& domain,
                                                       const PoseOut& settings) {
-  auto publisher = domain.advertise(pose_topic(settings.topic));
+  auto publisher = domain.advertise(settings.odometry ? odometry_topic(settings.topic)
+                                                      : pose_topic(settings.topic));
   if (!publisher) return tl::unexpected(std::move(publisher.error()));
   return std::unique_ptr<PoseSender>(new PoseSender(node, settings, *std::move(publisher)));
 }
@@ -59,17 +60,29 @@ void PoseSender::send(const PathWatch& path) {
     // An owner that is away has its frames, but they are not exported.
     const auto health = path.health();
     if (!health || !X) return log_once(X ? health.error().message : X.error().message);
-    if (auto message = message_of(settings_, *X, std::chrono::system_clock::now())) {
-      logged_.clear();
-      publisher_->publish(*std::move(message));
-    } else {
-      log_once("the covariance of " + quote(settings_.child) + " in " + quote(settings_.frame) +
-               " is unspecified");
-    }
+    publish(*X);
     while (!path.wait_for_more(messages, Clock::now() + kPatience)) {
       if (stopping_ || !path.health()) return;
     }
   }
+}
+
+void PoseSender::publish(const StampedTransform& X) {
+  const Time now = node_.now().value_or(Time());
+  std::optional<Message> message;
+  if (settings_.odometry) {
+    const auto velocity = node_.velocity(settings_.frame, settings_.child);
+    if (!velocity) return log_once(velocity.error().message);
+    message = message_of(settings_, X, *velocity, now);
+  } else {
+    message = message_of(settings_, X, now);
+  }
+  if (!message) {
+    return log_once("the covariance of " + quote(settings_.child) + " in " +
+                    quote(settings_.frame) + " is unspecified");
+  }
+  logged_.clear();
+  publisher_->publish(*message);
 }
 
 void PoseSender::log_once(const std::string& why) {

@@ -31,6 +31,7 @@ class PoseSender {
   void run();
   /// Until the path is no longer followed.
   void send(const PathWatch& path);
+  void publish(const StampedTransform& X);
   void log_once(const std::string& why);
   /// @return false if it is to stop
   bool pause();

@@ -3,8 +3,8 @@
 //   peer DOMAIN COMMANDS
 //   listen TOPIC KIND PROFILE         prints each message, as a line that begins with the topic
 //   advertise TOPIC KIND PROFILE      prints "matched TOPIC" once a reader is found
-//   publish TOPIC MESSAGE
-//   every HZ TIMES TOPIC MESSAGE      publishes it so often; STAMP 0 stands for the current time
+//   publish TOPIC MESSAGE             STAMP may be NOW
+//   every HZ TIMES TOPIC MESSAGE      publishes it so often
 //   forget TOPIC                      deletes its writer
 //   wait SECONDS
 // PROFILE: reliable, latched, or best_effort. peer.h describes KIND and MESSAGE.
@@ -125,25 +125,23 @@ static void advertise(char* topic, const char* kind, const char* profile) {
   dds_delete_listener(listener);
 }
 
-static void publish(const char* topic, char* text) {
+static void publish(const char* topic, const char* text) {
   const Advertised* one = not_null(find(topic), topic);
-  checked(dds_write(one->writer, one->kind->parse(text)), topic);
+  char* message = malloc(strlen(text) + 30);
+  if (strncmp(text, "NOW", 3) == 0) {
+    sprintf(message, "%lld%s", (long long)dds_time(), text + 3);
+  } else {
+    strcpy(message, text);
+  }
+  checked(dds_write(one->writer, one->kind->parse(message)), topic);
 }
 
-static void every(double rate, int times, const char* topic, char* text) {
-  const Advertised* one = not_null(find(topic), topic);
-  const bool stamps = strncmp(text, "0 ", 2) == 0;
+static void every(double rate, int times, const char* topic, const char* text) {
   const dds_time_t begin = dds_time();
   for (int i = 0; i < times; ++i) {
     const dds_time_t due = begin + (dds_time_t)(i * 1e9 / rate);
     if (dds_time() < due) dds_sleepfor(due - dds_time());
-    char line[1 << 16];
-    if (stamps) {
-      snprintf(line, sizeof line, "%lld %s", (long long)dds_time(), text + 2);
-    } else {
-      snprintf(line, sizeof line, "%s", text);
-    }
-    checked(dds_write(one->writer, one->kind->parse(line)), topic);
+    publish(topic, text);
   }
 }
 
