@@ -86,4 +86,30 @@ TEST_CASE("ros tf out: dynamic and static frames of a partition reach a late pee
   CHECK(left.count("camera") == 1);
 }
 
+TEST_CASE("ros tf out: frames of an owner that is not reachable are not sent, until it returns") {
+  const RosRig rig;
+  const testing::TemporaryDirectory files;
+  const std::string arm = files.write(
+      "arm.yaml", "partition: arm\nframes:\n  - {id: tool, parent: base, xyz: [1, 0, 0]}\n");
+  Node node = *Node::open("base", {{"world", "", {}}, {"base", "world", {}}}, rig.dude().options());
+  auto daemon = rig.dude().serve(arm);
+  auto bridge = rig.start_bridge({"--export", "*"});
+  RosPeer peer(rig.ros_domain());
+  peer.obey("listen /tf_static tf latched");
+  REQUIRE(await(peer, "/tf_static", {"base", "tool"}).size() == 2);
+  daemon.kill();
+  while (parse_tf(peer.next("/tf_static ")).size() != 1) {
+  }
+  auto back = rig.dude().serve(arm);
+  while (parse_tf(peer.next("/tf_static ")).size() != 2) {
+  }
+  // The peer restarts, then the bridge.
+  RosPeer late(rig.ros_domain());
+  late.obey("listen /tf_static tf latched");
+  CHECK(await(late, "/tf_static", {"base", "tool"}).size() == 2);
+  bridge.kill();
+  auto second = rig.start_bridge({"--export", "*"});
+  CHECK(await(late, "/tf_static", {"base", "tool"}).size() == 2);
+}
+
 }  // namespace tfdude
