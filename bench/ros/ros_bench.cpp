@@ -1,6 +1,7 @@
 // Both ends of the bridge to ROS 2, in one process, so that one clock measures latency:
 //   ros_bench in     writes to /tf; a watcher of the bridge's partition reads
 //   ros_bench out    updates edges of a partition; a reader of /tf reads
+//   ros_bench replay writes to /tf the stamps of an hour in a minute, and begins again every 10 s
 //   ros_bench bare   writes to /tf; a reader of /relayed reads
 //   ros_bench relay  what "bare" measures: passes /tf on to /relayed, and does nothing else
 // Options: --ros-domain N --domain N --edges N --rate HZ --per-message N --seconds N
@@ -176,6 +177,24 @@ void out(Bench& bench) {
   bench.run([&](Time stamp) { bench::check(node.update(edges, stamp), "update"); });
 }
 
+void replay(Bench& bench) {
+  auto tf = bench::must(bench.ros->advertise(ros::tf_topic()), "writer");
+  const Time start(std::chrono::hours(24));
+  int written = 0;
+  const auto next = [&](Time) {
+    const auto since = std::chrono::seconds(60) * (written++ % (10 * bench.rate)) / bench.rate;
+    bench.write_tf(*tf, start + since);
+  };
+  auto client = bench::must(Client::open(bench.options), "client");
+  while (!client.exists(frame(bench.edges - 1))) {
+    next({});
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  bench.run(next);
+  const auto history = bench::must(client.history(frame(0)), "history");
+  std::cout << "samples of an edge: " << history.front().samples << std::endl;
+}
+
 void bare(Bench& bench) {
   auto tf = bench::must(bench.ros->advertise(ros::tf_topic()), "writer");
   bench.read_tf("/relayed");
@@ -208,6 +227,8 @@ int main(int argc, char** argv) {
     in(bench);
   } else if (what == "out") {
     out(bench);
+  } else if (what == "replay") {
+    replay(bench);
   } else if (what == "bare") {
     bare(bench);
   } else {

@@ -66,15 +66,42 @@ def measure(way, per_message, arguments):
     return result
 
 
+def resident_kib(pid):
+    lines = pathlib.Path(f"/proc/{pid}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:"))
+
+
+def replay(arguments):
+    """The memory of the bridge during a replay that jumps back every 10 s."""
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(ROS_DOMAIN), "ROS_LOCALHOST_ONLY": "1"}
+    bridge = subprocess.Popen([BIN / "tfdude-ros", "--local", "--domain", str(DOMAIN)], text=True, env=environment,
+                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    bridge.stdout.readline()
+    command = [BIN / "ros_bench", "replay", "--ros-domain", str(ROS_DOMAIN), "--domain", str(DOMAIN), "--edges",
+               str(arguments.edges), "--rate", str(arguments.rate), "--per-message", str(arguments.edges), "--seconds",
+               str(arguments.seconds)]
+    with subprocess.Popen(command, text=True, stdout=subprocess.PIPE) as ends:
+        begin = time.monotonic()
+        while ends.poll() is None:
+            time.sleep(min(10, arguments.seconds / 6))
+            print(f"{time.monotonic() - begin:.0f} s: {resident_kib(bridge.pid)} KiB", flush=True)
+        print(ends.stdout.read().splitlines()[-1])
+    end(bridge)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--edges", type=int, default=100)
     parser.add_argument("--rate", type=int, default=100)
     parser.add_argument("--seconds", type=int, default=20)
+    parser.add_argument("--replay", action="store_true", help="memory while stamps run fast and jump back, instead")
     arguments = parser.parse_args()
     if "TFDUDE_OWN_NETWORK" not in os.environ:
         os.environ["TFDUDE_OWN_NETWORK"] = "1"
         os.execvp("unshare", ["unshare", "--net", "sh", "-c", 'ip link set lo up && exec "$0" "$@"', *sys.argv])
+    if arguments.replay:
+        replay(arguments)
+        return
     print("| way | edges a message | p50 [us] | p90 | p99 | read | lost | share of a core | bytes on lo an edge |")
     print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     for per_message in (arguments.edges, 1):
