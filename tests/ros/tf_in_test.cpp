@@ -66,4 +66,34 @@ TEST_CASE("ros tf in: a dynamic and a static frame have the peer's values and st
   CHECK(bridge.wait(testing::in_time()) == 0);
 }
 
+TEST_CASE("ros tf in: both domains may be the same") {
+  const RosRig rig;
+  const std::uint32_t domain = rig.dude().number();
+  RosPeer peer(domain);
+  const auto bridge = rig.start_bridge({"--ros-domain", std::to_string(domain)});
+  peer.advertise("/tf", "tf", "reliable");
+  peer.publish("/tf", tf_message(at(1), {{"odom", "base", pose(1, 0.1)}}));
+  Client client = rig.client();
+  CHECK(eventually([&] { return client.lookup("odom", "base").has_value(); }));
+}
+
+TEST_CASE("ros tf in: patterns and a prefix choose the frames of a robot") {
+  const RosRig rig;
+  const testing::TemporaryDirectory files;
+  const auto bridge = rig.start_bridge(
+      {"--config", files.write("b.yaml",
+                               "partition: r1\nprefix: r1/\n"
+                               "tf_in: {except: [\"camera*\"], covariance: exact}\n")});
+  RosPeer peer(rig.ros_domain());
+  peer.advertise("/tf", "tf", "reliable");
+  peer.publish("/tf", tf_message(at(1), {{"base", "camera_link", pose(1, 0)},
+                                         {"/odom", "/base", pose(2, 0.1)}}));
+  Client client = rig.client();
+  REQUIRE(eventually([&] { return client.lookup("r1/odom", "r1/base").has_value(); }));
+  CHECK(client.lookup("r1/odom", "r1/base")->covariance.complete());
+  const auto frames = client.frames();
+  REQUIRE(frames->size() == 2);
+  CHECK(frames->front().partition == "r1");
+}
+
 }  // namespace tfdude

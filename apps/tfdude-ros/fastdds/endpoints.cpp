@@ -145,7 +145,7 @@ edds::DataWriterQos writer_qos(const Topic& topic) {
   if (!topic.latched) qos.durability().kind = edds::VOLATILE_DURABILITY_QOS;
   qos.publish_mode().kind = edds::SYNCHRONOUS_PUBLISH_MODE;
   // With Fast DDS's 3 s, a late reader of Cyclone DDS waits that long for its first message.
-  qos.reliable_writer_qos().times.heartbeatPeriod = {0, 100'000'000};
+  fastdds::set_heartbeat_period(qos, 100'000'000);
   return qos;
 }
 

@@ -78,8 +78,9 @@ Result<void> FastDdsRosDomain::create(const RosSettings& settings) {
   // Fast DDS 3 announces descriptions of types that others take for other types than their own.
   qos.properties().properties().emplace_back("fastdds.type_propagation", "disabled");
   set_network(settings.range, qos);
-  auto& discovery = qos.wire_protocol().builtin.discovery_config;
-  discovery.initial_announcements = {20, {0, 50'000'000}};
+  auto& announcements = qos.wire_protocol().builtin.discovery_config.initial_announcements;
+  announcements.count = 20;
+  announcements.period = {0, 50'000'000};
   participant_ =
       factory().create_participant(settings.domain, qos, &listener_, edds::StatusMask::none());
   if (participant_ == nullptr) {

@@ -79,8 +79,9 @@ class Planner {
   }
 
   [[nodiscard]] const std::string& leader_of(const std::string& partition) {
-    const auto known = leaders_.emplace(partition, partition).first;
-    return known->second == known->first ? known->first : leader_of(known->second);
+    auto known = leaders_.emplace(partition, partition).first;
+    while (known->second != known->first) known = leaders_.find(known->second);
+    return known->first;
   }
 
   const ExportSettings& settings_;

@@ -98,6 +98,10 @@ inline void use_plain_cdr(edds::DataReaderQos& qos) {
   qos.type_consistency().representation.m_value = {edds::XCDR_DATA_REPRESENTATION};
 }
 
+inline void set_heartbeat_period(edds::DataWriterQos& qos, std::uint32_t nanoseconds) {
+  qos.reliable_writer_qos().times.heartbeatPeriod = {0, nanoseconds};
+}
+
 /// Elements of XML profiles that have another name in this version than in profiles/tfdude.xml.
 inline constexpr std::array<std::pair<const char*, const char*>, 0> kRenamedElements{};
 
@@ -191,6 +195,10 @@ inline void use_plain_cdr(edds::DataWriterQos& qos) {
 }
 inline void use_plain_cdr(edds::DataReaderQos& qos) {
   qos.representation().m_value = {edds::XCDR_DATA_REPRESENTATION};
+}
+
+inline void set_heartbeat_period(edds::DataWriterQos& qos, std::uint32_t nanoseconds) {
+  qos.reliable_writer_qos().times.heartbeat_period = {0, nanoseconds};
 }
 
 inline constexpr std::array<std::pair<const char*, const char*>, 6> kRenamedElements{{
