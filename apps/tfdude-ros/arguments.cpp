@@ -65,12 +65,7 @@ class Options {
     if (partition_->count() > 0) settings.partition = given_.partition;
     if (domain_->count() > 0) settings.ros_domain = given_.ros_domain;
     if (no_tf_in_) settings.frames_in.reset();
-    if (!partitions_.empty() || !frames_.empty()) {
-      if (!settings.frames_out) settings.frames_out.emplace();
-      settings.frames_out->partitions = Patterns(std::move(partitions_));
-      settings.frames_out->frames = Patterns(std::move(frames_));
-    }
-    if (rate_->count() > 0 && settings.frames_out) settings.frames_out->rate = out_.rate;
+    apply_exports(settings);
     if (joints_->count() > 0) {
       if (!settings.joints_in) settings.joints_in.emplace();
       settings.joints_in->stddev = stddev_;
@@ -85,6 +80,15 @@ class Options {
   }
 
  private:
+  void apply_exports(Settings& settings) {
+    if (!partitions_.empty() || !frames_.empty()) {
+      if (!settings.frames_out) settings.frames_out.emplace();
+      settings.frames_out->partitions = Patterns(std::move(partitions_));
+      settings.frames_out->frames = Patterns(std::move(frames_));
+    }
+    if (rate_->count() > 0 && settings.frames_out) settings.frames_out->rate = out_.rate;
+  }
+
   Settings given_;
   ExportSettings out_;
   std::string config_;

@@ -1,6 +1,8 @@
 #include "bridge.hpp"
 
 #include <algorithm>
+#include <array>
+#include <unistd.h>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -10,6 +12,12 @@ namespace {
 
 // How long frames of /tf wait for a description.
 constexpr std::chrono::seconds kDescriptionFirst{2};
+
+// As tf-dude announces it.
+std::string host_name() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
+}
 
 bool is_marked(const PartitionInfo& partition, const BridgeMark& mark) {
   return partition.name == mark.partition && partition.host == mark.host &&
@@ -48,9 +56,8 @@ Bridge::~Bridge() {
 }
 
 Result<void> Bridge::start(const Settings& settings) {
-  auto self = own_mark();
-  if (!self) return tl::unexpected(std::move(self.error()));
-  auto ros = join_ros_domain({settings.ros_domain, settings.range, *std::move(self)});
+  const BridgeMark self{settings.partition, host_name(), static_cast<std::uint32_t>(getpid())};
+  auto ros = join_ros_domain({settings.ros_domain, settings.range, self});
   if (!ros) return tl::unexpected(std::move(ros.error()));
   ros_ = *std::move(ros);
   if (settings.frames_in) frames_in_.emplace(node_, *settings.frames_in);
@@ -112,19 +119,11 @@ Result<void> Bridge::start_out(const Settings& settings) {
   return {};
 }
 
-Result<BridgeMark> Bridge::own_mark() {
-  const auto partitions = node_.partitions();
-  if (!partitions) return tl::unexpected(partitions.error());
-  for (const PartitionInfo& one : *partitions) {
-    if (one.name == node_.partition()) return BridgeMark{one.name, one.host, one.pid};
-  }
-  return fail(Errc::kTransport, "this process does not see its own partition");
-}
-
+// While that is not known, it is assumed: what is not passed on now can be later.
 bool Bridge::is_neighbour(const BridgeMark& bridge) {
   const auto partitions = node_.partitions();
-  return partitions && std::any_of(partitions->begin(), partitions->end(),
-                                   [&](const auto& one) { return is_marked(one, bridge); });
+  return !partitions || std::any_of(partitions->begin(), partitions->end(),
+                                    [&](const auto& one) { return is_marked(one, bridge); });
 }
 
 std::set<std::string> Bridge::partitions_from_ros() {

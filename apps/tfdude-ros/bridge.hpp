@@ -36,8 +36,6 @@ class Bridge {
   [[nodiscard]] Result<void> start(const Settings& settings);
   [[nodiscard]] Result<void> start_in(const Settings& settings);
   [[nodiscard]] Result<void> start_out(const Settings& settings);
-  /// How this process appears to others in tf-dude's domain.
-  [[nodiscard]] Result<BridgeMark> own_mark();
   /// Whether another bridge is in the same domain of tf-dude.
   [[nodiscard]] bool is_neighbour(const BridgeMark& bridge);
   /// The partitions with frames that a bridge of tf-dude's domain has taken from this ROS domain.

@@ -26,6 +26,9 @@ struct BridgeMark {
   }
 };
 
+/// Whether another bridge is in the same domain of tf-dude. What it sends to ROS is there already.
+using IsNeighbour = std::function<bool(const BridgeMark&)>;
+
 /// Which participants are discovered.
 enum class Range : std::uint8_t { kThisComputer, kNetwork };
 

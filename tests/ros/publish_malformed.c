@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
       "topic");
   dds_qos_t* qos = dds_create_qos();
   dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
+  dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
   dds_qset_data_representation(qos, 1,
                                (dds_data_representation_id_t[]){DDS_DATA_REPRESENTATION_XCDR1});
   dds_entity_t writer = checked(dds_create_writer(participant, topic, qos, NULL), "writer");

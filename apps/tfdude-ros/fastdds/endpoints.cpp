@@ -77,11 +77,11 @@ class Listener final : public edds::DataReaderListener {
 template <class OneKind>
 class Writing final : public Publisher {
  public:
-  explicit Writing(edds::DataWriter& writer) : writer_(writer) {}
-  ~Writing() override {
-    const auto* publisher = writer_.get_publisher();
-    (void)const_cast<edds::Publisher*>(publisher)->delete_datawriter(&writer_);
-  }
+  Writing(edds::Publisher& publisher, edds::DataWriter& writer)
+      : publisher_(publisher), writer_(writer) {}
+  Writing(const Writing&) = delete;
+  Writing& operator=(const Writing&) = delete;
+  ~Writing() override { (void)publisher_.delete_datawriter(&writer_); }
 
   bool publish(const Message& message) override {
     const auto* plain = std::get_if<typename OneKind::Plain>(&message);
@@ -91,6 +91,7 @@ class Writing final : public Publisher {
   }
 
  private:
+  edds::Publisher& publisher_;
   edds::DataWriter& writer_;
 };
 
@@ -108,9 +109,10 @@ std::unique_ptr<edds::DataReaderListener> reading(MessageType type, Take take,
   });
 }
 
-std::unique_ptr<Publisher> writing(MessageType type, edds::DataWriter& writer) {
+std::unique_ptr<Publisher> writing(MessageType type, edds::Publisher& publisher,
+                                   edds::DataWriter& writer) {
   return with_kind(type, [&](auto kind) -> std::unique_ptr<Publisher> {
-    return std::make_unique<Writing<decltype(kind)>>(writer);
+    return std::make_unique<Writing<decltype(kind)>>(publisher, writer);
   });
 }
 

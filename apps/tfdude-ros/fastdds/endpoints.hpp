@@ -19,8 +19,9 @@ using FindBridge = std::function<std::optional<BridgeMark>(const fastdds::ertps:
                                                                          Take take,
                                                                          FindBridge find_bridge);
 
-/// @param writer  deleted with it
+/// @param writer  of the publisher; deleted with the result
 [[nodiscard]] std::unique_ptr<Publisher> writing(MessageType type,
+                                                 fastdds::edds::Publisher& publisher,
                                                  fastdds::edds::DataWriter& writer);
 
 [[nodiscard]] fastdds::edds::DataReaderQos reader_qos(const Topic& topic);

@@ -10,7 +10,6 @@ namespace tfdude::ros {
 namespace {
 
 namespace edds = fastdds::edds;
-namespace ertps = fastdds::ertps;
 
 edds::DomainParticipantFactory& factory() {
   return *edds::DomainParticipantFactory::get_instance();
@@ -125,7 +124,7 @@ Result<std::unique_ptr<Publisher>> FastDdsRosDomain::advertise(const Topic& topi
   if (described == nullptr) return not_created("the topic " + topic.name);
   auto* writer = publisher_->create_datawriter(described, writer_qos(topic));
   if (writer == nullptr) return not_created("a writer of " + topic.name);
-  return writing(topic.type, *writer);
+  return writing(topic.type, *publisher_, *writer);
 }
 
 std::uint64_t FastDdsRosDomain::malformed() const { return malformed_samples(); }

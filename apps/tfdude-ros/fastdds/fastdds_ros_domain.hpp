@@ -36,6 +36,8 @@ class Bridges {
 class FastDdsRosDomain final : public RosDomain {
  public:
   [[nodiscard]] static Result<std::unique_ptr<FastDdsRosDomain>> join(const RosSettings& settings);
+  FastDdsRosDomain(const FastDdsRosDomain&) = delete;
+  FastDdsRosDomain& operator=(const FastDdsRosDomain&) = delete;
   ~FastDdsRosDomain() override;
 
   [[nodiscard]] Result<void> subscribe(const Topic& topic, Take take) override;

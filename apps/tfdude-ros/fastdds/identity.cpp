@@ -43,8 +43,8 @@ std::optional<BridgeMark> mark_of(const std::vector<std::uint8_t>& user_data) {
   if (text.substr(0, kBegin.size()) != kBegin || text.back() != ';') return std::nullopt;
   text = text.substr(kBegin.size(), text.size() - kBegin.size() - 1);
   const std::size_t host = text.find(',');
-  const std::size_t partition = host == text.npos ? host : text.find(',', host + 1);
-  if (partition == text.npos) return std::nullopt;
+  const std::size_t partition = host == std::string_view::npos ? host : text.find(',', host + 1);
+  if (partition == std::string_view::npos) return std::nullopt;
   BridgeMark mark;
   const auto pid = std::from_chars(text.data(), text.data() + host, mark.pid);
   if (pid.ec != std::errc() || pid.ptr != text.data() + host) return std::nullopt;

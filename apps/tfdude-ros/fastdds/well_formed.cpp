@@ -12,10 +12,13 @@ using fastdds::detail::CdrWalk;
 // A longer sample would not fit into the memory that a message may take anyway.
 constexpr std::uint32_t kMost = 1U << 26U;
 
-std::atomic<std::uint64_t> malformed{0};
+std::atomic<std::uint64_t>& malformed() {
+  static std::atomic<std::uint64_t> count{0};
+  return count;
+}
 
 bool counted(const CdrWalk& walk) {
-  if (!walk.good()) malformed.fetch_add(1, std::memory_order_relaxed);
+  if (!walk.good()) malformed().fetch_add(1, std::memory_order_relaxed);
   return walk.good();
 }
 
@@ -81,6 +84,6 @@ bool well_formed_clock(const std::uint8_t* data, std::size_t size) {
   return counted(walk);
 }
 
-std::uint64_t malformed_samples() { return malformed.load(std::memory_order_relaxed); }
+std::uint64_t malformed_samples() { return malformed().load(std::memory_order_relaxed); }
 
 }  // namespace tfdude::ros

@@ -6,7 +6,7 @@
 
 namespace tfdude::ros {
 
-Result<void> ClockIn::start(RosDomain& domain, std::function<bool(const BridgeMark&)> is_own) {
+Result<void> ClockIn::start(RosDomain& domain, const IsNeighbour& is_own) {
   return domain.subscribe(clock_topic(), [this, is_own](Message&& message, const Source& source) {
     if (source.bridge && is_own(*source.bridge)) return;
     worker_.post([this, now = std::get<ClockTime>(message).now] { take(now); });

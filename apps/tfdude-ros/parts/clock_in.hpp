@@ -18,8 +18,7 @@ class ClockIn {
   explicit ClockIn(Node& node) : node_(node) {}
 
   /// @param is_own  as for FramesIn. @return kTransport.
-  [[nodiscard]] Result<void> start(RosDomain& domain,
-                                   std::function<bool(const BridgeMark&)> is_own);
+  [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
   /// Nothing is passed on any more.
   void stop() { worker_.stop(); }
 

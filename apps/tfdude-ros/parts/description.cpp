@@ -10,8 +10,7 @@
 
 namespace tfdude::ros {
 
-Result<void> DescriptionIn::start(RosDomain& domain,
-                                  std::function<bool(const BridgeMark&)> is_own) {
+Result<void> DescriptionIn::start(RosDomain& domain, const IsNeighbour& is_own) {
   return domain.subscribe(
       description_topic(), [this, is_own](Message&& message, const Source& source) {
         if (source.bridge && is_own(*source.bridge)) return;

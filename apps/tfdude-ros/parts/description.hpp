@@ -24,8 +24,7 @@ class DescriptionIn {
       : settings_(std::move(settings)), options_(std::move(options)) {}
 
   /// @param is_own  as for FramesIn. @return kTransport.
-  [[nodiscard]] Result<void> start(RosDomain& domain,
-                                   std::function<bool(const BridgeMark&)> is_own);
+  [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
   void stop();
 
   /// Waits until a robot is served. @return false at the end of the patience

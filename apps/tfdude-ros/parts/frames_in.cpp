@@ -8,7 +8,7 @@ namespace tfdude::ros {
 
 using Edit = TfImport::Edit;
 
-Result<void> FramesIn::start(RosDomain& domain, std::function<bool(const BridgeMark&)> is_own) {
+Result<void> FramesIn::start(RosDomain& domain, const IsNeighbour& is_own) {
   for (const bool is_static : {false, true}) {
     auto take_message = [this, is_static, is_own](Message&& message, const Source& source) {
       if (source.bridge && is_own(*source.bridge)) return;

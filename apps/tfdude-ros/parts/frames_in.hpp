@@ -21,8 +21,7 @@ class FramesIn {
 
   /// @param is_own  whether a bridge is in the same domain of tf-dude: its frames are there already
   /// @return kTransport.
-  [[nodiscard]] Result<void> start(RosDomain& domain,
-                                   std::function<bool(const BridgeMark&)> is_own);
+  [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
   /// Nothing is taken any more. Logs what was not.
   void stop();
 

@@ -7,7 +7,7 @@
 
 namespace tfdude::ros {
 
-Result<void> JointsIn::start(RosDomain& domain, std::function<bool(const BridgeMark&)> is_own) {
+Result<void> JointsIn::start(RosDomain& domain, const IsNeighbour& is_own) {
   return domain.subscribe(
       joint_states_topic(), [this, is_own](Message&& message, const Source& source) {
         if (source.bridge && is_own(*source.bridge)) return;
@@ -31,7 +31,7 @@ void JointsIn::take(const JointState& message) {
   spdlog::warn("joints of ROS: {}", error);
 }
 
-Result<void> JointsOut::start(RosDomain& domain, std::function<bool(const BridgeMark&)> is_own) {
+Result<void> JointsOut::start(RosDomain& domain, const IsNeighbour& is_own) {
   auto publisher = domain.advertise(joint_states_topic());
   if (!publisher) return tl::unexpected(std::move(publisher.error()));
   publisher_ = *std::move(publisher);

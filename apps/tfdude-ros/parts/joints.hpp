@@ -19,8 +19,7 @@ class JointsIn {
   JointsIn(Node& node, const JointImportSettings& settings) : node_(node), import_(settings) {}
 
   /// @param is_own  as for FramesIn. @return kTransport.
-  [[nodiscard]] Result<void> start(RosDomain& domain,
-                                   std::function<bool(const BridgeMark&)> is_own);
+  [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
   /// Nothing is taken any more. Logs what was not.
   void stop();
 
@@ -40,8 +39,7 @@ class JointsOut {
   JointsOut(Node& node, const JointExportSettings& settings) : node_(node), export_(settings) {}
 
   /// @param domain  outlives it until stop(). @return kTransport.
-  [[nodiscard]] Result<void> start(RosDomain& domain,
-                                   std::function<bool(const BridgeMark&)> is_own);
+  [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
   void stop();
 
  private:

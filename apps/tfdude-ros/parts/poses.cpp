@@ -89,7 +89,7 @@ void PoseSender::log_once(const std::string& why) {
   if (std::exchange(logged_, why) != why) spdlog::warn("not sent to {}: {}", settings_.topic, why);
 }
 
-Result<void> PoseObserver::start(RosDomain& domain, std::function<bool(const BridgeMark&)> is_own) {
+Result<void> PoseObserver::start(RosDomain& domain, const IsNeighbour& is_own) {
   const Topic topic =
       settings_.odometry ? odometry_topic(settings_.topic) : pose_topic(settings_.topic);
   return domain.subscribe(topic, [this, is_own](Message&& message, const Source& source) {

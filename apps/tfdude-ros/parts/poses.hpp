@@ -51,8 +51,7 @@ class PoseObserver {
   PoseObserver(Node& node, PoseIn settings) : node_(node), settings_(std::move(settings)) {}
 
   /// @param is_own  as for FramesIn. @return kTransport.
-  [[nodiscard]] Result<void> start(RosDomain& domain,
-                                   std::function<bool(const BridgeMark&)> is_own);
+  [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
   /// Nothing is taken any more. Logs the answers.
   void stop();
 
