@@ -103,13 +103,24 @@ std::string tf_message(Time stamp, const std::vector<RosTransform>& transforms) 
   return text.str();
 }
 
-Process RosRig::start_bridge(const std::vector<std::string>& arguments) const {
+// Of a low domain: the ports of others are those that the kernel gives to any socket, and Cyclone
+// DDS does not start if one is taken.
+RosRig::RosRig() {
+  constexpr std::uint32_t kLow = 100;
+  std::vector<std::unique_ptr<DomainLease>> high;
+  do {
+    if (ros_ != nullptr) high.push_back(std::move(ros_));
+    ros_ = std::make_unique<DomainLease>();
+  } while (ros_->number() >= kLow);
+}
+
+Process RosRig::start_bridge(std::uint32_t dude, const std::vector<std::string>& arguments) const {
   std::vector<std::string> command{"/usr/bin/env",
                                    "ROS_LOCALHOST_ONLY=1",
                                    "ROS_DOMAIN_ID=" + std::to_string(ros_domain()),
                                    TFDUDE_ROS,
                                    "--domain",
-                                   std::to_string(dude_.number()),
+                                   std::to_string(dude),
                                    "--local"};
   command.insert(command.end(), arguments.begin(), arguments.end());
   Process bridge(command);

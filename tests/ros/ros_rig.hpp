@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -61,18 +62,23 @@ struct ReceivedTransform : RosTransform {
 /// The bridge, in a domain of tf-dude and one of ROS.
 class RosRig {
  public:
-  RosRig() = default;
+  RosRig();
 
   [[nodiscard]] const TestDomain& dude() const { return dude_; }
-  [[nodiscard]] std::uint32_t ros_domain() const { return ros_.number(); }
+  [[nodiscard]] std::uint32_t ros_domain() const { return ros_->number(); }
 
   /// Starts a bridge and waits until it is ready.
-  [[nodiscard]] Process start_bridge(const std::vector<std::string>& arguments = {}) const;
+  [[nodiscard]] Process start_bridge(const std::vector<std::string>& arguments = {}) const {
+    return start_bridge(dude_.number(), arguments);
+  }
+  /// The same in another domain of tf-dude.
+  [[nodiscard]] Process start_bridge(std::uint32_t dude,
+                                     const std::vector<std::string>& arguments) const;
   [[nodiscard]] Client client() const { return *Client::open(dude_.options()); }
 
  private:
   TestDomain dude_;
-  DomainLease ros_;
+  std::unique_ptr<DomainLease> ros_;
 };
 
 }  // namespace tfdude::testing

@@ -68,12 +68,13 @@ TEST_CASE("ros tf in: a dynamic and a static frame have the peer's values and st
 
 TEST_CASE("ros tf in: both domains may be the same") {
   const RosRig rig;
-  const std::uint32_t domain = rig.dude().number();
-  RosPeer peer(domain);
-  const auto bridge = rig.start_bridge({"--ros-domain", std::to_string(domain)});
+  RosPeer peer(rig.ros_domain());
+  const auto bridge = rig.start_bridge(rig.ros_domain(), {});
   peer.advertise("/tf", "tf", "reliable");
   peer.publish("/tf", tf_message(at(1), {{"odom", "base", pose(1, 0.1)}}));
-  Client client = rig.client();
+  auto options = rig.dude().options();
+  options.domain = rig.ros_domain();
+  Client client = *Client::open(options);
   CHECK(eventually([&] { return client.lookup("odom", "base").has_value(); }));
 }
 

@@ -105,6 +105,7 @@ ExportView FramesOut::view() {
   ExportView view;
   last_from_ros_ = view.from_ros = from_ros_();
   const auto partitions = node_.partitions();
+  incomplete_ = !partitions.has_value();
   std::map<std::string, Clock::time_point> known_since;
   const auto now = Clock::now();
   for (const PartitionInfo& one : partitions ? *partitions : std::vector<PartitionInfo>()) {
@@ -131,7 +132,6 @@ ExportView FramesOut::view() {
 
 void FramesOut::replan() {
   stale_ = false;
-  incomplete_ = false;
   const ExportView now = view();
   const auto frames = node_.frames();
   if (!frames) {

@@ -42,6 +42,7 @@ class FramesOut {
 
   void look();
   void replan();
+  /// Also says whether it is incomplete.
   [[nodiscard]] ExportView view();
   void send(std::size_t group, const std::vector<ExportEdge>& edges, const EdgesWatch& watch);
   void forget(std::size_t group);
