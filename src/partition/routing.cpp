@@ -43,6 +43,15 @@ Result<void> check_size(const Part& part, std::size_t items, const char* what) {
                                        " at once, of at most " + std::to_string(kMaxItems));
 }
 
+Result<WatchPlan> checked(const Directory& directory, WatchPlan plan) {
+  if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
+  for (const Part& part : plan.parts) {
+    const std::size_t edges = std::get<WatchRequest>(part.request.body).segments.size();
+    if (auto ok = check_size(part, edges, "edges"); !ok) return tl::unexpected(ok.error());
+  }
+  return plan;
+}
+
 // The end of the segment that its owner owns: for a segment that goes up, the lower one.
 const std::string& owned_end(const Forest& forest, const Segment& segment) {
   const auto from = forest.info(segment.from);
@@ -255,15 +264,6 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
     const auto& share = std::get<LookupRequest>(part.request.body).segments;
     if (auto ok = check_size(part, share.size(), "segments"); !ok)
       return tl::unexpected(ok.error());
-  }
-  return plan;
-}
-
-static Result<WatchPlan> checked(const Directory& directory, WatchPlan plan) {
-  if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
-  for (const Part& part : plan.parts) {
-    const std::size_t edges = std::get<WatchRequest>(part.request.body).segments.size();
-    if (auto ok = check_size(part, edges, "edges"); !ok) return tl::unexpected(ok.error());
   }
   return plan;
 }
