@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -28,6 +29,18 @@ inline void add_network_options(CLI::App& app, Options& options) {
         const auto good = check_discovery_server(text);
         return good ? std::string() : good.error().message;
       });
+}
+
+/// Adds the option of the clock.
+inline void add_clock_option(CLI::App& app, const std::function<void(ClockKind)>& choose) {
+  app.add_option_function<std::string>(
+         "--clock",
+         [choose](const std::string& kind) {
+           choose(kind == "external" ? ClockKind::kExternal : ClockKind::kSystem);
+         },
+         "the clock of stamps: the system's, or an external one, whose time is published on "
+         "tfdude/clock")
+      ->check(CLI::IsMember({"system", "external"}));
 }
 
 }  // namespace tfdude::cli

@@ -22,7 +22,7 @@ target_compile_definitions(tfdude_fastdds INTERFACE TFDUDE_FASTDDS_MAJOR=${TFDUD
 find_program(FASTDDSGEN fastddsgen REQUIRED)
 
 # tfdude_generate_idl(target file.idl): generates C++ from an IDL file in the build tree, as an object library. Its
-# headers are system headers for targets that link it.
+# headers are system headers for targets that link it. NAME_types.hpp includes the types and their serialization.
 function(tfdude_generate_idl target idl)
   get_filename_component(name ${idl} NAME_WE)
   set(dir ${CMAKE_CURRENT_BINARY_DIR}/generated)
@@ -31,12 +31,15 @@ function(tfdude_generate_idl target idl)
     set(sources ${dir}/${name}.cxx ${dir}/${name}PubSubTypes.cxx)
     set(headers ${dir}/${name}.h ${dir}/${name}PubSubTypes.h)
     set(flags -cs)
+    set(included ${name}PubSubTypes.h)
   else()
     set(sources ${dir}/${name}PubSubTypes.cxx ${dir}/${name}TypeObjectSupport.cxx)
     set(headers ${dir}/${name}.hpp ${dir}/${name}PubSubTypes.hpp ${dir}/${name}CdrAux.hpp
                 ${dir}/${name}CdrAux.ipp ${dir}/${name}TypeObjectSupport.hpp)
     set(flags -cs)
+    set(included ${name}PubSubTypes.hpp)
   endif()
+  file(CONFIGURE OUTPUT ${dir}/${name}_types.hpp CONTENT "#pragma once\n#include <${included}>\n")
   add_custom_command(
     OUTPUT ${sources} ${headers}
     COMMAND ${FASTDDSGEN} ${flags} -replace -d ${dir} ${CMAKE_CURRENT_SOURCE_DIR}/${idl} > ${dir}/fastddsgen.log

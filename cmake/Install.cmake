@@ -14,7 +14,7 @@ install(FILES ${CMAKE_BINARY_DIR}/tfdudeConfig.cmake ${CMAKE_BINARY_DIR}/tfdudeC
 
 # The programs find the library by a path relative to themselves, so the prefix may be moved.
 file(RELATIVE_PATH bin_to_lib ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
-foreach(program tfduded tfdude_cli)
+foreach(program tfduded tfdude_cli tfdude_ros)
   if(TARGET ${program})
     set_target_properties(${program} PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
     install(TARGETS ${program})
@@ -30,5 +30,6 @@ if(EXISTS ${CMAKE_SOURCE_DIR}/apps/tfdude/completion.bash)
   install(FILES apps/tfdude/completion.bash RENAME tfdude
     DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 endif()
-install(FILES idl/tfdude.idl DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude/idl)  # where examples/other-dds looks for it
+# Where examples/other-dds and examples/ros look for them.
+install(FILES idl/tfdude.idl idl/ros2.idl DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude/idl)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tfdude)

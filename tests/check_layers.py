@@ -17,13 +17,22 @@ LAYERS = ["base", "math", "types", "tree", "partition", "description", "store", 
           "runtime", "client", "apps"]
 SUFFIXES = {".hpp", ".cpp", ".h", ".cc", ".ipp"}
 DDS_FOLDER = "src/transport/fastdds/"
+# Has another participant, in a domain of ROS. It shares the differences between versions, and the check of lengths.
+ROS_DDS_FOLDER = "apps/tfdude-ros/fastdds/"
+DDS_FOLDERS = (DDS_FOLDER, ROS_DDS_FOLDER)
+# What a program may include of the library's private parts. Its own build compiles what it needs of them.
+SHARED = {
+    ROS_DDS_FOLDER: ("src/transport/fastdds/compat.hpp", "src/transport/fastdds/cdr_check.hpp"),
+    "apps/tfdude-ros/config/": ("src/description/file_text.hpp", "src/description/yaml_fields.hpp",
+                                "src/description/yaml_quirks.hpp"),
+}
 
 # (what, pattern of the include, folders or files that may include it)
 CONFINED = [
     ("Boost", r"boost/(?!math/)", ["src/tree/graph.hpp"]),
     ("Boost.Math", r"boost/math/", ["src/math/fusion.cpp"]),
-    ("DDS", r"(fastdds|fastrtps|fastcdr)/", [DDS_FOLDER]),
-    ("yaml-cpp", r"yaml-cpp/", ["src/description/"]),
+    ("DDS", r"(fastdds|fastrtps|fastcdr)/", list(DDS_FOLDERS)),
+    ("yaml-cpp", r"yaml-cpp/", ["src/description/", "apps/tfdude-ros/config/"]),
     ("urdfdom", r"(urdf_(model|parser|exception)|console_bridge)/", ["src/description/"]),
     ("tinyxml2", r"tinyxml2\.h$", ["src/description/", "src/keys/", "src/transport/fastdds/"]),
     ("SQLite", r"sqlite3\.h$", ["src/store/"]),
@@ -71,7 +80,7 @@ class Checker:
         self.generated = {
             idl.stem + tail
             for idl in (self.root / "idl").glob("*.idl")
-            for part in ("", "PubSubTypes", "CdrAux", "TypeObjectSupport")
+            for part in ("", "PubSubTypes", "CdrAux", "TypeObjectSupport", "_types")
             for tail in (part + ".h", part + ".hpp", part + ".ipp")}
         self.findings = []
         self.arrows = set()  # (layer, layer that it includes)
@@ -101,8 +110,8 @@ class Checker:
         if target is not None:
             self.check_own(path, layer, position, name, target)
             return
-        if name.rsplit("/", 1)[-1] in self.generated and not path.startswith(DDS_FOLDER):
-            self.report(path, position, "confined", f"<{name}> is generated: only in {DDS_FOLDER}")
+        if name.rsplit("/", 1)[-1] in self.generated and not path.startswith(DDS_FOLDERS):
+            self.report(path, position, "confined", f"<{name}> is generated: only in {', '.join(DDS_FOLDERS)}")
         for what, pattern, places in CONFINED:
             if re.match(pattern, name) and not any(path.startswith(place) for place in places):
                 self.report(path, position, "confined", f"<{name}>: {what} only in {', '.join(places)}")
@@ -122,9 +131,10 @@ class Checker:
             self.report(path, position, "arrow", f'{layer} may not include "{name}" of {other}')
         if path.startswith("include/") and not target.startswith("include/"):
             self.report(path, position, "public", f'a public header includes the private "{name}"')
-        if layer == "apps" and target.startswith("src/") and not target.startswith(DDS_FOLDER):
+        shares = any(path.startswith(place) and target in shared for place, shared in SHARED.items())
+        if layer == "apps" and target.startswith("src/") and not target.startswith(DDS_FOLDER) and not shares:
             self.report(path, position, "public", f'a program includes the private "{name}"')
-        if target.startswith(DDS_FOLDER) and not path.startswith(DDS_FOLDER):
+        if target.startswith(DDS_FOLDER) and not path.startswith(DDS_FOLDER) and not shares:
             self.report(path, position, "confined", f'"{name}" may bring DDS along: only in {DDS_FOLDER}')
 
     def check_listed(self):
@@ -185,6 +195,9 @@ class SelfTest(unittest.TestCase):
         "src/runtime/loop.cpp": 'auto t = Clock::now();\n#include <thread>\n',
         "apps/tfdude/main.cpp": '#include <CLI/CLI.hpp>\n#include <nlohmann/json.hpp>\n#include "tool.hpp"\n',
         "apps/tfdude/tool.hpp": '#include "tfdude/tree/forest.hpp"\n',
+        "src/transport/fastdds/compat.hpp": "#include <fastdds/dds/core.hpp>\n",
+        "apps/tfdude-ros/fastdds/ros.cpp":
+            '#include <fastdds/dds/core.hpp>\n#include "transport/fastdds/compat.hpp"\n#include <wire_types.hpp>\n',
     }
     # (rule, file, text)
     VIOLATIONS = [
@@ -207,6 +220,10 @@ class SelfTest(unittest.TestCase):
         ("confined", "src/client/a.cpp", '#include "wirePubSubTypes.h"\n'),
         ("confined", "src/client/a.cpp", "#include <generated/wire.hpp>\n"),
         ("confined", "apps/tfdude/a.cpp", '#include "transport/fastdds/entity.hpp"\n'),
+        ("confined", "apps/tfdude-ros/fastdds/a.cpp", '#include "transport/fastdds/entity.hpp"\n'),
+        ("confined", "apps/tfdude-ros/a.cpp", "#include <fastdds/dds/core.hpp>\n"),
+        ("confined", "apps/tfdude-ros/a.cpp", "#include <wire_types.hpp>\n"),
+        ("confined", "apps/tfdude-ros/a.cpp", '#include "transport/fastdds/compat.hpp"\n'),
         ("confined", "apps/tfdude/a.cpp", "#include <yaml-cpp/yaml.h>\n"),
         ("confined", "src/client/a.cpp", "#include <yaml-cpp/yaml.h>\n"),
         ("confined", "src/client/a.cpp", "#include <CLI/CLI.hpp>\n"),

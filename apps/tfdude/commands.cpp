@@ -190,7 +190,7 @@ Result<PartialTransform> given_parts(const TransformSpec& spec) {
 int run_update(Client& client, const Arguments& arguments) {
   const auto given = given_parts(arguments.spec);
   if (!given) return refuse_pose(given.error(), arguments);
-  const auto stamp = optional_stamp(arguments.stamp, wall_clock());
+  const auto stamp = optional_stamp(client, arguments.stamp);
   if (!stamp) return report(stamp.error(), arguments);
   const auto updated = client.update_partial({{arguments.id, *given}}, *stamp);
   return finish(client, updated, arguments, "updated");

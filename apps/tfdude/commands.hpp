@@ -60,17 +60,27 @@ struct Arguments {
   int samples = 0;
   double position = 0;                 ///< of a joint [rad or m]
   std::optional<double> joint_stddev;  ///< of this position [rad or m]
+  double over = 0.1;                   ///< interval of a velocity [s]
   KeysArguments keys;
 };
 
 [[nodiscard]] Time wall_clock();
 
+/// The time with which to compare the stamps of a path, for ages; nothing if an owner on it uses
+/// another clock, or if the time is not known.
+[[nodiscard]] std::optional<Time> present(Client& client, const Arguments& arguments,
+                                          const std::string& a, const std::string& b);
+/// Likewise, for one partition.
+[[nodiscard]] std::optional<Time> present(Client& client, const Arguments& arguments,
+                                          const PartitionInfo& partition);
+
 /// Reads a stamp of the command line: decimal seconds since the epoch, exact to nanoseconds. A
 /// negative number counts back from now. @return kInvalidInput naming the text.
 [[nodiscard]] Result<Time> parse_stamp(const std::string& text, Time now);
 
-/// As parse_stamp(), but no stamp for an empty text.
-[[nodiscard]] Result<std::optional<Time>> optional_stamp(const std::string& text, Time now);
+/// As parse_stamp(), with the client's clock, which only a relative stamp needs; no stamp for an
+/// empty text. @return also kNotYet
+[[nodiscard]] Result<std::optional<Time>> optional_stamp(Client& client, const std::string& text);
 
 /// Waits between two outputs of a command that runs until interrupted.
 /// @return whether it was interrupted
@@ -96,6 +106,7 @@ int run_remove(Client& client, const Arguments& arguments);
 int run_forget(Client& client, const Arguments& arguments);
 int run_move(Client& client, const Arguments& arguments);
 int run_lookup(Client& client, const Arguments& arguments);
+int run_velocity(Client& client, const Arguments& arguments);
 int run_parent(Client& client, const Arguments& arguments);
 int run_children(Client& client, const Arguments& arguments);
 int run_roots(Client& client, const Arguments& arguments);

@@ -15,7 +15,7 @@ _tfdude_command() {
   local i
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
-      --domain | --profile | --discovery-server | --timeout) ((++i)) ;;
+      --domain | --profile | --discovery-server | --timeout | --clock) ((++i)) ;;
       -*) ;;
       *) echo "${COMP_WORDS[i]}"; return ;;
     esac
@@ -35,8 +35,8 @@ _tfdude_keys() {
       words="--help --json --days"
       case " ${COMP_WORDS[*]} " in
         *" init "*) words+=" --sign --domains" ;;
-        *" daemon "*) words+=" --name --look --move --stream --observe" ;;
-        *" client "*) words+=" --look --move --stream --observe" ;;
+        *" daemon "*) words+=" --name --look --move --stream --observe --publish-clock" ;;
+        *" client "*) words+=" --look --move --stream --observe --publish-clock" ;;
       esac
       mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
       ;;
@@ -51,9 +51,10 @@ _tfdude_keys() {
 
 _tfdude() {
   local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command words common
-  local commands="tree frames partitions roots parent children exists lookup watch echo history monitor plot graph"
-  commands+=" events joints joint observe fuse correlate add update remove forget move keys"
-  local of_frames=" parent children exists lookup watch echo plot history observe fuse correlate update remove move "
+  local commands="tree frames partitions roots parent children exists lookup velocity watch echo history monitor"
+  commands+=" plot graph events joints joint observe fuse correlate add update remove forget move keys"
+  local of_frames=" parent children exists lookup velocity watch echo plot history observe fuse correlate update "
+  of_frames+="remove move "
   local pose="--xyz --rpy --quat --stddev --cov"
   COMPREPLY=()
   command=$(_tfdude_command)
@@ -65,17 +66,19 @@ _tfdude() {
   case $previous in
     --profile | --out) mapfile -t COMPREPLY < <(compgen -f -- "$word"); return ;;
     --domain | --discovery-server | --timeout | --rate | --at | --at-b | --stamp | --gate | --source) return ;;
-    --order | --samples | --extrapolate | --wait | --xyz | --rpy | --quat | --stddev) return ;;
+    --clock) words="system external" ;;
+    --order | --over | --samples | --extrapolate | --wait | --xyz | --rpy | --quat | --stddev) return ;;
     --partition) words=$(_tfdude_names partitions) ;;
     --parent | --fixed) words=$(timeout 0.5 tfdude "${common[@]}" frames 2>/dev/null) ;;
     *)
       if [[ $word == -* ]]; then
-        words="--help --domain --local --profile --discovery-server --timeout --json"
+        words="--help --domain --local --profile --discovery-server --clock --timeout --json"
         case $command in
           add) words+=" --parent --partition $pose" ;;
           update) words+=" --stamp $pose" ;;
           move) words+=" --parent $pose" ;;
           lookup) words+=" --cov --at --at-b --fixed --extrapolate --age-noise --wait --order" ;;
+          velocity) words+=" --cov --at --over" ;;
           correlate) words+=" --unknown --source" ;;
           observe | fuse) words+=" --stamp --gate --correlated $pose" ;;
           watch) words+=" --rate --composed --cov" ;;

@@ -113,10 +113,10 @@ std::string arrow(const Frame& frame, const std::string& beside, bool dashed) {
 
 }  // namespace
 
-std::string edge_text(const EdgeLabel& edge, Time now) {
+std::string edge_text(const EdgeLabel& edge) {
   constexpr double kMetres = 1e-3;
   constexpr double kTurn = 0.1;  // [°]
-  std::string text = edge.newest ? age_text(now - *edge.newest) : "";
+  std::string text = edge.age ? age_text(*edge.age) : "";
   if (!edge.covariance) return text;
   if (!edge.covariance->complete()) return text + (text.empty() ? "" : "  ") + "±?";
   const auto s = edge.covariance->of_specified().stddev();
@@ -154,7 +154,7 @@ std::string draw_graph(const Graph& graph) {
     if (frame.parent.empty()) continue;
     if (!frame.attached) missing.insert(frame.parent);
     const auto edge = graph.edges.find(frame.id);
-    arrows += arrow(frame, edge != graph.edges.end() ? edge_text(edge->second, graph.now) : "",
+    arrows += arrow(frame, edge != graph.edges.end() ? edge_text(edge->second) : "",
                     !frame.attached || reachable.count(frame.partition) == 0);
   }
   for (const std::string& parent : missing) text += missing_node(parent);

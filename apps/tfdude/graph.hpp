@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <optional>
 #include <string>
@@ -14,20 +15,19 @@ namespace tfdude::cli {
 /// The edge from a frame's parent to the frame, as far as it is known.
 struct EdgeLabel {
   std::optional<StatedCovariance> covariance;
-  std::optional<Time> newest;  ///< of its samples
+  std::optional<std::chrono::nanoseconds> age;  ///< of its newest sample
 };
 
 struct Graph {
   std::vector<Frame> frames;
   std::vector<PartitionInfo> partitions;
   std::map<std::string, EdgeLabel> edges;  ///< by the child's id
-  Time now;
 };
 
 /// The label of an edge: the age of its newest sample, and its largest standard deviations of
 /// position and rotation, if one is at least a millimetre or a tenth of a degree; "±?" if they are
 /// unspecified.
-[[nodiscard]] std::string edge_text(const EdgeLabel& edge, Time now);
+[[nodiscard]] std::string edge_text(const EdgeLabel& edge);
 
 /// A name in quotes, as DOT reads it.
 [[nodiscard]] std::string dot_id(std::string_view id);

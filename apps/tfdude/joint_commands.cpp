@@ -5,7 +5,7 @@
 namespace tfdude::cli {
 
 int run_joint(Client& client, const Arguments& arguments) {
-  const auto stamp = optional_stamp(arguments.stamp, wall_clock());
+  const auto stamp = optional_stamp(client, arguments.stamp);
   if (!stamp) return report(stamp.error(), arguments);
   JointValue joint{arguments.id, arguments.position};
   if (const auto stddev = arguments.joint_stddev) joint.variance = *stddev * *stddev;

@@ -36,6 +36,7 @@ json identity_json(const KeyFiles& files) {
           {"move", roles.move},
           {"stream", roles.stream},
           {"observe", roles.observe},
+          {"publish_clock", roles.clock},
           {"error", nullptr}};
 }
 
@@ -193,12 +194,13 @@ void add_roles(CLI::App* command, KeysArguments& keys) {
         });
   };
   command->add_flag("--look", keys.roles.look,
-                    "may ask for poses, joints and paths; all but --stream include it");
+                    "may ask for poses, joints and paths; --move and --observe include it");
   add_partitions("--move", keys.roles.move, "a partition that it may change in any way; repeat");
   add_partitions("--stream", keys.roles.stream,
                  "a partition to which it may stream values and joints; repeat");
   command->add_flag("--observe", keys.roles.observe,
                     "may send observations, and all other changes, to all partitions");
+  command->add_flag("--publish-clock", keys.roles.clock, "may publish the time of external clocks");
 }
 
 }  // namespace

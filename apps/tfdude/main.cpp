@@ -51,6 +51,7 @@ void add_pose_options(CLI::App& command, Arguments& arguments) {
 
 void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {
   cli::add_network_options(app, arguments.options);
+  cli::add_clock_option(app, [&](ClockKind kind) { arguments.options.clock = kind; });
   app.add_option("--timeout", timeout_ms, "how long to wait for an answer [ms]")
       ->check(CLI::Range(1, 3600000));
   app.add_flag("--json", arguments.json, "one JSON object per answer");
@@ -123,6 +124,22 @@ void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen) {
   lookup->get_option("--wait")->excludes(fixed);
 }
 
+void add_velocity_command(CLI::App& app, Arguments& arguments, Command& chosen) {
+  auto* velocity = add_command(app, "velocity", "mean velocity of B in A over an interval",
+                               "velocity world hand_left --over 0.05", cli::run_velocity, chosen);
+  ask_only(velocity, arguments);
+  add_ends(velocity, arguments);
+  velocity->add_flag("--cov", arguments.covariance, "print the full covariance");
+  add_stamp(velocity, "--at", arguments.stamp,
+            "the middle of the interval: seconds since the epoch or, negative, before now; "
+            "default: it ends at the latest common time");
+  velocity->add_option("--over", arguments.over, "length of the interval [s]")
+      ->check([](const std::string& text) {
+        const double seconds = std::strtod(text.c_str(), nullptr);
+        return seconds >= 1e-6 && seconds <= 1e6 ? "" : text + " is not within 1e-6 to 1e6";
+      });
+}
+
 // Commands that follow changes, most of them until interrupted.
 void add_following_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   auto* watch = add_command(app, "watch", "follow a path: its owners push what changes",
@@ -163,6 +180,7 @@ void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
   ask_only(exists, arguments);
   add_id(exists, arguments);
   add_lookup_command(app, arguments, chosen);
+  add_velocity_command(app, arguments, chosen);
 }
 
 void add_measuring_commands(CLI::App& app, Arguments& arguments, Command& chosen) {

@@ -204,12 +204,12 @@ Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTr
 
 // Collects the frames, and the edges of partitions that answer. A partition that does not answer is
 // not asked again, and is drawn as unreachable.
-Result<Graph> graph_of(Client& client) {
+Result<Graph> graph_of(Client& client, const Arguments& arguments) {
   auto frames = client.frames();
   if (!frames) return tl::unexpected(std::move(frames.error()));
   auto partitions = client.partitions();
   if (!partitions) return tl::unexpected(std::move(partitions.error()));
-  Graph graph{*std::move(frames), *std::move(partitions), {}, {}};
+  Graph graph{*std::move(frames), *std::move(partitions), {}};
   std::map<std::string, PartitionInfo*> by_name;
   for (PartitionInfo& partition : graph.partitions) {
     by_name[partition.name] = &partition;
@@ -217,7 +217,10 @@ Result<Graph> graph_of(Client& client) {
     const auto histories = client.histories(partition.name);
     partition.reachable = histories.has_value();
     if (!histories) continue;
-    for (const HistoryInfo& history : *histories) graph.edges[history.id].newest = history.newest;
+    const auto now = present(client, arguments, partition);
+    for (const HistoryInfo& history : *histories) {
+      if (now && history.newest) graph.edges[history.id].age = *now - *history.newest;
+    }
   }
   for (const Frame& frame : graph.frames) {
     const auto owner = by_name.find(frame.partition);
@@ -229,7 +232,6 @@ Result<Graph> graph_of(Client& client) {
       owner->second->reachable = false;
     }
   }
-  graph.now = wall_clock();
   return graph;
 }
 
@@ -237,11 +239,9 @@ Result<Graph> graph_of(Client& client) {
 
 int run_plot(Client& client, const Arguments& arguments) {
   Query query;
-  if (!arguments.stamp.empty()) {
-    const auto at = parse_stamp(arguments.stamp, wall_clock());
-    if (!at) return report(at.error(), arguments);
-    query.at = *at;
-  }
+  const auto at = optional_stamp(client, arguments.stamp);
+  if (!at) return report(at.error(), arguments);
+  query.at = *at;
   const auto X_AB = client.lookup(arguments.id, arguments.other, query);
   if (!X_AB) return refuse(client, X_AB.error(), arguments);
   const auto plot = plot_of(client, arguments, *X_AB);
@@ -262,7 +262,7 @@ int run_plot(Client& client, const Arguments& arguments) {
 }
 
 int run_graph(Client& client, const Arguments& arguments) {
-  const auto drawn = graph_of(client);
+  const auto drawn = graph_of(client, arguments);
   if (!drawn) return refuse(client, drawn.error(), arguments);
   const Graph& graph = *drawn;
   if (graph.partitions.empty()) {

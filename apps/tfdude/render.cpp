@@ -87,11 +87,33 @@ std::string partition_table(const std::vector<PartitionRow>& rows) {
               to_string(kProtocolVersion) + "\n";
       continue;
     }
+    if (partition.clock == ClockKind::kExternal) text += "  external clock\n";
     if (partition.reachable) continue;
     text += (partition.stopped ? "  stopped since " : "  lost since ") +
             to_string(partition.since) + "\n";
   }
   return text;
+}
+
+std::string matrix_table(const Matrix6d& sigma) {
+  std::string text;
+  for (const char* axis : {"x", "y", "z", "rx", "ry", "rz"}) text += format(" %12s", axis);
+  text += "\n";
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column < 6; ++column) text += format(" % .5e", sigma(row, column));
+    text += "\n";
+  }
+  return text;
+}
+
+nlohmann::json matrix_json(const Matrix6d& sigma) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (int row = 0; row < 6; ++row) {
+    nlohmann::json line = nlohmann::json::array();
+    for (int column = 0; column < 6; ++column) line.push_back(sigma(row, column));
+    rows.push_back(std::move(line));
+  }
+  return rows;
 }
 
 std::string unspecified_text(const std::vector<std::string>& edges) {
@@ -125,27 +147,13 @@ std::string describe(const Transform& X_AB, bool with_covariance,
   if (!with_covariance) return text;
   text += complete ? "covariance   (translation first, of the right perturbation; m, rad)\n"
                    : "covariance   of the others (translation first, right perturbation; m, rad)\n";
-  for (const char* axis : {"x", "y", "z", "rx", "ry", "rz"}) text += format(" %12s", axis);
-  text += "\n";
-  const Matrix6d sigma = X_AB.covariance.of_specified().matrix();
-  for (int row = 0; row < 6; ++row) {
-    for (int column = 0; column < 6; ++column) text += format(" % .5e", sigma(row, column));
-    text += "\n";
-  }
-  return text;
+  return text + matrix_table(X_AB.covariance.of_specified().matrix());
 }
 
 nlohmann::json lookup_json(const std::string& a, const std::string& b, const Transform& X_AB,
                            const std::vector<std::string>& partitions) {
   const Eigen::Vector3d t = X_AB.pose.translation();
   const Eigen::Quaterniond q = X_AB.pose.rotation();
-  const Matrix6d sigma = X_AB.covariance.of_specified().matrix();
-  nlohmann::json rows = nlohmann::json::array();
-  for (int row = 0; row < 6; ++row) {
-    nlohmann::json line = nlohmann::json::array();
-    for (int column = 0; column < 6; ++column) line.push_back(sigma(row, column));
-    rows.push_back(std::move(line));
-  }
   nlohmann::json json = {{"from", a},
                          {"to", b},
                          {"translation", {t.x(), t.y(), t.z()}},
@@ -153,7 +161,8 @@ nlohmann::json lookup_json(const std::string& a, const std::string& b, const Tra
                          {"covariance", nullptr},
                          {"partitions", partitions}};
   // Under another key if it is not all, so that nobody takes it for that.
-  json[X_AB.covariance.complete() ? "covariance" : "covariance_of_specified"] = std::move(rows);
+  json[X_AB.covariance.complete() ? "covariance" : "covariance_of_specified"] =
+      matrix_json(X_AB.covariance.of_specified().matrix());
   return json;
 }
 
@@ -172,6 +181,7 @@ nlohmann::json partition_json(const PartitionInfo& partition) {
                       {"reachable", partition.reachable}};
   if (!partition.program.empty()) json["program"] = partition.program;
   json["protocol"] = to_string(partition.protocol);
+  if (partition.compatible()) json["clock"] = to_string(partition.clock);
   if (!partition.compatible()) {
     json["reason"] = "incompatible";
   } else if (!partition.reachable) {

@@ -29,6 +29,10 @@ struct PartitionRow {
 [[nodiscard]] std::string describe(const Transform& X_AB, bool with_covariance,
                                    const std::vector<std::string>& unspecified = {});
 
+/// A table of the covariance, and its rows in JSON.
+[[nodiscard]] std::string matrix_table(const Matrix6d& sigma);
+[[nodiscard]] nlohmann::json matrix_json(const Matrix6d& sigma);
+
 /// "unspecified for odom, base"
 [[nodiscard]] std::string unspecified_text(const std::vector<std::string>& edges);
 

@@ -22,23 +22,26 @@ std::chrono::nanoseconds from_milliseconds(double milliseconds) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(milliseconds * 1e6));
 }
 
-Result<Query> query_of(const std::string& stamp, const Arguments& arguments) {
-  const Time now = wall_clock();
+Result<Query> query_of(Client& client, const std::string& stamp, const Arguments& arguments) {
   Query query;
-  const auto at = optional_stamp(stamp, now);
+  const auto at = optional_stamp(client, stamp);
   if (!at) return tl::unexpected(at.error());
   query.at = *at;
   query.extrapolate = from_milliseconds(arguments.extrapolate_ms);
-  if (arguments.age_noise) query.age_noise_until = now;
+  if (arguments.age_noise) {
+    const auto now = client.now();
+    if (!now) return tl::unexpected(now.error());
+    query.age_noise_until = *now;
+  }
   query.order = arguments.order == 4 ? Order::kFourth : Order::kSecond;
   return query;
 }
 
 Result<StampedTransform> look_up(Client& client, const Arguments& arguments) {
-  const auto at = query_of(arguments.stamp, arguments);
+  const auto at = query_of(client, arguments.stamp, arguments);
   if (!at) return tl::unexpected(at.error());
   if (!arguments.fixed.empty()) {
-    const auto other = query_of(arguments.other_stamp, arguments);
+    const auto other = query_of(client, arguments.other_stamp, arguments);
     if (!other) return tl::unexpected(other.error());
     return client.lookup(arguments.id, *at, arguments.other, *other, arguments.fixed);
   }
@@ -116,7 +119,7 @@ Result<Time> parse_stamp(const std::string& text, Time now) {
   const std::string digits = text.substr(before_now ? 1 : 0);
   const auto stamp_of = [&](std::int64_t ns) -> Result<Time> {
     const Time stamp = before_now ? now - std::chrono::nanoseconds(ns) : time_of(ns);
-    if (nanoseconds(stamp) <= 0) return bad();
+    if (nanoseconds(stamp) < 0) return bad();
     return stamp;
   };
   if (digits.find_first_of("eE") != std::string::npos &&
@@ -139,25 +142,58 @@ Result<Time> parse_stamp(const std::string& text, Time now) {
   return stamp_of(seconds * kSecond + std::stoll(fraction));
 }
 
-Result<std::optional<Time>> optional_stamp(const std::string& text, Time now) {
+Result<std::optional<Time>> optional_stamp(Client& client, const std::string& text) {
   if (text.empty()) return std::nullopt;
-  return parse_stamp(text, now).map([](Time stamp) { return std::optional<Time>(stamp); });
+  const auto now = text[0] == '-' ? client.now() : Result<Time>();
+  if (!now) return tl::unexpected(now.error());
+  return parse_stamp(text, *now).map([](Time stamp) { return std::optional<Time>(stamp); });
+}
+
+std::optional<Time> present(Client& client, const Arguments& arguments, const std::string& a,
+                            const std::string& b) {
+  const auto path = client.path(a, b);
+  const bool same = path && std::all_of(path->begin(), path->end(), [&](const PathSegment& one) {
+                      return one.clock == arguments.options.clock;
+                    });
+  const auto now = same ? client.now() : fail(Errc::kInvalidInput, "the clocks differ");
+  return now ? std::optional<Time>(*now) : std::nullopt;
+}
+
+std::optional<Time> present(Client& client, const Arguments& arguments,
+                            const PartitionInfo& partition) {
+  if (partition.clock != arguments.options.clock) return std::nullopt;
+  const auto now = client.now();
+  return now ? std::optional<Time>(*now) : std::nullopt;
 }
 
 int run_lookup(Client& client, const Arguments& arguments) {
   const auto X_AB = look_up(client, arguments);
   if (!X_AB) return refuse(client, X_AB.error(), arguments);
   std::string text = describe(*X_AB, arguments.covariance, X_AB->basis.unspecified);
-  if (X_AB->stamp) text += describe_stamp(X_AB->stamp, wall_clock());
+  if (X_AB->stamp && !arguments.json) {
+    text += describe_stamp(X_AB->stamp, present(client, arguments, arguments.id, arguments.other));
+  }
   text += describe(X_AB->basis);
   return answer(arguments, arguments.json ? json_of(client, arguments, *X_AB) : nlohmann::json(),
                 text);
 }
 
+int run_velocity(Client& client, const Arguments& arguments) {
+  const auto at = optional_stamp(client, arguments.stamp);
+  if (!at) return refuse(client, at.error(), arguments);
+  const VelocityQuery query{*at, from_milliseconds(arguments.over * 1e3)};
+  const auto velocity = client.velocity(arguments.id, arguments.other, query);
+  if (!velocity) return refuse(client, velocity.error(), arguments);
+  return answer(arguments, velocity_json(arguments.id, arguments.other, *velocity),
+                describe(*velocity, arguments.covariance));
+}
+
 int run_watch(Client& client, const Arguments& arguments) {
   return follow(client, arguments, [&](const StampedTransform& X_AB) {
     std::string text = describe(X_AB, arguments.covariance, X_AB.basis.unspecified);
-    if (X_AB.stamp) text += describe_stamp(X_AB.stamp, wall_clock());
+    if (X_AB.stamp && !arguments.json) {
+      text += describe_stamp(X_AB.stamp, present(client, arguments, arguments.id, arguments.other));
+    }
     (void)answer(arguments, arguments.json ? json_of(client, arguments, X_AB) : nlohmann::json(),
                  text);
   });
@@ -169,7 +205,8 @@ int run_echo(Client& client, const Arguments& arguments) {
     if (arguments.json) {
       (void)answer(arguments, json_of(client, arguments, X_AB), "");
     } else {
-      screen.redraw(echo_lines(arguments.id, arguments.other, X_AB, wall_clock()));
+      const auto now = present(client, arguments, arguments.id, arguments.other);
+      screen.redraw(echo_lines(arguments.id, arguments.other, X_AB, now));
     }
   });
 }
@@ -177,15 +214,21 @@ int run_echo(Client& client, const Arguments& arguments) {
 int run_history(Client& client, const Arguments& arguments) {
   const auto histories = client.history(arguments.id);
   if (!histories) return refuse(client, histories.error(), arguments);
-  const Time now = wall_clock();
   if (histories->empty() || !histories->front().newest) {
     const std::uint64_t refused = histories->empty() ? 0 : histories->front().refused_ahead;
+    const auto parent = client.parent(arguments.id);
+    const auto X_PC = parent ? client.lookup(*parent, arguments.id) : Result<Transform>();
+    const bool cleared = !X_PC && X_PC.error().code == Errc::kNotYet;
     const nlohmann::json json{
-        {"id", arguments.id}, {"moving", false}, {"samples", 0}, {"refused_ahead", refused}};
-    std::string text = arguments.id + " is static: it holds for all times\n";
+        {"id", arguments.id}, {"moving", cleared}, {"samples", 0}, {"refused_ahead", refused}};
+    std::string text = arguments.id + (cleared ? " is dynamic: no sample since its history was "
+                                                 "cleared\n"
+                                               : " is static: it holds for all times\n");
     if (refused > 0) text += "rejected     " + std::to_string(refused) + " too far ahead\n";
     return answer(arguments, json, text);
   }
+  const auto parent = client.parent(arguments.id);
+  const auto now = parent ? present(client, arguments, *parent, arguments.id) : std::nullopt;
   return answer(arguments, history_json(histories->front(), now),
                 describe(histories->front(), now));
 }
@@ -203,7 +246,7 @@ int run_monitor(Client& client, const Arguments& arguments) {
     if (partitions->empty()) text = nobody_answers(arguments) + "\n";
     for (const PartitionInfo& partition : *partitions) {
       const auto histories = client.histories(partition.name);
-      const Time now = wall_clock();
+      const auto now = present(client, arguments, partition);
       nlohmann::json one{{"partition", partition.name}, {"reachable", histories.has_value()}};
       if (histories) {
         one["edges"] = nlohmann::json::array();

@@ -16,8 +16,9 @@ double rate_of(const HistoryInfo& history) {
   return history.mean_gap.count() > 0 ? 1.0 / seconds(history.mean_gap) : 0.0;
 }
 
-std::string ago(Time stamp, Time now) {
-  const double age = seconds(now - stamp);
+std::string ago(Time stamp, std::optional<Time> now) {
+  if (!now) return "of another clock";
+  const double age = seconds(*now - stamp);
   return age < 0 ? format("%.6f s ahead of now", -age) : format("%.6f s ago", age);
 }
 
@@ -30,7 +31,7 @@ std::string seconds_of(Time stamp) {
                 static_cast<long long>(ns % kSecond));
 }
 
-std::string describe_stamp(const std::optional<Time>& stamp, Time now) {
+std::string describe_stamp(const std::optional<Time>& stamp, std::optional<Time> now) {
   if (!stamp) return "stamp        none: holds for all times\n";
   return "stamp        " + seconds_of(*stamp) + "  (" + ago(*stamp, now) + ")\n";
 }
@@ -41,7 +42,7 @@ void add_stamp(nlohmann::json& json, const std::optional<Time>& stamp) {
   json["stamp_ns"] = stamp ? nlohmann::json(nanoseconds(*stamp)) : nlohmann::json();
 }
 
-std::string describe(const HistoryInfo& history, Time now) {
+std::string describe(const HistoryInfo& history, std::optional<Time> now) {
   std::string text =
       format("samples      %zu of at most %zu, %.3f s of at most %.3f s\n", history.samples,
              history.count_limit, history.newest ? seconds(*history.newest - *history.oldest) : 0.0,
@@ -63,7 +64,7 @@ std::string describe(const HistoryInfo& history, Time now) {
   return text + format("memory       %zu bytes\n", history.bytes);
 }
 
-nlohmann::json history_json(const HistoryInfo& history, Time now) {
+nlohmann::json history_json(const HistoryInfo& history, std::optional<Time> now) {
   nlohmann::json json{{"id", history.id},
                       {"moving", history.newest.has_value()},
                       {"samples", history.samples},
@@ -81,7 +82,7 @@ nlohmann::json history_json(const HistoryInfo& history, Time now) {
   json["oldest_ns"] = nanoseconds(*history.oldest);
   json["newest_ns"] = nanoseconds(*history.newest);
   json["span"] = seconds(*history.newest - *history.oldest);
-  json["age"] = seconds(now - *history.newest);
+  json["age"] = now ? nlohmann::json(seconds(*now - *history.newest)) : nlohmann::json();
   return json;
 }
 
@@ -101,7 +102,7 @@ std::string describe(const HistorySum& sum) {
 }
 
 std::string echo_lines(const std::string& a, const std::string& b, const StampedTransform& X_AB,
-                       Time now) {
+                       std::optional<Time> now) {
   const Eigen::Vector3d t = X_AB.pose.translation();
   const Eigen::Vector3d rpy = to_rpy(X_AB.pose.rotation()) * kDegrees;
   const auto s = X_AB.covariance.of_specified().stddev();
@@ -120,7 +121,7 @@ std::string echo_lines(const std::string& a, const std::string& b, const Stamped
 }
 
 std::string monitor_table(const std::string& partition, const std::vector<HistoryInfo>& histories,
-                          Time now) {
+                          std::optional<Time> now) {
   std::string text =
       "partition " + shortened(partition, 24) + ": " + describe(sum_of(histories)) + "\n";
   if (histories.empty()) return text;
@@ -136,7 +137,7 @@ std::string monitor_table(const std::string& partition, const std::vector<Histor
     const std::uint64_t rejected =
         history.refused_old + history.refused_equal + history.refused_ahead;
     text += row(history.id, number(rate_of(history), 1, 10),
-                history.newest ? number(milliseconds(now - *history.newest), 1, 10) : "-",
+                history.newest && now ? number(milliseconds(*now - *history.newest), 1, 10) : "-",
                 number(milliseconds(history.jitter), 3, 11),
                 number(milliseconds(history.max_gap), 3, 10),
                 number(static_cast<double>(rejected), 0, 9));

@@ -14,15 +14,17 @@ namespace tfdude::cli {
 /// "1700000000.123456789": seconds since the epoch, exact.
 [[nodiscard]] std::string seconds_of(Time stamp);
 
+// Without `now`, ages are not known: the stamps are of another clock.
+
 /// The line with the stamp of a transform.
-[[nodiscard]] std::string describe_stamp(const std::optional<Time>& stamp, Time now);
+[[nodiscard]] std::string describe_stamp(const std::optional<Time>& stamp, std::optional<Time> now);
 
 /// Adds `stamp` [s] and `stamp_ns` to a transform's JSON; both are null if it holds for all times.
 void add_stamp(nlohmann::json& json, const std::optional<Time>& stamp);
 
 /// The history of one edge, or that it has none.
-[[nodiscard]] std::string describe(const HistoryInfo& history, Time now);
-[[nodiscard]] nlohmann::json history_json(const HistoryInfo& history, Time now);
+[[nodiscard]] std::string describe(const HistoryInfo& history, std::optional<Time> now);
+[[nodiscard]] nlohmann::json history_json(const HistoryInfo& history, std::optional<Time> now);
 
 /// The total of a partition's histories.
 struct HistorySum {
@@ -35,10 +37,11 @@ struct HistorySum {
 
 /// A transform in a fixed, small number of lines: position, angles, standard deviations, age.
 [[nodiscard]] std::string echo_lines(const std::string& a, const std::string& b,
-                                     const StampedTransform& X_AB, Time now);
+                                     const StampedTransform& X_AB, std::optional<Time> now);
 
 /// One partition's dynamic edges as a table.
 [[nodiscard]] std::string monitor_table(const std::string& partition,
-                                        const std::vector<HistoryInfo>& histories, Time now);
+                                        const std::vector<HistoryInfo>& histories,
+                                        std::optional<Time> now);
 
 }  // namespace tfdude::cli

@@ -21,7 +21,7 @@ int measure(Client& client, const Arguments& arguments, Measure take) {
   }
   const auto X = arguments.spec.build();
   if (!X) return report({X.error().code, "the measurement: " + X.error().message}, arguments);
-  const auto stamp = optional_stamp(arguments.stamp, wall_clock());
+  const auto stamp = optional_stamp(client, arguments.stamp);
   if (!stamp) return report(stamp.error(), arguments);
   const auto observed = take(client, arguments, *X, *stamp);
   if (!observed) return refuse(client, observed.error(), arguments);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "format.hpp"
+#include "render.hpp"
 #include "table.hpp"
 #include "time_render.hpp"
 
@@ -103,6 +104,51 @@ nlohmann::json consistency_json(const EdgeConsistency& edge) {
           {"variance_factor", factor_of(edge)},
           {"deviations", deviation_of(edge)},
           {"verdict", verdict_of(edge)}};
+}
+
+std::string describe(const Velocity& velocity, bool with_covariance) {
+  const Eigen::Vector3d& v = velocity.linear;
+  const Eigen::Vector3d w = velocity.angular * kDegrees;
+  const auto s = velocity.covariance.of_specified().stddev();
+  std::string text = format("linear       %.6f  %.6f  %.6f  m/s\n", v.x(), v.y(), v.z());
+  text += format("angular      %.4f  %.4f  %.4f  deg/s\n", w.x(), w.y(), w.z());
+  const bool complete = velocity.covariance.complete();
+  if (!complete) text += "std dev      " + unspecified_text(velocity.basis.unspecified) + "\n";
+  text += (complete ? "std dev      " : "  of others  ") +
+          format("%.6f  %.6f  %.6f  m/s\n", s[0], s[1], s[2]);
+  text += format("             %.4f  %.4f  %.4f  deg/s\n", s[3] * kDegrees, s[4] * kDegrees,
+                 s[5] * kDegrees);
+  if (with_covariance) {
+    text += complete ? "covariance   (linear first; m/s, rad/s)\n"
+                     : "covariance   of the others (linear first; m/s, rad/s)\n";
+    text += matrix_table(velocity.covariance.of_specified().matrix());
+  }
+  if (velocity.begin && velocity.end) {
+    text += "from         " + seconds_of(*velocity.begin) + "\nto           " +
+            seconds_of(*velocity.end) + "\n";
+  } else {
+    text += "interval     none: all edges are static\n";
+  }
+  return text + describe(velocity.basis);
+}
+
+nlohmann::json velocity_json(const std::string& a, const std::string& b, const Velocity& velocity) {
+  const Eigen::Vector3d& v = velocity.linear;
+  const Eigen::Vector3d& w = velocity.angular;
+  const auto ns = [](const std::optional<Time>& time) {
+    return time ? nlohmann::json(nanoseconds(*time)) : nlohmann::json();
+  };
+  nlohmann::json json{{"from", a},
+                      {"to", b},
+                      {"linear", {v.x(), v.y(), v.z()}},
+                      {"angular", {w.x(), w.y(), w.z()}},
+                      {"covariance", nullptr},
+                      {"begin_ns", ns(velocity.begin)},
+                      {"end_ns", ns(velocity.end)},
+                      {"basis", basis_json(velocity.basis)}};
+  json[velocity.covariance.complete() ? "covariance" : "covariance_of_specified"] =
+      matrix_json(velocity.covariance.of_specified().matrix());
+  return json;
 }
 
 }  // namespace tfdude::cli

@@ -23,4 +23,9 @@ namespace tfdude::cli {
 [[nodiscard]] std::string consistency_table(const std::vector<EdgeConsistency>& edges);
 [[nodiscard]] nlohmann::json consistency_json(const EdgeConsistency& edge);
 
+/// A velocity of B in A.
+[[nodiscard]] std::string describe(const Velocity& velocity, bool with_covariance);
+[[nodiscard]] nlohmann::json velocity_json(const std::string& a, const std::string& b,
+                                           const Velocity& velocity);
+
 }  // namespace tfdude::cli

@@ -110,6 +110,7 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
                "only print what the configuration would change in the stored state");
   const UrdfOptions urdfs(app);
   cli::add_network_options(app, arguments.options);
+  cli::add_clock_option(app, [&](ClockKind kind) { arguments.clock = kind; });
   auto* state = app.add_option("--state", arguments.options.state,
                                "directory in which to keep the frames "
                                "(default: $XDG_STATE_HOME/tfdude or ~/.local/state/tfdude)");

@@ -17,6 +17,7 @@ struct Arguments {
   std::string config;
   std::vector<UrdfPart> urdfs;
   bool check = false;  ///< only print what the configuration would change
+  std::optional<ClockKind> clock;
   Options options;
 };
 

@@ -44,6 +44,12 @@ tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
                                                    config.partition + "' is not the '" +
                                                    arguments.partition + "' of --partition");
   }
+  if (arguments.clock && config.clock && *arguments.clock != *config.clock) {
+    return tfdude::fail(tfdude::Errc::kConfig, arguments.config + ": clock '" +
+                                                   to_string(*config.clock) + "' is not the '" +
+                                                   to_string(*arguments.clock) + "' of --clock");
+  }
+  if (arguments.clock) config.clock = arguments.clock;
   if (config.partition.empty()) {
     return tfdude::fail(tfdude::Errc::kConfig,
                         "no partition: give --partition, or name it in --config");
@@ -93,6 +99,7 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
   if (arguments.check) return check(arguments, *config);
   tfdude::Options options = arguments.options;
   options.history = config->history;
+  options.clock = config->clock.value_or(tfdude::ClockKind::kSystem);
   auto node = tfdude::Node::open(config->partition, config->frames, options);
   if (!node) {
     spdlog::error("partition {}: {}", tfdude::quote(config->partition), node.error().message);

@@ -11,14 +11,14 @@ namespace tfdude {
 
 /// Whether a sample can have this stamp, if any.
 [[nodiscard]] inline bool is_stamp(std::optional<Time> stamp) {
-  return !stamp || nanoseconds(*stamp) > 0;
+  return !stamp || nanoseconds(*stamp) >= 0;
 }
 
 /// @return kInvalidInput naming it
 [[nodiscard]] inline Result<void> check_stamp(std::optional<Time> stamp) {
   if (is_stamp(stamp)) return {};
-  return fail(Errc::kInvalidInput, "the stamp must be after 1970-01-01, not " +
-                                       std::to_string(nanoseconds(*stamp)) + " ns");
+  return fail(Errc::kInvalidInput, "the stamp must not be negative, as " +
+                                       std::to_string(nanoseconds(*stamp)) + " ns is");
 }
 
 }  // namespace tfdude

@@ -7,6 +7,10 @@
 
 namespace tfdude {
 
+const char* to_string(ClockKind kind) {
+  return kind == ClockKind::kExternal ? "external" : "system";
+}
+
 std::string in_milliseconds(std::chrono::nanoseconds duration) {
   std::array<char, 32> text{};
   const double ms = static_cast<double>(duration.count()) * 1e-6;

@@ -225,6 +225,26 @@ Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
   });
 }
 
+Result<EdgesWatch> Client::watch_edges(const std::vector<std::string>& ids,
+                                       const WatchOptions& options) {
+  return participant_->watcher().watch_edges(ids, options).map([](auto edges) {
+    return EdgesWatch(edges);
+  });
+}
+
+Result<Velocity> Client::velocity(const std::string& a, const std::string& b,
+                                  const VelocityQuery& query) {
+  return participant_->velocities().velocity(a, b, query,
+                                             participant_->discovery().call_deadline());
+}
+
+Result<Time> Client::now() {
+  return participant_->clock().await(participant_->discovery().call_deadline());
+}
+
+Result<void> Client::set_time(Time now) { return participant_->set_time(now); }
+Result<void> Client::publish_clock(Time now) { return participant_->publish_clock(now); }
+
 Result<Observed> Client::observe(const std::string& a, const std::string& b, const Transform& X_AB,
                                  std::optional<Time> stamp, const ObserveOptions& options) {
   return participant_->observations().observe(a, b, X_AB, stamp, options,

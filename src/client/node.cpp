@@ -39,6 +39,12 @@ Result<Node> Node::open(TransportPtr transport, const std::string& partition,
 
 std::size_t Node::own_frames() const { return participant_->queries().own_frames(); }
 
+Result<void> Node::clear_history(const std::string& id) {
+  return participant_->forest().clear_history(id);
+}
+
+std::size_t Node::clear_history() { return participant_->forest().clear_histories(Time::min()); }
+
 RefusedCounts Node::refused() const { return participant_->refused(); }
 
 const std::string& Node::partition() const { return participant_->member().name(); }

@@ -23,4 +23,18 @@ bool PathWatch::wait_for_more(std::uint64_t messages,
   return path_->wait_for_more(messages, deadline);
 }
 
+Result<StampedTransform> EdgesWatch::lookup(std::string_view a, std::string_view b,
+                                            const Query& query) const {
+  return edges_->lookup(a, b, query);
+}
+
+Result<void> EdgesWatch::health() const { return edges_->health(); }
+
+std::uint64_t EdgesWatch::messages() const { return edges_->messages(); }
+
+bool EdgesWatch::wait_for_more(std::uint64_t messages,
+                               std::chrono::steady_clock::time_point deadline) const {
+  return edges_->wait_for_more(messages, deadline);
+}
+
 }  // namespace tfdude

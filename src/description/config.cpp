@@ -21,8 +21,8 @@
 namespace tfdude {
 namespace {
 
-constexpr std::array<std::string_view, 5> kFileKeys = {"partition", "covariance", "history",
-                                                       "frames", "urdf"};
+constexpr std::array<std::string_view, 6> kFileKeys = {"partition", "clock",  "covariance",
+                                                       "history",   "frames", "urdf"};
 constexpr std::array<std::string_view, 11> kFrameKeys = {
     "id",  "parent",     "xyz",     "rpy",         "quat",   "stddev",
     "cov", "covariance", "history", "correlation", "sources"};
@@ -218,6 +218,15 @@ Result<Config> Reader::config(const YAML::Node& root) const {
       return error(ok.error().code, found->second.mark, ok.error().message);
     }
     config.partition = *std::move(name);
+  }
+  if (const auto found = entries->find("clock"); found != entries->end()) {
+    const auto kind = text(found->second, "clock");
+    if (!kind) return tl::unexpected(kind.error());
+    if (*kind != "system" && *kind != "external") {
+      return error(Errc::kInvalidInput, found->second.mark,
+                   "clock must be system or external, not " + tfdude::quote(*kind));
+    }
+    config.clock = *kind == "external" ? ClockKind::kExternal : ClockKind::kSystem;
   }
   if (const auto found = entries->find("covariance"); found != entries->end()) {
     const auto word = text(found->second, "covariance");

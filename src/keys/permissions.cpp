@@ -20,6 +20,7 @@ enum class Right {
   kLook,    // in all
   kChange,  // in those that it may change
   kStream,  // in those that it may change, or stream to
+  kClock,   // in all
 };
 
 struct Access {
@@ -34,7 +35,7 @@ constexpr const char* kSubscribe = "subscribe";
 
 /// All that travels. Each line becomes a rule of its own: within one rule, Fast DDS allows each of
 /// its topics in the partitions of all others, and only the first rule for a topic counts.
-constexpr std::array<Access, 16> kTable{{
+constexpr std::array<Access, 18> kTable{{
     {kPresenceTopic, kPublish, Right::kServe},
     {kPresenceTopic, kSubscribe, Right::kAll},
     {kDirectoryTopic, kPublish, Right::kServe},
@@ -51,6 +52,8 @@ constexpr std::array<Access, 16> kTable{{
     {kUpdateTopic, kSubscribe, Right::kServe},
     {kJointTopic, kPublish, Right::kStream},
     {kJointTopic, kSubscribe, Right::kServe},
+    {kClockTopic, kPublish, Right::kClock},
+    {kClockTopic, kSubscribe, Right::kAll},
 }};
 
 // Also a pattern of Fast DDS: fnmatch() without escapes.
@@ -75,6 +78,9 @@ std::set<std::string> partitions_of(const Access& access, const Roles& roles) {
     case Right::kStream:
       names = roles.move;
       names.insert(roles.stream.begin(), roles.stream.end());
+      break;
+    case Right::kClock:
+      if (roles.clock) names.insert(kAllPartitions);
       break;
   }
   std::set<std::string> partitions;
@@ -190,6 +196,9 @@ void add_access(Roles& roles, const Access& access, const std::string& partition
       break;
     case Right::kStream:
       roles.stream.insert(partition);
+      break;
+    case Right::kClock:
+      roles.clock = true;
       break;
   }
 }

@@ -39,8 +39,9 @@ Result<Roles> complete(Roles roles) {
   }
   if (roles.serves || !roles.move.empty() || roles.observe) roles.look = true;
   for (const std::string& partition : roles.move) roles.stream.erase(partition);
-  if (!roles.look && roles.stream.empty()) {
-    return fail(Errc::kInvalidInput, "no role is given: look, move, stream or observe");
+  if (!roles.look && roles.stream.empty() && !roles.clock) {
+    return fail(Errc::kInvalidInput,
+                "no role is given: look, move, stream, observe or publish-clock");
   }
   return roles;
 }
@@ -67,6 +68,7 @@ std::vector<std::string> in_words(const Roles& roles) {
         "observes: sends observations to all partitions; nothing keeps it from other changes "
         "there");
   }
+  if (roles.clock) words.emplace_back("publishes the time of external clocks");
   return words;
 }
 

@@ -84,6 +84,7 @@ void Directory::apply(const Presence& presence, Time now) {
   info.pid = presence.pid;
   info.program = presence.program;
   info.protocol = presence.protocol;
+  info.clock = clock_of(presence);
   if (!info.reachable || info.since == Time{}) info.since = now;
   came_back(partition, owner);
   resolve_returns();

@@ -243,6 +243,7 @@ std::vector<PartitionInfo> Member::partitions() const {
     if (info.name != name_) continue;
     info.host = presence_.host;
     info.pid = presence_.pid;
+    info.clock = clock_of(presence_);
     info.frames = partition_->frame_count();
   }
   return all;

@@ -68,6 +68,8 @@ class Member {
   /// @param random  a different number for each process
   void claim(const std::string& host, std::uint32_t pid, Time now, std::uint64_t random);
   [[nodiscard]] const NameClaim& name_claim() const { return claim_; }
+  /// After claim(): its stamps are of an external clock.
+  void use_external_clock() { presence_.clock = Time{}; }
   /// Announces that it has taken the name.
   void take_name() { presence_.taken = true; }
   /// Serves the partition, with the frames that an earlier process left, if they are stored, and

@@ -323,7 +323,7 @@ struct Presence {
   std::uint64_t ticket = 0;  ///< of its claim to the name (NameClaim); constant for the process
   ProtocolVersion protocol = kProtocolVersion;
   std::string program{};        ///< the version of its program, for people
-  std::optional<Time> clock{};  ///< of its stamps, when it was sent; absent: the system's clock
+  std::optional<Time> clock{};  ///< its external clock when sent; absent: the system's
 
   friend bool operator==(const Presence& a, const Presence& b) {
     return a.partition == b.partition && a.incarnation == b.incarnation && a.host == b.host &&
@@ -333,5 +333,10 @@ struct Presence {
            a.clock.has_value() == b.clock.has_value();
   }
 };
+
+/// The clock that the sender's stamps are of.
+[[nodiscard]] inline ClockKind clock_of(const Presence& presence) {
+  return presence.clock ? ClockKind::kExternal : ClockKind::kSystem;
+}
 
 }  // namespace tfdude

@@ -11,8 +11,6 @@
 namespace tfdude {
 namespace {
 
-constexpr Time kFirstInstant{std::chrono::nanoseconds(1)};
-
 tl::unexpected<Error> unknown_frame(std::string_view id) {
   return fail(Errc::kUnknownFrame, "no frame " + quote(id));
 }
@@ -43,6 +41,15 @@ Result<void> check_size(const Part& part, std::size_t items, const char* what) {
   return fail(Errc::kInvalidInput, "partition " + quote(part.partition) + " is asked for " +
                                        std::to_string(items) + " " + what +
                                        " at once, of at most " + std::to_string(kMaxItems));
+}
+
+Result<WatchPlan> checked(const Directory& directory, WatchPlan plan) {
+  if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
+  for (const Part& part : plan.parts) {
+    const std::size_t edges = std::get<WatchRequest>(part.request.body).segments.size();
+    if (auto ok = check_size(part, edges, "edges"); !ok) return tl::unexpected(ok.error());
+  }
+  return plan;
 }
 
 // The end of the segment that its owner owns: for a segment that goes up, the lower one.
@@ -243,15 +250,13 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
                                 std::optional<Time> hint) {
   auto segments = forest.segments(a, b);
   if (!segments) return tl::unexpected(segments.error());
-  LookupPlan plan{*std::move(segments), {}};
+  LookupPlan plan{*std::move(segments), {}, query.at && *query.at < Time{}};
   for (const Segment& segment : plan.segments) {
     auto& body =
         body_for<LookupRequest>(plan.parts, directory, segment.owner, owned_end(forest, segment));
     body.segments.push_back({segment.from, segment.to});
     body.query = query;
-    // In a message zero means the latest instant. So an instant up to zero becomes the first valid
-    // one: there are no samples before that either.
-    if (query.at) body.query.at = std::max(*query.at, kFirstInstant);
+    if (plan.before_all) body.query.at = Time{};
     body.hint = hint;
   }
   if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
@@ -289,12 +294,25 @@ Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
     }
     plan.edges = *std::move(edges);
   }
-  if (auto ok = check_reachable(directory, plan.parts); !ok) return tl::unexpected(ok.error());
-  for (const Part& part : plan.parts) {
-    const std::size_t edges = std::get<WatchRequest>(part.request.body).segments.size();
-    if (auto ok = check_size(part, edges, "edges"); !ok) return tl::unexpected(ok.error());
+  return checked(directory, std::move(plan));
+}
+
+Result<WatchPlan> route_watch_edges(const Forest& forest, const Directory& directory,
+                                    const std::vector<std::string>& ids,
+                                    std::chrono::nanoseconds period) {
+  WatchPlan plan;
+  for (const std::string& id : ids) {
+    auto edge = forest.info(id);
+    if (!edge) return unknown_frame(id);
+    if (edge->parent.empty()) {
+      return fail(Errc::kInvalidInput, "frame " + quote(id) + " is a root: it has no edge");
+    }
+    auto& body = body_for<WatchRequest>(plan.parts, directory, edge->owner, id);
+    body.period = period;
+    body.segments.push_back({edge->parent, id});
+    plan.edges.push_back(*std::move(edge));
   }
-  return plan;
+  return checked(directory, std::move(plan));
 }
 
 namespace {
@@ -368,6 +386,9 @@ Result<StampedTransform> assemble(const LookupPlan& plan,
                                      std::to_string(asked.size()) + " segments");
   }
   StampedTransform X_AB = composed(plan, answers);
+  if (plan.before_all && X_AB.stamp) {
+    return fail(Errc::kTooOld, "there is no data for a negative time");
+  }
   if (!X_AB.covariance.complete()) X_AB.basis.unspecified = unspecified_edges(plan, answers);
   return X_AB;
 }

@@ -27,6 +27,9 @@ struct Part {
 struct LookupPlan {
   std::vector<Segment> segments;  ///< in the order of the path; empty if it starts where it ends
   std::vector<Part> parts;        ///< each with its owner's segments in the order of the path
+  /// The instant is negative. No sample is so early, and no message can name it, so the parts ask
+  /// for zero instead.
+  bool before_all = false;
 };
 
 /// A request to one owner. @return kUnreachable.
@@ -95,9 +98,16 @@ struct WatchPlan {
                                             const std::string& a, const std::string& b,
                                             bool composed, std::chrono::nanoseconds period);
 
+/// As route_watch(), for the edges of these frames, in their order.
+/// @return kUnknownFrame, kUnreachable, kInvalidInput (a root; too many edges).
+[[nodiscard]] Result<WatchPlan> route_watch_edges(const Forest& forest, const Directory& directory,
+                                                  const std::vector<std::string>& ids,
+                                                  std::chrono::nanoseconds period);
+
 /// X_AB from the answers to a plan's parts (same order); the identity if the plan has none. The
 /// values must be at one instant (one_instant()).
-/// @return kNotOwner if the number of transforms in an answer does not match the request.
+/// @return kNotOwner if the number of transforms in an answer does not match the request; kTooOld
+///   if the instant is negative, and an edge is dynamic.
 [[nodiscard]] Result<StampedTransform> assemble(const LookupPlan& plan,
                                                 const std::vector<SegmentValues>& answers);
 

@@ -3,7 +3,6 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/mutex.hpp"
-#include "runtime/wall_clock.hpp"
 
 namespace tfdude {
 namespace {
@@ -41,7 +40,7 @@ PendingLookups::Links Lookups::links(Transport& transport, const Watcher& watche
           [this](Error last, const Deadline& deadline) {
             return requests_.last_word(std::move(last), deadline);
           },
-          wall_clock,
+          [this] { return structure_.clock.now(); },
           timeout_,
           requests_.on_demand() != nullptr};
 }
@@ -54,8 +53,38 @@ Result<Gathering> Lookups::plan(const PendingLookups::Wanted& wanted) {
   }
   const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
   const Lock lock(structure_.mutex);
-  return route_lookup(structure_.forest, structure_.directory, a, b, query, hint)
-      .map([&, &a = a, &b = b](LookupPlan plan) { return Gathering(std::move(plan), a, b, hint); });
+  return routed(structure_.directory, a, b, query, hint).map([&, &a = a, &b = b](LookupPlan plan) {
+    return Gathering(std::move(plan), a, b, hint);
+  });
+}
+
+// The age of an instant is a difference of two times, which must be of one clock.
+Result<LookupPlan> Lookups::routed(const Directory& directory, const std::string& a,
+                                   const std::string& b, const Query& query,
+                                   std::optional<Time> hint) const {
+  auto plan = route_lookup(structure_.forest, directory, a, b, query, hint);
+  if (!plan || !query.age_noise_until) return plan;
+  const std::string differs = other_clock(directory, plan->parts);
+  if (differs.empty()) return plan;
+  return fail(Errc::kInvalidInput,
+              "no process noise can be added until another instant: " + differs);
+}
+
+void Lookups::explain(Error& error, const std::vector<Part>& parts) const {
+  const Lock lock(structure_.mutex);
+  const std::string differs = other_clock(structure_.directory, parts);
+  if (!differs.empty()) error.message += "; " + differs;
+}
+
+std::string Lookups::other_clock(const Directory& directory, const std::vector<Part>& parts) const {
+  const ClockKind own = structure_.clock.kind();
+  for (const Part& part : parts) {
+    if (part.owner == kHeldHere || directory.info(part.owner).clock == own) continue;
+    return "partition " + quote(part.partition) + " uses the " +
+           to_string(directory.info(part.owner).clock) + " clock, and this participant the " +
+           to_string(own) + " clock";
+  }
+  return {};
 }
 
 Result<StampedTransform> Lookups::elsewhere(std::string_view a, std::string_view b,
@@ -68,14 +97,14 @@ Result<StampedTransform> Lookups::elsewhere(std::string_view a, std::string_view
       [&] {
         return std::vector<std::string>{start, end};
       },
-      [&](const Directory& directory) {
-        return route_lookup(structure_.forest, directory, start, end, query, hint);
-      },
+      [&](const Directory& directory) { return routed(directory, start, end, query, hint); },
       [&](LookupPlan& plan) {
         Gathering gathering(std::move(plan), start, end, hint);
         while (true) {
           auto found = gathering.take(requests_.ask(gathering.parts(), deadline), hints_);
-          if (found) return *std::move(found);
+          if (!found) continue;
+          if (!*found && is_of_time(found->error())) explain(found->error(), gathering.parts());
+          return *std::move(found);
         }
       });
 }

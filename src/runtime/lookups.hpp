@@ -78,6 +78,15 @@ class Lookups {
   [[nodiscard]] Result<StampedTransform> elsewhere(std::string_view a, std::string_view b,
                                                    const Query& query, const Deadline& deadline);
   [[nodiscard]] PendingLookups::Links links(Transport& transport, const Watcher& watcher);
+  /// As route_lookup(). @return also kInvalidInput if ages are wanted, and clocks differ
+  [[nodiscard]] Result<LookupPlan> routed(const Directory& directory, const std::string& a,
+                                          const std::string& b, const Query& query,
+                                          std::optional<Time> hint) const;
+  /// Adds to an error about data in time that clocks differ.
+  void explain(Error& error, const std::vector<Part>& parts) const;
+  /// Names an owner with another clock than this participant; empty: there is none.
+  [[nodiscard]] std::string other_clock(const Directory& directory,
+                                        const std::vector<Part>& parts) const;
   [[nodiscard]] Result<Gathering> plan(const PendingLookups::Wanted& wanted);
   [[nodiscard]] Result<StampedTransform> elsewhere(Handle a, Handle b, const Query& query,
                                                    const Deadline& deadline);

@@ -105,6 +105,18 @@ void MemberRunner::react(const Outcome& outcome) {
   if (outcome.stopped) parts_.on_gone(outcome.stopped->partition);
   if (outcome.lost) parts_.on_gone(*outcome.lost);
   log_outcome(outcome, name_);
+  if (outcome.appeared) report_clocks(*outcome.appeared);
+}
+
+// Once: if the clocks differ, they usually differ from those of many.
+void MemberRunner::report_clocks(const Presence& appeared) {
+  const ClockKind own = structure_.clock.kind();
+  const ClockKind theirs = clock_of(appeared);
+  if (name_.empty() || theirs == own || clocks_reported_.exchange(true)) return;
+  log().warn(
+      "the clocks differ: partition {} uses the {} clock, and partition {} the {} clock; "
+      "their stamps cannot be compared",
+      quote(appeared.partition), to_string(theirs), quote(name_), to_string(own));
 }
 
 void MemberRunner::look_for_gone() {
@@ -190,13 +202,18 @@ Result<void> MemberRunner::serve(const StoredState* left,
   return served;
 }
 
+void MemberRunner::announce(Presence presence) {
+  if (presence.clock) presence.clock = structure_.clock.now().value_or(Time{});
+  transport_.announce(presence);
+}
+
 void MemberRunner::introduce() {
-  transport_.announce(with_rules([](Member& member) { return member.introduce(); }));
+  announce(with_rules([](Member& member) { return member.introduce(); }));
 }
 
 void MemberRunner::say_goodbye() {
   const auto last = with_rules([](Member& member) { return member.leave(); });
-  if (last) transport_.announce(*last);
+  if (last) announce(*last);
 }
 
 Result<void> MemberRunner::still_in() {
@@ -258,7 +275,7 @@ Ready MemberRunner::take(bool values_due) {
 void MemberRunner::publish(const Ready& ready) {
   const auto said = with_rules([&](Member& member) { return member.stored(ready); });
   for (const Page& page : ready.pages) transport_.publish(page);
-  if (said) transport_.announce(*said);
+  if (said) announce(*said);
   structure_.changed.notify_all();
 }
 
@@ -267,7 +284,7 @@ void MemberRunner::take_back(const Ready& ready) {
     const Lock joints(joints_mutex_);
     return member.not_stored(ready);
   });
-  if (said) transport_.announce(*said);
+  if (said) announce(*said);
 }
 
 void MemberRunner::reply(const PendingReply& pending) {

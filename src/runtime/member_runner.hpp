@@ -129,8 +129,10 @@ class MemberRunner final : private CommitLoop::Effects {
   /// As input(), and under that of joints.
   template <class Input>
   void input_of_joints(Input input);
+  void announce(Presence presence);
   [[nodiscard]] Outcome take_outcome() TFDUDE_REQUIRES(structure_.mutex);
   void react(const Outcome& outcome);
+  void report_clocks(const Presence& appeared);
   void look_for_gone();
   /// Why changes are rejected while earlier ones cannot be stored.
   [[nodiscard]] std::optional<Error> refusal() const;
@@ -142,6 +144,7 @@ class MemberRunner final : private CommitLoop::Effects {
   Member member_ TFDUDE_GUARDED_BY(structure_.mutex);
   Partition* partition_ = nullptr;  // owned by member_
   std::atomic<bool> out_{false};
+  std::atomic<bool> clocks_reported_{false};
   const std::shared_ptr<Events> events_ = std::make_shared<Events>();
   Mutex joints_mutex_{LockRank::kJoints};  // guards the joints of partition_
   // Both stop before the transport does.

@@ -6,14 +6,19 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "base/stamp.hpp"
 #include "runtime/stream_links.hpp"
-#include "runtime/wall_clock.hpp"
 
 namespace tfdude {
+namespace {
+
+double seconds_of(Time time) { return static_cast<double>(nanoseconds(time)) * 1e-9; }
+
+}  // namespace
 
 Participant::Participant(TransportPtr transport, std::string partition, const Options& options)
     : options_(options),
-      structure_(wall_clock, partition),
+      structure_(options.clock, partition),
       transport_(std::move(transport)),
       discovery_(structure_, *transport_, options.discovery, options.timeout),
       member_(structure_, *transport_, std::move(partition), parts()),
@@ -33,6 +38,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
           options.timeout),
       pushing_(structure_, *transport_, member_, watcher_, options.limits.watches),
       lookups_(structure_, discovery_, requests_, *transport_, watcher_, options.timeout),
+      velocities_(structure_, requests_, lookups_),
       streams_(edge_links(structure_, *transport_, member_),
                joint_links(structure_, *transport_, member_)) {
   const Lock lock(structure_.mutex);
@@ -94,6 +100,30 @@ Participant::~Participant() {
 Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   yielding_.start();
   return serving_.serve(frames);
+}
+
+Result<void> Participant::set_time(Time now) {
+  const auto before = structure_.clock.set(now);
+  if (!before) return tl::unexpected(before.error());
+  if (!*before) return {};
+  const std::size_t cleared = structure_.forest.clear_histories(now);
+  // The 1st, 2nd, 4th... only: two publishers of the time would fill the log.
+  const std::uint64_t jumps = ++jumps_;
+  if ((jumps & (jumps - 1)) == 0) {
+    log().warn(
+        "the external clock jumped back from {} s to {} s (jump {}): the histories of {} "
+        "edges are cleared",
+        seconds_of(**before), seconds_of(now), jumps, cleared);
+  }
+  return {};
+}
+
+Result<void> Participant::publish_clock(Time now) {
+  if (auto ok = check_stamp(now); !ok) return ok;
+  if (wants_clock()) {
+    if (auto set = set_time(now); !set) return set;
+  }
+  return transport_->publish_clock(now);
 }
 
 std::optional<Reply> Participant::answer_query(const Request& request) {

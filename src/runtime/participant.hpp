@@ -1,5 +1,7 @@
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,6 +22,7 @@
 #include "runtime/serving.hpp"
 #include "runtime/streams.hpp"
 #include "runtime/structure.hpp"
+#include "runtime/velocities.hpp"
 #include "runtime/watcher.hpp"
 #include "runtime/writes.hpp"
 #include "runtime/yielding.hpp"
@@ -44,6 +47,7 @@ class Participant final : public TransportHandler {
   /// Makes this participant the owner of its partition. @return as Serving::serve()
   [[nodiscard]] Result<void> serve(const std::vector<FrameSpec>& frames);
 
+  [[nodiscard]] SourceClock& clock() { return structure_.clock; }
   [[nodiscard]] Forest& forest() { return structure_.forest; }
   [[nodiscard]] Discovery& discovery() { return discovery_; }
   [[nodiscard]] MemberRunner& member() { return member_; }
@@ -53,8 +57,16 @@ class Participant final : public TransportHandler {
   [[nodiscard]] Observations& observations() { return observations_; }
   [[nodiscard]] Watcher& watcher() { return watcher_; }
   [[nodiscard]] Lookups& lookups() { return lookups_; }
+  [[nodiscard]] Velocities& velocities() { return velocities_; }
   /// @return kInvalidInput in a client that follows only some frames
   [[nodiscard]] Result<Streams*> streams();
+
+  /// Sets the external clock. If it jumps back, own values that are later do not hold any more.
+  /// @return kInvalidInput
+  [[nodiscard]] Result<void> set_time(Time now);
+  /// Sends the time to others with an external clock, and sets the own one, if it is external.
+  /// @return kInvalidInput; as Transport::publish_clock()
+  [[nodiscard]] Result<void> publish_clock(Time now);
 
   /// Waits until data sent on reliable streams is acknowledged. @return kTimeout, kTransport
   [[nodiscard]] Result<void> flush(Milliseconds wait) {
@@ -77,6 +89,10 @@ class Participant final : public TransportHandler {
     if (wants_pages()) member_.on_page(page);
   }
   [[nodiscard]] bool wants_pages() const override { return !options_.follow.has_value(); }
+  [[nodiscard]] bool wants_clock() const override {
+    return structure_.clock.kind() == ClockKind::kExternal;
+  }
+  void on_clock(Time now) override { (void)set_time(now); }
   void on_presence(const Presence& presence) override { member_.on_presence(presence); }
   void on_lost(const std::string& partition, std::uint64_t incarnation,
                std::chrono::nanoseconds early) override {
@@ -110,6 +126,8 @@ class Participant final : public TransportHandler {
   Watcher watcher_;
   Pushing pushing_;
   Lookups lookups_;
+  Velocities velocities_;
+  std::atomic<std::uint64_t> jumps_{0};  // of the clock
   Streams streams_;
 };
 

@@ -251,13 +251,13 @@ PendingLookups::Clock::time_point PendingLookups::next_attempt(const Lookup& loo
   const auto now = Clock::now();
   const std::chrono::nanoseconds waited = now - lookup.began;
   std::chrono::nanoseconds pause = waited / 4;
-  if (const auto at = lookup.wanted.query.at) {
-    // Most sources use stamps of a clock that agrees with the wall clock.
-    const Time today = links_.clock();
-    if (*at > today) {
-      pause = *at - today;
-    } else if (*at > today - waited) {
-      pause = (today - *at) / 4;
+  const auto today = links_.clock();
+  if (const auto at = lookup.wanted.query.at; at && today) {
+    // Most sources use stamps of a clock that agrees with this one.
+    if (*at > *today) {
+      pause = *at - *today;
+    } else if (*at > *today - waited) {
+      pause = (*today - *at) / 4;
     }
   }
   pause = std::clamp(pause, kAskSoonest, kAskLatest);

@@ -53,8 +53,8 @@ class PendingLookups {
     /// The error to return at the deadline: that of the last attempt, or that the result is not
     /// certain.
     std::function<Error(Error last, const Deadline&)> last_word;
-    /// The clock of sources that stamp samples.
-    std::function<Time()> clock;
+    /// The clock of sources that stamp samples; nothing if its time is not known.
+    std::function<std::optional<Time>()> clock;
     /// Maximum wait for the owners, for each request.
     Milliseconds timeout;
     /// Whether plan() asks others for frames, and may wait shortly: nothing here tells when missing

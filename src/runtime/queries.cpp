@@ -16,8 +16,9 @@ Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_v
     if (!segments) return tl::unexpected(std::move(segments.error()));
     std::vector<PathSegment> path;
     for (Segment& segment : *segments) {
-      path.push_back(
-          {directory.name(segment.owner), std::move(segment.from), std::move(segment.to)});
+      path.push_back({directory.name(segment.owner), std::move(segment.from), std::move(segment.to),
+                      segment.owner == kHeldHere ? structure_.clock.kind()
+                                                 : directory.info(segment.owner).clock});
     }
     return path;
   };

@@ -44,6 +44,7 @@ Result<void> Serving::serve(const std::vector<FrameSpec>& frames) {
   std::random_device device;
   member_.with_rules([&](Member& member) {
     member.claim(host_name(), static_cast<std::uint32_t>(getpid()), wall_clock(), device());
+    if (structure_.clock.kind() == ClockKind::kExternal) member.use_external_clock();
   });
   if (auto claimed = claim_name(); !claimed) return claimed;
   if (auto taken = take_frames(frames); !taken) return taken;

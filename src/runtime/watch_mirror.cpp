@@ -10,6 +10,24 @@ bool is_same_process(const WatchRoute::Source& a, const WatchRoute::Source& b) {
   return a.partition == b.partition && a.incarnation == b.incarnation;
 }
 
+Result<WatchRoute> route_of(Result<WatchPlan> plan, const Directory& directory,
+                            std::uint64_t own_incarnation) {
+  if (!plan) return tl::unexpected(std::move(plan.error()));
+  WatchRoute route{std::move(plan->edges), {}, std::move(plan->parts)};
+  for (const Part& part : route.parts) {
+    const auto& request = std::get<WatchRequest>(part.request.body);
+    const auto serving = directory.serving(part.partition);
+    const std::uint64_t incarnation = part.owner == kHeldHere ? own_incarnation
+                                      : serving               ? serving->incarnation
+                                                              : 0;
+    WatchRoute::Source source{
+        part.partition, incarnation, watch_group(part.partition, incarnation, request), {}};
+    for (const PathEnds& segment : request.segments) source.frames.push_back(segment.to);
+    route.sources.push_back(std::move(source));
+  }
+  return route;
+}
+
 }  // namespace
 
 bool WatchRoute::is_same(const WatchRoute& other) const {
@@ -26,21 +44,14 @@ bool WatchRoute::is_same(const WatchRoute& other) const {
 Result<WatchRoute> watch_route(const Forest& forest, const Directory& directory,
                                const std::string& a, const std::string& b, bool composed,
                                std::chrono::nanoseconds period, std::uint64_t own_incarnation) {
-  auto plan = route_watch(forest, directory, a, b, composed, period);
-  if (!plan) return tl::unexpected(std::move(plan.error()));
-  WatchRoute route{std::move(plan->edges), {}, std::move(plan->parts)};
-  for (const Part& part : route.parts) {
-    const auto& request = std::get<WatchRequest>(part.request.body);
-    const auto serving = directory.serving(part.partition);
-    const std::uint64_t incarnation = part.owner == kHeldHere ? own_incarnation
-                                      : serving               ? serving->incarnation
-                                                              : 0;
-    WatchRoute::Source source{
-        part.partition, incarnation, watch_group(part.partition, incarnation, request), {}};
-    for (const PathEnds& segment : request.segments) source.frames.push_back(segment.to);
-    route.sources.push_back(std::move(source));
-  }
-  return route;
+  return route_of(route_watch(forest, directory, a, b, composed, period), directory,
+                  own_incarnation);
+}
+
+Result<WatchRoute> watch_route(const Forest& forest, const Directory& directory,
+                               const std::vector<std::string>& ids, std::chrono::nanoseconds period,
+                               std::uint64_t own_incarnation) {
+  return route_of(route_watch_edges(forest, directory, ids, period), directory, own_incarnation);
 }
 
 WatchMirror::WatchMirror(const std::string& a, const std::string& b, WatchRoute route,
@@ -91,7 +102,7 @@ void WatchMirror::inherit(const WatchMirror& before) {
       continue;
     }
     std::vector<EdgeCursor> nothing{{own.id, own.parent}};
-    for (PushedValue& value : before.forest_.values_since(nothing, {false, time_of(1)}).values) {
+    for (PushedValue& value : before.forest_.values_since(nothing, {false, time_of(0)}).values) {
       value.index = i;
       values.push_back(std::move(value));
     }
@@ -111,13 +122,14 @@ std::optional<PushedValue> WatchMirror::admitted(const Source& source, PushedVal
   if (entry.history < edge.history || (begins && !entry.process_noise)) return std::nullopt;
   // A sample gives the edge's value at its stamp. But a value without a stamp may be half of a
   // commit.
-  if (!follows_on && !entry.stamp) return std::nullopt;
+  if (!follows_on && !entry.stamp && !entry.cleared) return std::nullopt;
   if (begins) {
     edge.newest.reset();
   } else {
     entry.process_noise.reset();
   }
   edge.history = entry.history;
+  if (entry.cleared) edge.newest.reset();
   if (entry.stamp && (!edge.newest || *entry.stamp > *edge.newest)) edge.newest = entry.stamp;
   return entry;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "partition/routing.hpp"
@@ -38,12 +39,19 @@ struct WatchRoute {
                                              bool composed, std::chrono::nanoseconds period,
                                              std::uint64_t own_incarnation);
 
+/// The route of the edges of these frames, wherever they are. @return as route_watch_edges()
+[[nodiscard]] Result<WatchRoute> watch_route(const Forest& forest, const Directory& directory,
+                                             const std::vector<std::string>& ids,
+                                             std::chrono::nanoseconds period,
+                                             std::uint64_t own_incarnation);
+
 /// The values that owners have pushed for one route: a forest of its edges. A value belongs to its
 /// edge by its group, which is specific to this route. Only the newest history of an edge is shown.
 /// A commit of an owner is one commit here.
 /// @par Thread safety  lookup() is thread-safe, without a lock; of the others one at a time.
 class WatchMirror {
  public:
+  /// @param a, b  the ends of the path; empty for edges that are no path
   /// @param timing  how much history is kept
   WatchMirror(const std::string& a, const std::string& b, WatchRoute route,
               const EdgeTiming& timing);
@@ -53,6 +61,10 @@ class WatchMirror {
   /// As Forest::lookup().
   [[nodiscard]] Result<StampedTransform> lookup(const Query& query) const {
     return forest_.lookup(a_, b_, query);
+  }
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
+                                                const Query& query) const {
+    return forest_.lookup(a, b, query);
   }
 
   [[nodiscard]] const WatchRoute& route() const { return route_; }

@@ -36,8 +36,12 @@ WatchedPath::WatchedPath(std::string a, std::string b, WatchOptions options)
     : a_(std::move(a)),
       b_(std::move(b)),
       options_(std::move(options)),
-      why_not_{Errc::kNotYet,
-               "the path from " + quote(a_) + " to " + quote(b_) + " is being asked for"} {}
+      why_not_{Errc::kNotYet, "the " + described() + " is being asked for"} {}
+
+WatchedPath::WatchedPath(std::vector<std::string> frames, WatchOptions options)
+    : frames_(std::move(frames)),
+      options_(std::move(options)),
+      why_not_{Errc::kNotYet, "the " + described() + " is being asked for"} {}
 
 WatchedPath::~WatchedPath() = default;
 
@@ -58,6 +62,24 @@ Result<StampedTransform> WatchedPath::lookup(const Query& query) const {
   auto found = followed_->lookup(query);
   if (wants_newest(query) && lacks_common(found) && newest_) return *newest_;
   return found;
+}
+
+Result<StampedTransform> WatchedPath::lookup(std::string_view a, std::string_view b,
+                                             const Query& query) const {
+  {
+    const epoch::Guard guard;
+    const WatchMirror* mirror = shown_.load(std::memory_order_seq_cst);
+    if (mirror != nullptr) return mirror->lookup(a, b, query);
+  }
+  const Lock lock(mutex_);
+  if (followed_ == nullptr) return tl::unexpected(why_not_);
+  return followed_->lookup(a, b, query);
+}
+
+std::string WatchedPath::described() const {
+  if (frames_.empty()) return "path from " + quote(a_) + " to " + quote(b_);
+  return "group of " + std::to_string(frames_.size()) + " edges, the first of which is " +
+         quote(frames_.front());
 }
 
 bool WatchedPath::has_data(const Query& query) const {
@@ -132,6 +154,10 @@ void WatchedPath::remember_newest() {
   auto newest = followed_->lookup({});
   if (newest) {
     newest_ = *std::move(newest);
+    hold(nullptr);
+  } else if (newest.error().code == Errc::kNotYet) {
+    // A history was cleared: what was before does not hold any more.
+    newest_.reset();
     hold(nullptr);
   } else if (lacks_common(newest) && newest_ && holder_ == nullptr) {
     hold(std::make_unique<const StampedTransform>(*newest_));

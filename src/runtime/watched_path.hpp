@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -17,15 +18,19 @@
 
 namespace tfdude {
 
-/// One watched path. It shows the mirror of one route, which readers find by one load. If the path
-/// takes another route, that has its own mirror, which is shown once it has all values; readers of
-/// the previous one keep it until they are done (epoch.hpp). While the shown mirror has no instant
+/// One watched path, or several edges that are watched together. It shows the mirror of one route,
+/// which readers find by one load. If the path takes another route, that has its own mirror, which
+/// is shown once it has all values; readers of the previous one keep it until they are done
+/// (epoch.hpp). While the shown mirror has no instant
 /// that all its edges have, its last transform is shown instead.
 class WatchedPath {
  public:
   using Clock = std::chrono::steady_clock;
 
   WatchedPath(std::string a, std::string b, WatchOptions options);
+  /// The edges of these frames. lookup(Query) then has no result, and there is no common instant to
+  /// wait for.
+  WatchedPath(std::vector<std::string> frames, WatchOptions options);
   ~WatchedPath();
   WatchedPath(const WatchedPath&) = delete;
   WatchedPath& operator=(const WatchedPath&) = delete;
@@ -35,6 +40,10 @@ class WatchedPath {
   /// No lock or allocation, except while the path is not followed, and at the moment when its edges
   /// lose or regain their common instant.
   [[nodiscard]] Result<StampedTransform> lookup(const Query& query) const;
+  /// Between two frames at the ends of watched edges. Without a lock, except while the edges are
+  /// not followed.
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
+                                                const Query& query) const;
   /// Whether the pushed values suffice for this query.
   [[nodiscard]] bool has_data(const Query& query) const;
 
@@ -48,7 +57,10 @@ class WatchedPath {
 
   [[nodiscard]] const std::string& a() const { return a_; }
   [[nodiscard]] const std::string& b() const { return b_; }
+  [[nodiscard]] const std::vector<std::string>& frames() const { return frames_; }
   [[nodiscard]] const WatchOptions& options() const { return options_; }
+  /// For messages: "path from 'a' to 'b'".
+  [[nodiscard]] std::string described() const;
 
   /// The result of applying pushed values.
   struct Taken {
@@ -95,6 +107,7 @@ class WatchedPath {
 
   const std::string a_;
   const std::string b_;
+  const std::vector<std::string> frames_;  // instead of a path
   const WatchOptions options_;
   std::atomic<const WatchMirror*> shown_{nullptr};      // followed_, for readers
   std::atomic<const StampedTransform*> held_{nullptr};  // holder_, for readers

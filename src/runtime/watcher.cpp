@@ -37,7 +37,30 @@ Result<std::shared_ptr<WatchedPath>> Watcher::watch(const std::string& a, const 
   auto known = requests_.after_asking(deadline, names, OnDemand::kFresh,
                                       [&] { return structure_.forest.segments(a, b); });
   if (!known) return tl::unexpected(std::move(known.error()));
-  auto path = watches().watch(a, b, options);
+  return follow(std::make_shared<WatchedPath>(a, b, options), deadline);
+}
+
+Result<std::shared_ptr<WatchedPath>> Watcher::watch_edges(const std::vector<std::string>& frames,
+                                                          const WatchOptions& options) {
+  if (auto ok = check_rate(options.rate); !ok) return tl::unexpected(std::move(ok.error()));
+  if (frames.empty() || options.composed) {
+    return fail(Errc::kInvalidInput,
+                frames.empty() ? "no edges to watch" : "edges are not a path that can be composed");
+  }
+  const Deadline deadline = discovery_.call_deadline();
+  const auto names = [&] { return frames; };
+  const auto known =
+      requests_.after_asking(deadline, names, OnDemand::kFresh, [&]() -> Result<WatchRoute> {
+        const Lock lock(structure_.mutex);
+        return watch_route(structure_.forest, structure_.directory, frames, {}, 0);
+      });
+  if (!known) return tl::unexpected(known.error());
+  return follow(std::make_shared<WatchedPath>(frames, options), deadline);
+}
+
+Result<std::shared_ptr<WatchedPath>> Watcher::follow(std::shared_ptr<WatchedPath> path,
+                                                     const Deadline& deadline) {
+  watches().watch(path);
   auto live = path->wait_until_live(deadline.at());
   if (live) return path;
   if (live.error().code == Errc::kNotYet) return unanswered(*path, deadline);
@@ -51,9 +74,8 @@ tl::unexpected<Error> Watcher::unanswered(const WatchedPath& path, const Deadlin
       owners += (owners.empty() ? "" : ", ") + quote(source.partition);
     }
   }
-  return fail(Errc::kTimeout, "of the owners of the path from " + quote(path.a()) + " to " +
-                                  quote(path.b()) + " (" + owners + ") not all answered within " +
-                                  deadline.text());
+  return fail(Errc::kTimeout, "of the owners of the " + path.described() + " (" + owners +
+                                  ") not all answered within " + deadline.text());
 }
 
 Watches& Watcher::watches() {
@@ -75,10 +97,16 @@ Result<WatchRoute> Watcher::plan(const WatchedPath& path) {
   const WatchOptions& options = path.options();
   const std::uint64_t own_incarnation = incarnation_();
   // If nobody can say whether the route is still right, the known one must do.
-  const auto known = requests_.know({path.a(), path.b()}, OnDemand::kFresh, Deadline(timeout_));
+  const auto names =
+      path.frames().empty() ? std::vector<std::string>{path.a(), path.b()} : path.frames();
+  const auto known = requests_.know(names, OnDemand::kFresh, Deadline(timeout_));
+  const auto period = period_of(options.rate);
   const Lock lock(structure_.mutex);
-  auto route = watch_route(structure_.forest, structure_.directory, path.a(), path.b(),
-                           options.composed, period_of(options.rate), own_incarnation);
+  auto route = path.frames().empty()
+                   ? watch_route(structure_.forest, structure_.directory, path.a(), path.b(),
+                                 options.composed, period, own_incarnation)
+                   : watch_route(structure_.forest, structure_.directory, path.frames(), period,
+                                 own_incarnation);
   if (!route && !known) return tl::unexpected(known.error());
   return route;
 }

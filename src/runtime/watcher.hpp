@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "base/mutex.hpp"
 #include "runtime/discovery.hpp"
@@ -39,6 +40,10 @@ class Watcher {
                                                            const std::string& b,
                                                            const WatchOptions& options);
 
+  /// @return as Client::watch_edges()
+  [[nodiscard]] Result<std::shared_ptr<WatchedPath>> watch_edges(
+      const std::vector<std::string>& frames, const WatchOptions& options);
+
   /// Applies pushed values. @return whether a path here needs them
   bool on_pushed(const PushedValues& pushed);
 
@@ -51,6 +56,8 @@ class Watcher {
 
  private:
   [[nodiscard]] Watches& watches();
+  [[nodiscard]] Result<std::shared_ptr<WatchedPath>> follow(std::shared_ptr<WatchedPath> path,
+                                                            const Deadline& deadline);
   [[nodiscard]] Result<WatchRoute> plan(const WatchedPath& path);
   /// kTimeout, naming the owners.
   [[nodiscard]] tl::unexpected<Error> unanswered(const WatchedPath& path, const Deadline& deadline);

@@ -32,15 +32,12 @@ void Watches::stop() {
   }
 }
 
-std::shared_ptr<WatchedPath> Watches::watch(const std::string& a, const std::string& b,
-                                            const WatchOptions& options) {
-  auto path = std::make_shared<WatchedPath>(a, b, options);
+void Watches::watch(std::shared_ptr<WatchedPath> path) {
   {
     const Lock lock(mutex_);
-    paths_.push_back(path);
+    paths_.push_back(std::move(path));
   }
   look_again();
-  return path;
 }
 
 void Watches::look_again() {
@@ -179,8 +176,8 @@ void Watches::tell(const Path& path, std::string what) {
 }
 
 void Watches::tell_rerouted(const Path& path) {
-  tell(path, "the path from " + quote(path->a()) + " to " + quote(path->b()) +
-                 " has a new route, over " + std::to_string(path->edge_count()) + " edges");
+  tell(path, "the " + path->described() + " has a new route, over " +
+                 std::to_string(path->edge_count()) + " edges");
 }
 
 void Watches::close_unused(const std::vector<Path>& paths) {

@@ -36,9 +36,8 @@ class Watches {
   /// After it has returned the paths get nothing new, and report so; no callback runs.
   void stop();
 
-  /// @return the path; watched while it has another holder
-  [[nodiscard]] std::shared_ptr<WatchedPath> watch(const std::string& a, const std::string& b,
-                                                   const WatchOptions& options);
+  /// The path is watched while it has another holder.
+  void watch(std::shared_ptr<WatchedPath> path);
 
   /// Applies pushed values.
   void on_pushed(const PushedValues& pushed);

@@ -48,6 +48,10 @@ class TransportHandler {
   virtual void on_page(const Page& page) = 0;
   /// Whether pages are needed. Constant.
   [[nodiscard]] virtual bool wants_pages() const { return true; }
+  /// Whether the time of external clocks is needed. Constant.
+  [[nodiscard]] virtual bool wants_clock() const { return false; }
+  /// The time of external clocks, as last published.
+  virtual void on_clock(Time) {}
   /// Another participant's presence.
   virtual void on_presence(const Presence& presence) = 0;
   /// The participant that announced this partition has stopped or is lost.
@@ -135,6 +139,10 @@ class Transport {
   /// Sends to the watchers of the group (may be lost), or releases the resources for that.
   virtual void push(const PushedValues& pushed) = 0;
   virtual void end_pushing(std::uint64_t group) = 0;
+
+  /// Sends the time to all participants that want the clock. May be lost; those that join later do
+  /// not get it. @return kTransport, kNotPermitted
+  [[nodiscard]] virtual Result<void> publish_clock(Time now) = 0;
 
   /// Whether the presence of all participants that were reachable when this one started should have
   /// arrived by now.

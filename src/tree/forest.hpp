@@ -81,7 +81,8 @@ struct CommitRange {
 ///   epoch.hpp).
 class Forest {
  public:
-  using Clock = std::function<Time()>;
+  /// Returns nothing while its time is not known.
+  using Clock = std::function<std::optional<Time>()>;
 
   /// @param clock  stamps updates of dynamic edges that have no stamp; without a clock these are
   ///   rejected
@@ -114,9 +115,10 @@ class Forest {
   /// sample at the clock's time, and a static edge a new value. Does not allocate, except while an
   /// edge's history grows to its limits and for a sample that is older than another: then
   /// O(samples).
-  /// @return kUnknownFrame, kNotOwner, kInvalidInput (not finite; a stamp before 1970, or further
-  ///   ahead of the clock than EdgeTiming::max_ahead), kTooOld (older than the kept history),
-  ///   kStampTaken (another sample has the stamp).
+  /// @return kUnknownFrame, kNotOwner, kInvalidInput (not finite; a negative stamp, or one further
+  ///   ahead of the clock than EdgeTiming::max_ahead), kNotYet (this needs the time of the clock,
+  ///   which is not known yet), kTooOld (older than the kept history), kStampTaken (another sample
+  ///   has the stamp).
   [[nodiscard]] Result<void> update(std::string_view id, const Transform& X_PC,
                                     std::optional<Time> stamp = std::nullopt);
   [[nodiscard]] Result<void> update(Handle frame, const Transform& X_PC,
@@ -145,6 +147,14 @@ class Forest {
 
   /// Sets the timing of all edges without their own, from their first sample on.
   [[nodiscard]] Result<void> set_default_timing(const EdgeTiming& timing);
+
+  /// Clears the history of a held dynamic edge. It stays dynamic, without a value until its next
+  /// sample. Does nothing if the edge is static.
+  /// @return kUnknownFrame, kNotOwner.
+  [[nodiscard]] Result<void> clear_history(std::string_view id);
+  /// Likewise for all held edges with samples at this time or later, as one commit. Also reads the
+  /// clock again before the next stamp is judged. O(slots). @return how many
+  std::size_t clear_histories(Time from);
 
   /// Limits the memory of all histories together. Once it is reached, a new sample takes the place
   /// of the edge's oldest one, and an edge without two samples gets none: kTooMuch.

@@ -66,8 +66,12 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
     return fail(Errc::kInvalidInput, "frame " + quote(frames_.newest_value(slots[0]).name->text) +
                                          " is dynamic: its update needs a stamp");
   }
+  auto now = clock_.now();
+  if (!now) {
+    return fail_at("frame " + quote(frames_.newest_value(slots[0]).name->text), now.error());
+  }
   // If the clock was set back, time advances as little as possible.
-  return newest == kAlways ? clock_.now() : std::max(clock_.now(), saturating_add(newest, 1));
+  return newest == kAlways ? *now : std::max(*now, saturating_add(newest, 1));
 }
 
 Result<void> Forest::Impl::check_room(const HeldVersion& edge) {
@@ -82,14 +86,16 @@ Result<void> Forest::Impl::check_room(const HeldVersion& edge) {
 Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t stamp) {
   const std::int64_t limit = timing_of(edge).max_ahead.count();
   if (!clock_.is_there() || limit == std::chrono::nanoseconds::max().count()) return {};
-  const auto said = clock_.refuses(stamp, limit);
-  if (!said) return {};
+  if (clock_.surely_admits(stamp, limit)) return {};
+  const auto now = clock_.read();
+  if (!now) return fail_at("frame " + quote(edge.name->text), now.error());
+  const std::int64_t ahead = saturating_subtract(stamp, *now);
+  if (ahead <= limit) return {};
   edge.name->refused.ahead.fetch_add(1, std::memory_order_relaxed);
   return fail(Errc::kInvalidInput,
               "frame " + quote(edge.name->text) + ": the stamp, " + to_string(time_of(stamp)) +
-                  ", is " +
-                  in_milliseconds(std::chrono::nanoseconds(saturating_subtract(stamp, *said))) +
-                  " ahead of the owner's clock, " + to_string(time_of(*said)) + ", more than the " +
+                  ", is " + in_milliseconds(std::chrono::nanoseconds(ahead)) +
+                  " ahead of the owner's clock, " + to_string(time_of(*now)) + ", more than the " +
                   in_milliseconds(timing_of(edge).max_ahead) + " allowed");
 }
 
@@ -209,6 +215,42 @@ void Forest::Impl::forget_history(HeldVersion& fresh) {
   fresh.samples = new SampleHistory(before->timing());
   fresh.stamp = kAlways;
   give_back(before, fresh.slot);
+}
+
+void Forest::Impl::clear_history(const HeldVersion& edge) {
+  edge.name->refused.behind = {};
+  HeldVersion& fresh = push_held(edge.slot, edge.X_PC);
+  forget_history(fresh);
+  if (fresh.samples == nullptr) fresh.samples = new SampleHistory(default_timing_);
+  fresh.stamp = kNoSample;
+  fresh.number = 0;
+  end_revision(fresh);
+}
+
+Result<void> Forest::clear_history(std::string_view id) {
+  const Writing lock(impl_->mutex_);
+  const auto slot = impl_->frames_.held_slot(id);
+  if (!slot) return tl::unexpected(slot.error());
+  const HeldVersion& edge = impl_->frames_.newest_value(*slot);
+  if (!edge.moving()) return {};
+  impl_->clear_history(edge);
+  impl_->commit();
+  return {};
+}
+
+std::size_t Forest::clear_histories(Time from) {
+  const Writing lock(impl_->mutex_);
+  impl_->clock_.read_again();
+  std::size_t cleared = 0;
+  for (std::uint32_t slot = 0; slot < impl_->frames_.size(); ++slot) {
+    if (!impl_->frames_.newest(slot).held()) continue;
+    const HeldVersion& edge = impl_->frames_.newest_value(slot);
+    if (!edge.moving() || edge.lacks_sample() || edge.stamp < nanoseconds(from)) continue;
+    impl_->clear_history(edge);
+    ++cleared;
+  }
+  if (cleared > 0) impl_->commit();
+  return cleared;
 }
 
 Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {

@@ -96,6 +96,8 @@ class Forest::Impl {
       TFDUDE_REQUIRES(mutex_);
   /// Makes the fresh version static and clears its history, but keeps its timing.
   void forget_history(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
+  /// Pushes a version of a dynamic edge without any sample.
+  void clear_history(const HeldVersion& edge) TFDUDE_REQUIRES(mutex_);
   /// Retires a history with all its samples. If the newest sample is also the newest version, that
   /// one is superseded next.
   void give_back(SampleHistory* samples, std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
@@ -137,6 +139,7 @@ class Forest::Impl {
       TFDUDE_REQUIRES(mutex_);
 
   Frames frames_;
+  StampClock clock_ TFDUDE_GUARDED_BY(mutex_);
   EdgeTiming default_timing_ TFDUDE_GUARDED_BY(mutex_);
   std::int64_t kept_samples_ TFDUDE_GUARDED_BY(mutex_) = 0;  // of all histories
   std::int64_t max_samples_ TFDUDE_GUARDED_BY(mutex_) = INT64_MAX;
@@ -169,7 +172,6 @@ class Forest::Impl {
   void release(Version& fresh) TFDUDE_REQUIRES(mutex_);
   void release_if_unused(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
 
-  StampClock clock_ TFDUDE_GUARDED_BY(mutex_);
   Reclaimer reclaimer_ TFDUDE_GUARDED_BY(mutex_);
   std::vector<const Name*> released_names_ TFDUDE_GUARDED_BY(mutex_);  // by the current commit
   std::vector<std::uint32_t> free_slots_ TFDUDE_GUARDED_BY(mutex_);

@@ -24,7 +24,7 @@ void Forest::Impl::begin_told_history(std::uint32_t slot, const PushedValue& val
 
 bool Forest::Impl::push_told_sample(const HeldVersion& edge, const Transform& X_PC,
                                     std::int64_t stamp, bool replace) {
-  if (stamp <= 0) return false;
+  if (stamp < 0) return false;
   if (edge.moving() && stamp <= edge.stamp) {
     const std::uint64_t place = edge.samples->place_of(stamp);
     if (place < edge.samples->next() && edge.samples->stamp(place) == stamp) {
@@ -42,6 +42,12 @@ bool Forest::Impl::push_told(const HeldVersion& edge, const PushedValue& value, 
   if (!is_finite(value.X)) return false;
   const std::uint32_t slot = edge.slot;
   if (value.process_noise) begin_told_history(slot, value);
+  if (value.cleared) {
+    const HeldVersion& newest = frames_.newest_value(slot);
+    if (!value.process_noise && (!newest.moving() || newest.lacks_sample())) return false;
+    clear_history(newest);
+    return true;
+  }
   if (value.stamp) {
     const bool taken =
         push_told_sample(frames_.newest_value(slot), value.X, nanoseconds(*value.stamp), replace);

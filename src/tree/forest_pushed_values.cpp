@@ -19,7 +19,7 @@ HistoryInfo history_of(const HeldVersion& edge) {
   info.span_limit = samples.timing().span;
   info.count_limit = samples.timing().count;
   info.bytes = samples.bytes();
-  if (!edge.moving()) return info;
+  if (!edge.moving() || edge.lacks_sample()) return info;
   double sum = 0;
   double squares = 0;
   std::int64_t before = kAlways;
@@ -81,8 +81,9 @@ void add_values(const HeldVersion& edge, std::uint32_t index, const PushedQuery&
   const auto tell = [&](const std::optional<Time>& stamp, const Transform& X) {
     values.push_back({index, stamp, X, {}, edge.history, {}});
   };
-  if (!edge.moving()) {
+  if (!edge.moving() || edge.lacks_sample()) {
     if (edge.commit > seen) tell(std::nullopt, edge.X_PC);
+    if (edge.lacks_sample() && values.size() > before) values.back().cleared = true;
   } else {
     const SampleHistory& samples = *edge.samples;
     for (auto number = first_to_tell(edge, cursor, seen, query); number < edge.number; ++number) {

@@ -54,6 +54,11 @@ tl::unexpected<Error> too_old(const HeldVersion& edge, std::int64_t t) {
   return no_data(Errc::kTooOld, edge, t, "its oldest sample is " + in_milliseconds(gap) + " later");
 }
 
+tl::unexpected<Error> no_sample(const HeldVersion& edge) {
+  return fail(Errc::kNotYet, "the edge of " + quote(edge.name->text) +
+                                 " has had no sample since its history was cleared");
+}
+
 tl::unexpected<Error> not_yet(const HeldVersion& edge, std::int64_t t, const std::string& more) {
   const std::chrono::nanoseconds gap(t - edge.stamp);
   return no_data(Errc::kNotYet, edge, t,
@@ -64,6 +69,7 @@ tl::unexpected<Error> not_yet(const HeldVersion& edge, std::int64_t t, const std
 template <class Value>
 Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Query& query,
                             OfEdge<Value>& X) {
+  if (edge.lacks_sample()) return no_sample(edge);
   const std::int64_t beyond = t - edge.stamp;
   const std::int64_t limit = query.extrapolate.count();
   if (limit == 0) return not_yet(edge, t, "");
@@ -199,6 +205,8 @@ Result<Value> PathLookup::walk_newest(const Ends& ends, Absent absent, Order ord
     return Result<void>();
   });
   met = {limiting, limiting != nullptr, correlated};
+  // It has the earliest of all stamps.
+  if (newest && limiting != nullptr && limiting->lacks_sample()) return no_sample(*limiting);
   if (!newest || !mixed || correlated) return newest;
   Query query;
   query.order = order;
@@ -212,7 +220,8 @@ Result<Value> PathLookup::walk_at(const Ends& ends, Absent absent, std::int64_t 
       query.age_noise_until
           ? std::max(saturating_subtract(nanoseconds(*query.age_noise_until), t), std::int64_t{0})
           : 0;
-  Moment moment{t, age, query};
+  // An edge without samples is behind every instant.
+  Moment moment{std::max(t, kNoSample + 1), age, query};
   return walk<Value>(ends, absent, query.order,
                      [&](auto& path, const HeldVersion& edge) -> Result<void> {
                        if (leaves_out_correlation<Value>(edge)) met.correlated = true;

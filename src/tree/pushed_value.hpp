@@ -37,11 +37,13 @@ struct PushedValue {
   std::uint32_t covariance_number = 0;
   /// The covariance of this number was pushed before, and X comes without it.
   bool covariance_known = false;
+  /// The history was cleared: the edge is dynamic, and has no value until its next sample.
+  bool cleared = false;
 };
 
 /// Values written to edges up to a commit.
 struct PushedCommit {
-  /// Sorted by stamp, after those that hold for all times.
+  /// Sorted by stamp, after those without one.
   std::vector<PushedValue> values;
   std::uint64_t commit = 0;
 };

@@ -13,6 +13,10 @@ struct HeldVersion;
 /// The stamp of a value that holds for all times.
 inline constexpr std::int64_t kAlways = INT64_MIN;
 
+/// The stamp of a dynamic edge whose history was cleared, until its next sample; earlier than all
+/// others.
+inline constexpr std::int64_t kNoSample = kAlways + 1;
+
 /// The history of one edge: its samples, ordered by stamp, in a ring buffer. Each sample is the
 /// version that showed it first.
 ///

@@ -10,7 +10,7 @@
 namespace tfdude {
 namespace {
 
-// Both are stamps, and so positive.
+// Both are stamps, and so not negative.
 std::chrono::nanoseconds apart(std::int64_t earlier, std::int64_t later) {
   return std::chrono::nanoseconds(later - earlier);
 }

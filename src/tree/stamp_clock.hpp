@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
 
 #include "base/saturating.hpp"
@@ -14,27 +15,39 @@ namespace tfdude {
 /// The clock by which a forest's writer judges stamps, if there is one. One writer at a time.
 class StampClock {
  public:
-  explicit StampClock(std::function<Time()> clock) : clock_(std::move(clock)) {}
+  explicit StampClock(std::function<std::optional<Time>()> clock) : clock_(std::move(clock)) {}
 
   [[nodiscard]] bool is_there() const { return clock_ != nullptr; }
-  [[nodiscard]] std::int64_t now() const { return nanoseconds(clock_()); }
 
-  /// The clock's time if the stamp is further ahead of it than the limit [ns]; otherwise nothing.
-  /// The clock is read again only if the last reading does not suffice, and after kGoesFor stamps,
-  /// as it may have been set back.
-  [[nodiscard]] std::optional<std::int64_t> refuses(std::int64_t stamp, std::int64_t limit) {
-    if (++asked_ago_ < kGoesFor && saturating_subtract(stamp, said_) <= limit) return std::nullopt;
-    said_ = now();
-    asked_ago_ = 0;
-    if (saturating_subtract(stamp, said_) <= limit) return std::nullopt;
-    return said_;
+  /// @return kNotYet if its time is not known yet
+  [[nodiscard]] Result<std::int64_t> now() const {
+    if (const auto time = clock_()) return nanoseconds(*time);
+    return fail(Errc::kNotYet, "the owner's clock is external, and has no time yet");
   }
+
+  /// Whether the last reading of the clock shows that the stamp is no further ahead than the limit
+  /// [ns]. Not after kGoesFor stamps, as the clock may have been set back.
+  [[nodiscard]] bool surely_admits(std::int64_t stamp, std::int64_t limit) {
+    return ++asked_ago_ < kGoesFor && saturating_subtract(stamp, said_) <= limit;
+  }
+
+  /// Reads the clock. @return as now()
+  [[nodiscard]] Result<std::int64_t> read() {
+    auto time = now();
+    if (!time) return time;
+    said_ = *time;
+    asked_ago_ = 0;
+    return time;
+  }
+
+  /// The clock is read for the next stamp.
+  void read_again() { asked_ago_ = kGoesFor; }
 
  private:
   static constexpr int kGoesFor = 64;
-  const std::function<Time()> clock_;
+  const std::function<std::optional<Time>()> clock_;
   std::int64_t said_ = 0;
-  int asked_ago_ = 0;
+  int asked_ago_ = kGoesFor;
 };
 
 }  // namespace tfdude

@@ -66,6 +66,8 @@ struct HeldVersion : Version {
   Transform X_PC;
 
   [[nodiscard]] bool moving() const { return stamp != kAlways; }
+  /// Whether it has no value, as its history was cleared.
+  [[nodiscard]] bool lacks_sample() const { return stamp == kNoSample; }
 };
 
 /// Blocks of one version type, reused in the order in which readers release them. One writer at a

@@ -9,6 +9,7 @@ inline constexpr const char* kReplyTopic = "tfdude/reply";
 inline constexpr const char* kUpdateTopic = "tfdude/update";
 inline constexpr const char* kJointTopic = "tfdude/joint";
 inline constexpr const char* kStateTopic = "tfdude/state";
+inline constexpr const char* kClockTopic = "tfdude/clock";  ///< the time of external clocks
 inline constexpr const char* kDirectoryTopic = "tfdude/directory";
 inline constexpr const char* kPresenceTopic = "tfdude/presence";
 

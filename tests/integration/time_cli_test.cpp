@@ -85,7 +85,7 @@ TEST_CASE("time: a negative stamp counts back from now") {
 
 TEST_CASE("time: an invalid stamp is rejected before anything is sent") {
   const ThesisDaemons d;
-  for (const char* stamp : {"", "x", "1.2.3", "--", "99999999999", "0", "1 2"}) {
+  for (const char* stamp : {"", "x", "1.2.3", "--", "99999999999", "1 2"}) {
     INFO(stamp);
     CHECK(d.domain.cli({"update", "arm_1", "--stamp", stamp}).status == 2);
     CHECK(d.domain.cli({"lookup", "world", "arm_1", "--at", stamp}).status == 2);

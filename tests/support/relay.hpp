@@ -49,6 +49,7 @@ class Relay : public Transport, protected TransportHandler {
   void unwatch(std::uint64_t group) override { real_->unwatch(group); }
   void push(const PushedValues& pushed) override { real_->push(pushed); }
   void end_pushing(std::uint64_t group) override { real_->end_pushing(group); }
+  Result<void> publish_clock(Time now) override { return real_->publish_clock(now); }
   bool discovered() const override { return real_->discovered(); }
   bool awaits_presence() const override { return real_->awaits_presence(); }
   Milliseconds discovery_time() const override { return real_->discovery_time(); }
@@ -67,6 +68,8 @@ class Relay : public Transport, protected TransportHandler {
   void on_page(const Page& page) override { handler_->on_page(page); }
   bool wants_pages() const override { return handler_->wants_pages(); }
   void on_presence(const Presence& presence) override { handler_->on_presence(presence); }
+  bool wants_clock() const override { return handler_->wants_clock(); }
+  void on_clock(Time now) override { handler_->on_clock(now); }
   void on_lost(const std::string& partition, std::uint64_t incarnation,
                std::chrono::nanoseconds early) override {
     handler_->on_lost(partition, incarnation, early);

@@ -16,7 +16,6 @@
 #include "runtime/member_runner.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/structure.hpp"
-#include "runtime/wall_clock.hpp"
 #include "support/catch.hpp"
 #include "support/relay.hpp"
 
@@ -36,7 +35,7 @@ class Rig {
  public:
   explicit Rig(TransportPtr to, const std::string& partition = "", const Options& with = quick())
       : options(with),
-        structure(wall_clock, partition),
+        structure(with.clock, partition),
         transport(std::move(to)),
         discovery(structure, *transport, options.discovery, options.timeout),
         member(structure, *transport, partition,

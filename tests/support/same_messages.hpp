@@ -218,6 +218,7 @@ inline void check_same(const PushedValues& actual, const PushedValues& expected)
     check_same(actual.entries[i].X, expected.entries[i].X);
     CHECK(actual.entries[i].correlation == expected.entries[i].correlation);
     CHECK(actual.entries[i].history == expected.entries[i].history);
+    CHECK(actual.entries[i].cleared == expected.entries[i].cleared);
     const auto& noise = expected.entries[i].process_noise;
     REQUIRE(actual.entries[i].process_noise.has_value() == noise.has_value());
     if (noise) CHECK(actual.entries[i].process_noise->upper() == noise->upper());

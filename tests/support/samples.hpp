@@ -260,7 +260,8 @@ bool take(const Bytes& bytes) {
        18446744073709551615ULL,
        1,
        4294967295U},
-      {5, {{0, time_of(7), unspecified(random)}, {1, {}, unspecified(random)}}}};
+      {5, {{0, time_of(7), unspecified(random)}, {1, {}, unspecified(random)}}},
+      {6, {{0, {}, random.transform(), {}, 9, Covariance(), 0, false, true}}}};
 }
 
 [[nodiscard]] inline std::vector<Update> updates(Random& random) {
@@ -331,6 +332,8 @@ bool take(const Bytes& bytes) {
                      serialized<StateType>(to_wire(one)), well_formed_state,
                      take<StateType, wire::State>});
   }
+  kinds.push_back({"clock", serialized<ClockType>(to_wire(time_of(INT64_MAX))), well_formed_clock,
+                   take<ClockType, wire::Clock>});
   for (const Page& one : pages()) {
     kinds.push_back({"page " + std::to_string(one.number), serialized<PageType>(to_wire(one)),
                      well_formed_page, take<PageType, wire::Page>});

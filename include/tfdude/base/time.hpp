@@ -8,13 +8,22 @@
 
 namespace tfdude {
 
-/// Wall-clock instant in nanoseconds since the UNIX epoch. Most layers get the time as an argument;
-/// only `client`, `runtime` and `transport` read the clock.
+/// Instant in nanoseconds since the UNIX epoch, or since the start of a simulation. Most layers get
+/// the time as an argument; only `client`, `runtime` and `transport` read the clock.
 using Time = std::chrono::time_point<std::chrono::system_clock, std::chrono::nanoseconds>;
 
 using Milliseconds = std::chrono::milliseconds;
 
-/// As sent and stored: nanoseconds since the UNIX epoch.
+/// The clock that a participant's stamps are of.
+enum class ClockKind : std::uint8_t {
+  kSystem,
+  kExternal,  ///< its time comes from outside: it may start at 0, run at any rate, stop, jump back
+};
+
+/// "system" or "external".
+[[nodiscard]] TFDUDE_EXPORT const char* to_string(ClockKind kind);
+
+/// As sent and stored: nanoseconds since the epoch of the clock.
 [[nodiscard]] inline std::int64_t nanoseconds(Time time) { return time.time_since_epoch().count(); }
 [[nodiscard]] inline Time time_of(std::int64_t nanoseconds) {
   return Time(std::chrono::nanoseconds(nanoseconds));

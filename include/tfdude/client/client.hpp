@@ -103,7 +103,8 @@ class TFDUDE_EXPORT Client {
   /// With a stamp (of the source's clock) the value is a sample. From its first sample on the edge
   /// is dynamic: its value is interpolated between samples, and undefined before and after them.
   /// Without a stamp, the value is a sample with the owner's time of arrival if the edge is
-  /// dynamic, and the value for all times if it is static.
+  /// dynamic, and the value for all times if it is static. An owner whose external clock has no
+  /// time yet rejects samples that need it, with kNotYet.
   /// @return kUnknownFrame, kTooOld (older than the kept history), kStampTaken.
   [[nodiscard]] Result<void> update(const std::string& id, const Transform& X_PC,
                                     std::optional<Time> stamp = std::nullopt);
@@ -251,6 +252,49 @@ class TFDUDE_EXPORT Client {
   /// @return as lookup().
   [[nodiscard]] Result<PathWatch> watch(const std::string& a, const std::string& b,
                                         const WatchOptions& options = {});
+
+  /// As watch(), for the edges of these frames, wherever they are: to follow many edges. While an
+  /// owner is unreachable or an edge does not exist, the others get nothing new for more than
+  /// seconds either, so watch the edges of each owner separately.
+  /// @return kUnknownFrame; kInvalidInput (no edges, a root, more than kMaxItems of one owner,
+  ///   `composed`).
+  [[nodiscard]] Result<EdgesWatch> watch_edges(const std::vector<std::string>& ids,
+                                               const WatchOptions& options = {});
+
+  /// The mean velocity of frame b in frame a over an interval: the difference of its poses at both
+  /// ends, divided by the length. The counterpart of tf2's lookupVelocity(b, a, time, interval):
+  /// expressed in a's axes, at the origin of b.
+  ///
+  /// The covariance is of first order. The error of a static edge is the same at both ends, so only
+  /// the part that depends on the motion remains. How the errors of a dynamic edge at the two ends
+  /// are correlated is not known, so its share is an upper bound for any correlation. That is at
+  /// most twice the variance of independent errors, and it is too large if the error changes
+  /// slowly. The same holds for sources that dynamic edges share. Unspecified edges are named, and
+  /// the covariance is that of the others. The velocity is a mean: how far it is from the velocity
+  /// at an instant is not part of the covariance. Two to four round trips for the path of others.
+  /// @return as lookup(); kInvalidInput (the interval is not positive; more than 128 edges).
+  [[nodiscard]] Result<Velocity> velocity(const std::string& a, const std::string& b,
+                                          const VelocityQuery& query = {});
+
+  /// The time of this client's clock (Options::clock). An external clock that has not got its time
+  /// yet is waited for.
+  /// @return kNotYet: nobody has set or published the time.
+  [[nodiscard]] Result<Time> now();
+
+  /// Sets the external clock of this client, for simulators that embed it and for tests. If the
+  /// time is earlier than before, a Node clears the histories of its edges that have samples at
+  /// this time or later (clear_history()). Participants that watch these edges are told. Ownership,
+  /// structure and static edges stay.
+  /// @return kInvalidInput: a negative time; the client uses the system's clock.
+  [[nodiscard]] Result<void> set_time(Time now);
+
+  /// Sends the time to all participants of the domain with an external clock, and sets that of this
+  /// client, if it has one. Not acknowledged: a value may be lost. Participants that start later
+  /// have no time before the next value, so publish it also while it stands still. The first call
+  /// takes some milliseconds, later calls do not wait. There should be one publisher: each time
+  /// that is earlier than the one before clears histories.
+  /// @return kInvalidInput: a negative time; kNotPermitted, kTransport.
+  [[nodiscard]] Result<void> publish_clock(Time now);
 
   /// Applies a measurement of X_AB: corrects the edges between a and b according to their
   /// uncertainty (see tfdude/math/observation.hpp), whoever owns them. Each owner applies its part

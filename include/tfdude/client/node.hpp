@@ -45,6 +45,14 @@ class TFDUDE_EXPORT Node : public Client {
   [[nodiscard]] const std::string& partition() const;
   /// The number of frames of the partition.
   [[nodiscard]] std::size_t own_frames() const;
+  /// Clears the history of a dynamic edge, as after a jump of its source's clock. The edge stays
+  /// dynamic, but lookups fail with kNotYet until its next sample, which may have any stamp. Does
+  /// nothing if the edge is static.
+  /// @return kUnknownFrame, kNotOwner.
+  [[nodiscard]] Result<void> clear_history(const std::string& id);
+  /// Likewise for all dynamic edges of the partition, as one commit. @return how many
+  std::size_t clear_history();
+
   /// What limits have rejected since the start.
   [[nodiscard]] RefusedCounts refused() const;
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string_view>
 #include <string>
 
 #include "tfdude/base/export.hpp"
@@ -49,6 +50,33 @@ class TFDUDE_EXPORT PathWatch {
 
  private:
   std::shared_ptr<WatchedPath> path_;
+};
+
+/// Edges whose owners push their changes, so that they are read from this process's memory: many
+/// edges of an owner in one message. They are watched while a copy of this object exists. It may
+/// outlive the Client, but then receives nothing new.
+/// @par Thread safety  All functions are thread-safe.
+class TFDUDE_EXPORT EdgesWatch {
+ public:
+  explicit EdgesWatch(std::shared_ptr<WatchedPath> edges) : edges_(std::move(edges)) {}
+
+  /// X_AB over watched edges, as PathWatch::lookup(); but if the edges have no instant in common,
+  /// there is no result.
+  /// @return as Client::lookup(), where other frames than the ends of watched edges are unknown;
+  ///   kUnknownFrame if one of the edges no longer exists.
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
+                                                const Query& query = {}) const;
+
+  /// As PathWatch::health().
+  [[nodiscard]] Result<void> health() const;
+  /// As PathWatch::messages().
+  [[nodiscard]] std::uint64_t messages() const;
+  /// As PathWatch::wait_for_more().
+  [[nodiscard]] bool wait_for_more(std::uint64_t messages,
+                                   std::chrono::steady_clock::time_point deadline) const;
+
+ private:
+  std::shared_ptr<WatchedPath> edges_;
 };
 
 }  // namespace tfdude

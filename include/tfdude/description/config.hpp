@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,9 @@ namespace tfdude {
 
 /// The content of a daemon's YAML file. docs/configuration.md describes the keys.
 struct Config {
-  std::string partition;  ///< empty if the file names none
-  EdgeTiming history;     ///< default for frames without their own
+  std::string partition;           ///< empty if the file names none
+  std::optional<ClockKind> clock;  ///< absent if the file names none
+  EdgeTiming history;              ///< default for frames without their own
   /// Of edges for which the file gives none: unspecified, or exact.
   StatedCovariance covariance{};
   std::vector<FrameSpec> frames;

@@ -18,10 +18,11 @@ struct Roles {
   std::set<std::string> move;         ///< partitions that it changes in any way; includes look
   std::set<std::string> stream;       ///< partitions to which it streams values and joints only
   bool observe = false;               ///< changes edges of all partitions; includes look
+  bool clock = false;                 ///< publishes the time of external clocks
 
   friend bool operator==(const Roles& a, const Roles& b) {
     return a.serves == b.serves && a.look == b.look && a.move == b.move && a.stream == b.stream &&
-           a.observe == b.observe;
+           a.observe == b.observe && a.clock == b.clock;
   }
 };
 

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "tfdude/base/time.hpp"
 #include "tfdude/math/transform.hpp"
 #include "tfdude/types/correlation.hpp"
 #include "tfdude/types/edge.hpp"
@@ -34,6 +35,7 @@ struct PathSegment {
   std::string partition;
   std::string from;
   std::string to;
+  ClockKind clock = ClockKind::kSystem;  ///< of the stamps of the partition
 };
 
 }  // namespace tfdude

@@ -74,6 +74,12 @@ struct Options {
   Milliseconds save_every{1000};
   /// Default timing and history of a Node's edges, for frames without their own.
   EdgeTiming history{};
+  /// The clock of stamps: of unstamped updates of a Node's dynamic edges, of the check how far a
+  /// stamp is ahead, and of Client::now(). Liveness and time limits always use a steady clock, and
+  /// events, logs and conflicts between partitions the system's clock. An external clock gets its
+  /// time from Client::publish_clock() of any participant of the domain, or from
+  /// Client::set_time(). All participants of a domain should have the same kind.
+  ClockKind clock = ClockKind::kSystem;
   /// Limits of a Node.
   PartitionLimits limits{};
   /// Maximum time that the destructor of a client waits until the values it has streamed (publish,

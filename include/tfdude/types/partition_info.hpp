@@ -20,6 +20,7 @@ struct PartitionInfo {
   bool stopped = false;   ///< if not reachable: it announced its stop; otherwise it was lost
   std::string program{};  ///< the version of its program; empty: not known
   ProtocolVersion protocol = kProtocolVersion;
+  ClockKind clock = ClockKind::kSystem;  ///< the clock that its stamps are of
 
   /// Whether its protocol is understood here. If not, only its name and versions are known.
   [[nodiscard]] bool compatible() const { return protocol.major == kProtocolVersion.major; }

@@ -45,6 +45,27 @@ struct StampedTransform : Transform {
   Basis basis{};
 };
 
+/// The interval of a velocity.
+struct VelocityQuery {
+  /// The middle of the interval, which then ends no later than the newest instant for which all
+  /// dynamic edges of the path have data. Absent: the interval ends there.
+  std::optional<Time> at;
+  std::chrono::nanoseconds over = std::chrono::milliseconds(100);  ///< the length; positive
+};
+
+/// The mean velocity of frame B in frame A over an interval. Both vectors are expressed in the axes
+/// of A, and the reference point is the origin of B.
+struct Velocity {
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero();   ///< of B's origin [m/s]
+  Eigen::Vector3d angular = Eigen::Vector3d::Zero();  ///< [rad/s]
+  /// Of the errors of (linear, angular), to first order [m²/s², rad²/s²].
+  StatedCovariance covariance{};
+  /// The ends of the interval; absent: all edges are static, so the velocity is zero at all times.
+  std::optional<Time> begin{};
+  std::optional<Time> end{};
+  Basis basis{};
+};
+
 /// The result of a measurement.
 struct Observed {
   /// Squared Mahalanobis distance of the measurement from the estimate.

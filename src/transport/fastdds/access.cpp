@@ -71,4 +71,10 @@ Result<void> Access::check_watch(const std::string& partition) const {
   return refuse(partition, "watch paths");
 }
 
+Result<void> Access::check_clock() const {
+  if (!keys_ || keys_->roles.clock) return {};
+  return fail(Errc::kNotPermitted,
+              "identity " + quote(keys_->identity) + " may not publish the time");
+}
+
 }  // namespace tfdude::fastdds

@@ -43,6 +43,7 @@ class Access {
   [[nodiscard]] Result<void> check(const std::string& partition, const Request& request) const;
   [[nodiscard]] Result<void> check_stream(const std::string& partition) const;
   [[nodiscard]] Result<void> check_watch(const std::string& partition) const;
+  [[nodiscard]] Result<void> check_clock() const;
 
  private:
   [[nodiscard]] tl::unexpected<Error> refuse(const std::string& partition,

@@ -203,6 +203,12 @@ bool well_formed_joints(const std::uint8_t* data, std::size_t size) {
   return walk.good();
 }
 
+bool well_formed_clock(const std::uint8_t* data, std::size_t size) {
+  CdrWalk walk(data, size);
+  walk.skip(8, 8);
+  return walk.good();
+}
+
 bool well_formed_page(const std::uint8_t* data, std::size_t size) {
   CdrWalk walk(data, size);
   walk.id();

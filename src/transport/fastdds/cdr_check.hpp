@@ -17,6 +17,7 @@ namespace tfdude::fastdds {
 [[nodiscard]] bool well_formed_update(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_joints(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_state(const std::uint8_t* data, std::size_t size);
+[[nodiscard]] bool well_formed_clock(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_page(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_presence(const std::uint8_t* data, std::size_t size);
 

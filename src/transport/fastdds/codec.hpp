@@ -16,6 +16,8 @@ namespace tfdude::fastdds {
 
 /// What is sent instead of an absent stamp.
 inline constexpr std::int64_t kNoStamp = -1;
+/// What is pushed instead of the stamp of a value if the history was cleared.
+inline constexpr std::int64_t kClearedStamp = -2;
 
 [[nodiscard]] inline std::int64_t wire_stamp(std::optional<Time> stamp) {
   return stamp ? nanoseconds(*stamp) : kNoStamp;
@@ -36,6 +38,7 @@ void write_wire(const JointUpdate& update, wire::Joints& sample);
 [[nodiscard]] wire::Update to_wire(const Update& update);
 [[nodiscard]] wire::Joints to_wire(const JointUpdate& update);
 [[nodiscard]] wire::State to_wire(const PushedValues& pushed);
+[[nodiscard]] wire::Clock to_wire(Time now);
 [[nodiscard]] wire::Page to_wire(const Page& page);
 [[nodiscard]] wire::Presence to_wire(const Presence& presence);
 
@@ -48,6 +51,7 @@ void write_wire(const JointUpdate& update, wire::Joints& sample);
 [[nodiscard]] Result<JointUpdate> from_wire(const wire::Joints& sample,
                                             const std::function<bool(std::string_view)>& accept);
 [[nodiscard]] Result<PushedValues> from_wire(const wire::State& sample);
+[[nodiscard]] Result<Time> from_wire(const wire::Clock& sample);
 [[nodiscard]] Result<Page> from_wire(const wire::Page& sample);
 [[nodiscard]] Result<Presence> from_wire(const wire::Presence& sample);
 

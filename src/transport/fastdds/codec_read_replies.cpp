@@ -172,14 +172,16 @@ Result<PushedValues> from_wire(const wire::State& sample) {
   pushed.pieces = sample.pieces();
   pushed.entries.reserve(sample.entries().size());
   for (const wire::PushedEntry& entry : sample.entries()) {
-    const auto stamp = stamp_from_wire(entry.stamp(), "the stamp of a pushed value");
+    const bool cleared = entry.stamp() == kClearedStamp;
+    const auto stamp =
+        stamp_from_wire(cleared ? kNoStamp : entry.stamp(), "the stamp of a pushed value");
     if (!stamp) return tl::unexpected(stamp.error());
     const bool known = entry.covariance() != 0 && is_pose_only(entry.x());
     auto X = read_computed(entry.x());
     if (!X) return fail_at("pushed values", X.error());
     if (known) X->covariance = {};
     pushed.entries.push_back(
-        {entry.index(), *stamp, *X, {}, entry.history(), {}, entry.covariance(), known});
+        {entry.index(), *stamp, *X, {}, entry.history(), {}, entry.covariance(), known, cleared});
   }
   for (const wire::PushedCorrelation& one : sample.correlations()) {
     if (one.entry() >= pushed.entries.size()) {

@@ -1,3 +1,6 @@
+#include <utility>
+
+#include "base/stamp.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/codec_values.hpp"
 
@@ -35,6 +38,18 @@ wire::Joints to_wire(const JointUpdate& update) {
   wire::Joints sample;
   write_wire(update, sample);
   return sample;
+}
+
+wire::Clock to_wire(Time now) {
+  wire::Clock sample;
+  sample.stamp(nanoseconds(now));
+  return sample;
+}
+
+Result<Time> from_wire(const wire::Clock& sample) {
+  const Time now = time_of(sample.stamp());
+  if (auto ok = check_stamp(now); !ok) return tl::unexpected(std::move(ok.error()));
+  return now;
 }
 
 }  // namespace tfdude::fastdds

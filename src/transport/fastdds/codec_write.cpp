@@ -349,7 +349,8 @@ wire::State to_wire(const PushedValues& pushed) {
   sample.entries().resize(pushed.entries.size());
   for (std::size_t i = 0; i < pushed.entries.size(); ++i) {
     sample.entries()[i].index(pushed.entries[i].index);
-    sample.entries()[i].stamp(wire_stamp(pushed.entries[i].stamp));
+    sample.entries()[i].stamp(pushed.entries[i].cleared ? kClearedStamp
+                                                        : wire_stamp(pushed.entries[i].stamp));
     sample.entries()[i].history(pushed.entries[i].history);
     sample.entries()[i].covariance(pushed.entries[i].covariance_number);
     if (pushed.entries[i].covariance_known) {

@@ -90,6 +90,18 @@ inline bool write(edds::DataWriter& writer, void* data, ertps::WriteParams& para
 
 inline std::string name_of(const edds::TopicDataType& type) { return type.getName(); }
 
+/// Plain CDR of XCDR1 only, as ROS 2 has it.
+inline void use_plain_cdr(edds::DataWriterQos& qos) {
+  qos.representation().m_value = {edds::XCDR_DATA_REPRESENTATION};
+}
+inline void use_plain_cdr(edds::DataReaderQos& qos) {
+  qos.type_consistency().representation.m_value = {edds::XCDR_DATA_REPRESENTATION};
+}
+
+inline void set_heartbeat_period(edds::DataWriterQos& qos, std::uint32_t nanoseconds) {
+  qos.reliable_writer_qos().times.heartbeatPeriod = {0, nanoseconds};
+}
+
 /// Elements of XML profiles that have another name in this version than in profiles/tfdude.xml.
 inline constexpr std::array<std::pair<const char*, const char*>, 0> kRenamedElements{};
 
@@ -177,6 +189,17 @@ inline bool write(edds::DataWriter& writer, void* data, ertps::WriteParams& para
 }
 
 inline std::string name_of(const edds::TopicDataType& type) { return type.get_name(); }
+
+inline void use_plain_cdr(edds::DataWriterQos& qos) {
+  qos.representation().m_value = {edds::XCDR_DATA_REPRESENTATION};
+}
+inline void use_plain_cdr(edds::DataReaderQos& qos) {
+  qos.representation().m_value = {edds::XCDR_DATA_REPRESENTATION};
+}
+
+inline void set_heartbeat_period(edds::DataWriterQos& qos, std::uint32_t nanoseconds) {
+  qos.reliable_writer_qos().times.heartbeat_period = {0, nanoseconds};
+}
 
 inline constexpr std::array<std::pair<const char*, const char*>, 6> kRenamedElements{{
     {"initialHeartbeatDelay", "initial_heartbeat_delay"},

@@ -88,7 +88,9 @@ Result<void> FastDdsTransport::create_participant() {
     if (auto used = use_discovery_server(qos, options_.discovery_server); !used) return used;
   }
   DiscoveryGate discovery_gate(gate_, life_signs_);
-  discovery_gate.prepare(qos, options_.domain, options_.partition.empty());
+  // The time may be published by a client.
+  const bool owners_only = options_.partition.empty() && !handler_->wants_clock();
+  discovery_gate.prepare(qos, options_.domain, owners_only);
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
       options_.domain, qos, &participant_listener_, edds::StatusMask::none());
   if (participant_ == nullptr) {
@@ -125,6 +127,9 @@ Result<void> FastDdsTransport::create_endpoints() {
       context(), *topics_.state, options_.partition,
       PushChannels::Calls{[this](const PushedValues& pushed) { handler_->on_pushed(pushed); },
                           [this](std::uint64_t group) { handler_->on_watcher(group); }});
+  std::function<void(Time)> on_clock;
+  if (handler_->wants_clock()) on_clock = [this](Time now) { handler_->on_clock(now); };
+  clock_.emplace(context(), *topics_.clock, std::move(on_clock));
   presence_ = std::make_unique<Reader<wire::Presence>>(
       context(), *topics_.presence, kAllOwners, "presence_reader",
       Reader<wire::Presence>::Calls{
@@ -142,7 +147,8 @@ Result<void> FastDdsTransport::create_endpoints() {
       Reader<wire::Reply>::Calls{
           [this](const wire::Reply& sample, const Guid& from) { take_reply(sample, from); },
           nullptr});
-  if (!presence_->good() || (pages_ != nullptr && !pages_->good()) || !replies_->good()) {
+  if (!presence_->good() || (pages_ != nullptr && !pages_->good()) || !replies_->good() ||
+      !clock_->good()) {
     return not_created("the readers");
   }
   const std::string& own = options_.partition;
@@ -232,6 +238,7 @@ void FastDdsTransport::stop() {
   pages_.reset();
   presence_.reset();
   push_channels_.reset();
+  clock_.reset();
   reply_writers_.clear();
   senders_.reset();
   directory_writer_.reset();
@@ -257,6 +264,11 @@ void FastDdsTransport::publish(const Page& page) {
 Result<void> FastDdsTransport::watch(const std::string& owner, std::uint64_t group) {
   if (auto ok = access_.check_watch(owner); !ok) return ok;
   return push_channels_->watch(owner, group);
+}
+
+Result<void> FastDdsTransport::publish_clock(Time now) {
+  if (auto ok = access_.check_clock(); !ok) return ok;
+  return clock_->publish(now);
 }
 
 // --- replying ---

@@ -12,6 +12,7 @@
 #include "transport/fastdds/access.hpp"
 #include "transport/fastdds/admission.hpp"
 #include "transport/fastdds/attention.hpp"
+#include "transport/fastdds/clock_channel.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/contact.hpp"
 #include "transport/fastdds/entities.hpp"
@@ -70,6 +71,7 @@ class FastDdsTransport final : public Transport {
   void unwatch(std::uint64_t group) override { push_channels_->unwatch(group); }
   void push(const PushedValues& pushed) override { push_channels_->push(pushed); }
   void end_pushing(std::uint64_t group) override { push_channels_->end_pushing(group); }
+  Result<void> publish_clock(Time now) override;
   bool discovered() const override {
     return peers_.discovered() && !admission_.awaits_authentication();
   }
@@ -169,6 +171,7 @@ class FastDdsTransport final : public Transport {
   std::unique_ptr<Reader<wire::Page>> pages_;
   std::unique_ptr<Reader<wire::Presence>> presence_;
   std::optional<PushChannels> push_channels_;
+  std::optional<ClockChannel> clock_;
   std::optional<Worker> worker_;
 };
 

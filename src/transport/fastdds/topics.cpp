@@ -17,9 +17,10 @@ bool create_topics(edds::DomainParticipant& participant, Topics& topics) {
   topics.update = create(kUpdateTopic, edds::TypeSupport(new UpdateType));
   topics.joint = create(kJointTopic, edds::TypeSupport(new JointsType));
   topics.state = create(kStateTopic, edds::TypeSupport(new StateType));
+  topics.clock = create(kClockTopic, edds::TypeSupport(new ClockType));
   return topics.presence != nullptr && topics.directory != nullptr && topics.reply != nullptr &&
          topics.request != nullptr && topics.change != nullptr && topics.update != nullptr &&
-         topics.joint != nullptr && topics.state != nullptr;
+         topics.joint != nullptr && topics.state != nullptr && topics.clock != nullptr;
 }
 
 void count_malformed(FastDdsCounters& counters, const char* topic) {

@@ -14,6 +14,7 @@ using ReplyType = CheckedType<wire::ReplyPubSubType, well_formed_reply>;
 using UpdateType = CheckedType<wire::UpdatePubSubType, well_formed_update>;
 using JointsType = CheckedType<wire::JointsPubSubType, well_formed_joints>;
 using StateType = CheckedType<wire::StatePubSubType, well_formed_state>;
+using ClockType = CheckedType<wire::ClockPubSubType, well_formed_clock>;
 using PageType = CheckedType<wire::PagePubSubType, well_formed_page>;
 using PresenceType = CheckedType<wire::PresencePubSubType, well_formed_presence>;
 
@@ -25,6 +26,7 @@ struct Topics {
   edds::Topic* update = nullptr;
   edds::Topic* joint = nullptr;
   edds::Topic* state = nullptr;
+  edds::Topic* clock = nullptr;
   edds::Topic* directory = nullptr;
   edds::Topic* presence = nullptr;
 };

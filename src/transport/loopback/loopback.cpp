@@ -255,6 +255,13 @@ class LoopbackTransport final : public Transport {
 
   void end_pushing(std::uint64_t) override {}
 
+  Result<void> publish_clock(Time now) override {
+    tell_others([now](TransportHandler& handler) {
+      if (handler.wants_clock()) handler.on_clock(now);
+    });
+    return {};
+  }
+
   [[nodiscard]] bool discovered() const override { return true; }
   [[nodiscard]] bool awaits_presence() const override { return false; }
   [[nodiscard]] Milliseconds discovery_time() const override { return Milliseconds(0); }

@@ -161,8 +161,8 @@ TEST_CASE("a partition as JSON has its process and state") {
   info.frames = 3;
   info.reachable = true;
   info.program = "0.1.0";
-  json said{{"name", "arms"},    {"host", "tower"},    {"pid", 7},         {"frames", 3},
-            {"reachable", true}, {"program", "0.1.0"}, {"protocol", "1.1"}};
+  json said{{"name", "arms"},    {"host", "tower"},    {"pid", 7},          {"frames", 3},
+            {"reachable", true}, {"program", "0.1.0"}, {"protocol", "1.1"}, {"clock", "system"}};
   CHECK(partition_json(info) == said);
   info.reachable = false;
   said["reachable"] = false;
@@ -171,7 +171,11 @@ TEST_CASE("a partition as JSON has its process and state") {
   info.stopped = true;
   said["reason"] = "stopped";
   CHECK(partition_json(info) == said);
+  info.clock = ClockKind::kExternal;
+  said["clock"] = "external";
+  CHECK(partition_json(info) == said);
   info.protocol = {2, 0};
+  said.erase("clock");
   said["protocol"] = "2.0";
   said["reason"] = "incompatible";
   CHECK(partition_json(info) == said);

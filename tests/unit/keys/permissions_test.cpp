@@ -24,9 +24,9 @@ using testing::moving;
 using testing::observing;
 using testing::streaming;
 
-const std::vector<std::string> kTopics = {kRequestTopic,   kChangeTopic,  kReplyTopic,
-                                          kUpdateTopic,    kJointTopic,   kStateTopic,
-                                          kDirectoryTopic, kPresenceTopic};
+const std::vector<std::string> kTopics = {kRequestTopic,   kChangeTopic,   kReplyTopic,
+                                          kUpdateTopic,    kJointTopic,    kStateTopic,
+                                          kDirectoryTopic, kPresenceTopic, kClockTopic};
 
 Grant granted(const Roles& roles) {
   return {"CN=arm 1", *complete(roles), {3, 7}, kKeysTime, kKeysTime + std::chrono::hours(1)};
@@ -150,6 +150,23 @@ TEST_CASE("permissions: a client that may move changes only its partitions") {
   }
   CHECK(client.publishes(kRequestTopic, "legs"));
   CHECK_FALSE(client.publishes(kReplyTopic, "arm/0123"));
+}
+
+TEST_CASE("permissions: all hear the time, and only who may publishes it") {
+  Roles roles = looking();
+  CHECK_FALSE(Decision(roles).publishes(kClockTopic, ""));
+  CHECK(Decision(roles).subscribes(kClockTopic, ""));
+  roles.clock = true;
+  const Decision client(roles);
+  client.check_rules();
+  CHECK(client.publishes(kClockTopic, ""));
+  CHECK_FALSE(client.publishes(kUpdateTopic, ""));
+  const auto again = read_permissions(permissions_of(granted(roles)));
+  REQUIRE(again);
+  CHECK(again->roles.clock);
+  Roles only;
+  only.clock = true;
+  CHECK(complete(only));
 }
 
 TEST_CASE("permissions: a client that may stream sends no requests") {

@@ -41,6 +41,15 @@ TEST_CASE("pushed values are decoded as they were encoded") {
   }
 }
 
+TEST_CASE("the time is decoded as it was encoded, and a negative time is rejected") {
+  for (const Time now : {time_of(0), time_of(1), time_of(INT64_MAX)}) {
+    CHECK(*from_wire(travelled<ClockType>(to_wire(now))) == now);
+  }
+  const auto negative = from_wire(travelled<ClockType>(to_wire(time_of(-1))));
+  REQUIRE_FALSE(negative);
+  CHECK(negative.error().code == Errc::kInvalidInput);
+}
+
 TEST_CASE("requests are decoded as they were encoded") {
   Random random(0xc0de1);
   INFO("seed " << random.seed());

@@ -40,6 +40,7 @@ TEST_CASE("recorded messages are read and written again with the same bytes") {
     check_recorded<UpdateType, wire::Update>(folder / "update");
     check_recorded<JointsType, wire::Joints>(folder / "joint");
     check_recorded<StateType, wire::State>(folder / "state");
+    check_recorded<ClockType, wire::Clock>(folder / "clock");
     check_recorded<PageType, wire::Page>(folder / "page");
     check_recorded<PresenceType, wire::Presence>(folder / "presence");
     ++versions;

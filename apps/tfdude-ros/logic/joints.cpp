@@ -1,0 +1,51 @@
+#include "joints.hpp"
+
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude::ros {
+
+JointPositions JointImport::take(const JointState& message) {
+  JointPositions out;
+  // A stamp of zero is one that was not set.
+  if (message.stamp != Time()) out.stamp = message.stamp;
+  std::set<std::string> seen;
+  for (std::size_t i = 0; i < message.names.size(); ++i) {
+    const std::string& name = message.names[i];
+    if (!settings_.joints.takes(name)) continue;
+    std::string id = settings_.prefix + name;
+    const bool good = i < message.positions.size() && is_position(message.positions[i]) &&
+                      check_id(id, "joint") && seen.insert(id).second;
+    if (!good) {
+      ++counts_.refused;
+      continue;
+    }
+    const auto own = settings_.stddev_of.find(name);
+    const double stddev = own == settings_.stddev_of.end() ? settings_.stddev : own->second;
+    out.names.push_back(std::move(id));
+    out.positions.push_back(message.positions[i]);
+    out.variances.push_back(stddev * stddev);
+    ++counts_.taken;
+  }
+  return out;
+}
+
+void JointExport::heard(const JointState& message) {
+  // Names that nobody has here need not be known.
+  constexpr std::size_t kMost = 10'000;
+  for (const std::string& name : message.names) {
+    if (from_ros_.size() < kMost) from_ros_.insert(name);
+  }
+}
+
+void JointExport::add(const std::vector<JointInfo>& joints, JointState& message) const {
+  for (const JointInfo& joint : joints) {
+    auto name = ros_name_of(joint.name, settings_.prefix);
+    if (!joint.measured || !name || from_ros_.count(*name) != 0) continue;
+    message.names.push_back(*std::move(name));
+    message.positions.push_back(joint.position);
+  }
+}
+
+}  // namespace tfdude::ros

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tfdude/base/result.hpp"
+#include "tfdude/math/pose.hpp"
+
+#include "../messages.hpp"
+
+// What ROS's names and numbers are here.
+namespace tfdude::ros {
+
+/// Patterns of names: '*' stands for any characters, also none.
+class Patterns {
+ public:
+  Patterns() = default;
+  explicit Patterns(std::vector<std::string> patterns) : patterns_(std::move(patterns)) {}
+
+  [[nodiscard]] bool empty() const { return patterns_.empty(); }
+  [[nodiscard]] bool match(std::string_view name) const;
+
+ private:
+  std::vector<std::string> patterns_;
+};
+
+/// Which names are chosen: those that match `include` (empty: all) and not `exclude`.
+struct Choice {
+  Patterns include;
+  Patterns exclude;
+
+  [[nodiscard]] bool takes(std::string_view name) const {
+    return (include.empty() || include.match(name)) && !exclude.match(name);
+  }
+};
+
+/// ROS 1 had a leading slash, and some nodes still do.
+[[nodiscard]] std::string_view without_slashes(std::string_view name);
+
+/// The id of a frame of ROS: without leading slashes, with the prefix.
+/// @return kInvalidInput naming the frame: as check_id().
+[[nodiscard]] Result<std::string> id_of(std::string_view ros_name, const std::string& prefix);
+
+/// The inverse. @return none for a frame without the prefix: it has no name in ROS
+[[nodiscard]] std::optional<std::string> ros_name_of(std::string_view id, std::string_view prefix);
+
+/// Quaternions are normalized if their squared norm is within 0.01 of one, as in tf2.
+/// @return kInvalidInput naming the field.
+[[nodiscard]] Result<Pose> pose_of(const RosPose& pose);
+[[nodiscard]] RosPose ros_pose_of(const Pose& pose);
+
+}  // namespace tfdude::ros

@@ -1,0 +1,65 @@
+#include "poses.hpp"
+
+#include <algorithm>
+
+#include "tfdude/math/perturbation.hpp"
+
+#include "names.hpp"
+
+namespace tfdude::ros {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+
+}  // namespace
+
+std::optional<PoseWithCovariance> message_of(const PoseOut& out, const StampedTransform& X,
+                                             Time now) {
+  const StatedCovariance stated = ros_covariance(X);
+  const Covariance* covariance = stated.if_complete();
+  const auto frame = ros_name_of(out.frame, out.prefix);
+  if (covariance == nullptr || !frame) return std::nullopt;
+  PoseWithCovariance message{X.stamp.value_or(now), *frame, ros_pose_of(X.pose), {}};
+  Eigen::Map<RowMajor>(message.covariance.data()) = covariance->matrix();
+  return message;
+}
+
+std::optional<Odometry> message_of(const PoseOut& out, const StampedTransform& X,
+                                   const Velocity& velocity, Time now) {
+  auto pose = message_of(out, X, now);
+  const Covariance* covariance = velocity.covariance.if_complete();
+  auto child = ros_name_of(out.child, out.prefix);
+  if (!pose || covariance == nullptr || !child) return std::nullopt;
+  Odometry message{*std::move(pose), *std::move(child)};
+  const Eigen::Matrix3d R_CA = X.pose.rotation().conjugate().toRotationMatrix();
+  Eigen::Map<Eigen::Vector3d>(message.linear.data()) = R_CA * velocity.linear;
+  Eigen::Map<Eigen::Vector3d>(message.angular.data()) = R_CA * velocity.angular;
+  Matrix6d T = Matrix6d::Zero();
+  T.topLeftCorner<3, 3>() = R_CA;
+  T.bottomRightCorner<3, 3>() = R_CA;
+  Eigen::Map<RowMajor>(message.twist_covariance.data()) = T * covariance->matrix() * T.transpose();
+  return message;
+}
+
+Result<Measurement> measurement_of(const PoseIn& in, const PoseWithCovariance& message,
+                                   const std::string& child) {
+  auto a = id_of(message.frame, in.prefix);
+  if (!a) return tl::unexpected(std::move(a.error()));
+  auto b = id_of(child, in.prefix);
+  if (!b) return tl::unexpected(std::move(b.error()));
+  const auto pose = pose_of(message.pose);
+  if (!pose) return tl::unexpected(pose.error());
+  const auto& numbers = message.covariance;
+  const bool is_zero =
+      std::all_of(numbers.begin(), numbers.end(), [](double one) { return one == 0; });
+  if (is_zero || numbers[0] == -1) {
+    return fail(Errc::kInvalidInput, "covariance: the message has none");
+  }
+  const auto ros = Covariance::from_matrix(Eigen::Map<const RowMajor>(numbers.data()));
+  if (!ros) return tl::unexpected(ros.error());
+  Measurement out{*std::move(a), *std::move(b), from_ros_covariance(*pose, *ros), std::nullopt};
+  if (message.stamp != Time()) out.stamp = message.stamp;
+  return out;
+}
+
+}  // namespace tfdude::ros

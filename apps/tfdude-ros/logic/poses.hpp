@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "tfdude/base/result.hpp"
+#include "tfdude/math/observation.hpp"
+#include "tfdude/types/query.hpp"
+
+#include "../messages.hpp"
+
+// Poses with covariance. ROS's covariance is about axes parallel to those of the header's frame,
+// ours is that of the right perturbation, in the child frame (docs/uncertainty.md).
+namespace tfdude::ros {
+
+/// A path that is sent.
+struct PoseOut {
+  std::string topic;
+  std::string frame;
+  std::string child;
+  std::string prefix{};
+  double rate = 10;       ///< at most [Hz]; 0: every change
+  bool odometry = false;  ///< nav_msgs/Odometry: with the velocity
+};
+
+/// A topic whose messages are measurements.
+struct PoseIn {
+  std::string topic;
+  bool odometry = false;  ///< nav_msgs/Odometry, which names the child
+  std::string child{};
+  std::string prefix{};
+  ObserveOptions options{};
+};
+
+/// @param now  the stamp of a path that is static
+/// @return none if an edge of the path is unspecified: ROS cannot say that
+[[nodiscard]] std::optional<PoseWithCovariance> message_of(const PoseOut& out,
+                                                           const StampedTransform& X, Time now);
+
+/// The same with the mean velocity, which ROS has in the axes of the child.
+/// @return none also if the velocity depends on an unspecified edge
+[[nodiscard]] std::optional<Odometry> message_of(const PoseOut& out, const StampedTransform& X,
+                                                 const Velocity& velocity, Time now);
+
+/// A measurement as Client::observe() takes it.
+struct Measurement {
+  std::string a;
+  std::string b;
+  Transform X_AB;
+  std::optional<Time> stamp;
+};
+
+/// @return kInvalidInput naming the field: a name, the pose, a covariance that is not one. All
+///   zero, or -1 as the first number, means in ROS that it is not known.
+[[nodiscard]] Result<Measurement> measurement_of(const PoseIn& in,
+                                                 const PoseWithCovariance& message,
+                                                 const std::string& child);
+
+}  // namespace tfdude::ros

@@ -1,0 +1,214 @@
+#include "tf_import.hpp"
+
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude::ros {
+namespace {
+
+using Kind = TfImport::Edit::Kind;
+
+// A publisher that was silent for so long no longer decides about its frames.
+constexpr std::chrono::seconds kSilent{1};
+
+// Samples of one publisher that go back by more are from a clock that has jumped back. Late samples
+// of one publisher are later than that only if it is slow beyond use.
+constexpr std::chrono::seconds kJump{1};
+
+// So many reports are remembered; what happens after that is only counted.
+constexpr std::size_t kMaxReports = 1000;
+
+TfImport::Batch& batch_of(std::optional<Time> stamp, const std::string& id,
+                          std::vector<TfImport::Batch>& batches) {
+  const auto has = [&](const TfImport::Batch& batch) {
+    return std::any_of(batch.edges.begin(), batch.edges.end(),
+                       [&](const EdgeUpdate& edge) { return edge.id == id; });
+  };
+  if (batches.empty() || batches.back().stamp != stamp || has(batches.back())) {
+    batches.push_back({stamp, {}});
+  }
+  return batches.back();
+}
+
+bool equal(const Pose& a, const Pose& b) {
+  return a.translation() == b.translation() && a.rotation().coeffs() == b.rotation().coeffs();
+}
+
+}  // namespace
+
+TfImport::Changes TfImport::take(const TfMessage& message, const std::string& writer,
+                                 bool is_static, SteadyTime now, const WhoHolds& who_holds) {
+  Changes changes;
+  for (const TransformStamped& transform : message) {
+    take_one(transform, writer, is_static, now, who_holds, changes);
+  }
+  return changes;
+}
+
+TfImport::Changes TfImport::retry(SteadyTime now, const WhoHolds& who_holds) {
+  Changes changes;
+  for (const auto& [name, held] : std::exchange(held_back_, {})) {
+    take_one(held.transform, held.writer, true, now, who_holds, changes);
+  }
+  return changes;
+}
+
+std::optional<std::string> TfImport::rejected(const std::string& id, const Error& error) {
+  ++counts_.rejected;
+  if (error.code == Errc::kTooOld || error.code == Errc::kStampTaken) return std::nullopt;
+  entries_.erase(id);
+  if (!is_first("rejected " + id + std::string(tfdude::to_string(error.code)))) return std::nullopt;
+  return "not taken: frame " + quote(id) + ": " + error.message;
+}
+
+void TfImport::take_one(const TransformStamped& transform, const std::string& writer,
+                        bool is_static, SteadyTime now, const WhoHolds& who_holds,
+                        Changes& changes) {
+  const auto one = check(transform, is_static, changes);
+  if (!one) return;
+  const bool may =
+      may_take(*one, writer, who_holds, changes) && has_parent(*one, who_holds, changes);
+  if (!may) {
+    ++counts_.owned;
+    if (is_static) held_back_[transform.child] = {transform, writer};
+    return;
+  }
+  Entry& entry = entries_[one->id];
+  if (!may_write(*one, writer, now, entry, changes)) return;
+  apply(*one, writer, now, entry, changes);
+  ++counts_.taken;
+}
+
+std::optional<TfImport::Checked> TfImport::check(const TransformStamped& transform, bool is_static,
+                                                 Changes& changes) {
+  const std::string_view name = without_slashes(transform.child);
+  if (!settings_.frames.takes(name)) return std::nullopt;
+  auto id = id_of(transform.child, settings_.prefix);
+  auto parent = id_of(transform.parent, settings_.prefix);
+  if (!id || !parent) {
+    ++counts_.names;
+    const std::string& why = id ? parent.error().message : id.error().message;
+    report_once("name " + transform.child + '\n' + transform.parent, "not taken: " + why, changes);
+    return std::nullopt;
+  }
+  const auto pose = pose_of(transform.pose);
+  if (!pose || *id == *parent) {
+    ++counts_.values;
+    const std::string why = pose ? "it is its own parent" : pose.error().message;
+    report_once("value " + *id, "not taken: frame " + quote(*id) + ": " + why, changes);
+    return std::nullopt;
+  }
+  return Checked{*std::move(id),
+                 *std::move(parent),
+                 {*pose, settings_.covariance},
+                 transform.stamp,
+                 is_static};
+}
+
+bool TfImport::may_take(const Checked& one, const std::string& writer, const WhoHolds& who_holds,
+                        Changes& changes) {
+  if (entries_.count(one.id) != 0) return true;
+  const Holding holding = who_holds(one.id);
+  switch (holding.kind) {
+    case Holding::Kind::kOther:
+      report_once("owned " + one.id + writer,
+                  "not taken: frame " + quote(one.id) + " belongs to partition " +
+                      quote(holding.who) + "; it is also published by the writer " + writer,
+                  changes);
+      return false;
+    case Holding::Kind::kUnknown:
+      report_once("unknown " + one.id,
+                  "not taken for now: frame " + quote(one.id) + ": " + holding.who, changes);
+      return false;
+    case Holding::Kind::kBridge:
+      entries_[one.id].exists = true;
+      return true;
+    default:
+      return true;
+  }
+}
+
+bool TfImport::has_parent(const Checked& one, const WhoHolds& who_holds, Changes& changes) {
+  if (entries_.count(one.parent) != 0) return true;
+  const Holding holding = who_holds(one.parent);
+  if (holding.kind == Holding::Kind::kUnknown) {
+    report_once("unknown " + one.parent,
+                "not taken for now: frame " + quote(one.parent) + ", the parent of " +
+                    quote(one.id) + ": " + holding.who,
+                changes);
+    return false;
+  }
+  if (holding.kind == Holding::Kind::kOther) return true;
+  if (holding.kind == Holding::Kind::kNobody) {
+    changes.edits.push_back({Kind::kAddRoot, one.parent});
+  }
+  entries_[one.parent].exists = true;
+  return true;
+}
+
+bool TfImport::may_write(const Checked& one, const std::string& writer, SteadyTime now,
+                         Entry& entry, Changes& changes) {
+  if (entry.writer.empty() || entry.writer == writer) return true;
+  const bool is_active = now - entry.heard < kSilent;
+  const bool agrees = entry.parent == one.parent;
+  // A static transform is published once, by nodes that may all be there.
+  if ((is_active || one.is_static) && !std::exchange(entry.shared, true)) {
+    report_once("shared " + one.id + entry.writer + writer,
+                "frame " + quote(one.id) + " has two publishers: the writers " + entry.writer +
+                    " (parent " + quote(entry.parent) + ") and " + writer + " (parent " +
+                    quote(one.parent) + ")",
+                changes);
+  }
+  if (agrees || one.is_static || !is_active) return true;
+  ++counts_.contested;
+  return false;
+}
+
+std::optional<Kind> TfImport::edit_for(const Checked& one, const Entry& entry, bool jumped) {
+  // A frame that is the parent of others exists already, as a root.
+  if (entry.parent.empty()) return entry.exists ? Kind::kMove : Kind::kAdd;
+  if (entry.parent != one.parent || (one.is_static && !entry.is_static)) return Kind::kMove;
+  return jumped ? std::optional<Kind>(Kind::kClear) : std::nullopt;
+}
+
+void TfImport::apply(const Checked& one, const std::string& writer, SteadyTime now, Entry& entry,
+                     Changes& changes) {
+  const bool decides = entry.writer == writer || now - entry.heard >= kSilent;
+  const bool jumped = !one.is_static && !entry.is_static && decides && entry.parent == one.parent &&
+                      entry.newest - one.stamp > kJump;
+  if (jumped) report_jump(one, entry.newest, now, changes);
+  const auto edit = edit_for(one, entry, jumped);
+  if (edit) changes.edits.push_back({*edit, one.id, one.parent, one.X_PC});
+  if (!one.is_static) {
+    batch_of(one.stamp, one.id, changes.batches).edges.push_back({one.id, one.X_PC});
+  } else if (!edit && !equal(entry.X_PC, one.X_PC.pose)) {
+    batch_of(std::nullopt, one.id, changes.batches).edges.push_back({one.id, one.X_PC});
+  }
+  entry.newest = edit ? one.stamp : std::max(entry.newest, one.stamp);
+  entry.exists = true;
+  entry.parent = one.parent;
+  entry.is_static = one.is_static;
+  entry.writer = writer;
+  entry.heard = now;
+  entry.X_PC = one.X_PC.pose;
+}
+
+// All frames of a bag jump at the same moment.
+void TfImport::report_jump(const Checked& one, Time newest, SteadyTime now, Changes& changes) {
+  if (jump_reported_ && now - *jump_reported_ < kSilent) return;
+  jump_reported_ = now;
+  changes.reports.push_back("frame " + quote(one.id) + ": time has jumped back from " +
+                            to_string(newest) + " to " + to_string(one.stamp) +
+                            "; its samples are dropped, and those of all frames that jump, too");
+}
+
+void TfImport::report_once(const std::string& about, std::string text, Changes& changes) {
+  if (is_first(about)) changes.reports.push_back(std::move(text));
+}
+
+bool TfImport::is_first(const std::string& about) {
+  return reported_.size() < kMaxReports && reported_.insert(about).second;
+}
+
+}  // namespace tfdude::ros

@@ -1,0 +1,151 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "tfdude/base/time.hpp"
+#include "tfdude/types/edge.hpp"
+
+#include "../messages.hpp"
+#include "names.hpp"
+
+// What the transforms of ROS change in the partition that the bridge serves for them. No DDS, no
+// threads and no clock.
+namespace tfdude::ros {
+
+/// Whose a frame is, in the domain of tf-dude.
+struct Holding {
+  enum class Kind : std::uint8_t {
+    kNobody,
+    kBridge,   ///< the partition that the bridge serves for /tf
+    kOther,    ///< another partition, whether it is reachable or not
+    kUnknown,  ///< it may belong to a partition that is not reachable
+  };
+  Kind kind = Kind::kNobody;
+  std::string who{};  ///< the other partition, or why it is not known
+};
+
+/// Why transforms were not taken, and how many.
+struct ImportCounts {
+  std::uint64_t taken = 0;
+  std::uint64_t names = 0;      ///< a name that cannot be an id
+  std::uint64_t values = 0;     ///< not a rigid transform, or a frame in itself
+  std::uint64_t owned = 0;      ///< the frame belongs to another partition, or may
+  std::uint64_t contested = 0;  ///< another publisher gives the frame another parent
+  std::uint64_t rejected = 0;   ///< by the partition: too old, repeated, a cycle...
+};
+
+struct ImportSettings {
+  Choice frames;  ///< by the names in ROS
+  std::string prefix;
+  StatedCovariance covariance = StatedCovariance::unspecified();
+};
+
+class TfImport {
+ public:
+  using SteadyTime = std::chrono::steady_clock::time_point;
+  using WhoHolds = std::function<Holding(const std::string& id)>;
+
+  /// A change of the structure.
+  struct Edit {
+    enum class Kind : std::uint8_t {
+      kAddRoot,  ///< a parent that no message has described
+      kAdd,
+      kMove,   ///< has another parent now, or has become static
+      kClear,  ///< time has jumped back: its samples are dropped
+    };
+    Kind kind = Kind::kAdd;
+    std::string id;
+    std::string parent{};
+    std::optional<Transform> X_PC{};
+  };
+  /// Values with one stamp; without, they hold for all times.
+  struct Batch {
+    std::optional<Time> stamp;
+    std::vector<EdgeUpdate> edges;
+  };
+  /// Apply the edits first, in their order.
+  struct Changes {
+    std::vector<Edit> edits;
+    std::vector<Batch> batches;
+    std::vector<std::string> reports;  ///< each once, for the log
+
+    [[nodiscard]] bool empty() const { return edits.empty() && batches.empty(); }
+  };
+
+  explicit TfImport(ImportSettings settings) : settings_(std::move(settings)) {}
+
+  /// @param writer  its GUID
+  [[nodiscard]] Changes take(const TfMessage& message, const std::string& writer, bool is_static,
+                             SteadyTime now, const WhoHolds& who_holds);
+
+  /// Static transforms come only once. Takes those again that were not taken because of their
+  /// owner. Call when the structure has changed.
+  [[nodiscard]] Changes retry(SteadyTime now, const WhoHolds& who_holds);
+
+  /// The partition did not apply a change of this frame. Unless only a stamp was wrong, it starts
+  /// over with the next message.
+  /// @return a report for the log, if it is the first of this kind
+  [[nodiscard]] std::optional<std::string> rejected(const std::string& id, const Error& error);
+
+  [[nodiscard]] const ImportCounts& counts() const { return counts_; }
+
+ private:
+  struct Entry {
+    bool exists = false;  // in the partition
+    std::string parent;   // empty: only known as the parent of others
+    bool is_static = false;
+    std::string writer;   // of the newest transform
+    SteadyTime heard{};   // when that came
+    Time newest{};        // its stamp
+    Pose X_PC{};          // if static
+    bool shared = false;  // it was reported that it has several publishers
+  };
+  struct HeldBack {
+    TransformStamped transform;
+    std::string writer;
+  };
+  /// One transform with checked names and numbers.
+  struct Checked {
+    std::string id;
+    std::string parent;
+    Transform X_PC;
+    Time stamp;
+    bool is_static;
+  };
+
+  void take_one(const TransformStamped& transform, const std::string& writer, bool is_static,
+                SteadyTime now, const WhoHolds& who_holds, Changes& changes);
+  [[nodiscard]] std::optional<Checked> check(const TransformStamped& transform, bool is_static,
+                                             Changes& changes);
+  [[nodiscard]] bool may_take(const Checked& one, const std::string& writer,
+                              const WhoHolds& who_holds, Changes& changes);
+  [[nodiscard]] bool has_parent(const Checked& one, const WhoHolds& who_holds, Changes& changes);
+  /// @return whether this writer decides about the frame now
+  [[nodiscard]] bool may_write(const Checked& one, const std::string& writer, SteadyTime now,
+                               Entry& entry, Changes& changes);
+  void apply(const Checked& one, const std::string& writer, SteadyTime now, Entry& entry,
+             Changes& changes);
+  [[nodiscard]] static std::optional<Edit::Kind> edit_for(const Checked& one, const Entry& entry,
+                                                          bool jumped);
+  void report_jump(const Checked& one, Time newest, SteadyTime now, Changes& changes);
+  void report_once(const std::string& about, std::string text, Changes& changes);
+  [[nodiscard]] bool is_first(const std::string& about);
+
+  ImportSettings settings_;
+  std::unordered_map<std::string, Entry> entries_;
+  std::map<std::string, HeldBack> held_back_;  // static transforms, by the child's name in ROS
+  std::set<std::string> reported_;
+  std::optional<SteadyTime> jump_reported_;
+  ImportCounts counts_;
+};
+
+}  // namespace tfdude::ros

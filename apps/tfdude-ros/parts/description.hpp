@@ -1,0 +1,51 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "tfdude/client/node.hpp"
+
+#include "../ros_domain.hpp"
+#include "../settings.hpp"
+#include "worker.hpp"
+
+namespace tfdude::ros {
+
+/// Serves the robot of /robot_description as a partition, as a daemon serves that of a file. A new
+/// description replaces it.
+class DescriptionIn {
+ public:
+  /// @param options  as for a daemon
+  DescriptionIn(DescriptionSettings settings, Options options)
+      : settings_(std::move(settings)), options_(std::move(options)) {}
+
+  /// @param is_own  as for FramesIn. @return kTransport.
+  [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
+  void stop();
+
+  /// Waits until a robot is served. @return false at the end of the patience
+  bool wait_until_served(std::chrono::milliseconds patience);
+
+ private:
+  void take(const std::string& text);
+
+  const DescriptionSettings settings_;
+  const Options options_;
+  std::string text_;          // of the robot that is served
+  std::optional<Node> node_;  // serves it
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool served_ = false;
+  Worker worker_{4};  // last: it uses the other members
+};
+
+/// Publishes a URDF file on /robot_description.
+/// @return the publisher, which keeps it there for late nodes; kConfig naming the file, kTransport.
+[[nodiscard]] Result<std::unique_ptr<Publisher>> publish_description(RosDomain& domain,
+                                                                     const std::string& file);
+
+}  // namespace tfdude::ros

@@ -1,0 +1,91 @@
+#include "frames_in.hpp"
+
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+namespace tfdude::ros {
+
+using Edit = TfImport::Edit;
+
+Result<void> FramesIn::start(RosDomain& domain, const IsNeighbour& is_own) {
+  for (const bool is_static : {false, true}) {
+    auto take_message = [this, is_static, is_own](Message&& message, const Source& source) {
+      if (source.bridge && is_own(*source.bridge)) return;
+      worker_.post([this, is_static, writer = source.guid,
+                    transforms = std::get<TfMessage>(std::move(message))] {
+        take(transforms, writer, is_static);
+      });
+    };
+    auto subscribed =
+        domain.subscribe(is_static ? tf_static_topic() : tf_topic(), std::move(take_message));
+    if (!subscribed) return subscribed;
+  }
+  return {};
+}
+
+void FramesIn::stop() {
+  worker_.stop();
+  const ImportCounts& counts = import_.counts();
+  spdlog::info(
+      "transforms of ROS: taken={} not taken: names={} values={} owned={} contested={} rejected={} "
+      "dropped messages={}",
+      counts.taken, counts.names, counts.values, counts.owned, counts.contested, counts.rejected,
+      worker_.dropped());
+}
+
+void FramesIn::on_change(const Change& change) {
+  structure_.changed();
+  const bool own = change.partition == node_.partition() && change.kind != ChangeKind::kConflict;
+  if (own || retrying_.exchange(true)) return;
+  worker_.post([this] {
+    retrying_ = false;
+    apply(import_.retry(Worker::Clock::now(),
+                        [this](const std::string& id) { return structure_.holding(id); }));
+  });
+}
+
+void FramesIn::take(const TfMessage& message, const std::string& writer, bool is_static) {
+  apply(import_.take(message, writer, is_static, Worker::Clock::now(),
+                     [this](const std::string& id) { return structure_.holding(id); }));
+}
+
+void FramesIn::apply(const TfImport::Changes& changes) {
+  for (const std::string& report : changes.reports) spdlog::warn("{}", report);
+  for (const Edit& edit : changes.edits) apply(edit);
+  for (const TfImport::Batch& batch : changes.batches) apply(batch);
+}
+
+void FramesIn::apply(const Edit& edit) {
+  const auto done = [&]() -> Result<void> {
+    switch (edit.kind) {
+      case Edit::Kind::kAddRoot:
+        return node_.add(edit.id, {}, Transform(), node_.partition());
+      case Edit::Kind::kAdd:
+        return node_.add(edit.id, edit.parent, *edit.X_PC, node_.partition());
+      case Edit::Kind::kClear:
+        return node_.clear_history(edit.id);
+      default:  // also to the same parent: without samples it is static
+        return node_.move(edit.id, edit.parent, *edit.X_PC);
+    }
+  }();
+  if (!done) rejected(edit.id, done.error());
+}
+
+// All of a batch at once; if one is rejected, each alone.
+void FramesIn::apply(const TfImport::Batch& batch) {
+  const auto done = node_.update(batch.edges, batch.stamp);
+  if (done) return;
+  for (const EdgeUpdate& edge : batch.edges) {
+    const auto alone =
+        batch.edges.size() == 1 ? done : node_.update(edge.id, edge.X_PC, batch.stamp);
+    if (!alone) rejected(edge.id, alone.error());
+  }
+}
+
+void FramesIn::rejected(const std::string& id, const Error& error) {
+  if (const auto report = import_.rejected(id, error)) spdlog::warn("{}", *report);
+  structure_.changed();
+}
+
+}  // namespace tfdude::ros

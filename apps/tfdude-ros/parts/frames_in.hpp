@@ -1,0 +1,45 @@
+#pragma once
+
+#include <atomic>
+#include <string>
+
+#include "tfdude/client/node.hpp"
+
+#include "../logic/tf_import.hpp"
+#include "../ros_domain.hpp"
+#include "structure.hpp"
+#include "worker.hpp"
+
+namespace tfdude::ros {
+
+/// Makes the frames of /tf and /tf_static those of the partition that the bridge serves.
+class FramesIn {
+ public:
+  /// @param node  serves the partition; outlives it
+  FramesIn(Node& node, const ImportSettings& settings)
+      : node_(node), structure_(node), import_(settings) {}
+
+  /// @param is_own  whether a bridge is in the same domain of tf-dude: its frames are there already
+  /// @return kTransport.
+  [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
+  /// Nothing is taken any more. Logs what was not.
+  void stop();
+
+  /// The structure of tf-dude's domain has changed. Thread-safe.
+  void on_change(const Change& change);
+
+ private:
+  void take(const TfMessage& message, const std::string& writer, bool is_static);
+  void apply(const TfImport::Changes& changes);
+  void apply(const TfImport::Edit& edit);
+  void apply(const TfImport::Batch& batch);
+  void rejected(const std::string& id, const Error& error);
+
+  Node& node_;
+  Structure structure_;
+  TfImport import_;
+  std::atomic<bool> retrying_{false};
+  Worker worker_;  // last: it uses the other members
+};
+
+}  // namespace tfdude::ros

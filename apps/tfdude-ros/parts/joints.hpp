@@ -1,0 +1,54 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "tfdude/client/node.hpp"
+
+#include "../logic/joints.hpp"
+#include "../ros_domain.hpp"
+#include "worker.hpp"
+
+namespace tfdude::ros {
+
+/// Passes /joint_states on to the owners of the joints.
+class JointsIn {
+ public:
+  /// @param node  outlives it
+  JointsIn(Node& node, const JointImportSettings& settings) : node_(node), import_(settings) {}
+
+  /// @param is_own  as for FramesIn. @return kTransport.
+  [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
+  /// Nothing is taken any more. Logs what was not.
+  void stop();
+
+ private:
+  void take(const JointState& message);
+
+  Node& node_;
+  JointImport import_;
+  std::string logged_;  // the last error
+  Worker worker_;       // last: it uses the other members
+};
+
+/// Sends the joints of tf-dude to /joint_states.
+class JointsOut {
+ public:
+  /// @param node  outlives it
+  JointsOut(Node& node, const JointExportSettings& settings) : node_(node), export_(settings) {}
+
+  /// @param domain  outlives it until stop(). @return kTransport.
+  [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
+  void stop();
+
+ private:
+  void send();
+
+  Node& node_;
+  JointExport export_;
+  std::unique_ptr<Publisher> publisher_;
+  Worker worker_;  // last: it uses the other members
+};
+
+}  // namespace tfdude::ros

@@ -1,0 +1,127 @@
+#include "poses.hpp"
+
+#include <chrono>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude::ros {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kPatience{100};
+
+}  // namespace
+
+Result<std::unique_ptr<PoseSender>> PoseSender::start(Node& node, RosDomain& domain,
+                                                      const PoseOut& settings) {
+  auto publisher = domain.advertise(settings.odometry ? odometry_topic(settings.topic)
+                                                      : pose_topic(settings.topic));
+  if (!publisher) return tl::unexpected(std::move(publisher.error()));
+  return std::unique_ptr<PoseSender>(new PoseSender(node, settings, *std::move(publisher)));
+}
+
+PoseSender::PoseSender(Node& node, PoseOut settings, std::unique_ptr<Publisher> publisher)
+    : node_(node),
+      settings_(std::move(settings)),
+      publisher_(std::move(publisher)),
+      thread_([this] { run(); }) {}
+
+PoseSender::~PoseSender() {
+  stopping_ = true;
+  thread_.join();
+}
+
+bool PoseSender::pause() {
+  std::this_thread::sleep_for(kPatience);
+  return !stopping_;
+}
+
+void PoseSender::run() {
+  do {
+    WatchOptions options;
+    options.rate = settings_.rate;
+    const auto path = node_.watch(settings_.frame, settings_.child, options);
+    if (path) {
+      send(*path);
+    } else {
+      log_once(path.error().message);
+    }
+  } while (pause());
+}
+
+void PoseSender::send(const PathWatch& path) {
+  while (!stopping_) {
+    const std::uint64_t messages = path.messages();
+    const auto X = path.latest();
+    // An owner that is away has its frames, but they are not exported.
+    const auto health = path.health();
+    if (!health || !X) return log_once(X ? health.error().message : X.error().message);
+    publish(*X);
+    while (!path.wait_for_more(messages, Clock::now() + kPatience)) {
+      if (stopping_ || !path.health()) return;
+    }
+  }
+}
+
+void PoseSender::publish(const StampedTransform& X) {
+  const Time now = node_.now().value_or(Time());
+  std::optional<Message> message;
+  if (settings_.odometry) {
+    const auto velocity = node_.velocity(settings_.frame, settings_.child);
+    if (!velocity) return log_once(velocity.error().message);
+    message = message_of(settings_, X, *velocity, now);
+  } else {
+    message = message_of(settings_, X, now);
+  }
+  if (!message) {
+    return log_once("the covariance of " + quote(settings_.child) + " in " +
+                    quote(settings_.frame) + " is unspecified");
+  }
+  logged_.clear();
+  publisher_->publish(*message);
+}
+
+void PoseSender::log_once(const std::string& why) {
+  if (std::exchange(logged_, why) != why) spdlog::warn("not sent to {}: {}", settings_.topic, why);
+}
+
+Result<void> PoseObserver::start(RosDomain& domain, const IsNeighbour& is_own) {
+  const Topic topic =
+      settings_.odometry ? odometry_topic(settings_.topic) : pose_topic(settings_.topic);
+  return domain.subscribe(topic, [this, is_own](Message&& message, const Source& source) {
+    if (source.bridge && is_own(*source.bridge)) return;
+    worker_.post([this, taken = std::move(message)] {
+      if (const auto* odometry = std::get_if<Odometry>(&taken)) {
+        take(odometry->pose, odometry->child);
+      } else {
+        take(std::get<PoseWithCovariance>(taken), settings_.child);
+      }
+    });
+  });
+}
+
+void PoseObserver::stop() {
+  worker_.stop();
+  spdlog::info("{}: accepted={} rejected by the gate={} failed={} dropped messages={}",
+               settings_.topic, accepted_, rejected_, failed_, worker_.dropped());
+}
+
+void PoseObserver::take(const PoseWithCovariance& message, const std::string& child) {
+  const auto observed = measurement_of(settings_, message, child).and_then([&](const auto& one) {
+    return node_.observe(one.a, one.b, one.X_AB, one.stamp, settings_.options);
+  });
+  if (observed) {
+    ++(observed->accepted ? accepted_ : rejected_);
+    logged_.clear();
+    return;
+  }
+  ++failed_;
+  const std::string& why = observed.error().message;
+  if (std::exchange(logged_, why) != why) spdlog::warn("{}: {}", settings_.topic, why);
+}
+
+}  // namespace tfdude::ros

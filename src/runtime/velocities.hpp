@@ -1,0 +1,49 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tfdude/types/query.hpp"
+
+#include "math/mean_velocity.hpp"
+#include "partition/observing.hpp"
+#include "runtime/lookups.hpp"
+#include "runtime/requests.hpp"
+#include "runtime/structure.hpp"
+
+namespace tfdude {
+
+/// Mean velocities of frames. Client describes the return values.
+/// @par Thread safety  All functions are thread-safe.
+class Velocities {
+ public:
+  Velocities(Structure& structure, Requests& requests, Lookups& lookups)
+      : structure_(structure), requests_(requests), lookups_(lookups) {}
+
+  [[nodiscard]] Result<Velocity> velocity(const std::string& a, const std::string& b,
+                                          const VelocityQuery& query, const Deadline& deadline);
+
+ private:
+  struct Interval {
+    Time begin;
+    Time end;
+  };
+
+  /// Empty: the path is static.
+  [[nodiscard]] Result<std::optional<Interval>> interval(const std::string& a, const std::string& b,
+                                                         const VelocityQuery& query,
+                                                         const Deadline& deadline);
+  /// The edges of the plan at both ends.
+  [[nodiscard]] Result<std::vector<EdgeAtEnds>> edges(const ObservePlan& plan,
+                                                      const Interval& interval,
+                                                      const Deadline& deadline);
+  /// Finds out which of the edges are static.
+  [[nodiscard]] Result<void> find_fixed(const ObservePlan& plan, std::vector<EdgeAtEnds>& edges,
+                                        const Deadline& deadline);
+
+  Structure& structure_;
+  Requests& requests_;
+  Lookups& lookups_;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,211 @@
+// Time from outside, over each transport.
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+#include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/networks.hpp"
+#include "support/process.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::along_x;
+using testing::Approx;
+using testing::ContainsSubstring;
+using testing::eventually;
+using testing::Join;
+using testing::joined_by;
+using testing::outcome;
+
+Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
+
+Query at(Time t) { return {t, 0ns, {}}; }
+
+double x_of(const Result<StampedTransform>& X) {
+  return X ? X->pose.translation().x() : std::numeric_limits<double>::quiet_NaN();
+}
+
+Options external(Milliseconds timeout = Milliseconds(1000)) {
+  Options options;
+  options.clock = ClockKind::kExternal;
+  options.timeout = timeout;
+  options.history.moving = true;
+  return options;
+}
+
+ClockKind clock_of(Client& client, const std::string& partition) {
+  const auto partitions = client.partitions();
+  REQUIRE(partitions);
+  for (const PartitionInfo& one : *partitions) {
+    if (one.name == partition) return one.clock;
+  }
+  FAIL("no partition " << partition);
+  return ClockKind::kSystem;
+}
+
+// A simulation: world -> arm -> hand of two partitions, a client with the external clock, and a
+// publisher of the time, which uses the system's clock.
+struct Simulation {
+  explicit Simulation(const Join& join) {
+    base.emplace(
+        *Node::open(join("base"), "base", {{"world", "", {}}, {"arm", "world", {}}}, external()));
+    tool.emplace(*Node::open(join("tool"), "tool", {{"hand", "arm", along_x(1)}}, external()));
+    client.emplace(*Client::open(join(""), external()));
+    publisher.emplace(*Client::open(join("")));
+  }
+
+  // The time may be lost, so it is published until all have it.
+  void tell(Time now) {
+    REQUIRE(eventually([&] {
+      REQUIRE(publisher->publish_clock(now));
+      const auto has = [now](Client& one) { return one.now() == now; };
+      return has(*base) && has(*tool) && has(*client);
+    }));
+  }
+
+  std::optional<Node> base;
+  std::optional<Node> tool;
+  std::optional<Client> client;
+  std::optional<Client> publisher;
+};
+
+TEST_CASE("clock: before the first time, whatever needs the present fails and says so") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Node base = *Node::open(join("base"), "base", {{"world", "", {}}, {"arm", "world", {}}},
+                          external(Milliseconds(300)));
+  Client client = *Client::open(join(""), external(Milliseconds(300)));
+  for (Client* caller : {static_cast<Client*>(&base), &client}) {
+    const auto now = caller->now();
+    CHECK(outcome(now) == "not_yet");
+    CHECK_THAT(now.error().message, ContainsSubstring("nobody has published the time"));
+    const auto unstamped = caller->update("arm", along_x(1));
+    CHECK(outcome(unstamped) == "not_yet");
+    CHECK_THAT(unstamped.error().message, ContainsSubstring("clock is external"));
+    CHECK(outcome(caller->update("arm", along_x(1), ms(5))) == "not_yet");
+  }
+  CHECK(outcome(base.set_time(ms(-1))) == "invalid_input");
+  CHECK(outcome(base.publish_clock(ms(-1))) == "invalid_input");
+  REQUIRE(base.set_time(ms(0)));
+  CHECK(outcome(client.update("arm", along_x(1))) == "ok");
+  CHECK(client.lookup("world", "arm", Query{})->stamp == ms(0));
+  Client other = *Client::open(join(""));
+  CHECK(outcome(other.set_time(ms(1))) == "invalid_input");
+  CHECK(outcome(other.now()) == "ok");
+}
+
+TEST_CASE("clock: unstamped samples and limits follow the published time") {
+  Simulation sim(joined_by(GENERATE(from_range(testing::networks()))));
+  sim.tell(ms(0));
+  REQUIRE(sim.client->update({{"arm", along_x(1)}, {"hand", along_x(10)}}));
+  CHECK(sim.client->lookup("world", "hand", Query{})->stamp == ms(0));
+  // It stands still.
+  REQUIRE(sim.base->update("arm", along_x(2)));
+  CHECK(sim.base->lookup("world", "arm", Query{})->stamp == ms(0) + 1ns);
+  // Ten seconds at once.
+  sim.tell(ms(10'000));
+  REQUIRE(sim.client->update({{"arm", along_x(3)}, {"hand", along_x(20)}}));
+  CHECK(sim.client->lookup("world", "hand", Query{})->stamp == ms(10'000));
+  CHECK(x_of(sim.client->lookup("world", "hand", at(ms(5000)))) == Approx(2.5 + 15).epsilon(1e-6));
+  CHECK(outcome(sim.client->update("arm", along_x(4), ms(70'001))) == "invalid_input");
+  CHECK(outcome(sim.client->update("arm", along_x(4), ms(69'999))) == "ok");
+}
+
+TEST_CASE("clock: after a jump back a replay works") {
+  Simulation sim(joined_by(GENERATE(from_range(testing::networks()))));
+  const auto play = [&](double offset) {
+    for (const int t : {0, 1000, 2000}) {
+      sim.tell(ms(t));
+      REQUIRE(sim.client->update({{"arm", along_x(t + offset)}, {"hand", along_x(0)}}, ms(t)));
+    }
+    CHECK(x_of(sim.client->lookup("world", "hand", at(ms(1500)))) == Approx(1500 + offset));
+  };
+  play(0);
+  auto watch = sim.client->watch("world", "hand");
+  REQUIRE(watch);
+  CHECK(x_of(watch->latest()) == 2000);
+  sim.tell(ms(500));
+  // The values are of the future.
+  CHECK(outcome(sim.client->lookup("world", "hand", Query{})) == "not_yet");
+  CHECK(outcome(sim.base->lookup("world", "arm", at(ms(100)))) == "not_yet");
+  CHECK(eventually([&] { return outcome(watch->latest()) == "not_yet"; }));
+  play(7);
+  CHECK(eventually([&] { return x_of(watch->latest()) == 2007; }));
+  // Ownership, structure and static edges stay.
+  REQUIRE(sim.client->add("camera", "hand", along_x(3)));
+  sim.tell(ms(0));
+  CHECK(sim.client->frames()->size() == 4);
+  CHECK(x_of(sim.client->lookup("hand", "camera", Query{})) == 3);
+}
+
+TEST_CASE("clock: each participant says which clock it uses") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Node sim = *Node::open(join("sim"), "sim", {{"world", "", {}}, {"arm", "world", {}}}, external());
+  Node real = *Node::open(join("real"), "real", {{"hand", "arm", along_x(1)}});
+  Client client = *Client::open(join(""));
+  for (Client* caller : {static_cast<Client*>(&sim), static_cast<Client*>(&real), &client}) {
+    CHECK(clock_of(*caller, "sim") == ClockKind::kExternal);
+    CHECK(clock_of(*caller, "real") == ClockKind::kSystem);
+    const auto path = caller->path("world", "hand");
+    REQUIRE(path);
+    REQUIRE(path->size() == 2);
+    CHECK((*path)[0].clock == ClockKind::kExternal);
+    CHECK((*path)[1].clock == ClockKind::kSystem);
+  }
+}
+
+TEST_CASE("clock: the present of one clock is not taken for that of another") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Node sim = *Node::open(join("sim"), "sim", {{"world", "", {}}, {"arm", "world", {}}}, external());
+  Client client = *Client::open(join(""));
+  REQUIRE(sim.set_time(ms(5000)));
+  for (const int t : {4000, 5000}) REQUIRE(sim.update("arm", along_x(t), ms(t)));
+  const auto now = client.lookup("world", "arm", at(*client.now()));
+  CHECK(outcome(now) == "not_yet");
+  CHECK_THAT(now.error().message,
+             ContainsSubstring("partition 'sim' uses the external clock, and this participant the "
+                               "system clock"));
+  Query aged;
+  aged.age_noise_until = *client.now();
+  const auto noise = client.lookup("world", "arm", aged);
+  CHECK(outcome(noise) == "invalid_input");
+  CHECK_THAT(noise.error().message, ContainsSubstring("'sim' uses the external clock"));
+  CHECK(x_of(client.lookup("world", "arm", at(ms(4500)))) == 4500);
+}
+
+TEST_CASE("clock: an owner clears the history of one edge or of all") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Node arm = *Node::open(join("arm"), "arm",
+                         {{"world", "", {}}, {"arm", "world", {}}, {"hand", "arm", {}}});
+  Node tool = *Node::open(join("tool"), "tool", {{"tool", "hand", {}}});
+  Client client = *Client::open(join(""));
+  for (const int t : {1000, 2000}) {
+    REQUIRE(
+        client.update({{"arm", along_x(1)}, {"hand", along_x(2)}, {"tool", along_x(3)}}, ms(t)));
+  }
+  CHECK(outcome(arm.clear_history("nobody")) == "unknown_frame");
+  CHECK(outcome(arm.clear_history("tool")) == "not_owner");
+  REQUIRE(arm.clear_history("hand"));
+  CHECK(outcome(client.lookup("world", "tool", Query{})) == "not_yet");
+  CHECK(x_of(client.lookup("world", "arm", Query{})) == 1);
+  // A lookup waits for the next sample.
+  auto waiting = client.lookup_async("world", "tool", Query{}, 20s);
+  REQUIRE(client.update("hand", along_x(5), ms(2000)));
+  CHECK(x_of(waiting.get()) == 9);
+  CHECK(arm.clear_history() == 2);
+  CHECK(arm.clear_history() == 0);
+  CHECK(outcome(client.lookup("world", "arm", Query{})) == "not_yet");
+  CHECK(x_of(client.lookup("hand", "tool", Query{})) == 3);
+  // Earlier stamps are accepted.
+  REQUIRE(client.update({{"arm", along_x(6)}, {"hand", along_x(7)}}, ms(10)));
+  CHECK(x_of(client.lookup("world", "hand", Query{})) == 13);
+}
+
+}  // namespace
+}  // namespace tfdude

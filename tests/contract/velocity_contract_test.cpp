@@ -1,0 +1,154 @@
+// Velocities of paths over partitions, over each transport.
+
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/networks.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::along_x;
+using testing::Approx;
+using testing::ContainsSubstring;
+using testing::Join;
+using testing::joined_by;
+using testing::outcome;
+
+Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
+
+Covariance isotropic(double metres, double radians) {
+  return *Covariance::from_stddev({metres, metres, metres, radians, radians, radians});
+}
+
+// world -> base drives along x at 1 m/s; base -> arm turns about z at 2 rad/s; arm -> hand is
+// static, half a metre ahead. Each is of another partition. Samples from 1 to 2 s, every 10 ms.
+struct Robot {
+  explicit Robot(const Join& join, const Covariance& base_error = {},
+                 const Covariance& hand_error = {}) {
+    base.emplace(*Node::open(join("base"), "base", {{"world", "", {}}, {"base", "world", {}}}));
+    arm.emplace(*Node::open(join("arm"), "arm", {{"arm", "base", {}}}));
+    const Transform X_AH{along_x(0.5).pose, hand_error};
+    hand.emplace(*Node::open(join("hand"), "hand", {{"hand", "arm", X_AH}}));
+    client.emplace(*Client::open(join("")));
+    for (int t = 1000; t <= 2000; t += 10) {
+      const double s = 1e-3 * t;
+      const Eigen::Quaterniond q(Eigen::AngleAxisd(2 * (s - 1), Eigen::Vector3d::UnitZ()));
+      REQUIRE(base->update("base", {along_x(s).pose, base_error}, ms(t)));
+      REQUIRE(arm->update("arm", {Pose::trusted(q, {0, 0, 0}), Covariance()}, ms(t)));
+    }
+  }
+
+  std::optional<Node> base;
+  std::optional<Node> arm;
+  std::optional<Node> hand;
+  std::optional<Client> client;
+};
+
+TEST_CASE("velocity: it is in the axes of A at the origin of B") {
+  Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
+  for (Client* caller : {&*robot.client, static_cast<Client*>(&*robot.arm)}) {
+    const auto velocity = caller->velocity("world", "hand", {ms(1500), 2ms});
+    REQUIRE(velocity);
+    CHECK(velocity->begin == ms(1499));
+    CHECK(velocity->end == ms(1501));
+    // The hand points at 1 rad, and moves at 1 m/s to the left of that, besides the base's 1 m/s.
+    CHECK(velocity->linear.x() == Approx(1 - std::sin(1.0)).epsilon(1e-5));
+    CHECK(velocity->linear.y() == Approx(std::cos(1.0)).epsilon(1e-5));
+    CHECK(std::abs(velocity->linear.z()) < 1e-12);
+    CHECK((velocity->angular - Eigen::Vector3d(0, 0, 2)).norm() < 1e-9);
+    CHECK(velocity->covariance.if_complete() != nullptr);
+    // In the other direction the axes are those of the hand.
+    const auto back = caller->velocity("hand", "world", {ms(1500), 2ms});
+    REQUIRE(back);
+    CHECK((back->angular - Eigen::Vector3d(0, 0, -2)).norm() < 1e-9);
+  }
+}
+
+TEST_CASE("velocity: the interval ends at the latest common time") {
+  Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
+  REQUIRE(robot.base->update("base", along_x(2.01), ms(2010)));
+  const auto newest = robot.client->velocity("world", "hand");
+  REQUIRE(newest);
+  CHECK(newest->end == ms(2000));
+  CHECK(newest->begin == ms(1900));
+  const auto late = robot.client->velocity("world", "hand", {ms(1990), 40ms});
+  REQUIRE(late);
+  // By now the latest common time is predicted, which may make it a little older.
+  CHECK(late->end >= ms(1990));
+  CHECK(late->end <= ms(2000));
+  CHECK(late->begin == *late->end - 40ms);
+  CHECK(outcome(robot.client->velocity("world", "hand", {ms(2001), 100ms})) == "not_yet");
+  CHECK(outcome(robot.client->velocity("world", "hand", {ms(1010), 100ms})) == "too_old");
+  CHECK(outcome(robot.client->velocity("world", "hand", {ms(1010), 60s})) == "too_old");
+  CHECK(outcome(robot.client->velocity("world", "hand", {std::nullopt, 0ms})) == "invalid_input");
+  CHECK(outcome(robot.client->velocity("world", "hand", {ms(-1), 1ms})) == "invalid_input");
+  CHECK(outcome(robot.client->velocity("world", "nobody")) == "unknown_end");
+}
+
+TEST_CASE("velocity: static edges do not move, whatever their errors are") {
+  Robot robot(joined_by(GENERATE(from_range(testing::networks()))), {}, isotropic(1, 1));
+  for (const char* to : {"hand", "arm"}) {
+    const auto still = robot.client->velocity("arm", to);
+    REQUIRE(still);
+    CHECK(still->linear.norm() == 0);
+    CHECK(still->covariance == StatedCovariance());
+    CHECK_FALSE(still->begin);
+    CHECK_FALSE(still->end);
+  }
+}
+
+TEST_CASE("velocity: common errors of static edges cancel, and those of dynamic edges do not") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  SECTION("only the hand's mount is uncertain") {
+    Robot robot(join, {}, isotropic(0.01, 0));
+    const auto velocity = robot.client->velocity("world", "hand", {ms(1500), 2ms});
+    REQUIRE(velocity);
+    // The lever is off by 1 cm: 2 rad/s make 2 cm/s of it, across the axis of rotation.
+    const auto s = velocity->covariance.if_complete()->stddev();
+    CHECK(s[0] == Approx(0.02).epsilon(1e-4));
+    CHECK(s[1] == Approx(0.02).epsilon(1e-4));
+    CHECK(s[2] < 1e-9);
+    CHECK(s[5] < 1e-9);
+    CHECK_FALSE(velocity->basis.bound);
+  }
+  SECTION("the base's samples are uncertain") {
+    Robot robot(join, isotropic(0.01, 0), {});
+    const auto velocity = robot.client->velocity("world", "hand", {ms(1500), 100ms});
+    REQUIRE(velocity);
+    const auto s = velocity->covariance.if_complete()->stddev();
+    CHECK(s[0] == Approx(2 * 0.01 / 0.1).epsilon(1e-4));
+    CHECK(velocity->basis.bound);
+  }
+  SECTION("a dynamic edge that stands still is not static") {
+    Robot robot(join, {}, {});
+    for (int t = 1000; t <= 2000; t += 500) {
+      REQUIRE(robot.hand->update("hand", {along_x(0.5).pose, isotropic(0.01, 0)}, ms(t)));
+    }
+    const auto velocity = robot.client->velocity("arm", "hand", {ms(1500), 100ms});
+    REQUIRE(velocity);
+    CHECK(velocity->linear.norm() < 1e-12);
+    CHECK(velocity->covariance.if_complete()->stddev()[0] == Approx(2 * 0.01 / 0.1));
+  }
+}
+
+TEST_CASE("velocity: unspecified edges are named") {
+  Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
+  REQUIRE(robot.hand->update("hand", {along_x(0.5).pose, StatedCovariance::unspecified()}));
+  const auto velocity = robot.client->velocity("world", "hand");
+  REQUIRE(velocity);
+  CHECK_FALSE(velocity->covariance.complete());
+  CHECK(velocity->basis.unspecified == std::vector<std::string>{"hand"});
+  CHECK((velocity->angular - Eigen::Vector3d(0, 0, 2)).norm() < 1e-9);
+}
+
+}  // namespace
+}  // namespace tfdude

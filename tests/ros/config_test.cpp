@@ -1,0 +1,129 @@
+#include "tfdude-ros/config/config.hpp"
+
+#include <map>
+#include <string>
+
+#include "support/catch.hpp"
+
+namespace tfdude::ros {
+namespace {
+
+using testing::ContainsSubstring;
+
+std::string error_of(const std::string& text) {
+  Settings settings;
+  const auto read = parse_config(text, "bridge.yaml", settings);
+  return read ? "" : read.error().message;
+}
+
+Result<Settings> in_environment(const std::map<std::string, std::string>& variables) {
+  Settings settings;
+  const auto read = read_environment(
+      [&](const char* name) {
+        const auto found = variables.find(name);
+        return found == variables.end() ? std::string() : found->second;
+      },
+      settings);
+  if (!read) return tl::unexpected(read.error());
+  return settings;
+}
+
+}  // namespace
+
+TEST_CASE("ros config: every key") {
+  Settings settings;
+  const auto read = parse_config(R"(
+partition: from_ros
+ros_domain: 7
+clock: ros
+prefix: r1/
+tf_in: {frames: ["odom", "base*"], except: [base_old], covariance: exact}
+tf_out: {partitions: [arm], frames: [tool], rate: 30}
+joints_in: {stddev: 0.001, stddev_of: {lift: 0.01}, except: [gripper]}
+joints_out: {partitions: ["*"], rate: 20}
+description_in: {partition: bot, root: world, xyz: [1, 0, 0], links: [base], strict_limits: true,
+                 origins: unspecified}
+description_out: robot.urdf
+poses_in:
+  - {topic: /gps, child: base, gate: 0.99, correlated: true}
+  - {topic: /odom, type: odometry}
+poses_out:
+  - {topic: /tool, frame: world, child: tool, rate: 5}
+  - {topic: /tool_odometry, type: odometry, frame: world, child: tool}
+)",
+                                 "/etc/bridge.yaml", settings);
+  REQUIRE(read);
+  CHECK(settings.partition == "from_ros");
+  CHECK(settings.ros_domain == 7);
+  CHECK(settings.frames_in->frames.takes("base_link"));
+  CHECK(!settings.frames_in->frames.takes("base_old"));
+  CHECK(settings.frames_in->covariance.complete());
+  CHECK(settings.frames_in->prefix == "r1/");
+  CHECK(settings.frames_out->partitions.match("arm"));
+  CHECK(settings.frames_out->rate == 30);
+  CHECK(settings.joints_in->stddev_of.at("lift") == 0.01);
+  CHECK(settings.joints_out->rate == 20);
+  CHECK(settings.description_in->partition == "bot");
+  CHECK(settings.description_in->part.root == "world");
+  CHECK(settings.description_in->part.prefix == "r1/");
+  CHECK(settings.description_in->part.strict_limits);
+  CHECK(!settings.description_in->part.origins.complete());
+  CHECK(settings.description_out == "/etc/robot.urdf");
+  REQUIRE(settings.poses_in.size() == 2);
+  CHECK(settings.poses_in[0].options.gate == 0.99);
+  CHECK(!settings.poses_in[0].options.independent);
+  CHECK(settings.poses_in[1].odometry);
+  REQUIRE(settings.poses_out.size() == 2);
+  CHECK(settings.poses_out[0].rate == 5);
+  CHECK(!settings.poses_out[0].odometry);
+  CHECK(settings.poses_out[1].odometry);
+  CHECK(settings.passes_clock);
+  CHECK(settings.options.clock == ClockKind::kExternal);
+}
+
+TEST_CASE("ros config: what is left out stays as it is") {
+  Settings settings;
+  REQUIRE(parse_config("partition: x\n", "f", settings));
+  CHECK(settings.frames_in);
+  CHECK(!settings.frames_in->covariance.complete());
+  CHECK(!settings.frames_out);
+  CHECK(!settings.joints_in);
+  REQUIRE(parse_config("tf_in: false\n", "f", settings));
+  CHECK(!settings.frames_in);
+}
+
+TEST_CASE("ros config: mistakes are named with their line") {
+  CHECK_THAT(error_of("partitio: x\n"), ContainsSubstring("bridge.yaml:1: the file: unknown key"));
+  CHECK_THAT(error_of("joints_in: {joints: [a]}\n"), ContainsSubstring("stddev is missing"));
+  CHECK_THAT(error_of("joints_in: {stddev: -1}\n"), ContainsSubstring("is not within"));
+  CHECK_THAT(error_of("ros_domain: 233\n"), ContainsSubstring("ros_domain is not within"));
+  CHECK_THAT(error_of("tf_out: {rate: fast}\n"), ContainsSubstring("not a number"));
+  CHECK_THAT(error_of("tf_out:\n  frames: tool\n"), ContainsSubstring("bridge.yaml:2"));
+  CHECK_THAT(error_of("poses_in: [{topic: /p}]\n"), ContainsSubstring("child is missing"));
+  CHECK_THAT(error_of("poses_in: [{topic: /p, type: twist}]\n"), ContainsSubstring("neither"));
+  CHECK_THAT(error_of("poses_out: [{topic: /p, frame: a}]\n"),
+             ContainsSubstring("child is missing"));
+  CHECK_THAT(error_of("description_in: {partition: 'a,b'}\n"), ContainsSubstring("description_in"));
+  CHECK_THAT(error_of("tf_in: {covariance: large}\n"), ContainsSubstring("covariance"));
+  CHECK_THAT(error_of("a: [\n"), ContainsSubstring("not YAML"));
+  CHECK_THAT(error_of("clock: sundial\n"), ContainsSubstring("bridge.yaml:1: clock must be"));
+  CHECK_THAT(error_of(""), ContainsSubstring("is empty"));
+}
+
+TEST_CASE("ros config: the environment of ROS is heeded") {
+  CHECK(in_environment({})->ros_domain == 0);
+  CHECK(in_environment({})->range == Range::kNetwork);
+  CHECK(in_environment({{"ROS_DOMAIN_ID", "42"}})->ros_domain == 42);
+  CHECK(in_environment({{"ROS_LOCALHOST_ONLY", "1"}})->range == Range::kThisComputer);
+  CHECK(in_environment({{"ROS_LOCALHOST_ONLY", "0"}})->range == Range::kNetwork);
+  const char* const kRange = "ROS_AUTOMATIC_DISCOVERY_RANGE";
+  CHECK(in_environment({{kRange, "LOCALHOST"}})->range == Range::kThisComputer);
+  CHECK(in_environment({{kRange, "SUBNET"}})->range == Range::kNetwork);
+  CHECK(in_environment({{kRange, "SYSTEM_DEFAULT"}})->range == Range::kNetwork);
+  CHECK(in_environment({{kRange, "SUBNET"}, {"ROS_LOCALHOST_ONLY", "1"}})->range ==
+        Range::kThisComputer);
+  for (const char* bad : {"OFF", "EVERYWHERE"}) CHECK(!in_environment({{kRange, bad}}));
+  for (const char* bad : {"-1", "233", "1x", "x"}) CHECK(!in_environment({{"ROS_DOMAIN_ID", bad}}));
+}
+
+}  // namespace tfdude::ros

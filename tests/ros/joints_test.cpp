@@ -1,0 +1,58 @@
+#include "tfdude-ros/logic/joints.hpp"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+
+namespace tfdude::ros {
+namespace {
+
+using Names = std::vector<std::string>;
+
+JointInfo joint(const std::string& name, double position, bool measured = true) {
+  JointInfo info;
+  info.name = name;
+  info.position = position;
+  info.measured = measured;
+  return info;
+}
+
+}  // namespace
+
+TEST_CASE("ros joints: positions get the variances of the settings, and the prefix") {
+  JointImport import({0.1, {{"lift", 0.5}}, {Patterns(), Patterns({"gripper_*"})}, "r1/"});
+  const auto taken = import.take({time_of(7), {"elbow", "lift", "gripper_left"}, {1.0, 2.0, 3.0}});
+  CHECK(taken.stamp == time_of(7));
+  CHECK(taken.names == Names{"r1/elbow", "r1/lift"});
+  CHECK(taken.positions == std::vector<double>{1, 2});
+  CHECK(taken.variances == std::vector<double>{0.1 * 0.1, 0.25});
+  CHECK(import.counts().taken == 2);
+  CHECK(import.counts().refused == 0);
+}
+
+TEST_CASE("ros joints: joints without a usable position or name are counted") {
+  JointImport import({});
+  const auto taken = import.take(
+      {Time(), {"a", "", std::string(256, 'x'), "a", "b", "c"}, {1, 2, 3, 4, std::nan("")}});
+  CHECK(taken.names == Names{"a"});
+  CHECK(taken.positions == std::vector<double>{1});
+  CHECK(!taken.stamp);
+  CHECK(import.counts().refused == 5);
+}
+
+TEST_CASE("ros joints: measured joints are sent, unless a node of ROS publishes them") {
+  JointExportSettings settings;
+  settings.prefix = "r1/";
+  JointExport out(settings);
+  out.heard({Time(), {"wrist"}, {0}});
+  JointState message;
+  out.add(
+      {joint("r1/elbow", 1), joint("r1/wrist", 2), joint("r1/lift", 3, false), joint("other", 4)},
+      message);
+  CHECK(message.names == Names{"elbow"});
+  CHECK(message.positions == std::vector<double>{1});
+}
+
+}  // namespace tfdude::ros

@@ -1,0 +1,152 @@
+// The bytes of ROS's messages: every type on its way and back, and bytes that are not well formed.
+
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "tfdude-ros/fastdds/convert.hpp"
+#include "tfdude-ros/fastdds/endpoints.hpp"
+#include "tfdude-ros/fastdds/identity.hpp"
+#include "tfdude-ros/fastdds/well_formed.hpp"
+#include "transport/fastdds/compat.hpp"
+
+namespace tfdude::ros {
+namespace {
+
+using Payload = fastdds::ertps::SerializedPayload_t;
+
+#if TFDUDE_FASTDDS_MAJOR == 2
+template <class Generated>
+bool serialize(fastdds::edds::TopicDataType& type, Generated& message, Payload& payload) {
+  return type.serialize(&message, &payload);
+}
+template <class Generated>
+bool deserialize(fastdds::edds::TopicDataType& type, Payload& payload, Generated& message) {
+  return type.deserialize(&payload, &message);
+}
+#else
+template <class Generated>
+bool serialize(fastdds::edds::TopicDataType& type, Generated& message, Payload& payload) {
+  return type.serialize(&message, payload, fastdds::edds::DEFAULT_DATA_REPRESENTATION);
+}
+template <class Generated>
+bool deserialize(fastdds::edds::TopicDataType& type, Payload& payload, Generated& message) {
+  return type.deserialize(payload, &message);
+}
+#endif
+
+template <class Generated>
+std::vector<std::uint8_t> bytes_of(MessageType type, Generated message) {
+  Payload payload(1U << 16U);
+  REQUIRE(serialize(*type_support(type), message, payload));
+  return {payload.data, payload.data + payload.length};
+}
+
+template <class Generated>
+bool read(MessageType type, std::vector<std::uint8_t> bytes, Generated& message) {
+  Payload payload(static_cast<std::uint32_t>(bytes.size() + 1));
+  std::copy(bytes.begin(), bytes.end(), payload.data);
+  payload.length = static_cast<std::uint32_t>(bytes.size());
+  return deserialize(*type_support(type), payload, message);
+}
+
+TfMessage tf_example() {
+  return {{time_of(1'234'567'890'123'456'789), "odom", "base", {{1, 2, 3}, {0.1, 0.2, 0.3, 0.4}}},
+          {time_of(-1), "", std::string(300, 'x'), {}}};
+}
+
+// What a reader of bytes does with all that is not what was written.
+template <class Generated>
+void check_robust(MessageType type, const Generated& message) {
+  const auto bytes = bytes_of(type, message);
+  Generated out;
+  REQUIRE(read(type, bytes, out));
+  // The last bytes may be padding.
+  for (std::size_t length = 0; length + 8 < bytes.size(); ++length) {
+    CHECK(!read(type, {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(length)}, out));
+  }
+  std::mt19937 random(20);  // NOLINT(cert-msc51-cpp): the same each time
+  for (int i = 0; i < 3000; ++i) {
+    auto odd = bytes;
+    for (int k = 0; k < 1 + i % 4; ++k) {
+      odd[random() % odd.size()] = i % 3 == 0 ? 0xff : static_cast<std::uint8_t>(random());
+    }
+    (void)read(type, odd, out);  // neither throws nor takes gigabytes
+  }
+}
+
+}  // namespace
+
+TEST_CASE("ros wire: transforms survive the way, and damaged ones are rejected") {
+  auto message = generated(tf_example());
+  wire::Tf back;
+  REQUIRE(read(MessageType::kTf, bytes_of(MessageType::kTf, message), back));
+  const auto out = plain(back);
+  REQUIRE(out.size() == 2);
+  CHECK(out[0].stamp == tf_example()[0].stamp);
+  CHECK(out[1].stamp == time_of(-1));
+  CHECK(out[0].parent == "odom");
+  CHECK(out[1].child == std::string(300, 'x'));
+  CHECK(out[0].pose.xyz == tf_example()[0].pose.xyz);
+  CHECK(out[0].pose.quat == tf_example()[0].pose.quat);
+  check_robust(MessageType::kTf, message);
+}
+
+TEST_CASE("ros wire: joints survive the way, and damaged ones are rejected") {
+  auto message = generated(JointState{time_of(5), {"a", "b"}, {1, 2}});
+  wire::JointState back;
+  REQUIRE(read(MessageType::kJointState, bytes_of(MessageType::kJointState, message), back));
+  const auto out = plain(back);
+  CHECK(out.stamp == time_of(5));
+  CHECK(out.names == std::vector<std::string>{"a", "b"});
+  CHECK(out.positions == std::vector<double>{1, 2});
+  check_robust(MessageType::kJointState, message);
+}
+
+TEST_CASE("ros wire: the other messages survive the way, and damaged ones are rejected") {
+  Odometry odometry{{time_of(7), "odom", {{1, 2, 3}, {0, 0, 0, 1}}, {}}, "base"};
+  odometry.pose.covariance[35] = 4;
+  odometry.linear = {1, 2, 3};
+  odometry.angular = {4, 5, 6};
+  odometry.twist_covariance[1] = 8;
+  auto message = generated(odometry);
+  wire::Odometry back;
+  REQUIRE(read(MessageType::kOdometry, bytes_of(MessageType::kOdometry, message), back));
+  const auto out = plain(back);
+  CHECK(out.child == "base");
+  CHECK(out.pose.covariance == odometry.pose.covariance);
+  CHECK(out.linear == odometry.linear);
+  CHECK(out.angular == odometry.angular);
+  CHECK(out.twist_covariance == odometry.twist_covariance);
+  check_robust(MessageType::kOdometry, message);
+  check_robust(MessageType::kPoseWithCovarianceStamped, generated(odometry.pose));
+  check_robust(MessageType::kString, generated(Text{std::string(1000, 'y')}));
+  check_robust(MessageType::kClock, generated(ClockTime{time_of(9)}));
+}
+
+TEST_CASE("ros wire: types have the names that ROS 2 gives them") {
+  const auto name = [](MessageType type) { return type_support(type).get_type_name(); };
+  CHECK(name(MessageType::kTf) == "tf2_msgs::msg::dds_::TFMessage_");
+  CHECK(name(MessageType::kJointState) == "sensor_msgs::msg::dds_::JointState_");
+  CHECK(name(MessageType::kString) == "std_msgs::msg::dds_::String_");
+  CHECK(name(MessageType::kPoseWithCovarianceStamped) ==
+        "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_");
+  CHECK(name(MessageType::kOdometry) == "nav_msgs::msg::dds_::Odometry_");
+  CHECK(name(MessageType::kClock) == "rosgraph_msgs::msg::dds_::Clock_");
+}
+
+TEST_CASE("ros wire: a bridge is recognized by the user data of its participant") {
+  const BridgeMark mark{"ros;2", "host-1", 4711};
+  CHECK(mark_of(user_data_of(mark)) == mark);
+  for (const std::string& text :
+       {std::string(), std::string("enclave=/;"), std::string("enclave=/;tfdude-bridge=;"),
+        std::string("enclave=/;tfdude-bridge=x,h,p;"), std::string("enclave=/;tfdude-bridge=1,h;"),
+        std::string("enclave=/;tfdude-bridge=1,h,p")}) {
+    CAPTURE(text);
+    CHECK(!mark_of({text.begin(), text.end()}));
+  }
+}
+
+}  // namespace tfdude::ros

@@ -1,0 +1,191 @@
+// Clocks that start at zero, have no time yet, stop or jump back.
+
+#include <optional>
+#include <string>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "tree/forest.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::along_x;
+using testing::ContainsSubstring;
+using testing::outcome;
+
+Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
+
+Query at(std::int64_t milliseconds) { return {ms(milliseconds), 0ns, {}}; }
+
+double x_of(const Result<StampedTransform>& X) {
+  return X ? X->pose.translation().x() : std::numeric_limits<double>::quiet_NaN();
+}
+
+// world -> mast, static; world -> arm -> hand, dynamic from the first sample on.
+struct Simulated {
+  Simulated() {
+    REQUIRE(forest.add("world", "", {}));
+    REQUIRE(forest.add("mast", "world", along_x(3)));
+    REQUIRE(forest.add("arm", "world", along_x(4)));
+    REQUIRE(forest.add("hand", "arm", along_x(5)));
+    EdgeTiming timing;
+    timing.moving = true;
+    REQUIRE(forest.set_timing("arm", timing));
+  }
+
+  std::optional<Time> now;
+  Forest forest{[this] { return now; }};
+};
+
+TEST_CASE("clock: without a time, whatever needs it fails") {
+  Simulated sim;
+  const auto unstamped = sim.forest.update("arm", along_x(1));
+  CHECK(outcome(unstamped) == "not_yet");
+  CHECK_THAT(unstamped.error().message,
+             ContainsSubstring("'arm'") && ContainsSubstring("has no time yet"));
+  // How far it is ahead cannot be judged, even of a small stamp.
+  CHECK(outcome(sim.forest.update("hand", along_x(1), ms(1))) == "not_yet");
+  CHECK(outcome(sim.forest.update({{"mast", along_x(2)}, {"arm", along_x(1)}})) == "not_yet");
+  CHECK(x_of(sim.forest.lookup("world", "mast", Query{})) == 3);
+  CHECK(outcome(sim.forest.update("mast", along_x(9))) == "ok");
+  EdgeTiming boundless;
+  boundless.max_ahead = std::chrono::nanoseconds::max();
+  REQUIRE(sim.forest.set_timing("hand", boundless));
+  CHECK(outcome(sim.forest.update("hand", along_x(1), ms(1))) == "ok");
+  sim.now = ms(0);
+  CHECK(outcome(sim.forest.update("arm", along_x(1))) == "ok");
+  CHECK(sim.forest.histories("arm").at(0).newest == ms(0));
+}
+
+TEST_CASE("clock: samples begin at zero") {
+  Simulated sim;
+  sim.now = ms(0);
+  REQUIRE(sim.forest.update("arm", along_x(0), ms(0)));
+  CHECK(outcome(sim.forest.update("arm", along_x(0), ms(0))) == "stamp_taken");
+  CHECK(outcome(sim.forest.update("arm", along_x(0), Time(-1ns))) == "invalid_input");
+  REQUIRE(sim.forest.update("arm", along_x(10), ms(10)));
+  CHECK(x_of(sim.forest.lookup("world", "arm", at(0))) == 0);
+  CHECK(x_of(sim.forest.lookup("world", "arm", at(5))) == testing::Approx(5));
+  CHECK(outcome(sim.forest.lookup("world", "arm", {Time(-1ns), 0ns, {}})) == "too_old");
+}
+
+TEST_CASE("clock: while it stands still, unstamped updates advance as little as possible") {
+  Simulated sim;
+  sim.now = ms(7);
+  for (int i = 0; i < 3; ++i) REQUIRE(sim.forest.update("arm", along_x(i)));
+  const HistoryInfo history = sim.forest.histories("arm").at(0);
+  CHECK(history.oldest == ms(7));
+  CHECK(history.newest == ms(7) + 2ns);
+}
+
+TEST_CASE("clock: a cleared edge is dynamic and has no value until its next sample") {
+  Simulated sim;
+  sim.now = ms(5000);
+  for (const int t : {1000, 2000}) {
+    REQUIRE(sim.forest.update({{"arm", along_x(t)}, {"hand", along_x(1)}}, ms(t)));
+  }
+  const std::uint64_t before = sim.forest.newest_commit();
+  REQUIRE(sim.forest.clear_history("arm"));
+  CHECK(sim.forest.newest_commit() == before + 1);
+  const Query first{time_of(INT64_MIN + 1), 0ns, {}};
+  for (const Query& when : {Query{}, first, at(0), at(1500), at(1'000'000'000)}) {
+    const auto X = sim.forest.lookup("world", "arm", when);
+    CHECK(outcome(X) == "not_yet");
+    CHECK_THAT(X.error().message,
+               ContainsSubstring("'arm'") && ContainsSubstring("history was cleared"));
+  }
+  CHECK(outcome(sim.forest.lookup("world", "hand", Query{})) == "not_yet");
+  Query extrapolating = at(2001);
+  extrapolating.extrapolate = 1h;
+  CHECK(outcome(sim.forest.lookup("world", "arm", extrapolating)) == "not_yet");
+  CHECK(outcome(sim.forest.lookup("world", "arm")) == "not_yet");
+  CHECK(outcome(sim.forest.lookup_pose("hand", "world")) == "not_yet");
+  CHECK(x_of(sim.forest.lookup("arm", "hand", at(1500))) == 1);
+  const HistoryInfo history = sim.forest.histories("arm").at(0);
+  CHECK(history.samples == 0);
+  CHECK_FALSE(history.newest);
+  // Any stamp may follow.
+  REQUIRE(sim.forest.update("arm", along_x(7), ms(0)));
+  CHECK(x_of(sim.forest.lookup("world", "arm", Query{})) == 7);
+  REQUIRE(sim.forest.update("arm", along_x(8), ms(1)));
+  CHECK(sim.forest.histories("arm").at(0).samples == 2);
+  CHECK(outcome(sim.forest.clear_history("mast")) == "ok");
+  CHECK(x_of(sim.forest.lookup("world", "mast", Query{})) == 3);
+  CHECK(outcome(sim.forest.clear_history("nobody")) == "unknown_frame");
+}
+
+TEST_CASE("clock: an edge that got its samples by stamps stays dynamic when cleared") {
+  Simulated sim;
+  sim.now = ms(5000);
+  REQUIRE(sim.forest.update("hand", along_x(1), ms(1000)));
+  REQUIRE(sim.forest.clear_history("hand"));
+  sim.now = ms(3);
+  REQUIRE(sim.forest.update("hand", along_x(2)));
+  CHECK(sim.forest.lookup("arm", "hand", Query{})->stamp == ms(3));
+}
+
+TEST_CASE("clock: after a jump back only what is earlier holds") {
+  Simulated sim;
+  sim.now = ms(9000);
+  for (const int t : {1000, 2000}) REQUIRE(sim.forest.update("arm", along_x(t), ms(t)));
+  for (const int t : {1000, 8000}) REQUIRE(sim.forest.update("hand", along_x(t), ms(t)));
+  sim.now = ms(3000);
+  CHECK(sim.forest.clear_histories(ms(3000)) == 1);
+  CHECK(x_of(sim.forest.lookup("world", "arm", Query{})) == 2000);
+  CHECK(outcome(sim.forest.lookup("arm", "hand")) == "not_yet");
+  CHECK(x_of(sim.forest.lookup("world", "mast", Query{})) == 3);
+  // The clock was read before the jump, but is read again for the next stamp.
+  CHECK(outcome(sim.forest.update("hand", along_x(1), ms(64'000))) == "invalid_input");
+  CHECK(outcome(sim.forest.update("hand", along_x(1), ms(3000))) == "ok");
+  CHECK(sim.forest.clear_histories(ms(3001)) == 0);
+  // A sample at the time itself is published again by a replay.
+  CHECK(sim.forest.clear_histories(ms(3000)) == 1);
+  CHECK(sim.forest.clear_histories(Time::min()) == 1);
+  CHECK(sim.forest.clear_histories(Time::min()) == 0);
+}
+
+TEST_CASE("clock: cleared samples do not count for the limit of memory") {
+  Simulated sim;
+  sim.now = ms(0);
+  for (int i = 0; i < 100; ++i) REQUIRE(sim.forest.update("arm", along_x(i), ms(i)));
+  REQUIRE(sim.forest.clear_history("arm"));
+  sim.forest.limit_history(3000);
+  for (int i = 0; i < 5; ++i) REQUIRE(sim.forest.update("arm", along_x(i), ms(i)));
+  CHECK(sim.forest.histories("arm").at(0).samples == 5);
+}
+
+TEST_CASE("clock: watchers are told that a history was cleared") {
+  Simulated sim;
+  sim.now = ms(9000);
+  Forest mirror;
+  REQUIRE(mirror.add("world", "", {}));
+  REQUIRE(mirror.add("arm", "world", {}));
+  const std::vector<Handle> edges{*mirror.find("arm")};
+  std::vector<EdgeCursor> cursors{{"arm", "world"}};
+  const auto pass_on = [&] {
+    auto told = sim.forest.values_since(cursors, {});
+    mirror.take(edges, told.values);
+    return told.values.size();
+  };
+  for (const int t : {1000, 2000}) REQUIRE(sim.forest.update("arm", along_x(t), ms(t)));
+  REQUIRE(pass_on() > 0);
+  CHECK(x_of(mirror.lookup("world", "arm", Query{})) == 2000);
+  REQUIRE(sim.forest.clear_history("arm"));
+  CHECK(pass_on() == 1);
+  CHECK(outcome(mirror.lookup("world", "arm", Query{})) == "not_yet");
+  CHECK(pass_on() == 0);
+  REQUIRE(sim.forest.update("arm", along_x(5), ms(5)));
+  CHECK(pass_on() == 1);
+  CHECK(x_of(mirror.lookup("world", "arm", Query{})) == 5);
+  CHECK(outcome(mirror.lookup("world", "arm", at(4))) == "too_old");
+  // A watcher that begins meanwhile is told, too.
+  REQUIRE(sim.forest.clear_history("arm"));
+  cursors = {{"arm", "world"}};
+  CHECK(pass_on() == 1);
+  CHECK(outcome(mirror.lookup("world", "arm", Query{})) == "not_yet");
+}
+
+}  // namespace
+}  // namespace tfdude
