@@ -9,6 +9,7 @@
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "support/joint_frames.hpp"
 #include "support/networks.hpp"
 #include "support/process.hpp"
 
@@ -142,6 +143,22 @@ TEST_CASE("clock: after a jump back a replay works") {
   sim.tell(ms(0));
   CHECK(sim.client->frames()->size() == 4);
   CHECK(x_of(sim.client->lookup("hand", "camera", Query{})) == 3);
+}
+
+TEST_CASE("clock: a joint has the position of its newest sample after a jump back") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  FrameSpec arm{"arm", "world", {}};
+  arm.joint = testing::revolute_named("shoulder");
+  Node node = *Node::open(join("arm"), "arm", {{"world", "", {}}, arm}, external());
+  REQUIRE(node.set_time(ms(9000)));
+  REQUIRE(node.update_joints({"shoulder"}, {0.5}, {0}, ms(9000)));
+  REQUIRE(node.set_time(ms(0)));
+  CHECK(outcome(node.lookup("world", "arm", Query{})) == "not_yet");
+  for (const int t : {0, 10}) {
+    REQUIRE(node.update_joints({"shoulder"}, {1 + 0.01 * t}, {0}, ms(t)));
+    CHECK(testing::yaw(node.lookup("world", "arm")) == Approx(1 + 0.01 * t));
+    CHECK(node.joints("arm")->front().position == 1 + 0.01 * t);
+  }
 }
 
 TEST_CASE("clock: each participant says which clock it uses") {
