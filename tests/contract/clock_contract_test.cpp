@@ -128,7 +128,10 @@ TEST_CASE("clock: after a jump back a replay works") {
     CHECK(x_of(sim.client->lookup("world", "hand", at(ms(1500)))) == Approx(1500 + offset));
   };
   play(0);
-  auto watch = sim.client->watch("world", "hand");
+  WatchOptions options;
+  options.composed = GENERATE(false, true);
+  INFO("composed " << options.composed);
+  auto watch = sim.client->watch("world", "hand", options);
   REQUIRE(watch);
   CHECK(x_of(watch->latest()) == 2000);
   sim.tell(ms(500));
@@ -136,6 +139,9 @@ TEST_CASE("clock: after a jump back a replay works") {
   CHECK(outcome(sim.client->lookup("world", "hand", Query{})) == "not_yet");
   CHECK(outcome(sim.base->lookup("world", "arm", at(ms(100)))) == "not_yet");
   CHECK(eventually([&] { return outcome(watch->latest()) == "not_yet"; }));
+  // Who begins to watch now is told, too.
+  const auto other = sim.base->watch("world", "hand", options);
+  CHECK(outcome(other ? other->latest() : tl::unexpected(other.error())) == "not_yet");
   play(7);
   CHECK(eventually([&] { return x_of(watch->latest()) == 2007; }));
   // Ownership, structure and static edges stay.
