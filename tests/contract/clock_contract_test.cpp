@@ -151,6 +151,20 @@ TEST_CASE("clock: after a jump back a replay works") {
   CHECK(x_of(sim.client->lookup("hand", "camera", Query{})) == 3);
 }
 
+TEST_CASE("clock: a participant that starts later has the next time") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Simulation sim(join);
+  sim.tell(ms(5000));
+  Node late = *Node::open(join("late"), "late", {{"camera", "hand", {}}}, external());
+  // The time stands still, and is published again.
+  CHECK(eventually([&] {
+    REQUIRE(sim.publisher->publish_clock(ms(5000)));
+    return late.now() == ms(5000);
+  }));
+  REQUIRE(late.update("camera", along_x(2)));
+  CHECK(late.lookup("hand", "camera", Query{})->stamp == ms(5000));
+}
+
 TEST_CASE("clock: a joint has the position of its newest sample after a jump back") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   FrameSpec arm{"arm", "world", {}};
