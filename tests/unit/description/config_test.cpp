@@ -207,15 +207,6 @@ TEST_CASE("anchors and aliases stand for their values") {
   check_refused_at("frames: *nowhere\n", "robot.yaml:1: not YAML: ");
 }
 
-TEST_CASE("a file may name the clock of its stamps") {
-  CHECK(tfdude::parse_config("clock: external", "robot.yaml")->clock ==
-        tfdude::ClockKind::kExternal);
-  CHECK(tfdude::parse_config("clock: system", "robot.yaml")->clock == tfdude::ClockKind::kSystem);
-  CHECK(tfdude::parse_config("partition: a", "robot.yaml")->clock == std::nullopt);
-  check_refused({"partition: a\nclock: sun", Errc::kInvalidInput,
-                 "robot.yaml:2: clock must be system or external, not 'sun'"});
-}
-
 TEST_CASE("a file of the wrong structure is rejected") {
   check_refused({"", Errc::kConfig, "robot.yaml: is empty"});
   check_refused({"# only a comment\n\n", Errc::kConfig, "robot.yaml: is empty"});
