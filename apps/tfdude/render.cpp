@@ -181,7 +181,7 @@ nlohmann::json partition_json(const PartitionInfo& partition) {
                       {"reachable", partition.reachable}};
   if (!partition.program.empty()) json["program"] = partition.program;
   json["protocol"] = to_string(partition.protocol);
-  if (partition.compatible()) json["clock"] = to_string(partition.clock);
+  if (partition.clock) json["clock"] = to_string(*partition.clock);
   if (!partition.compatible()) {
     json["reason"] = "incompatible";
   } else if (!partition.reachable) {

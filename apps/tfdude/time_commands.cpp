@@ -153,7 +153,7 @@ std::optional<Time> present(Client& client, const Arguments& arguments, const st
                             const std::string& b) {
   const auto path = client.path(a, b);
   const bool same = path && std::all_of(path->begin(), path->end(), [&](const PathSegment& one) {
-                      return one.clock == arguments.options.clock;
+                      return !one.clock || *one.clock == arguments.options.clock;
                     });
   const auto now = same ? client.now() : fail(Errc::kInvalidInput, "the clocks differ");
   return now ? std::optional<Time>(*now) : std::nullopt;
@@ -161,7 +161,7 @@ std::optional<Time> present(Client& client, const Arguments& arguments, const st
 
 std::optional<Time> present(Client& client, const Arguments& arguments,
                             const PartitionInfo& partition) {
-  if (partition.clock != arguments.options.clock) return std::nullopt;
+  if (partition.clock && *partition.clock != arguments.options.clock) return std::nullopt;
   const auto now = client.now();
   return now ? std::optional<Time>(*now) : std::nullopt;
 }

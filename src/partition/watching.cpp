@@ -41,6 +41,7 @@ std::vector<PushedValue> entries_of(const SegmentValues& found) {
   std::vector<PushedValue> entries;
   for (std::uint32_t i = 0; i < found.values.size(); ++i) {
     entries.push_back({i, found.stamp, found.values[i], {}, found.history, {}});
+    entries.back().cleared = found.cleared;
     // As for an edge: if one edge of a segment is unspecified, the segment is.
     StatedCovariance& covariance = entries.back().X.covariance;
     if (!covariance.complete()) covariance = StatedCovariance::unspecified();
@@ -180,8 +181,10 @@ PushedValues WatchedGroup::changed(const Forest& forest) {
 }
 
 Result<PushedValues> WatchedGroup::composed(const Forest& forest, std::optional<Time> from) const {
-  auto found = forest.lookup_segments(request_.segments);
-  if (!found) return tl::unexpected(std::move(found.error()));
+  // Only the newest, as if all others were known.
+  auto newest = forest.segments_since(request_.segments, {UINT64_MAX, Time::max(), true}, 0);
+  if (!newest) return tl::unexpected(std::move(newest.error()));
+  const SegmentValues* found = &newest->back();
   if (forest.have_noise(request_.segments)) {
     const PathEnds& first = request_.segments.front();
     return fail(Errc::kInvalidInput,
@@ -212,8 +215,8 @@ bool WatchedGroup::begins(const PushedValue& entry) const {
 
 bool WatchedGroup::is_new(const PushedValue& entry) const {
   const auto& sent = sent_[entry.index];
-  return begins(entry) || entry.stamp != sent->stamp || !(entry.correlation == sent->correlation) ||
-         !same(entry.X, sent->X);
+  return begins(entry) || entry.stamp != sent->stamp || entry.cleared != sent->cleared ||
+         !(entry.correlation == sent->correlation) || !same(entry.X, sent->X);
 }
 
 PushedValues WatchedGroup::next_composed_push(const Forest& forest) {

@@ -79,10 +79,10 @@ void Lookups::explain(Error& error, const std::vector<Part>& parts) const {
 std::string Lookups::other_clock(const Directory& directory, const std::vector<Part>& parts) const {
   const ClockKind own = structure_.clock.kind();
   for (const Part& part : parts) {
-    if (part.owner == kHeldHere || directory.info(part.owner).clock == own) continue;
-    return "partition " + quote(part.partition) + " uses the " +
-           to_string(directory.info(part.owner).clock) + " clock, and this participant the " +
-           to_string(own) + " clock";
+    const auto theirs = part.owner == kHeldHere ? std::nullopt : directory.info(part.owner).clock;
+    if (!theirs || *theirs == own) continue;
+    return "partition " + quote(part.partition) + " uses the " + to_string(*theirs) +
+           " clock, and this participant the " + to_string(own) + " clock";
   }
   return {};
 }

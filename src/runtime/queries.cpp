@@ -17,7 +17,7 @@ Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_v
     std::vector<PathSegment> path;
     for (Segment& segment : *segments) {
       path.push_back({directory.name(segment.owner), std::move(segment.from), std::move(segment.to),
-                      segment.owner == kHeldHere ? structure_.clock.kind()
+                      segment.owner == kHeldHere ? std::optional<ClockKind>(structure_.clock.kind())
                                                  : directory.info(segment.owner).clock});
     }
     return path;

@@ -229,7 +229,8 @@ class Forest {
                                                       bool edges = false) const;
 
   /// The values of such segments at their newest common instant, after those at earlier instants
-  /// at which an edge has a sample, and that are not known from `seen`. All are of one commit.
+  /// at which an edge has a sample, and that are not known from `seen`. All are of one commit. If
+  /// the history of an edge was cleared, the last one says that there are no values.
   /// @param most  of the earlier instants, the newest
   [[nodiscard]] Result<std::vector<SegmentValues>> segments_since(
       const std::vector<PathEnds>& segments, const SeenSegments& seen, std::size_t most) const;

@@ -28,6 +28,11 @@ Result<void> check_timing(const EdgeTiming& timing) {
   return {};
 }
 
+tl::unexpected<Error> no_time(const HeldVersion& edge) {
+  return fail(Errc::kNotYet, "frame " + quote(edge.name->text) +
+                                 ": the owner's clock is external, and has no time yet");
+}
+
 }  // namespace
 
 Forest::Impl::~Impl() {
@@ -66,10 +71,8 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
     return fail(Errc::kInvalidInput, "frame " + quote(frames_.newest_value(slots[0]).name->text) +
                                          " is dynamic: its update needs a stamp");
   }
-  auto now = clock_.now();
-  if (!now) {
-    return fail_at("frame " + quote(frames_.newest_value(slots[0]).name->text), now.error());
-  }
+  const auto now = clock_.now();
+  if (!now) return no_time(frames_.newest_value(slots[0]));
   // If the clock was set back, time advances as little as possible.
   return newest == kAlways ? *now : std::max(*now, saturating_add(newest, 1));
 }
@@ -88,7 +91,7 @@ Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t sta
   if (!clock_.is_there() || limit == std::chrono::nanoseconds::max().count()) return {};
   if (clock_.surely_admits(stamp, limit)) return {};
   const auto now = clock_.read();
-  if (!now) return fail_at("frame " + quote(edge.name->text), now.error());
+  if (!now) return no_time(edge);
   const std::int64_t ahead = saturating_subtract(stamp, *now);
   if (ahead <= limit) return {};
   edge.name->refused.ahead.fetch_add(1, std::memory_order_relaxed);

@@ -206,6 +206,16 @@ Result<SegmentValues> newest_segments(const std::vector<Ends>& segments, const Q
   return found;
 }
 
+// The newest values, or that an edge has lost its samples.
+Result<SegmentValues> newest_or_cleared(const std::vector<Ends>& segments) {
+  auto newest = newest_segments(segments, {});
+  if (newest || newest.error().code != Errc::kNotYet) return newest;
+  SegmentValues none;
+  none.values.resize(segments.size());
+  none.cleared = true;
+  return none;
+}
+
 }  // namespace
 
 Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
@@ -241,7 +251,7 @@ Result<std::vector<SegmentValues>> Forest::segments_since(const std::vector<Path
   const epoch::Guard guard;
   const auto ends = all_ends(impl_->frames_, segments);
   if (!ends) return tl::unexpected(ends.error());
-  auto newest = newest_segments(*ends, {});
+  auto newest = newest_or_cleared(*ends);
   if (!newest) return tl::unexpected(std::move(newest.error()));
   describe(*ends, *newest);
   std::vector<SegmentValues> all;

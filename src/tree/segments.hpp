@@ -56,6 +56,8 @@ struct SegmentValues {
   std::uint64_t commit = 0;       ///< the commit of the values; see revise()
   std::uint64_t history = 0;      ///< the newest history of their edges; see PushedValue
   std::uint64_t incarnation = 0;  ///< of the owner that counts the commits; see Partition
+  /// There are no values: the history of an edge was cleared. Only of segments_since().
+  bool cleared = false;
 };
 
 /// What was seen of segments: their values at a commit, at instants up to their newest one. Late

@@ -5,7 +5,6 @@
 #include <optional>
 #include <utility>
 
-#include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
 
 #include "base/saturating.hpp"
@@ -19,10 +18,10 @@ class StampClock {
 
   [[nodiscard]] bool is_there() const { return clock_ != nullptr; }
 
-  /// @return kNotYet if its time is not known yet
-  [[nodiscard]] Result<std::int64_t> now() const {
-    if (const auto time = clock_()) return nanoseconds(*time);
-    return fail(Errc::kNotYet, "the owner's clock is external, and has no time yet");
+  /// Nothing while its time is not known.
+  [[nodiscard]] std::optional<std::int64_t> now() const {
+    const auto time = clock_();
+    return time ? std::optional<std::int64_t>(nanoseconds(*time)) : std::nullopt;
   }
 
   /// Whether the last reading of the clock shows that the stamp is no further ahead than the limit
@@ -31,9 +30,9 @@ class StampClock {
     return ++asked_ago_ < kGoesFor && saturating_subtract(stamp, said_) <= limit;
   }
 
-  /// Reads the clock. @return as now()
-  [[nodiscard]] Result<std::int64_t> read() {
-    auto time = now();
+  /// As now(), for surely_admits().
+  [[nodiscard]] std::optional<std::int64_t> read() {
+    const auto time = now();
     if (!time) return time;
     said_ = *time;
     asked_ago_ = 0;

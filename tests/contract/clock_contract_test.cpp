@@ -9,6 +9,7 @@
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "support/joint_frames.hpp"
 #include "support/networks.hpp"
 #include "support/process.hpp"
 
@@ -40,14 +41,14 @@ Options external(Milliseconds timeout = Milliseconds(1000)) {
   return options;
 }
 
-ClockKind clock_of(Client& client, const std::string& partition) {
+std::optional<ClockKind> clock_of(Client& client, const std::string& partition) {
   const auto partitions = client.partitions();
   REQUIRE(partitions);
   for (const PartitionInfo& one : *partitions) {
     if (one.name == partition) return one.clock;
   }
   FAIL("no partition " << partition);
-  return ClockKind::kSystem;
+  return std::nullopt;
 }
 
 // A simulation: world -> arm -> hand of two partitions, a client with the external clock, and a
@@ -127,7 +128,10 @@ TEST_CASE("clock: after a jump back a replay works") {
     CHECK(x_of(sim.client->lookup("world", "hand", at(ms(1500)))) == Approx(1500 + offset));
   };
   play(0);
-  auto watch = sim.client->watch("world", "hand");
+  WatchOptions options;
+  options.composed = GENERATE(false, true);
+  INFO("composed " << options.composed);
+  auto watch = sim.client->watch("world", "hand", options);
   REQUIRE(watch);
   CHECK(x_of(watch->latest()) == 2000);
   sim.tell(ms(500));
@@ -135,6 +139,9 @@ TEST_CASE("clock: after a jump back a replay works") {
   CHECK(outcome(sim.client->lookup("world", "hand", Query{})) == "not_yet");
   CHECK(outcome(sim.base->lookup("world", "arm", at(ms(100)))) == "not_yet");
   CHECK(eventually([&] { return outcome(watch->latest()) == "not_yet"; }));
+  // Who begins to watch now is told, too.
+  const auto other = sim.base->watch("world", "hand", options);
+  CHECK(outcome(other ? other->latest() : tl::unexpected(other.error())) == "not_yet");
   play(7);
   CHECK(eventually([&] { return x_of(watch->latest()) == 2007; }));
   // Ownership, structure and static edges stay.
@@ -144,14 +151,45 @@ TEST_CASE("clock: after a jump back a replay works") {
   CHECK(x_of(sim.client->lookup("hand", "camera", Query{})) == 3);
 }
 
+TEST_CASE("clock: a participant that starts later has the next time") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Simulation sim(join);
+  sim.tell(ms(5000));
+  Node late = *Node::open(join("late"), "late", {{"camera", "hand", {}}}, external());
+  // The time stands still, and is published again.
+  CHECK(eventually([&] {
+    REQUIRE(sim.publisher->publish_clock(ms(5000)));
+    return late.now() == ms(5000);
+  }));
+  REQUIRE(late.update("camera", along_x(2)));
+  CHECK(late.lookup("hand", "camera", Query{})->stamp == ms(5000));
+}
+
+TEST_CASE("clock: a joint has the position of its newest sample after a jump back") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  FrameSpec arm{"arm", "world", {}};
+  arm.joint = testing::revolute_named("shoulder");
+  Node node = *Node::open(join("arm"), "arm", {{"world", "", {}}, arm}, external());
+  REQUIRE(node.set_time(ms(9000)));
+  REQUIRE(node.update_joints({"shoulder"}, {0.5}, {0}, ms(9000)));
+  REQUIRE(node.set_time(ms(0)));
+  CHECK(outcome(node.lookup("world", "arm", Query{})) == "not_yet");
+  for (const int t : {0, 10}) {
+    REQUIRE(node.update_joints({"shoulder"}, {1 + 0.01 * t}, {0}, ms(t)));
+    CHECK(testing::yaw(node.lookup("world", "arm")) == Approx(1 + 0.01 * t));
+    CHECK(node.joints("arm")->front().position == 1 + 0.01 * t);
+  }
+}
+
 TEST_CASE("clock: each participant says which clock it uses") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node sim = *Node::open(join("sim"), "sim", {{"world", "", {}}, {"arm", "world", {}}}, external());
   Node real = *Node::open(join("real"), "real", {{"hand", "arm", along_x(1)}});
   Client client = *Client::open(join(""));
   for (Client* caller : {static_cast<Client*>(&sim), static_cast<Client*>(&real), &client}) {
-    CHECK(clock_of(*caller, "sim") == ClockKind::kExternal);
-    CHECK(clock_of(*caller, "real") == ClockKind::kSystem);
+    // It comes with the presence, which may be later than the first page.
+    CHECK(eventually([&] { return clock_of(*caller, "sim") == ClockKind::kExternal; }));
+    CHECK(eventually([&] { return clock_of(*caller, "real") == ClockKind::kSystem; }));
     const auto path = caller->path("world", "hand");
     REQUIRE(path);
     REQUIRE(path->size() == 2);

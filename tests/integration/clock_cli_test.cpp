@@ -207,6 +207,19 @@ TEST_CASE("clock: a jump back clears what is later, and a replay works") {
   CHECK_THAT(sim.base.err(), ContainsSubstring("the external clock jumped back from 3 s to 0 s"));
 }
 
+TEST_CASE("clock: a daemon has one clock") {
+  const TestDomain domain;
+  const TemporaryDirectory files;
+  const std::string base = files.write("base.yaml", kBase);
+  Process conflict = domain.start_daemon({"--config", base, "--no-state", "--clock", "system"});
+  CHECK(conflict.wait(in_time()) == 2);
+  CHECK_THAT(conflict.err(), ContainsSubstring("clock 'external' is not the 'system' of --clock"));
+  Process same = domain.start_daemon({"--config", base, "--no-state", "--clock", "external"});
+  (void)await_ready(same);
+  Process unknown = domain.start_daemon({"--partition", "a", "--no-state", "--clock", "sun"});
+  CHECK(unknown.wait(in_time()) == 2);
+}
+
 TEST_CASE("clock: different clocks are shown and not mixed") {
   Simulated sim;
   Process real = sim.domain.start_daemon({"--partition", "real", "--no-state"});

@@ -81,6 +81,7 @@ TEST_CASE("keys command: creates keys and prints what they allow") {
                          {"move", {"arm", "base"}},
                          {"stream", {"legs"}},
                          {"observe", true},
+                         {"publish_clock", false},
                          {"error", nullptr}}));
   CHECK(answered({"check", store.path + "/arm"}).at("identities").at(0).at("serves") == "arm");
 }

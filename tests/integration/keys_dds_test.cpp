@@ -7,6 +7,8 @@
 #include <string>
 #include <thread>
 
+#include "tfdude/client/node.hpp"
+
 #include "keys/certificates.hpp"
 #include "keys/permissions.hpp"
 #include "support/catch.hpp"
@@ -103,6 +105,32 @@ TEST_CASE("keys in DDS: an endpoint without permission cannot be created") {
   CHECK(client.write(kJointTopic, "base") == nullptr);
   CHECK(client.write(kPresenceTopic, "arm") == nullptr);
   CHECK(client.write("another/topic", "arm") == nullptr);
+}
+
+TEST_CASE("keys in DDS: only who may publish the time is heard") {
+  const testing::DomainLease domain;
+  const TestKeys keys(now());
+  (void)keys.add("arm", daemon_of("arm"));
+  (void)keys.add("eye", looking());
+  Roles timekeeping;
+  timekeeping.clock = true;
+  (void)keys.add("clock", timekeeping);
+  Options options;
+  options.domain = domain.number();
+  options.profile = TFDUDE_LOOPBACK_PROFILE;
+  options.timeout = Milliseconds(100);
+  options.clock = ClockKind::kExternal;
+  options.keys = keys.path("arm");
+  Node arm = *Node::open("arm", {}, options);
+  options.keys = keys.path("eye");
+  Client eye = *Client::open(options);
+  const Time now = time_of(7);
+  const auto rejected = eye.publish_clock(now);
+  REQUIRE_FALSE(rejected);
+  CHECK(rejected.error().code == Errc::kNotPermitted);
+  options.keys = keys.path("clock");
+  Client publisher = *Client::open(options);
+  CHECK(eventually([&] { return publisher.publish_clock(now) && arm.now() == now; }));
 }
 
 TEST_CASE("keys in DDS: participants that know the list do not match a revoked identity") {

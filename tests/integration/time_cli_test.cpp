@@ -1,6 +1,7 @@
 // Time on the command line, with real daemons.
 
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <string>
 #include <vector>
@@ -93,6 +94,35 @@ TEST_CASE("time: an invalid stamp is rejected before anything is sent") {
   CHECK(d.domain.cli({"lookup", "world", "arm_1", "--extrapolate", "-1"}).status == 2);
   CHECK(d.domain.cli({"lookup", "world", "arm_1", "--at-b", "1"}).status == 2);
   CHECK_THAT(text(d, {"history", "arm_1"}), ContainsSubstring("arm_1 is static"));
+}
+
+TEST_CASE("time: the velocity of a frame is shown with its standard deviations") {
+  const ThesisDaemons d;
+  // 2 m/s along x, and all edges but this one are static.
+  for (const char* sample : {"100", "101", "102"}) {
+    const std::string x = std::to_string(2 * std::stoi(sample));
+    CHECK(text(d, {"update", "arm_1", "--xyz", x, "0", "0", "--rpy", "0", "0", "0", "--stddev",
+                   "0.01", "0.01", "0.01", "0", "0", "0", "--stamp", sample}) == "updated arm_1\n");
+  }
+  const json velocity =
+      answered(d, {"velocity", "robot_1", "arm_1", "--at", "101", "--over", "0.5"});
+  CHECK(velocity.at("linear").at(0).get<double>() == testing::Approx(2));
+  CHECK(velocity.at("angular") == json({0.0, 0.0, 0.0}));
+  CHECK(velocity.at("begin_ns") == 100'750'000'000);
+  CHECK(velocity.at("end_ns") == 101'250'000'000);
+  // The bound: twice the error of one end, per half a second.
+  CHECK(std::sqrt(velocity.at("covariance").at(0).at(0).get<double>()) ==
+        testing::Approx(2 * 0.01 / 0.5).epsilon(1e-6));
+  CHECK(velocity.at("basis").at("bound") == true);
+  const std::string shown = text(d, {"velocity", "world", "hand_left", "--cov"});
+  CHECK_THAT(shown, ContainsSubstring("linear       ") && ContainsSubstring("m/s\n") &&
+                        ContainsSubstring("to           102.000000000\n") &&
+                        ContainsSubstring("covariance   (linear first"));
+  CHECK_THAT(text(d, {"velocity", "world", "camera"}), ContainsSubstring("all edges are static"));
+  CHECK(answered(d, {"velocity", "world", "arm_1", "--at", "103"}, 1).at("error").at("code") ==
+        "not_yet");
+  CHECK(answered(d, {"velocity", "world", "nobody"}, 1).at("error").at("code") == "unknown_end");
+  CHECK(d.domain.cli({"velocity", "world", "arm_1", "--over", "0"}).status == 2);
 }
 
 TEST_CASE("time: histories and rates are shown with the rejected samples") {

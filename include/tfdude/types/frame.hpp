@@ -35,7 +35,7 @@ struct PathSegment {
   std::string partition;
   std::string from;
   std::string to;
-  ClockKind clock = ClockKind::kSystem;  ///< of the stamps of the partition
+  std::optional<ClockKind> clock{};  ///< as of PartitionInfo
 };
 
 }  // namespace tfdude

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "tfdude/base/time.hpp"
@@ -20,7 +21,7 @@ struct PartitionInfo {
   bool stopped = false;   ///< if not reachable: it announced its stop; otherwise it was lost
   std::string program{};  ///< the version of its program; empty: not known
   ProtocolVersion protocol = kProtocolVersion;
-  ClockKind clock = ClockKind::kSystem;  ///< the clock that its stamps are of
+  std::optional<ClockKind> clock{};  ///< that its stamps are of; absent: not known (yet)
 
   /// Whether its protocol is understood here. If not, only its name and versions are known.
   [[nodiscard]] bool compatible() const { return protocol.major == kProtocolVersion.major; }

@@ -147,6 +147,35 @@ TEST_CASE("JSON has no covariance if it is not complete") {
   CHECK(basis_json(basis)["unspecified"] == json({"odom"}));
 }
 
+TEST_CASE("a velocity is printed in metres and degrees per second") {
+  Velocity velocity;
+  velocity.linear = {1, -2, 0.5};
+  velocity.angular = {0, 0, std::acos(-1) / 2};
+  velocity.covariance = *Covariance::from_stddev({0.1, 0.1, 0.1, 0, 0, std::acos(-1) / 180});
+  velocity.begin = time_of(0);
+  velocity.end = time_of(100'000'000);
+  velocity.basis.bound = true;
+  CHECK(describe(velocity, false) ==
+        "linear       1.000000  -2.000000  0.500000  m/s\n"
+        "angular      0.0000  0.0000  90.0000  deg/s\n"
+        "std dev      0.100000  0.100000  0.100000  m/s\n"
+        "             0.0000  0.0000  1.0000  deg/s\n"
+        "from         0.000000000\n"
+        "to           0.100000000\n"
+        "basis        bound for unknown correlation\n");
+  const json all = velocity_json("world", "hand", velocity);
+  CHECK(all["linear"] == json({1.0, -2.0, 0.5}));
+  CHECK(all["begin_ns"] == 0);
+  CHECK(all["covariance"].size() == 6);
+  velocity.covariance.set_complete(false);
+  velocity.basis.unspecified = {"odom"};
+  CHECK(describe(velocity, false).find("std dev      unspecified for odom\n  of others  ") !=
+        std::string::npos);
+  CHECK(velocity_json("world", "hand", velocity)["covariance"].is_null());
+  CHECK(describe(Velocity{}, false).find("interval     none: all edges are static") !=
+        std::string::npos);
+}
+
 TEST_CASE("a frame as JSON has null for no parent") {
   CHECK(frame_json({"world", "", "robot", false}) ==
         json({{"id", "world"}, {"parent", nullptr}, {"partition", "robot"}, {"attached", false}}));
@@ -161,6 +190,7 @@ TEST_CASE("a partition as JSON has its process and state") {
   info.frames = 3;
   info.reachable = true;
   info.program = "0.1.0";
+  info.clock = ClockKind::kSystem;
   json said{{"name", "arms"},    {"host", "tower"},    {"pid", 7},          {"frames", 3},
             {"reachable", true}, {"program", "0.1.0"}, {"protocol", "1.1"}, {"clock", "system"}};
   CHECK(partition_json(info) == said);
@@ -175,6 +205,7 @@ TEST_CASE("a partition as JSON has its process and state") {
   said["clock"] = "external";
   CHECK(partition_json(info) == said);
   info.protocol = {2, 0};
+  info.clock.reset();
   said.erase("clock");
   said["protocol"] = "2.0";
   said["reason"] = "incompatible";

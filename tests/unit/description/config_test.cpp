@@ -211,12 +211,14 @@ TEST_CASE("a file of the wrong structure is rejected") {
   check_refused({"", Errc::kConfig, "robot.yaml: is empty"});
   check_refused({"# only a comment\n\n", Errc::kConfig, "robot.yaml: is empty"});
   check_refused({"---\n", Errc::kConfig, "robot.yaml: is empty"});
-  check_refused({"hello", Errc::kConfig,
-                 "robot.yaml:1: the file is not a mapping with the keys partition, covariance, "
-                 "history, frames, urdf"});
-  check_refused({"partition: a\nframe: []\n", Errc::kConfig,
-                 "robot.yaml:2: the file: unknown key 'frame'; known are partition, covariance, "
-                 "history, frames, urdf"});
+  check_refused(
+      {"hello", Errc::kConfig,
+       "robot.yaml:1: the file is not a mapping with the keys partition, clock, covariance, "
+       "history, frames, urdf"});
+  check_refused(
+      {"partition: a\nframe: []\n", Errc::kConfig,
+       "robot.yaml:2: the file: unknown key 'frame'; known are partition, clock, covariance, "
+       "history, frames, urdf"});
   check_refused({"partition: a\npartition: a\n", Errc::kConfig,
                  "robot.yaml:2: the file: partition is given twice"});
   check_refused({"partition: [a]\n", Errc::kConfig, "robot.yaml:1: partition is not text"});
