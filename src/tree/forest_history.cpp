@@ -72,11 +72,11 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
 
 Result<void> Forest::Impl::check_room(const HeldVersion& edge) {
   const bool replaces = edge.samples != nullptr && edge.samples->count() >= 2;
-  if (kept_samples_ < max_samples_ || replaces) return {};
+  if (!is_full() || replaces) return {};
   refused_samples_.fetch_add(1, std::memory_order_relaxed);
   return fail(Errc::kTooMuch, "frame " + quote(edge.name->text) +
-                                  ": there is no room for its history. All histories have " +
-                                  std::to_string(kept_samples_) + " samples, the limit");
+                                  ": there is no room for its history. All histories take " +
+                                  std::to_string(max_bytes_) + " bytes, the limit");
 }
 
 Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t stamp) {
@@ -112,9 +112,9 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_P
   if (samples == nullptr) {
     samples = new SampleHistory(default_timing_);
   } else {
-    // First, so that a ring buffer with as many slots as samples suffices. At least two samples are
-    // kept, so this is not the newest.
-    if (samples->count() >= samples->timing().count) drop_oldest(*samples);
+    // First, so that the ring buffer need not grow for it. At least two samples are kept, so this
+    // is not the newest.
+    if (samples->count() >= samples->timing().count) samples->drop_oldest(reclaimer_.samples());
     if (samples->full()) {
       samples = samples->grown().release();
       reclaimer_.supersede(newest.samples);
@@ -122,12 +122,22 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_P
   }
   HeldVersion& fresh = push_held(newest.slot, X_PC);
   fresh.samples = samples;
+  append_to(fresh, X_PC, stamp);
+  drop_samples(*samples, stamp);
+}
+
+void Forest::Impl::append_to(HeldVersion& fresh, const Transform& X_PC, std::int64_t stamp) {
+  SampleHistory& samples = *fresh.samples;
   fresh.stamp = stamp;
-  fresh.number = samples->next();
-  fresh.kept = true;
-  samples->append(&fresh, stamp);
-  ++kept_samples_;
-  drop_samples(*samples);
+  fresh.number = samples.next();
+  const Sample* before = samples.newest();
+  fill_in(samples.append(stamp, reclaimer_.samples()), X_PC, before);
+}
+
+void Forest::Impl::fill_in(Sample& sample, const Transform& X_PC, const Sample* neighbour) {
+  sample.commit = frames_.commit_being_made();
+  sample.covariance = reclaimer_.samples().share(X_PC.covariance, neighbour);
+  sample.pose = X_PC.pose;
 }
 
 void Forest::Impl::restart_history(const HeldVersion& newest, const Transform& X_PC,
@@ -135,11 +145,7 @@ void Forest::Impl::restart_history(const HeldVersion& newest, const Transform& X
   const HistoryRestart restart{newest.name->text, time_of(newest.stamp), time_of(stamp)};
   HeldVersion& fresh = push_held(newest.slot, X_PC);
   forget_history(fresh);
-  fresh.stamp = stamp;
-  fresh.number = fresh.samples->next();
-  fresh.kept = true;
-  fresh.samples->append(&fresh, stamp);
-  ++kept_samples_;
+  append_to(fresh, X_PC, stamp);
   newest.name->refused.behind = {};
   if (restart_listener_) restart_listener_(restart);
 }
@@ -149,56 +155,38 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_P
                                  std::int64_t stamp) {
   newest.name->refused.behind = {};
   const std::uint64_t place = newest.samples->place_of(stamp);
-  if (place < newest.samples->next() && newest.samples->stamp(place) == stamp) {
+  const Sample* there = newest.samples->sample(place);
+  Sample sample;
+  sample.stamp = stamp;
+  fill_in(sample, X_PC, there);
+  if (there->stamp == stamp) {
     // Twice in one update: the later one counts, and no reader has seen the earlier.
-    newest.samples->sample(place)->X_PC = X_PC;
+    reclaimer_.samples().release(*there);
+    newest.samples->rewrite(sample, place);
     if (newest.stamp == stamp) const_cast<HeldVersion&>(newest).X_PC = X_PC;
     return;
   }
-  HeldVersion* sample = reclaimer_.take<HeldVersion>();
-  *sample = HeldVersion{};
-  sample->commit = frames_.commit_being_made();
-  sample->depth = 0;  // so that it counts as held
-  sample->X_PC = X_PC;
-  sample->stamp = stamp;
-  sample->kept = true;
-  SampleHistory* samples = newest.samples->with(sample, stamp, place).release();
-  samples->rewritten = sample->commit;
+  SampleHistory* samples = newest.samples->with(sample, place, reclaimer_.samples()).release();
+  samples->rewritten = sample.commit;
   reclaimer_.supersede(newest.samples);
   HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
   fresh.samples = samples;
   fresh.number = samples->next() - 1;
-  ++kept_samples_;
-  drop_samples(*samples);
+  drop_samples(*samples, newest.stamp);
 }
 
-void Forest::Impl::drop_oldest(SampleHistory& samples) {
-  HeldVersion* dropped = samples.drop_oldest();
-  dropped->kept = false;
-  --kept_samples_;
-  reclaimer_.supersede(dropped);
-}
-
-void Forest::Impl::drop_samples(SampleHistory& samples) {
-  const std::int64_t limit = samples.stamp(samples.next() - 1) - samples.timing().span.count();
-  const auto beyond = [&]() TFDUDE_REQUIRES(mutex_) {
-    return samples.count() > samples.timing().count || samples.stamp(samples.oldest()) < limit ||
-           (kept_samples_ > max_samples_ && samples.count() > 2);
-  };
-  while (beyond()) {
-    drop_oldest(samples);
+void Forest::Impl::drop_samples(SampleHistory& samples, std::int64_t newest) {
+  const std::int64_t limit = newest - samples.timing().span.count();
+  const std::size_t most = samples.timing().count;
+  while (samples.count() > most || samples.first_stamp() < limit ||
+         (is_full() && samples.count() > 2)) {
+    samples.drop_oldest(reclaimer_.samples());
   }
 }
 
-void Forest::Impl::give_back(SampleHistory* samples, std::uint32_t slot) {
+void Forest::Impl::give_back(SampleHistory* samples) {
   if (samples == nullptr) return;
-  const Version* head = &frames_.newest(slot);
-  kept_samples_ -= static_cast<std::int64_t>(samples->count());
-  for (std::uint64_t number = samples->oldest(); number < samples->next(); ++number) {
-    HeldVersion* sample = samples->sample(number);
-    sample->kept = false;
-    if (sample != head) reclaimer_.supersede(sample);
-  }
+  samples->drop_all(reclaimer_.samples());
   reclaimer_.supersede(samples);
 }
 
@@ -208,7 +196,7 @@ void Forest::Impl::forget_history(HeldVersion& fresh) {
   if (before == nullptr) return;
   fresh.samples = new SampleHistory(before->timing());
   fresh.stamp = kAlways;
-  give_back(before, fresh.slot);
+  give_back(before);
 }
 
 Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
@@ -225,9 +213,8 @@ Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
 }
 
 void Forest::limit_history(std::size_t bytes) {
-  constexpr std::size_t kSampleBytes = sizeof(HeldVersion) + 2 * sizeof(std::int64_t);
   const Writing lock(impl_->mutex_);
-  impl_->max_samples_ = static_cast<std::int64_t>(bytes / kSampleBytes);
+  impl_->max_bytes_ = bytes;
 }
 
 std::uint64_t Forest::refused_samples() const {

@@ -96,9 +96,16 @@ class Forest::Impl {
       TFDUDE_REQUIRES(mutex_);
   /// Makes the fresh version static and clears its history, but keeps its timing.
   void forget_history(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
-  /// Retires a history with all its samples. If the newest sample is also the newest version, that
-  /// one is superseded next.
-  void give_back(SampleHistory* samples, std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
+  /// Retires a history with all its samples.
+  void give_back(SampleHistory* samples) TFDUDE_REQUIRES(mutex_);
+  /// Gives a sample of the current commit its value. It shares the covariance of its neighbour, if
+  /// that is the same.
+  void fill_in(Sample& sample, const Transform& X_PC, const Sample* neighbour)
+      TFDUDE_REQUIRES(mutex_);
+  /// Whether the histories have all the memory that they may have.
+  [[nodiscard]] bool is_full() TFDUDE_REQUIRES(mutex_) {
+    return reclaimer_.samples().bytes() >= max_bytes_;
+  }
 
   // Values from another forest (forest_mirror.cpp).
 
@@ -138,8 +145,7 @@ class Forest::Impl {
 
   Frames frames_;
   EdgeTiming default_timing_ TFDUDE_GUARDED_BY(mutex_);
-  std::int64_t kept_samples_ TFDUDE_GUARDED_BY(mutex_) = 0;  // of all histories
-  std::int64_t max_samples_ TFDUDE_GUARDED_BY(mutex_) = INT64_MAX;
+  std::size_t max_bytes_ TFDUDE_GUARDED_BY(mutex_) = SIZE_MAX;  // of all histories
   std::atomic<std::uint64_t> refused_samples_{0};
   /// With the owner of each.
   std::vector<std::pair<const void*, std::function<void()>>> commit_listeners_
@@ -162,8 +168,10 @@ class Forest::Impl {
   void tell_commit() const TFDUDE_REQUIRES(mutex_) {
     for (const auto& [whose, listener] : commit_listeners_) listener();
   }
-  void drop_oldest(SampleHistory& samples) TFDUDE_REQUIRES(mutex_);
-  void drop_samples(SampleHistory& samples) TFDUDE_REQUIRES(mutex_);
+  /// Makes the fresh version's value the newest sample.
+  void append_to(HeldVersion& fresh, const Transform& X_PC, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
+  void drop_samples(SampleHistory& samples, std::int64_t newest) TFDUDE_REQUIRES(mutex_);
   void hang(Version& fresh, std::uint32_t parent) const TFDUDE_REQUIRES(mutex_);
   void renew_depths(std::uint32_t top) TFDUDE_REQUIRES(mutex_);
   void release(Version& fresh) TFDUDE_REQUIRES(mutex_);

@@ -20,6 +20,7 @@ HistoryInfo history_of(const HeldVersion& edge) {
   info.count_limit = samples.timing().count;
   info.bytes = samples.bytes();
   if (!edge.moving()) return info;
+  info.bytes += samples.bytes_until(edge.number);
   double sum = 0;
   double squares = 0;
   std::int64_t before = kAlways;
@@ -38,7 +39,6 @@ HistoryInfo history_of(const HeldVersion& edge) {
     before = stamp;
   }
   info.newest = time_of(edge.stamp);
-  info.bytes += info.samples * sizeof(HeldVersion);
   if (info.samples < 2) return info;
   const double gaps = static_cast<double>(info.samples - 1);
   const double mean = sum / gaps;
@@ -66,7 +66,7 @@ std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, s
   // Late samples may be anywhere.
   if (samples.rewritten > seen) return samples.oldest();
   const auto is_new = [&](std::uint64_t number) {
-    const HeldVersion* sample = samples.sample(number);
+    const Sample* sample = samples.sample(number);
     return sample != nullptr && sample->commit > seen;
   };
   while (first > samples.oldest() && is_new(first - 1)) --first;
@@ -86,11 +86,11 @@ void add_values(const HeldVersion& edge, std::uint32_t index, const PushedQuery&
   } else {
     const SampleHistory& samples = *edge.samples;
     for (auto number = first_to_tell(edge, cursor, seen, query); number < edge.number; ++number) {
-      const HeldVersion* sample = samples.sample(number);
-      if (sample != nullptr && sample->commit > seen) tell(time_of(sample->stamp), sample->X_PC);
+      const Sample* sample = samples.sample(number);
+      if (sample != nullptr && sample->commit > seen) tell(time_of(sample->stamp), sample->value());
     }
     // The edge's version may be newer than the sample that it shows.
-    const HeldVersion* newest = samples.sample(edge.number);
+    const Sample* newest = samples.sample(edge.number);
     if (newest == nullptr || newest->commit > seen) tell(time_of(edge.stamp), edge.X_PC);
   }
   cursor.commit = commit;

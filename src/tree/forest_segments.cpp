@@ -110,7 +110,7 @@ void add_changed(const HeldVersion& edge, std::uint64_t since, std::int64_t unti
   if (samples.rewritten <= since) return;
   std::int64_t after = kAllInstants.last;
   for (std::uint64_t number = edge.number + 1; number-- > samples.oldest();) {
-    const HeldVersion* sample = samples.sample(number);
+    const Sample* sample = samples.sample(number);
     if (sample == nullptr) return;
     const std::int64_t before = number > 0 ? samples.stamp(number - 1) : kAlways;
     if (sample->commit > since && before < until) {

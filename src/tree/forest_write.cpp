@@ -80,9 +80,7 @@ T& Forest::Impl::push(std::uint32_t slot) {
   fresh->owner = old->owner;
   fresh->slot = slot;
   fresh->generation = old->generation;
-  fresh->kept = false;
-  // A sample stays until its history drops it.
-  if (!old->kept) reclaimer_.supersede(old);
+  reclaimer_.supersede(old);
   // Readers skip the fresh version by its number until commit(), so it may be filled in later.
   head.store(fresh, std::memory_order_release);
   return *fresh;
@@ -133,7 +131,7 @@ void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
 
 void Forest::Impl::make_absent(std::uint32_t slot) {
   if (frames_.newest(slot).held()) {
-    give_back(frames_.newest_value(slot).samples, slot);
+    give_back(frames_.newest_value(slot).samples);
     reclaimer_.supersede(frames_.newest_value(slot).correlation);
   }
   Version& fresh = push_remote(slot);

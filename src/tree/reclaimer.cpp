@@ -32,6 +32,7 @@ void Reclaimer::collect(Frames& frames) {
   const std::uint64_t below = epoch::safe_below();
   held_pool_.collect(below);
   remote_pool_.collect(below);
+  samples_.collect(tag, below);
   histories_.collect(tag, below);
   correlations_.collect(tag, below);
   frames.collect_names(tag, below);

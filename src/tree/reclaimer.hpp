@@ -6,6 +6,7 @@
 
 #include "tree/frames.hpp"
 #include "tree/sample_history.hpp"
+#include "tree/sample_store.hpp"
 #include "tree/versions.hpp"
 
 namespace tfdude {
@@ -31,6 +32,8 @@ class Reclaimer {
     correlations_.superseded.emplace_back(correlation);
   }
 
+  [[nodiscard]] SampleStore& samples() { return samples_; }
+
   /// Whether collect() is due.
   [[nodiscard]] bool is_due() const { return versions_.size() > kCollectAt; }
 
@@ -53,6 +56,7 @@ class Reclaimer {
 
   VersionPool<HeldVersion> held_pool_;
   VersionPool<Version> remote_pool_;
+  SampleStore samples_;
   std::vector<Version*> versions_;  // superseded since the readers were last checked
   Waiting<SampleHistory> histories_;
   Waiting<EdgeCorrelation> correlations_;

@@ -34,7 +34,6 @@ struct Version {
   std::uint32_t slot = kNoSlot;
   // Identifies the frame: a new number whenever one appears, even under the same name.
   std::uint32_t generation = 0;
-  bool kept = false;  // by a history, as a sample; for the writer only
   // Bookkeeping of the pool; not for readers.
   std::uint64_t retire_tag = 0;
   Version* next = nullptr;
