@@ -111,15 +111,13 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_
                                   std::int64_t stamp) {
   const std::uint64_t place = newest.samples->place_of(stamp);
   if (place == newest.samples->next() || newest.samples->stamp(place) != stamp) {
-    push_value(newest.slot, X_PC, stamp);
+    push_value(newest.slot, {X_PC}, stamp);
     return;
   }
   SampleHistory* superseded = newest.samples;
   const Sample* before = superseded->sample(place);
-  Sample sample;
-  sample.stamp = stamp;
-  fill_in(sample, X_PC, before);
-  reclaimer_.samples().release(*before);
+  const Sample sample = sample_beside(*before, {X_PC}, stamp);
+  reclaimer_.samples().release(before->shared);
   const bool is_newest = newest.stamp == stamp;
   HeldVersion& fresh = push_held(newest.slot, is_newest ? X_PC : newest.X_PC);
   fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();

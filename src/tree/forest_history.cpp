@@ -45,7 +45,6 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
     const std::int64_t stamp = nanoseconds(*given);
     for (std::size_t i = 0; i < count; ++i) {
       auto ok = check_ahead(frames_.newest_value(slots[i]), stamp);
-      if (ok) ok = check_room(frames_.newest_value(slots[i]));
       if (!ok) return tl::unexpected(std::move(ok.error()));
     }
     return stamp;
@@ -58,25 +57,12 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
     newest = std::max(newest, edge.stamp);
   }
   if (!moving) return kAlways;
-  for (std::size_t i = 0; i < count; ++i) {
-    auto ok = check_room(frames_.newest_value(slots[i]));
-    if (!ok) return tl::unexpected(std::move(ok.error()));
-  }
   if (!clock_.is_there()) {
     return fail(Errc::kInvalidInput, "frame " + quote(frames_.newest_value(slots[0]).name->text) +
                                          " is dynamic: its update needs a stamp");
   }
   // If the clock was set back, time advances as little as possible.
   return newest == kAlways ? clock_.now() : std::max(clock_.now(), saturating_add(newest, 1));
-}
-
-Result<void> Forest::Impl::check_room(const HeldVersion& edge) {
-  const bool replaces = edge.samples != nullptr && edge.samples->count() >= 2;
-  if (!is_full() || replaces) return {};
-  refused_samples_.fetch_add(1, std::memory_order_relaxed);
-  return fail(Errc::kTooMuch, "frame " + quote(edge.name->text) +
-                                  ": there is no room for its history. All histories take " +
-                                  std::to_string(max_bytes_) + " bytes, the limit");
 }
 
 Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t stamp) {
@@ -93,20 +79,20 @@ Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t sta
                   in_milliseconds(timing_of(edge).max_ahead) + " allowed");
 }
 
-void Forest::Impl::push_value(std::uint32_t slot, const Transform& X_PC, std::int64_t stamp) {
+void Forest::Impl::push_value(std::uint32_t slot, const GivenValue& value, std::int64_t stamp) {
   const HeldVersion& old = frames_.newest_value(slot);
   if (stamp == kAlways) {
-    end_revision(push_held(slot, X_PC));
+    end_revision(push_held(slot, value.X_PC));
   } else if (!old.moving() || stamp > old.stamp) {
-    append_sample(old, X_PC, stamp);
+    append_sample(old, value, stamp);
   } else if (stamp < old.stamp - old.samples->timing().span.count()) {
-    restart_history(old, X_PC, stamp);
+    restart_history(old, value, stamp);
   } else {
-    insert_sample(old, X_PC, stamp);
+    insert_sample(old, value, stamp);
   }
 }
 
-void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_PC,
+void Forest::Impl::append_sample(const HeldVersion& newest, const GivenValue& value,
                                  std::int64_t stamp) {
   SampleHistory* samples = newest.samples;
   if (samples == nullptr) {
@@ -120,50 +106,50 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_P
       reclaimer_.supersede(newest.samples);
     }
   }
-  HeldVersion& fresh = push_held(newest.slot, X_PC);
+  HeldVersion& fresh = push_held(newest.slot, value.X_PC);
   fresh.samples = samples;
-  append_to(fresh, X_PC, stamp);
+  append_to(fresh, value, stamp);
   drop_samples(*samples, stamp);
 }
 
-void Forest::Impl::append_to(HeldVersion& fresh, const Transform& X_PC, std::int64_t stamp) {
-  SampleHistory& samples = *fresh.samples;
+void Forest::Impl::append_to(HeldVersion& fresh, const GivenValue& value, std::int64_t stamp) {
   fresh.stamp = stamp;
-  fresh.number = samples.next();
-  const Sample* before = samples.newest();
-  fill_in(samples.append(stamp, reclaimer_.samples()), X_PC, before);
+  fresh.number = fresh.samples->next();
+  fresh.samples->append(stamp, fresh.commit, value, reclaimer_.samples());
 }
 
-void Forest::Impl::fill_in(Sample& sample, const Transform& X_PC, const Sample* neighbour) {
-  sample.commit = frames_.commit_being_made();
-  sample.covariance = reclaimer_.samples().share(X_PC.covariance, neighbour);
-  sample.pose = X_PC.pose;
-}
-
-void Forest::Impl::restart_history(const HeldVersion& newest, const Transform& X_PC,
+void Forest::Impl::restart_history(const HeldVersion& newest, const GivenValue& value,
                                    std::int64_t stamp) {
   const HistoryRestart restart{newest.name->text, time_of(newest.stamp), time_of(stamp)};
-  HeldVersion& fresh = push_held(newest.slot, X_PC);
+  HeldVersion& fresh = push_held(newest.slot, value.X_PC);
   forget_history(fresh);
-  append_to(fresh, X_PC, stamp);
+  append_to(fresh, value, stamp);
   newest.name->refused.behind = {};
   if (restart_listener_) restart_listener_(restart);
 }
 
+Sample Forest::Impl::sample_beside(const Sample& neighbour, const GivenValue& value,
+                                   std::int64_t stamp) {
+  Sample sample;
+  sample.stamp = stamp;
+  sample.commit = frames_.commit_being_made();
+  sample.shared = reclaimer_.samples().share(value, neighbour.shared);
+  sample.set(value);
+  return sample;
+}
+
 // The newest sample stays unchanged, in a version that refers to the history with the new sample.
-void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_PC,
+void Forest::Impl::insert_sample(const HeldVersion& newest, const GivenValue& value,
                                  std::int64_t stamp) {
   newest.name->refused.behind = {};
   const std::uint64_t place = newest.samples->place_of(stamp);
   const Sample* there = newest.samples->sample(place);
-  Sample sample;
-  sample.stamp = stamp;
-  fill_in(sample, X_PC, there);
+  const Sample sample = sample_beside(*there, value, stamp);
   if (there->stamp == stamp) {
     // Twice in one update: the later one counts, and no reader has seen the earlier.
-    reclaimer_.samples().release(*there);
+    reclaimer_.samples().release(there->shared);
     newest.samples->rewrite(sample, place);
-    if (newest.stamp == stamp) const_cast<HeldVersion&>(newest).X_PC = X_PC;
+    if (newest.stamp == stamp) const_cast<HeldVersion&>(newest).X_PC = value.X_PC;
     return;
   }
   SampleHistory* samples = newest.samples->with(sample, place, reclaimer_.samples()).release();
@@ -178,10 +164,10 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_P
 void Forest::Impl::drop_samples(SampleHistory& samples, std::int64_t newest) {
   const std::int64_t limit = newest - samples.timing().span.count();
   const std::size_t most = samples.timing().count;
-  while (samples.count() > most || samples.first_stamp() < limit ||
-         (is_full() && samples.count() > 2)) {
+  while (samples.count() > most || samples.first_stamp() < limit) {
     samples.drop_oldest(reclaimer_.samples());
   }
+  keep_to_limit();
 }
 
 void Forest::Impl::give_back(SampleHistory* samples) {
@@ -210,15 +196,6 @@ Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   fresh.samples = new SampleHistory(timing);
   impl_->commit();
   return {};
-}
-
-void Forest::limit_history(std::size_t bytes) {
-  const Writing lock(impl_->mutex_);
-  impl_->max_bytes_ = bytes;
-}
-
-std::uint64_t Forest::refused_samples() const {
-  return impl_->refused_samples_.load(std::memory_order_relaxed);
 }
 
 Result<void> Forest::set_default_timing(const EdgeTiming& timing) {

@@ -34,7 +34,7 @@ bool Forest::Impl::push_told_sample(const HeldVersion& edge, const Transform& X_
     }
     if (!check_sample(edge, stamp)) return false;
   }
-  push_value(edge.slot, X_PC, stamp);
+  push_value(edge.slot, {X_PC}, stamp);
   return true;
 }
 

@@ -19,6 +19,12 @@ const Correlation* correlation_of(const EdgeUpdate&) { return nullptr; }
 const Correlation* correlation_of(const HandleUpdate&) { return nullptr; }
 const Correlation* correlation_of(const CorrelatedUpdate& update) { return update.correlation; }
 
+const JointState* state_of(const EdgeUpdate&) { return nullptr; }
+const JointState* state_of(const HandleUpdate&) { return nullptr; }
+const JointState* state_of(const CorrelatedUpdate& update) {
+  return update.state.joint != nullptr ? &update.state : nullptr;
+}
+
 template <class Update>
 Result<void> check_said(const Update& update) {
   const Correlation* said = correlation_of(update);
@@ -251,7 +257,7 @@ Result<void> Forest::Impl::update_one(const HeldVersion& edge, const Transform& 
     const auto at = stamp_for(&slot, 1, stamp);
     if (!at) return tl::unexpected(at.error());
     if (auto ok = check_sample(edge, *at); !ok) return ok;
-    push_value(slot, X_PC, *at);
+    push_value(slot, {X_PC}, *at);
   } else {
     end_revision(push_held(slot, X_PC));
   }
@@ -296,7 +302,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   }
   if (!fits) return fits;
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    push_value(to_update_[i], edges[i].X_PC, *at);
+    push_value(to_update_[i], {edges[i].X_PC, state_of(edges[i])}, *at);
     if (const Correlation* said = correlation_of(edges[i])) say_correlation(to_update_[i], *said);
   }
   commit();

@@ -32,7 +32,7 @@ const OfEdge<Value>& value_of(const HeldVersion& version) {
 template <class Value>
 OfEdge<Value> value_of(const Sample& sample) {
   if constexpr (std::is_same_v<Value, Pose>) {
-    return sample.pose;
+    return sample.value_pose();
   } else {
     return sample.value();
   }
@@ -82,9 +82,11 @@ Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Query
   }
   const Sample* before =
       edge.number > edge.samples->oldest() ? edge.samples->sample(edge.number - 1) : nullptr;
-  if (before == nullptr) return not_yet(edge, t, ", and the only one: cannot extrapolate");
+  const Sample* newest = edge.samples->sample(edge.number);
+  if (before == nullptr || newest == nullptr)
+    return not_yet(edge, t, ", and the only one: cannot extrapolate");
   const double s = seconds(t - before->stamp) / seconds(edge.stamp - before->stamp);
-  X = extrapolate(value_of<Value>(*before), value_of<Value>(edge), s);
+  extrapolate(*before, *newest, value_of<Value>(edge), s, X);
   add_noise(X, edge, seconds(beyond));
   return {};
 }
@@ -116,13 +118,14 @@ void accumulate_between(PathAccumulation<Value>& path, const HeldVersion& edge,
   const Sample& after = *samples.after;
   const auto span = static_cast<double>(after.stamp - before.stamp);
   const double s = static_cast<double>(moment.t - before.stamp) / span;
-  if (!edge.samples->has_noise()) {
+  const bool noisy = edge.samples->has_noise();
+  if (!noisy && before.joint() == nullptr && after.joint() == nullptr) {
     path.up_between(before.parts(), after.parts(), s);
     return;
   }
   OfEdge<Value>& X = path.place();
-  interpolate(value_of<Value>(before), value_of<Value>(after), s, X);
-  add_noise(X, edge, seconds(moment.age) + s * (1.0 - s) * span * 1e-9);
+  interpolate(before, after, s, X);
+  if (noisy) add_noise(X, edge, seconds(moment.age) + s * (1.0 - s) * span * 1e-9);
   path.up(X);
 }
 

@@ -4,8 +4,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <memory>
-#include <utility>
 #include <vector>
 
 namespace tfdude {
@@ -27,15 +27,26 @@ class Pool {
 
   /// Call only between two commits. @param tag  from epoch::retire_tag()
   void collect(std::uint64_t tag, std::uint64_t safe_below) {
-    for (T* object : superseded_) waiting_.emplace_back(tag, object);
-    superseded_.clear();
-    const auto seen = std::find_if(waiting_.begin(), waiting_.end(),
-                                   [=](const auto& one) { return one.first >= safe_below; });
-    for (auto one = waiting_.begin(); one != seen; ++one) free_.push_back(one->second);
-    waiting_.erase(waiting_.begin(), seen);
+    if (retired_.empty() || retired_.back().end < superseded_.size()) {
+      retired_.push_back({tag, superseded_.size()});
+    }
+    const auto seen = std::find_if(retired_.begin(), retired_.end(),
+                                   [=](const Retired& some) { return some.tag >= safe_below; });
+    if (seen == retired_.begin()) return;
+    const std::size_t unseen = std::prev(seen)->end;
+    const auto end = superseded_.begin() + static_cast<std::ptrdiff_t>(unseen);
+    free_.insert(free_.end(), superseded_.begin(), end);
+    superseded_.erase(superseded_.begin(), end);
+    retired_.erase(retired_.begin(), seen);
+    for (Retired& some : retired_) some.end -= unseen;
   }
 
  private:
+  // The superseded objects before this one have this tag, or an earlier one. Tags do not decrease.
+  struct Retired {
+    std::uint64_t tag;
+    std::size_t end;
+  };
   static constexpr std::size_t kBlock = 16;
 
   void grow() {
@@ -46,8 +57,8 @@ class Pool {
 
   std::vector<std::unique_ptr<std::array<T, kBlock>>> blocks_;
   std::vector<T*> free_;
-  std::vector<T*> superseded_;                         // since the readers were last checked
-  std::vector<std::pair<std::uint64_t, T*>> waiting_;  // with their tags, which do not decrease
+  std::vector<T*> superseded_;
+  std::vector<Retired> retired_;
 };
 
 }  // namespace tfdude

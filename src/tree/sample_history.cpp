@@ -54,15 +54,29 @@ SampleHistory::Bracket SampleHistory::around(std::int64_t t, std::uint64_t newes
   return before != nullptr ? Bracket{before, after} : Bracket{};
 }
 
+Transform SampleHistory::value_between(const Sample& before, const Sample& after,
+                                       std::int64_t t) const {
+  const auto span = static_cast<double>(after.stamp - before.stamp);
+  const double s = static_cast<double>(t - before.stamp) / span;
+  Transform X;
+  interpolate(before, after, s, X);
+  if (has_noise_ && X.covariance.complete()) {
+    Covariance::Upper noise = timing_.process_noise.upper();
+    for (double& number : noise) number *= s * (1.0 - s) * span * 1e-9;
+    X.covariance += Covariance::trusted(noise);
+  }
+  return X;
+}
+
 std::size_t SampleHistory::bytes_until(std::uint64_t newest) const {
   const std::uint64_t first = oldest();
   std::size_t total = (newest / kSize + 1 - first / kSize) * sizeof(SampleChunk);
-  const SharedCovariance* last = nullptr;
+  const SharedPart* last = nullptr;
   for (std::uint64_t number = first; number <= newest; ++number) {
     const Sample* found = sample(number);
     if (found == nullptr) continue;
-    if (found->covariance != last) total += sizeof(SharedCovariance);
-    last = found->covariance;
+    if (found->shared != last) total += bytes_of(*found->shared);
+    last = found->shared;
   }
   return total;
 }
@@ -84,7 +98,7 @@ std::uint64_t SampleHistory::place_of(std::int64_t stamp) const {
 // Readers of earlier commits still see them, so the range stays.
 void SampleHistory::drop_all(SampleStore& store) const {
   for (std::uint64_t number = oldest(); number < next_; ++number) {
-    store.release(*at(number));
+    store.release(at(number)->shared);
     if (is_last_of_chunk(number)) store.supersede(chunk(number));
   }
 }
@@ -96,10 +110,10 @@ std::unique_ptr<SampleHistory> SampleHistory::copy(std::uint64_t capacity,
   copy->rewritten = rewritten;
   copy->first_.store(first, std::memory_order_relaxed);
   copy->next_ = std::max(first, end);
-  copy->first_stamp_ = first_stamp_;
   for (std::uint64_t number = first; number < end; number += kSize - number % kSize) {
     copy->put(chunk(number));
   }
+  copy->find_ends();
   return copy;
 }
 
@@ -109,10 +123,11 @@ std::unique_ptr<SampleHistory> SampleHistory::with(const Sample& sample, std::ui
                                                    SampleStore& store) const {
   auto with_one = copy(full() ? 2 * (mask_ + 1) : mask_ + 1, place - place % kSize);
   for (std::uint64_t number = with_one->next_; number < next_; ++number) {
-    if (number == place) with_one->append(sample.stamp, store) = sample;
-    with_one->append(at(number)->stamp, store) = *at(number);
+    if (number == place) with_one->add(store) = sample;
+    with_one->add(store) = *at(number);
     if (is_last_of_chunk(number)) store.supersede(chunk(number));
   }
+  with_one->find_ends();
   return with_one;
 }
 
@@ -123,7 +138,7 @@ std::unique_ptr<SampleHistory> SampleHistory::replaced(const Sample& sample, std
   *fresh = *chunk(place);
   store.supersede(chunk(place));
   with_other->put(fresh);
-  *with_other->at(place) = sample;
+  with_other->rewrite(sample, place);
   return with_other;
 }
 

@@ -40,6 +40,10 @@ class SampleHistory {
   /// @return empty if all are later. O(1) if the samples come at an even rate, otherwise O(log n).
   [[nodiscard]] Bracket around(std::int64_t t, std::uint64_t newest, std::uint64_t& back) const;
 
+  /// The value at an instant between two consecutive samples, with process noise.
+  [[nodiscard]] Transform value_between(const Sample& before, const Sample& after,
+                                        std::int64_t t) const;
+
   /// Null if the sample is not kept any more.
   [[nodiscard]] const Sample* sample(std::uint64_t number) const {
     const std::uint64_t index = number / SampleChunk::kSize;
@@ -77,33 +81,27 @@ class SampleHistory {
   /// The number for a sample with this stamp; samples from that number on are later.
   [[nodiscard]] std::uint64_t place_of(std::int64_t stamp) const;
 
-  /// Adds a sample, whose other fields the caller sets. There must be room.
-  [[nodiscard]] Sample& append(std::int64_t stamp, SampleStore& store) {
-    if (count() == 0) first_stamp_ = stamp;
-    if (count() == 0 || next_ % SampleChunk::kSize == 0) {
-      SampleChunk* fresh = store.take_chunk();
-      fresh->first = next_ - next_ % SampleChunk::kSize;
-      put(fresh);
-    }
-    Sample& sample = *at(next_++);
+  /// Adds a sample of a commit, later than all others. There must be room.
+  void append(std::int64_t stamp, std::uint64_t commit, const GivenValue& value,
+              SampleStore& store) {
+    const bool is_first = count() == 0;
+    Sample& sample = add(store);
     sample.stamp = stamp;
-    return sample;
+    sample.commit = commit;
+    sample.shared = ends_.newest_shared = store.share(value, ends_.newest_shared);
+    sample.set(value);
+    if (is_first) find_first();
   }
 
-  /// The newest sample; null: there is none.
-  [[nodiscard]] const Sample* newest() const { return count() > 0 ? at(next_ - 1) : nullptr; }
+  [[nodiscard]] std::int64_t first_stamp() const { return ends_.first_stamp; }
 
-  /// The stamp of the oldest sample. Known before that is needed, so that the writer need not wait
-  /// for memory that it last wrote some thousand samples ago.
-  [[nodiscard]] std::int64_t first_stamp() const { return first_stamp_; }
-
-  /// Drops the oldest sample.
+  /// Drops the oldest sample, but not the only one.
   void drop_oldest(SampleStore& store) {
     const std::uint64_t first = first_.load(std::memory_order_relaxed);
-    store.release(*at(first));
+    store.release(ends_.first_shared);
     if (is_last_of_chunk(first)) store.supersede(chunk(first));
     first_.store(first + 1, std::memory_order_release);
-    if (first + 1 < next_) first_stamp_ = at(first + 1)->stamp;
+    find_first();
   }
 
   /// Drops all samples, when the whole history is superseded.
@@ -112,7 +110,7 @@ class SampleHistory {
   /// A copy with room for twice as many samples.
   [[nodiscard]] std::unique_ptr<SampleHistory> grown() const;
 
-  /// A copy with one more sample, inserted at `place`, which is not behind the newest.
+  /// A copy with one more sample, inserted at `place`, which is not after the newest.
   [[nodiscard]] std::unique_ptr<SampleHistory> with(const Sample& sample, std::uint64_t place,
                                                     SampleStore& store) const;
 
@@ -121,7 +119,10 @@ class SampleHistory {
                                                         SampleStore& store) const;
 
   /// Replaces a sample that no reader can see yet.
-  void rewrite(const Sample& sample, std::uint64_t place) { *at(place) = sample; }
+  void rewrite(const Sample& sample, std::uint64_t place) {
+    *at(place) = sample;
+    find_ends();
+  }
 
   /// The commit of the last sample that was inserted or replaced. Set before readers see it.
   std::uint64_t rewritten = 0;
@@ -144,16 +145,44 @@ class SampleHistory {
   [[nodiscard]] bool is_last_of_chunk(std::uint64_t number) const {
     return number % SampleChunk::kSize == SampleChunk::kSize - 1 || number + 1 == next_;
   }
+  [[nodiscard]] Sample& add(SampleStore& store) {
+    if (count() == 0 || next_ % SampleChunk::kSize == 0) {
+      ends_.newest = store.take_chunk();
+      ends_.newest->first = next_ - next_ % SampleChunk::kSize;
+      put(ends_.newest);
+    }
+    return ends_.newest->samples[next_++ % SampleChunk::kSize];
+  }
+  void find_first() {
+    const Sample& first = *at(first_.load(std::memory_order_relaxed));
+    ends_.first_stamp = first.stamp;
+    ends_.first_shared = first.shared;
+  }
+  void find_ends() {
+    if (count() == 0) return;
+    find_first();
+    ends_.newest = chunk(next_ - 1);
+    ends_.newest_shared = at(next_ - 1)->shared;
+  }
   void put(SampleChunk* chunk) {
     chunks_[(chunk->first / SampleChunk::kSize) & mask_].store(chunk, std::memory_order_release);
   }
+
+  // What the writer needs of the oldest and the newest sample. It is read before that, so that the
+  // writer need not wait for memory that it last used some thousand samples ago.
+  struct Ends {
+    std::int64_t first_stamp = kAlways;
+    const SharedPart* first_shared = nullptr;
+    SampleChunk* newest = nullptr;
+    const SharedPart* newest_shared = nullptr;
+  };
 
   const EdgeTiming timing_;
   const bool has_noise_;
   const std::uint64_t mask_;
   std::atomic<std::uint64_t> first_{0};
   std::uint64_t next_ = 0;
-  std::int64_t first_stamp_ = kAlways;
+  Ends ends_;
   // NOLINTNEXTLINE(modernize-avoid-c-arrays): atomics cannot be moved
   std::unique_ptr<std::atomic<SampleChunk*>[]> chunks_;
 };

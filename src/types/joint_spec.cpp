@@ -55,8 +55,12 @@ Result<void> check_joint(const JointSpec& joint) {
 
 std::string shared_source(const std::string& leader) { return "joint " + leader; }
 
+double own_variance(const JointSpec& joint, double variance) {
+  return joint.coupled ? 0.0 : variance;
+}
+
 Transform value_at(const JointSpec& joint, double position, double variance) {
-  return joint_transform(joint.joint, position, joint.coupled ? 0.0 : variance);
+  return joint_transform(joint.joint, position, own_variance(joint, variance));
 }
 
 double rest_position(const std::optional<JointLimits>& limits) {

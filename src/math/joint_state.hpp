@@ -1,0 +1,39 @@
+#pragma once
+
+#include "tfdude/math/joint.hpp"
+
+namespace tfdude {
+
+/// The position of a joint [rad or m], and its variance.
+struct JointPosition {
+  double position = 0;
+  double variance = 0;
+};
+
+/// Between two positions, at s in [0, 1]. The correlation of their errors is unknown; as for
+/// interpolate() of transforms, the variance is that of errors which are fully correlated and
+/// alike, and an upper bound for any other correlation.
+[[nodiscard]] inline JointPosition interpolate(const JointPosition& q0, const JointPosition& q1,
+                                               double s) {
+  return {q0.position + s * (q1.position - q0.position), (1.0 - s) * q0.variance + s * q1.variance};
+}
+
+/// Beyond the second of two positions, at s of at least 1. The variance is the bound of
+/// extrapolate() of transforms.
+[[nodiscard]] inline JointPosition extrapolate(const JointPosition& q0, const JointPosition& q1,
+                                               double s) {
+  const double beyond = s - 1.0;
+  return {q0.position + s * (q1.position - q0.position),
+          (s + beyond) * (s * q1.variance + beyond * q0.variance)};
+}
+
+/// The value of an edge that a joint moves: joint_transform() of both.
+struct JointState {
+  const Joint* joint = nullptr;
+  JointPosition at{};
+};
+
+/// The pose of joint_transform().
+[[nodiscard]] Pose joint_pose(const Joint& joint, double position);
+
+}  // namespace tfdude
