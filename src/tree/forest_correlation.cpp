@@ -116,13 +116,16 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_
   }
   SampleHistory* superseded = newest.samples;
   const Sample* before = superseded->sample(place);
-  const Sample sample = sample_beside(*before, {X_PC}, stamp);
+  const Sample sample = sample_at(*superseded, place, {X_PC}, stamp);
   reclaimer_.samples().release(before->shared);
   const bool is_newest = newest.stamp == stamp;
   HeldVersion& fresh = push_held(newest.slot, is_newest ? X_PC : newest.X_PC);
   fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();
   fresh.samples->rewritten = fresh.commit;
   fresh.number = fresh.samples->next() - 1;
+  if (superseded->has_instants(place) || superseded->has_instants(place + 1)) {
+    fresh.history = fresh.commit;
+  }
   reclaimer_.supersede(superseded);
 }
 

@@ -128,12 +128,14 @@ void Forest::Impl::restart_history(const HeldVersion& newest, const GivenValue& 
   if (restart_listener_) restart_listener_(restart);
 }
 
-Sample Forest::Impl::sample_beside(const Sample& neighbour, const GivenValue& value,
-                                   std::int64_t stamp) {
+Sample Forest::Impl::sample_at(const SampleHistory& samples, std::uint64_t place,
+                               const GivenValue& value, std::int64_t stamp) {
+  const Sample* before = place > samples.oldest() ? samples.sample(place - 1) : nullptr;
   Sample sample;
   sample.stamp = stamp;
   sample.commit = frames_.commit_being_made();
-  sample.shared = reclaimer_.samples().share(value, neighbour.shared);
+  sample.shared = reclaimer_.samples().share(value, samples.sample(place)->shared,
+                                             before != nullptr ? before->shared : nullptr);
   sample.set(value);
   return sample;
 }
@@ -144,7 +146,7 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const GivenValue& va
   newest.name->refused.behind = {};
   const std::uint64_t place = newest.samples->place_of(stamp);
   const Sample* there = newest.samples->sample(place);
-  const Sample sample = sample_beside(*there, value, stamp);
+  const Sample sample = sample_at(*newest.samples, place, value, stamp);
   if (there->stamp == stamp) {
     // Twice in one update: the later one counts, and no reader has seen the earlier.
     reclaimer_.samples().release(there->shared);
@@ -158,6 +160,7 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const GivenValue& va
   HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
   fresh.samples = samples;
   fresh.number = samples->next() - 1;
+  if (newest.samples->has_instants(place)) fresh.history = fresh.commit;
   drop_samples(*samples, newest.stamp);
 }
 

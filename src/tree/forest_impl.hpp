@@ -97,9 +97,11 @@ class Forest::Impl {
   void forget_history(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
   /// Retires a history with all its samples.
   void give_back(SampleHistory* samples) TFDUDE_REQUIRES(mutex_);
-  /// A sample of the current commit, which shares with its neighbour what they have in common.
-  [[nodiscard]] Sample sample_beside(const Sample& neighbour, const GivenValue& value,
-                                     std::int64_t stamp) TFDUDE_REQUIRES(mutex_);
+  /// A sample of the current commit for a place in a history; it shares with a neighbour there what
+  /// they have in common.
+  [[nodiscard]] Sample sample_at(const SampleHistory& samples, std::uint64_t place,
+                                 const GivenValue& value, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
 
   // The limit of all histories (forest_limit.cpp).
 

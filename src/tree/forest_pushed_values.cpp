@@ -91,7 +91,6 @@ class Telling {
 
  private:
   void tell_between(const Sample& before, const Sample& after);
-  void tell_again_between(const Sample& before, const Sample& after);
 
   const HeldVersion& edge_;
   std::uint32_t index_;
@@ -102,17 +101,6 @@ class Telling {
 void Telling::tell_between(const Sample& before, const Sample& after) {
   for (const std::int64_t t : instants_between(before, after)) {
     tell(time_of(t), edge_.samples->value_between(before, after, t));
-  }
-}
-
-// For the instants that were told when the two were neighbours.
-void Telling::tell_again_between(const Sample& before, const Sample& after) {
-  const SampleHistory& samples = *edge_.samples;
-  std::uint64_t back = 0;
-  for (const std::int64_t t : instants_between(before, after)) {
-    const auto found = samples.around(t, edge_.number, back);
-    if (found.before == nullptr) continue;
-    tell(time_of(t), samples.value_between(*found.before, *found.after, t));
   }
 }
 
@@ -134,18 +122,13 @@ void Telling::tell_samples(std::uint64_t first, std::uint64_t seen) {
   const auto is_new = [seen](const Sample& sample) { return sample.commit > seen; };
   const bool follows = seen != 0 && first > samples.oldest();
   const Sample* before = follows ? samples.sample(first - 1) : nullptr;
-  const Sample* seen_before = nullptr;  // the last one, if late ones follow it
   for (std::uint64_t number = first; number <= edge_.number; ++number) {
     const Sample* sample = samples.sample(number);
     if (sample == nullptr) continue;
     if (before != nullptr && (is_new(*sample) || is_new(*before))) tell_between(*before, *sample);
     if (is_new(*sample)) {
-      if (before != nullptr && !is_new(*before)) seen_before = before;
       // The edge's version may be newer than the sample that it shows.
       tell(time_of(sample->stamp), number == edge_.number ? edge_.X_PC : sample->value());
-    } else {
-      if (seen_before != nullptr) tell_again_between(*seen_before, *sample);
-      seen_before = nullptr;
     }
     before = sample;
   }

@@ -78,6 +78,15 @@ class SampleHistory {
     return next_ / SampleChunk::kSize - first / SampleChunk::kSize > mask_;
   }
 
+  /// Whether there are instants_between() the sample before this place and that at it. Watchers
+  /// were sent their values. If a sample changes these, the watchers have to forget them: this is
+  /// another history to them. It is sent again, but is short, as so are those of joints that turn
+  /// far from sample to sample.
+  [[nodiscard]] bool has_instants(std::uint64_t place) const {
+    return place > oldest() && place < next_ &&
+           !instants_between(*at(place - 1), *at(place)).empty();
+  }
+
   /// The number for a sample with this stamp; samples from that number on are later.
   [[nodiscard]] std::uint64_t place_of(std::int64_t stamp) const;
 

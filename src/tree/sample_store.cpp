@@ -38,9 +38,16 @@ bool is_shared(const GivenValue& value, const SharedPart& part) {
 
 }  // namespace
 
-const SharedPart* SampleStore::share(const GivenValue& value, const SharedPart* neighbour) {
-  const bool shared = neighbour != nullptr && is_shared(value, *neighbour);
-  const SharedPart* part = shared ? neighbour : fresh_part(value);
+const SharedPart* SampleStore::share(const GivenValue& value, const SharedPart* neighbour,
+                                     const SharedPart* other) {
+  const SharedPart* part = nullptr;
+  if (neighbour != nullptr && is_shared(value, *neighbour)) {
+    part = neighbour;
+  } else if (other != nullptr && is_shared(value, *other)) {
+    part = other;
+  } else {
+    part = fresh_part(value);
+  }
   ++of_writer(part).samples;
   return part;
 }

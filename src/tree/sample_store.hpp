@@ -20,9 +20,11 @@ class SampleStore {
     chunks_.supersede(chunk);
   }
 
-  /// What a new sample shares with its neighbour, if they have it in common; otherwise a new part.
+  /// What a new sample shares with one of its neighbours, if they have it in common; otherwise a
+  /// new part.
   /// @param neighbour  null: there is none
-  [[nodiscard]] const SharedPart* share(const GivenValue& value, const SharedPart* neighbour);
+  [[nodiscard]] const SharedPart* share(const GivenValue& value, const SharedPart* neighbour,
+                                        const SharedPart* other = nullptr);
 
   /// For a sample that is dropped. What it shares goes with the last sample that does.
   void release(const SharedPart* shared) {
