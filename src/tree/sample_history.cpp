@@ -15,8 +15,8 @@ SampleHistory::SampleHistory(const EdgeTiming& timing, std::uint64_t capacity)
       mask_(capacity - 1),
       chunks_(new std::atomic<SampleChunk*>[capacity]()) {}
 
-// A sample that is dropped meanwhile stays as it is until this reader has left, but another may take
-// its place. Then it counts as earlier than t.
+// A sample that is dropped meanwhile stays as it is until this reader has left. But another one may
+// take its place: it then counts as earlier than t.
 SampleHistory::Bracket SampleHistory::around(std::int64_t t, std::uint64_t newest,
                                              std::uint64_t& back) const {
   // How far a guess may be off before bisection is faster.
