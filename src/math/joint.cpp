@@ -1,4 +1,4 @@
-#include "math/joint_state.hpp"
+#include "tfdude/math/joint.hpp"
 
 namespace tfdude {
 namespace {
@@ -17,10 +17,6 @@ Joint revolute_joint(const Transform& X_PJ, const Eigen::Vector3d& axis) {
 
 Joint prismatic_joint(const Transform& X_PJ, const Eigen::Vector3d& axis) {
   return along(X_PJ, axis, Eigen::Vector3d::Zero());
-}
-
-Pose joint_pose(const Joint& joint, double position) {
-  return joint.X_PJ.pose * exp(joint.S * position);
 }
 
 Transform joint_transform(const Joint& joint, double position, double variance) {

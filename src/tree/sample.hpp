@@ -27,7 +27,7 @@ struct alignas(64) SharedCovariance : SharedPart {
 };
 
 struct SharedJoint : SharedPart {
-  Joint joint;
+  PreparedJoint joint;
 };
 
 /// A new value of an edge.
@@ -57,7 +57,7 @@ struct Sample {
   }
 
   /// Null: it is a pose.
-  [[nodiscard]] const Joint* joint() const {
+  [[nodiscard]] const PreparedJoint* joint() const {
     return shared->is_joint ? &static_cast<const SharedJoint*>(shared)->joint : nullptr;
   }
   /// Of a pose.

@@ -31,7 +31,7 @@ bool is_shared(const GivenValue& value, const SharedPart& part) {
     return same(value.X_PC.covariance, static_cast<const SharedCovariance&>(part).covariance);
   }
   const Joint& joint = *value.state->joint;
-  const Joint& of_part = static_cast<const SharedJoint&>(part).joint;
+  const Joint& of_part = static_cast<const SharedJoint&>(part).joint.joint();
   return joint.S == of_part.S && same(joint.X_PJ.covariance, of_part.X_PJ.covariance) &&
          std::memcmp(&joint.X_PJ.pose, &of_part.X_PJ.pose, sizeof(Pose)) == 0;
 }
@@ -61,7 +61,7 @@ const SharedPart* SampleStore::fresh_part(const GivenValue& value) {
   }
   SharedJoint* part = joints_.take();
   part->is_joint = true;
-  part->joint = *value.state->joint;
+  part->joint = PreparedJoint(*value.state->joint);
   bytes_ += sizeof(*part);
   return part;
 }
