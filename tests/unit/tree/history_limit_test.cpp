@@ -44,20 +44,29 @@ TEST_CASE("the oldest samples of all edges are dropped, and the two newest of ea
   INFO("seed " << random.seed());
   constexpr std::size_t kEdges = 30;
   constexpr std::size_t kLimit = 200'000;
-  Crowd crowd(kEdges);
+  constexpr std::size_t kShort = 10;
+  Crowd crowd(kEdges + 1);
+  // Drops its oldest sample itself, so its samples are always the newest ones.
+  EdgeTiming few;
+  few.count = kShort;
+  REQUIRE(crowd.forest.set_timing(edge_id(kEdges), few));
   int warned = 0;
   crowd.forest.limit_history(kLimit, [&] { ++warned; });
-  // A few are sampled often, most rarely, and some no more.
   std::int64_t now = 1000;
   std::uint64_t taken = 0;
-  for (int i = 0; i < 20'000; ++i, ++taken) {
+  for (int i = 0; i < 20'000; ++i) {
+    crowd.sample(kEdges, ++now);
+    // A few are sampled often, most rarely, and some no more.
     const std::size_t edge = random.index(3) > 0 ? random.index(5) : random.index(kEdges);
-    crowd.sample(i > 10'000 && edge > 20 ? 0 : edge,
-                 now += 1 + static_cast<std::int64_t>(random.index(50)));
+    const std::size_t sampled = i > 10'000 && edge > 20 ? 0 : edge;
+    now += 1 + static_cast<std::int64_t>(random.index(50));
+    // Every other one has its own covariance.
+    const Covariance covariance = *Covariance::from_stddev({sampled % 2 == 0 ? 1.0 : 1.0 * i});
+    REQUIRE(crowd.forest.update(edge_id(sampled), {Pose(), covariance}, time_of(now)));
+    ++taken;
     if (i % 500 != 0 || warned == 0) continue;
-    std::int64_t kept_from = 0;  // of the edges with more than two samples
-    std::size_t bytes = 0;
     std::vector<std::int64_t> oldest;
+    std::size_t bytes = 0;
     std::size_t samples = 0;
     for (std::size_t k = 0; k < kEdges; ++k) {
       const HistoryInfo history = crowd.history(k);
@@ -66,12 +75,14 @@ TEST_CASE("the oldest samples of all edges are dropped, and the two newest of ea
       if (history.samples > 2) oldest.push_back(nanoseconds(*history.oldest));
       if (history.samples <= 2) REQUIRE((history.samples == 2 || !history.newest));
     }
-    kept_from = *std::max_element(oldest.begin(), oldest.end());
     // Samples are dropped up to eight at a time.
+    const std::int64_t kept_from = *std::max_element(oldest.begin(), oldest.end());
     const auto older = [&](std::int64_t stamp) { return stamp < kept_from - 40'000; };
     REQUIRE(std::count_if(oldest.begin(), oldest.end(), older) == 0);
     REQUIRE(bytes < kLimit + kEdges * 1000);
-    REQUIRE(samples + crowd.forest.dropped_samples() == taken + 1);
+    REQUIRE(bytes > kLimit - 5000);
+    REQUIRE(samples + crowd.forest.dropped_samples() == taken);
+    REQUIRE(crowd.history(kEdges).samples == kShort);
   }
   CHECK(warned == 1);
   CHECK(crowd.forest.dropped_samples() > 10'000);
