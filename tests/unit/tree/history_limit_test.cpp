@@ -46,6 +46,8 @@ TEST_CASE("the oldest samples of all edges are dropped, and the two newest of ea
   constexpr std::size_t kLimit = 200'000;
   constexpr std::size_t kShort = 10;
   Crowd crowd(kEdges + 1);
+  // The more frames there are, the rarer the oldest samples are searched for.
+  for (int i = 0; i < 2000; ++i) REQUIRE(crowd.forest.add("static " + std::to_string(i), "", {}));
   // Drops its oldest sample itself, so its samples are always the newest ones.
   EdgeTiming few;
   few.count = kShort;
