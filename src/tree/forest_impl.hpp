@@ -180,6 +180,7 @@ class Forest::Impl {
   void drop_samples(SampleHistory& samples, std::int64_t newest) TFDUDE_REQUIRES(mutex_);
   void drop_down_to_limit() TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool drop_oldest_samples() TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool drop_oldest_found() TFDUDE_REQUIRES(mutex_);
   void find_oldest_samples() TFDUDE_REQUIRES(mutex_);
   void hang(Version& fresh, std::uint32_t parent) const TFDUDE_REQUIRES(mutex_);
   void renew_depths(std::uint32_t top) TFDUDE_REQUIRES(mutex_);

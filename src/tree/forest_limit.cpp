@@ -26,11 +26,15 @@ void Forest::Impl::drop_down_to_limit() {
   }
 }
 
-// Drops samples of one edge, until that frees memory.
 bool Forest::Impl::drop_oldest_samples() {
+  if (drops_until_search_ > 0 && drop_oldest_found()) return true;
+  find_oldest_samples();
+  return drop_oldest_found();
+}
+
+// Drops samples of one edge, until that frees memory.
+bool Forest::Impl::drop_oldest_found() {
   constexpr std::uint64_t kLeast = 2;
-  const bool searched = oldest_.empty() || drops_until_search_ == 0;
-  if (searched) find_oldest_samples();
   while (!oldest_.empty()) {
     const OldestSamples::Entry oldest = oldest_.pop();
     if (!frames_.newest(oldest.slot).held()) continue;
@@ -48,7 +52,7 @@ bool Forest::Impl::drop_oldest_samples() {
     --drops_until_search_;
     return true;
   }
-  return !searched && drop_oldest_samples();
+  return false;
 }
 
 // Edges that got a history since are included, too. As many drops as frames lie between two

@@ -17,15 +17,15 @@ const PreparedJoint* joint_of(const Sample& before, const Sample& after) {
 
 Transform Sample::value() const {
   const PreparedJoint* moved_by = joint();
-  if (moved_by == nullptr) return {pose, covariance()};
+  if (moved_by == nullptr) return {pose(), covariance()};
   Transform X;
-  moved_by->compute(at, X);
+  moved_by->compute(at(), X);
   return X;
 }
 
 Pose Sample::value_pose() const {
   const PreparedJoint* moved_by = joint();
-  return moved_by != nullptr ? moved_by->pose(at.position) : pose;
+  return moved_by != nullptr ? moved_by->pose(at().position) : pose();
 }
 
 bool Sample::complete() const {
@@ -36,7 +36,7 @@ bool Sample::complete() const {
 
 void interpolate(const Sample& before, const Sample& after, double s, Transform& X) {
   if (const PreparedJoint* joint = joint_of(before, after)) {
-    joint->compute(interpolate(before.at, after.at, s), X);
+    joint->compute(interpolate(before.at(), after.at(), s), X);
   } else {
     interpolate(before.value(), after.value(), s, X);
   }
@@ -44,7 +44,7 @@ void interpolate(const Sample& before, const Sample& after, double s, Transform&
 
 void interpolate(const Sample& before, const Sample& after, double s, Pose& X) {
   if (const PreparedJoint* joint = joint_of(before, after)) {
-    X = joint->pose(interpolate(before.at, after.at, s).position);
+    X = joint->pose(interpolate(before.at(), after.at(), s).position);
   } else {
     interpolate(before.value_pose(), after.value_pose(), s, X);
   }
@@ -53,7 +53,7 @@ void interpolate(const Sample& before, const Sample& after, double s, Pose& X) {
 void extrapolate(const Sample& before, const Sample& after, const Transform& X1, double s,
                  Transform& X) {
   if (const PreparedJoint* joint = joint_of(before, after)) {
-    joint->compute(extrapolate(before.at, after.at, s), X);
+    joint->compute(extrapolate(before.at(), after.at(), s), X);
   } else {
     X = extrapolate(before.value(), X1, s);
   }
@@ -61,7 +61,7 @@ void extrapolate(const Sample& before, const Sample& after, const Transform& X1,
 
 void extrapolate(const Sample& before, const Sample& after, const Pose& X1, double s, Pose& X) {
   if (const PreparedJoint* joint = joint_of(before, after)) {
-    X = joint->pose(extrapolate(before.at, after.at, s).position);
+    X = joint->pose(extrapolate(before.at(), after.at(), s).position);
   } else {
     X = extrapolate(before.value_pose(), X1, s);
   }
@@ -74,7 +74,7 @@ std::vector<std::int64_t> instants_between(const Sample& before, const Sample& a
   const PreparedJoint* joint = joint_of(before, after);
   if (joint == nullptr) return instants;
   const double turn =
-      std::abs(after.at.position - before.at.position) * joint->joint().S.tail<3>().norm();
+      std::abs(after.at().position - before.at().position) * joint->joint().S.tail<3>().norm();
   if (turn <= kFar) return instants;
   const auto parts = static_cast<std::int64_t>(std::min(std::ceil(turn / kFar), kMost));
   const std::int64_t span = after.stamp - before.stamp;

@@ -37,24 +37,22 @@ struct GivenValue {
 };
 
 /// A sample of an edge: a pose, or the position of a joint. Immutable once its commit is visible.
-struct Sample {
-  Sample() : pose() {}
-
-  std::int64_t stamp = 0;
-  std::uint64_t commit = 0;  ///< that added it
-  const SharedPart* shared = nullptr;
-  union {
-    Pose pose;
-    JointPosition at;  ///< of the joint
-  };
+class Sample {
+ public:
+  // NOLINTBEGIN(cppcoreguidelines-pro-type-union-access): `shared` tells which of both it is
+  Sample() : pose_() {}
 
   void set(const GivenValue& value) {
     if (value.state == nullptr) {
-      pose = value.X_PC.pose;
+      pose_ = value.X_PC.pose;
     } else {
-      at = value.state->at;
+      at_ = value.state->at;
     }
   }
+  [[nodiscard]] const Pose& pose() const { return pose_; }
+  /// Of the joint.
+  [[nodiscard]] const JointPosition& at() const { return at_; }
+  // NOLINTEND(cppcoreguidelines-pro-type-union-access)
 
   /// Null: it is a pose.
   [[nodiscard]] const PreparedJoint* joint() const {
@@ -64,11 +62,21 @@ struct Sample {
   [[nodiscard]] const StatedCovariance& covariance() const {
     return static_cast<const SharedCovariance*>(shared)->covariance;
   }
-  [[nodiscard]] TransformParts parts() const { return {&pose, &covariance()}; }
+  [[nodiscard]] TransformParts parts() const { return {&pose(), &covariance()}; }
 
   [[nodiscard]] Transform value() const;
   [[nodiscard]] Pose value_pose() const;
   [[nodiscard]] bool complete() const;
+
+  std::int64_t stamp = 0;
+  std::uint64_t commit = 0;  ///< that added it
+  const SharedPart* shared = nullptr;
+
+ private:
+  union {
+    Pose pose_;
+    JointPosition at_;
+  };
 };
 
 /// The value at the fraction s of the time between two consecutive samples: that of a position

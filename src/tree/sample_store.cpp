@@ -32,8 +32,11 @@ bool is_shared(const GivenValue& value, const SharedPart& part) {
   }
   const Joint& joint = *value.state->joint;
   const Joint& of_part = static_cast<const SharedJoint&>(part).joint.joint();
-  return joint.S == of_part.S && same(joint.X_PJ.covariance, of_part.X_PJ.covariance) &&
-         std::memcmp(&joint.X_PJ.pose, &of_part.X_PJ.pose, sizeof(Pose)) == 0;
+  const Pose& X = joint.X_PJ.pose;
+  const Pose& Y = of_part.X_PJ.pose;
+  return joint.S == of_part.S && X.translation() == Y.translation() &&
+         X.rotation().coeffs() == Y.rotation().coeffs() &&
+         same(joint.X_PJ.covariance, of_part.X_PJ.covariance);
 }
 
 }  // namespace
