@@ -44,10 +44,10 @@ Nanoseconds. Our values include a covariance unless the row says "pose only"; tf
 """
 HISTORY = """\
 For lookups at an earlier instant, all edges are dynamic and turn at 1 rad/s. Both sides repeat
-lookups of the same instant, between the same samples. tf-dude keeps 2,048 samples of an edge by
-default, tf2 those of ten seconds. A sample of an edge with a full history takes {ours} bytes
-according to `history()`, and {heap} bytes measured by the growth of the heap; in tf2, without a
-covariance, {tf2} bytes.
+lookups of the same instant, between the same samples. Both keep the samples of ten seconds by
+default. A sample of an edge with a full history takes {ours} bytes according to `history()`, and
+{heap} bytes measured by the growth of the heap, if its covariance is that of the one before; in
+tf2, without a covariance, {tf2} bytes.
 """
 CONTENTION = """\
 A writer of 100 joints at 1 kHz, and a reader that repeatedly looks up a path of 30 of them.

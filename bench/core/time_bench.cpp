@@ -3,8 +3,7 @@
 // and memory.
 //
 // Keys: core/OPERATION/WHO/DEPTH/FRAMES, where the operation is one of
-//   set_history       a sample per millisecond: tf-dude keeps 2,048, tf2 ten seconds, both by
-//                     default
+//   set_history       a sample per millisecond: both keep ten seconds by default
 //   lookup_at         18.5 samples of 1 kHz before the newest
 //   lookup_at_far     200.5 samples of 1 kHz before the newest
 //   lookup_at_100hz   18.5 samples of 100 Hz before the newest
@@ -40,7 +39,7 @@ constexpr nanoseconds kMillisecond{1000000};
 constexpr nanoseconds kSpan = std::chrono::seconds(2);
 constexpr double kTurning = 1.0;  // of each edge [rad/s]
 
-// Samples until no history grows: more than 2,048, and more than ten seconds for tf2.
+// Samples until no history grows: more than ten seconds.
 constexpr int kFull = 11000;
 
 Time start() { return time_of(1000000000); }
@@ -241,14 +240,12 @@ int main(int argc, char** argv) {
   benchmark::RegisterBenchmark(key("set_history/ours_by_handle", 2).c_str(),
                                set_with_history<Ours>);
   benchmark::RegisterBenchmark(key("set_history/tf2", 2).c_str(), set_with_history<Tf2>);
-  constexpr int kKeptByOurs = 2048;
-  constexpr int kKeptByTf2 = 10000;
+  constexpr int kKept = 10000;
   benchmark::RegisterBenchmark(key("history_bytes/ours", 2).c_str(), count_history)->Iterations(1);
   benchmark::RegisterBenchmark(key("history_bytes/ours_heap", 2).c_str(), weigh_history<Ours>,
-                               kKeptByOurs)
+                               kKept)
       ->Iterations(1);
-  benchmark::RegisterBenchmark(key("history_bytes/tf2_heap", 2).c_str(), weigh_history<Tf2>,
-                               kKeptByTf2)
+  benchmark::RegisterBenchmark(key("history_bytes/tf2_heap", 2).c_str(), weigh_history<Tf2>, kKept)
       ->Iterations(1);
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();

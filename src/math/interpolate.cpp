@@ -94,7 +94,8 @@ void interpolate(const Transform& X0, const Transform& X1, double s, Transform& 
     const Alike both = alike(X0, X1);
     return interpolate(both.X0, both.X1, s, X);
   }
-  kernel::Blend one{numbers(X0), numbers(X1), s, numbers(X)};
+  kernel::Blend one{numbers(X0), numbers(X1), numbers(X0.covariance), numbers(X1.covariance),
+                    s,           numbers(X)};
   kernel::functions().blend_with_covariance(&one, 1);
   if (!one.near) interpolate_far(X0, X1, s, X);
   X.covariance.set_complete(X0.covariance.complete());
@@ -108,7 +109,7 @@ void interpolate_far(const Transform& X0, const Transform& X1, double s, Transfo
 }
 
 void interpolate(const Pose& X0, const Pose& X1, double s, Pose& X) {
-  kernel::Blend one{numbers(X0), numbers(X1), s, numbers(X)};
+  kernel::Blend one{numbers(X0), numbers(X1), nullptr, nullptr, s, numbers(X)};
   kernel::functions().blend_poses(&one, 1);
   if (!one.near) interpolate_far(X0, X1, s, X);
 }

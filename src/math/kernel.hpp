@@ -31,8 +31,10 @@ using Edge = const double*;
 
 /// One interpolation.
 struct Blend {
-  Edge X0 = nullptr;
+  Edge X0 = nullptr;  ///< of these, the poses are read
   Edge X1 = nullptr;
+  const double* upper0 = nullptr;  ///< the covariance of X0, as an upper triangle; maybe that of X1
+  const double* upper1 = nullptr;
   double s = 0;
   double* X = nullptr;  ///< output; room for an edge, not X0 or X1
   bool near = false;    ///< output: the two are less than 0.1 rad apart; otherwise X is not written

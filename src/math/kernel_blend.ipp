@@ -166,10 +166,10 @@ inline bool add_bulge(const Way& way, double s, const double* upper, Blocks& sum
 inline void blend_covariance(const Way& way, const Blend& one) {
   // Up to here, what add_bulge() leaves out is below 1e-8.
   constexpr double kQuarticEnds = 1e-3;
-  const double* u0 = one.X0 + 7;
-  const double* u1 = one.X1 + 7;
+  const double* u0 = one.upper0;
+  const double* u1 = one.upper1;
   double* u = one.X + 7;
-  const bool same = std::memcmp(u0, u1, 21 * sizeof(double)) == 0;
+  const bool same = u0 == u1 || std::memcmp(u0, u1, 21 * sizeof(double)) == 0;
   Blocks sum;
   if (same && way.angle2 < kQuarticEnds) {
     if (add_bulge(way, one.s, u0, sum)) {

@@ -14,16 +14,52 @@ namespace tfdude {
 static_assert(std::is_standard_layout_v<Pose> && sizeof(Pose) == 7 * sizeof(double));
 static_assert(std::is_standard_layout_v<Transform> && sizeof(Transform) == 29 * sizeof(double));
 static_assert(offsetof(Transform, covariance) == 7 * sizeof(double));
+static_assert(std::is_standard_layout_v<StatedCovariance> &&
+              sizeof(StatedCovariance) == 22 * sizeof(double));
 
 template <class Value>
-void PathAccumulation<Value>::up_between(const Value& X0, const Value& X1, double s) {
+void PathAccumulation<Value>::up_between(const TransformParts& X0, const TransformParts& X1,
+                                         double s) {
   // NOLINTBEGIN(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
-  blends_[blend_count_++] = {reinterpret_cast<kernel::Edge>(&X0),
-                             reinterpret_cast<kernel::Edge>(&X1), s,
+  blends_[blend_count_++] = {reinterpret_cast<kernel::Edge>(X0.pose),
+                             reinterpret_cast<kernel::Edge>(X1.pose),
+                             reinterpret_cast<const double*>(X0.covariance),
+                             reinterpret_cast<const double*>(X1.covariance),
+                             s,
                              reinterpret_cast<double*>(&place())};
   // NOLINTEND(cppcoreguidelines-pro-type-reinterpret-cast)
   up(place());
 }
+
+namespace {
+
+// NOLINTBEGIN(cppcoreguidelines-pro-type-reinterpret-cast): what they were before
+TransformParts first_of(const kernel::Blend& one) {
+  return {reinterpret_cast<const Pose*>(one.X0),
+          reinterpret_cast<const StatedCovariance*>(one.upper0)};
+}
+TransformParts second_of(const kernel::Blend& one) {
+  return {reinterpret_cast<const Pose*>(one.X1),
+          reinterpret_cast<const StatedCovariance*>(one.upper1)};
+}
+// NOLINTEND(cppcoreguidelines-pro-type-reinterpret-cast)
+
+void finish(const kernel::Blend& one, Transform& X) {
+  const TransformParts X0 = first_of(one);
+  const TransformParts X1 = second_of(one);
+  const bool complete = X0.covariance->complete();
+  if (complete != X1.covariance->complete()) {
+    return interpolate(X0.whole(), X1.whole(), one.s, X);
+  }
+  if (!one.near) interpolate_far(X0.whole(), X1.whole(), one.s, X);
+  X.covariance.set_complete(complete);
+}
+
+void finish(const kernel::Blend& one, Pose& X) {
+  if (!one.near) interpolate_far(*first_of(one).pose, *second_of(one).pose, one.s, X);
+}
+
+}  // namespace
 
 template <class Value>
 void PathAccumulation<Value>::blend() {
@@ -34,23 +70,8 @@ void PathAccumulation<Value>::blend() {
     functions.blend_poses(blends_.data(), blend_count_);
   }
   for (std::size_t i = 0; i < blend_count_; ++i) {
-    const kernel::Blend& one = blends_[i];
-    // NOLINTBEGIN(cppcoreguidelines-pro-type-reinterpret-cast): what they were before
-    const auto& X0 = *reinterpret_cast<const Value*>(one.X0);
-    const auto& X1 = *reinterpret_cast<const Value*>(one.X1);
-    auto& X = *reinterpret_cast<Value*>(one.X);
-    // NOLINTEND(cppcoreguidelines-pro-type-reinterpret-cast)
-    if constexpr (std::is_same_v<Value, Transform>) {
-      const bool complete = X0.covariance.complete();
-      if (complete != X1.covariance.complete()) {
-        interpolate(X0, X1, one.s, X);
-        continue;
-      }
-      if (!one.near) interpolate_far(X0, X1, one.s, X);
-      X.covariance.set_complete(complete);
-    } else {
-      if (!one.near) interpolate_far(X0, X1, one.s, X);
-    }
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): what it was before
+    finish(blends_[i], *reinterpret_cast<Value*>(blends_[i].X));
   }
   blend_count_ = 0;
 }
@@ -101,8 +122,9 @@ void PathAccumulation<Belief>::up(const Transform& X_PC) {
   X_HS_ = compose(edge, X_HS_, order_);
 }
 
-void PathAccumulation<Belief>::up_between(const Transform& X0, const Transform& X1, double s) {
-  up(interpolate(X0, X1, s));
+void PathAccumulation<Belief>::up_between(const TransformParts& X0, const TransformParts& X1,
+                                          double s) {
+  up(interpolate(X0.whole(), X1.whole(), s));
 }
 
 Belief join(PathAccumulation<Belief>&& from_a, PathAccumulation<Belief>&& from_b) {

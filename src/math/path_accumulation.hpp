@@ -10,6 +10,14 @@
 
 namespace tfdude {
 
+/// A transform whose parts are stored apart.
+struct TransformParts {
+  const Pose* pose;
+  const StatedCovariance* covariance;
+
+  [[nodiscard]] Transform whole() const { return {*pose, *covariance}; }
+};
+
 /// The path from a frame S up towards its root, accumulated in S itself. The sum Σ Ad(X_SC) Σ_C
 /// Ad(X_SC)ᵀ over the climbed edges (C is the child of each) needs one adjoint per edge, whatever
 /// follows. Edges are computed in batches, which keeps the arithmetic in registers. So a value
@@ -29,9 +37,9 @@ class PathAccumulation {
     if (count_ == pending_.size()) compute();
   }
 
-  /// As up(), for X_PC at the fraction s between X0 and X1 (interpolate()), which must also stay in
-  /// place.
-  void up_between(const Value& X0, const Value& X1, double s);
+  /// As up(), for X_PC at the fraction s between X0 and X1 (interpolate()), whose parts must also
+  /// stay in place.
+  void up_between(const TransformParts& X0, const TransformParts& X1, double s);
 
   /// Storage in which to compute a value for the next up().
   [[nodiscard]] Value& place() { return computed_[count_]; }
@@ -75,7 +83,7 @@ class PathAccumulation<Belief> {
   }
 
   void up(const Transform& X_PC);
-  void up_between(const Transform& X0, const Transform& X1, double s);
+  void up_between(const TransformParts& X0, const TransformParts& X1, double s);
   [[nodiscard]] Transform& place() { return computed_; }
 
   friend Belief join(PathAccumulation<Belief>&& from_a, PathAccumulation<Belief>&& from_b);

@@ -157,6 +157,7 @@ Result<std::size_t> Joints::apply(const JointUpdate& update) {
   for (const Step& step : steps_) {
     Mover& mover = movers_[step.mover];
     CorrelatedUpdate one{mover.handle, value_at(mover.spec, step.position, step.variance)};
+    one.state = {&mover.spec.joint, {step.position, own_variance(mover.spec, step.variance)}};
     const bool resay = mover.spec.coupled && mover.said_variance != step.variance;
     if (resay && is_newer(mover, update.stamp)) {
       mover.said = shared_error(mover.spec, step.variance);

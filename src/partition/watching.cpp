@@ -224,22 +224,32 @@ PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
   const auto& before = sent_.front();
   SeenSegments seen{told_, Time::min(), !before || request_.period > std::chrono::nanoseconds(0)};
   if (before && before->stamp) seen.until = *before->stamp;
-  const auto all =
-      forest.segments_since(request_.segments, seen, kMaxItems / request_.segments.size());
+  const std::size_t most = kMaxItems / request_.segments.size();
+  auto all = forest.segments_since(request_.segments, seen, most);
+  // Of another history, the watchers have nothing.
+  const bool again = all && before && all->back().history != before->history;
+  if (again) {
+    seen = {0, Time::min(), seen.newest_only};
+    all = forest.segments_since(request_.segments, seen, most);
+  }
   if (!all) return pushed;
   const SegmentValues& newest = all->back();
   pushed.commit = newest.commit;
+  std::vector<bool> begun(sent_.size(), false);
+  const auto push = [&](PushedValue&& entry) {
+    if (begins(entry) && !begun[entry.index]) entry.process_noise = Covariance();
+    begun[entry.index] = true;
+    pushed.entries.push_back(std::move(entry));
+  };
   for (auto earlier = all->begin(); earlier + 1 != all->end(); ++earlier) {
     for (PushedValue& entry : entries_of(*earlier)) {
-      if (!begins(entry)) pushed.entries.push_back(std::move(entry));
+      if (again || !begins(entry)) push(std::move(entry));
     }
   }
   for (PushedValue& entry : entries_of(newest)) {
     if (!is_new(entry)) continue;
-    const bool first = begins(entry);
-    sent_[entry.index] = entry;
-    if (first) entry.process_noise = Covariance();
-    pushed.entries.push_back(std::move(entry));
+    push(PushedValue(entry));
+    sent_[entry.index] = std::move(entry);
   }
   if (!pushed.entries.empty()) told_ = pushed.commit;
   return pushed;

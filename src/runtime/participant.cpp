@@ -160,7 +160,7 @@ Reply Participant::answer_frames(const Request& request) {
 RefusedCounts Participant::refused() {
   RefusedCounts counts;
   counts.watches = pushing_.refused();
-  counts.samples = structure_.forest.refused_samples();
+  counts.dropped_samples = structure_.forest.dropped_samples();
   counts.messages = transport_->dropped();
   const Lock lock(structure_.mutex);
   if (const Partition* own = member_.partition()) counts.frames = own->refused_frames();

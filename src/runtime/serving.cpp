@@ -111,13 +111,23 @@ Result<void> Serving::take_frames(const std::vector<FrameSpec>& frames) {
   while (any && Clock::now() < discovery_.met_by() && incomplete()) discovery_.wait_for_change();
   if (any) await_gone();
   if (auto taken = member_.serve(kept ? &state : nullptr, frames); !taken) return taken;
-  structure_.forest.limit_history(options_.limits.history_bytes);
+  limit_history();
   {
     const Lock lock(structure_.mutex);
     member_.partition()->limit_frames(options_.limits.frames);
   }
   log_configured(state, frames);
   return set_timings(frames);
+}
+
+void Serving::limit_history() {
+  const std::size_t bytes = options_.limits.history_bytes;
+  structure_.forest.limit_history(bytes, [name = member_.name(), bytes] {
+    log().warn(
+        "partition {}: the samples of its edges take {} bytes, the limit (--max-history). From now "
+        "on the oldest ones are dropped for new ones",
+        quote(name), bytes);
+  });
 }
 
 Result<void> Serving::set_timings(const std::vector<FrameSpec>& frames) {

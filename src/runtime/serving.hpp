@@ -33,6 +33,7 @@ class Serving {
   [[nodiscard]] Result<void> claim_name();
   [[nodiscard]] Result<StoredState> open_store(std::unique_ptr<StateStore>& store);
   [[nodiscard]] Result<void> take_frames(const std::vector<FrameSpec>& frames);
+  void limit_history();
   [[nodiscard]] Result<void> set_timings(const std::vector<FrameSpec>& frames);
   void await_gone();
 

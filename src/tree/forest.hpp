@@ -18,6 +18,7 @@
 #include "tfdude/types/edge.hpp"
 #include "tfdude/types/query.hpp"
 
+#include "math/joint_state.hpp"
 #include "tree/path_correlation.hpp"
 #include "tree/pushed_value.hpp"
 #include "tree/segments.hpp"
@@ -29,6 +30,9 @@ struct CorrelatedUpdate {
   Handle frame;
   Transform X_PC;
   const Correlation* correlation = nullptr;  ///< null: unchanged
+  /// If a joint gives the value: the value between two such samples is that of a position between
+  /// both.
+  JointState state{};
 };
 
 /// Checks a partial update.
@@ -156,11 +160,12 @@ class Forest {
   /// clock again before the next stamp is judged. O(slots). @return how many
   std::size_t clear_histories(Time from);
 
-  /// Limits the memory of all histories together. Once it is reached, a new sample takes the place
-  /// of the edge's oldest one, and an edge without two samples gets none: kTooMuch.
-  void limit_history(std::size_t bytes);
-  /// How many samples were refused for that.
-  [[nodiscard]] std::uint64_t refused_samples() const;
+  /// Limits the memory of the samples of all histories together. Once it is reached, the oldest
+  /// samples are dropped, except the two newest of each edge.
+  /// @param on_full  called when the first ones are dropped, as a function of on_commit()
+  void limit_history(std::size_t bytes, std::function<void()> on_full = nullptr);
+  /// How many samples were dropped for that.
+  [[nodiscard]] std::uint64_t dropped_samples() const;
 
   /// Sets how an edge's error is correlated with those of others, from now on and for all its
   /// history. Updates do not change it.

@@ -111,31 +111,22 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_
                                   std::int64_t stamp) {
   const std::uint64_t place = newest.samples->place_of(stamp);
   if (place == newest.samples->next() || newest.samples->stamp(place) != stamp) {
-    push_value(newest.slot, X_PC, stamp);
+    push_value(newest.slot, {X_PC}, stamp);
     return;
   }
-  HeldVersion* before = newest.samples->sample(place);
   SampleHistory* superseded = newest.samples;
-  HeldVersion* sample = nullptr;
-  HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
-  if (before->stamp == fresh.stamp) {
-    sample = &fresh;
-    fresh.X_PC = X_PC;
-  } else {
-    sample = reclaimer_.take<HeldVersion>();
-    *sample = HeldVersion{};
-    sample->commit = fresh.commit;
-    sample->depth = 0;  // so that it counts as held
-    sample->X_PC = X_PC;
-    sample->stamp = stamp;
-  }
-  sample->kept = true;
-  fresh.samples = superseded->replaced(sample, place).release();
+  const Sample* before = superseded->sample(place);
+  const Sample sample = sample_at(*superseded, place, {X_PC}, stamp);
+  reclaimer_.samples().release(before->shared);
+  const bool is_newest = newest.stamp == stamp;
+  HeldVersion& fresh = push_held(newest.slot, is_newest ? X_PC : newest.X_PC);
+  fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();
   fresh.samples->rewritten = fresh.commit;
   fresh.number = fresh.samples->next() - 1;
+  if (superseded->has_instants(place) || superseded->has_instants(place + 1)) {
+    fresh.history = fresh.commit;
+  }
   reclaimer_.supersede(superseded);
-  before->kept = false;
-  reclaimer_.supersede(before);
 }
 
 Transform Forest::Impl::whole(const Transform& X_PC, const Correlation& correlation) {

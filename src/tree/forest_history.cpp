@@ -50,7 +50,6 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
     const std::int64_t stamp = nanoseconds(*given);
     for (std::size_t i = 0; i < count; ++i) {
       auto ok = check_ahead(frames_.newest_value(slots[i]), stamp);
-      if (ok) ok = check_room(frames_.newest_value(slots[i]));
       if (!ok) return tl::unexpected(std::move(ok.error()));
     }
     return stamp;
@@ -63,10 +62,6 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
     newest = std::max(newest, edge.stamp);
   }
   if (!moving) return kAlways;
-  for (std::size_t i = 0; i < count; ++i) {
-    auto ok = check_room(frames_.newest_value(slots[i]));
-    if (!ok) return tl::unexpected(std::move(ok.error()));
-  }
   if (!clock_.is_there()) {
     return fail(Errc::kInvalidInput, "frame " + quote(frames_.newest_value(slots[0]).name->text) +
                                          " is dynamic: its update needs a stamp");
@@ -75,15 +70,6 @@ Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::si
   if (!now) return no_time(frames_.newest_value(slots[0]));
   // If the clock was set back, time advances as little as possible.
   return newest == kAlways ? *now : std::max(*now, saturating_add(newest, 1));
-}
-
-Result<void> Forest::Impl::check_room(const HeldVersion& edge) {
-  const bool replaces = edge.samples != nullptr && edge.samples->count() >= 2;
-  if (kept_samples_ < max_samples_ || replaces) return {};
-  refused_samples_.fetch_add(1, std::memory_order_relaxed);
-  return fail(Errc::kTooMuch, "frame " + quote(edge.name->text) +
-                                  ": there is no room for its history. All histories have " +
-                                  std::to_string(kept_samples_) + " samples, the limit");
 }
 
 Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t stamp) {
@@ -102,112 +88,103 @@ Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t sta
                   in_milliseconds(timing_of(edge).max_ahead) + " allowed");
 }
 
-void Forest::Impl::push_value(std::uint32_t slot, const Transform& X_PC, std::int64_t stamp) {
+void Forest::Impl::push_value(std::uint32_t slot, const GivenValue& value, std::int64_t stamp) {
   const HeldVersion& old = frames_.newest_value(slot);
   if (stamp == kAlways) {
-    end_revision(push_held(slot, X_PC));
+    end_revision(push_held(slot, value.X_PC));
   } else if (!old.moving() || stamp > old.stamp) {
-    append_sample(old, X_PC, stamp);
+    append_sample(old, value, stamp);
   } else if (stamp < old.stamp - old.samples->timing().span.count()) {
-    restart_history(old, X_PC, stamp);
+    restart_history(old, value, stamp);
   } else {
-    insert_sample(old, X_PC, stamp);
+    insert_sample(old, value, stamp);
   }
 }
 
-void Forest::Impl::append_sample(const HeldVersion& newest, const Transform& X_PC,
+void Forest::Impl::append_sample(const HeldVersion& newest, const GivenValue& value,
                                  std::int64_t stamp) {
   SampleHistory* samples = newest.samples;
   if (samples == nullptr) {
     samples = new SampleHistory(default_timing_);
   } else {
-    // First, so that a ring buffer with as many slots as samples suffices. At least two samples are
-    // kept, so this is not the newest.
-    if (samples->count() >= samples->timing().count) drop_oldest(*samples);
+    // First, so that the ring buffer need not grow for it. At least two samples are kept, so this
+    // is not the newest.
+    if (samples->count() >= samples->timing().count) samples->drop_oldest(reclaimer_.samples());
     if (samples->full()) {
       samples = samples->grown().release();
       reclaimer_.supersede(newest.samples);
     }
   }
-  HeldVersion& fresh = push_held(newest.slot, X_PC);
+  HeldVersion& fresh = push_held(newest.slot, value.X_PC);
   fresh.samples = samples;
-  fresh.stamp = stamp;
-  fresh.number = samples->next();
-  fresh.kept = true;
-  samples->append(&fresh, stamp);
-  ++kept_samples_;
-  drop_samples(*samples);
+  append_to(fresh, value, stamp);
+  drop_samples(*samples, stamp);
 }
 
-void Forest::Impl::restart_history(const HeldVersion& newest, const Transform& X_PC,
-                                   std::int64_t stamp) {
-  const HistoryRestart restart{newest.name->text, time_of(newest.stamp), time_of(stamp)};
-  HeldVersion& fresh = push_held(newest.slot, X_PC);
-  forget_history(fresh);
+void Forest::Impl::append_to(HeldVersion& fresh, const GivenValue& value, std::int64_t stamp) {
   fresh.stamp = stamp;
   fresh.number = fresh.samples->next();
-  fresh.kept = true;
-  fresh.samples->append(&fresh, stamp);
-  ++kept_samples_;
+  fresh.samples->append(stamp, fresh.commit, value, reclaimer_.samples());
+}
+
+void Forest::Impl::restart_history(const HeldVersion& newest, const GivenValue& value,
+                                   std::int64_t stamp) {
+  const HistoryRestart restart{newest.name->text, time_of(newest.stamp), time_of(stamp)};
+  HeldVersion& fresh = push_held(newest.slot, value.X_PC);
+  forget_history(fresh);
+  append_to(fresh, value, stamp);
   newest.name->refused.behind = {};
   if (restart_listener_) restart_listener_(restart);
 }
 
+Sample Forest::Impl::sample_at(const SampleHistory& samples, std::uint64_t place,
+                               const GivenValue& value, std::int64_t stamp) {
+  const Sample* before = place > samples.oldest() ? samples.sample(place - 1) : nullptr;
+  Sample sample;
+  sample.stamp = stamp;
+  sample.commit = frames_.commit_being_made();
+  sample.shared = reclaimer_.samples().share(value, samples.sample(place)->shared,
+                                             before != nullptr ? before->shared : nullptr);
+  sample.set(value);
+  return sample;
+}
+
 // The newest sample stays unchanged, in a version that refers to the history with the new sample.
-void Forest::Impl::insert_sample(const HeldVersion& newest, const Transform& X_PC,
+void Forest::Impl::insert_sample(const HeldVersion& newest, const GivenValue& value,
                                  std::int64_t stamp) {
   newest.name->refused.behind = {};
   const std::uint64_t place = newest.samples->place_of(stamp);
-  if (place < newest.samples->next() && newest.samples->stamp(place) == stamp) {
+  const Sample* there = newest.samples->sample(place);
+  const Sample sample = sample_at(*newest.samples, place, value, stamp);
+  if (there->stamp == stamp) {
     // Twice in one update: the later one counts, and no reader has seen the earlier.
-    newest.samples->sample(place)->X_PC = X_PC;
-    if (newest.stamp == stamp) const_cast<HeldVersion&>(newest).X_PC = X_PC;
+    reclaimer_.samples().release(there->shared);
+    newest.samples->rewrite(sample, place);
+    if (newest.stamp == stamp) const_cast<HeldVersion&>(newest).X_PC = value.X_PC;
     return;
   }
-  HeldVersion* sample = reclaimer_.take<HeldVersion>();
-  *sample = HeldVersion{};
-  sample->commit = frames_.commit_being_made();
-  sample->depth = 0;  // so that it counts as held
-  sample->X_PC = X_PC;
-  sample->stamp = stamp;
-  sample->kept = true;
-  SampleHistory* samples = newest.samples->with(sample, stamp, place).release();
-  samples->rewritten = sample->commit;
+  SampleHistory* samples = newest.samples->with(sample, place, reclaimer_.samples()).release();
+  samples->rewritten = sample.commit;
   reclaimer_.supersede(newest.samples);
   HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
   fresh.samples = samples;
   fresh.number = samples->next() - 1;
-  ++kept_samples_;
-  drop_samples(*samples);
+  if (newest.samples->has_instants(place)) fresh.history = fresh.commit;
+  drop_samples(*samples, newest.stamp);
 }
 
-void Forest::Impl::drop_oldest(SampleHistory& samples) {
-  HeldVersion* dropped = samples.drop_oldest();
-  dropped->kept = false;
-  --kept_samples_;
-  reclaimer_.supersede(dropped);
-}
-
-void Forest::Impl::drop_samples(SampleHistory& samples) {
-  const std::int64_t limit = samples.stamp(samples.next() - 1) - samples.timing().span.count();
-  const auto beyond = [&]() TFDUDE_REQUIRES(mutex_) {
-    return samples.count() > samples.timing().count || samples.stamp(samples.oldest()) < limit ||
-           (kept_samples_ > max_samples_ && samples.count() > 2);
-  };
-  while (beyond()) {
-    drop_oldest(samples);
+void Forest::Impl::drop_samples(SampleHistory& samples, std::int64_t newest) {
+  const std::int64_t limit = newest - samples.timing().span.count();
+  const std::size_t most = samples.timing().count;
+  while (samples.count() > most || samples.first_stamp() < limit) {
+    samples.drop_oldest(reclaimer_.samples());
   }
+  keep_to_limit();
 }
 
-void Forest::Impl::give_back(SampleHistory* samples, std::uint32_t slot) {
+void Forest::Impl::give_back(SampleHistory* samples) {
   if (samples == nullptr) return;
-  const Version* head = &frames_.newest(slot);
-  kept_samples_ -= static_cast<std::int64_t>(samples->count());
-  for (std::uint64_t number = samples->oldest(); number < samples->next(); ++number) {
-    HeldVersion* sample = samples->sample(number);
-    sample->kept = false;
-    if (sample != head) reclaimer_.supersede(sample);
-  }
+  samples->drop_all(reclaimer_.samples());
   reclaimer_.supersede(samples);
 }
 
@@ -217,7 +194,7 @@ void Forest::Impl::forget_history(HeldVersion& fresh) {
   if (before == nullptr) return;
   fresh.samples = new SampleHistory(before->timing());
   fresh.stamp = kAlways;
-  give_back(before, fresh.slot);
+  give_back(before);
 }
 
 void Forest::Impl::clear_history(const HeldVersion& edge) {
@@ -267,16 +244,6 @@ Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   fresh.samples = new SampleHistory(timing);
   impl_->commit();
   return {};
-}
-
-void Forest::limit_history(std::size_t bytes) {
-  constexpr std::size_t kSampleBytes = sizeof(HeldVersion) + 2 * sizeof(std::int64_t);
-  const Writing lock(impl_->mutex_);
-  impl_->max_samples_ = static_cast<std::int64_t>(bytes / kSampleBytes);
-}
-
-std::uint64_t Forest::refused_samples() const {
-  return impl_->refused_samples_.load(std::memory_order_relaxed);
 }
 
 Result<void> Forest::set_default_timing(const EdgeTiming& timing) {

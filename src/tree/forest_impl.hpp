@@ -4,6 +4,7 @@
 #include "tree/forest.hpp"
 #include "tree/frames.hpp"
 #include "tree/graph.hpp"
+#include "tree/oldest_samples.hpp"
 #include "tree/path_lookup.hpp"
 #include "tree/reclaimer.hpp"
 #include "tree/sample_rules.hpp"
@@ -88,19 +89,28 @@ class Forest::Impl {
   ///   it
   [[nodiscard]] Result<void> check_ahead(const HeldVersion& edge, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
-  /// @return kTooMuch if the edge has no history, and there is no room for one; counts it
-  [[nodiscard]] Result<void> check_room(const HeldVersion& edge) TFDUDE_REQUIRES(mutex_);
   /// Pushes a checked update: a sample if the edge is dynamic or becomes so, otherwise the value
   /// for all times.
-  void push_value(std::uint32_t slot, const Transform& X_PC, std::int64_t stamp)
+  void push_value(std::uint32_t slot, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   /// Makes the fresh version static and clears its history, but keeps its timing.
   void forget_history(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
   /// Pushes a version of a dynamic edge without any sample.
   void clear_history(const HeldVersion& edge) TFDUDE_REQUIRES(mutex_);
-  /// Retires a history with all its samples. If the newest sample is also the newest version, that
-  /// one is superseded next.
-  void give_back(SampleHistory* samples, std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
+  /// Retires a history with all its samples.
+  void give_back(SampleHistory* samples) TFDUDE_REQUIRES(mutex_);
+  /// A sample of the current commit for a place in a history; it shares with a neighbour there what
+  /// they have in common.
+  [[nodiscard]] Sample sample_at(const SampleHistory& samples, std::uint64_t place,
+                                 const GivenValue& value, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
+
+  // The limit of all histories (forest_limit.cpp).
+
+  /// Drops the oldest samples while all take more memory than they may.
+  void keep_to_limit() TFDUDE_REQUIRES(mutex_) {
+    if (reclaimer_.samples().bytes() > full_at_) drop_down_to_limit();
+  }
 
   // Values from another forest (forest_mirror.cpp).
 
@@ -141,9 +151,11 @@ class Forest::Impl {
   Frames frames_;
   StampClock clock_ TFDUDE_GUARDED_BY(mutex_);
   EdgeTiming default_timing_ TFDUDE_GUARDED_BY(mutex_);
-  std::int64_t kept_samples_ TFDUDE_GUARDED_BY(mutex_) = 0;  // of all histories
-  std::int64_t max_samples_ TFDUDE_GUARDED_BY(mutex_) = INT64_MAX;
-  std::atomic<std::uint64_t> refused_samples_{0};
+  std::size_t max_bytes_ TFDUDE_GUARDED_BY(mutex_) = SIZE_MAX;  // of all samples
+  // The bytes at which samples are dropped: max_bytes_, unless there is nothing to drop.
+  std::size_t full_at_ TFDUDE_GUARDED_BY(mutex_) = SIZE_MAX;
+  std::function<void()> on_full_ TFDUDE_GUARDED_BY(mutex_);
+  std::atomic<std::uint64_t> dropped_samples_{0};
   /// With the owner of each.
   std::vector<std::pair<const void*, std::function<void()>>> commit_listeners_
       TFDUDE_GUARDED_BY(mutex_);
@@ -155,23 +167,31 @@ class Forest::Impl {
  private:
   template <class T>
   T& push(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
-  void append_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp)
+  void append_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
-  void restart_history(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp)
+  void restart_history(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
-  void insert_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp)
+  void insert_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   void show_commit() TFDUDE_REQUIRES(mutex_);
   void tell_commit() const TFDUDE_REQUIRES(mutex_) {
     for (const auto& [whose, listener] : commit_listeners_) listener();
   }
-  void drop_oldest(SampleHistory& samples) TFDUDE_REQUIRES(mutex_);
-  void drop_samples(SampleHistory& samples) TFDUDE_REQUIRES(mutex_);
+  /// Makes the fresh version's value the newest sample.
+  void append_to(HeldVersion& fresh, const GivenValue& value, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
+  void drop_samples(SampleHistory& samples, std::int64_t newest) TFDUDE_REQUIRES(mutex_);
+  void drop_down_to_limit() TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool drop_oldest_samples() TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool drop_oldest_found() TFDUDE_REQUIRES(mutex_);
+  void find_oldest_samples() TFDUDE_REQUIRES(mutex_);
   void hang(Version& fresh, std::uint32_t parent) const TFDUDE_REQUIRES(mutex_);
   void renew_depths(std::uint32_t top) TFDUDE_REQUIRES(mutex_);
   void release(Version& fresh) TFDUDE_REQUIRES(mutex_);
   void release_if_unused(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
 
+  OldestSamples oldest_ TFDUDE_GUARDED_BY(mutex_);
+  std::size_t drops_until_search_ TFDUDE_GUARDED_BY(mutex_) = 0;
   Reclaimer reclaimer_ TFDUDE_GUARDED_BY(mutex_);
   std::vector<const Name*> released_names_ TFDUDE_GUARDED_BY(mutex_);  // by the current commit
   std::vector<std::uint32_t> free_slots_ TFDUDE_GUARDED_BY(mutex_);

@@ -28,13 +28,13 @@ bool Forest::Impl::push_told_sample(const HeldVersion& edge, const Transform& X_
   if (edge.moving() && stamp <= edge.stamp) {
     const std::uint64_t place = edge.samples->place_of(stamp);
     if (place < edge.samples->next() && edge.samples->stamp(place) == stamp) {
-      if (!replace || same(edge.samples->sample(place)->X_PC, X_PC)) return false;
+      if (!replace || same(edge.samples->sample(place)->value(), X_PC)) return false;
       replace_sample(edge, X_PC, stamp);
       return true;
     }
     if (!check_sample(edge, stamp)) return false;
   }
-  push_value(edge.slot, X_PC, stamp);
+  push_value(edge.slot, {X_PC}, stamp);
   return true;
 }
 

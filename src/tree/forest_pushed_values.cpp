@@ -20,6 +20,7 @@ HistoryInfo history_of(const HeldVersion& edge) {
   info.count_limit = samples.timing().count;
   info.bytes = samples.bytes();
   if (!edge.moving() || edge.lacks_sample()) return info;
+  info.bytes += samples.bytes_until(edge.number);
   double sum = 0;
   double squares = 0;
   std::int64_t before = kAlways;
@@ -38,7 +39,6 @@ HistoryInfo history_of(const HeldVersion& edge) {
     before = stamp;
   }
   info.newest = time_of(edge.stamp);
-  info.bytes += info.samples * sizeof(HeldVersion);
   if (info.samples < 2) return info;
   const double gaps = static_cast<double>(info.samples - 1);
   const double mean = sum / gaps;
@@ -57,7 +57,6 @@ std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, s
                             const PushedQuery& query) {
   const SampleHistory& samples = *edge.samples;
   std::uint64_t first = edge.number;
-  if (query.newest_only) return first;
   if (cursor.history == 0) {
     const std::int64_t from = query.from ? nanoseconds(*query.from) : edge.stamp;
     while (first > samples.oldest() && samples.stamp(first) > from) --first;
@@ -66,41 +65,111 @@ std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, s
   // Late samples may be anywhere.
   if (samples.rewritten > seen) return samples.oldest();
   const auto is_new = [&](std::uint64_t number) {
-    const HeldVersion* sample = samples.sample(number);
+    const Sample* sample = samples.sample(number);
     return sample != nullptr && sample->commit > seen;
   };
   while (first > samples.oldest() && is_new(first - 1)) --first;
   return first;
 }
 
+// Adds values of one edge. Between positions of a joint that are far apart, it adds values, since
+// the watcher only has the poses.
+class Telling {
+ public:
+  Telling(const HeldVersion& edge, std::uint32_t index, std::vector<PushedValue>& values)
+      : edge_(edge), index_(index), values_(values), begin_(values.size()) {}
+
+  void tell(const std::optional<Time>& stamp, const Transform& X) {
+    values_.push_back({index_, stamp, X, {}, edge_.history, {}});
+  }
+
+  /// The samples from `first` on whose commits are after `seen`; 0: nothing was seen.
+  void tell_samples(std::uint64_t first, std::uint64_t seen);
+  void tell_newest(std::uint64_t seen);
+  void tell_cleared(std::uint64_t seen);
+
+  void finish(bool begins);
+
+ private:
+  void tell_between(const Sample& before, const Sample& after);
+
+  const HeldVersion& edge_;
+  std::uint32_t index_;
+  std::vector<PushedValue>& values_;
+  std::size_t begin_;
+};
+
+void Telling::tell_between(const Sample& before, const Sample& after) {
+  for (const std::int64_t t : instants_between(before, after)) {
+    tell(time_of(t), edge_.samples->value_between(before, after, t));
+  }
+}
+
+void Telling::tell_newest(std::uint64_t seen) {
+  const SampleHistory& samples = *edge_.samples;
+  const Sample* newest = samples.sample(edge_.number);
+  if (newest != nullptr && newest->commit <= seen) return;
+  tell(time_of(edge_.stamp), edge_.X_PC);
+  if (seen == 0 || newest == nullptr) return;
+  const Sample* before = newest;
+  for (std::uint64_t number = edge_.number; before != nullptr && before->commit > seen; --number) {
+    before = number > samples.oldest() ? samples.sample(number - 1) : nullptr;
+  }
+  if (before != nullptr) tell_between(*before, *newest);
+}
+
+void Telling::tell_samples(std::uint64_t first, std::uint64_t seen) {
+  const SampleHistory& samples = *edge_.samples;
+  const auto is_new = [seen](const Sample& sample) { return sample.commit > seen; };
+  const bool follows = seen != 0 && first > samples.oldest();
+  const Sample* before = follows ? samples.sample(first - 1) : nullptr;
+  for (std::uint64_t number = first; number <= edge_.number; ++number) {
+    const Sample* sample = samples.sample(number);
+    if (sample == nullptr) continue;
+    if (before != nullptr && (is_new(*sample) || is_new(*before))) tell_between(*before, *sample);
+    if (is_new(*sample)) {
+      // The edge's version may be newer than the sample that it shows.
+      tell(time_of(sample->stamp), number == edge_.number ? edge_.X_PC : sample->value());
+    }
+    before = sample;
+  }
+  if (samples.sample(edge_.number) == nullptr) tell(time_of(edge_.stamp), edge_.X_PC);
+}
+
+void Telling::tell_cleared(std::uint64_t seen) {
+  if (edge_.commit <= seen) return;
+  tell(std::nullopt, edge_.X_PC);
+  values_.back().cleared = true;
+}
+
+void Telling::finish(bool begins) {
+  if (values_.size() == begin_) return;
+  const auto begin = values_.begin() + static_cast<std::ptrdiff_t>(begin_);
+  std::stable_sort(begin, values_.end(),
+                   [](const PushedValue& a, const PushedValue& b) { return a.stamp < b.stamp; });
+  values_.back().correlation = correlation_of(edge_);
+  if (!begins) return;
+  begin->process_noise =
+      edge_.samples != nullptr ? edge_.samples->timing().process_noise : Covariance();
+}
+
 void add_values(const HeldVersion& edge, std::uint32_t index, const PushedQuery& query,
                 std::uint64_t commit, EdgeCursor& cursor, std::vector<PushedValue>& values) {
   const bool begins = edge.history != cursor.history;
   const std::uint64_t seen = begins ? 0 : cursor.commit;
-  const std::size_t before = values.size();
-  const auto tell = [&](const std::optional<Time>& stamp, const Transform& X) {
-    values.push_back({index, stamp, X, {}, edge.history, {}});
-  };
-  if (!edge.moving() || edge.lacks_sample()) {
-    if (edge.commit > seen) tell(std::nullopt, edge.X_PC);
-    if (edge.lacks_sample() && values.size() > before) values.back().cleared = true;
-  } else {
-    const SampleHistory& samples = *edge.samples;
-    for (auto number = first_to_tell(edge, cursor, seen, query); number < edge.number; ++number) {
-      const HeldVersion* sample = samples.sample(number);
-      if (sample != nullptr && sample->commit > seen) tell(time_of(sample->stamp), sample->X_PC);
-    }
-    // The edge's version may be newer than the sample that it shows.
-    const HeldVersion* newest = samples.sample(edge.number);
-    if (newest == nullptr || newest->commit > seen) tell(time_of(edge.stamp), edge.X_PC);
+  Telling telling(edge, index, values);
+  if (edge.lacks_sample()) {
+    telling.tell_cleared(seen);
+  } else if (edge.moving() && query.newest_only) {
+    telling.tell_newest(seen);
+  } else if (edge.moving()) {
+    telling.tell_samples(first_to_tell(edge, cursor, seen, query), seen);
+  } else if (edge.commit > seen) {
+    telling.tell(std::nullopt, edge.X_PC);
   }
   cursor.commit = commit;
   cursor.history = edge.history;
-  if (values.size() == before) return;
-  values.back().correlation = correlation_of(edge);
-  if (!begins) return;
-  values[before].process_noise =
-      edge.samples != nullptr ? edge.samples->timing().process_noise : Covariance();
+  telling.finish(begins);
 }
 
 }  // namespace

@@ -110,7 +110,7 @@ void add_changed(const HeldVersion& edge, std::uint64_t since, std::int64_t unti
   if (samples.rewritten <= since) return;
   std::int64_t after = kAllInstants.last;
   for (std::uint64_t number = edge.number + 1; number-- > samples.oldest();) {
-    const HeldVersion* sample = samples.sample(number);
+    const Sample* sample = samples.sample(number);
     if (sample == nullptr) return;
     const std::int64_t before = number > 0 ? samples.stamp(number - 1) : kAlways;
     if (sample->commit > since && before < until) {
@@ -135,13 +135,21 @@ std::vector<std::int64_t> changed_instants(const std::vector<Ends>& segments,
     }
   });
   std::vector<std::int64_t> instants;
+  const auto add = [&](std::int64_t t) {
+    if (t > until ? !seen.newest_only : t <= changed.last) instants.push_back(t);
+  };
   for_each_held(segments, [&](const HeldVersion& edge) {
     if (!edge.moving()) return;
+    const Sample* after = nullptr;
     for (std::uint64_t number = edge.number + 1; number-- > edge.samples->oldest();) {
-      const std::int64_t stamp = edge.samples->stamp(number);
-      if (stamp == kAlways || (stamp <= until && stamp < changed.first)) break;
-      const bool wanted = stamp > until ? !seen.newest_only : stamp <= changed.last;
-      if (wanted) instants.push_back(stamp);
+      const Sample* sample = edge.samples->sample(number);
+      if (sample == nullptr) break;
+      if (after != nullptr) {
+        for (const std::int64_t t : instants_between(*sample, *after)) add(t);
+      }
+      if (sample->stamp <= until && sample->stamp < changed.first) break;
+      add(sample->stamp);
+      after = sample;
     }
   });
   std::sort(instants.begin(), instants.end());

@@ -19,6 +19,12 @@ const Correlation* correlation_of(const EdgeUpdate&) { return nullptr; }
 const Correlation* correlation_of(const HandleUpdate&) { return nullptr; }
 const Correlation* correlation_of(const CorrelatedUpdate& update) { return update.correlation; }
 
+const JointState* state_of(const EdgeUpdate&) { return nullptr; }
+const JointState* state_of(const HandleUpdate&) { return nullptr; }
+const JointState* state_of(const CorrelatedUpdate& update) {
+  return update.state.joint != nullptr ? &update.state : nullptr;
+}
+
 template <class Update>
 Result<void> check_said(const Update& update) {
   const Correlation* said = correlation_of(update);
@@ -80,9 +86,7 @@ T& Forest::Impl::push(std::uint32_t slot) {
   fresh->owner = old->owner;
   fresh->slot = slot;
   fresh->generation = old->generation;
-  fresh->kept = false;
-  // A sample stays until its history drops it.
-  if (!old->kept) reclaimer_.supersede(old);
+  reclaimer_.supersede(old);
   // Readers skip the fresh version by its number until commit(), so it may be filled in later.
   head.store(fresh, std::memory_order_release);
   return *fresh;
@@ -133,7 +137,7 @@ void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
 
 void Forest::Impl::make_absent(std::uint32_t slot) {
   if (frames_.newest(slot).held()) {
-    give_back(frames_.newest_value(slot).samples, slot);
+    give_back(frames_.newest_value(slot).samples);
     reclaimer_.supersede(frames_.newest_value(slot).correlation);
   }
   Version& fresh = push_remote(slot);
@@ -253,7 +257,7 @@ Result<void> Forest::Impl::update_one(const HeldVersion& edge, const Transform& 
     const auto at = stamp_for(&slot, 1, stamp);
     if (!at) return tl::unexpected(at.error());
     if (auto ok = check_sample(edge, *at); !ok) return ok;
-    push_value(slot, X_PC, *at);
+    push_value(slot, {X_PC}, *at);
   } else {
     end_revision(push_held(slot, X_PC));
   }
@@ -298,7 +302,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   }
   if (!fits) return fits;
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    push_value(to_update_[i], edges[i].X_PC, *at);
+    push_value(to_update_[i], {edges[i].X_PC, state_of(edges[i])}, *at);
     if (const Correlation* said = correlation_of(edges[i])) say_correlation(to_update_[i], *said);
   }
   commit();

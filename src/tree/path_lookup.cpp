@@ -29,6 +29,15 @@ const OfEdge<Value>& value_of(const HeldVersion& version) {
   }
 }
 
+template <class Value>
+OfEdge<Value> value_of(const Sample& sample) {
+  if constexpr (std::is_same_v<Value, Pose>) {
+    return sample.value_pose();
+  } else {
+    return sample.value();
+  }
+}
+
 double seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
 
 void add_noise(Pose&, const HeldVersion&, double) {}
@@ -77,11 +86,13 @@ Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Query
     return not_yet(edge, t,
                    ", and the extrapolation limit is " + in_milliseconds(query.extrapolate));
   }
-  const HeldVersion* before =
+  const Sample* before =
       edge.number > edge.samples->oldest() ? edge.samples->sample(edge.number - 1) : nullptr;
-  if (before == nullptr) return not_yet(edge, t, ", and the only one: cannot extrapolate");
+  const Sample* newest = edge.samples->sample(edge.number);
+  if (before == nullptr || newest == nullptr)
+    return not_yet(edge, t, ", and the only one: cannot extrapolate");
   const double s = seconds(t - before->stamp) / seconds(edge.stamp - before->stamp);
-  X = extrapolate(value_of<Value>(*before), value_of<Value>(edge), s);
+  extrapolate(*before, *newest, value_of<Value>(edge), s, X);
   add_noise(X, edge, seconds(beyond));
   return {};
 }
@@ -93,6 +104,36 @@ struct Moment {
   const Query& query;
   std::uint64_t back = 0;  // see SampleHistory::around()
 };
+
+// Accumulates an edge whose instant is that of a sample, with this value.
+template <class Value>
+void accumulate_sample(PathAccumulation<Value>& path, const HeldVersion& edge,
+                       const OfEdge<Value>& X_PC, std::int64_t age) {
+  if (age == 0 || !edge.samples->has_noise()) return path.up(X_PC);
+  OfEdge<Value>& X = path.place();
+  X = X_PC;
+  add_noise(X, edge, seconds(age));
+  path.up(X);
+}
+
+// Accumulates an edge between two samples.
+template <class Value>
+void accumulate_between(PathAccumulation<Value>& path, const HeldVersion& edge,
+                        const SampleHistory::Bracket& samples, const Moment& moment) {
+  const Sample& before = *samples.before;
+  const Sample& after = *samples.after;
+  const auto span = static_cast<double>(after.stamp - before.stamp);
+  const double s = static_cast<double>(moment.t - before.stamp) / span;
+  const bool noisy = edge.samples->has_noise();
+  if (!noisy && before.joint() == nullptr && after.joint() == nullptr) {
+    path.up_between(before.parts(), after.parts(), s);
+    return;
+  }
+  OfEdge<Value>& X = path.place();
+  interpolate(before, after, s, X);
+  if (noisy) add_noise(X, edge, seconds(moment.age) + s * (1.0 - s) * span * 1e-9);
+  path.up(X);
+}
 
 // Accumulates a dynamic edge of the path.
 template <class Value>
@@ -106,27 +147,18 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edg
     path.up(X);
     return {};
   }
-  const HeldVersion* before = &edge;
-  const HeldVersion* after = &edge;
-  if (t < edge.stamp) {
-    const auto found = edge.samples->around(t, edge.number, moment.back);
-    if (found.before == nullptr) return too_old(edge, t);
-    before = found.before;
-    after = before->stamp == t ? before : found.after;
+  if (t == edge.stamp) {
+    accumulate_sample(path, edge, value_of<Value>(edge), moment.age);
+    return {};
   }
-  const auto span = static_cast<double>(after->stamp - before->stamp);
-  const double s = after == before ? 0 : static_cast<double>(t - before->stamp) / span;
-  const double noise = seconds(moment.age) + s * (1.0 - s) * span * 1e-9;
-  if (edge.samples->has_noise() && noise > 0) {
+  const auto found = edge.samples->around(t, edge.number, moment.back);
+  if (found.before == nullptr) return too_old(edge, t);
+  if (t == found.before->stamp) {
     OfEdge<Value>& X = path.place();
-    X = value_of<Value>(*before);
-    if (after != before) interpolate(value_of<Value>(*before), value_of<Value>(*after), s, X);
-    add_noise(X, edge, noise);
-    path.up(X);
-  } else if (after == before) {
-    path.up(value_of<Value>(*before));
+    X = value_of<Value>(*found.before);
+    accumulate_sample(path, edge, X, moment.age);
   } else {
-    path.up_between(value_of<Value>(*before), value_of<Value>(*after), s);
+    accumulate_between(path, edge, found, moment);
   }
   return {};
 }

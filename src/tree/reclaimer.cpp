@@ -21,17 +21,11 @@ void Reclaimer::Waiting<T>::collect(std::uint64_t tag, std::uint64_t safe_below)
 void Reclaimer::collect(Frames& frames) {
   frames.order_commit();
   const std::uint64_t tag = epoch::retire_tag();
-  for (Version* version : versions_) {
-    if (version->held()) {
-      held_pool_.retire(version, tag);
-    } else {
-      remote_pool_.retire(version, tag);
-    }
-  }
-  versions_.clear();
+  superseded_ = 0;
   const std::uint64_t below = epoch::safe_below();
-  held_pool_.collect(below);
-  remote_pool_.collect(below);
+  held_pool_.collect(tag, below);
+  remote_pool_.collect(tag, below);
+  samples_.collect(tag, below);
   histories_.collect(tag, below);
   correlations_.collect(tag, below);
   frames.collect_names(tag, below);

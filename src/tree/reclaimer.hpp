@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "tree/frames.hpp"
+#include "tree/pool.hpp"
 #include "tree/sample_history.hpp"
+#include "tree/sample_store.hpp"
 #include "tree/versions.hpp"
 
 namespace tfdude {
@@ -25,14 +27,23 @@ class Reclaimer {
   }
 
   // Takes an object superseded by the current commit, or by an earlier one. Ignores null.
-  void supersede(Version* version) { versions_.push_back(version); }
+  void supersede(Version* version) {
+    ++superseded_;
+    if (version->held()) {
+      held_pool_.supersede(static_cast<HeldVersion*>(version));
+    } else {
+      remote_pool_.supersede(version);
+    }
+  }
   void supersede(SampleHistory* samples) { histories_.superseded.emplace_back(samples); }
   void supersede(EdgeCorrelation* correlation) {
     correlations_.superseded.emplace_back(correlation);
   }
 
+  [[nodiscard]] SampleStore& samples() { return samples_; }
+
   /// Whether collect() is due.
-  [[nodiscard]] bool is_due() const { return versions_.size() > kCollectAt; }
+  [[nodiscard]] bool is_due() const { return superseded_ > kCollectAt; }
 
   /// Call only between two commits.
   void collect(Frames& frames);
@@ -51,9 +62,10 @@ class Reclaimer {
     void collect(std::uint64_t tag, std::uint64_t safe_below);
   };
 
-  VersionPool<HeldVersion> held_pool_;
-  VersionPool<Version> remote_pool_;
-  std::vector<Version*> versions_;  // superseded since the readers were last checked
+  Pool<HeldVersion> held_pool_;
+  Pool<Version> remote_pool_;
+  SampleStore samples_;
+  std::size_t superseded_ = 0;  // versions, since the readers were last checked
   Waiting<SampleHistory> histories_;
   Waiting<EdgeCorrelation> correlations_;
 };

@@ -3,15 +3,20 @@
 #include <algorithm>
 
 namespace tfdude {
+namespace {
 
-// A slot is rewritten only after its sample was dropped. So, if the first sample is still kept,
-// everything read before is valid.
-SampleHistory::Bracket SampleHistory::pair(std::uint64_t before) const {
-  const Bracket found{slot(before).sample.load(std::memory_order_acquire),
-                      slot(before + 1).sample.load(std::memory_order_acquire)};
-  return oldest() <= before ? found : Bracket{};
-}
+constexpr std::uint64_t kSize = SampleChunk::kSize;
 
+}  // namespace
+
+SampleHistory::SampleHistory(const EdgeTiming& timing, std::uint64_t capacity)
+    : timing_(timing),
+      has_noise_(timing.process_noise.upper() != Covariance::Upper{}),
+      mask_(capacity - 1),
+      chunks_(new std::atomic<SampleChunk*>[capacity]()) {}
+
+// A sample that is dropped meanwhile stays as it is until this reader has left. But another one may
+// take its place: it then counts as earlier than t.
 SampleHistory::Bracket SampleHistory::around(std::int64_t t, std::uint64_t newest,
                                              std::uint64_t& back) const {
   // How far a guess may be off before bisection is faster.
@@ -19,88 +24,122 @@ SampleHistory::Bracket SampleHistory::around(std::int64_t t, std::uint64_t newes
   std::uint64_t low = oldest();
   std::uint64_t high = newest;
   if (back > 0 && back <= high - low) {
-    const std::uint64_t same = high - back;
-    if (stamp_at(same) <= t && t < stamp_at(same + 1)) return pair(same);
+    const Sample* before = sample(high - back);
+    const Sample* after = sample(high - back + 1);
+    const bool both = before != nullptr && after != nullptr;
+    if (both && before->stamp <= t && t < after->stamp) return {before, after};
   }
-  const std::int64_t first = stamp_at(low);
-  const std::int64_t last = stamp_at(high);
-  if (low >= high || t < first) return {};
-  const double share = static_cast<double>(t - first) / static_cast<double>(last - first);
-  std::uint64_t at = low + static_cast<std::uint64_t>(share * static_cast<double>(high - low));
+  const Sample* before = sample(low);
+  const Sample* after = sample(high);
+  if (low >= high || after == nullptr || (before != nullptr && t < before->stamp)) return {};
+  std::uint64_t at = low;
+  if (before != nullptr) {
+    const double share =
+        static_cast<double>(t - before->stamp) / static_cast<double>(after->stamp - before->stamp);
+    at += static_cast<std::uint64_t>(share * static_cast<double>(high - low));
+  }
   for (int step = 0; high - low > 1; ++step) {
     if (step >= kSteps) at = low + (high - low) / 2;
     at = std::clamp(at, low + 1, high - 1);
-    if (stamp_at(at) <= t) {
+    const Sample* here = sample(at);
+    if (here == nullptr || here->stamp <= t) {
+      before = here;
       low = at++;
     } else {
+      after = here;
       high = at--;
     }
   }
   back = newest - low;
-  return pair(low);
+  return before != nullptr ? Bracket{before, after} : Bracket{};
 }
 
-HeldVersion* SampleHistory::sample(std::uint64_t number) const {
-  HeldVersion* found = slot(number).sample.load(std::memory_order_acquire);
-  return oldest() <= number ? found : nullptr;
+Transform SampleHistory::value_between(const Sample& before, const Sample& after,
+                                       std::int64_t t) const {
+  const auto span = static_cast<double>(after.stamp - before.stamp);
+  const double s = static_cast<double>(t - before.stamp) / span;
+  Transform X;
+  interpolate(before, after, s, X);
+  if (has_noise_ && X.covariance.complete()) {
+    Covariance::Upper noise = timing_.process_noise.upper();
+    for (double& number : noise) number *= s * (1.0 - s) * span * 1e-9;
+    X.covariance += Covariance::trusted(noise);
+  }
+  return X;
 }
 
-std::int64_t SampleHistory::stamp(std::uint64_t number) const {
-  const std::int64_t found = stamp_at(number);
-  return oldest() <= number ? found : kAlways;
+std::size_t SampleHistory::bytes_until(std::uint64_t newest) const {
+  const std::uint64_t first = oldest();
+  std::size_t total = (newest / kSize + 1 - first / kSize) * sizeof(SampleChunk);
+  const SharedPart* last = nullptr;
+  for (std::uint64_t number = first; number <= newest; ++number) {
+    const Sample* found = sample(number);
+    if (found == nullptr) continue;
+    if (found->shared != last) total += bytes_of(*found->shared);
+    last = found->shared;
+  }
+  return total;
 }
 
 std::uint64_t SampleHistory::place_of(std::int64_t stamp) const {
-  std::uint64_t place = next_;
-  while (place > first_.load(std::memory_order_relaxed) && stamp_at(place - 1) >= stamp) --place;
-  return place;
+  std::uint64_t low = first_.load(std::memory_order_relaxed);
+  std::uint64_t high = next_;
+  while (low < high) {
+    const std::uint64_t middle = low + (high - low) / 2;
+    if (at(middle)->stamp < stamp) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return low;
 }
 
-void SampleHistory::append(HeldVersion* sample, std::int64_t stamp) {
-  Slot& free = slot(next_++);
-  free.stamp.store(stamp, std::memory_order_release);
-  free.sample.store(sample, std::memory_order_release);
+// Readers of earlier commits still see them, so the range stays.
+void SampleHistory::drop_all(SampleStore& store) const {
+  for (std::uint64_t number = oldest(); number < next_; ++number) {
+    store.release(at(number)->shared);
+    if (is_last_of_chunk(number)) store.supersede(chunk(number));
+  }
 }
 
-HeldVersion* SampleHistory::drop_oldest() {
-  const std::uint64_t first = first_.load(std::memory_order_relaxed);
-  HeldVersion* dropped = slot(first).sample.load(std::memory_order_relaxed);
-  first_.store(first + 1, std::memory_order_release);
-  return dropped;
-}
-
-std::unique_ptr<SampleHistory> SampleHistory::empty_copy(std::uint64_t capacity) const {
+std::unique_ptr<SampleHistory> SampleHistory::copy(std::uint64_t capacity,
+                                                   std::uint64_t end) const {
   std::unique_ptr<SampleHistory> copy(new SampleHistory(timing_, capacity));
+  const std::uint64_t first = oldest();
   copy->rewritten = rewritten;
+  copy->first_.store(first, std::memory_order_relaxed);
+  copy->next_ = std::max(first, end);
+  for (std::uint64_t number = first; number < end; number += kSize - number % kSize) {
+    copy->put(chunk(number));
+  }
+  copy->find_ends();
   return copy;
 }
 
-std::unique_ptr<SampleHistory> SampleHistory::grown() const {
-  auto copy = empty_copy(2 * (mask_ + 1));
-  for (std::uint64_t number = oldest(); number < next_; ++number) {
-    copy->append(slot(number).sample.load(std::memory_order_relaxed), stamp_at(number));
+std::unique_ptr<SampleHistory> SampleHistory::grown() const { return copy(2 * (mask_ + 1), next_); }
+
+std::unique_ptr<SampleHistory> SampleHistory::with(const Sample& sample, std::uint64_t place,
+                                                   SampleStore& store) const {
+  auto with_one = copy(full() ? 2 * (mask_ + 1) : mask_ + 1, place - place % kSize);
+  for (std::uint64_t number = with_one->next_; number < next_; ++number) {
+    if (number == place) with_one->add(store) = sample;
+    with_one->add(store) = *at(number);
+    if (is_last_of_chunk(number)) store.supersede(chunk(number));
   }
-  return copy;
+  with_one->find_ends();
+  return with_one;
 }
 
-std::unique_ptr<SampleHistory> SampleHistory::with(HeldVersion* sample, std::int64_t stamp,
-                                                   std::uint64_t place) const {
-  auto copy = empty_copy(full() ? 2 * (mask_ + 1) : mask_ + 1);
-  for (std::uint64_t number = oldest(); number < next_; ++number) {
-    if (number == place) copy->append(sample, stamp);
-    copy->append(slot(number).sample.load(std::memory_order_relaxed), stamp_at(number));
-  }
-  return copy;
-}
-
-std::unique_ptr<SampleHistory> SampleHistory::replaced(HeldVersion* sample,
-                                                       std::uint64_t place) const {
-  auto copy = empty_copy(mask_ + 1);
-  for (std::uint64_t number = oldest(); number < next_; ++number) {
-    HeldVersion* own = slot(number).sample.load(std::memory_order_relaxed);
-    copy->append(number == place ? sample : own, stamp_at(number));
-  }
-  return copy;
+std::unique_ptr<SampleHistory> SampleHistory::replaced(const Sample& sample, std::uint64_t place,
+                                                       SampleStore& store) const {
+  auto with_other = copy(mask_ + 1, next_);
+  SampleChunk* fresh = store.take_chunk();
+  *fresh = *chunk(place);
+  store.supersede(chunk(place));
+  with_other->put(fresh);
+  with_other->rewrite(sample, place);
+  return with_other;
 }
 
 }  // namespace tfdude

@@ -36,8 +36,7 @@ bool starts_again(const HeldVersion& newest, std::int64_t stamp) {
 
 }  // namespace
 
-Result<void> check_sample(const HeldVersion& newest, std::int64_t stamp) {
-  if (!newest.moving() || stamp > newest.stamp || stamp == kAlways) return {};
+Result<void> check_late_sample(const HeldVersion& newest, std::int64_t stamp) {
   const SampleHistory& samples = *newest.samples;
   const std::uint64_t place = samples.place_of(stamp);
   if (place < samples.next() && samples.stamp(place) == stamp) {

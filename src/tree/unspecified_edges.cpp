@@ -6,16 +6,15 @@
 namespace tfdude {
 namespace {
 
-bool is_unspecified(const HeldVersion* sample) {
-  return sample == nullptr || !sample->X_PC.covariance.complete();
-}
+bool is_unspecified(const Sample* sample) { return sample == nullptr || !sample->complete(); }
+bool is_unspecified(const HeldVersion& edge) { return !edge.X_PC.covariance.complete(); }
 
 // Whether a sample that the value at that instant is computed from is unspecified. One that was
 // dropped meanwhile may have been.
 bool is_unspecified_at(const HeldVersion& edge, std::int64_t t) {
-  if (!edge.moving() || t == edge.stamp) return is_unspecified(&edge);
+  if (!edge.moving() || t == edge.stamp) return is_unspecified(edge);
   if (t > edge.stamp) {
-    return is_unspecified(&edge) || is_unspecified(edge.samples->sample(edge.number - 1));
+    return is_unspecified(edge) || is_unspecified(edge.samples->sample(edge.number - 1));
   }
   std::uint64_t back = 0;
   const auto found = edge.samples->around(t, edge.number, back);

@@ -3,8 +3,6 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <memory>
-#include <vector>
 
 #include "tfdude/math/transform.hpp"
 
@@ -34,10 +32,6 @@ struct Version {
   std::uint32_t slot = kNoSlot;
   // Identifies the frame: a new number whenever one appears, even under the same name.
   std::uint32_t generation = 0;
-  bool kept = false;  // by a history, as a sample; for the writer only
-  // Bookkeeping of the pool; not for readers.
-  std::uint64_t retire_tag = 0;
-  Version* next = nullptr;
 
   /// The depth of a slot that others name as their parent, while that frame does not exist.
   static constexpr std::int32_t kAbsent = -1;
@@ -68,53 +62,6 @@ struct HeldVersion : Version {
   [[nodiscard]] bool moving() const { return stamp != kAlways; }
   /// Whether it has no value, as its history was cleared.
   [[nodiscard]] bool lacks_sample() const { return stamp == kNoSample; }
-};
-
-/// Blocks of one version type, reused in the order in which readers release them. One writer at a
-/// time.
-template <class T>
-class VersionPool {
- public:
-  T* take() {
-    if (free_ == nullptr) grow();
-    Version* taken = free_;
-    free_ = taken->next;
-    return static_cast<T*>(taken);
-  }
-
-  /// Queues a superseded version; `tag` from epoch::retire_tag().
-  void retire(Version* version, std::uint64_t tag) {
-    version->retire_tag = tag;
-    version->next = nullptr;
-    (last_ != nullptr ? last_->next : first_) = version;
-    last_ = version;
-  }
-
-  void collect(std::uint64_t safe_below) {
-    while (first_ != nullptr && first_->retire_tag < safe_below) {
-      Version* version = first_;
-      first_ = version->next;
-      if (first_ == nullptr) last_ = nullptr;
-      version->next = free_;
-      free_ = version;
-    }
-  }
-
- private:
-  static constexpr std::size_t kBlock = 64;
-
-  void grow() {
-    blocks_.push_back(std::make_unique<std::array<T, kBlock>>());
-    for (T& version : *blocks_.back()) {
-      version.next = free_;
-      free_ = &version;
-    }
-  }
-
-  std::vector<std::unique_ptr<std::array<T, kBlock>>> blocks_;
-  Version* free_ = nullptr;
-  Version* first_ = nullptr;
-  Version* last_ = nullptr;
 };
 
 /// The newest version of each slot. Grows without moving memory that readers access: segment k

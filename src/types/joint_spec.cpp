@@ -55,9 +55,12 @@ Result<void> check_joint(const JointSpec& joint) {
 
 std::string shared_source(const std::string& leader) { return "joint " + leader; }
 
+std::optional<double> own_variance(const JointSpec& joint, std::optional<double> variance) {
+  return variance && joint.coupled ? 0.0 : variance;
+}
+
 Transform value_at(const JointSpec& joint, double position, std::optional<double> variance) {
-  if (variance && joint.coupled) variance = 0;
-  return joint_transform(joint.joint, position, variance);
+  return joint_transform(joint.joint, position, own_variance(joint, variance));
 }
 
 double rest_position(const std::optional<JointLimits>& limits) {

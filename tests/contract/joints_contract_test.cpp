@@ -6,14 +6,17 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/node.hpp"
+#include "tfdude/client/watch.hpp"
 
 #include "support/catch.hpp"
 #include "support/joint_frames.hpp"
 #include "support/networks.hpp"
+#include "support/pose_diff.hpp"
 #include "support/process.hpp"
 
 namespace tfdude {
@@ -169,6 +172,58 @@ TEST_CASE("joints: a lookup sees all positions of one stamp also over several ow
   }));
   stop = true;
   controller.join();
+}
+
+TEST_CASE("joints: between positions far apart all participants see the way of the joint") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  JointSpec turn = revolute_named("turn");
+  turn.limits = JointLimits{-3, 3};
+  turn.coupled = true;
+  JointSpec wrist = following("wrist", "turn", 2, 0);
+  wrist.limits = JointLimits{-6, 6};
+  const auto base =
+      *Node::open(join("base"), "base", {{"world", "", {}}, moved_by("turret", "world", turn)});
+  const auto tool = *Node::open(join("tool"), "tool", {moved_by("hand", "turret", wrist)});
+  auto client = *Client::open(join(""));
+  WatchOptions composed;
+  composed.composed = true;
+  const std::vector<PathWatch> watches{*client.watch("world", "hand"),
+                                       *client.watch("world", "hand", composed)};
+  const auto at = [](int milliseconds) { return Time(Milliseconds(milliseconds)); };
+  const auto turn_to = [&](double position, int milliseconds) {
+    return outcome(client.update_joints({"turn"}, {position}, {4e-4}, at(milliseconds)));
+  };
+  REQUIRE(turn_to(-2, 1000) == "ok");
+  const auto has = [&](const PathWatch& watch, int milliseconds) {
+    return comes_true([&] { return watch.latest() && watch.latest()->stamp == at(milliseconds); });
+  };
+  for (const PathWatch& watch : watches) REQUIRE(has(watch, 1000));
+  REQUIRE(turn_to(2, 2000) == "ok");
+  REQUIRE(turn_to(-3, 3000) == "ok");
+  // A late one.
+  REQUIRE(turn_to(1, 2500) == "ok");
+  for (const PathWatch& watch : watches) REQUIRE(has(watch, 3000));
+  const auto difference = [&](const PathWatch& watch, int milliseconds) {
+    const auto X = client.lookup("world", "hand", Query{at(milliseconds), {}, {}});
+    const auto Y = watch.at(at(milliseconds));
+    return X && Y ? testing::transform_diff(*X, *Y, 1e-9) : outcome(X) + ", " + outcome(Y);
+  };
+  for (int t = 1000; t <= 3000; t += 50) {
+    INFO("at " << t);
+    const double position = t <= 2000   ? -2 + 0.004 * (t - 1000)
+                            : t <= 2500 ? 2 - 0.002 * (t - 2000)
+                                        : 1 - 0.008 * (t - 2500);
+    const Query query{at(t), {}, {}};
+    for (const auto& [a, b, angle] :
+         {std::tuple{"world", "turret", position}, std::tuple{"turret", "hand", 2 * position}}) {
+      const double found = yaw(client.lookup(a, b, query));
+      CHECK(std::abs(std::remainder(found - angle, 2 * std::acos(-1.0))) < 1e-9);
+    }
+    for (const PathWatch& watch : watches) {
+      (void)comes_true([&] { return difference(watch, t) == ""; });
+      CHECK(difference(watch, t) == "");
+    }
+  }
 }
 
 TEST_CASE("joints: reachable owners get their positions although another owner is unreachable") {

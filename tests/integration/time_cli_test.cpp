@@ -141,7 +141,7 @@ TEST_CASE("time: histories and rates are shown with the rejected samples") {
   CHECK(history.at("max_gap") == 1.0);
   CHECK(history.at("refused_old") == 1);
   CHECK(history.at("refused_equal") == 1);
-  CHECK_THAT(text(d, {"history", "arm_1"}), ContainsSubstring("samples      5 of at most 2048") &&
+  CHECK_THAT(text(d, {"history", "arm_1"}), ContainsSubstring("samples      5 of at most 10240") &&
                                                 ContainsSubstring("rate         1.000 Hz"));
   CHECK(answered(d, {"history", "nobody"}, 1).at("error").at("code") == "unknown_frame");
   CHECK(answered(d, {"update", "hand_left", "--stamp", "9e9"}, 1).at("error").at("code") ==

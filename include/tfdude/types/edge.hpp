@@ -63,8 +63,8 @@ struct PartialUpdate {
 struct EdgeTiming {
   /// Samples that are older than the newest one by more than this are dropped.
   std::chrono::nanoseconds span = std::chrono::seconds(10);
-  /// Maximum number of samples; at least 2.
-  std::size_t count = 2048;
+  /// Maximum number of samples; at least 2. The default is 10 s at 1 kHz, and a little more.
+  std::size_t count = 10'240;
   /// Covariance per second by which the edge may deviate from the geodesic between two samples, or
   /// from its last value. At the fraction a of the interval Δt between two samples this adds a
   /// (1-a) Δt Q (Brownian bridge).

@@ -94,6 +94,11 @@ struct JointValue {
 ///   mimic that is not coupled; what check_value() rejects.
 [[nodiscard]] TFDUDE_EXPORT Result<void> check_joint(const JointSpec& joint);
 
+/// The part of a joint's variance that the covariance of its edge has: all of it, but nothing for a
+/// coupled joint.
+[[nodiscard]] TFDUDE_EXPORT std::optional<double> own_variance(const JointSpec& joint,
+                                                               std::optional<double> variance);
+
 /// The edge's value at a joint position. The error of a coupled joint is not part of the
 /// covariance, but a common error.
 [[nodiscard]] TFDUDE_EXPORT Transform value_at(const JointSpec& joint, double position,

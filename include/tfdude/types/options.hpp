@@ -27,12 +27,15 @@ inline constexpr std::uint32_t kNoDomain = UINT32_MAX;
 /// The directory of keys in the environment's TFDUDE_KEYS, else empty.
 [[nodiscard]] TFDUDE_EXPORT std::string keys_of_environment();
 
-/// How much others can make a Node keep. What would exceed it is rejected with kTooMuch.
+/// How much others can make a Node keep. What would exceed it is rejected with kTooMuch, except
+/// samples.
 struct PartitionLimits {
   std::size_t frames = 200'000;  ///< that the partition owns
   /// Groups of watchers. Those that watch the same edges of the partition in the same way are one.
   std::size_t watches = 1000;
-  std::size_t history_bytes = std::size_t{1} << 30U;  ///< of the samples of all its edges
+  /// Of the samples of all its edges. The oldest ones are dropped for new ones, and counted
+  /// (Node::refused()); the two newest of each edge stay.
+  std::size_t history_bytes = std::size_t{256} << 20U;
 };
 
 /// How a participant joins a domain. Participants discover each other only in the same domain and

@@ -9,7 +9,8 @@ namespace tfdude {
 struct RefusedCounts {
   std::uint64_t frames = 0;
   std::uint64_t watches = 0;
-  std::uint64_t samples = 0;
+  /// Samples that were dropped from histories for newer ones, to keep to the limit of memory.
+  std::uint64_t dropped_samples = 0;
   std::uint64_t messages = 0;  ///< requests and stream messages, dropped unread
 };
 

@@ -8,6 +8,7 @@
 #include "tfdude/client/watch.hpp"
 #include "tfdude/transport/loopback.hpp"
 
+#include "support/captured_log.hpp"
 #include "support/catch.hpp"
 
 namespace tfdude {
@@ -63,25 +64,28 @@ TEST_CASE("limits: no more groups of watchers than allowed") {
   CHECK(first->lookup(Query{}));
 }
 
-TEST_CASE("limits: the memory of histories is limited, and a dynamic edge goes on") {
+TEST_CASE("limits: the oldest samples of all histories make room for new ones") {
   PartitionLimits limits;
   limits.history_bytes = 20'000;
   Pair pair(limits);
-  int samples = 0;
-  for (; samples < 200; ++samples) {
-    REQUIRE(pair.client->update("a", {}, at(samples)));
-  }
-  const auto history = pair.client->history("a");
-  REQUIRE(history);
-  CHECK(history->at(0).samples < 100);
-  CHECK(history->at(0).samples >= 2);
-  const auto refused = pair.client->update("b", {}, at(0));
-  REQUIRE_FALSE(refused);
-  CHECK(refused.error().code == Errc::kTooMuch);
-  CHECK_THAT(refused.error().message, ContainsSubstring("'b'"));
-  CHECK(pair.node->refused().samples == 1);
-  CHECK(pair.client->update("b", {}));  // a value for all times needs no history
-  CHECK(pair.client->update("a", {}, at(samples)));
+  const testing::CapturedLog log;
+  const auto samples_of = [&](const char* frame) {
+    return pair.client->history(frame)->at(0).samples;
+  };
+  for (int i = 0; i < 400; ++i) REQUIRE(pair.client->update("a", {}, at(i)));
+  const std::size_t alone = samples_of("a");
+  CHECK(alone > 100);
+  CHECK(alone < 250);
+  // The samples of the other edge are newer.
+  for (int i = 400; i < 500; ++i) REQUIRE(pair.client->update("b", {}, at(i)));
+  CHECK(samples_of("b") == 100);
+  CHECK(samples_of("a") < alone - 50);
+  for (int i = 500; i < 900; ++i) REQUIRE(pair.client->update("b", {}, at(i)));
+  CHECK(samples_of("a") == 2);
+  CHECK(pair.client->lookup("root", "a")->pose.translation().x() == 0);
+  CHECK(pair.node->refused().dropped_samples == 400 + 500 - 2 - samples_of("b"));
+  CHECK(log.count("--max-history") == 1);
+  CHECK_THAT(log.text(), ContainsSubstring("'arm'") && ContainsSubstring("20000 bytes"));
 }
 
 }  // namespace

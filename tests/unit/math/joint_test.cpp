@@ -3,7 +3,9 @@
 #include <cmath>
 #include <vector>
 
+#include "math/joint_state.hpp"
 #include "support/catch.hpp"
+#include "support/pose_diff.hpp"
 #include "support/random.hpp"
 #include "support/sampling.hpp"
 
@@ -12,9 +14,13 @@ namespace {
 using tfdude::Covariance;
 using tfdude::Joint;
 using tfdude::Matrix6d;
+using tfdude::PreparedJoint;
+using tfdude::StatedCovariance;
 using tfdude::Transform;
 using tfdude::Twist;
+using tfdude::testing::pose_diff;
 using tfdude::testing::Random;
+using tfdude::testing::transform_diff;
 
 // Rodrigues's formula: I + sin q K + (1 - cos q) K².
 Eigen::Matrix3d turned(const Eigen::Vector3d& axis, double q) {
@@ -122,4 +128,24 @@ TEST_CASE("joint: a position's error is exact however large it is") {
   const auto off = tfdude::joint_transform(joint, 0.5, 0).pose.inverse() *
                    tfdude::joint_transform(joint, 3.0, 0).pose;
   CHECK((tfdude::log(off) - 2.5 * joint.S).norm() < 1e-14);
+}
+
+TEST_CASE("joint: a prepared joint gives the values of joint_transform") {
+  Random random(409);
+  INFO("seed " << random.seed());
+  const Transform unspecified{random.pose(), StatedCovariance::unspecified()};
+  for (const Transform& X_PJ : {exact(random.transform()), random.transform(), unspecified}) {
+    for (const Joint& joint : {tfdude::revolute_joint(X_PJ, random.direction()),
+                               tfdude::prismatic_joint(X_PJ, random.direction()),
+                               Joint{X_PJ, random.twist(1)}, Joint{X_PJ, random.twist(0.4, 0)}}) {
+      const PreparedJoint prepared(joint);
+      for (const double position : {0.0, 1e-9, -0.3, 3.2, -40.0}) {
+        const Transform expected = tfdude::joint_transform(joint, position, 0.04);
+        Transform X = unspecified;
+        prepared.compute({position, 0.04}, X);
+        CHECK(transform_diff(X, expected, 1e-12) == "");
+        CHECK(pose_diff(prepared.pose(position), expected.pose, 1e-12) == "");
+      }
+    }
+  }
 }

@@ -46,8 +46,13 @@ TEST_CASE("the portable kernel and that of this processor interpolate alike") {
     const Transform X1{X0.pose * exp(random.twist(random.uniform(0, 0.12), 0.3)),
                        i % 2 == 0 ? X0.covariance : random.covariance()};
     const auto blended = [&](const kernel::Functions& functions, Transform& X) {
-      kernel::Blend one{reinterpret_cast<kernel::Edge>(&X0), reinterpret_cast<kernel::Edge>(&X1),
-                        0.01 * i, reinterpret_cast<double*>(&X)};
+      const auto numbers = [](auto& value) { return reinterpret_cast<const double*>(&value); };
+      kernel::Blend one{numbers(X0),
+                        numbers(X1),
+                        numbers(X0.covariance),
+                        numbers(X1.covariance),
+                        0.01 * i,
+                        reinterpret_cast<double*>(&X)};
       functions.blend_with_covariance(&one, 1);
       return one.near;
     };

@@ -7,15 +7,12 @@
 #include <future>
 #include <memory>
 #include <mutex>
-#include <sstream>
 #include <string>
 #include <unistd.h>
 #include <vector>
 
-#include <spdlog/sinks/ostream_sink.h>
-
-#include "base/log.hpp"
 #include "runtime/yielding.hpp"
+#include "support/captured_log.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/joint_frames.hpp"
@@ -28,6 +25,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using testing::along_x;
+using testing::CapturedLog;
 using testing::ContainsSubstring;
 using testing::eventually;
 using testing::outcome;
@@ -90,27 +88,6 @@ class SlowStore final : public StateStore {
 
  private:
   Disk& disk_;
-};
-
-/// Captures the log while it exists. No other thread may log when it begins or ends.
-class CapturedLog {
- public:
-  CapturedLog() { log().sinks().push_back(sink_); }
-  ~CapturedLog() { log().sinks().pop_back(); }
-  CapturedLog(const CapturedLog&) = delete;
-  CapturedLog& operator=(const CapturedLog&) = delete;
-
-  /// How often a text occurs.
-  [[nodiscard]] int count(const std::string& what) const {
-    const std::string all = text_.str();
-    int found = 0;
-    for (auto at = all.find(what); at != std::string::npos; at = all.find(what, at + 1)) ++found;
-    return found;
-  }
-
- private:
-  std::ostringstream text_;
-  const spdlog::sink_ptr sink_ = std::make_shared<spdlog::sinks::ostream_sink_mt>(text_);
 };
 
 }  // namespace

@@ -131,6 +131,38 @@ TEST_CASE("updates and lookups with a history do not allocate") {
   CHECK(allocations_of([&] { return forest.lookup(a, b, query).has_value(); }) == 0);
 }
 
+TEST_CASE(
+    "samples with other covariances, of joints, and beyond the limit of memory do not allocate") {
+  Forest forest;
+  plant_chain(forest);
+  Random random(704);
+  forest.limit_history(100'000);
+  const Joint joint = revolute_joint(random.transform(), {0, 0, 1});
+  const Transform samples[] = {random.transform(), random.transform()};
+  std::int64_t t = 1'000'000;
+  std::vector<CorrelatedUpdate> batch(10);
+  const auto update = [&] {
+    t += 1000;
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const double position = 1e-6 * static_cast<double>(t);
+      CorrelatedUpdate& one = batch[i];
+      one.X_PC = i % 2 == 0 ? samples[(t / 1000) % 2] : joint_transform(joint, position, 0.1);
+      if (i % 2 == 1) one.state = {&joint, {position, 0.1}};
+    }
+    return forest.update_correlated(batch, time_of(t)).has_value();
+  };
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    batch[i].frame = forest.find(deep_id(static_cast<int>(i))).value();
+  }
+  CHECK(allocations_of(update) == 0);
+  CHECK(forest.dropped_samples() > 0);
+  const Handle a = forest.find(deep_id(0)).value();
+  const Handle b = forest.find(deep_id(9)).value();
+  Query query;
+  query.at = time_of(t - 12'345);
+  CHECK(allocations_of([&] { return forest.lookup(a, b, query).has_value(); }) == 0);
+}
+
 // ---- memory does not grow with history
 
 constexpr int kCycles = 200'000;

@@ -71,6 +71,48 @@ struct Reader {
   }
 };
 
+// At stamp t each link is t metres long, and all but the third have a variance of kVariance · t.
+// Links 2 and 4 are slides; the latter's samples are in turn positions and poses.
+constexpr double kVariance = 1e-3;
+
+struct Slides {
+  Slides() {
+    REQUIRE(forest.add("world", "", along_x(0)));
+    for (int i = 1; i <= kLinks; ++i) {
+      REQUIRE(forest.add(link_id(i), link_id(i - 1), along_x(0)));
+      handles.push_back(forest.find(link_id(i)).value());
+    }
+  }
+
+  bool write(std::int64_t t) {
+    const auto length = static_cast<double>(t);
+    std::vector<CorrelatedUpdate> batch;
+    for (int i = 1; i <= kLinks; ++i) {
+      const double variance = i == 3 ? 0 : kVariance * length;
+      CorrelatedUpdate one{handles[static_cast<std::size_t>(i - 1)],
+                           joint_transform(slide, length, variance)};
+      const bool position = i == 2 || (i == 4 && t % 40 == 0);
+      if (position) one.state = {&slide, {length, variance}};
+      batch.push_back(one);
+    }
+    return forest.update_correlated(batch, time_of(t)).has_value();
+  }
+
+  /// Empty if the answer is right.
+  static std::string judge(const StampedTransform& X) {
+    const auto t = static_cast<double>(nanoseconds(*X.stamp));
+    const double x = X.pose.translation().x();
+    const double variance = X.covariance.of_specified().upper()[0];
+    const bool right = std::abs(x - kLinks * t) <= 1e-9 * kLinks * t &&
+                       std::abs(variance - 3 * kVariance * t) <= 1e-9 * t;
+    return right ? "" : "x is " + std::to_string(x) + ", its variance " + std::to_string(variance);
+  }
+
+  Joint slide = prismatic_joint({}, {1, 0, 0});
+  Forest forest;
+  std::vector<Handle> handles;
+};
+
 }  // namespace
 
 TEST_CASE("every answer is of one instant while buffers wrap around and late samples come") {
@@ -117,6 +159,43 @@ TEST_CASE("every answer is of one instant while buffers wrap around and late sam
     CHECK(reader.earlier > kAnswers);
     CHECK(reader.too_old > kAnswers);
   }
+}
+
+TEST_CASE("shared covariances and positions are right while the oldest samples are dropped") {
+  Slides slides;
+  slides.forest.limit_history(100'000);
+  std::int64_t t = 10'000;
+  REQUIRE(slides.write(t));
+  std::atomic<bool> stop{false};
+  std::atomic<int> answers{0};
+  std::string findings[kReaders];
+  std::vector<std::thread> threads;
+  for (int i = 0; i < kReaders; ++i) {
+    threads.emplace_back([&, i] {
+      Random random(910U + static_cast<unsigned>(i));
+      while (!stop.load() && findings[i].empty()) {
+        const auto newest = slides.forest.lookup("world", link_id(kLinks), Query{});
+        if (!newest) continue;
+        Query then;
+        then.at = *newest->stamp - std::chrono::nanoseconds(random.index(5000));
+        const auto found = slides.forest.lookup("world", link_id(kLinks), then);
+        findings[i] = Slides::judge(found ? *found : *newest);
+        answers += found ? 1 : 0;
+      }
+    });
+  }
+  int refused = 0;
+  for (int round = 0; round < kMostRounds && (round < 2000 || answers < 3 * kAnswers); ++round) {
+    t += 20;
+    refused += slides.write(t) ? 0 : 1;
+    if (round % 16 == 0) refused += slides.write(t - 30) ? 0 : 1;
+  }
+  stop.store(true);
+  for (std::thread& thread : threads) thread.join();
+  CHECK(refused == 0);
+  CHECK(answers >= 3 * kAnswers);
+  for (const std::string& finding : findings) CHECK(finding.empty());
+  CHECK(slides.forest.dropped_samples() > 0);
 }
 
 TEST_CASE("a history may be dropped while it is read") {

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <memory>
+#include <vector>
+
+namespace tfdude {
+
+/// Objects of one type, reused when no reader can see them any more (epoch.hpp). One writer at a
+/// time.
+template <class T>
+class Pool {
+ public:
+  [[nodiscard]] T* take() {
+    if (free_.empty()) grow();
+    T* taken = free_.back();
+    free_.pop_back();
+    return taken;
+  }
+
+  /// Takes an object back that the current commit has superseded, or an earlier one.
+  void supersede(T* object) { superseded_.push_back(object); }
+
+  /// Call only between two commits. @param tag  from epoch::retire_tag()
+  void collect(std::uint64_t tag, std::uint64_t safe_below) {
+    if (retired_.empty() || retired_.back().end < superseded_.size()) {
+      retired_.push_back({tag, superseded_.size()});
+    }
+    const auto seen = std::find_if(retired_.begin(), retired_.end(),
+                                   [=](const Retired& some) { return some.tag >= safe_below; });
+    if (seen == retired_.begin()) return;
+    const std::size_t unseen = std::prev(seen)->end;
+    const auto end = superseded_.begin() + static_cast<std::ptrdiff_t>(unseen);
+    free_.insert(free_.end(), superseded_.begin(), end);
+    superseded_.erase(superseded_.begin(), end);
+    retired_.erase(retired_.begin(), seen);
+    for (Retired& some : retired_) some.end -= unseen;
+  }
+
+ private:
+  // The superseded objects before this one have this tag, or an earlier one. Tags do not decrease.
+  struct Retired {
+    std::uint64_t tag;
+    std::size_t end;
+  };
+  static constexpr std::size_t kBlock = 16;
+
+  void grow() {
+    blocks_.push_back(std::make_unique<std::array<T, kBlock>>());
+    free_.reserve(blocks_.capacity() * kBlock);
+    for (T& object : *blocks_.back()) free_.push_back(&object);
+  }
+
+  std::vector<std::unique_ptr<std::array<T, kBlock>>> blocks_;
+  std::vector<T*> free_;
+  std::vector<T*> superseded_;
+  std::vector<Retired> retired_;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "tree/pool.hpp"
+#include "tree/sample.hpp"
+
+namespace tfdude {
+
+/// The memory of the samples of all histories. One writer at a time.
+class SampleStore {
+ public:
+  [[nodiscard]] SampleChunk* take_chunk() {
+    bytes_ += sizeof(SampleChunk);
+    return chunks_.take();
+  }
+  void supersede(SampleChunk* chunk) {
+    bytes_ -= sizeof(SampleChunk);
+    chunks_.supersede(chunk);
+  }
+
+  /// What a new sample shares with one of its neighbours, if they have it in common; otherwise a
+  /// new part.
+  /// @param neighbour  null: there is none
+  [[nodiscard]] const SharedPart* share(const GivenValue& value, const SharedPart* neighbour,
+                                        const SharedPart* other = nullptr);
+
+  /// For a sample that is dropped. What it shares goes with the last sample that does.
+  void release(const SharedPart* shared) {
+    if (--of_writer(shared).samples == 0) supersede(shared);
+  }
+
+  /// Of all samples.
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+
+  void collect(std::uint64_t tag, std::uint64_t safe_below) {
+    chunks_.collect(tag, safe_below);
+    covariances_.collect(tag, safe_below);
+    joints_.collect(tag, safe_below);
+  }
+
+ private:
+  // Only readers see it as constant.
+  [[nodiscard]] static SharedPart& of_writer(const SharedPart* shared) {
+    return const_cast<SharedPart&>(*shared);
+  }
+  [[nodiscard]] const SharedPart* fresh_part(const GivenValue& value);
+  void supersede(const SharedPart* shared);
+
+  Pool<SampleChunk> chunks_;
+  Pool<SharedCovariance> covariances_;
+  Pool<SharedJoint> joints_;
+  std::size_t bytes_ = 0;
+};
+
+/// The memory of a part that samples share.
+[[nodiscard]] inline std::size_t bytes_of(const SharedPart& shared) {
+  return shared.is_joint ? sizeof(SharedJoint) : sizeof(SharedCovariance);
+}
+
+}  // namespace tfdude
