@@ -45,7 +45,8 @@ class Options {
                 ->check(CLI::Range(0.0, 1e6));
     joints_ = app.add_option("--joints", stddev_,
                              "pass on the joints of /joint_states, with this standard deviation "
-                             "[rad or m]")
+                             "[rad or m]; without one it is unspecified")
+                  ->expected(0, 1)
                   ->check(CLI::Range(0.0, 1e9));
     app.add_flag("--description", description_,
                  "serve the robot of /robot_description as the partition 'robot'");
@@ -68,7 +69,7 @@ class Options {
     apply_exports(settings);
     if (joints_->count() > 0) {
       if (!settings.joints_in) settings.joints_in.emplace();
-      settings.joints_in->stddev = stddev_;
+      if (stddev_) settings.joints_in->stddev = stddev_;
     }
     if (description_ && !settings.description_in) settings.description_in.emplace();
     if (clock_->count() > 0) {
@@ -96,7 +97,7 @@ class Options {
   std::string clock_kind_;
   std::vector<std::string> partitions_;
   std::vector<std::string> frames_;
-  double stddev_ = 0;
+  std::optional<double> stddev_;
   bool no_tf_in_ = false;
   bool description_ = false;
   CLI::Option* partition_;

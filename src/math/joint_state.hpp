@@ -8,8 +8,8 @@
 
 namespace tfdude {
 
-/// The position of a joint [rad or m], and its variance. An unspecified variance is not a number, as
-/// is then what is computed of it.
+/// The position of a joint [rad or m], and its variance. If that is unspecified it is not a number,
+/// as is then what is computed of it.
 struct JointPosition {
   JointPosition() = default;
   JointPosition(double q, std::optional<double> of_q)

@@ -116,7 +116,9 @@ TEST_CASE("joints: positions without a variance make a lookup name the edges") {
   const auto Y = robot.client->lookup("world", "fore", Query{});
   REQUIRE(Y);
   CHECK(Y->basis.unspecified == Names{"fore"});
-  for (const JointInfo& joint : *robot.client->joints("arm")) {
+  const auto joints = robot.client->joints("arm");
+  REQUIRE(joints);
+  for (const JointInfo& joint : *joints) {
     CHECK(joint.variance.has_value() == (joint.name == "shoulder"));
   }
 }

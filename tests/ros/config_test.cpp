@@ -42,7 +42,7 @@ tf_out: {partitions: [arm], frames: [tool], rate: 30}
 joints_in: {stddev: 0.001, stddev_of: {lift: 0.01}, except: [gripper]}
 joints_out: {partitions: ["*"], rate: 20}
 description_in: {partition: bot, root: world, xyz: [1, 0, 0], links: [base], strict_limits: true,
-                 origins: unspecified}
+                 fixed: exact}
 description_out: robot.urdf
 poses_in:
   - {topic: /gps, child: base, gate: 0.99, correlated: true}
@@ -67,7 +67,7 @@ poses_out:
   CHECK(settings.description_in->part.root == "world");
   CHECK(settings.description_in->part.prefix == "r1/");
   CHECK(settings.description_in->part.strict_limits);
-  CHECK(!settings.description_in->part.origins.complete());
+  CHECK(settings.description_in->part.fixed.complete());
   CHECK(settings.description_out == "/etc/robot.urdf");
   REQUIRE(settings.poses_in.size() == 2);
   CHECK(settings.poses_in[0].options.gate == 0.99);
@@ -94,7 +94,6 @@ TEST_CASE("ros config: what is left out stays as it is") {
 
 TEST_CASE("ros config: mistakes are named with their line") {
   CHECK_THAT(error_of("partitio: x\n"), ContainsSubstring("bridge.yaml:1: the file: unknown key"));
-  CHECK_THAT(error_of("joints_in: {joints: [a]}\n"), ContainsSubstring("stddev is missing"));
   CHECK_THAT(error_of("joints_in: {stddev: -1}\n"), ContainsSubstring("is not within"));
   CHECK_THAT(error_of("ros_domain: 233\n"), ContainsSubstring("ros_domain is not within"));
   CHECK_THAT(error_of("tf_out: {rate: fast}\n"), ContainsSubstring("not a number"));

@@ -25,9 +25,13 @@ TEST_CASE("ros joints: positions get the variances of the settings, and the pref
   JointImport import({0.1, {{"lift", 0.5}}, {Patterns(), Patterns({"gripper_*"})}, "r1/"});
   const auto taken = import.take({time_of(7), {"elbow", "lift", "gripper_left"}, {1.0, 2.0, 3.0}});
   CHECK(taken.stamp == time_of(7));
-  CHECK(taken.names == Names{"r1/elbow", "r1/lift"});
-  CHECK(taken.positions == std::vector<double>{1, 2});
-  CHECK(taken.variances == std::vector<double>{0.1 * 0.1, 0.25});
+  REQUIRE(taken.joints.size() == 2);
+  CHECK(taken.joints[0].name == "r1/elbow");
+  CHECK(taken.joints[0].position == 1);
+  CHECK(taken.joints[0].variance == 0.1 * 0.1);
+  CHECK(taken.joints[1].name == "r1/lift");
+  CHECK(taken.joints[1].position == 2);
+  CHECK(taken.joints[1].variance == 0.25);
   CHECK(import.counts().taken == 2);
   CHECK(import.counts().refused == 0);
 }
@@ -36,8 +40,10 @@ TEST_CASE("ros joints: joints without a usable position or name are counted") {
   JointImport import({});
   const auto taken = import.take(
       {Time(), {"a", "", std::string(256, 'x'), "a", "b", "c"}, {1, 2, 3, 4, std::nan("")}});
-  CHECK(taken.names == Names{"a"});
-  CHECK(taken.positions == std::vector<double>{1});
+  REQUIRE(taken.joints.size() == 1);
+  CHECK(taken.joints[0].name == "a");
+  CHECK(taken.joints[0].position == 1);
+  CHECK_FALSE(taken.joints[0].variance);  // nobody has given one
   CHECK(!taken.stamp);
   CHECK(import.counts().refused == 5);
 }

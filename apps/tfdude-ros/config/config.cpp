@@ -157,13 +157,13 @@ Result<void> Reader::joints_in(const YAML::Node& node, Settings& settings) const
   const auto entries = fields(node, kKeys, "joints_in");
   if (!entries) return tl::unexpected(entries.error());
   JointImportSettings in;
+  double stddev = 0;
   auto ok =
-      require(node, *entries, "stddev", "joints_in")
-          .and_then(
-              [&] { return within(*entries, "stddev", "joints_in", 0, kMaxStddev, in.stddev); })
+      within(*entries, "stddev", "joints_in", 0, kMaxStddev, stddev)
           .and_then([&] { return patterns(*entries, "joints", "joints_in", in.joints.include); })
           .and_then([&] { return patterns(*entries, "except", "joints_in", in.joints.exclude); });
   if (!ok) return ok;
+  if (entries->count("stddev") > 0) in.stddev = stddev;
   if (const auto found = entries->find("stddev_of"); found != entries->end()) {
     const std::string what = "joints_in: stddev_of";
     const auto joints = fields(found->second.value, what);
@@ -193,18 +193,18 @@ Result<void> Reader::joints_out(const YAML::Node& node, Settings& settings) cons
 Result<void> Reader::description_in(const YAML::Node& node, Settings& settings) const {
   constexpr std::array<Keys, 11> kKeys = {"partition", "root",       "xyz",           "rpy",
                                           "quat",      "links",      "strict_limits", "stddev",
-                                          "cov",       "covariance", "origins"};
+                                          "cov",       "covariance", "fixed"};
   const auto entries = fields(node, kKeys, "description_in");
   if (!entries) return tl::unexpected(entries.error());
   DescriptionSettings in;
-  std::string origins;
+  std::string fixed;
   auto ok = words(*entries, "partition", "description_in", in.partition)
                 .and_then([&] { return words(*entries, "root", "description_in", in.part.root); })
                 .and_then([&] { return list(*entries, "links", "description_in", in.part.links); })
                 .and_then([&] {
                   return flag(*entries, "strict_limits", "description_in", in.part.strict_limits);
                 })
-                .and_then([&] { return words(*entries, "origins", "description_in", origins); });
+                .and_then([&] { return words(*entries, "fixed", "description_in", fixed); });
   if (!ok) return ok;
   const auto X_root = transform(node, *entries, "description_in", {});
   if (!X_root) return tl::unexpected(X_root.error());
@@ -212,10 +212,10 @@ Result<void> Reader::description_in(const YAML::Node& node, Settings& settings) 
   if (const auto name = check_partition_name(in.partition); !name) {
     return error(name.error().code, node.Mark(), "description_in: " + name.error().message);
   }
-  if (!origins.empty()) {
-    const auto stated = covariance_named(origins);
+  if (!fixed.empty()) {
+    const auto stated = covariance_named(fixed);
     if (!stated) return error(stated.error().code, node.Mark(), stated.error().message);
-    in.part.origins = *stated;
+    in.part.fixed = *stated;
   }
   settings.description_in = std::move(in);
   return {};

@@ -22,10 +22,10 @@ JointPositions JointImport::take(const JointState& message) {
       continue;
     }
     const auto own = settings_.stddev_of.find(name);
-    const double stddev = own == settings_.stddev_of.end() ? settings_.stddev : own->second;
-    out.names.push_back(std::move(id));
-    out.positions.push_back(message.positions[i]);
-    out.variances.push_back(stddev * stddev);
+    const auto stddev = own == settings_.stddev_of.end() ? settings_.stddev : own->second;
+    JointValue joint{std::move(id), message.positions[i]};
+    if (stddev) joint.variance = *stddev * *stddev;
+    out.joints.push_back(std::move(joint));
     ++counts_.taken;
   }
   return out;

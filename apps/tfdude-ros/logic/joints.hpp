@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -16,7 +17,7 @@ namespace tfdude::ros {
 
 /// ROS says nothing of the uncertainty of joints.
 struct JointImportSettings {
-  double stddev = 0;                          ///< of a position [rad or m]
+  std::optional<double> stddev{};             ///< of a position [rad or m]; absent: unspecified
   std::map<std::string, double> stddev_of{};  ///< by the name in ROS, for joints with another one
   Choice joints{};                            ///< by the names in ROS
   std::string prefix{};
@@ -30,9 +31,7 @@ struct JointCounts {
 /// As Client::publish_joints() takes them.
 struct JointPositions {
   std::optional<Time> stamp;
-  std::vector<std::string> names;
-  std::vector<double> positions;
-  std::vector<double> variances;
+  std::vector<JointValue> joints;
 };
 
 class JointImport {

@@ -22,10 +22,9 @@ void JointsIn::stop() {
 }
 
 void JointsIn::take(const JointState& message) {
-  const JointPositions joints = import_.take(message);
-  if (joints.names.empty()) return;
-  const auto sent =
-      node_.publish_joints(joints.names, joints.positions, joints.variances, joints.stamp);
+  JointPositions positions = import_.take(message);
+  if (positions.joints.empty()) return;
+  const auto sent = node_.publish_joints(std::move(positions.joints), positions.stamp);
   const std::string error = sent ? std::string() : sent.error().message;
   if (error == std::exchange(logged_, error) || sent) return;
   spdlog::warn("joints of ROS: {}", error);

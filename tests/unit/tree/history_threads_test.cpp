@@ -108,7 +108,7 @@ struct Slides {
     return right ? "" : "x is " + std::to_string(x) + ", its variance " + std::to_string(variance);
   }
 
-  Joint slide = prismatic_joint({}, {1, 0, 0});
+  Joint slide = prismatic_joint(Transform::exact({}), {1, 0, 0});
   Forest forest;
   std::vector<Handle> handles;
 };

@@ -30,7 +30,7 @@ Query query(std::int64_t milliseconds, std::chrono::nanoseconds beyond = 0ns) {
 
 // base -> arm, which turns about the z axis, a metre along x.
 struct Turning {
-  explicit Turning(const StatedCovariance& of_origin = {}) {
+  explicit Turning(const StatedCovariance& of_origin = StatedCovariance::exact()) {
     Transform origin = along_x(1);
     origin.covariance = of_origin;
     joint = revolute_joint(origin, {0, 0, 1});
