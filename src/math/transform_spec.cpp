@@ -51,9 +51,9 @@ Result<Transform> TransformSpec::build(const StatedCovariance& otherwise) const 
   const auto t = xyz.value_or(std::array<double, 3>{});
   const auto pose = Pose::create(*rotation, {t[0], t[1], t[2]});
   if (!pose) return tl::unexpected(pose.error());
-  const auto covariance = covariance_of(*this, otherwise);
-  if (!covariance) return tl::unexpected(covariance.error());
-  return Transform{*pose, *covariance};
+  const auto stated = covariance_of(*this, otherwise);
+  if (!stated) return tl::unexpected(stated.error());
+  return Transform{*pose, *stated};
 }
 
 }  // namespace tfdude
