@@ -105,7 +105,6 @@ void MemberRunner::react(const Outcome& outcome) {
   if (outcome.stopped) parts_.on_gone(outcome.stopped->partition);
   if (outcome.lost) parts_.on_gone(*outcome.lost);
   log_outcome(outcome, name_);
-  if (outcome.appeared) report_clocks(*outcome.appeared);
 }
 
 // Once: if the clocks differ, they usually differ from those of many.
@@ -135,6 +134,8 @@ void MemberRunner::on_page(const Page& page) {
 
 void MemberRunner::on_presence(const Presence& presence) {
   input([&](Member& member) { member.on_presence(presence, wall_clock()); });
+  // Of each presence: its sender may become reachable only later.
+  if (presence.serving) report_clocks(presence);
 }
 
 void MemberRunner::on_lost(const std::string& partition, std::uint64_t incarnation,
