@@ -1,14 +1,10 @@
 // The daemon of one subsystem: loads its frames, owns them, and serves them until a signal stops
 // it.
 
-#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <string>
-#include <unistd.h>
 
-#include <spdlog/async.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include "tfdude/base/id.hpp"
@@ -16,16 +12,15 @@
 #include "tfdude/client/config_preview.hpp"
 #include "tfdude/client/node.hpp"
 #include "tfdude/description/config.hpp"
-#include "tfdude/transport/fastdds.hpp"
 
+#include "../process.hpp"
 #include "arguments.hpp"
 
 namespace {
 
+using tfdude::cli::kRefused;
 using tfdude::daemon::Arguments;
 using tfdude::daemon::kWrongUsage;
-
-constexpr int kRefused = 1;
 
 tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
   tfdude::Config config;
@@ -55,23 +50,6 @@ tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
                         "no partition: give --partition, or name it in --config");
   }
   return config;
-}
-
-// Waits for a signal to stop, or until another process has taken the partition.
-// @return the exit status
-int run(tfdude::Node& node, const sigset_t& stop_signals) {
-  std::atomic<bool> given_up{false};
-  const auto subscription = node.on_change([&](const tfdude::Change& change) {
-    const bool own = change.partition == node.partition() && change.frame.empty();
-    if (change.kind != tfdude::ChangeKind::kConflict || !own) return;
-    given_up = true;
-    kill(getpid(), SIGTERM);
-  });
-  int signal = 0;
-  sigwait(&stop_signals, &signal);
-  if (given_up) return kRefused;
-  spdlog::info("stopping on signal {}", signal);
-  return 0;
 }
 
 // Prints what the configuration would change in the stored state. @return the exit status
@@ -110,7 +88,7 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
   std::fflush(stdout);
   spdlog::info("serving partition {} in domain {}", tfdude::quote(config->partition),
                arguments.options.domain);
-  return run(*node, stop_signals);
+  return tfdude::cli::wait_until_stopped(*node, stop_signals);
 }
 
 }  // namespace
@@ -119,18 +97,9 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
 int main(int argc, char** argv) {
   Arguments arguments;
   if (const auto status = read_arguments(argc, argv, arguments)) return *status;
-  // Blocks the signals before any thread starts: all threads inherit this, so sigwait() gets them.
-  sigset_t stop_signals;
-  sigemptyset(&stop_signals);
-  sigaddset(&stop_signals, SIGINT);
-  sigaddset(&stop_signals, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
-  // Logs go to standard error: standard output has only the line "ready", or the result of --check.
-  // The library uses the logger of this name. If nobody reads the log, lines are lost rather than
-  // delaying the daemon.
-  spdlog::set_default_logger(
-      spdlog::create_async_nb<spdlog::sinks::stderr_color_sink_mt>("tfdude"));
-  tfdude::log_fastdds_to_standard_error();
+  const sigset_t stop_signals = tfdude::cli::block_stop_signals();
+  // Standard output has only the line "ready", or the result of --check.
+  tfdude::cli::log_to_standard_error();
   const int status = serve(arguments, stop_signals);
   spdlog::shutdown();
   return status;

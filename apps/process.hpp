@@ -1,0 +1,57 @@
+#pragma once
+
+#include <atomic>
+#include <csignal>
+#include <unistd.h>
+
+#include <spdlog/async.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include "tfdude/client/node.hpp"
+#include "tfdude/transport/fastdds.hpp"
+
+// What the programs that serve a partition have in common as processes.
+namespace tfdude::cli {
+
+/// The exit status if a program could not start, or has lost its partition.
+inline constexpr int kRefused = 1;
+
+/// Blocks the signals to stop. Call it before any thread starts: all threads inherit this, so
+/// sigwait() gets the signals.
+inline sigset_t block_stop_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  return signals;
+}
+
+/// Logs go to standard error, those of the library, too, which uses the logger of this name. If
+/// nobody reads the log, lines are lost rather than delaying the program.
+inline void log_to_standard_error() {
+  spdlog::set_default_logger(
+      spdlog::create_async_nb<spdlog::sinks::stderr_color_sink_mt>("tfdude"));
+  log_fastdds_to_standard_error();
+}
+
+/// Waits for a signal to stop, or until another process has taken the partition.
+/// @param stop_signals  from block_stop_signals()
+/// @return the exit status
+[[nodiscard]] inline int wait_until_stopped(Node& node, const sigset_t& stop_signals) {
+  std::atomic<bool> given_up{false};
+  const auto subscription = node.on_change([&](const Change& change) {
+    const bool own = change.partition == node.partition() && change.frame.empty();
+    if (change.kind != ChangeKind::kConflict || !own) return;
+    given_up = true;
+    kill(getpid(), SIGTERM);
+  });
+  int signal = 0;
+  sigwait(&stop_signals, &signal);
+  if (given_up) return kRefused;
+  spdlog::info("stopping on signal {}", signal);
+  return 0;
+}
+
+}  // namespace tfdude::cli
