@@ -23,8 +23,7 @@ DDS_FOLDERS = (DDS_FOLDER, ROS_DDS_FOLDER)
 # What a program may include of the library's private parts. Its own build compiles what it needs of them.
 SHARED = {
     ROS_DDS_FOLDER: ("src/transport/fastdds/compat.hpp", "src/transport/fastdds/cdr_check.hpp"),
-    "apps/tfdude-ros/config/": ("src/description/file_text.hpp", "src/description/yaml_fields.hpp",
-                                "src/description/yaml_quirks.hpp"),
+    "apps/tfdude-ros/config/": ("src/description/file_text.hpp", "src/description/yaml_fields.hpp"),
 }
 
 # (what, pattern of the include, folders or files that may include it)

@@ -289,19 +289,13 @@ Result<void> Reader::urdfs(const Field& field, Config& config) const {
 
 Result<Config> parse_config(const std::string& text, const std::string& name) {
   const Reader reader(name);
-  if (auto ok = check_bytes(name, text); !ok) return tl::unexpected(ok.error());
-  try {
-    const YAML::Node document = YAML::Load(text);
-    if (const auto second = second_document(text)) {
-      return reader.error(Errc::kConfig, *second, "holds more than one YAML document");
-    }
-    if (document.IsNull()) return fail(Errc::kConfig, name + ": is empty");
-    return reader.config(document);
-  } catch (const YAML::Exception& e) {
-    return reader.error(Errc::kConfig, e.mark, "not YAML: " + printable(e.msg));
-  } catch (const std::exception& e) {
-    return fail(Errc::kConfig, name + ": " + e.what());
-  }
+  Result<Config> config;
+  auto read = reader.read_document(text, [&](const YAML::Node& root) -> Result<void> {
+    config = reader.config(root);
+    return {};
+  });
+  if (!read) return tl::unexpected(std::move(read.error()));
+  return config;
 }
 
 Result<Config> load_config(const std::string& path) {

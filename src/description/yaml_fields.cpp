@@ -32,6 +32,23 @@ tl::unexpected<Error> YamlFields::error(Errc code, const YAML::Mark& mark,
   return fail(code, place(mark) + ": " + printable(message));
 }
 
+Result<void> YamlFields::read_document(
+    const std::string& text, const std::function<Result<void>(const YAML::Node&)>& read) const {
+  if (auto ok = check_bytes(name_, text); !ok) return ok;
+  try {
+    const YAML::Node document = YAML::Load(text);
+    if (const auto second = second_document(text)) {
+      return error(Errc::kConfig, *second, "holds more than one YAML document");
+    }
+    if (document.IsNull()) return fail(Errc::kConfig, name_ + ": is empty");
+    return read(document);
+  } catch (const YAML::Exception& e) {
+    return error(Errc::kConfig, e.mark, "not YAML: " + printable(e.msg));
+  } catch (const std::exception& e) {
+    return fail(Errc::kConfig, name_ + ": " + e.what());
+  }
+}
+
 std::string YamlFields::place(const YAML::Mark& mark) const {
   return mark.is_null() ? name_ : name_ + ":" + std::to_string(mark.line + 1);
 }

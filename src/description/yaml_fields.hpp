@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -32,6 +33,11 @@ class YamlFields {
 
   [[nodiscard]] tl::unexpected<Error> error(Errc code, const YAML::Mark& mark,
                                             const std::string& message) const;
+
+  /// Passes the root of the file's only document to `read`, and returns what that does.
+  /// @return also kConfig: not YAML, empty, or several documents
+  [[nodiscard]] Result<void> read_document(
+      const std::string& text, const std::function<Result<void>(const YAML::Node&)>& read) const;
 
  protected:
   [[nodiscard]] const std::string& name() const { return name_; }

@@ -11,7 +11,6 @@
 
 #include "description/file_text.hpp"
 #include "description/yaml_fields.hpp"
-#include "description/yaml_quirks.hpp"
 
 namespace tfdude::ros {
 namespace {
@@ -44,10 +43,12 @@ class Reader : public YamlFields {
                                       const std::string& place, Patterns& out) const;
   [[nodiscard]] Result<void> covariance(const YAML::Node& node, const Fields& fields,
                                         const std::string& place, StatedCovariance& out) const;
-  /// A number within a range, which the error names.
+  /// A number within a range, which the error names. Without the key, `out` stays as it is.
+  /// @tparam Number  double or std::optional<double>
+  template <class Number>
   [[nodiscard]] Result<void> within(const Fields& fields, std::string_view key,
                                     const std::string& place, double least, double most,
-                                    double& out) const;
+                                    Number& out) const;
   [[nodiscard]] Result<void> is_odometry(const YAML::Node& node, const std::string& place,
                                          const std::string& type, bool& out) const;
   /// An entry that must be there.
@@ -101,8 +102,9 @@ Result<void> Reader::covariance(const YAML::Node& node, const Fields& fields,
   return {};
 }
 
+template <class Number>
 Result<void> Reader::within(const Fields& fields, std::string_view key, const std::string& place,
-                            double least, double most, double& out) const {
+                            double least, double most, Number& out) const {
   std::optional<double> value;
   if (auto ok = number(fields, key, place, value); !ok) return ok;
   if (!value) return {};
@@ -157,13 +159,11 @@ Result<void> Reader::joints_in(const YAML::Node& node, Settings& settings) const
   const auto entries = fields(node, kKeys, "joints_in");
   if (!entries) return tl::unexpected(entries.error());
   JointImportSettings in;
-  double stddev = 0;
   auto ok =
-      within(*entries, "stddev", "joints_in", 0, kMaxStddev, stddev)
+      within(*entries, "stddev", "joints_in", 0, kMaxStddev, in.stddev)
           .and_then([&] { return patterns(*entries, "joints", "joints_in", in.joints.include); })
           .and_then([&] { return patterns(*entries, "except", "joints_in", in.joints.exclude); });
   if (!ok) return ok;
-  if (entries->count("stddev") > 0) in.stddev = stddev;
   if (const auto found = entries->find("stddev_of"); found != entries->end()) {
     const std::string what = "joints_in: stddev_of";
     const auto joints = fields(found->second.value, what);
@@ -335,19 +335,8 @@ Result<void> Reader::read(const YAML::Node& root, Settings& settings) const {
 
 Result<void> parse_config(const std::string& text, const std::string& name, Settings& settings) {
   const Reader reader(name);
-  if (auto ok = check_bytes(name, text); !ok) return ok;
-  try {
-    const YAML::Node document = YAML::Load(text);
-    if (const auto second = second_document(text)) {
-      return reader.error(Errc::kConfig, *second, "holds more than one YAML document");
-    }
-    if (document.IsNull()) return fail(Errc::kConfig, name + ": is empty");
-    return reader.read(document, settings);
-  } catch (const YAML::Exception& e) {
-    return reader.error(Errc::kConfig, e.mark, "not YAML: " + printable(e.msg));
-  } catch (const std::exception& e) {
-    return fail(Errc::kConfig, name + ": " + e.what());
-  }
+  return reader.read_document(text,
+                              [&](const YAML::Node& root) { return reader.read(root, settings); });
 }
 
 Result<void> load_config(const std::string& path, Settings& settings) {
