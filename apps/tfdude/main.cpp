@@ -86,19 +86,22 @@ void add_stamp(CLI::App* command, const char* name, std::string& stamp, const ch
   });
 }
 
+// CLI::Range would accept NaN.
+// @param range  as the message names it
+std::function<std::string(const std::string&)> within(double least, double most,
+                                                      const char* range) {
+  return [=](const std::string& text) {
+    const double value = std::strtod(text.c_str(), nullptr);
+    return value >= least && value <= most ? "" : text + " is not within " + range;
+  };
+}
+
 void add_milliseconds(CLI::App* command, const char* name, double& value, const char* help) {
-  command->add_option(name, value, help)->type_name("MS")->check([](const std::string& text) {
-    // CLI::Range would accept NaN.
-    const double ms = std::strtod(text.c_str(), nullptr);
-    return ms >= 0 && ms <= 3.6e6 ? "" : text + " is not within 0 to 3600000";
-  });
+  command->add_option(name, value, help)->type_name("MS")->check(within(0, 3.6e6, "0 to 3600000"));
 }
 
 void add_rate(CLI::App* command, double& rate, const char* help) {
-  command->add_option("--rate", rate, help)->check([](const std::string& text) {
-    const double hertz = std::strtod(text.c_str(), nullptr);
-    return hertz >= 0.001 && hertz <= 1000.0 ? "" : text + " is not within 0.001 to 1000";
-  });
+  command->add_option("--rate", rate, help)->check(within(0.001, 1000, "0.001 to 1000"));
 }
 
 void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen) {
@@ -134,10 +137,7 @@ void add_velocity_command(CLI::App& app, Arguments& arguments, Command& chosen) 
             "the middle of the interval: seconds since the epoch or, negative, before now; "
             "default: it ends at the latest common time");
   velocity->add_option("--over", arguments.over, "length of the interval [s]")
-      ->check([](const std::string& text) {
-        const double seconds = std::strtod(text.c_str(), nullptr);
-        return seconds >= 1e-6 && seconds <= 1e6 ? "" : text + " is not within 1e-6 to 1e6";
-      });
+      ->check(within(1e-6, 1e6, "1e-6 to 1e6"));
 }
 
 // Commands that follow changes, most of them until interrupted.
@@ -276,10 +276,7 @@ void add_joint_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   joint
       ->add_option("--stddev", arguments.joint_stddev,
                    "standard deviation of the position [rad or m]")
-      ->check([](const std::string& text) {
-        const double stddev = std::strtod(text.c_str(), nullptr);
-        return stddev >= 0 && stddev <= 1e9 ? "" : text + " is not within 0 to 1e9";
-      });
+      ->check(within(0, 1e9, "0 to 1e9"));
   add_stamp(joint, "--stamp", arguments.stamp,
             "make it a sample of this instant: seconds since the epoch or, negative, before now");
 }
