@@ -3,12 +3,12 @@
 #include <string>
 #include <vector>
 
-#include <geometry_msgs/TransformStamped.h>
 #include <tf2/buffer_core.h>
 
 #include "tfdude/client/client.hpp"
 
 #include "support/random.hpp"
+#include "support/tf2_message.hpp"
 
 namespace bench {
 
@@ -38,20 +38,7 @@ inline Tree up_down_tree(std::size_t depth, std::size_t frames) {
 
 /// The same edge for tf2, which keeps no covariance.
 inline geometry_msgs::TransformStamped stamped(const tfdude::FrameSpec& frame, ros::Time at) {
-  geometry_msgs::TransformStamped message;
-  message.header.frame_id = frame.parent;
-  message.header.stamp = at;
-  message.child_frame_id = frame.id;
-  const auto q = frame.X_PC.pose.rotation();
-  const auto p = frame.X_PC.pose.translation();
-  message.transform.translation.x = p.x();
-  message.transform.translation.y = p.y();
-  message.transform.translation.z = p.z();
-  message.transform.rotation.x = q.x();
-  message.transform.rotation.y = q.y();
-  message.transform.rotation.z = q.z();
-  message.transform.rotation.w = q.w();
-  return message;
+  return tfdude::testing::tf2_message(frame.parent, frame.id, frame.X_PC.pose, at);
 }
 
 /// The same tree in tf-dude and in tf2, each edge with one value.

@@ -50,10 +50,6 @@ std::vector<PushedValue> entries_of(const SegmentValues& found) {
   return entries;
 }
 
-bool same(const Transform& a, const Transform& b) {
-  return a.pose.matrix() == b.pose.matrix() && a.covariance == b.covariance;
-}
-
 }  // namespace
 
 std::size_t correlated_entries(const PushedValues& pushed) {

@@ -3,13 +3,6 @@
 
 // Applies values from another forest.
 namespace tfdude {
-namespace {
-
-bool same(const Transform& a, const Transform& b) {
-  return a.pose.matrix() == b.pose.matrix() && a.covariance == b.covariance;
-}
-
-}  // namespace
 
 // The edge is static, until a sample follows.
 void Forest::Impl::begin_told_history(std::uint32_t slot, const PushedValue& value) {

@@ -41,6 +41,11 @@ struct PushedValue {
   bool cleared = false;
 };
 
+/// Whether two values are the same, so that one need not be told after the other.
+[[nodiscard]] inline bool same(const Transform& a, const Transform& b) {
+  return a.pose.matrix() == b.pose.matrix() && a.covariance == b.covariance;
+}
+
 /// Values written to edges up to a commit.
 struct PushedCommit {
   /// Sorted by stamp, after those without one.

@@ -13,6 +13,7 @@
 #include "ros_rig.hpp"
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"
+#include "support/tf2_message.hpp"
 
 namespace tfdude {
 namespace {
@@ -40,19 +41,7 @@ ros::Time ros_time(Time time) {
 }
 
 void set(tf2::BufferCore& buffer, const RosTransform& one, Time stamp, bool is_static) {
-  geometry_msgs::TransformStamped message;
-  message.header.stamp = ros_time(stamp);
-  message.header.frame_id = one.parent;
-  message.child_frame_id = one.child;
-  const Eigen::Vector3d p = one.X_PC.translation();
-  const Eigen::Quaterniond q = one.X_PC.rotation();
-  message.transform.translation.x = p.x();
-  message.transform.translation.y = p.y();
-  message.transform.translation.z = p.z();
-  message.transform.rotation.x = q.x();
-  message.transform.rotation.y = q.y();
-  message.transform.rotation.z = q.z();
-  message.transform.rotation.w = q.w();
+  const auto message = testing::tf2_message(one.parent, one.child, one.X_PC, ros_time(stamp));
   REQUIRE(buffer.setTransform(message, "test", is_static));
 }
 
