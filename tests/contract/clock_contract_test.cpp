@@ -204,6 +204,8 @@ TEST_CASE("clock: the present of one clock is not taken for that of another") {
   Client client = *Client::open(join(""));
   REQUIRE(sim.set_time(ms(5000)));
   for (const int t : {4000, 5000}) REQUIRE(sim.update("arm", along_x(t), ms(t)));
+  // The clock comes with the presence, which may be later than the first page.
+  REQUIRE(eventually([&] { return clock_of(client, "sim") == ClockKind::kExternal; }));
   const auto now = client.lookup("world", "arm", at(*client.now()));
   CHECK(outcome(now) == "not_yet");
   CHECK_THAT(now.error().message,
