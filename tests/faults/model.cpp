@@ -101,6 +101,7 @@ void Model::add(const std::string& id, const std::string& partition, const Place
   frame.partition = partition;
   frame.possible.assign(1, place);
   if (!done) frame.possible.emplace_back();
+  frame.may_change_late = !done;
 }
 
 void Model::update(const std::string& id, const Transform& X_PC, bool done) {
@@ -112,6 +113,7 @@ void Model::update(const std::string& id, const Transform& X_PC, bool done) {
   }
   if (frame.doomed) insert(after, std::nullopt);
   if (done) frame.may_move_late = frame.unsaved = false;
+  frame.may_change_late = !done;
   frame.possible = std::move(after);
 }
 
@@ -123,7 +125,7 @@ void Model::move(const std::string& id, const std::string& parent,
   for (const auto& place : frame.possible) {
     if (place) insert(after, Place{parent, X_PC ? *X_PC : place->X_PC});
   }
-  frame.may_move_late = !done;
+  frame.may_move_late = frame.may_change_late = !done;
   if (done) frame.unsaved = false;
   frame.possible = std::move(after);
 }
@@ -162,6 +164,7 @@ void Model::may_be_as_in(const Model& earlier, const std::string& partition) {
     for (const auto& place : before.possible) insert(frame.possible, place);
     frame.doomed = frame.doomed || before.doomed;
     frame.may_move_late = frame.may_move_late || before.may_move_late;
+    frame.may_change_late = frame.may_change_late || before.may_change_late;
   }
   for (auto& [id, frame] : frames_) {
     const bool later = earlier.frames_.count(id) == 0 && earlier.removed_.count(id) == 0;
@@ -342,8 +345,9 @@ std::string Model::judge(const std::string& a, const std::string& b,
   if (X_AB) {
     for (auto& [id, places] : left) {
       Frame& frame = frames_.at(id);
-      if (frame.unsaved) continue;
+      if (frame.unsaved || (frame.may_change_late && !quiet)) continue;
       frame.possible = std::move(places);
+      frame.may_change_late = false;
       if (quiet) frame.doomed = false;
       if (frame.doomed) insert(frame.possible, std::nullopt);
     }

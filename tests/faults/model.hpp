@@ -20,8 +20,8 @@ struct Place {
 
 /// What is known of the frames that only one client changes. After an acknowledged change one state
 /// is possible. After a change without an answer two states are possible, with and without it,
-/// until a later answer of the same owner decides: the requests of one client to one owner arrive
-/// in order or not at all.
+/// until a later change of the same owner is acknowledged, or a lookup in quiet times decides: the
+/// changes of one client to one owner arrive in order or not at all, but a lookup may overtake them.
 class Model {
  public:
   struct Frame {
@@ -35,6 +35,8 @@ class Model {
     std::set<std::string> removed_by;
     /// A move had no answer: its owner may still make it, even after what it names was removed.
     bool may_move_late = false;
+    /// Likewise any change: what a lookup shows may not be the last word.
+    bool may_change_late = false;
     /// The state that its owner shows may not be stored: it is undone if the owner is killed.
     bool unsaved = false;
     std::vector<std::string> history;
