@@ -13,10 +13,12 @@ constexpr std::array<std::string_view, 12> kUrdfKeys = {
     "cov",  "covariance", "prefix", "links", "strict_limits", "joints"};
 constexpr std::array<std::string_view, 6> kRootKeys = {"xyz",    "rpy", "quat",
                                                        "stddev", "cov", "covariance"};
-constexpr std::array<std::string_view, 3> kJointKeys = {"position", "stddev", "origin"};
+constexpr std::array<std::string_view, 4> kJointKeys = {"position", "stddev", "sample_stddev",
+                                                        "origin"};
 // The key in files of earlier versions.
 constexpr const char* kFormerOrigin = "mount";
-constexpr std::array<std::string_view, 3> kFormerJointKeys = {"position", "stddev", kFormerOrigin};
+constexpr std::array<std::string_view, 4> kFormerJointKeys = {"position", "stddev", "sample_stddev",
+                                                              kFormerOrigin};
 constexpr std::array<std::string_view, 3> kOriginKeys = {"stddev", "cov", "covariance"};
 
 }  // namespace
@@ -65,9 +67,10 @@ Result<UrdfJoint> UrdfFields::joint(const YAML::Node& node, const std::string& p
   const auto entries = fields(node, former ? kFormerJointKeys : kJointKeys, place);
   if (!entries) return tl::unexpected(entries.error());
   UrdfJoint joint;
-  const auto read = number(*entries, "position", place, joint.position).and_then([&] {
-    return number(*entries, "stddev", place, joint.stddev);
-  });
+  const auto read =
+      number(*entries, "position", place, joint.position)
+          .and_then([&] { return number(*entries, "stddev", place, joint.stddev); })
+          .and_then([&] { return number(*entries, "sample_stddev", place, joint.sample_stddev); });
   if (!read) return tl::unexpected(read.error());
   const std::string key = former ? kFormerOrigin : "origin";
   const auto origin = entries->find(key);

@@ -21,6 +21,11 @@ std::string written(double value) {
 
 bool is_sane(double value) { return std::abs(value) <= kLargest; }  // false for NaN
 
+// Whether something is said about the position.
+bool has_position(const UrdfJoint& said) {
+  return said.position || said.stddev || said.sample_stddev;
+}
+
 std::optional<JointType> moving_type(const urdf::Joint& joint) {
   switch (joint.type) {
     case urdf::Joint::REVOLUTE:
@@ -108,7 +113,7 @@ Result<void> EdgeReader::read(Index i) {
   const auto type = moving_type(urdf);
   edges_[i].X_PJ.covariance = said.origin.value_or(type ? StatedCovariance::exact() : part_.fixed);
   if (!type) {
-    if (!said.position && !said.stddev) return {};
+    if (!has_position(said)) return {};
     return tree_.joint_error(i, "has no position: it does not move by one number");
   }
   JointSpec joint;
@@ -162,7 +167,7 @@ std::optional<JointLimits> range_of(const JointSpec& joint) {
 Result<void> EdgeReader::read_position(Index i, JointSpec& joint) const {
   const UrdfJoint& said = said_of(i);
   if (urdf_of(i).mimic) {
-    if (!said.position && !said.stddev) return {};
+    if (!has_position(said)) return {};
     return tree_.joint_error(
         i, "has no position of its own: it mimics " + quote(urdf_of(i).mimic->joint_name));
   }
@@ -175,11 +180,13 @@ Result<void> EdgeReader::read_position(Index i, JointSpec& joint) const {
     return tree_.joint_error(i, "position " + written(joint.position) + " is outside its limits " +
                                     written(limits->lower) + " and " + written(limits->upper));
   }
-  if (said.stddev && !(*said.stddev >= 0 && is_sane(*said.stddev))) {
-    return tree_.joint_error(i, "stddev " + written(*said.stddev) + " is not within 0 and 1e9");
+  for (const auto& stddev : {said.stddev, said.sample_stddev}) {
+    if (!stddev || (*stddev >= 0 && is_sane(*stddev))) continue;
+    return tree_.joint_error(i, "stddev " + written(*stddev) + " is not within 0 and 1e9");
   }
   joint.variance = said.stddev ? *said.stddev * *said.stddev
                                : unmeasured_variance(joint.type, range_of(joint), joint.position);
+  if (said.sample_stddev) joint.sample_variance = *said.sample_stddev * *said.sample_stddev;
   return {};
 }
 
@@ -245,8 +252,10 @@ Result<void> EdgeReader::couple(Index i) {
   joint->coupled = true;
   joint->position = mimic.position(other.position);
   joint->variance = mimic.variance(other.variance);
+  joint->sample_variance = mimic.variance(other.sample_variance);
   if (auto ok = check_joint(*joint); !ok) return tree_.joint_error(i, ok.error().message);
-  if (is_sane(joint->position) && joint->variance.value_or(0) <= kMaxVariance) return {};
+  const double variance = std::max(joint->variance.value_or(0), joint->sample_variance.value_or(0));
+  if (is_sane(joint->position) && variance <= kMaxVariance) return {};
   return tree_.joint_error(i, "mimic: its position or the variance of that is too large");
 }
 

@@ -107,7 +107,8 @@ Result<void> Joints::plan(const JointValue& value) {
     if (mover.let_go) continue;
     const JointSpec& spec = mover.spec;
     const Mimic mimic = spec.mimic.value_or(Mimic{});
-    Step step{index, mimic.position(value.position), mimic.variance(value.variance)};
+    Step step{index, mimic.position(value.position),
+              value.variance ? mimic.variance(value.variance) : spec.sample_variance};
     if (!is_position(step.position) || (step.variance && !is_variance(*step.variance))) {
       return check_value({spec.name, step.position, step.variance});
     }

@@ -50,7 +50,9 @@ Result<void> check_joint(const JointSpec& joint) {
     return bad("its lower limit is above its upper limit");
   }
   if (!is_finite(joint.joint.X_PJ)) return bad("its origin is not finite");
-  return check_value({joint.name, joint.position, joint.variance});
+  return check_value({joint.name, joint.position, joint.variance}).and_then([&] {
+    return check_value({joint.name, joint.position, joint.sample_variance});
+  });
 }
 
 std::string shared_source(const std::string& leader) { return "joint " + leader; }

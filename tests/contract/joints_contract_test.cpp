@@ -71,6 +71,34 @@ struct Robot {
   std::optional<Client> client;
 };
 
+TEST_CASE("joints: a position without a variance has that of its owner's configuration") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  JointSpec elbow = revolute_named("elbow");
+  elbow.coupled = true;
+  elbow.sample_variance = 0.04;
+  JointSpec wrist = following("wrist", "elbow", -0.5, 0);
+  wrist.sample_variance = 0.01;
+  const Node arm = *Node::open(join("arm"), "arm",
+                               {{"upper", "", {}},
+                                moved_by("fore", "upper", elbow),
+                                moved_by("side", "upper", revolute_named("shoulder"))});
+  const Node tool = *Node::open(join("tool"), "tool", {moved_by("hand", "fore", wrist)});
+  Client client = *Client::open(join(""));
+  const auto variances = [&] {
+    const auto of_arm = client.joints("arm");
+    const auto of_tool = client.joints("tool");
+    REQUIRE(of_arm);
+    REQUIRE(of_tool);
+    return std::tuple{(*of_arm)[0].variance, (*of_arm)[1].variance, (*of_tool)[0].variance};
+  };
+  REQUIRE(client.update_joints(std::vector<JointValue>{{"elbow", 0.5}, {"shoulder", 0.25}}));
+  CHECK(variances() ==
+        std::tuple{std::optional(0.04), std::optional<double>(), std::optional(0.01)});
+  // What a sample says counts.
+  REQUIRE(client.update_joints(std::vector<JointValue>{{"elbow", 0.5, 1.0}, {"shoulder", 1, 4.0}}));
+  CHECK(variances() == std::tuple{std::optional(1.0), std::optional(4.0), std::optional(0.25)});
+}
+
 TEST_CASE("joints: published positions reach the owners of joints and of those that mimic them") {
   Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
   REQUIRE(robot.client->publish_joints({"turn", "shoulder", "elbow"}, {0.1, 0.2, 0.4},

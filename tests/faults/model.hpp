@@ -21,7 +21,8 @@ struct Place {
 /// What is known of the frames that only one client changes. After an acknowledged change one state
 /// is possible. After a change without an answer two states are possible, with and without it,
 /// until a later change of the same owner is acknowledged, or a lookup in quiet times decides: the
-/// changes of one client to one owner arrive in order or not at all, but a lookup may overtake them.
+/// changes of one client to one owner arrive in order or not at all, but a lookup may overtake
+/// them.
 class Model {
  public:
   struct Frame {

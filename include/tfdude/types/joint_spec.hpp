@@ -52,6 +52,8 @@ struct JointSpec {
   bool strict = false;               ///< positions outside the limits are rejected
   double position = 0;               ///< before the first sample [rad or m]
   std::optional<double> variance{};  ///< of the position [rad² or m²]; absent: unspecified
+  /// Of samples that come without one [rad² or m²]; absent: unspecified.
+  std::optional<double> sample_variance{};
 };
 
 /// A joint and its state.

@@ -34,6 +34,7 @@ TEST_CASE("a configuration may include URDFs") {
       "    strict_limits: true\n"
       "    joints:\n"
       "      elbow_joint: {position: 0.5, stddev: 0.01, origin: {stddev: [0, 0, 0.2, 0, 0, 0]}}\n"
+      "      shoulder_pan_joint: {sample_stddev: 0.002}\n"
       "  - {file: robots/ur5e.urdf, prefix: b_, links: [base_link..forearm_link, tool0]}\n",
       TFDUDE_EXAMPLES "/robot.yaml");
   INFO((config ? "" : config.error().message));
@@ -51,6 +52,9 @@ TEST_CASE("a configuration may include URDFs") {
   CHECK(*elbow.variance == tfdude::testing::Approx(1e-4));
   CHECK(elbow.strict);
   CHECK(elbow.joint.X_PJ.covariance.of_specified().stddev()[2] == tfdude::testing::Approx(0.2));
+  CHECK_FALSE(elbow.sample_variance);
+  CHECK(*config->frames[2].joint->sample_variance == tfdude::testing::Approx(4e-6));
+  CHECK(config->robots.size() == 2);
   CHECK(config->frames[9].id == "b_base_link");
   CHECK(config->frames[9].parent.empty());
   CHECK(config->frames[13].id == "b_tool0");
@@ -98,11 +102,15 @@ TEST_CASE("an invalid entry for a URDF is rejected by name and line") {
   entry("joints: [a]", ": joints is not a mapping");
   entry("joints: {x: {}}", ": " + folder + "ur5e.urdf: joint 'x' does not exist");
   entry("joints: {elbow_joint: {at: 1}}",
-        ": joint 'elbow_joint': unknown key 'at'; known are position, stddev, origin");
+        ": joint 'elbow_joint': unknown key 'at'; known are position, stddev, "
+        "sample_stddev, origin");
   entry("joints: {elbow_joint: {origin: {}, mount: {}}}",
-        ": joint 'elbow_joint': unknown key 'origin'; known are position, stddev, mount");
+        ": joint 'elbow_joint': unknown key 'origin'; known are position, stddev, "
+        "sample_stddev, mount");
   entry("joints: {elbow_joint: {position: up}}",
         ": joint 'elbow_joint': position is 'up', which is not a number");
+  entry("joints: {elbow_joint: {sample_stddev: [1]}}",
+        ": joint 'elbow_joint': sample_stddev is not a number");
   entry("joints: {elbow_joint: {origin: {xyz: [0, 0, 0]}}}",
         ": joint 'elbow_joint': origin: unknown key 'xyz'; known are stddev, cov, covariance");
   entry("joints: {elbow_joint: {origin: {stddev: [-1, 0, 0, 0, 0, 0]}}}",
