@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "tfdude/base/id.hpp"
 #include "tfdude/types/version.hpp"
 
 #include "../network_options.hpp"
@@ -50,6 +51,9 @@ class Options {
                   ->check(CLI::Range(0.0, 1e9));
     app.add_flag("--description", description_,
                  "serve the robot of /robot_description as the partition 'robot'");
+    described_ =
+        app.add_option("--publish-description", out_of_,
+                       "publish the URDF of this partition's daemon on /robot_description");
     clock_ =
         app.add_option("--clock", clock_kind_,
                        "the clock of stamps: system, external (as the option of all programs), "
@@ -72,6 +76,10 @@ class Options {
       if (stddev_) settings.joints_in->stddev = stddev_;
     }
     if (description_ && !settings.description_in) settings.description_in.emplace();
+    if (described_->count() > 0) {
+      if (auto ok = check_partition_name(out_of_); !ok) return ok;
+      settings.description_out = DescriptionOutSettings{{}, out_of_};
+    }
     if (clock_->count() > 0) {
       settings.passes_clock = clock_kind_ == "ros";
       settings.options.clock = clock_kind_ == "system" ? ClockKind::kSystem : ClockKind::kExternal;
@@ -95,6 +103,7 @@ class Options {
   std::string config_;
   std::string text_;
   std::string clock_kind_;
+  std::string out_of_;
   std::vector<std::string> partitions_;
   std::vector<std::string> frames_;
   std::optional<double> stddev_;
@@ -104,6 +113,7 @@ class Options {
   CLI::Option* domain_;
   CLI::Option* rate_;
   CLI::Option* joints_;
+  CLI::Option* described_;
   CLI::Option* clock_;
   CLI::Option* prefix_;
 };

@@ -43,7 +43,7 @@ Bridge::~Bridge() {
   if (frames_out_) frames_out_->stop();
   if (joints_out_) joints_out_->stop();
   poses_out_.clear();
-  description_out_ = nullptr;
+  if (description_out_) description_out_->stop();
   if (ros_ != nullptr && ros_->malformed() > 0) {
     spdlog::warn("malformed messages of ROS: {}", ros_->malformed());
   }
@@ -62,9 +62,14 @@ Result<void> Bridge::start(const Settings& settings) {
   ros_ = *std::move(ros);
   if (settings.frames_in) frames_in_.emplace(node_, *settings.frames_in);
   if (settings.frames_out) frames_out_.emplace(node_, *settings.frames_out);
+  if (settings.description_out) {
+    description_out_.emplace(node_, *settings.description_out);
+    if (auto started = description_out_->start(*ros_); !started) return started;
+  }
   changes_ = node_.on_change([this](const Change& change) {
     if (frames_in_) frames_in_->on_change(change);
     if (frames_out_) frames_out_->on_change();
+    if (description_out_) description_out_->on_change(change);
   });
   if (auto started = start_in(settings); !started) return started;
   return start_out(settings);
@@ -106,11 +111,7 @@ Result<void> Bridge::start_out(const Settings& settings) {
     const auto is_own = [this](const BridgeMark& mark) { return is_neighbour(mark); };
     if (auto started = joints_out_->start(*ros_, is_own); !started) return started;
   }
-  if (!settings.description_out.empty()) {
-    auto published = publish_description(*ros_, settings.description_out);
-    if (!published) return tl::unexpected(std::move(published.error()));
-    description_out_ = *std::move(published);
-  }
+  if (description_out_) description_out_->look();
   for (const PoseOut& one : settings.poses_out) {
     auto sender = PoseSender::start(node_, *ros_, one);
     if (!sender) return tl::unexpected(std::move(sender.error()));

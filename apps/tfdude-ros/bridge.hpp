@@ -50,7 +50,7 @@ class Bridge {
   std::optional<JointsOut> joints_out_;
   std::vector<std::unique_ptr<PoseObserver>> poses_in_;
   std::vector<std::unique_ptr<PoseSender>> poses_out_;
-  std::unique_ptr<Publisher> description_out_;
+  std::optional<DescriptionOut> description_out_;
   std::unique_ptr<RosDomain> ros_;
   Subscription changes_;
 };

@@ -23,6 +23,12 @@ struct DescriptionSettings {
   UrdfPart part{"/robot_description"};
 };
 
+/// What is published on /robot_description: the URDF of a file, or of a partition.
+struct DescriptionOutSettings {
+  std::string file{};
+  std::string partition{};  ///< if there is no file
+};
+
 /// All that the command line and the configuration say. What is absent is not passed on.
 struct Settings {
   std::string partition = "ros";  ///< for the frames of /tf
@@ -34,7 +40,7 @@ struct Settings {
   std::optional<JointImportSettings> joints_in{};
   std::optional<JointExportSettings> joints_out{};
   std::optional<DescriptionSettings> description_in{};
-  std::string description_out{};  ///< a URDF file
+  std::optional<DescriptionOutSettings> description_out{};
   /// The time of /clock is passed on to all who have an external clock.
   bool passes_clock = false;
   std::vector<PoseIn> poses_in{};

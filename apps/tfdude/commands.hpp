@@ -120,6 +120,7 @@ int run_fuse(Client& client, const Arguments& arguments);
 int run_correlate(Client& client, const Arguments& arguments);
 int run_joint(Client& client, const Arguments& arguments);
 int run_joints(Client& client, const Arguments& arguments);
+int run_description(Client& client, const Arguments& arguments);
 int run_monitor(Client& client, const Arguments& arguments);
 int run_plot(Client& client, const Arguments& arguments);
 int run_graph(Client& client, const Arguments& arguments);

@@ -36,4 +36,15 @@ int run_joints(Client& client, const Arguments& arguments) {
   return answer(arguments, {{"partitions", std::move(json)}}, text);
 }
 
+int run_description(Client& client, const Arguments& arguments) {
+  const auto text = client.description(arguments.partition);
+  if (!text) return refuse(client, text.error(), arguments);
+  if (text->empty()) {
+    return report({Errc::kInvalidInput, "partition '" + arguments.partition +
+                                            "' has no description: it serves no URDF, or several"},
+                  arguments);
+  }
+  return answer(arguments, {{"partition", arguments.partition}, {"description", *text}}, *text);
+}
+
 }  // namespace tfdude::cli

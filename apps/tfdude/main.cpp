@@ -281,6 +281,13 @@ void add_joint_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
             "make it a sample of this instant: seconds since the epoch or, negative, before now");
 }
 
+void add_description_command(CLI::App& app, Arguments& arguments, Command& chosen) {
+  add_command(app, "description", "print the URDF that a partition's daemon serves",
+              "description arm > arm.urdf", cli::run_description, chosen)
+      ->add_option("PARTITION", arguments.partition, "the partition")
+      ->required();
+}
+
 void add_events_command(CLI::App& app, Command& chosen) {
   add_command(app, "events", "print changes: partitions that come and go, frames, conflicts",
               "--json events", cli::run_events, chosen);
@@ -344,6 +351,7 @@ int main(int argc, char** argv) {
   add_correlate_command(app, arguments, command);
   add_picture_commands(app, arguments, command);
   add_joint_commands(app, arguments, command);
+  add_description_command(app, arguments, command);
   cli::LocalCommand local;
   cli::add_keys_commands(app, arguments.keys, local);
   cli::require_numbers(app);

@@ -78,6 +78,8 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
   tfdude::Options options = arguments.options;
   options.history = config->history;
   options.clock = config->clock.value_or(tfdude::ClockKind::kSystem);
+  // One of several would be taken for the whole.
+  if (config->robots.size() == 1) options.description = config->robots.front();
   auto node = tfdude::Node::open(config->partition, config->frames, options);
   if (!node) {
     spdlog::error("partition {}: {}", tfdude::quote(config->partition), node.error().message);

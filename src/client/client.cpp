@@ -161,6 +161,10 @@ Result<std::vector<JointInfo>> Client::joints(const std::string& partition) {
   return participant_->joints().list(partition);
 }
 
+Result<std::string> Client::description(const std::string& partition) {
+  return participant_->descriptions().of(partition, participant_->discovery().call_deadline());
+}
+
 Result<void> Client::move(const std::string& id, const std::string& parent,
                           const PartialTransform& X_PC) {
   return participant_->writes().move(id, {parent, X_PC});

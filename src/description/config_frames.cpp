@@ -7,6 +7,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "description/file_text.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -60,7 +62,9 @@ Result<void> check_no_cycle(const Config& config) {
 }
 
 Result<void> add_urdf(Config& config, const UrdfPart& part) {
-  auto frames = load_urdf(part);
+  auto text = read_text(part.file);
+  if (!text) return tl::unexpected(std::move(text.error()));
+  auto frames = parse_urdf(*text, part);
   if (!frames) return tl::unexpected(std::move(frames.error()));
   const std::size_t before = config.frames.size();
   for (FrameSpec& frame : *frames) {
@@ -68,7 +72,10 @@ Result<void> add_urdf(Config& config, const UrdfPart& part) {
     config.places.push_back(part.file);
   }
   auto ok = check_names(config).and_then([&] { return check_no_cycle(config); });
-  if (ok) return {};
+  if (ok) {
+    config.robots.push_back(*std::move(text));
+    return {};
+  }
   config.frames.resize(before);
   config.places.resize(before);
   return ok;

@@ -157,6 +157,12 @@ struct FramesRequest {
   std::vector<SeenEpoch> seen{};  ///< the answer must not be older
 };
 
+/// Asks for the partition's robot description, from this byte on. The request's id is the name of
+/// the partition asked.
+struct DescriptionRequest {
+  std::uint64_t from = 0;
+};
+
 /// The last character of an entry of FramesRequest::trees that is the beginning of ids.
 inline constexpr char kAnyName = '*';
 
@@ -169,7 +175,8 @@ struct Request {
   std::string id;
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
                HistoryRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
-               PartialUpdateRequest, CorrelateRequest, ForgetRequest, FramesRequest>
+               PartialUpdateRequest, CorrelateRequest, ForgetRequest, FramesRequest,
+               DescriptionRequest>
       body;
   /// The sender awaits no replies to requests with lower numbers, in whatever order they come. Not
   /// greater than the full number of this request, of which `sequence` has the lower half.
@@ -198,6 +205,15 @@ struct KnownFrame {
   std::string partition;
 };
 
+/// The bytes of a robot description that a request names, at most kMaxDescriptionPart.
+struct DescriptionPart {
+  std::uint64_t size = 0;  ///< of the whole text; 0: there is none
+  std::uint64_t hash = 0;  ///< of the whole text, to recognize parts of another one
+  std::string text;
+};
+
+inline constexpr std::size_t kMaxDescriptionPart = 32768;
+
 struct Done {};
 
 struct Reply {
@@ -207,7 +223,8 @@ struct Reply {
   std::uint64_t epoch = 0;
   /// Done, the error, or the requested data.
   std::variant<Done, Error, SegmentValues, PushedValues, std::vector<HistoryInfo>,
-               std::vector<EdgeConsistency>, std::vector<JointInfo>, std::vector<KnownFrame>>
+               std::vector<EdgeConsistency>, std::vector<JointInfo>, std::vector<KnownFrame>,
+               DescriptionPart>
       body;
   /// For a change: the latest time known to the owner, for the next change of the requester.
   LamportTime lamport_time = 0;

@@ -15,8 +15,8 @@ bool is_one_of(const Request& request) {
 bool is_read_only(const Request& request) {
   const auto* remove = std::get_if<RemoveRequest>(&request.body);
   if (remove != nullptr) return remove->tops.empty();
-  return is_one_of<LookupRequest, HistoryRequest, JointsRequest, ConsistencyRequest, FramesRequest>(
-      request);
+  return is_one_of<LookupRequest, HistoryRequest, JointsRequest, ConsistencyRequest, FramesRequest,
+                   DescriptionRequest>(request);
 }
 
 bool is_change(const Request& request) {

@@ -39,6 +39,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       pushing_(structure_, *transport_, member_, watcher_, options.limits.watches),
       lookups_(structure_, discovery_, requests_, *transport_, watcher_, options.timeout),
       velocities_(structure_, requests_, lookups_),
+      descriptions_(requests_, options.description),
       streams_(edge_links(structure_, *transport_, member_),
                joint_links(structure_, *transport_, member_)) {
   const Lock lock(structure_.mutex);
@@ -135,6 +136,8 @@ std::optional<Reply> Participant::answer_query(const Request& request) {
   }
   if (std::holds_alternative<WatchRequest>(request.body)) return pushing_.answer(request);
   if (std::holds_alternative<FramesRequest>(request.body)) return answer_frames(request);
+  if (std::holds_alternative<DescriptionRequest>(request.body))
+    return descriptions_.answer(request);
   return std::nullopt;
 }
 

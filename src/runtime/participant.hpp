@@ -11,6 +11,7 @@
 #include "tfdude/types/options.hpp"
 #include "tfdude/types/refused.hpp"
 
+#include "runtime/descriptions.hpp"
 #include "runtime/discovery.hpp"
 #include "runtime/joint_calls.hpp"
 #include "runtime/lookups.hpp"
@@ -58,6 +59,7 @@ class Participant final : public TransportHandler {
   [[nodiscard]] Watcher& watcher() { return watcher_; }
   [[nodiscard]] Lookups& lookups() { return lookups_; }
   [[nodiscard]] Velocities& velocities() { return velocities_; }
+  [[nodiscard]] Descriptions& descriptions() { return descriptions_; }
   /// @return kInvalidInput in a client that follows only some frames
   [[nodiscard]] Result<Streams*> streams();
 
@@ -127,6 +129,7 @@ class Participant final : public TransportHandler {
   Pushing pushing_;
   Lookups lookups_;
   Velocities velocities_;
+  Descriptions descriptions_;
   std::atomic<std::uint64_t> jumps_{0};  // of the clock
   Streams streams_;
 };

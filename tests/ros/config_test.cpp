@@ -68,7 +68,7 @@ poses_out:
   CHECK(settings.description_in->part.prefix == "r1/");
   CHECK(settings.description_in->part.strict_limits);
   CHECK(settings.description_in->part.fixed.complete());
-  CHECK(settings.description_out == "/etc/robot.urdf");
+  CHECK(settings.description_out->file == "/etc/robot.urdf");
   REQUIRE(settings.poses_in.size() == 2);
   CHECK(settings.poses_in[0].options.gate == 0.99);
   CHECK(!settings.poses_in[0].options.independent);
@@ -79,6 +79,17 @@ poses_out:
   CHECK(settings.poses_out[1].odometry);
   CHECK(settings.passes_clock);
   CHECK(settings.options.clock == ClockKind::kExternal);
+}
+
+TEST_CASE("ros config: the description may be that of a partition") {
+  Settings settings;
+  REQUIRE(parse_config("description_out: {partition: arm}\n", "f", settings));
+  CHECK(settings.description_out->partition == "arm");
+  CHECK(settings.description_out->file.empty());
+  CHECK_THAT(error_of("description_out: {}\n"), ContainsSubstring("partition is missing"));
+  CHECK_THAT(error_of("description_out: {partition: 'a,b'}\n"),
+             ContainsSubstring("description_out"));
+  CHECK_THAT(error_of("description_out: {file: a}\n"), ContainsSubstring("unknown key"));
 }
 
 TEST_CASE("ros config: what is left out stays as it is") {

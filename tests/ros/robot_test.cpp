@@ -138,6 +138,22 @@ TEST_CASE("ros robot: a description of 400 kB reaches a late node") {
   CHECK(peer.next("/robot_description ") == length_and_sum(large));
 }
 
+TEST_CASE("ros robot: the description that a daemon serves reaches ROS, and its next one") {
+  const RosRig rig;
+  const auto serving = [&](const std::string& description) {
+    Options options = rig.dude().options();
+    options.description = description;
+    return *Node::open("arm", {{"base", "", {}}}, options);
+  };
+  const auto bridge = rig.start_bridge({"--publish-description", "arm"});
+  RosPeer peer(rig.ros_domain());
+  peer.obey("listen /robot_description string latched");
+  for (const std::string& text : {text_of(kRobot), std::string("<robot name='other'/>")}) {
+    const Node arm = serving(text);
+    CHECK(peer.next("/robot_description ") == length_and_sum(text));
+  }
+}
+
 TEST_CASE("ros robot: a path is sent with its covariance about fixed axes") {
   const RosRig rig;
   Transform X{*Pose::create(from_rpy(0.1, 0.2, 1.5), Eigen::Vector3d(1, 2, 3)),

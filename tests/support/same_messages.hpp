@@ -194,6 +194,8 @@ inline void check_same(const Request& actual, const Request& expected) {
     CHECK(std::get<ForgetRequest>(actual.body).incarnation == forget->incarnation);
   } else if (const auto* frames = std::get_if<FramesRequest>(&expected.body)) {
     CHECK(listed(std::get<FramesRequest>(actual.body)) == listed(*frames));
+  } else if (const auto* description = std::get_if<DescriptionRequest>(&expected.body)) {
+    CHECK(std::get<DescriptionRequest>(actual.body).from == description->from);
   } else if (const auto* joints = std::get_if<JointUpdate>(&expected.body)) {
     CHECK(listed(std::get<JointUpdate>(actual.body)) == listed(*joints));
   }

@@ -140,6 +140,7 @@ bool take(const Bytes& bytes) {
       {31, "base", FramesRequest{{"hand", std::string(255, 'i')}}},
       {32, "base",
        FramesRequest{{}, {"arm", "left_*"}, {{"arms", 18446744073709551615ULL}, {"legs", 1}}}},
+      {33, "arm", DescriptionRequest{18446744073709551615ULL}},
       {40, "hand", AddRequest{"arm", unspecified(random), 1}},
       {41, "hand",
        UpdateRequest{{{"hand", unspecified(random)}, {"arm", unspecified(random)}}, time_of(1)}},
@@ -242,7 +243,9 @@ bool take(const Bytes& bytes) {
        std::vector<KnownFrame>{{"world", "", "base"}, {"hand", "world", std::string(255, 'p')}}},
       {10, 1, std::vector<HistoryInfo>{history_info("hand"), HistoryInfo{}}},
       {15, 1, incomplete_values(random, false)},
-      {16, 1, incomplete_values(random, true)}};
+      {16, 1, incomplete_values(random, true)},
+      {17, 1, DescriptionPart{18446744073709551615ULL, 1, std::string(kMaxDescriptionPart, '<')}},
+      {18, 1, DescriptionPart{7, 8, "<robot/>"}}};
 }
 
 [[nodiscard]] inline std::vector<PushedValues> pushed_values(Random& random) {

@@ -222,9 +222,23 @@ Result<void> Reader::description_in(const YAML::Node& node, Settings& settings) 
 }
 
 Result<void> Reader::description_out(const YAML::Node& node, Settings& settings) const {
-  auto file = text({node, node.Mark()}, "description_out");
-  if (!file) return tl::unexpected(std::move(file.error()));
-  settings.description_out = (std::filesystem::path(name()).parent_path() / *file).string();
+  DescriptionOutSettings out;
+  if (!node.IsMap()) {
+    auto file = text({node, node.Mark()}, "description_out");
+    if (!file) return tl::unexpected(std::move(file.error()));
+    out.file = (std::filesystem::path(name()).parent_path() / *file).string();
+  } else {
+    const auto entries = fields(node, std::array<Keys, 1>{"partition"}, "description_out");
+    if (!entries) return tl::unexpected(entries.error());
+    auto ok = require(node, *entries, "partition", "description_out").and_then([&] {
+      return words(*entries, "partition", "description_out", out.partition);
+    });
+    if (!ok) return ok;
+    if (const auto name = check_partition_name(out.partition); !name) {
+      return error(name.error().code, node.Mark(), "description_out: " + name.error().message);
+    }
+  }
+  settings.description_out = std::move(out);
   return {};
 }
 

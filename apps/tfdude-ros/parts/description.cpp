@@ -1,12 +1,11 @@
 #include "description.hpp"
 
-#include <fstream>
-#include <sstream>
 #include <utility>
 
 #include <spdlog/spdlog.h>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/description/config.hpp"
 
 namespace tfdude::ros {
 
@@ -37,7 +36,9 @@ void DescriptionIn::take(const std::string& text) {
   }
   node_.reset();
   text_.clear();
-  auto node = Node::open(settings_.partition, *frames, options_);
+  Options options = options_;
+  options.description = text;
+  auto node = Node::open(settings_.partition, *frames, options);
   if (!node) {
     spdlog::error("partition {}: {}", quote(settings_.partition), node.error().message);
     return;
@@ -51,19 +52,60 @@ void DescriptionIn::take(const std::string& text) {
   changed_.notify_all();
 }
 
-Result<std::unique_ptr<Publisher>> publish_description(RosDomain& domain, const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) return fail(Errc::kConfig, file + ": cannot be read");
-  // A file that no daemon could serve is a mistake.
-  if (const auto frames = load_urdf(UrdfPart{file}); !frames) {
-    return tl::unexpected(frames.error());
-  }
+Result<void> DescriptionOut::start(RosDomain& domain) {
   auto publisher = domain.advertise(description_topic());
-  if (publisher && !(*publisher)->publish(Text{text.str()})) {
-    return fail(Errc::kTransport, file + ": DDS did not take the description");
+  if (!publisher) return tl::unexpected(std::move(publisher.error()));
+  publisher_ = *std::move(publisher);
+  if (settings_.file.empty()) return {};
+  // A file that no daemon could serve is a mistake.
+  Config served;
+  if (auto read = add_urdf(served, UrdfPart{settings_.file}); !read) return read;
+  return publish(served.robots.front());
+}
+
+void DescriptionOut::stop() {
+  worker_.stop();
+  publisher_ = nullptr;
+}
+
+void DescriptionOut::on_change(const Change& change) {
+  if (change.kind == ChangeKind::kPartitionUp && change.partition == settings_.partition) {
+    look();
   }
-  return publisher;
+}
+
+void DescriptionOut::look() {
+  if (settings_.file.empty()) worker_.post([this] { ask(); });
+}
+
+Result<void> DescriptionOut::publish(const std::string& text) {
+  if (publisher_->publish(Text{text})) return {};
+  return fail(Errc::kTransport, "DDS did not take the description");
+}
+
+void DescriptionOut::ask() {
+  const auto text = client_.description(settings_.partition);
+  if (!text) {
+    // It may come up later.
+    if (text.error().code != Errc::kUnknownPartition) {
+      spdlog::warn("no description of partition {}: {}", quote(settings_.partition),
+                   text.error().message);
+    }
+    return;
+  }
+  if (text->empty()) {
+    spdlog::warn("partition {} has no description: it serves no URDF, or more than one",
+                 quote(settings_.partition));
+    return;
+  }
+  if (*text == text_) return;
+  if (const auto done = publish(*text); !done) {
+    spdlog::error("{}", done.error().message);
+    return;
+  }
+  text_ = *text;
+  spdlog::info("publishing the description of partition {}: {} bytes", quote(settings_.partition),
+               text_.size());
 }
 
 }  // namespace tfdude::ros

@@ -43,9 +43,29 @@ class DescriptionIn {
   Worker worker_{4};  // last: it uses the other members
 };
 
-/// Publishes a URDF file on /robot_description.
-/// @return the publisher, which keeps it there for late nodes; kConfig naming the file, kTransport.
-[[nodiscard]] Result<std::unique_ptr<Publisher>> publish_description(RosDomain& domain,
-                                                                     const std::string& file);
+/// Publishes the URDF of a file, or of a partition, on /robot_description, also for late nodes.
+class DescriptionOut {
+ public:
+  DescriptionOut(Client& client, DescriptionOutSettings settings)
+      : client_(client), settings_(std::move(settings)) {}
+
+  /// @return kConfig naming the file, kTransport.
+  [[nodiscard]] Result<void> start(RosDomain& domain);
+  /// Asks the partition's daemon, which may serve another description. Thread-safe; does not wait.
+  void look();
+  void on_change(const Change& change);
+  /// Before the domain ends.
+  void stop();
+
+ private:
+  [[nodiscard]] Result<void> publish(const std::string& text);
+  void ask();
+
+  Client& client_;
+  const DescriptionOutSettings settings_;
+  std::unique_ptr<Publisher> publisher_;
+  std::string text_;
+  Worker worker_{4};  // last: it uses the other members
+};
 
 }  // namespace tfdude::ros

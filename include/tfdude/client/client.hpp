@@ -180,6 +180,11 @@ class TFDUDE_EXPORT Client {
   /// @return kUnknownPartition.
   [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition);
 
+  /// The robot description (URDF) of a partition, Options::description of its Node; empty: it has
+  /// none. One round trip per 32 KiB.
+  /// @return kUnknownPartition; kUnsupported (an owner of protocol 1.0).
+  [[nodiscard]] Result<std::string> description(const std::string& partition);
+
   /// Moves a frame, with all frames below it, to a new parent (empty: makes it a root). The owner
   /// stays the same.
   /// @param X_PC  the new edge's value, a Transform or parts of one; absent parts keep their value,

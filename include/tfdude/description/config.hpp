@@ -20,6 +20,7 @@ struct Config {
   StatedCovariance covariance{};
   std::vector<FrameSpec> frames;
   std::vector<std::string> places;  ///< where each of the frames is described, for messages
+  std::vector<std::string> robots;  ///< the text of each URDF
 };
 
 /// Reads a YAML file and the URDF files that it names.

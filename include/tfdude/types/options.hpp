@@ -83,6 +83,9 @@ struct Options {
   /// time from Client::publish_clock() of any participant of the domain, or from
   /// Client::set_time(). All participants of a domain should have the same kind.
   ClockKind clock = ClockKind::kSystem;
+  /// The robot description (URDF) of a Node's partition, which others can ask for. It is only
+  /// passed on: the frames are those given to Node::open().
+  std::string description;
   /// Limits of a Node.
   PartitionLimits limits{};
   /// Maximum time that the destructor of a client waits until the values it has streamed (publish,

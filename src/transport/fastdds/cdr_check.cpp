@@ -1,5 +1,6 @@
 #include "transport/fastdds/cdr_check.hpp"
 
+#include "partition/messages.hpp"
 #include "transport/fastdds/kinds.hpp"
 
 namespace tfdude::fastdds {
@@ -86,6 +87,9 @@ void request_body(CdrWalk& walk) {
       break;
     case kJointStates:
       walk.id();
+      break;
+    case kDescription:
+      walk.skip(8, 8);
       break;
     case kFrames:
       walk.sequence([&] { walk.id(); });
@@ -177,6 +181,10 @@ bool well_formed_reply(const std::uint8_t* data, std::size_t size) {
         walk.id();
         walk.id();
       });
+      break;
+    case kDescriptionPart:
+      walk.skip(2 * 8, 8);
+      walk.string(kMaxDescriptionPart);
       break;
     default:;  // a reply of a later version, which is rejected by name
   }

@@ -212,6 +212,8 @@ Result<void> read_body(const wire::Request& sample, Request& request) {
       return as(ForgetRequest{string_of(body.forget().partition()), body.forget().incarnation()});
     case kFrames:
       return take(request, read_frames(body.structure()));
+    case kDescription:
+      return as(DescriptionRequest{body.description()});
     default:
       // Which one it is, is not known either: Fast DDS 3 replaces the number.
       return fail(Errc::kUnsupported,

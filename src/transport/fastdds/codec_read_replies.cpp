@@ -146,6 +146,10 @@ Result<void> read_body(const wire::ReplyBody& body, Reply& reply) {
     }
     case kKnownFrames:
       return put<std::vector<KnownFrame>>(reply, read_frames(body.structure()));
+    case kDescriptionPart:
+      reply.body = DescriptionPart{body.description().size(), body.description().hash(),
+                                   body.description().text()};
+      return {};
     default:
       return fail(Errc::kUnsupported,
                   "this kind of reply is not known to protocol " + to_string(kProtocolVersion));

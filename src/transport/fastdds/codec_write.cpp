@@ -174,6 +174,7 @@ struct BodyWriter {
   }
   void operator()(const ConsistencyRequest& asked) { out.consistency(asked.all ? 1 : 0); }
   void operator()(const FramesRequest& asked) { out.structure(write_frames(asked)); }
+  void operator()(const DescriptionRequest& asked) { out.description(asked.from); }
 };
 
 }  // namespace
@@ -326,6 +327,13 @@ struct ReplyWriter {
     out.joint_states(std::move(body));
   }
   void operator()(const std::vector<KnownFrame>& known) { out.structure(write_frames(known)); }
+  void operator()(const DescriptionPart& part) {
+    wire::DescriptionPart body;
+    body.size(part.size);
+    body.hash(part.hash);
+    body.text(part.text.substr(0, kMaxDescriptionPart));
+    out.description(std::move(body));
+  }
 };
 
 }  // namespace

@@ -24,7 +24,8 @@ enum RequestKind : std::uint8_t {
   kForget = 16,
   kProbe = 17,
   kFrames = 18,
-  kLastRequestKind = kFrames
+  kDescription = 19,
+  kLastRequestKind = kDescription
 };
 
 enum ReplyKind : std::uint8_t {
@@ -40,7 +41,8 @@ enum ReplyKind : std::uint8_t {
   kAlive = 10,
   kKnownFrames = 11,
   kIncomplete = 12,
-  kLastReplyKind = kIncomplete
+  kDescriptionPart = 13,
+  kLastReplyKind = kDescriptionPart
 };
 
 }  // namespace tfdude::fastdds

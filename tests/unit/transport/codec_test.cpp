@@ -108,6 +108,11 @@ TEST_CASE("replies are decoded as they were encoded") {
       for (std::size_t i = 0; i < came.size(); ++i) CHECK(listed(came[i]) == listed((*joints)[i]));
     } else if (const auto* frames = std::get_if<std::vector<KnownFrame>>(&one.body)) {
       CHECK(listed(std::get<std::vector<KnownFrame>>(arrived->body)) == listed(*frames));
+    } else if (const auto* part = std::get_if<DescriptionPart>(&one.body)) {
+      const auto& came = std::get<DescriptionPart>(arrived->body);
+      CHECK(came.size == part->size);
+      CHECK(came.hash == part->hash);
+      CHECK(came.text == part->text);
     }
   }
 }

@@ -1,0 +1,71 @@
+#include "runtime/descriptions.hpp"
+
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude {
+namespace {
+
+// FNV-1a with 64 bits.
+std::uint64_t hash_of(const std::string& text) {
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  return hash;
+}
+
+}  // namespace
+
+Descriptions::Descriptions(Requests& requests, std::string own)
+    : requests_(requests), own_(std::move(own)), hash_(hash_of(own_)) {}
+
+Reply Descriptions::answer(const Request& request) const {
+  const std::uint64_t from = std::get<DescriptionRequest>(request.body).from;
+  DescriptionPart part{own_.size(), hash_, {}};
+  if (from < own_.size()) part.text = own_.substr(from, kMaxDescriptionPart);
+  return {request.sequence, 0, std::move(part)};
+}
+
+Result<DescriptionPart> Descriptions::ask(const std::string& partition, std::uint64_t from,
+                                          const Deadline& deadline) {
+  return requests_.retry_on_stale_route(
+      deadline,
+      [&](const Directory& directory) -> Result<Part> {
+        const auto owner = directory.owner(partition);
+        if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+        return route_to(directory, *owner, Request{0, partition, DescriptionRequest{from}});
+      },
+      [&](Part& part) -> Result<DescriptionPart> {
+        std::vector<Part> parts{std::move(part)};
+        Reply reply = std::move(requests_.ask(parts, deadline).front());
+        if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
+        auto* answer = std::get_if<DescriptionPart>(&reply.body);
+        if (answer != nullptr) return std::move(*answer);
+        return fail(Errc::kUnsupported, "partition " + quote(partition) +
+                                            " gave another answer than that it was asked for");
+      });
+}
+
+Result<std::string> Descriptions::of(const std::string& partition, const Deadline& deadline) {
+  std::string text;
+  std::uint64_t hash = 0;
+  while (true) {
+    auto part = ask(partition, text.size(), deadline);
+    if (!part) return tl::unexpected(std::move(part.error()));
+    if (part->size == 0) return std::string();
+    if (!text.empty() && part->hash != hash) {
+      // It was replaced meanwhile.
+      text.clear();
+      continue;
+    }
+    hash = part->hash;
+    text += part->text;
+    if (text.size() == part->size && hash_of(text) == hash) return text;
+    if (part->text.empty() || text.size() >= part->size) {
+      return fail(Errc::kInvalidInput, "partition " + quote(partition) +
+                                           " sent a description that does not fit its size");
+    }
+  }
+}
+
+}  // namespace tfdude
