@@ -18,12 +18,12 @@ struct UrdfJoint {
   std::optional<double> position{};
   /// Of the position [rad or m]; absent: the root of unmeasured_variance().
   std::optional<double> stddev{};
-  /// Of samples that come without one [rad or m]; absent: unspecified. Not for a joint that mimics
-  /// another.
-  std::optional<double> sample_stddev{};
   /// Of the joint's origin. Absent: exact for a joint that moves, as its error is that of its
   /// position; UrdfPart::fixed for one that does not.
   std::optional<StatedCovariance> origin{};
+  /// Of samples that come without one [rad or m]; absent: unspecified. Not for a joint that mimics
+  /// another.
+  std::optional<double> sample_stddev{};
 };
 
 /// A URDF file, or a part of it, and its place among the other frames.
