@@ -82,7 +82,8 @@ Result<void> Bridge::start_in(const Settings& settings) {
     if (auto started = clock_in_->start(*ros_, is_own); !started) return started;
   }
   if (settings.description_in) {
-    description_in_.emplace(*settings.description_in, settings.options);
+    description_in_.emplace(*settings.description_in, settings.options,
+                            frames_in_ ? &*frames_in_ : nullptr);
     if (auto started = description_in_->start(*ros_, is_own); !started) return started;
     // A node that publishes the same frames on /tf would otherwise be first.
     if (frames_in_) (void)description_in_->wait_until_served(kDescriptionFirst);

@@ -45,6 +45,10 @@ Result<void> Node::clear_history(const std::string& id) {
 
 std::size_t Node::clear_history() { return participant_->forest().clear_histories(Time::min()); }
 
+Result<void> Node::release(const std::vector<std::string>& ids) {
+  return participant_->member().release(ids, participant_->discovery().call_deadline());
+}
+
 RefusedCounts Node::refused() const { return participant_->refused(); }
 
 const std::string& Node::partition() const { return participant_->member().name(); }

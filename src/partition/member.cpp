@@ -107,6 +107,12 @@ Reply Member::answer(const Request& request, const std::optional<Error>& refusal
   return reply;
 }
 
+Result<void> Member::release(const std::vector<std::string>& ids, Time now) {
+  auto released = partition_->release(ids, now);
+  if (released) outcome_.to_commit = outcome_.routes = true;
+  return released;
+}
+
 Result<void> Member::forget(const std::string& partition, Time now) {
   auto forgotten = directory_.forget(partition, 0, now);
   if (forgotten) outcome_.heard = outcome_.routes = true;

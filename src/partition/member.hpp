@@ -53,6 +53,8 @@ class Member {
 
   /// As on_request(), for its own process, which sees its changes before they are stored. [joints]
   [[nodiscard]] Reply answer(const Request& request, const std::optional<Error>& refusal, Time now);
+  /// As Partition::release(). [joints]
+  [[nodiscard]] Result<void> release(const std::vector<std::string>& ids, Time now);
   /// Drops everything about an unreachable partition. @return kPartitionTaken if it is reachable.
   [[nodiscard]] Result<void> forget(const std::string& partition, Time now);
 

@@ -79,6 +79,10 @@ class Partition {
   /// Whether this partition owns a joint of that name, or one that follows it. Takes no lock.
   [[nodiscard]] bool moves(std::string_view joint) const { return joints_.moves(joint); }
 
+  /// Gives up these frames. Those below stay, and wait for other frames of these ids.
+  /// @return kUnknownFrame, kNotOwner: then it gives up none
+  [[nodiscard]] Result<void> release(const std::vector<std::string>& ids, Time now);
+
   /// What would have to be yielded according to the directory's current state. O(contested frames).
   [[nodiscard]] std::set<PendingYield> pending_yields() const {
     return directory_.pending_yields();

@@ -152,6 +152,22 @@ bool Partition::release(const std::string& id) {
   return true;
 }
 
+Result<void> Partition::release(const std::vector<std::string>& ids, Time now) {
+  for (const std::string& id : ids) {
+    const auto there = forest_.info(id);
+    if (!there) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+    if (there->owner == kHeldHere) continue;
+    return fail(Errc::kNotOwner, "frame " + quote(id) + " belongs to partition " +
+                                     quote(directory_.name(there->owner)) + ", not to " +
+                                     quote(name_));
+  }
+  for (const std::string& id : ids) {
+    if (release(id)) tell_dropped(id, now);
+  }
+  pages_.close_epoch();
+  return {};
+}
+
 // Others must not remove the frames below, as they do for a tombstone of a removed frame.
 void Partition::tell_dropped(const std::string& id, Time now) {
   pages_.leave({id, directory_.next_lamport_time(now), Tombstone::Kind::kDropped, {}});

@@ -158,6 +158,14 @@ Reply MemberRunner::answer(const Request& request) {
   return reply;
 }
 
+Result<void> MemberRunner::release(const std::vector<std::string>& ids, const Deadline& deadline) {
+  if (auto in = still_in(); !in) return in;
+  if (auto why = refusal()) return tl::unexpected(*std::move(why));
+  Result<void> released;
+  input_of_joints([&](Member& member) { released = member.release(ids, wall_clock()); });
+  return released ? commits_->flush(deadline.at()) : released;
+}
+
 Result<void> MemberRunner::forget(const std::string& partition) {
   Result<void> forgotten;
   input([&](Member& member) { forgotten = member.forget(partition, wall_clock()); });

@@ -63,6 +63,8 @@ class MemberRunner final : private CommitLoop::Effects {
   [[nodiscard]] std::optional<Reply> on_request(const PeerId& from, const Request& request);
   /// A request of this process.
   [[nodiscard]] Reply answer(const Request& request);
+  /// As Node::release()
+  [[nodiscard]] Result<void> release(const std::vector<std::string>& ids, const Deadline& deadline);
   /// @return as Member::forget
   [[nodiscard]] Result<void> forget(const std::string& partition);
   /// Applies joint positions. @return the number of moved edges; kInvalidInput

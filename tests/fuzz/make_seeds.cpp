@@ -9,8 +9,10 @@
 #include <sqlite3.h>
 #include <string>
 
+#include "ros/ros_bytes.hpp"
 #include "store/sqlite_store.hpp"
 #include "support/samples.hpp"
+#include "tfdude-ros/fastdds/convert.hpp"
 
 namespace tfdude::fuzz {
 namespace {
@@ -33,6 +35,30 @@ void write_samples(const std::filesystem::path& folder) {
     const std::string rest = kind.name.substr(kind.name.rfind(' ') + 1);
     write(folder / topic, rest, kind.valid);
   }
+}
+
+// The first byte is the type.
+template <class Message>
+void write_ros(const std::filesystem::path& folder, ros::MessageType type, const Message& message) {
+  Bytes bytes = ros::bytes_of(type, ros::generated(message));
+  bytes.insert(bytes.begin(), static_cast<std::uint8_t>(type));
+  write(folder / "ros", std::to_string(bytes.front()), bytes);
+}
+
+void write_ros(const std::filesystem::path& folder) {
+  using ros::MessageType;
+  const ros::RosPose pose{{1, 2, 3}, {0, 0, 0.6, 0.8}};
+  ros::PoseWithCovariance measured{testing::time_of(3), "map", pose, {}};
+  measured.covariance[0] = 0.25;
+  write_ros(
+      folder, MessageType::kTf,
+      ros::TfMessage{{testing::time_of(1), "odom", "base", pose}, {{}, "base", "/imu", pose}});
+  write_ros(folder, MessageType::kJointState,
+            ros::JointState{testing::time_of(2), {"elbow", "wrist"}, {0.5, -1}});
+  write_ros(folder, MessageType::kString, ros::Text{"<robot/>"});
+  write_ros(folder, MessageType::kPoseWithCovarianceStamped, measured);
+  write_ros(folder, MessageType::kOdometry, ros::Odometry{measured, "base", {1, 0, 0}, {}, {}});
+  write_ros(folder, MessageType::kClock, ros::ClockTime{testing::time_of(4)});
 }
 
 void write_choices(const std::filesystem::path& folder) {
@@ -119,6 +145,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   tfdude::fuzz::write_samples(argv[1]);
+  tfdude::fuzz::write_ros(argv[1]);
   tfdude::fuzz::write_choices(argv[1]);
   return tfdude::fuzz::write_states(argv[1]) ? 0 : 1;
 }

@@ -1,5 +1,7 @@
 // Joints, descriptions and poses, both ways.
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <fstream>
@@ -105,10 +107,11 @@ TEST_CASE("ros robot: a description is served as by a daemon, and a new one repl
   peer.publish("/robot_description", "@" + kRobot);
   const auto bridge = rig.start_bridge({"--description", "--joints", "0.001", "--prefix", "r1/"});
   Client client = rig.client();
-  REQUIRE(eventually([&] { return client.exists("r1/base_link") || !client.frames()->empty(); }));
+  REQUIRE(eventually([&] { return client.frames()->size() > 1; }));
   const auto frames = *client.frames();
   for (const Frame& frame : frames) {
-    CHECK(frame.partition == "robot");
+    // Where the root link is, /tf may say.
+    CHECK(frame.partition == (frame.parent.empty() ? "ros" : "robot"));
     CHECK(frame.id.rfind("r1/", 0) == 0);
   }
   const std::string name = client.joints("robot")->front().name;
@@ -123,7 +126,53 @@ TEST_CASE("ros robot: a description is served as by a daemon, and a new one repl
       files.write("other.urdf", "<robot name=\"other\"><link name=\"only\"/></robot>");
   peer.publish("/robot_description", "this is no URDF");
   peer.publish("/robot_description", "@" + other);
-  CHECK(eventually([&] { return client.exists("r1/only") && !client.exists(frames[0].id); }));
+  const auto linked = std::find_if(frames.begin(), frames.end(),
+                                   [](const Frame& frame) { return frame.partition == "robot"; });
+  REQUIRE(linked != frames.end());
+  CHECK(eventually([&] { return client.exists("r1/only") && !client.exists(linked->id); }));
+}
+
+TEST_CASE("ros robot: a description that comes after its links on /tf gets them") {
+  const RosRig rig;
+  RosPeer peer(rig.ros_domain());
+  peer.obey("advertise /robot_description string latched");
+  const auto bridge = rig.start_bridge({"--description"});
+  peer.advertise("/tf", "tf", "reliable");
+  Client client = rig.client();
+  const auto place = [](double x) {
+    return Pose::trusted(Eigen::Quaterniond::Identity(), {x, 0, 0});
+  };
+  const auto publish = [&](const std::vector<testing::RosTransform>& transforms) {
+    const auto now = std::chrono::system_clock::now();
+    peer.publish(
+        "/tf", testing::tf_message(std::chrono::time_point_cast<Time::duration>(now), transforms));
+  };
+  REQUIRE(eventually([&] {
+    publish({{"odom", "base", place(1)}, {"base", "arm", place(9)}, {"arm", "camera", place(4)}});
+    return client.lookup("odom", "camera").has_value();
+  }));
+
+  const testing::TemporaryDirectory files;
+  peer.publish("/robot_description",
+               "@" + files.write("r.urdf",
+                                 "<robot name='r'><link name='base'/><link name='arm'/>"
+                                 "<joint name='j' type='fixed'><parent link='base'/>"
+                                 "<child link='arm'/><origin xyz='2 0 0'/></joint></robot>"));
+  const auto partition_of = [&](const std::string& id) {
+    for (const Frame& frame : *client.frames()) {
+      if (frame.id == id) return frame.partition;
+    }
+    return std::string();
+  };
+  CHECK(eventually([&] { return partition_of("arm") == "robot"; }));
+  CHECK(partition_of("base") == "ros");
+  CHECK(partition_of("camera") == "ros");
+  // The robot moves on, with what is below it.
+  CHECK(eventually([&] {
+    publish({{"odom", "base", place(3)}, {"base", "arm", place(9)}});
+    const auto X = client.lookup("odom", "camera");
+    return X && X->pose.translation().x() == 9;
+  }));
 }
 
 TEST_CASE("ros robot: a description of 400 kB reaches a late node") {

@@ -217,4 +217,22 @@ TEST_CASE("ros import: after a rejected change a frame starts over") {
   CHECK(rig.import.counts().rejected == 3);
 }
 
+TEST_CASE("ros import: frames of a description are given up, and what is below them stays") {
+  Rig rig;
+  CHECK(text(rig.take({edge("odom", "base", 1), edge("base", "arm", 1), edge("arm", "eye", 1)})) ==
+        "root odom; add base under odom; add arm under base; add eye under arm; "
+        "at 1000 base arm eye; ");
+  CHECK(rig.import.give_up({"arm", "hand"}) == std::vector<std::string>{"arm"});
+  // Nobody has it yet; also a static transform of it waits, and is not taken later.
+  CHECK(text(rig.take({edge("base", "arm", 2), edge("arm", "eye", 2)})) == "");
+  CHECK(text(rig.take({edge("arm", "hand", 2)}, "w1", true)) == "");
+  rig.holdings["arm"] = rig.holdings["hand"] = {Holding::Kind::kOther, "robot"};
+  CHECK(text(rig.retry()) == "");
+  CHECK(text(rig.take({edge("base", "arm", 3), edge("arm", "eye", 3)})) == "at 3000 eye; ");
+  // The next description has other frames.
+  rig.holdings.clear();
+  CHECK(rig.import.give_up({}).empty());
+  CHECK(text(rig.take({edge("base", "arm", 4)})) == "add arm under base; at 4000 arm; ");
+}
+
 }  // namespace tfdude::ros

@@ -54,6 +54,24 @@ TfImport::Changes TfImport::retry(SteadyTime now, const WhoHolds& who_holds) {
   return changes;
 }
 
+std::vector<std::string> TfImport::give_up(std::set<std::string> frames) {
+  given_up_ = std::move(frames);
+  std::vector<std::string> taken;
+  for (const std::string& id : given_up_) {
+    const auto entry = entries_.find(id);
+    if (entry == entries_.end()) continue;
+    if (entry->second.exists) taken.push_back(id);
+    entries_.erase(entry);
+  }
+  return taken;
+}
+
+Holding TfImport::holding(const std::string& id, const WhoHolds& who_holds) const {
+  Holding holding = who_holds(id);
+  if (holding.kind == Holding::Kind::kOther || given_up_.count(id) == 0) return holding;
+  return {Holding::Kind::kUnknown, "it is one of the robot's description"};
+}
+
 std::optional<std::string> TfImport::rejected(const std::string& id, const Error& error) {
   ++counts_.rejected;
   if (error.code == Errc::kTooOld || error.code == Errc::kStampTaken) return std::nullopt;
@@ -109,7 +127,7 @@ std::optional<TfImport::Checked> TfImport::check(const TransformStamped& transfo
 bool TfImport::may_take(const Checked& one, const std::string& writer, const WhoHolds& who_holds,
                         Changes& changes) {
   if (entries_.count(one.id) != 0) return true;
-  const Holding holding = who_holds(one.id);
+  const Holding holding = this->holding(one.id, who_holds);
   switch (holding.kind) {
     case Holding::Kind::kOther:
       report_once("owned " + one.id + writer,
@@ -131,7 +149,7 @@ bool TfImport::may_take(const Checked& one, const std::string& writer, const Who
 
 bool TfImport::has_parent(const Checked& one, const WhoHolds& who_holds, Changes& changes) {
   if (entries_.count(one.parent) != 0) return true;
-  const Holding holding = who_holds(one.parent);
+  const Holding holding = this->holding(one.parent, who_holds);
   if (holding.kind == Holding::Kind::kUnknown) {
     report_once("unknown " + one.parent,
                 "not taken for now: frame " + quote(one.parent) + ", the parent of " +

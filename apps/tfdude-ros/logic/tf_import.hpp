@@ -91,6 +91,11 @@ class TfImport {
   /// owner. Call when the structure has changed.
   [[nodiscard]] Changes retry(SteadyTime now, const WhoHolds& who_holds);
 
+  /// Takes none of these frames, which another partition is about to serve: they replace those of
+  /// the last call. What is below stays as it is.
+  /// @return those that were taken before: the partition must release them
+  [[nodiscard]] std::vector<std::string> give_up(std::set<std::string> frames);
+
   /// The partition did not apply a change of this frame. Unless only a stamp was wrong, it starts
   /// over with the next message.
   /// @return a report for the log, if it is the first of this kind
@@ -126,6 +131,7 @@ class TfImport {
                 SteadyTime now, const WhoHolds& who_holds, Changes& changes);
   [[nodiscard]] std::optional<Checked> check(const TransformStamped& transform, bool is_static,
                                              Changes& changes);
+  [[nodiscard]] Holding holding(const std::string& id, const WhoHolds& who_holds) const;
   [[nodiscard]] bool may_take(const Checked& one, const std::string& writer,
                               const WhoHolds& who_holds, Changes& changes);
   [[nodiscard]] bool has_parent(const Checked& one, const WhoHolds& who_holds, Changes& changes);
@@ -143,6 +149,7 @@ class TfImport {
   ImportSettings settings_;
   std::unordered_map<std::string, Entry> entries_;
   std::map<std::string, HeldBack> held_back_;  // static transforms, by the child's name in ROS
+  std::set<std::string> given_up_;
   std::set<std::string> reported_;
   std::optional<SteadyTime> jump_reported_;
   ImportCounts counts_;

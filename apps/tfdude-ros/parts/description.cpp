@@ -1,5 +1,7 @@
 #include "description.hpp"
 
+#include <algorithm>
+#include <set>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -29,18 +31,20 @@ bool DescriptionIn::wait_until_served(std::chrono::milliseconds patience) {
 
 void DescriptionIn::take(const std::string& text) {
   if (text == text_) return;
-  const auto frames = parse_urdf(text, settings_.part);
+  auto frames = parse_urdf(text, settings_.part);
   if (!frames) {
     spdlog::error("not served: {}", frames.error().message);
     return;
   }
   node_.reset();
   text_.clear();
+  leave_root_to_tf(*frames);
   Options options = options_;
   options.description = text;
   auto node = Node::open(settings_.partition, *frames, options);
   if (!node) {
     spdlog::error("partition {}: {}", quote(settings_.partition), node.error().message);
+    if (frames_in_ != nullptr) frames_in_->give_up({});
     return;
   }
   node_.emplace(*std::move(node));
@@ -50,6 +54,21 @@ void DescriptionIn::take(const std::string& text) {
   const std::lock_guard<std::mutex> lock(mutex_);
   served_ = true;
   changed_.notify_all();
+}
+
+// Where a robot stands is said on /tf, by odometry or localization: unless the configuration says
+// it, its root link is a frame of /tf.
+void DescriptionIn::leave_root_to_tf(std::vector<FrameSpec>& frames) {
+  if (frames_in_ == nullptr) return;
+  const auto root = std::find_if(frames.begin(), frames.end(),
+                                 [](const FrameSpec& frame) { return frame.parent.empty(); });
+  if (root != frames.end()) {
+    frames_in_->add_root(root->id);
+    frames.erase(root);
+  }
+  std::set<std::string> ids;
+  for (const FrameSpec& frame : frames) ids.insert(frame.id);
+  frames_in_->give_up(std::move(ids));
 }
 
 Result<void> DescriptionOut::start(RosDomain& domain) {

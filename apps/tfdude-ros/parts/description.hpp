@@ -6,11 +6,13 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "tfdude/client/node.hpp"
 
 #include "../ros_domain.hpp"
 #include "../settings.hpp"
+#include "frames_in.hpp"
 #include "worker.hpp"
 
 namespace tfdude::ros {
@@ -20,8 +22,9 @@ namespace tfdude::ros {
 class DescriptionIn {
  public:
   /// @param options  as for a daemon
-  DescriptionIn(DescriptionSettings settings, Options options)
-      : settings_(std::move(settings)), options_(std::move(options)) {}
+  /// @param frames_in  gives up frames of the robot; null: /tf is not read
+  DescriptionIn(DescriptionSettings settings, Options options, FramesIn* frames_in)
+      : settings_(std::move(settings)), options_(std::move(options)), frames_in_(frames_in) {}
 
   /// @param is_own  as for FramesIn. @return kTransport.
   [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
@@ -32,9 +35,11 @@ class DescriptionIn {
 
  private:
   void take(const std::string& text);
+  void leave_root_to_tf(std::vector<FrameSpec>& frames);
 
   const DescriptionSettings settings_;
   const Options options_;
+  FramesIn* const frames_in_;
   std::string text_;          // of the robot that is served
   std::optional<Node> node_;  // serves it
   std::mutex mutex_;

@@ -40,12 +40,29 @@ void FramesIn::on_change(const Change& change) {
   if (own || retrying_.exchange(true)) return;
   worker_.post([this] {
     retrying_ = false;
+    const std::lock_guard<std::mutex> lock(mutex_);
     apply(import_.retry(Worker::Clock::now(),
                         [this](const std::string& id) { return structure_.holding(id); }));
   });
 }
 
+void FramesIn::add_root(const std::string& id) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto added = node_.add(id, {}, Transform(), node_.partition());
+  if (!added && added.error().code != Errc::kAlreadyExists) rejected(id, added.error());
+}
+
+void FramesIn::give_up(std::set<std::string> frames) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto taken = import_.give_up(std::move(frames));
+  if (taken.empty()) return;
+  if (const auto released = node_.release(taken); !released) {
+    spdlog::error("frames of /tf are not given up: {}", released.error().message);
+  }
+}
+
 void FramesIn::take(const TfMessage& message, const std::string& writer, bool is_static) {
+  const std::lock_guard<std::mutex> lock(mutex_);
   apply(import_.take(message, writer, is_static, Worker::Clock::now(),
                      [this](const std::string& id) { return structure_.holding(id); }));
 }

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <atomic>
+#include <mutex>
+#include <set>
 #include <string>
 
 #include "tfdude/client/node.hpp"
@@ -25,6 +27,12 @@ class FramesIn {
   /// Nothing is taken any more. Logs what was not.
   void stop();
 
+  /// Serves a frame as a root, until /tf names its parent. Thread-safe.
+  void add_root(const std::string& id);
+  /// Leaves these frames to another partition of this process, instead of those of the last call.
+  /// Thread-safe.
+  void give_up(std::set<std::string> frames);
+
   /// The structure of tf-dude's domain has changed. Thread-safe.
   void on_change(const Change& change);
 
@@ -37,6 +45,7 @@ class FramesIn {
 
   Node& node_;
   Structure structure_;
+  std::mutex mutex_;  // so that what is decided is also applied before the next decision
   TfImport import_;
   std::atomic<bool> retrying_{false};
   Worker worker_;  // last: it uses the other members

@@ -53,6 +53,12 @@ class TFDUDE_EXPORT Node : public Client {
   /// Likewise for all dynamic edges of the partition, as one commit. @return how many
   std::size_t clear_history();
 
+  /// Gives up frames of the partition without removing those below them, for instance to let
+  /// another partition have them. The frames below wait until there is a frame of that id again.
+  /// Returns when that is stored, if it is, and published.
+  /// @return kUnknownFrame, kNotOwner: then it gives up none; kState.
+  [[nodiscard]] Result<void> release(const std::vector<std::string>& ids);
+
   /// What limits have rejected since the start.
   [[nodiscard]] RefusedCounts refused() const;
 
