@@ -159,7 +159,8 @@ TEST_CASE("ros robot: a description that comes after its links on /tf gets them"
                                  "<joint name='j' type='fixed'><parent link='base'/>"
                                  "<child link='arm'/><origin xyz='2 0 0'/></joint></robot>"));
   const auto partition_of = [&](const std::string& id) {
-    for (const Frame& frame : *client.frames()) {
+    const auto frames = *client.frames();
+    for (const Frame& frame : frames) {
       if (frame.id == id) return frame.partition;
     }
     return std::string();
@@ -169,7 +170,7 @@ TEST_CASE("ros robot: a description that comes after its links on /tf gets them"
   CHECK(partition_of("camera") == "ros");
   // The robot moves on, with what is below it.
   CHECK(eventually([&] {
-    publish({{"odom", "base", place(3)}, {"base", "arm", place(9)}});
+    publish({{"odom", "base", place(3)}, {"base", "arm", place(9)}, {"arm", "camera", place(4)}});
     const auto X = client.lookup("odom", "camera");
     return X && X->pose.translation().x() == 9;
   }));
