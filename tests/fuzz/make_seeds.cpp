@@ -48,17 +48,16 @@ void write_ros(const std::filesystem::path& folder, ros::MessageType type, const
 void write_ros(const std::filesystem::path& folder) {
   using ros::MessageType;
   const ros::RosPose pose{{1, 2, 3}, {0, 0, 0.6, 0.8}};
-  ros::PoseWithCovariance measured{testing::time_of(3), "map", pose, {}};
+  ros::PoseWithCovariance measured{time_of(3), "map", pose, {}};
   measured.covariance[0] = 0.25;
-  write_ros(
-      folder, MessageType::kTf,
-      ros::TfMessage{{testing::time_of(1), "odom", "base", pose}, {{}, "base", "/imu", pose}});
+  write_ros(folder, MessageType::kTf,
+            ros::TfMessage{{time_of(1), "odom", "base", pose}, {{}, "base", "/imu", pose}});
   write_ros(folder, MessageType::kJointState,
-            ros::JointState{testing::time_of(2), {"elbow", "wrist"}, {0.5, -1}});
+            ros::JointState{time_of(2), {"elbow", "wrist"}, {0.5, -1}});
   write_ros(folder, MessageType::kString, ros::Text{"<robot/>"});
   write_ros(folder, MessageType::kPoseWithCovarianceStamped, measured);
   write_ros(folder, MessageType::kOdometry, ros::Odometry{measured, "base", {1, 0, 0}, {}, {}});
-  write_ros(folder, MessageType::kClock, ros::ClockTime{testing::time_of(4)});
+  write_ros(folder, MessageType::kClock, ros::ClockTime{time_of(4)});
 }
 
 void write_choices(const std::filesystem::path& folder) {
