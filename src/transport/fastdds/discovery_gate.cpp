@@ -11,18 +11,34 @@ namespace tfdude::fastdds {
 namespace {
 
 using Flag = std::shared_ptr<std::atomic<bool>>;
+using Count = std::shared_ptr<std::atomic<int>>;
+
+// A domain has ports for so many participants of a host.
+constexpr std::uint32_t kParticipantsOfHost = 120;
+
+constexpr std::uint32_t kUsualSendBuffer = 212'992;  // bytes, Linux's default
 
 struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   GatedDescriptor(std::shared_ptr<etransport::TransportDescriptorInterface> guarded, Flag flag,
-                  std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs)
+                  Count count, std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
+        ports(std::move(count)),
         gate(std::move(inward)),
         life_signs(std::move(signs)) {}
 
   [[nodiscard]] etransport::TransportInterface* create_transport() const override;
 
+  // A reliable writer requests acknowledgements from all its readers after so many bytes. If the
+  // profile leaves the size to the system, the guarded transport finds it out, but the descriptor
+  // here still says zero: then it would request them with each DDS sample.
+  [[nodiscard]] std::uint32_t min_send_buffer_size() const override {
+    const std::uint32_t set = ChainingTransportDescriptor::min_send_buffer_size();
+    return set != 0 ? set : kUsualSendBuffer;
+  }
+
   Flag open;
+  Count ports;
   std::shared_ptr<Gate> gate;
   std::shared_ptr<LifeSigns> life_signs;
   std::shared_ptr<SendThrottle> throttle = std::make_shared<SendThrottle>();
@@ -44,6 +60,14 @@ class GatedTransport final : public SendFilter {
       : SendFilter(descriptor), descriptor_(descriptor) {}
 
   etransport::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
+
+  bool OpenInputChannel(const ertps::Locator_t& at,
+                        etransport::TransportReceiverInterface* receiver,
+                        std::uint32_t max_size) override {
+    if (!SendFilter::OpenInputChannel(at, receiver, max_size)) return false;
+    if (!ertps::IPLocator::isMulticast(at)) ++*descriptor_.ports;
+    return true;
+  }
 
   void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
                std::uint32_t size, const ertps::Locator_t& local,
@@ -110,6 +134,12 @@ bool only_udp(const edds::DomainParticipantQos& qos) {
          std::all_of(transports.begin(), transports.end(), is_udp);
 }
 
+// One for discovery and one for data, which depend on the domain.
+bool uses_standard_ports(const edds::DomainParticipantQos& qos) {
+  return qos.wire_protocol().builtin.metatrafficUnicastLocatorList.empty() &&
+         qos.wire_protocol().default_unicast_locator_list.empty();
+}
+
 }  // namespace
 
 bool DiscoveryGate::hears_announcements(const edds::DomainParticipantQos& qos) {
@@ -117,13 +147,15 @@ bool DiscoveryGate::hears_announcements(const edds::DomainParticipantQos& qos) {
   return discovery.discoveryProtocol == DiscoveryProtocol::SIMPLE && only_udp(qos);
 }
 
-void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain,
-                            bool client) const {
+void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) {
+  auto& builtin = qos.wire_protocol().builtin;
+  builtin.mutation_tries = std::max(builtin.mutation_tries, kParticipantsOfHost - 1);
+  ports_needed_ = only_udp(qos) && uses_standard_ports(qos) ? 2 : 0;
   if (client) announce_eagerly(qos);
   if (client && only_udp(qos)) hear_by_unicast_only(qos, domain);
   for (auto& transport : qos.transport().user_transports) {
     if (!is_udp(transport)) continue;
-    transport = std::make_shared<GatedDescriptor>(transport, open_, gate_, life_signs_);
+    transport = std::make_shared<GatedDescriptor>(transport, open_, ports_, gate_, life_signs_);
   }
 }
 

@@ -25,6 +25,9 @@ namespace tfdude::fastdds {
 ///   not discover other clients.
 /// - A client announces itself every 2 ms at first; later, and a server always, as set in the
 ///   profile.
+/// - Fast DDS searches free ports for 101 participants of a host. The next ones receive nothing, and
+///   nobody is told. So it searches through all ports of the domain here, for 120 participants, and
+///   can_receive() says whether it has found some.
 class DiscoveryGate {
  public:
   /// @param gate  all datagrams received over UDP pass it
@@ -34,11 +37,15 @@ class DiscoveryGate {
 
   /// Prepares the creation of a participant. Changes neither transports other than UDP, nor
   /// discovery settings that the profile overrides.
-  void prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) const;
+  void prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client);
 
   /// Whether participants with these settings hear each other's periodic announcements, and
   /// LifeSigns sees them: discovery is the simple one, and all transports are UDP.
   [[nodiscard]] static bool hears_announcements(const edds::DomainParticipantQos& qos);
+
+  /// Whether the participant, which has been created, has found ports to receive at. True if the
+  /// profile sets the ports, or transports other than UDP.
+  [[nodiscard]] bool can_receive() const { return *ports_ >= ports_needed_; }
 
   /// Lets the participant send: it has been created.
   void open() { open_->store(true, std::memory_order_relaxed); }
@@ -47,6 +54,8 @@ class DiscoveryGate {
   const std::shared_ptr<Gate> gate_;
   const std::shared_ptr<LifeSigns> life_signs_;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);
+  const std::shared_ptr<std::atomic<int>> ports_ = std::make_shared<std::atomic<int>>(0);
+  int ports_needed_ = 0;
 };
 
 }  // namespace tfdude::fastdds
