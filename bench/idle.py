@@ -5,8 +5,8 @@
 
 For each size it starts, in turn, as many bare participants with the same readers and writers, and then daemons with one
 frame each and clients that print events. It counts packets on the loopback interface and processor time while nothing
-happens; then it measures how long a new participant needs for its answers. Needs root for its own network namespace;
-otherwise packets of others are counted, too.
+happens; then it measures how long a new participant needs for its answers: among the bare ones, until one of them has
+answered one request. Needs root for its own network namespace; otherwise packets of others are counted, too.
 """
 
 import argparse
@@ -24,6 +24,11 @@ import scaling
 
 IDLE_S = 6.0
 QUESTIONS = 15
+PAUSE_S = 0.5  # until its leaving has been handled
+SETTLED_WITHIN_S = 60
+CONSTANT_FOR_S = 3
+MOST_IDLE_CORES = 1.0  # more means that they still discover each other
+NOT_THERE = 1  # exit status of tfdude
 
 
 @contextlib.contextmanager
@@ -43,34 +48,48 @@ def running(commands):
 
 
 def settle(started):
-    """Waits until they have discovered each other: two processors need some 0.3 s for each."""
-    time.sleep(5 + 0.4 * len(started))
+    """Waits until they have discovered each other: traffic is constant, and the processors are not busy. Returns how
+    long that took, or None if it did not end in time."""
+    begin = time.monotonic()
+    counts = []
+    while time.monotonic() < begin + SETTLED_WITHIN_S:
+        before = scaling.loopback()[0], sum(scaling.seconds_of(one.pid) for one in started)
+        time.sleep(1)
+        counts.append(scaling.loopback()[0] - before[0])
+        busy = sum(scaling.seconds_of(one.pid) for one in started) - before[1] > MOST_IDLE_CORES
+        last = counts[-CONSTANT_FOR_S:]
+        if len(last) == CONSTANT_FOR_S and not busy and max(last) < 1.2 * min(last) + 20:
+            return time.monotonic() - begin
+    return None
 
 
 def cost_of(started):
     """What these processes cost while nothing happens."""
-    settle(started)
+    settled = settle(started)
     before = scaling.loopback(), [scaling.seconds_of(one.pid) for one in started], time.monotonic()
     time.sleep(IDLE_S)
     span = time.monotonic() - before[2]
     packets, size = scaling.loopback()
     used = sum(scaling.seconds_of(one.pid) for one in started) - sum(before[1])
     threads = [len(list(pathlib.Path(f"/proc/{one.pid}/task").iterdir())) for one in started]
-    return {"packets_s": (packets - before[0][0]) / span, "kB_s": (size - before[0][1]) / span / 1000,
+    return {"settled_s": settled, "packets_s": (packets - before[0][0]) / span, "kB_s": (size - before[0][1]) / span / 1000,
             "cores": used / span, "threads": statistics.median(threads),
             "rss_kib": statistics.median(scaling.status_of(one.pid, "VmRSS") for one in started),
             "anonymous_kib": statistics.median(scaling.status_of(one.pid, "RssAnon") for one in started)}
 
 
-def milliseconds(command):
-    """How long a new participant takes for its answer."""
+def milliseconds(command, status=0):
+    """How long a new participant takes for its answer, with this exit status."""
     times = []
     for _ in range(QUESTIONS):
         begin = time.monotonic()
-        subprocess.run([str(part) for part in command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                       timeout=processes.PATIENCE_S, check=False)
+        run = subprocess.run([str(part) for part in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                             timeout=processes.PATIENCE_S, check=False)
         times.append((time.monotonic() - begin) * 1000)
-    return statistics.median(times)
+        time.sleep(PAUSE_S)
+        if run.returncode != status:
+            raise RuntimeError(f"{command[-3:]} ended with {run.returncode}: {run.stderr.decode()}")
+    return {"median": statistics.median(times), "longest": max(times)}
 
 
 def measure(bin_dir, daemons, clients):
@@ -78,10 +97,11 @@ def measure(bin_dir, daemons, clients):
     domain, lease = processes.lease_domain()
     common = ["--domain", domain, "--profile", processes.PROFILE]
     with tempfile.TemporaryDirectory() as folder, lease:
-        bare = [[bin_dir / "bare_participant", domain, processes.PROFILE, "owner"]] * daemons
-        bare += [[bin_dir / "bare_participant", domain, processes.PROFILE, "client"]] * clients
+        program = [bin_dir / "bare_participant", domain, processes.PROFILE]
+        bare = [[*program, "server"]] + [[*program, "owner"]] * (daemons - 1) + [[*program, "client"]] * clients
         with running(bare) as started:
             control = cost_of(started)
+            control["new_participant_ms"] = milliseconds([*program, "asker"])
         files = scaling.configurations(pathlib.Path(folder), daemons, daemons)
         ours = [[bin_dir / "tfduded", "--no-state", "--config", file, *common] for file in files]
         with running(ours) as owners:
@@ -95,10 +115,12 @@ def measure(bin_dir, daemons, clients):
                     row = {"daemons": daemons, "clients": clients, "bare": control,
                            "ours": cost_of(owners + listeners), "new_participant_ms": {}}
                     tfdude = [bin_dir / "tfdude", *common]
-                    for name, command in {"lookup": ["lookup", "p0_0", f"p{daemons - 1}_0"], "tree": ["tree"],
-                                          "frames": ["frames"], "joints": ["joints"],
-                                          "not there": ["lookup", "p0_0", "nowhere"]}.items():
+                    for name, command in {"lookup of one owner": ["lookup", "p0_0", "p1_0"],
+                                          "lookup of all owners": ["lookup", "p0_0", f"p{daemons - 1}_0"],
+                                          "tree": ["tree"], "frames": ["frames"], "joints": ["joints"]}.items():
                         row["new_participant_ms"][name] = milliseconds([*tfdude, *command])
+                    row["new_participant_ms"]["not there"] = milliseconds(
+                        [*tfdude, "lookup", "p0_0", "nowhere"], status=NOT_THERE)
                 finally:
                     for one in listeners:
                         processes.end(one)

@@ -12,17 +12,17 @@ namespace tfdude::fastdds {
 namespace {
 
 using Flag = std::shared_ptr<std::atomic<bool>>;
-using Count = std::shared_ptr<std::atomic<int>>;
 
 // A domain has ports for so many participants of a host.
 constexpr std::uint32_t kParticipantsOfHost = 120;
 
 struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   GatedDescriptor(std::shared_ptr<etransport::TransportDescriptorInterface> guarded, Flag flag,
-                  Count count, std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs)
+                  std::shared_ptr<DiscoveryGate::Ports> own_ports, std::shared_ptr<Gate> inward,
+                  std::shared_ptr<LifeSigns> signs)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
-        ports(std::move(count)),
+        ports(std::move(own_ports)),
         gate(std::move(inward)),
         life_signs(std::move(signs)) {}
 
@@ -38,7 +38,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   }
 
   Flag open;
-  Count ports;
+  std::shared_ptr<DiscoveryGate::Ports> ports;
   std::shared_ptr<Gate> gate;
   std::shared_ptr<LifeSigns> life_signs;
   std::shared_ptr<SendThrottle> throttle = std::make_shared<SendThrottle>();
@@ -64,8 +64,10 @@ class GatedTransport final : public SendFilter {
   bool OpenInputChannel(const ertps::Locator_t& at,
                         etransport::TransportReceiverInterface* receiver,
                         std::uint32_t max_size) override {
+    const bool multicast = ertps::IPLocator::isMulticast(at);
+    if (!multicast && at.port > descriptor_.ports->last) return false;
     if (!SendFilter::OpenInputChannel(at, receiver, max_size)) return false;
-    if (!ertps::IPLocator::isMulticast(at)) ++*descriptor_.ports;
+    if (!multicast) ++descriptor_.ports->opened;
     return true;
   }
 
@@ -140,6 +142,14 @@ bool uses_standard_ports(const edds::DomainParticipantQos& qos) {
          qos.wire_protocol().default_unicast_locator_list.empty();
 }
 
+// After it come those of the next domain.
+std::uint32_t last_port(const edds::DomainParticipantQos& qos, std::uint32_t domain) {
+  const auto& port = qos.wire_protocol().port;
+  const std::uint32_t last = port.portBase + port.domainIDGain * domain + port.offsetd3 +
+                             port.participantIDGain * (kParticipantsOfHost - 1);
+  return std::min<std::uint32_t>(last, std::numeric_limits<std::uint16_t>::max());
+}
+
 }  // namespace
 
 bool DiscoveryGate::hears_announcements(const edds::DomainParticipantQos& qos) {
@@ -150,7 +160,10 @@ bool DiscoveryGate::hears_announcements(const edds::DomainParticipantQos& qos) {
 void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) {
   auto& builtin = qos.wire_protocol().builtin;
   builtin.mutation_tries = std::max(builtin.mutation_tries, kParticipantsOfHost - 1);
-  ports_needed_ = only_udp(qos) && uses_standard_ports(qos) ? 2 : 0;
+  if (only_udp(qos) && uses_standard_ports(qos)) {
+    ports_->needed = 2;
+    ports_->last = last_port(qos, domain);
+  }
   if (client) announce_eagerly(qos);
   if (client && only_udp(qos)) hear_by_unicast_only(qos, domain);
   for (auto& transport : qos.transport().user_transports) {

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -30,6 +31,13 @@ namespace tfdude::fastdds {
 ///   can_receive() says whether it has found some.
 class DiscoveryGate {
  public:
+  /// At which a participant receives what is sent to it alone.
+  struct Ports {
+    int needed = 0;
+    std::uint32_t last = std::numeric_limits<std::uint32_t>::max();  // that it may use
+    std::atomic<int> opened{0};
+  };
+
   /// @param gate  all datagrams received over UDP pass it
   /// @param life_signs  is told of each of them
   DiscoveryGate(std::shared_ptr<Gate> gate, std::shared_ptr<LifeSigns> life_signs)
@@ -45,7 +53,7 @@ class DiscoveryGate {
 
   /// Whether the participant, which has been created, has found ports to receive at. True if the
   /// profile sets the ports, or transports other than UDP.
-  [[nodiscard]] bool can_receive() const { return *ports_ >= ports_needed_; }
+  [[nodiscard]] bool can_receive() const { return ports_->opened >= ports_->needed; }
 
   /// Lets the participant send: it has been created.
   void open() { open_->store(true, std::memory_order_relaxed); }
@@ -54,8 +62,7 @@ class DiscoveryGate {
   const std::shared_ptr<Gate> gate_;
   const std::shared_ptr<LifeSigns> life_signs_;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);
-  const std::shared_ptr<std::atomic<int>> ports_ = std::make_shared<std::atomic<int>>(0);
-  int ports_needed_ = 0;
+  const std::shared_ptr<Ports> ports_ = std::make_shared<Ports>();
 };
 
 }  // namespace tfdude::fastdds
