@@ -24,7 +24,7 @@ import scaling
 
 IDLE_S = 6.0
 QUESTIONS = 15
-PAUSE_S = 0.5  # until its leaving has been handled
+ANNOUNCED_EVERY_S = 0.3  # by each participant (profiles/loopback.xml)
 SETTLED_WITHIN_S = 60
 CONSTANT_FOR_S = 3
 MOST_IDLE_CORES = 1.0  # more means that they still discover each other
@@ -63,6 +63,18 @@ def settle(started):
     return None
 
 
+def await_idle(packets_s):
+    """Waits until no more packets are sent than while the processes were idle: the last participant has left, and the
+    others have handled that."""
+    deadline = time.monotonic() + processes.PATIENCE_S
+    while time.monotonic() < deadline:
+        before = scaling.loopback()[0]
+        time.sleep(ANNOUNCED_EVERY_S)
+        if scaling.loopback()[0] - before < 1.2 * packets_s * ANNOUNCED_EVERY_S + 20:
+            return
+    raise RuntimeError(f"the processes have not become idle within {processes.PATIENCE_S} s")
+
+
 def cost_of(started):
     """What these processes cost while nothing happens."""
     settled = settle(started)
@@ -72,21 +84,22 @@ def cost_of(started):
     packets, size = scaling.loopback()
     used = sum(scaling.seconds_of(one.pid) for one in started) - sum(before[1])
     threads = [len(list(pathlib.Path(f"/proc/{one.pid}/task").iterdir())) for one in started]
-    return {"settled_s": settled, "packets_s": (packets - before[0][0]) / span, "kB_s": (size - before[0][1]) / span / 1000,
-            "cores": used / span, "threads": statistics.median(threads),
+    return {"settled_s": settled, "packets_s": (packets - before[0][0]) / span,
+            "kB_s": (size - before[0][1]) / span / 1000, "cores": used / span, "threads": statistics.median(threads),
             "rss_kib": statistics.median(scaling.status_of(one.pid, "VmRSS") for one in started),
             "anonymous_kib": statistics.median(scaling.status_of(one.pid, "RssAnon") for one in started)}
 
 
-def milliseconds(command, status=0):
-    """How long a new participant takes for its answer, with this exit status."""
+def milliseconds(command, packets_s, status=0):
+    """How long a new participant takes for its answer, with this exit status, beside processes that send so many
+    packets while they are idle."""
     times = []
     for _ in range(QUESTIONS):
+        await_idle(packets_s)
         begin = time.monotonic()
         run = subprocess.run([str(part) for part in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                              timeout=processes.PATIENCE_S, check=False)
         times.append((time.monotonic() - begin) * 1000)
-        time.sleep(PAUSE_S)
         if run.returncode != status:
             raise RuntimeError(f"{command[-3:]} ended with {run.returncode}: {run.stderr.decode()}")
     return {"median": statistics.median(times), "longest": max(times)}
@@ -101,7 +114,7 @@ def measure(bin_dir, daemons, clients):
         bare = [[*program, "server"]] + [[*program, "owner"]] * (daemons - 1) + [[*program, "client"]] * clients
         with running(bare) as started:
             control = cost_of(started)
-            control["new_participant_ms"] = milliseconds([*program, "asker"])
+            control["new_participant_ms"] = milliseconds([*program, "asker"], control["packets_s"])
         files = scaling.configurations(pathlib.Path(folder), daemons, daemons)
         ours = [[bin_dir / "tfduded", "--no-state", "--config", file, *common] for file in files]
         with running(ours) as owners:
@@ -118,9 +131,9 @@ def measure(bin_dir, daemons, clients):
                     for name, command in {"lookup of one owner": ["lookup", "p0_0", "p1_0"],
                                           "lookup of all owners": ["lookup", "p0_0", f"p{daemons - 1}_0"],
                                           "tree": ["tree"], "frames": ["frames"], "joints": ["joints"]}.items():
-                        row["new_participant_ms"][name] = milliseconds([*tfdude, *command])
+                        row["new_participant_ms"][name] = milliseconds([*tfdude, *command], row["ours"]["packets_s"])
                     row["new_participant_ms"]["not there"] = milliseconds(
-                        [*tfdude, "lookup", "p0_0", "nowhere"], status=NOT_THERE)
+                        [*tfdude, "lookup", "p0_0", "nowhere"], row["ours"]["packets_s"], status=NOT_THERE)
                 finally:
                     for one in listeners:
                         processes.end(one)

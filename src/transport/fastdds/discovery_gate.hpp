@@ -26,9 +26,9 @@ namespace tfdude::fastdds {
 ///   not discover other clients.
 /// - A client announces itself every 2 ms at first; later, and a server always, as set in the
 ///   profile.
-/// - Fast DDS searches free ports for 101 participants of a host. The next ones receive nothing, and
-///   nobody is told. So it searches through all ports of the domain here, for 120 participants, and
-///   can_receive() says whether it has found some.
+/// - Fast DDS searches free ports for 101 participants of a host. The next ones receive nothing,
+///   and nobody is told. So it searches through all ports of the domain here, for 120 participants,
+///   and can_receive() says whether it has found some.
 class DiscoveryGate {
  public:
   /// At which a participant receives what is sent to it alone.
