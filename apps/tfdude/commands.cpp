@@ -83,6 +83,7 @@ int refuse(Client& client, const Error& error, const Arguments& arguments) {
   if (is_unknown(error.code)) {
     if (const int status = none_there(client, arguments, false); status != kDone) return status;
   }
+  if (error.code == Errc::kUnsupported && arguments.options.follow) return kNeedsAllFrames;
   return report(error, arguments);
 }
 
@@ -237,7 +238,7 @@ int run_roots(Client& client, const Arguments& arguments) {
 
 int run_exists(Client& client, const Arguments& arguments) {
   const auto parent = client.parent(arguments.id);
-  if (!parent && parent.error().code == Errc::kTimeout) {
+  if (!parent && !is_unknown(parent.error().code)) {
     return refuse(client, parent.error(), arguments);
   }
   const bool exists = parent.has_value();

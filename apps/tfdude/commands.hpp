@@ -19,6 +19,11 @@ inline constexpr int kRefused = 1;
 inline constexpr int kWrongUsage = 2;
 inline constexpr int kNoAnswer = 3;
 
+/// Instead of an exit status, before anything was printed: all owners are of an earlier version,
+/// and do not know the request for single frames (Options::follow). So the command must be repeated
+/// by a client that receives all frames.
+inline constexpr int kNeedsAllFrames = -1;
+
 /// Number of values of `correlate --source`: the source's name, and one column of the loading.
 inline constexpr int kSourceSize = 7;
 
@@ -93,10 +98,11 @@ int finish(Client& client, const Result<void>& changed, const Arguments& argumen
            const std::string& what);
 /// That no partition answers, and what may be the cause.
 [[nodiscard]] std::string nobody_answers(const Arguments& arguments);
-/// Prints why the request failed. @return the exit status
+/// Prints why the request failed. @return the exit status, or kNeedsAllFrames
 int refuse(Client& client, const Error& error, const Arguments& arguments);
 
-// Each function runs one command, prints its answer and returns the exit status.
+// Each function runs one command, prints its answer and returns the exit status, or
+// kNeedsAllFrames.
 int run_tree(Client& client, const Arguments& arguments);
 int run_frames(Client& client, const Arguments& arguments);
 int run_partitions(Client& client, const Arguments& arguments);

@@ -320,14 +320,19 @@ void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen)
   add_pose_options(*move, arguments);
 }
 
-int run(const Arguments& arguments, const Command& command, const cli::LocalCommand& local) {
+int run(Arguments arguments, const Command& command, const cli::LocalCommand& local) {
   if (local) return local(arguments);
-  auto client = Client::open(arguments.options);
-  if (!client) {
-    (void)cli::report(client.error(), arguments);
-    return cli::kWrongUsage;
+  int status = cli::kNeedsAllFrames;
+  while (status == cli::kNeedsAllFrames) {
+    auto client = Client::open(arguments.options);
+    if (!client) {
+      (void)cli::report(client.error(), arguments);
+      return cli::kWrongUsage;
+    }
+    status = command(*client, arguments);
+    arguments.options.follow.reset();
   }
-  return command(*client, arguments);
+  return status;
 }
 
 }  // namespace

@@ -2,12 +2,17 @@
 
 #include <optional>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
+#include "tfdude/transport/fastdds.hpp"
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "support/relay.hpp"
 #include "support/test_domain.hpp"
 
 namespace tfdude {
@@ -15,6 +20,7 @@ namespace {
 
 using testing::along_x;
 using testing::await_ready;
+using testing::ContainsSubstring;
 using testing::eventually;
 using testing::outcome;
 using testing::Process;
@@ -54,7 +60,53 @@ struct Robot {
   std::optional<Process> left;
 };
 
+// Makes an owner answer as one of an earlier version, which does not know requests for single
+// frames.
+class Earlier final : public testing::Relay {
+ public:
+  using Relay::Relay;
+
+ private:
+  void on_request(const PeerId& from, const Request& request) override {
+    if (!std::holds_alternative<FramesRequest>(request.body)) {
+      Relay::on_request(from, request);
+      return;
+    }
+    Reply reply;
+    reply.sequence = request.sequence;
+    reply.body = Error{Errc::kUnsupported, "this kind of request is not known"};
+    real().reply(from, reply);
+  }
+};
+
+Node earlier(const Options& options, const std::string& partition,
+             const std::vector<FrameSpec>& frames) {
+  auto real = *make_fastdds_transport({options.domain, options.profile, partition, nullptr});
+  return *Node::open(std::make_unique<Earlier>(std::move(real)), partition, frames, options);
+}
+
 }  // namespace
+
+TEST_CASE("follow: the command line also finds frames if all owners are of an earlier version") {
+  const TestDomain domain;
+  const Node base = earlier(domain.options(), "base", {{"world", "", {}}});
+  const Node arm = earlier(domain.options(), "arm", {{"hand", "world", along_x(11)}});
+
+  Options options = domain.options();
+  options.follow.emplace();
+  auto client = Client::open(options);
+  REQUIRE(client);
+  CHECK(outcome(client->lookup("world", "hand")) == "unsupported");
+
+  const auto found = domain.cli({"--json", "lookup", "world", "hand"});
+  CHECK(found.status == 0);
+  CHECK_THAT(found.out, ContainsSubstring("11"));
+  CHECK(domain.cli({"exists", "hand"}).out == "yes\n");
+  const auto foot = domain.cli({"exists", "foot"});
+  CHECK(foot.status == 1);
+  CHECK(foot.out == "no\n");
+  CHECK_THAT(domain.cli({"lookup", "world", "foot"}).err, ContainsSubstring("'foot'"));
+}
 
 TEST_CASE("follow: a new client finds frames and is certain about those that do not exist") {
   const Robot robot;
