@@ -66,6 +66,9 @@ class Discovery {
   /// The final error of an operation that failed and is not repeated.
   [[nodiscard]] Error last_word(Error error, const Deadline& deadline);
 
+  /// Why a result was not certain when the deadline was over: kTimeout.
+  [[nodiscard]] Error undecided(const std::string& what, const Deadline& deadline);
+
   /// Explains an error about something missing, if others know more.
   [[nodiscard]] Error explained(Error error);
 
@@ -74,8 +77,6 @@ class Discovery {
 
  private:
   [[nodiscard]] Result<void> nobody_but_excluded() const;
-  /// Why the result is not certain: kTimeout.
-  [[nodiscard]] Error undecided(const std::string& what, const Deadline& deadline);
 
   Structure& structure_;
   const Transport& transport_;

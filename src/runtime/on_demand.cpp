@@ -1,6 +1,7 @@
 #include "runtime/on_demand.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -74,7 +75,7 @@ void OnDemand::changed(Owner owner, std::uint64_t epoch) {
 
 Result<std::vector<KnownFrame>> OnDemand::ask(const FramesRequest& request,
                                               const Deadline& deadline) {
-  Error last{Errc::kUnknownFrame, name_of(request) + " may exist"};
+  std::optional<Error> last;
   std::size_t refusals = 0;
   Milliseconds pause = kFirstPause;
   for (std::size_t turn = 0; !deadline.over(); ++turn) {
@@ -91,17 +92,17 @@ Result<std::vector<KnownFrame>> OnDemand::ask(const FramesRequest& request,
     auto answer = ask_one(owners[turn % owners.size()], request, deadline);
     if (answer) return answer;
     last = std::move(answer.error());
-    refusals = is_of_owner(last.code) ? refusals + 1 : 0;
+    refusals = is_of_owner(last->code) ? refusals + 1 : 0;
     const bool all_refuse = refusals >= owners.size() && discovery_.complete();
-    if (all_refuse || !(may_pass(last.code) || is_of_owner(last.code))) {
-      return tl::unexpected(std::move(last));
+    if (all_refuse || !(may_pass(last->code) || is_of_owner(last->code))) {
+      return tl::unexpected(*std::move(last));
     }
     std::this_thread::sleep_until(deadline.within(pause).at());
     pause = std::min(2 * pause, kLastPause);
   }
-  if (last.code == Errc::kUnknownFrame) return tl::unexpected(discovery_.last_word(last, deadline));
+  if (!last) return tl::unexpected(discovery_.undecided(name_of(request) + " may exist", deadline));
   return fail(Errc::kTimeout, "no partition has said where " + name_of(request) + " is, within " +
-                                  deadline.text() + ": " + last.message);
+                                  deadline.text() + ": " + last->message);
 }
 
 Result<std::vector<KnownFrame>> OnDemand::ask_one(Owner owner, const FramesRequest& request,
