@@ -46,6 +46,7 @@ tfdude::Options Arguments::options(const std::string& domain_name) const {
   tfdude::Options options;
   options.domain = static_cast<std::uint32_t>(number(domain_name));
   options.profile = text("profile");
+  if (values_.count("--keys") > 0) options.keys = text("keys");
   // A failed call ends the benchmark; a call that a busy computer delays counts as any other.
   options.timeout = std::chrono::seconds(9);
   return options;

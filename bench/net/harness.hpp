@@ -21,7 +21,8 @@ class Arguments {
 
   [[nodiscard]] const std::string& text(const std::string& name) const;
   [[nodiscard]] int number(const std::string& name) const;
-  /// Options for the domain given under a name, with the profile of --profile.
+  /// Options for the domain given under a name, with the profile of --profile, and the keys of
+  /// --keys if it is given.
   [[nodiscard]] tfdude::Options options(const std::string& domain_name) const;
 
  private:

@@ -5,7 +5,7 @@
 //   stream_bench --mode publish --shared FILE --domain DOMAIN --profile FILE --seconds S
 //                --repetitions R
 //
-// The owner prints "ready"; the publisher measures, and prints:
+// Both take --keys DIR, too. The owner prints "ready"; the publisher measures, and prints:
 //   stream/1khz/latency       from before publish() until a lookup in the owner sees the value [us]
 //   stream/1khz/owner_cpu     processor time of the owner [% of one core], one value per repetition
 //   stream/1khz/lost          lost samples, one value per repetition
@@ -102,8 +102,9 @@ class Latency final : public bench::AppliedListener {
   for (int i = 0; i < kEdges; ++i) frames.push_back({joint(i), kRoot, {}});
   for (int i = 0; i < kJoints; ++i) frames.push_back(moved_frame(i));
   Latency latency(state);
-  auto transport = must(make_fastdds_transport({options.domain, options.profile, kPartition, {}}),
-                        "a transport");
+  auto transport = must(
+      make_fastdds_transport({options.domain, options.profile, kPartition, {}, {}, options.keys}),
+      "a transport");
   auto node =
       must(Node::open(bench::watch(std::move(transport), latency), kPartition, frames, options),
            "a node");
