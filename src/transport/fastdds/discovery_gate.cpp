@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <mutex>
 #include <utility>
 
 #include "transport/fastdds/fair_share.hpp"
@@ -18,11 +19,13 @@ constexpr std::uint32_t kParticipantsOfHost = 120;
 
 struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   GatedDescriptor(std::shared_ptr<etransport::TransportDescriptorInterface> guarded, Flag flag,
-                  std::shared_ptr<DiscoveryGate::Ports> own_ports, std::shared_ptr<Gate> inward,
+                  std::shared_ptr<DiscoveryGate::Ports> own_ports,
+                  std::shared_ptr<std::mutex> one_by_one, std::shared_ptr<Gate> inward,
                   std::shared_ptr<LifeSigns> signs)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
         ports(std::move(own_ports)),
+        discovering(std::move(one_by_one)),
         gate(std::move(inward)),
         life_signs(std::move(signs)) {}
 
@@ -39,6 +42,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
 
   Flag open;
   std::shared_ptr<DiscoveryGate::Ports> ports;
+  std::shared_ptr<std::mutex> discovering;  // held while a message of discovery is handled, or null
   std::shared_ptr<Gate> gate;
   std::shared_ptr<LifeSigns> life_signs;
   std::shared_ptr<SendThrottle> throttle = std::make_shared<SendThrottle>();
@@ -74,6 +78,11 @@ class GatedTransport final : public SendFilter {
   void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
                std::uint32_t size, const ertps::Locator_t& local,
                const ertps::Locator_t& remote) override {
+    // Before the gate: whoever holds both may shut it.
+    std::unique_lock<std::mutex> one_by_one;
+    if (descriptor_.discovering != nullptr && !descriptor_.ports->are_for_data(local.port)) {
+      one_by_one = std::unique_lock(*descriptor_.discovering);
+    }
     const Gate::Pass pass(*descriptor_.gate);
     if (!pass) return;
     const auto now = LifeSigns::Clock::now();
@@ -142,6 +151,12 @@ bool uses_standard_ports(const edds::DomainParticipantQos& qos) {
          qos.wire_protocol().default_unicast_locator_list.empty();
 }
 
+bool has_keys(const edds::DomainParticipantQos& qos) {
+  const auto& properties = qos.properties().properties();
+  return std::any_of(properties.begin(), properties.end(),
+                     [](const auto& property) { return property.name() == "dds.sec.auth.plugin"; });
+}
+
 // After it come those of the next domain.
 std::uint32_t last_port(const edds::DomainParticipantQos& qos, std::uint32_t domain) {
   const auto& port = qos.wire_protocol().port;
@@ -163,12 +178,17 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
   if (only_udp(qos) && uses_standard_ports(qos)) {
     ports_->needed = 2;
     ports_->last = last_port(qos, domain);
+    const auto& port = qos.wire_protocol().port;
+    ports_->first_of_data = port.portBase + port.domainIDGain * domain + port.offsetd3;
+    ports_->step_of_data = port.participantIDGain;
   }
+  auto discovering = has_keys(qos) ? std::make_shared<std::mutex>() : nullptr;
   if (client) announce_eagerly(qos);
   if (client && only_udp(qos)) hear_by_unicast_only(qos, domain);
   for (auto& transport : qos.transport().user_transports) {
     if (!is_udp(transport)) continue;
-    transport = std::make_shared<GatedDescriptor>(transport, open_, ports_, gate_, life_signs_);
+    transport = std::make_shared<GatedDescriptor>(transport, open_, ports_, discovering, gate_,
+                                                  life_signs_);
   }
 }
 
