@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures what idle daemons and clients cost, beside bare Fast DDS participants; run by scripts/scaling --idle.
 
-  idle.py [--bin DIR] [--rounds N] [--sizes DAEMONS+CLIENTS,...]
+  idle.py [--bin DIR] [--rounds N] [--sizes DAEMONS+CLIENTS,...] [--questions N]
 
 For each size it starts, in turn, as many bare participants with the same readers and writers, and then daemons with one
 frame each and clients that print events. It counts packets on the loopback interface and processor time while nothing
@@ -23,11 +23,10 @@ import processes
 import scaling
 
 IDLE_S = 6.0
-QUESTIONS = 15
 ANNOUNCED_EVERY_S = 0.3  # by each participant (profiles/loopback.xml)
 SETTLED_WITHIN_S = 60
 CONSTANT_FOR_S = 3
-MOST_IDLE_CORES = 1.0  # more means that they still discover each other
+MOST_IDLE_CORES = 1.6  # more means that they still discover each other
 NOT_THERE = 1  # exit status of tfdude
 
 
@@ -90,11 +89,11 @@ def cost_of(started):
             "anonymous_kib": statistics.median(scaling.status_of(one.pid, "RssAnon") for one in started)}
 
 
-def milliseconds(command, packets_s, status=0):
+def milliseconds(command, questions, packets_s, status=0):
     """How long a new participant takes for its answer, with this exit status, beside processes that send so many
     packets while they are idle."""
     times = []
-    for _ in range(QUESTIONS):
+    for _ in range(questions):
         await_idle(packets_s)
         begin = time.monotonic()
         run = subprocess.run([str(part) for part in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
@@ -105,7 +104,7 @@ def milliseconds(command, packets_s, status=0):
     return {"median": statistics.median(times), "longest": max(times)}
 
 
-def measure(bin_dir, daemons, clients):
+def measure(bin_dir, daemons, clients, questions):
     """One row: bare participants, then ours."""
     domain, lease = processes.lease_domain()
     common = ["--domain", domain, "--profile", processes.PROFILE]
@@ -114,7 +113,7 @@ def measure(bin_dir, daemons, clients):
         bare = [[*program, "server"]] + [[*program, "owner"]] * (daemons - 1) + [[*program, "client"]] * clients
         with running(bare) as started:
             control = cost_of(started)
-            control["new_participant_ms"] = milliseconds([*program, "asker"], control["packets_s"])
+            control["new_participant_ms"] = milliseconds([*program, "asker"], questions, control["packets_s"])
         files = scaling.configurations(pathlib.Path(folder), daemons, daemons)
         ours = [[bin_dir / "tfduded", "--no-state", "--config", file, *common] for file in files]
         with running(ours) as owners:
@@ -131,9 +130,10 @@ def measure(bin_dir, daemons, clients):
                     for name, command in {"lookup of one owner": ["lookup", "p0_0", "p1_0"],
                                           "lookup of all owners": ["lookup", "p0_0", f"p{daemons - 1}_0"],
                                           "tree": ["tree"], "frames": ["frames"], "joints": ["joints"]}.items():
-                        row["new_participant_ms"][name] = milliseconds([*tfdude, *command], row["ours"]["packets_s"])
+                        row["new_participant_ms"][name] = milliseconds(
+                            [*tfdude, *command], questions, row["ours"]["packets_s"])
                     row["new_participant_ms"]["not there"] = milliseconds(
-                        [*tfdude, "lookup", "p0_0", "nowhere"], row["ours"]["packets_s"], status=NOT_THERE)
+                        [*tfdude, "lookup", "p0_0", "nowhere"], questions, row["ours"]["packets_s"], status=NOT_THERE)
                 finally:
                     for one in listeners:
                         processes.end(one)
@@ -145,6 +145,7 @@ def main():
     parser.add_argument("--idle", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--bin", type=pathlib.Path, default=processes.ROOT / "build/release/bin")
     parser.add_argument("--rounds", type=int, default=1)
+    parser.add_argument("--questions", type=int, default=15, help="new participants for each median")
     parser.add_argument("--sizes", default="4+0,8+0,16+0,32+0,4+40,10+100")
     arguments = parser.parse_args()
     if not scaling.enter_namespace():
@@ -152,7 +153,8 @@ def main():
     for size in arguments.sizes.split(","):
         daemons, _, clients = size.partition("+")
         for _ in range(arguments.rounds):
-            print(json.dumps(measure(arguments.bin, int(daemons), int(clients or 0))), flush=True)
+            row = measure(arguments.bin, int(daemons), int(clients or 0), arguments.questions)
+            print(json.dumps(row), flush=True)
 
 
 if __name__ == "__main__":

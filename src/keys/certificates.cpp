@@ -217,8 +217,8 @@ Result<void> verify(const Certificate& authority, const RevokedList& revoked,
 }
 
 Result<std::string> sign_document(const Pair& authority, std::string_view text) {
-  // What `openssl smime -sign -text` makes.
-  constexpr int kFlags = PKCS7_TEXT | PKCS7_DETACHED;
+  // What `openssl smime -sign -text -nosmimecap` makes.
+  constexpr int kFlags = PKCS7_TEXT | PKCS7_DETACHED | PKCS7_NOSMIMECAP;
   const Bio in = bio_of(text);
   const Bio out = sink();
   const Signed made(in == nullptr ? nullptr
