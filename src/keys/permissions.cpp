@@ -1,10 +1,13 @@
 #include "keys/permissions.hpp"
 
+#include <algorithm>
 #include <array>
 #include <ctime>
 #include <set>
+#include <string>
 #include <string_view>
 #include <tinyxml2.h>
+#include <vector>
 
 #include "tfdude/base/id.hpp"
 
@@ -33,8 +36,9 @@ struct Access {
 constexpr const char* kPublish = "publish";
 constexpr const char* kSubscribe = "subscribe";
 
-/// All that travels. Each line becomes a rule of its own: within one rule, Fast DDS allows each of
-/// its topics in the partitions of all others, and only the first rule for a topic counts.
+/// All that travels. Lines of one direction that name the same partitions become one rule, others
+/// do not: within one rule, Fast DDS allows each of its topics in the partitions of all others, and
+/// only the first rule for a topic counts.
 constexpr std::array<Access, 18> kTable{{
     {kPresenceTopic, kPublish, Right::kServe},
     {kPresenceTopic, kSubscribe, Right::kAll},
@@ -122,18 +126,37 @@ void write_domains(Printer& xml, const DomainRange& range) {
   write(xml, "max", std::to_string(range.last));
 }
 
-void write_rule(Printer& xml, const Access& access, const Grant& grant) {
-  const std::set<std::string> partitions = partitions_of(access, grant.roles);
-  if (partitions.empty()) return;
-  const Element rule(xml, "allow_rule");
-  write_domains(xml, grant.domains);
-  const Element direction(xml, access.direction);
+/// Topics that are allowed in one direction in the same partitions.
+struct Rule {
+  std::string direction;
+  std::set<std::string> partitions;
+  std::vector<std::string> topics;
+};
+
+std::vector<Rule> rules_of(const Roles& roles) {
+  std::vector<Rule> rules;
+  for (const Access& access : kTable) {
+    const std::set<std::string> partitions = partitions_of(access, roles);
+    if (partitions.empty()) continue;
+    auto same = std::find_if(rules.begin(), rules.end(), [&](const Rule& rule) {
+      return rule.direction == access.direction && rule.partitions == partitions;
+    });
+    if (same == rules.end()) same = rules.insert(rules.end(), {access.direction, partitions, {}});
+    same->topics.emplace_back(access.topic);
+  }
+  return rules;
+}
+
+void write_rule(Printer& xml, const Rule& rule, const DomainRange& domains) {
+  const Element element(xml, "allow_rule");
+  write_domains(xml, domains);
+  const Element direction(xml, rule.direction.c_str());
   {
     const Element topics(xml, "topics");
-    write(xml, "topic", access.topic);
+    for (const std::string& topic : rule.topics) write(xml, "topic", topic);
   }
   const Element names(xml, "partitions");
-  for (const std::string& partition : partitions) write(xml, "partition", partition);
+  for (const std::string& partition : rule.partitions) write(xml, "partition", partition);
 }
 
 std::string one_rule_a_line(std::string text) {
@@ -220,10 +243,16 @@ void add_access(Roles& roles, const Access& access, const std::string& partition
   }
 }
 
+bool names_topic(const tinyxml2::XMLElement* direction, const std::string& name) {
+  const auto* topic = child(child(direction, "topics"), "topic");
+  while (topic != nullptr && text_of(topic) != name) topic = topic->NextSiblingElement("topic");
+  return topic != nullptr;
+}
+
 void read_rule(const tinyxml2::XMLElement& rule, Roles& roles) {
   for (const Access& access : kTable) {
     const auto* direction = child(&rule, access.direction);
-    if (text_of(child(child(direction, "topics"), "topic")) != access.topic) continue;
+    if (!names_topic(direction, access.topic)) continue;
     const auto* partition = child(child(direction, "partitions"), "partition");
     for (; partition != nullptr; partition = partition->NextSiblingElement("partition")) {
       add_access(roles, access, text_of(partition));
@@ -255,7 +284,7 @@ std::string permissions_of(const Grant& grant) {
       write(xml, "not_before", date_of(grant.not_before));
       write(xml, "not_after", date_of(grant.not_after));
     }
-    for (const Access& access : kTable) write_rule(xml, access, grant);
+    for (const Rule& rule : rules_of(grant.roles)) write_rule(xml, rule, grant.domains);
     write(xml, "default", "DENY");
   }
   return one_rule_a_line(xml.CStr());

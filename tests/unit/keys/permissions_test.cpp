@@ -49,16 +49,17 @@ class Decision {
     return allowed("subscribe", topic, partition);
   }
 
-  /// Checks that each rule is about one topic in one direction, and no two about the same.
+  /// Checks that each rule is about one direction, and no two about the same topic in it.
   void check_rules() const {
     std::set<std::string> seen;
     for (const auto* rule = grant_->FirstChildElement("allow_rule"); rule != nullptr;
          rule = rule->NextSiblingElement("allow_rule")) {
       const auto* direction = rule->FirstChildElement("domains")->NextSiblingElement();
       CHECK(direction->NextSiblingElement() == nullptr);
-      const auto* topic = direction->FirstChildElement("topics")->FirstChildElement();
-      CHECK(topic->NextSiblingElement() == nullptr);
-      CHECK(seen.insert(std::string(direction->Name()) + topic->GetText()).second);
+      for (const auto* topic = direction->FirstChildElement("topics")->FirstChildElement();
+           topic != nullptr; topic = topic->NextSiblingElement()) {
+        CHECK(seen.insert(std::string(direction->Name()) + topic->GetText()).second);
+      }
     }
   }
 
@@ -68,9 +69,10 @@ class Decision {
     for (const auto* rule = grant_->FirstChildElement("allow_rule"); rule != nullptr;
          rule = rule->NextSiblingElement("allow_rule")) {
       const auto* criteria = rule->FirstChildElement(direction);
-      if (criteria == nullptr ||
-          criteria->FirstChildElement("topics")->FirstChildElement()->GetText() != topic)
-        continue;
+      if (criteria == nullptr) continue;
+      const auto* named = criteria->FirstChildElement("topics")->FirstChildElement();
+      while (named != nullptr && named->GetText() != topic) named = named->NextSiblingElement();
+      if (named == nullptr) continue;
       for (const auto* one = criteria->FirstChildElement("partitions")->FirstChildElement();
            one != nullptr; one = one->NextSiblingElement()) {
         if (fnmatch(one->GetText(), partition.c_str(), FNM_NOESCAPE) == 0) return true;
