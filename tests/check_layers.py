@@ -13,8 +13,8 @@ import sys
 import tempfile
 import unittest
 
-LAYERS = ["base", "math", "types", "tree", "partition", "description", "store", "keys", "transport",
-          "runtime", "client", "apps"]
+LAYERS = ["base", "math", "types", "tree", "partition", "description", "store", "keys", "recording",
+          "transport", "runtime", "client", "apps"]
 SUFFIXES = {".hpp", ".cpp", ".h", ".cc", ".ipp"}
 DDS_FOLDER = "src/transport/fastdds/"
 # Has another participant, in a domain of ROS. It shares the differences between versions, and the check of lengths.
@@ -36,6 +36,7 @@ CONFINED = [
     ("tinyxml2", r"tinyxml2\.h$", ["src/description/", "src/keys/", "src/transport/fastdds/"]),
     ("SQLite", r"sqlite3\.h$", ["src/store/"]),
     ("OpenSSL", r"openssl/", ["src/keys/"]),
+    ("zstd", r"zstd\.h$", ["src/recording/"]),
     ("CLI11", r"CLI/", ["apps/"]),
     ("nlohmann", r"nlohmann/", ["apps/"]),
 ]
@@ -46,7 +47,8 @@ BARRED = [
     ("input and output", r"(iostream|fstream|spdlog/.*)$", ["math", "types", "tree", "partition"]),
 ]
 CLOCK = re.compile(r"::\s*now\s*\(|\b(clock_gettime|gettimeofday)\b|\btime\s*\(\s*(nullptr|NULL|0)\s*\)")
-CLOCKLESS = ["base", "math", "types", "tree", "partition", "description", "store", "keys"]
+CLOCKLESS = ["base", "math", "types", "tree", "partition", "description", "store", "keys",
+             "recording"]
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 COMMENT_OR_LITERAL = re.compile(
