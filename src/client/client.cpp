@@ -249,6 +249,13 @@ Result<Time> Client::now() {
 Result<void> Client::set_time(Time now) { return participant_->set_time(now); }
 Result<void> Client::publish_clock(Time now) { return participant_->publish_clock(now); }
 
+Result<PartitionWatch> Client::watch_partition(const std::string& partition,
+                                               const PartitionWatchOptions& options) {
+  return participant_->watcher()
+      .watch_partition(partition, options.rate, options.on_news)
+      .map([](auto followed) { return PartitionWatch(std::move(followed)); });
+}
+
 Result<Observed> Client::observe(const std::string& a, const std::string& b, const Transform& X_AB,
                                  std::optional<Time> stamp, const ObserveOptions& options) {
   return participant_->observations().observe(a, b, X_AB, stamp, options,

@@ -27,6 +27,7 @@ std::chrono::nanoseconds period_of(double rate) {
 
 void Watcher::stop() {
   if (Watches* watches = watching_.load()) watches->stop();
+  if (PartitionWatches* watches = watching_partitions_.load()) watches->stop();
 }
 
 Result<std::shared_ptr<WatchedPath>> Watcher::watch(const std::string& a, const std::string& b,
@@ -85,12 +86,52 @@ Watches& Watcher::watches() {
         [this](const WatchedPath& path) { return plan(path); },
         [this](std::vector<Part>& parts) { return requests_.ask(parts, Deadline(timeout_)); },
         [this](const std::string& owner, std::uint64_t group) {
-          return transport_.watch(owner, group);
+          return readers_.open(owner, group);
         },
-        [this](std::uint64_t group) { transport_.unwatch(group); }});
+        [this](std::uint64_t group) { readers_.close(group); }});
     watching_.store(watches_.get());
   }
   return *watches_;
+}
+
+Result<std::shared_ptr<FollowedPartition>> Watcher::watch_partition(
+    const std::string& partition, double rate, FollowedPartition::Listener listener) {
+  if (auto ok = check_rate(rate); !ok) return tl::unexpected(std::move(ok.error()));
+  if (auto ok = requests_.check_keeps_all("watch partition " + quote(partition)); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  auto known = requests_.planned(
+      discovery_.call_deadline(), [&](const Directory& directory) -> Result<void> {
+        if (directory.owner(partition)) return {};
+        return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+      });
+  if (!known) return tl::unexpected(std::move(known.error()));
+  auto followed =
+      std::make_shared<FollowedPartition>(partition, period_of(rate), std::move(listener));
+  partition_watches().add(followed);
+  return followed;
+}
+
+PartitionWatches& Watcher::partition_watches() {
+  const Lock lock(mutex_);
+  if (partition_watches_ == nullptr) {
+    partition_watches_ = std::make_unique<PartitionWatches>(PartitionWatches::Links{
+        [this](const FollowedPartition& partition) { return plan(partition); },
+        [this](std::vector<Part>& parts) { return requests_.ask(parts, Deadline(timeout_)); },
+        [this](const std::string& owner, std::uint64_t group) {
+          return readers_.open(owner, group);
+        },
+        [this](std::uint64_t group) { readers_.close(group); }});
+    watching_partitions_.store(partition_watches_.get());
+  }
+  return *partition_watches_;
+}
+
+Result<PartitionPlan> Watcher::plan(const FollowedPartition& partition) {
+  const std::uint64_t own_incarnation = incarnation_();
+  const Lock lock(structure_.mutex);
+  return plan_partition(structure_.forest, structure_.directory, partition.name(),
+                        partition.period(), own_incarnation, partition.most());
 }
 
 Result<WatchRoute> Watcher::plan(const WatchedPath& path) {
@@ -112,6 +153,7 @@ Result<WatchRoute> Watcher::plan(const WatchedPath& path) {
 }
 
 bool Watcher::on_pushed(const PushedValues& pushed) {
+  if (PartitionWatches* watches = watching_partitions_.load()) watches->on_pushed(pushed);
   Watches* watches = watching_.load();
   if (watches == nullptr) return false;
   watches->on_pushed(pushed);
@@ -125,6 +167,7 @@ bool Watcher::can_answer(const std::string& a, const std::string& b, const Query
 
 void Watcher::look_again() {
   if (Watches* watches = watching_.load()) watches->look_again();
+  if (PartitionWatches* watches = watching_partitions_.load()) watches->look_again();
 }
 
 }  // namespace tfdude

@@ -8,6 +8,8 @@
 
 #include "base/mutex.hpp"
 #include "runtime/discovery.hpp"
+#include "runtime/group_readers.hpp"
+#include "runtime/partition_watches.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/structure.hpp"
 #include "runtime/watches.hpp"
@@ -27,7 +29,7 @@ class Watcher {
       : structure_(structure),
         discovery_(discovery),
         requests_(requests),
-        transport_(transport),
+        readers_(transport),
         incarnation_(std::move(incarnation)),
         timeout_(timeout) {}
 
@@ -44,6 +46,10 @@ class Watcher {
   [[nodiscard]] Result<std::shared_ptr<WatchedPath>> watch_edges(
       const std::vector<std::string>& frames, const WatchOptions& options);
 
+  /// @return as Client::watch_partition()
+  [[nodiscard]] Result<std::shared_ptr<FollowedPartition>> watch_partition(
+      const std::string& partition, double rate, FollowedPartition::Listener listener);
+
   /// Applies pushed values. @return whether a path here needs them
   bool on_pushed(const PushedValues& pushed);
 
@@ -58,19 +64,25 @@ class Watcher {
   [[nodiscard]] Watches& watches();
   [[nodiscard]] Result<std::shared_ptr<WatchedPath>> follow(std::shared_ptr<WatchedPath> path,
                                                             const Deadline& deadline);
+
+  [[nodiscard]] PartitionWatches& partition_watches();
   [[nodiscard]] Result<WatchRoute> plan(const WatchedPath& path);
+  [[nodiscard]] Result<PartitionPlan> plan(const FollowedPartition& partition);
   /// kTimeout, naming the owners.
   [[nodiscard]] tl::unexpected<Error> unanswered(const WatchedPath& path, const Deadline& deadline);
 
   Structure& structure_;
   Discovery& discovery_;
   Requests& requests_;
-  Transport& transport_;
+  GroupReaders readers_;
   const std::function<std::uint64_t()> incarnation_;
   const Milliseconds timeout_;
-  Mutex mutex_;                                                 // guards the creation of watches_
+  Mutex mutex_;                                                 // guards the creation of these
   std::unique_ptr<Watches> watches_ TFDUDE_GUARDED_BY(mutex_);  // once this process watches a path
   std::atomic<Watches*> watching_{nullptr};
+  std::unique_ptr<PartitionWatches> partition_watches_
+      TFDUDE_GUARDED_BY(mutex_);  // once it watches a partition
+  std::atomic<PartitionWatches*> watching_partitions_{nullptr};
 };
 
 }  // namespace tfdude

@@ -13,6 +13,7 @@
 #include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
+#include "tfdude/client/partition_watch.hpp"
 #include "tfdude/client/stream.hpp"
 #include "tfdude/client/subscription.hpp"
 #include "tfdude/client/watch.hpp"
@@ -300,6 +301,15 @@ class TFDUDE_EXPORT Client {
   /// that is earlier than the one before clears histories.
   /// @return kInvalidInput: a negative time; kNotPermitted, kTransport.
   [[nodiscard]] Result<void> publish_clock(Time now);
+
+  /// Asks the owner of a partition to push all its values and their changes, and reports them with
+  /// the partition's structure to a function: for displays and recordings of whole robots. Returns
+  /// before the first news. Watch each partition that on_change() reports as up to see all of them.
+  /// Values of one commit come together, or in several parts if the partition has more than
+  /// kMaxItems edges, or more than kMaxCommonErrors that are correlated with others.
+  /// @return kUnknownPartition, kInvalidInput (the rate).
+  [[nodiscard]] Result<PartitionWatch> watch_partition(const std::string& partition,
+                                                       const PartitionWatchOptions& options);
 
   /// Applies a measurement of X_AB: corrects the edges between a and b according to their
   /// uncertainty (see tfdude/math/observation.hpp), whoever owns them. Each owner applies its part

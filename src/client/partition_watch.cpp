@@ -1,0 +1,25 @@
+#include "tfdude/client/partition_watch.hpp"
+
+#include <utility>
+
+#include "runtime/followed_partition.hpp"
+
+namespace tfdude {
+
+PartitionWatch::PartitionWatch(std::shared_ptr<FollowedPartition> partition)
+    : partition_(std::move(partition)) {}
+
+PartitionWatch::PartitionWatch(PartitionWatch&&) noexcept = default;
+
+PartitionWatch& PartitionWatch::operator=(PartitionWatch&& other) noexcept {
+  if (this == &other) return *this;
+  if (partition_ != nullptr) partition_->stop();
+  partition_ = std::move(other.partition_);
+  return *this;
+}
+
+PartitionWatch::~PartitionWatch() {
+  if (partition_ != nullptr) partition_->stop();
+}
+
+}  // namespace tfdude
