@@ -100,12 +100,14 @@ Result<std::shared_ptr<FollowedPartition>> Watcher::watch_partition(
   if (auto ok = requests_.check_keeps_all("watch partition " + quote(partition)); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
-  auto known = requests_.planned(
-      discovery_.call_deadline(), [&](const Directory& directory) -> Result<void> {
-        if (directory.owner(partition)) return {};
-        return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
-      });
+  const Deadline deadline = discovery_.call_deadline();
+  auto known = requests_.planned(deadline, [&](const Directory& directory) -> Result<void> {
+    if (directory.owner(partition)) return {};
+    return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+  });
   if (!known) return tl::unexpected(std::move(known.error()));
+  // So that the first list of frames is complete; if something is missing, it follows.
+  (void)discovery_.await(deadline);
   auto followed =
       std::make_shared<FollowedPartition>(partition, period_of(rate), std::move(listener));
   partition_watches().add(followed);
