@@ -1,6 +1,7 @@
 #include "runtime/followed_partition.hpp"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -15,6 +16,15 @@ constexpr std::chrono::seconds kStreamed{1};
 
 bool same(const Transform& a, const Transform& b) {
   return a.pose.matrix() == b.pose.matrix() && a.covariance == b.covariance;
+}
+
+// Gives each value of an edge the correlation that its last one has.
+void spread_correlations(std::vector<PushedValue>& entries) {
+  std::map<std::uint32_t, const Correlation*> last;
+  for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry) {
+    const auto [known, is_last] = last.emplace(entry->index, &entry->correlation);
+    if (!is_last) entry->correlation = *known->second;
+  }
 }
 
 // For each frame of `from` its index in `to`, if it has the same parent there.
@@ -103,6 +113,7 @@ bool FollowedPartition::follow(const PartitionPlan& plan) {
   carry_over(plan);
   incarnation_ = plan.incarnation;
   answered_.reset();
+  missing_from_ = recent();
   if (new_frames) post({name_, FramesNews{plan.frames, plan.incarnation}});
   return true;
 }
@@ -127,10 +138,11 @@ void FollowedPartition::carry_over(const PartitionPlan& plan) {
   for (const PartitionPlan::Group& group : plan.groups) {
     const auto before = std::find_if(groups_.begin(), groups_.end(),
                                      [&](const Group& one) { return one.id == group.id; });
+    Group fresh{group.id, group.frames, {}, KnownCovariances(group.frames.size())};
     if (before != groups_.end()) {
-      before->outdated = false;
+      *before = std::move(fresh);
     } else {
-      groups_.push_back({group.id, group.frames, {}, KnownCovariances(group.frames.size())});
+      groups_.push_back(std::move(fresh));
     }
   }
 }
@@ -144,7 +156,7 @@ FollowedPartition::Message FollowedPartition::place(Group& group, const PushedVa
                                                     bool knows_all) {
   Message message;
   message.reply = whole.after == 0;
-  message.is_old = whole.commit <= std::max(group.complete, group.replied);
+  message.commit = whole.commit;
   message.follows_on =
       message.reply || (knows_all && whole.after <= std::max(group.complete, group.replied));
   group.heard = std::max(group.heard, whole.commit);
@@ -164,18 +176,23 @@ std::optional<WatchedValue> FollowedPartition::admitted(const Group& group, Push
   Known& known = known_[frame];
   const bool begins = entry.history > known.history;
   if (entry.history < known.history || (begins && !entry.process_noise)) return std::nullopt;
+  // Another group, or a reply, has told the edge's value as of a later commit.
+  const bool is_old = !begins && message.commit <= known.commit;
+  if (is_old) entry.correlation = known.correlation;
   if (!begins) {
     const bool repeats = entry.stamp == known.newest && same(entry.X, known.X) &&
                          entry.correlation == known.correlation;
     if (repeats) return std::nullopt;
-    // Half of a commit, or of one before a reply.
-    if (!entry.stamp && (!message.follows_on || message.is_old)) return std::nullopt;
+    // Of one commit, a part may be missing.
+    if (!entry.stamp && (!message.follows_on || is_old)) return std::nullopt;
     const bool late = entry.stamp && known.newest && *entry.stamp < *known.newest;
     const bool wanted = message.reply ? missing_from_.has_value() : period_.count() == 0;
     if (late && !wanted) return std::nullopt;
+    if (late) known.correlation = entry.correlation;
     if (late) return WatchedValue{frame, entry.stamp, entry.X, std::move(entry.correlation), {}};
   }
-  known = {entry.history, entry.stamp, entry.X, entry.correlation};
+  known = {entry.history, std::max(known.commit, message.commit), entry.stamp, entry.X,
+           entry.correlation};
   WatchedValue value{frame, entry.stamp, entry.X, std::move(entry.correlation), {}};
   if (begins) value.begins = entry.process_noise;
   return value;
@@ -196,6 +213,7 @@ bool FollowedPartition::take(const PushedValues& pushed) {
   const bool knows_all = group->covariances.fill_in(whole->entries);
   const Message message = place(*group, *whole, knows_all);
   if (!message.follows_on && !missing_from_) missing_from_ = recent();
+  if (correlated_entries(*whole) > 0) spread_correlations(whole->entries);
   ValuesNews news{whole->commit, {}};
   news.values.reserve(whole->entries.size());
   for (PushedValue& entry : whole->entries) {
@@ -203,9 +221,10 @@ bool FollowedPartition::take(const PushedValues& pushed) {
   }
   const std::size_t count = news.values.size();
   if (count > 0) post({name_, std::move(news)}, count);
-  const bool lacks = lacks_any();
-  if (!lacks) missing_from_.reset();
-  return lacks;
+  if (lacks_any()) return true;
+  missing_from_.reset();
+  if (settles(Clock::now())) missing_from_ = recent();
+  return false;
 }
 
 bool FollowedPartition::lacks_any() const {
@@ -215,9 +234,13 @@ bool FollowedPartition::lacks_any() const {
   });
 }
 
-bool FollowedPartition::lacks() const {
+bool FollowedPartition::settles(Clock::time_point now) const {
+  return period_.count() == 0 && (!answered_ || now - *answered_ < kSettle);
+}
+
+bool FollowedPartition::lacks(Clock::time_point now) const {
   const Lock lock(mutex_);
-  return lacks_any();
+  return lacks_any() || settles(now);
 }
 
 // The oldest of the newest samples of the edges that are streamed now.

@@ -54,6 +54,8 @@ class FollowedPartition {
   /// How long the groups of the plan before stay once the new ones have answered: DDS may match
   /// their readers later.
   static constexpr Milliseconds kKeepBefore{1000};
+  /// How long after their answer all samples are requested repeatedly, if all are wanted.
+  static constexpr Milliseconds kSettle{400};
 
   FollowedPartition(std::string name, std::chrono::nanoseconds period, Listener listener);
 
@@ -76,8 +78,8 @@ class FollowedPartition {
   /// Applies pushed values, or the reply to a request. @return whether values are missing
   bool take(const PushedValues& pushed);
 
-  /// Whether values of the plan are missing.
-  [[nodiscard]] bool lacks() const;
+  /// Whether values of the plan are missing, or may be because DDS has not matched the readers yet.
+  [[nodiscard]] bool lacks(Clock::time_point now) const;
   /// The instant from which samples must be requested if some are missing.
   [[nodiscard]] std::optional<Time> lacks_from() const;
   /// The groups whose values are needed. Those of the plan before end here.
@@ -86,6 +88,7 @@ class FollowedPartition {
  private:
   struct Known {
     std::uint64_t history = 0;  // 0: nothing
+    std::uint64_t commit = 0;   // as of which its value is known
     std::optional<Time> newest;
     Transform X;
     Correlation correlation;
@@ -104,7 +107,7 @@ class FollowedPartition {
   struct Message {
     bool reply = false;       // all values, with the newest samples only
     bool follows_on = false;  // nothing is missing before it
-    bool is_old = false;      // a reply has been later
+    std::uint64_t commit = 0;
   };
 
   [[nodiscard]] Message place(Group& group, const PushedValues& whole, bool knows_all);
@@ -112,6 +115,7 @@ class FollowedPartition {
                                                      const Message& message)
       TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool lacks_any() const TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool settles(Clock::time_point now) const TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Time> recent() const TFDUDE_REQUIRES(mutex_);
   void carry_over(const PartitionPlan& plan) TFDUDE_REQUIRES(mutex_);
   void post(PartitionNews news, std::size_t values = 0);

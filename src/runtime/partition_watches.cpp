@@ -101,7 +101,9 @@ bool PartitionWatches::attend(const Followed& partition, bool renew) {
     partition->interrupt(plan.error().message);
     return true;  // it is looked at again when it returns
   }
-  if (!partition->follow(*plan) && !renew && !partition->lacks()) return true;
+  if (!partition->follow(*plan) && !renew && !partition->lacks(Clock::now())) {
+    return true;
+  }
   std::vector<Part> parts;
   for (PartitionPlan::Group& group : plan->groups) {
     if (!open_.contains(group.id) && links_.open(partition->name(), group.id)) {
@@ -130,7 +132,7 @@ bool PartitionWatches::ask(const Followed& partition, std::vector<Part> parts,
       return true;  // until the next renewal
     }
   }
-  return !partition->lacks();
+  return !partition->lacks(Clock::now());
 }
 
 void PartitionWatches::close_unused(const std::vector<Followed>& partitions) {

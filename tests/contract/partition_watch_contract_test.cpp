@@ -117,7 +117,7 @@ TEST_CASE("partition watch: all samples come, those of one commit together") {
   // From the first value on, until DDS has matched the reader, only the newest one comes.
   REQUIRE(node->update({{"arm", along_x(0)}, {"hand", along_x(0)}}, ms(1)));
   REQUIRE(eventually([&] { return is_last(log, "hand", 0); }));
-  std::this_thread::sleep_for(300ms);
+  std::this_thread::sleep_for(600ms);
   constexpr int kSamples = 500;
   for (int i = 2; i <= kSamples; ++i) {
     REQUIRE(node->update({{"arm", along_x(i)}, {"hand", along_x(-i)}}, ms(i)));
@@ -150,17 +150,22 @@ TEST_CASE("partition watch: changes of the structure are reported, and no value 
   REQUIRE(node->move("tool", "base", along_x(8)));
   REQUIRE(eventually([&] { return is_last(log, "tool", 8); }));
   CHECK(ids_in(log).back() == "tool<base");
+  REQUIRE(node->move("tool", "base", along_x(8.5)));
+  REQUIRE(eventually([&] { return is_last(log, "tool", 8.5); }));
   REQUIRE(node->update("hand", along_x(3)));
   REQUIRE(eventually([&] { return is_last(log, "hand", 3); }));
   REQUIRE(node->remove("tool"));
   REQUIRE(eventually([&] { return ids_in(log).size() == 3; }));
   REQUIRE(node->update("hand", along_x(4)));
   REQUIRE(eventually([&] { return is_last(log, "hand", 4); }));
+  // As before, within the time that the group of before is kept.
+  REQUIRE(node->add("tool", "base", along_x(9)));
+  REQUIRE(eventually([&] { return is_last(log, "tool", 9); }));
   log([](const Log& all) {
     CHECK(all.values_.at("arm") == 1);
     CHECK(all.values_.at("hand") == 3);
     CHECK(all.begins_.at("hand") == 1);
-    CHECK(all.begins_.at("tool") == 2);  // the edge under another parent is another one
+    CHECK(all.begins_.at("tool") == 4);  // the edge under another parent is another one
     return 0;
   });
 }

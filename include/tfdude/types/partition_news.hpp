@@ -35,7 +35,7 @@ struct WatchedValue {
   std::uint32_t frame = 0;    ///< index among the last reported frames
   std::optional<Time> stamp;  ///< absent: it holds for all times
   Transform X_PC;
-  /// Of the edge, from now on and for all its history; only with the last of its values here.
+  /// Of the edge, from now on and for all its history.
   Correlation correlation{};
   /// Process noise of the edge per second. Given with the first value of a history: what is known
   /// of the edge so far does not hold any more.

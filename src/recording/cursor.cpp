@@ -1,0 +1,175 @@
+#include "recording/cursor.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tfdude::recording {
+namespace {
+
+// Of a file that is damaged throughout, not every place is told.
+constexpr std::size_t kMostProblems = 20;
+
+bool ends_with(std::string_view text, std::string_view end) {
+  return text.size() >= end.size() && text.substr(text.size() - end.size()) == end;
+}
+
+Time log_of(const Message& message) { return checked_time(message.log_time); }
+
+}  // namespace
+
+Result<Cursor> Cursor::open(std::unique_ptr<ByteSource> source) {
+  auto reader = McapReader::open(std::move(source));
+  if (!reader) return tl::unexpected(std::move(reader.error()));
+  Cursor cursor(*std::move(reader));
+  cursor.problems_ = cursor.reader_.problems();
+  const auto& metadata = cursor.reader_.metadata();
+  cursor.foreign_ = std::none_of(metadata.begin(), metadata.end(),
+                                 [](const Metadata& one) { return one.name == "tfdude"; });
+  cursor.find_topics();
+  // The channels of a file without a summary may be in its chunks.
+  if (cursor.foreign_ && cursor.topics_.empty() && !cursor.peek() && cursor.topics_.empty()) {
+    return fail(Errc::kState,
+                "it has no transforms: neither a recording of tf-dude nor /tf of ROS");
+  }
+  cursor.rewind();
+  return cursor;
+}
+
+void Cursor::find_topics() {
+  if (topics_known_ == reader_.channels().size()) return;
+  topics_known_ = reader_.channels().size();
+  for (const auto& [id, channel] : reader_.channels()) {
+    const Schema* schema = reader_.schema(channel.schema);
+    if (schema == nullptr || channel.encoding != "cdr") continue;
+    if (foreign_) {
+      if (schema->name != kTfType) continue;
+      topics_[id] = ends_with(channel.topic, "tf_static") ? Topic::kTfStatic : Topic::kTf;
+      continue;
+    }
+    for (const TopicType& type : topic_types()) {
+      if (type.name == channel.topic && type.type == schema->name) topics_[id] = type.topic;
+    }
+  }
+}
+
+std::optional<Topic> Cursor::topic_of(std::uint16_t channel) const {
+  const auto found = topics_.find(channel);
+  if (found == topics_.end()) return std::nullopt;
+  return found->second;
+}
+
+bool Cursor::has(const ChunkPlace& chunk, Topic topic) const {
+  return std::any_of(chunk.channels.begin(), chunk.channels.end(),
+                     [&](std::uint16_t channel) { return topic_of(channel) == topic; });
+}
+
+void Cursor::begin_at(std::size_t chunk) {
+  first_chunk_ = chunk_ = chunk;
+  waiting_.clear();
+  decoder_ = {};
+}
+
+void Cursor::rewind() {
+  statics_before_.reset();
+  begin_at(0);
+}
+
+void Cursor::start(Time from) {
+  rewind();
+  if (foreign_) {
+    const auto& chunks = reader_.chunks();
+    if (!chunks.empty() && checked_time(chunks.front().start) < from) statics_before_ = from;
+    return;
+  }
+  const auto& chunks = reader_.chunks();
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    if (checked_time(chunks[i].start) > from) break;
+    if (has(chunks[i], Topic::kKeyframe)) begin_at(i);
+  }
+}
+
+bool Cursor::is_wanted(const ChunkPlace& chunk, bool statics_only) const {
+  if (chunk.channels.empty()) return true;
+  if (statics_only) return has(chunk, Topic::kTfStatic);
+  if (only_) return has(chunk, *only_);
+  return std::any_of(chunk.channels.begin(), chunk.channels.end(), [&](std::uint16_t channel) {
+    const auto topic = topic_of(channel);
+    return topic && (foreign_ || *topic >= Topic::kFrames);
+  });
+}
+
+void Cursor::note(std::string problem) {
+  if (problems_.size() < kMostProblems &&
+      std::find(problems_.begin(), problems_.end(), problem) == problems_.end()) {
+    problems_.push_back(std::move(problem));
+  }
+}
+
+void Cursor::load(const ChunkPlace& chunk) {
+  const bool statics_only = statics_before_ && checked_time(chunk.end) < *statics_before_;
+  if (!is_wanted(chunk, statics_only)) return;
+  auto read = reader_.read(chunk, [&](const Message& message) {
+    find_topics();
+    add(message, statics_only);
+    return true;
+  });
+  if (!read) note(read.error().message);
+  if (!foreign_) return;
+  std::stable_sort(
+      waiting_.begin(), waiting_.end(),
+      [](const RecordedMessage& a, const RecordedMessage& b) { return a.log < b.log; });
+}
+
+void Cursor::add(const Message& message, bool statics_only) {
+  const auto topic = topic_of(message.channel);
+  if (!topic || (only_ && *topic != *only_) || (statics_only && *topic != Topic::kTfStatic)) return;
+  if (auto ok = decode(*topic, message); !ok) note(ok.error().message);
+}
+
+Result<void> Cursor::decode(Topic topic, const Message& message) {
+  const auto take = [&](auto decoded) -> Result<void> {
+    if (!decoded) return tl::unexpected(std::move(decoded.error()));
+    waiting_.push_back({log_of(message), *std::move(decoded), false});
+    return {};
+  };
+  switch (topic) {
+    case Topic::kFrames:
+      return take(decode_frames(message.data));
+    case Topic::kValues:
+      return take(decoder_.decode(message.data));
+    case Topic::kJoints:
+      return take(decode_joints(message.data));
+    case Topic::kEvents:
+      return take(decode_event(message.data));
+    case Topic::kTf:
+    case Topic::kTfStatic: {
+      if (!foreign_) return {};
+      auto values = decode_tf(message.data);
+      if (!values) return tl::unexpected(std::move(values.error()));
+      if (topic == Topic::kTfStatic) {
+        for (RecordedValue& value : *values) value.value.stamp.reset();
+      }
+      waiting_.push_back(
+          {log_of(message), RecordedValues{kForeignPartition, 0, false, *std::move(values)}, true});
+      return {};
+    }
+    case Topic::kKeyframe:
+      return {};
+  }
+  return {};
+}
+
+std::optional<Time> Cursor::peek() {
+  while (waiting_.empty() && chunk_ < reader_.chunks().size()) load(reader_.chunks()[chunk_++]);
+  if (waiting_.empty()) return std::nullopt;
+  return waiting_.front().log;
+}
+
+std::optional<RecordedMessage> Cursor::next() {
+  if (!peek()) return std::nullopt;
+  RecordedMessage message = std::move(waiting_.front());
+  waiting_.pop_front();
+  return message;
+}
+
+}  // namespace tfdude::recording

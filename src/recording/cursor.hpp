@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "recording/mcap_reader.hpp"
+#include "recording/messages.hpp"
+#include "recording/schemas.hpp"
+
+namespace tfdude::recording {
+
+/// A message of a recording, ours or that of ROS.
+struct RecordedMessage {
+  Time log;
+  std::variant<RecordedFrames, RecordedValues, RecordedJoints, Change> what;
+  bool foreign = false;  ///< transforms without frames and owners, which its values imply
+};
+
+/// The partition of the transforms of a foreign recording.
+inline constexpr const char* kForeignPartition = "ros";
+
+/// Reads the messages of a recording one after the other. In files of ours these are the messages
+/// of ours; in others, the transforms of ROS.
+/// @par Memory  One chunk.
+class Cursor {
+ public:
+  /// @return as McapReader::open(); kState: there is nothing in it that could be read
+  [[nodiscard]] static Result<Cursor> open(std::unique_ptr<ByteSource> source);
+
+  [[nodiscard]] const McapReader& reader() const { return reader_; }
+  [[nodiscard]] bool foreign() const { return foreign_; }
+  /// What is wrong with the file, as far as it was read.
+  [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
+
+  /// Goes to the last place, not later than an instant, from which everything is known without
+  /// what is before. In a foreign file, transforms that were sent regularly are then left out
+  /// before that instant.
+  void start(Time from);
+  /// Goes to the beginning.
+  void rewind();
+  /// Whether it was started at the beginning.
+  [[nodiscard]] bool from_beginning() const { return first_chunk_ == 0 && !statics_before_; }
+
+  /// From now on, reads only messages of this topic.
+  void only(Topic topic) { only_ = topic; }
+  void all_topics() { only_.reset(); }
+
+  /// The log time of the next message; none at the end.
+  [[nodiscard]] std::optional<Time> peek();
+  [[nodiscard]] std::optional<RecordedMessage> next();
+
+ private:
+  explicit Cursor(McapReader reader) : reader_(std::move(reader)) {}
+
+  void begin_at(std::size_t chunk);
+  void find_topics();
+  [[nodiscard]] std::optional<Topic> topic_of(std::uint16_t channel) const;
+  [[nodiscard]] bool has(const ChunkPlace& chunk, Topic topic) const;
+  [[nodiscard]] bool is_wanted(const ChunkPlace& chunk, bool statics_only) const;
+  void load(const ChunkPlace& chunk);
+  void add(const Message& message, bool statics_only);
+  [[nodiscard]] Result<void> decode(Topic topic, const Message& message);
+  void note(std::string problem);
+
+  McapReader reader_;
+  bool foreign_ = false;
+  std::map<std::uint16_t, Topic> topics_;
+  std::size_t topics_known_ = 0;  // channels that were looked at
+  std::vector<std::string> problems_;
+  std::optional<Topic> only_;
+  std::size_t first_chunk_ = 0;
+  std::optional<Time> statics_before_;
+  std::size_t chunk_ = 0;  // the next one
+  std::deque<RecordedMessage> waiting_;
+  ValuesDecoder decoder_;
+};
+
+}  // namespace tfdude::recording

@@ -1,0 +1,327 @@
+#include "recording/messages.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "tfdude/base/id.hpp"
+
+#include "math/flat.hpp"
+
+namespace tfdude::recording {
+namespace {
+
+// The least bytes of an element of a sequence.
+constexpr std::size_t kLeastText = 4;
+constexpr std::size_t kLeastValue = 4 + 4 + 8 + 2 + 56 + 4 * 4;
+constexpr std::size_t kLeastJoint = 4 + 4 + 2 + 8 + 4 + 4 + 4 + 32;
+
+tl::unexpected<Error> invalid(const char* what) {
+  return fail(Errc::kState, std::string("a message is not a valid one of ") + what);
+}
+
+enum class CovarianceIs : std::uint8_t { kGiven = 0, kUnspecified = 1, kAsBefore = 2 };
+
+void put_upper(CdrWriter& writer, const Covariance& covariance) {
+  writer.u32(Covariance::kSize);
+  writer.f64s(covariance.upper());
+}
+
+// Nothing if there are no numbers; otherwise they must be 21.
+std::optional<Covariance::Upper> upper_of(CdrReader& reader, bool& valid) {
+  const std::uint32_t count = reader.count(sizeof(double));
+  if (count == 0) return std::nullopt;
+  Covariance::Upper upper{};
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const double number = reader.f64();
+    if (i < upper.size()) upper[i] = number;
+  }
+  valid = valid && count == upper.size();
+  return upper;
+}
+
+void put(CdrWriter& writer, const Correlation& correlation) {
+  writer.flag(correlation.unknown);
+  writer.u32(static_cast<std::uint32_t>(correlation.common_errors.size()));
+  for (const CommonError& error : correlation.common_errors) {
+    writer.text(error.source);
+    writer.flag(error.subtracts);
+    writer.u32(static_cast<std::uint32_t>(error.loading.size()));
+    for (Eigen::Index i = 0; i < error.loading.size(); ++i) writer.f64(error.loading.data()[i]);
+  }
+  writer.u32(static_cast<std::uint32_t>(correlation.observed_with.size()));
+  for (const std::string& edge : correlation.observed_with) writer.text(edge);
+}
+
+Correlation correlation_of(CdrReader& reader, bool& valid) {
+  Correlation correlation;
+  correlation.unknown = reader.flag();
+  const std::uint32_t errors = reader.count(12);
+  for (std::uint32_t i = 0; i < errors && reader.good(); ++i) {
+    CommonError error;
+    error.source = reader.text();
+    error.subtracts = reader.flag();
+    const std::uint32_t numbers = reader.count(sizeof(double));
+    if (numbers % 6 != 0 || numbers / 6 > static_cast<std::uint32_t>(kMaxLoadingColumns)) {
+      valid = false;
+      for (std::uint32_t n = 0; n < numbers; ++n) (void)reader.f64();
+      continue;
+    }
+    error.loading.resize(6, static_cast<Eigen::Index>(numbers / 6));
+    for (std::uint32_t n = 0; n < numbers; ++n) error.loading.data()[n] = reader.f64();
+    correlation.common_errors.push_back(std::move(error));
+  }
+  const std::uint32_t edges = reader.count(kLeastText);
+  for (std::uint32_t i = 0; i < edges && reader.good(); ++i) {
+    correlation.observed_with.emplace_back(reader.text());
+    valid = valid && check_id(correlation.observed_with.back(), "id");
+  }
+  valid = valid && check_common_errors(correlation.common_errors);
+  return correlation;
+}
+
+bool is_edge(const WatchedFrame& edge) {
+  return check_id(edge.id, "id") && check_id(edge.parent, "parent") && edge.id != edge.parent;
+}
+
+}  // namespace
+
+ValuesEncoder::ValuesEncoder(std::string& out, std::string_view partition, std::uint64_t commit,
+                             bool repeats)
+    : writer_(out) {
+  writer_.text(partition);
+  writer_.u64(commit);
+  writer_.flag(repeats);
+  count_place_ = writer_.later();
+}
+
+void ValuesEncoder::add(const WatchedFrame& edge, const WatchedValue& value, bool as_before) {
+  ++count_;
+  writer_.text(edge.id);
+  writer_.text(edge.parent);
+  writer_.i64(value.stamp ? nanoseconds(*value.stamp) : -1);
+  const StatedCovariance& covariance = value.X_PC.covariance;
+  const CovarianceIs is = !covariance.complete() ? CovarianceIs::kUnspecified
+                          : as_before            ? CovarianceIs::kAsBefore
+                                                 : CovarianceIs::kGiven;
+  writer_.u8(static_cast<std::uint8_t>(is));
+  writer_.flag(value.begins.has_value());
+  const Flat flat = to_flat(value.X_PC);
+  for (std::size_t i = 0; i < 7; ++i) writer_.f64(flat[i]);
+  if (is == CovarianceIs::kGiven) {
+    put_upper(writer_, covariance.of_specified());
+  } else {
+    writer_.u32(0);
+  }
+  const bool noise = value.begins && value.begins->upper() != Covariance::Upper{};
+  if (noise) {
+    put_upper(writer_, *value.begins);
+  } else {
+    writer_.u32(0);
+  }
+  put(writer_, value.correlation);
+}
+
+std::optional<RecordedValue> ValuesDecoder::decode_value(CdrReader& reader) {
+  RecordedValue recorded;
+  recorded.edge.id = reader.text();
+  recorded.edge.parent = reader.text();
+  const std::int64_t stamp = reader.i64();
+  const auto is = static_cast<CovarianceIs>(reader.u8());
+  const bool begins = reader.flag();
+  Flat flat{};
+  for (std::size_t i = 0; i < 7; ++i) flat[i] = reader.f64();
+  bool valid = is_edge(recorded.edge) && stamp >= -1 && stamp <= kMaxTime;
+  const auto upper = upper_of(reader, valid);
+  const auto noise = upper_of(reader, valid);
+  recorded.value.correlation = correlation_of(reader, valid);
+  if (!reader.good() || !valid) return std::nullopt;
+  if (is == CovarianceIs::kAsBefore) {
+    const auto before = last_.find(recorded.edge.id);
+    if (before == last_.end()) return std::nullopt;
+    std::copy(before->second.upper().begin(), before->second.upper().end(), flat.begin() + 7);
+  } else if (upper) {
+    std::copy(upper->begin(), upper->end(), flat.begin() + 7);
+  } else if (is != CovarianceIs::kUnspecified) {
+    return std::nullopt;
+  }
+  auto X_PC = computed_from(flat);
+  if (!X_PC) return std::nullopt;
+  if (is == CovarianceIs::kGiven) last_[recorded.edge.id] = X_PC->covariance.of_specified();
+  recorded.value.X_PC = *X_PC;
+  recorded.value.X_PC.covariance.set_complete(is != CovarianceIs::kUnspecified);
+  if (stamp >= 0) recorded.value.stamp = time_of(stamp);
+  if (!begins) return recorded;
+  recorded.value.begins.emplace();
+  if (noise) {
+    const auto checked = Covariance::from_upper(*noise);
+    if (!checked) return std::nullopt;
+    recorded.value.begins = *checked;
+  }
+  return recorded;
+}
+
+Result<RecordedValues> ValuesDecoder::decode(std::string_view message) {
+  CdrReader reader(message);
+  RecordedValues all;
+  all.partition = reader.text();
+  all.commit = reader.u64();
+  all.repeats = reader.flag();
+  const std::uint32_t count = reader.count(kLeastValue);
+  if (!reader.good() || !check_partition_name(all.partition)) return invalid("values");
+  all.values.reserve(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (auto value = decode_value(reader)) all.values.push_back(*std::move(value));
+    if (!reader.good()) return invalid("values");
+  }
+  return all;
+}
+
+void encode(const RecordedFrames& frames, std::string& out) {
+  CdrWriter writer(out);
+  writer.text(frames.partition);
+  writer.u64(frames.incarnation);
+  writer.flag(frames.reachable);
+  writer.text(frames.why);
+  writer.flag(frames.complete);
+  writer.flag(frames.repeats);
+  writer.u32(static_cast<std::uint32_t>(frames.frames.size()));
+  for (const WatchedFrame& frame : frames.frames) {
+    writer.text(frame.id);
+    writer.text(frame.parent);
+  }
+  writer.u32(static_cast<std::uint32_t>(frames.removed.size()));
+  for (const std::string& id : frames.removed) writer.text(id);
+}
+
+Result<RecordedFrames> decode_frames(std::string_view message) {
+  CdrReader reader(message);
+  RecordedFrames all;
+  all.partition = reader.text();
+  all.incarnation = reader.u64();
+  all.reachable = reader.flag();
+  all.why = reader.text();
+  all.complete = reader.flag();
+  all.repeats = reader.flag();
+  const std::uint32_t count = reader.count(2 * kLeastText);
+  for (std::uint32_t i = 0; i < count && reader.good(); ++i) {
+    WatchedFrame frame;
+    frame.id = reader.text();
+    frame.parent = reader.text();
+    if (check_id(frame.id, "id") && (frame.parent.empty() || is_edge(frame))) {
+      all.frames.push_back(std::move(frame));
+    }
+  }
+  const std::uint32_t removed = reader.count(kLeastText);
+  for (std::uint32_t i = 0; i < removed && reader.good(); ++i) {
+    all.removed.emplace_back(reader.text());
+  }
+  if (!reader.good() || !check_partition_name(all.partition)) return invalid("frames");
+  return all;
+}
+
+void encode(const RecordedJoints& joints, std::string& out) {
+  CdrWriter writer(out);
+  writer.text(joints.partition);
+  writer.flag(joints.repeats);
+  writer.u32(static_cast<std::uint32_t>(joints.joints.size()));
+  for (const JointInfo& joint : joints.joints) {
+    writer.text(joint.name);
+    writer.text(joint.frame);
+    writer.u8(static_cast<std::uint8_t>(joint.type));
+    writer.flag(joint.measured);
+    writer.f64(joint.position);
+    writer.u32(1);
+    writer.f64(joint.variance);
+    writer.u32(joint.limits ? 2 : 0);
+    if (joint.limits) {
+      writer.f64(joint.limits->lower);
+      writer.f64(joint.limits->upper);
+    }
+    writer.text(joint.mimic ? joint.mimic->joint : "");
+    writer.f64(joint.mimic ? joint.mimic->multiplier : 0);
+    writer.f64(joint.mimic ? joint.mimic->offset : 0);
+    writer.u64(joint.outside);
+    writer.u64(joint.refused);
+  }
+}
+
+Result<RecordedJoints> decode_joints(std::string_view message) {
+  CdrReader reader(message);
+  RecordedJoints all;
+  all.partition = reader.text();
+  all.repeats = reader.flag();
+  const std::uint32_t count = reader.count(kLeastJoint);
+  for (std::uint32_t i = 0; i < count && reader.good(); ++i) {
+    JointInfo joint;
+    joint.name = reader.text();
+    joint.frame = reader.text();
+    const std::uint8_t type = reader.u8();
+    joint.type = static_cast<JointType>(type);
+    joint.measured = reader.flag();
+    joint.position = reader.f64();
+    joint.variance = std::numeric_limits<double>::quiet_NaN();
+    for (std::uint32_t n = reader.count(sizeof(double)); n > 0; --n) joint.variance = reader.f64();
+    std::vector<double> limits(reader.count(sizeof(double)));
+    reader.f64s(limits);
+    if (limits.size() == 2) joint.limits = JointLimits{limits[0], limits[1]};
+    Mimic mimic;
+    mimic.joint = reader.text();
+    mimic.multiplier = reader.f64();
+    mimic.offset = reader.f64();
+    if (!mimic.joint.empty()) joint.mimic = std::move(mimic);
+    joint.outside = reader.u64();
+    joint.refused = reader.u64();
+    if (type < 1 || type > 3) return invalid("joints");
+    all.joints.push_back(std::move(joint));
+  }
+  if (!reader.good() || !check_partition_name(all.partition)) return invalid("joints");
+  return all;
+}
+
+void encode(const Change& change, std::string& out) {
+  CdrWriter writer(out);
+  writer.text(to_string(change.kind));
+  writer.text(change.partition);
+  writer.text(change.frame);
+  writer.text(change.parent);
+  writer.text(change.rival);
+  writer.text(change.message);
+  writer.i64(nanoseconds(change.time));
+  writer.flag(change.stopped);
+}
+
+Result<Change> decode_event(std::string_view message) {
+  CdrReader reader(message);
+  const std::string_view kind = reader.text();
+  Change change;
+  change.partition = reader.text();
+  change.frame = reader.text();
+  change.parent = reader.text();
+  change.rival = reader.text();
+  change.message = reader.text();
+  change.time = checked_time(reader.i64());
+  change.stopped = reader.flag();
+  if (!reader.good()) return invalid("events");
+  for (auto i = ChangeKind::kPartitionUp; i <= ChangeKind::kMissed;
+       i = static_cast<ChangeKind>(static_cast<int>(i) + 1)) {
+    if (to_string(i) != kind) continue;
+    change.kind = i;
+    return change;
+  }
+  return invalid("events");
+}
+
+void encode_keyframe(bool ends, std::string& out) {
+  CdrWriter writer(out);
+  writer.flag(ends);
+}
+
+Result<bool> decode_keyframe(std::string_view message) {
+  CdrReader reader(message);
+  const bool ends = reader.flag();
+  if (!reader.good()) return invalid("keyframes");
+  return ends;
+}
+
+}  // namespace tfdude::recording

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "tfdude/types/change.hpp"
+#include "tfdude/types/joint_spec.hpp"
+#include "tfdude/types/partition_news.hpp"
+
+#include "recording/cdr.hpp"
+
+// The messages of a recording: to bytes, and from bytes of unknown origin.
+namespace tfdude::recording {
+
+/// Times of a file that are within this range can be subtracted from each other.
+inline constexpr std::int64_t kMaxTime = 4'000'000'000'000'000'000;
+
+/// The time nearest to this one that can be used.
+[[nodiscard]] inline Time checked_time(std::int64_t ns) {
+  return time_of(std::clamp<std::int64_t>(ns, 0, kMaxTime));
+}
+
+/// A value of an edge.
+struct RecordedValue {
+  WatchedFrame edge;
+  WatchedValue value;  ///< its frame is not used
+};
+
+struct RecordedValues {
+  std::string partition;
+  std::uint64_t commit = 0;
+  bool repeats = false;
+  std::vector<RecordedValue> values;
+};
+
+struct RecordedFrames {
+  std::string partition;
+  std::uint64_t incarnation = 0;
+  bool reachable = true;
+  std::string why;
+  bool complete = false;
+  bool repeats = false;
+  std::vector<WatchedFrame> frames;
+  std::vector<std::string> removed;
+};
+
+struct RecordedJoints {
+  std::string partition;
+  bool repeats = false;
+  std::vector<JointInfo> joints;
+};
+
+/// Writes the values of one message one after the other.
+class ValuesEncoder {
+ public:
+  /// @param out  replaced by the message
+  ValuesEncoder(std::string& out, std::string_view partition, std::uint64_t commit, bool repeats);
+  /// @param as_before  the covariance is that of the edge's last value in the file
+  void add(const WatchedFrame& edge, const WatchedValue& value, bool as_before);
+  void finish() { writer_.set(count_place_, count_); }
+
+ private:
+  CdrWriter writer_;
+  std::size_t count_place_;
+  std::uint32_t count_ = 0;
+};
+
+/// Reads values, in the order of the file from a keyframe or the beginning on.
+class ValuesDecoder {
+ public:
+  /// @return kState: not a valid message; values that are not valid are left out
+  [[nodiscard]] Result<RecordedValues> decode(std::string_view message);
+
+ private:
+  [[nodiscard]] std::optional<RecordedValue> decode_value(CdrReader& reader);
+  std::unordered_map<std::string, Covariance> last_;  // by frame
+};
+
+void encode(const RecordedFrames& frames, std::string& out);
+void encode(const RecordedJoints& joints, std::string& out);
+void encode(const Change& change, std::string& out);
+void encode_keyframe(bool ends, std::string& out);
+
+/// @return kState: not a valid message
+[[nodiscard]] Result<RecordedFrames> decode_frames(std::string_view message);
+[[nodiscard]] Result<RecordedJoints> decode_joints(std::string_view message);
+[[nodiscard]] Result<Change> decode_event(std::string_view message);
+[[nodiscard]] Result<bool> decode_keyframe(std::string_view message);
+
+/// Transforms as ROS has them.
+class TfEncoder {
+ public:
+  explicit TfEncoder(std::string& out);
+  void add(const WatchedFrame& edge, const Pose& X_PC, Time stamp);
+  [[nodiscard]] std::uint32_t count() const { return count_; }
+  void finish() { writer_.set(count_place_, count_); }
+
+ private:
+  CdrWriter writer_;
+  std::size_t count_place_;
+  std::uint32_t count_ = 0;
+};
+
+/// The values of a TFMessage, whose covariance is unspecified; invalid transforms are left out.
+/// @return kState: not a valid message
+[[nodiscard]] Result<std::vector<RecordedValue>> decode_tf(std::string_view message);
+
+}  // namespace tfdude::recording

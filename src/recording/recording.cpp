@@ -1,0 +1,306 @@
+#include "tfdude/recording/recording.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "recording/state.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace recording;
+
+// How much is read before an instant, at first: as much as live histories have.
+constexpr std::chrono::seconds kHistory{10};
+// If that was not enough, so many times more, and in the end all.
+constexpr int kMore = 8;
+constexpr std::chrono::nanoseconds kAll = std::chrono::hours(24 * 365);
+
+// Whether later data may give an answer.
+bool may_come(Errc code) {
+  return code == Errc::kNotYet || code == Errc::kNotConnected || is_unknown(code);
+}
+
+// The samples of an edge. Late ones are counted, but do not divide a gap.
+struct Gaps {
+  std::size_t samples = 0;
+  std::optional<Time> oldest;
+  std::optional<Time> newest;
+  std::size_t count = 0;
+  double sum = 0;
+  double squares = 0;
+  std::chrono::nanoseconds greatest{0};
+
+  void add(Time stamp) {
+    ++samples;
+    if (!oldest || stamp < *oldest) oldest = stamp;
+    if (newest && stamp <= *newest) return;
+    if (newest) {
+      const std::chrono::nanoseconds gap = stamp - *newest;
+      const auto ns = static_cast<double>(gap.count());
+      ++count;
+      sum += ns;
+      squares += ns * ns;
+      greatest = std::max(greatest, gap);
+    }
+    newest = stamp;
+  }
+
+  [[nodiscard]] HistoryInfo info(const std::string& id) const {
+    HistoryInfo info;
+    info.id = id;
+    info.samples = samples;
+    info.count_limit = samples;
+    info.oldest = oldest;
+    info.newest = newest;
+    info.span_limit = *newest - *oldest;
+    info.max_gap = greatest;
+    if (count == 0) return info;
+    const double mean = sum / static_cast<double>(count);
+    const double variance = squares / static_cast<double>(count) - mean * mean;
+    info.mean_gap = std::chrono::nanoseconds(std::llround(mean));
+    info.jitter = std::chrono::nanoseconds(std::llround(std::sqrt(std::max(variance, 0.0))));
+    return info;
+  }
+};
+
+Time before(Time at, std::chrono::nanoseconds span) {
+  const std::int64_t ns = nanoseconds(at);
+  return time_of(ns > span.count() ? ns - span.count() : 0);
+}
+
+}  // namespace
+
+class Recording::Impl {
+ public:
+  explicit Impl(Cursor cursor) : cursor_(std::move(cursor)) {
+    for (const ChunkPlace& chunk : cursor_.reader().chunks()) {
+      const Time start = checked_time(chunk.start);
+      const Time end = checked_time(chunk.end);
+      start_ = std::min(start_.value_or(start), start);
+      end_ = std::max(end_.value_or(end), end);
+    }
+    load(end_.value_or(Time{}), kHistory);
+  }
+
+  void seek(Time at) {
+    if (at < now_) return load(at, kHistory);
+    advance(at);
+  }
+
+  bool step() { return step_message().has_value(); }
+
+  // A state that began too late is read again, from an earlier place.
+  Result<StampedTransform> lookup(std::string_view a, std::string_view b, const Query& query) {
+    while (true) {
+      auto X_AB = state_->lookup(a, b, query);
+      if (X_AB || cursor_.from_beginning() || span_ >= kAll) return X_AB;
+      const bool too_late =
+          X_AB.error().code == Errc::kTooOld || (cursor_.foreign() && may_come(X_AB.error().code));
+      if (!too_late) return X_AB;
+      load(now_, span_ * kMore);
+    }
+  }
+
+  Result<StampedTransform> lookup_at(std::string_view a, std::string_view b, Query query, Time at,
+                                     Milliseconds wait) {
+    query.at = at;
+    seek(at);
+    while (true) {
+      auto X_AB = lookup(a, b, query);
+      if (X_AB || !may_come(X_AB.error().code)) return X_AB;
+      const auto next = cursor_.peek();
+      if (!next || std::chrono::duration_cast<Milliseconds>(*next - at) > wait || !step()) {
+        return X_AB;
+      }
+    }
+  }
+
+  [[nodiscard]] std::vector<RecordedNews> next() {
+    while (const auto message = step_message()) {
+      std::vector<RecordedNews> all;
+      for (PartitionNews& news : state_->news_of(*message)) {
+        all.push_back({message->log, std::move(news)});
+      }
+      if (!all.empty()) return all;
+    }
+    return {};
+  }
+
+  // Calls a function for all messages of a topic, and of foreign files for all messages, from a
+  // place before an instant on, until it returns false. Then restores the instant that is shown.
+  template <class Visit>
+  void visit(std::optional<Topic> only, Time from, Visit visit) {
+    cursor_.rewind();
+    if (only) cursor_.only(*only);
+    while (auto message = cursor_.next()) {
+      if (message->log >= from && !visit(*message)) break;
+    }
+    cursor_.all_topics();
+    load(now_, span_);
+  }
+
+  [[nodiscard]] const State& state() const { return *state_; }
+  [[nodiscard]] const Cursor& cursor() const { return cursor_; }
+  [[nodiscard]] Time now() const { return now_; }
+  [[nodiscard]] std::optional<Time> start() const { return start_; }
+  [[nodiscard]] std::optional<Time> end() const { return end_; }
+
+ private:
+  void load(Time at, std::chrono::nanoseconds span) {
+    span_ = std::min(span, kAll);
+    state_ = std::make_unique<State>();
+    cursor_.start(span_ < kAll ? before(at, span_) : Time{});
+    now_ = at;
+    advance(at);
+  }
+
+  void advance(Time at) {
+    now_ = at;
+    for (auto next = cursor_.peek(); next && *next <= at; next = cursor_.peek()) {
+      state_->apply(*cursor_.next());
+    }
+  }
+
+  std::optional<RecordedMessage> step_message() {
+    auto message = cursor_.next();
+    if (!message) return std::nullopt;
+    now_ = std::max(now_, message->log);
+    state_->apply(*message);
+    return message;
+  }
+
+  Cursor cursor_;
+  std::unique_ptr<State> state_;
+  Time now_{};
+  std::chrono::nanoseconds span_ = kHistory;
+  std::optional<Time> start_;
+  std::optional<Time> end_;
+};
+
+Recording::Recording(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Recording::Recording(Recording&&) noexcept = default;
+Recording& Recording::operator=(Recording&&) noexcept = default;
+Recording::~Recording() = default;
+
+Result<Recording> Recording::open(const std::string& file) {
+  auto source = open_source(file);
+  if (!source) return tl::unexpected(std::move(source.error()));
+  auto cursor = Cursor::open(*std::move(source));
+  if (!cursor) return fail_at(quote(file), cursor.error());
+  return Recording(std::make_unique<Impl>(*std::move(cursor)));
+}
+
+Result<Recording> Recording::read(std::string_view bytes) {
+  auto cursor = Cursor::open(std::make_unique<TextSource>(bytes));
+  if (!cursor) return tl::unexpected(std::move(cursor.error()));
+  return Recording(std::make_unique<Impl>(*std::move(cursor)));
+}
+
+RecordingSummary Recording::summary() const {
+  const Cursor& cursor = impl_->cursor();
+  const McapReader& reader = cursor.reader();
+  return {reader.library(),       cursor.foreign(),       reader.finished(),
+          impl_->start(),         impl_->end(),           reader.size(),
+          reader.chunks().size(), reader.message_count(), cursor.problems()};
+}
+
+void Recording::seek(Time at) { impl_->seek(at); }
+Time Recording::now() const { return impl_->now(); }
+bool Recording::step() { return impl_->step(); }
+
+Result<StampedTransform> Recording::lookup(std::string_view a, std::string_view b,
+                                           const Query& query) {
+  return impl_->lookup(a, b, query);
+}
+
+Result<StampedTransform> Recording::lookup_at(std::string_view a, std::string_view b, Time at,
+                                              const Query& query, Milliseconds wait) {
+  return impl_->lookup_at(a, b, query, at, wait);
+}
+
+Result<StampedTransform> Recording::lookup_at(std::string_view a, Time at_a, std::string_view b,
+                                              Time at_b, std::string_view fixed,
+                                              const Query& query) {
+  const auto X_FA = lookup_at(fixed, a, at_a, query);
+  if (!X_FA) return tl::unexpected(X_FA.error());
+  const auto X_FB = lookup_at(fixed, b, at_b, query);
+  if (!X_FB) return tl::unexpected(X_FB.error());
+  StampedTransform X_AB{between(*X_FA, *X_FB), X_FB->stamp};
+  std::vector<std::string>& unspecified = X_AB.basis.unspecified;
+  unspecified.assign(X_FA->basis.unspecified.rbegin(), X_FA->basis.unspecified.rend());
+  unspecified.insert(unspecified.end(), X_FB->basis.unspecified.begin(),
+                     X_FB->basis.unspecified.end());
+  return X_AB;
+}
+
+Result<std::vector<PathSegment>> Recording::path(std::string_view a, std::string_view b) const {
+  const auto edges = impl_->state().forest().edges(a, b);
+  if (!edges) return tl::unexpected(edges.error());
+  return impl_->state().segments(*edges, a);
+}
+
+Result<std::string> Recording::parent(const std::string& id) const {
+  const auto info = impl_->state().forest().info(id);
+  if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+  return info->parent;
+}
+
+Result<std::vector<std::string>> Recording::children(const std::string& id) const {
+  return impl_->state().forest().children(id);
+}
+
+std::vector<std::string> Recording::roots() const { return impl_->state().forest().roots(); }
+bool Recording::exists(const std::string& id) const { return impl_->state().forest().exists(id); }
+std::vector<Frame> Recording::frames() const { return impl_->state().frames(); }
+std::vector<PartitionInfo> Recording::partitions() const { return impl_->state().partitions(); }
+
+Result<std::vector<JointInfo>> Recording::joints(const std::string& partition) const {
+  const auto* joints = impl_->state().joints(partition);
+  if (joints == nullptr) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+  return *joints;
+}
+
+Result<std::vector<HistoryInfo>> Recording::histories(const std::string& partition) const {
+  if (impl_->state().joints(partition) == nullptr) {
+    return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+  }
+  std::vector<HistoryInfo> all;
+  for (HistoryInfo& history : impl_->state().forest().histories()) {
+    if (impl_->state().owner(history.id) == partition) all.push_back(std::move(history));
+  }
+  return all;
+}
+
+Result<std::vector<HistoryInfo>> Recording::history(const std::string& id) {
+  Gaps gaps;
+  bool found = exists(id);
+  impl_->visit(std::nullopt, Time::min(), [&](const RecordedMessage& message) {
+    const auto* values = std::get_if<RecordedValues>(&message.what);
+    if (values == nullptr || values->repeats) return true;
+    for (const RecordedValue& value : values->values) {
+      if (value.edge.id != id) continue;
+      found = true;
+      if (value.value.stamp) gaps.add(*value.value.stamp);
+    }
+    return true;
+  });
+  if (!found) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+  if (!gaps.newest) return std::vector<HistoryInfo>();
+  return std::vector<HistoryInfo>{gaps.info(id)};
+}
+
+void Recording::events(Time from, const std::function<bool(const Change&)>& visit) {
+  impl_->visit(Topic::kEvents, from, [&](const RecordedMessage& message) {
+    const auto* change = std::get_if<Change>(&message.what);
+    return change == nullptr || visit(*change);
+  });
+}
+
+std::vector<PartitionNews> Recording::state() const { return impl_->state().news(); }
+std::vector<RecordedNews> Recording::next() { return impl_->next(); }
+
+}  // namespace tfdude

@@ -1,0 +1,160 @@
+#include "recording/schemas.hpp"
+
+namespace tfdude::recording {
+namespace {
+
+constexpr std::string_view kTfDefinition = R"(geometry_msgs/TransformStamped[] transforms
+================================================================================
+MSG: geometry_msgs/TransformStamped
+std_msgs/Header header
+string child_frame_id
+Transform transform
+================================================================================
+MSG: geometry_msgs/Transform
+Vector3 translation
+Quaternion rotation
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x 0
+float64 y 0
+float64 z 0
+float64 w 1
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+)";
+
+constexpr std::string_view kKeyframeDefinition =
+    R"(# All that is known follows once more: messages with `repeats`, up to the one that says so.
+# Who starts to read here needs nothing before; others ignore these messages.
+bool ends
+)";
+
+constexpr std::string_view kFramesDefinition =
+    R"(# The frames of a partition, and whether its owner is reachable.
+string partition
+uint64 incarnation  # of the owner's process
+bool reachable
+string why          # if it is not
+bool complete       # the partition has no other frames
+bool repeats        # see Keyframe
+Frame[] frames      # new, or under another parent
+string[] removed
+================================================================================
+MSG: tfdude_msgs/Frame
+string id
+string parent       # empty: a root
+)";
+
+constexpr std::string_view kValuesDefinition =
+    R"(# What the owner of a partition has written in one commit, or in several consecutive ones.
+string partition
+uint64 commit
+bool repeats        # see Keyframe
+Value[] values
+================================================================================
+MSG: tfdude_msgs/Value
+# The value of the edge from a frame's parent to the frame.
+string frame
+string parent
+int64 stamp         # nanoseconds; -1: none, the value holds for all times
+uint8 GIVEN = 0
+uint8 UNSPECIFIED = 1
+uint8 AS_BEFORE = 2 # as in the edge's value before this one
+uint8 covariance_is
+bool begins         # a new history: earlier values of the edge do not hold any more
+float64[7] pose     # x, y, z, w of the unit quaternion; x, y, z [m]
+# Upper triangle of the 6x6 covariance, row by row, of the right perturbation: translation [m],
+# then rotation [rad]. Without the part that is shared with other edges.
+float64[] covariance
+float64[] process_noise  # per second; likewise; with `begins`, if there is any
+# How the error of the edge is correlated with others, from the last of its values here on.
+bool unknown        # its own part may be correlated with anything
+CommonError[] common_errors
+string[] observed_with
+================================================================================
+MSG: tfdude_msgs/CommonError
+string source
+bool subtracts
+float64[] loading   # 6xk, column by column
+)";
+
+constexpr std::string_view kJointsDefinition =
+    R"(# The joints of a partition, once a second if they have changed.
+string partition
+bool repeats        # see Keyframe
+Joint[] joints
+================================================================================
+MSG: tfdude_msgs/Joint
+string name
+string frame        # that it moves
+uint8 REVOLUTE = 1
+uint8 CONTINUOUS = 2
+uint8 PRISMATIC = 3
+uint8 type
+bool measured       # by a sample
+float64 position    # [rad or m]
+float64[] variance  # none: unspecified
+float64[] limits    # lower and upper, or none
+string mimics       # another joint; empty: none
+float64 multiplier
+float64 offset
+uint64 outside      # how many positions were outside of the limits
+uint64 refused
+)";
+
+constexpr std::string_view kEventsDefinition = R"(# A change, as the recorder saw it.
+string kind
+string partition
+string frame
+string parent
+string rival
+string message
+int64 time          # nanoseconds
+bool stopped
+)";
+
+// tf_static: reliable, transient local, depth 1. The numbers are those of rmw.
+constexpr std::string_view kStaticQos = R"(- history: 1
+  depth: 1
+  reliability: 1
+  durability: 1
+  deadline:
+    sec: 9223372036
+    nsec: 854775807
+  lifespan:
+    sec: 9223372036
+    nsec: 854775807
+  liveliness: 1
+  liveliness_lease_duration:
+    sec: 9223372036
+    nsec: 854775807
+  avoid_ros_namespace_conventions: false
+)";
+
+}  // namespace
+
+const std::array<TopicType, 7>& topic_types() {
+  static const std::array<TopicType, 7> kTypes{{
+      {Topic::kTf, "/tf", kTfType, kTfDefinition, ""},
+      {Topic::kTfStatic, "/tf_static", kTfType, kTfDefinition, kStaticQos},
+      {Topic::kKeyframe, "/tfdude/keyframe", "tfdude_msgs/msg/Keyframe", kKeyframeDefinition, ""},
+      {Topic::kFrames, "/tfdude/frames", "tfdude_msgs/msg/Frames", kFramesDefinition, ""},
+      {Topic::kValues, "/tfdude/values", "tfdude_msgs/msg/Values", kValuesDefinition, ""},
+      {Topic::kJoints, "/tfdude/joints", "tfdude_msgs/msg/Joints", kJointsDefinition, ""},
+      {Topic::kEvents, "/tfdude/events", "tfdude_msgs/msg/Event", kEventsDefinition, ""},
+  }};
+  return kTypes;
+}
+
+}  // namespace tfdude::recording

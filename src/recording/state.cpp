@@ -1,0 +1,266 @@
+#include "recording/state.hpp"
+
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+
+#include "partition/routing.hpp"
+
+namespace tfdude::recording {
+namespace {
+
+// Of all edges together, about 400 bytes each.
+constexpr std::size_t kMostSamples = 2'000'000;
+constexpr std::size_t kLeastSamples = 64;
+constexpr std::size_t kMostOfOneEdge = 65'536;
+
+EdgeTiming unlimited(std::size_t edges) {
+  EdgeTiming timing;
+  timing.span = std::chrono::hours(24 * 365 * 50);
+  timing.count =
+      std::clamp(kMostSamples / std::max<std::size_t>(edges, 1), kLeastSamples, kMostOfOneEdge);
+  timing.max_ahead = std::chrono::nanoseconds::max();
+  timing.restart_after = 0;
+  return timing;
+}
+
+}  // namespace
+
+State::State() { (void)forest_.set_default_timing(unlimited(1)); }
+
+// Edges that are not dynamic yet get fewer samples if there are more of them.
+void State::share_memory() {
+  if (owners_.size() < shared_by_ + shared_by_ / 8 + 1) return;
+  shared_by_ = owners_.size();
+  (void)forest_.set_default_timing(unlimited(shared_by_));
+}
+
+State::Known& State::partition(const std::string& name) {
+  Known& known = partitions_[name];
+  known.info.name = name;
+  return known;
+}
+
+void State::put(Known& known, const WatchedFrame& frame) {
+  const auto before = forest_.info(frame.id);
+  const std::string& owner = owners_[frame.id];
+  if (owner != known.info.name) {
+    if (const auto other = partitions_.find(owner); other != partitions_.end()) {
+      other->second.places.clear();
+      other->second.frames.erase(frame.id);
+    }
+    owners_[frame.id] = known.info.name;
+  }
+  known.frames[frame.id] = frame.parent;
+  known.places.clear();
+  share_memory();
+  if (before && before->parent == frame.parent) return;
+  if (before) (void)forest_.release(frame.id);
+  // A cycle can only be in a damaged file; the frame then waits for another parent.
+  constexpr auto kAllow = Forest::MissingParent::kAllow;
+  if (!forest_.add(frame.id, frame.parent, Transform(), kAllow)) {
+    (void)forest_.add(frame.id, "", Transform());
+  }
+  if (!frame.parent.empty()) valueless_.insert(frame.id);
+}
+
+void State::drop(Known& known, const std::string& id) {
+  const auto owner = owners_.find(id);
+  if (owner == owners_.end() || owner->second != known.info.name) return;
+  owners_.erase(owner);
+  known.places.clear();
+  known.frames.erase(id);
+  valueless_.erase(id);
+  (void)forest_.release(id);
+}
+
+FramesNews State::frames_of(const Known& known) {
+  FramesNews news;
+  news.incarnation = known.incarnation;
+  for (const auto& [id, parent] : known.frames) news.frames.push_back({id, parent});
+  return news;
+}
+
+void State::apply(const RecordedMessage& message) {
+  frames_changed_ = false;
+  if (const auto* frames = std::get_if<RecordedFrames>(&message.what)) {
+    apply(*frames, message.log);
+  } else if (const auto* values = std::get_if<RecordedValues>(&message.what)) {
+    apply(*values, message.foreign);
+  } else if (const auto* joints = std::get_if<RecordedJoints>(&message.what)) {
+    partition(joints->partition).joints = joints->joints;
+  }
+}
+
+void State::apply(const RecordedFrames& frames, Time log) {
+  Known& known = partition(frames.partition);
+  if (frames.repeats && std::exchange(known.has_state, true)) return;
+  known.has_state = true;
+  if (known.info.reachable != frames.reachable) known.info.since = log;
+  known.info.reachable = frames.reachable;
+  known.why = frames.why;
+  known.incarnation = frames.incarnation;
+  std::vector<std::string> gone = frames.removed;
+  if (frames.complete) {
+    std::unordered_set<std::string_view> stay;
+    for (const WatchedFrame& frame : frames.frames) stay.insert(frame.id);
+    for (const auto& [id, parent] : known.frames) {
+      if (stay.count(id) == 0) gone.push_back(id);
+    }
+  }
+  for (const std::string& id : gone) drop(known, id);
+  for (const WatchedFrame& frame : frames.frames) put(known, frame);
+  frames_changed_ = frames.complete || !frames.frames.empty() || !gone.empty();
+  known.info.frames = known.frames.size();
+}
+
+void State::apply(const RecordedValues& recorded, bool foreign) {
+  Known& known = partition(recorded.partition);
+  std::vector<Handle> edges;
+  std::vector<PushedValue> values;
+  for (const RecordedValue& one : recorded.values) {
+    // One that only repeats is needed if nothing was known.
+    if (recorded.repeats && valueless_.count(one.edge.id) == 0) continue;
+    const auto frame = known.frames.find(one.edge.id);
+    if (frame == known.frames.end() || frame->second != one.edge.parent) {
+      if (!foreign) continue;
+      if (!forest_.exists(one.edge.parent)) put(known, {one.edge.parent, ""});
+      put(known, one.edge);
+      frames_changed_ = true;
+    }
+    const auto handle = forest_.find(one.edge.id);
+    if (!handle) continue;
+    PushedValue value{static_cast<std::uint32_t>(edges.size()), one.value.stamp, one.value.X_PC,
+                      one.value.correlation};
+    value.process_noise = one.value.begins;
+    const bool first = valueless_.erase(one.edge.id) > 0;
+    if (first && !value.process_noise) value.process_noise = Covariance();
+    edges.push_back(*handle);
+    values.push_back(std::move(value));
+  }
+  known.info.reachable = known.info.reachable || foreign;
+  known.info.frames = known.frames.size();
+  forest_.take(edges, values);
+}
+
+PartitionNews State::news_of(const RecordedValues& recorded, Known& known) {
+  if (known.places.empty()) {
+    for (const auto& [id, parent] : known.frames) {
+      known.places.emplace(id, static_cast<std::uint32_t>(known.places.size()));
+    }
+  }
+  ValuesNews news{recorded.commit, {}};
+  for (const RecordedValue& one : recorded.values) {
+    const auto frame = known.frames.find(one.edge.id);
+    if (frame == known.frames.end() || frame->second != one.edge.parent) continue;
+    news.values.push_back(one.value);
+    news.values.back().frame = known.places.at(one.edge.id);
+  }
+  return {recorded.partition, std::move(news)};
+}
+
+std::vector<PartitionNews> State::news_of(const RecordedMessage& message) {
+  std::vector<PartitionNews> news;
+  if (const auto* frames = std::get_if<RecordedFrames>(&message.what)) {
+    const Known& known = partition(frames->partition);
+    if (frames->repeats && !frames_changed_) return news;
+    news.push_back({frames->partition, ReachNews{frames->reachable, frames->why}});
+    if (frames_changed_) news.push_back({frames->partition, frames_of(known)});
+  } else if (const auto* values = std::get_if<RecordedValues>(&message.what)) {
+    Known& known = partition(values->partition);
+    if (frames_changed_) news.push_back({values->partition, frames_of(known)});
+    if (!values->repeats) news.push_back(news_of(*values, known));
+  }
+  return news;
+}
+
+// As the owners answered and the caller put it together, because to fourth order that matters.
+Result<StampedTransform> State::lookup(std::string_view a, std::string_view b,
+                                       const Query& query) const {
+  const auto edges = forest_.edges(a, b);
+  if (!edges) return tl::unexpected(edges.error());
+  for (const FrameInfo& edge : *edges) {
+    if (valueless_.count(edge.id) == 0) continue;
+    return fail(Errc::kNotYet, "frame " + quote(edge.id) + " has no value yet");
+  }
+  LookupPlan plan;
+  LookupRequest request;
+  request.query = query;
+  for (const PathSegment& segment : segments(*edges, a)) {
+    plan.segments.push_back({kHeldHere, segment.from, segment.to});
+    request.segments.push_back({segment.from, segment.to});
+  }
+  if (request.segments.empty()) return assemble(plan, {});
+  auto values = forest_.lookup_segments(request.segments, query);
+  if (!values) return tl::unexpected(std::move(values.error()));
+  plan.parts.push_back({kHeldHere, {}, Request{0, {}, std::move(request)}});
+  return assemble(plan, {*std::move(values)});
+}
+
+std::vector<PathSegment> State::segments(const std::vector<FrameInfo>& edges,
+                                         std::string_view from) const {
+  std::vector<PathSegment> path;
+  std::string at(from);
+  for (const FrameInfo& edge : edges) {
+    const std::string partition = owner(edge.id);
+    if (path.empty() || path.back().partition != partition) path.push_back({partition, at, at});
+    at = edge.id == at ? edge.parent : edge.id;
+    path.back().to = at;
+  }
+  return path;
+}
+
+std::string State::owner(const std::string& frame) const {
+  const auto found = owners_.find(frame);
+  return found != owners_.end() ? found->second : std::string();
+}
+
+std::vector<Frame> State::frames() const {
+  std::vector<Frame> frames;
+  for (FrameInfo& info : forest_.frames()) {
+    std::string partition = owner(info.id);
+    frames.push_back(
+        {std::move(info.id), std::move(info.parent), std::move(partition), info.attached});
+  }
+  std::sort(frames.begin(), frames.end(),
+            [](const Frame& a, const Frame& b) { return a.id < b.id; });
+  return frames;
+}
+
+std::vector<PartitionInfo> State::partitions() const {
+  std::vector<PartitionInfo> all;
+  for (const auto& [name, known] : partitions_) all.push_back(known.info);
+  return all;
+}
+
+const std::vector<JointInfo>* State::joints(const std::string& partition) const {
+  const auto found = partitions_.find(partition);
+  return found != partitions_.end() ? &found->second.joints : nullptr;
+}
+
+std::vector<PartitionNews> State::news() const {
+  std::vector<PartitionNews> all;
+  for (const auto& [name, known] : partitions_) {
+    all.push_back({name, ReachNews{known.info.reachable, known.why}});
+    all.push_back({name, frames_of(known)});
+    std::vector<EdgeCursor> cursors;
+    std::vector<std::uint32_t> places;
+    std::uint32_t place = 0;
+    for (const auto& [id, parent] : known.frames) {
+      if (!parent.empty() && valueless_.count(id) == 0) {
+        cursors.push_back({id, parent});
+        places.push_back(place);
+      }
+      ++place;
+    }
+    ValuesNews values;
+    for (PushedValue& value : forest_.values_since(cursors, {true, {}}).values) {
+      values.values.push_back({places[value.index], value.stamp, value.X,
+                               std::move(value.correlation), value.process_noise});
+    }
+    all.push_back({name, std::move(values)});
+  }
+  return all;
+}
+
+}  // namespace tfdude::recording

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "tfdude/types/frame.hpp"
+#include "tfdude/types/partition_info.hpp"
+
+#include "recording/cursor.hpp"
+#include "tree/forest.hpp"
+
+namespace tfdude::recording {
+
+/// What was known at an instant of a recording: one forest with the frames of all partitions, as a
+/// watched path has one of its edges.
+/// @par Memory  As many samples as all edges together may have.
+class State {
+ public:
+  State();
+
+  /// Applies the next message.
+  void apply(const RecordedMessage& message);
+  /// What a watch would have reported of the message that was applied last; nothing for one that
+  /// only repeats, or is of another kind.
+  [[nodiscard]] std::vector<PartitionNews> news_of(const RecordedMessage& message);
+
+  [[nodiscard]] const Forest& forest() const { return forest_; }
+  /// As Forest::lookup(); kNotYet also if an edge has no value yet.
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
+                                                const Query& query) const;
+  /// The runs of edges of one owner, of a path that begins here.
+  [[nodiscard]] std::vector<PathSegment> segments(const std::vector<FrameInfo>& edges,
+                                                  std::string_view from) const;
+  /// The owner; empty: unknown.
+  [[nodiscard]] std::string owner(const std::string& frame) const;
+  [[nodiscard]] std::vector<Frame> frames() const;
+  [[nodiscard]] std::vector<PartitionInfo> partitions() const;
+  /// Null: no such partition.
+  [[nodiscard]] const std::vector<JointInfo>* joints(const std::string& partition) const;
+
+  /// What a watch of each partition would have reported if it began now.
+  [[nodiscard]] std::vector<PartitionNews> news() const;
+
+ private:
+  struct Known {
+    PartitionInfo info;
+    std::string why;
+    std::uint64_t incarnation = 0;
+    bool has_state = false;                                      // its frames have come
+    std::map<std::string, std::string> frames;                   // parents
+    std::unordered_map<std::string_view, std::uint32_t> places;  // of the frames; or empty
+    std::vector<JointInfo> joints;
+  };
+
+  void apply(const RecordedFrames& frames, Time log);
+  void apply(const RecordedValues& values, bool foreign);
+  [[nodiscard]] static PartitionNews news_of(const RecordedValues& recorded, Known& known);
+  void put(Known& known, const WatchedFrame& frame);
+  void drop(Known& known, const std::string& id);
+  void share_memory();
+  [[nodiscard]] Known& partition(const std::string& name);
+  [[nodiscard]] static FramesNews frames_of(const Known& known);
+
+  Forest forest_;
+  std::map<std::string, Known> partitions_;
+  std::unordered_map<std::string, std::string> owners_;  // by frame
+  std::unordered_set<std::string> valueless_;            // frames whose edge has no value yet
+  std::size_t shared_by_ = 0;
+  bool frames_changed_ = false;  // by the last message
+};
+
+}  // namespace tfdude::recording
