@@ -145,7 +145,7 @@ class Recording::Impl {
 
   [[nodiscard]] const State& state() const { return *state_; }
   [[nodiscard]] const Cursor& cursor() const { return cursor_; }
-  [[nodiscard]] Time now() const { return now_; }
+  [[nodiscard]] Time instant() const { return now_; }
   [[nodiscard]] std::optional<Time> start() const { return start_; }
   [[nodiscard]] std::optional<Time> end() const { return end_; }
 
@@ -209,7 +209,7 @@ RecordingSummary Recording::summary() const {
 }
 
 void Recording::seek(Time at) { impl_->seek(at); }
-Time Recording::now() const { return impl_->now(); }
+Time Recording::instant() const { return impl_->instant(); }
 bool Recording::step() { return impl_->step(); }
 
 Result<StampedTransform> Recording::lookup(std::string_view a, std::string_view b,

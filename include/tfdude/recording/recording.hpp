@@ -72,7 +72,7 @@ class TFDUDE_EXPORT Recording {
   /// file is read up to there: mostly 8 to 16 MB.
   void seek(Time at);
   /// The instant that is shown.
-  [[nodiscard]] Time now() const;
+  [[nodiscard]] Time instant() const;
   /// Goes to the next message. @return whether there is one
   bool step();
 
