@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 
 #include "tfdude/base/id.hpp"
 
@@ -19,6 +18,10 @@ constexpr std::size_t kLeastJoint = 4 + 4 + 2 + 8 + 4 + 4 + 4 + 32;
 tl::unexpected<Error> invalid(const char* what) {
   return fail(Errc::kState, std::string("a message is not a valid one of ") + what);
 }
+
+// Instead of a stamp.
+constexpr std::int64_t kAlways = -1;
+constexpr std::int64_t kCleared = -2;
 
 enum class CovarianceIs : std::uint8_t { kGiven = 0, kUnspecified = 1, kAsBefore = 2 };
 
@@ -99,7 +102,7 @@ void ValuesEncoder::add(const WatchedFrame& edge, const WatchedValue& value, boo
   ++count_;
   writer_.text(edge.id);
   writer_.text(edge.parent);
-  writer_.i64(value.stamp ? nanoseconds(*value.stamp) : -1);
+  writer_.i64(value.cleared ? kCleared : value.stamp ? nanoseconds(*value.stamp) : kAlways);
   const StatedCovariance& covariance = value.X_PC.covariance;
   const CovarianceIs is = !covariance.complete() ? CovarianceIs::kUnspecified
                           : as_before            ? CovarianceIs::kAsBefore
@@ -131,7 +134,7 @@ std::optional<RecordedValue> ValuesDecoder::decode_value(CdrReader& reader) {
   const bool begins = reader.flag();
   Flat flat{};
   for (std::size_t i = 0; i < 7; ++i) flat[i] = reader.f64();
-  bool valid = is_edge(recorded.edge) && stamp >= -1 && stamp <= kMaxTime;
+  bool valid = is_edge(recorded.edge) && stamp >= kCleared && stamp <= kMaxTime;
   const auto upper = upper_of(reader, valid);
   const auto noise = upper_of(reader, valid);
   recorded.value.correlation = correlation_of(reader, valid);
@@ -151,6 +154,7 @@ std::optional<RecordedValue> ValuesDecoder::decode_value(CdrReader& reader) {
   recorded.value.X_PC = *X_PC;
   recorded.value.X_PC.covariance.set_complete(is != CovarianceIs::kUnspecified);
   if (stamp >= 0) recorded.value.stamp = time_of(stamp);
+  recorded.value.cleared = stamp == kCleared;
   if (!begins) return recorded;
   recorded.value.begins.emplace();
   if (noise) {
@@ -231,8 +235,8 @@ void encode(const RecordedJoints& joints, std::string& out) {
     writer.u8(static_cast<std::uint8_t>(joint.type));
     writer.flag(joint.measured);
     writer.f64(joint.position);
-    writer.u32(1);
-    writer.f64(joint.variance);
+    writer.u32(joint.variance ? 1 : 0);
+    if (joint.variance) writer.f64(*joint.variance);
     writer.u32(joint.limits ? 2 : 0);
     if (joint.limits) {
       writer.f64(joint.limits->lower);
@@ -260,7 +264,6 @@ Result<RecordedJoints> decode_joints(std::string_view message) {
     joint.type = static_cast<JointType>(type);
     joint.measured = reader.flag();
     joint.position = reader.f64();
-    joint.variance = std::numeric_limits<double>::quiet_NaN();
     for (std::uint32_t n = reader.count(sizeof(double)); n > 0; --n) joint.variance = reader.f64();
     std::vector<double> limits(reader.count(sizeof(double)));
     reader.f64s(limits);

@@ -14,6 +14,9 @@ std::size_t place_of(const std::vector<WatchedFrame>& frames, const WatchedFrame
   return static_cast<std::size_t>(found - frames.begin());
 }
 
+// Whether it holds for all times.
+bool is_static(const WatchedValue& value) { return !value.stamp && !value.cleared; }
+
 }  // namespace
 
 Result<void> Recorder::put(Topic topic, Time now, std::optional<Time> publish) {
@@ -82,14 +85,15 @@ Result<void> Recorder::write(const std::string& name, Known& known, const Values
     encoder.add(known.frames[value.frame], value, as_before);
     if (covariance.complete()) edge.written = covariance.of_specified();
     publish = std::max(publish, value.stamp);
-    if (!value.stamp) statics_changed_ = true;
-    const bool late = !value.begins && edge.newest && value.stamp < edge.newest->stamp;
+    if (is_static(value)) statics_changed_ = true;
+    const bool late =
+        !value.begins && !value.cleared && edge.newest && value.stamp < edge.newest->stamp;
     if (late) {
       edge.newest->correlation = value.correlation;
       continue;
     }
     // A static edge that becomes dynamic is no longer one of the statics.
-    if (edge.newest && !edge.newest->stamp && value.stamp) statics_changed_ = true;
+    if (edge.newest && is_static(*edge.newest) && value.stamp) statics_changed_ = true;
     auto begins = value.begins  ? value.begins
                   : edge.newest ? std::move(edge.newest->begins)
                                 : std::optional<Covariance>(Covariance());
@@ -120,7 +124,7 @@ Result<void> Recorder::write_statics(Time now) {
   for (const auto& [name, known] : partitions_) {
     for (std::size_t i = 0; i < known.edges.size(); ++i) {
       const auto& value = known.edges[i].newest;
-      if (value && !value->stamp) encoder.add(known.frames[i], value->X_PC.pose, now);
+      if (value && is_static(*value)) encoder.add(known.frames[i], value->X_PC.pose, now);
     }
   }
   encoder.finish();

@@ -17,6 +17,8 @@ using namespace recording;
 
 // What waits longer is flushed. With the interval of ticks, at most a second is lost.
 constexpr Milliseconds kFlushAfter{800};
+// A clock that goes back by more has jumped: times within one file never go back.
+constexpr std::chrono::seconds kJump{1};
 // A message of all static values is written at most so often.
 constexpr Milliseconds kStaticsEvery{1000};
 constexpr std::size_t kChunkBytes = std::size_t{4} << 20U;
@@ -75,9 +77,13 @@ class RecordingWriter::Impl {
   template <class Record>
   [[nodiscard]] Result<void> record(Time now, Record record) {
     if (!state_) return state_;
+    if (now_ - now > kJump) {
+      now_ = now;
+      state_ = split(now_);
+    }
     now_ = std::max(now_, now);
-    if (!writer_->pending()) pending_since_ = now_;
-    state_ = record(recorder_, now_);
+    if (!writer_->pending()) pending_since_ = std::chrono::steady_clock::now();
+    if (state_) state_ = record(recorder_, now_);
     if (state_) state_ = after(now_);
     return state_;
   }
@@ -140,8 +146,8 @@ class RecordingWriter::Impl {
         std::max(kKeyframeEvery, kKeyframeShare * keyframe_size_)) {
       if (auto ok = keyframe(now); !ok) return ok;
     }
-    if (writer_->pending() && now - pending_since_ >= kFlushAfter) return writer_->flush();
-    return {};
+    const auto waited = std::chrono::steady_clock::now() - pending_since_;
+    return writer_->pending() && waited >= kFlushAfter ? writer_->flush() : Result<void>();
   }
 
   [[nodiscard]] Result<void> split(Time now) {
@@ -161,7 +167,7 @@ class RecordingWriter::Impl {
   std::vector<std::string> files_;
   Time now_{};
   Time begun_{};
-  Time pending_since_{};
+  std::chrono::steady_clock::time_point pending_since_;
   Time statics_at_{};
   std::uint64_t keyframe_end_ = 0;
   std::uint64_t keyframe_size_ = 0;

@@ -133,6 +133,7 @@ void State::apply(const RecordedValues& recorded, bool foreign) {
     PushedValue value{static_cast<std::uint32_t>(edges.size()), one.value.stamp, one.value.X_PC,
                       one.value.correlation};
     value.process_noise = one.value.begins;
+    value.cleared = one.value.cleared;
     const bool first = valueless_.erase(one.edge.id) > 0;
     if (first && !value.process_noise) value.process_noise = Covariance();
     edges.push_back(*handle);
@@ -256,7 +257,7 @@ std::vector<PartitionNews> State::news() const {
     ValuesNews values;
     for (PushedValue& value : forest_.values_since(cursors, {true, {}}).values) {
       values.values.push_back({places[value.index], value.stamp, value.X,
-                               std::move(value.correlation), value.process_noise});
+                               std::move(value.correlation), value.process_noise, value.cleared});
     }
     all.push_back({name, std::move(values)});
   }

@@ -14,10 +14,6 @@ constexpr std::uint32_t kGone = UINT32_MAX;
 // Edges that were written within this time of the newest sample are those that are streamed.
 constexpr std::chrono::seconds kStreamed{1};
 
-bool same(const Transform& a, const Transform& b) {
-  return a.pose.matrix() == b.pose.matrix() && a.covariance == b.covariance;
-}
-
 // Gives each value of an edge the correlation that its last one has.
 void spread_correlations(std::vector<PushedValue>& entries) {
   std::map<std::uint32_t, const Correlation*> last;
@@ -180,21 +176,24 @@ std::optional<WatchedValue> FollowedPartition::admitted(const Group& group, Push
   const bool is_old = !begins && message.commit <= known.commit;
   if (is_old) entry.correlation = known.correlation;
   if (!begins) {
-    const bool repeats = entry.stamp == known.newest && same(entry.X, known.X) &&
-                         entry.correlation == known.correlation;
+    const bool repeats = entry.stamp == known.newest && entry.cleared == known.cleared &&
+                         same(entry.X, known.X) && entry.correlation == known.correlation;
     if (repeats) return std::nullopt;
     // Of one commit, a part may be missing.
-    if (!entry.stamp && (!message.follows_on || is_old)) return std::nullopt;
+    if (!entry.stamp && !entry.cleared && (!message.follows_on || is_old)) return std::nullopt;
+    if (entry.cleared && is_old) return std::nullopt;
     const bool late = entry.stamp && known.newest && *entry.stamp < *known.newest;
     const bool wanted = message.reply ? missing_from_.has_value() : period_.count() == 0;
     if (late && !wanted) return std::nullopt;
     if (late) known.correlation = entry.correlation;
-    if (late) return WatchedValue{frame, entry.stamp, entry.X, std::move(entry.correlation), {}};
+    if (late) return WatchedValue{frame, entry.stamp, entry.X, std::move(entry.correlation)};
   }
-  known = {entry.history, std::max(known.commit, message.commit), entry.stamp, entry.X,
-           entry.correlation};
-  WatchedValue value{frame, entry.stamp, entry.X, std::move(entry.correlation), {}};
+  known = {entry.history,     std::max(known.commit, message.commit),
+           entry.stamp,       entry.X,
+           entry.correlation, entry.cleared};
+  WatchedValue value{frame, entry.stamp, entry.X, std::move(entry.correlation)};
   if (begins) value.begins = entry.process_noise;
+  value.cleared = entry.cleared;
   return value;
 }
 

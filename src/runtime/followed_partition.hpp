@@ -92,6 +92,7 @@ class FollowedPartition {
     std::optional<Time> newest;
     Transform X;
     Correlation correlation;
+    bool cleared = false;
   };
   struct Group {
     std::uint64_t id = 0;

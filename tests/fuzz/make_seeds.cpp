@@ -1,5 +1,6 @@
 // Writes seeds: make_seeds FOLDER. One file for each message of tests/support/samples.hpp, choices
-// for the harness of partitions, and stored states; those of configurations are written by hand.
+// for the harness of partitions, stored states and recordings; those of configurations are written
+// by hand.
 
 #include <cstdio>
 #include <filesystem>
@@ -8,6 +9,8 @@
 #include <memory>
 #include <sqlite3.h>
 #include <string>
+
+#include "tfdude/recording/recording_writer.hpp"
 
 #include "ros/ros_bytes.hpp"
 #include "store/sqlite_store.hpp"
@@ -135,6 +138,32 @@ bool write_states(const std::filesystem::path& folder) {
   return true;
 }
 
+// A recording of two partitions, compressed and not.
+bool write_recordings(const std::filesystem::path& folder) {
+  Random random(0x4ec0);
+  for (const bool compress : {false, true}) {
+    const auto file = std::filesystem::temp_directory_path() / "tfdude-seed.mcap";
+    std::filesystem::remove(file);
+    RecordingOptions options;
+    options.compress = compress;
+    auto writer = RecordingWriter::create(file, time_of(0), options);
+    if (!writer) return false;
+    const FramesNews frames{{{"arm", "base"}, {"hand", "arm"}}, 7};
+    bool good = writer->add({"arms", ReachNews{true, ""}}, time_of(1)) &&
+                writer->add({"arms", frames}, time_of(2));
+    WatchedValue begins{0, std::nullopt, random.transform(), {}, Covariance()};
+    WatchedValue sample{1, time_of(5), random.transform(), {}, Covariance()};
+    good = good && writer->add({"arms", ValuesNews{3, {begins, sample}}}, time_of(6)) &&
+           writer->add(Change{ChangeKind::kPartitionUp, "arms"}, time_of(7)) &&
+           writer->add("arms", {JointInfo{"elbow", "hand"}}, time_of(8)) &&
+           writer->finish(time_of(9));
+    if (!good) return false;
+    write(folder / "recording", compress ? "compressed" : "plain", content(file));
+    std::filesystem::remove(file);
+  }
+  return true;
+}
+
 }  // namespace
 }  // namespace tfdude::fuzz
 
@@ -146,5 +175,7 @@ int main(int argc, char** argv) {
   tfdude::fuzz::write_samples(argv[1]);
   tfdude::fuzz::write_ros(argv[1]);
   tfdude::fuzz::write_choices(argv[1]);
-  return tfdude::fuzz::write_states(argv[1]) ? 0 : 1;
+  const bool written =
+      tfdude::fuzz::write_states(argv[1]) && tfdude::fuzz::write_recordings(argv[1]);
+  return written ? 0 : 1;
 }

@@ -43,14 +43,17 @@ class TFDUDE_EXPORT RecordingWriter {
   /// Finishes the file.
   ~RecordingWriter();
 
-  /// @param now  when it was heard. Times that go back are treated as the last one.
+  /// @param now  when it was heard, by the clock of the stamps. If it goes back by more than a
+  ///   second, as a simulation does that starts again, another file is begun; by less, it is
+  ///   treated as the last time.
   [[nodiscard]] Result<void> add(const PartitionNews& news, Time now);
   /// All joints of a partition; ignored if nothing has changed.
   [[nodiscard]] Result<void> add(const std::string& partition, const std::vector<JointInfo>& joints,
                                  Time now);
   [[nodiscard]] Result<void> add(const Change& change, Time now);
 
-  /// Flushes what has waited for most of a second. Call it several times a second.
+  /// Flushes what has waited for most of a second, by a steady clock. Call it several times a
+  /// second.
   [[nodiscard]] Result<void> tick(Time now);
 
   /// Writes the summary, which makes opening the file faster.

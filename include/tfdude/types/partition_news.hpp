@@ -40,6 +40,8 @@ struct WatchedValue {
   /// Process noise of the edge per second. Given with the first value of a history: what is known
   /// of the edge so far does not hold any more.
   std::optional<Covariance> begins{};
+  /// The history was cleared: the edge is dynamic, and has no value until its next sample.
+  bool cleared = false;
 };
 
 /// What the owner has written in one commit, or in several consecutive ones. Samples of an edge are
