@@ -43,11 +43,14 @@ std::string profile_of(const Options& options) {
 }
 
 // An empty answer without any partition counts as no answer. @return the exit status
-int none_there(Client& client, const Arguments& arguments, bool found) {
+int none_there(Source source, const Arguments& arguments, bool found) {
   if (found) return kDone;
-  const auto partitions = client.partitions();
+  const auto partitions = source.partitions();
   if (!partitions) return report(partitions.error(), arguments);
   if (!partitions->empty()) return kDone;
+  if (!source.live()) {
+    return report({Errc::kUnknownPartition, "the recording has no partition then"}, arguments);
+  }
   return report({Errc::kUnreachable, nobody_answers(arguments)}, arguments);
 }
 
@@ -79,9 +82,9 @@ int finish(Client& client, const Result<void>& changed, const Arguments& argumen
                 what + " " + arguments.id + "\n");
 }
 
-int refuse(Client& client, const Error& error, const Arguments& arguments) {
+int refuse(Source source, const Error& error, const Arguments& arguments) {
   if (is_unknown(error.code)) {
-    if (const int status = none_there(client, arguments, false); status != kDone) return status;
+    if (const int status = none_there(source, arguments, false); status != kDone) return status;
   }
   if (error.code == Errc::kUnsupported && arguments.options.follow) return kNeedsAllFrames;
   return report(error, arguments);
@@ -117,12 +120,12 @@ int report(const Error& error, const Arguments& arguments) {
   }
 }
 
-int run_tree(Client& client, const Arguments& arguments) {
-  const auto frames = client.frames();
+int run_tree(Source source, const Arguments& arguments) {
+  const auto frames = source.frames();
   if (!frames) return report(frames.error(), arguments);
-  const auto partitions = client.partitions();
+  const auto partitions = source.partitions();
   if (!partitions) return report(partitions.error(), arguments);
-  if (const int status = none_there(client, arguments, !frames->empty()); status != kDone)
+  if (const int status = none_there(source, arguments, !frames->empty()); status != kDone)
     return status;
   std::vector<std::string> unreachable;
   for (const PartitionInfo& partition : *partitions) {
@@ -133,10 +136,10 @@ int run_tree(Client& client, const Arguments& arguments) {
   return answer(arguments, {{"frames", json}}, draw_tree(*frames, unreachable));
 }
 
-int run_frames(Client& client, const Arguments& arguments) {
-  const auto frames = client.frames();
+int run_frames(Source source, const Arguments& arguments) {
+  const auto frames = source.frames();
   if (!frames) return report(frames.error(), arguments);
-  if (const int status = none_there(client, arguments, !frames->empty()); status != kDone)
+  if (const int status = none_there(source, arguments, !frames->empty()); status != kDone)
     return status;
   nlohmann::json json = nlohmann::json::array();
   std::string text;
@@ -247,6 +250,11 @@ int run_exists(Client& client, const Arguments& arguments) {
   return exists ? kDone : kRefused;
 }
 
+void print_event(const Change& change, const Arguments& arguments) {
+  print(arguments.json ? dump(change_json(change)) + "\n"
+                       : to_string(change.time) + "  " + change.message + "\n");
+}
+
 int run_events(Client& client, const Arguments& arguments) {
   // Completes discovery first, so that partitions that exist already are no events.
   const auto partitions = client.partitions();
@@ -254,10 +262,8 @@ int run_events(Client& client, const Arguments& arguments) {
     const std::string why = partitions ? nobody_answers(arguments) : partitions.error().message;
     std::fprintf(stderr, "tfdude: %s\n", why.c_str());
   }
-  const auto subscription = client.on_change([&](const Change& change) {
-    print(arguments.json ? dump(change_json(change)) + "\n"
-                         : to_string(change.time) + "  " + change.message + "\n");
-  });
+  const auto subscription =
+      client.on_change([&](const Change& change) { print_event(change, arguments); });
   const sigset_t stop_signals = signals_to_stop();
   int signal = 0;
   sigwait(&stop_signals, &signal);

@@ -11,6 +11,8 @@
 #include "tfdude/keys/key_store.hpp"
 #include "tfdude/math/transform_spec.hpp"
 
+#include "source.hpp"
+
 namespace tfdude::cli {
 
 /// Exit statuses.
@@ -36,6 +38,17 @@ struct KeysArguments {
   bool sign = false;
   std::vector<std::uint32_t> domains{0, 232};  ///< first and last
   Days lifetime{0};                            ///< zero: the default
+};
+
+/// What is given to the commands that record, replay, or ask a recording.
+struct RecordingArguments {
+  std::string file;
+  double split_mb = 0;  ///< 0: as RecordingOptions
+  double split_s = 0;   ///< 0: never
+  bool raw = false;     ///< not compressed
+  double rate = 1;      ///< of a replay: how many times as fast
+  bool loop = false;
+  bool paused = false;
 };
 
 /// The command line.
@@ -66,6 +79,7 @@ struct Arguments {
   double position = 0;                 ///< of a joint [rad or m]
   std::optional<double> joint_stddev;  ///< of this position [rad or m]
   double over = 0.1;                   ///< interval of a velocity [s]
+  RecordingArguments recording;
   KeysArguments keys;
 };
 
@@ -73,19 +87,19 @@ struct Arguments {
 
 /// The time with which to compare the stamps of a path, for ages; nothing if an owner on it uses
 /// another clock, or if the time is not known.
-[[nodiscard]] std::optional<Time> present(Client& client, const Arguments& arguments,
+[[nodiscard]] std::optional<Time> present(Source source, const Arguments& arguments,
                                           const std::string& a, const std::string& b);
 /// Likewise, for one partition.
-[[nodiscard]] std::optional<Time> present(Client& client, const Arguments& arguments,
+[[nodiscard]] std::optional<Time> present(Source source, const Arguments& arguments,
                                           const PartitionInfo& partition);
 
 /// Reads a stamp of the command line: decimal seconds since the epoch, exact to nanoseconds. A
 /// negative number counts back from now. @return kInvalidInput naming the text.
 [[nodiscard]] Result<Time> parse_stamp(const std::string& text, Time now);
 
-/// As parse_stamp(), with the client's clock, which only a relative stamp needs; no stamp for an
-/// empty text. @return also kNotYet
-[[nodiscard]] Result<std::optional<Time>> optional_stamp(Client& client, const std::string& text);
+/// As parse_stamp(), with the clock of the source, which only a relative stamp needs; no stamp for
+/// an empty text. @return also kNotYet
+[[nodiscard]] Result<std::optional<Time>> optional_stamp(Source source, const std::string& text);
 
 /// Waits between two outputs of a command that runs until interrupted.
 /// @return whether it was interrupted
@@ -99,19 +113,25 @@ int finish(Client& client, const Result<void>& changed, const Arguments& argumen
 /// That no partition answers, and what may be the cause.
 [[nodiscard]] std::string nobody_answers(const Arguments& arguments);
 /// Prints why the request failed. @return the exit status, or kNeedsAllFrames
-int refuse(Client& client, const Error& error, const Arguments& arguments);
+int refuse(Source source, const Error& error, const Arguments& arguments);
+
+/// Prints a change.
+void print_event(const Change& change, const Arguments& arguments);
+/// A transform of a path, as `lookup` and `echo` print it.
+[[nodiscard]] nlohmann::json path_json(Source source, const Arguments& arguments,
+                                       const StampedTransform& X_AB);
 
 // Each function runs one command, prints its answer and returns the exit status, or
 // kNeedsAllFrames.
-int run_tree(Client& client, const Arguments& arguments);
-int run_frames(Client& client, const Arguments& arguments);
+int run_tree(Source source, const Arguments& arguments);
+int run_frames(Source source, const Arguments& arguments);
 int run_partitions(Client& client, const Arguments& arguments);
 int run_add(Client& client, const Arguments& arguments);
 int run_update(Client& client, const Arguments& arguments);
 int run_remove(Client& client, const Arguments& arguments);
 int run_forget(Client& client, const Arguments& arguments);
 int run_move(Client& client, const Arguments& arguments);
-int run_lookup(Client& client, const Arguments& arguments);
+int run_lookup(Source source, const Arguments& arguments);
 int run_velocity(Client& client, const Arguments& arguments);
 int run_parent(Client& client, const Arguments& arguments);
 int run_children(Client& client, const Arguments& arguments);
@@ -125,11 +145,11 @@ int run_observe(Client& client, const Arguments& arguments);
 int run_fuse(Client& client, const Arguments& arguments);
 int run_correlate(Client& client, const Arguments& arguments);
 int run_joint(Client& client, const Arguments& arguments);
-int run_joints(Client& client, const Arguments& arguments);
+int run_joints(Source source, const Arguments& arguments);
 int run_description(Client& client, const Arguments& arguments);
 int run_monitor(Client& client, const Arguments& arguments);
-int run_plot(Client& client, const Arguments& arguments);
-int run_graph(Client& client, const Arguments& arguments);
+int run_plot(Source source, const Arguments& arguments);
+int run_graph(Source source, const Arguments& arguments);
 
 /// Prints an error of the command line as JSON. @return the exit status
 int report_usage(const std::string& message);

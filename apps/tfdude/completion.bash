@@ -52,7 +52,8 @@ _tfdude_keys() {
 _tfdude() {
   local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command words common
   local commands="tree frames partitions roots parent children exists lookup velocity watch echo history monitor"
-  commands+=" plot graph events joints joint observe fuse correlate add update remove forget move keys"
+  commands+=" plot graph events joints joint observe fuse correlate add update remove forget move keys record info"
+  commands+=" replay"
   local of_frames=" parent children exists lookup velocity watch echo plot history observe fuse correlate update "
   of_frames+="remove move "
   local pose="--xyz --rpy --quat --stddev --cov"
@@ -64,8 +65,9 @@ _tfdude() {
     return
   fi
   case $previous in
-    --profile | --out) mapfile -t COMPREPLY < <(compgen -f -- "$word"); return ;;
+    --profile | --out | --recording) mapfile -t COMPREPLY < <(compgen -f -- "$word"); return ;;
     --domain | --discovery-server | --timeout | --rate | --at | --at-b | --stamp | --gate | --source) return ;;
+    --split-size | --split-time) return ;;
     --clock) words="system external" ;;
     --order | --over | --samples | --extrapolate | --wait | --xyz | --rpy | --quat | --stddev) return ;;
     --partition) words=$(_tfdude_names partitions) ;;
@@ -77,19 +79,25 @@ _tfdude() {
           add) words+=" --parent --partition $pose" ;;
           update) words+=" --stamp $pose" ;;
           move) words+=" --parent $pose" ;;
-          lookup) words+=" --cov --at --at-b --fixed --extrapolate --age-noise --wait --order" ;;
+          lookup) words+=" --cov --at --at-b --fixed --extrapolate --age-noise --wait --order --recording" ;;
           velocity) words+=" --cov --at --over" ;;
           correlate) words+=" --unknown --source" ;;
           observe | fuse) words+=" --stamp --gate --correlated $pose" ;;
           watch) words+=" --rate --composed --cov" ;;
-          echo) words+=" --rate --composed" ;;
-          plot) words+=" --out --samples --at" ;;
-          graph) words+=" --out" ;;
+          echo) words+=" --rate --composed --recording --at" ;;
+          tree | frames | joints | events) words+=" --recording --at" ;;
+          record) words+=" --split-size --split-time --raw" ;;
+          replay) words+=" --rate --at --loop --paused" ;;
+          plot) words+=" --out --samples --at --recording" ;;
+          graph) words+=" --out --recording --at" ;;
           joint) words+=" --stddev --stamp" ;;
           monitor) words+=" --rate --once" ;;
         esac
       elif [[ -z $command ]]; then
         words=$commands
+      elif [[ $command =~ ^(record|info|replay)$ ]]; then
+        mapfile -t COMPREPLY < <(compgen -f -- "$word")
+        return
       elif [[ $command == forget ]]; then
         words=$(_tfdude_names partitions)
       elif [[ $command == joint ]]; then

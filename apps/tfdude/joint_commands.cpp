@@ -13,14 +13,14 @@ int run_joint(Client& client, const Arguments& arguments) {
   return finish(client, updated, arguments, "moved");
 }
 
-int run_joints(Client& client, const Arguments& arguments) {
-  const auto partitions = client.partitions();
-  if (!partitions) return refuse(client, partitions.error(), arguments);
-  if (partitions->empty()) return refuse(client, {Errc::kUnknownPartition, ""}, arguments);
+int run_joints(Source source, const Arguments& arguments) {
+  const auto partitions = source.partitions();
+  if (!partitions) return refuse(source, partitions.error(), arguments);
+  if (partitions->empty()) return refuse(source, {Errc::kUnknownPartition, ""}, arguments);
   nlohmann::json json = nlohmann::json::array();
   std::string text;
   for (const PartitionInfo& partition : *partitions) {
-    const auto joints = client.joints(partition.name);
+    const auto joints = source.joints(partition.name);
     nlohmann::json one{{"partition", partition.name}, {"reachable", joints.has_value()}};
     if (!joints) {
       text += "partition " + partition.name + ": " + joints.error().message + "\n";

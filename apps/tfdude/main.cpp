@@ -18,13 +18,17 @@
 
 #include "../network_options.hpp"
 #include "../numbers.hpp"
+#include "command_options.hpp"
 #include "commands.hpp"
 #include "keys_commands.hpp"
+#include "recording_options.hpp"
 
 namespace {
 
 using namespace tfdude;
+using cli::add_stamp;
 using cli::Arguments;
+using cli::within;
 
 constexpr long kTimeoutByServer = 3000;  // [ms]
 
@@ -59,10 +63,8 @@ void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {
 
 CLI::App* add_command(CLI::App& app, const char* name, const char* help, const char* example,
                       Command run, Command& chosen) {
-  CLI::App* command = app.add_subcommand(name, help);
-  command->footer(std::string("Example: tfdude ") + example);
-  command->callback([&chosen, run = std::move(run)] { chosen = run; });
-  return command;
+  return cli::add_command(app, name, help, example,
+                          [&chosen, run = std::move(run)] { chosen = run; });
 }
 
 // A command about one or two frames asks for them, instead of receiving all frames.
@@ -79,23 +81,6 @@ void add_ends(CLI::App* command, Arguments& arguments) {
   command->add_option("B", arguments.other, "the frame seen from A")->required();
 }
 
-void add_stamp(CLI::App* command, const char* name, std::string& stamp, const char* help) {
-  command->add_option(name, stamp, help)->type_name("SECONDS")->check([](const std::string& text) {
-    const auto parsed = cli::parse_stamp(text, Time(std::chrono::seconds(INT32_MAX)));
-    return parsed ? std::string() : parsed.error().message;
-  });
-}
-
-// CLI::Range would accept NaN.
-// @param range  as the message names it
-std::function<std::string(const std::string&)> within(double least, double most,
-                                                      const char* range) {
-  return [=](const std::string& text) {
-    const double value = std::strtod(text.c_str(), nullptr);
-    return value >= least && value <= most ? "" : text + " is not within " + range;
-  };
-}
-
 void add_milliseconds(CLI::App* command, const char* name, double& value, const char* help) {
   command->add_option(name, value, help)->type_name("MS")->check(within(0, 3.6e6, "0 to 3600000"));
 }
@@ -104,7 +89,8 @@ void add_rate(CLI::App* command, double& rate, const char* help) {
   command->add_option("--rate", rate, help)->check(within(0.001, 1000, "0.001 to 1000"));
 }
 
-void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen) {
+void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen,
+                        cli::LocalCommand& local) {
   auto* lookup = add_command(app, "lookup", "pose of B in A, with its uncertainty",
                              "lookup world hand_left --cov", cli::run_lookup, chosen);
   ask_only(lookup, arguments);
@@ -125,6 +111,7 @@ void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen) {
       ->check(CLI::IsMember({2, 4}));
   add_milliseconds(lookup, "--wait", arguments.wait_ms, "how long to wait for frames and data");
   lookup->get_option("--wait")->excludes(fixed);
+  cli::add_recording(lookup, arguments, local, cli::run_lookup);
 }
 
 void add_velocity_command(CLI::App& app, Arguments& arguments, Command& chosen) {
@@ -141,7 +128,8 @@ void add_velocity_command(CLI::App& app, Arguments& arguments, Command& chosen) 
 }
 
 // Commands that follow changes, most of them until interrupted.
-void add_following_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
+void add_following_commands(CLI::App& app, Arguments& arguments, Command& chosen,
+                            cli::LocalCommand& local) {
   auto* watch = add_command(app, "watch", "follow a path: its owners push what changes",
                             "watch world hand_left --rate 5", cli::run_watch, chosen);
   auto* echo =
@@ -153,6 +141,7 @@ void add_following_commands(CLI::App& app, Arguments& arguments, Command& chosen
     command->add_flag("--composed", arguments.composed,
                       "each owner sends its part of the path as one transform");
   }
+  cli::add_recorded(echo, arguments, local, cli::run_recorded_echo);
   watch->add_flag("--cov", arguments.covariance, "print the full covariance");
   auto* monitor = add_command(app, "monitor", "rate, age and jitter of all dynamic edges",
                               "monitor --once", cli::run_monitor, chosen);
@@ -163,9 +152,14 @@ void add_following_commands(CLI::App& app, Arguments& arguments, Command& chosen
          arguments);
 }
 
-void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
-  add_command(app, "tree", "draw all frames with their owners", "tree", cli::run_tree, chosen);
-  add_command(app, "frames", "list all frames", "--json frames", cli::run_frames, chosen);
+void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen,
+                          cli::LocalCommand& local) {
+  auto* tree =
+      add_command(app, "tree", "draw all frames with their owners", "tree", cli::run_tree, chosen);
+  cli::add_recording(tree, arguments, local, cli::run_tree);
+  auto* frames =
+      add_command(app, "frames", "list all frames", "--json frames", cli::run_frames, chosen);
+  cli::add_recording(frames, arguments, local, cli::run_frames);
   add_command(app, "partitions", "list all partitions", "partitions", cli::run_partitions, chosen);
   add_command(app, "roots", "list roots: frames whose parent does not exist", "roots",
               cli::run_roots, chosen);
@@ -179,7 +173,7 @@ void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
                              cli::run_exists, chosen);
   ask_only(exists, arguments);
   add_id(exists, arguments);
-  add_lookup_command(app, arguments, chosen);
+  add_lookup_command(app, arguments, chosen, local);
   add_velocity_command(app, arguments, chosen);
 }
 
@@ -250,7 +244,8 @@ void add_out(CLI::App* command, Arguments& arguments, const std::vector<std::str
       });
 }
 
-void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
+void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen,
+                          cli::LocalCommand& local) {
   auto* plot =
       add_command(app, "plot", "draw where B is in A, with its uncertainty",
                   "plot world hand_left --out hand.svg --samples 2000", cli::run_plot, chosen);
@@ -261,14 +256,19 @@ void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen) 
       ->check(CLI::Range(1, 100000));
   add_stamp(plot, "--at", arguments.stamp,
             "the instant: seconds since the epoch or, negative, before now");
+  cli::add_recording(plot, arguments, local, cli::run_plot);
   auto* graph = add_command(app, "graph", "draw all frames with their owners, ages, deviations",
                             "graph --out frames.svg", cli::run_graph, chosen);
   add_out(graph, arguments, {".svg", ".png", ".dot"});
+  cli::add_recording(graph, arguments, local, cli::run_graph);
 }
 
-void add_joint_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
-  add_command(app, "joints", "list all joints: positions, limits, which joint they mimic", "joints",
-              cli::run_joints, chosen);
+void add_joint_commands(CLI::App& app, Arguments& arguments, Command& chosen,
+                        cli::LocalCommand& local) {
+  auto* joints =
+      add_command(app, "joints", "list all joints: positions, limits, which joint they mimic",
+                  "joints", cli::run_joints, chosen);
+  cli::add_recording(joints, arguments, local, cli::run_joints);
   auto* joint = add_command(app, "joint", "set the position of a joint",
                             "joint shoulder_pan_joint 0.5 --stddev 0.001", cli::run_joint, chosen);
   joint->add_option("NAME", arguments.id, "the joint")->required();
@@ -288,9 +288,12 @@ void add_description_command(CLI::App& app, Arguments& arguments, Command& chose
       ->required();
 }
 
-void add_events_command(CLI::App& app, Command& chosen) {
-  add_command(app, "events", "print changes: partitions that come and go, frames, conflicts",
-              "--json events", cli::run_events, chosen);
+void add_events_command(CLI::App& app, Arguments& arguments, Command& chosen,
+                        cli::LocalCommand& local) {
+  auto* events =
+      add_command(app, "events", "print changes: partitions that come and go, frames, conflicts",
+                  "--json events", cli::run_events, chosen);
+  cli::add_recorded(events, arguments, local, cli::run_recorded_events);
 }
 
 void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
@@ -348,16 +351,17 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.fallthrough();
   add_common_options(app, arguments, timeout_ms);
-  add_reading_commands(app, arguments, command);
-  add_following_commands(app, arguments, command);
-  add_events_command(app, command);
+  cli::LocalCommand local;
+  add_reading_commands(app, arguments, command, local);
+  add_following_commands(app, arguments, command, local);
+  add_events_command(app, arguments, command, local);
   add_changing_commands(app, arguments, command);
   add_measuring_commands(app, arguments, command);
   add_correlate_command(app, arguments, command);
-  add_picture_commands(app, arguments, command);
-  add_joint_commands(app, arguments, command);
+  add_picture_commands(app, arguments, command, local);
+  add_joint_commands(app, arguments, command, local);
   add_description_command(app, arguments, command);
-  cli::LocalCommand local;
+  cli::add_recording_commands(app, arguments, command, local);
   cli::add_keys_commands(app, arguments.keys, local);
   cli::require_numbers(app);
   try {
@@ -387,7 +391,7 @@ int main(int argc, char** argv) {
   sigemptyset(&stop_signals);
   sigaddset(&stop_signals, SIGINT);
   sigaddset(&stop_signals, SIGTERM);
-  for (const char* name : {"watch", "echo", "monitor", "events"}) {
+  for (const char* name : {"watch", "echo", "monitor", "events", "record", "replay"}) {
     if (app.got_subcommand(name)) pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
   }
   log_fastdds_to_standard_error();

@@ -141,11 +141,11 @@ bool ends_with(const std::string& text, std::string_view end) {
 }
 
 // Writes the picture to its file, and prints the answer.
-int finish(Client& client, const Arguments& arguments, const Result<std::string>& picture,
+int finish(Source source, const Arguments& arguments, const Result<std::string>& picture,
            nlohmann::json json) {
-  if (!picture) return refuse(client, picture.error(), arguments);
+  if (!picture) return refuse(source, picture.error(), arguments);
   const auto written = write_file(arguments.out, *picture);
-  if (!written) return refuse(client, written.error(), arguments);
+  if (!written) return refuse(source, written.error(), arguments);
   json["file"] = arguments.out;
   return answer(arguments, json, "wrote " + printable(arguments.out) + "\n");
 }
@@ -163,8 +163,8 @@ std::vector<const Frame*> ancestors(const std::map<std::string, const Frame*>& f
 }
 
 // The frames from A to B and the edges between them, each looked up at the stamp of X_AB.
-Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTransform& X_AB) {
-  const auto all = client.frames();
+Result<Plot> plot_of(Source source, const Arguments& arguments, const StampedTransform& X_AB) {
+  const auto all = source.frames();
   if (!all) return tl::unexpected(all.error());
   std::map<std::string, const Frame*> by_id;
   for (const Frame& frame : *all) by_id.emplace(frame.id, &frame);
@@ -185,7 +185,7 @@ Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTr
   Query query;
   query.at = X_AB.stamp;
   const auto add = [&](const Frame& child, bool upwards) -> Result<void> {
-    const auto X_PC = client.lookup(child.parent, child.id, query);
+    const auto X_PC = source.lookup(child.parent, child.id, query);
     if (!X_PC) return tl::unexpected(X_PC.error());
     plot.steps.push_back({{X_PC->pose, X_PC->covariance}, upwards});
     return {};
@@ -204,20 +204,20 @@ Result<Plot> plot_of(Client& client, const Arguments& arguments, const StampedTr
 
 // Collects the frames, and the edges of partitions that answer. A partition that does not answer is
 // not asked again, and is drawn as unreachable.
-Result<Graph> graph_of(Client& client, const Arguments& arguments) {
-  auto frames = client.frames();
+Result<Graph> graph_of(Source source, const Arguments& arguments) {
+  auto frames = source.frames();
   if (!frames) return tl::unexpected(std::move(frames.error()));
-  auto partitions = client.partitions();
+  auto partitions = source.partitions();
   if (!partitions) return tl::unexpected(std::move(partitions.error()));
   Graph graph{*std::move(frames), *std::move(partitions), {}};
   std::map<std::string, PartitionInfo*> by_name;
   for (PartitionInfo& partition : graph.partitions) {
     by_name[partition.name] = &partition;
     if (!partition.reachable) continue;
-    const auto histories = client.histories(partition.name);
+    const auto histories = source.histories(partition.name);
     partition.reachable = histories.has_value();
     if (!histories) continue;
-    const auto now = present(client, arguments, partition);
+    const auto now = present(source, arguments, partition);
     for (const HistoryInfo& history : *histories) {
       if (now && history.newest) graph.edges[history.id].age = *now - *history.newest;
     }
@@ -225,7 +225,7 @@ Result<Graph> graph_of(Client& client, const Arguments& arguments) {
   for (const Frame& frame : graph.frames) {
     const auto owner = by_name.find(frame.partition);
     if (!frame.attached || owner == by_name.end() || !owner->second->reachable) continue;
-    const auto X_PC = client.lookup(frame.parent, frame.id);
+    const auto X_PC = source.lookup(frame.parent, frame.id);
     if (X_PC) {
       graph.edges[frame.id].covariance = X_PC->covariance;
     } else if (X_PC.error().code == Errc::kTimeout || X_PC.error().code == Errc::kUnreachable) {
@@ -237,15 +237,15 @@ Result<Graph> graph_of(Client& client, const Arguments& arguments) {
 
 }  // namespace
 
-int run_plot(Client& client, const Arguments& arguments) {
+int run_plot(Source source, const Arguments& arguments) {
   Query query;
-  const auto at = optional_stamp(client, arguments.stamp);
+  const auto at = optional_stamp(source, arguments.stamp);
   if (!at) return report(at.error(), arguments);
   query.at = *at;
-  const auto X_AB = client.lookup(arguments.id, arguments.other, query);
-  if (!X_AB) return refuse(client, X_AB.error(), arguments);
-  const auto plot = plot_of(client, arguments, *X_AB);
-  if (!plot) return refuse(client, plot.error(), arguments);
+  const auto X_AB = source.lookup(arguments.id, arguments.other, query);
+  if (!X_AB) return refuse(source, X_AB.error(), arguments);
+  const auto plot = plot_of(source, arguments, *X_AB);
+  if (!plot) return refuse(source, plot.error(), arguments);
   nlohmann::json json{{"from", arguments.id}, {"to", arguments.other}, {"frames", plot->frames}};
   if (plot->samples > 0) {
     json["samples"] = plot->samples;
@@ -258,15 +258,15 @@ int run_plot(Client& client, const Arguments& arguments) {
     picture =
         run_program({{"rsvg-convert", "--zoom", "2", "--unlimited"}, "librsvg2-bin"}, *picture);
   }
-  return finish(client, arguments, picture, json);
+  return finish(source, arguments, picture, json);
 }
 
-int run_graph(Client& client, const Arguments& arguments) {
-  const auto drawn = graph_of(client, arguments);
-  if (!drawn) return refuse(client, drawn.error(), arguments);
+int run_graph(Source source, const Arguments& arguments) {
+  const auto drawn = graph_of(source, arguments);
+  if (!drawn) return refuse(source, drawn.error(), arguments);
   const Graph& graph = *drawn;
   if (graph.partitions.empty()) {
-    return refuse(client, {Errc::kUnknownPartition, "no partition"}, arguments);
+    return refuse(source, {Errc::kUnknownPartition, "no partition"}, arguments);
   }
   nlohmann::json json{{"frames", graph.frames.size()}, {"partitions", graph.partitions.size()}};
   Result<std::string> picture = draw_graph(graph);
@@ -275,7 +275,7 @@ int run_graph(Client& client, const Arguments& arguments) {
   } else if (ends_with(arguments.out, ".png")) {
     picture = run_program({{"dot", "-Tpng", "-Gdpi=144"}, "graphviz"}, *picture);
   }
-  return finish(client, arguments, picture, json);
+  return finish(source, arguments, picture, json);
 }
 
 }  // namespace tfdude::cli

@@ -1,39 +1,36 @@
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <map>
 #include <mutex>
+#include <thread>
 
+#include "tfdude/base/id.hpp"
 #include "tfdude/recording/recording_writer.hpp"
 
 #include "commands.hpp"
-#include "render.hpp"
+#include "recording_options.hpp"
 
 // Records all partitions of a domain.
 namespace tfdude::cli {
 namespace {
 
-constexpr double kTick = 0.1;           // [s]
+constexpr double kTick = 0.1;  // [s]
 constexpr int kTicksBetweenJoints = 10;
 
 // Passes what a client hears to a file. All functions are thread-safe.
-class Recording {
+class Recorder {
  public:
-  Recording(Client& client, RecordingWriter writer) : client_(client), writer_(std::move(writer)) {}
-
-  // The news of partitions and the changes come on different threads.
-  template <class... What>
-  void add(const What&... what) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (state_) state_ = writer_.add(what..., wall_clock());
-  }
+  Recorder(Client& client, ClockKind clock, RecordingWriter writer)
+      : client_(client), clock_(clock), writer_(std::move(writer)) {}
 
   void watch(const std::string& partition) {
     {
       const std::lock_guard<std::mutex> lock(watches_mutex_);
       if (!watches_.emplace(partition, std::nullopt).second) return;
     }
-    auto watch = client_.watch_partition(
-        partition, {0, [this](const PartitionNews& news) { add(news); }});
+    auto watch =
+        client_.watch_partition(partition, {0, [this](const PartitionNews& news) { add(news); }});
     const std::lock_guard<std::mutex> lock(watches_mutex_);
     if (watch) {
       watches_[partition] = *std::move(watch);
@@ -47,12 +44,6 @@ class Recording {
     if (change.kind == ChangeKind::kPartitionUp) watch(change.partition);
   }
 
-  [[nodiscard]] Result<void> tick() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (state_) state_ = writer_.tick(wall_clock());
-    return state_;
-  }
-
   void add_joints() {
     const auto partitions = client_.partitions();
     if (!partitions) return;
@@ -60,6 +51,12 @@ class Recording {
       if (!partition.reachable) continue;
       if (const auto joints = client_.joints(partition.name)) add(partition.name, *joints);
     }
+  }
+
+  [[nodiscard]] Result<void> tick() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (state_) state_ = writer_.tick(now());
+    return state_;
   }
 
   // Ends all watches, then the file.
@@ -71,61 +68,101 @@ class Recording {
     }
     watches.clear();
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (state_) state_ = writer_.finish(wall_clock());
+    if (state_) state_ = writer_.finish(now());
     return state_;
   }
 
+  // After finish().
   [[nodiscard]] const RecordingWriter& writer() const { return writer_; }
 
  private:
+  // The news of partitions, the changes and the joints come on different threads.
+  template <class... What>
+  void add(const What&... what) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (state_) state_ = writer_.add(what..., now());
+  }
+
+  Time now() {
+    if (clock_ == ClockKind::kSystem) return wall_clock();
+    if (const auto external = client_.now()) last_ = *external;
+    return last_;
+  }
+
   Client& client_;
+  const ClockKind clock_;
   std::mutex mutex_;
   RecordingWriter writer_;
   Result<void> state_;
+  Time last_{};
   std::mutex watches_mutex_;
   std::map<std::string, std::optional<PartitionWatch>> watches_;
 };
+
+RecordingOptions options_of(const RecordingArguments& given) {
+  RecordingOptions options;
+  if (given.split_mb > 0) options.split_bytes = static_cast<std::uint64_t>(given.split_mb * 1e6);
+  if (given.split_s > 0) {
+    options.split_after = Milliseconds(static_cast<std::int64_t>(given.split_s * 1e3));
+  }
+  options.compress = !given.raw;
+  return options;
+}
+
+// Records until interrupted, or until the file cannot be written.
+Result<void> record(Client& client, Recorder& recorder, const Arguments& arguments) {
+  // Completes discovery first, so that partitions that exist already are no events.
+  const auto partitions = client.partitions();
+  if (!partitions || partitions->empty()) {
+    const std::string why = partitions ? nobody_answers(arguments) : partitions.error().message;
+    std::fprintf(stderr, "tfdude: %s; recording those that come\n", why.c_str());
+  }
+  auto changes = client.on_change([&](const Change& change) { recorder.on(change); });
+  if (partitions) {
+    for (const PartitionInfo& partition : *partitions) recorder.watch(partition.name);
+  }
+  // On its own thread, because an owner that does not answer is waited for.
+  std::atomic<bool> stopping{false};
+  std::thread joints([&] {
+    for (int ticks = 0; !stopping; ++ticks) {
+      if (ticks % kTicksBetweenJoints == 0) recorder.add_joints();
+      std::this_thread::sleep_for(std::chrono::duration<double>(kTick));
+    }
+  });
+  Result<void> written;
+  while (written && !interrupted_within(kTick)) written = recorder.tick();
+  stopping = true;
+  joints.join();
+  changes = Subscription();
+  return recorder.finish();
+}
 
 }  // namespace
 
 int run_record(Client& client, const Arguments& arguments) {
   // A limit of the file's size is reported as an error of writing.
   (void)std::signal(SIGXFSZ, SIG_IGN);
-  const RecordingArguments& given = arguments.recording;
-  RecordingOptions options;
-  if (given.split_mb > 0) options.split_bytes = static_cast<std::uint64_t>(given.split_mb * 1e6);
-  if (given.split_seconds > 0) {
-    options.split_after = Milliseconds(static_cast<long>(given.split_seconds * 1e3));
-  }
-  auto writer = RecordingWriter::create(given.file, wall_clock(), options);
+  const ClockKind clock = arguments.options.clock;
+  const auto begin = clock == ClockKind::kSystem ? Result<Time>(wall_clock()) : client.now();
+  if (!begin) return report(begin.error(), arguments);
+  auto writer =
+      RecordingWriter::create(arguments.recording.file, *begin, options_of(arguments.recording));
   if (!writer) return report(writer.error(), arguments);
-  Recording recording(client, *std::move(writer));
-  const auto partitions = client.partitions();
-  if (!partitions || partitions->empty()) {
-    const std::string why = partitions ? nobody_answers(arguments) : partitions.error().message;
-    std::fprintf(stderr, "tfdude: %s; recording those that come\n", why.c_str());
-  }
-  auto changes = client.on_change([&](const Change& change) { recording.on(change); });
-  if (partitions) {
-    for (const PartitionInfo& partition : *partitions) recording.watch(partition.name);
-  }
-  recording.add_joints();
-  Result<void> written;
-  for (int ticks = 1; written && !interrupted_within(kTick); ++ticks) {
-    if (ticks % kTicksBetweenJoints == 0) recording.add_joints();
-    written = recording.tick();
-  }
-  changes = Subscription();
-  const auto finished = recording.finish();
-  if (!finished) return report(finished.error(), arguments);
-  const RecordingWriter& done = recording.writer();
+  std::fprintf(stderr, "tfdude: recording to %s\n", printable(arguments.recording.file).c_str());
+  Recorder recorder(client, clock, *std::move(writer));
+  const auto recorded = record(client, recorder, arguments);
+  if (!recorded) return report(recorded.error(), arguments);
+  const RecordingWriter& done = recorder.writer();
+  std::string text;
+  for (const std::string& file : done.files()) text += printable(file) + "\n";
+  text += std::to_string(done.messages()) + " messages of " + std::to_string(done.raw_bytes()) +
+          " bytes in " + std::to_string(done.bytes()) + " bytes\n";
   return answer(arguments,
                 {{"files", done.files()},
                  {"bytes", done.bytes()},
                  {"raw_bytes", done.raw_bytes()},
                  {"messages", done.messages()}},
-                "recorded " + std::to_string(done.messages()) + " messages in " +
-                    std::to_string(done.bytes()) + " bytes\n");
+                text);
 }
 
 }  // namespace tfdude::cli

@@ -22,14 +22,14 @@ std::chrono::nanoseconds from_milliseconds(double milliseconds) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(milliseconds * 1e6));
 }
 
-Result<Query> query_of(Client& client, const std::string& stamp, const Arguments& arguments) {
+Result<Query> query_of(Source source, const std::string& stamp, const Arguments& arguments) {
   Query query;
-  const auto at = optional_stamp(client, stamp);
+  const auto at = optional_stamp(source, stamp);
   if (!at) return tl::unexpected(at.error());
   query.at = *at;
   query.extrapolate = from_milliseconds(arguments.extrapolate_ms);
   if (arguments.age_noise) {
-    const auto now = client.now();
+    const auto now = source.present();
     if (!now) return tl::unexpected(now.error());
     query.age_noise_until = *now;
   }
@@ -37,28 +37,17 @@ Result<Query> query_of(Client& client, const std::string& stamp, const Arguments
   return query;
 }
 
-Result<StampedTransform> look_up(Client& client, const Arguments& arguments) {
-  const auto at = query_of(client, arguments.stamp, arguments);
+Result<StampedTransform> look_up(Source source, const Arguments& arguments) {
+  const auto at = query_of(source, arguments.stamp, arguments);
   if (!at) return tl::unexpected(at.error());
   if (!arguments.fixed.empty()) {
-    const auto other = query_of(client, arguments.other_stamp, arguments);
+    const auto other = query_of(source, arguments.other_stamp, arguments);
     if (!other) return tl::unexpected(other.error());
-    return client.lookup(arguments.id, *at, arguments.other, *other, arguments.fixed);
+    return source.lookup(arguments.id, *at, arguments.other, *other, arguments.fixed);
   }
   const Milliseconds wait(static_cast<long>(arguments.wait_ms));
-  if (wait.count() == 0) return client.lookup(arguments.id, arguments.other, *at);
-  return client.lookup(arguments.id, arguments.other, *at, wait);
-}
-
-nlohmann::json json_of(Client& client, const Arguments& arguments, const StampedTransform& X_AB) {
-  std::vector<std::string> partitions;
-  if (const auto path = client.path(arguments.id, arguments.other)) {
-    for (const PathSegment& segment : *path) partitions.push_back(segment.partition);
-  }
-  auto json = lookup_json(arguments.id, arguments.other, X_AB, partitions);
-  add_stamp(json, X_AB.stamp);
-  json["basis"] = basis_json(X_AB.basis);
-  return json;
+  if (wait.count() == 0) return source.lookup(arguments.id, arguments.other, *at);
+  return source.lookup(arguments.id, arguments.other, *at, wait);
 }
 
 // Calls show() with the path's newest transform at the rate, until interrupted. While the path
@@ -142,39 +131,50 @@ Result<Time> parse_stamp(const std::string& text, Time now) {
   return stamp_of(seconds * kSecond + std::stoll(fraction));
 }
 
-Result<std::optional<Time>> optional_stamp(Client& client, const std::string& text) {
+Result<std::optional<Time>> optional_stamp(Source source, const std::string& text) {
   if (text.empty()) return std::nullopt;
-  const auto now = text[0] == '-' ? client.now() : Result<Time>();
+  const auto now = text[0] == '-' ? source.now() : Result<Time>();
   if (!now) return tl::unexpected(now.error());
   return parse_stamp(text, *now).map([](Time stamp) { return std::optional<Time>(stamp); });
 }
 
-std::optional<Time> present(Client& client, const Arguments& arguments, const std::string& a,
+std::optional<Time> present(Source source, const Arguments& arguments, const std::string& a,
                             const std::string& b) {
-  const auto path = client.path(a, b);
+  const auto path = source.path(a, b);
   const bool same = path && std::all_of(path->begin(), path->end(), [&](const PathSegment& one) {
                       return !one.clock || *one.clock == arguments.options.clock;
                     });
-  const auto now = same ? client.now() : fail(Errc::kInvalidInput, "the clocks differ");
+  const auto now = same ? source.present() : fail(Errc::kInvalidInput, "the clocks differ");
   return now ? std::optional<Time>(*now) : std::nullopt;
 }
 
-std::optional<Time> present(Client& client, const Arguments& arguments,
+std::optional<Time> present(Source source, const Arguments& arguments,
                             const PartitionInfo& partition) {
   if (partition.clock && *partition.clock != arguments.options.clock) return std::nullopt;
-  const auto now = client.now();
+  const auto now = source.present();
   return now ? std::optional<Time>(*now) : std::nullopt;
 }
 
-int run_lookup(Client& client, const Arguments& arguments) {
-  const auto X_AB = look_up(client, arguments);
-  if (!X_AB) return refuse(client, X_AB.error(), arguments);
+nlohmann::json path_json(Source source, const Arguments& arguments, const StampedTransform& X_AB) {
+  std::vector<std::string> partitions;
+  if (const auto path = source.path(arguments.id, arguments.other)) {
+    for (const PathSegment& segment : *path) partitions.push_back(segment.partition);
+  }
+  auto json = lookup_json(arguments.id, arguments.other, X_AB, partitions);
+  add_stamp(json, X_AB.stamp);
+  json["basis"] = basis_json(X_AB.basis);
+  return json;
+}
+
+int run_lookup(Source source, const Arguments& arguments) {
+  const auto X_AB = look_up(source, arguments);
+  if (!X_AB) return refuse(source, X_AB.error(), arguments);
   std::string text = describe(*X_AB, arguments.covariance, X_AB->basis.unspecified);
   if (X_AB->stamp && !arguments.json) {
-    text += describe_stamp(X_AB->stamp, present(client, arguments, arguments.id, arguments.other));
+    text += describe_stamp(X_AB->stamp, present(source, arguments, arguments.id, arguments.other));
   }
   text += describe(X_AB->basis);
-  return answer(arguments, arguments.json ? json_of(client, arguments, *X_AB) : nlohmann::json(),
+  return answer(arguments, arguments.json ? path_json(source, arguments, *X_AB) : nlohmann::json(),
                 text);
 }
 
@@ -194,7 +194,7 @@ int run_watch(Client& client, const Arguments& arguments) {
     if (X_AB.stamp && !arguments.json) {
       text += describe_stamp(X_AB.stamp, present(client, arguments, arguments.id, arguments.other));
     }
-    (void)answer(arguments, arguments.json ? json_of(client, arguments, X_AB) : nlohmann::json(),
+    (void)answer(arguments, arguments.json ? path_json(client, arguments, X_AB) : nlohmann::json(),
                  text);
   });
 }
@@ -203,7 +203,7 @@ int run_echo(Client& client, const Arguments& arguments) {
   Screen screen;
   return follow(client, arguments, [&](const StampedTransform& X_AB) {
     if (arguments.json) {
-      (void)answer(arguments, json_of(client, arguments, X_AB), "");
+      (void)answer(arguments, path_json(client, arguments, X_AB), "");
     } else {
       const auto now = present(client, arguments, arguments.id, arguments.other);
       screen.redraw(echo_lines(arguments.id, arguments.other, X_AB, now));

@@ -22,7 +22,7 @@ Result<bool> McapReader::read_summary() {
   const std::uint64_t size = source_->size();
   const std::uint64_t tail = kFooterRecord + kMagic.size();
   if (size < data_begin_ + tail) {
-    problems_.emplace_back("it has no end: its writer was interrupted");
+    problems_.emplace_back("it has no end: its writer was interrupted, or still writes");
     return false;
   }
   const auto bytes = window_->at(size - tail, static_cast<std::size_t>(tail));
@@ -33,7 +33,7 @@ Result<bool> McapReader::read_summary() {
   (void)reader.u64();  // summary offsets
   const std::uint32_t crc = reader.u32();
   if (!footer || bytes->substr(kFooterRecord) != kMagic) {
-    problems_.emplace_back("it has no end: its writer was interrupted");
+    problems_.emplace_back("it has no end: its writer was interrupted, or still writes");
     return false;
   }
   finished_ = true;

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+// What several commands need to describe themselves to CLI11.
+namespace tfdude::cli {
+
+/// Adds a command with an example, after "tfdude ", that calls a function if it is given.
+CLI::App* add_command(CLI::App& app, const char* name, const char* help, const char* example,
+                      const std::function<void()>& choose);
+
+/// Adds an option for a stamp, see parse_stamp().
+CLI::Option* add_stamp(CLI::App* command, const char* name, std::string& stamp, const char* help);
+
+/// Checks that a number is within a range, which the message names as `range`. CLI::Range would
+/// accept NaN.
+std::function<std::string(const std::string&)> within(double least, double most, const char* range);
+
+}  // namespace tfdude::cli

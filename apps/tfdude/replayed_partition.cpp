@@ -1,0 +1,176 @@
+#include "replayed_partition.hpp"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+namespace tfdude::cli {
+namespace {
+
+// Only observations may use their prefix, and name the edges that they changed.
+constexpr std::string_view kReplayedPrefix = "replayed:";
+
+Correlation replayed(Correlation correlation) {
+  correlation.observed_with.clear();
+  for (CommonError& error : correlation.common_errors) {
+    if (!is_observed(error)) continue;
+    error.source = std::string(kReplayedPrefix) + error.source.substr(kObservedPrefix.size());
+  }
+  return correlation;
+}
+
+// The values by frame.
+std::vector<const WatchedValue*> by_frame(std::size_t frames, const ValuesNews& values) {
+  std::vector<const WatchedValue*> all(frames);
+  for (const WatchedValue& value : values.values) {
+    if (value.frame < frames) all[value.frame] = &value;
+  }
+  return all;
+}
+
+}  // namespace
+
+Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const FramesNews& frames,
+                                                  const ValuesNews& values,
+                                                  const Options& options) {
+  std::vector<FrameSpec> specs;
+  std::unordered_map<std::string, Edge> served;
+  const auto known = by_frame(frames.frames.size(), values);
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const WatchedFrame& frame = frames.frames[i];
+    FrameSpec spec{frame.id, frame.parent, {}};
+    Edge edge{frame.parent, false, Correlation()};
+    if (known[i] != nullptr) {
+      spec.X_PC = known[i]->X_PC;
+      spec.correlation = replayed(known[i]->correlation);
+      edge.correlation = spec.correlation;
+      if (known[i]->begins && known[i]->begins->upper() != Covariance::Upper{}) {
+        spec.timing = options.history;
+        spec.timing->process_noise = *known[i]->begins;
+      }
+    }
+    specs.push_back(std::move(spec));
+    served.emplace(frame.id, std::move(edge));
+  }
+  auto node = Node::open(name, specs, options);
+  if (!node) return tl::unexpected(std::move(node.error()));
+  ReplayedPartition partition(*std::move(node));
+  partition.frames_ = frames.frames;
+  partition.served_ = std::move(served);
+  if (auto taken = partition.take(values); !taken) return tl::unexpected(std::move(taken.error()));
+  return partition;
+}
+
+void ReplayedPartition::take(const FramesNews& frames) {
+  frames_ = frames.frames;
+  settled_ = false;
+}
+
+void ReplayedPartition::settle(const ValuesNews& values) {
+  if (std::exchange(settled_, true)) return;
+  std::set<std::string_view> wanted;
+  for (const WatchedFrame& frame : frames_) wanted.insert(frame.id);
+  bool removed = false;
+  for (auto served = served_.begin(); served != served_.end();) {
+    if (wanted.count(served->first) > 0) {
+      ++served;
+      continue;
+    }
+    (void)node_.remove(served->first);
+    served = served_.erase(served);
+    removed = true;
+  }
+  // With a frame those below it went.
+  for (auto served = served_.begin(); removed && served != served_.end();) {
+    served = node_.parent(served->first) ? std::next(served) : served_.erase(served);
+  }
+  const auto known = by_frame(frames_.size(), values);
+  // Parents may come after their children.
+  for (bool progress = true; progress;) {
+    progress = false;
+    settled_ = true;
+    for (std::size_t i = 0; i < frames_.size(); ++i) {
+      const auto served = served_.find(frames_[i].id);
+      if (served != served_.end() && served->second.parent == frames_[i].parent) continue;
+      const bool placed = place(frames_[i], known[i]);
+      progress = progress || placed;
+      settled_ = settled_ && placed;
+    }
+  }
+}
+
+bool ReplayedPartition::place(const WatchedFrame& frame, const WatchedValue* value) {
+  const Transform X_PC = value != nullptr ? value->X_PC : Transform();
+  const bool moves = served_.count(frame.id) > 0;
+  const auto placed = moves ? node_.move(frame.id, frame.parent, X_PC)
+                            : node_.add(frame.id, frame.parent, X_PC, node_.partition());
+  if (!placed) return false;
+  served_[frame.id] = Edge{frame.parent, false, {}};
+  return true;
+}
+
+Result<void> ReplayedPartition::flush() {
+  if (batch_.empty()) return {};
+  const std::vector<EdgeUpdate> batch = std::exchange(batch_, {});
+  const auto updated = node_.update(batch, stamp_);
+  if (updated) return {};
+  if (updated.error().code == Errc::kPartitionTaken) return updated;
+  // One that is rejected does not hold up the others.
+  for (const EdgeUpdate& edge : batch) {
+    const auto one = node_.update(edge.id, edge.X_PC, stamp_);
+    if (!one && one.error().code != Errc::kStampTaken) ++rejected_;
+  }
+  return {};
+}
+
+// The value begins a history, so nothing before it holds any more.
+void ReplayedPartition::begin(const WatchedFrame& frame, const WatchedValue& value, Edge& edge) {
+  if (!edge.dynamic) return;
+  if (value.stamp) {
+    (void)node_.clear_history(frame.id);
+  } else {
+    (void)node_.move(frame.id, frame.parent, value.X_PC);
+    edge = Edge{frame.parent, false, {}};
+  }
+}
+
+void ReplayedPartition::clear(const std::string& id, const WatchedValue& value, Edge& edge) {
+  // Only a sample makes an edge dynamic.
+  if (!edge.dynamic) (void)node_.update(id, value.X_PC, Time{});
+  edge.dynamic = true;
+  (void)node_.clear_history(id);
+}
+
+Result<void> ReplayedPartition::take(const ValuesNews& values) {
+  settle(values);
+  for (const WatchedValue& value : values.values) {
+    if (value.frame >= frames_.size()) continue;
+    const WatchedFrame& frame = frames_[value.frame];
+    const auto served = served_.find(frame.id);
+    if (served == served_.end() || frame.parent.empty()) continue;
+    Edge& edge = served->second;
+    Correlation correlation = replayed(value.correlation);
+    const auto correlates = [&] {
+      return !edge.correlation || !(correlation == *edge.correlation);
+    };
+    const bool plain = !correlates() && !value.begins && !value.cleared;
+    if (!plain || value.stamp != stamp_) {
+      if (auto ok = flush(); !ok) return ok;
+    }
+    stamp_ = value.stamp;
+    if (value.cleared) {
+      clear(frame.id, value, edge);
+      continue;
+    }
+    if (value.begins) begin(frame, value, edge);
+    if (correlates() && node_.correlate(frame.id, correlation)) {
+      edge.correlation = std::move(correlation);
+    }
+    if (!value.stamp && edge.dynamic) continue;
+    edge.dynamic = value.stamp.has_value();
+    batch_.push_back({frame.id, value.X_PC});
+  }
+  return flush();
+}
+
+}  // namespace tfdude::cli

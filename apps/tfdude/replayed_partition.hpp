@@ -1,0 +1,59 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "tfdude/client/node.hpp"
+#include "tfdude/types/partition_news.hpp"
+
+namespace tfdude::cli {
+
+/// A recorded partition that is served again, by a Node of its own.
+/// @par Thread safety  One thread at a time.
+class ReplayedPartition {
+ public:
+  /// Serves the partition with these frames and values. @return as Node::open()
+  [[nodiscard]] static Result<ReplayedPartition> open(const std::string& name,
+                                                      const FramesNews& frames,
+                                                      const ValuesNews& values,
+                                                      const Options& options);
+
+  /// New frames and parents are served together with the values that follow, or after settle().
+  void take(const FramesNews& frames);
+  /// @return kPartitionTaken: another process serves the partition now
+  [[nodiscard]] Result<void> take(const ValuesNews& values);
+  /// Serves the frames that were taken last. Those that cannot be served yet, because their parent
+  /// is missing, are tried again by the next call.
+  void settle() { settle({}); }
+  [[nodiscard]] bool settled() const { return settled_; }
+  /// Values that the rules rejected, such as late samples.
+  [[nodiscard]] std::size_t rejected() const { return rejected_; }
+
+ private:
+  struct Edge {
+    std::string parent;
+    bool dynamic = false;
+    std::optional<Correlation> correlation{};  // absent: not known
+  };
+
+  explicit ReplayedPartition(Node node) : node_(std::move(node)) {}
+  void settle(const ValuesNews& values);
+  [[nodiscard]] bool place(const WatchedFrame& frame, const WatchedValue* value);
+  void begin(const WatchedFrame& frame, const WatchedValue& value, Edge& edge);
+  void clear(const std::string& id, const WatchedValue& value, Edge& edge);
+  [[nodiscard]] Result<void> flush();
+
+  Node node_;
+  std::vector<WatchedFrame> frames_;  // as they were taken last
+  std::unordered_map<std::string, Edge> served_;
+  bool settled_ = true;
+  std::size_t rejected_ = 0;
+  // Values of one stamp, which become visible together.
+  std::vector<EdgeUpdate> batch_;
+  std::optional<Time> stamp_;
+};
+
+}  // namespace tfdude::cli

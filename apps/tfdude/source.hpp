@@ -1,0 +1,52 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+#include "tfdude/recording/recording.hpp"
+
+namespace tfdude::cli {
+
+/// Who answers a command: the live system, or a recording at the instant that it shows. A
+/// reference to either of them.
+class Source {
+ public:
+  // NOLINTNEXTLINE(google-explicit-constructor): a client is one
+  Source(Client& client) : client_(&client) {}
+  /// The end of the recording is now, for stamps that count back from it.
+  explicit Source(Recording& recording) : recording_(&recording), end_(recording.instant()) {}
+
+  [[nodiscard]] bool live() const { return client_ != nullptr; }
+  /// The end of a recording.
+  [[nodiscard]] Result<Time> now() const;
+  /// The time to compare stamps with: of a recording, the instant that it shows.
+  [[nodiscard]] Result<Time> present() const;
+
+  // As the functions of Client.
+  [[nodiscard]] Result<std::vector<Frame>> frames() const;
+  [[nodiscard]] Result<std::vector<PartitionInfo>> partitions() const;
+  [[nodiscard]] Result<std::vector<PathSegment>> path(const std::string& a,
+                                                      const std::string& b) const;
+  [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition) const;
+  [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition) const;
+  /// A recording that does not show an instant after that of the query is read on until it has the
+  /// data, as Recording::lookup_at() does. An instant before its beginning, as of stamps of another
+  /// clock, is looked up at its end.
+  [[nodiscard]] Result<StampedTransform> lookup(const std::string& a, const std::string& b,
+                                                const Query& query = {}) const;
+  [[nodiscard]] Result<StampedTransform> lookup(const std::string& a, const std::string& b,
+                                                const Query& query, Milliseconds wait) const;
+  [[nodiscard]] Result<StampedTransform> lookup(const std::string& a, const Query& at_a,
+                                                const std::string& b, const Query& at_b,
+                                                const std::string& fixed) const;
+
+ private:
+  Client* client_ = nullptr;
+  Recording* recording_ = nullptr;
+  Time end_{};
+};
+
+}  // namespace tfdude::cli

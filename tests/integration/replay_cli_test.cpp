@@ -1,0 +1,176 @@
+// Replays on the command line.
+
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "tfdude/recording/recording.hpp"
+#include "tfdude/recording/recording_writer.hpp"
+
+#include "support/catch.hpp"
+#include "support/process.hpp"
+#include "support/thesis.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::CliResult;
+using testing::ContainsSubstring;
+using testing::eventually;
+using testing::Process;
+using testing::TemporaryDirectory;
+using testing::TestDomain;
+
+Time at(double seconds) { return time_of(static_cast<std::int64_t>(seconds * 1e9)); }
+
+Transform shifted(double x, double sigma) {
+  return {*Pose::create(Eigen::Quaterniond::Identity(), {x, 0, 0}),
+          *Covariance::from_stddev({sigma, sigma, sigma, sigma, sigma, sigma})};
+}
+
+constexpr double kBegin = 1000;
+constexpr double kEnd = 1010;
+
+// Two partitions: a base whose lift moves by 0.1 m/s, and an arm that gets a tool after 5 s.
+std::string written(const TemporaryDirectory& directory) {
+  const std::string file = directory.path() + "/robot.mcap";
+  auto writer = RecordingWriter::create(file, at(kBegin));
+  REQUIRE(writer);
+  const auto add = [&](const char* partition, auto what, double time) {
+    REQUIRE(writer->add(PartitionNews{partition, std::move(what)}, at(time)));
+  };
+  add("base", ReachNews{true, ""}, kBegin);
+  add("base", FramesNews{{{"lift", "world"}, {"world", ""}}, 5}, kBegin);
+  add("base", ValuesNews{1, {{0, at(kBegin), shifted(0, 0.01), {}, Covariance()}}}, kBegin);
+  add("arm", ReachNews{true, ""}, kBegin);
+  add("arm", FramesNews{{{"hand", "lift"}}, 6}, kBegin);
+  CommonError supply{"supply", false, Loading::Constant(6, 1, 0.01)};
+  add("arm",
+      ValuesNews{1, {{0, std::nullopt, shifted(1, 0.02), {false, {supply}, {}}, Covariance()}}},
+      kBegin);
+  for (int i = 1; i <= 1000; ++i) {
+    const double time = kBegin + 0.01 * i;
+    add("base",
+        ValuesNews{1U + static_cast<unsigned>(i), {{0, at(time), shifted(0.001 * i, 0.01)}}}, time);
+    if (i != 500) continue;
+    add("arm", FramesNews{{{"hand", "lift"}, {"tool", "hand"}}, 6}, time);
+    add("arm", ValuesNews{2, {{1, std::nullopt, shifted(0.5, 0.005), {}, Covariance()}}}, time);
+  }
+  REQUIRE(writer->finish(at(kEnd)));
+  return file;
+}
+
+Options external(const TestDomain& domain) {
+  Options options = domain.options();
+  options.clock = ClockKind::kExternal;
+  return options;
+}
+
+bool has_frame(Client& client, const std::string& id) {
+  const auto partitions = client.partitions();
+  return partitions && client.parent(id).has_value();
+}
+
+void check_same(const Result<StampedTransform>& served, const Result<StampedTransform>& recorded) {
+  REQUIRE(served);
+  REQUIRE(recorded);
+  CHECK(served->stamp == recorded->stamp);
+  CHECK((served->pose.matrix() - recorded->pose.matrix()).cwiseAbs().maxCoeff() < 1e-12);
+  const auto& a = served->covariance.of_specified().matrix();
+  const auto& b = recorded->covariance.of_specified().matrix();
+  CHECK((a - b).cwiseAbs().maxCoeff() < 1e-12);
+}
+
+}  // namespace
+
+TEST_CASE("replay: the partitions are served as they were recorded, at the recording's time") {
+  const TemporaryDirectory directory;
+  const std::string file = written(directory);
+  auto recording = Recording::open(file);
+  REQUIRE(recording);
+  const TestDomain domain;
+  Process replay = domain.start_cli({"replay", file, "--rate", "2"});
+  auto client = Client::open(external(domain));
+  REQUIRE(client);
+  REQUIRE(eventually([&] { return has_frame(*client, "hand") && has_frame(*client, "lift"); }));
+  CHECK_FALSE(has_frame(*client, "tool"));
+  Query query;
+  query.at = at(kBegin + 4.005);
+  check_same(client->lookup("world", "hand", query, 20s),
+             recording->lookup_at("world", "hand", *query.at, query));
+  const auto now = client->now();
+  REQUIRE(now);
+  CHECK(*now >= at(kBegin + 4));
+  CHECK(*now <= at(kEnd));
+  query.at = at(kBegin + 8.0025);
+  check_same(client->lookup("world", "tool", query, 20s),
+             recording->lookup_at("world", "tool", *query.at, query));
+  const CliResult result = testing::finish(replay);
+  CHECK(result.status == 0);
+  CHECK_THAT(result.out, ContainsSubstring("replayed") && !ContainsSubstring("rejected"));
+}
+
+TEST_CASE("replay: it pauses, and begins anywhere") {
+  const TemporaryDirectory directory;
+  const std::string file = written(directory);
+  const TestDomain domain;
+  Process replay = domain.start_cli({"replay", file, "--at", "1006", "--paused"});
+  auto client = Client::open(external(domain));
+  REQUIRE(client);
+  REQUIRE(eventually([&] { return has_frame(*client, "tool") && has_frame(*client, "lift"); }));
+  REQUIRE(client->now());
+  CHECK(*client->now() == at(kBegin + 6));
+  std::this_thread::sleep_for(300ms);
+  CHECK(*client->now() == at(kBegin + 6));
+  const auto X = client->lookup("world", "lift", Query());
+  REQUIRE(X);
+  CHECK(X->stamp == at(kBegin + 6));
+  replay.signal(SIGINT);
+  CHECK(testing::finish(replay).status == 0);
+}
+
+TEST_CASE("replay: a loop begins again, and what came later is gone") {
+  const TemporaryDirectory directory;
+  const std::string file = written(directory);
+  const TestDomain domain;
+  Process replay = domain.start_cli({"replay", file, "--loop", "--rate", "4", "--at", "1004"});
+  auto client = Client::open(external(domain));
+  REQUIRE(client);
+  REQUIRE(eventually([&] { return has_frame(*client, "tool"); }));
+  REQUIRE(eventually([&] { return !has_frame(*client, "tool"); }));
+  const auto now = client->now();
+  REQUIRE(now);
+  CHECK(*now < at(kBegin + 8));
+  REQUIRE(eventually([&] { return has_frame(*client, "tool"); }));
+  CHECK(replay.runs());
+}
+
+TEST_CASE("replay: a name that a live partition has is refused") {
+  const testing::ThesisDaemons d;
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/robot.mcap";
+  Process recorder = d.domain.start_cli({"record", file});
+  REQUIRE(eventually([&] {
+    return d.domain.cli({"tree", "--recording", file}).out == testing::text(d, {"tree"});
+  }));
+  recorder.signal(SIGINT);
+  REQUIRE(testing::finish(recorder).status == 0);
+  const CliResult refused = d.domain.cli({"replay", file});
+  CHECK(refused.status == 1);
+  CHECK_THAT(refused.err, ContainsSubstring("partition"));
+  // Elsewhere it is served, with all that the robot had.
+  const TestDomain other;
+  Process replay = other.start_cli({"replay", file, "--at", "-0", "--paused"});
+  const std::vector<std::string> question{"--clock", "external", "tree"};
+  const std::string live = testing::text(d, {"tree"});
+  CHECK(eventually([&] { return other.cli(question).out == live; }));
+}
+
+}  // namespace tfdude
