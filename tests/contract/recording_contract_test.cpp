@@ -17,6 +17,7 @@
 #include "tfdude/recording/recording_writer.hpp"
 
 #include "support/catch.hpp"
+#include "support/joint_frames.hpp"
 #include "support/networks.hpp"
 #include "support/process.hpp"
 #include "support/random.hpp"
@@ -27,7 +28,9 @@ namespace {
 using testing::eventually;
 using testing::Join;
 using testing::joined_by;
+using testing::moved_by;
 using testing::Random;
+using testing::revolute_named;
 
 // The clock of the test: one step is a second.
 Time step(int number) { return Time(std::chrono::seconds(1000 + number)); }
@@ -162,7 +165,8 @@ class World {
     arm_.emplace(*Node::open(join("arm"), "arm",
                              {{"shoulder", "lift", random_.transform()},
                               {"elbow", "shoulder", random_.transform(), noisy},
-                              {"hand", "elbow", random_.transform()}}));
+                              {"hand", "elbow", random_.transform()},
+                              moved_by("wrist", "hand", revolute_named("wrist"))}));
   }
 
   void change(int number) {
@@ -199,6 +203,10 @@ class World {
       const Time at = stamp + std::chrono::milliseconds(250 * i);
       (void)base_->update("lift", random_value(random_), at);
       (void)arm_->update({{"elbow", random_value(random_)}}, at);
+      // More than half a turn apart, too.
+      JointValue wrist{"wrist", random_.uniform(-5, 5), 1e-4};
+      if (random_.index(5) == 0) wrist.variance.reset();
+      (void)arm_->update_joints({wrist}, at);
     }
   }
 
@@ -232,12 +240,13 @@ TEST_CASE("recording: it answers as the live system did, with covariance, at any
       world.change(number);
       REQUIRE(eventually([&] { return recorded.has_all(world.arm(), *client); }));
       frames[number] = lines(*client->frames());
-      const std::vector<std::string> names{"world", "base", "lift", "shoulder", "hand", "tool"};
+      const std::vector<std::string> names{"world", "lift", "shoulder", "hand", "wrist", "tool"};
       for (int i = 0; i < 8; ++i) {
         const auto& a = names[random.index(names.size())];
         const auto& b = names[random.index(names.size())];
         Query query;
-        query.at = step(number) + std::chrono::milliseconds(random.index(4) * 250 - 1300);
+        query.at = step(number) +
+                   std::chrono::milliseconds(random.index(4) * 250 - 1300 + random.index(3) * 70);
         if (random.index(4) == 0) query.order = Order::kFourth;
         asked.push_back({number, a, b, query, client->lookup(a, b, query)});
       }

@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+"""What a recorder costs beside a bare DDS reader of as many bytes: 100 edges of one owner that move at 1 kHz.
+
+    python3 bench/recorded.py [--edges N] [--rate HZ] [--seconds S]     prints a table; needs push_load of bench/net
+
+It runs in a network of its own. Processor time is that of the whole process that records or reads, from /proc. That of
+zstd alone is measured on the uncompressed file.
+"""
+
+import argparse
+import os
+import pathlib
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+BIN = ROOT / "build" / "release" / "bin"
+COMMON = ["--domain", "80", "--profile", str(ROOT / "profiles" / "loopback.xml")]
+WARM_UP_S = 2
+HEADERS = 110  # of Ethernet, IP, UDP and RTPS on each datagram [bytes]
+
+
+def loopback():
+    """(bytes, packets) received so far."""
+    for line in pathlib.Path("/proc/net/dev").read_text().splitlines():
+        if line.strip().startswith("lo:"):
+            fields = line.split(":")[1].split()
+            return int(fields[0]), int(fields[1])
+    raise RuntimeError("no loopback interface")
+
+
+def cpu_seconds(pid):
+    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def start(program, *arguments):
+    return subprocess.Popen([BIN / program, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+
+
+def load(mode, arguments, *more):
+    return start("push_load", "--mode", mode, *COMMON, "--joints", arguments.edges, "--rate", arguments.rate, *more)
+
+
+def measured(process, seconds):
+    """Processor time per second of a process, and bytes per second of the network."""
+    time.sleep(WARM_UP_S)
+    before = time.monotonic(), cpu_seconds(process.pid), loopback()
+    time.sleep(seconds)
+    after = time.monotonic(), cpu_seconds(process.pid), loopback()
+    span = after[0] - before[0]
+    return (after[1] - before[1]) / span, [(b - a) / span for a, b in zip(before[2], after[2])]
+
+
+def end(process, how=signal.SIGTERM):
+    process.send_signal(how)
+    process.communicate(timeout=30)
+
+
+def zstd_seconds(file):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(["zstd", "-1", "--single-thread", "-q", "-c", file], stdout=subprocess.DEVNULL, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--edges", type=int, default=100)
+    parser.add_argument("--rate", type=int, default=1000)
+    parser.add_argument("--seconds", type=float, default=10)
+    arguments = parser.parse_args()
+    if "TFDUDE_OWN_NETWORK" not in os.environ:
+        os.environ["TFDUDE_OWN_NETWORK"] = "1"
+        os.execvp("unshare", ["unshare", "--net", "sh", "-c", 'ip link set lo up && exec "$0" "$@"', sys.executable,
+                              *sys.argv])
+    share, size, zstd = {}, {}, 0
+    owner = load("own", arguments)
+    owner.stdout.readline()
+    with tempfile.TemporaryDirectory() as folder:
+        for way, options in (("compressed", ()), ("raw", ("--raw",))):
+            file = pathlib.Path(folder) / f"{way}.mcap"
+            begin = time.monotonic()
+            recorder = start("tfdude", *COMMON, "record", file, *options)
+            share[way], (bytes_rate, packets) = measured(recorder, arguments.seconds)
+            end(recorder, signal.SIGINT)
+            size[way] = file.stat().st_size / (time.monotonic() - begin)
+            if way == "raw":
+                zstd = zstd_seconds(file) / (time.monotonic() - begin)
+    end(owner)
+    per_message = int((bytes_rate - packets * HEADERS) / arguments.rate)
+    listener = load("listen", arguments, "--watchers", 1)
+    sender = load("send", arguments, "--bytes", per_message)
+    share["bare"], _ = measured(listener, arguments.seconds)
+    end(sender)
+    end(listener)
+    limit = 1.5 * share["bare"] + zstd
+    print(f"{arguments.edges} edges at {arguments.rate} Hz, {per_message} bytes a message")
+    print(f"bare reader          {share['bare']:.3f} of a core")
+    print(f"zstd alone           {zstd:.3f}")
+    print(f"recorder, raw        {share['raw']:.3f}   {share['raw'] / share['bare']:.2f} times the bare reader")
+    print(f"recorder, compressed {share['compressed']:.3f}   {share['compressed'] / limit:.2f} times 1.5 bare and zstd")
+    print(f"file, raw            {size['raw'] / 1e6:.2f} MB/s")
+    print(f"file, compressed     {size['compressed'] / 1e6:.2f} MB/s   {size['compressed'] / size['raw']:.3f} of it")
+
+
+if __name__ == "__main__":
+    main()
