@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <map>
 #include <mutex>
+#include <set>
 #include <thread>
 
 #include "tfdude/base/id.hpp"
@@ -15,8 +16,9 @@
 namespace tfdude::cli {
 namespace {
 
-constexpr double kTick = 0.1;  // [s]
-constexpr int kTicksBetweenJoints = 10;
+constexpr double kFlushEvery = 0.8;  // [s]: with what that takes, at most a second is lost
+constexpr double kTick = 0.1;        // [s]
+constexpr int kTicksBetweenLooks = 10;
 
 // Passes what a client hears to a file. All functions are thread-safe.
 class Recorder {
@@ -34,9 +36,12 @@ class Recorder {
     const std::lock_guard<std::mutex> lock(watches_mutex_);
     if (watch) {
       watches_[partition] = *std::move(watch);
-    } else {
-      watches_.erase(partition);
+      return;
     }
+    watches_.erase(partition);
+    if (!failed_.insert(partition).second) return;
+    std::fprintf(stderr, "tfdude: partition %s is not recorded yet: %s\n", partition.c_str(),
+                 watch.error().message.c_str());
   }
 
   void on(const Change& change) {
@@ -44,18 +49,20 @@ class Recorder {
     if (change.kind == ChangeKind::kPartitionUp) watch(change.partition);
   }
 
-  void add_joints() {
+  // The joints of all partitions; and those that could not be watched are tried again.
+  void look_again() {
     const auto partitions = client_.partitions();
     if (!partitions) return;
     for (const PartitionInfo& partition : *partitions) {
       if (!partition.reachable) continue;
+      watch(partition.name);
       if (const auto joints = client_.joints(partition.name)) add(partition.name, *joints);
     }
   }
 
-  [[nodiscard]] Result<void> tick() {
+  [[nodiscard]] Result<void> flush() {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (state_) state_ = writer_.tick(now());
+    if (state_) state_ = writer_.flush(now());
     return state_;
   }
 
@@ -97,6 +104,7 @@ class Recorder {
   Time last_{};
   std::mutex watches_mutex_;
   std::map<std::string, std::optional<PartitionWatch>> watches_;
+  std::set<std::string> failed_;  // to watch, and it was said
 };
 
 RecordingOptions options_of(const RecordingArguments& given) {
@@ -123,16 +131,16 @@ Result<void> record(Client& client, Recorder& recorder, const Arguments& argumen
   }
   // On its own thread, because an owner that does not answer is waited for.
   std::atomic<bool> stopping{false};
-  std::thread joints([&] {
+  std::thread looking([&] {
     for (int ticks = 0; !stopping; ++ticks) {
-      if (ticks % kTicksBetweenJoints == 0) recorder.add_joints();
+      if (ticks % kTicksBetweenLooks == 0) recorder.look_again();
       std::this_thread::sleep_for(std::chrono::duration<double>(kTick));
     }
   });
   Result<void> written;
-  while (written && !interrupted_within(kTick)) written = recorder.tick();
+  while (written && !interrupted_within(kFlushEvery)) written = recorder.flush();
   stopping = true;
-  joints.join();
+  looking.join();
   changes = Subscription();
   return recorder.finish();
 }

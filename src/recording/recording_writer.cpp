@@ -15,8 +15,6 @@ namespace {
 
 using namespace recording;
 
-// What waits longer is flushed. With the interval of ticks, at most a second is lost.
-constexpr Milliseconds kFlushAfter{800};
 // A clock that goes back by more has jumped: times within one file never go back.
 constexpr std::chrono::seconds kJump{1};
 // A message of all static values is written at most so often.
@@ -82,10 +80,15 @@ class RecordingWriter::Impl {
       state_ = split(now_);
     }
     now_ = std::max(now_, now);
-    if (!writer_->pending()) pending_since_ = std::chrono::steady_clock::now();
     if (state_) state_ = record(recorder_, now_);
     if (state_) state_ = after(now_);
     return state_;
+  }
+
+  [[nodiscard]] Result<void> flush(Time now) {
+    auto ok = record(now, [](Recorder&, Time) { return Result<void>(); });
+    if (ok && writer_->pending()) ok = state_ = writer_->flush();
+    return ok;
   }
 
   [[nodiscard]] Result<void> finish(Time now) {
@@ -144,10 +147,9 @@ class RecordingWriter::Impl {
     if (full || age >= options_.split_after) return split(now);
     if (writer_->raw_size() - keyframe_end_ >=
         std::max(kKeyframeEvery, kKeyframeShare * keyframe_size_)) {
-      if (auto ok = keyframe(now); !ok) return ok;
+      return keyframe(now);
     }
-    const auto waited = std::chrono::steady_clock::now() - pending_since_;
-    return writer_->pending() && waited >= kFlushAfter ? writer_->flush() : Result<void>();
+    return {};
   }
 
   [[nodiscard]] Result<void> split(Time now) {
@@ -167,7 +169,6 @@ class RecordingWriter::Impl {
   std::vector<std::string> files_;
   Time now_{};
   Time begun_{};
-  std::chrono::steady_clock::time_point pending_since_;
   Time statics_at_{};
   std::uint64_t keyframe_end_ = 0;
   std::uint64_t keyframe_size_ = 0;
@@ -204,9 +205,7 @@ Result<void> RecordingWriter::add(const Change& change, Time now) {
   return impl_->record(now, [&](Recorder& recorder, Time at) { return recorder.add(change, at); });
 }
 
-Result<void> RecordingWriter::tick(Time now) {
-  return impl_->record(now, [](Recorder&, Time) { return Result<void>(); });
-}
+Result<void> RecordingWriter::flush(Time now) { return impl_->flush(now); }
 
 Result<void> RecordingWriter::finish(Time now) { return impl_->finish(now); }
 std::vector<std::string> RecordingWriter::files() const { return impl_->files(); }

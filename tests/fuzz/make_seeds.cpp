@@ -12,6 +12,8 @@
 
 #include "tfdude/recording/recording_writer.hpp"
 
+#include "recording/messages.hpp"
+#include "recording/schemas.hpp"
 #include "ros/ros_bytes.hpp"
 #include "store/sqlite_store.hpp"
 #include "support/samples.hpp"
@@ -138,7 +140,44 @@ bool write_states(const std::filesystem::path& folder) {
   return true;
 }
 
-// A recording of two partitions, compressed and not.
+// Choices of the harness: messages of a partition, and transforms of ROS.
+void write_messages(const std::filesystem::path& folder) {
+  using namespace recording;
+  Random random(0x7f);
+  std::string message;
+  const auto add = [&](Bytes& choices, Topic topic) {
+    choices.push_back(static_cast<std::uint8_t>(topic));
+    choices.push_back(static_cast<std::uint8_t>(choices.size() % 100));
+    choices.push_back(static_cast<std::uint8_t>(message.size() / 256));
+    choices.push_back(static_cast<std::uint8_t>(message.size() % 256));
+    choices.insert(choices.end(), message.begin(), message.end());
+  };
+  Bytes ours{0};
+  const WatchedFrame hand{"hand", "arm"};
+  encode(RecordedFrames{"arms", 1, true, "", true, false, {{"arm", ""}, hand}, {}}, message);
+  add(ours, Topic::kFrames);
+  for (int i = 0; i < 3; ++i) {
+    ValuesEncoder encoder(message, "arms", 1, false);
+    WatchedValue value{1, time_of(i), random.transform(), {}, Covariance()};
+    if (i > 0) value.begins.reset();
+    encoder.add(hand, value, i == 2);
+    encoder.finish();
+    add(ours, Topic::kValues);
+  }
+  encode(Change{ChangeKind::kPartitionUp, "arms"}, message);
+  add(ours, Topic::kEvents);
+  write(folder / "recording", "messages", ours);
+  Bytes ros{1};
+  for (const Topic topic : {Topic::kTf, Topic::kTfStatic}) {
+    TfEncoder encoder(message);
+    encoder.add({topic == Topic::kTf ? "base" : "camera", "odom"}, random.pose(), time_of(5));
+    encoder.finish();
+    add(ros, topic);
+  }
+  write(folder / "recording", "ros", ros);
+}
+
+// A recording of a partition, compressed and not.
 bool write_recordings(const std::filesystem::path& folder) {
   Random random(0x4ec0);
   for (const bool compress : {false, true}) {
@@ -175,6 +214,7 @@ int main(int argc, char** argv) {
   tfdude::fuzz::write_samples(argv[1]);
   tfdude::fuzz::write_ros(argv[1]);
   tfdude::fuzz::write_choices(argv[1]);
+  tfdude::fuzz::write_messages(argv[1]);
   const bool written =
       tfdude::fuzz::write_states(argv[1]) && tfdude::fuzz::write_recordings(argv[1]);
   return written ? 0 : 1;

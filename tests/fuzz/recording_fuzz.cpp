@@ -20,8 +20,8 @@ using namespace recording;
 constexpr char kMagic = '\x89';
 constexpr std::size_t kMostFrames = 8;  // of which all pairs are looked up
 
-// A file of messages: for each its topic, its time [s], the length, and its bytes. Without our
-// metadata it is one of ROS.
+// A file of messages: for each its topic, its time [s], the length in two bytes, and its bytes.
+// Without our metadata it is one of ROS.
 std::string file_of(std::string_view choices) {
   std::string file;
   McapWriter writer(
@@ -38,12 +38,12 @@ std::string file_of(std::string_view choices) {
     (void)writer.add_schema({static_cast<std::uint16_t>(i + 1), std::string(type.type), "", ""});
     (void)writer.add_channel({i, static_cast<std::uint16_t>(i + 1), std::string(type.name), "cdr"});
   }
-  for (std::size_t at = 1; at + 3 < choices.size();) {
+  for (std::size_t at = 1; at + 4 < choices.size();) {
     const auto number = [&](std::size_t i) { return static_cast<unsigned char>(choices[at + i]); };
-    const std::string_view data = choices.substr(at + 3, number(2));
+    const std::string_view data = choices.substr(at + 4, number(2) * 256U + number(3));
     const auto topic = static_cast<std::uint16_t>(number(0) % topic_types().size());
     (void)writer.write({topic, number(1) * 1'000'000'000LL, 0, data});
-    at += 3 + data.size();
+    at += 4 + data.size();
   }
   (void)writer.finish();
   return file;

@@ -52,9 +52,9 @@ class TFDUDE_EXPORT RecordingWriter {
                                  Time now);
   [[nodiscard]] Result<void> add(const Change& change, Time now);
 
-  /// Flushes what has waited for most of a second, by a steady clock. Call it several times a
-  /// second.
-  [[nodiscard]] Result<void> tick(Time now);
+  /// Writes what waits for a chunk to be full. What was added since the last call is lost if the
+  /// process is killed.
+  [[nodiscard]] Result<void> flush(Time now);
 
   /// Writes the summary, which makes opening the file faster.
   [[nodiscard]] Result<void> finish(Time now);
