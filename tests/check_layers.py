@@ -14,7 +14,9 @@ import tempfile
 import unittest
 
 LAYERS = ["base", "math", "types", "tree", "partition", "description", "store", "keys", "recording",
-          "transport", "runtime", "client", "apps"]
+          "transport", "runtime", "client", "apps", "python"]
+# Use the library as everybody does, and know nothing of each other.
+USERS = ["apps", "python"]
 SUFFIXES = {".hpp", ".cpp", ".h", ".cc", ".ipp"}
 DDS_FOLDER = "src/transport/fastdds/"
 # Has another participant, in a domain of ROS. It shares the differences between versions, and the check of lengths.
@@ -39,6 +41,7 @@ CONFINED = [
     ("zstd", r"zstd\.h$", ["src/recording/"]),
     ("CLI11", r"CLI/", ["apps/"]),
     ("nlohmann", r"nlohmann/", ["apps/"]),
+    ("pybind11", r"(pybind11/|Python\.h$)", ["python/"]),
 ]
 # (what, pattern of the include, layers that must do without it)
 BARRED = [
@@ -65,7 +68,7 @@ def strip_comments(text, literals_too=False):
 
 def layer_of(path):
     """The layer of a file of the project; None if it belongs to no layer."""
-    match = re.match(r"(?:include/tfdude|src)/([^/]+)/|(apps)/", path)
+    match = re.match(r"(?:include/tfdude|src)/([^/]+)/|(apps|python)/", path)
     name = match and (match[1] or match[2])
     return name if name in LAYERS else None
 
@@ -75,7 +78,7 @@ class Checker:
         self.root = pathlib.Path(root)
         self.files = {
             path.relative_to(self.root).as_posix(): path.read_text(encoding="utf-8")
-            for folder in ("include", "src", "apps")
+            for folder in ("include", "src", "apps", "python")
             for path in sorted((self.root / folder).rglob("*"))
             if path.suffix in SUFFIXES and path.is_file()}
         self.generated = {
@@ -128,12 +131,12 @@ class Checker:
         other = layer_of(target)
         if other not in (None, layer):
             self.arrows.add((layer, other))
-        if other is None or LAYERS.index(other) > LAYERS.index(layer):
+        if other is None or LAYERS.index(other) > LAYERS.index(layer) or {layer, other} == set(USERS):
             self.report(path, position, "arrow", f'{layer} may not include "{name}" of {other}')
         if path.startswith("include/") and not target.startswith("include/"):
             self.report(path, position, "public", f'a public header includes the private "{name}"')
         shares = any(path.startswith(place) and target in shared for place, shared in SHARED.items())
-        if layer == "apps" and target.startswith("src/") and not target.startswith(DDS_FOLDER) and not shares:
+        if layer in USERS and target.startswith("src/") and not target.startswith(DDS_FOLDER) and not shares:
             self.report(path, position, "public", f'a program includes the private "{name}"')
         if target.startswith(DDS_FOLDER) and not path.startswith(DDS_FOLDER) and not shares:
             self.report(path, position, "confined", f'"{name}" may bring DDS along: only in {DDS_FOLDER}')
@@ -195,6 +198,7 @@ class SelfTest(unittest.TestCase):
         "src/description/config.cpp": "#include <yaml-cpp/yaml.h>\n",
         "src/runtime/loop.cpp": 'auto t = Clock::now();\n#include <thread>\n',
         "apps/tfdude/main.cpp": '#include <CLI/CLI.hpp>\n#include <nlohmann/json.hpp>\n#include "tool.hpp"\n',
+        "python/src/module.cpp": '#include <pybind11/pybind11.h>\n#include "tfdude/tree/forest.hpp"\n',
         "apps/tfdude/tool.hpp": '#include "tfdude/tree/forest.hpp"\n',
         "src/transport/fastdds/compat.hpp": "#include <fastdds/dds/core.hpp>\n",
         "apps/tfdude-ros/fastdds/ros.cpp":
@@ -213,6 +217,8 @@ class SelfTest(unittest.TestCase):
         ("arrow", "src/client/a.cpp", '#include "../../apps/tfdude/tool.hpp"\n'),
         ("arrow", "src/client/a.cpp", '#include "tfdude/unheard_of/a.hpp"\n'),
         ("public", "apps/tfdude/a.cpp", '#include "tree/graph.hpp"\n'),
+        ("arrow", "python/src/a.cpp", '#include "../../apps/tfdude/tool.hpp"\n'),
+        ("public", "python/src/a.cpp", '#include "tree/graph.hpp"\n'),
         ("public", "include/tfdude/tree/forest.hpp", '#include "tree/graph.hpp"\n'),
         ("confined", "src/tree/a.cpp", "#include <boost/graph/graph_traits.hpp>\n"),
         ("confined", "src/client/a.cpp", "#include <fastdds/dds/core.hpp>\n"),
@@ -234,6 +240,7 @@ class SelfTest(unittest.TestCase):
         ("confined", "src/transport/a.cpp", "#include <openssl/x509.h>\n"),
         ("arrow", "src/store/a.cpp", '#include "tfdude/transport/port.hpp"\n'),
         ("confined", "src/client/a.cpp", "#include <nlohmann/json.hpp>\n"),
+        ("confined", "src/client/a.cpp", "#include <pybind11/numpy.h>\n"),
         ("math", "src/math/a.cpp", "#include <tl/expected.hpp>\n"),
         ("math", "src/math/a.cpp", "#include <unistd.h>\n"),
         ("barred", "src/partition/a.cpp", "int a;  // fine\n#include <thread>\n"),

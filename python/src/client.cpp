@@ -1,0 +1,172 @@
+#include "client.hpp"
+
+#include <pybind11/stl.h>
+
+#include "tfdude/transport/loopback.hpp"
+
+#include "arrays.hpp"
+#include "bind.hpp"
+#include "session.hpp"
+
+namespace tfdude::python {
+namespace {
+
+std::shared_ptr<Session> open_client(const OpenArguments& arguments) {
+  check_usable();
+  note_use();
+  const Options options = to_options(arguments);
+  LoopbackNetwork* const network = arguments.network;
+  auto client = without_gil([&] {
+    return network != nullptr ? Client::open(network->join(), options) : Client::open(options);
+  });
+  return std::make_shared<Session>(std::make_shared<Client>(value_of(std::move(client))),
+                                   options.timeout);
+}
+
+void bind_opening(py::class_<Session, std::shared_ptr<Session>>& cls) {
+  cls.def(py::init([](TFDUDE_OPEN_PARAMETERS) { return open_client(TFDUDE_OPEN_VALUES); }),
+          py::kw_only(), TFDUDE_OPEN_ARGUMENTS);
+  cls.def("close", &Session::close,
+          "Leaves the domain. Afterwards each call raises TransformException.");
+  cls.def_property_readonly("closed", &Session::closed);
+  cls.def("__enter__", [](py::object self) { return self; });
+  cls.def("__exit__", [](Session& session, const py::args&) { session.close(); });
+}
+
+void bind_writes(py::class_<Session, std::shared_ptr<Session>>& cls) {
+  cls.def(
+      "add",
+      [](const Session& session, const std::string& id, const std::string& parent,
+         const Transform& X_PC, const std::string& partition) {
+        check(session.call([&](Client& c) { return c.add(id, parent, X_PC, partition); }));
+      },
+      py::arg("id"), py::arg("parent"), py::arg("X_PC"), py::arg("partition") = "",
+      "Adds a frame; parent '' makes it a root. partition: its owner, if not the parent's.");
+  cls.def(
+      "remove",
+      [](const Session& session, const std::string& id) {
+        check(session.call([&](Client& c) { return c.remove(id); }));
+      },
+      py::arg("id"), "Removes a frame and all frames below it, whoever owns them.");
+  cls.def(
+      "forget",
+      [](const Session& session, const std::string& partition) {
+        check(session.call([&](Client& c) { return c.forget(partition); }));
+      },
+      py::arg("partition"), "Declares that an unreachable partition will not return.");
+  cls.def(
+      "move",
+      [](const Session& session, const std::string& id, const std::string& parent,
+         std::optional<Transform> X_PC) {
+        const PartialTransform parts = X_PC ? PartialTransform(*X_PC) : PartialTransform();
+        check(session.call([&](Client& c) { return c.move(id, parent, parts); }));
+      },
+      py::arg("id"), py::arg("parent"), py::arg("X_PC") = py::none(),
+      "Moves a frame, with all below it, to a new parent. X_PC: None keeps its value.");
+  cls.def(
+      "update",
+      [](const Session& session, const std::string& id, const Transform& X_PC, py::handle stamp) {
+        const std::optional<Time> time = to_stamp(stamp);
+        check(session.call([&](Client& c) { return c.update(id, X_PC, time); }));
+      },
+      py::arg("id"), py::arg("X_PC"), py::arg("stamp") = py::none(),
+      "Sets the value of the edge from a frame's parent to the frame; the owner acknowledges it.\n"
+      "With a stamp the value is a sample.");
+}
+
+void bind_structure(py::class_<Session, std::shared_ptr<Session>>& cls) {
+  cls.def(
+      "parent",
+      [](const Session& session, const std::string& id) {
+        return value_of(session.call([&](Client& c) { return c.parent(id); }));
+      },
+      py::arg("id"), "The id of the parent; '' for a root.");
+  cls.def(
+      "children",
+      [](const Session& session, const std::string& id) {
+        return value_of(session.call([&](Client& c) { return c.children(id); }));
+      },
+      py::arg("id"), "The ids of the children, sorted.");
+  cls.def(
+      "roots",
+      [](const Session& session) {
+        return value_of(session.call([](Client& c) { return c.roots(); }));
+      },
+      "The ids of frames without an existing parent, sorted.");
+  cls.def(
+      "exists",
+      [](const Session& session, const std::string& id) {
+        return session.call([&](Client& c) { return c.exists(id); });
+      },
+      py::arg("id"), "Whether a frame with this id is known.");
+  cls.def(
+      "frames",
+      [](const Session& session) {
+        return value_of(session.call([](Client& c) { return c.frames(); }));
+      },
+      "All frames, sorted by id.");
+  cls.def(
+      "partitions",
+      [](const Session& session) {
+        return value_of(session.call([](Client& c) { return c.partitions(); }));
+      },
+      "All partitions, also unreachable ones, sorted by name.");
+  cls.def(
+      "path",
+      [](const Session& session, const std::string& a, const std::string& b) {
+        return value_of(session.call([&](Client& c) { return c.path(a, b); }));
+      },
+      py::arg("a"), py::arg("b"), "The partitions that a lookup asks, in the order of the path.");
+  cls.def(
+      "now",
+      [](const Session& session) {
+        return from_stamp(value_of(session.call([](Client& c) { return c.now(); })));
+      },
+      "The time of this client's clock [ns].");
+}
+
+}  // namespace
+
+Options to_options(const OpenArguments& arguments) {
+  Options options;
+  if (arguments.domain) options.domain = *arguments.domain;
+  if (arguments.profile) options.profile = *arguments.profile;
+  if (arguments.discovery_server) options.discovery_server = *arguments.discovery_server;
+  if (arguments.keys) options.keys = *arguments.keys;
+  if (!arguments.timeout.is_none()) options.timeout = to_milliseconds(arguments.timeout, "timeout");
+  if (!arguments.discovery.is_none()) {
+    options.discovery = to_milliseconds(arguments.discovery, "discovery");
+  }
+  options.follow = arguments.follow;
+  if (arguments.clock == "external") {
+    options.clock = ClockKind::kExternal;
+  } else if (arguments.clock != "system") {
+    throw py::value_error("clock must be 'system' or 'external', not '" + arguments.clock + "'");
+  }
+  return options;
+}
+
+void bind_client(py::module_& module) {
+  py::class_<LoopbackNetwork>(
+      module, "LoopbackNetwork",
+      "A network inside this process, for tests: Client(network=...) instead of DDS.")
+      .def(py::init<>());
+  py::class_<Session, std::shared_ptr<Session>> cls(
+      module, "Client",
+      "Access to all frames of a domain. See Node for a process that owns frames.\n\n"
+      "domain: DDS domain (default: the environment's TFDUDE_DOMAIN, else 0). profile: XML file\n"
+      "of DDS profiles, or 'local' for this computer only. keys: directory of an identity. "
+      "timeout\n"
+      "[s]: of each call. discovery [s]: how long a new participant searches for others. follow:\n"
+      "frames to follow instead of all. clock: 'system' or 'external'. network: a LoopbackNetwork\n"
+      "instead of DDS.\n\n"
+      "All calls may be used from any thread; they release the GIL while they wait. Instants are\n"
+      "int [ns], float [s] or datetime with a time zone; durations are numbers [s] or timedelta.\n"
+      "Each call may raise TransformException; its subclasses say why.");
+  bind_opening(cls);
+  bind_writes(cls);
+  bind_structure(cls);
+  bind_lookups(cls);
+}
+
+}  // namespace tfdude::python

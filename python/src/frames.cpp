@@ -1,0 +1,127 @@
+#include <pybind11/stl.h>
+
+#include "tfdude/description/config.hpp"
+#include "tfdude/description/urdf.hpp"
+#include "tfdude/types/frame.hpp"
+
+#include "arrays.hpp"
+#include "bind.hpp"
+
+namespace tfdude::python {
+namespace {
+
+JointType type_named(const std::string& name) {
+  for (const JointType type :
+       {JointType::kRevolute, JointType::kContinuous, JointType::kPrismatic}) {
+    if (name == to_string(type)) return type;
+  }
+  throw py::value_error("type must be 'revolute', 'continuous' or 'prismatic', not '" + name + "'");
+}
+
+JointSpec make_joint(std::string name, const std::string& type, py::handle axis,
+                     std::optional<std::pair<double, double>> limits, double position,
+                     std::optional<double> variance, bool strict) {
+  JointSpec joint;
+  joint.name = std::move(name);
+  joint.type = type_named(type);
+  // The origin is the frame's transform, and is set by make_frame().
+  const Eigen::Vector3d unit = to_vector3(axis, "axis").normalized();
+  joint.joint = joint.type == JointType::kPrismatic ? prismatic_joint(Transform{}, unit)
+                                                    : revolute_joint(Transform{}, unit);
+  if (limits) joint.limits = JointLimits{limits->first, limits->second};
+  joint.position = position;
+  joint.variance = variance;
+  joint.strict = strict;
+  return joint;
+}
+
+EdgeTiming timing_of(bool moving, py::handle span, std::optional<std::size_t> count,
+                     py::handle process_noise) {
+  EdgeTiming timing;
+  timing.moving = moving;
+  if (!span.is_none()) timing.span = to_duration(span, "span");
+  if (count) timing.count = *count;
+  if (!process_noise.is_none()) {
+    const StatedCovariance noise = to_covariance(process_noise);
+    if (!noise.complete()) throw py::value_error("process_noise must be specified");
+    timing.process_noise = noise.of_specified();
+  }
+  return timing;
+}
+
+FrameSpec make_frame(std::string id, std::string parent, const Transform& X_PC,
+                     std::optional<JointSpec> joint, bool moving, py::handle span,
+                     std::optional<std::size_t> count, py::handle process_noise) {
+  FrameSpec frame;
+  frame.id = std::move(id);
+  frame.parent = std::move(parent);
+  frame.X_PC = X_PC;
+  if (moving || !span.is_none() || count || !process_noise.is_none()) {
+    frame.timing = timing_of(moving, span, count, process_noise);
+  }
+  if (joint) {
+    joint->joint.X_PJ = X_PC;
+    check(check_joint(*joint));
+    frame.X_PC = value_at(*joint, joint->position, joint->variance);
+    frame.joint = std::move(joint);
+  }
+  return frame;
+}
+
+std::vector<FrameSpec> load(std::string file, std::string root, const Transform& X_root,
+                            std::string prefix, std::vector<std::string> links,
+                            bool strict_limits) {
+  UrdfPart part;
+  part.file = std::move(file);
+  part.root = std::move(root);
+  part.X_root = X_root;
+  part.prefix = std::move(prefix);
+  part.links = std::move(links);
+  part.strict_limits = strict_limits;
+  return value_of(load_urdf(part));
+}
+
+}  // namespace
+
+void bind_frames(py::module_& module) {
+  py::class_<JointSpec>(
+      module, "Joint",
+      "A joint that moves a frame by one number.\n\n"
+      "type: 'revolute', 'continuous' or 'prismatic'. axis: (3,), of any length. limits: (lower,\n"
+      "upper) [rad or m]. position, variance: before the first sample. strict: positions outside\n"
+      "the limits are rejected. Its origin is the transform of the frame.")
+      .def(py::init(&make_joint), py::arg("name"), py::arg("type") = "revolute",
+           py::arg("axis") = py::make_tuple(0, 0, 1), py::kw_only(), py::arg("limits") = py::none(),
+           py::arg("position") = 0.0, py::arg("variance") = py::none(), py::arg("strict") = false)
+      .def_readonly("name", &JointSpec::name)
+      .def_property_readonly("type", [](const JointSpec& joint) { return to_string(joint.type); })
+      .def_readonly("position", &JointSpec::position)
+      .def_readonly("variance", &JointSpec::variance);
+  py::class_<FrameSpec>(
+      module, "FrameSpec",
+      "A frame of a new Node: its id, its parent ('' makes it a root), and where it is in it.\n\n"
+      "joint: moves it; X_PC then is the origin. moving: samples need no stamps to count as such.\n"
+      "span [s], count: how much history is kept. process_noise: covariance per second (6, 6).")
+      .def(py::init(&make_frame), py::arg("id"), py::arg("parent") = "",
+           py::arg("X_PC") = Transform{}, py::kw_only(), py::arg("joint") = py::none(),
+           py::arg("moving") = false, py::arg("span") = py::none(), py::arg("count") = py::none(),
+           py::arg("process_noise") = py::none())
+      .def_readonly("id", &FrameSpec::id)
+      .def_readonly("parent", &FrameSpec::parent)
+      .def_readonly("X_PC", &FrameSpec::X_PC, "The value at the start.")
+      .def_readonly("joint", &FrameSpec::joint);
+  py::class_<Config>(module, "Config", "The content of a daemon's YAML file.")
+      .def_readonly("partition", &Config::partition, "Empty if the file names none.")
+      .def_readonly("frames", &Config::frames);
+  module.def(
+      "load_config", [](const std::string& path) { return value_of(load_config(path)); },
+      py::arg("path"), "Reads a daemon's YAML file, and the URDF files that it names.");
+  module.def("load_urdf", &load, py::arg("file"), py::arg("root") = "",
+             py::arg("X_root") = Transform{}, py::kw_only(), py::arg("prefix") = "",
+             py::arg("links") = std::vector<std::string>{}, py::arg("strict_limits") = false,
+             "Reads the frames of a robot, each moved by its joint.\n\n"
+             "root: the frame in which the robot's root link is, at X_root. prefix: of all names.\n"
+             "links: what to load, as LINK or FROM..TO; none: all.");
+}
+
+}  // namespace tfdude::python

@@ -1,0 +1,116 @@
+#include <pybind11/stl.h>
+
+#include "bind.hpp"
+#include "client.hpp"
+#include "waiting.hpp"
+
+namespace tfdude::python {
+namespace {
+
+/// tf2's users pass 0 for the newest transform.
+Query tf2_query(py::handle time) {
+  Query query;
+  query.at = to_stamp(time);
+  if (query.at && nanoseconds(*query.at) == 0) query.at.reset();
+  return query;
+}
+
+StampedTransform lookup(const Session& session, const std::string& a, const std::string& b,
+                        const Query& query, Milliseconds wait) {
+  if (wait > Milliseconds(0)) return value_of(wait_for_lookup(session, a, b, query, wait));
+  return value_of(session.call([&](Client& c) { return c.lookup(a, b, query); }));
+}
+
+void bind_own(ClientClass& cls) {
+  cls.def(
+      "lookup",
+      [](const Session& session, const std::string& a, const std::string& b, py::handle at,
+         py::handle timeout, py::handle extrapolate, py::handle age_noise_until, int order) {
+        return lookup(session, a, b, to_query(at, extrapolate, age_noise_until, order),
+                      to_milliseconds(timeout, "timeout"));
+      },
+      py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(),
+      py::arg("timeout") = 0.0, py::arg("extrapolate") = 0.0,
+      py::arg("age_noise_until") = py::none(), py::arg("order") = 2,
+      "X_AB, the pose of frame b in frame a.\n\n"
+      "at: the instant; None: the newest for which all dynamic edges have data. timeout [s]: how\n"
+      "long to wait for missing frames and data; inf: without limit. extrapolate [s]: how far an\n"
+      "edge may be extrapolated. age_noise_until: adds process noise until this instant. order: 2\n"
+      "or 4, of the covariance's propagation.\n\n"
+      "Raises LookupException (no such frame), ConnectivityException (no common root),\n"
+      "ExtrapolationException (no data for the instant).");
+  cls.def(
+      "lookup_full",
+      [](const Session& session, const std::string& a, py::handle at_a, const std::string& b,
+         py::handle at_b, const std::string& fixed) {
+        Query query_a;
+        Query query_b;
+        query_a.at = to_stamp(at_a);
+        query_b.at = to_stamp(at_b);
+        return value_of(
+            session.call([&](Client& c) { return c.lookup(a, query_a, b, query_b, fixed); }));
+      },
+      py::arg("a"), py::arg("at_a"), py::arg("b"), py::arg("at_b"), py::arg("fixed"),
+      "Frame b at one instant, seen from frame a at another, through a frame that is assumed\n"
+      "fixed in between.");
+  cls.def(
+      "velocity",
+      [](const Session& session, const std::string& a, const std::string& b, py::handle at,
+         py::handle over) {
+        VelocityQuery query;
+        query.at = to_stamp(at);
+        query.over = to_duration(over, "over");
+        return value_of(session.call([&](Client& c) { return c.velocity(a, b, query); }));
+      },
+      py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(), py::arg("over") = 0.1,
+      "The mean velocity of frame b in frame a over an interval of `over` seconds around `at`, or\n"
+      "up to the newest data.");
+}
+
+void bind_as_tf2(ClientClass& cls) {
+  cls.def(
+      "lookup_transform",
+      [](const Session& session, const std::string& target, const std::string& source,
+         py::handle time, py::handle timeout) {
+        return lookup(session, target, source, tf2_query(time),
+                      to_milliseconds(timeout, "timeout"));
+      },
+      py::arg("target_frame"), py::arg("source_frame"), py::arg("time") = py::none(),
+      py::arg("timeout") = 0.0,
+      "As tf2's: the pose of the source frame in the target frame, which takes points from source\n"
+      "to target. time: None or 0: the newest. It is lookup(target_frame, source_frame).");
+  cls.def(
+      "can_transform",
+      [](const Session& session, const std::string& target, const std::string& source,
+         py::handle time, py::handle timeout) {
+        const Query query = tf2_query(time);
+        const Milliseconds wait = to_milliseconds(timeout, "timeout");
+        if (wait > Milliseconds(0)) {
+          return wait_for_lookup(session, target, source, query, wait).has_value();
+        }
+        return session.call(
+            [&](Client& c) { return c.can_lookup(target, source, query).has_value(); });
+      },
+      py::arg("target_frame"), py::arg("source_frame"), py::arg("time") = py::none(),
+      py::arg("timeout") = 0.0,
+      "As tf2's: whether lookup_transform() would succeed, waiting for it up to timeout [s].");
+  cls.def(
+      "wait_for_transform",
+      [](const Session& session, const std::string& target, const std::string& source,
+         py::handle time, py::handle timeout) {
+        static_cast<void>(
+            lookup(session, target, source, tf2_query(time), to_milliseconds(timeout, "timeout")));
+      },
+      py::arg("target_frame"), py::arg("source_frame"), py::arg("time") = py::none(),
+      py::arg("timeout") = 1.0,
+      "As tf's: returns when lookup_transform() would succeed; raises why not after timeout [s].");
+}
+
+}  // namespace
+
+void bind_lookups(ClientClass& cls) {
+  bind_own(cls);
+  bind_as_tf2(cls);
+}
+
+}  // namespace tfdude::python

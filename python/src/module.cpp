@@ -1,0 +1,17 @@
+#include "tfdude/types/version.hpp"
+
+#include "bind.hpp"
+#include "session.hpp"
+
+PYBIND11_MODULE(_core, module) {
+  namespace py = pybind11;
+  using namespace tfdude::python;
+  module.doc() = "The extension module of the package tfdude.";
+  module.attr("__version__") = tfdude::program_version();
+  bind_transform(module);
+  bind_values(module);
+  bind_frames(module);
+  bind_client(module);
+  bind_node(module);
+  py::module_::import("atexit").attr("register")(py::cpp_function(&finish));
+}

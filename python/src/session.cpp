@@ -1,0 +1,105 @@
+#include "session.hpp"
+
+#include <condition_variable>
+#include <mutex>
+#include <pthread.h>
+
+namespace tfdude::python {
+namespace {
+
+struct Process {
+  std::mutex mutex;
+  std::condition_variable idle;
+  int under_way = 0;
+  std::atomic<bool> exiting{false};
+  std::atomic<bool> used{false};
+  std::atomic<bool> forked{false};
+};
+
+// Never destroyed: threads of the library may still use it when static objects are.
+Process& process() {
+  static Process& one = *new Process;
+  return one;
+}
+
+constexpr std::chrono::seconds kLongestExit{10};
+
+}  // namespace
+
+UnderWay::UnderWay() {
+  const std::lock_guard<std::mutex> lock(process().mutex);
+  ++process().under_way;
+}
+
+UnderWay::~UnderWay() {
+  const std::lock_guard<std::mutex> lock(process().mutex);
+  if (--process().under_way == 0) process().idle.notify_all();
+}
+
+bool exiting() { return process().exiting; }
+bool is_forked_child() { return process().forked; }
+
+void finish() {
+  if (is_forked_child()) return;
+  process().exiting = true;
+  const py::gil_scoped_release release;
+  std::unique_lock<std::mutex> lock(process().mutex);
+  process().idle.wait_for(lock, kLongestExit, [] { return process().under_way == 0; });
+}
+
+void check_usable() {
+  if (is_forked_child()) {
+    raise({Errc::kTransport,
+           "this process is a fork of one that has used tfdude, whose threads it lacks: start "
+           "processes before, or by multiprocessing's 'spawn' or subprocess"});
+  }
+  if (exiting()) raise({Errc::kTransport, "the interpreter ends"});
+}
+
+void note_use() {
+  if (process().used.exchange(true)) return;
+  pthread_atfork(nullptr, nullptr, [] { process().forked = true; });
+}
+
+void call_python(const py::function& function, const std::function<py::object()>& argument) {
+  const UnderWay under_way;
+  if (exiting()) return;
+  const py::gil_scoped_acquire acquire;
+  try {
+    function(argument());
+  } catch (py::error_already_set& error) {
+    error.discard_as_unraisable(function);
+  }
+}
+
+SharedFunction share(py::function function) {
+  return SharedFunction(new py::function(std::move(function)), [](py::function* shared) {
+    const UnderWay under_way;
+    if (exiting()) return;  // the interpreter's memory goes anyway
+    const py::gil_scoped_acquire acquire;
+    delete shared;
+  });
+}
+
+Session::Session(std::shared_ptr<Client> client, Milliseconds timeout)
+    : client_(std::move(client)), timeout_(timeout) {}
+
+void Session::close() {
+  std::shared_ptr<Client> client = std::move(client_);
+  client_ = nullptr;
+  if (!client) return;
+  if (is_forked_child()) {
+    // Its threads are not there to end it.
+    static_cast<void>(new std::shared_ptr<Client>(std::move(client)));
+    return;
+  }
+  without_gil([&] { client.reset(); });
+}
+
+std::shared_ptr<Client> Session::client() const {
+  check_usable();
+  if (!client_) raise({Errc::kTransport, "this client is closed"});
+  return client_;
+}
+
+}  // namespace tfdude::python

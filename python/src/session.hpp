@@ -1,0 +1,98 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <type_traits>
+#include <utility>
+
+#include "tfdude/client/node.hpp"
+
+#include "arguments.hpp"
+
+// How the library's threads, the GIL, the end of the interpreter and fork() get along.
+namespace tfdude::python {
+
+/// Counts what is under way in the library, or in a callback from it: at exit the interpreter waits
+/// for it, because a thread that returns to an interpreter that has ended is killed.
+class UnderWay {
+ public:
+  UnderWay();
+  ~UnderWay();
+  UnderWay(const UnderWay&) = delete;
+  UnderWay& operator=(const UnderWay&) = delete;
+};
+
+/// Whether the interpreter ends: nothing new begins, and what waits stops waiting.
+[[nodiscard]] bool exiting();
+
+/// Called by atexit: waits until nothing is under way. Needs the GIL, and releases it meanwhile.
+void finish();
+
+/// For the child of a fork: a process that has used tfdude before cannot use it after.
+/// @throws TransformException (code "transport") in such a child, and while the interpreter ends
+void check_usable();
+/// Notes that threads of the library may exist from now on.
+void note_use();
+[[nodiscard]] bool is_forked_child();
+
+/// Runs a function without the GIL. It must not touch Python.
+template <class Function>
+auto without_gil(const Function& function) {
+  const UnderWay under_way;
+  const py::gil_scoped_release release;
+  return function();
+}
+
+/// Calls a Python function from a thread of the library: takes the GIL, and reports an exception as
+/// one that cannot be raised. Does nothing while the interpreter ends.
+void call_python(const py::function& function, const std::function<py::object()>& argument);
+
+/// A reference to a Python function that may be dropped by any thread.
+using SharedFunction = std::shared_ptr<py::function>;
+[[nodiscard]] SharedFunction share(py::function function);
+
+/// An open Client or Node, for the Python object of the same name. It can be closed while other
+/// threads call it; they finish first.
+class Session {
+ public:
+  Session(std::shared_ptr<Client> client, Milliseconds timeout);
+  ~Session() { close(); }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  /// Closing waits for callbacks, which need the GIL: so this releases it.
+  void close();
+  [[nodiscard]] bool closed() const { return client_ == nullptr; }
+  [[nodiscard]] Milliseconds timeout() const { return timeout_; }
+
+  /// @throws TransformException if it is closed, or was opened before a fork
+  [[nodiscard]] std::shared_ptr<Client> client() const;
+
+  /// Calls `function(client)` without the GIL. If the client was closed meanwhile, it ends here,
+  /// still without the GIL.
+  template <class Function>
+  auto call(const Function& function) const {
+    std::shared_ptr<Client> client = this->client();
+    return without_gil([&] {
+      auto result = function(*client);
+      client.reset();
+      return result;
+    });
+  }
+
+ private:
+  std::shared_ptr<Client> client_;  // guarded by the GIL
+  Milliseconds timeout_;
+};
+
+/// The Python class Node: a Session whose client is a Node.
+class NodeSession : public Session {
+ public:
+  using Session::Session;
+  template <class Function>
+  auto call_node(const Function& function) const {
+    return call([&](Client& client) { return function(static_cast<Node&>(client)); });
+  }
+};
+
+}  // namespace tfdude::python

@@ -1,0 +1,118 @@
+#include <cmath>
+
+#include "arguments.hpp"
+
+namespace tfdude::python {
+namespace {
+
+constexpr double kNanoseconds = 1e9;
+
+[[noreturn]] void wrong_type(const char* what, const char* expected, py::handle value) {
+  throw py::type_error(std::string(what) + " must be " + expected + ", not " +
+                       std::string(py::str(py::type::handle_of(value).attr("__name__"))));
+}
+
+std::int64_t nanoseconds_of(double seconds, const char* what) {
+  const double ns = std::round(seconds * kNanoseconds);
+  if (!(std::abs(ns) < 9.2e18)) {
+    throw py::value_error(std::string(what) + " is out of range: " + std::to_string(seconds));
+  }
+  return static_cast<std::int64_t>(ns);
+}
+
+std::int64_t integer(py::handle value) {
+  const auto index = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
+  if (!index) throw py::error_already_set();
+  const std::int64_t number = PyLong_AsLongLong(index.ptr());
+  if (number == -1 && PyErr_Occurred() != nullptr) throw py::error_already_set();
+  return number;
+}
+
+/// Of a timedelta, exactly.
+std::int64_t of_timedelta(py::handle delta) {
+  return ((integer(delta.attr("days")) * 86400 + integer(delta.attr("seconds"))) * 1'000'000 +
+          integer(delta.attr("microseconds"))) *
+         1000;
+}
+
+py::object epoch() {
+  const py::module_ datetime = py::module_::import("datetime");
+  return datetime.attr("datetime")(1970, 1, 1, 0, 0, 0, 0, datetime.attr("timezone").attr("utc"));
+}
+
+}  // namespace
+
+Time to_time(py::handle time) {
+  if (PyLong_CheckExact(time.ptr())) return time_of(integer(time));
+  if (PyFloat_Check(time.ptr())) return time_of(nanoseconds_of(time.cast<double>(), "time"));
+  if (PyBool_Check(time.ptr()) || time.is_none()) {
+    wrong_type("time", "int [ns], float [s] or datetime", time);
+  }
+  if (PyIndex_Check(time.ptr())) return time_of(integer(time));
+  if (py::hasattr(time, "nanoseconds")) return time_of(integer(time.attr("nanoseconds")));
+  if (py::isinstance(time, py::module_::import("datetime").attr("datetime"))) {
+    if (time.attr("tzinfo").is_none()) {
+      throw py::value_error("time: a datetime needs a time zone, such as timezone.utc");
+    }
+    return time_of(of_timedelta(time - epoch()));
+  }
+  wrong_type("time", "int [ns], float [s] or datetime", time);
+}
+
+std::optional<Time> to_stamp(py::handle time_or_none) {
+  if (time_or_none.is_none()) return std::nullopt;
+  return to_time(time_or_none);
+}
+
+py::object from_stamp(std::optional<Time> stamp) {
+  if (!stamp) return py::none();
+  return py::int_(nanoseconds(*stamp));
+}
+
+py::object to_datetime(std::optional<Time> stamp) {
+  if (!stamp) return py::none();
+  const py::object timedelta = py::module_::import("datetime").attr("timedelta");
+  return epoch() + timedelta(0, 0, nanoseconds(*stamp) / 1000);
+}
+
+std::chrono::nanoseconds to_duration(py::handle duration, const char* what) {
+  if (!PyBool_Check(duration.ptr())) {
+    const double seconds = PyFloat_AsDouble(duration.ptr());
+    if (PyErr_Occurred() == nullptr) {
+      return std::chrono::nanoseconds(nanoseconds_of(seconds, what));
+    }
+    PyErr_Clear();
+    if (py::hasattr(duration, "nanoseconds")) {
+      return std::chrono::nanoseconds(integer(duration.attr("nanoseconds")));
+    }
+    if (py::isinstance(duration, py::module_::import("datetime").attr("timedelta"))) {
+      return std::chrono::nanoseconds(of_timedelta(duration));
+    }
+  }
+  wrong_type(what, "a number [s] or timedelta", duration);
+}
+
+Milliseconds to_milliseconds(py::handle duration, const char* what) {
+  // Infinity is what people write for "no limit".
+  if (PyFloat_Check(duration.ptr()) && std::isinf(duration.cast<double>()) &&
+      duration.cast<double>() > 0) {
+    return Milliseconds::max();
+  }
+  return std::chrono::ceil<Milliseconds>(to_duration(duration, what));
+}
+
+double to_seconds(std::chrono::nanoseconds duration) {
+  return static_cast<double>(duration.count()) / kNanoseconds;
+}
+
+Query to_query(py::handle at, py::handle extrapolate, py::handle age_noise_until, int order) {
+  if (order != 2 && order != 4) throw py::value_error("order must be 2 or 4");
+  Query query;
+  query.at = to_stamp(at);
+  query.extrapolate = to_duration(extrapolate, "extrapolate");
+  query.age_noise_until = to_stamp(age_noise_until);
+  query.order = order == 2 ? Order::kSecond : Order::kFourth;
+  return query;
+}
+
+}  // namespace tfdude::python

@@ -1,0 +1,80 @@
+"""Coordinate frames with uncertainty, of a robot's processes and computers, over DDS.
+
+    import tfdude
+
+    client = tfdude.Client()
+    X = client.lookup("map", "hand")    # the pose of hand in map
+    X.matrix, X.covariance              # numpy arrays
+    X @ X_hand_tool                     # composes, with covariance
+
+Client asks for and changes frames, and Node owns some. Transform is a pose with covariance.
+Instants are int [ns], float [s] or datetime with a time zone; durations are numbers [s] or timedelta. Lengths are in
+metres, angles in radians. A covariance (6, 6) is that of the right perturbation, translation first, expressed in the
+child frame. Errors are TransformException and its subclasses, which have tf2's names.
+"""
+
+from __future__ import annotations
+
+from ._core import (
+    Change,
+    Client,
+    Config,
+    EdgeConsistency,
+    Frame,
+    FrameSpec,
+    HistoryInfo,
+    Joint,
+    JointInfo,
+    LoopbackNetwork,
+    Node,
+    Observed,
+    PartitionInfo,
+    PathSegment,
+    StampedTransform,
+    Transform,
+    Velocity,
+    __version__,
+    load_config,
+    load_urdf,
+)
+from ._errors import (
+    ConnectivityException,
+    ExtrapolationException,
+    InvalidArgumentException,
+    LookupException,
+    TimeoutException,
+    TransformException,
+    UnreachableException,
+    UnspecifiedCovariance,
+)
+
+__all__ = [
+    "Change",
+    "Client",
+    "Config",
+    "ConnectivityException",
+    "EdgeConsistency",
+    "ExtrapolationException",
+    "Frame",
+    "FrameSpec",
+    "HistoryInfo",
+    "InvalidArgumentException",
+    "Joint",
+    "JointInfo",
+    "LookupException",
+    "LoopbackNetwork",
+    "Node",
+    "Observed",
+    "PartitionInfo",
+    "PathSegment",
+    "StampedTransform",
+    "TimeoutException",
+    "Transform",
+    "TransformException",
+    "UnreachableException",
+    "UnspecifiedCovariance",
+    "Velocity",
+    "__version__",
+    "load_config",
+    "load_urdf",
+]
