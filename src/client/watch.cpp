@@ -23,6 +23,10 @@ bool PathWatch::wait_for_more(std::uint64_t messages,
   return path_->wait_for_more(messages, deadline);
 }
 
+Subscription PathWatch::on_news(std::function<void()> listener) const {
+  return Subscription(path_->on_news(std::move(listener)));
+}
+
 Result<StampedTransform> EdgesWatch::lookup(std::string_view a, std::string_view b,
                                             const Query& query) const {
   return edges_->lookup(a, b, query);
@@ -35,6 +39,10 @@ std::uint64_t EdgesWatch::messages() const { return edges_->messages(); }
 bool EdgesWatch::wait_for_more(std::uint64_t messages,
                                std::chrono::steady_clock::time_point deadline) const {
   return edges_->wait_for_more(messages, deadline);
+}
+
+Subscription EdgesWatch::on_news(std::function<void()> listener) const {
+  return Subscription(edges_->on_news(std::move(listener)));
 }
 
 }  // namespace tfdude

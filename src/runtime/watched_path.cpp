@@ -127,7 +127,7 @@ bool WatchedPath::prepare(WatchRoute route) {
     if (followed_ != nullptr) next_->inherit(*followed_);
     shown = swap_if_ready();
   }
-  changed_.notify_all();
+  tell();
   return shown;
 }
 
@@ -146,7 +146,7 @@ WatchedPath::Taken WatchedPath::take(const PushedValues& pushed) {
     taken.lacks = latest != nullptr && latest->lacks();
     if (is_new) messages_.fetch_add(1, std::memory_order_relaxed);
   }
-  changed_.notify_all();  // late samples are not new to show, but may be waited for
+  tell();  // late samples are not new to show, but may be waited for
   return taken;
 }
 
@@ -207,7 +207,7 @@ void WatchedPath::interrupt(Error why) {
     newest_.reset();
     hold(nullptr);
   }
-  changed_.notify_all();
+  tell();
 }
 
 bool WatchedPath::up_to_date() const {
@@ -239,6 +239,21 @@ std::set<std::uint64_t> WatchedPath::groups() const {
     for (const WatchRoute::Source& source : mirror->route().sources) groups.insert(source.group);
   }
   return groups;
+}
+
+std::shared_ptr<void> WatchedPath::on_news(std::function<void()> listener) {
+  const Lock lock(listeners_->mutex);
+  const auto mine = listeners_->all.insert(listeners_->all.end(), std::move(listener));
+  return {nullptr, [listeners = listeners_, mine](void*) {
+            const Lock removing(listeners->mutex);
+            listeners->all.erase(mine);
+          }};
+}
+
+void WatchedPath::tell() {
+  changed_.notify_all();
+  const Lock lock(listeners_->mutex);
+  for (const auto& listener : listeners_->all) listener();
 }
 
 bool WatchedPath::wait_for_more(std::uint64_t messages, Clock::time_point deadline) const {

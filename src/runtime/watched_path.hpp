@@ -3,6 +3,8 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
+#include <list>
 #include <memory>
 #include <optional>
 #include <set>
@@ -50,6 +52,8 @@ class WatchedPath {
   [[nodiscard]] Result<void> health() const;
   [[nodiscard]] std::uint64_t messages() const { return messages_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool wait_for_more(std::uint64_t messages, Clock::time_point deadline) const;
+  /// See PathWatch::on_news(). @return keeps the listener; it may outlive this object
+  [[nodiscard]] std::shared_ptr<void> on_news(std::function<void()> listener);
   /// Waits until the path is followed and its dynamic edges have a common instant; lack of the
   /// latter is no error.
   /// @return why it is not followed, at the deadline
@@ -94,6 +98,10 @@ class WatchedPath {
   void collect();
 
  private:
+  struct Listeners {
+    Mutex mutex;
+    std::list<std::function<void()>> all TFDUDE_GUARDED_BY(mutex);
+  };
   struct Retired {
     std::uint64_t tag;
     std::shared_ptr<const void> object;
@@ -101,6 +109,8 @@ class WatchedPath {
 
   [[nodiscard]] bool swap_if_ready() TFDUDE_REQUIRES(mutex_);
   void show(std::unique_ptr<WatchMirror> mirror) TFDUDE_REQUIRES(mutex_);
+  /// Tells all who wait that something is new.
+  void tell();
   /// Call after any change of the shown values.
   void remember_newest() TFDUDE_REQUIRES(mutex_);
   void hold(std::unique_ptr<const StampedTransform> X) TFDUDE_REQUIRES(mutex_);
@@ -112,6 +122,7 @@ class WatchedPath {
   std::atomic<const WatchMirror*> shown_{nullptr};      // followed_, for readers
   std::atomic<const StampedTransform*> held_{nullptr};  // holder_, for readers
   std::atomic<std::uint64_t> messages_{0};
+  const std::shared_ptr<Listeners> listeners_ = std::make_shared<Listeners>();
   mutable Condition changed_;                    // of messages_, shown_
   mutable Mutex mutex_{LockRank::kWatchedPath};  // guards the following members
   std::unique_ptr<WatchMirror> followed_ TFDUDE_GUARDED_BY(mutex_);

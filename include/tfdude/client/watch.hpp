@@ -4,12 +4,13 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <string_view>
 #include <string>
+#include <string_view>
 
 #include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
+#include "tfdude/client/subscription.hpp"
 #include "tfdude/types/options.hpp"
 #include "tfdude/types/query.hpp"
 
@@ -48,6 +49,13 @@ class TFDUDE_EXPORT PathWatch {
   [[nodiscard]] bool wait_for_more(std::uint64_t messages,
                                    std::chrono::steady_clock::time_point deadline) const;
 
+  /// Calls a function when there is something new: data, another route, or none. For loops that
+  /// wait for many things, as by a file descriptor; wait_for_more() is simpler otherwise. Called
+  /// from library threads, one call at a time, under a lock: the function may only signal. It must
+  /// not wait, call this library or throw. Once the Subscription is destroyed, it is not running
+  /// and will not run.
+  [[nodiscard]] Subscription on_news(std::function<void()> listener) const;
+
  private:
   std::shared_ptr<WatchedPath> path_;
 };
@@ -74,6 +82,8 @@ class TFDUDE_EXPORT EdgesWatch {
   /// As PathWatch::wait_for_more().
   [[nodiscard]] bool wait_for_more(std::uint64_t messages,
                                    std::chrono::steady_clock::time_point deadline) const;
+  /// As PathWatch::on_news().
+  [[nodiscard]] Subscription on_news(std::function<void()> listener) const;
 
  private:
   std::shared_ptr<WatchedPath> edges_;
