@@ -17,7 +17,9 @@ namespace tfdude::python {
 
 namespace py = pybind11;
 
-/// Raises the exception of an error (tfdude/_errors.py).
+/// The exception of an error (tfdude/_errors.py).
+[[nodiscard]] py::object exception_of(const Error& error);
+/// Raises it.
 [[noreturn]] void raise(const Error& error);
 
 /// The value of a result; raises its error.

@@ -167,6 +167,10 @@ void bind_client(py::module_& module) {
   bind_writes(cls);
   bind_structure(cls);
   bind_lookups(cls);
+  bind_batches(module, cls);
+  bind_values_of_many(module, cls);
+  bind_watches(module, cls);
+  bind_events(module, cls);
 }
 
 }  // namespace tfdude::python

@@ -50,5 +50,12 @@ struct OpenArguments {
 
 /// Lookups, by this library's names and tf2's.
 void bind_lookups(ClientClass& cls);
+/// lookup_many().
+void bind_batches(py::module_& module, ClientClass& cls);
+/// Values of many edges or joints, and streams.
+void bind_values_of_many(py::module_& module, ClientClass& cls);
+void bind_watches(py::module_& module, ClientClass& cls);
+/// Changes of the structure, what asyncio needs, observations, the clock.
+void bind_events(py::module_& module, ClientClass& cls);
 
 }  // namespace tfdude::python

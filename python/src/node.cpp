@@ -23,7 +23,7 @@ std::shared_ptr<NodeSession> open_node(const std::string& partition,
                               : Node::open(partition, frames, options);
   });
   return std::make_shared<NodeSession>(std::make_shared<Node>(value_of(std::move(node))),
-                                       options.timeout);
+                                       options.timeout, partition);
 }
 
 }  // namespace
@@ -42,11 +42,7 @@ void bind_node(py::module_& module) {
            }),
            py::arg("partition"), py::arg("frames") = std::vector<FrameSpec>{}, py::kw_only(),
            py::arg("state") = "", py::arg("sync") = false, TFDUDE_OPEN_ARGUMENTS)
-      .def_property_readonly(
-          "partition",
-          [](const NodeSession& session) {
-            return session.call_node([](Node& node) { return node.partition(); });
-          })
+      .def_property_readonly("partition", &Session::partition)
       .def_property_readonly(
           "own_frames",
           [](const NodeSession& session) {

@@ -1,8 +1,10 @@
 #include "session.hpp"
 
+#include <atomic>
 #include <condition_variable>
 #include <mutex>
 #include <pthread.h>
+#include <set>
 
 namespace tfdude::python {
 namespace {
@@ -11,6 +13,7 @@ struct Process {
   std::mutex mutex;
   std::condition_variable idle;
   int under_way = 0;
+  std::set<Session*> sessions;  // guarded by the GIL
   std::atomic<bool> exiting{false};
   std::atomic<bool> used{false};
   std::atomic<bool> forked{false};
@@ -42,6 +45,8 @@ bool is_forked_child() { return process().forked; }
 void finish() {
   if (is_forked_child()) return;
   process().exiting = true;
+  const std::set<Session*> sessions = process().sessions;
+  for (Session* session : sessions) session->close();
   const py::gil_scoped_release release;
   std::unique_lock<std::mutex> lock(process().mutex);
   process().idle.wait_for(lock, kLongestExit, [] { return process().under_way == 0; });
@@ -81,10 +86,14 @@ SharedFunction share(py::function function) {
   });
 }
 
-Session::Session(std::shared_ptr<Client> client, Milliseconds timeout)
-    : client_(std::move(client)), timeout_(timeout) {}
+Session::Session(std::shared_ptr<Client> client, Milliseconds timeout, std::string partition)
+    : client_(std::move(client)), timeout_(timeout), partition_(std::move(partition)) {
+  process().sessions.insert(this);
+}
 
 void Session::close() {
+  process().sessions.erase(this);
+  endings_->end_all();
   std::shared_ptr<Client> client = std::move(client_);
   client_ = nullptr;
   if (!client) return;

@@ -1,13 +1,13 @@
 #pragma once
 
-#include <atomic>
+#include <functional>
 #include <memory>
-#include <type_traits>
 #include <utility>
 
 #include "tfdude/client/node.hpp"
 
 #include "arguments.hpp"
+#include "mailbox.hpp"
 
 // How the library's threads, the GIL, the end of the interpreter and fork() get along.
 namespace tfdude::python {
@@ -25,7 +25,8 @@ class UnderWay {
 /// Whether the interpreter ends: nothing new begins, and what waits stops waiting.
 [[nodiscard]] bool exiting();
 
-/// Called by atexit: waits until nothing is under way. Needs the GIL, and releases it meanwhile.
+/// Called by atexit: closes all clients, and waits until nothing is under way. Needs the GIL, and
+/// releases it meanwhile.
 void finish();
 
 /// For the child of a fork: a process that has used tfdude before cannot use it after.
@@ -55,7 +56,8 @@ using SharedFunction = std::shared_ptr<py::function>;
 /// threads call it; they finish first.
 class Session {
  public:
-  Session(std::shared_ptr<Client> client, Milliseconds timeout);
+  /// @param partition  of a Node
+  Session(std::shared_ptr<Client> client, Milliseconds timeout, std::string partition = {});
   ~Session() { close(); }
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -64,6 +66,10 @@ class Session {
   void close();
   [[nodiscard]] bool closed() const { return client_ == nullptr; }
   [[nodiscard]] Milliseconds timeout() const { return timeout_; }
+  /// Of a Node; else empty.
+  [[nodiscard]] const std::string& partition() const { return partition_; }
+  /// Of mailboxes that end when this is closed.
+  [[nodiscard]] const std::shared_ptr<Endings>& endings() const { return endings_; }
 
   /// @throws TransformException if it is closed, or was opened before a fork
   [[nodiscard]] std::shared_ptr<Client> client() const;
@@ -83,6 +89,31 @@ class Session {
  private:
   std::shared_ptr<Client> client_;  // guarded by the GIL
   Milliseconds timeout_;
+  std::string partition_;
+  std::shared_ptr<Endings> endings_ = std::make_shared<Endings>();
+};
+
+/// Something that, while it exists, lets the library call a function: ending it waits for a call
+/// under way, which may need the GIL.
+template <class Token>
+class Ending {
+ public:
+  explicit Ending(Token token) : token_(std::make_unique<Token>(std::move(token))) {}
+  ~Ending() { end(); }
+  Ending(const Ending&) = delete;
+  Ending& operator=(const Ending&) = delete;
+  void end() {
+    std::unique_ptr<Token> token = std::move(token_);
+    if (!token) return;
+    if (is_forked_child()) {
+      static_cast<void>(token.release());  // its threads are not there to end it
+      return;
+    }
+    without_gil([&] { token.reset(); });
+  }
+
+ private:
+  std::unique_ptr<Token> token_;
 };
 
 /// The Python class Node: a Session whose client is a Node.

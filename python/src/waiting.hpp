@@ -12,4 +12,10 @@ namespace tfdude::python {
                                                        const std::string& b, const Query& query,
                                                        Milliseconds wait);
 
+/// Ends a wait without the GIL that looks for these once in a while.
+/// @throws what a signal raises; TransformException if the interpreter ends
+void check_interrupted();
+/// How often a wait looks.
+inline constexpr Milliseconds kLook{50};
+
 }  // namespace tfdude::python

@@ -1,0 +1,140 @@
+#include <algorithm>
+#include <chrono>
+
+#include <pybind11/stl.h>
+
+#include "tfdude/client/watch.hpp"
+
+#include "bind.hpp"
+#include "client.hpp"
+#include "waiting.hpp"
+
+namespace tfdude::python {
+namespace {
+
+using Steady = std::chrono::steady_clock;
+
+/// A watch of the library, and what ends when its client is closed.
+template <class Watch>
+struct Watching {
+  Watch watch;
+  std::shared_ptr<Endings> endings;
+};
+using Path = Watching<PathWatch>;
+using Edges = Watching<EdgesWatch>;
+using Listening = Ending<Subscription>;
+
+/// In slices, so that signals and the end of the interpreter are noticed.
+template <class Watch>
+bool wait_for_more(const Watching<Watch>& self, std::uint64_t messages, py::handle timeout) {
+  const Milliseconds wait = to_milliseconds(timeout, "timeout");
+  const bool forever = wait == Milliseconds::max();
+  const Steady::time_point end = forever ? Steady::time_point::max() : Steady::now() + wait;
+  while (true) {
+    const Steady::time_point slice = std::min(end, Steady::now() + kLook);
+    if (without_gil([&] { return self.watch.wait_for_more(messages, slice); })) return true;
+    check_interrupted();
+    if (!forever && Steady::now() >= end) return false;
+  }
+}
+
+template <class Watch>
+std::unique_ptr<Listening> listen(const Watching<Watch>& self, const MailboxPtr& mailbox) {
+  check_usable();
+  self.endings->add(mailbox);
+  return std::make_unique<Listening>(self.watch.on_news([mailbox] { mailbox->wake(); }));
+}
+
+template <class Watch>
+void bind_common(py::class_<Watching<Watch>>& cls) {
+  using Self = Watching<Watch>;
+  cls.def(
+      "check", [](const Self& self) { check(self.watch.health()); },
+      "Raises UnreachableException if an owner is not reachable: the last values are used then.");
+  cls.def_property_readonly(
+      "messages", [](const Self& self) { return self.watch.messages(); },
+      "The number of received messages with new data.");
+  cls.def("wait_for_more", &wait_for_more<Watch>, py::arg("messages"), py::arg("timeout") = 1.0,
+          "Waits until `messages` exceeds this number; False after timeout [s].");
+  cls.def("_listen", &listen<Watch>, py::arg("mailbox"));
+}
+
+WatchOptions options_of(double rate, bool composed, py::handle span) {
+  WatchOptions options;
+  options.rate = rate;
+  options.composed = composed;
+  if (!span.is_none()) options.timing.span = to_duration(span, "span");
+  return options;
+}
+
+template <class Watch>
+std::unique_ptr<Watching<Watch>> made(const Session& session, Result<Watch>&& watch) {
+  return std::make_unique<Watching<Watch>>(
+      Watching<Watch>{value_of(std::move(watch)), session.endings()});
+}
+
+void bind_path(py::module_& module, ClientClass& client) {
+  py::class_<Path> cls(
+      module, "PathWatch",
+      "A path whose owners push its changes, so that it is read from this process's\n"
+      "memory. It is watched while this object exists.\n\n"
+      "`async for X in watch` gets the newest transform whenever there is a new one.");
+  cls.def(
+      "latest", [](const Path& self) { return value_of(self.watch.latest()); },
+      "X_AB at the newest instant that all dynamic edges of the path have received.");
+  cls.def(
+      "lookup",
+      [](const Path& self, py::handle at, py::handle extrapolate, py::handle age_noise_until,
+         int order) {
+        return value_of(self.watch.lookup(to_query(at, extrapolate, age_noise_until, order)));
+      },
+      py::arg("at") = py::none(), py::kw_only(), py::arg("extrapolate") = 0.0,
+      py::arg("age_noise_until") = py::none(), py::arg("order") = 2,
+      "As Client.lookup(), from the received values.");
+  bind_common(cls);
+  client.def(
+      "watch",
+      [](const Session& session, const std::string& a, const std::string& b, double rate,
+         bool composed, py::handle span) {
+        const WatchOptions options = options_of(rate, composed, span);
+        return made(session, session.call([&](Client& c) { return c.watch(a, b, options); }));
+      },
+      py::arg("a"), py::arg("b"), py::kw_only(), py::arg("rate") = 0.0, py::arg("composed") = false,
+      py::arg("span") = py::none(),
+      "Asks the owners of the path to push its changes.\n\n"
+      "rate [Hz]: the most at which an owner sends; 0: every sample. composed: one transform for\n"
+      "each partition instead of all its edges. span [s]: how much history is kept here.");
+}
+
+void bind_edges(py::module_& module, ClientClass& client) {
+  py::class_<Edges> cls(module, "EdgesWatch",
+                        "Edges whose owners push their changes; see Client.watch_edges().");
+  cls.def(
+      "lookup",
+      [](const Edges& self, const std::string& a, const std::string& b, py::handle at,
+         py::handle extrapolate, py::handle age_noise_until, int order) {
+        return value_of(self.watch.lookup(a, b, to_query(at, extrapolate, age_noise_until, order)));
+      },
+      py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(),
+      py::arg("extrapolate") = 0.0, py::arg("age_noise_until") = py::none(), py::arg("order") = 2,
+      "As Client.lookup(), over the watched edges.");
+  bind_common(cls);
+  client.def(
+      "watch_edges",
+      [](const Session& session, const std::vector<std::string>& ids, double rate,
+         py::handle span) {
+        const WatchOptions options = options_of(rate, false, span);
+        return made(session, session.call([&](Client& c) { return c.watch_edges(ids, options); }));
+      },
+      py::arg("ids"), py::kw_only(), py::arg("rate") = 0.0, py::arg("span") = py::none(),
+      "As watch(), for the edges of these frames, wherever they are.");
+}
+
+}  // namespace
+
+void bind_watches(py::module_& module, ClientClass& cls) {
+  bind_path(module, cls);
+  bind_edges(module, cls);
+}
+
+}  // namespace tfdude::python

@@ -1,0 +1,169 @@
+"""What waits: lookup_async(), events() and loops over a watch.
+
+Threads of the library put answers into a mailbox, whose file descriptor wakes asyncio's loop. So there is no thread for
+a wait, and none of the library's threads needs the GIL.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import select
+import weakref
+
+from . import _core
+
+
+class _Hub:
+    """The lookups that wait in one loop. Its descriptor is in the loop while there are any."""
+
+    def __init__(self) -> None:
+        self._mailbox = _core._Mailbox()
+        self._waiting: dict[int, asyncio.Future] = {}
+        self._keys = itertools.count()
+
+    async def lookup(self, client, a, b, at, timeout, extrapolate, age_noise_until, order):
+        loop = asyncio.get_running_loop()
+        key = next(self._keys)
+        future = loop.create_future()
+        if not self._waiting:
+            loop.add_reader(self._mailbox.fileno(), self._take)
+        self._waiting[key] = future
+        pending = None
+        try:
+            pending = client._start_lookup(
+                self._mailbox, key, a, b, at, timeout, extrapolate, age_noise_until, order
+            )
+            return await future
+        finally:
+            if pending is not None:
+                pending.cancel()
+            del self._waiting[key]
+            if not self._waiting:
+                loop.remove_reader(self._mailbox.fileno())
+
+    def _take(self) -> None:
+        for key, answer in self._mailbox.take():
+            future = self._waiting.get(key)
+            if future is None or future.done():
+                continue  # was cancelled
+            if isinstance(answer, Exception):
+                future.set_exception(answer)
+            else:
+                future.set_result(answer)
+
+
+_hubs: weakref.WeakKeyDictionary[asyncio.AbstractEventLoop, _Hub] = weakref.WeakKeyDictionary()
+
+
+async def lookup_async(
+    self, a, b, at=None, *, timeout=None, extrapolate=0.0, age_noise_until=None, order=2
+):
+    """X_AB, as lookup(), for asyncio: `X = await client.lookup_async(a, b)`.
+
+    Waits for missing frames and data, up to timeout [s] (None: the client's). Thousands may wait at once. If the task
+    is cancelled, so is the lookup.
+    """
+    loop = asyncio.get_running_loop()
+    hub = _hubs.get(loop)
+    if hub is None:
+        hub = _hubs[loop] = _Hub()
+    return await hub.lookup(self, a, b, at, timeout, extrapolate, age_noise_until, order)
+
+
+async def _until_readable(mailbox) -> None:
+    loop = asyncio.get_running_loop()
+    readable = loop.create_future()
+
+    def wake() -> None:
+        if not readable.done():
+            readable.set_result(None)
+
+    loop.add_reader(mailbox.fileno(), wake)
+    try:
+        await readable
+    finally:
+        loop.remove_reader(mailbox.fileno())
+
+
+class Events:
+    """Changes of the structure, in order: `for change in client.events()`, or `async for`.
+
+    Those that come while nobody waits are kept. It ends when it or the client is closed.
+    """
+
+    def __init__(self, client) -> None:
+        self._mailbox = _core._Mailbox()
+        self._changes: list[_core.Change] = []  # taken, but not returned yet; the oldest last
+        self._subscription = client._subscribe(self._mailbox)
+
+    def close(self) -> None:
+        """Nothing more comes; a loop over it ends."""
+        self._subscription.close()
+        self._mailbox.end()
+
+    def __enter__(self) -> Events:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
+    def get(self, timeout: float | None = None) -> _core.Change | None:
+        """The next change; None after timeout [s] (None: without limit), or if nothing more comes."""
+        change = self._next()
+        if change is None and not self._mailbox.ended:
+            select.select([self._mailbox], [], [], timeout)
+            change = self._next()
+        return change
+
+    def __iter__(self) -> Events:
+        return self
+
+    def __next__(self) -> _core.Change:
+        while (change := self.get()) is None:
+            if self._mailbox.ended:
+                raise StopIteration
+        return change
+
+    def __aiter__(self) -> Events:
+        return self
+
+    async def __anext__(self) -> _core.Change:
+        while (change := self._next()) is None:
+            if self._mailbox.ended:
+                raise StopAsyncIteration
+            await _until_readable(self._mailbox)
+        return change
+
+    def _next(self) -> _core.Change | None:
+        if not self._changes:
+            self._changes = self._mailbox.take()[::-1]
+        return self._changes.pop() if self._changes else None
+
+
+def events(self) -> Events:
+    """The later changes of the structure, to loop over, with or without asyncio."""
+    return Events(self)
+
+
+async def _news(watch):
+    """The newest transform of a watch, each time that there is a new one."""
+    mailbox = _core._Mailbox()
+    listening = watch._listen(mailbox)
+    try:
+        seen = -1
+        while not mailbox.ended:
+            mailbox.take()
+            messages = watch.messages
+            if messages != seen:
+                seen = messages
+                yield watch.latest()
+            else:
+                await _until_readable(mailbox)
+    finally:
+        listening.close()
+
+
+_core.Client.lookup_async = lookup_async
+_core.Client.events = events
+_core.PathWatch.__aiter__ = _news
