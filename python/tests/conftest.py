@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import collections.abc
+import contextlib
+import os
+import socket
 
 import pytest
 import tfdude
@@ -30,3 +33,16 @@ def node(network: tfdude.LoopbackNetwork) -> collections.abc.Iterator[tfdude.Nod
 def client(network: tfdude.LoopbackNetwork, node: tfdude.Node) -> collections.abc.Iterator[tfdude.Client]:
     with tfdude.Client(network=network) as opened:
         yield opened
+
+
+@pytest.fixture
+def dds_domain() -> collections.abc.Iterator[int]:
+    """A DDS domain that no other test on this computer uses now; claimed as by tests/support/domain_lease.cpp."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
+        for i in range(200):
+            domain = 20 + (os.getpid() * 7 + i) % 200
+            with contextlib.suppress(OSError):
+                claim.bind(f"\0tfdude-test-domain-{domain}")
+                yield domain
+                return
+    raise RuntimeError("all DDS domains for tests are taken")
