@@ -37,7 +37,8 @@ def hand(domain):
 
 
 def test_a_node_in_python_serves_others(domain, hand):
-    with tfdude.Node("arm", [FrameSpec("base"), FrameSpec("tool", "base", Transform.exact((1, 0, 0)))], **domain) as arm:
+    frames = [FrameSpec("base"), FrameSpec("tool", "base", Transform.exact((1, 0, 0)))]
+    with tfdude.Node("arm", frames, **domain) as arm:
         X = arm.lookup("base", "hand", timeout=20)
         assert np.allclose(X.translation, [1, 0, 1]) and np.allclose(X.stddev, 0.01)
         with tfdude.Client(**domain) as client:

@@ -24,7 +24,10 @@ def run(text, prepare=PREPARE, literal=False):
     """The program's output; it must end by itself, without an error."""
     text = textwrap.dedent(text)
     program = subprocess.run(
-        [sys.executable, "-c", prepare + (repr(text) if literal else text)], capture_output=True, text=True, timeout=TIMEOUT
+        [sys.executable, "-c", prepare + (repr(text) if literal else text)],
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
     )
     assert program.returncode == 0, program.stderr
     assert program.stderr == ""

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import math
 import select
+import time
 import weakref
 
 from . import _core
@@ -110,10 +112,13 @@ class Events:
 
     def get(self, timeout: float | None = None) -> _core.Change | None:
         """The next change; None after timeout [s] (None: without limit), or if nothing more comes."""
-        change = self._next()
-        if change is None and not self._mailbox.ended:
-            select.select([self._mailbox], [], [], timeout)
-            change = self._next()
+        deadline = math.inf if timeout is None else time.monotonic() + timeout
+        while (change := self._next()) is None and not self._mailbox.ended:
+            left = deadline - time.monotonic()
+            if left < 0:
+                break
+            # In slices: a signal just before the call would not end it.
+            select.select([self._mailbox], [], [], min(left, 0.1))
         return change
 
     def __iter__(self) -> Events:
