@@ -7,13 +7,18 @@ a wait, and none of the library's threads needs the GIL.
 from __future__ import annotations
 
 import asyncio
+import collections.abc
 import itertools
 import math
 import select
 import time
 import weakref
+from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
+
+if TYPE_CHECKING:
+    from ._core import _Duration, _Instant
 
 
 class _Hub:
@@ -21,21 +26,19 @@ class _Hub:
 
     def __init__(self) -> None:
         self._mailbox = _core._Mailbox()
-        self._waiting: dict[int, asyncio.Future] = {}
+        self._waiting: dict[int, asyncio.Future[_core.StampedTransform]] = {}
         self._keys = itertools.count()
 
-    async def lookup(self, client, a, b, at, timeout, extrapolate, age_noise_until, order):
+    async def lookup(self, client: _core.Client, *query: Any) -> _core.StampedTransform:
         loop = asyncio.get_running_loop()
         key = next(self._keys)
-        future = loop.create_future()
+        future: asyncio.Future[_core.StampedTransform] = loop.create_future()
         if not self._waiting:
             loop.add_reader(self._mailbox.fileno(), self._take)
         self._waiting[key] = future
         pending = None
         try:
-            pending = client._start_lookup(
-                self._mailbox, key, a, b, at, timeout, extrapolate, age_noise_until, order
-            )
+            pending = client._start_lookup(self._mailbox, key, *query)
             return await future
         finally:
             if pending is not None:
@@ -59,8 +62,16 @@ _hubs: weakref.WeakKeyDictionary[asyncio.AbstractEventLoop, _Hub] = weakref.Weak
 
 
 async def lookup_async(
-    self, a, b, at=None, *, timeout=None, extrapolate=0.0, age_noise_until=None, order=2
-):
+    self: _core.Client,
+    a: str,
+    b: str,
+    at: _Instant | None = None,
+    *,
+    timeout: _Duration | None = None,
+    extrapolate: _Duration = 0.0,
+    age_noise_until: _Instant | None = None,
+    order: Literal[2, 4] = 2,
+) -> _core.StampedTransform:
     """X_AB, as lookup(), for asyncio: `X = await client.lookup_async(a, b)`.
 
     Waits for missing frames and data, up to timeout [s] (None: the client's). Thousands may wait at once. If the task
@@ -73,9 +84,9 @@ async def lookup_async(
     return await hub.lookup(self, a, b, at, timeout, extrapolate, age_noise_until, order)
 
 
-async def _until_readable(mailbox) -> None:
+async def _until_readable(mailbox: _core._Mailbox) -> None:
     loop = asyncio.get_running_loop()
-    readable = loop.create_future()
+    readable: asyncio.Future[None] = loop.create_future()
 
     def wake() -> None:
         if not readable.done():
@@ -94,7 +105,7 @@ class Events:
     Those that come while nobody waits are kept. It ends when it or the client is closed.
     """
 
-    def __init__(self, client) -> None:
+    def __init__(self, client: _core.Client) -> None:
         self._mailbox = _core._Mailbox()
         self._changes: list[_core.Change] = []  # taken, but not returned yet; the oldest last
         self._subscription = client._subscribe(self._mailbox)
@@ -107,7 +118,7 @@ class Events:
     def __enter__(self) -> Events:
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def get(self, timeout: float | None = None) -> _core.Change | None:
@@ -146,12 +157,12 @@ class Events:
         return self._changes.pop() if self._changes else None
 
 
-def events(self) -> Events:
+def events(self: _core.Client) -> Events:
     """The later changes of the structure, to loop over, with or without asyncio."""
     return Events(self)
 
 
-async def _news(watch):
+async def _news(watch: _core.PathWatch) -> collections.abc.AsyncIterator[_core.StampedTransform]:
     """The newest transform of a watch, each time that there is a new one."""
     mailbox = _core._Mailbox()
     listening = watch._listen(mailbox)
@@ -169,6 +180,9 @@ async def _news(watch):
         listening.close()
 
 
-_core.Client.lookup_async = lookup_async
-_core.Client.events = events
-_core.PathWatch.__aiter__ = _news
+for _class, _name, _method in (
+    (_core.Client, "lookup_async", lookup_async),
+    (_core.Client, "events", events),
+    (_core.PathWatch, "__aiter__", _news),
+):
+    setattr(_class, _name, _method)
