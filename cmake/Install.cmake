@@ -14,7 +14,7 @@ install(FILES ${CMAKE_BINARY_DIR}/tfdudeConfig.cmake ${CMAKE_BINARY_DIR}/tfdudeC
 
 # The programs find the library by a path relative to themselves, so the prefix may be moved.
 file(RELATIVE_PATH bin_to_lib ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
-foreach(program tfduded tfdude_cli tfdude_ros)
+foreach(program tfduded tfdude_cli tfdude_ros tfdude_web)
   if(TARGET ${program})
     set_target_properties(${program} PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
     install(TARGETS ${program})
@@ -26,6 +26,9 @@ foreach(folder profiles examples)
     install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude)
   endif()
 endforeach()
+if(TARGET tfdude_web)
+  install(DIRECTORY apps/tfdude-web/page/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude/web)
+endif()
 if(EXISTS ${CMAKE_SOURCE_DIR}/apps/tfdude/completion.bash)
   install(FILES apps/tfdude/completion.bash RENAME tfdude
     DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)

@@ -30,7 +30,7 @@ SHARED = {
 
 # (what, pattern of the include, folders or files that may include it)
 CONFINED = [
-    ("Boost", r"boost/(?!math/)", ["src/tree/graph.hpp"]),
+    ("Boost", r"boost/(?!math/)", ["src/tree/graph.hpp", "apps/tfdude-web/server.cpp"]),
     ("Boost.Math", r"boost/math/", ["src/math/fusion.cpp"]),
     ("DDS", r"(fastdds|fastrtps|fastcdr)/", list(DDS_FOLDERS)),
     ("yaml-cpp", r"yaml-cpp/", ["src/description/", "apps/tfdude-ros/config/"]),

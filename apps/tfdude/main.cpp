@@ -22,6 +22,7 @@
 #include "commands.hpp"
 #include "keys_commands.hpp"
 #include "recording_options.hpp"
+#include "web_command.hpp"
 
 namespace {
 
@@ -342,6 +343,8 @@ int run(Arguments arguments, const Command& command, const cli::LocalCommand& lo
 
 // NOLINTNEXTLINE(bugprone-exception-escape): only a lack of memory throws, and should end it
 int main(int argc, char** argv) {
+  // It has options of its own.
+  if (argc > 1 && argv[1] == std::string_view("web")) return cli::become_web(argc, argv);
   Arguments arguments;
   Command command;
   long timeout_ms = arguments.options.timeout.count();
@@ -362,6 +365,8 @@ int main(int argc, char** argv) {
   add_joint_commands(app, arguments, command, local);
   add_description_command(app, arguments, command);
   cli::add_recording_commands(app, arguments, command, local);
+  app.add_subcommand("web", "show all frames and their uncertainty in a browser")
+      ->footer("It is given first: tfdude web --help");
   cli::add_keys_commands(app, arguments.keys, local);
   cli::require_numbers(app);
   try {
@@ -378,6 +383,10 @@ int main(int argc, char** argv) {
     }
     if (no_command) std::fprintf(stderr, "tfdude: %s\n", what.c_str());
     (void)app.exit(error);
+    return cli::kWrongUsage;
+  }
+  if (app.got_subcommand("web")) {
+    std::fputs("tfdude: write web first, then its options\n", stderr);
     return cli::kWrongUsage;
   }
   // Discovery by a server takes most of the default timeout of a second.

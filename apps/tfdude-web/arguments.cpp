@@ -1,0 +1,40 @@
+#include <CLI/CLI.hpp>
+
+#include "tfdude/types/version.hpp"
+
+#include "../network_options.hpp"
+#include "../numbers.hpp"
+#include "settings.hpp"
+
+namespace tfdude::web {
+
+std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
+  CLI::App app{"tfdude-web: shows all frames and their uncertainty in a browser"};
+  app.footer("Example: tfdude web --domain 7, then open http://127.0.0.1:8765/");
+  app.set_version_flag("--version", version_line());
+  app.add_option("--bind", settings.server.address,
+                 "address to listen on; if others can reach it, a token is needed, which is "
+                 "printed")
+      ->capture_default_str();
+  app.add_option("--port", settings.server.port, "port to listen on; 0: any that is free")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 65535));
+  app.add_option("--rate", settings.server.rate, "pictures a second, at most [Hz]")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 60.0));
+  app.add_option("--allow-origin", settings.origins,
+                 "other pages that may connect, such as https://app.foxglove.dev; may be repeated")
+      ->allow_extra_args(false);
+  cli::add_network_options(app, settings.options);
+  cli::add_clock_option(app, [&](ClockKind kind) { settings.options.clock = kind; });
+  cli::require_numbers(app);
+  try {
+    app.name(argv[0]);
+    app.parse(cli::arguments_of(argc, argv));
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kWrongUsage;
+  }
+  return std::nullopt;
+}
+
+}  // namespace tfdude::web

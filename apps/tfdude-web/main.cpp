@@ -1,0 +1,136 @@
+// Shows all frames of a domain to browsers, until a signal stops it. Changes nothing.
+
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <random>
+
+#include <spdlog/spdlog.h>
+
+#include "../process.hpp"
+#include "live.hpp"
+#include "page_talk.hpp"
+#include "settings.hpp"
+#include "site.hpp"
+
+namespace {
+
+using namespace tfdude;
+using web::Access;
+using web::Files;
+using web::Settings;
+
+constexpr const char* kThree = "/usr/share/javascript/three/";
+
+// Where the page is: as installed, or in the sources.
+std::string page_folder() {
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  const auto installed = program.parent_path() / TFDUDE_PAGE_FROM_PROGRAM;
+  return std::filesystem::is_directory(installed, error) ? installed.string() : TFDUDE_PAGE_SOURCES;
+}
+
+Result<Files> read_files() {
+  Files files;
+  if (auto page = files.add_folder(page_folder(), "/"); !page) return tl::unexpected(page.error());
+  for (const char* part : {"build/three.module.js", "examples/jsm/controls/OrbitControls.js"}) {
+    if (auto three = files.add_file(std::string(kThree) + part, std::string("/three/") + part);
+        !three) {
+      return fail(Errc::kConfig,
+                  three.error().message + "; Debian's package libjs-three is needed");
+    }
+  }
+  return files;
+}
+
+// 128 bits of the system's generator.
+std::string new_token() {
+  std::random_device random;
+  std::string token;
+  for (int i = 0; i < 4; ++i) {
+    char digits[9];
+    std::snprintf(digits, sizeof(digits), "%08x", random());
+    token += digits;
+  }
+  return token;
+}
+
+bool is_loopback(const std::string& address) {
+  return address.rfind("127.", 0) == 0 || address == "::1";
+}
+
+web::Site make_site(web::Live& live, const Files& files, const Access& access,
+                    const std::function<void(std::function<void()>)>& post) {
+  web::Site site;
+  site.get = [&files, access](const web::Request& request) {
+    if (const auto reply = web::reject(access, request)) return *reply;
+    web::Reply reply = files.get(request.path);
+    const std::string token = web::parameter(request.query, "token");
+    if (!access.token.empty() && !token.empty()) {
+      reply.set_cookie = "tfdude_token=" + token + "; HttpOnly; SameSite=Strict; Path=/";
+    }
+    return reply;
+  };
+  site.accept = [&live, access,
+                 post](const web::Request& request) -> tl::expected<web::Accepted, web::Reply> {
+    if (auto reply = web::reject(access, request)) return tl::unexpected(*reply);
+    const std::string protocol = web::choose_protocol(request.protocols, {web::kPageProtocol});
+    if (protocol.empty()) {
+      web::Reply reply;
+      reply.status = 400;
+      reply.body = std::make_shared<const std::string>("no known subprotocol is offered\n");
+      return tl::unexpected(reply);
+    }
+    return web::Accepted{protocol, web::talk_to_page(live, post)};
+  };
+  site.tick = [&live] { live.tick(); };
+  return site;
+}
+
+int serve(const Settings& settings, const sigset_t& stop_signals) {
+  const auto files = read_files();
+  auto live = files ? web::Live::open(settings.options, settings.server.rate)
+                    : tl::unexpected(files.error());
+  if (!live) {
+    spdlog::error("{}", live.error().message);
+    return live.error().code == Errc::kConfig ? web::kWrongUsage : cli::kRefused;
+  }
+  Access access;
+  access.loopback = is_loopback(settings.server.address);
+  if (!access.loopback) access.token = new_token();
+  access.origins = settings.origins;
+  std::unique_ptr<web::Server> server;
+  const auto post = [&server](std::function<void()> function) {
+    server->post(std::move(function));
+  };
+  auto opened = web::Server::open(settings.server, make_site(**live, *files, access, post));
+  if (!opened) {
+    spdlog::error("{}", opened.error().message);
+    return opened.error().code == Errc::kInvalidInput ? web::kWrongUsage : cli::kRefused;
+  }
+  server = std::move(*opened);
+  const bool six = settings.server.address.find(':') != std::string::npos;
+  const std::string host = six ? "[" + settings.server.address + "]" : settings.server.address;
+  std::printf("open http://%s:%u/%s\n", host.c_str(), server->port(),
+              access.token.empty() ? "" : ("?token=" + access.token).c_str());
+  std::fflush(stdout);
+  int signal = 0;
+  sigwait(&stop_signals, &signal);
+  spdlog::info("stopping on signal {}", signal);
+  (*live)->worker().stop();
+  server->stop();
+  return 0;
+}
+
+}  // namespace
+
+// NOLINTNEXTLINE(bugprone-exception-escape): only a lack of memory throws, and should end it
+int main(int argc, char** argv) {
+  Settings settings;
+  if (const auto status = web::read_arguments(argc, argv, settings)) return *status;
+  const sigset_t stop_signals = cli::block_stop_signals();
+  cli::log_to_standard_error();
+  const int status = serve(settings, stop_signals);
+  spdlog::shutdown();
+  return status;
+}

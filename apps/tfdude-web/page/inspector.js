@@ -1,0 +1,173 @@
+// B in A: the numbers that the server has got from the owners, exactly as `tfdude lookup` prints them.
+import { Plot } from './plot.js';
+import { eigen, rotation, toRpy } from './spatial.js';
+import { clock, degrees, element, metres, seconds } from './text.js';
+
+const NAMES = ['x', 'y', 'z', 'roll', 'pitch', 'yaw'];
+// Of a normal distribution in three dimensions.
+const SHARES = { 1: '19.9 %', 2: '73.9 %', 2.795: '95 %', 3: '97.1 %', 30: 'all' };
+
+export class Inspector {
+  /** @param on  functions: ends(a, b) */
+  constructor(model, on) {
+    this.model = model;
+    this.on = on;
+    this.plot = new Plot();
+    this.answer = null;
+    this.k = 3;
+    this.box = document.getElementById('inspector');
+    const end = (letter) => element('input', {
+      type: 'text', id: `end-${letter}`, list: 'all-frames', placeholder: letter === 'a' ? 'seen from' : 'choose a frame',
+      spellcheck: 'false', autocomplete: 'off', 'aria-label': `Frame ${letter.toUpperCase()}`,
+      onchange: () => this.on.ends(this.a.value, this.b.value),
+    });
+    this.a = end('a');
+    this.b = end('b');
+    this.body = element('div', { class: 'block' });
+    this.canvas = element('canvas', { id: 'plot' });
+    this.plotBox = element('div', { class: 'block' }, this.plotTitle = element('h2', {}), this.canvas);
+    this.choices = element('datalist', { id: 'all-frames' });
+    this.box.append(element('div', { class: 'ends' },
+      element('b', { class: 'a' }, 'A'), this.a,
+      element('button', { class: 'swap icon', title: 'Swap (X)', onclick: () => this.on.ends(this.b.value, this.a.value) }, '⇅'),
+      element('b', { class: 'b' }, 'B'), this.b), this.choices, this.body, this.plotBox);
+    this.draw();
+  }
+
+  setFrames() {
+    this.choices.replaceChildren(...this.model.ids.map((id) => element('option', { value: id })));
+  }
+
+  setEnds(a, b) {
+    if (a !== this.a.value || b !== this.b.value) {
+      this.plot.clear();
+      this.answer = null;
+    }
+    this.a.value = a;
+    this.b.value = b;
+    this.draw();
+  }
+
+  take(answer) {
+    if (answer.from !== this.a.value || answer.to !== this.b.value) return;
+    this.answer = answer;
+    this.dirty = true;
+    if (answer.error || answer.past) return;
+    const { translation, rotation: q } = answer;
+    const t = answer.stamp_ns ? Number(BigInt(answer.stamp_ns) / 1000n) * 1e-6 : Date.now() / 1e3;
+    this.plot.add(t, [...translation, ...toRpy(q)], this.sigmas(answer));
+  }
+
+  sigmas(answer) {
+    const rows = answer.covariance || answer.covariance_of_specified;
+    return rows ? rows.map((row, i) => Math.sqrt(Math.max(0, row[i]))) : null;
+  }
+
+  draw() {
+    this.dirty = false;
+    const parts = [];
+    const { answer } = this;
+    this.plotBox.hidden = !answer || Boolean(answer.error);
+    if (!this.b.value) {
+      parts.push(element('p', { class: 'note' }, 'Choose a frame in the list or in the picture to see where it is, and how sure that is.'));
+    } else if (!answer) {
+      parts.push(element('p', { class: 'note' }, 'Asking its owners …'));
+    } else {
+      if (answer.error) parts.push(element('p', { class: 'note bad' }, answer.error));
+      else parts.push(...this.pose(answer), ...this.ellipsoid(answer));
+      parts.push(...this.path(answer));
+    }
+    this.body.replaceChildren(...parts);
+    if (!this.plotBox.hidden) {
+      this.plotTitle.textContent = `${NAMES[this.plot.component]} in the last 30 s, ±${this.k} σ`;
+      this.plot.k = this.k;
+      this.plot.draw(this.canvas);
+    }
+  }
+
+  pose(answer) {
+    const q = answer.rotation, rpy = toRpy(q), s = this.sigmas(answer);
+    const complete = Boolean(answer.covariance);
+    const rows = NAMES.map((name, i) => element('tr', {
+      class: i === this.plot.component ? 'on' : '', title: 'Plot it',
+      onclick: () => { this.plot.component = i; this.draw(); },
+    },
+    element('th', { class: i < 3 ? name : '' }, name),
+    element('td', {}, i < 3 ? `${answer.translation[i].toFixed(6)} m` : `${((rpy[i - 3] * 180) / Math.PI).toFixed(4)}°`),
+    element('td', { class: 's' }, s ? `± ${i < 3 ? metres(s[i]) : degrees(s[i])}` : '')));
+    const notes = [];
+    const { basis } = answer;
+    if (!complete) {
+      notes.push(element('p', { class: 'note warn' }, `σ is not given for ${basis.unspecified.join(', ')}: these numbers are of the other edges only.`));
+    }
+    if (basis.bound) notes.push(element('p', { class: 'note' }, 'σ is an upper bound: some correlations are not known.'));
+    const copy = element('button', { class: 'copy', title: 'Copy as JSON',
+      onclick: () => navigator.clipboard.writeText(JSON.stringify(answer)) }, 'copy');
+    return [element('h2', {}, 'B in A', copy), element('table', { class: 'pose' }, element('tbody', {}, ...rows)),
+      element('p', { class: 'note', title: 'x, y, z, w' }, `quaternion ${q.map((c) => c.toFixed(6)).join('  ')}`),
+      element('p', { class: 'note' }, this.instant(answer)), ...notes];
+  }
+
+  instant(answer) {
+    if (!answer.stamp_ns) return 'Static: it holds for all times.';
+    const stamp = BigInt(answer.stamp_ns), age = Number(this.model.now - stamp) * 1e-9;
+    return answer.past ? `At ${clock(stamp)}.` : `At ${clock(stamp)}, ${seconds(Math.max(0, age))} ago.`;
+  }
+
+  /** The semi-axes of the ellipsoid of B's position, in A. */
+  ellipsoid(answer) {
+    const rows = answer.covariance || answer.covariance_of_specified;
+    if (!rows || rows.slice(0, 3).every((row, i) => row[i] === 0)) {
+      return answer.covariance ? [element('p', { class: 'note' }, 'Declared as exact: σ is zero.')] : [];
+    }
+    const R = new Float64Array(9), S = new Float64Array(9);
+    rotation(R, [...answer.rotation, 0, 0, 0], 0);
+    for (let i = 0; i < 3; ++i) {
+      for (let j = 0; j < 3; ++j) {
+        let sum = 0;
+        for (let m = 0; m < 3; ++m) for (let n = 0; n < 3; ++n) sum += R[3 * i + m] * rows[m][n] * R[3 * j + n];
+        S[3 * i + j] = sum;
+      }
+    }
+    const { values, vectors } = eigen(S);
+    const most = Math.sqrt(values[0]) || 1;
+    return [element('h2', {}, `Ellipsoid · ${this.k} σ contains ${SHARES[this.k]}`),
+      element('div', { class: 'bars' }, ...values.map((value, i) => element('div', {},
+        element('span', { class: 'name', title: 'direction in A' }, `along ${vectors[i].map((c) => c.toFixed(2)).join(' ')}`),
+        element('span', { class: 'bar' }, element('i', { style: `width:${(100 * Math.sqrt(value)) / most}%` })),
+        element('span', { class: 'n' }, metres(this.k * Math.sqrt(value))))))];
+  }
+
+  path(answer) {
+    const { model } = this, parts = [];
+    if (answer.path && answer.path.length) {
+      parts.push(element('h2', {}, 'Path by owners'), element('ul', { class: 'path' }, ...answer.path.map((segment) => {
+        const owner = model.partitions.findIndex((one) => one.name === segment.partition);
+        const gone = owner >= 0 && !model.partitions[owner].reachable;
+        return element('li', { style: `--colour:${gone ? 'var(--faint)' : this.colours[owner % this.colours.length]}`, class: gone ? 'gone' : '' },
+          element('b', {}, segment.partition), `  ${segment.from} → ${segment.to}${gone ? ', unreachable' : ''}`);
+      })));
+    }
+    const a = model.index.get(answer.from), b = model.index.get(answer.to);
+    if (a === undefined || b === undefined) return parts;
+    const way = model.path(a, b);
+    if (!way) {
+      parts.push(element('p', { class: 'note' }, `${answer.from} is below ${model.ids[model.rootOf(a)]}, ${answer.to} below ${model.ids[model.rootOf(b)]}.`));
+      return parts;
+    }
+    return parts.concat(this.budget([...way.up, ...way.down]));
+  }
+
+  /** The edges of the path, with their own deviations: what to improve first. */
+  budget(edges) {
+    const { model } = this;
+    const sizes = edges.map((i) => ({ i, s: Math.sqrt(model.sigma[36 * i] + model.sigma[36 * i + 7] + model.sigma[36 * i + 14]),
+      r: Math.sqrt(model.sigma[36 * i + 21] + model.sigma[36 * i + 28] + model.sigma[36 * i + 35]) }));
+    const most = Math.max(...sizes.map(({ s }) => s), 1e-12), turn = Math.max(...sizes.map(({ r }) => r), 1e-12);
+    if (sizes.length === 0) return [];
+    return [element('h2', {}, 'σ of each edge'), element('div', { class: 'bars' }, ...sizes.map(({ i, s, r }) => element('div', {},
+      element('span', { class: 'name', title: model.ids[i] }, model.ids[i]),
+      element('span', { class: 'bar', title: `${metres(s)}, ${degrees(r)}` }, element('i', { style: `width:${100 * Math.max(s / most, r / turn)}%` })),
+      element('span', { class: 'n' }, model.sigmaKind[i] === 2 ? 'not given' : s > 0 ? metres(s) : r > 0 ? degrees(r) : 'exact'))))];
+  }
+}

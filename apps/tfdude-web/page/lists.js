@@ -1,0 +1,44 @@
+// The lists beside the tree: owners, joints, events.
+import { clock, degrees, element, metres } from './text.js';
+
+export function drawOwners(model, colours) {
+  document.getElementById('owners').replaceChildren(...model.partitions.map(({ name, reachable, why }, i) => element('span', {
+    class: reachable ? '' : 'gone', style: `--colour:${colours[i % colours.length]}`, title: reachable ? `partition ${name}` : why,
+  }, reachable ? name : `${name} unreachable`)));
+}
+
+export function drawJoints(joints) {
+  document.getElementById('count-joints').textContent = joints.length || '';
+  const box = document.getElementById('joints');
+  if (!joints.length) {
+    box.replaceChildren(element('div', { class: 'empty' }, 'No joints'));
+    return;
+  }
+  box.replaceChildren(...joints.map((joint) => {
+    const show = joint.type === 'prismatic' ? metres : degrees;
+    const stddev = joint.variance === null ? null : Math.sqrt(joint.variance);
+    const deviation = stddev === null ? '' : ` ± ${show(stddev)}`;
+    const made = element('div', { class: 'joint', title: `moves ${joint.frame}` }, element('div', {},
+      element('span', { class: 'name' }, joint.name),
+      element('span', { class: 'n' }, joint.measured === false ? `assumed ${show(joint.position)}` : `${show(joint.position)}${deviation}`)));
+    const { limits } = joint;
+    if (limits && limits[1] > limits[0]) {
+      const [low, high] = limits, at = (v) => Math.max(0, Math.min(100, (100 * (v - low)) / (high - low)));
+      const range = element('div', { class: 'range' });
+      if (stddev) {
+        const from = at(joint.position - 3 * stddev);
+        range.append(element('u', { style: `left:${from}%;width:${at(joint.position + 3 * stddev) - from}%` }));
+      }
+      range.append(element('i', { style: `left:${at(joint.position)}%` }));
+      made.append(range, element('small', {}, element('span', {}, show(low)), element('span', {}, show(high))));
+    }
+    return made;
+  }));
+}
+
+export function drawEvents(events) {
+  document.getElementById('count-events').textContent = events.length || '';
+  document.getElementById('events').replaceChildren(...(events.length ? [...events].reverse().map((event) => element('div', {
+    class: `event ${event.level}` }, element('time', {}, clock(BigInt(event.time_ns))), event.message))
+    : [element('div', { class: 'empty' }, 'Nothing has happened since the server started')]));
+}

@@ -1,0 +1,151 @@
+#include "page_talk.hpp"
+
+#include <utility>
+
+#include "tfdude/types/version.hpp"
+
+#include "../tfdude/render.hpp"
+#include "request.hpp"
+
+namespace tfdude::web {
+namespace {
+
+// A page that has so much to take yet gets no picture.
+constexpr std::size_t kBehind = std::size_t{256} << 10U;  // [B]
+// Covariances change slowly and are large: every so many pictures.
+constexpr int kCovarianceEvery = 15;
+
+using Post = std::function<void(std::function<void()>)>;
+
+class PageTalk final : public Talk {
+ public:
+  PageTalk(Live& live, Post post) : live_(live), post_(std::move(post)) { live_.count_viewer(1); }
+  ~PageTalk() override { live_.count_viewer(-1); }
+  PageTalk(const PageTalk&) = delete;
+  PageTalk& operator=(const PageTalk&) = delete;
+
+  void begin(Link& link) override {
+    link_ = &link;
+    const nlohmann::json hello{{"op", "hello"}, {"version", version_line()}};
+    send(std::make_shared<const std::string>(cli::dump(hello)));
+    send(live_.status());
+    status_ = live_.status_change().first;
+    tick();
+  }
+
+  bool receive(std::string_view message, bool binary) override {
+    const auto request = binary ? std::nullopt : parse_request(message);
+    if (!request) return false;
+    if (const auto* pair = std::get_if<PairRequest>(&*request)) {
+      pair_ = pair->a.empty() ? nullptr : live_.pairs().follow(pair->a, pair->b);
+      pair_number_ = 0;
+      if (past_) ask();
+    } else if (const auto* past = std::get_if<PastRequest>(&*request)) {
+      past_ = past->at;
+      for (std::string& part : live_.world().at(*past_)) {
+        link_->send(std::make_shared<const std::string>(std::move(part)), true);
+      }
+      ask();
+    } else {
+      past_.reset();
+      values_ = 0;
+      covariances_ = 0;
+      pair_number_ = 0;
+    }
+    return true;
+  }
+
+  void tick() override {
+    if (link_->waiting() > kBehind) return;
+    tell_structure();
+    tell_events();
+    const auto [number, change] = live_.status_change();
+    if (number != status_) send(change);
+    status_ = number;
+    if (past_) return;
+    if (pair_ && pair_->number() != pair_number_) {
+      pair_number_ = pair_->number();
+      send(pair_->answer());
+    }
+    if (const Text values = live_.values_since(values_)) link_->send(values, true);
+    values_ = live_.picture();
+    if (covariances_ != 0 && live_.picture() < covariances_ + kCovarianceEvery) return;
+    if (const Text covariances = live_.covariances_since(covariances_)) {
+      link_->send(covariances, true);
+    }
+    covariances_ = live_.picture();
+  }
+
+ private:
+  void send(const Text& text) {
+    if (text) link_->send(text, false);
+  }
+
+  void tell_structure() {
+    const Text structure = live_.structure();
+    if (live_.structure_number() == structure_) return;
+    structure_ = live_.structure_number();
+    send(structure);
+    values_ = 0;
+    covariances_ = 0;
+    if (past_) {
+      for (std::string& part : live_.world().at(*past_)) {
+        link_->send(std::make_shared<const std::string>(std::move(part)), true);
+      }
+    }
+  }
+
+  void tell_events() {
+    const auto events = live_.events_after(events_);
+    if (events.empty()) return;
+    nlohmann::json list = nlohmann::json::array();
+    for (const Event& event : events) list.push_back(event.json);
+    events_ = events.back().number;
+    send(std::make_shared<const std::string>(
+        cli::dump({{"op", "events"}, {"events", std::move(list)}})));
+  }
+
+  // Asks the owners for the pair at the instant that is shown. While they answer, only the last
+  // wish is kept.
+  void ask() {
+    if (!pair_ || !past_ || *asking_) return;
+    *asking_ = true;
+    const bool posted = live_.worker().post(
+        [this, pair = pair_, past = *past_, alive = std::weak_ptr<bool>(asking_), post = post_] {
+          const Text answer = live_.pairs().answer_at(pair->a(), pair->b(), past);
+          post([this, pair, past, alive, answer] {
+            const auto asking = alive.lock();
+            if (!asking) return;
+            *asking = false;
+            if (past_ == past && pair_ == pair) {
+              send(answer);
+            } else {
+              ask();
+            }
+          });
+        });
+    if (!posted) *asking_ = false;
+  }
+
+  Live& live_;
+  Post post_;
+  Link* link_ = nullptr;
+  std::uint32_t structure_ = 0;
+  std::uint64_t values_ = 0;
+  std::uint64_t covariances_ = 0;
+  std::uint64_t events_ = 0;
+  std::uint64_t status_ = 0;
+  std::shared_ptr<Pair> pair_;
+  std::uint64_t pair_number_ = 0;
+  std::optional<Time> past_;
+  // Also says whether this object exists, to answers that come later.
+  std::shared_ptr<bool> asking_ = std::make_shared<bool>(false);
+};
+
+}  // namespace
+
+std::unique_ptr<Talk> talk_to_page(Live& live, Post post) {
+  return std::make_unique<PageTalk>(live, std::move(post));
+}
+
+}  // namespace tfdude::web

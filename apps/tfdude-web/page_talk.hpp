@@ -1,0 +1,19 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "live.hpp"
+#include "server.hpp"
+
+namespace tfdude::web {
+
+/// The subprotocol of the page (docs/web.md).
+inline constexpr const char* kPageProtocol = "tfdude.v1";
+
+/// What one page is told. A page that takes too long misses pictures, and then gets all that has
+/// changed since its last one. `live` and `server` must outlive it.
+[[nodiscard]] std::unique_ptr<Talk> talk_to_page(Live& live,
+                                                 std::function<void(std::function<void()>)> post);
+
+}  // namespace tfdude::web

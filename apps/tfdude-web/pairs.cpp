@@ -1,0 +1,125 @@
+#include "pairs.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "../tfdude/render.hpp"
+#include "../tfdude/uncertainty_render.hpp"
+
+namespace tfdude::web {
+namespace {
+
+// After so long an answer is made again without news of the path: an owner may have died.
+constexpr std::chrono::milliseconds kRenewed{500};
+
+}  // namespace
+
+std::shared_ptr<Pair> Pairs::follow(const std::string& a, const std::string& b) {
+  auto& known = pairs_[{a, b}];
+  auto pair = known.lock();
+  if (!pair) {
+    pair = std::make_shared<Pair>(a, b);
+    known = pair;
+    renew(*pair);
+    begin(pair);
+  }
+  return pair;
+}
+
+void Pairs::begin(const std::shared_ptr<Pair>& pair) {
+  {
+    const std::lock_guard<std::mutex> lock(pair->mutex_);
+    if (pair->watch_ || pair->asked_) return;
+    pair->asked_ = true;
+  }
+  const bool posted = worker_.post([this, pair] {
+    WatchOptions options;
+    options.rate = rate_;
+    auto watch = client_.watch(pair->a(), pair->b(), options);
+    const std::lock_guard<std::mutex> lock(pair->mutex_);
+    if (watch) pair->watch_ = *std::move(watch);
+    pair->asked_ = false;
+  });
+  if (posted) return;
+  const std::lock_guard<std::mutex> lock(pair->mutex_);
+  pair->asked_ = false;
+}
+
+void Pairs::tick() {
+  for (auto known = pairs_.begin(); known != pairs_.end();) {
+    const auto pair = known->second.lock();
+    if (!pair) {
+      known = pairs_.erase(known);
+      continue;
+    }
+    renew(*pair);
+    if (std::chrono::steady_clock::now() >= pair->next_) {
+      pair->next_ = std::chrono::steady_clock::now() + kRenewed;
+      begin(pair);
+    }
+    ++known;
+  }
+}
+
+void Pairs::renew(Pair& pair) {
+  std::optional<PathWatch> watch;
+  {
+    const std::lock_guard<std::mutex> lock(pair.mutex_);
+    watch = pair.watch_;
+  }
+  const std::optional<std::uint64_t> messages =
+      watch ? std::optional<std::uint64_t>(watch->messages()) : std::nullopt;
+  const auto now = std::chrono::steady_clock::now();
+  if (messages == pair.seen_ && pair.answer_ && now < pair.next_) return;
+  pair.seen_ = messages;
+  const auto X_AB =
+      watch ? watch->latest()
+            : fail(Errc::kNotYet, "'" + pair.a() + "' and '" + pair.b() + "' are asked for");
+  const Text answer = text_of(pair.a(), pair.b(), X_AB, false);
+  if (pair.answer_ && *pair.answer_ == *answer) return;
+  pair.answer_ = answer;
+  ++pair.number_;
+}
+
+void Pairs::each(const std::function<void(const Pair&)>& see) const {
+  for (const auto& [ends, known] : pairs_) {
+    if (const auto pair = known.lock()) see(*pair);
+  }
+}
+
+Text Pairs::answer_at(const std::string& a, const std::string& b, Time instant) const {
+  Query query;
+  query.at = instant;
+  return text_of(a, b, client_.lookup(a, b, query), true);
+}
+
+Text Pairs::text_of(const std::string& a, const std::string& b,
+                    const Result<StampedTransform>& X_AB, bool past) const {
+  nlohmann::json json;
+  const auto path = client_.path(a, b);
+  std::vector<std::string> partitions;
+  nlohmann::json segments = nlohmann::json::array();
+  if (path) {
+    for (const PathSegment& segment : *path) {
+      partitions.push_back(segment.partition);
+      segments.push_back(
+          {{"partition", segment.partition}, {"from", segment.from}, {"to", segment.to}});
+    }
+  }
+  if (X_AB) {
+    json = cli::lookup_json(a, b, *X_AB, partitions);
+    cli::add_stamp(json, X_AB->stamp);
+    if (X_AB->stamp) json["stamp_ns"] = std::to_string(nanoseconds(*X_AB->stamp));
+    json["basis"] = cli::basis_json(X_AB->basis);
+  } else {
+    json = {{"from", a},
+            {"to", b},
+            {"error", X_AB.error().message},
+            {"code", to_string(X_AB.error().code)}};
+  }
+  json["op"] = "pair";
+  json["past"] = past;
+  json["path"] = std::move(segments);
+  return std::make_shared<const std::string>(cli::dump(json));
+}
+
+}  // namespace tfdude::web

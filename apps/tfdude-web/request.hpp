@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "tfdude/base/time.hpp"
+
+// What pages may ask for. They cannot change anything.
+namespace tfdude::web {
+
+/// Follow B in A; without names, nothing.
+struct PairRequest {
+  std::string a;
+  std::string b;
+};
+/// Show an instant.
+struct PastRequest {
+  Time at;
+};
+/// Show what is new.
+struct LiveRequest {};
+
+using PageRequest = std::variant<PairRequest, PastRequest, LiveRequest>;
+
+/// Reads a message of a page. @return nothing if it is malformed
+[[nodiscard]] std::optional<PageRequest> parse_request(std::string_view text);
+
+}  // namespace tfdude::web

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tfdude/types/options.hpp"
+
+#include "server.hpp"
+
+namespace tfdude::web {
+
+/// The exit status of a wrong command line.
+inline constexpr int kWrongUsage = 2;
+
+struct Settings {
+  Options options;
+  ServerSettings server;
+  std::vector<std::string> origins;  ///< of other pages that may connect
+};
+
+/// Reads the command line. @return the exit status, if the program ends here
+[[nodiscard]] std::optional<int> read_arguments(int argc, char** argv, Settings& settings);
+
+}  // namespace tfdude::web
