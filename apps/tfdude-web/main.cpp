@@ -8,6 +8,7 @@
 #include <spdlog/spdlog.h>
 
 #include "../process.hpp"
+#include "foxglove_talk.hpp"
 #include "live.hpp"
 #include "page_talk.hpp"
 #include "settings.hpp"
@@ -74,14 +75,17 @@ web::Site make_site(web::Live& live, const Files& files, const Access& access,
   site.accept = [&live, access,
                  post](const web::Request& request) -> tl::expected<web::Accepted, web::Reply> {
     if (auto reply = web::reject(access, request)) return tl::unexpected(*reply);
-    const std::string protocol = web::choose_protocol(request.protocols, {web::kPageProtocol});
+    std::vector<std::string> known = web::kFoxgloveProtocols;
+    known.emplace_back(web::kPageProtocol);
+    const std::string protocol = web::choose_protocol(request.protocols, known);
     if (protocol.empty()) {
       web::Reply reply;
       reply.status = 400;
       reply.body = std::make_shared<const std::string>("no known subprotocol is offered\n");
       return tl::unexpected(reply);
     }
-    return web::Accepted{protocol, web::talk_to_page(live, post)};
+    return web::Accepted{protocol, protocol == web::kPageProtocol ? web::talk_to_page(live, post)
+                                                                  : web::talk_to_foxglove(live)};
   };
   site.tick = [&live] { live.tick(); };
   return site;

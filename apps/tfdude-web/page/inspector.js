@@ -24,13 +24,14 @@ export class Inspector {
     this.a = end('a');
     this.b = end('b');
     this.body = element('div', { class: 'block' });
+    this.more = element('div', { class: 'block' });
     this.canvas = element('canvas', { id: 'plot' });
     this.plotBox = element('div', { class: 'block' }, this.plotTitle = element('h2', {}), this.canvas);
     this.choices = element('datalist', { id: 'all-frames' });
     this.box.append(element('div', { class: 'ends' },
       element('b', { class: 'a' }, 'A'), this.a,
       element('button', { class: 'swap icon', title: 'Swap (X)', onclick: () => this.on.ends(this.b.value, this.a.value) }, '⇅'),
-      element('b', { class: 'b' }, 'B'), this.b), this.choices, this.body, this.plotBox);
+      element('b', { class: 'b' }, 'B'), this.b), this.choices, this.body, this.plotBox, this.more);
     this.draw();
   }
 
@@ -65,7 +66,7 @@ export class Inspector {
 
   draw() {
     this.dirty = false;
-    const parts = [];
+    const parts = [], more = [];
     const { answer } = this;
     this.plotBox.hidden = !answer || Boolean(answer.error);
     if (!this.b.value) {
@@ -74,10 +75,12 @@ export class Inspector {
       parts.push(element('p', { class: 'note' }, 'Asking its owners …'));
     } else {
       if (answer.error) parts.push(element('p', { class: 'note bad' }, answer.error));
-      else parts.push(...this.pose(answer), ...this.ellipsoid(answer));
-      parts.push(...this.path(answer));
+      else parts.push(...this.pose(answer));
+      if (!answer.error) more.push(...this.ellipsoid(answer));
+      more.push(...this.path(answer));
     }
     this.body.replaceChildren(...parts);
+    this.more.replaceChildren(...more);
     if (!this.plotBox.hidden) {
       this.plotTitle.textContent = `${NAMES[this.plot.component]} in the last 30 s, ±${this.k} σ`;
       this.plot.k = this.k;

@@ -217,8 +217,8 @@ export class Scene {
       if (!this.isDrawn(i) || model.covKind[i] !== GIVEN) continue;
       const p = 7 * i, c = 36 * i, pose = model.pose, cov = model.cov;
       const origin = [pose[p + 4] - anchor[0], pose[p + 5] - anchor[1], pose[p + 6] - anchor[2]];
-      const colour = this.colourOf(i);
-      const alpha = i === this.b ? 1 : this.b < 0 ? 0.75 : 0.5;
+      const colour = i === this.b ? this.chosen.b : this.colourOf(i);
+      const alpha = i === this.b ? 1 : this.b < 0 ? 0.85 : 0.6;
       if (this.show.ellipsoids) {
         for (let row = 0; row < 3; ++row) for (let j = 0; j < 3; ++j) block[3 * row + j] = cov[c + 6 * row + j];
         congruence(S, R, pose, p, block);

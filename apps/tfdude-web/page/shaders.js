@@ -152,6 +152,6 @@ export function ellipsoidMaterial() {
       float facing = abs(dot(normalize(normalSeen), normalize(eye)));
       float rim = pow(1.0 - facing, 2.0);
       vec3 lit = mix(shade.rgb, vec3(1.0), 0.18 * rim);
-      gl_FragColor = vec4(lit, shade.a * (0.10 + 0.62 * rim));
+      gl_FragColor = vec4(lit, shade.a * (0.15 + 0.62 * rim));
     }`, { side: THREE.FrontSide });
 }

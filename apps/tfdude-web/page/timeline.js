@@ -77,7 +77,7 @@ export class Timeline {
     const past = this.at !== null, { model } = this;
     document.body.classList.toggle('past', past);
     document.getElementById('live').classList.toggle('on', !past);
-    const kept = model.span ? Number(model.span[1] - model.span[0]) * 1e-9 : KEPT;
+    const kept = model.span ? Number(model.span[1] - model.span[0]) * 1e-9 : 0;
     if (!past) this.slider.min = -Math.max(1, Math.min(KEPT, Math.ceil(kept)));
     if (!past) {
       this.output.textContent = model.count ? `now · ${clock(model.now)}` : '';

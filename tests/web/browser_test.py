@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+"""The page in a real browser. Needs Debian's chromium, chromium-driver and python3-selenium. Keeps a screenshot."""
+
+import os
+import pathlib
+import shutil
+import signal
+import unittest
+
+import rig
+
+try:
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+except ImportError:
+    rig.skip("python3-selenium is missing")
+
+DRIVER = shutil.which("chromedriver")
+if not DRIVER or not shutil.which("chromium"):
+    rig.skip("chromium or chromedriver is missing")
+
+PICTURES = pathlib.Path(os.environ.get("TFDUDE_ARTEFACTS", rig.ROOT / "build/web-screenshots"))
+POSE = "const {model} = tfdude, i = 7 * model.index.get(arguments[0]); return [...model.pose.subarray(i, i + 7)]"
+
+
+def open_browser(width=1440, height=900):
+    options = webdriver.ChromeOptions()
+    for argument in ("--headless=new", "--no-sandbox", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage",
+                     "--hide-scrollbars", f"--window-size={width},{height}"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    browser = webdriver.Chrome(service=Service(DRIVER), options=options)
+    browser.set_script_timeout(60)
+    return browser
+
+
+class Browser(unittest.TestCase):
+    def number(self, answer):
+        """An answer's pose as 7 numbers, quaternion first."""
+        return answer["rotation"] + answer["translation"]
+
+    def assert_same_pose(self, a, b, tolerance):
+        """As 7 numbers each; a quaternion and its negative are the same rotation."""
+        sign = 1 if sum(p * q for p, q in zip(a[:4], b[:4])) > 0 else -1
+        self.assert_close([sign * q for q in a[:4]] + a[4:], b, tolerance)
+
+    def assert_close(self, a, b, tolerance):
+        for one, other in zip(a, b):
+            self.assertAlmostEqual(one, other, delta=tolerance)
+
+    def answer(self, browser, condition=""):
+        script = "const a = tfdude.inspector.answer; return a && !a.error" + condition + " ? a : null"
+        return rig.eventually(lambda: browser.execute_script(script), "an answer for A and B")
+
+    def test_a_page_shows_what_the_command_line_says(self):
+        with rig.Rig() as robot:
+            browser = open_browser()
+            try:
+                self.look(robot, browser)
+            finally:
+                PICTURES.mkdir(parents=True, exist_ok=True)
+                browser.save_screenshot(str(PICTURES / "arm.png"))
+                browser.quit()
+
+    def look(self, robot, browser):
+        browser.get(robot.url)
+        shown = "return window.tfdude && tfdude.model.shown.filter(x => x).length"
+        rig.eventually(lambda: browser.execute_script(shown) == 12, "all frames")
+        for frame in ("tool0", "lidar"):
+            said = self.number(robot.ask("lookup", "world", frame))
+            self.assert_same_pose(browser.execute_script(POSE, frame), said, 1e-4)
+        self.choose_two(robot, browser)
+        self.drag(robot, browser)
+        robot.arm.send_signal(signal.SIGKILL)
+        rig.eventually(lambda: browser.execute_script(
+            "const {model} = tfdude; return !model.isReachable(model.index.get('tool0'))"), "an owner that died")
+        grey = browser.execute_script("const {scene, model} = tfdude; return ['tool0', 'lidar'].map(id => "
+                                      "scene.colourOf(model.index.get(id)) === scene.grey)")
+        self.assertEqual(grey, [True, False])
+        severe = [line["message"] for line in browser.get_log("browser") if line["level"] == "SEVERE"]
+        self.assertEqual(severe, [])
+
+    def choose_two(self, robot, browser):
+        find = "return [...document.querySelectorAll('.row')].find(row => row.querySelector('.name').textContent === "
+        browser.execute_script(find + "'tool0')").click()
+        self.assertEqual(browser.execute_script("return tfdude.inspector.a.value"), "world")
+        answer = self.answer(browser)
+        said = robot.ask("lookup", "world", "tool0")
+        self.assert_same_pose(self.number(answer), self.number(said), 1e-12)
+        key = "covariance" if said.get("covariance") else "covariance_of_specified"
+        for row, other in zip(answer[key], said[key]):
+            self.assert_close(row, other, 1e-12)
+        # Seen from another frame, the ellipsoid is that of a lookup from there.
+        browser.execute_script("tfdude.seeFrom('lidar'); tfdude.model.solveSigmas()")
+        said = robot.ask("lookup", "lidar", "wrist_1_link")
+        self.assert_same_pose(browser.execute_script(POSE, "wrist_1_link"), self.number(said), 1e-4)
+        diagonal = browser.execute_script("const {model} = tfdude, i = model.index.get('wrist_1_link'); "
+                                          "return [0, 7, 14, 21, 28, 35].map(k => model.cov[36 * i + k])")
+        rows = said.get("covariance") or said["covariance_of_specified"]
+        for i, variance in enumerate(diagonal):
+            self.assertAlmostEqual(variance, rows[i][i], delta=1e-3 * rows[i][i] + 1e-12)
+        browser.execute_script("tfdude.seeFrom('world')")
+
+    def drag(self, robot, browser):
+        robot.move()
+        rig.eventually(lambda: browser.execute_script("return Number(tfdude.timeline.slider.min) < -3"),
+                       "some seconds of motion")
+        browser.execute_script("const {slider} = tfdude.timeline; slider.value = -1.5; "
+                               "slider.dispatchEvent(new Event('input'))")
+        at = int(browser.execute_script("return String(tfdude.timeline.at)"))
+        answer = self.answer(browser, f" && a.past && a.stamp_ns === '{at}'")
+        said = robot.ask("lookup", "world", "tool0", "--at", f"{at // 10**9}.{at % 10**9:09}")
+        self.assertEqual(answer["translation"], said["translation"])
+        self.assertEqual(answer["covariance"], said["covariance"])
+        # The picture is interpolated between values at 30 Hz.
+        self.assert_same_pose(browser.execute_script(POSE, "tool0"), self.number(said), 5e-3)
+        browser.execute_script("tfdude.timeline.live()")
+        self.answer(browser, " && !a.past")
+
+
+if __name__ == "__main__":
+    unittest.main()

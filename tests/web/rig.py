@@ -1,0 +1,93 @@
+"""Processes of a robot and of tfdude-web, in a DDS domain that no other test uses, on this computer only."""
+
+import json
+import os
+import pathlib
+import socket
+import subprocess
+import sys
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BIN = pathlib.Path(os.environ.get("TFDUDE_BIN", ROOT / "build/release/bin"))
+WAIT = 30  # [s], more than a busy machine needs
+
+
+def skip(why):
+    """Ends the test as skipped, for ctest."""
+    print("SKIPPED: " + why)
+    sys.exit(0)
+
+
+def lease_domain():
+    """@return a domain, and the socket that claims it as tests/support/domain_lease.cpp does."""
+    for i in range(200):
+        domain = 20 + (os.getpid() * 7 + i) % 200
+        claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            claim.bind("\0tfdude-test-domain-" + str(domain))
+            return domain, claim
+        except OSError:
+            claim.close()
+    raise RuntimeError("all DDS domains for tests are taken")
+
+
+def eventually(condition, what):
+    """The first true result of a function."""
+    end = time.monotonic() + WAIT
+    while True:
+        result = condition()
+        if result:
+            return result
+        if time.monotonic() > end:
+            raise AssertionError("not in time: " + what)
+        time.sleep(0.05)
+
+
+class Rig:
+    """The arm on a mobile base, of two daemons, and the server; use it as a context."""
+
+    def __init__(self, *web_options):
+        self.domain, self.claim = lease_domain()
+        self.environment = dict(os.environ, TFDUDE_PROFILE="local", TFDUDE_DOMAIN=str(self.domain))
+        self.environment.pop("TFDUDE_KEYS", None)
+        self.running = []
+        self.web_options = web_options
+
+    def __enter__(self):
+        try:
+            self.base = self.start("tfduded", "--config", ROOT / "examples/arm/base.yaml", "--no-state", ready="ready")
+            self.arm = self.start("tfduded", "--config", ROOT / "examples/arm/arm.yaml", "--no-state", ready="ready")
+            self.web = self.start("tfdude", "web", "--port", "0", *self.web_options, ready="open ")
+            self.url = self.web.first_line.split()[1]
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        for process in self.running:
+            process.kill()
+        for process in self.running:
+            process.wait()
+            process.stdout.close()
+        self.claim.close()
+
+    def start(self, program, *arguments, ready=None):
+        process = subprocess.Popen([BIN / program, *map(str, arguments)], env=self.environment, text=True,
+                                   stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        self.running.append(process)
+        if ready:
+            process.first_line = process.stdout.readline()
+            assert process.first_line.startswith(ready), (program, process.first_line)
+        return process
+
+    def move(self, seconds=600):
+        """Drives the arm at 1 kHz."""
+        return self.start("arm_controller", "--seconds", seconds)
+
+    def ask(self, *arguments):
+        """The answer of the command line."""
+        done = subprocess.run([BIN / "tfdude", "--json", "--timeout", "20000", *map(str, arguments)],
+                              env=self.environment, text=True, capture_output=True, timeout=60, check=False)
+        return json.loads(done.stdout)
