@@ -31,6 +31,8 @@ nlohmann::json rate_json(const HistoryInfo& history) {
 Result<std::unique_ptr<Live>> Live::open(const Options& options, double rate) {
   auto client = Client::open(options);
   if (!client) return tl::unexpected(client.error());
+  // Completes discovery first, so that what exists already is no event.
+  (void)client->partitions();
   return std::unique_ptr<Live>(new Live(*std::move(client), options.clock, rate));
 }
 

@@ -36,7 +36,11 @@ void Pairs::begin(const std::shared_ptr<Pair>& pair) {
     options.rate = rate_;
     auto watch = client_.watch(pair->a(), pair->b(), options);
     const std::lock_guard<std::mutex> lock(pair->mutex_);
-    if (watch) pair->watch_ = *std::move(watch);
+    if (watch) {
+      pair->watch_ = *std::move(watch);
+    } else {
+      pair->error_ = watch.error();
+    }
     pair->asked_ = false;
   });
   if (posted) return;
@@ -62,9 +66,11 @@ void Pairs::tick() {
 
 void Pairs::renew(Pair& pair) {
   std::optional<PathWatch> watch;
+  Error error{Errc::kNotYet, "its owners are asked"};
   {
     const std::lock_guard<std::mutex> lock(pair.mutex_);
     watch = pair.watch_;
+    if (pair.error_) error = *pair.error_;
   }
   const std::optional<std::uint64_t> messages =
       watch ? std::optional<std::uint64_t>(watch->messages()) : std::nullopt;
@@ -72,9 +78,11 @@ void Pairs::renew(Pair& pair) {
   if (messages == pair.seen_ && pair.answer_ && now < pair.next_) return;
   pair.seen_ = messages;
   const auto X_AB =
-      watch ? watch->latest()
-            : fail(Errc::kNotYet, "'" + pair.a() + "' and '" + pair.b() + "' are asked for");
-  const Text answer = text_of(pair.a(), pair.b(), X_AB, false);
+      watch ? watch->latest() : Result<StampedTransform>(tl::unexpected(std::move(error)));
+  // The last values hold on while an owner is not reachable; the command line gets an error then.
+  const auto health = watch ? watch->health() : Result<void>();
+  const std::string why = health ? std::string() : health.error().message;
+  const Text answer = text_of(pair.a(), pair.b(), X_AB, false, why);
   if (pair.answer_ && *pair.answer_ == *answer) return;
   pair.answer_ = answer;
   ++pair.number_;
@@ -89,11 +97,12 @@ void Pairs::each(const std::function<void(const Pair&)>& see) const {
 Text Pairs::answer_at(const std::string& a, const std::string& b, Time instant) const {
   Query query;
   query.at = instant;
-  return text_of(a, b, client_.lookup(a, b, query), true);
+  return text_of(a, b, client_.lookup(a, b, query), true, {});
 }
 
 Text Pairs::text_of(const std::string& a, const std::string& b,
-                    const Result<StampedTransform>& X_AB, bool past) const {
+                    const Result<StampedTransform>& X_AB, bool past,
+                    const std::string& unreachable) const {
   nlohmann::json json;
   const auto path = client_.path(a, b);
   std::vector<std::string> partitions;
@@ -118,6 +127,7 @@ Text Pairs::text_of(const std::string& a, const std::string& b,
   }
   json["op"] = "pair";
   json["past"] = past;
+  if (!unreachable.empty()) json["unreachable"] = unreachable;
   json["path"] = std::move(segments);
   return std::make_shared<const std::string>(cli::dump(json));
 }

@@ -43,6 +43,7 @@ class Pair {
   // Of both threads.
   std::mutex mutex_;
   std::optional<PathWatch> watch_;
+  std::optional<Error> error_;  // why there is none
   bool asked_ = false;
 };
 
@@ -65,7 +66,8 @@ class Pairs {
   void renew(Pair& pair);
   void begin(const std::shared_ptr<Pair>& pair);
   [[nodiscard]] Text text_of(const std::string& a, const std::string& b,
-                             const Result<StampedTransform>& X_AB, bool past) const;
+                             const Result<StampedTransform>& X_AB, bool past,
+                             const std::string& unreachable) const;
 
   Client& client_;
   Worker& worker_;

@@ -55,7 +55,8 @@ export class Inspector {
     this.dirty = true;
     if (answer.error || answer.past) return;
     const { translation, rotation: q } = answer;
-    const t = answer.stamp_ns ? Number(BigInt(answer.stamp_ns) / 1000n) * 1e-6 : Date.now() / 1e3;
+    if (!answer.stamp_ns) return;
+    const t = Number(BigInt(answer.stamp_ns) / 1000n) * 1e-6;
     this.plot.add(t, [...translation, ...toRpy(q)], this.sigmas(answer));
   }
 
@@ -68,7 +69,7 @@ export class Inspector {
     this.dirty = false;
     const parts = [], more = [];
     const { answer } = this;
-    this.plotBox.hidden = !answer || Boolean(answer.error);
+    this.plotBox.hidden = !answer || Boolean(answer.error) || this.plot.samples.length < 2;
     if (!this.b.value) {
       parts.push(element('p', { class: 'note' }, 'Choose a frame in the list or in the picture to see where it is, and how sure that is.'));
     } else if (!answer) {
@@ -100,6 +101,7 @@ export class Inspector {
     element('td', { class: 's' }, s ? `± ${i < 3 ? metres(s[i]) : degrees(s[i])}` : '')));
     const notes = [];
     const { basis } = answer;
+    if (answer.unreachable) notes.push(element('p', { class: 'note bad' }, `${answer.unreachable}. These are its last values.`));
     if (!complete) {
       notes.push(element('p', { class: 'note warn' }, `σ is not given for ${basis.unspecified.join(', ')}: these numbers are of the other edges only.`));
     }
@@ -170,7 +172,7 @@ export class Inspector {
     if (sizes.length === 0) return [];
     return [element('h2', {}, 'σ of each edge'), element('div', { class: 'bars' }, ...sizes.map(({ i, s, r }) => element('div', {},
       element('span', { class: 'name', title: model.ids[i] }, model.ids[i]),
-      element('span', { class: 'bar', title: `${metres(s)}, ${degrees(r)}` }, element('i', { style: `width:${100 * Math.max(s / most, r / turn)}%` })),
+      element('span', { class: 'bar', title: `${metres(s)}, ${degrees(r)}` }, element('i', { style: `width:${(100 * s) / most || (100 * r) / turn}%` })),
       element('span', { class: 'n' }, model.sigmaKind[i] === 2 ? 'not given' : s > 0 ? metres(s) : r > 0 ? degrees(r) : 'exact'))))];
   }
 }

@@ -1,7 +1,7 @@
 // Names beside the frames, on one canvas. The most important come first; what would overlap is counted instead.
 import { Vector3 } from '/three/build/three.module.js';
 
-const MOST = 80;
+const MOST = 60;
 const HEIGHT = 15;
 
 export class Labels {
@@ -68,10 +68,12 @@ export class Labels {
   }
 
   spot(label, w, taken) {
+    // Names of lesser frames keep a distance, so that a crowd stays legible.
+    const apart = label.rank < 4 ? 4 : 18;
     for (const [dx, dy] of [[9, -HEIGHT - 2], [9, 4], [-w - 9, -HEIGHT - 2], [-w - 9, 4]]) {
       const box = { x: label.x + dx, y: label.y + dy, w, h: HEIGHT };
-      const free = taken.every((other) => box.x > other.x + other.w + 4 || other.x > box.x + box.w + 4 ||
-        box.y > other.y + other.h || other.y > box.y + box.h);
+      const free = taken.every((other) => box.x > other.x + other.w + apart || other.x > box.x + box.w + apart ||
+        box.y > other.y + other.h + apart / 3 || other.y > box.y + box.h + apart / 3);
       if (free) return box;
       if (label.rank < 2) return box;
     }

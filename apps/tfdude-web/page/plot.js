@@ -30,13 +30,15 @@ export class Plot {
     if (samples.length < 2) {
       g.fillStyle = colour('--faint');
       g.textAlign = 'center';
-      g.fillText(samples.length ? 'nothing has changed yet' : 'no samples yet', width / 2, height / 2);
+      g.fillText('nothing has moved yet', width / 2, height / 2);
       return;
     }
     const end = samples[samples.length - 1].t;
     let low = Infinity, high = -Infinity;
+    // A few samples of a large deviation, as before the first measurement, would flatten all others.
+    const usual = samples.map(({ sigma }) => (sigma ? k * sigma[component] : 0)).sort((a, b) => a - b)[samples.length >> 1];
     for (const { value, sigma } of samples) {
-      const band = sigma ? k * sigma[component] : 0;
+      const band = Math.min(sigma ? k * sigma[component] : 0, 4 * usual);
       low = Math.min(low, value[component] - band);
       high = Math.max(high, value[component] + band);
     }
@@ -58,6 +60,10 @@ export class Plot {
     g.textAlign = 'center';
     g.textBaseline = 'alphabetic';
     for (const s of [-30, -20, -10, 0]) g.fillText(s ? `${s} s` : 'now', Math.min(right - 10, Math.max(left + 12, x(end + s))), height - 4);
+    g.save();
+    g.beginPath();
+    g.rect(left, top, right - left, bottom - top);
+    g.clip();
     g.fillStyle = colour('--accent-soft');
     g.beginPath();
     samples.forEach((s, n) => g[n ? 'lineTo' : 'moveTo'](x(s.t), y(s.value[component] + k * (s.sigma ? s.sigma[component] : 0))));
@@ -68,6 +74,7 @@ export class Plot {
     g.beginPath();
     samples.forEach((s, n) => g[n ? 'lineTo' : 'moveTo'](x(s.t), y(s.value[component])));
     g.stroke();
+    g.restore();
   }
 }
 

@@ -279,6 +279,17 @@ export class Scene {
     this.controls.update();
   }
 
+  /** Axes that neither overlap their neighbours nor vanish. */
+  axisLength(radius) {
+    const { edge, parent, known, count } = this.model, lengths = [];
+    for (let i = 0; i < count; ++i) {
+      const length = parent[i] < 0 || !known[i] ? 0 : Math.hypot(edge[7 * i + 4], edge[7 * i + 5], edge[7 * i + 6]);
+      if (length > 1e-6) lengths.push(length);
+    }
+    const usual = lengths.sort((a, b) => a - b)[lengths.length >> 1] || radius;
+    return Math.min(radius / 7, Math.max(0.6 * usual, radius / 60));
+  }
+
   /** Shows all frames. */
   fit() {
     const { model } = this;
@@ -295,8 +306,8 @@ export class Scene {
     const diagonal = Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
     this.anchor = low.map((c, k) => (c + high[k]) / 2);
     const radius = Math.max(diagonal / 2, 0.05);
-    this.size = Math.max(radius / 7, 0.01);
-    const away = new THREE.Vector3(0.62, -0.82, 0.55).normalize().multiplyScalar(radius * 3.0);
+    this.size = this.axisLength(radius);
+    const away = new THREE.Vector3(0.62, -0.82, 0.55).normalize().multiplyScalar(radius * 2.6);
     this.camera.position.copy(away);
     this.controls.target.set(0, 0, 0);
     this.controls.update();

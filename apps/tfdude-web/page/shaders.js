@@ -6,10 +6,10 @@ const COMMON = `
   uniform float pixels;   // per unit at distance one
   uniform float size;     // length of an axis
   vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
-  // The length of an axis at a place: as in the world, but from 9 to 54 pixels.
+  // The length of an axis at a place: as in the world, but from 5 to 54 pixels.
   float lengthAt(vec3 place) {
     float unit = pixels / max(1e-9, -(viewMatrix * vec4(place, 1.0)).z);
-    return clamp(size * unit, 9.0, 54.0) / unit;
+    return clamp(size * unit, 5.0, 54.0) / unit;
   }
   // A corner of the line between two places.
   vec4 line(vec3 from, vec3 to, float end, float side, float width) {
@@ -65,7 +65,7 @@ export function axesMaterial() {
       shade = vec4(look.y < 0.0 ? vec3(mix(grey, 0.5, 0.6)) : base, abs(look.y));
       across = corner.z;
       vec3 tip = origin + turned(quaternion, axis) * lengthAt(origin) * look.x;
-      gl_Position = line(origin, tip, corner.y, corner.z, look.x > 1.0 ? 5.0 : 3.6);
+      gl_Position = line(origin, tip, corner.y, corner.z, look.x > 1.0 ? 5.0 : size * pixels / max(1e-9, -(viewMatrix * vec4(origin, 1.0)).z) < 24.0 ? 2.6 : 3.6);
     }`, `
     varying vec4 shade; varying float across;
     void main() { gl_FragColor = vec4(shade.rgb, shade.a * smoothstep(1.0, 0.5, abs(across))); }`);

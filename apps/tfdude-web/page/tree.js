@@ -88,7 +88,7 @@ export class Tree {
     const reachable = model.isReachable(i);
     const made = element('div', {
       class: `row${id === this.cursor ? ' at' : ''}${reachable ? '' : ' gone'}${model.shown[i] ? '' : ' out'}`,
-      style: `top:${n * ROW}px;padding-left:${6 + Math.min(row.depth, 12) * 11}px;--colour:${reachable ? this.colours[model.owner[i] %
+      style: `top:${n * ROW}px;padding-left:${6 + Math.min(row.depth, 6) * 10 + Math.min(20, Math.max(0, row.depth - 6)) * 4}px;--colour:${reachable ? this.colours[model.owner[i] %
         this.colours.length] : 'var(--faint)'}`,
       role: 'treeitem', 'aria-selected': id === this.cursor, title: this.titleOf(i),
       onclick: (event) => { this.cursor = id; this.on.choose(i, event.shiftKey); this.box.focus(); },
