@@ -4,10 +4,12 @@
 #include <cstdio>
 #include <ctime>
 #include <string_view>
+#include <utility>
 
 #include "tfdude/base/id.hpp"
 
 #include "render.hpp"
+#include "screen.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -120,20 +122,41 @@ int report(const Error& error, const Arguments& arguments) {
   }
 }
 
-int run_tree(Source source, const Arguments& arguments) {
+namespace {
+
+// The tree as text and as JSON; no frames at all if nobody answers.
+Result<std::pair<std::string, nlohmann::json>> tree_of(Source source) {
   const auto frames = source.frames();
-  if (!frames) return report(frames.error(), arguments);
+  if (!frames) return tl::unexpected(frames.error());
   const auto partitions = source.partitions();
-  if (!partitions) return report(partitions.error(), arguments);
-  if (const int status = none_there(source, arguments, !frames->empty()); status != kDone)
-    return status;
+  if (!partitions) return tl::unexpected(partitions.error());
   std::vector<std::string> unreachable;
   for (const PartitionInfo& partition : *partitions) {
     if (!partition.reachable) unreachable.push_back(partition.name);
   }
   nlohmann::json json = nlohmann::json::array();
   for (const Frame& frame : *frames) json.push_back(frame_json(frame));
-  return answer(arguments, {{"frames", json}}, draw_tree(*frames, unreachable));
+  return std::pair(draw_tree(*frames, unreachable), std::move(json));
+}
+
+}  // namespace
+
+int run_tree(Source source, const Arguments& arguments) {
+  Screen screen;
+  do {
+    const auto tree = tree_of(source);
+    if (!tree) return report(tree.error(), arguments);
+    if (!arguments.watch) {
+      const int status = none_there(source, arguments, !tree->second.empty());
+      if (status != kDone) return status;
+    }
+    if (arguments.json || !arguments.watch) {
+      (void)answer(arguments, {{"frames", tree->second}}, tree->first);
+    } else {
+      screen.redraw(tree->first.empty() ? nobody_answers(arguments) + "\n" : tree->first);
+    }
+  } while (arguments.watch && !interrupted_within(1.0 / arguments.rate));
+  return kDone;
 }
 
 int run_frames(Source source, const Arguments& arguments) {

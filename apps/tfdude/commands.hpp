@@ -70,6 +70,7 @@ struct Arguments {
   double wait_ms = 0;
   bool composed = false;
   bool once = false;
+  bool watch = false;    ///< tree, lookup: redraw it until interrupted
   bool unknown = false;  ///< correlation
   int order = 2;
   ObserveOptions observe;
@@ -132,6 +133,8 @@ int run_remove(Client& client, const Arguments& arguments);
 int run_forget(Client& client, const Arguments& arguments);
 int run_move(Client& client, const Arguments& arguments);
 int run_lookup(Source source, const Arguments& arguments);
+/// Redraws what `lookup` prints, until interrupted.
+int follow_lookup(Client& client, const Arguments& arguments);
 int run_velocity(Client& client, const Arguments& arguments);
 int run_parent(Client& client, const Arguments& arguments);
 int run_children(Client& client, const Arguments& arguments);

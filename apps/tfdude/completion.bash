@@ -52,8 +52,8 @@ _tfdude_keys() {
 _tfdude() {
   local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command words common
   local commands="tree frames partitions roots parent children exists lookup velocity watch echo history monitor"
-  commands+=" plot graph events joints joint observe fuse correlate add update remove forget move keys record info"
-  commands+=" replay"
+  commands+=" plot graph events joints joint description observe fuse correlate add update remove forget move keys"
+  commands+=" record info replay web"
   local of_frames=" parent children exists lookup velocity watch echo plot history observe fuse correlate update "
   of_frames+="remove move "
   local pose="--xyz --rpy --quat --stddev --cov"
@@ -79,13 +79,14 @@ _tfdude() {
           add) words+=" --parent --partition $pose" ;;
           update) words+=" --stamp $pose" ;;
           move) words+=" --parent $pose" ;;
-          lookup) words+=" --cov --at --at-b --fixed --extrapolate --age-noise --wait --order --recording" ;;
+          lookup) words+=" --cov --watch --at --at-b --fixed --extrapolate --age-noise --wait --order --recording" ;;
           velocity) words+=" --cov --at --over" ;;
           correlate) words+=" --unknown --source" ;;
           observe | fuse) words+=" --stamp --gate --correlated $pose" ;;
           watch) words+=" --rate --composed --cov" ;;
           echo) words+=" --rate --composed --recording --at" ;;
-          tree | frames | joints | events) words+=" --recording --at" ;;
+          tree) words+=" --watch --recording --at" ;;
+          frames | joints | events) words+=" --recording --at" ;;
           record) words+=" --split-size --split-time --raw" ;;
           replay) words+=" --rate --at --loop --paused" ;;
           plot) words+=" --out --samples --at --recording" ;;

@@ -32,6 +32,7 @@ using cli::Arguments;
 using cli::within;
 
 constexpr long kTimeoutByServer = 3000;  // [ms]
+constexpr const char* kWatchHelp = "redraw it twice a second, until interrupted";
 
 using Command = std::function<int(Client&, const Arguments&)>;
 
@@ -92,11 +93,16 @@ void add_rate(CLI::App* command, double& rate, const char* help) {
 
 void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen,
                         cli::LocalCommand& local) {
-  auto* lookup = add_command(app, "lookup", "pose of B in A, with its uncertainty",
-                             "lookup world hand_left --cov", cli::run_lookup, chosen);
+  auto* lookup = add_command(
+      app, "lookup", "pose of B in A, with its uncertainty", "lookup world hand_left --cov",
+      [](Client& client, const Arguments& given) {
+        return given.watch ? cli::follow_lookup(client, given) : cli::run_lookup(client, given);
+      },
+      chosen);
   ask_only(lookup, arguments);
   add_ends(lookup, arguments);
   lookup->add_flag("--cov", arguments.covariance, "print the full covariance");
+  auto* watch = lookup->add_flag("--watch", arguments.watch, kWatchHelp);
   add_stamp(lookup, "--at", arguments.stamp,
             "the instant: seconds since the epoch or, negative, before now");
   auto* fixed =
@@ -113,6 +119,11 @@ void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen,
   add_milliseconds(lookup, "--wait", arguments.wait_ms, "how long to wait for frames and data");
   lookup->get_option("--wait")->excludes(fixed);
   cli::add_recording(lookup, arguments, local, cli::run_lookup);
+  for (const char* other : {"--at", "--extrapolate", "--age-noise", "--order", "--wait"}) {
+    watch->excludes(lookup->get_option(other));
+  }
+  watch->excludes(fixed);
+  watch->excludes(lookup->get_option("--recording"));
 }
 
 void add_velocity_command(CLI::App& app, Arguments& arguments, Command& chosen) {
@@ -158,6 +169,7 @@ void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen,
   auto* tree =
       add_command(app, "tree", "draw all frames with their owners", "tree", cli::run_tree, chosen);
   cli::add_recording(tree, arguments, local, cli::run_tree);
+  tree->add_flag("--watch", arguments.watch, kWatchHelp)->excludes(tree->get_option("--recording"));
   auto* frames =
       add_command(app, "frames", "list all frames", "--json frames", cli::run_frames, chosen);
   cli::add_recording(frames, arguments, local, cli::run_frames);
@@ -365,8 +377,7 @@ int main(int argc, char** argv) {
   add_joint_commands(app, arguments, command, local);
   add_description_command(app, arguments, command);
   cli::add_recording_commands(app, arguments, command, local);
-  app.add_subcommand("web", "show all frames and their uncertainty in a browser")
-      ->footer("It is given first: tfdude web --help");
+  cli::add_web_command(app, local);
   cli::add_keys_commands(app, arguments.keys, local);
   cli::require_numbers(app);
   try {
@@ -385,10 +396,6 @@ int main(int argc, char** argv) {
     (void)app.exit(error);
     return cli::kWrongUsage;
   }
-  if (app.got_subcommand("web")) {
-    std::fputs("tfdude: write web first, then its options\n", stderr);
-    return cli::kWrongUsage;
-  }
   // Discovery by a server takes most of the default timeout of a second.
   const bool by_server = !arguments.options.discovery_server.empty();
   if (by_server && app.count("--timeout") == 0) timeout_ms = kTimeoutByServer;
@@ -401,7 +408,8 @@ int main(int argc, char** argv) {
   sigaddset(&stop_signals, SIGINT);
   sigaddset(&stop_signals, SIGTERM);
   for (const char* name : {"watch", "echo", "monitor", "events", "record", "replay"}) {
-    if (app.got_subcommand(name)) pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
+    if (app.got_subcommand(name) || arguments.watch)
+      pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
   }
   log_fastdds_to_standard_error();
   const int status = run(arguments, command, local);

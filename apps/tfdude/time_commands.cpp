@@ -166,6 +166,22 @@ nlohmann::json path_json(Source source, const Arguments& arguments, const Stampe
   return json;
 }
 
+// Redraws what `lookup` prints. The owners push it.
+int follow_lookup(Client& client, const Arguments& arguments) {
+  Screen screen;
+  return follow(client, arguments, [&](const StampedTransform& X_AB) {
+    if (arguments.json) {
+      (void)answer(arguments, path_json(client, arguments, X_AB), "");
+      return;
+    }
+    const auto now = present(client, arguments, arguments.id, arguments.other);
+    std::string text = arguments.other + " in " + arguments.id + "\n" +
+                       describe(X_AB, arguments.covariance, X_AB.basis.unspecified);
+    if (X_AB.stamp) text += describe_stamp(X_AB.stamp, now);
+    screen.redraw(text + describe(X_AB.basis));
+  });
+}
+
 int run_lookup(Source source, const Arguments& arguments) {
   const auto X_AB = look_up(source, arguments);
   if (!X_AB) return refuse(source, X_AB.error(), arguments);

@@ -25,4 +25,14 @@ int become_web(int argc, char** argv) {
   return kWrongUsage;
 }
 
+void add_web_command(CLI::App& app, LocalCommand& chosen) {
+  app.add_subcommand("web", "show all frames and their uncertainty in a browser")
+      ->callback([&chosen] {
+        chosen = [](const Arguments& /*arguments*/) {
+          std::fputs("tfdude: write web first, and its options behind it\n", stderr);
+          return kWrongUsage;
+        };
+      });
+}
+
 }  // namespace tfdude::cli

@@ -5,7 +5,7 @@ import { Labels } from './labels.js';
 import { drawEvents, drawJoints, drawOwners } from './lists.js';
 import { Model } from './model.js';
 import { Scene } from './scene.js';
-import { clock, element, seconds } from './text.js';
+import { element } from './text.js';
 import { Timeline } from './timeline.js';
 import { Tree } from './tree.js';
 import { Color } from '/three/build/three.module.js';
@@ -138,16 +138,13 @@ function picture(time) {
   const begin = performance.now();
   if (later.update) {
     later.update = false;
+    // Poses move at each picture; covariances need not be computed for all frames as often.
     if (model.sigmaStale || time > sigmasDue) {
-      // Poses move at each picture; shapes need not be computed for all frames as often.
       model.solveSigmas();
       sigmasDue = time + 100;
-      scene.update();
-      scene.updateSigmas();
-    } else {
-      scene.update();
-      scene.updateSigmas();
     }
+    scene.update();
+    scene.updateSigmas();
     if (later.fit) {
       later.fit = false;
       fitted = true;
@@ -169,6 +166,14 @@ function picture(time) {
   }
 }
 
+/** How many standard deviations the shapes have. */
+function setShape(k) {
+  scene.k = inspector.k = k;
+  by('sigma').value = String(k);
+  later.update = true;
+  inspector.draw();
+}
+
 function press(button) {
   const on = button.getAttribute('aria-pressed') !== 'true';
   button.setAttribute('aria-pressed', on);
@@ -185,11 +190,7 @@ function follow(on) {
 function listen() {
   by('toggles').addEventListener('click', ({ target }) => target.dataset.show && press(target));
   by('root').addEventListener('change', ({ target }) => seeFrom(target.value));
-  by('sigma').addEventListener('change', ({ target }) => {
-    scene.k = inspector.k = Number(target.value);
-    later.update = true;
-    inspector.draw();
-  });
+  by('sigma').addEventListener('change', ({ target }) => setShape(Number(target.value)));
   by('theme').addEventListener('click', () => setTheme(!document.documentElement.classList.contains('light')));
   by('help').addEventListener('click', () => by('keys').showModal());
   by('fit').addEventListener('click', () => scene.fit());
@@ -259,4 +260,4 @@ drawJoints([]);
 drawEvents([]);
 requestAnimationFrame(picture);
 // For tests and for the curious.
-window.tfdude = { model, scene, inspector, timeline, tree, connection, costs, setEnds, seeFrom, setTheme, clock, seconds };
+window.tfdude = { model, scene, inspector, timeline, tree, connection, costs, setEnds, seeFrom, setTheme, setShape };
