@@ -25,6 +25,10 @@ std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
   app.add_option("--allow-origin", settings.origins,
                  "other pages that may connect, such as https://app.foxglove.dev; may be repeated")
       ->allow_extra_args(false);
+  app.add_option("--urdf", settings.urdf, "URDF of the robot: shows the shapes of its links");
+  app.add_option("--packages", settings.packages,
+                 "folder of packages, in which the URDF's meshes are found; may be repeated")
+      ->allow_extra_args(false);
   cli::add_network_options(app, settings.options);
   cli::add_clock_option(app, [&](ClockKind kind) { settings.options.clock = kind; });
   cli::require_numbers(app);

@@ -10,6 +10,7 @@
 #include "../process.hpp"
 #include "foxglove_talk.hpp"
 #include "live.hpp"
+#include "meshes.hpp"
 #include "page_talk.hpp"
 #include "settings.hpp"
 #include "site.hpp"
@@ -31,16 +32,22 @@ std::string page_folder() {
   return std::filesystem::is_directory(installed, error) ? installed.string() : TFDUDE_PAGE_SOURCES;
 }
 
-Result<Files> read_files() {
+Result<Files> read_files(const Settings& settings) {
   Files files;
   if (auto page = files.add_folder(page_folder(), "/"); !page) return tl::unexpected(page.error());
-  for (const char* part : {"build/three.module.js", "examples/jsm/controls/OrbitControls.js"}) {
+  for (const char* part :
+       {"build/three.module.js", "examples/jsm/controls/OrbitControls.js",
+        "examples/jsm/loaders/ColladaLoader.js", "examples/jsm/loaders/STLLoader.js",
+        "examples/jsm/loaders/TGALoader.js"}) {
     if (auto three = files.add_file(std::string(kThree) + part, std::string("/three/") + part);
         !three) {
       return fail(Errc::kConfig,
                   three.error().message + "; Debian's package libjs-three is needed");
     }
   }
+  const auto left_out = web::add_meshes(settings.urdf, settings.packages, files);
+  if (!left_out) return tl::unexpected(left_out.error());
+  for (const std::string& remark : *left_out) spdlog::warn("{}", remark);
   return files;
 }
 
@@ -92,7 +99,7 @@ web::Site make_site(web::Live& live, const Files& files, const Access& access,
 }
 
 int serve(const Settings& settings, const sigset_t& stop_signals) {
-  const auto files = read_files();
+  const auto files = read_files(settings);
   auto live = files ? web::Live::open(settings.options, settings.server.rate)
                     : tl::unexpected(files.error());
   if (!live) {

@@ -16,7 +16,9 @@ inline constexpr int kWrongUsage = 2;
 struct Settings {
   Options options;
   ServerSettings server;
-  std::vector<std::string> origins;  ///< of other pages that may connect
+  std::string urdf;                   ///< of the robot whose shapes are shown; empty: none
+  std::vector<std::string> packages;  ///< folders of its packages
+  std::vector<std::string> origins;   ///< of other pages that may connect
 };
 
 /// Reads the command line. @return the exit status, if the program ends here

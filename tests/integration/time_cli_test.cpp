@@ -203,4 +203,25 @@ TEST_CASE("time: watch shows what is written and follows a frame that is moved")
   CHECK(echo.wait(in_time()) == 0);
 }
 
+TEST_CASE("cli: tree and lookup are redrawn until interrupted") {
+  const ThesisDaemons d;
+  Process tree = d.domain.start_cli({"tree", "--watch"});
+  REQUIRE(tree.wait_for_line("world  [robot]", in_time()));
+  REQUIRE(d.domain.cli({"remove", "hand_left"}).status == 0);
+  CHECK(eventually([&] {
+    (void)tree.runs();
+    const auto last = tree.out().rfind("world  [robot]");
+    const auto end = tree.out().find("[robot]\n\n", last + 10);
+    return end != std::string::npos && tree.out().find("hand_left", last) == std::string::npos;
+  }));
+  tree.signal(SIGINT);
+  CHECK(tree.wait(in_time()) == 0);
+  Process lookup = d.domain.start_cli({"lookup", "world", "camera", "--watch"});
+  REQUIRE(lookup.wait_for_line("camera in world", in_time()));
+  REQUIRE(lookup.wait_for_line("camera in world", in_time()));
+  lookup.signal(SIGINT);
+  CHECK(lookup.wait(in_time()) == 0);
+  CHECK(d.domain.cli({"lookup", "world", "camera", "--watch", "--at", "1"}).status == 2);
+}
+
 }  // namespace tfdude

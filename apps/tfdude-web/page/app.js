@@ -256,6 +256,10 @@ function key(event) {
 const stored = localStorage.getItem('tfdude-theme');
 setTheme(stored ? stored === 'light' : window.matchMedia('(prefers-color-scheme: light)').matches);
 listen();
+scene.meshes.load().then((any) => {
+  document.querySelector('[data-show=meshes]').hidden = !any;
+  later.update = true;
+});
 drawJoints([]);
 drawEvents([]);
 requestAnimationFrame(picture);

@@ -2,6 +2,7 @@
 import * as THREE from '/three/build/three.module.js';
 import { OrbitControls } from '/three/examples/jsm/controls/OrbitControls.js';
 import { EXACT, GIVEN, UNSPECIFIED } from './model.js';
+import { Meshes } from './meshes.js';
 import { factor } from './spatial.js';
 import { axesMaterial, coneMaterial, ellipsoidMaterial, linkMaterial, pointMaterial } from './shaders.js';
 
@@ -102,6 +103,7 @@ export class Scene {
     this.controls.enableKeys = false;
     this.controls.addEventListener('change', () => { this.dirty = true; });
     this.makeParts();
+    this.meshes = new Meshes(this);
     this.dirty = true;
   }
 
@@ -203,6 +205,7 @@ export class Scene {
       ++this.points.n;
     }
     for (const part of [this.axes, this.links, this.points]) part.end();
+    this.meshes.update();
     this.dirty = true;
   }
 
