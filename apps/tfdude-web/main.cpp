@@ -68,7 +68,7 @@ bool is_loopback(const std::string& address) {
 }
 
 web::Site make_site(web::Live& live, const Files& files, const Access& access,
-                    const std::function<void(std::function<void()>)>& post) {
+                    const web::Post& post) {
   web::Site site;
   site.get = [&files, access](const web::Request& request) {
     if (const auto reply = web::reject(access, request)) return *reply;
@@ -110,26 +110,24 @@ int serve(const Settings& settings, const sigset_t& stop_signals) {
   access.loopback = is_loopback(settings.server.address);
   if (!access.loopback) access.token = new_token();
   access.origins = settings.origins;
-  std::unique_ptr<web::Server> server;
-  const auto post = [&server](std::function<void()> function) {
-    server->post(std::move(function));
-  };
-  auto opened = web::Server::open(settings.server, make_site(**live, *files, access, post));
+  const auto opened = web::Server::open(settings.server, [&](const web::Post& post) {
+    return make_site(**live, *files, access, post);
+  });
   if (!opened) {
     spdlog::error("{}", opened.error().message);
     return opened.error().code == Errc::kInvalidInput ? web::kWrongUsage : cli::kRefused;
   }
-  server = std::move(*opened);
+  web::Server& server = **opened;
   const bool six = settings.server.address.find(':') != std::string::npos;
   const std::string host = six ? "[" + settings.server.address + "]" : settings.server.address;
-  std::printf("open http://%s:%u/%s\n", host.c_str(), server->port(),
+  std::printf("open http://%s:%u/%s\n", host.c_str(), server.port(),
               access.token.empty() ? "" : ("?token=" + access.token).c_str());
   std::fflush(stdout);
   int signal = 0;
   sigwait(&stop_signals, &signal);
   spdlog::info("stopping on signal {}", signal);
   (*live)->worker().stop();
-  server->stop();
+  server.stop();
   return 0;
 }
 

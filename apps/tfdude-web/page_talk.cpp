@@ -15,8 +15,6 @@ constexpr std::size_t kBehind = std::size_t{256} << 10U;  // [B]
 // Covariances change slowly and are large: every so many pictures.
 constexpr int kCovarianceEvery = 15;
 
-using Post = std::function<void(std::function<void()>)>;
-
 class PageTalk final : public Talk {
  public:
   PageTalk(Live& live, Post post) : live_(live), post_(std::move(post)) { live_.count_viewer(1); }

@@ -12,8 +12,7 @@ namespace tfdude::web {
 inline constexpr const char* kPageProtocol = "tfdude.v1";
 
 /// What one page is told. A page that takes too long misses pictures, and then gets all that has
-/// changed since its last one. `live` and `server` must outlive it.
-[[nodiscard]] std::unique_ptr<Talk> talk_to_page(Live& live,
-                                                 std::function<void(std::function<void()>)> post);
+/// changed since its last one. `live` must outlive it.
+[[nodiscard]] std::unique_ptr<Talk> talk_to_page(Live& live, Post post);
 
 }  // namespace tfdude::web

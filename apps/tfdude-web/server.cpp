@@ -225,8 +225,10 @@ class Visit : public std::enable_shared_from_this<Visit> {
 
 class BeastServer final : public Server {
  public:
-  explicit BeastServer(Site site) : acceptor_(context_), timer_(context_) {
-    shared_.site = std::move(site);
+  explicit BeastServer(const std::function<Site(const Post&)>& make_site)
+      : acceptor_(context_), timer_(context_) {
+    shared_.site = make_site(
+        [this](std::function<void()> function) { asio::post(context_, std::move(function)); });
   }
   ~BeastServer() override { stop(); }
   BeastServer(const BeastServer&) = delete;
@@ -254,7 +256,6 @@ class BeastServer final : public Server {
     return {};
   }
 
-  void post(std::function<void()> function) override { asio::post(context_, std::move(function)); }
   [[nodiscard]] std::uint16_t port() const override { return port_; }
 
   void stop() override {
@@ -301,8 +302,9 @@ class BeastServer final : public Server {
 
 }  // namespace
 
-Result<std::unique_ptr<Server>> Server::open(const ServerSettings& settings, Site site) {
-  auto server = std::make_unique<BeastServer>(std::move(site));
+Result<std::unique_ptr<Server>> Server::open(const ServerSettings& settings,
+                                             const std::function<Site(const Post&)>& make_site) {
+  auto server = std::make_unique<BeastServer>(make_site);
   if (auto listening = server->listen(settings); !listening) {
     return tl::unexpected(listening.error());
   }

@@ -73,6 +73,9 @@ struct Site {
   std::function<void()> tick;
 };
 
+/// Runs a function on the server's thread; from any thread.
+using Post = std::function<void(std::function<void()>)>;
+
 struct ServerSettings {
   std::string address = "127.0.0.1";
   std::uint16_t port = 8765;
@@ -82,16 +85,15 @@ struct ServerSettings {
 /// Serves on a thread of its own while it exists.
 class Server {
  public:
+  /// @param make_site  gets what talks may use until the server is destroyed
   /// @return kInvalidInput (the address), kTransport (the port is taken).
-  [[nodiscard]] static Result<std::unique_ptr<Server>> open(const ServerSettings& settings,
-                                                            Site site);
+  [[nodiscard]] static Result<std::unique_ptr<Server>> open(
+      const ServerSettings& settings, const std::function<Site(const Post&)>& make_site);
   virtual ~Server() = default;
   Server() = default;
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// Runs a function on the server's thread; from any thread.
-  virtual void post(std::function<void()> function) = 0;
   /// The port, also if it was given as 0.
   [[nodiscard]] virtual std::uint16_t port() const = 0;
   /// Closes all connections and waits for the thread. No function is called afterwards.

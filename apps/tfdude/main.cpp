@@ -356,7 +356,7 @@ int run(Arguments arguments, const Command& command, const cli::LocalCommand& lo
 // NOLINTNEXTLINE(bugprone-exception-escape): only a lack of memory throws, and should end it
 int main(int argc, char** argv) {
   // It has options of its own.
-  if (argc > 1 && argv[1] == std::string_view("web")) return cli::become_web(argc, argv);
+  if (argc > 1 && argv[1] == std::string_view("web")) return cli::become_web(argc, argv, 1);
   Arguments arguments;
   Command command;
   long timeout_ms = arguments.options.timeout.count();
@@ -377,7 +377,7 @@ int main(int argc, char** argv) {
   add_joint_commands(app, arguments, command, local);
   add_description_command(app, arguments, command);
   cli::add_recording_commands(app, arguments, command, local);
-  cli::add_web_command(app, local);
+  cli::add_web_command(app, argc, argv, local);
   cli::add_keys_commands(app, arguments.keys, local);
   cli::require_numbers(app);
   try {

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <unistd.h>
 #include <vector>
@@ -12,12 +13,14 @@
 
 namespace tfdude::cli {
 
-int become_web(int argc, char** argv) {
+int become_web(int argc, char** argv, int command) {
   std::error_code ignored;
   const auto own = std::filesystem::read_symlink("/proc/self/exe", ignored);
   std::string program = (own.parent_path() / "tfdude-web").string();
   std::vector<char*> arguments{program.data()};
-  for (int i = 2; i < argc; ++i) arguments.push_back(argv[i]);
+  for (int i = 1; i < argc; ++i) {
+    if (i != command) arguments.push_back(argv[i]);
+  }
   arguments.push_back(nullptr);
   execv(program.c_str(), arguments.data());
   const std::error_code why(errno, std::generic_category());
@@ -25,12 +28,15 @@ int become_web(int argc, char** argv) {
   return kWrongUsage;
 }
 
-void add_web_command(CLI::App& app, LocalCommand& chosen) {
+void add_web_command(CLI::App& app, int argc, char** argv, LocalCommand& chosen) {
   app.add_subcommand("web", "show all frames and their uncertainty in a browser")
-      ->callback([&chosen] {
-        chosen = [](const Arguments& /*arguments*/) {
-          std::fputs("tfdude: write web first, and its options behind it\n", stderr);
-          return kWrongUsage;
+      ->allow_extras()
+      ->footer("Example: tfdude web --port 8765")
+      ->callback([&chosen, argc, argv] {
+        chosen = [argc, argv](const Arguments& /*arguments*/) {
+          int command = 1;
+          while (argv[command] != std::string_view("web")) ++command;
+          return become_web(argc, argv, command);
         };
       });
 }

@@ -11,8 +11,10 @@ import { Tree } from './tree.js';
 import { Color } from '/three/build/three.module.js';
 
 // Distinct hues of one lightness; one a partition, in the order of their names.
-const DARK = ['#7c9cff', '#f2a65a', '#5fd4a0', '#e58bd2', '#e5d15a', '#5cc8e8', '#ff8a80', '#b39dff', '#9fd05f', '#d7a98c'];
-const LIGHT = ['#3d63e0', '#c2640a', '#128a57', '#b23c9a', '#8a7400', '#0a7fa8', '#cf3b34', '#6d4fd0', '#4f8a10', '#8d5a3a'];
+const DARK = ['#7c9cff', '#f2a65a', '#5fd4a0', '#e58bd2', '#e5d15a', '#5cc8e8',
+  '#ff8a80', '#b39dff', '#9fd05f', '#d7a98c'];
+const LIGHT = ['#3d63e0', '#c2640a', '#128a57', '#b23c9a', '#8a7400', '#0a7fa8',
+  '#cf3b34', '#6d4fd0', '#4f8a10', '#8d5a3a'];
 
 const by = (id) => document.getElementById(id);
 const model = new Model();
@@ -21,7 +23,8 @@ const labels = new Labels(by('labels'), scene);
 const tree = new Tree(model, { choose });
 const inspector = new Inspector(model, { ends: setEnds });
 const timeline = new Timeline(model, { ask: (request) => connection.send(request) });
-const costs = [];            // of the last pictures, in ms
+const costs = [];            // what the script took for each of the last pictures, without drawing [ms]
+let waiting = 0;             // the same, for messages since the last picture
 let fitted = false;
 let sigmasDue = 0;
 let behindText = 0;
@@ -42,7 +45,7 @@ const connection = new Connection({
     if (!model.take(buffer)) return;
     if (!fitted && model.known.some((known) => known)) later.fit = true;
     later.update = true;
-    costs.push(performance.now() - begin);
+    waiting += performance.now() - begin;
   },
   state(name) {
     by('link').className = `link ${name === 'open' ? 'good' : 'bad'}`;
@@ -59,11 +62,11 @@ const later = { update: false, fit: false };
 function takeStructure(message) {
   model.setStructure(message);
   by('count-frames').textContent = model.count;
-  const roots = by('root');
+  const roots = by('root'), option = (id) => element('option', { value: id }, id);
   const others = model.ids.filter((id) => model.parent[model.index.get(id)] >= 0).sort();
   roots.replaceChildren(
-    element('optgroup', { label: 'roots' }, ...model.roots().map((i) => element('option', { value: model.ids[i] }, model.ids[i]))),
-    element('optgroup', { label: 'frames' }, ...others.map((id) => element('option', { value: id }, id))));
+    element('optgroup', { label: 'roots' }, ...model.roots().map((i) => option(model.ids[i]))),
+    element('optgroup', { label: 'frames' }, ...others.map(option)));
   roots.value = model.root;
   scene.a = model.index.get(inspector.a.value) ?? -1;
   scene.b = model.index.get(inspector.b.value) ?? -1;
@@ -74,7 +77,8 @@ function takeStructure(message) {
   later.update = true;
   const notice = by('notice');
   notice.hidden = model.count > 0;
-  notice.replaceChildren(element('b', {}, 'No frames yet'), 'No partition answers in this domain. Start one, for example with scripts/demo.');
+  notice.replaceChildren(element('b', {}, 'No frames yet'),
+    'No partition answers in this domain. Start one, for example with scripts/demo.');
 }
 
 function takeStatus({ edges, joints, span }) {
@@ -135,7 +139,7 @@ function setTheme(light) {
 
 function picture(time) {
   requestAnimationFrame(picture);
-  const begin = performance.now();
+  let begin = performance.now();
   if (later.update) {
     later.update = false;
     // Poses move at each picture; covariances need not be computed for all frames as often.
@@ -150,20 +154,26 @@ function picture(time) {
       fitted = true;
       scene.fit();
     }
-    costs.push(performance.now() - begin);
-    if (costs.length > 240) costs.splice(0, 120);
   }
-  if (scene.draw()) labels.draw();
+  const drawing = performance.now(), drawn = scene.draw();
+  begin += performance.now() - drawing;
+  if (drawn) labels.draw();
   if (time > behindText) {
     behindText = time + 500;
     tree.draw();
     inspector.draw();
     timeline.draw();
-    by('legend').textContent = `grid ${scene.gridStep >= 1 ? `${scene.gridStep} m` : `${Math.round(scene.gridStep * 1000)} mm`}`;
+    by('legend').textContent = `grid ${scene.gridStep >= 1 ? scene.gridStep : Math.round(scene.gridStep * 1000)} ${
+      scene.gridStep >= 1 ? 'm' : 'mm'}`;
   } else if (inspector.dirty && time > (inspector.due || 0)) {
     inspector.due = time + 100;
     inspector.draw();
   }
+  if (drawn) {
+    costs.push(performance.now() - begin + waiting);
+    waiting = 0;
+  }
+  if (costs.length > 2000) costs.splice(0, 1000);
 }
 
 /** How many standard deviations the shapes have. */

@@ -1,4 +1,5 @@
 // B in A: the numbers that the server has got from the owners, exactly as `tfdude lookup` prints them.
+import { UNSPECIFIED } from './model.js';
 import { Plot } from './plot.js';
 import { eigen, rotation, toRpy } from './spatial.js';
 import { clock, degrees, element, metres, seconds } from './text.js';
@@ -6,6 +7,8 @@ import { clock, degrees, element, metres, seconds } from './text.js';
 const NAMES = ['x', 'y', 'z', 'roll', 'pitch', 'yaw'];
 // Of a normal distribution in three dimensions.
 const SHARES = { 1: '19.9 %', 2: '73.9 %', 2.795: '95 %', 3: '97.1 %', 30: 'all' };
+
+const note = (text, kind) => element('p', { class: `note ${kind}` }, text);
 
 export class Inspector {
   /** @param on  functions: ends(a, b) */
@@ -17,7 +20,8 @@ export class Inspector {
     this.k = 3;
     this.box = document.getElementById('inspector');
     const end = (letter) => element('input', {
-      type: 'text', id: `end-${letter}`, list: 'all-frames', placeholder: letter === 'a' ? 'seen from' : 'choose a frame',
+      type: 'text', id: `end-${letter}`, list: 'all-frames',
+      placeholder: letter === 'a' ? 'seen from' : 'choose a frame',
       spellcheck: 'false', autocomplete: 'off', 'aria-label': `Frame ${letter.toUpperCase()}`,
       onchange: () => this.on.ends(this.a.value, this.b.value),
     });
@@ -30,7 +34,8 @@ export class Inspector {
     this.choices = element('datalist', { id: 'all-frames' });
     this.box.append(element('div', { class: 'ends' },
       element('b', { class: 'a' }, 'A'), this.a,
-      element('button', { class: 'swap icon', title: 'Swap (X)', onclick: () => this.on.ends(this.b.value, this.a.value) }, '⇅'),
+      element('button', { class: 'swap icon', title: 'Swap (X)',
+        onclick: () => this.on.ends(this.b.value, this.a.value) }, '⇅'),
       element('b', { class: 'b' }, 'B'), this.b), this.choices, this.body, this.plotBox, this.more);
     this.draw();
   }
@@ -71,9 +76,9 @@ export class Inspector {
     const { answer } = this;
     this.plotBox.hidden = !answer || Boolean(answer.error) || this.plot.samples.length < 2;
     if (!this.b.value) {
-      parts.push(element('p', { class: 'note' }, 'Choose a frame in the list or in the picture to see where it is, and how sure that is.'));
+      parts.push(note('Choose a frame in the list or in the picture to see where it is, and how sure that is.', ''));
     } else if (!answer) {
-      parts.push(element('p', { class: 'note' }, 'Asking its owners …'));
+      parts.push(note('Asking its owners …', ''));
     } else {
       if (answer.error) parts.push(element('p', { class: 'note bad' }, answer.error));
       else parts.push(...this.pose(answer));
@@ -97,15 +102,17 @@ export class Inspector {
       onclick: () => { this.plot.component = i; this.draw(); },
     },
     element('th', { class: i < 3 ? name : '' }, name),
-    element('td', {}, i < 3 ? `${answer.translation[i].toFixed(6)} m` : `${((rpy[i - 3] * 180) / Math.PI).toFixed(4)}°`),
+    element('td', {}, i < 3 ? `${answer.translation[i].toFixed(6)} m`
+      : `${((rpy[i - 3] * 180) / Math.PI).toFixed(4)}°`),
     element('td', { class: 's' }, s ? `± ${i < 3 ? metres(s[i]) : degrees(s[i])}` : '')));
     const notes = [];
     const { basis } = answer;
-    if (answer.unreachable) notes.push(element('p', { class: 'note bad' }, `${answer.unreachable}. These are its last values.`));
+    if (answer.unreachable) notes.push(note(`${answer.unreachable}. These are its last values.`, 'bad'));
     if (!complete) {
-      notes.push(element('p', { class: 'note warn' }, `σ is not given for ${basis.unspecified.join(', ')}: these numbers are of the other edges only.`));
+      const edges = basis.unspecified.join(', ');
+      notes.push(note(`σ is not given for ${edges}: these numbers are of the other edges only.`, 'warn'));
     }
-    if (basis.bound) notes.push(element('p', { class: 'note' }, 'σ is an upper bound: some correlations are not known.'));
+    if (basis.bound) notes.push(note('σ is an upper bound: some correlations are not known.', ''));
     const copy = element('button', { class: 'copy', title: 'Copy as JSON',
       onclick: () => navigator.clipboard.writeText(JSON.stringify(answer)) }, 'copy');
     return [element('h2', {}, 'B in A', copy), element('table', { class: 'pose' }, element('tbody', {}, ...rows)),
@@ -138,7 +145,8 @@ export class Inspector {
     const most = Math.sqrt(values[0]) || 1;
     return [element('h2', {}, `Ellipsoid · ${this.k} σ contains ${SHARES[this.k]}`),
       element('div', { class: 'bars' }, ...values.map((value, i) => element('div', {},
-        element('span', { class: 'name', title: 'direction in A' }, `along ${vectors[i].map((c) => c.toFixed(2)).join(' ')}`),
+        element('span', { class: 'name', title: 'direction in A' },
+          `along ${vectors[i].map((c) => c.toFixed(2)).join(' ')}`),
         element('span', { class: 'bar' }, element('i', { style: `width:${(100 * Math.sqrt(value)) / most}%` })),
         element('span', { class: 'n' }, metres(this.k * Math.sqrt(value))))))];
   }
@@ -149,7 +157,8 @@ export class Inspector {
       parts.push(element('h2', {}, 'Path by owners'), element('ul', { class: 'path' }, ...answer.path.map((segment) => {
         const owner = model.partitions.findIndex((one) => one.name === segment.partition);
         const gone = owner >= 0 && !model.partitions[owner].reachable;
-        return element('li', { style: `--colour:${gone ? 'var(--faint)' : this.colours[owner % this.colours.length]}`, class: gone ? 'gone' : '' },
+        const colour = gone ? 'var(--faint)' : this.colours[owner % this.colours.length];
+        return element('li', { style: `--colour:${colour}`, class: gone ? 'gone' : '' },
           element('b', {}, segment.partition), `  ${segment.from} → ${segment.to}${gone ? ', unreachable' : ''}`);
       })));
     }
@@ -157,7 +166,8 @@ export class Inspector {
     if (a === undefined || b === undefined) return parts;
     const way = model.path(a, b);
     if (!way) {
-      parts.push(element('p', { class: 'note' }, `${answer.from} is below ${model.ids[model.rootOf(a)]}, ${answer.to} below ${model.ids[model.rootOf(b)]}.`));
+      const root = (i) => model.ids[model.rootOf(i)];
+      parts.push(note(`${answer.from} is below ${root(a)}, ${answer.to} below ${root(b)}.`, ''));
       return parts;
     }
     return parts.concat(this.budget([...way.up, ...way.down]));
@@ -166,13 +176,19 @@ export class Inspector {
   /** The edges of the path, with their own deviations: what to improve first. */
   budget(edges) {
     const { model } = this;
-    const sizes = edges.map((i) => ({ i, s: Math.sqrt(model.sigma[36 * i] + model.sigma[36 * i + 7] + model.sigma[36 * i + 14]),
-      r: Math.sqrt(model.sigma[36 * i + 21] + model.sigma[36 * i + 28] + model.sigma[36 * i + 35]) }));
+    const total = (i, ...places) => Math.sqrt(places.reduce((sum, k) => sum + model.sigma[36 * i + k], 0));
+    const sizes = edges.map((i) => ({ i, s: total(i, 0, 7, 14), r: total(i, 21, 28, 35) }));
     const most = Math.max(...sizes.map(({ s }) => s), 1e-12), turn = Math.max(...sizes.map(({ r }) => r), 1e-12);
     if (sizes.length === 0) return [];
-    return [element('h2', {}, 'σ of each edge'), element('div', { class: 'bars' }, ...sizes.map(({ i, s, r }) => element('div', {},
-      element('span', { class: 'name', title: model.ids[i] }, model.ids[i]),
-      element('span', { class: 'bar', title: `${metres(s)}, ${degrees(r)}` }, element('i', { style: `width:${(100 * s) / most || (100 * r) / turn}%` })),
-      element('span', { class: 'n' }, model.sigmaKind[i] === 2 ? 'not given' : s > 0 ? metres(s) : r > 0 ? degrees(r) : 'exact'))))];
+    const rows = sizes.map(({ i, s, r }) => {
+      const width = (100 * s) / most || (100 * r) / turn;
+      const text = s > 0 ? metres(s) : r > 0 ? degrees(r) : 'exact';
+      return element('div', {},
+        element('span', { class: 'name', title: model.ids[i] }, model.ids[i]),
+        element('span', { class: 'bar', title: `${metres(s)}, ${degrees(r)}` },
+          element('i', { style: `width:${width}%` })),
+        element('span', { class: 'n' }, model.sigmaKind[i] === UNSPECIFIED ? 'not given' : text));
+    });
+    return [element('h2', {}, 'σ of each edge'), element('div', { class: 'bars' }, ...rows)];
   }
 }

@@ -32,8 +32,8 @@ export class Labels {
     g.font = '12px system-ui, "DejaVu Sans", sans-serif';
     g.textBaseline = 'middle';
     const taken = [], shown = new Set();
-    const colours = { ink: colour('--ink'), soft: colour('--soft'), ground: colour('--ground'), a: colour('--a'), b: colour('--b'),
-      faint: colour('--faint') };
+    const colours = { ink: colour('--ink'), soft: colour('--soft'), ground: colour('--ground'),
+      a: colour('--a'), b: colour('--b'), faint: colour('--faint') };
     for (const label of this.ranked()) {
       if (shown.size >= MOST) break;
       const w = this.width(g, label.id), spot = this.spot(label, w, taken);
@@ -62,7 +62,8 @@ export class Labels {
       const important = i === scene.b || i === scene.a ? 0 : i === this.hovered ? 1 : scene.path.has(i) ? 2
         : model.parent[i] < 0 ? 3 : 4;
       if (!scene.show.names && important > 1) continue;
-      list.push({ i, id: model.ids[i], rank: important, near: place.distance * (this.before.has(i) ? 0.7 : 1), ...place });
+      const near = place.distance * (this.before.has(i) ? 0.7 : 1);
+      list.push({ i, id: model.ids[i], rank: important, near, ...place });
     }
     return list.sort((p, q) => p.rank - q.rank || p.near - q.near);
   }

@@ -2,9 +2,11 @@
 import { clock, degrees, element, metres } from './text.js';
 
 export function drawOwners(model, colours) {
-  document.getElementById('owners').replaceChildren(...model.partitions.map(({ name, reachable, why }, i) => element('span', {
-    class: reachable ? '' : 'gone', style: `--colour:${colours[i % colours.length]}`, title: reachable ? `partition ${name}` : why,
-  }, reachable ? name : `${name} unreachable`)));
+  const made = model.partitions.map(({ name, reachable, why }, i) => element('span', {
+    class: reachable ? '' : 'gone', style: `--colour:${colours[i % colours.length]}`,
+    title: reachable ? `partition ${name}` : why,
+  }, reachable ? name : `${name} unreachable`));
+  document.getElementById('owners').replaceChildren(...made);
 }
 
 export function drawJoints(joints) {
@@ -20,7 +22,8 @@ export function drawJoints(joints) {
     const deviation = stddev === null ? '' : ` ± ${show(stddev)}`;
     const made = element('div', { class: 'joint', title: `moves ${joint.frame}` }, element('div', {},
       element('span', { class: 'name' }, joint.name),
-      element('span', { class: 'n' }, joint.measured === false ? `assumed ${show(joint.position)}` : `${show(joint.position)}${deviation}`)));
+      element('span', { class: 'n' }, joint.measured ? `${show(joint.position)}${deviation}`
+        : `assumed ${show(joint.position)}`)));
     const { limits } = joint;
     if (limits && limits[1] > limits[0]) {
       const [low, high] = limits, at = (v) => Math.max(0, Math.min(100, (100 * (v - low)) / (high - low)));
@@ -38,7 +41,8 @@ export function drawJoints(joints) {
 
 export function drawEvents(events) {
   document.getElementById('count-events').textContent = events.length || '';
-  document.getElementById('events').replaceChildren(...(events.length ? [...events].reverse().map((event) => element('div', {
-    class: `event ${event.level}` }, element('time', {}, clock(BigInt(event.time_ns))), event.message))
-    : [element('div', { class: 'empty' }, 'Nothing has happened since the server started')]));
+  const made = [...events].reverse().map((event) => element('div', { class: `event ${event.level}` },
+    element('time', {}, clock(BigInt(event.time_ns))), event.message));
+  if (!made.length) made.push(element('div', { class: 'empty' }, 'Nothing has happened since the server started'));
+  document.getElementById('events').replaceChildren(...made);
 }

@@ -36,11 +36,12 @@ export class Plot {
     const end = samples[samples.length - 1].t;
     let low = Infinity, high = -Infinity;
     // A few samples of a large deviation, as before the first measurement, would flatten all others.
-    const usual = samples.map(({ sigma }) => (sigma ? k * sigma[component] : 0)).sort((a, b) => a - b)[samples.length >> 1];
-    for (const { value, sigma } of samples) {
-      const band = Math.min(sigma ? k * sigma[component] : 0, 4 * usual);
-      low = Math.min(low, value[component] - band);
-      high = Math.max(high, value[component] + band);
+    const band = ({ sigma }) => (sigma ? k * sigma[component] : 0);
+    const usual = samples.map(band).sort((a, b) => a - b)[samples.length >> 1];
+    for (const sample of samples) {
+      const width = Math.min(band(sample), 4 * usual);
+      low = Math.min(low, sample.value[component] - width);
+      high = Math.max(high, sample.value[component] + width);
     }
     const margin = Math.max((high - low) * 0.08, Math.abs(high) * 1e-9, 1e-12);
     low -= margin; high += margin;
@@ -59,15 +60,17 @@ export class Plot {
     }
     g.textAlign = 'center';
     g.textBaseline = 'alphabetic';
-    for (const s of [-30, -20, -10, 0]) g.fillText(s ? `${s} s` : 'now', Math.min(right - 10, Math.max(left + 12, x(end + s))), height - 4);
+    for (const s of [-30, -20, -10, 0]) {
+      g.fillText(s ? `${s} s` : 'now', Math.min(right - 10, Math.max(left + 12, x(end + s))), height - 4);
+    }
     g.save();
     g.beginPath();
     g.rect(left, top, right - left, bottom - top);
     g.clip();
     g.fillStyle = colour('--accent-soft');
     g.beginPath();
-    samples.forEach((s, n) => g[n ? 'lineTo' : 'moveTo'](x(s.t), y(s.value[component] + k * (s.sigma ? s.sigma[component] : 0))));
-    for (const s of [...samples].reverse()) g.lineTo(x(s.t), y(s.value[component] - k * (s.sigma ? s.sigma[component] : 0)));
+    samples.forEach((s, n) => g[n ? 'lineTo' : 'moveTo'](x(s.t), y(s.value[component] + band(s))));
+    for (const s of [...samples].reverse()) g.lineTo(x(s.t), y(s.value[component] - band(s)));
     g.fill();
     g.strokeStyle = colour('--accent');
     g.lineWidth = 1.5;

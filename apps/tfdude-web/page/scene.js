@@ -114,7 +114,7 @@ export class Scene {
     this.points = new Instances(this.scene, ribbon(1), pointMaterial(), { origin: 3, colour: 4 });
     this.coneFans = new Instances(this.scene, cones(28), coneMaterial(), {
       origin: 3, quaternion: 4, sigmaDiagonal: 3, sigmaOff: 3, colour: 4 });
-    this.ellipsoids = new Instances(this.scene, new THREE.SphereBufferGeometry(1, 28, 18), ellipsoidMaterial(), {
+    this.ellipsoids = new Instances(this.scene, new THREE.SphereBufferGeometry(1, 22, 14), ellipsoidMaterial(), {
       origin: 3, axis0: 3, axis1: 3, axis2: 3, colour: 4 });
     this.links.mesh.renderOrder = 1;
     this.axes.mesh.renderOrder = 2;

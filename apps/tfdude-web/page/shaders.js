@@ -65,7 +65,8 @@ export function axesMaterial() {
       shade = vec4(look.y < 0.0 ? vec3(mix(grey, 0.5, 0.6)) : base, abs(look.y));
       across = corner.z;
       vec3 tip = origin + turned(quaternion, axis) * lengthAt(origin) * look.x;
-      gl_Position = line(origin, tip, corner.y, corner.z, look.x > 1.0 ? 5.0 : size * pixels / max(1e-9, -(viewMatrix * vec4(origin, 1.0)).z) < 24.0 ? 2.6 : 3.6);
+      bool small = size * pixels < -24.0 * (viewMatrix * vec4(origin, 1.0)).z;
+      gl_Position = line(origin, tip, corner.y, corner.z, look.x > 1.0 ? 5.0 : small ? 2.6 : 3.6);
     }`, `
     varying vec4 shade; varying float across;
     void main() { gl_FragColor = vec4(shade.rgb, shade.a * smoothstep(1.0, 0.5, abs(across))); }`);
@@ -90,8 +91,8 @@ export function pointMaterial() {
     }`);
 }
 
-// The tip of an axis e moves to Exp(δθ) e. The ring has δθ at k standard deviations in the plane across e: the errors
-// are expressed in the frame itself, so their covariance there is a block of the given one.
+// The tip of an axis e moves to Exp(δθ) e. The ring has δθ at k standard deviations in the plane across e: errors are
+// expressed in the frame itself, so their covariance there is a block of the given one.
 export function coneMaterial() {
   return material({ k: { value: 3 }, ...axisColours() }, `
     attribute vec3 corner; attribute vec3 origin; attribute vec4 quaternion;

@@ -1,5 +1,5 @@
-// Poses are 7 numbers in a Float64Array: quaternion x, y, z, w, then translation. A covariance is 36 numbers, row by row,
-// of the right perturbation with the translation first, as everywhere in tf-dude.
+// Poses are 7 numbers in a Float64Array: quaternion x, y, z, w, then translation. A covariance is 36 numbers, row by
+// row, of the right perturbation with the translation first, as everywhere in tf-dude.
 
 /** Writes X_AB · X_BC to out at o. */
 export function compose(out, o, X, a, Y, b) {

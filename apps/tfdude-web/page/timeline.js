@@ -83,7 +83,8 @@ export class Timeline {
       this.output.textContent = model.count ? `now · ${clock(model.now)}` : '';
     } else {
       const back = Number(this.held - this.at) * 1e-9;
-      this.output.textContent = back < 0.0005 ? `paused · ${clock(this.at)}` : `${seconds(back)} earlier · ${clock(this.at)}`;
+      const state = back < 0.0005 ? 'paused' : `${seconds(back)} earlier`;
+      this.output.textContent = `${state} · ${clock(this.at)}`;
     }
   }
 }

@@ -67,8 +67,12 @@ export class Tree {
   }
 
   foldAll() {
-    if (this.folded.size) this.folded.clear();
-    else this.model.children.forEach((list, i) => { if (list.length && this.model.parent[i] >= 0) this.folded.add(this.model.ids[i]); });
+    const { children, parent, ids } = this.model;
+    if (this.folded.size) {
+      this.folded.clear();
+    } else {
+      children.forEach((list, i) => { if (list.length && parent[i] >= 0) this.folded.add(ids[i]); });
+    }
     this.layout();
   }
 
@@ -86,10 +90,12 @@ export class Tree {
   row(row, n) {
     const { model } = this, { i } = row, id = model.ids[i];
     const reachable = model.isReachable(i);
+    const colour = reachable ? this.colours[model.owner[i] % this.colours.length] : 'var(--faint)';
+    // Deep levels take less room, so that names keep theirs.
+    const indent = 6 + Math.min(row.depth, 6) * 10 + Math.min(20, Math.max(0, row.depth - 6)) * 4;
     const made = element('div', {
       class: `row${id === this.cursor ? ' at' : ''}${reachable ? '' : ' gone'}${model.shown[i] ? '' : ' out'}`,
-      style: `top:${n * ROW}px;padding-left:${6 + Math.min(row.depth, 6) * 10 + Math.min(20, Math.max(0, row.depth - 6)) * 4}px;--colour:${reachable ? this.colours[model.owner[i] %
-        this.colours.length] : 'var(--faint)'}`,
+      style: `top:${n * ROW}px;padding-left:${indent}px;--colour:${colour}`,
       role: 'treeitem', 'aria-selected': id === this.cursor, title: this.titleOf(i),
       onclick: (event) => { this.cursor = id; this.on.choose(i, event.shiftKey); this.box.focus(); },
     });
@@ -106,7 +112,8 @@ export class Tree {
     if (at < 0) {
       made.append(id);
     } else {
-      made.append(id.slice(0, at), element('mark', {}, id.slice(at, at + this.sought.length)), id.slice(at + this.sought.length));
+      const end = at + this.sought.length;
+      made.append(id.slice(0, at), element('mark', {}, id.slice(at, end)), id.slice(end));
     }
     return made;
   }
@@ -126,7 +133,8 @@ export class Tree {
     if (model.waits[i]) lines.push(`waits for its parent ${model.waits[i]}`);
     if (!model.shown[i]) lines.push(`not connected with ${model.root}: its root is ${model.ids[model.rootOf(i)]}`);
     const age = model.age(i), rate = model.rates[model.ids[i]];
-    if (age !== null) lines.push(`newest sample ${seconds(Math.max(0, age))} ago${rate && rate.hz ? `, ${hertz(rate.hz)}` : ''}`);
+    if (age !== null) lines.push(`newest sample ${seconds(Math.max(0, age))} ago`);
+    if (age !== null && rate && rate.hz) lines.push(hertz(rate.hz));
     if (rate && rate.refused) lines.push(`${rate.refused} samples rejected`);
     if (model.parent[i] >= 0 && model.sigmaKind[i] === UNSPECIFIED) lines.push('σ not given');
     return lines.join('\n');
@@ -134,10 +142,13 @@ export class Tree {
 
   figures(i) {
     const { model } = this, made = element('span', { class: 'figures' });
-    if (model.waits[i]) return element('span', { class: 'figures' }, element('span', { class: 'none' }, `waits for ${model.waits[i]}`));
-    if (!model.isReachable(i)) return element('span', { class: 'figures' }, element('span', { class: 'none' }, 'unreachable'));
-    if (model.noData[i] && model.parent[i] >= 0) return element('span', { class: 'figures' }, element('span', { class: 'none' }, 'no data'));
-    if (!model.shown[i] && model.parent[i] < 0) return element('span', { class: 'figures' }, element('span', { class: 'none' }, 'unconnected'));
+    const remark = model.waits[i] ? `waits for ${model.waits[i]}` : !model.isReachable(i) ? 'unreachable'
+      : model.noData[i] && model.parent[i] >= 0 ? 'no data'
+        : !model.shown[i] && model.parent[i] < 0 ? 'unconnected' : '';
+    if (remark) {
+      made.append(element('span', { class: 'none' }, remark));
+      return made;
+    }
     let sigma = '';
     if (model.shown[i] && model.ids[i] !== model.root) {
       const c = 36 * i;
