@@ -30,6 +30,7 @@ int become_web(int argc, char** argv, int command) {
 
 void add_web_command(CLI::App& app, int argc, char** argv, LocalCommand& chosen) {
   app.add_subcommand("web", "show all frames and their uncertainty in a browser")
+      ->fallthrough(false)
       ->allow_extras()
       ->footer("Example: tfdude web --port 8765")
       ->callback([&chosen, argc, argv] {
