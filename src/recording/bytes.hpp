@@ -8,6 +8,13 @@
 // Little-endian numbers in byte strings, as MCAP has them.
 namespace tfdude::recording {
 
+template <class Number>
+void put_number(char* to, Number value) {
+  for (std::size_t i = 0; i < sizeof value; ++i) {
+    to[i] = static_cast<char>(static_cast<std::uint64_t>(value) >> (8 * i));
+  }
+}
+
 /// Appends to a string.
 class ByteWriter {
  public:
@@ -16,9 +23,7 @@ class ByteWriter {
   template <class Number>
   void number(Number value) {
     char raw[sizeof value];
-    for (std::size_t i = 0; i < sizeof value; ++i) {
-      raw[i] = static_cast<char>(static_cast<std::uint64_t>(value) >> (8 * i));
-    }
+    put_number(raw, value);
     out_.append(raw, sizeof value);
   }
   void u8(std::uint8_t value) { number(value); }
@@ -33,9 +38,7 @@ class ByteWriter {
   }
 
   /// Overwrites four bytes that were written before.
-  void set_u32(std::size_t at, std::uint32_t value) {
-    for (std::size_t i = 0; i < 4; ++i) out_[at + i] = static_cast<char>(value >> (8 * i));
-  }
+  void set_u32(std::size_t at, std::uint32_t value) { put_number(out_.data() + at, value); }
 
   [[nodiscard]] std::size_t size() const { return out_.size(); }
 

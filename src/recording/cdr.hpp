@@ -12,20 +12,31 @@ namespace tfdude::recording {
 
 inline constexpr std::string_view kCdrHead{"\0\1\0\0", 4};
 
+/// Writes a message over what a string has, which saves the time to fill it. The string is the
+/// message after finish(), or after the writer's end.
 class CdrWriter {
  public:
-  /// Starts a message.
-  explicit CdrWriter(std::string& out) : out_(out), bytes_(out) { out_.assign(kCdrHead); }
+  explicit CdrWriter(std::string& out) : out_(&out) {
+    std::memcpy(room(kCdrHead.size()), kCdrHead.data(), kCdrHead.size());
+  }
+  CdrWriter(const CdrWriter&) = delete;
+  CdrWriter& operator=(const CdrWriter&) = delete;
+  ~CdrWriter() { finish(); }
 
-  void u8(std::uint8_t value) { bytes_.u8(value); }
-  void flag(bool value) { bytes_.u8(value ? 1 : 0); }
+  void finish() {
+    if (out_ != nullptr) out_->resize(size_);
+    out_ = nullptr;
+  }
+
+  void u8(std::uint8_t value) { *room(1) = static_cast<char>(value); }
+  void flag(bool value) { u8(value ? 1 : 0); }
   void u32(std::uint32_t value) {
     align(4);
-    bytes_.u32(value);
+    put_number(room(4), value);
   }
   void u64(std::uint64_t value) {
     align(8);
-    bytes_.u64(value);
+    put_number(room(8), value);
   }
   void i64(std::int64_t value) { u64(static_cast<std::uint64_t>(value)); }
   void f64(double value) {
@@ -35,8 +46,9 @@ class CdrWriter {
   }
   void text(std::string_view value) {
     u32(static_cast<std::uint32_t>(value.size() + 1));
-    out_.append(value);
-    out_.push_back('\0');
+    char* to = room(value.size() + 1);
+    std::memcpy(to, value.data(), value.size());
+    to[value.size()] = '\0';
   }
   template <class Numbers>
   void f64s(const Numbers& values) {
@@ -45,18 +57,24 @@ class CdrWriter {
   /// A number that is set later. @return its place
   [[nodiscard]] std::size_t later() {
     u32(0);
-    return out_.size() - 4;
+    return size_ - 4;
   }
-  void set(std::size_t place, std::uint32_t value) { bytes_.set_u32(place, value); }
+  void set(std::size_t place, std::uint32_t value) { put_number(out_->data() + place, value); }
 
  private:
+  // The next bytes, to be written.
+  char* room(std::size_t count) {
+    if (out_->size() - size_ < count) out_->resize(size_ + count + size_ / 2);
+    char* at = out_->data() + size_;
+    size_ += count;
+    return at;
+  }
   void align(std::size_t size) {
-    const std::size_t past = (out_.size() - kCdrHead.size()) % size;
-    if (past != 0) out_.append(size - past, '\0');
+    for (std::size_t past = (size_ - kCdrHead.size()) % size; past % size != 0; ++past) u8(0);
   }
 
-  std::string& out_;
-  ByteWriter bytes_;
+  std::string* out_;
+  std::size_t size_ = 0;
 };
 
 /// Reads a message of unknown origin; as ByteReader. Big-endian messages are not good().

@@ -5,7 +5,7 @@
 namespace tfdude::recording {
 namespace {
 
-constexpr std::size_t kSlices = 8;
+constexpr std::size_t kSlices = 16;
 using Tables = std::array<std::array<std::uint32_t, 256>, kSlices>;
 
 // Table k has the CRC of a byte that is followed by k zero bytes.
@@ -25,22 +25,33 @@ Tables make_tables() {
   return tables;
 }
 
+// Eight bytes, the first of which is the lowest.
+std::uint64_t word_at(const char* bytes) {
+  std::uint64_t word = 0;
+  for (std::size_t i = 0; i < 8; ++i) {
+    word |= std::uint64_t{static_cast<std::uint8_t>(bytes[i])} << (8 * i);
+  }
+  return word;
+}
+
 }  // namespace
 
-// Eight bytes at a time ("slicing by 8", Kounavis & Berry 2005).
+// Sixteen bytes at a time ("slicing by 8", Kounavis & Berry 2005, twice).
 std::uint32_t crc32(std::string_view bytes, std::uint32_t before) {
   static const Tables tables = make_tables();
-  const auto byte = [](char c) { return std::uint32_t{static_cast<std::uint8_t>(c)}; };
   std::uint32_t crc = ~before;
   while (bytes.size() >= kSlices) {
+    const std::uint64_t first = word_at(bytes.data()) ^ crc;
+    const std::uint64_t second = word_at(bytes.data() + 8);
     std::uint32_t next = 0;
-    for (std::size_t i = 0; i < kSlices; ++i) {
-      const std::uint32_t mixed = i < 4 ? (crc >> (8 * i)) & 0xFFU : 0U;
-      next ^= tables[kSlices - 1 - i][mixed ^ byte(bytes[i])];
+    for (std::size_t i = 0; i < 8; ++i) {
+      next ^= tables[15 - i][(first >> (8 * i)) & 0xFFU];
+      next ^= tables[7 - i][(second >> (8 * i)) & 0xFFU];
     }
     crc = next;
     bytes.remove_prefix(kSlices);
   }
+  const auto byte = [](char c) { return std::uint32_t{static_cast<std::uint8_t>(c)}; };
   for (const char c : bytes) crc = (crc >> 8U) ^ tables[0][(crc ^ byte(c)) & 0xFFU];
   return ~crc;
 }

@@ -62,7 +62,10 @@ class ValuesEncoder {
   ValuesEncoder(std::string& out, std::string_view partition, std::uint64_t commit, bool repeats);
   /// @param as_before  the covariance is that of the edge's last value in the file
   void add(const WatchedFrame& edge, const WatchedValue& value, bool as_before);
-  void finish() { writer_.set(count_place_, count_); }
+  void finish() {
+    writer_.set(count_place_, count_);
+    writer_.finish();
+  }
 
  private:
   CdrWriter writer_;
@@ -98,7 +101,10 @@ class TfEncoder {
   explicit TfEncoder(std::string& out);
   void add(const WatchedFrame& edge, const Pose& X_PC, Time stamp);
   [[nodiscard]] std::uint32_t count() const { return count_; }
-  void finish() { writer_.set(count_place_, count_); }
+  void finish() {
+    writer_.set(count_place_, count_);
+    writer_.finish();
+  }
 
  private:
   CdrWriter writer_;

@@ -14,6 +14,9 @@ constexpr std::uint32_t kGone = UINT32_MAX;
 // Edges that were written within this time of the newest sample are those that are streamed.
 constexpr std::chrono::seconds kStreamed{1};
 
+// Who wants every sample can wait a moment for several, which wake a thread once.
+constexpr Milliseconds kGather{5};
+
 // Gives each value of an edge the correlation that its last one has.
 void spread_correlations(std::vector<PushedValue>& entries) {
   std::map<std::uint32_t, const Correlation*> last;
@@ -78,7 +81,8 @@ FollowedPartition::FollowedPartition(std::string name, std::chrono::nanoseconds 
                                      Listener listener)
     : name_(std::move(name)),
       period_(period),
-      listener_(std::make_shared<const Listener>(std::move(listener))) {}
+      listener_(std::make_shared<const Listener>(std::move(listener))),
+      notices_(period.count() == 0 ? kGather : Milliseconds(0)) {}
 
 void FollowedPartition::stop() {
   stopped_ = true;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -14,7 +15,8 @@ namespace tfdude {
 /// call any function. Thread-safe.
 class Notices {
  public:
-  Notices() = default;
+  /// @param gather  how long a call may wait for others, so that many of them wake the thread once
+  explicit Notices(std::chrono::milliseconds gather = {}) : gather_(gather) {}
   ~Notices() { stop(); }
   Notices(const Notices&) = delete;
   Notices& operator=(const Notices&) = delete;
@@ -23,8 +25,10 @@ class Notices {
     const Lock lock(shared_->mutex);
     if (shared_->stopping) return;
     shared_->waiting.push_back(std::move(call));
-    if (!thread_.joinable()) thread_ = std::thread([shared = shared_] { run(*shared); });
-    shared_->changed.notify_one();
+    if (!thread_.joinable()) {
+      thread_ = std::thread([shared = shared_, gather = gather_] { run(*shared, gather); });
+    }
+    if (shared_->waiting.size() == 1) shared_->changed.notify_one();
   }
 
   /// Waits for a running call, unless that call itself calls this; queued calls are dropped.
@@ -53,12 +57,18 @@ class Notices {
     bool stopping TFDUDE_GUARDED_BY(mutex) = false;
   };
 
-  static void run(Shared& shared) {
+  static void run(Shared& shared, std::chrono::milliseconds gather) {
     Lock lock(shared.mutex);
     while (true) {
-      shared.changed.wait(lock, [&]() TFDUDE_REQUIRES(shared.mutex) {
-        return shared.stopping || !shared.waiting.empty();
-      });
+      if (shared.waiting.empty()) {
+        shared.changed.wait(lock, [&]() TFDUDE_REQUIRES(shared.mutex) {
+          return shared.stopping || !shared.waiting.empty();
+        });
+        if (gather.count() > 0) {
+          shared.changed.wait_for(lock, gather,
+                                  [&]() TFDUDE_REQUIRES(shared.mutex) { return shared.stopping; });
+        }
+      }
       if (shared.stopping) return;
       auto call = std::move(shared.waiting.front());
       shared.waiting.pop_front();
@@ -69,6 +79,7 @@ class Notices {
     }
   }
 
+  const std::chrono::milliseconds gather_;
   const std::shared_ptr<Shared> shared_ = std::make_shared<Shared>();
   std::thread thread_;  // from the first call on
 };

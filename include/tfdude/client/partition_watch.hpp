@@ -13,7 +13,8 @@ class FollowedPartition;
 /// How to watch a partition.
 struct PartitionWatchOptions {
   /// Maximum rate at which the owner sends changes [Hz]: from once an hour to 1e6; 0: every sample.
-  /// With a rate, only the newest sample of each edge is sent.
+  /// With a rate, only the newest sample of each edge is sent. Without one, news may wait 5 ms for
+  /// others, so that a stream of 1 kHz wakes few threads.
   double rate = 0;
   /// Gets all news, in order. One call at a time, from a library thread that holds no lock: it may
   /// call any function of the client, and end its own watch. Must not throw. If it takes so long
