@@ -294,6 +294,14 @@ Result<void> check_names(Client& client, const Recording& recording) {
   return {};
 }
 
+// Where the first partitions are there: a recorder discovers them only after it has begun.
+Time beginning(Recording& recording) {
+  const RecordingSummary summary = recording.summary();
+  recording.seek(summary.start.value_or(Time{}));
+  while (recording.frames().empty() && recording.step()) continue;
+  return std::min(recording.instant() + kSettle, summary.end.value_or(Time{}));
+}
+
 }  // namespace
 
 int run_replay(const Arguments& arguments) {
@@ -301,12 +309,12 @@ int run_replay(const Arguments& arguments) {
   if (!recording) return report(recording.error(), arguments);
   const auto at = optional_stamp(Source(*recording), arguments.stamp);
   if (!at) return report(at.error(), arguments);
-  const Time start = at->value_or(recording->summary().start.value_or(Time{}));
   Arguments external = arguments;
   external.options.clock = ClockKind::kExternal;
   auto clock = Client::open(external.options);
   if (!clock) return report(clock.error(), arguments);
   if (auto free = check_names(*clock, *recording); !free) return report(free.error(), arguments);
+  const Time start = *at ? **at : beginning(*recording);
   Replay replay(*recording, *clock, external, start);
   if (auto begun = replay.begin(); !begun) return report(begun.error(), arguments);
   std::fprintf(stderr,
