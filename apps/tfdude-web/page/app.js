@@ -263,6 +263,8 @@ function key(event) {
   event.preventDefault();
 }
 
+// On a narrow screen the lists lie over the picture.
+if (window.innerWidth <= 860) document.querySelector('main').classList.add('no-side', 'no-inspector');
 const stored = localStorage.getItem('tfdude-theme');
 setTheme(stored ? stored === 'light' : window.matchMedia('(prefers-color-scheme: light)').matches);
 listen();

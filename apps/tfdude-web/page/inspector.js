@@ -143,7 +143,8 @@ export class Inspector {
     }
     const { values, vectors } = eigen(S);
     const most = Math.sqrt(values[0]) || 1;
-    return [element('h2', {}, `Ellipsoid · ${this.k} σ contains ${SHARES[this.k]}`),
+    const title = answer.covariance ? `${this.k} σ contains ${SHARES[this.k]}` : `${this.k} σ of the other edges`;
+    return [element('h2', {}, `Ellipsoid · ${title}`),
       element('div', { class: 'bars' }, ...values.map((value, i) => element('div', {},
         element('span', { class: 'name', title: 'direction in A' },
           `along ${vectors[i].map((c) => c.toFixed(2)).join(' ')}`),
