@@ -103,25 +103,26 @@ class PageTalk final : public Talk {
         cli::dump({{"op", "events"}, {"events", std::move(list)}})));
   }
 
-  // Asks the owners for the pair at the instant that is shown. While they answer, only the last
+  // Asks the owners for the pair at the instant that is shown. The page may leave before they
+  // answer, so the worker does not touch this object. While they answer, only the last
   // wish is kept.
   void ask() {
     if (!pair_ || !past_ || *asking_) return;
     *asking_ = true;
-    const bool posted = live_.worker().post(
-        [this, pair = pair_, past = *past_, alive = std::weak_ptr<bool>(asking_), post = post_] {
-          const Text answer = live_.pairs().answer_at(pair->a(), pair->b(), past);
-          post([this, pair, past, alive, answer] {
-            const auto asking = alive.lock();
-            if (!asking) return;
-            *asking = false;
-            if (past_ == past && pair_ == pair) {
-              send(answer);
-            } else {
-              ask();
-            }
-          });
-        });
+    const bool posted = live_.worker().post([this, &live = live_, pair = pair_, past = *past_,
+                                             alive = std::weak_ptr<bool>(asking_), post = post_] {
+      const Text answer = live.pairs().answer_at(pair->a(), pair->b(), past);
+      post([this, pair, past, alive, answer] {
+        const auto asking = alive.lock();
+        if (!asking) return;
+        *asking = false;
+        if (past_ == past && pair_ == pair) {
+          send(answer);
+        } else {
+          ask();
+        }
+      });
+    });
     if (!posted) *asking_ = false;
   }
 
