@@ -69,7 +69,6 @@ class GatedTransport final : public SendFilter {
                         etransport::TransportReceiverInterface* receiver,
                         std::uint32_t max_size) override {
     const bool multicast = ertps::IPLocator::isMulticast(at);
-    if (!multicast && at.port > descriptor_.ports->last) return false;
     if (!SendFilter::OpenInputChannel(at, receiver, max_size)) return false;
     if (!multicast) ++descriptor_.ports->opened;
     return true;
@@ -157,14 +156,6 @@ bool has_keys(const edds::DomainParticipantQos& qos) {
                      [](const auto& property) { return property.name() == "dds.sec.auth.plugin"; });
 }
 
-// After it come those of the next domain.
-std::uint32_t last_port(const edds::DomainParticipantQos& qos, std::uint32_t domain) {
-  const auto& port = qos.wire_protocol().port;
-  const std::uint32_t last = port.portBase + port.domainIDGain * domain + port.offsetd3 +
-                             port.participantIDGain * (kParticipantsOfHost - 1);
-  return std::min<std::uint32_t>(last, std::numeric_limits<std::uint16_t>::max());
-}
-
 }  // namespace
 
 bool DiscoveryGate::hears_announcements(const edds::DomainParticipantQos& qos) {
@@ -177,7 +168,6 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
   builtin.mutation_tries = std::max(builtin.mutation_tries, kParticipantsOfHost - 1);
   if (only_udp(qos) && uses_standard_ports(qos)) {
     ports_->needed = 2;
-    ports_->last = last_port(qos, domain);
     const auto& port = qos.wire_protocol().port;
     ports_->first_of_data = port.portBase + port.domainIDGain * domain + port.offsetd3;
     ports_->step_of_data = port.participantIDGain;

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -29,7 +28,7 @@ namespace tfdude::fastdds {
 ///   profile.
 /// - Fast DDS searches free ports for 101 participants of a host. The next ones receive nothing,
 ///   and nobody is told. So it searches through all ports of the domain here, for 120 participants,
-///   and can_receive() says whether it has found some.
+///   from its number in this process on, which Fast DDS 2.9 counts up.
 /// - With keys, messages of discovery are handled one after the other. A participant is announced
 ///   at one socket, and its handshake comes to another one. Fast DDS (2.9 and 3.1) drops a message
 ///   of the handshake while another thread handles something of the same participant, and repeats
@@ -39,7 +38,6 @@ class DiscoveryGate {
   /// At which a participant receives what is sent to it alone.
   struct Ports {
     int needed = 0;
-    std::uint32_t last = std::numeric_limits<std::uint32_t>::max();  // that it may use
     std::uint32_t first_of_data = 0;  // 0: not known which are not for discovery
     std::uint32_t step_of_data = 1;
     std::atomic<int> opened{0};
