@@ -16,7 +16,7 @@ NOISE = np.diag([0.002] * 3 + [0.005] * 3) ** 2  # of one measurement [mÂ², radÂ
 
 
 def main() -> None:
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(2)
     frames = [FrameSpec("head"), FrameSpec("camera", "head", ASSUMED)]
     with tfdude.Node("head", frames, network=tfdude.LoopbackNetwork()) as node:
         print("measurements  error [mm]  stddev [mm]  error [deg]  stddev [deg]")
