@@ -79,3 +79,16 @@ def test_everything_public_says_what_it_is():
                 # pybind11 writes the signature first.
                 text = (getattr(thing, method).__doc__ or "").split("\n\n", 1)
                 assert text[-1].strip(), f"{name}.{method}"
+
+
+def test_blocks_of_the_page_about_python():
+    page = (TESTS.parent.parent / "docs/python.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert len(blocks) >= 7
+    names = {}
+    for block in blocks:
+        exec(compile(block, "docs/python.md", "exec"), names)
+    assert names["batch"].poses.shape == (2, 7)
+    assert names["not_sent"] == []
+    names["client"].close()
+    names["node"].close()
