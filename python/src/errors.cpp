@@ -1,4 +1,5 @@
 #include "arguments.hpp"
+#include "session.hpp"
 
 namespace tfdude::python {
 
@@ -8,6 +9,13 @@ py::object exception_of(const Error& error) {
 }
 
 void raise(const Error& error) {
+  if (exiting()) {
+    // Ends the thread without a word. And it runs no code of Python: a thread that comes back to it
+    // while the interpreter ends is killed, which C++ does not survive.
+    PyErr_SetString(PyExc_SystemExit, "the interpreter ends");
+    throw py::error_already_set();
+  }
+  const UnderWay under_way;
   const py::object exception = exception_of(error);
   PyErr_SetObject(py::type::handle_of(exception).ptr(), exception.ptr());
   throw py::error_already_set();

@@ -47,9 +47,18 @@ void finish() {
   process().exiting = true;
   const std::set<Session*> sessions = process().sessions;
   for (Session* session : sessions) session->close();
-  const py::gil_scoped_release release;
-  std::unique_lock<std::mutex> lock(process().mutex);
-  process().idle.wait_for(lock, kLongestExit, [] { return process().under_way == 0; });
+  const auto none = [] { return process().under_way == 0; };
+  bool done = false;
+  while (!done) {
+    {
+      const py::gil_scoped_release release;
+      std::unique_lock<std::mutex> lock(process().mutex);
+      done = !process().idle.wait_for(lock, kLongestExit, none);
+    }
+    // A thread with the GIL may have begun something since. None can while this one has it.
+    const std::lock_guard<std::mutex> lock(process().mutex);
+    done = done || none();
+  }
 }
 
 void check_usable() {
@@ -58,7 +67,7 @@ void check_usable() {
            "this process is a fork of one that has used tfdude, whose threads it lacks: start "
            "processes before, or by multiprocessing's 'spawn' or subprocess"});
   }
-  if (exiting()) raise({Errc::kTransport, "the interpreter ends"});
+  if (exiting()) raise({Errc::kTransport, "the interpreter ends"});  // as SystemExit
 }
 
 void note_use() {

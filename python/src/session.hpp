@@ -30,7 +30,8 @@ class UnderWay {
 void finish();
 
 /// For the child of a fork: a process that has used tfdude before cannot use it after.
-/// @throws TransformException (code "transport") in such a child, and while the interpreter ends
+/// @throws TransformException (code "transport") in such a child; SystemExit while the interpreter
+///   ends
 void check_usable();
 /// Notes that threads of the library may exist from now on.
 void note_use();

@@ -13,7 +13,7 @@ namespace tfdude::python {
                                                        Milliseconds wait);
 
 /// Ends a wait without the GIL that looks for these once in a while.
-/// @throws what a signal raises; TransformException if the interpreter ends
+/// @throws what a signal raises; SystemExit if the interpreter ends
 void check_interrupted();
 /// How often a wait looks.
 inline constexpr Milliseconds kLook{50};
