@@ -4,6 +4,7 @@
 namespace tfdude::python {
 
 py::object exception_of(const Error& error) {
+  const UnderWay under_way;
   const py::object make = py::module_::import("tfdude._errors").attr("make");
   return make(std::string(to_string(error.code)), error.message);
 }
@@ -15,7 +16,6 @@ void raise(const Error& error) {
     PyErr_SetString(PyExc_SystemExit, "the interpreter ends");
     throw py::error_already_set();
   }
-  const UnderWay under_way;
   const py::object exception = exception_of(error);
   PyErr_SetObject(py::type::handle_of(exception).ptr(), exception.ptr());
   throw py::error_already_set();
