@@ -1,9 +1,10 @@
 #include "command_options.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 
-#include "commands.hpp"
+#include "tfdude/base/id.hpp"
 
 namespace tfdude::cli {
 
@@ -30,6 +31,39 @@ std::function<std::string(const std::string&)> within(double least, double most,
     const double value = std::strtod(text.c_str(), nullptr);
     return value >= least && value <= most ? "" : text + " is not within " + range;
   };
+}
+
+void add_pose_options(CLI::App& command, Arguments& arguments) {
+  auto& spec = arguments.spec;
+  command.add_option("--xyz", spec.xyz, "translation [m]")->type_name("X Y Z");
+  auto* rpy = command.add_option("--rpy", spec.rpy, "rotation about fixed axes X, Y, Z [rad]");
+  rpy->type_name("R P Y");
+  command.add_option("--quat", spec.quat, "rotation as unit quaternion")
+      ->type_name("X Y Z W")
+      ->excludes(rpy);
+  auto* stddev =
+      command.add_option("--stddev", spec.stddev, "standard deviations [m m m rad rad rad]")
+          ->type_name("6 NUMBERS");
+  command.add_option("--cov", spec.cov, "upper triangle of the covariance row by row")
+      ->type_name("21 NUMBERS")
+      ->excludes(stddev);
+  command.add_option("--covariance", spec.covariance, "instead of numbers: unspecified or exact")
+      ->check(CLI::IsMember({"unspecified", "exact"}))
+      ->excludes(stddev);
+}
+
+void add_out(CLI::App* command, Arguments& arguments, const std::vector<std::string>& endings) {
+  std::string all;
+  for (const std::string& ending : endings) all += (all.empty() ? "" : ", ") + ending;
+  command->add_option("--out", arguments.out, "the picture's file: " + all)
+      ->type_name("FILE")
+      ->required()
+      ->check([endings, all](const std::string& file) {
+        const auto dot = file.rfind('.');
+        const std::string ending = dot == std::string::npos ? "" : file.substr(dot);
+        const bool known = std::find(endings.begin(), endings.end(), ending) != endings.end();
+        return known ? "" : quote(file) + " does not end in one of " + all;
+      });
 }
 
 }  // namespace tfdude::cli

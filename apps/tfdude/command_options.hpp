@@ -2,8 +2,11 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
+
+#include "commands.hpp"
 
 // What several commands need to describe themselves to CLI11.
 namespace tfdude::cli {
@@ -18,5 +21,11 @@ CLI::Option* add_stamp(CLI::App* command, const char* name, std::string& stamp, 
 /// Checks that a number is within a range, which the message names as `range`. CLI::Range would
 /// accept NaN.
 std::function<std::string(const std::string&)> within(double least, double most, const char* range);
+
+/// Adds the options for a pose and its covariance.
+void add_pose_options(CLI::App& command, Arguments& arguments);
+
+/// Adds the option for the file of a picture, whose name must end in one of these.
+void add_out(CLI::App* command, Arguments& arguments, const std::vector<std::string>& endings);
 
 }  // namespace tfdude::cli

@@ -27,6 +27,8 @@
 namespace {
 
 using namespace tfdude;
+using cli::add_out;
+using cli::add_pose_options;
 using cli::add_stamp;
 using cli::Arguments;
 using cli::within;
@@ -35,25 +37,6 @@ constexpr long kTimeoutByServer = 3000;  // [ms]
 constexpr const char* kWatchHelp = "redraw it twice a second, until interrupted";
 
 using Command = std::function<int(Client&, const Arguments&)>;
-
-void add_pose_options(CLI::App& command, Arguments& arguments) {
-  auto& spec = arguments.spec;
-  command.add_option("--xyz", spec.xyz, "translation [m]")->type_name("X Y Z");
-  auto* rpy = command.add_option("--rpy", spec.rpy, "rotation about fixed axes X, Y, Z [rad]");
-  rpy->type_name("R P Y");
-  command.add_option("--quat", spec.quat, "rotation as unit quaternion")
-      ->type_name("X Y Z W")
-      ->excludes(rpy);
-  auto* stddev =
-      command.add_option("--stddev", spec.stddev, "standard deviations [m m m rad rad rad]")
-          ->type_name("6 NUMBERS");
-  command.add_option("--cov", spec.cov, "upper triangle of the covariance row by row")
-      ->type_name("21 NUMBERS")
-      ->excludes(stddev);
-  command.add_option("--covariance", spec.covariance, "instead of numbers: unspecified or exact")
-      ->check(CLI::IsMember({"unspecified", "exact"}))
-      ->excludes(stddev);
-}
 
 void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {
   cli::add_network_options(app, arguments.options);
@@ -241,20 +224,6 @@ void add_correlate_command(CLI::App& app, Arguments& arguments, Command& chosen)
       throw CLI::ValidationError("--source", quote(said) + " is not a number");
     }
   });
-}
-
-void add_out(CLI::App* command, Arguments& arguments, const std::vector<std::string>& endings) {
-  std::string all;
-  for (const std::string& ending : endings) all += (all.empty() ? "" : ", ") + ending;
-  command->add_option("--out", arguments.out, "the picture's file: " + all)
-      ->type_name("FILE")
-      ->required()
-      ->check([endings, all](const std::string& file) {
-        const auto dot = file.rfind('.');
-        const std::string ending = dot == std::string::npos ? "" : file.substr(dot);
-        const bool known = std::find(endings.begin(), endings.end(), ending) != endings.end();
-        return known ? "" : quote(file) + " does not end in one of " + all;
-      });
 }
 
 void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <mutex>
 #include <utility>
 
@@ -17,14 +18,23 @@ using Flag = std::shared_ptr<std::atomic<bool>>;
 // A domain has ports for so many participants of a host.
 constexpr std::uint32_t kParticipantsOfHost = 120;
 
+// The ports at which participants of a domain receive data, not messages of discovery.
+struct DataPorts {
+  std::uint32_t first = 0;  // 0: not known
+  std::uint32_t step = 1;
+
+  [[nodiscard]] bool contain(std::uint32_t port) const {
+    return first > 0 && port >= first && (port - first) % step == 0;
+  }
+};
+
 struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   GatedDescriptor(std::shared_ptr<etransport::TransportDescriptorInterface> guarded, Flag flag,
-                  std::shared_ptr<DiscoveryGate::Ports> own_ports,
-                  std::shared_ptr<std::mutex> one_by_one, std::shared_ptr<Gate> inward,
-                  std::shared_ptr<LifeSigns> signs)
+                  DataPorts ports_of_data, std::shared_ptr<std::mutex> one_by_one,
+                  std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
-        ports(std::move(own_ports)),
+        data_ports(ports_of_data),
         discovering(std::move(one_by_one)),
         gate(std::move(inward)),
         life_signs(std::move(signs)) {}
@@ -41,7 +51,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   }
 
   Flag open;
-  std::shared_ptr<DiscoveryGate::Ports> ports;
+  DataPorts data_ports;
   std::shared_ptr<std::mutex> discovering;  // held while a message of discovery is handled, or null
   std::shared_ptr<Gate> gate;
   std::shared_ptr<LifeSigns> life_signs;
@@ -65,21 +75,12 @@ class GatedTransport final : public SendFilter {
 
   etransport::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
 
-  bool OpenInputChannel(const ertps::Locator_t& at,
-                        etransport::TransportReceiverInterface* receiver,
-                        std::uint32_t max_size) override {
-    const bool multicast = ertps::IPLocator::isMulticast(at);
-    if (!SendFilter::OpenInputChannel(at, receiver, max_size)) return false;
-    if (!multicast) ++descriptor_.ports->opened;
-    return true;
-  }
-
   void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
                std::uint32_t size, const ertps::Locator_t& local,
                const ertps::Locator_t& remote) override {
     // Before the gate: whoever holds both may shut it.
     std::unique_lock<std::mutex> one_by_one;
-    if (descriptor_.discovering != nullptr && !descriptor_.ports->are_for_data(local.port)) {
+    if (descriptor_.discovering != nullptr && !descriptor_.data_ports.contain(local.port)) {
       one_by_one = std::unique_lock(*descriptor_.discovering);
     }
     const Gate::Pass pass(*descriptor_.gate);
@@ -163,21 +164,22 @@ bool DiscoveryGate::hears_announcements(const edds::DomainParticipantQos& qos) {
   return discovery.discoveryProtocol == DiscoveryProtocol::SIMPLE && only_udp(qos);
 }
 
-void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) {
+void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain,
+                            bool client) const {
   auto& builtin = qos.wire_protocol().builtin;
   builtin.mutation_tries = std::max(builtin.mutation_tries, kParticipantsOfHost - 1);
+  DataPorts data_ports;
   if (only_udp(qos) && uses_standard_ports(qos)) {
-    ports_->needed = 2;
     const auto& port = qos.wire_protocol().port;
-    ports_->first_of_data = port.portBase + port.domainIDGain * domain + port.offsetd3;
-    ports_->step_of_data = port.participantIDGain;
+    data_ports.first = port.portBase + port.domainIDGain * domain + port.offsetd3;
+    data_ports.step = port.participantIDGain;
   }
   auto discovering = has_keys(qos) ? std::make_shared<std::mutex>() : nullptr;
   if (client) announce_eagerly(qos);
   if (client && only_udp(qos)) hear_by_unicast_only(qos, domain);
   for (auto& transport : qos.transport().user_transports) {
     if (!is_udp(transport)) continue;
-    transport = std::make_shared<GatedDescriptor>(transport, open_, ports_, discovering, gate_,
+    transport = std::make_shared<GatedDescriptor>(transport, open_, data_ports, discovering, gate_,
                                                   life_signs_);
   }
 }

@@ -3,7 +3,6 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <utility>
 
 #include "transport/fastdds/compat.hpp"
@@ -35,19 +34,6 @@ namespace tfdude::fastdds {
 ///   it later: 2.9 after a second. Of first meetings with one daemon, 6 % took so long.
 class DiscoveryGate {
  public:
-  /// At which a participant receives what is sent to it alone.
-  struct Ports {
-    int needed = 0;
-    std::uint32_t first_of_data = 0;  // 0: not known which are not for discovery
-    std::uint32_t step_of_data = 1;
-    std::atomic<int> opened{0};
-
-    [[nodiscard]] bool are_for_data(std::uint32_t port) const {
-      return first_of_data > 0 && port >= first_of_data &&
-             (port - first_of_data) % step_of_data == 0;
-    }
-  };
-
   /// @param gate  all datagrams received over UDP pass it
   /// @param life_signs  is told of each of them
   DiscoveryGate(std::shared_ptr<Gate> gate, std::shared_ptr<LifeSigns> life_signs)
@@ -55,15 +41,11 @@ class DiscoveryGate {
 
   /// Prepares the creation of a participant. Changes neither transports other than UDP, nor
   /// discovery settings that the profile overrides.
-  void prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client);
+  void prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) const;
 
   /// Whether participants with these settings hear each other's periodic announcements, and
   /// LifeSigns sees them: discovery is the simple one, and all transports are UDP.
   [[nodiscard]] static bool hears_announcements(const edds::DomainParticipantQos& qos);
-
-  /// Whether the participant, which has been created, has found ports to receive at. True if the
-  /// profile sets the ports, or transports other than UDP.
-  [[nodiscard]] bool can_receive() const { return ports_->opened >= ports_->needed; }
 
   /// Lets the participant send: it has been created.
   void open() { open_->store(true, std::memory_order_relaxed); }
@@ -72,7 +54,6 @@ class DiscoveryGate {
   const std::shared_ptr<Gate> gate_;
   const std::shared_ptr<LifeSigns> life_signs_;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);
-  const std::shared_ptr<Ports> ports_ = std::make_shared<Ports>();
 };
 
 }  // namespace tfdude::fastdds

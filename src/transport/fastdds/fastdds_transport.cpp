@@ -97,11 +97,6 @@ Result<void> FastDdsTransport::create_participant() {
     return fail(Errc::kTransport,
                 "Fast DDS could not join domain " + std::to_string(options_.domain));
   }
-  if (!discovery_gate.can_receive()) {
-    return fail(Errc::kTransport, "no free port was found in domain " +
-                                      std::to_string(options_.domain) +
-                                      ": on one host, a domain has ports for 120 participants");
-  }
   discovery_gate.open();
   self_ = peer_of(participant_->guid().guidPrefix);
   return create_topics(*participant_, topics_) ? Result<void>() : not_created("the topics");
