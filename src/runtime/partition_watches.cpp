@@ -15,17 +15,16 @@ constexpr Milliseconds kRetryAfter{50};
 }  // namespace
 
 PartitionWatches::PartitionWatches(Links links)
-    : links_(std::move(links)), thread_([this] { run(); }) {}
+    : links_(std::move(links)),
+      rounds_(kRenewEvery, kRetryAfter, [this](bool renew) { return attend_all(renew); }) {}
 
 void PartitionWatches::stop() {
+  rounds_.stop();
   std::vector<Followed> partitions;
   {
     const Lock lock(mutex_);
-    stopping_ = true;
     partitions = std::exchange(partitions_, {});
   }
-  changed_.notify_one();
-  if (thread_.joinable()) thread_.join();
   for (const Followed& partition : partitions) partition->stop();
 }
 
@@ -33,17 +32,8 @@ void PartitionWatches::add(std::shared_ptr<FollowedPartition> partition) {
   {
     const Lock lock(mutex_);
     partitions_.push_back(std::move(partition));
-    asked_ = true;
   }
-  changed_.notify_one();
-}
-
-void PartitionWatches::look_again() {
-  {
-    const Lock lock(mutex_);
-    asked_ = true;
-  }
-  changed_.notify_one();
+  rounds_.ask();
 }
 
 void PartitionWatches::on_pushed(const PushedValues& pushed) {
@@ -54,45 +44,22 @@ void PartitionWatches::on_pushed(const PushedValues& pushed) {
   }
   bool lacks = false;
   for (const Followed& partition : partitions) lacks = partition->take(pushed) || lacks;
-  if (!lacks) return;
+  if (lacks) rounds_.lack();
+}
+
+bool PartitionWatches::attend_all(bool renew) {
+  std::vector<Followed> partitions;
   {
     const Lock lock(mutex_);
-    if (std::exchange(lacking_, true)) return;
-  }
-  changed_.notify_one();
-}
-
-void PartitionWatches::wait(Lock& lock, Clock::time_point renew_at) {
-  while (!stopping_ && !asked_) {
-    const auto wake_at = lacking_ ? std::min(renew_at, last_round_ + kRetryAfter) : renew_at;
-    if (Clock::now() >= wake_at) return;
-    changed_.wait_until(lock, wake_at);
-  }
-}
-
-void PartitionWatches::run() {
-  auto renew_at = Clock::now() + kRenewEvery;
-  Lock lock(mutex_);
-  while (true) {
-    wait(lock, renew_at);
-    if (stopping_) return;
-    asked_ = false;
-    lacking_ = false;
-    last_round_ = Clock::now();
     partitions_.erase(std::remove_if(partitions_.begin(), partitions_.end(),
                                      [](const Followed& one) { return one->stopped(); }),
                       partitions_.end());
-    auto partitions = partitions_;
-    lock.unlock();
-    const bool renew = Clock::now() >= renew_at;
-    if (renew) renew_at = Clock::now() + kRenewEvery;
-    bool all_well = true;
-    for (const Followed& partition : partitions) all_well = attend(partition, renew) && all_well;
-    close_unused(partitions);
-    partitions.clear();
-    lock.lock();
-    lacking_ = lacking_ || !all_well;
+    partitions = partitions_;
   }
+  bool all_well = true;
+  for (const Followed& partition : partitions) all_well = attend(partition, renew) && all_well;
+  close_unused(partitions);
+  return all_well;
 }
 
 bool PartitionWatches::attend(const Followed& partition, bool renew) {

@@ -5,12 +5,12 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "base/mutex.hpp"
 #include "runtime/followed_partition.hpp"
 #include "runtime/open_groups.hpp"
+#include "runtime/renewal_loop.hpp"
 
 namespace tfdude {
 
@@ -38,14 +38,14 @@ class PartitionWatches {
   void add(std::shared_ptr<FollowedPartition> partition);
   void on_pushed(const PushedValues& pushed);
   /// The structure or the reachable partitions have changed.
-  void look_again();
+  void look_again() { rounds_.ask(); }
 
  private:
   using Clock = std::chrono::steady_clock;
   using Followed = std::shared_ptr<FollowedPartition>;
 
-  void run();
-  void wait(Lock& lock, Clock::time_point renew_at) TFDUDE_REQUIRES(mutex_);
+  /// @return whether nothing is missing
+  bool attend_all(bool renew);
   /// @return whether nothing is missing
   bool attend(const Followed& partition, bool renew);
   bool ask(const Followed& partition, std::vector<Part> parts, std::optional<Time> from);
@@ -54,13 +54,8 @@ class PartitionWatches {
   const Links links_;
   OpenGroups open_;  // used by the thread only
   Mutex mutex_{LockRank::kParts};
-  Condition changed_;
   std::vector<Followed> partitions_ TFDUDE_GUARDED_BY(mutex_);
-  bool asked_ TFDUDE_GUARDED_BY(mutex_) = false;
-  bool lacking_ TFDUDE_GUARDED_BY(mutex_) = false;
-  Clock::time_point last_round_ TFDUDE_GUARDED_BY(mutex_){};
-  bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
-  std::thread thread_;  // last: it uses the other members
+  RenewalLoop rounds_;  // last: its thread uses the other members
 };
 
 }  // namespace tfdude

@@ -16,15 +16,12 @@ constexpr Milliseconds kRetryAfter{50};
 
 }  // namespace
 
-Watches::Watches(Links links) : links_(std::move(links)), thread_([this] { run(); }) {}
+Watches::Watches(Links links)
+    : links_(std::move(links)),
+      rounds_(kRenewEvery, kRetryAfter, [this](bool renew) { return attend_all(renew); }) {}
 
 void Watches::stop() {
-  {
-    const Lock lock(mutex_);
-    stopping_ = true;
-  }
-  changed_.notify_one();
-  if (thread_.joinable()) thread_.join();
+  rounds_.stop();
   notices_.stop();
   const Lock lock(mutex_);
   for (const Path& path : std::exchange(paths_, {})) {
@@ -37,15 +34,7 @@ void Watches::watch(std::shared_ptr<WatchedPath> path) {
     const Lock lock(mutex_);
     paths_.push_back(std::move(path));
   }
-  look_again();
-}
-
-void Watches::look_again() {
-  {
-    const Lock lock(mutex_);
-    asked_ = true;
-  }
-  changed_.notify_one();
+  rounds_.ask();
 }
 
 void Watches::on_pushed(const PushedValues& pushed) {
@@ -60,12 +49,7 @@ void Watches::on_pushed(const PushedValues& pushed) {
     if (taken.rerouted) tell_rerouted(path);
     lacks = lacks || taken.lacks;
   }
-  if (!lacks) return;
-  {
-    const Lock lock(mutex_);
-    if (std::exchange(lacking_, true)) return;
-  }
-  changed_.notify_one();
+  if (lacks) rounds_.lack();
 }
 
 bool Watches::can_answer(const std::string& a, const std::string& b, const Query& query) const {
@@ -75,41 +59,24 @@ bool Watches::can_answer(const std::string& a, const std::string& b, const Query
   });
 }
 
-void Watches::wait(Lock& lock, Clock::time_point renew_at) {
-  while (!stopping_ && !asked_) {
-    const auto wake_at = lacking_ ? std::min(renew_at, last_round_ + kRetryAfter) : renew_at;
-    if (Clock::now() >= wake_at) return;
-    changed_.wait_until(lock, wake_at);
-  }
-}
-
-void Watches::run() {
-  auto renew_at = Clock::now() + kRenewEvery;
-  Lock lock(mutex_);
-  while (true) {
-    wait(lock, renew_at);
-    if (stopping_) return;
-    asked_ = false;
-    lacking_ = false;
-    last_round_ = Clock::now();
+bool Watches::attend_all(bool renew) {
+  std::vector<Path> paths;
+  std::vector<Path> gone;
+  {
+    const Lock lock(mutex_);
     // Paths without other holders have no readers. They are destroyed without the lock, with their
     // callbacks.
     const auto unused = std::stable_partition(
         paths_.begin(), paths_.end(), [](const Path& path) { return path.use_count() > 1; });
-    std::vector<Path> gone(unused, paths_.end());
+    gone.assign(unused, paths_.end());
     paths_.erase(unused, paths_.end());
-    auto paths = paths_;
-    lock.unlock();
-    gone.clear();
-    const bool renew = Clock::now() >= renew_at;
-    if (renew) renew_at = Clock::now() + kRenewEvery;
-    bool all_well = true;
-    for (const Path& path : paths) all_well = attend(path, renew) && all_well;
-    close_unused(paths);
-    paths.clear();
-    lock.lock();
-    lacking_ = lacking_ || !all_well;
+    paths = paths_;
   }
+  gone.clear();
+  bool all_well = true;
+  for (const Path& path : paths) all_well = attend(path, renew) && all_well;
+  close_unused(paths);
+  return all_well;
 }
 
 bool Watches::attend(const Path& path, bool renew) {

@@ -5,12 +5,12 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "base/mutex.hpp"
 #include "runtime/notices.hpp"
 #include "runtime/open_groups.hpp"
+#include "runtime/renewal_loop.hpp"
 #include "runtime/watched_path.hpp"
 
 namespace tfdude {
@@ -47,14 +47,14 @@ class Watches {
                                 const Query& query) const;
 
   /// The structure or the reachable partitions have changed.
-  void look_again();
+  void look_again() { rounds_.ask(); }
 
  private:
   using Clock = std::chrono::steady_clock;
   using Path = std::shared_ptr<WatchedPath>;
 
-  void run();
-  void wait(Lock& lock, Clock::time_point renew_at) TFDUDE_REQUIRES(mutex_);
+  /// @return whether all are up to date
+  bool attend_all(bool renew);
   /// @return whether it is up to date; otherwise it must be retried soon
   bool attend(const Path& path, bool renew);
   bool cannot_be_planned(const Path& path, Error why);
@@ -69,13 +69,8 @@ class Watches {
   Notices notices_;
   OpenGroups open_;  // used by the thread only
   mutable Mutex mutex_{LockRank::kParts};
-  Condition changed_;
   std::vector<Path> paths_ TFDUDE_GUARDED_BY(mutex_);
-  bool asked_ TFDUDE_GUARDED_BY(mutex_) = false;
-  bool lacking_ TFDUDE_GUARDED_BY(mutex_) = false;            // a path is not up to date
-  Clock::time_point last_round_ TFDUDE_GUARDED_BY(mutex_){};  // when paths were last checked
-  bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
-  std::thread thread_;  // last: it uses the other members
+  RenewalLoop rounds_;  // last: its thread uses the other members
 };
 
 }  // namespace tfdude
