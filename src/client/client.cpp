@@ -6,6 +6,7 @@
 #include "tfdude/transport/fastdds.hpp"
 
 #include "runtime/participant.hpp"
+#include "tree/over_fixed.hpp"
 
 namespace tfdude {
 namespace {
@@ -199,12 +200,7 @@ Result<StampedTransform> Client::lookup(std::string_view a, const Query& at_a, s
   if (!X_FA) return tl::unexpected(X_FA.error());
   const auto X_FB = participant_->lookups().lookup(fixed, b, at_b, deadline);
   if (!X_FB) return tl::unexpected(X_FB.error());
-  StampedTransform X_AB{between(*X_FA, *X_FB), X_FB->stamp};
-  std::vector<std::string>& unspecified = X_AB.basis.unspecified;
-  unspecified.assign(X_FA->basis.unspecified.rbegin(), X_FA->basis.unspecified.rend());
-  unspecified.insert(unspecified.end(), X_FB->basis.unspecified.begin(),
-                     X_FB->basis.unspecified.end());
-  return X_AB;
+  return over_fixed(*X_FA, *X_FB);
 }
 
 PendingLookup Client::lookup_async(const std::string& a, const std::string& b, const Query& query,

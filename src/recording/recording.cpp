@@ -7,6 +7,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "recording/state.hpp"
+#include "tree/over_fixed.hpp"
 
 namespace tfdude {
 namespace {
@@ -229,12 +230,7 @@ Result<StampedTransform> Recording::lookup_at(std::string_view a, Time at_a, std
   if (!X_FA) return tl::unexpected(X_FA.error());
   const auto X_FB = lookup_at(fixed, b, at_b, query);
   if (!X_FB) return tl::unexpected(X_FB.error());
-  StampedTransform X_AB{between(*X_FA, *X_FB), X_FB->stamp};
-  std::vector<std::string>& unspecified = X_AB.basis.unspecified;
-  unspecified.assign(X_FA->basis.unspecified.rbegin(), X_FA->basis.unspecified.rend());
-  unspecified.insert(unspecified.end(), X_FB->basis.unspecified.begin(),
-                     X_FB->basis.unspecified.end());
-  return X_AB;
+  return over_fixed(*X_FA, *X_FB);
 }
 
 Result<std::vector<PathSegment>> Recording::path(std::string_view a, std::string_view b) const {
