@@ -16,8 +16,8 @@
 
 #include "tfdude/client/client.hpp"
 
+#include "../worker.hpp"
 #include "pairs.hpp"
-#include "worker.hpp"
 #include "world.hpp"
 
 namespace tfdude::web {
@@ -41,7 +41,7 @@ class Live {
   Live& operator=(const Live&) = delete;
 
   [[nodiscard]] World& world() { return world_; }
-  [[nodiscard]] Worker& worker() { return worker_; }
+  [[nodiscard]] cli::Worker& worker() { return worker_; }
 
   // On the server's thread:
 
@@ -84,7 +84,7 @@ class Live {
   const double rate_;
   World world_;
   Client client_;
-  Worker worker_;
+  cli::Worker worker_{256};
   Pairs pairs_;
   std::atomic<int> viewers_{0};
 

@@ -12,7 +12,7 @@
 
 #include "tfdude/client/client.hpp"
 
-#include "worker.hpp"
+#include "../worker.hpp"
 
 // The poses that pages ask for. Each is followed once, however many pages show it.
 namespace tfdude::web {
@@ -49,7 +49,7 @@ class Pair {
 
 class Pairs {
  public:
-  Pairs(Client& client, Worker& worker, double rate)
+  Pairs(Client& client, cli::Worker& worker, double rate)
       : client_(client), worker_(worker), rate_(rate) {}
 
   /// Follows a pair while the result exists. On the server's thread.
@@ -70,7 +70,7 @@ class Pairs {
                              const std::string& unreachable) const;
 
   Client& client_;
-  Worker& worker_;
+  cli::Worker& worker_;
   const double rate_;
   std::map<std::pair<std::string, std::string>, std::weak_ptr<Pair>> pairs_;
 };

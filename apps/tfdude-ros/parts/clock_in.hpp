@@ -5,8 +5,8 @@
 
 #include "tfdude/client/node.hpp"
 
+#include "../../worker.hpp"
 #include "../ros_domain.hpp"
-#include "worker.hpp"
 
 namespace tfdude::ros {
 
@@ -27,7 +27,7 @@ class ClockIn {
 
   Node& node_;
   std::string logged_;
-  Worker worker_{10};  // last: it uses the other members
+  cli::Worker worker_{10};  // last: it uses the other members
 };
 
 }  // namespace tfdude::ros

@@ -10,10 +10,10 @@
 
 #include "tfdude/client/node.hpp"
 
+#include "../../worker.hpp"
 #include "../ros_domain.hpp"
 #include "../settings.hpp"
 #include "frames_in.hpp"
-#include "worker.hpp"
 
 namespace tfdude::ros {
 
@@ -45,7 +45,7 @@ class DescriptionIn {
   std::mutex mutex_;
   std::condition_variable changed_;
   bool served_ = false;
-  Worker worker_{4};  // last: it uses the other members
+  cli::Worker worker_{4};  // last: it uses the other members
 };
 
 /// Publishes the URDF of a file, or of a partition, on /robot_description, also for late nodes.
@@ -70,7 +70,7 @@ class DescriptionOut {
   const DescriptionOutSettings settings_;
   std::unique_ptr<Publisher> publisher_;
   std::string text_;
-  Worker worker_{4};  // last: it uses the other members
+  cli::Worker worker_{4};  // last: it uses the other members
 };
 
 }  // namespace tfdude::ros

@@ -41,7 +41,7 @@ void FramesIn::on_change(const Change& change) {
   worker_.post([this] {
     retrying_ = false;
     const std::lock_guard<std::mutex> lock(mutex_);
-    apply(import_.retry(Worker::Clock::now(),
+    apply(import_.retry(cli::Worker::Clock::now(),
                         [this](const std::string& id) { return structure_.holding(id); }));
   });
 }
@@ -63,7 +63,7 @@ void FramesIn::give_up(std::set<std::string> frames) {
 
 void FramesIn::take(const TfMessage& message, const std::string& writer, bool is_static) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  apply(import_.take(message, writer, is_static, Worker::Clock::now(),
+  apply(import_.take(message, writer, is_static, cli::Worker::Clock::now(),
                      [this](const std::string& id) { return structure_.holding(id); }));
 }
 

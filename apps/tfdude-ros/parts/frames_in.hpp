@@ -7,10 +7,10 @@
 
 #include "tfdude/client/node.hpp"
 
+#include "../../worker.hpp"
 #include "../logic/tf_import.hpp"
 #include "../ros_domain.hpp"
 #include "structure.hpp"
-#include "worker.hpp"
 
 namespace tfdude::ros {
 
@@ -48,7 +48,7 @@ class FramesIn {
   std::mutex mutex_;  // so that what is decided is also applied before the next decision
   TfImport import_;
   std::atomic<bool> retrying_{false};
-  Worker worker_;  // last: it uses the other members
+  cli::Worker worker_;  // last: it uses the other members
 };
 
 }  // namespace tfdude::ros

@@ -9,7 +9,7 @@
 namespace tfdude::ros {
 namespace {
 
-using Clock = Worker::Clock;
+using Clock = cli::Worker::Clock;
 
 // How often it is checked whether the plan still holds.
 constexpr std::chrono::milliseconds kLookEvery{100};
@@ -79,7 +79,7 @@ Result<void> FramesOut::start(RosDomain& domain, std::function<std::set<std::str
   if (!tf_static) return tl::unexpected(std::move(tf_static.error()));
   tf_ = *std::move(tf);
   tf_static_ = *std::move(tf_static);
-  worker_ = std::make_unique<Worker>();
+  worker_ = std::make_unique<cli::Worker>();
   worker_->repeat(kLookEvery, [this] { look(); });
   return {};
 }

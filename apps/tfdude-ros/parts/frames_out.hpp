@@ -12,9 +12,9 @@
 
 #include "tfdude/client/node.hpp"
 
+#include "../../worker.hpp"
 #include "../logic/tf_export.hpp"
 #include "../ros_domain.hpp"
-#include "worker.hpp"
 
 namespace tfdude::ros {
 
@@ -59,12 +59,12 @@ class FramesOut {
   std::atomic<bool> stale_{true};
   // The following belong to the worker.
   std::set<std::string> last_from_ros_;
-  std::map<std::string, Worker::Clock::time_point> known_since_;  // reachable partitions
+  std::map<std::string, cli::Worker::Clock::time_point> known_since_;  // reachable partitions
   bool incomplete_ = true;  // something could not be watched, or is not to be yet
   std::vector<std::unique_ptr<Group>> groups_;
   std::size_t next_group_ = 0;
   std::string logged_;  // the last reason for what is missing
-  std::unique_ptr<Worker> worker_;
+  std::unique_ptr<cli::Worker> worker_;
 };
 
 }  // namespace tfdude::ros

@@ -6,9 +6,9 @@
 
 #include "tfdude/client/node.hpp"
 
+#include "../../worker.hpp"
 #include "../logic/joints.hpp"
 #include "../ros_domain.hpp"
-#include "worker.hpp"
 
 namespace tfdude::ros {
 
@@ -29,7 +29,7 @@ class JointsIn {
   Node& node_;
   JointImport import_;
   std::string logged_;  // the last error
-  Worker worker_;       // last: it uses the other members
+  cli::Worker worker_;  // last: it uses the other members
 };
 
 /// Sends the joints of tf-dude to /joint_states.
@@ -48,7 +48,7 @@ class JointsOut {
   Node& node_;
   JointExport export_;
   std::unique_ptr<Publisher> publisher_;
-  Worker worker_;  // last: it uses the other members
+  cli::Worker worker_;  // last: it uses the other members
 };
 
 }  // namespace tfdude::ros

@@ -9,9 +9,9 @@
 
 #include "tfdude/client/node.hpp"
 
+#include "../../worker.hpp"
 #include "../logic/poses.hpp"
 #include "../ros_domain.hpp"
-#include "worker.hpp"
 
 namespace tfdude::ros {
 
@@ -64,7 +64,7 @@ class PoseObserver {
   std::uint64_t rejected_ = 0;  // by the gate
   std::uint64_t failed_ = 0;
   std::string logged_;
-  Worker worker_{100};  // last: it uses the other members
+  cli::Worker worker_{100};  // last: it uses the other members
 };
 
 }  // namespace tfdude::ros

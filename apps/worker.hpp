@@ -11,11 +11,11 @@
 #include <thread>
 #include <utility>
 
-namespace tfdude::ros {
+namespace tfdude::cli {
 
-/// A thread that runs what it is given, in order. Each part of the bridge has its own, so that none
-/// waits for another's requests. Its inbox is bounded: what does not fit is dropped and counted, as
-/// a DDS reader of a bounded depth does.
+/// A thread that runs what it is given, in order, so that those who give it do not wait for
+/// requests. Its inbox is bounded: what does not fit is dropped and counted, as a DDS reader of a
+/// bounded depth does.
 class Worker {
  public:
   using Clock = std::chrono::steady_clock;
@@ -26,17 +26,18 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// Thread-safe; does not wait.
-  void post(Task task) {
+  /// Thread-safe; does not wait. @return false: it is dropped
+  bool post(Task task) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (tasks_.size() >= capacity_) {
         dropped_.fetch_add(1, std::memory_order_relaxed);
-        return;
+        return false;
       }
       tasks_.push_back(std::move(task));
     }
     changed_.notify_one();
+    return true;
   }
 
   /// Runs a task periodically. Call once.
@@ -103,4 +104,4 @@ class Worker {
   std::thread thread_;  // last: it uses the other members
 };
 
-}  // namespace tfdude::ros
+}  // namespace tfdude::cli
