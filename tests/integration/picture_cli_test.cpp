@@ -12,12 +12,13 @@
 #include <nlohmann/json.hpp>
 
 #include "support/catch.hpp"
-#include "support/thesis.hpp"
+#include "support/thesis_json.hpp"
 
 namespace tfdude {
 namespace {
 
 using nlohmann::json;
+using testing::answered;
 using testing::CliResult;
 using testing::ContainsSubstring;
 using testing::Process;
@@ -74,14 +75,6 @@ CliResult run_with_path(const ThesisDaemons& d, const std::string& path, Argumen
                         TFDUDE_LOOPBACK_PROFILE};
   arguments.insert(arguments.begin(), begin.begin(), begin.end());
   return run(arguments);
-}
-
-json answered(const ThesisDaemons& d, Arguments arguments, int status = 0) {
-  arguments.insert(arguments.begin(), "--json");
-  const CliResult result = d.domain.cli(arguments);
-  INFO(result.out << result.err);
-  CHECK(result.status == status);
-  return json::parse(result.out);
 }
 
 }  // namespace

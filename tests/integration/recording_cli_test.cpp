@@ -14,13 +14,14 @@
 
 #include "support/catch.hpp"
 #include "support/process.hpp"
-#include "support/thesis.hpp"
+#include "support/thesis_json.hpp"
 
 namespace tfdude {
 namespace {
 
 using namespace std::chrono_literals;
 using nlohmann::json;
+using testing::answered;
 using testing::CliResult;
 using testing::ContainsSubstring;
 using testing::eventually;
@@ -29,14 +30,6 @@ using testing::TemporaryDirectory;
 using testing::text;
 using testing::ThesisDaemons;
 using Arguments = std::vector<std::string>;
-
-json answered(const ThesisDaemons& d, Arguments arguments, int status = 0) {
-  arguments.insert(arguments.begin(), "--json");
-  const CliResult result = d.domain.cli(arguments);
-  INFO(result.out << result.err);
-  CHECK(result.status == status);
-  return json::parse(result.out);
-}
 
 Arguments of_file(Arguments arguments, const std::string& file) {
   arguments.insert(arguments.end(), {"--recording", file});

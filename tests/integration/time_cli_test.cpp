@@ -10,12 +10,13 @@
 
 #include "support/catch.hpp"
 #include "support/process.hpp"
-#include "support/thesis.hpp"
+#include "support/thesis_json.hpp"
 
 namespace tfdude {
 namespace {
 
 using nlohmann::json;
+using testing::answered;
 using testing::CliResult;
 using testing::ContainsSubstring;
 using testing::eventually;
@@ -24,14 +25,6 @@ using testing::Process;
 using testing::text;
 using testing::ThesisDaemons;
 using Arguments = std::vector<std::string>;
-
-json answered(const ThesisDaemons& d, Arguments arguments, int status = 0) {
-  arguments.insert(arguments.begin(), "--json");
-  const CliResult result = d.domain.cli(arguments);
-  INFO(result.out);
-  CHECK(result.status == status);
-  return json::parse(result.out);
-}
 
 void sample(const ThesisDaemons& d, const std::string& id, const std::string& x,
             const std::string& stamp) {

@@ -96,18 +96,7 @@ def connect(robot, protocol="foxglove.websocket.v1"):
     return websockets.connect(robot.url.replace("http", "ws"), max_size=None, subprotocols=[protocol])
 
 
-class Foxglove(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.robot = rig.Rig().__enter__()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.robot.__exit__()
-
-    def run_async(self, coroutine):
-        return asyncio.run(asyncio.wait_for(coroutine, 2 * rig.WAIT))
-
+class Foxglove(rig.RigTest):
     def assert_pose(self, frame, translation, rotation, parent):
         said = self.robot.ask("lookup", parent, frame)
         for one, other in zip(translation, said["translation"]):

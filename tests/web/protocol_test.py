@@ -96,18 +96,7 @@ def same_rotation(p, q, tolerance):
     return 1 - abs(sum(a * b for a, b in zip(p, q))) <= tolerance
 
 
-class Protocol(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.robot = rig.Rig().__enter__()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.robot.__exit__()
-
-    def run_async(self, coroutine):
-        return asyncio.run(asyncio.wait_for(coroutine, 2 * rig.WAIT))
-
+class Protocol(rig.RigTest):
     def test_all_frames_and_their_values(self):
         async def talk():
             async with connect(self.robot) as socket:

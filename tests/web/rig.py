@@ -1,5 +1,6 @@
 """Processes of a robot and of tfdude-web, in a DDS domain that no other test uses, on this computer only."""
 
+import asyncio
 import json
 import os
 import pathlib
@@ -7,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = pathlib.Path(os.environ.get("TFDUDE_BIN", ROOT / "build/release/bin"))
@@ -91,3 +93,18 @@ class Rig:
         done = subprocess.run([BIN / "tfdude", "--json", "--timeout", "20000", *map(str, arguments)],
                               env=self.environment, text=True, capture_output=True, timeout=60, check=False)
         return json.loads(done.stdout)
+
+
+class RigTest(unittest.TestCase):
+    """Its tests share one robot."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.robot = Rig().__enter__()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.robot.__exit__()
+
+    def run_async(self, coroutine):
+        return asyncio.run(asyncio.wait_for(coroutine, 2 * WAIT))
