@@ -25,7 +25,7 @@ bool same(const std::string& a, const std::string& b) {
   if (a.size() != b.size()) return false;
   unsigned differs = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    differs |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);
+    differs |= static_cast<unsigned>(a[i] ^ b[i]);
   }
   return differs == 0;
 }

@@ -112,6 +112,9 @@ def test_nothing_works_once_the_interpreter_ends():
 
 def test_child_of_a_fork_gets_a_clear_error():
     out = run("""
+        import warnings
+        # Python 3.12 and later warn of what is tested here.
+        warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
         child = os.fork()
         if child == 0:
             failures = 0

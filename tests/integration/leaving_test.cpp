@@ -114,6 +114,15 @@ TEST_CASE("leaving: 5000 readers are deleted while writers come and go") {
   Member joiner(lease.number());
   std::atomic<bool> over{false};
   std::atomic<int> matches{0};
+  {
+    // All would be over before they discover each other.
+    const auto reader = leaver.read(
+        matches, [] {}, "call_reader");
+    const auto writer = joiner.write("call_writer");
+    REQUIRE(
+        writer->wait_until_matched(std::chrono::steady_clock::now() + std::chrono::seconds(20)));
+  }
+  matches = 0;
   std::thread others([&] {
     while (!over) {
       std::vector<std::unique_ptr<Writer>> writers;
