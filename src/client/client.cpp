@@ -214,6 +214,36 @@ std::future<Result<StampedTransform>> Client::lookup_async(const std::string& a,
   return participant_->lookups().start(a, b, query, wait);
 }
 
+Result<TransformedPoints> Client::transform(std::string_view a, std::string_view b,
+                                            const std::vector<Point>& points_B,
+                                            const Query& query) {
+  for (std::size_t i = 0; i < points_B.size(); ++i) {
+    if (auto ok = check_point(points_B[i]); !ok) {
+      return fail_at("point " + std::to_string(i) + " of frame " + quote(b), ok.error());
+    }
+  }
+  return lookup(a, b, query).map([&](const StampedTransform& X_AB) {
+    TransformedPoints points_A{{}, X_AB};
+    points_A.points.reserve(points_B.size());
+    for (const Point& p_B : points_B) {
+      points_A.points.push_back(tfdude::transform(X_AB, p_B, query.order));
+    }
+    return points_A;
+  });
+}
+
+Result<StampedTransform> Client::transform(std::string_view a, std::string_view b,
+                                           const Transform& X_BC, const Query& query) {
+  if (auto finite = check_finite(X_BC); !finite) return tl::unexpected(finite.error());
+  return lookup(a, b, query).map([&](StampedTransform X_AC) {
+    const auto belief = [](const Transform& X) {
+      return Belief{X.pose, X.covariance.of_specified(), {}, {}, !X.covariance.complete()};
+    };
+    static_cast<Transform&>(X_AC) = collapse(compose(belief(X_AC), belief(X_BC), query.order));
+    return X_AC;
+  });
+}
+
 Result<void> Client::can_lookup(std::string_view a, std::string_view b, const Query& query) {
   return participant_->lookups().lookup(a, b, query).map([](const StampedTransform&) {});
 }

@@ -18,6 +18,7 @@
 #include "tfdude/client/subscription.hpp"
 #include "tfdude/client/watch.hpp"
 #include "tfdude/math/observation.hpp"
+#include "tfdude/math/point.hpp"
 #include "tfdude/math/transform.hpp"
 #include "tfdude/transport/transport.hpp"
 #include "tfdude/types/change.hpp"
@@ -28,6 +29,7 @@
 #include "tfdude/types/options.hpp"
 #include "tfdude/types/partition_info.hpp"
 #include "tfdude/types/query.hpp"
+#include "tfdude/types/transformed_points.hpp"
 
 namespace tfdude {
 
@@ -36,17 +38,8 @@ class Participant;
 /// A process's access to all frames of a domain. See Node for a process that owns frames.
 ///
 /// Each process has a replica of the structure. So missing frames are known without a request, and
-/// requests go straight to the owners.
+/// requests go straight to the owners. With Options::follow it has no replica, see there.
 ///
-/// @par Following only some frames  With Options::follow, a client has no replica. It asks an
-///   owner, which has one, for the frames that it needs, and keeps the answers. So the first call
-///   about a frame takes one more round trip. If a call fails with a kept answer, it asks again.
-///   find(), path(), parent() and exists() ask each time, and so does frames(), which lists what is
-///   followed and all frames above. A watched path takes a new route, and publish() notices a new
-///   owner, up to a second after the change. remove(), children(), roots(), and all that moves
-///   joints or opens streams fail with kInvalidInput, because they need all frames. partitions()
-///   gives no numbers of frames; on_change() reports partitions only. Every function may also fail
-///   with kUnsupported (all owners are of an earlier version) or kNotPermitted (keys).
 /// @par Thread safety  All functions may be called from any thread. Each waits for its own answer
 ///   only.
 /// @par Errors  Every function may also fail with kUnreachable (a partition concerned is known to
@@ -248,6 +241,18 @@ class TFDUDE_EXPORT Client {
                                                                    const std::string& b,
                                                                    const Query& query,
                                                                    Milliseconds wait);
+
+  /// Points and directions p_B of frame b, in frame a, with the covariance of both: one lookup, then
+  /// tfdude::transform() for each. joint_covariance() of the answer's X_AB says how their errors
+  /// are correlated.
+  /// @return as lookup(); kInvalidInput naming the point.
+  [[nodiscard]] Result<TransformedPoints> transform(std::string_view a, std::string_view b,
+                                                    const std::vector<Point>& points_B,
+                                                    const Query& query = {});
+  /// X_AC of a pose X_BC, for example of an object seen by camera b. The error of X_BC counts as
+  /// independent of the path's. @return as lookup().
+  [[nodiscard]] Result<StampedTransform> transform(std::string_view a, std::string_view b,
+                                                   const Transform& X_BC, const Query& query = {});
 
   /// Whether lookup() would succeed; if not, why. Takes as long as lookup().
   [[nodiscard]] Result<void> can_lookup(std::string_view a, std::string_view b,

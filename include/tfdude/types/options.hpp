@@ -58,11 +58,20 @@ struct Options {
   /// more.
   Milliseconds discovery{1000};
   /// What a client follows, instead of all frames. Absent: it receives the structure of all
-  /// partitions, and keeps it. Otherwise it keeps only the frames that it follows or has been asked
-  /// about, each with all frames above it. It asks an owner for them, at the first use: one more
-  /// round trip. See Client for what is different then. An entry is the id of a frame, for it and
-  /// all frames below it; or the beginning of ids, followed by '*'. No entries: it only asks. Not
-  /// for a Node, which needs all frames.
+  /// partitions, and keeps it. Otherwise it has no replica, and keeps only the frames that it
+  /// follows or has been asked about, each with all frames above it. An entry is the id of a frame,
+  /// for it and all frames below it; or the beginning of ids, followed by '*'. No entries: it only
+  /// asks. Not for a Node, which needs all frames.
+  ///
+  /// It asks an owner, which has a replica, for the frames that it needs, and keeps the answers. So
+  /// the first call about a frame takes one more round trip. If a call fails with a kept answer, it
+  /// asks again. find(), path(), parent() and exists() ask each time, and so does frames(), which
+  /// lists what is followed and all frames above. A watched path takes a new route, and publish()
+  /// notices a new owner, up to a second after the change. remove(), children(), roots(), and all
+  /// that moves joints or opens streams fail with kInvalidInput, because they need all frames.
+  /// partitions() gives no numbers of frames; on_change() reports partitions only. Every function
+  /// may also fail with kUnsupported (all owners are of an earlier version) or kNotPermitted
+  /// (keys).
   std::optional<std::vector<std::string>> follow{};
   /// Directory in which a Node stores its partition's frames, from which its next process restores
   /// them; empty: nothing is stored. Changes requested by others are stored before they are
