@@ -38,18 +38,30 @@ void add_pose_options(CLI::App& command, Arguments& arguments) {
   command.add_option("--xyz", spec.xyz, "translation [m]")->type_name("X Y Z");
   auto* rpy = command.add_option("--rpy", spec.rpy, "rotation about fixed axes X, Y, Z [rad]");
   rpy->type_name("R P Y");
-  command.add_option("--quat", spec.quat, "rotation as unit quaternion")
-      ->type_name("X Y Z W")
-      ->excludes(rpy);
+  auto* quat = command.add_option("--quat", spec.quat, "rotation as unit quaternion");
+  quat->type_name("X Y Z W")->excludes(rpy);
+  command.add_option("--matrix", spec.matrix, "the pose as homogeneous 4x4 matrix row by row")
+      ->type_name("16 NUMBERS")
+      ->excludes("--xyz")
+      ->excludes(rpy)
+      ->excludes(quat);
   auto* stddev =
       command.add_option("--stddev", spec.stddev, "standard deviations [m m m rad rad rad]")
           ->type_name("6 NUMBERS");
+  explain_angles(command);
   command.add_option("--cov", spec.cov, "upper triangle of the covariance row by row")
       ->type_name("21 NUMBERS")
       ->excludes(stddev);
   command.add_option("--covariance", spec.covariance, "instead of numbers: unspecified or exact")
       ->check(CLI::IsMember({"unspecified", "exact"}))
       ->excludes(stddev);
+}
+
+void explain_angles(CLI::App& command) {
+  command.footer(
+      "Angles are in radians; with --deg in degrees, typed and printed. JSON always has "
+      "radians.\n" +
+      command.get_footer());
 }
 
 void add_out(CLI::App* command, Arguments& arguments, const std::vector<std::string>& endings) {

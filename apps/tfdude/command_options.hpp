@@ -25,6 +25,9 @@ std::function<std::string(const std::string&)> within(double least, double most,
 /// Adds the options for a pose and its covariance.
 void add_pose_options(CLI::App& command, Arguments& arguments);
 
+/// Says in the help which unit angles have.
+void explain_angles(CLI::App& command);
+
 /// Adds the option for the file of a picture, whose name must end in one of these.
 void add_out(CLI::App* command, Arguments& arguments, const std::vector<std::string>& endings);
 

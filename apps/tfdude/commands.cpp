@@ -23,15 +23,6 @@ void print_error(std::string_view code, std::string_view message) {
   print(dump({{"error", {{"code", code}, {"message", message}}}}) + "\n");
 }
 
-// The signals that end a command that runs until interrupted; main() has blocked them.
-sigset_t signals_to_stop() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  return signals;
-}
-
 // Prints a list of ids, one per line.
 int list(const Arguments& arguments, const char* key, const std::vector<std::string>& ids) {
   std::string text;
@@ -90,6 +81,14 @@ int refuse(Source source, const Error& error, const Arguments& arguments) {
   }
   if (error.code == Errc::kUnsupported && arguments.options.follow) return kNeedsAllFrames;
   return report(error, arguments);
+}
+
+sigset_t signals_to_stop() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  return signals;
 }
 
 bool interrupted_within(double seconds) {
@@ -208,8 +207,8 @@ Result<PartialTransform> given_parts(const TransformSpec& spec) {
   const auto X_PC = spec.build();
   if (!X_PC) return tl::unexpected(X_PC.error());
   PartialTransform given;
-  if (spec.xyz) given.translation = X_PC->pose.translation();
-  if (spec.rpy || spec.quat) given.rotation = X_PC->pose.rotation();
+  if (spec.xyz || spec.matrix) given.translation = X_PC->pose.translation();
+  if (spec.gives_rotation()) given.rotation = X_PC->pose.rotation();
   if (spec.gives_covariance()) given.covariance = X_PC->covariance;
   return given;
 }

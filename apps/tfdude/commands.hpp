@@ -1,5 +1,6 @@
 #pragma once
 
+#include <csignal>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 #include "tfdude/keys/key_store.hpp"
 #include "tfdude/math/transform_spec.hpp"
 
+#include "render.hpp"
 #include "source.hpp"
 
 namespace tfdude::cli {
@@ -60,7 +62,9 @@ struct Arguments {
   std::string parent;
   std::string partition;
   TransformSpec spec;
-  bool covariance = false;
+  AngleUnit angles = kRadian;  ///< of angles that are typed, and of printed text
+  bool covariance = false;     ///< print the full one
+  bool matrix = false;         ///< print poses as matrices
   double rate = 2.0;
   std::string stamp;  ///< as written, see parse_stamp(); also the instant of a lookup
   std::string other_stamp;
@@ -77,9 +81,16 @@ struct Arguments {
   std::vector<std::string> sources;  ///< for each column: its source's name and 6 numbers
   std::string out;                   ///< the picture's file
   int samples = 0;
-  double position = 0;                 ///< of a joint [rad or m]
-  std::optional<double> joint_stddev;  ///< of this position [rad or m]
-  double over = 0.1;                   ///< interval of a velocity [s]
+  std::vector<std::string> joints;     ///< a name and a position, or NAME=POSITION each
+  std::optional<double> joint_stddev;  ///< of these positions
+  std::string from;                    ///< the file of samples; "-": standard input
+  std::optional<double> pace;          ///< samples per second from the file
+  std::vector<double> points;          ///< three coordinates each
+  std::vector<double> point_stddev;
+  std::vector<double> point_cov;  ///< upper triangle
+  bool direction = false;
+  bool joint_covariance = false;  ///< of all points together
+  double over = 0.1;              ///< interval of a velocity [s]
   RecordingArguments recording;
   KeysArguments keys;
 };
@@ -102,6 +113,8 @@ struct Arguments {
 /// an empty text. @return also kNotYet
 [[nodiscard]] Result<std::optional<Time>> optional_stamp(Source source, const std::string& text);
 
+/// The signals that end a command that runs until interrupted; main() has blocked them.
+[[nodiscard]] sigset_t signals_to_stop();
 /// Waits between two outputs of a command that runs until interrupted.
 /// @return whether it was interrupted
 [[nodiscard]] bool interrupted_within(double seconds);
@@ -118,6 +131,9 @@ int refuse(Source source, const Error& error, const Arguments& arguments);
 
 /// Prints a change.
 void print_event(const Change& change, const Arguments& arguments);
+[[nodiscard]] Order order_of(const Arguments& arguments);
+/// How the options want transforms to be printed.
+[[nodiscard]] Shown shown_by(const Arguments& arguments);
 /// A transform of a path, as `lookup` and `echo` print it.
 [[nodiscard]] nlohmann::json path_json(Source source, const Arguments& arguments,
                                        const StampedTransform& X_AB);
@@ -148,6 +164,10 @@ int run_observe(Client& client, const Arguments& arguments);
 int run_fuse(Client& client, const Arguments& arguments);
 int run_correlate(Client& client, const Arguments& arguments);
 int run_joint(Client& client, const Arguments& arguments);
+int run_point(Source source, const Arguments& arguments);
+int run_publish(Client& client, const Arguments& arguments);
+/// Sends the lines of `--from`. @param acknowledged  joints only, each line one commit of each owner
+int send_lines(Client& client, const Arguments& arguments, bool acknowledged);
 int run_joints(Source source, const Arguments& arguments);
 int run_description(Client& client, const Arguments& arguments);
 int run_monitor(Client& client, const Arguments& arguments);

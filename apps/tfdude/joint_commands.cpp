@@ -1,16 +1,82 @@
+#include "tfdude/base/id.hpp"
+
+#include "../numbers.hpp"
 #include "commands.hpp"
 #include "joint_render.hpp"
+#include "known_joints.hpp"
+#include "samples.hpp"
 
 // Commands for joints.
 namespace tfdude::cli {
+namespace {
+
+struct Typed {
+  std::string name;
+  double position;
+};
+
+// NAME=POSITION..., or NAME POSITION. A name may contain '=', a position cannot.
+Result<std::vector<Typed>> typed_joints(const std::vector<std::string>& words) {
+  if (words.size() == 2 && is_number(words[1])) {
+    return std::vector<Typed>{{words[0], std::strtod(words[1].c_str(), nullptr)}};
+  }
+  std::vector<Typed> typed;
+  for (const std::string& word : words) {
+    const std::size_t equals = word.rfind('=');
+    const std::string number = equals == std::string::npos ? "" : word.substr(equals + 1);
+    if (!is_number(number)) {
+      return fail(Errc::kInvalidInput, quote(word) + " is not NAME=POSITION");
+    }
+    typed.push_back({word.substr(0, equals), std::strtod(number.c_str(), nullptr)});
+  }
+  if (typed.empty()) return fail(Errc::kInvalidInput, "no joint is given: NAME=POSITION");
+  return typed;
+}
+
+Result<std::vector<JointValue>> values_of(const std::vector<Typed>& typed, const Arguments& said,
+                                          const SampleReader& units) {
+  std::vector<JointValue> values;
+  for (const Typed& joint : typed) {
+    const auto position = units.position(joint.name, joint.position);
+    if (!position) return tl::unexpected(position.error());
+    values.push_back({joint.name, *position});
+    if (!said.joint_stddev) continue;
+    const double stddev = *units.position(joint.name, *said.joint_stddev);
+    values.back().variance = stddev * stddev;
+  }
+  return values;
+}
+
+}  // namespace
 
 int run_joint(Client& client, const Arguments& arguments) {
+  if (!arguments.from.empty()) return send_lines(client, arguments, true);
+  const auto typed = typed_joints(arguments.joints);
+  if (!typed) {
+    (void)report(typed.error(), arguments);
+    return kWrongUsage;
+  }
   const auto stamp = optional_stamp(client, arguments.stamp);
   if (!stamp) return report(stamp.error(), arguments);
-  JointValue joint{arguments.id, arguments.position};
-  if (const auto stddev = arguments.joint_stddev) joint.variance = *stddev * *stddev;
-  const auto updated = client.update_joints({joint}, *stamp);
-  return finish(client, updated, arguments, "moved");
+  const auto known = known_joints(client);
+  const auto values = values_of(*typed, arguments, SampleReader(arguments.angles, known));
+  if (!values) return refuse(client, values.error(), arguments);
+  const auto updated = client.update_joints(*values, *stamp);
+  if (!updated) return refuse(client, updated.error(), arguments);
+  nlohmann::json json = nlohmann::json::array();
+  std::string text;
+  for (const JointValue& value : *values) {
+    const auto joint = known.find(value.name);
+    json.push_back({{"name", value.name}, {"position", value.position}});
+    text += "moved " + value.name;
+    if (joint != known.end()) {
+      const JointInfo& info = joint->second;
+      json.back()["outside"] = info.limits && !info.limits->contain(value.position);
+      text += " to " + position_text(info, value.position, arguments.angles);
+    }
+    text += "\n";
+  }
+  return answer(arguments, {{"done", "moved"}, {"joints", std::move(json)}}, text);
 }
 
 int run_joints(Source source, const Arguments& arguments) {
@@ -25,7 +91,7 @@ int run_joints(Source source, const Arguments& arguments) {
     if (!joints) {
       text += "partition " + partition.name + ": " + joints.error().message + "\n";
     } else if (!joints->empty()) {
-      text += "partition " + partition.name + "\n" + joint_table(*joints);
+      text += "partition " + partition.name + "\n" + joint_table(*joints, arguments.angles);
     }
     if (joints) {
       one["joints"] = nlohmann::json::array();

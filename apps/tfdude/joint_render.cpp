@@ -10,17 +10,26 @@ namespace {
 
 bool is_prismatic(const JointInfo& joint) { return joint.type == JointType::kPrismatic; }
 
-const char* unit_of(const JointInfo& joint) { return is_prismatic(joint) ? "mm" : "deg"; }
-
-// Degrees or millimetres, the usual units of joints.
-double in_unit(const JointInfo& joint, double value) {
-  return value * (is_prismatic(joint) ? 1e3 : kDegrees);
+// Metres, or the unit of angles.
+double in_unit(const JointInfo& joint, double value, const AngleUnit& angles) {
+  return is_prismatic(joint) ? value : value * angles.per_radian;
 }
 
-std::string limits_of(const JointInfo& joint) {
+const char* unit_of(const JointInfo& joint, const AngleUnit& angles) {
+  return is_prismatic(joint) ? "m" : angles.name;
+}
+
+std::string position_cell(const JointInfo& joint, double value, const AngleUnit& angles,
+                          std::size_t columns) {
+  constexpr int kDecimals = 5;  // of metres and radians
+  const int decimals = is_prismatic(joint) || angles.per_radian == 1 ? kDecimals : 3;
+  return number(in_unit(joint, value, angles), decimals, columns);
+}
+
+std::string limits_of(const JointInfo& joint, const AngleUnit& angles) {
   if (!joint.limits) return "none";
   const auto limit = [&](double value) {
-    const double shown = in_unit(joint, value);
+    const double shown = in_unit(joint, value, angles);
     return std::abs(shown) < 9999.5 ? format("%.4g", shown) : format("%.2g", shown);
   };
   return limit(joint.limits->lower) + ".." + limit(joint.limits->upper);
@@ -45,7 +54,13 @@ std::string remarks_of(const JointInfo& joint) {
 
 }  // namespace
 
-std::string joint_table(const std::vector<JointInfo>& joints) {
+std::string position_text(const JointInfo& joint, double position, const AngleUnit& angles) {
+  std::string text = format("%.6g %s", in_unit(joint, position, angles), unit_of(joint, angles));
+  if (!joint.limits || joint.limits->contain(position)) return text;
+  return text + ", outside its limits " + limits_of(joint, angles) + " " + unit_of(joint, angles);
+}
+
+std::string joint_table(const std::vector<JointInfo>& joints, const AngleUnit& angles) {
   if (joints.empty()) return "";
   const auto row = [](const std::string& name, const std::string& frame,
                       const std::string& position, const std::string& stddev, const char* unit,
@@ -55,15 +70,15 @@ std::string joint_table(const std::vector<JointInfo>& joints) {
   };
   std::string text = row("joint", "frame", "position", "std dev", "unit", "limits");
   for (const JointInfo& joint : joints) {
-    text += row(joint.name, joint.frame, number(in_unit(joint, joint.position), 3, 10),
-                joint.variance ? number(in_unit(joint, std::sqrt(*joint.variance)), 3, 9) : "?",
-                unit_of(joint), limits_of(joint)) +
+    text += row(joint.name, joint.frame, position_cell(joint, joint.position, angles, 10),
+                joint.variance ? position_cell(joint, std::sqrt(*joint.variance), angles, 9) : "?",
+                unit_of(joint, angles), limits_of(joint, angles)) +
             remarks_of(joint);
   }
   return text;
 }
 
-std::string outside_table(const std::vector<JointInfo>& joints) {
+std::string outside_table(const std::vector<JointInfo>& joints, const AngleUnit& angles) {
   std::string text;
   for (const JointInfo& joint : joints) {
     if (joint.outside == 0 && joint.refused == 0) continue;
@@ -72,11 +87,12 @@ std::string outside_table(const std::vector<JointInfo>& joints) {
           "  " + cell("joint outside limits", 22) +
           format(" %10s %-4s %10s %10s %s\n", "position", "unit", "applied", "rejected", "limits");
     }
-    text +=
-        "  " + cell(joint.name, 22) +
-        format(" %10s %-4s %10s %10s %s\n", number(in_unit(joint, joint.position), 3, 10).c_str(),
-               unit_of(joint), number(static_cast<double>(joint.outside), 0, 10).c_str(),
-               number(static_cast<double>(joint.refused), 0, 10).c_str(), limits_of(joint).c_str());
+    text += "  " + cell(joint.name, 22) +
+            format(" %10s %-4s %10s %10s %s\n",
+                   position_cell(joint, joint.position, angles, 10).c_str(), unit_of(joint, angles),
+                   number(static_cast<double>(joint.outside), 0, 10).c_str(),
+                   number(static_cast<double>(joint.refused), 0, 10).c_str(),
+                   limits_of(joint, angles).c_str());
   }
   return text;
 }

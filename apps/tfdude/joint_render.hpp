@@ -7,14 +7,22 @@
 
 #include "tfdude/types/joint_spec.hpp"
 
+#include "angles.hpp"
+
 // Joints as text for people, and as JSON for programs.
 namespace tfdude::cli {
 
+/// "0.5 rad", and if so: ", outside its limits -0.1..0.1 rad".
+[[nodiscard]] std::string position_text(const JointInfo& joint, double position,
+                                        const AngleUnit& angles);
+
 /// All joints of a partition as a table.
-[[nodiscard]] std::string joint_table(const std::vector<JointInfo>& joints);
+[[nodiscard]] std::string joint_table(const std::vector<JointInfo>& joints,
+                                      const AngleUnit& angles);
 
 /// The joints that received positions outside their limits; empty if there are none.
-[[nodiscard]] std::string outside_table(const std::vector<JointInfo>& joints);
+[[nodiscard]] std::string outside_table(const std::vector<JointInfo>& joints,
+                                        const AngleUnit& angles);
 
 [[nodiscard]] nlohmann::json joint_json(const JointInfo& joint);
 

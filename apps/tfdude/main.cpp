@@ -22,6 +22,7 @@
 #include "commands.hpp"
 #include "keys_commands.hpp"
 #include "recording_options.hpp"
+#include "value_options.hpp"
 #include "web_command.hpp"
 
 namespace {
@@ -36,6 +37,8 @@ using cli::within;
 constexpr long kTimeoutByServer = 3000;  // [ms]
 constexpr const char* kWatchHelp = "redraw it twice a second, until interrupted";
 
+constexpr const char* kCovarianceHelp = "print the full covariance";
+
 using Command = std::function<int(Client&, const Arguments&)>;
 
 void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {
@@ -44,6 +47,10 @@ void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {
   app.add_option("--timeout", timeout_ms, "how long to wait for an answer [ms]")
       ->check(CLI::Range(1, 3600000));
   app.add_flag("--json", arguments.json, "one JSON object per answer");
+  app.add_flag_callback(
+      "--deg", [&arguments] { arguments.angles = cli::kDegree; },
+      "angles in degrees instead of radians, typed and printed; JSON always has "
+      "radians");
 }
 
 CLI::App* add_command(CLI::App& app, const char* name, const char* help, const char* example,
@@ -70,6 +77,12 @@ void add_milliseconds(CLI::App* command, const char* name, double& value, const 
   command->add_option(name, value, help)->type_name("MS")->check(within(0, 3.6e6, "0 to 3600000"));
 }
 
+void add_printing(CLI::App* command, Arguments& arguments) {
+  command->add_flag("--cov", arguments.covariance, kCovarianceHelp);
+  command->add_flag("--matrix", arguments.matrix, "print the pose as homogeneous 4x4 matrix");
+  cli::explain_angles(*command);
+}
+
 void add_rate(CLI::App* command, double& rate, const char* help) {
   command->add_option("--rate", rate, help)->check(within(0.001, 1000, "0.001 to 1000"));
 }
@@ -84,7 +97,7 @@ void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen,
       chosen);
   ask_only(lookup, arguments);
   add_ends(lookup, arguments);
-  lookup->add_flag("--cov", arguments.covariance, "print the full covariance");
+  add_printing(lookup, arguments);
   auto* watch = lookup->add_flag("--watch", arguments.watch, kWatchHelp);
   add_stamp(lookup, "--at", arguments.stamp,
             "the instant: seconds since the epoch or, negative, before now");
@@ -114,7 +127,8 @@ void add_velocity_command(CLI::App& app, Arguments& arguments, Command& chosen) 
                                "velocity world hand_left --over 0.05", cli::run_velocity, chosen);
   ask_only(velocity, arguments);
   add_ends(velocity, arguments);
-  velocity->add_flag("--cov", arguments.covariance, "print the full covariance");
+  velocity->add_flag("--cov", arguments.covariance, kCovarianceHelp);
+  cli::explain_angles(*velocity);
   add_stamp(velocity, "--at", arguments.stamp,
             "the middle of the interval: seconds since the epoch or, negative, before now; "
             "default: it ends at the latest common time");
@@ -137,11 +151,13 @@ void add_following_commands(CLI::App& app, Arguments& arguments, Command& chosen
                       "each owner sends its part of the path as one transform");
   }
   cli::add_recorded(echo, arguments, local, cli::run_recorded_echo);
-  watch->add_flag("--cov", arguments.covariance, "print the full covariance");
+  add_printing(watch, arguments);
+  cli::explain_angles(*echo);
   auto* monitor = add_command(app, "monitor", "rate, age and jitter of all dynamic edges",
                               "monitor --once", cli::run_monitor, chosen);
   add_rate(monitor, arguments.rate, "output rate [Hz]");
   monitor->add_flag("--once", arguments.once, "print it once");
+  cli::explain_angles(*monitor);
   add_id(add_command(app, "history", "an edge's history: samples, rate, age, rejected samples",
                      "history hand_left", cli::run_history, chosen),
          arguments);
@@ -217,6 +233,7 @@ void add_correlate_command(CLI::App& app, Arguments& arguments, Command& chosen)
       ->type_name("NAME 6 NUMBERS")
       ->type_size(cli::kSourceSize)
       ->allow_extra_args(false);
+  cli::explain_angles(*correlate);
   correlate->parse_complete_callback([&arguments] {
     for (std::size_t i = 0; i < arguments.sources.size(); ++i) {
       const std::string& said = arguments.sources[i];
@@ -243,24 +260,6 @@ void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen,
                             "graph --out frames.svg", cli::run_graph, chosen);
   add_out(graph, arguments, {".svg", ".png", ".dot"});
   cli::add_recording(graph, arguments, local, cli::run_graph);
-}
-
-void add_joint_commands(CLI::App& app, Arguments& arguments, Command& chosen,
-                        cli::LocalCommand& local) {
-  auto* joints =
-      add_command(app, "joints", "list all joints: positions, limits, which joint they mimic",
-                  "joints", cli::run_joints, chosen);
-  cli::add_recording(joints, arguments, local, cli::run_joints);
-  auto* joint = add_command(app, "joint", "set the position of a joint",
-                            "joint shoulder_pan_joint 0.5 --stddev 0.001", cli::run_joint, chosen);
-  joint->add_option("NAME", arguments.id, "the joint")->required();
-  joint->add_option("POSITION", arguments.position, "its position [rad or m]")->required();
-  joint
-      ->add_option("--stddev", arguments.joint_stddev,
-                   "standard deviation of the position [rad or m]")
-      ->check(within(0, 1e9, "0 to 1e9"));
-  add_stamp(joint, "--stamp", arguments.stamp,
-            "make it a sample of this instant: seconds since the epoch or, negative, before now");
 }
 
 void add_description_command(CLI::App& app, Arguments& arguments, Command& chosen) {
@@ -343,7 +342,7 @@ int main(int argc, char** argv) {
   add_measuring_commands(app, arguments, command);
   add_correlate_command(app, arguments, command);
   add_picture_commands(app, arguments, command, local);
-  add_joint_commands(app, arguments, command, local);
+  cli::add_value_commands(app, arguments, command, local);
   add_description_command(app, arguments, command);
   cli::add_recording_commands(app, arguments, command, local);
   cli::add_web_command(app, argc, argv, local);
@@ -369,6 +368,7 @@ int main(int argc, char** argv) {
   const bool by_server = !arguments.options.discovery_server.empty();
   if (by_server && app.count("--timeout") == 0) timeout_ms = kTimeoutByServer;
   arguments.options.timeout = Milliseconds(timeout_ms);
+  cli::to_radians(arguments.spec, arguments.angles);
   arguments.options.discovery = arguments.options.timeout;
   // Blocks the signals before any thread starts, so that commands that run until interrupted can
   // wait for them.
@@ -376,7 +376,8 @@ int main(int argc, char** argv) {
   sigemptyset(&stop_signals);
   sigaddset(&stop_signals, SIGINT);
   sigaddset(&stop_signals, SIGTERM);
-  for (const char* name : {"watch", "echo", "monitor", "events", "record", "replay"}) {
+  for (const char* name :
+       {"watch", "echo", "monitor", "events", "record", "replay", "publish", "joint"}) {
     if (app.got_subcommand(name) || arguments.watch)
       pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
   }

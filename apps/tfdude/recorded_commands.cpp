@@ -114,7 +114,7 @@ int run_recorded_echo(Recording& recording, const Arguments& arguments) {
     } else if (arguments.json) {
       (void)answer(arguments, path_json(Source(recording), arguments, *X_AB), "");
     } else {
-      screen.redraw(echo_lines(arguments.id, arguments.other, *X_AB, at));
+      screen.redraw(echo_lines(arguments.id, arguments.other, *X_AB, at, arguments.angles));
     }
     // People watch it in the time of the recording, programs read it at once.
     if (!arguments.json && interrupted_within(1.0 / arguments.rate)) break;

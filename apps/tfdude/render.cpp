@@ -95,12 +95,16 @@ std::string partition_table(const std::vector<PartitionRow>& rows) {
   return text;
 }
 
-std::string matrix_table(const Matrix6d& sigma) {
+std::string matrix_table(const Matrix6d& sigma, const AngleUnit& angles) {
+  Twist scale = Twist::Ones();
+  scale.tail<3>().setConstant(angles.per_radian);
   std::string text;
   for (const char* axis : {"x", "y", "z", "rx", "ry", "rz"}) text += format(" %12s", axis);
   text += "\n";
   for (int row = 0; row < 6; ++row) {
-    for (int column = 0; column < 6; ++column) text += format(" % .5e", sigma(row, column));
+    for (int column = 0; column < 6; ++column) {
+      text += format(" % .5e", scale[row] * sigma(row, column) * scale[column]);
+    }
     text += "\n";
   }
   return text;
@@ -124,30 +128,47 @@ std::string unspecified_text(const std::vector<std::string>& edges) {
   return text;
 }
 
-std::string describe(const Transform& X_AB, bool with_covariance,
-                     const std::vector<std::string>& unspecified) {
-  const Eigen::Vector3d t = X_AB.pose.translation();
-  const Eigen::Quaterniond q = X_AB.pose.rotation();
-  const Eigen::Vector3d rpy = (to_rpy(q) * kDegrees).unaryExpr([](double angle) {
-    return std::abs(angle) < 0.5e-4 ? 0.0 : angle;  // not "-0.0000"
-  });
-  const auto s = X_AB.covariance.of_specified().stddev();
-  std::string text = format("translation  %.6f  %.6f  %.6f  m\n", t.x(), t.y(), t.z());
+namespace {
+
+std::string describe_pose(const Pose& X_AB, const Shown& shown) {
+  std::string text;
+  if (shown.matrix) {
+    const Eigen::Matrix4d matrix = X_AB.matrix();
+    for (int row = 0; row < 4; ++row) {
+      text += row == 0 ? "matrix     " : "           ";
+      for (int column = 0; column < 4; ++column) text += format(" % .9f", matrix(row, column));
+      text += "\n";
+    }
+    return text;
+  }
+  const Eigen::Vector3d t = X_AB.translation();
+  const Eigen::Quaterniond q = X_AB.rotation();
+  const Eigen::Vector3d rpy = to_rpy(q);
+  text = format("translation  %.6f  %.6f  %.6f  m\n", t.x(), t.y(), t.z());
   text += format("quaternion   %.6f  %.6f  %.6f  %.6f  (x y z w)\n", q.x(), q.y(), q.z(), q.w());
-  text += format("rpy          %.4f  %.4f  %.4f  deg\n", rpy.x(), rpy.y(), rpy.z());
+  return text + "rpy          " + angles_text(rpy.x(), rpy.y(), rpy.z(), shown.angles) + "\n";
+}
+
+}  // namespace
+
+std::string describe(const Transform& X_AB, const Shown& shown,
+                     const std::vector<std::string>& unspecified) {
+  std::string text = describe_pose(X_AB.pose, shown);
+  const auto s = X_AB.covariance.of_specified().stddev();
   const bool complete = X_AB.covariance.complete();
   if (!complete) text += "std dev      " + unspecified_text(unspecified) + "\n";
   const std::string deviations =
       format(complete ? "std dev      %.6f  %.6f  %.6f  m" : "  of others  %.6f  %.6f  %.6f  m",
              s[0], s[1], s[2]);
-  const std::string angles =
-      format("%.4f  %.4f  %.4f  deg", s[3] * kDegrees, s[4] * kDegrees, s[5] * kDegrees);
+  const std::string angles = angles_text(s[3], s[4], s[5], shown.angles);
   const bool fits = deviations.size() + 3 + angles.size() <= 80;
   text += deviations + (fits ? "   " : "\n             ") + angles + "\n";
-  if (!with_covariance) return text;
-  text += complete ? "covariance   (translation first, of the right perturbation; m, rad)\n"
-                   : "covariance   of the others (translation first, right perturbation; m, rad)\n";
-  return text + matrix_table(X_AB.covariance.of_specified().matrix());
+  if (!shown.covariance) return text;
+  text += std::string("covariance   ") +
+          (complete ? "(translation first, of the right perturbation; m, "
+                    : "of the others (translation first, right perturbation; m, ") +
+          shown.angles.name + ")\n";
+  return text + matrix_table(X_AB.covariance.of_specified().matrix(), shown.angles);
 }
 
 nlohmann::json lookup_json(const std::string& a, const std::string& b, const Transform& X_AB,

@@ -8,6 +8,7 @@
 
 #include "tfdude/client/client.hpp"
 
+#include "angles.hpp"
 #include "time_render.hpp"
 
 // Answers as text for people, and as JSON for programs.
@@ -25,12 +26,20 @@ struct PartitionRow {
 };
 [[nodiscard]] std::string partition_table(const std::vector<PartitionRow>& rows);
 
+/// How a transform or velocity is printed.
+struct Shown {
+  AngleUnit angles = kRadian;
+  bool covariance = false;  ///< the full one
+  bool matrix = false;      ///< the pose as a homogeneous matrix
+};
+
 /// @param unspecified  the edges whose covariance is unspecified
-[[nodiscard]] std::string describe(const Transform& X_AB, bool with_covariance,
+[[nodiscard]] std::string describe(const Transform& X_AB, const Shown& shown,
                                    const std::vector<std::string>& unspecified = {});
 
-/// A table of the covariance, and its rows in JSON.
-[[nodiscard]] std::string matrix_table(const Matrix6d& sigma);
+/// A table of the covariance, whose last three rows and columns are of angles, and its rows in
+/// JSON [m, rad].
+[[nodiscard]] std::string matrix_table(const Matrix6d& sigma, const AngleUnit& angles);
 [[nodiscard]] nlohmann::json matrix_json(const Matrix6d& sigma);
 
 /// "unspecified for odom, base"

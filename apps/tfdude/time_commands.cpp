@@ -33,7 +33,7 @@ Result<Query> query_of(Source source, const std::string& stamp, const Arguments&
     if (!now) return tl::unexpected(now.error());
     query.age_noise_until = *now;
   }
-  query.order = arguments.order == 4 ? Order::kFourth : Order::kSecond;
+  query.order = order_of(arguments);
   return query;
 }
 
@@ -155,6 +155,14 @@ std::optional<Time> present(Source source, const Arguments& arguments,
   return now ? std::optional<Time>(*now) : std::nullopt;
 }
 
+Order order_of(const Arguments& arguments) {
+  return arguments.order == 4 ? Order::kFourth : Order::kSecond;
+}
+
+Shown shown_by(const Arguments& arguments) {
+  return {arguments.angles, arguments.covariance, arguments.matrix};
+}
+
 nlohmann::json path_json(Source source, const Arguments& arguments, const StampedTransform& X_AB) {
   std::vector<std::string> partitions;
   if (const auto path = source.path(arguments.id, arguments.other)) {
@@ -163,6 +171,11 @@ nlohmann::json path_json(Source source, const Arguments& arguments, const Stampe
   auto json = lookup_json(arguments.id, arguments.other, X_AB, partitions);
   add_stamp(json, X_AB.stamp);
   json["basis"] = basis_json(X_AB.basis);
+  if (!arguments.matrix) return json;
+  const Eigen::Matrix4d matrix = X_AB.pose.matrix();
+  for (int row = 0; row < 4; ++row) {
+    json["matrix"].push_back({matrix(row, 0), matrix(row, 1), matrix(row, 2), matrix(row, 3)});
+  }
   return json;
 }
 
@@ -176,7 +189,7 @@ int follow_lookup(Client& client, const Arguments& arguments) {
     }
     const auto now = present(client, arguments, arguments.id, arguments.other);
     std::string text = arguments.other + " in " + arguments.id + "\n" +
-                       describe(X_AB, arguments.covariance, X_AB.basis.unspecified);
+                       describe(X_AB, shown_by(arguments), X_AB.basis.unspecified);
     if (X_AB.stamp) text += describe_stamp(X_AB.stamp, now);
     screen.redraw(text + describe(X_AB.basis));
   });
@@ -185,7 +198,7 @@ int follow_lookup(Client& client, const Arguments& arguments) {
 int run_lookup(Source source, const Arguments& arguments) {
   const auto X_AB = look_up(source, arguments);
   if (!X_AB) return refuse(source, X_AB.error(), arguments);
-  std::string text = describe(*X_AB, arguments.covariance, X_AB->basis.unspecified);
+  std::string text = describe(*X_AB, shown_by(arguments), X_AB->basis.unspecified);
   if (X_AB->stamp && !arguments.json) {
     text += describe_stamp(X_AB->stamp, present(source, arguments, arguments.id, arguments.other));
   }
@@ -201,12 +214,12 @@ int run_velocity(Client& client, const Arguments& arguments) {
   const auto velocity = client.velocity(arguments.id, arguments.other, query);
   if (!velocity) return refuse(client, velocity.error(), arguments);
   return answer(arguments, velocity_json(arguments.id, arguments.other, *velocity),
-                describe(*velocity, arguments.covariance));
+                describe(*velocity, shown_by(arguments)));
 }
 
 int run_watch(Client& client, const Arguments& arguments) {
   return follow(client, arguments, [&](const StampedTransform& X_AB) {
-    std::string text = describe(X_AB, arguments.covariance, X_AB.basis.unspecified);
+    std::string text = describe(X_AB, shown_by(arguments), X_AB.basis.unspecified);
     if (X_AB.stamp && !arguments.json) {
       text += describe_stamp(X_AB.stamp, present(client, arguments, arguments.id, arguments.other));
     }
@@ -222,7 +235,7 @@ int run_echo(Client& client, const Arguments& arguments) {
       (void)answer(arguments, path_json(client, arguments, X_AB), "");
     } else {
       const auto now = present(client, arguments, arguments.id, arguments.other);
-      screen.redraw(echo_lines(arguments.id, arguments.other, X_AB, now));
+      screen.redraw(echo_lines(arguments.id, arguments.other, X_AB, now, arguments.angles));
     }
   });
 }
@@ -277,7 +290,7 @@ int run_monitor(Client& client, const Arguments& arguments) {
         if (const auto joints = client.joints(partition.name)) {
           one["joints"] = nlohmann::json::array();
           for (const JointInfo& joint : *joints) one["joints"].push_back(joint_json(joint));
-          text += outside_table(*joints);
+          text += outside_table(*joints, arguments.angles);
         }
       } else {
         text += "partition " + partition.name + ": " + histories.error().message + "\n";

@@ -102,21 +102,25 @@ std::string describe(const HistorySum& sum) {
 }
 
 std::string echo_lines(const std::string& a, const std::string& b, const StampedTransform& X_AB,
-                       std::optional<Time> now) {
+                       std::optional<Time> now, const AngleUnit& angles) {
   const Eigen::Vector3d t = X_AB.pose.translation();
-  const Eigen::Vector3d rpy = to_rpy(X_AB.pose.rotation()) * kDegrees;
+  const Eigen::Vector3d rpy = to_rpy(X_AB.pose.rotation()) * angles.per_radian;
   const auto s = X_AB.covariance.of_specified().stddev();
   std::string text = shortened(b, 34) + " seen from " + shortened(a, 34) + "\n";
   text += format("position  %12.6f %12.6f %12.6f m\n", t.x(), t.y(), t.z());
-  text += format("rpy       %12.4f %12.4f %12.4f deg\n", rpy.x(), rpy.y(), rpy.z());
+  const auto row = [&](double x, double y, double z) {
+    return format("%12.*f %12.*f %12.*f %s\n", angles.decimals, x, angles.decimals, y,
+                  angles.decimals, z, angles.name);
+  };
+  text += "rpy       " + row(rpy.x(), rpy.y(), rpy.z());
   const bool complete = X_AB.covariance.complete();
   if (!complete) {
     text += "std dev   " + shortened(unspecified_text(X_AB.basis.unspecified), 70) + "\n";
   }
   text += (complete ? "std dev   " : "of others ") +
           format("%12.6f %12.6f %12.6f m\n", s[0], s[1], s[2]);
-  text += format("          %12.4f %12.4f %12.4f deg\n", s[3] * kDegrees, s[4] * kDegrees,
-                 s[5] * kDegrees);
+  const double unit = angles.per_radian;
+  text += "          " + row(s[3] * unit, s[4] * unit, s[5] * unit);
   return text + "age       " + (X_AB.stamp ? ago(*X_AB.stamp, now) : "none (static)") + "\n";
 }
 

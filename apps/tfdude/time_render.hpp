@@ -8,6 +8,8 @@
 
 #include "tfdude/client/client.hpp"
 
+#include "angles.hpp"
+
 // Stamps, histories and followed paths as text for people, and as JSON for programs.
 namespace tfdude::cli {
 
@@ -37,7 +39,8 @@ struct HistorySum {
 
 /// A transform in a fixed, small number of lines: position, angles, standard deviations, age.
 [[nodiscard]] std::string echo_lines(const std::string& a, const std::string& b,
-                                     const StampedTransform& X_AB, std::optional<Time> now);
+                                     const StampedTransform& X_AB, std::optional<Time> now,
+                                     const AngleUnit& angles);
 
 /// One partition's dynamic edges as a table.
 [[nodiscard]] std::string monitor_table(const std::string& partition,

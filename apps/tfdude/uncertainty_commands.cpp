@@ -30,7 +30,8 @@ int measure(Client& client, const Arguments& arguments, Measure take) {
 }
 
 // The columns of one source form one loading, in the order in which they are given.
-std::vector<CommonError> read_common_errors(const std::vector<std::string>& said) {
+std::vector<CommonError> read_common_errors(const std::vector<std::string>& said,
+                                            const AngleUnit& angles) {
   constexpr std::size_t kRows = kSourceSize - 1;
   std::vector<CommonError> common_errors;
   for (std::size_t at = 0; at + kRows < said.size(); at += kSourceSize) {
@@ -39,6 +40,7 @@ std::vector<CommonError> read_common_errors(const std::vector<std::string>& said
     for (std::size_t row = 0; row < kRows; ++row) {
       column[static_cast<Eigen::Index>(row)] = std::strtod(said[at + 1 + row].c_str(), nullptr);
     }
+    column.tail<3>() /= angles.per_radian;
     auto common_error = std::find_if(common_errors.begin(), common_errors.end(),
                                      [&](const CommonError& one) { return one.source == source; });
     if (common_error == common_errors.end()) {
@@ -54,7 +56,8 @@ std::vector<CommonError> read_common_errors(const std::vector<std::string>& said
 }  // namespace
 
 int run_correlate(Client& client, const Arguments& arguments) {
-  const Correlation said{arguments.unknown, read_common_errors(arguments.sources), {}};
+  const Correlation said{
+      arguments.unknown, read_common_errors(arguments.sources, arguments.angles), {}};
   return finish(client, client.correlate(arguments.id, said), arguments, "correlated");
 }
 

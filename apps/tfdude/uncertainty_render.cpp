@@ -106,22 +106,21 @@ nlohmann::json consistency_json(const EdgeConsistency& edge) {
           {"verdict", verdict_of(edge)}};
 }
 
-std::string describe(const Velocity& velocity, bool with_covariance) {
+std::string describe(const Velocity& velocity, const Shown& shown) {
   const Eigen::Vector3d& v = velocity.linear;
-  const Eigen::Vector3d w = velocity.angular * kDegrees;
+  const Eigen::Vector3d& w = velocity.angular;
   const auto s = velocity.covariance.of_specified().stddev();
   std::string text = format("linear       %.6f  %.6f  %.6f  m/s\n", v.x(), v.y(), v.z());
-  text += format("angular      %.4f  %.4f  %.4f  deg/s\n", w.x(), w.y(), w.z());
+  text += "angular      " + angles_text(w.x(), w.y(), w.z(), shown.angles, "/s") + "\n";
   const bool complete = velocity.covariance.complete();
   if (!complete) text += "std dev      " + unspecified_text(velocity.basis.unspecified) + "\n";
   text += (complete ? "std dev      " : "  of others  ") +
           format("%.6f  %.6f  %.6f  m/s\n", s[0], s[1], s[2]);
-  text += format("             %.4f  %.4f  %.4f  deg/s\n", s[3] * kDegrees, s[4] * kDegrees,
-                 s[5] * kDegrees);
-  if (with_covariance) {
-    text += complete ? "covariance   (linear first; m/s, rad/s)\n"
-                     : "covariance   of the others (linear first; m/s, rad/s)\n";
-    text += matrix_table(velocity.covariance.of_specified().matrix());
+  text += "             " + angles_text(s[3], s[4], s[5], shown.angles, "/s") + "\n";
+  if (shown.covariance) {
+    text += format("covariance   %s(linear first; m/s, %s/s)\n", complete ? "" : "of the others ",
+                   shown.angles.name);
+    text += matrix_table(velocity.covariance.of_specified().matrix(), shown.angles);
   }
   if (velocity.begin && velocity.end) {
     text += "from         " + seconds_of(*velocity.begin) + "\nto           " +

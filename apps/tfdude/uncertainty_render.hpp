@@ -7,6 +7,8 @@
 
 #include "tfdude/client/client.hpp"
 
+#include "render.hpp"
+
 // Uncertainty as text for people, and as JSON for programs.
 namespace tfdude::cli {
 
@@ -24,7 +26,7 @@ namespace tfdude::cli {
 [[nodiscard]] nlohmann::json consistency_json(const EdgeConsistency& edge);
 
 /// A velocity of B in A.
-[[nodiscard]] std::string describe(const Velocity& velocity, bool with_covariance);
+[[nodiscard]] std::string describe(const Velocity& velocity, const Shown& shown);
 [[nodiscard]] nlohmann::json velocity_json(const std::string& a, const std::string& b,
                                            const Velocity& velocity);
 

@@ -49,6 +49,8 @@ inline void check(const Result<void>& result) {
 /// What a covariance is given as: None or "unspecified", "exact", 6x6, or 21 of the upper triangle.
 [[nodiscard]] StatedCovariance to_covariance(py::handle covariance);
 
+/// Of 2 or 4.
+[[nodiscard]] Order to_order(int order);
 /// A query; `order` is 2 or 4.
 [[nodiscard]] Query to_query(py::handle at, py::handle extrapolate, py::handle age_noise_until,
                              int order);

@@ -81,19 +81,6 @@ Matrix6d to_matrix6(const double* row_major) {
   return Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(row_major);
 }
 
-Pose to_pose(const Eigen::Matrix4d& matrix) {
-  const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
-  constexpr double kTolerance = 1e-6;
-  if (!((R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kTolerance) ||
-      !(R.determinant() > 0)) {
-    throw py::value_error("matrix: the upper left 3x3 is not a rotation");
-  }
-  if (matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
-    throw py::value_error("matrix: the last row must be 0 0 0 1");
-  }
-  return value_of(Pose::create(Eigen::Quaterniond(R).normalized(), matrix.topRightCorner<3, 1>()));
-}
-
 py::array read_only(const double* values, std::vector<py::ssize_t> shape) {
   py::array array = py::array_t<double>(std::move(shape), values);
   py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;

@@ -28,8 +28,6 @@ using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 [[nodiscard]] Twist to_twist(py::handle values, const char* what);
 /// Of (x, y, z, w), as scipy and ROS have it.
 [[nodiscard]] Eigen::Quaterniond to_quaternion(py::handle xyzw, const char* what);
-/// A rotation matrix, or rigid transform, to 1e-6. @throws ValueError
-[[nodiscard]] Pose to_pose(const Eigen::Matrix4d& matrix);
 [[nodiscard]] Eigen::Matrix4d to_matrix4(py::handle values, const char* what);
 [[nodiscard]] Matrix6d to_matrix6(const double* row_major);
 

@@ -12,6 +12,7 @@
 namespace tfdude::python {
 
 void bind_transform(py::module_& module);
+void bind_points(py::module_& module);
 /// What calls return: stamped transforms, frames, partitions, changes ...
 void bind_values(py::module_& module);
 /// What a partition consists of: frames, joints, configurations.

@@ -2,6 +2,7 @@
 
 #include "bind.hpp"
 #include "client.hpp"
+#include "points.hpp"
 #include "waiting.hpp"
 
 namespace tfdude::python {
@@ -53,6 +54,29 @@ void bind_own(ClientClass& cls) {
       py::arg("a"), py::arg("at_a"), py::arg("b"), py::arg("at_b"), py::arg("fixed"),
       "Frame b at one instant, seen from frame a at another, through a frame that is assumed\n"
       "fixed in between.");
+  cls.def(
+      "transform",
+      [](const Session& session, const std::string& a, const std::string& b, py::handle what,
+         py::handle at, py::handle covariance, bool direction, int order) -> py::object {
+        Query query;
+        query.at = to_stamp(at);
+        query.order = to_order(order);
+        if (py::isinstance<Transform>(what)) {
+          if (!covariance.is_none() || direction) {
+            throw py::type_error("a Transform has its own covariance, and no direction");
+          }
+          const auto& X_BC = what.cast<const Transform&>();
+          return py::cast(
+              value_of(session.call([&](Client& c) { return c.transform(a, b, X_BC, query); })));
+        }
+        Points points = to_points(what, covariance, direction);
+        return transformed(py::cast(lookup(session, a, b, query, Milliseconds(0))),
+                           std::move(points), query.order);
+      },
+      py::arg("a"), py::arg("b"), py::arg("what"), py::arg("at") = py::none(), py::kw_only(),
+      py::arg("covariance") = py::none(), py::arg("direction") = false, py::arg("order") = 2,
+      "Points (3,) or (N, 3) of frame b, in frame a: as lookup(a, b).transform(what, ...). Of a\n"
+      "Transform X_BC with an error of its own: X_AC. Raises as lookup().");
   cls.def(
       "velocity",
       [](const Session& session, const std::string& a, const std::string& b, py::handle at,

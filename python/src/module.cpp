@@ -9,6 +9,7 @@ PYBIND11_MODULE(_core, module) {
   module.doc() = "The extension module of the package tfdude.";
   module.attr("__version__") = tfdude::program_version();
   bind_transform(module);
+  bind_points(module);
   bind_values(module);
   bind_frames(module);
   bind_client(module);

@@ -105,13 +105,17 @@ double to_seconds(std::chrono::nanoseconds duration) {
   return static_cast<double>(duration.count()) / kNanoseconds;
 }
 
-Query to_query(py::handle at, py::handle extrapolate, py::handle age_noise_until, int order) {
+Order to_order(int order) {
   if (order != 2 && order != 4) throw py::value_error("order must be 2 or 4");
+  return order == 2 ? Order::kSecond : Order::kFourth;
+}
+
+Query to_query(py::handle at, py::handle extrapolate, py::handle age_noise_until, int order) {
   Query query;
   query.at = to_stamp(at);
   query.extrapolate = to_duration(extrapolate, "extrapolate");
   query.age_noise_until = to_stamp(age_noise_until);
-  query.order = order == 2 ? Order::kSecond : Order::kFourth;
+  query.order = to_order(order);
   return query;
 }
 

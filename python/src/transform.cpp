@@ -9,6 +9,7 @@
 
 #include "arrays.hpp"
 #include "bind.hpp"
+#include "points.hpp"
 
 namespace tfdude::python {
 namespace {
@@ -86,7 +87,8 @@ void bind_construction(py::class_<Transform>& cls) {
   cls.def_static(
       "from_matrix",
       [](py::handle matrix, py::handle covariance) {
-        return Transform{to_pose(to_matrix4(matrix, "matrix")), to_covariance(covariance)};
+        return Transform{value_of(Pose::from_matrix(to_matrix4(matrix, "matrix"))),
+                         to_covariance(covariance)};
       },
       py::arg("matrix"), py::arg("covariance") = py::none(),
       "Of a homogeneous matrix (4, 4). ValueError if it is no rigid transform to 1e-6.");
@@ -198,6 +200,18 @@ void bind_operations(py::class_<Transform>& cls) {
         return py::array(p_A);
       },
       py::arg("points"), "Points (3,) or (N, 3) of the child, in the parent [m].");
+  cls.def(
+      "transform",
+      [](py::object self, py::handle points, py::handle covariance, bool direction, int order) {
+        return transformed(std::move(self), to_points(points, covariance, direction),
+                           to_order(order));
+      },
+      py::arg("points"), py::arg("covariance") = py::none(), py::kw_only(),
+      py::arg("direction") = false, py::arg("order") = 2,
+      "Points (3,) or (N, 3) of the child, in the parent, with their covariance: Points.\n\n"
+      "covariance: of the points' own errors, (3, 3) or (N, 3, 3) [m²]; None: they are exact.\n"
+      "direction: only turn them. order: 2 or 4, of the covariance's propagation. apply() is\n"
+      "faster where no covariance is needed.");
   cls.def(
       "inverse", [](const Transform& X) { return inverse(X); },
       "X_BA of X_AB, with its covariance.");

@@ -1,7 +1,7 @@
 # The types of the extension module; help(tfdude) has what they mean.
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 import datetime as _datetime
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Any, Literal, Protocol, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -63,11 +63,34 @@ class Transform:
     __hash__: None  # type: ignore[assignment]
     __array_ufunc__: None
     def apply(self, points: npt.ArrayLike) -> _Doubles: ...
+    def transform(
+        self,
+        points: npt.ArrayLike,
+        covariance: npt.ArrayLike | None = None,
+        *,
+        direction: bool = False,
+        order: Literal[2, 4] = 2,
+    ) -> Points: ...
     def inverse(self) -> Transform: ...
     def log(self) -> _Doubles: ...
     def adjoint(self) -> _Doubles: ...
     def interpolate(self, X1: Transform, s: float) -> Transform: ...
     def with_covariance(self, covariance: _Covariance) -> Transform: ...
+
+class Points:
+    def __len__(self) -> int: ...
+    @property
+    def coordinates(self) -> _Doubles: ...
+    @property
+    def bias(self) -> _Doubles: ...
+    @property
+    def covariance(self) -> _Doubles: ...
+    @property
+    def covariance_of_specified(self) -> _Doubles: ...
+    @property
+    def joint_covariance(self) -> _Doubles: ...
+    @property
+    def transform(self) -> Transform: ...
 
 class StampedTransform(Transform):
     @property
@@ -414,6 +437,30 @@ class Client:
         age_noise_until: _Instant | None = None,
         order: Literal[2, 4] = 2,
     ) -> StampedTransform: ...
+    @overload
+    def transform(
+        self,
+        a: str,
+        b: str,
+        what: Transform,
+        at: _Instant | None = None,
+        *,
+        covariance: None = None,
+        direction: Literal[False] = False,
+        order: Literal[2, 4] = 2,
+    ) -> StampedTransform: ...
+    @overload
+    def transform(
+        self,
+        a: str,
+        b: str,
+        what: npt.ArrayLike,
+        at: _Instant | None = None,
+        *,
+        covariance: npt.ArrayLike | None = None,
+        direction: bool = False,
+        order: Literal[2, 4] = 2,
+    ) -> Points: ...
     async def lookup_async(
         self,
         a: str,

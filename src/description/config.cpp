@@ -23,9 +23,9 @@ namespace {
 
 constexpr std::array<std::string_view, 6> kFileKeys = {"partition", "clock",  "covariance",
                                                        "history",   "frames", "urdf"};
-constexpr std::array<std::string_view, 11> kFrameKeys = {
-    "id",  "parent",     "xyz",     "rpy",         "quat",   "stddev",
-    "cov", "covariance", "history", "correlation", "sources"};
+constexpr std::array<std::string_view, 12> kFrameKeys = {
+    "id",     "parent", "xyz",        "rpy",     "quat",        "matrix",
+    "stddev", "cov",    "covariance", "history", "correlation", "sources"};
 constexpr std::array<std::string_view, 6> kHistoryKeys = {"span",   "count",     "process_noise",
                                                           "moving", "max_ahead", "restart_after"};
 

@@ -1,7 +1,6 @@
 #include "tfdude/math/point.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 
@@ -17,16 +16,18 @@ using Matrix4d = Eigen::Matrix4d;
 using Vector4d = Eigen::Vector4d;
 
 // li^, the columns of the square root as elements of se(3).
-using Generators = std::array<Matrix4d, 6>;
+struct Generators {
+  Matrix4d l[6];
+};
 
 Generators generators_of(const Covariance& sigma) {
   const SymmetricEigen eigen = symmetric_eigen(sigma.matrix());
   Generators all;
   for (int i = 0; i < 6; ++i) {
     const Twist l = eigen.vectors.col(i) * std::sqrt(std::max(eigen.values[i], 0.0));
-    all[i].setZero();
-    all[i].topLeftCorner<3, 3>() = skew(l.tail<3>());
-    all[i].topRightCorner<3, 1>() = l.head<3>();
+    all.l[i].setZero();
+    all.l[i].topLeftCorner<3, 3>() = skew(l.tail<3>());
+    all.l[i].topRightCorner<3, 1>() = l.head<3>();
   }
   return all;
 }
@@ -46,13 +47,14 @@ struct Expansion {
 
 // Third powers enter by E[z_i z_j z_k z_l], which pairs three factors with the one of the first
 // power: the sum over the three pairings.
-Expansion expand(const Matrix3d& R, const Generators& l, const Vector4d& p, Order order) {
+Expansion expand(const Matrix3d& R, const Generators& generators, const Point& point, Order order) {
+  const auto& l = generators.l;
+  const Vector4d p = homogeneous(point);
   Expansion e;
   e.even.setZero();
-  Vector4d mean = Vector4d::Zero();
   Matrix4d squares = Matrix4d::Zero();
   for (const Matrix4d& li : l) squares += li * li;
-  mean += 0.5 * squares * p;
+  Vector4d mean = 0.5 * squares * p;
   for (int i = 0; i < 6; ++i) {
     Vector4d odd = l[i] * p;
     if (order == Order::kFourth) {
@@ -79,7 +81,7 @@ Matrix3d own_covariance(const Matrix3d& R, const Generators& l, const Matrix3d& 
   Matrix3d own = S;
   if (order == Order::kFourth && !S.isZero(0)) {
     Matrix3d squares = Matrix3d::Zero();
-    for (const Matrix4d& li : l) {
+    for (const Matrix4d& li : l.l) {
       const Matrix3d turn = li.topLeftCorner<3, 3>();
       own += turn * S * turn.transpose();
       squares += 0.5 * turn * turn;
@@ -108,7 +110,7 @@ Result<void> check_point(const Point& p_B) {
 TransformedPoint transform(const Transform& X_AB, const Point& p_B, Order order) {
   const Matrix3d R = X_AB.pose.rotation().toRotationMatrix();
   const Generators l = generators_of(X_AB.covariance.of_specified());
-  const Expansion expansion = expand(R, l, homogeneous(p_B), order);
+  const Expansion expansion = expand(R, l, p_B, order);
   TransformedPoint p_A;
   p_A.coordinates =
       p_B.direction ? Eigen::Vector3d(R * p_B.coordinates) : X_AB.pose * p_B.coordinates;
@@ -125,7 +127,7 @@ Eigen::MatrixXd joint_covariance(const Transform& X_AB, const std::vector<Point>
   const Generators l = generators_of(X_AB.covariance.of_specified());
   std::vector<Expansion> expansions;
   expansions.reserve(points_B.size());
-  for (const Point& p : points_B) expansions.push_back(expand(R, l, homogeneous(p), order));
+  for (const Point& p : points_B) expansions.push_back(expand(R, l, p, order));
   const auto size = static_cast<Eigen::Index>(3 * points_B.size());
   Eigen::MatrixXd joint(size, size);
   for (std::size_t i = 0; i < points_B.size(); ++i) {

@@ -52,6 +52,20 @@ Result<Pose> Pose::create(const Eigen::Quaterniond& rotation, const Eigen::Vecto
   return trusted(Eigen::Quaterniond(rotation.coeffs() / norm), translation);
 }
 
+Result<Pose> Pose::from_matrix(const Eigen::Matrix4d& matrix) {
+  const Eigen::Matrix3d R = matrix.topLeftCorner<3, 3>();
+  constexpr double kTolerance = 1e-6;
+  // Also true for NaN.
+  if (!((R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kTolerance) ||
+      !(R.determinant() > 0)) {
+    return fail(Errc::kInvalidInput, "matrix: the upper left 3x3 is not a rotation");
+  }
+  if (matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+    return fail(Errc::kInvalidInput, "matrix: the last row must be 0 0 0 1");
+  }
+  return create(Eigen::Quaterniond(R).normalized(), matrix.topRightCorner<3, 1>());
+}
+
 Pose Pose::trusted(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
   Pose X;
   Eigen::Map<Eigen::Vector4d>(X.q_) = rotation.coeffs();

@@ -23,6 +23,20 @@ Result<Eigen::Quaterniond> rotation_of(const TransformSpec& spec) {
   return from_rpy((*spec.rpy)[0], (*spec.rpy)[1], (*spec.rpy)[2]);
 }
 
+Result<Pose> pose_of(const TransformSpec& spec) {
+  if (spec.matrix) {
+    if (spec.xyz || spec.rpy || spec.quat) {
+      return fail(Errc::kInvalidInput, "matrix is given beside xyz, rpy or quat, one is enough");
+    }
+    return Pose::from_matrix(
+        Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(spec.matrix->data()));
+  }
+  const auto rotation = rotation_of(spec);
+  if (!rotation) return tl::unexpected(rotation.error());
+  const auto t = spec.xyz.value_or(std::array<double, 3>{});
+  return Pose::create(*rotation, {t[0], t[1], t[2]});
+}
+
 Result<StatedCovariance> covariance_of(const TransformSpec& spec,
                                        const StatedCovariance& otherwise) {
   const auto both = [](const char* fields) {
@@ -46,10 +60,7 @@ Result<StatedCovariance> covariance_named(std::string_view word) {
 }
 
 Result<Transform> TransformSpec::build(const StatedCovariance& otherwise) const {
-  const auto rotation = rotation_of(*this);
-  if (!rotation) return tl::unexpected(rotation.error());
-  const auto t = xyz.value_or(std::array<double, 3>{});
-  const auto pose = Pose::create(*rotation, {t[0], t[1], t[2]});
+  const auto pose = pose_of(*this);
   if (!pose) return tl::unexpected(pose.error());
   const auto stated = covariance_of(*this, otherwise);
   if (!stated) return tl::unexpected(stated.error());

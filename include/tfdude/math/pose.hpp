@@ -32,6 +32,10 @@ class TFDUDE_EXPORT Pose {
   [[nodiscard]] static Result<Pose> create(const Eigen::Quaterniond& rotation,
                                            const Eigen::Vector3d& translation);
 
+  /// Of a homogeneous matrix [R, t; 0, 1].
+  /// @return kInvalidInput: R is no rotation to 1e-6, another last row, and as create().
+  [[nodiscard]] static Result<Pose> from_matrix(const Eigen::Matrix4d& matrix);
+
   /// For results of the library's own computations: `rotation` must be of unit length up to
   /// rounding.
   [[nodiscard]] static Pose trusted(const Eigen::Quaterniond& rotation,

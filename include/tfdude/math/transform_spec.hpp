@@ -18,19 +18,22 @@ namespace tfdude {
 /// A transform as people write it, in a configuration file or on the command line. Omitted parts
 /// are identity.
 struct TFDUDE_EXPORT TransformSpec {
-  std::optional<std::array<double, 3>> xyz;     ///< translation [m]
-  std::optional<std::array<double, 3>> rpy;     ///< fixed axes X, Y, Z as in URDF [rad]
-  std::optional<std::array<double, 4>> quat;    ///< x, y, z, w
+  std::optional<std::array<double, 3>> xyz;   ///< translation [m]
+  std::optional<std::array<double, 3>> rpy;   ///< fixed axes X, Y, Z as in URDF [rad]
+  std::optional<std::array<double, 4>> quat;  ///< x, y, z, w
+  /// The pose instead of the fields above: a homogeneous matrix row by row
+  std::optional<std::array<double, 16>> matrix;
   std::optional<std::array<double, 6>> stddev;  ///< three [m], three [rad]
   std::optional<Covariance::Upper> cov;         ///< upper triangle row by row
   std::optional<std::string> covariance;        ///< instead of both: see covariance_named()
 
   [[nodiscard]] bool gives_covariance() const { return stddev || cov || covariance; }
-  [[nodiscard]] bool empty() const { return !xyz && !rpy && !quat && !gives_covariance(); }
+  [[nodiscard]] bool gives_rotation() const { return rpy || quat || matrix; }
+  [[nodiscard]] bool empty() const { return !xyz && !gives_rotation() && !gives_covariance(); }
 
   /// @param otherwise  the covariance if none is given
-  /// @return kInvalidInput naming the field: both rpy and quat, two of stddev, cov and covariance,
-  ///   or a field that Pose::create(), Covariance or covariance_named() rejects.
+  /// @return kInvalidInput naming the field: both rpy and quat, matrix beside one of them or xyz, two of stddev, cov and covariance,
+  ///   or a field that Pose, Covariance or covariance_named() rejects.
   [[nodiscard]] Result<Transform> build(const StatedCovariance& otherwise = {}) const;
 };
 

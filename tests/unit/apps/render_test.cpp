@@ -14,13 +14,15 @@ namespace tfdude::cli {
 namespace {
 
 using nlohmann::json;
+using testing::Approx;
+using testing::ContainsSubstring;
 
 // Turned by (10, -20, 90) degrees, at (1, -2, 3); standard deviations of 1 to 3 cm and 1 to 3
 // degrees.
 Transform example() {
-  constexpr double kDegree = 0.017453292519943295;
-  return {*Pose::create(from_rpy(10 * kDegree, -20 * kDegree, 90 * kDegree), {1, -2, 3}),
-          *Covariance::from_stddev({0.01, 0.02, 0.03, kDegree, 2 * kDegree, 3 * kDegree})};
+  constexpr double kTurn = 0.017453292519943295;  // a degree
+  return {*Pose::create(from_rpy(10 * kTurn, -20 * kTurn, 90 * kTurn), {1, -2, 3}),
+          *Covariance::from_stddev({0.01, 0.02, 0.03, kTurn, 2 * kTurn, 3 * kTurn})};
 }
 
 std::vector<std::string> lines_of(const std::string& text) {
@@ -61,8 +63,65 @@ TEST_CASE("unreachable partitions and frames that wait for a parent are marked")
 
 // ---- describe
 
-TEST_CASE("a transform is printed in metres and degrees") {
-  CHECK(lines_of(describe(example(), false)) ==
+Shown in_degrees(bool covariance = false) { return {kDegree, covariance, false}; }
+
+TEST_CASE("a transform is printed in metres and radians unless degrees are asked for") {
+  CHECK(lines_of(describe(example(), {})) ==
+        std::vector<std::string>{
+            "translation  1.000000  -2.000000  3.000000  m",
+            "quaternion   0.183013  -0.061628  0.704416  0.683013  (x y z w)",
+            "rpy          0.174533  -0.349066  1.570796  rad",
+            "std dev      0.010000  0.020000  0.030000  m   0.017453  0.034907  0.052360  rad"});
+}
+
+TEST_CASE("the covariance of angles has the unit of the angles") {
+  const Transform X = example();
+  const auto rows = lines_of(matrix_table(X.covariance.of_specified().matrix(), kDegree));
+  REQUIRE(rows.size() == 7);
+  std::istringstream last(rows[6]);
+  double value = 0;
+  for (int column = 0; column < 6; ++column) last >> value;
+  CHECK(value == Approx(9.0));  // 3° squared
+  CHECK_THAT(describe(X, in_degrees(true)), ContainsSubstring("m, deg)"));
+  CHECK_THAT(describe(X, {kRadian, true, false}), ContainsSubstring("m, rad)"));
+}
+
+TEST_CASE("a pose is printed as a matrix if asked for") {
+  const Transform X = example();
+  const auto lines = lines_of(describe(X, {kRadian, false, true}));
+  REQUIRE(lines.size() == 5);
+  const Eigen::Matrix4d matrix = X.pose.matrix();
+  for (int row = 0; row < 4; ++row) {
+    std::istringstream in(lines[static_cast<std::size_t>(row)].substr(row == 0 ? 6 : 0));
+    for (int column = 0; column < 4; ++column) {
+      double value = 0;
+      REQUIRE(in >> value);
+      CHECK(value == Approx(matrix(row, column)).margin(1e-9));
+    }
+  }
+}
+
+TEST_CASE("what is typed in degrees is converted where it is an angle") {
+  TransformSpec spec;
+  spec.rpy = {0, 90, -180};
+  spec.stddev = {1, 2, 3, 180, 90, 0};
+  spec.cov = Covariance::trusted(Matrix6d(Matrix6d::Ones())).upper();
+  to_radians(spec, kDegree);
+  const double pi = std::acos(-1.0);
+  CHECK((*spec.rpy)[1] == Approx(pi / 2));
+  CHECK((*spec.stddev)[2] == 3);
+  CHECK((*spec.stddev)[3] == Approx(pi));
+  CHECK((*spec.cov)[upper_index(0, 2)] == 1);
+  CHECK((*spec.cov)[upper_index(2, 3)] == Approx(pi / 180));
+  CHECK((*spec.cov)[upper_index(3, 5)] == Approx(pi * pi / 180 / 180));
+  TransformSpec radians;
+  radians.rpy = {1, 2, 3};
+  to_radians(radians, kRadian);
+  CHECK((*radians.rpy)[2] == 3);
+}
+
+TEST_CASE("a transform is printed in degrees") {
+  CHECK(lines_of(describe(example(), in_degrees())) ==
         std::vector<std::string>{
             "translation  1.000000  -2.000000  3.000000  m",
             "quaternion   0.183013  -0.061628  0.704416  0.683013  (x y z w)",
@@ -75,7 +134,7 @@ TEST_CASE("a covariance is printed as a matrix if asked for") {
   Covariance::Upper upper = X.covariance.of_specified().upper();
   upper[upper_index(0, 1)] = -1e-5;
   X.covariance = *Covariance::from_upper(upper);
-  const auto lines = lines_of(describe(X, true));
+  const auto lines = lines_of(describe(X, {kRadian, true, false}));
   REQUIRE(lines.size() == 12);
   CHECK(lines[4].find("translation first") != std::string::npos);
   for (std::size_t row = 0; row < 6; ++row) {
@@ -93,21 +152,21 @@ TEST_CASE("a covariance is printed as a matrix if asked for") {
 TEST_CASE("a covariance that is not complete is printed as that of the other edges") {
   Transform X = example();
   X.covariance.set_complete(false);
-  CHECK(lines_of(describe(X, false, {"odom", "a\nb"})) ==
+  CHECK(lines_of(describe(X, in_degrees(), {"odom", "a\nb"})) ==
         std::vector<std::string>{
             "translation  1.000000  -2.000000  3.000000  m",
             "quaternion   0.183013  -0.061628  0.704416  0.683013  (x y z w)",
             "rpy          10.0000  -20.0000  90.0000  deg",
             "std dev      unspecified for odom, a\\x0ab",
             "  of others  0.010000  0.020000  0.030000  m   1.0000  2.0000  3.0000  deg"});
-  const std::string text = describe(X, true, {"odom"});
+  const std::string text = describe(X, in_degrees(true), {"odom"});
   CHECK(text.find("covariance   of the others") != std::string::npos);
 }
 
 TEST_CASE("extreme values are printed in full") {
   const Transform X{*Pose::create(Eigen::Quaterniond::Identity(), {-1e9, 1e9, 1e-9}),
                     *Covariance::from_stddev({1e9, 0, 0, 1e9, 0, 0})};
-  const std::string text = describe(X, true);
+  const std::string text = describe(X, in_degrees(true));
   CHECK(text.find("translation  -1000000000.000000  1000000000.000000  0.000000  m\n") == 0);
   CHECK(text.find("1.00000e+18") != std::string::npos);
   CHECK(lines_of(text).size() == 13);
@@ -155,7 +214,7 @@ TEST_CASE("a velocity is printed in metres and degrees per second") {
   velocity.begin = time_of(0);
   velocity.end = time_of(100'000'000);
   velocity.basis.bound = true;
-  CHECK(describe(velocity, false) ==
+  CHECK(describe(velocity, in_degrees()) ==
         "linear       1.000000  -2.000000  0.500000  m/s\n"
         "angular      0.0000  0.0000  90.0000  deg/s\n"
         "std dev      0.100000  0.100000  0.100000  m/s\n"
@@ -169,10 +228,10 @@ TEST_CASE("a velocity is printed in metres and degrees per second") {
   CHECK(all["covariance"].size() == 6);
   velocity.covariance.set_complete(false);
   velocity.basis.unspecified = {"odom"};
-  CHECK(describe(velocity, false).find("std dev      unspecified for odom\n  of others  ") !=
+  CHECK(describe(velocity, in_degrees()).find("std dev      unspecified for odom\n  of others  ") !=
         std::string::npos);
   CHECK(velocity_json("world", "hand", velocity)["covariance"].is_null());
-  CHECK(describe(Velocity{}, false).find("interval     none: all edges are static") !=
+  CHECK(describe(Velocity{}, in_degrees()).find("interval     none: all edges are static") !=
         std::string::npos);
 }
 

@@ -65,23 +65,32 @@ HistoryInfo history_of(const std::string& id) {
 }  // namespace
 
 TEST_CASE("tables: joints have a header and fit 80 columns") {
-  const std::string table = joint_table({shoulder()});
+  const std::string table = joint_table({shoulder()}, kDegree);
   CHECK(table ==
         "  joint              frame             position   std dev unit limits\n"
         "  shoulder_pan_joint shoulder_link     -180.000   208.166 deg  -360..360\n"
         "    no sample yet\n"
         "    outside 3 times\n");
-  CHECK(width_of(outside_table({shoulder()})) <= 80);
-  CHECK(joint_table({}).empty());
+  CHECK(width_of(outside_table({shoulder()}, kDegree)) <= 80);
+  CHECK(joint_table({}, kDegree).empty());
+}
+
+TEST_CASE("tables: joints are in radians unless degrees are asked for") {
+  CHECK_THAT(joint_table({shoulder()}, kRadian),
+             ContainsSubstring(" -3.14159   3.63318 rad  -6.283..6.283\n"));
+  CHECK(width_of(joint_table({shoulder(), longest()}, kRadian)) <= 80);
+  CHECK(position_text(shoulder(), 0.5, kRadian) == "0.5 rad");
+  CHECK(position_text(shoulder(), -7, kRadian) == "-7 rad, outside its limits -6.283..6.283 rad");
+  CHECK(position_text(shoulder(), -7, kDegree) == "-401.07 deg, outside its limits -360..360 deg");
 }
 
 TEST_CASE("tables: long names and numbers of joints fit 80 columns") {
   JointInfo head = shoulder();
   head.limits = JointLimits{-2.7995, 2.7995};
-  CHECK_THAT(joint_table({head}), ContainsSubstring("-160.4..160.4"));
-  CHECK(width_of(joint_table({head, longest()})) <= 80);
-  CHECK(width_of(outside_table({head, longest()})) <= 80);
-  CHECK_THAT(joint_table({longest()}), ContainsSubstring("  left_arm…pan_joint "));
+  CHECK_THAT(joint_table({head}, kDegree), ContainsSubstring("-160.4..160.4"));
+  CHECK(width_of(joint_table({head, longest()}, kDegree)) <= 80);
+  CHECK(width_of(outside_table({head, longest()}, kDegree)) <= 80);
+  CHECK_THAT(joint_table({longest()}, kDegree), ContainsSubstring("  left_arm…pan_joint "));
 }
 
 TEST_CASE("tables: rates of edges fit 80 columns") {
@@ -101,7 +110,7 @@ TEST_CASE("tables: long names and numbers of edges fit 80 columns") {
   CHECK(width_of(monitor_table(kLong, {history, history_of("a")}, later)) <= 80);
   history.refused_old = history.refused_equal = history.refused_ahead = 1'000'000;
   CHECK(width_of(describe(history, later)) <= 80);
-  CHECK(width_of(echo_lines(kLong, kLong, {}, later)) <= 80);
+  CHECK(width_of(echo_lines(kLong, kLong, {}, later, kRadian)) <= 80);
 }
 
 TEST_CASE("tables: observed edges fit 80 columns") {
@@ -146,7 +155,7 @@ TEST_CASE("tables: partitions have a header and fit 80 columns") {
 TEST_CASE("tables: a transform with its covariance fits 80 columns") {
   const Transform X{*Pose::create(Eigen::Quaterniond::Identity(), {-1234.5, 1234.5, 0}),
                     *Covariance::from_stddev({123, 123, 123, 3, 3, 3})};
-  const std::string text = describe(X, true);
+  const std::string text = describe(X, {kRadian, true, false});
   CHECK_THAT(text, ContainsSubstring("            x            y            z           rx"));
   CHECK(width_of(text) <= 80);
 }

@@ -55,6 +55,38 @@ TEST_CASE("a spec with any field is not empty") {
   CHECK(transform_diff(*X, Transform::exact({}), 0.0) == "");
 }
 
+TEST_CASE("a matrix is the pose that it has row by row") {
+  Random random(402);
+  INFO("seed " << random.seed());
+  const Pose X_AB = random.pose();
+  TransformSpec spec;
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = X_AB.matrix();
+  spec.matrix.emplace();
+  std::copy_n(rows.data(), rows.size(), spec.matrix->begin());
+  CHECK_FALSE(spec.empty());
+  CHECK(pose_diff(spec.build()->pose, X_AB, 1e-14) == "");
+  SECTION("no rotation") {
+    (*spec.matrix)[0] += 1e-3;
+    CHECK(refusal(spec) == "matrix: the upper left 3x3 is not a rotation");
+  }
+  SECTION("a reflection") {
+    for (const std::size_t i : {0U, 1U, 2U}) (*spec.matrix)[i] *= -1;
+    CHECK(refusal(spec) == "matrix: the upper left 3x3 is not a rotation");
+  }
+  SECTION("by columns") {
+    (*spec.matrix)[12] = 1;
+    CHECK(refusal(spec) == "matrix: the last row must be 0 0 0 1");
+  }
+  SECTION("not a number") {
+    (*spec.matrix)[3] = kNan;
+    CHECK(contains(refusal(spec), "translation.x is not a finite number"));
+  }
+  SECTION("beside xyz") {
+    spec.xyz.emplace();
+    CHECK(contains(refusal(spec), "matrix is given beside"));
+  }
+}
+
 TEST_CASE("xyz alone is a translation") {
   TransformSpec spec;
   spec.xyz = {1, 2, 3};

@@ -1,0 +1,30 @@
+#include "angles.hpp"
+
+namespace tfdude::cli {
+
+std::string angles_text(double x, double y, double z, const AngleUnit& unit, const char* suffix) {
+  const auto one = [&](double angle) {
+    const std::string text = format("%.*f", unit.decimals, angle * unit.per_radian);
+    return text[0] == '-' && text.find_first_not_of("-0.") == std::string::npos ? text.substr(1)
+                                                                                : text;
+  };
+  return one(x) + "  " + one(y) + "  " + one(z) + "  " + unit.name + suffix;
+}
+
+void to_radians(TransformSpec& spec, const AngleUnit& angles) {
+  const double unit = angles.per_radian;
+  if (spec.rpy) {
+    for (double& angle : *spec.rpy) angle /= unit;
+  }
+  if (spec.stddev) {
+    for (const std::size_t axis : {3U, 4U, 5U}) (*spec.stddev)[axis] /= unit;
+  }
+  if (!spec.cov) return;
+  for (std::size_t row = 0; row < 6; ++row) {
+    for (std::size_t column = row; column < 6; ++column) {
+      if (column >= 3) (*spec.cov)[upper_index(row, column)] /= row >= 3 ? unit * unit : unit;
+    }
+  }
+}
+
+}  // namespace tfdude::cli

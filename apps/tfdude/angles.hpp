@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+
+#include "tfdude/math/transform_spec.hpp"
+
+#include "format.hpp"
+
+namespace tfdude::cli {
+
+/// The unit of angles, typed and printed: radians, or degrees with --deg.
+struct AngleUnit {
+  double per_radian = 1;
+  const char* name = "rad";
+  int decimals = 6;  ///< of printed angles: about a microradian
+};
+inline constexpr AngleUnit kRadian{};
+inline constexpr AngleUnit kDegree{kDegrees, "deg", 4};
+
+/// Three angles [rad] in their unit: "0.1000  0.2000  0.3000  deg".
+/// @param suffix  of the unit, such as "/s"
+[[nodiscard]] std::string angles_text(double x, double y, double z, const AngleUnit& unit,
+                                      const char* suffix = "");
+
+/// Converts what was typed in this unit.
+void to_radians(TransformSpec& spec, const AngleUnit& angles);
+
+}  // namespace tfdude::cli

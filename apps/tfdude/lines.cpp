@@ -1,0 +1,90 @@
+#include "lines.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "commands.hpp"
+
+namespace tfdude::cli {
+
+Result<Lines> Lines::open(const std::string& file, std::optional<double> pace) {
+  const int opened = file == "-" ? dup(STDIN_FILENO) : ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (opened < 0) {
+    return fail(Errc::kConfig, "cannot read " + quote(file) + ": " + std::strerror(errno));
+  }
+  const sigset_t signals = signals_to_stop();
+  return Lines(opened, signalfd(-1, &signals, SFD_CLOEXEC), pace);
+}
+
+Lines::Lines(Lines&& other) noexcept
+    : file_(std::exchange(other.file_, -1)),
+      interrupts_(std::exchange(other.interrupts_, -1)),
+      pace_(other.pace_),
+      due_(other.due_),
+      buffer_(std::move(other.buffer_)),
+      at_(other.at_),
+      ended_(other.ended_),
+      number_(other.number_) {}
+
+Lines::~Lines() {
+  for (const int descriptor : {file_, interrupts_}) {
+    if (descriptor >= 0) close(descriptor);
+  }
+}
+
+// Keeps to a schedule, so that small delays do not add up. After a long one it goes on from there,
+// instead of sending what was due meanwhile all at once.
+bool Lines::wait_until_due() {
+  if (!pace_) return true;
+  const auto now = std::chrono::steady_clock::now();
+  const std::chrono::duration<double> left = due_ - now;
+  if (left.count() > 0 && interrupted_within(left.count())) return false;
+  const auto period = std::chrono::nanoseconds(std::llround(1e9 / *pace_));
+  due_ = std::max(due_ + period, now);
+  return true;
+}
+
+// Reads what there is, waiting for something. @return false at the end, or if interrupted
+bool Lines::fill() {
+  std::array<pollfd, 2> sources{{{file_, POLLIN, 0}, {interrupts_, POLLIN, 0}}};
+  while (poll(sources.data(), sources.size(), -1) < 0) {
+    if (errno != EINTR) return false;
+  }
+  buffer_.erase(0, sources[1].revents == 0 ? at_ : buffer_.size());
+  at_ = 0;
+  if (sources[1].revents != 0) return false;
+  std::array<char, 65536> block{};
+  const ssize_t size = read(file_, block.data(), block.size());
+  if (size <= 0) return false;
+  buffer_.append(block.data(), static_cast<std::size_t>(size));
+  return true;
+}
+
+std::optional<std::string> Lines::next() {
+  if (!wait_until_due()) return std::nullopt;
+  std::size_t end = buffer_.find('\n', at_);
+  while (end == std::string::npos && !ended_) {
+    const std::size_t searched = buffer_.size() - at_;
+    ended_ = !fill();
+    end = buffer_.find('\n', searched);
+  }
+  if (end == std::string::npos) end = buffer_.size();  // the last line may lack its end
+  if (at_ == buffer_.size() && end == buffer_.size()) return std::nullopt;
+  std::string line = buffer_.substr(at_, end - at_);
+  at_ = std::min(end + 1, buffer_.size());
+  ++number_;
+  return line;
+}
+
+}  // namespace tfdude::cli

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+#include "tfdude/base/result.hpp"
+
+namespace tfdude::cli {
+
+/// The lines of a file or of standard input, until its end or an interrupt (SIGINT, SIGTERM, which
+/// the process blocks).
+class Lines {
+ public:
+  /// @param file  "-": standard input
+  /// @param pace  lines per second; absent: as fast as they come
+  /// @return kConfig: the file cannot be opened.
+  [[nodiscard]] static Result<Lines> open(const std::string& file, std::optional<double> pace);
+
+  Lines(const Lines&) = delete;
+  Lines& operator=(const Lines&) = delete;
+  Lines(Lines&& other) noexcept;
+  Lines& operator=(Lines&&) = delete;
+  ~Lines();
+
+  /// The next line, when it is due; nothing at the end.
+  [[nodiscard]] std::optional<std::string> next();
+  /// The number of the line that next() returned, from 1.
+  [[nodiscard]] std::size_t number() const { return number_; }
+
+ private:
+  Lines(int file, int interrupts, std::optional<double> pace)
+      : file_(file), interrupts_(interrupts), pace_(pace) {}
+
+  [[nodiscard]] bool wait_until_due();
+  [[nodiscard]] bool fill();
+
+  int file_;
+  int interrupts_;
+  std::optional<double> pace_;
+  std::chrono::steady_clock::time_point due_ = std::chrono::steady_clock::now();  // the next line
+  std::string buffer_;
+  std::size_t at_ = 0;  // the beginning of the next line in the buffer
+  bool ended_ = false;
+  std::size_t number_ = 0;
+};
+
+}  // namespace tfdude::cli

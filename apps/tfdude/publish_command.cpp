@@ -1,0 +1,104 @@
+#include <chrono>
+
+#include "commands.hpp"
+#include "joint_render.hpp"
+#include "known_joints.hpp"
+#include "lines.hpp"
+#include "samples.hpp"
+
+// Samples from a file or pipe: `publish`, and `joint --from`.
+namespace tfdude::cli {
+namespace {
+
+constexpr std::size_t kToldErrors = 10;
+
+// What was sent, for the words at the end.
+struct Sent {
+  std::size_t lines = 0;
+  std::size_t values = 0;
+  std::size_t rejected = 0;
+  std::size_t outside = 0;  // positions of joints outside their limits
+  double seconds = 0;
+
+  [[nodiscard]] double rate() const {
+    return seconds > 0 ? static_cast<double>(lines) / seconds : 0.0;
+  }
+};
+
+std::string describe(const Sent& sent) {
+  std::string text = format("sent         %zu lines with %zu values in %.3f s, %.1f lines/s\n",
+                            sent.lines, sent.values, sent.seconds, sent.rate());
+  if (sent.rejected > 0) text += format("rejected     %zu lines\n", sent.rejected);
+  if (sent.outside > 0)
+    text += format("outside      %zu positions, of their limits\n", sent.outside);
+  return text;
+}
+
+Result<void> send(Client& client, const Sample& sample, bool acknowledged) {
+  if (acknowledged) {
+    if (!sample.edges.empty()) return fail(Errc::kInvalidInput, "an edge is not a joint");
+    return client.update_joints(sample.joints, sample.stamp);
+  }
+  if (!sample.edges.empty()) {
+    if (auto sent = client.publish(sample.edges, sample.stamp); !sent) return sent;
+  }
+  return sample.joints.empty() ? Result<void>()
+                               : client.publish_joints(sample.joints, sample.stamp);
+}
+
+// Tells the first errors; a controller's pipe may repeat one a thousand times per second.
+void reject(Sent& sent, const Lines& lines, const Error& error) {
+  if (++sent.rejected > kToldErrors) return;
+  std::fprintf(stderr, "tfdude: line %zu: %s\n", lines.number(), error.message.c_str());
+  if (sent.rejected == kToldErrors) std::fputs("tfdude: further errors are only counted\n", stderr);
+}
+
+void count(Sent& sent, const Sample& sample, const std::map<std::string, JointInfo>& known) {
+  ++sent.lines;
+  sent.values += sample.edges.size() + sample.joints.size();
+  for (const JointValue& value : sample.joints) {
+    const auto joint = known.find(value.name);
+    const bool limited = joint != known.end() && joint->second.limits.has_value();
+    if (limited && !joint->second.limits->contain(value.position)) ++sent.outside;
+  }
+}
+
+}  // namespace
+
+int send_lines(Client& client, const Arguments& arguments, bool acknowledged) {
+  auto lines = Lines::open(arguments.from, arguments.pace);
+  if (!lines) return report(lines.error(), arguments);
+  const auto known = known_joints(client);
+  SampleReader reader(arguments.angles, known);
+  Sent sent;
+  const auto start = std::chrono::steady_clock::now();
+  while (const auto line = lines->next()) {
+    const auto sample = reader.read(*line);
+    if (sample && !*sample) continue;
+    const auto done = sample ? send(client, **sample, acknowledged)
+                             : Result<void>(tl::unexpected(sample.error()));
+    if (done) {
+      count(sent, **sample, known);
+    } else {
+      reject(sent, *lines, done.error());
+    }
+  }
+  const auto flushed = client.flush(arguments.options.timeout);
+  sent.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  (void)answer(arguments,
+               {{"lines", sent.lines},
+                {"values", sent.values},
+                {"rejected", sent.rejected},
+                {"outside", sent.outside},
+                {"seconds", sent.seconds},
+                {"rate", sent.rate()}},
+               describe(sent));
+  if (!flushed) return report(flushed.error(), arguments);
+  return sent.rejected == 0 ? kDone : kRefused;
+}
+
+int run_publish(Client& client, const Arguments& arguments) {
+  return send_lines(client, arguments, false);
+}
+
+}  // namespace tfdude::cli
