@@ -180,7 +180,7 @@ TEST_CASE("cli: wrong usage exits with 2") {
           {{"tree", "--profile", directory.write("broken.xml", "<profiles><")}, "", {"broken.xml"}},
           {{"tree", "--domain", "233"}, "", {"233", "232"}},
           {{"tree", "--domain", "-1"}, "", {"--domain", "-1"}},
-          {{"joint", "elbow", " 1"}, "", {"POSITION", "' 1' is not a number"}},
+          {{"joint", "elbow", " 1"}, "", {"'elbow' is not NAME=POSITION"}},
           {{"lookup", "world", "camera", "--at", "9223372036854775807"}, "", {"--at"}},
           {{"lookup", "world", "camera", "--at", "1e10"}, "", {"--at"}},
           {{"lookup", "world", "camera", "--at", "-9223372035"}, "", {"--at"}},
@@ -194,7 +194,7 @@ TEST_CASE("cli: no option accepts an empty text as a number") {
       {
           {{"tree", "--domain", ""}, "", {"--domain", "not a number"}},
           {{"tree", "--timeout", ""}, "", {"--timeout", "not a number"}},
-          {{"joint", "elbow", ""}, "", {"POSITION", "not a number"}},
+          {{"joint", "elbow", ""}, "", {"'elbow' is not NAME=POSITION"}},
           {{"joint", "elbow", "0", "--stddev", ""}, "", {"--stddev", "not a number"}},
           {{"joint", "elbow", "0", "--stamp", ""}, "", {"--stamp"}},
           {{"update", "camera", "--xyz", "", "", ""}, "", {"--xyz", "not a number"}},

@@ -1,0 +1,212 @@
+// Values on the command line: units of angles, many joints, samples from a pipe, points.
+
+#include <cmath>
+#include <csignal>
+#include <fcntl.h>
+#include <string>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "support/catch.hpp"
+#include "support/process.hpp"
+#include "support/test_domain.hpp"
+
+namespace tfdude {
+namespace {
+
+using nlohmann::json;
+using testing::Approx;
+using testing::await_ready;
+using testing::CliResult;
+using testing::ContainsSubstring;
+using testing::eventually;
+using testing::in_time;
+using testing::Process;
+using testing::TemporaryDirectory;
+using testing::TestDomain;
+using Arguments = std::vector<std::string>;
+
+const double kPi = std::acos(-1.0);
+
+// A mobile arm: one daemon for its base, one for the rest.
+struct Robot {
+  Robot()
+      : base(domain.serve(TFDUDE_EXAMPLES "/arm/base.yaml")),
+        arm(domain.serve(TFDUDE_EXAMPLES "/arm/arm.yaml")) {}
+
+  std::string text(const Arguments& arguments) const {
+    const CliResult result = domain.cli(arguments);
+    INFO(result.err);
+    CHECK(result.status == 0);
+    return result.out;
+  }
+  json answered(Arguments arguments, int status = 0) const {
+    arguments.insert(arguments.begin(), "--json");
+    const CliResult result = domain.cli(arguments);
+    INFO(result.out << result.err);
+    CHECK(result.status == status);
+    return json::parse(result.out);
+  }
+  double position(const std::string& joint) const {
+    const json all = answered({"joints"});
+    for (const json& partition : all.at("partitions")) {
+      for (const json& one : partition.at("joints")) {
+        if (one.at("name") == joint) return one.at("position").get<double>();
+      }
+    }
+    return NAN;
+  }
+
+  TestDomain domain;
+  TemporaryDirectory directory;
+  Process base;
+  Process arm;
+};
+
+}  // namespace
+
+TEST_CASE("values: angles are in radians, and in degrees with --deg") {
+  const Robot robot;
+  CHECK(robot.text({"joint", "elbow_joint", "90", "--deg"}) == "moved elbow_joint to 90 deg\n");
+  CHECK(robot.position("elbow_joint") == Approx(kPi / 2));
+  CHECK_THAT(robot.text({"joints"}), ContainsSubstring("1.57080         ? rad"));
+  CHECK_THAT(robot.text({"joints", "--deg"}), ContainsSubstring("90.000         ? deg"));
+  robot.text({"add", "tool", "--parent", "tool0", "--rpy", "0", "0", "90", "--deg", "--stddev", "1",
+              "1", "1", "0", "0", "9"});
+  const json tool = robot.answered({"lookup", "tool0", "tool"});
+  CHECK(tool.at("rotation").at(2).get<double>() == Approx(std::sqrt(0.5)));
+  CHECK(tool.at("covariance").at(5).at(5).get<double>() == Approx(std::pow(kPi / 20, 2)));
+  CHECK_THAT(robot.text({"lookup", "tool0", "tool"}),
+             ContainsSubstring("rpy          0.000000  0.000000  1.570796  rad\n"));
+  CHECK_THAT(robot.text({"lookup", "tool0", "tool", "--deg", "--cov"}),
+             ContainsSubstring("rpy          0.0000  0.0000  90.0000  deg\n") &&
+                 ContainsSubstring("0.0000  0.0000  9.0000  deg\n") &&
+                 ContainsSubstring("(translation first, of the right perturbation; m, deg)") &&
+                 ContainsSubstring("8.10000e+01"));
+  // JSON has radians in any case.
+  CHECK(robot.answered({"lookup", "tool0", "tool", "--deg"}) == tool);
+}
+
+TEST_CASE("values: a pose is typed and printed as a matrix") {
+  const Robot robot;
+  robot.text({"add", "tool", "--parent", "tool0", "--matrix", "0", "-1", "0", "1", "1", "0",
+              "0",   "2",    "0",        "0",     "1",        "3", "0",  "0", "0", "1"});
+  const json tool = robot.answered({"lookup", "tool0", "tool", "--matrix"});
+  CHECK(tool.at("translation").at(1).get<double>() == Approx(2));
+  CHECK(tool.at("matrix").at(1).at(0).get<double>() == Approx(1));
+  CHECK_THAT(robot.text({"lookup", "tool0", "tool", "--matrix"}),
+             ContainsSubstring("matrix       0.000000000 -1.000000000  0.000000000  1.000000000\n"));
+  const CliResult scaled =
+      robot.domain.cli({"update", "tool", "--matrix", "2", "0", "0", "0", "0", "1", "0", "0", "0",
+                        "0", "1", "0", "0", "0", "0", "1"});
+  CHECK(scaled.status == 1);
+  CHECK_THAT(scaled.err, ContainsSubstring("frame 'tool': matrix: the upper left 3x3 is not"));
+  CHECK(robot.answered({"lookup", "tool0", "tool"}).at("translation") == tool.at("translation"));
+}
+
+TEST_CASE("values: many joints move at once, and one outside its limits is said at once") {
+  const Robot robot;
+  CHECK(robot.text({"joint", "elbow_joint=0.5", "wrist_1_joint=-7", "--stddev", "0.01"}) ==
+        "moved elbow_joint to 0.5 rad\n"
+        "moved wrist_1_joint to -7 rad, outside its limits -6.283..6.283 rad\n");
+  const json moved = robot.answered({"joint", "elbow_joint=0.25", "wrist_1_joint=1"});
+  CHECK(moved.at("joints").at(0) ==
+        json({{"name", "elbow_joint"}, {"position", 0.25}, {"outside", false}}));
+  // One unknown joint: nothing moves.
+  const CliResult wrong = robot.domain.cli({"joint", "elbow_joint=3", "knee=1"});
+  CHECK(wrong.status == 1);
+  CHECK_THAT(wrong.err, ContainsSubstring("no joint 'knee'"));
+  CHECK(robot.position("elbow_joint") == 0.25);
+  for (const Arguments& bad : std::vector<Arguments>{
+           {"joint"}, {"joint", "elbow_joint"}, {"joint", "elbow_joint="}, {"joint", "a=1", "b"}}) {
+    CHECK(robot.domain.cli(bad).status == 2);
+  }
+}
+
+TEST_CASE("values: joints are set from a file line by line") {
+  const Robot robot;
+  const std::string file = robot.directory.write("moves.jsonl",
+                                                 "{\"joints\": {\"elbow_joint\": 0.1}}\n\n"
+                                                 "{\"joints\": {\"knee\": 1}}\n"
+                                                 "{\"edge\": \"tool0\", \"xyz\": [0, 0, 1]}\n"
+                                                 "{\"joints\": {\"elbow_joint\": 0.2}}");
+  const CliResult result = robot.domain.cli({"joint", "--from", file, "--rate", "50"});
+  CHECK(result.status == 1);
+  CHECK_THAT(result.err, ContainsSubstring("line 3: no joint 'knee'") &&
+                             ContainsSubstring("line 4: an edge is not a joint"));
+  CHECK_THAT(result.out, ContainsSubstring("sent         2 lines with 2 values") &&
+                             ContainsSubstring("rejected     2 lines"));
+  CHECK(robot.position("elbow_joint") == 0.2);
+  CHECK(robot.domain.cli({"joint", "--from", "/nowhere"}).status == 2);
+}
+
+TEST_CASE("values: samples from a pipe are streamed until it ends") {
+  const Robot robot;
+  std::string csv = "stamp_ns,elbow_joint,wrist_1_joint\n";
+  const auto now = nanoseconds(Time(std::chrono::duration_cast<Time::duration>(
+      std::chrono::system_clock::now().time_since_epoch())));
+  for (int i = 0; i < 200; ++i) {
+    csv += std::to_string(now + i * 1'000'000) + "," + std::to_string(i * 0.001) + ",0.5\n";
+  }
+  const std::string file = robot.directory.write("moves.csv", csv);
+  const json sent = robot.answered({"publish", file});
+  CHECK(sent.at("lines") == 200);
+  CHECK(sent.at("values") == 400);
+  CHECK(sent.at("rejected") == 0);
+  CHECK(sent.at("rate").get<double>() > 0);
+  CHECK(eventually([&] { return robot.position("elbow_joint") == Approx(0.199); }));
+  CHECK(robot.answered({"history", "forearm_link"}).at("samples") == 200);
+}
+
+TEST_CASE("values: publishing a pipe ends at an interrupt and tells what was sent") {
+  const Robot robot;
+  const std::string pipe = robot.directory.path() + "/pipe";
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  const int writer = open(pipe.c_str(), O_RDWR | O_CLOEXEC);
+  const std::string written = "{\"edge\": \"tool0\", \"xyz\": [0, 0, 0.25]}\n{\"edge\": \"too";
+  REQUIRE(write(writer, written.data(), written.size()) == static_cast<ssize_t>(written.size()));
+  Process publish = robot.domain.start_cli({"publish", pipe});
+  CHECK(eventually([&] {
+    return robot.answered({"lookup", "wrist_3_link", "tool0"}).at("translation").at(2) == 0.25;
+  }));
+  publish.signal(SIGINT);
+  CHECK(publish.wait(in_time()) == 0);
+  close(writer);
+  CHECK_THAT(publish.out(), ContainsSubstring("sent         1 lines with 1 values"));
+}
+
+TEST_CASE("values: points of one frame are given in another with their covariance") {
+  const Robot robot;
+  robot.text({"add", "tool", "--parent", "tool0", "--xyz", "1", "2", "3", "--stddev", "0.01",
+              "0.01", "0.01", "0", "0", "0.1"});
+  const json origin = robot.answered({"point", "tool0", "tool", "0", "0", "0"});
+  CHECK(origin.at("points").at(0).at("coordinates") == json({1.0, 2.0, 3.0}));
+  CHECK(origin.at("points").at(0).at("covariance").at(1).at(1).get<double>() == Approx(1e-4));
+  const json two = robot.answered({"point", "tool0", "tool", "1", "0", "0", "-1", "0", "0",
+                                   "--joint", "--cov", "1e-6", "0", "0", "1e-6", "0", "1e-6"});
+  REQUIRE(two.at("points").size() == 2);
+  CHECK(two.at("points").at(0).at("covariance").at(1).at(1).get<double>() ==
+        Approx(1e-4 + 1e-2 + 1e-6));
+  CHECK(two.at("points").at(0).at("bias").at(0).get<double>() == Approx(-0.005));
+  // Turned by the same error, the two move in opposite directions.
+  CHECK(two.at("joint_covariance").at(1).at(4).get<double>() == Approx(1e-4 - 1e-2));
+  const json normal = robot.answered({"point", "tool0", "tool", "0", "0", "1", "--direction"});
+  CHECK(normal.at("points").at(0).at("coordinates") == json({0.0, 0.0, 1.0}));
+  CHECK_THAT(robot.text({"point", "tool0", "tool", "1", "0", "0"}),
+             ContainsSubstring("point        2.000000  2.000000  3.000000  m\n"
+                               "std dev      0.010000  0.100499  0.010000  m\n"
+                               "mean off by  -0.005000  0.000000  0.000000  m\n"));
+  CHECK_THAT(robot.text({"point", "world", "tool", "1", "0", "0"}),
+             ContainsSubstring("std dev      "));
+  CHECK(robot.domain.cli({"point", "tool0", "tool", "1", "0"}).status == 2);
+  const CliResult negative = robot.domain.cli(
+      {"point", "tool0", "tool", "1", "0", "0", "--cov", "-1", "0", "0", "1", "0", "1"});
+  CHECK(negative.status == 1);
+  CHECK_THAT(negative.err, ContainsSubstring("point 1: covariance"));
+  CHECK(robot.domain.cli({"point", "tool0", "nowhere", "1", "0", "0"}).status == 1);
+}
+
+}  // namespace tfdude
