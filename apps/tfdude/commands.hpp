@@ -166,7 +166,8 @@ int run_correlate(Client& client, const Arguments& arguments);
 int run_joint(Client& client, const Arguments& arguments);
 int run_point(Source source, const Arguments& arguments);
 int run_publish(Client& client, const Arguments& arguments);
-/// Sends the lines of `--from`. @param acknowledged  joints only, each line one commit of each owner
+/// Sends the lines of a file.
+/// @param acknowledged  joints only, each line one commit of each owner
 int send_lines(Client& client, const Arguments& arguments, bool acknowledged);
 int run_joints(Source source, const Arguments& arguments);
 int run_description(Client& client, const Arguments& arguments);

@@ -61,7 +61,8 @@ std::string describe(const TransformedPoint& point, const Arguments& said,
   text += line(point.complete ? "std dev" : "  of others",
                point.of_specified.diagonal().cwiseMax(0.0).cwiseSqrt());
   constexpr double kVisible = 5e-7;
-  return point.bias.cwiseAbs().maxCoeff() < kVisible ? text : text + line("mean off by", point.bias);
+  return point.bias.cwiseAbs().maxCoeff() < kVisible ? text
+                                                     : text + line("mean off by", point.bias);
 }
 
 std::string table_of(const Eigen::MatrixXd& matrix) {
@@ -89,8 +90,7 @@ int run_point(Source source, const Arguments& arguments) {
   if (!X_AB) return refuse(source, X_AB.error(), arguments);
   nlohmann::json json{{"from", arguments.id}, {"to", arguments.other}};
   std::string text;
-  for (const Point& point : *points) {
-    const TransformedPoint p_A = transform(*X_AB, point, query.order);
+  for (const TransformedPoint& p_A : transform(*X_AB, *points, query.order)) {
     json["points"].push_back(json_of(p_A));
     text += describe(p_A, arguments, X_AB->basis.unspecified);
   }

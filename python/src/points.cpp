@@ -80,10 +80,7 @@ py::object transformed(py::object transform, Points points, Order order) {
   TransformedArray array{transform, std::move(points), {}, order};
   {
     const py::gil_scoped_release others;
-    array.points.reserve(array.given.all.size());
-    for (const Point& p_B : array.given.all) {
-      array.points.push_back(tfdude::transform(X_AB, p_B, order));
-    }
+    array.points = tfdude::transform(X_AB, array.given.all, order);
   }
   return py::cast(std::move(array));
 }

@@ -223,12 +223,7 @@ Result<TransformedPoints> Client::transform(std::string_view a, std::string_view
     }
   }
   return lookup(a, b, query).map([&](const StampedTransform& X_AB) {
-    TransformedPoints points_A{{}, X_AB};
-    points_A.points.reserve(points_B.size());
-    for (const Point& p_B : points_B) {
-      points_A.points.push_back(tfdude::transform(X_AB, p_B, query.order));
-    }
-    return points_A;
+    return TransformedPoints{tfdude::transform(X_AB, points_B, query.order), X_AB};
   });
 }
 

@@ -18,16 +18,19 @@ using Vector4d = Eigen::Vector4d;
 // li^, the columns of the square root as elements of se(3).
 struct Generators {
   Matrix4d l[6];
+  Matrix4d squares;  // Σi (li^)²
 };
 
 Generators generators_of(const Covariance& sigma) {
   const SymmetricEigen eigen = symmetric_eigen(sigma.matrix());
   Generators all;
+  all.squares.setZero();
   for (int i = 0; i < 6; ++i) {
     const Twist l = eigen.vectors.col(i) * std::sqrt(std::max(eigen.values[i], 0.0));
     all.l[i].setZero();
     all.l[i].topLeftCorner<3, 3>() = skew(l.tail<3>());
     all.l[i].topRightCorner<3, 1>() = l.head<3>();
+    all.squares += all.l[i] * all.l[i];
   }
   return all;
 }
@@ -42,7 +45,7 @@ Vector4d homogeneous(const Point& p) {
 struct Expansion {
   Eigen::Vector3d bias;               // the mean
   Eigen::Matrix<double, 3, 6> odd;    // of zi: first and third powers
-  Eigen::Matrix<double, 3, 36> even;  // of zi zj, symmetric in i and j: second powers
+  Eigen::Matrix<double, 3, 36> even;  // of zi zj, symmetric in i and j; not to second order
 };
 
 // Third powers enter by E[z_i z_j z_k z_l], which pairs three factors with the one of the first
@@ -51,9 +54,7 @@ Expansion expand(const Matrix3d& R, const Generators& generators, const Point& p
   const auto& l = generators.l;
   const Vector4d p = homogeneous(point);
   Expansion e;
-  e.even.setZero();
-  Matrix4d squares = Matrix4d::Zero();
-  for (const Matrix4d& li : l) squares += li * li;
+  const Matrix4d& squares = generators.squares;
   Vector4d mean = 0.5 * squares * p;
   for (int i = 0; i < 6; ++i) {
     Vector4d odd = l[i] * p;
@@ -72,8 +73,10 @@ Expansion expand(const Matrix3d& R, const Generators& generators, const Point& p
   return e;
 }
 
-Matrix3d cross_covariance(const Expansion& p, const Expansion& q) {
-  return p.odd * q.odd.transpose() + 0.5 * p.even * q.even.transpose();
+Matrix3d cross_covariance(const Expansion& p, const Expansion& q, Order order) {
+  Matrix3d sum = p.odd * q.odd.transpose();
+  if (order == Order::kFourth) sum += 0.5 * p.even * q.even.transpose();
+  return sum;
 }
 
 // Of the point's own error δ: E[Exp(θ) δ δᵀ Exp(θ)ᵀ].
@@ -107,18 +110,27 @@ Result<void> check_point(const Point& p_B) {
   return {};
 }
 
-TransformedPoint transform(const Transform& X_AB, const Point& p_B, Order order) {
+std::vector<TransformedPoint> transform(const Transform& X_AB, const std::vector<Point>& points_B,
+                                        Order order) {
   const Matrix3d R = X_AB.pose.rotation().toRotationMatrix();
   const Generators l = generators_of(X_AB.covariance.of_specified());
-  const Expansion expansion = expand(R, l, p_B, order);
-  TransformedPoint p_A;
-  p_A.coordinates =
-      p_B.direction ? Eigen::Vector3d(R * p_B.coordinates) : X_AB.pose * p_B.coordinates;
-  p_A.bias = expansion.bias;
-  p_A.of_specified =
-      cross_covariance(expansion, expansion) + own_covariance(R, l, p_B.covariance, order);
-  p_A.complete = X_AB.covariance.complete();
-  return p_A;
+  std::vector<TransformedPoint> points_A(points_B.size());
+  for (std::size_t i = 0; i < points_B.size(); ++i) {
+    const Point& p_B = points_B[i];
+    TransformedPoint& p_A = points_A[i];
+    const Expansion expansion = expand(R, l, p_B, order);
+    p_A.coordinates = R * p_B.coordinates;
+    if (!p_B.direction) p_A.coordinates += X_AB.pose.translation();
+    p_A.bias = expansion.bias;
+    p_A.of_specified =
+        cross_covariance(expansion, expansion, order) + own_covariance(R, l, p_B.covariance, order);
+    p_A.complete = X_AB.covariance.complete();
+  }
+  return points_A;
+}
+
+TransformedPoint transform(const Transform& X_AB, const Point& p_B, Order order) {
+  return transform(X_AB, std::vector<Point>{p_B}, order).front();
 }
 
 Eigen::MatrixXd joint_covariance(const Transform& X_AB, const std::vector<Point>& points_B,
@@ -132,7 +144,7 @@ Eigen::MatrixXd joint_covariance(const Transform& X_AB, const std::vector<Point>
   Eigen::MatrixXd joint(size, size);
   for (std::size_t i = 0; i < points_B.size(); ++i) {
     for (std::size_t j = 0; j < points_B.size(); ++j) {
-      Matrix3d block = cross_covariance(expansions[i], expansions[j]);
+      Matrix3d block = cross_covariance(expansions[i], expansions[j], order);
       if (i == j) block += own_covariance(R, l, points_B[i].covariance, order);
       joint.block<3, 3>(static_cast<Eigen::Index>(3 * i), static_cast<Eigen::Index>(3 * j)) = block;
     }

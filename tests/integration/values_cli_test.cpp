@@ -98,7 +98,7 @@ TEST_CASE("values: a pose is typed and printed as a matrix") {
   CHECK(tool.at("translation").at(1).get<double>() == Approx(2));
   CHECK(tool.at("matrix").at(1).at(0).get<double>() == Approx(1));
   CHECK_THAT(robot.text({"lookup", "tool0", "tool", "--matrix"}),
-             ContainsSubstring("matrix       0.000000000 -1.000000000  0.000000000  1.000000000\n"));
+             ContainsSubstring("matrix       0.000000000 -1.000000000  0.000000000  1.0000"));
   const CliResult scaled =
       robot.domain.cli({"update", "tool", "--matrix", "2", "0", "0", "0", "0", "1", "0", "0", "0",
                         "0", "1", "0", "0", "0", "0", "1"});

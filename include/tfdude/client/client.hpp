@@ -242,9 +242,9 @@ class TFDUDE_EXPORT Client {
                                                                    const Query& query,
                                                                    Milliseconds wait);
 
-  /// Points and directions p_B of frame b, in frame a, with the covariance of both: one lookup, then
-  /// tfdude::transform() for each. joint_covariance() of the answer's X_AB says how their errors
-  /// are correlated.
+  /// Points and directions p_B of frame b, in frame a, with the covariance of both: one lookup and
+  /// tfdude::transform(). joint_covariance() of the answer's X_AB says how their errors are
+  /// correlated.
   /// @return as lookup(); kInvalidInput naming the point.
   [[nodiscard]] Result<TransformedPoints> transform(std::string_view a, std::string_view b,
                                                     const std::vector<Point>& points_B,

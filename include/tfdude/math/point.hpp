@@ -43,11 +43,17 @@ struct TransformedPoint {
 /// Transforms a point from B to A, p_A = X̄ Exp(ξ) (p_B + δ) with independent Gaussian ξ and δ.
 /// The moments are those of the power series of Exp(ξ), by Isserlis' theorem, as Barfoot & Furgale
 /// 2014, Section IV, has them for a camera. To second order the covariance is linear,
-/// R̄ (J Σ Jᵀ + S) R̄ᵀ with J = [1, -p×]; to fourth order the next terms are added, and one of sixth
-/// order that keeps it positive semi-definite. Angular errors above half a radian are beyond the
-/// series: the bias is then no longer that of the mean. Takes some 0.1 µs to second order, 2 µs to fourth.
+/// R̄ (J Σ Jᵀ + S) R̄ᵀ with J = [1, -p×]; to fourth order the next terms are added, and one of
+/// sixth order that keeps it positive semi-definite. Angular errors above half a radian are beyond the
+/// series: the bias is then no longer that of the mean. Takes 1 µs to second order, 2.5 µs to
+/// fourth.
 [[nodiscard]] TFDUDE_EXPORT TransformedPoint transform(const Transform& X_AB, const Point& p_B,
                                                        Order order = Order::kSecond);
+
+/// The same for many points, for which the transform is prepared once: 0.3 µs for each to second
+/// order, 2 µs to fourth.
+[[nodiscard]] TFDUDE_EXPORT std::vector<TransformedPoint> transform(
+    const Transform& X_AB, const std::vector<Point>& points_B, Order order = Order::kSecond);
 
 /// The 3Nx3N covariance of N points transformed together: one pose moves all of them, so their
 /// errors are correlated. The blocks on the diagonal are those of transform(). Unspecified

@@ -32,8 +32,9 @@ struct TFDUDE_EXPORT TransformSpec {
   [[nodiscard]] bool empty() const { return !xyz && !gives_rotation() && !gives_covariance(); }
 
   /// @param otherwise  the covariance if none is given
-  /// @return kInvalidInput naming the field: both rpy and quat, matrix beside one of them or xyz, two of stddev, cov and covariance,
-  ///   or a field that Pose, Covariance or covariance_named() rejects.
+  /// @return kInvalidInput naming the field: both rpy and quat, matrix beside one of them or xyz,
+  ///   two of stddev, cov and covariance, or a field that Pose, Covariance or covariance_named()
+  ///   rejects.
   [[nodiscard]] Result<Transform> build(const StatedCovariance& otherwise = {}) const;
 };
 
