@@ -23,11 +23,11 @@ def core(quick, bin_dir, _work):
         yield from google_benchmark(program, quick)
 
 
-def google_benchmark(program, quick):
+def google_benchmark(program, quick, options=(), repetitions=None):
     """Runs one program of Google Benchmark."""
-    repetitions, seconds = (5, 0.02) if quick else (11, 0.2)
+    usual, seconds = (5, 0.02) if quick else (11, 0.2)
     printed = processes.output_of(
-        pinned() + [program, f"--benchmark_repetitions={repetitions}",
+        pinned() + [program, *options, f"--benchmark_repetitions={repetitions or usual}",
                     f"--benchmark_min_time={seconds}", "--benchmark_format=json",
                     "--benchmark_enable_random_interleaving=true"], SECONDS_FOR_A_STAGE)
     measured = {}

@@ -43,3 +43,5 @@ set_tests_properties("readme: its lines and programs work" PROPERTIES LABELS int
 add_test(NAME "readme: the check itself"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/readme/type_blocks.py --self-test)
 set_tests_properties("readme: the check itself" PROPERTIES LABELS unit TIMEOUT 60)
+add_test(NAME "bench: comparing" COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/bench/compare_test.py)
+set_tests_properties("bench: comparing" PROPERTIES LABELS unit)

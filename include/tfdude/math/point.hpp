@@ -44,8 +44,8 @@ struct TransformedPoint {
 /// The moments are those of the power series of Exp(ξ), by Isserlis' theorem, as Barfoot & Furgale
 /// 2014, Section IV, has them for a camera. To second order the covariance is linear,
 /// R̄ (J Σ Jᵀ + S) R̄ᵀ with J = [1, -p×]; to fourth order the next terms are added, and one of
-/// sixth order that keeps it positive semi-definite. Angular errors above half a radian are beyond the
-/// series: the bias is then no longer that of the mean. Takes 1 µs to second order, 2.5 µs to
+/// sixth order that keeps it positive semi-definite. Angular errors above half a radian are beyond
+/// the series: the bias is then no longer that of the mean. Takes 1 µs to second order, 2.5 µs to
 /// fourth.
 [[nodiscard]] TFDUDE_EXPORT TransformedPoint transform(const Transform& X_AB, const Point& p_B,
                                                        Order order = Order::kSecond);
