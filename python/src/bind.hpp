@@ -19,6 +19,7 @@ void bind_values(py::module_& module);
 void bind_frames(py::module_& module);
 void bind_client(py::module_& module);
 void bind_node(py::module_& module);
+void bind_recording(py::module_& module);
 
 /// Six standard deviations: three [m], three [rad].
 [[nodiscard]] StatedCovariance from_stddev(py::handle stddev);

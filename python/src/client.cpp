@@ -1,5 +1,7 @@
 #include "client.hpp"
 
+#include <map>
+
 #include <pybind11/stl.h>
 
 #include "tfdude/transport/loopback.hpp"
@@ -72,6 +74,52 @@ void bind_writes(py::class_<Session, std::shared_ptr<Session>>& cls) {
       py::arg("id"), py::arg("X_PC"), py::arg("stamp") = py::none(),
       "Sets the value of the edge from a frame's parent to the frame; the owner acknowledges it.\n"
       "With a stamp the value is a sample.");
+}
+
+Loading to_loading(py::handle values) {
+  const py::array any = py::array::ensure(values);
+  PyErr_Clear();
+  if (any && any.ndim() == 1) return to_twist(values, "sources");
+  const Doubles array = doubles(values, {6, -1}, "sources");
+  using Rows = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::RowMajor>;
+  return Eigen::Map<const Rows>(array.data(), 6, array.shape(1));
+}
+
+void bind_parts(py::class_<Session, std::shared_ptr<Session>>& cls) {
+  cls.def(
+      "update_parts",
+      [](const Session& session, const std::string& id, py::handle translation,
+         py::handle quaternion, py::handle covariance, py::handle stamp) {
+        PartialUpdate update{id};
+        if (!translation.is_none()) {
+          update.X_PC.translation = to_vector3(translation, "translation");
+        }
+        if (!quaternion.is_none()) update.X_PC.rotation = to_quaternion(quaternion, "quaternion");
+        if (!covariance.is_none()) update.X_PC.covariance = to_covariance(covariance);
+        const std::optional<Time> time = to_stamp(stamp);
+        check(session.call([&](Client& c) { return c.update_partial({update}, time); }));
+      },
+      py::arg("id"), py::kw_only(), py::arg("translation") = py::none(),
+      py::arg("quaternion") = py::none(), py::arg("covariance") = py::none(),
+      py::arg("stamp") = py::none(),
+      "Sets parts of an edge; the owner keeps the others. covariance: 'unspecified', 'exact',\n"
+      "(6, 6) or (21,).");
+  cls.def(
+      "correlate",
+      [](const Session& session, const std::string& id,
+         const std::map<std::string, py::object>& sources, bool unknown) {
+        Correlation correlation;
+        correlation.unknown = unknown;
+        for (const auto& [source, loading] : sources) {
+          correlation.common_errors.push_back({source, false, to_loading(loading)});
+        }
+        check(session.call([&](Client& c) { return c.correlate(id, correlation); }));
+      },
+      py::arg("id"), py::arg("sources") = py::dict(), py::kw_only(), py::arg("unknown") = false,
+      "Sets how the error of an edge is correlated with those of others. sources: for each name\n"
+      "the edge's error for one standard deviation of the source, (6,) or (6, k); edges that name\n"
+      "the same source share it. unknown: its own part may be correlated with anything. Without\n"
+      "arguments the edge is independent.");
 }
 
 void bind_structure(py::class_<Session, std::shared_ptr<Session>>& cls) {
@@ -165,6 +213,7 @@ void bind_client(py::module_& module) {
       "Each call may raise TransformException; its subclasses say why.");
   bind_opening(cls);
   bind_writes(cls);
+  bind_parts(cls);
   bind_structure(cls);
   bind_lookups(cls);
   bind_batches(module, cls);

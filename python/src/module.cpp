@@ -14,5 +14,6 @@ PYBIND11_MODULE(_core, module) {
   bind_frames(module);
   bind_client(module);
   bind_node(module);
+  bind_recording(module);
   py::module_::import("atexit").attr("register")(py::cpp_function(&finish));
 }

@@ -229,3 +229,32 @@ def test_joint_of_a_frame(network):
         FrameSpec("lower", "base", joint=tfdude.Joint("elbow", axis=(0, 0, 0)))
     with pytest.raises(tfdude.InvalidArgumentException):
         FrameSpec("lower", "base", joint=tfdude.Joint("elbow", limits=(1, -1)))
+
+
+def test_parts_of_an_edge_are_set_and_others_kept(client, node):
+    before = client.lookup("base", "upper")
+    client.update_parts("upper", translation=(7, 8, 9))
+    after = client.lookup("base", "upper")
+    assert np.allclose(after.translation, (7, 8, 9))
+    assert np.allclose(after.quaternion, before.quaternion)
+    assert np.allclose(after.covariance, before.covariance)
+    client.update_parts("upper", covariance="exact")
+    assert np.array_equal(client.lookup("base", "upper").covariance, np.zeros((6, 6)))
+    with pytest.raises(tfdude.InvalidArgumentException):
+        client.update_parts("upper", quaternion=(0, 0, 0, 2))
+
+
+def test_edges_that_share_a_source_are_correlated(client, node):
+    client.update_parts("upper", covariance="exact")
+    client.update_parts("lower", covariance="exact")
+    heat = (0, 0, 1e-3, 0, 0, 0)
+    client.correlate("upper", {"heat": heat})
+    client.correlate("lower", {"heat": np.reshape(heat, (6, 1))})
+    X = client.lookup("base", "lower")
+    assert X.sources == ["heat"]
+    independent = node.lookup("base", "upper") @ node.lookup("upper", "lower")
+    assert not np.allclose(X.covariance, independent.covariance)
+    client.correlate("lower")
+    assert client.lookup("upper", "lower").sources == []
+    with pytest.raises(ValueError):
+        client.correlate("lower", {"heat": np.ones(5)})

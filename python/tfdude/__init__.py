@@ -7,7 +7,7 @@
     X.matrix, X.covariance              # numpy arrays
     X @ X_hand_tool                     # composes, with covariance
 
-Client asks for and changes frames, and Node owns some. Transform is a pose with covariance.
+Client asks for and changes frames, Node owns some, and Recording asks a file. Transform is a pose with covariance.
 Instants are int [ns], float [s] or datetime with a time zone; durations are numbers [s] or timedelta. Lengths are in
 metres, angles in radians. A covariance (6, 6) is that of the right perturbation, translation first, expressed in the
 child frame. Errors are TransformException and its subclasses, which have tf2's names.
@@ -37,6 +37,8 @@ from ._core import (
     PathSegment,
     PathWatch,
     Points,
+    Recording,
+    RecordingSummary,
     StampedTransform,
     Subscription,
     Transform,
@@ -82,6 +84,8 @@ __all__ = [
     "PathSegment",
     "PathWatch",
     "Points",
+    "Recording",
+    "RecordingSummary",
     "StampedTransform",
     "Subscription",
     "TimeoutException",

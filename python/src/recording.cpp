@@ -1,0 +1,193 @@
+#include "tfdude/recording/recording.hpp"
+
+#include <mutex>
+
+#include <pybind11/stl.h>
+
+#include "bind.hpp"
+#include "session.hpp"
+
+namespace tfdude::python {
+namespace {
+
+/// A recording for any thread: it is read without the GIL, by one thread at a time.
+class SharedRecording {
+ public:
+  explicit SharedRecording(Recording recording) : recording_(std::move(recording)) {}
+
+  template <class Function>
+  auto call(const Function& function) {
+    return without_gil([&] {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      return function(recording_);
+    });
+  }
+
+ private:
+  std::mutex mutex_;
+  Recording recording_;
+};
+using RecordingClass = py::class_<SharedRecording>;
+
+std::vector<Change> events_of(SharedRecording& shared, std::optional<Time> from) {
+  return shared.call([&](Recording& recording) {
+    std::vector<Change> changes;
+    recording.events(from.value_or(Time{}), [&](const Change& change) {
+      changes.push_back(change);
+      return true;
+    });
+    return changes;
+  });
+}
+
+StampedTransform lookup(SharedRecording& shared, const std::string& a, const std::string& b,
+                        const Query& query) {
+  return value_of(shared.call([&](Recording& recording) {
+    return query.at ? recording.lookup_at(a, b, *query.at, query) : recording.lookup(a, b, query);
+  }));
+}
+
+void bind_questions(RecordingClass& cls) {
+  cls.def(
+      "lookup",
+      [](SharedRecording& shared, const std::string& a, const std::string& b, py::handle at,
+         py::handle extrapolate, py::handle age_noise_until, int order) {
+        return lookup(shared, a, b, to_query(at, extrapolate, age_noise_until, order));
+      },
+      py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(),
+      py::arg("extrapolate") = 0.0, py::arg("age_noise_until") = py::none(), py::arg("order") = 2,
+      "X_AB as Client.lookup() answered it. at: None: at the instant that is shown; else goes\n"
+      "there, and on until all edges have their data. Raises as Client.lookup().");
+  cls.def(
+      "lookup_full",
+      [](SharedRecording& shared, const std::string& a, py::handle at_a, const std::string& b,
+         py::handle at_b, const std::string& fixed) {
+        const Time time_a = to_time(at_a);
+        const Time time_b = to_time(at_b);
+        return value_of(shared.call([&](Recording& recording) {
+          return recording.lookup_at(a, time_a, b, time_b, fixed);
+        }));
+      },
+      py::arg("a"), py::arg("at_a"), py::arg("b"), py::arg("at_b"), py::arg("fixed"),
+      "As Client.lookup_full().");
+  cls.def(
+      "joints",
+      [](SharedRecording& shared, const std::string& partition) {
+        return value_of(
+            shared.call([&](Recording& recording) { return recording.joints(partition); }));
+      },
+      py::arg("partition"), "The joints of a partition; they are recorded once a second.");
+  cls.def(
+      "history",
+      [](SharedRecording& shared, const std::string& id) {
+        return value_of(shared.call([&](Recording& recording) { return recording.history(id); }));
+      },
+      py::arg("id"), "Of an edge in the whole recording; reads the whole file.");
+  cls.def(
+      "events",
+      [](SharedRecording& shared, py::handle start) { return events_of(shared, to_stamp(start)); },
+      py::arg("start") = py::none(), "All recorded changes from an instant on; reads the file.");
+}
+
+void bind_structure(RecordingClass& cls) {
+  cls.def(
+      "parent",
+      [](SharedRecording& shared, const std::string& id) {
+        return value_of(shared.call([&](Recording& recording) { return recording.parent(id); }));
+      },
+      py::arg("id"), "The id of the parent; '' for a root.");
+  cls.def(
+      "children",
+      [](SharedRecording& shared, const std::string& id) {
+        return value_of(shared.call([&](Recording& recording) { return recording.children(id); }));
+      },
+      py::arg("id"), "The ids of the children, sorted.");
+  cls.def(
+      "path",
+      [](SharedRecording& shared, const std::string& a, const std::string& b) {
+        return value_of(shared.call([&](Recording& recording) { return recording.path(a, b); }));
+      },
+      py::arg("a"), py::arg("b"), "The partitions on a path.");
+  cls.def(
+      "roots",
+      [](SharedRecording& shared) {
+        return shared.call([](Recording& recording) { return recording.roots(); });
+      },
+      "The ids of frames without an existing parent, sorted.");
+  cls.def(
+      "frames",
+      [](SharedRecording& shared) {
+        return shared.call([](Recording& recording) { return recording.frames(); });
+      },
+      "All frames, sorted by id.");
+  cls.def(
+      "partitions",
+      [](SharedRecording& shared) {
+        return shared.call([](Recording& recording) { return recording.partitions(); });
+      },
+      "All partitions, sorted by name.");
+}
+
+void bind_instant(RecordingClass& cls) {
+  cls.def(
+      "seek",
+      [](SharedRecording& shared, py::handle at) {
+        const Time time = to_time(at);
+        shared.call([&](Recording& recording) {
+          recording.seek(time);
+          return true;
+        });
+      },
+      py::arg("at"), "Goes to an instant.");
+  cls.def(
+      "step",
+      [](SharedRecording& shared) {
+        return shared.call([](Recording& recording) { return recording.step(); });
+      },
+      "Goes to the next message. Returns whether there is one.");
+  cls.def_property_readonly(
+      "instant",
+      [](SharedRecording& shared) {
+        return from_stamp(shared.call([](Recording& recording) { return recording.instant(); }));
+      },
+      "The instant that is shown [ns]; at first the end.");
+  cls.def_property_readonly(
+      "summary",
+      [](SharedRecording& shared) {
+        return shared.call([](Recording& recording) { return recording.summary(); });
+      },
+      "What the recording contains, and what is wrong with it.");
+}
+
+}  // namespace
+
+void bind_recording(py::module_& module) {
+  py::class_<RecordingSummary>(module, "RecordingSummary", "What a recording contains.")
+      .def_readonly("library", &RecordingSummary::library, "That wrote the file.")
+      .def_readonly("foreign", &RecordingSummary::foreign, "Transforms of ROS only.")
+      .def_readonly("finished", &RecordingSummary::finished, "False: it was interrupted.")
+      .def_property_readonly(
+          "start", [](const RecordingSummary& summary) { return from_stamp(summary.start); },
+          "[ns], or None")
+      .def_property_readonly(
+          "end", [](const RecordingSummary& summary) { return from_stamp(summary.end); },
+          "[ns], or None")
+      .def_readonly("bytes", &RecordingSummary::bytes)
+      .def_readonly("chunks", &RecordingSummary::chunks)
+      .def_readonly("messages", &RecordingSummary::messages, "None: not known without reading.")
+      .def_readonly("problems", &RecordingSummary::problems, "What is wrong with the file.");
+  RecordingClass cls(
+      module, "Recording",
+      "A file of `tfdude record`, or an MCAP file with transforms of ROS, which is asked as a\n"
+      "Client, without a network. It shows one instant, at first its end. For any thread.");
+  cls.def(py::init([](const std::string& file) {
+            auto recording = without_gil([&] { return Recording::open(file); });
+            return std::make_unique<SharedRecording>(value_of(std::move(recording)));
+          }),
+          py::arg("file"));
+  bind_instant(cls);
+  bind_questions(cls);
+  bind_structure(cls);
+}
+
+}  // namespace tfdude::python
