@@ -14,16 +14,22 @@ Flat to_flat(const Transform& X) {
   return flat;
 }
 
+Result<Pose> computed_pose(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
+  // A computed translation may be longer than an accepted one.
+  const bool finite = translation.allFinite();
+  auto unit = Pose::create(rotation, finite ? Eigen::Vector3d(0, 0, 0) : translation);
+  if (unit && finite) *unit = Pose::trusted(unit->rotation(), translation);
+  return unit;
+}
+
 Result<Transform> computed_from(const Flat& flat) {
-  const Eigen::Quaterniond rotation(flat[3], flat[0], flat[1], flat[2]);
-  Transform X{Pose::trusted(rotation, {flat[4], flat[5], flat[6]}), {}};
+  const auto pose = computed_pose(Eigen::Quaterniond(flat[3], flat[0], flat[1], flat[2]),
+                                  {flat[4], flat[5], flat[6]});
+  if (!pose) return tl::unexpected(pose.error());
   Covariance::Upper upper{};
   std::copy_n(flat.begin() + 7, Covariance::kSize, upper.begin());
-  X.covariance = Covariance::trusted(upper);
+  const Transform X{*pose, Covariance::trusted(upper)};
   if (auto finite = check_finite(X); !finite) return tl::unexpected(finite.error());
-  const auto unit = Pose::create(rotation, Eigen::Vector3d::Zero());
-  if (!unit) return tl::unexpected(unit.error());
-  X.pose = Pose::trusted(unit->rotation(), X.pose.translation());
   return X;
 }
 

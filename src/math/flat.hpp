@@ -13,6 +13,10 @@ using Flat = std::array<double, 28>;
 
 [[nodiscard]] Flat to_flat(const Transform& X);
 
+/// As computed_from(), of a pose alone.
+[[nodiscard]] Result<Pose> computed_pose(const Eigen::Quaterniond& rotation,
+                                         const Eigen::Vector3d& translation);
+
 /// Restores a transform that was valid, or computed from valid ones, when it was flattened. It may
 /// have any size and is semi-definite up to its rounding, so the rules for user input do not apply.
 /// @return kInvalidInput: not finite, or not a rotation.

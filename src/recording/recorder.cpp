@@ -83,7 +83,7 @@ Result<void> Recorder::write(const std::string& name, Known& known, const Values
     const bool as_before = covariance.complete() && !value.begins && edge.written &&
                            edge.written->upper() == covariance.of_specified().upper();
     encoder.add(known.frames[value.frame], value, as_before);
-    if (covariance.complete()) edge.written = covariance.of_specified();
+    if (covariance.complete() && !as_before) edge.written = covariance.of_specified();
     publish = std::max(publish, value.stamp);
     if (is_static(value)) statics_changed_ = true;
     const bool late =
@@ -94,11 +94,13 @@ Result<void> Recorder::write(const std::string& name, Known& known, const Values
     }
     // A static edge that becomes dynamic is no longer one of the statics.
     if (edge.newest && is_static(*edge.newest) && value.stamp) statics_changed_ = true;
-    auto begins = value.begins  ? value.begins
-                  : edge.newest ? std::move(edge.newest->begins)
-                                : std::optional<Covariance>(Covariance());
-    edge.newest = value;
-    edge.newest->begins = std::move(begins);
+    if (!edge.newest) edge.newest.emplace().begins = Covariance();
+    WatchedValue& newest = *edge.newest;
+    newest.stamp = value.stamp;
+    newest.X_PC = value.X_PC;
+    newest.correlation = value.correlation;
+    newest.cleared = value.cleared;
+    if (value.begins) newest.begins = value.begins;
   }
   encoder.finish();
   if (auto ok = put(Topic::kValues, now, publish); !ok) return ok;

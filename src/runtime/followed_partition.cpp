@@ -168,37 +168,44 @@ FollowedPartition::Message FollowedPartition::place(Group& group, const PushedVa
   return message;
 }
 
-std::optional<WatchedValue> FollowedPartition::admitted(const Group& group, PushedValue& entry,
-                                                        const Message& message) {
-  if (entry.index >= group.frames.size()) return std::nullopt;
+void FollowedPartition::admit(const Group& group, PushedValue& entry, const Message& message,
+                              std::vector<WatchedValue>& values) {
+  if (entry.index >= group.frames.size()) return;
   const std::uint32_t frame = group.frames[entry.index];
-  if (frame == kGone) return std::nullopt;
+  if (frame == kGone) return;
   Known& known = known_[frame];
   const bool begins = entry.history > known.history;
-  if (entry.history < known.history || (begins && !entry.process_noise)) return std::nullopt;
+  if (entry.history < known.history || (begins && !entry.process_noise)) return;
   // Another group, or a reply, has told the edge's value as of a later commit.
   const bool is_old = !begins && message.commit <= known.commit;
   if (is_old) entry.correlation = known.correlation;
+  bool late = false;
   if (!begins) {
     const bool repeats = entry.stamp == known.newest && entry.cleared == known.cleared &&
                          same(entry.X, known.X) && entry.correlation == known.correlation;
-    if (repeats) return std::nullopt;
+    if (repeats) return;
     // Of one commit, a part may be missing.
-    if (!entry.stamp && !entry.cleared && (!message.follows_on || is_old)) return std::nullopt;
-    if (entry.cleared && is_old) return std::nullopt;
-    const bool late = entry.stamp && known.newest && *entry.stamp < *known.newest;
+    if (!entry.stamp && !entry.cleared && (!message.follows_on || is_old)) return;
+    if (entry.cleared && is_old) return;
+    late = entry.stamp && known.newest && *entry.stamp < *known.newest;
     const bool wanted = message.reply ? missing_from_.has_value() : period_.count() == 0;
-    if (late && !wanted) return std::nullopt;
-    if (late) known.correlation = entry.correlation;
-    if (late) return WatchedValue{frame, entry.stamp, entry.X, std::move(entry.correlation)};
+    if (late && !wanted) return;
   }
-  known = {entry.history,     std::max(known.commit, message.commit),
-           entry.stamp,       entry.X,
-           entry.correlation, entry.cleared};
-  WatchedValue value{frame, entry.stamp, entry.X, std::move(entry.correlation)};
+  known.correlation = entry.correlation;
+  if (!late) {
+    known.history = entry.history;
+    known.commit = std::max(known.commit, message.commit);
+    known.newest = entry.stamp;
+    known.X = entry.X;
+    known.cleared = entry.cleared;
+  }
+  WatchedValue& value = values.emplace_back();
+  value.frame = frame;
+  value.stamp = entry.stamp;
+  value.X_PC = entry.X;
+  value.correlation = std::move(entry.correlation);
   if (begins) value.begins = entry.process_noise;
   value.cleared = entry.cleared;
-  return value;
 }
 
 bool FollowedPartition::take(const PushedValues& pushed) {
@@ -219,9 +226,7 @@ bool FollowedPartition::take(const PushedValues& pushed) {
   if (correlated_entries(*whole) > 0) spread_correlations(whole->entries);
   ValuesNews news{whole->commit, {}};
   news.values.reserve(whole->entries.size());
-  for (PushedValue& entry : whole->entries) {
-    if (auto value = admitted(*group, entry, message)) news.values.push_back(*std::move(value));
-  }
+  for (PushedValue& entry : whole->entries) admit(*group, entry, message, news.values);
   const std::size_t count = news.values.size();
   if (count > 0) post({name_, std::move(news)}, count);
   if (lacks_any()) return true;

@@ -112,9 +112,9 @@ class FollowedPartition {
   };
 
   [[nodiscard]] Message place(Group& group, const PushedValues& whole, bool knows_all);
-  [[nodiscard]] std::optional<WatchedValue> admitted(const Group& group, PushedValue& entry,
-                                                     const Message& message)
-      TFDUDE_REQUIRES(mutex_);
+  // Appends the value if it is news.
+  void admit(const Group& group, PushedValue& entry, const Message& message,
+             std::vector<WatchedValue>& values) TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool lacks_any() const TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool settles(Clock::time_point now) const TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Time> recent() const TFDUDE_REQUIRES(mutex_);

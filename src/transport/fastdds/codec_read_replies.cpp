@@ -180,12 +180,16 @@ Result<PushedValues> from_wire(const wire::State& sample) {
     const auto stamp =
         stamp_from_wire(cleared ? kNoStamp : entry.stamp(), "the stamp of a pushed value");
     if (!stamp) return tl::unexpected(stamp.error());
-    const bool known = entry.covariance() != 0 && is_pose_only(entry.x());
     auto X = read_computed(entry.x());
     if (!X) return fail_at("pushed values", X.error());
-    if (known) X->covariance = {};
-    pushed.entries.push_back(
-        {entry.index(), *stamp, *X, {}, entry.history(), {}, entry.covariance(), known, cleared});
+    PushedValue& value = pushed.entries.emplace_back();
+    value.index = entry.index();
+    value.stamp = *stamp;
+    value.X = *X;
+    value.history = entry.history();
+    value.covariance_number = entry.covariance();
+    value.covariance_known = entry.covariance() != 0 && is_pose_only(entry.x());
+    value.cleared = cleared;
   }
   for (const wire::PushedCorrelation& one : sample.correlations()) {
     if (one.entry() >= pushed.entries.size()) {

@@ -49,11 +49,15 @@ Result<Transform> read_transform(const Numbers& in, std::string_view frame) {
 
 Result<Transform> read_computed(const Numbers& in) {
   if (auto ok = check_size(in); !ok) return tl::unexpected(std::move(ok.error()));
-  Flat flat{};
-  std::copy(in.begin(), in.end(), flat.begin());
-  auto X = computed_from(flat);
-  if (X) X->covariance.set_complete(!is_pose_only(in));
-  return X;
+  if (!is_pose_only(in)) {
+    Flat flat{};
+    std::copy(in.begin(), in.end(), flat.begin());
+    return computed_from(flat);
+  }
+  const auto pose =
+      computed_pose(Eigen::Quaterniond(in[3], in[0], in[1], in[2]), {in[4], in[5], in[6]});
+  if (!pose) return tl::unexpected(pose.error());
+  return Transform{*pose, StatedCovariance::unspecified()};
 }
 
 Result<Covariance> read_covariance(const Numbers& in, std::size_t first) {

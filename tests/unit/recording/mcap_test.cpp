@@ -103,6 +103,17 @@ TEST_CASE("mcap: the CRC is that of IEEE 802.3, also in parts") {
   CHECK(crc32(std::string_view(text).substr(13), crc32(text.substr(0, 13))) == crc32(text));
 }
 
+TEST_CASE("mcap: the CRC of many bytes is that of the same bytes one by one") {
+  std::string text;
+  std::uint32_t one_by_one = 0;
+  for (int i = 0; i < 400; ++i) {
+    CAPTURE(i);
+    CHECK(crc32(text) == one_by_one);
+    text.push_back(static_cast<char>(i * 89 + 7));
+    one_by_one = crc32(std::string_view(text).substr(text.size() - 1), one_by_one);
+  }
+}
+
 TEST_CASE("mcap: what is written is read, with and without compression, also without a summary") {
   const bool compress = GENERATE(false, true);
   const int messages = GENERATE(0, 1, 100);
