@@ -1,15 +1,22 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <csignal>
+#include <ctime>
+#include <memory>
 #include <unistd.h>
+#include <utility>
 
 #include <spdlog/async.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include "tfdude/base/id.hpp"
 #include "tfdude/client/node.hpp"
 #include "tfdude/transport/fastdds.hpp"
+
+#include "service_manager.hpp"
 
 // What the programs that serve a partition have in common as processes.
 namespace tfdude::cli {
@@ -29,14 +36,37 @@ inline sigset_t block_stop_signals() {
 }
 
 /// Logs go to standard error, those of the library, too, which uses the logger of this name. If
-/// nobody reads the log, lines are lost rather than delaying the program.
+/// nobody reads the log, lines are lost rather than delaying the program. The journal gets
+/// the level instead of the time and the name, which it knows.
 inline void log_to_standard_error() {
   spdlog::set_default_logger(
       spdlog::create_async_nb<spdlog::sinks::stderr_color_sink_mt>("tfdude"));
+  if (is_journal(STDERR_FILENO)) {
+    auto formatter = std::make_unique<spdlog::pattern_formatter>();
+    formatter->add_flag<JournalLevel>('*').set_pattern("<%*>%v");
+    spdlog::set_formatter(std::move(formatter));
+  }
   log_fastdds_to_standard_error();
 }
 
-/// Waits for a signal to stop, or until another process has taken the partition.
+/// Waits for a signal. Meanwhile feeds the watchdog of the service manager three times in its
+/// interval, as long as the node responds.
+[[nodiscard]] inline int wait_for_signal(Node& node, const sigset_t& signals) {
+  const auto pause = watchdog_interval() / 3;
+  int signal = 0;
+  if (pause.count() <= 0) {
+    sigwait(&signals, &signal);
+    return signal;
+  }
+  const auto wait = std::chrono::duration_cast<Milliseconds>(pause);
+  const timespec until{pause.count() / 1'000'000, pause.count() % 1'000'000 * 1000};
+  while ((signal = sigtimedwait(&signals, nullptr, &until)) < 0) {
+    if (node.responds(wait)) notify("WATCHDOG=1");
+  }
+  return signal;
+}
+
+/// Serves until a signal to stop, or until another process has taken the partition.
 /// @param stop_signals  from block_stop_signals()
 /// @return the exit status
 [[nodiscard]] inline int wait_until_stopped(Node& node, const sigset_t& stop_signals) {
@@ -47,8 +77,9 @@ inline void log_to_standard_error() {
     given_up = true;
     kill(getpid(), SIGTERM);
   });
-  int signal = 0;
-  sigwait(&stop_signals, &signal);
+  notify("READY=1\nSTATUS=serving partition " + quote(node.partition()));
+  const int signal = wait_for_signal(node, stop_signals);
+  notify("STOPPING=1");
   if (given_up) return kRefused;
   spdlog::info("stopping on signal {}", signal);
   return 0;

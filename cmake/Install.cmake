@@ -33,6 +33,10 @@ if(EXISTS ${CMAKE_SOURCE_DIR}/apps/tfdude/completion.bash)
   install(FILES apps/tfdude/completion.bash RENAME tfdude
     DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 endif()
+install(DIRECTORY ${CMAKE_BINARY_DIR}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+set(TFDUDE_UNIT_DIR lib/systemd/system CACHE STRING "Where units of systemd are installed, in the prefix")
+configure_file(systemd/tfduded@.service.in ${CMAKE_BINARY_DIR}/systemd/tfduded@.service @ONLY)
+install(FILES ${CMAKE_BINARY_DIR}/systemd/tfduded@.service systemd/tfdude.target DESTINATION ${TFDUDE_UNIT_DIR})
 # Where examples/other-dds and examples/ros look for them.
 install(FILES idl/tfdude.idl idl/ros2.idl DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude/idl)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tfdude)

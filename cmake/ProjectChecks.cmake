@@ -35,6 +35,14 @@ add_test(NAME "install: consumer"
     -P ${CMAKE_SOURCE_DIR}/tests/install_consumer/run.cmake)
 set_tests_properties("install: consumer" PROPERTIES LABELS install TIMEOUT 300)
 
+add_test(NAME "manual: its pages are complete and without warnings"
+  COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/packaging/check_manual.py ${CMAKE_BINARY_DIR})
+add_test(NAME "systemd: the units are valid, and the service is confined"
+  COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/packaging/check_units.py ${CMAKE_BINARY_DIR})
+set_tests_properties("manual: its pages are complete and without warnings"
+  "systemd: the units are valid, and the service is confined"
+  PROPERTIES LABELS install TIMEOUT 60 SKIP_REGULAR_EXPRESSION "SKIPPED: ")
+
 # The commands of README.md and docs/install.md work as typed in a fresh clone, also a second time.
 add_test(NAME "readme: its lines and programs work"
   COMMAND ${CMAKE_COMMAND} -E env CXX=${CMAKE_CXX_COMPILER}

@@ -11,6 +11,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/types/version.hpp"
 
+#include "../manual.hpp"
 #include "../network_options.hpp"
 #include "../numbers.hpp"
 #include "config/config.hpp"
@@ -122,11 +123,15 @@ class Options {
 
 std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
   CLI::App app{"tfdude-ros: connects the frames, joints and robots of ROS 2 and of tf-dude"};
-  app.footer("Example: tfdude-ros --domain 7 --ros-domain 0 --export arm");
+  app.footer(
+      "Exit status: 0 stopped by a signal, 1 the partition is served by another process, or DDS "
+      "cannot start, 2 wrong usage or configuration.\n"
+      "Example: tfdude-ros --domain 7 --ros-domain 0 --export arm");
   app.set_version_flag("--version", version_line());
   Options options(app);
   cli::add_network_options(app, settings.options);
   cli::require_numbers(app);
+  cli::add_manual(app);
   try {
     app.name(argv[0]);
     app.parse(cli::arguments_of(argc, argv));

@@ -2,6 +2,7 @@
 
 #include "tfdude/types/version.hpp"
 
+#include "../manual.hpp"
 #include "../network_options.hpp"
 #include "../numbers.hpp"
 #include "settings.hpp"
@@ -10,7 +11,11 @@ namespace tfdude::web {
 
 std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
   CLI::App app{"tfdude-web: shows all frames and their uncertainty in a browser"};
-  app.footer("Example: tfdude web --domain 7, then open http://127.0.0.1:8765/");
+  app.footer(
+      "Then open the address that it prints.\n"
+      "Exit status: 0 stopped by a signal, 1 the port or DDS cannot be opened, 2 wrong usage, or a "
+      "file is missing.\n"
+      "Example: tfdude web --domain 7");
   app.set_version_flag("--version", version_line());
   app.add_option("--bind", settings.server.address,
                  "address to listen on; if others can reach it, a token is needed, which is "
@@ -32,6 +37,7 @@ std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
   cli::add_network_options(app, settings.options);
   cli::add_clock_option(app, [&](ClockKind kind) { settings.options.clock = kind; });
   cli::require_numbers(app);
+  cli::add_manual(app);
   try {
     app.name(argv[0]);
     app.parse(cli::arguments_of(argc, argv));

@@ -16,6 +16,7 @@
 #include "tfdude/transport/fastdds.hpp"
 #include "tfdude/types/version.hpp"
 
+#include "../manual.hpp"
 #include "../network_options.hpp"
 #include "../numbers.hpp"
 #include "command_options.hpp"
@@ -329,7 +330,9 @@ int main(int argc, char** argv) {
   Command command;
   long timeout_ms = arguments.options.timeout.count();
   CLI::App app{"tfdude: where is frame B seen from frame A, and how sure are we?"};
-  app.footer("Exit status: 0 done, 1 request rejected, 2 wrong usage, 3 no answer.");
+  app.footer(
+      "Exit status: 0 done, 1 request rejected, 2 wrong usage, 3 no answer.\n"
+      "Example: tfdude lookup world hand_left");
   app.set_version_flag("--version", version_line());
   app.require_subcommand(1);
   app.fallthrough();
@@ -348,6 +351,7 @@ int main(int argc, char** argv) {
   cli::add_web_command(app, argc, argv, local);
   cli::add_keys_commands(app, arguments.keys, local);
   cli::require_numbers(app);
+  cli::add_manual(app);
   try {
     app.name(argv[0]);
     app.parse(cli::arguments_of(argc, argv));

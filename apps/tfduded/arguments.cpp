@@ -8,6 +8,7 @@
 
 #include "tfdude/types/version.hpp"
 
+#include "../manual.hpp"
 #include "../network_options.hpp"
 #include "../numbers.hpp"
 
@@ -102,7 +103,10 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   bool no_state = false;
   int save_every_ms = 1000;
   CLI::App app{"tfduded: owns a partition of the coordinate frames and serves it over DDS"};
-  app.footer("Example: tfduded --partition arms --config examples/thesis/arms.yaml --domain 7");
+  app.footer(
+      "Exit status: 0 stopped by a signal, 1 the partition is served by another process, or DDS "
+      "cannot start, 2 wrong usage, configuration or state.\n"
+      "Example: tfduded --partition arms --config examples/thesis/arms.yaml --domain 7");
   app.set_version_flag("--version", version_line());
   app.add_option("--partition", arguments.partition, "the partition's name");
   app.add_option("--config", arguments.config, "YAML file of frames");
@@ -133,6 +137,11 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
       ->capture_default_str()
       ->check(CLI::Range(std::size_t{1}, kMost));
   cli::require_numbers(app);
+  cli::add_manual(
+      app, {{"FILES",
+             "The service tfduded@PARTITION of systemd reads /etc/tfdude/PARTITION.yaml and the "
+             "variables in /etc/default/tfdude, and keeps its state in /var/lib/tfdude/PARTITION. "
+             "The target tfdude.target stands for all of these services."}});
   try {
     app.name(argv[0]);
     app.parse(cli::arguments_of(argc, argv));

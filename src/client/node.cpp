@@ -49,6 +49,8 @@ Result<void> Node::release(const std::vector<std::string>& ids) {
   return participant_->member().release(ids, participant_->discovery().call_deadline());
 }
 
+bool Node::responds(Milliseconds wait) { return participant_->member().responds(Deadline(wait)); }
+
 RefusedCounts Node::refused() const { return participant_->refused(); }
 
 const std::string& Node::partition() const { return participant_->member().name(); }

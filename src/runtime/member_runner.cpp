@@ -242,6 +242,11 @@ Result<void> MemberRunner::await_stored(const Request& request, const Deadline& 
                                                         : Result<void>();
 }
 
+bool MemberRunner::responds(const Deadline& deadline) {
+  const auto flushed = commits_->flush(deadline.at());
+  return flushed || flushed.error().code != Errc::kTimeout;
+}
+
 std::optional<Error> MemberRunner::refusal() const {
   auto failure = commits_ ? commits_->failure() : std::nullopt;
   if (!failure) return std::nullopt;

@@ -59,6 +59,11 @@ class TFDUDE_EXPORT Node : public Client {
   /// @return kUnknownFrame, kNotOwner: then it gives up none; kState.
   [[nodiscard]] Result<void> release(const std::vector<std::string>& ids);
 
+  /// Whether the thread that stores and announces changes is alive: waits until it has done a
+  /// round, even if that could not store them.
+  /// @return false: not within `wait`, because it hangs, or waits for the disk
+  [[nodiscard]] bool responds(Milliseconds wait);
+
   /// What limits have rejected since the start.
   [[nodiscard]] RefusedCounts refused() const;
 
