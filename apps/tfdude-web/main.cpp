@@ -24,12 +24,10 @@ using web::Settings;
 
 constexpr const char* kThree = "/usr/share/javascript/three/";
 
-// Where the page is: as installed, or in the sources.
 std::string page_folder() {
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const auto installed = program.parent_path() / TFDUDE_PAGE_FROM_PROGRAM;
-  return std::filesystem::is_directory(installed, error) ? installed.string() : TFDUDE_PAGE_SOURCES;
+  return program.parent_path() / TFDUDE_PAGE_FROM_PROGRAM;
 }
 
 Result<Files> read_files(const Settings& settings) {
