@@ -29,10 +29,11 @@ endforeach()
 if(TARGET tfdude_web)
   install(DIRECTORY apps/tfdude-web/page/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude/web)
 endif()
-if(EXISTS ${CMAKE_SOURCE_DIR}/apps/tfdude/completion.bash)
-  install(FILES apps/tfdude/completion.bash RENAME tfdude
-    DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
-endif()
+install(FILES apps/tfdude/completion.bash RENAME tfdude
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+install(FILES apps/tfdude/completion.zsh RENAME _tfdude DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+install(FILES apps/tfdude/completion.fish RENAME tfdude.fish
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
 set(TFDUDE_UNIT_DIR lib/systemd/system CACHE STRING "Where units of systemd are installed, in the prefix")
 configure_file(systemd/tfduded@.service.in ${CMAKE_BINARY_DIR}/systemd/tfduded@.service @ONLY)

@@ -37,6 +37,12 @@ set_tests_properties("install: consumer" PROPERTIES LABELS install TIMEOUT 300)
 
 add_test(NAME "manual: its pages are complete and without warnings"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/packaging/check_manual.py ${CMAKE_BINARY_DIR})
+foreach(shell zsh fish)
+  add_test(NAME "completion: ${shell} completes words, names and files"
+    COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/packaging/check_completion.py ${shell})
+  set_tests_properties("completion: ${shell} completes words, names and files"
+    PROPERTIES LABELS install TIMEOUT 120 SKIP_REGULAR_EXPRESSION "SKIPPED: ")
+endforeach()
 add_test(NAME "systemd: the units are valid, and the service is confined"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/packaging/check_units.py ${CMAKE_BINARY_DIR})
 set_tests_properties("manual: its pages are complete and without warnings"
