@@ -111,7 +111,8 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   app.add_option("--partition", arguments.partition, "the partition's name");
   app.add_option("--config", arguments.config, "YAML file of frames");
   app.add_flag("--check", arguments.check,
-               "only print what the configuration would change in the stored state");
+               "check configuration, URDF, keys and stored state, print what would be served and "
+               "what would change in the state, and write nothing");
   const UrdfOptions urdfs(app);
   cli::add_network_options(app, arguments.options);
   cli::add_clock_option(app, [&](ClockKind kind) { arguments.clock = kind; });

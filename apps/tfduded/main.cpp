@@ -9,12 +9,12 @@
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
-#include "tfdude/client/config_preview.hpp"
 #include "tfdude/client/node.hpp"
 #include "tfdude/description/config.hpp"
 
 #include "../process.hpp"
 #include "arguments.hpp"
+#include "check.hpp"
 
 namespace {
 
@@ -52,29 +52,13 @@ tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
   return config;
 }
 
-// Prints what the configuration would change in the stored state. @return the exit status
-int check(const Arguments& arguments, const tfdude::Config& config) {
-  const auto preview = tfdude::preview_config(config.partition, config.frames, arguments.options);
-  if (!preview) {
-    spdlog::error("partition {}: {}", tfdude::quote(config.partition), preview.error().message);
-    return kWrongUsage;
-  }
-  const std::string kept = preview->file.empty() ? "(none)" : preview->file;
-  std::printf("state %s: frames=%zu\n", kept.c_str(), preview->frames);
-  for (const tfdude::ConfiguredChange& change : preview->changes) {
-    std::printf("%s\n", describe(change).c_str());
-  }
-  if (preview->changes.empty()) std::puts("nothing changes");
-  return std::fflush(stdout) == 0 ? 0 : kRefused;
-}
-
 int serve(const Arguments& arguments, const sigset_t& stop_signals) {
   const auto config = configure(arguments);
   if (!config) {
     spdlog::error("{}", config.error().message);
     return kWrongUsage;
   }
-  if (arguments.check) return check(arguments, *config);
+  if (arguments.check) return tfdude::daemon::check(arguments, *config);
   tfdude::Options options = arguments.options;
   options.history = config->history;
   options.clock = config->clock.value_or(tfdude::ClockKind::kSystem);

@@ -29,6 +29,10 @@ Result<ConfigPreview> preview_config(const std::string& partition,
   Directory directory(forest, partition);
   Partition taken(partition, 1, forest, directory);
   if (auto ok = taken.restore(state, frames, Time{}); !ok) return tl::unexpected(ok.error());
+  for (FrameInfo& frame : forest.frames()) {
+    preview.served.push_back(
+        {std::move(frame.id), std::move(frame.parent), partition, frame.attached});
+  }
   return preview;
 }
 

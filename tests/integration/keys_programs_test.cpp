@@ -118,6 +118,24 @@ std::string refused(const CliResult& result, const std::string& code) {
 
 }  // namespace
 
+TEST_CASE("keys: tfduded --check tells until when keys are valid, and whether they fit") {
+  const SecuredRobot robot;
+  const auto check = [&](const std::string& identity) {
+    const std::string config = robot.files.write("checked.yaml", kArm);
+    Process process = robot.domain.start_daemon(
+        {"--check", "--no-state", "--keys", robot.keys.path(identity), "--config", config});
+    return testing::finish(process);
+  };
+  const CliResult fits = check("arm");
+  CHECK(fits.status == 0);
+  CHECK_THAT(fits.out, ContainsSubstring("identity 'arm', valid until 2"));
+  for (const char* other : {"base", "eye"}) {
+    const CliResult refused = check(other);
+    CHECK(refused.status == 2);
+    CHECK_THAT(refused.err, ContainsSubstring("is not the daemon of this partition"));
+  }
+}
+
 TEST_CASE("keys: each role may do what it says, and is told at once what it may not") {
   const SecuredRobot robot;
   CHECK(robot.as("eye", {"lookup", "base", "secret_forearm"}).status == 0);

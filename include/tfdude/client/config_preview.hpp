@@ -15,6 +15,8 @@ struct ConfigPreview {
   std::string file;        ///< file of the stored state; empty: nothing is stored
   std::size_t frames = 0;  ///< number of stored frames
   std::vector<ConfiguredChange> changes;
+  /// The frames that it would then serve. `attached`: their parents are among them.
+  std::vector<Frame> served;
 };
 
 /// Reports what Node::open() with these frames and options would change. Does not join the

@@ -1,0 +1,134 @@
+#include "check.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/client/config_preview.hpp"
+#include "tfdude/keys/key_files.hpp"
+
+#include "../process.hpp"
+
+namespace tfdude::daemon {
+namespace {
+
+using Change = ConfiguredChange::Kind;
+
+std::string number_of(std::size_t count, const char* what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+std::string profile_of(const Options& options) {
+  return options.profile.empty() ? "the built-in profiles" : "profile " + quote(options.profile);
+}
+
+// The file of an entry of Config::places, which may have a line.
+std::string file_of(const std::string& place) {
+  const auto colon = place.rfind(':');
+  const bool line = colon != std::string::npos && colon + 1 < place.size() &&
+                    place.find_first_not_of("0123456789", colon + 1) == std::string::npos;
+  return line ? place.substr(0, colon) : place;
+}
+
+// How many frames and joints each file describes.
+void print_sources(const Config& config) {
+  struct Count {
+    std::size_t frames = 0;
+    std::size_t joints = 0;
+  };
+  std::vector<std::pair<std::string, Count>> files;  // in the order of the configuration
+  for (std::size_t i = 0; i < config.frames.size(); ++i) {
+    const std::string file = file_of(config.places[i]);
+    if (files.empty() || files.back().first != file) files.push_back({file, {}});
+    ++files.back().second.frames;
+    if (config.frames[i].joint) ++files.back().second.joints;
+  }
+  for (const auto& [file, count] : files) {
+    std::printf("configured by %s: %s, %s\n", file.c_str(),
+                number_of(count.frames, "frame").c_str(), number_of(count.joints, "joint").c_str());
+  }
+  if (files.empty()) std::puts("no frames configured: all stays as it was stored");
+}
+
+// The keys as a participant would use them. Prints until when they are valid.
+Result<void> check_keys(const std::string& directory, const std::string& partition,
+                        std::uint32_t domain) {
+  if (directory.empty()) return {};
+  const Time now = std::chrono::system_clock::now();
+  const auto keys = find_keys(directory, now);
+  if (!keys) return tl::unexpected(keys.error());
+  const std::string identity = "keys " + directory + ": identity " + quote(keys->identity);
+  if (keys->roles.serves != partition) {
+    return fail(Errc::kNotPermitted,
+                identity +
+                    " is not the daemon of this partition: tfdude keys daemon makes its "
+                    "keys");
+  }
+  const auto [first, last] = keys->settings.domains;
+  if (domain < first || domain > last) {
+    return fail(Errc::kNotPermitted, identity + " is valid in the domains " +
+                                         std::to_string(first) + " to " + std::to_string(last) +
+                                         ", not in " + std::to_string(domain));
+  }
+  const auto days = std::chrono::duration_cast<std::chrono::hours>(keys->until - now).count() / 24;
+  std::printf("%s, valid until %s (%s)\n", identity.c_str(), to_string(keys->until).c_str(),
+              number_of(static_cast<std::size_t>(days), "day").c_str());
+  return {};
+}
+
+// What becomes of the stored state.
+void print_state(const ConfigPreview& preview) {
+  if (preview.file.empty()) {
+    std::puts("nothing is stored, and nothing was: --no-state");
+    return;
+  }
+  std::printf("state %s: %s\n", preview.file.c_str(), number_of(preview.frames, "frame").c_str());
+  std::size_t kept = preview.frames;
+  for (const ConfiguredChange& change : preview.changes) {
+    std::printf("  %s\n", describe(change).c_str());
+    if (change.kind == Change::kRemove || change.kind == Change::kReplace) --kept;
+  }
+  if (preview.changes.empty()) std::puts("  nothing changes");
+  if (kept > 0) std::printf("  %s kept as stored\n", number_of(kept, "frame").c_str());
+}
+
+// What the partition needs of others.
+void print_needs(const std::vector<Frame>& served) {
+  std::map<std::string, std::vector<std::string>> needed;  // by the parents
+  for (const Frame& frame : served) {
+    if (!frame.attached && !frame.parent.empty()) needed[frame.parent].push_back(frame.id);
+  }
+  for (const auto& [parent, children] : needed) {
+    std::string below;
+    for (const std::string& child : children) below += (below.empty() ? "" : ", ") + quote(child);
+    std::printf("needs %s of another partition, for %s\n", quote(parent).c_str(), below.c_str());
+  }
+}
+
+}  // namespace
+
+int check(const Arguments& arguments, const Config& config) {
+  const Options& options = arguments.options;
+  const auto preview = preview_config(config.partition, config.frames, options);
+  if (!preview) {
+    spdlog::error("partition {}: {}", quote(config.partition), preview.error().message);
+    return kWrongUsage;
+  }
+  std::printf("would serve partition %s in domain %u with %s: %s\n",
+              quote(config.partition).c_str(), options.domain, profile_of(options).c_str(),
+              number_of(preview->served.size(), "frame").c_str());
+  print_sources(config);
+  print_state(*preview);
+  print_needs(preview->served);
+  if (auto ok = check_keys(options.keys, config.partition, options.domain); !ok) {
+    spdlog::error("{}", ok.error().message);
+    return kWrongUsage;
+  }
+  return std::fflush(stdout) == 0 ? 0 : cli::kRefused;
+}
+
+}  // namespace tfdude::daemon
