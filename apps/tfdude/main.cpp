@@ -21,6 +21,7 @@
 #include "../numbers.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "complete.hpp"
 #include "keys_commands.hpp"
 #include "recording_options.hpp"
 #include "value_options.hpp"
@@ -352,6 +353,12 @@ int main(int argc, char** argv) {
   cli::add_keys_commands(app, arguments.keys, local);
   cli::require_numbers(app);
   cli::add_manual(app);
+  if (argc > 1 && argv[1] == std::string_view("__complete")) {
+    log_fastdds_to_standard_error();
+    (void)cli::run_complete(app, {argv + 2, argv + argc});
+    (void)std::fflush(stdout);
+    _exit(cli::kDone);
+  }
   try {
     app.name(argv[0]);
     app.parse(cli::arguments_of(argc, argv));
