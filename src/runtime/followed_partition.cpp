@@ -199,13 +199,8 @@ void FollowedPartition::admit(const Group& group, PushedValue& entry, const Mess
     known.X = entry.X;
     known.cleared = entry.cleared;
   }
-  WatchedValue& value = values.emplace_back();
-  value.frame = frame;
-  value.stamp = entry.stamp;
-  value.X_PC = entry.X;
-  value.correlation = std::move(entry.correlation);
-  if (begins) value.begins = entry.process_noise;
-  value.cleared = entry.cleared;
+  values.push_back({frame, entry.stamp, entry.X, std::move(entry.correlation), {}, entry.cleared});
+  if (begins) values.back().begins = entry.process_noise;
 }
 
 bool FollowedPartition::take(const PushedValues& pushed) {

@@ -182,14 +182,9 @@ Result<PushedValues> from_wire(const wire::State& sample) {
     if (!stamp) return tl::unexpected(stamp.error());
     auto X = read_computed(entry.x());
     if (!X) return fail_at("pushed values", X.error());
-    PushedValue& value = pushed.entries.emplace_back();
-    value.index = entry.index();
-    value.stamp = *stamp;
-    value.X = *X;
-    value.history = entry.history();
-    value.covariance_number = entry.covariance();
-    value.covariance_known = entry.covariance() != 0 && is_pose_only(entry.x());
-    value.cleared = cleared;
+    const bool known = entry.covariance() != 0 && is_pose_only(entry.x());
+    pushed.entries.push_back(
+        {entry.index(), *stamp, *X, {}, entry.history(), {}, entry.covariance(), known, cleared});
   }
   for (const wire::PushedCorrelation& one : sample.correlations()) {
     if (one.entry() >= pushed.entries.size()) {

@@ -54,10 +54,8 @@ Result<Transform> read_computed(const Numbers& in) {
     std::copy(in.begin(), in.end(), flat.begin());
     return computed_from(flat);
   }
-  const auto pose =
-      computed_pose(Eigen::Quaterniond(in[3], in[0], in[1], in[2]), {in[4], in[5], in[6]});
-  if (!pose) return tl::unexpected(pose.error());
-  return Transform{*pose, StatedCovariance::unspecified()};
+  return computed_pose(Eigen::Quaterniond(in[3], in[0], in[1], in[2]), {in[4], in[5], in[6]})
+      .map([](const Pose& X) { return Transform{X, StatedCovariance::unspecified()}; });
 }
 
 Result<Covariance> read_covariance(const Numbers& in, std::size_t first) {
