@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kFlushEvery = 0.8;  // [s]: with what that takes, at most a second is lost
 constexpr double kTick = 0.1;        // [s]
-constexpr int kTicksBetweenLooks = 10;
+constexpr int kTicksBetweenLooks = 2;
 
 // Passes what a client hears to a file. All functions are thread-safe.
 class Recorder {
@@ -77,6 +77,11 @@ class Recorder {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (state_) state_ = writer_.finish(now());
     return state_;
+  }
+
+  [[nodiscard]] bool has_partition() {
+    const std::lock_guard<std::mutex> lock(watches_mutex_);
+    return !watches_.empty();
   }
 
   // After finish().
@@ -142,6 +147,7 @@ Result<void> record(Client& client, Recorder& recorder, const Arguments& argumen
   stopping = true;
   looking.join();
   changes = Subscription();
+  if (!recorder.has_partition()) std::fputs("tfdude: no partition was recorded\n", stderr);
   return recorder.finish();
 }
 

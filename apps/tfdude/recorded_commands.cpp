@@ -61,6 +61,7 @@ std::string describe(const Recording& recording) {
                  summary.chunks);
   if (summary.messages) text += ", " + std::to_string(*summary.messages) + " messages";
   text += "\n";
+  if (recording.partitions().empty()) text += "partition    none\n";
   for (const PartitionInfo& partition : recording.partitions()) {
     text += "partition    " + partition.name + ": " + std::to_string(partition.frames) + " frames";
     const auto joints = recording.joints(partition.name);

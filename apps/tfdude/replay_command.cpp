@@ -25,8 +25,8 @@ constexpr std::chrono::milliseconds kClockEvery{10};  // while time passes
 constexpr std::chrono::milliseconds kRepeatEvery{100};
 // Frames wait so long for their values, of the recording's time.
 constexpr std::chrono::milliseconds kSettle{100};
-// How long a clock that was set back may take to reach all partitions.
-constexpr double kBackInTime = 0.1;  // [s]
+// How long a time that was published may take to reach all partitions.
+constexpr double kClockDelay = 0.1;  // [s]
 
 // Keys of the terminal, or characters of another standard input, without waiting.
 class Keys {
@@ -127,6 +127,8 @@ class Replay {
   [[nodiscard]] Result<void> take(const RecordedNews& recorded);
   [[nodiscard]] Result<void> take_due(Time due);
   [[nodiscard]] Result<void> settle();
+  void show_joints();
+  [[nodiscard]] Result<void> set_back();
   void close(One& one);
   void fetch();
   [[nodiscard]] Result<void> publish_clock(Time now);
@@ -142,6 +144,7 @@ class Replay {
   std::map<std::string, One> partitions_;
   std::vector<RecordedNews> upcoming_;  // of one message, to which the recording has gone
   Steady::time_point published_{};
+  Steady::time_point shown_{};  // the joints
   std::size_t rejected_ = 0;
 };
 
@@ -260,6 +263,24 @@ void Replay::obey(char key) {
   std::fputs(pace_.paused() ? "tfdude: paused\n" : "tfdude: going on\n", stderr);
 }
 
+void Replay::show_joints() {
+  shown_ = Steady::now();
+  for (auto& [name, one] : partitions_) {
+    if (!one.served) continue;
+    if (auto joints = recording_.joints(name)) one.served->show(*std::move(joints));
+  }
+}
+
+// First where it is expected, so that nobody in this process is surprised by it.
+Result<void> Replay::set_back() {
+  std::fputs("tfdude: from the beginning\n", stderr);
+  for (auto& [name, one] : partitions_) {
+    if (!one.served) continue;
+    if (auto ok = one.served->set_time(start_); !ok) return ok;
+  }
+  return publish_clock(start_);
+}
+
 Result<void> Replay::run() {
   Keys keys;
   while (!interrupted_within(kStep)) {
@@ -267,13 +288,15 @@ Result<void> Replay::run() {
     const Time due = std::min(pace_.now(), end_);
     if (auto ok = take_due(due); !ok) return ok;
     if (auto ok = settle(); !ok) return ok;
+    if (Steady::now() - shown_ >= kRepeatEvery) show_joints();
     if (Steady::now() - published_ >= (pace_.paused() ? kRepeatEvery : kClockEvery)) {
       if (auto ok = publish_clock(due); !ok) return ok;
     }
     if (pace_.paused() || !upcoming_.empty() || due < end_) continue;
     if (!loop_) return publish_clock(end_);
-    if (auto ok = publish_clock(start_); !ok) return ok;
-    if (interrupted_within(kBackInTime)) return {};
+    if (interrupted_within(kClockDelay)) return {};
+    if (auto ok = set_back(); !ok) return ok;
+    if (interrupted_within(kClockDelay)) return {};
     if (auto ok = begin(); !ok) return ok;
   }
   return {};
@@ -307,6 +330,9 @@ Time beginning(Recording& recording) {
 int run_replay(const Arguments& arguments) {
   auto recording = Recording::open(arguments.recording.file);
   if (!recording) return report(recording.error(), arguments);
+  if (recording->partitions().empty()) {
+    return report({Errc::kState, quote(arguments.recording.file) + " has no partition"}, arguments);
+  }
   const auto at = optional_stamp(Source(*recording), arguments.stamp);
   if (!at) return report(at.error(), arguments);
   Arguments external = arguments;

@@ -267,7 +267,7 @@ Result<Time> Client::now() {
   return participant_->clock().await(participant_->discovery().call_deadline());
 }
 
-Result<void> Client::set_time(Time now) { return participant_->set_time(now); }
+Result<void> Client::set_time(Time now) { return participant_->set_time(now, true); }
 Result<void> Client::publish_clock(Time now) { return participant_->publish_clock(now); }
 
 Result<PartitionWatch> Client::watch_partition(const std::string& partition,

@@ -45,6 +45,10 @@ Result<void> Node::clear_history(const std::string& id) {
 
 std::size_t Node::clear_history() { return participant_->forest().clear_histories(Time::min()); }
 
+void Node::show_joints(std::vector<JointInfo> joints) {
+  participant_->member().show(std::move(joints));
+}
+
 Result<void> Node::release(const std::vector<std::string>& ids) {
   return participant_->member().release(ids, participant_->discovery().call_deadline());
 }

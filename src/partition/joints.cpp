@@ -176,8 +176,18 @@ Result<std::size_t> Joints::apply(const JointUpdate& update) {
   return steps_.size();
 }
 
+void Joints::show(std::vector<JointInfo> joints) {
+  shown_ = std::move(joints);
+  std::sort(shown_.begin(), shown_.end(),
+            [](const JointInfo& a, const JointInfo& b) { return a.name < b.name; });
+}
+
 std::vector<JointInfo> Joints::infos(std::string_view after) const {
   std::vector<JointInfo> infos;
+  for (const JointInfo& joint : shown_) {
+    if (joint.name > after && infos.size() < kMaxItems) infos.push_back(joint);
+  }
+  if (!shown_.empty()) return infos;
   for (const Mover& mover : movers_) {
     if (mover.spec.name <= after || mover.let_go || !forest_.info(mover.handle)) continue;
     const JointSpec& spec = mover.spec;

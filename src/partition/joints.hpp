@@ -55,6 +55,8 @@ class Joints {
   ///   Forest::update(). On an error nothing is moved.
   [[nodiscard]] Result<std::size_t> apply(const JointUpdate& update);
 
+  /// From now on infos() are these, which move no frame.
+  void show(std::vector<JointInfo> joints);
   /// Sorted by name, starting after this one; at most kMaxItems.
   [[nodiscard]] std::vector<JointInfo> infos(std::string_view after = {}) const;
 
@@ -97,6 +99,7 @@ class Joints {
 
   Forest& forest_;
   std::vector<Mover> movers_;
+  std::vector<JointInfo> shown_;  // instead, sorted by name
   // The movers of a joint: its own and those that follow it. Empty for a follower.
   std::map<std::string, std::vector<std::size_t>, std::less<>> by_name_;
   std::uint64_t plans_ = 0;                // number of updates so far

@@ -76,6 +76,8 @@ class Partition {
   [[nodiscard]] Result<std::size_t> apply(const JointUpdate& update) {
     return joints_.apply(update);
   }
+  /// As Joints::show()
+  void show(std::vector<JointInfo> joints) { joints_.show(std::move(joints)); }
   /// Whether this partition owns a joint of that name, or one that follows it. Takes no lock.
   [[nodiscard]] bool moves(std::string_view joint) const { return joints_.moves(joint); }
 

@@ -187,6 +187,11 @@ Result<std::size_t> MemberRunner::try_apply(const JointUpdate& update) {
   return partition_->apply(update);
 }
 
+void MemberRunner::show(std::vector<JointInfo> joints) {
+  const Lock lock(joints_mutex_);
+  partition_->show(std::move(joints));
+}
+
 // ---- becoming an owner
 
 void MemberRunner::open(std::unique_ptr<StateStore> store, Milliseconds save_every) {

@@ -71,6 +71,8 @@ class MemberRunner final : private CommitLoop::Effects {
   [[nodiscard]] Result<std::size_t> apply(const JointUpdate& update);
   /// As apply(), without waiting. @return also kTimeout if another thread does the same
   [[nodiscard]] Result<std::size_t> try_apply(const JointUpdate& update);
+  /// As Node::show_joints()
+  void show(std::vector<JointInfo> joints);
 
   /// @return as Member::yield
   void yield(const std::set<PendingYield>& due, bool current);

@@ -103,7 +103,7 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   return serving_.serve(frames);
 }
 
-Result<void> Participant::set_time(Time now) {
+Result<void> Participant::set_time(Time now, bool by_itself) {
   const auto before = structure_.clock.set(now);
   if (!before) return tl::unexpected(before.error());
   if (!*before) return {};
@@ -111,7 +111,10 @@ Result<void> Participant::set_time(Time now) {
   // The 1st, 2nd, 4th... only: two publishers of the time would fill the log.
   const std::uint64_t jumps = ++jumps_;
   if ((jumps & (jumps - 1)) == 0) {
-    log().warn(
+    // No surprise to who has set it back, and no harm where there is no history.
+    const bool calm = by_itself || cleared == 0;
+    log().log(
+        calm ? spdlog::level::info : spdlog::level::warn,
         "the external clock jumped back from {} s to {} s (jump {}): the histories of {} "
         "edges are cleared",
         seconds_of(**before), seconds_of(now), jumps, cleared);
@@ -122,7 +125,7 @@ Result<void> Participant::set_time(Time now) {
 Result<void> Participant::publish_clock(Time now) {
   if (auto ok = check_stamp(now); !ok) return ok;
   if (wants_clock()) {
-    if (auto set = set_time(now); !set) return set;
+    if (auto set = set_time(now, true); !set) return set;
   }
   return transport_->publish_clock(now);
 }

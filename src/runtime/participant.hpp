@@ -65,7 +65,8 @@ class Participant final : public TransportHandler {
 
   /// Sets the external clock. If it jumps back, own values that are later do not hold any more.
   /// @return kInvalidInput
-  [[nodiscard]] Result<void> set_time(Time now);
+  /// @param by_itself  the process has determined the time, and not another one
+  [[nodiscard]] Result<void> set_time(Time now, bool by_itself);
   /// Sends the time to others with an external clock, and sets the own one, if it is external.
   /// @return kInvalidInput; as Transport::publish_clock()
   [[nodiscard]] Result<void> publish_clock(Time now);
@@ -94,7 +95,7 @@ class Participant final : public TransportHandler {
   [[nodiscard]] bool wants_clock() const override {
     return structure_.clock.kind() == ClockKind::kExternal;
   }
-  void on_clock(Time now) override { (void)set_time(now); }
+  void on_clock(Time now) override { (void)set_time(now, false); }
   void on_presence(const Presence& presence) override { member_.on_presence(presence); }
   void on_lost(const std::string& partition, std::uint64_t incarnation,
                std::chrono::nanoseconds early) override {

@@ -55,8 +55,11 @@ std::string written(const TemporaryDirectory& directory) {
   add("arm",
       ValuesNews{1, {{0, std::nullopt, shifted(1, 0.02), {false, {supply}, {}}, Covariance()}}},
       kBegin);
+  JointInfo wrist{"wrist", "hand", JointType::kRevolute, JointLimits{-1, 1}, Mimic{"lift", 2, 0}};
   for (int i = 1; i <= 1000; ++i) {
     const double time = kBegin + 0.01 * i;
+    wrist.position = 0.001 * i;
+    REQUIRE(writer->add("arm", {wrist}, at(time)));
     add("base",
         ValuesNews{1U + static_cast<unsigned>(i), {{0, at(time), shifted(0.001 * i, 0.01)}}}, time);
     if (i != 500) continue;
@@ -149,7 +152,50 @@ TEST_CASE("replay: a loop begins again, and what came later is gone") {
   REQUIRE(now);
   CHECK(*now < at(kBegin + 8));
   REQUIRE(eventually([&] { return has_frame(*client, "tool"); }));
-  CHECK(replay.runs());
+  replay.signal(SIGINT);
+  const CliResult result = testing::finish(replay);
+  CHECK_THAT(result.err, ContainsSubstring("from the beginning"));
+  // Nothing is wrong.
+  CHECK_THAT(result.err, !ContainsSubstring("[warning]"));
+}
+
+TEST_CASE("replay: joints are where they were") {
+  const TemporaryDirectory directory;
+  const std::string file = written(directory);
+  const TestDomain domain;
+  Process replay = domain.start_cli({"replay", file, "--at", "1006", "--paused"});
+  auto client = Client::open(external(domain));
+  REQUIRE(client);
+  REQUIRE(eventually([&] {
+    const auto joints = client->joints("arm");
+    return joints && joints->size() == 1;
+  }));
+  const auto joints = client->joints("arm");
+  REQUIRE(joints);
+  const JointInfo& wrist = joints->front();
+  CHECK(wrist.name == "wrist");
+  CHECK(wrist.frame == "hand");
+  CHECK(std::abs(wrist.position - 0.6) < 0.0025);
+  REQUIRE(wrist.limits);
+  CHECK(wrist.limits->upper == 1);
+  REQUIRE(wrist.mimic);
+  CHECK(wrist.mimic->joint == "lift");
+}
+
+TEST_CASE("replay: a recording without partitions is an error") {
+  const TestDomain domain;
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/empty.mcap";
+  Process recorder = domain.start_cli({"record", file});
+  REQUIRE(eventually([&] { return domain.cli({"info", file}).status == 0; }));
+  recorder.signal(SIGINT);
+  const CliResult recorded = testing::finish(recorder);
+  CHECK(recorded.status == 0);
+  CHECK_THAT(recorded.err, ContainsSubstring("no partition was recorded"));
+  CHECK_THAT(domain.cli({"info", file}).out, ContainsSubstring("partition    none"));
+  const CliResult refused = domain.cli({"replay", file});
+  CHECK(refused.status == 1);
+  CHECK_THAT(refused.err, ContainsSubstring("has no partition"));
 }
 
 TEST_CASE("replay: a name that a live partition has is refused") {

@@ -8,6 +8,7 @@
 #include "tfdude/base/result.hpp"
 #include "tfdude/client/client.hpp"
 #include "tfdude/types/frame.hpp"
+#include "tfdude/types/joint_spec.hpp"
 #include "tfdude/types/refused.hpp"
 
 namespace tfdude {
@@ -52,6 +53,10 @@ class TFDUDE_EXPORT Node : public Client {
   [[nodiscard]] Result<void> clear_history(const std::string& id);
   /// Likewise for all dynamic edges of the partition, as one commit. @return how many
   std::size_t clear_history();
+
+  /// For players of recordings: joints() of this partition are these from now on. They move no
+  /// frame. An empty list: those of its frames.
+  void show_joints(std::vector<JointInfo> joints);
 
   /// Gives up frames of the partition without removing those below them, for instance to let
   /// another partition have them. The frames below wait until there is a frame of that id again.

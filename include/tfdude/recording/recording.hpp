@@ -99,7 +99,7 @@ class TFDUDE_EXPORT Recording {
   [[nodiscard]] bool exists(const std::string& id) const;
   [[nodiscard]] std::vector<Frame> frames() const;
   [[nodiscard]] std::vector<PartitionInfo> partitions() const;
-  /// Joints are recorded once a second.
+  /// Joints are recorded five times a second.
   [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition) const;
   /// The samples that are loaded, up to the instant that is shown.
   [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition) const;
