@@ -37,6 +37,10 @@ set_tests_properties("install: consumer" PROPERTIES LABELS install TIMEOUT 300)
 
 add_test(NAME "manual: its pages are complete and without warnings"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/packaging/check_manual.py ${CMAKE_BINARY_DIR})
+file(STRINGS ${CMAKE_SOURCE_DIR}/debian/changelog newest LIMIT_COUNT 1)
+if(NOT newest MATCHES "^tfdude \\(${PROJECT_VERSION}\\) ")
+  message(FATAL_ERROR "debian/changelog begins with \"${newest}\", not with version ${PROJECT_VERSION}")
+endif()
 foreach(shell zsh fish)
   add_test(NAME "completion: ${shell} completes words, names and files"
     COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/packaging/check_completion.py ${shell})
