@@ -30,11 +30,6 @@ int list(const Arguments& arguments, const char* key, const std::vector<std::str
   return answer(arguments, {{key, ids}}, text);
 }
 
-std::string profile_of(const Options& options) {
-  if (options.profile.empty()) return "the built-in profile";
-  return "profile " + quote(options.profile);
-}
-
 // An empty answer without any partition counts as no answer. @return the exit status
 int none_there(Source source, const Arguments& arguments, bool found) {
   if (found) return kDone;
@@ -52,6 +47,11 @@ int refuse_pose(const Error& error, const Arguments& arguments) {
 }
 
 }  // namespace
+
+std::string profile_of(const Options& options) {
+  if (options.profile.empty()) return "the built-in profile";
+  return "profile " + quote(options.profile);
+}
 
 std::string nobody_answers(const Arguments& arguments) {
   return "no partition answers in domain " + std::to_string(arguments.options.domain) + " with " +

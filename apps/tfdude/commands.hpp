@@ -124,6 +124,8 @@ int answer(const Arguments& arguments, const nlohmann::json& json, const std::st
 /// Prints that the command changed its frame or joint, or why it did not. @return the exit status
 int finish(Client& client, const Result<void>& changed, const Arguments& arguments,
            const std::string& what);
+/// "the built-in profile", or which one.
+[[nodiscard]] std::string profile_of(const Options& options);
 /// That no partition answers, and what may be the cause.
 [[nodiscard]] std::string nobody_answers(const Arguments& arguments);
 /// Prints why the request failed. @return the exit status, or kNeedsAllFrames
@@ -174,6 +176,7 @@ int run_description(Client& client, const Arguments& arguments);
 int run_monitor(Client& client, const Arguments& arguments);
 int run_plot(Source source, const Arguments& arguments);
 int run_graph(Source source, const Arguments& arguments);
+int run_doctor(const Arguments& arguments);
 
 /// Prints an error of the command line as JSON. @return the exit status
 int report_usage(const std::string& message);

@@ -351,6 +351,8 @@ int main(int argc, char** argv) {
   cli::add_recording_commands(app, arguments, command, local);
   cli::add_web_command(app, argc, argv, local);
   cli::add_keys_commands(app, arguments.keys, local);
+  cli::add_command(app, "doctor", "find out why nobody is met, and what to do", "doctor",
+                   [&local] { local = cli::run_doctor; });
   cli::require_numbers(app);
   cli::add_manual(app);
   if (argc > 1 && argv[1] == std::string_view("__complete")) {

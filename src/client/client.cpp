@@ -162,6 +162,10 @@ Result<std::vector<JointInfo>> Client::joints(const std::string& partition) {
   return participant_->joints().list(partition);
 }
 
+Result<ClockDifference> Client::clock_difference(const std::string& partition) {
+  return participant_->queries().clock_difference(partition);
+}
+
 Result<std::string> Client::description(const std::string& partition) {
   return participant_->descriptions().of(partition, participant_->discovery().call_deadline());
 }

@@ -228,6 +228,8 @@ struct Reply {
       body;
   /// For a change: the latest time known to the owner, for the next change of the requester.
   LamportTime lamport_time = 0;
+  /// When it was sent, by the system's clock of the sender's host, as the transport knows it.
+  std::optional<Time> sent{};
 };
 
 /// The group of watchers that share what an owner sends: a hash of the owner, its incarnation, and

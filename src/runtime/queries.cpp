@@ -7,6 +7,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/mutex.hpp"
+#include "runtime/wall_clock.hpp"
 
 namespace tfdude {
 
@@ -133,6 +134,38 @@ Result<std::vector<HistoryInfo>> Queries::history(const std::string& id) {
 Result<std::vector<HistoryInfo>> Queries::histories(const std::string& partition) {
   return requests_.ask_all<HistoryInfo>(partition, HistoryRequest{true},
                                         discovery_.call_deadline());
+}
+
+// The owner's clock is read once between the request and the reply. So its difference is known to
+// within half of the round trip, and best by the fastest one.
+Result<ClockDifference> Queries::clock_difference(const std::string& partition) {
+  constexpr int kRoundTrips = 8;
+  const Deadline deadline = discovery_.call_deadline();
+  std::optional<ClockDifference> best;
+  for (int i = 0; i < kRoundTrips; ++i) {
+    auto part = requests_.planned(deadline, [&](const Directory& directory) -> Result<Part> {
+      const auto owner = directory.owner(partition);
+      if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+      // The part of a description after its end: nothing.
+      constexpr std::uint64_t kEnd = UINT64_MAX;
+      return route_to(directory, *owner, Request{0, partition, DescriptionRequest{kEnd}});
+    });
+    if (!part) return tl::unexpected(std::move(part.error()));
+    std::vector<Part> parts{*std::move(part)};
+    const Time begin = wall_clock();
+    Reply reply = std::move(requests_.ask(parts, deadline).front());
+    const Time end = wall_clock();
+    const auto* error = std::get_if<Error>(&reply.body);
+    if (!reply.sent && error != nullptr) return tl::unexpected(*error);
+    if (!reply.sent) {
+      return fail(Errc::kUnsupported, "the clock of partition " + quote(partition) +
+                                          " is not told: it is of this process, or its transport "
+                                          "has no stamps");
+    }
+    const auto half = (end - begin) / 2;
+    if (!best || half < best->error) best = {*reply.sent - (begin + half), half};
+  }
+  return *best;
 }
 
 }  // namespace tfdude

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tfdude/types/clock_difference.hpp"
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/partition_info.hpp"
 
@@ -41,6 +42,7 @@ class Queries {
   /// The history of a frame's edge, and those of all edges of a partition.
   [[nodiscard]] Result<std::vector<HistoryInfo>> history(const std::string& id);
   [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition);
+  [[nodiscard]] Result<ClockDifference> clock_difference(const std::string& partition);
 
  private:
   [[nodiscard]] Result<std::vector<Frame>> followed();

@@ -22,6 +22,7 @@
 #include "tfdude/math/transform.hpp"
 #include "tfdude/transport/transport.hpp"
 #include "tfdude/types/change.hpp"
+#include "tfdude/types/clock_difference.hpp"
 #include "tfdude/types/correlation.hpp"
 #include "tfdude/types/edge.hpp"
 #include "tfdude/types/frame.hpp"
@@ -178,6 +179,10 @@ class TFDUDE_EXPORT Client {
   /// none. One round trip per 32 KiB.
   /// @return kUnknownPartition; kUnsupported (an owner of protocol 1.0).
   [[nodiscard]] Result<std::string> description(const std::string& partition);
+
+  /// How far the system's clock of a partition's host is ahead of this host's. Eight round trips.
+  /// @return kUnknownPartition; kUnsupported (a partition of this process, or not over DDS)
+  [[nodiscard]] Result<ClockDifference> clock_difference(const std::string& partition);
 
   /// Moves a frame, with all frames below it, to a new parent (empty: makes it a root). The owner
   /// stays the same.

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "tfdude/base/time.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
 #include "base/mutex.hpp"
@@ -116,6 +117,8 @@ class Reader : public edds::DataReaderListener {
   struct Calls {
     std::function<void(const Sample&, const ertps::GUID_t& writer)> on_sample;
     std::function<void(const ertps::GUID_t& writer, int change)> on_matched;
+    /// Instead of on_sample, with the time at which it was written, by the writer's system clock.
+    std::function<void(const Sample&, const ertps::GUID_t& writer, Time sent)> on_dated_sample{};
   };
 
   Reader(const Context& context, edds::TopicDescription& topic, const std::string& partition,
@@ -161,7 +164,13 @@ class Reader : public edds::DataReaderListener {
       return a.info.sample_identity.sequence_number() < b.info.sample_identity.sequence_number();
     });
     for (auto one = batch_.begin(); one != end; ++one) {
-      calls_.on_sample(one->sample, one->info.sample_identity.writer_guid());
+      const auto& writer = one->info.sample_identity.writer_guid();
+      if (calls_.on_dated_sample) {
+        const Time sent{std::chrono::nanoseconds(one->info.source_timestamp.to_ns())};
+        calls_.on_dated_sample(one->sample, writer, sent);
+      } else {
+        calls_.on_sample(one->sample, writer);
+      }
     }
   }
 

@@ -144,9 +144,10 @@ Result<void> FastDdsTransport::create_endpoints() {
   }
   replies_ = std::make_unique<Reader<wire::Reply>>(
       context(), *topics_.reply, reply_partition(kAllOwners, self_), "call_reader",
-      Reader<wire::Reply>::Calls{
-          [this](const wire::Reply& sample, const Guid& from) { take_reply(sample, from); },
-          nullptr});
+      Reader<wire::Reply>::Calls{nullptr, nullptr,
+                                 [this](const wire::Reply& sample, const Guid& from, Time sent) {
+                                   take_reply(sample, from, sent);
+                                 }});
   if (!presence_->good() || (pages_ != nullptr && !pages_->good()) || !replies_->good() ||
       !clock_->good()) {
     return not_created("the readers");

@@ -121,7 +121,7 @@ class FastDdsTransport final : public Transport {
   void take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from, bool may_change);
   void take_update(const wire::Update& sample);
   void take_joints(const wire::Joints& sample);
-  void take_reply(const wire::Reply& sample, const ertps::GUID_t& writer);
+  void take_reply(const wire::Reply& sample, const ertps::GUID_t& writer, Time sent);
   void take_page(const wire::Page& sample, const ertps::GUID_t& writer);
   void take_presence(const wire::Presence& sample, const ertps::GUID_t& writer);
   [[nodiscard]] bool ignores(const ertps::GUID_t& writer) const;

@@ -84,4 +84,13 @@ TEST_CASE("queries: partitions and histories are listed") {
   CHECK_FALSE(asker.queries.partitions()->front().reachable);
 }
 
+TEST_CASE("queries: the clock of a host is known by the stamps of replies") {
+  LoopbackNetwork network;
+  const ScriptedOwner arm(network, "arm", {{"arm", "", {}}});
+  Asker asker(network);
+  CHECK(outcome(asker.queries.clock_difference("leg")) == "unknown_partition");
+  // Messages inside a process have none.
+  CHECK(outcome(asker.queries.clock_difference("arm")) == "unsupported");
+}
+
 }  // namespace tfdude

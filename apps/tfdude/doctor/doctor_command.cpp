@@ -1,0 +1,74 @@
+#include "tfdude/base/id.hpp"
+
+#include "../commands.hpp"
+#include "../format.hpp"
+#include "domain_facts.hpp"
+
+namespace tfdude::cli {
+namespace {
+
+using nlohmann::json;
+
+double seconds(std::chrono::nanoseconds time) {
+  return std::chrono::duration<double>(time).count();
+}
+
+json met_json(const Met& met) {
+  json object{{"partition", met.partition.name}, {"host", met.partition.host},
+              {"pid", met.partition.pid},        {"reachable", met.partition.reachable},
+              {"clock_ahead_s", nullptr},        {"clock_error_s", nullptr}};
+  if (met.clock) {
+    object["clock_ahead_s"] = seconds(met.clock->ahead);
+    object["clock_error_s"] = seconds(met.clock->error);
+  }
+  return object;
+}
+
+std::string met_text(const Met& met) {
+  const PartitionInfo& partition = met.partition;
+  std::string text = "met          " + partition.name + " on " + partition.host + ", process " +
+                     std::to_string(partition.pid);
+  if (met.clock) {
+    text += format(", clock %+.3f ms (±%.3f)", 1e3 * seconds(met.clock->ahead),
+                   1e3 * seconds(met.clock->error));
+  }
+  return text + "\n";
+}
+
+std::string interfaces_text(const std::vector<NetworkInterface>& interfaces) {
+  std::string text;
+  for (const NetworkInterface& one : interfaces) {
+    if (!one.up || one.address.empty()) continue;
+    text += (text.empty() ? "interfaces   " : ", ") + one.name + " " + one.address;
+  }
+  return text + (text.empty() ? "" : "\n");
+}
+
+}  // namespace
+
+int run_doctor(const Arguments& arguments) {
+  const Facts facts = gather_facts(arguments.options);
+  const auto findings = findings_of(facts);
+  json object{{"domain", facts.domain},
+              {"met", json::array()},
+              {"findings", json::array()},
+              {"unchecked", unchecked_of(facts)}};
+  std::string text = "domain       " + std::to_string(facts.domain) + ", " + facts.profile + "\n" +
+                     interfaces_text(facts.interfaces);
+  for (const Met& met : facts.met) {
+    object["met"].push_back(met_json(met));
+    text += met_text(met);
+  }
+  for (const std::string& one : unchecked_of(facts)) text += "not checked  " + one + "\n";
+  for (const Finding& finding : findings) {
+    object["findings"].push_back(
+        {{"code", finding.code}, {"what", finding.what}, {"remedy", finding.remedy}});
+    text += "\n" + finding.code + ": " + printable(finding.what) + "\n  -> " +
+            printable(finding.remedy) + "\n";
+  }
+  if (findings.empty()) text += "\nno problem found\n";
+  (void)answer(arguments, object, text);
+  return findings.empty() ? kDone : kRefused;
+}
+
+}  // namespace tfdude::cli

@@ -1,0 +1,106 @@
+#include "domain_facts.hpp"
+
+#include <algorithm>
+
+#include "tfdude/client/client.hpp"
+
+#include "../commands.hpp"
+#include "host_facts.hpp"
+
+namespace tfdude::cli {
+namespace {
+
+// Long enough to meet whoever is on this host.
+constexpr Milliseconds kMoment{400};
+// Of the domains that this host has participants of.
+constexpr std::size_t kMostDomains = 5;
+
+// The sockets of others, or of this process.
+std::vector<UdpSocket> sockets_of(bool own) {
+  const auto mine = own_sockets();
+  std::vector<UdpSocket> sockets = read_sockets();
+  const auto of_others = [&](const UdpSocket& socket) {
+    return (std::find(mine.begin(), mine.end(), socket.inode) != mine.end()) != own;
+  };
+  sockets.erase(std::remove_if(sockets.begin(), sockets.end(), of_others), sockets.end());
+  return sockets;
+}
+
+// Whoever a participant with these options meets within a moment.
+std::vector<PartitionInfo> met_by(Options options) {
+  options.timeout = options.discovery = kMoment;
+  auto client = Client::open(options);
+  if (!client) return {};
+  return client->partitions().value_or(std::vector<PartitionInfo>());
+}
+
+void ask_domain(Client& client, Facts& facts) {
+  auto partitions = client.partitions();
+  if (!partitions) {
+    facts.failed = std::move(partitions.error());
+    return;
+  }
+  for (PartitionInfo& partition : *partitions) {
+    std::optional<ClockDifference> clock;
+    if (partition.reachable && partition.compatible()) {
+      const auto difference = client.clock_difference(partition.name);
+      if (difference) clock = *difference;
+      if (!difference && difference.error().code == Errc::kNotPermitted) {
+        facts.failed = difference.error();
+      }
+    }
+    facts.met.push_back({std::move(partition), clock});
+  }
+}
+
+void look_elsewhere(const Options& options, Facts& facts) {
+  const auto here = facts.others.find(facts.domain);
+  const Listeners others = here != facts.others.end() ? here->second : Listeners{};
+  if ((facts.loopback ? others.everywhere : others.loopback) > 0) {
+    Options other = options;
+    other.profile = facts.loopback ? "" : kLocalProfile;
+    facts.of_other_profile = met_by(other);
+  }
+  if (!facts.met.empty()) return;
+  for (const auto& [domain, listeners] : facts.others) {
+    if (domain == facts.domain || facts.elsewhere.size() == kMostDomains) continue;
+    Options other = options;
+    other.domain = domain;
+    if (options.profile.empty() || options.profile == kLocalProfile) {
+      other.profile = listeners.everywhere > 0 ? "" : kLocalProfile;
+    }
+    std::vector<std::string> names;
+    for (const PartitionInfo& partition : met_by(other)) names.push_back(partition.name);
+    facts.elsewhere.emplace(domain, std::move(names));
+  }
+}
+
+}  // namespace
+
+Facts gather_facts(const Options& options) {
+  Facts facts;
+  facts.now = wall_clock();
+  facts.domain = options.domain;
+  facts.profile = profile_of(options);
+  facts.discovery_server = options.discovery_server;
+  facts.loopback = options.profile == kLocalProfile;
+  if (!options.keys.empty()) facts.keys = find_keys(options.keys, facts.now);
+  facts.others = listeners_of(sockets_of(false));
+  if (auto client = Client::open(options)) {
+    // A profile of a file may be of either kind.
+    const auto own = listeners_of(sockets_of(true));
+    const auto here = own.find(options.domain);
+    if (here != own.end()) facts.loopback = here->second.everywhere == 0;
+    ask_domain(*client, facts);
+  } else {
+    facts.failed = client.error();
+  }
+  look_elsewhere(options, facts);
+  facts.interfaces = read_interfaces(facts.loopback);
+  facts.receive_buffer = granted_receive_buffer(kReceiveBuffer);
+  facts.send_buffer = granted_send_buffer(kSendBuffer);
+  facts.firewall = read_firewall();
+  return facts;
+}
+
+}  // namespace tfdude::cli
