@@ -16,6 +16,20 @@ CLI::App* add_command(CLI::App& app, const char* name, const char* help, const c
   return command;
 }
 
+CLI::App* add_command(CLI::App& app, const char* name, const char* help, const char* example,
+                      Command run, Command& chosen) {
+  return add_command(app, name, help, example, [&chosen, run = std::move(run)] { chosen = run; });
+}
+
+void add_id(CLI::App* command, Arguments& arguments) {
+  command->add_option("ID", arguments.id, "the frame")->required();
+}
+
+void add_ends(CLI::App* command, Arguments& arguments) {
+  command->add_option("A", arguments.id, "the reference frame")->required();
+  command->add_option("B", arguments.other, "the frame seen from A")->required();
+}
+
 CLI::Option* add_stamp(CLI::App* command, const char* name, std::string& stamp, const char* help) {
   return command->add_option(name, stamp, help)
       ->type_name("SECONDS")

@@ -11,9 +11,20 @@
 // What several commands need to describe themselves to CLI11.
 namespace tfdude::cli {
 
+/// A command that asks or changes the live system. @return the exit status, or kNeedsAllFrames
+using Command = std::function<int(Client&, const Arguments&)>;
+
 /// Adds a command with an example, after "tfdude ", that calls a function if it is given.
 CLI::App* add_command(CLI::App& app, const char* name, const char* help, const char* example,
                       const std::function<void()>& choose);
+
+/// The same, for a command that is chosen then.
+CLI::App* add_command(CLI::App& app, const char* name, const char* help, const char* example,
+                      Command run, Command& chosen);
+
+/// Adds the frame, or the two frames, that a command is about.
+void add_id(CLI::App* command, Arguments& arguments);
+void add_ends(CLI::App* command, Arguments& arguments);
 
 /// Adds an option for a stamp, see parse_stamp().
 CLI::Option* add_stamp(CLI::App* command, const char* name, std::string& stamp, const char* help);

@@ -37,6 +37,7 @@ Completed kind_of(const CLI::App& command, const std::string& name) {
       {"ID", Completed::kFrames},
       {"--parent", Completed::kFrames},
       {"--fixed", Completed::kFrames},
+      {"--root", Completed::kFrames},
       {"PARTITION", Completed::kPartitions},
       {"--partition", Completed::kPartitions},
       {"FILE", Completed::kFiles},
@@ -218,35 +219,28 @@ Completion completion_after(CLI::App& app, const std::vector<std::string>& words
   return reader.next(begun);
 }
 
-int run_complete(CLI::App& app, const std::vector<std::string>& words) {
-  const std::vector<std::string> before(words.begin(),
-                                        words.empty() ? words.end() : words.end() - 1);
+void complete(CLI::App& app, const std::vector<std::string>& words) {
+  const auto last = words.empty() ? words.end() : words.end() - 1;
+  const std::vector<std::string> before(words.begin(), last);
   const std::string begun = words.empty() ? "" : words.back();
-  const Completion completion = completion_after(app, before, begun);
-  switch (completion.kind) {
-    case Completed::kNothing:
-      return kDone;
-    case Completed::kWords:
-      print(completion.words, begun);
-      return kDone;
-    case Completed::kFiles:
-      std::puts(":files");
-      return kDone;
-    case Completed::kDirectories:
-      std::puts(":directories");
-      return kDone;
-    case Completed::kFrames:
-    case Completed::kPartitions:
-    case Completed::kJoints:
-      break;
+  Completion completion = completion_after(app, before, begun);
+  if (completion.kind == Completed::kFiles) std::puts(":files");
+  if (completion.kind == Completed::kDirectories) std::puts(":directories");
+  const bool names = completion.kind == Completed::kFrames ||
+                     completion.kind == Completed::kPartitions ||
+                     completion.kind == Completed::kJoints;
+  if (names) {
+    log_fastdds_to_standard_error();
+    // Whoever types waits for it: whatever hangs, it ends.
+    std::thread([] {
+      std::this_thread::sleep_for(kCompletionTime);
+      _exit(kDone);
+    }).detach();
+    completion.words = names_of(completion.kind, options_among(before));
   }
-  // Whoever types waits for it: whatever hangs, it ends.
-  std::thread([] {
-    std::this_thread::sleep_for(kCompletionTime);
-    _exit(kDone);
-  }).detach();
-  print(names_of(completion.kind, options_among(before)), begun);
-  return kDone;
+  print(completion.words, begun);
+  (void)std::fflush(stdout);
+  _exit(kDone);
 }
 
 }  // namespace tfdude::cli

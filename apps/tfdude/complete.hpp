@@ -40,9 +40,8 @@ struct Completion {
 /// Runs the hidden command `__complete [WORD]... BEGUN`, for the shells: prints each word that may
 /// stand there and begins like this, one per line, after a tab what it means; ":files" or
 /// ":directories" if the shell should complete these. Asks the live system for names, for at most
-/// kCompletionTime in all.
-/// @return the exit status: always 0
-int run_complete(CLI::App& app, const std::vector<std::string>& words);
+/// kCompletionTime in all. Ends the process, with status 0.
+[[noreturn]] void complete(CLI::App& app, const std::vector<std::string>& words);
 
 inline constexpr Milliseconds kCompletionTime{130};
 

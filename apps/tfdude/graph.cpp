@@ -11,17 +11,20 @@
 namespace tfdude::cli {
 namespace {
 
+constexpr double kNameSize = 9;    // [pt]
+constexpr double kDetailSize = 8;  // [pt]
+constexpr double kMostOfName = 150;
+constexpr double kMostOfDetail = 165;
+
 constexpr const char* kHead =
     "digraph frames {\n"
-    "  graph [rankdir=LR, bgcolor=\"#ffffff\", nodesep=0.14, ranksep=0.45, pad=0.25,\n"
-    "         fontname=\"Helvetica,Arial,sans-serif\", fontsize=11, fontcolor=\"#33414f\","
+    "  graph [rankdir=LR, bgcolor=\"#ffffff\", nodesep=0.07, ranksep=0.3, pad=0.1,\n"
+    "         fontname=\"Helvetica,Arial,sans-serif\", fontsize=9, fontcolor=\"#33414f\","
     " labelloc=b, labeljust=l]\n"
     "  node [shape=box, style=\"filled,rounded\", fontname=\"Helvetica,Arial,sans-serif\","
-    " fontsize=12,\n"
-    "        fontcolor=\"#1b2733\", height=0.32, margin=\"0.12,0.04\"]\n"
-    "  edge [color=\"#7d8896\", arrowsize=0.6, fontname=\"Helvetica,Arial,sans-serif\","
-    " fontsize=10,\n"
-    "        fontcolor=\"#5b6776\"]\n";
+    " fontsize=9,\n"
+    "        fontcolor=\"#1b2733\", height=0.2, margin=\"0.08,0.02\"]\n"
+    "  edge [color=\"#7d8896\", arrowsize=0.5]\n";
 
 struct Colours {
   std::string fill;
@@ -47,9 +50,8 @@ Colours colours_of(std::size_t index) {
   return {colour(hue, 0.16, 0.98), colour(hue, 0.6, 0.66)};
 }
 
-// Shortens a long name, which would push the other nodes apart. Graphviz shows the full name when
-// the pointer rests on it.
-std::string name_of(const std::string& id) { return dot_label(elide(id, 12, 220)); }
+// Shortens a long name, which would push the others apart.
+std::string name_of(const std::string& id) { return elide(id, kNameSize, kMostOfName); }
 
 // The colours of each partition; a partition that is not in the map is drawn as unreachable.
 using Looks = std::map<std::string, Colours>;
@@ -92,23 +94,76 @@ std::string legend(const std::vector<PartitionInfo>& partitions, const Looks& lo
   return text + "  </TABLE>>\n";
 }
 
-std::string node(const Frame& frame, const Looks& looks) {
+Colours look_of(const Frame& frame, const Looks& looks) {
   const auto found = looks.find(frame.partition);
-  const Colours look = found != looks.end() ? found->second : grey();
-  return "  " + dot_id(frame.id) + " [label=" + name_of(frame.id) + ", fillcolor=\"" + look.fill +
-         "\", color=\"" + look.line + "\"]\n";
+  return found != looks.end() ? found->second : grey();
+}
+
+std::string detail_of(const Graph& graph, const Frame& frame) {
+  const auto edge = graph.edges.find(frame.id);
+  return edge == graph.edges.end() ? ""
+                                   : elide(edge_text(edge->second), kDetailSize, kMostOfDetail);
+}
+
+GraphMeasures measures_of(const Graph& graph) {
+  GraphMeasures measures;
+  measures.row_height = 12.2;
+  measures.row_width = [&graph](const Frame& frame) {
+    return text_width(name_of(frame.id), kNameSize) +
+           text_width(detail_of(graph, frame), kDetailSize) + 16;
+  };
+  measures.between = 8;
+  measures.columns = 24;
+  return measures;
+}
+
+// A line of a box: the frame, and what is known of the edge to it.
+std::string row_text(const Graph& graph, const GraphRow& row, std::size_t number,
+                     const Colours& look) {
+  const char* before = "";
+  if (row.place == GraphRow::Place::kNext) before = "↳ ";
+  if (row.place == GraphRow::Place::kLeaf) before = "&#160;&#160;• ";
+  const std::string cell = R"(<TD ALIGN="LEFT" BGCOLOR=")" + look.fill + R"(" PORT=")";
+  std::string detail = xml_escape(detail_of(graph, *row.frame));
+  if (!detail.empty()) {
+    detail.insert(0, "<FONT POINT-SIZE=\"8\" COLOR=\"#5b6776\">");
+    detail += "</FONT>";
+  }
+  const std::string at = std::to_string(number) + "\">";
+  return "    <TR>" + cell + "in" + at + before + xml_escape(name_of(row.frame->id)) + "</TD>" +
+         cell + "out" + at + detail + "</TD></TR>\n";
+}
+
+std::string box_text(const Graph& graph, const GraphBox& box, const Looks& looks) {
+  const Frame& first = *box.rows.front().frame;
+  std::string text =
+      "  " + dot_id(first.id) + " [shape=plain, style=\"\", label=<\n" +
+      R"(  <TABLE BORDER="1" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1" COLOR=")" +
+      look_of(first, looks).line + "\">\n";
+  for (std::size_t i = 0; i < box.rows.size(); ++i) {
+    text += row_text(graph, box.rows[i], i, look_of(*box.rows[i].frame, looks));
+  }
+  if (box.folded > 0) {
+    text += R"(    <TR><TD ALIGN="LEFT" COLSPAN="2" BGCOLOR="#ffffff"><I>+ )" +
+            std::to_string(box.folded) + (box.folded == 1 ? " frame" : " frames") +
+            " below</I></TD></TR>\n";
+  }
+  return text + "  </TABLE>>]\n";
+}
+
+// From the row of a frame to the box that begins below it.
+std::string arrow(const GraphBox& from, const GraphBox& to, bool dashed) {
+  std::size_t row = 0;
+  for (std::size_t i = 0; i < from.rows.size(); ++i) {
+    if (from.rows[i].frame == &from.last()) row = i;
+  }
+  return "  " + dot_id(from.rows.front().frame->id) + ":out" + std::to_string(row) + ":e -> " +
+         dot_id(to.rows.front().frame->id) + ":in0:w" + (dashed ? " [style=dashed]" : "") + "\n";
 }
 
 std::string missing_node(const std::string& id) {
-  return "  " + dot_id(id) + " [label=" + name_of(id) +
+  return "  " + dot_id(id) + " [label=" + dot_label(name_of(id)) +
          ", style=\"dashed,rounded\", color=\"#aeb4bc\", fontcolor=\"#7d8896\"]\n";
-}
-
-std::string arrow(const Frame& frame, const std::string& beside, bool dashed) {
-  std::string look = beside.empty() ? "" : "label=" + dot_label(" " + beside + " ");
-  if (dashed) look += std::string(look.empty() ? "" : ", ") + "style=dashed";
-  if (!look.empty()) look = " [" + look + "]";
-  return "  " + dot_id(frame.parent) + " -> " + dot_id(frame.id) + look + "\n";
 }
 
 }  // namespace
@@ -116,17 +171,22 @@ std::string arrow(const Frame& frame, const std::string& beside, bool dashed) {
 std::string edge_text(const EdgeLabel& edge) {
   constexpr double kMetres = 1e-3;
   constexpr double kTurn = 0.1;  // [°]
-  std::string text = edge.age ? age_text(*edge.age) : "";
+  std::string text = edge.joint;
+  const auto add = [&text](const std::string& more) { text += (text.empty() ? "" : "  ") + more; };
+  if (edge.age) add(age_text(*edge.age));
   if (!edge.covariance) return text;
-  if (!edge.covariance->complete()) return text + (text.empty() ? "" : "  ") + "±?";
+  if (!edge.covariance->complete()) {
+    add("±?");
+    return text;
+  }
   const auto s = edge.covariance->of_specified().stddev();
   const double metres = *std::max_element(s.begin(), s.begin() + 3);
   const double turn = *std::max_element(s.begin() + 3, s.end()) * kDegrees;
   // A value read from decimal text may be a little smaller, due to rounding.
   constexpr double kAlmost = 1 - 1e-9;
-  if (metres < kMetres * kAlmost && turn < kTurn * kAlmost) return text;
-  return text + (text.empty() ? "" : "  ") + "±" + length_text(metres) + " " + "±" +
-         angle_text(turn, 2) + "°";
+  if (metres >= kMetres * kAlmost) add("±" + length_text(metres));
+  if (turn >= kTurn * kAlmost) add("±" + angle_text(turn, 2) + "°");
+  return text;
 }
 
 std::string dot_id(std::string_view id) {
@@ -140,22 +200,25 @@ std::string dot_id(std::string_view id) {
 
 std::string dot_label(std::string_view text) { return dot_id(xml_escape(text)); }
 
-std::string draw_graph(const Graph& graph) {
+std::string draw_graph(const Graph& graph, const GraphScope& scope) {
   const Looks looks = looks_of(graph.partitions);
   std::set<std::string> reachable;
   for (const PartitionInfo& partition : graph.partitions) {
     if (partition.reachable) reachable.insert(partition.name);
   }
+  const auto boxes = boxes_of(graph.frames, scope, measures_of(graph));
   std::string text = kHead + legend(graph.partitions, looks);
   std::string arrows;
   std::set<std::string> missing;
-  for (const Frame& frame : graph.frames) {
-    text += node(frame, looks);
-    if (frame.parent.empty()) continue;
-    if (!frame.attached) missing.insert(frame.parent);
-    const auto edge = graph.edges.find(frame.id);
-    arrows += arrow(frame, edge != graph.edges.end() ? edge_text(edge->second) : "",
-                    !frame.attached || reachable.count(frame.partition) == 0);
+  for (const GraphBox& box : boxes) {
+    const Frame& first = *box.rows.front().frame;
+    text += box_text(graph, box, looks);
+    if (box.above) {
+      arrows += arrow(boxes[*box.above], box, reachable.count(first.partition) == 0);
+    } else if (!first.attached && !first.parent.empty()) {
+      missing.insert(first.parent);
+      arrows += "  " + dot_id(first.parent) + " -> " + dot_id(first.id) + ":in0:w [style=dashed]\n";
+    }
   }
   for (const std::string& parent : missing) text += missing_node(parent);
   return text + arrows + "}\n";

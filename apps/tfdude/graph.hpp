@@ -9,6 +9,8 @@
 
 #include "tfdude/client/client.hpp"
 
+#include "graph_layout.hpp"
+
 // Draws the whole forest: from its data to text for Graphviz.
 namespace tfdude::cli {
 
@@ -16,6 +18,7 @@ namespace tfdude::cli {
 struct EdgeLabel {
   std::optional<StatedCovariance> covariance;
   std::optional<std::chrono::nanoseconds> age;  ///< of its newest sample
+  std::string joint{};                          ///< that moves it; empty: none
 };
 
 struct Graph {
@@ -24,9 +27,9 @@ struct Graph {
   std::map<std::string, EdgeLabel> edges;  ///< by the child's id
 };
 
-/// The label of an edge: the age of its newest sample, and its largest standard deviations of
-/// position and rotation, if one is at least a millimetre or a tenth of a degree; "±?" if they are
-/// unspecified.
+/// The label of an edge: the joint that moves it, the age of its newest sample, and its largest
+/// standard deviations of position, if at least a millimetre, and of rotation, if at least a tenth
+/// of a degree; "±?" if they are unspecified.
 [[nodiscard]] std::string edge_text(const EdgeLabel& edge);
 
 /// A name in quotes, as DOT reads it.
@@ -35,6 +38,6 @@ struct Graph {
 [[nodiscard]] std::string dot_label(std::string_view text);
 
 /// The picture in DOT; equal graphs give equal text.
-[[nodiscard]] std::string draw_graph(const Graph& graph);
+[[nodiscard]] std::string draw_graph(const Graph& graph, const GraphScope& scope = {});
 
 }  // namespace tfdude::cli

@@ -19,6 +19,7 @@
 #include "../manual.hpp"
 #include "../network_options.hpp"
 #include "../numbers.hpp"
+#include "changing_options.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "complete.hpp"
@@ -30,18 +31,19 @@
 namespace {
 
 using namespace tfdude;
+using cli::add_command;
+using cli::add_ends;
+using cli::add_id;
 using cli::add_out;
-using cli::add_pose_options;
 using cli::add_stamp;
 using cli::Arguments;
+using cli::Command;
 using cli::within;
 
 constexpr long kTimeoutByServer = 3000;  // [ms]
 constexpr const char* kWatchHelp = "redraw it twice a second, until interrupted";
 
 constexpr const char* kCovarianceHelp = "print the full covariance";
-
-using Command = std::function<int(Client&, const Arguments&)>;
 
 void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {
   cli::add_network_options(app, arguments.options);
@@ -55,24 +57,9 @@ void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {
       "radians");
 }
 
-CLI::App* add_command(CLI::App& app, const char* name, const char* help, const char* example,
-                      Command run, Command& chosen) {
-  return cli::add_command(app, name, help, example,
-                          [&chosen, run = std::move(run)] { chosen = run; });
-}
-
 // A command about one or two frames asks for them, instead of receiving all frames.
 void ask_only(CLI::App* command, Arguments& arguments) {
   command->parse_complete_callback([&arguments] { arguments.options.follow.emplace(); });
-}
-
-void add_id(CLI::App* command, Arguments& arguments) {
-  command->add_option("ID", arguments.id, "the frame")->required();
-}
-
-void add_ends(CLI::App* command, Arguments& arguments) {
-  command->add_option("A", arguments.id, "the reference frame")->required();
-  command->add_option("B", arguments.other, "the frame seen from A")->required();
 }
 
 void add_milliseconds(CLI::App* command, const char* name, double& value, const char* help) {
@@ -191,60 +178,6 @@ void add_reading_commands(CLI::App& app, Arguments& arguments, Command& chosen,
   add_velocity_command(app, arguments, chosen);
 }
 
-void add_measuring_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
-  auto* observe =
-      add_command(app, "observe", "correct the edges of a path by a measurement of B in A",
-                  "observe world tool --xyz 0.8 0.1 1.1 --stddev 1e-3 1e-3 1e-3 "
-                  "2e-3 2e-3 2e-3",
-                  cli::run_observe, chosen);
-  add_ends(observe, arguments);
-  auto* fuse = add_command(app, "fuse", "fuse a measurement of an edge with its value",
-                           "fuse camera --xyz 0.1 0 0.3 --stddev 1e-3 1e-3 1e-3 2e-3 2e-3 2e-3",
-                           cli::run_fuse, chosen);
-  add_id(fuse, arguments);
-  for (CLI::App* command : {observe, fuse}) {
-    add_pose_options(*command, arguments);
-    add_stamp(command, "--stamp", arguments.stamp,
-              "when it was measured: seconds since the epoch or, negative, before now");
-    command
-        ->add_option("--gate", arguments.observe.gate,
-                     "chi-squared gate probability; 1: accept all")
-        ->check([](const std::string& text) {
-          const double gate = std::strtod(text.c_str(), nullptr);
-          return gate > 0 && gate <= 1 ? "" : text + " is not above 0 and at most 1";
-        });
-    command->add_flag_callback(
-        "--correlated", [&arguments] { arguments.observe.independent = false; },
-        "possibly correlated with the edges: use covariance intersection");
-  }
-}
-
-void add_correlate_command(CLI::App& app, Arguments& arguments, Command& chosen) {
-  auto* correlate =
-      add_command(app, "correlate", "declare how an edge's error is correlated with others",
-                  "correlate elbow --source supply 0 0 0 0 0 0.002", cli::run_correlate, chosen);
-  add_id(correlate, arguments);
-  correlate->add_flag(
-      "--unknown", arguments.unknown,
-      "the edge's own error may be correlated with any other; default: independent");
-  correlate
-      ->add_option(
-          "--source", arguments.sources,
-          "error shared with all edges that name the same source: this edge's error for one "
-          "standard deviation of the source [m m m rad rad rad]; repeat for each dimension")
-      ->type_name("NAME 6 NUMBERS")
-      ->type_size(cli::kSourceSize)
-      ->allow_extra_args(false);
-  cli::explain_angles(*correlate);
-  correlate->parse_complete_callback([&arguments] {
-    for (std::size_t i = 0; i < arguments.sources.size(); ++i) {
-      const std::string& said = arguments.sources[i];
-      if (i % cli::kSourceSize == 0 || cli::is_number(said)) continue;
-      throw CLI::ValidationError("--source", quote(said) + " is not a number");
-    }
-  });
-}
-
 void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen,
                           cli::LocalCommand& local) {
   auto* plot =
@@ -261,6 +194,9 @@ void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen,
   auto* graph = add_command(app, "graph", "draw all frames with their owners, ages, deviations",
                             "graph --out frames.svg", cli::run_graph, chosen);
   add_out(graph, arguments, {".svg", ".png", ".dot"});
+  graph->add_option("--root", arguments.id, "draw this frame and all below it");
+  graph->add_option("--depth", arguments.depth,
+                    "levels below a root; default: as many as fit a screen");
   cli::add_recording(graph, arguments, local, cli::run_graph);
 }
 
@@ -277,33 +213,6 @@ void add_events_command(CLI::App& app, Arguments& arguments, Command& chosen,
       add_command(app, "events", "print changes: partitions that come and go, frames, conflicts",
                   "--json events", cli::run_events, chosen);
   cli::add_recorded(events, arguments, local, cli::run_recorded_events);
-}
-
-void add_changing_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
-  auto* add = add_command(app, "add", "add a frame", "add tool --parent camera --xyz 0.1 0 -0.2",
-                          cli::run_add, chosen);
-  add_id(add, arguments);
-  add->add_option("--parent", arguments.parent, "its parent")->required();
-  add->add_option("--partition", arguments.partition, "its owner, if not its parent's");
-  add_pose_options(*add, arguments);
-  auto* update = add_command(app, "update", "set parts of an edge; other parts stay unchanged",
-                             "update tool --rpy 0 0 1.57", cli::run_update, chosen);
-  add_id(update, arguments);
-  add_pose_options(*update, arguments);
-  add_stamp(update, "--stamp", arguments.stamp,
-            "make it a sample of this instant: seconds since the epoch or, negative, before now");
-  add_id(add_command(app, "remove", "remove a frame and all below it", "remove tool",
-                     cli::run_remove, chosen),
-         arguments);
-  add_command(app, "forget", "delete all data of a partition that will not return", "forget arm",
-              cli::run_forget, chosen)
-      ->add_option("PARTITION", arguments.id, "the partition; rejected while it is reachable")
-      ->required();
-  auto* move = add_command(app, "move", "move a frame to a new parent", "move tool --parent arm_2",
-                           cli::run_move, chosen);
-  add_id(move, arguments);
-  move->add_option("--parent", arguments.parent, "the new parent")->required();
-  add_pose_options(*move, arguments);
 }
 
 int run(Arguments arguments, const Command& command, const cli::LocalCommand& local) {
@@ -342,9 +251,7 @@ int main(int argc, char** argv) {
   add_reading_commands(app, arguments, command, local);
   add_following_commands(app, arguments, command, local);
   add_events_command(app, arguments, command, local);
-  add_changing_commands(app, arguments, command);
-  add_measuring_commands(app, arguments, command);
-  add_correlate_command(app, arguments, command);
+  cli::add_changing_commands(app, arguments, command);
   add_picture_commands(app, arguments, command, local);
   cli::add_value_commands(app, arguments, command, local);
   add_description_command(app, arguments, command);
@@ -356,10 +263,7 @@ int main(int argc, char** argv) {
   cli::require_numbers(app);
   cli::add_manual(app);
   if (argc > 1 && argv[1] == std::string_view("__complete")) {
-    log_fastdds_to_standard_error();
-    (void)cli::run_complete(app, {argv + 2, argv + argc});
-    (void)std::fflush(stdout);
-    _exit(cli::kDone);
+    cli::complete(app, {argv + 2, argv + argc});
   }
   try {
     app.name(argv[0]);

@@ -119,6 +119,10 @@ Result<Graph> graph_of(Source source, const Arguments& arguments) {
     for (const HistoryInfo& history : *histories) {
       if (now && history.newest) graph.edges[history.id].age = *now - *history.newest;
     }
+    const auto joints = source.joints(partition.name);
+    for (const JointInfo& joint : joints.value_or(std::vector<JointInfo>())) {
+      graph.edges[joint.frame].joint = joint.name;
+    }
   }
   for (const Frame& frame : graph.frames) {
     const auto owner = by_name.find(frame.partition);
@@ -167,11 +171,17 @@ int run_graph(Source source, const Arguments& arguments) {
     return refuse(source, {Errc::kUnknownPartition, "no partition"}, arguments);
   }
   nlohmann::json json{{"frames", graph.frames.size()}, {"partitions", graph.partitions.size()}};
-  Result<std::string> picture = draw_graph(graph);
+  if (const std::string& root = arguments.id; !root.empty()) {
+    const auto is_root = [&](const Frame& frame) { return frame.id == root; };
+    if (std::none_of(graph.frames.begin(), graph.frames.end(), is_root)) {
+      return refuse(source, {Errc::kUnknownFrame, "no frame " + quote(root)}, arguments);
+    }
+  }
+  Result<std::string> picture = draw_graph(graph, {arguments.id, arguments.depth});
   if (ends_with(arguments.out, ".svg")) {
     picture = run_program({{"dot", "-Tsvg"}, "graphviz"}, *picture).map(xml_allowed);
   } else if (ends_with(arguments.out, ".png")) {
-    picture = run_program({{"dot", "-Tpng", "-Gdpi=144"}, "graphviz"}, *picture);
+    picture = run_program({{"dot", "-Tpng", "-Gdpi=96"}, "graphviz"}, *picture);
   }
   return finish(source, arguments, picture, json);
 }

@@ -2,7 +2,6 @@
 
 #include "tfdude/recording/recording.hpp"
 
-#include "command_options.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -49,12 +48,11 @@ void add_recording(CLI::App* command, Arguments& arguments, LocalCommand& local,
                });
 }
 
-void add_recording_commands(CLI::App& app, Arguments& arguments,
-                            std::function<int(Client&, const Arguments&)>& chosen,
+void add_recording_commands(CLI::App& app, Arguments& arguments, Command& chosen,
                             LocalCommand& local) {
   RecordingArguments& given = arguments.recording;
   auto* record = add_command(app, "record", "record all partitions, until interrupted",
-                             "record robot.mcap", [&chosen] { chosen = run_record; });
+                             "record robot.mcap", run_record, chosen);
   add_file(record, arguments);
   record->add_option("--split-size", given.split_mb, "begin another file after so many megabytes")
       ->type_name("MB")

@@ -2,6 +2,7 @@
 
 #include <functional>
 
+#include "command_options.hpp"
 #include "keys_commands.hpp"
 
 namespace tfdude::cli {
@@ -19,8 +20,7 @@ void add_recorded(CLI::App* command, Arguments& arguments, LocalCommand& local,
                   RecordingCommand run);
 
 /// Adds the commands that record, replay, and describe a recording.
-void add_recording_commands(CLI::App& app, Arguments& arguments,
-                            std::function<int(Client&, const Arguments&)>& chosen,
+void add_recording_commands(CLI::App& app, Arguments& arguments, Command& chosen,
                             LocalCommand& local);
 
 int run_record(Client& client, const Arguments& arguments);

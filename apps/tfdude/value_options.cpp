@@ -1,11 +1,7 @@
 #include "value_options.hpp"
 
-#include "command_options.hpp"
-
 namespace tfdude::cli {
 namespace {
-
-using Chosen = std::function<int(Client&, const Arguments&)>;
 
 constexpr const char* kStampHelp =
     "make it a sample of this instant: seconds since the epoch or, negative, before now";
@@ -17,10 +13,10 @@ void add_pace(CLI::App* command, Arguments& arguments, CLI::Option* file) {
       ->needs(file);
 }
 
-void add_joint_command(CLI::App& app, Arguments& arguments, Chosen& chosen) {
-  auto* joint = add_command(app, "joint", "set positions of joints, as one commit of each owner",
-                            "joint shoulder_pan_joint=0.5 elbow_joint=1.6 --stddev 0.001",
-                            [&chosen] { chosen = run_joint; });
+void add_joint_command(CLI::App& app, Arguments& arguments, Command& chosen) {
+  auto* joint =
+      add_command(app, "joint", "set positions of joints, as one commit of each owner",
+                  "joint shoulder_pan_joint=0.5 elbow_joint=1.6 --stddev 0.001", run_joint, chosen);
   auto* joints = joint->add_option("JOINTS", arguments.joints,
                                    "NAME=POSITION of each joint, or one NAME POSITION [rad or m]");
   joint
@@ -37,11 +33,11 @@ void add_joint_command(CLI::App& app, Arguments& arguments, Chosen& chosen) {
   explain_angles(*joint);
 }
 
-void add_publish_command(CLI::App& app, Arguments& arguments, Chosen& chosen) {
+void add_publish_command(CLI::App& app, Arguments& arguments, Command& chosen) {
   auto* publish = add_command(
       app, "publish", "stream edges and joints from lines of JSON or CSV, not acknowledged",
-      R"(publish - <<< '{"joints": {"elbow_joint": 1.6}, "stamp": 1795000000.5}')",
-      [&chosen] { chosen = run_publish; });
+      R"(publish - <<< '{"joints": {"elbow_joint": 1.6}, "stamp": 1795000000.5}')", run_publish,
+      chosen);
   auto* file = publish->add_option("FILE", arguments.from, "the samples; -: standard input");
   file->type_name("FILE")->required();
   add_pace(publish, arguments, file);
@@ -55,15 +51,10 @@ void add_publish_command(CLI::App& app, Arguments& arguments, Chosen& chosen) {
   explain_angles(*publish);
 }
 
-void add_point_command(CLI::App& app, Arguments& arguments, Chosen& chosen, LocalCommand& local) {
+void add_point_command(CLI::App& app, Arguments& arguments, Command& chosen, LocalCommand& local) {
   auto* point = add_command(app, "point", "points of frame B, in frame A, with their covariance",
-                            "point world hand_left 0 0 0.1", [&chosen] {
-                              chosen = [](Client& client, const Arguments& given) {
-                                return run_point(client, given);
-                              };
-                            });
-  point->add_option("A", arguments.id, "the reference frame")->required();
-  point->add_option("B", arguments.other, "the frame of the points")->required();
+                            "point world hand_left 0 0 0.1", run_point, chosen);
+  add_ends(point, arguments);
   point->add_option("POINT", arguments.points, "coordinates in B [m], three for each point")
       ->type_name("X Y Z ...")
       ->required();
@@ -92,12 +83,10 @@ void add_point_command(CLI::App& app, Arguments& arguments, Chosen& chosen, Loca
 
 }  // namespace
 
-void add_value_commands(CLI::App& app, Arguments& arguments, Chosen& chosen, LocalCommand& local) {
-  auto* joints = add_command(
-      app, "joints", "list all joints: positions, limits, which joint they mimic", "joints",
-      [&chosen] {
-        chosen = [](Client& client, const Arguments& given) { return run_joints(client, given); };
-      });
+void add_value_commands(CLI::App& app, Arguments& arguments, Command& chosen, LocalCommand& local) {
+  auto* joints =
+      add_command(app, "joints", "list all joints: positions, limits, which joint they mimic",
+                  "joints", run_joints, chosen);
   add_recording(joints, arguments, local, run_joints);
   explain_angles(*joints);
   add_joint_command(app, arguments, chosen);

@@ -85,8 +85,7 @@ class TFDUDE_EXPORT Client {
 
   /// Declares that an unreachable partition will not return. All participants drop what they keep
   /// of it, also those that are away now, as soon as they return. The partition's own file is not
-  /// touched; if it is started again, it counts as new. Thread-safe; takes at most `timeout`, plus
-  /// discovery.
+  /// touched; if it is started again, it counts as new.
   /// @return kUnknownPartition; kPartitionTaken if this participant, or another that was told, can
   ///   reach the partition; kUnreachable if nobody is reachable who could remember it.
   [[nodiscard]] Result<void> forget(const std::string& partition);
