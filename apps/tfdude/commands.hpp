@@ -81,7 +81,6 @@ struct Arguments {
   std::vector<std::string> sources;  ///< for each column: its source's name and 6 numbers
   std::string out;                   ///< the picture's file
   int samples = 0;
-<<<<<<< HEAD
   std::vector<std::string> joints;     ///< a name and a position, or NAME=POSITION each
   std::optional<double> joint_stddev;  ///< of these positions
   std::string from;                    ///< the file of samples; "-": standard input
@@ -92,12 +91,7 @@ struct Arguments {
   bool direction = false;
   bool joint_covariance = false;  ///< of all points together
   double over = 0.1;              ///< interval of a velocity [s]
-=======
-  std::optional<std::size_t> depth;    ///< of a graph
-  double position = 0;                 ///< of a joint [rad or m]
-  std::optional<double> joint_stddev;  ///< of this position [rad or m]
-  double over = 0.1;                   ///< interval of a velocity [s]
->>>>>>> 1c205dd (Draw graph as columns of chains that fit a screen, with the joints' names)
+  std::optional<std::size_t> depth;  ///< of a graph
   RecordingArguments recording;
   KeysArguments keys;
 };

@@ -2,7 +2,6 @@
 
 #include "tfdude/recording/recording.hpp"
 
-
 namespace tfdude::cli {
 namespace {
 
