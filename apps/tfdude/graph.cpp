@@ -105,6 +105,17 @@ std::string detail_of(const Graph& graph, const Frame& frame) {
                                    : elide(edge_text(edge->second), kDetailSize, kMostOfDetail);
 }
 
+// As text in an HTML-like label. There DOT would replace a backslash and an N by the name of the
+// node, and knows no escape for it. So a space without width comes between.
+std::string html_text(const std::string& text) {
+  std::string out;
+  for (const char c : xml_escape(text)) {
+    out += c;
+    if (c == '\\') out += "\u200B";
+  }
+  return out;
+}
+
 GraphMeasures measures_of(const Graph& graph) {
   GraphMeasures measures;
   measures.row_height = 12.2;
@@ -124,13 +135,13 @@ std::string row_text(const Graph& graph, const GraphRow& row, std::size_t number
   if (row.place == GraphRow::Place::kNext) before = "↳ ";
   if (row.place == GraphRow::Place::kLeaf) before = "&#160;&#160;• ";
   const std::string cell = R"(<TD ALIGN="LEFT" BGCOLOR=")" + look.fill + R"(" PORT=")";
-  std::string detail = xml_escape(detail_of(graph, *row.frame));
+  std::string detail = html_text(detail_of(graph, *row.frame));
   if (!detail.empty()) {
     detail.insert(0, "<FONT POINT-SIZE=\"8\" COLOR=\"#5b6776\">");
     detail += "</FONT>";
   }
   const std::string at = std::to_string(number) + "\">";
-  return "    <TR>" + cell + "in" + at + before + xml_escape(name_of(row.frame->id)) + "</TD>" +
+  return "    <TR>" + cell + "in" + at + before + html_text(name_of(row.frame->id)) + "</TD>" +
          cell + "out" + at + detail + "</TD></TR>\n";
 }
 

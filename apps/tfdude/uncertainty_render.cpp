@@ -2,6 +2,9 @@
 
 #include <cmath>
 
+#include "tfdude/base/id.hpp"
+#include "tfdude/math/belief.hpp"
+
 #include "format.hpp"
 #include "render.hpp"
 #include "table.hpp"
@@ -38,13 +41,21 @@ const char* verdict_of(const EdgeConsistency& edge) {
 }  // namespace
 
 std::string describe(const Basis& basis) {
-  std::string text;
-  if (basis.order == Order::kFourth) text += "fourth order";
-  if (basis.bound) text += std::string(text.empty() ? "" : "; ") + "bound for unknown correlation";
-  if (!basis.sources.empty()) {
-    text += (text.empty() ? "" : "; ") + std::string("shared: ") + joined(basis.sources);
+  // Sources with a name that somebody gave, and those that observations have left.
+  std::vector<std::string> named;
+  for (const std::string& source : basis.sources) {
+    if (source.rfind(kObservedPrefix, 0) != 0) named.push_back(quote(source));
   }
-  return text.empty() ? "" : "basis        " + text + "\n";
+  std::string text;
+  const auto add = [&text](const std::string& line) {
+    text += (text.empty() ? "correlation  " : "             ") + line + "\n";
+  };
+  if (!named.empty()) add("edges share the error of " + joined(named) + ", which is accounted for");
+  if (named.size() < basis.sources.size()) {
+    add("edges were corrected by one measurement, which is accounted for");
+  }
+  if (basis.bound) add("of some edges is not known: the std dev is an upper bound");
+  return text + (basis.order == Order::kFourth ? "order        fourth\n" : "");
 }
 
 nlohmann::json basis_json(const Basis& basis) {

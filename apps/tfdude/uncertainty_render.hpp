@@ -12,7 +12,7 @@
 // Uncertainty as text for people, and as JSON for programs.
 namespace tfdude::cli {
 
-/// The line that says how a covariance was computed; empty for second order without correlation.
+/// What a covariance is based on, in words; empty for second order without correlation.
 [[nodiscard]] std::string describe(const Basis& basis);
 [[nodiscard]] nlohmann::json basis_json(const Basis& basis);
 

@@ -153,9 +153,8 @@ TEST_CASE("pictures: graph draws the forest as DOT and SVG and PNG") {
   (void)text(d, {"update", "arm_2", "--xyz", "0", "0", "1", "--stamp", "-7200"});
   CHECK(text(d, {"graph", "--out", dot}) == "wrote " + dot + "\n");
   const std::string drawn = read(dot);
-  CHECK_THAT(drawn, ContainsSubstring("\"world\" -> \"robot_1\" [label=\" ±30 mm ±0.57° \"]"));
-  CHECK_THAT(drawn, ContainsSubstring("\"arm_1\" -> \"arm_2\" [label=\" 2 h  ±1 mm ±0.057° \"]"));
-  CHECK_THAT(drawn, ContainsSubstring("\"arm_1\" -> \"arm_left\"\n"));
+  CHECK_THAT(drawn, ContainsSubstring("↳ robot_1</TD>") && ContainsSubstring(">±30 mm  ±0.57°<"));
+  CHECK_THAT(drawn, ContainsSubstring("• arm_2</TD>") && ContainsSubstring(">2 h  ±1 mm<"));
   CHECK_THAT(drawn, ContainsSubstring("pid " + std::to_string(d.arms->pid())));
   const CliResult plain = run({"/usr/bin/env", "dot", "-Tplain", dot});
   CHECK(plain.status == 0);
@@ -163,17 +162,75 @@ TEST_CASE("pictures: graph draws the forest as DOT and SVG and PNG") {
     const std::regex line("(^|\n)" + kind + " ");
     return std::distance(std::sregex_iterator(plain.out.begin(), plain.out.end(), line), {});
   };
-  CHECK(lines("node") == 9);
-  CHECK(lines("edge") == 8);
+  // From robot_1 on there are two branches: the arms, and the rest of the base.
+  CHECK(lines("node") == 3);
+  CHECK(lines("edge") == 2);
   const std::string svg = directory.path() + "/all.svg";
   CHECK(answered(d, {"graph", "--out", svg}) ==
         json({{"file", svg}, {"frames", 9}, {"partitions", 2}}));
   CHECK_THAT(elements_of(svg), ContainsSubstring("svg g"));
-  CHECK_THAT(texts_of(svg), ContainsSubstring("\nhand_left\n"));
+  CHECK_THAT(texts_of(svg), ContainsSubstring("↳ hand_left\n"));
+  CHECK(text(d, {"graph", "--out", dot, "--root", "arm_1", "--depth", "1"}) ==
+        "wrote " + dot + "\n");
+  CHECK_THAT(read(dot), ContainsSubstring("arm_left") && ContainsSubstring("+ 1 frame below") &&
+                            !ContainsSubstring("world") && !ContainsSubstring("hand_left"));
+  CHECK(answered(d, {"graph", "--out", dot, "--root", "nowhere"}, 1).at("error").at("code") ==
+        "unknown_frame");
   const std::string png = directory.path() + "/all.png";
   (void)text(d, {"graph", "--out", png});
   CHECK(is_png(png));
   CHECK(files_in(directory) == 3);
+}
+
+TEST_CASE("pictures: the graph of a humanoid with fingers fits a screen, with all its joints") {
+  std::string urdf = "<robot name='humanoid'><link name='base'/>";
+  std::size_t links = 1;
+  // Each hangs on the one before. @return the last one
+  const auto chain = [&](std::string parent, const std::vector<std::string>& names) {
+    for (const std::string& name : names) {
+      urdf += "<link name='" + name + "_link'/><joint name='" + name +
+              "_joint' type='continuous'><parent link='" + parent + "'/><child link='" + name +
+              "_link'/></joint>";
+      parent = name + "_link";
+      ++links;
+    }
+    return parent;
+  };
+  const std::string torso = chain("base", {"waist_yaw", "waist_roll", "waist_pitch", "torso"});
+  const std::string head = chain(torso, {"neck_yaw", "neck_pitch", "head"});
+  for (const char* eye : {"camera_left", "camera_right", "depth_camera"}) chain(head, {eye});
+  for (const std::string side : {"left_", "right_"}) {
+    const auto named = [&](std::vector<std::string> names) {
+      for (std::string& name : names) name.insert(0, side);
+      return names;
+    };
+    chain("base",
+          named({"hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle_pitch", "ankle_roll", "sole"}));
+    const std::string hand =
+        chain(torso, named({"shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow",
+                            "wrist_roll", "wrist_pitch", "wrist_yaw", "hand_base"}));
+    for (const std::string finger : {"thumb", "index", "middle", "ring", "little"}) {
+      chain(hand, named({finger + "_0", finger + "_1", finger + "_2", finger + "_tip"}));
+    }
+  }
+  urdf += "</robot>";
+  REQUIRE(links > 75);
+  const testing::TestDomain domain;
+  const TemporaryDirectory directory;
+  testing::Process daemon = domain.start_daemon(
+      {"--no-state", "--partition", "humanoid", "--urdf", directory.write("humanoid.urdf", urdf)});
+  testing::await_ready(daemon);
+  const std::string file = directory.path() + "/humanoid.svg";
+  REQUIRE(domain.cli({"graph", "--out", file}).status == 0);
+  const std::string svg = read(file);
+  std::smatch size;
+  REQUIRE(
+      std::regex_search(svg, size, std::regex("<svg width=\"([0-9]+)pt\" height=\"([0-9]+)pt")));
+  constexpr double kPixels = 96.0 / 72;  // per point
+  CHECK(std::stod(size[1]) * kPixels <= 1600);
+  CHECK(std::stod(size[2]) * kPixels <= 1200);
+  CHECK_THAT(svg, ContainsSubstring("right_little_tip_joint") && !ContainsSubstring("below") &&
+                      !ContainsSubstring("±0 mm"));
 }
 
 TEST_CASE("pictures: any name can be drawn") {
@@ -192,8 +249,8 @@ TEST_CASE("pictures: any name can be drawn") {
   (void)text(d, {"graph", "--out", file});
   CHECK_THAT(elements_of(file), ContainsSubstring("svg "));
   const std::string drawn = texts_of(file);
-  CHECK_THAT(drawn, ContainsSubstring("&lt;a &amp; &quot;b\\\n"));
-  CHECK_THAT(drawn, ContainsSubstring("\\N \xEF\xBF\xBD\n"));
+  CHECK_THAT(drawn, ContainsSubstring("&lt;a &amp; &quot;b\\\u200B\n"));
+  CHECK_THAT(drawn, ContainsSubstring("\\\u200BN \xEF\xBF\xBD\n"));
 }
 
 TEST_CASE("pictures: their commands have help with an example") {
@@ -288,8 +345,8 @@ TEST_CASE("pictures: an unreachable partition is grey and graph does not wait fo
   }));
   const std::string drawn = read(file);
   CHECK_THAT(drawn, ContainsSubstring("BGCOLOR=\"#eceef1\""));
-  CHECK_THAT(drawn, ContainsSubstring("\"robot_1\" -> \"arm_1\" [style=dashed]\n"));
-  CHECK_THAT(drawn, ContainsSubstring("\"arm_left\" -> \"hand_left\" [label=\" ±2.53 mm"));
+  CHECK_THAT(drawn, ContainsSubstring("\"robot_1\" -> \"arm_1\":in0:w [style=dashed]\n"));
+  CHECK_THAT(drawn, ContainsSubstring("↳ hand_left</TD>") && ContainsSubstring(">±2.53 mm"));
   const CliResult plot = d.domain.cli({"plot", "arm_1", "world", "--out", file + ".svg"});
   CHECK(plot.status == 3);
   CHECK(files_in(directory) == 1);

@@ -70,8 +70,12 @@ TEST_CASE("uncertainty: lookups over owners use configured sources and unknown c
   CHECK(to_tool.at("basis").at("bound").get<bool>());
   CHECK(stddev(to_tool, 3) > std::hypot(0.01, 0.01, 0.01));
   CHECK_THAT(robot.run({"lookup", "world", "tool"}).out,
-             ContainsSubstring("basis        bound for unknown correlation; shared: calibration"));
-  CHECK_THAT(robot.run({"lookup", "arm", "arm"}).out, !ContainsSubstring("basis"));
+             ContainsSubstring(
+                 "correlation  edges share the error of 'calibration', which is accounted for\n"
+                 "             of some edges is not known: the std dev is an upper bound\n"));
+  CHECK_THAT(robot.run({"lookup", "arm", "arm"}).out, !ContainsSubstring("correlation"));
+  CHECK_THAT(robot.run({"lookup", "world", "arm", "--order", "4"}).out,
+             ContainsSubstring("order        fourth\n"));
   const json fourth = robot.answered({"lookup", "world", "arm", "--order", "4"});
   CHECK(fourth.at("basis").at("order") == 4);
   CHECK(robot.run({"lookup", "world", "arm", "--order", "3"}).status == 2);

@@ -48,22 +48,32 @@ std::string line(const std::string& dot, const std::string& begin) {
   return dot.substr(at + 3, dot.find('\n', at + 1) - at - 3);
 }
 
-std::string fill(const std::string& node) {
+// The row of a frame in its box.
+std::string row(const std::string& dot, const std::string& id) {
+  const std::regex expected("    <TR>.*PORT=\"in[0-9]+\">[^<]*" + id + "</TD>.*</TR>\n");
   std::smatch found;
-  return std::regex_search(node, found, std::regex("fillcolor=\"(#[0-9a-f]{6})\"")) ? found[1]
-                                                                                    : std::string();
+  return std::regex_search(dot, found, expected) ? found[0] : std::string();
+}
+
+std::string fill(const std::string& row) {
+  std::smatch found;
+  return std::regex_search(row, found, std::regex("BGCOLOR=\"(#[0-9a-f]{6})\"")) ? found[1]
+                                                                                 : std::string();
 }
 
 TEST_CASE("the label of an edge has its age and its large deviations") {
   EdgeLabel edge = label(0.003, 0.4);
-  CHECK(edge_text(edge) == "±3 mm ±0.4°");
+  CHECK(edge_text(edge) == "±3 mm  ±0.4°");
   edge.age = std::chrono::milliseconds(12);
-  CHECK(edge_text(edge) == "12 ms  ±3 mm ±0.4°");
-  CHECK(edge_text(label(0.001, 0)) == "±1 mm ±0°");
-  CHECK(edge_text(label(0, 0.1)) == "±0 mm ±0.1°");
+  CHECK(edge_text(edge) == "12 ms  ±3 mm  ±0.4°");
+  edge.joint = "elbow";
+  CHECK(edge_text(edge) == "elbow  12 ms  ±3 mm  ±0.4°");
+  edge.joint.clear();
+  CHECK(edge_text(label(0.001, 0)) == "±1 mm");
+  CHECK(edge_text(label(0, 0.1)) == "±0.1°");
   // The deviations of unmeasured joints.
-  CHECK(edge_text(label(0, 103.923)) == "±0 mm ±104°");
-  CHECK(edge_text(label(0, 99.7)) == "±0 mm ±100°");
+  CHECK(edge_text(label(0, 103.923)) == "±104°");
+  CHECK(edge_text(label(0, 99.7)) == "±100°");
   CHECK(edge_text(label(0.0009, 0.09)).empty());
   CHECK(edge_text({}).empty());
   EdgeLabel unspecified{StatedCovariance::unspecified(), edge.age};
@@ -89,31 +99,39 @@ TEST_CASE("names are escaped for DOT") {
 TEST_CASE("a forest is drawn with its owners and edges and missing parents") {
   const std::string dot = draw_graph(example());
   CHECK(dot.rfind("digraph frames {\n", 0) == 0);
-  CHECK(line(dot, "\"base\" -> ") == "\"base\" -> \"arm\" [label=\" 12 ms  ±3 mm ±0.4° \"]");
-  CHECK(line(dot, "\"world\" -> ") == "\"world\" -> \"base\"");
-  CHECK(line(dot, "\"gone\" -> ") == "\"gone\" -> \"lost\" [style=dashed]");
+  // A chain is one box, whose rows have the edges to them.
+  CHECK_THAT(row(dot, "arm"), ContainsSubstring(">12 ms  ±3 mm  ±0.4°</FONT>"));
+  CHECK_THAT(row(dot, "arm"), ContainsSubstring(">↳ arm</TD>"));
+  CHECK(line(dot, "\"world\" -> ").empty());
+  CHECK(line(dot, "\"gone\" -> ") == "\"gone\" -> \"lost\":in0:w [style=dashed]");
   CHECK_THAT(line(dot, "\"gone\" ["), ContainsSubstring("dashed"));
   CHECK_THAT(dot, ContainsSubstring("arms  on tower, pid 42") && !ContainsSubstring("reachable"));
-  const std::string arm = fill(line(dot, "\"arm\" ["));
+  const std::string arm = fill(row(dot, "arm"));
   CHECK(arm.size() == 7);
-  CHECK(arm != fill(line(dot, "\"base\" [")));
-  CHECK(fill(line(dot, "\"world\" [")) == fill(line(dot, "\"base\" [")));
-  CHECK_THAT(dot, ContainsSubstring("<TD BGCOLOR=\"" + arm + "\""));
+  CHECK(arm != fill(row(dot, "base")));
+  CHECK(fill(row(dot, "world")) == fill(row(dot, "base")));
+  CHECK_THAT(dot, ContainsSubstring("<TR><TD BGCOLOR=\"" + arm + "\""));
 }
 
-TEST_CASE("an unreachable partition is grey and its edges are dashed") {
+TEST_CASE("an unreachable partition is grey and its arrows are dashed") {
   Graph graph = example();
+  graph.frames.insert(graph.frames.begin(), {{"leg", "base", "robot", true},
+                                             {"foot", "leg", "robot", true},
+                                             {"hand", "arm", "arms", true}});
   const std::string before = draw_graph(graph);
+  CHECK(line(before, "\"world\":out1:e -> \"arm\"") == "\"world\":out1:e -> \"arm\":in0:w");
   graph.partitions[0].reachable = false;
   graph.edges.clear();
   const std::string dot = draw_graph(graph);
-  CHECK(fill(line(dot, "\"arm\" [")) == "#eceef1");
-  CHECK(line(dot, "\"base\" -> ") == "\"base\" -> \"arm\" [style=dashed]");
+  CHECK(fill(row(dot, "arm")) == "#eceef1");
+  CHECK(line(dot, "\"world\":out1:e -> \"arm\"") ==
+        "\"world\":out1:e -> \"arm\":in0:w [style=dashed]");
+  CHECK(line(dot, "\"world\":out1:e -> \"leg\"") == "\"world\":out1:e -> \"leg\":in0:w");
   CHECK_THAT(dot, ContainsSubstring("arms  on tower, pid 42, not reachable"));
   // The others keep their colours.
-  CHECK(fill(line(dot, "\"base\" [")) == fill(line(before, "\"base\" [")));
+  CHECK(fill(row(dot, "base")) == fill(row(before, "base")));
   graph.partitions.erase(graph.partitions.begin());
-  CHECK(fill(line(draw_graph(graph), "\"arm\" [")) == "#eceef1");
+  CHECK(fill(row(draw_graph(graph), "arm")) == "#eceef1");
 }
 
 TEST_CASE("each partition has its own colour") {
@@ -125,9 +143,7 @@ TEST_CASE("each partition has its own colour") {
   }
   const std::string dot = draw_graph(graph);
   std::set<std::string> colours;
-  for (const Frame& frame : graph.frames) {
-    colours.insert(fill(line(dot, "\"" + frame.id + "\" [")));
-  }
+  for (const Frame& frame : graph.frames) colours.insert(fill(row(dot, frame.id)));
   CHECK(colours.size() == 40);
   CHECK(colours.count("") == 0);
 }
@@ -139,10 +155,11 @@ TEST_CASE("an empty forest is drawn") {
 TEST_CASE("a long name is shortened only in the picture") {
   Graph graph;
   graph.frames = {{std::string(255, 'w'), "", "p", false}};
-  const std::string node = line(draw_graph(graph), "\"w");
-  CHECK_THAT(node, ContainsSubstring("…"));
-  CHECK(std::count(node.begin(), node.end(), 'w') < 280);
-  CHECK(node.rfind("\"" + std::string(255, 'w') + "\" [", 0) == 0);
+  const std::string dot = draw_graph(graph);
+  const std::string shown = row(dot, "w");
+  CHECK_THAT(shown, ContainsSubstring("…"));
+  CHECK(std::count(shown.begin(), shown.end(), 'w') < 30);
+  CHECK(line(dot, "\"w").rfind("\"" + std::string(255, 'w') + "\" [", 0) == 0);
 }
 
 }  // namespace

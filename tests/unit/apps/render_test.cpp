@@ -221,7 +221,7 @@ TEST_CASE("a velocity is printed in metres and degrees per second") {
         "             0.0000  0.0000  1.0000  deg/s\n"
         "from         0.000000000\n"
         "to           0.100000000\n"
-        "basis        bound for unknown correlation\n");
+        "correlation  of some edges is not known: the std dev is an upper bound\n");
   const json all = velocity_json("world", "hand", velocity);
   CHECK(all["linear"] == json({1.0, -2.0, 0.5}));
   CHECK(all["begin_ns"] == 0);
