@@ -27,9 +27,15 @@ Result<Cursor> Cursor::open(std::unique_ptr<ByteSource> source) {
                                  [](const Metadata& one) { return one.name == "tfdude"; });
   cursor.find_topics();
   // The channels of a file without a summary may be in its chunks.
-  if (cursor.foreign_ && cursor.topics_.empty() && !cursor.peek() && cursor.topics_.empty()) {
-    return fail(Errc::kState,
-                "it has no transforms: neither a recording of tf-dude nor /tf of ROS");
+  if (cursor.foreign_ && !cursor.peek()) {
+    const std::size_t known = cursor.reader_.problems().size();
+    if (cursor.problems_.size() > known) {
+      return fail(Errc::kState, "nothing of it can be read: " + cursor.problems_[known]);
+    }
+    if (cursor.topics_.empty()) {
+      return fail(Errc::kState,
+                  "it has no transforms: neither a recording of tf-dude nor /tf of ROS");
+    }
   }
   cursor.rewind();
   return cursor;

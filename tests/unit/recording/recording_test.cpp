@@ -146,6 +146,27 @@ TEST_CASE("recording: a file without transforms is rejected with a clear error")
   CHECK_FALSE(Recording::read(""));
 }
 
+TEST_CASE("recording: a compression that cannot be read is named") {
+  std::string file;
+  McapWriter writer(
+      [&](std::string_view bytes) {
+        file += bytes;
+        return Result<void>();
+      },
+      {"ros2", "other", true, 1, 300});
+  REQUIRE(writer.start());
+  REQUIRE(writer.add_schema({2, "tf2_msgs/msg/TFMessage", "ros2msg", ""}));
+  REQUIRE(writer.add_channel({0, 2, "/tf", "cdr", {}}));
+  REQUIRE(writer.write({0, 1, 1, "hello"}));
+  REQUIRE(writer.finish());
+  for (auto at = file.find("zstd"); at != std::string::npos; at = file.find("zstd", at)) {
+    file.replace(at, 4, "lz77");
+  }
+  const auto recording = Recording::read(file);
+  REQUIRE_FALSE(recording);
+  CHECK_THAT(recording.error().message, testing::ContainsSubstring("compressed with 'lz77'"));
+}
+
 TEST_CASE("recording: a file that is cut anywhere answers up to where it is whole") {
   const File file;
   {
