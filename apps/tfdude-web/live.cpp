@@ -10,6 +10,7 @@ namespace tfdude::web {
 namespace {
 
 constexpr std::size_t kKeptEvents = 200;
+constexpr std::chrono::milliseconds kJointsEvery{200};
 
 // Two significant digits, so that a steady rate does not change.
 double rounded(double rate) {
@@ -39,6 +40,9 @@ Result<std::unique_ptr<Live>> Live::open(const Options& options, double rate) {
 Live::Live(Client client, ClockKind clock, double rate)
     : clock_(clock), rate_(rate), client_(std::move(client)), pairs_(client_, worker_, rate) {
   worker_.post([this] { follow_partitions(); });
+  worker_.repeat(kJointsEvery, [this] {
+    if (viewers_ > 0) ask_joints();
+  });
   changes_ = client_.on_change([this](const Change& change) {
     add_event(change);
     const bool of_partition = change.frame.empty();
@@ -83,19 +87,14 @@ void Live::ask_status() {
   const auto partitions = client_.partitions();
   if (!partitions) return;
   nlohmann::json edges = nlohmann::json::object();
-  nlohmann::json joints = nlohmann::json::array();
   for (const PartitionInfo& partition : *partitions) {
     if (!partition.reachable || !partition.compatible()) continue;
     const auto histories = client_.histories(partition.name);
-    if (histories) {
-      for (const HistoryInfo& history : *histories) {
-        edges[history.id] = rate_json(history);
-        note_refused(partition.name, history);
-      }
+    if (!histories) continue;
+    for (const HistoryInfo& history : *histories) {
+      edges[history.id] = rate_json(history);
+      note_refused(partition.name, history);
     }
-    const auto moved = client_.joints(partition.name);
-    if (!moved) continue;
-    for (const JointInfo& joint : *moved) joints.push_back(cli::joint_json(joint));
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   nlohmann::json change{{"op", "status"}, {"edges", nlohmann::json::object()}};
@@ -103,15 +102,29 @@ void Live::ask_status() {
     const auto before = edges_.find(id);
     if (before == edges_.end() || *before != rate) change["edges"][id] = rate;
   }
-  if (joints != joints_) change["joints"] = joints;
   change["partitions"] = partitions_;
   if (const auto span = world_.span()) {
     change["span"] = {std::to_string(nanoseconds(span->first)),
                       std::to_string(nanoseconds(span->second))};
   }
   edges_ = std::move(edges);
-  joints_ = std::move(joints);
   change_ = {change_.first + 1, std::make_shared<const std::string>(cli::dump(change))};
+}
+
+void Live::ask_joints() {
+  const auto partitions = client_.partitions();
+  if (!partitions) return;
+  nlohmann::json joints = nlohmann::json::array();
+  for (const PartitionInfo& partition : *partitions) {
+    if (!partition.reachable || !partition.compatible()) continue;
+    const auto moved = client_.joints(partition.name);
+    if (!moved) continue;
+    for (const JointInfo& joint : *moved) joints.push_back(cli::joint_json(joint));
+  }
+  std::string text = cli::dump({{"op", "joints"}, {"joints", std::move(joints)}});
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (joints_.second && *joints_.second == text) return;
+  joints_ = {joints_.first + 1, std::make_shared<const std::string>(std::move(text))};
 }
 
 void Live::note_refused(const std::string& partition, const HistoryInfo& history) {
@@ -162,8 +175,13 @@ std::vector<Event> Live::events_after(std::uint64_t number) const {
 
 Text Live::status() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return std::make_shared<const std::string>(cli::dump(
-      {{"op", "status"}, {"edges", edges_}, {"joints", joints_}, {"partitions", partitions_}}));
+  return std::make_shared<const std::string>(
+      cli::dump({{"op", "status"}, {"edges", edges_}, {"partitions", partitions_}}));
+}
+
+std::pair<std::uint64_t, Text> Live::joints() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return joints_;
 }
 
 std::pair<std::uint64_t, Text> Live::status_change() const {

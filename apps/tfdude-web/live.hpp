@@ -61,12 +61,15 @@ class Live {
 
   // On any thread:
 
-  /// Somebody begins (1) or ceases (-1) to look. Meanwhile rates and joints are asked for, once a
-  /// second.
+  /// Somebody begins (1) or ceases (-1) to look. Meanwhile rates are asked for once a second, and
+  /// joints five times.
   void count_viewer(int change) { viewers_ += change; }
-  /// Rates, refused samples, joints, partitions: all of it, and what changed a second ago.
+  /// Rates, refused samples, partitions: all of it, and what has changed. The number counts
+  /// changes.
   [[nodiscard]] Text status() const;
   [[nodiscard]] std::pair<std::uint64_t, Text> status_change() const;
+  /// All joints. The number counts changes.
+  [[nodiscard]] std::pair<std::uint64_t, Text> joints() const;
   [[nodiscard]] std::vector<Event> events_after(std::uint64_t number) const;
 
  private:
@@ -74,6 +77,7 @@ class Live {
 
   void follow_partitions();
   void ask_status();
+  void ask_joints();
   void note_refused(const std::string& partition, const HistoryInfo& history);
   void add_event(const Change& change);
   void add_event(Event event);
@@ -103,9 +107,9 @@ class Live {
   std::deque<Event> events_;
   std::uint64_t last_event_ = 0;
   nlohmann::json edges_ = nlohmann::json::object();
-  nlohmann::json joints_ = nlohmann::json::array();
   nlohmann::json partitions_ = nlohmann::json::array();
   std::pair<std::uint64_t, Text> change_;
+  std::pair<std::uint64_t, Text> joints_;
 
   Subscription changes_;  // last: it calls into all of the above
 };

@@ -57,9 +57,7 @@ class PageTalk final : public Talk {
     if (link_->waiting() > kBehind) return;
     tell_structure();
     tell_events();
-    const auto [number, change] = live_.status_change();
-    if (number != status_) send(change);
-    status_ = number;
+    tell_status();
     if (past_) return;
     if (pair_ && pair_->number() != pair_number_) {
       pair_number_ = pair_->number();
@@ -91,6 +89,16 @@ class PageTalk final : public Talk {
         link_->send(std::make_shared<const std::string>(std::move(part)), true);
       }
     }
+  }
+
+  void tell_status() {
+    const auto [number, change] = live_.status_change();
+    // Who has missed a change needs all.
+    if (number != status_) send(number == status_ + 1 ? change : live_.status());
+    status_ = number;
+    const auto [joints_number, joints] = live_.joints();
+    if (joints_number != joints_) send(joints);
+    joints_ = joints_number;
   }
 
   void tell_events() {
@@ -134,6 +142,7 @@ class PageTalk final : public Talk {
   std::uint64_t covariances_ = 0;
   std::uint64_t events_ = 0;
   std::uint64_t status_ = 0;
+  std::uint64_t joints_ = 0;
   std::shared_ptr<Pair> pair_;
   std::uint64_t pair_number_ = 0;
   std::optional<Time> past_;

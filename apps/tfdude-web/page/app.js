@@ -34,8 +34,9 @@ const connection = new Connection({
     const take = {
       hello: () => { by('link').title = message.version; },
       structure: () => takeStructure(message),
-      pair: () => inspector.take(message),
+      pair: () => takePair(message),
       status: () => takeStatus(message),
+      joints: () => drawJoints(model.joints = message.joints),
       events: () => { model.events.push(...message.events); drawEvents(model.events = model.events.slice(-300)); },
     }[message.op];
     if (take) take();
@@ -58,9 +59,15 @@ const connection = new Connection({
 });
 
 const later = { update: false, fit: false };
+const wanted = new URLSearchParams(location.hash.slice(1));
 
 function takeStructure(message) {
   model.setStructure(message);
+  if (model.index.has(wanted.get('root'))) {
+    model.chooseRoot(wanted.get('root'));
+    wanted.delete('root');
+    remember();
+  }
   by('count-frames').textContent = model.count;
   const roots = by('root'), option = (id) => element('option', { value: id }, id);
   const others = model.ids.filter((id) => model.parent[model.index.get(id)] >= 0).sort();
@@ -81,9 +88,14 @@ function takeStructure(message) {
     'No partition answers in this domain. Start one, for example with scripts/demo.');
 }
 
-function takeStatus({ edges, joints, span }) {
+function takePair(message) {
+  inspector.take(message);
+  const { answer } = inspector;
+  model.chosen = answer && answer.covariance ? { root: answer.from, frame: answer.to, rows: answer.covariance } : null;
+}
+
+function takeStatus({ edges, span }) {
   Object.assign(model.rates, edges);
-  if (joints) drawJoints(model.joints = joints);
   if (span) model.span = span.map(BigInt);
 }
 
@@ -94,6 +106,8 @@ function choose(i, asA) {
 
 function setEnds(a, b) {
   inspector.setEnds(a, b);
+  model.chosen = null;
+  remember();
   tree.a = a;
   tree.b = b;
   scene.a = model.index.get(a) ?? -1;
@@ -117,11 +131,19 @@ function askPair() {
 function seeFrom(id) {
   model.chooseRoot(id);
   by('root').value = id;
+  remember();
   const wasA = inspector.a.value;
   if (inspector.b.value && wasA !== id) setEnds(id, inspector.b.value);
   model.solveSigmas();
   scene.fit();
   tree.draw();
+}
+
+/** What is looked at is a part of the address, so that it can be passed on. */
+function remember() {
+  const view = { root: model.root, a: inspector.a.value, b: inspector.b.value };
+  const text = new URLSearchParams(Object.entries(view).filter(([, id]) => id)).toString();
+  history.replaceState(null, '', `${location.pathname}${location.search}#${text}`);
 }
 
 function setTheme(light) {
@@ -140,6 +162,7 @@ function setTheme(light) {
 function picture(time) {
   requestAnimationFrame(picture);
   let begin = performance.now();
+  if (model.advance(begin)) later.update = true;
   if (later.update) {
     later.update = false;
     // Poses move at each picture; covariances need not be computed for all frames as often.
@@ -274,6 +297,7 @@ scene.meshes.load().then((any) => {
 });
 drawJoints([]);
 drawEvents([]);
+if (wanted.get('b')) setEnds(wanted.get('a') || '', wanted.get('b'));
 requestAnimationFrame(picture);
 // For tests and for the curious.
 window.tfdude = { model, scene, inspector, timeline, tree, connection, costs, setEnds, seeFrom, setTheme, setShape };

@@ -24,6 +24,8 @@ export class Model {
     this.root = null;         // id of the frame that all is seen from
     this.past = false;        // an instant is shown
     this.picture = 0;         // counts what arrives
+    this.chosen = null;       // what the owners say of one frame: root, frame, rows of its covariance
+    this.period = 33;         // between values [ms]
     this.allocate(0);
   }
 
@@ -34,7 +36,10 @@ export class Model {
     this.waits = new Array(n).fill('');       // the parent's id, if it does not exist
     this.children = Array.from({ length: n }, () => []);
     this.known = new Uint8Array(n);           // the edge has a value
-    this.edge = new Float64Array(7 * n);
+    this.edge = new Float64Array(7 * n);      // as shown: on the way from the values before to the newest
+    this.newest = new Float64Array(7 * n);
+    this.before = new Float64Array(7 * n);
+    this.moving = [];
     this.stamp = new BigInt64Array(n);        // 0: holds for all times
     this.isStatic = new Uint8Array(n);
     this.noData = new Uint8Array(n);          // at the instant that is shown
@@ -51,6 +56,7 @@ export class Model {
   }
 
   setStructure({ version, partitions, frames }) {
+    this.arrive();
     const before = this.index;
     const kept = { known: this.known, edge: this.edge, stamp: this.stamp, isStatic: this.isStatic, sigma: this.sigma,
       sigmaKind: this.sigmaKind };
@@ -72,6 +78,7 @@ export class Model {
       this.known[i] = kept.known[old]; this.stamp[i] = kept.stamp[old]; this.isStatic[i] = kept.isStatic[old];
       this.sigmaKind[i] = kept.sigmaKind[old];
       this.edge.set(kept.edge.subarray(7 * old, 7 * old + 7), 7 * i);
+      this.newest.set(kept.edge.subarray(7 * old, 7 * old + 7), 7 * i);
       this.sigma.set(kept.sigma.subarray(36 * old, 36 * old + 36), 36 * i);
     });
     for (const list of this.children) list.sort((a, b) => (this.ids[a] < this.ids[b] ? -1 : 1));
@@ -183,7 +190,15 @@ export class Model {
         transport(cov, 36 * i, edge, 7 * from, sum, 0);
       }
     }
+    this.takeChosen();
     this.sigmaStale = false;
+  }
+
+  /** The owners know how errors on the way to the chosen frame are correlated. */
+  takeChosen() {
+    const { chosen } = this, i = chosen && chosen.root === this.root ? this.index.get(chosen.frame) : undefined;
+    if (i === undefined || !this.shown[i] || this.covKind[i] !== GIVEN) return;
+    for (let k = 0; k < 36; ++k) this.cov[36 * i + k] = chosen.rows[Math.floor(k / 6)][k % 6];
   }
 
   /** Takes a binary message. @return whether it fits what is shown */
@@ -203,7 +218,10 @@ export class Model {
   }
 
   takeValues(view, count, base) {
-    const scale = Math.SQRT1_2 / 32767;
+    const scale = Math.SQRT1_2 / 32767, { newest, edge, before } = this, now = performance.now();
+    this.arrive();
+    this.period += 0.2 * (Math.min(100, Math.max(16, now - (this.arrived || 0))) - this.period);
+    this.arrived = now;
     let at = HEADER;
     for (let n = 0; n < count; ++n) {
       const word = view.getUint32(at, true), i = word & 0x1fffffff, largest = word >>> 30, wide = word & 0x20000000;
@@ -213,22 +231,55 @@ export class Model {
       this.stamp[i] = stamp === STATIC ? 0n : base + BigInt(stamp) * 100000n;
       const e = 7 * i;
       for (let k = 4; k < 7; ++k) {
-        this.edge[e + k] = wide ? view.getFloat64(at, true) : view.getFloat32(at, true);
+        newest[e + k] = wide ? view.getFloat64(at, true) : view.getFloat32(at, true);
         at += wide ? 8 : 4;
       }
       let rest = 1;
       for (let k = 0; k < 4; ++k) {
         if (k === largest) continue;
         const part = view.getInt16(at, true) * scale;
-        this.edge[e + k] = part;
+        newest[e + k] = part;
         rest -= part * part;
         at += 2;
       }
-      this.edge[e + largest] = Math.sqrt(Math.max(0, rest));
+      newest[e + largest] = Math.sqrt(Math.max(0, rest));
+      const shown = edge.subarray(e, e + 7), next = newest.subarray(e, e + 7);
+      if (this.known[i] && !this.past) {
+        const same = shown[0] * next[0] + shown[1] * next[1] + shown[2] * next[2] + shown[3] * next[3] >= 0 ? 1 : -1;
+        for (let k = 0; k < 7; ++k) before[e + k] = k < 4 ? same * shown[k] : shown[k];
+        this.moving.push(i);
+      } else {
+        shown.set(next);
+      }
       this.known[i] = 1;
       this.noData[i] = 0;
     }
     this.solve();
+  }
+
+  /** Moves what is shown on to the newest values, within the time between two of them. @return whether it moves */
+  advance(now) {
+    if (!this.moving.length) return false;
+    const part = Math.min(1, Math.max(0, (now - this.arrived) / this.period));
+    if (part === 1) {
+      this.arrive();
+    } else {
+      const { edge, newest, before } = this;
+      for (const i of this.moving) {
+        const e = 7 * i;
+        for (let k = e; k < e + 7; ++k) edge[k] = before[k] + part * (newest[k] - before[k]);
+        const length = Math.hypot(edge[e], edge[e + 1], edge[e + 2], edge[e + 3]);
+        for (let k = e; k < e + 4; ++k) edge[k] /= length;
+      }
+    }
+    this.solve();
+    return true;
+  }
+
+  /** Shows the newest values. */
+  arrive() {
+    for (const i of this.moving) this.edge.set(this.newest.subarray(7 * i, 7 * i + 7), 7 * i);
+    this.moving = [];
   }
 
   takeSigmas(view, count) {

@@ -91,6 +91,8 @@ export class Scene {
     this.a = this.b = -1;
     this.following = false;
     this.size = 0.2;
+    this.radius = 1;                  // of all frames
+    this.turned = false;              // by the user
     // r111 would make a context of WebGL 1, which knows instances only by an extension.
     const context = canvas.getContext('webgl2', { antialias: true, alpha: true, preserveDrawingBuffer: true });
     this.renderer = new THREE.WebGLRenderer({ canvas, context, antialias: true, alpha: true });
@@ -102,6 +104,7 @@ export class Scene {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableKeys = false;
     this.controls.addEventListener('change', () => { this.dirty = true; });
+    this.controls.addEventListener('start', () => { this.turned = true; });
     this.makeParts();
     this.meshes = new Meshes(this);
     this.dirty = true;
@@ -156,6 +159,7 @@ export class Scene {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    if (!this.turned) this.fit();
     this.dirty = true;
   }
 
@@ -225,13 +229,16 @@ export class Scene {
       if (this.show.ellipsoids) {
         for (let row = 0; row < 3; ++row) for (let j = 0; j < 3; ++j) block[3 * row + j] = cov[c + 6 * row + j];
         congruence(S, R, pose, p, block);
+        // One that is larger than the robot would cover it.
+        const reach = k * Math.sqrt(cov[c] + cov[c + 7] + cov[c + 14]);
+        const clear = Math.max(0.15, Math.min(1, (2 * this.radius) / reach));
         factor(A, S);
         const { n, data } = this.ellipsoids;
         data.origin.set(origin, 3 * n);
         data.axis0.set([k * A[0], k * A[3], k * A[6]], 3 * n);
         data.axis1.set([k * A[1], k * A[4], k * A[7]], 3 * n);
         data.axis2.set([k * A[2], k * A[5], k * A[8]], 3 * n);
-        data.colour.set([colour.r, colour.g, colour.b, alpha], 4 * n);
+        data.colour.set([colour.r, colour.g, colour.b, alpha * clear], 4 * n);
         ++this.ellipsoids.n;
       }
       if (this.show.cones) {
@@ -310,7 +317,10 @@ export class Scene {
     this.anchor = low.map((c, k) => (c + high[k]) / 2);
     const radius = Math.max(diagonal / 2, 0.05);
     this.size = this.axisLength(radius);
-    const away = new THREE.Vector3(0.62, -0.82, 0.55).normalize().multiplyScalar(radius * 2.6);
+    this.radius = radius;
+    this.turned = false;
+    const distance = (radius * 2.6) / Math.min(1, this.camera.aspect);
+    const away = new THREE.Vector3(0.62, -0.82, 0.55).normalize().multiplyScalar(distance);
     this.camera.position.copy(away);
     this.controls.target.set(0, 0, 0);
     this.controls.update();

@@ -98,7 +98,7 @@ export function coneMaterial() {
     attribute vec3 corner; attribute vec3 origin; attribute vec4 quaternion;
     attribute vec3 sigmaDiagonal; attribute vec3 sigmaOff; attribute vec4 colour;
     uniform float k; uniform vec3 axisX; uniform vec3 axisY; uniform vec3 axisZ;
-    varying vec4 shade; varying float rim;
+    varying vec4 shade; varying float rim; varying float unknown;
     void main() {
       vec3 e = vec3(1, 0, 0), u = vec3(0, 1, 0), v = vec3(0, 0, 1), base = axisX;
       vec3 block = vec3(sigmaDiagonal.y, sigmaOff.z, sigmaDiagonal.z);
@@ -112,6 +112,9 @@ export function coneMaterial() {
       float a = sqrt(max(block.x, 0.0));
       float b = a > 0.0 ? block.y / a : 0.0;
       float c = sqrt(max(block.z - b * b, 0.0));
+      float mean = 0.5 * (block.x + block.z);
+      float largest = mean + sqrt(max(0.0, mean * mean - block.x * block.z + block.y * block.y));
+      unknown = 3.0 * sqrt(max(0.0, largest)) > 3.14159 ? 1.0 : 0.0;
       vec2 around = vec2(cos(corner.y), sin(corner.y));
       vec3 turn = k * (a * around.x * u + (b * around.x + c * around.y) * v);
       float angle = min(length(turn), 3.14159);
@@ -120,13 +123,19 @@ export function coneMaterial() {
         vec3 about = normalize(turn);
         tip = e * cos(angle) + cross(about, e) * sin(angle) + about * dot(about, e) * (1.0 - cos(angle));
       }
+      if (unknown > 0.5) tip = around.x * u + around.y * v;
       rim = corner.z;
       shade = vec4(base, colour.a);
       vec3 place = origin + corner.z * turned(quaternion, tip) * lengthAt(origin) * colour.r;
       gl_Position = projectionMatrix * viewMatrix * vec4(place, 1.0);
     }`, `
-    varying vec4 shade; varying float rim;
-    void main() { gl_FragColor = vec4(shade.rgb, shade.a * (rim > 0.94 ? 0.75 : 0.08 + 0.3 * rim * rim)); }`);
+    varying vec4 shade; varying float rim; varying float unknown;
+    void main() {
+      float alpha = rim > 0.94 ? 0.75 : 0.08 + 0.3 * rim * rim;
+      // If 3 standard deviations are half a turn, the axis may point anywhere: a hatched disc across it.
+      if (unknown > 0.5) alpha = mod(gl_FragCoord.x + gl_FragCoord.y, 7.0) < 2.0 ? 0.6 : 0.05;
+      gl_FragColor = vec4(shade.rgb, shade.a * alpha);
+    }`);
 }
 
 // The unit sphere times a matrix. Its columns need not be the principal axes: any A with A·Aᵀ = k²Σ gives the same
