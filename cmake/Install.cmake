@@ -35,9 +35,8 @@ install(FILES apps/tfdude/completion.zsh RENAME _tfdude DESTINATION ${CMAKE_INST
 install(FILES apps/tfdude/completion.fish RENAME tfdude.fish
   DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
-set(TFDUDE_UNIT_DIR lib/systemd/system CACHE STRING "Where units of systemd are installed, in the prefix")
 configure_file(systemd/tfduded@.service.in ${CMAKE_BINARY_DIR}/systemd/tfduded@.service @ONLY)
-install(FILES ${CMAKE_BINARY_DIR}/systemd/tfduded@.service systemd/tfdude.target DESTINATION ${TFDUDE_UNIT_DIR})
+install(FILES ${CMAKE_BINARY_DIR}/systemd/tfduded@.service systemd/tfdude.target DESTINATION lib/systemd/system)
 # Where examples/other-dds and examples/ros look for them.
 install(FILES idl/tfdude.idl idl/ros2.idl DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude/idl)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tfdude)
