@@ -11,6 +11,13 @@ std::string angles_text(double x, double y, double z, const AngleUnit& unit, con
   return one(x) + "  " + one(y) + "  " + one(z) + "  " + unit.name + suffix;
 }
 
+std::string angle_text(double angle, int digits, const AngleUnit& unit) {
+  constexpr double kZero = 5e-4 / kDegrees;
+  const double shown = angle < kZero ? 0 : angle * unit.per_radian;
+  const std::string text = shown < 99.5 ? format("%.*g", digits, shown) : format("%.0f", shown);
+  return text + (unit.per_radian == 1 ? " rad" : "°");
+}
+
 void to_radians(TransformSpec& spec, const AngleUnit& angles) {
   const double unit = angles.per_radian;
   if (spec.rpy) {

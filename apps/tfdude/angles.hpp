@@ -22,6 +22,10 @@ inline constexpr AngleUnit kDegree{kDegrees, "deg", 4};
 [[nodiscard]] std::string angles_text(double x, double y, double z, const AngleUnit& unit,
                                       const char* suffix = "");
 
+/// An angle [rad] in a picture, with so many significant digits and its unit: "0.57°", "0.01 rad".
+/// Below half a thousandth of a degree it is zero.
+[[nodiscard]] std::string angle_text(double angle, int digits, const AngleUnit& unit);
+
 /// Converts what was typed in this unit.
 void to_radians(TransformSpec& spec, const AngleUnit& angles);
 

@@ -89,8 +89,8 @@ struct Arguments {
   std::vector<double> point_stddev;
   std::vector<double> point_cov;  ///< upper triangle
   bool direction = false;
-  bool joint_covariance = false;  ///< of all points together
-  double over = 0.1;              ///< interval of a velocity [s]
+  bool joint_covariance = false;     ///< of all points together
+  double over = 0.1;                 ///< interval of a velocity [s]
   std::optional<std::size_t> depth;  ///< of a graph
   RecordingArguments recording;
   KeysArguments keys;

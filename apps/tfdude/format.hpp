@@ -16,11 +16,4 @@ template <class... Values>
   return text.data();
 }
 
-/// An angle [°] in a picture, with so many significant digits; from 99.5 on, a whole number. Below
-/// half a thousandth it is zero.
-[[nodiscard]] inline std::string angle_text(double degrees, int digits) {
-  if (degrees < 5e-4) return "0";
-  return degrees < 99.5 ? format("%.*g", digits, degrees) : format("%.0f", degrees);
-}
-
 }  // namespace tfdude::cli

@@ -101,8 +101,9 @@ Colours look_of(const Frame& frame, const Looks& looks) {
 
 std::string detail_of(const Graph& graph, const Frame& frame) {
   const auto edge = graph.edges.find(frame.id);
-  return edge == graph.edges.end() ? ""
-                                   : elide(edge_text(edge->second), kDetailSize, kMostOfDetail);
+  return edge == graph.edges.end()
+             ? ""
+             : elide(edge_text(edge->second, graph.angles), kDetailSize, kMostOfDetail);
 }
 
 // As text in an HTML-like label. There DOT would replace a backslash and an N by the name of the
@@ -179,9 +180,9 @@ std::string missing_node(const std::string& id) {
 
 }  // namespace
 
-std::string edge_text(const EdgeLabel& edge) {
+std::string edge_text(const EdgeLabel& edge, const AngleUnit& angles) {
   constexpr double kMetres = 1e-3;
-  constexpr double kTurn = 0.1;  // [°]
+  constexpr double kTurn = 0.1 / kDegrees;
   std::string text = edge.joint;
   const auto add = [&text](const std::string& more) { text += (text.empty() ? "" : "  ") + more; };
   if (edge.age) add(age_text(*edge.age));
@@ -192,11 +193,11 @@ std::string edge_text(const EdgeLabel& edge) {
   }
   const auto s = edge.covariance->of_specified().stddev();
   const double metres = *std::max_element(s.begin(), s.begin() + 3);
-  const double turn = *std::max_element(s.begin() + 3, s.end()) * kDegrees;
+  const double turn = *std::max_element(s.begin() + 3, s.end());
   // A value read from decimal text may be a little smaller, due to rounding.
   constexpr double kAlmost = 1 - 1e-9;
   if (metres >= kMetres * kAlmost) add("±" + length_text(metres));
-  if (turn >= kTurn * kAlmost) add("±" + angle_text(turn, 2) + "°");
+  if (turn >= kTurn * kAlmost) add("±" + angle_text(turn, 2, angles));
   return text;
 }
 

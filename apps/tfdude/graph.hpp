@@ -9,6 +9,7 @@
 
 #include "tfdude/client/client.hpp"
 
+#include "angles.hpp"
 #include "graph_layout.hpp"
 
 // Draws the whole forest: from its data to text for Graphviz.
@@ -25,12 +26,13 @@ struct Graph {
   std::vector<Frame> frames;
   std::vector<PartitionInfo> partitions;
   std::map<std::string, EdgeLabel> edges;  ///< by the child's id
+  AngleUnit angles = kRadian;
 };
 
 /// The label of an edge: the joint that moves it, the age of its newest sample, and its largest
 /// standard deviations of position, if at least a millimetre, and of rotation, if at least a tenth
 /// of a degree; "±?" if they are unspecified.
-[[nodiscard]] std::string edge_text(const EdgeLabel& edge);
+[[nodiscard]] std::string edge_text(const EdgeLabel& edge, const AngleUnit& angles);
 
 /// A name in quotes, as DOT reads it.
 [[nodiscard]] std::string dot_id(std::string_view id);

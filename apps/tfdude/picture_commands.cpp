@@ -79,7 +79,7 @@ Result<Plot> plot_of(Source source, const Arguments& arguments, const StampedTra
   // Now the common ancestor is the last of both lists; it is kept in one.
   down.pop_back();
   std::reverse(down.begin(), down.end());
-  Plot plot{X_AB, {}, {}, arguments.samples};
+  Plot plot{X_AB, {}, {}, arguments.samples, arguments.angles};
   Query query;
   query.at = X_AB.stamp;
   const auto add = [&](const Frame& child, bool upwards) -> Result<void> {
@@ -107,7 +107,7 @@ Result<Graph> graph_of(Source source, const Arguments& arguments) {
   if (!frames) return tl::unexpected(std::move(frames.error()));
   auto partitions = source.partitions();
   if (!partitions) return tl::unexpected(std::move(partitions.error()));
-  Graph graph{*std::move(frames), *std::move(partitions), {}};
+  Graph graph{*std::move(frames), *std::move(partitions), {}, arguments.angles};
   std::map<std::string, PartitionInfo*> by_name;
   for (PartitionInfo& partition : graph.partitions) {
     by_name[partition.name] = &partition;

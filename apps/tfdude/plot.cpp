@@ -163,8 +163,8 @@ void draw_header(Svg& svg, const Scene& scene) {
   const auto s = plot.X_AB.covariance.of_specified().stddev();
   svg.text({kLeft, 80},
            std::string("rotation ± ") + (least ? "more than " : "") +
-               angle_text(s[3] * kDegrees, 3) + "°, " + angle_text(s[4] * kDegrees, 3) + "°, " +
-               angle_text(s[5] * kDegrees, 3) + "° about the axes of " +
+               angle_text(s[3], 3, plot.angles) + ", " + angle_text(s[4], 3, plot.angles) + ", " +
+               angle_text(s[5], 3, plot.angles) + " about the axes of " +
                elide(to, kLabelSize, 300) + "; ± is one standard deviation",
            "");
 }

@@ -6,6 +6,7 @@
 
 #include "tfdude/types/query.hpp"
 
+#include "angles.hpp"
 #include "plot_geometry.hpp"
 
 // Draws where a frame is, with its uncertainty: from its data to SVG.
@@ -16,6 +17,7 @@ struct Plot {
   std::vector<std::string> frames;  ///< of the path, from A to B
   std::vector<Step> steps;          ///< between them
   int samples = 0;                  ///< number of points to sample and draw
+  AngleUnit angles = kRadian;
 };
 
 inline constexpr std::uint64_t kSampleSeed = 1;

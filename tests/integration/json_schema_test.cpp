@@ -149,6 +149,11 @@ TEST_CASE("json: what each command prints is as the schema says") {
   checked.run({"lookup", "world", "hand_left"});
   checked.run({"lookup", "world", "tool", "--order", "4"});
   checked.run({"lookup", "world", "lower"});
+  checked.run({"lookup", "world", "hand_left", "--matrix"});
+  checked.run({"point", "world", "hand_left", "0", "0", "1", "1", "0", "0", "--joint"});
+  checked.run({"point", "world", "lower", "0", "0", "1", "--joint"});
+  checked.run({"joint", "shoulder=0.25"});
+  checked.run({"publish", directory.write("joints.jsonl", "{\"joints\": {\"shoulder\": 0.1}}")});
   checked.run({"velocity", "arm_1", "arm_2"});
   checked.run({"velocity", "world", "lower"});
   checked.run({"history", "arm_2"});

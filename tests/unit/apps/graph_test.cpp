@@ -13,7 +13,7 @@ namespace {
 
 using testing::ContainsSubstring;
 
-constexpr double kDegree = 0.017453292519943295;
+constexpr double kTurn = 0.017453292519943295;  // a degree
 const Time kNow = time_of(1'700'000'000'000'000'000);
 
 PartitionInfo partition(const std::string& name, bool reachable) {
@@ -26,7 +26,7 @@ PartitionInfo partition(const std::string& name, bool reachable) {
 }
 
 EdgeLabel label(double metres, double degrees) {
-  return {*Covariance::from_stddev({0, metres, 0, 0, 0, degrees * kDegree}), std::nullopt};
+  return {*Covariance::from_stddev({0, metres, 0, 0, 0, degrees * kTurn}), std::nullopt};
 }
 
 Graph example() {
@@ -63,18 +63,19 @@ std::string fill(const std::string& row) {
 
 TEST_CASE("the label of an edge has its age and its large deviations") {
   EdgeLabel edge = label(0.003, 0.4);
-  CHECK(edge_text(edge) == "±3 mm  ±0.4°");
+  CHECK(edge_text(edge, kDegree) == "±3 mm  ±0.4°");
   edge.age = std::chrono::milliseconds(12);
-  CHECK(edge_text(edge) == "12 ms  ±3 mm  ±0.4°");
+  CHECK(edge_text(edge, kDegree) == "12 ms  ±3 mm  ±0.4°");
   edge.joint = "elbow";
-  CHECK(edge_text(edge) == "elbow  12 ms  ±3 mm  ±0.4°");
+  CHECK(edge_text(edge, kDegree) == "elbow  12 ms  ±3 mm  ±0.4°");
   edge.joint.clear();
-  CHECK(edge_text(label(0.001, 0)) == "±1 mm");
-  CHECK(edge_text(label(0, 0.1)) == "±0.1°");
+  CHECK(edge_text(label(0.001, 0), kDegree) == "±1 mm");
+  CHECK(edge_text(label(0, 0.1), kDegree) == "±0.1°");
+  CHECK(edge_text(label(0, 0.1), kRadian) == "±0.0017 rad");
   // The deviations of unmeasured joints.
-  CHECK(edge_text(label(0, 103.923)) == "±104°");
-  CHECK(edge_text(label(0, 99.7)) == "±100°");
-  CHECK(edge_text(label(0.0009, 0.09)).empty());
+  CHECK(edge_text(label(0, 103.923), kDegree) == "±104°");
+  CHECK(edge_text(label(0, 99.7), kDegree) == "±100°");
+  CHECK(edge_text(label(0.0009, 0.09), kDegree).empty());
   CHECK(edge_text({}).empty());
   EdgeLabel unspecified{StatedCovariance::unspecified(), edge.age};
   CHECK(edge_text(unspecified) == "12 ms  ±?");
@@ -85,7 +86,7 @@ TEST_CASE("the label of an edge has its age and its large deviations") {
                                       {7200.0, "2 h"},
                                       {8.64e5, "10 days"}}) {
     edge.age = std::chrono::nanoseconds(static_cast<std::int64_t>(seconds * 1e9));
-    CHECK(edge_text(edge) == text);
+    CHECK(edge_text(edge, kDegree) == text);
   }
 }
 
@@ -100,7 +101,7 @@ TEST_CASE("a forest is drawn with its owners and edges and missing parents") {
   const std::string dot = draw_graph(example());
   CHECK(dot.rfind("digraph frames {\n", 0) == 0);
   // A chain is one box, whose rows have the edges to them.
-  CHECK_THAT(row(dot, "arm"), ContainsSubstring(">12 ms  ±3 mm  ±0.4°</FONT>"));
+  CHECK_THAT(row(dot, "arm"), ContainsSubstring(">12 ms  ±3 mm  ±0.007 rad</FONT>"));
   CHECK_THAT(row(dot, "arm"), ContainsSubstring(">↳ arm</TD>"));
   CHECK(line(dot, "\"world\" -> ").empty());
   CHECK(line(dot, "\"gone\" -> ") == "\"gone\" -> \"lost\":in0:w [style=dashed]");
