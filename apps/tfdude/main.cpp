@@ -198,6 +198,7 @@ void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen,
   graph->add_option("--depth", arguments.depth,
                     "levels below a root; default: as many as fit a screen");
   cli::add_recording(graph, arguments, local, cli::run_graph);
+  for (CLI::App* command : {plot, graph}) cli::explain_angles(*command);
 }
 
 void add_description_command(CLI::App& app, Arguments& arguments, Command& chosen) {

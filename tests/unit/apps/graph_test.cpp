@@ -76,9 +76,9 @@ TEST_CASE("the label of an edge has its age and its large deviations") {
   CHECK(edge_text(label(0, 103.923), kDegree) == "±104°");
   CHECK(edge_text(label(0, 99.7), kDegree) == "±100°");
   CHECK(edge_text(label(0.0009, 0.09), kDegree).empty());
-  CHECK(edge_text({}).empty());
+  CHECK(edge_text(EdgeLabel{}, kDegree).empty());
   EdgeLabel unspecified{StatedCovariance::unspecified(), edge.age};
-  CHECK(edge_text(unspecified) == "12 ms  ±?");
+  CHECK(edge_text(unspecified, kDegree) == "12 ms  ±?");
   edge = label(0, 0);
   for (const auto& [seconds, text] : {std::pair(-0.5, "-500 ms"),
                                       {3.44, "3.4 s"},
