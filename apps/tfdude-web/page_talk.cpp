@@ -40,12 +40,12 @@ class PageTalk final : public Talk {
       if (past_) ask();
     } else if (const auto* past = std::get_if<PastRequest>(&*request)) {
       past_ = past->at;
-      for (std::string& part : live_.world().at(*past_)) {
-        link_->send(std::make_shared<const std::string>(std::move(part)), true);
-      }
+      past_due_ = true;
+      if (link_->waiting() <= kBehind) tell_past();
       ask();
     } else {
       past_.reset();
+      past_due_ = false;
       values_ = 0;
       covariances_ = 0;
       pair_number_ = 0;
@@ -58,6 +58,7 @@ class PageTalk final : public Talk {
     tell_structure();
     tell_events();
     tell_status();
+    if (past_due_) tell_past();
     if (past_) return;
     if (pair_ && pair_->number() != pair_number_) {
       pair_number_ = pair_->number();
@@ -84,10 +85,13 @@ class PageTalk final : public Talk {
     send(structure);
     values_ = 0;
     covariances_ = 0;
-    if (past_) {
-      for (std::string& part : live_.world().at(*past_)) {
-        link_->send(std::make_shared<const std::string>(std::move(part)), true);
-      }
+    past_due_ = past_.has_value();
+  }
+
+  void tell_past() {
+    past_due_ = false;
+    for (std::string& part : live_.world().at(*past_)) {
+      link_->send(std::make_shared<const std::string>(std::move(part)), true);
     }
   }
 
@@ -146,6 +150,7 @@ class PageTalk final : public Talk {
   std::shared_ptr<Pair> pair_;
   std::uint64_t pair_number_ = 0;
   std::optional<Time> past_;
+  bool past_due_ = false;  // its picture was not sent yet
   // Also says whether this object exists, to answers that come later.
   std::shared_ptr<bool> asking_ = std::make_shared<bool>(false);
 };

@@ -113,11 +113,10 @@ Result<void> Participant::set_time(Time now, bool by_itself) {
   if ((jumps & (jumps - 1)) == 0) {
     // No surprise to who has set it back, and no harm where there is no history.
     const bool calm = by_itself || cleared == 0;
-    log().log(
-        calm ? spdlog::level::info : spdlog::level::warn,
-        "the external clock jumped back from {} s to {} s (jump {}): the histories of {} "
-        "edges are cleared",
-        seconds_of(**before), seconds_of(now), jumps, cleared);
+    log().log(calm ? spdlog::level::info : spdlog::level::warn,
+              "the external clock jumped back from {} s to {} s (jump {}): the histories of {} "
+              "edges are cleared",
+              seconds_of(**before), seconds_of(now), jumps, cleared);
   }
   return {};
 }

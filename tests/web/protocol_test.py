@@ -30,6 +30,7 @@ class Page:
         self.sigmas = {}  # id: "unspecified", "zero", or 21 numbers
         self.last = {}    # op: message
         self.binary = 0
+        self.base = 0
         self.bytes = 0
 
     async def read(self):
@@ -46,6 +47,7 @@ class Page:
 
     def take(self, message):
         kind, _, _, version, base, count = HEADER.unpack_from(message)
+        self.base = base
         assert version == self.structure["version"]
         at = HEADER.size
         for _ in range(count):
@@ -230,6 +232,30 @@ class Moving(unittest.TestCase):
                     late = Page(slow)
                     await late.until(lambda p: "wrist_3_link" in p.values
                                      and (p.values["wrist_3_link"][0] or 0) > page.values["wrist_3_link"][0])
+            asyncio.run(asyncio.wait_for(talk(), 3 * rig.WAIT))
+
+
+class Greedy(unittest.TestCase):
+    def test_a_page_that_asks_and_does_not_read_takes_little_memory(self):
+        with rig.Rig() as robot:
+
+            def memory():
+                with open(f"/proc/{robot.web.pid}/status", encoding="ascii") as status:
+                    return next(int(line.split()[1]) for line in status if line.startswith("VmRSS:"))
+
+            async def talk():
+                async with connect(robot, **FEW_BYTES) as socket:
+                    page = Page(socket)
+                    await page.until(lambda p: p.binary > 0)
+                    before = memory()
+                    for i in range(30000):  # of 1.3 kB each
+                        await page.send(op="past", at=str(i))
+                        if i % 100 == 0:
+                            await asyncio.sleep(0)
+                    await asyncio.sleep(1)
+                    self.assertLess(memory() - before, 8000)
+                    # The last wish is fulfilled when the page reads again.
+                    await page.until(lambda p: p.base == 29999)
             asyncio.run(asyncio.wait_for(talk(), 3 * rig.WAIT))
 
 

@@ -55,7 +55,9 @@ Result<Transform> read_computed(const Numbers& in) {
     return computed_from(flat);
   }
   return computed_pose(Eigen::Quaterniond(in[3], in[0], in[1], in[2]), {in[4], in[5], in[6]})
-      .map([](const Pose& X) { return Transform{X, StatedCovariance::unspecified()}; });
+      .map([](const Pose& X) {
+        return Transform{X, StatedCovariance::unspecified()};
+      });
 }
 
 Result<Covariance> read_covariance(const Numbers& in, std::size_t first) {
