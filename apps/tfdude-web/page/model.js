@@ -254,7 +254,7 @@ export class Model {
       this.known[i] = 1;
       this.noData[i] = 0;
     }
-    this.solve();
+    if (!this.moving.length) this.solve();  // else advance() does
   }
 
   /** Moves what is shown on to the newest values, within the time between two of them. @return whether it moves */
