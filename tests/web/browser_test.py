@@ -5,6 +5,7 @@ import os
 import pathlib
 import shutil
 import signal
+import time
 import unittest
 
 import rig
@@ -90,6 +91,12 @@ class Browser(unittest.TestCase):
         key = "covariance" if said.get("covariance") else "covariance_of_specified"
         for row, other in zip(answer[key], said[key]):
             self.assert_close(row, other, 1e-12)
+        # The picture of B has the covariance of the owners, not only nearly.
+        shown = browser.execute_script("const {model} = tfdude; model.solveSigmas(); const i = 36 * "
+                                       "model.index.get('tool0'); return [...model.cov.subarray(i, i + 36)]")
+        rows = [entry for row in said["covariance"] for entry in row]
+        self.assert_close(shown, rows, 1e-12 * max(rows))
+        self.assertIn("#root=world&a=world&b=tool0", browser.current_url)
         # Seen from another frame, the ellipsoid is that of a lookup from there.
         browser.execute_script("tfdude.seeFrom('lidar'); tfdude.model.solveSigmas()")
         said = robot.ask("lookup", "lidar", "wrist_1_link")
@@ -101,12 +108,22 @@ class Browser(unittest.TestCase):
             self.assertAlmostEqual(variance, rows[i][i], delta=1e-3 * rows[i][i] + 1e-12)
         browser.execute_script("tfdude.seeFrom('world')")
 
+    def joints_move(self, browser):
+        position = "return tfdude.model.joints[0].position"
+        begin = time.monotonic()
+        for _ in range(10):
+            before = browser.execute_script(position)
+            rig.eventually(lambda before=before: browser.execute_script(position) != before, "a joint that moves")
+        # Five times a second; a busy machine is slower.
+        self.assertLess(time.monotonic() - begin, 8)
+
     def drag(self, robot, browser):
         robot.move()
         rig.eventually(lambda: browser.execute_script("return Number(tfdude.timeline.slider.min) < -3"),
                        "some seconds of motion")
         browser.execute_script("const {slider} = tfdude.timeline; slider.value = -1.5; "
                                "slider.dispatchEvent(new Event('input'))")
+        self.joints_move(browser)
         at = int(browser.execute_script("return String(tfdude.timeline.at)"))
         answer = self.answer(browser, f" && a.past && a.stamp_ns === '{at}'")
         said = robot.ask("lookup", "world", "tool0", "--at", f"{at // 10**9}.{at % 10**9:09}")

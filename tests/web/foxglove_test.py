@@ -199,6 +199,21 @@ class Foxglove(rig.RigTest):
                 await viewer.next(1)
         self.run_async(talk())
 
+    def test_events_are_a_log(self):
+        async def talk():
+            async with connect(self.robot) as socket:
+                viewer = Viewer(socket)
+                await viewer.subscribe(4, "events")
+                guest = self.robot.start("tfduded", "--partition", "guest", "--no-state", ready="ready")
+                guest.kill()
+                lines = []
+                while not any("guest" in line["message"] and line["level"] == 3 for line in lines):
+                    lines.append(json.loads(await viewer.next(4)))
+                return lines
+        lines = self.run_async(talk())
+        self.assertIn(2, [line["level"] for line in lines if "guest" in line["message"]])
+        self.assertTrue(all(line["timestamp"]["sec"] > 0 for line in lines))
+
     def test_a_pair_of_a_page_is_a_channel(self):
         async def talk():
             page = websockets.connect(self.robot.url.replace("http", "ws"), subprotocols=["tfdude.v1"])
