@@ -4,12 +4,14 @@
 #include <cstdio>
 #include <ctime>
 #include <string_view>
+#include <unistd.h>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
 #include "render.hpp"
 #include "screen.hpp"
+#include "terminal.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -107,7 +109,8 @@ int report(const Error& error, const Arguments& arguments) {
   if (arguments.json) {
     print_error(to_string(error.code), error.message);
   } else {
-    std::fprintf(stderr, "tfdude: %s\n", error.message.c_str());
+    const std::string who = painted(Look::kBad, "tfdude:", terminal_of(STDERR_FILENO));
+    std::fprintf(stderr, "%s %s\n", who.c_str(), error.message.c_str());
   }
   switch (error.code) {
     case Errc::kTimeout:

@@ -4,6 +4,7 @@
 
 #include "format.hpp"
 #include "table.hpp"
+#include "terminal.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -44,10 +45,12 @@ std::string remarks_of(const JointInfo& joint) {
                    joint.mimic->multiplier, joint.mimic->offset);
   }
   if (joint.outside > 0) {
-    text += format("    outside %llu times\n", static_cast<unsigned long long>(joint.outside));
+    text += painted(Look::kWarning, format("    outside %llu times\n",
+                                           static_cast<unsigned long long>(joint.outside)));
   }
   if (joint.refused > 0) {
-    text += format("    rejected %llu times\n", static_cast<unsigned long long>(joint.refused));
+    text += painted(Look::kWarning, format("    rejected %llu times\n",
+                                           static_cast<unsigned long long>(joint.refused)));
   }
   return text;
 }
@@ -68,7 +71,8 @@ std::string joint_table(const std::vector<JointInfo>& joints, const AngleUnit& a
     return "  " + cell(name, 18) + " " + cell(frame, 15) +
            format(" %10s %9s %-4s %s\n", position.c_str(), stddev.c_str(), unit, limits.c_str());
   };
-  std::string text = row("joint", "frame", "position", "std dev", "unit", "limits");
+  std::string text =
+      painted(Look::kHeader, row("joint", "frame", "position", "std dev", "unit", "limits"));
   for (const JointInfo& joint : joints) {
     text += row(joint.name, joint.frame, position_cell(joint, joint.position, angles, 10),
                 joint.variance ? position_cell(joint, std::sqrt(*joint.variance), angles, 9) : "?",

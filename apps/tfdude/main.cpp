@@ -25,6 +25,7 @@
 #include "complete.hpp"
 #include "keys_commands.hpp"
 #include "recording_options.hpp"
+#include "terminal.hpp"
 #include "value_options.hpp"
 #include "web_command.hpp"
 
@@ -288,8 +289,7 @@ int main(int argc, char** argv) {
   arguments.options.timeout = Milliseconds(timeout_ms);
   cli::to_radians(arguments.spec, arguments.angles);
   arguments.options.discovery = arguments.options.timeout;
-  // Blocks the signals before any thread starts, so that commands that run until interrupted can
-  // wait for them.
+  // Before any thread starts, so that commands that run until interrupted can wait for them.
   sigset_t stop_signals;
   sigemptyset(&stop_signals);
   sigaddset(&stop_signals, SIGINT);
@@ -300,6 +300,7 @@ int main(int argc, char** argv) {
       pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
   }
   log_fastdds_to_standard_error();
+  cli::terminal() = cli::terminal_of(STDOUT_FILENO);
   const int status = run(arguments, command, local);
   const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
   if (!written) std::perror("tfdude: standard output");

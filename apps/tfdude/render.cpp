@@ -8,6 +8,7 @@
 
 #include "format.hpp"
 #include "table.hpp"
+#include "terminal.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -22,12 +23,13 @@ struct Line {
 };
 
 std::string label(const Frame& frame, const std::vector<std::string>& unreachable) {
-  std::string text = frame.id + "  [" + frame.partition;
-  if (std::count(unreachable.begin(), unreachable.end(), frame.partition) > 0) {
-    text += ", unreachable";
+  const bool lost = std::count(unreachable.begin(), unreachable.end(), frame.partition) > 0;
+  std::string text = frame.id + "  " +
+                     (lost ? painted(Look::kBad, "[" + frame.partition + ", unreachable]")
+                           : painted_by_name(frame.partition, "[" + frame.partition + "]"));
+  if (!frame.parent.empty() && !frame.attached) {
+    text += painted(Look::kWarning, "  (waits for '" + frame.parent + "')");
   }
-  text += "]";
-  if (!frame.parent.empty() && !frame.attached) text += "  (waits for '" + frame.parent + "')";
   return text + "\n";
 }
 
@@ -69,7 +71,8 @@ std::string partition_table(const std::vector<PartitionRow>& rows) {
     return cell(name, 18) + format(" %8s ", frames.c_str()) + cell(host, 16) +
            format(" %8s %10s %12s\n", pid.c_str(), samples.c_str(), memory.c_str());
   };
-  std::string text = line("partition", "frames", "host", "pid", "samples", "history");
+  std::string text =
+      painted(Look::kHeader, line("partition", "frames", "host", "pid", "samples", "history"));
   for (const PartitionRow& row : rows) {
     const PartitionInfo& partition = row.partition;
     // Only the name is known of a partition that was lost before this process started.
@@ -81,16 +84,19 @@ std::string partition_table(const std::vector<PartitionRow>& rows) {
              sampled ? std::to_string(row.history->samples) : "-",
              sampled ? format("%.1f KiB", static_cast<double>(row.history->bytes) / 1024.0) : "-");
     if (!partition.compatible()) {
-      text += "  incompatible: tf-dude " +
-              (partition.program.empty() ? "of an unknown version" : partition.program) +
-              " speaks protocol " + to_string(partition.protocol) + ", this program speaks " +
-              to_string(kProtocolVersion) + "\n";
+      text +=
+          painted(Look::kBad,
+                  "  incompatible: tf-dude " +
+                      (partition.program.empty() ? "of an unknown version" : partition.program) +
+                      " speaks protocol " + to_string(partition.protocol) +
+                      ", this program speaks " + to_string(kProtocolVersion) + "\n");
       continue;
     }
     if (partition.clock == ClockKind::kExternal) text += "  external clock\n";
     if (partition.reachable) continue;
-    text += (partition.stopped ? "  stopped since " : "  lost since ") +
-            to_string(partition.since) + "\n";
+    text += painted(partition.stopped ? Look::kWarning : Look::kBad,
+                    (partition.stopped ? "  stopped since " : "  lost since ") +
+                        to_string(partition.since) + "\n");
   }
   return text;
 }

@@ -8,6 +8,7 @@
 
 #include "format.hpp"
 #include "table.hpp"
+#include "terminal.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -43,6 +44,8 @@ void Screen::redraw(const std::string& page) {
     winsize size{};
     const bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row > 1;
     // One row is left for the cursor, which stands below the last line.
+    // The next page is made for it.
+    if (known) terminal().columns = size.ws_col;
     const std::string text = known ? fitted(page, size.ws_row - 1U, size.ws_col) : page;
     if (drawn_ > 0) std::printf("\x1b[%tdA\x1b[J", drawn_);
     std::fputs(text.c_str(), stdout);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "format.hpp"
+#include "terminal.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -12,13 +13,30 @@ bool begins_character(char byte) { return (static_cast<unsigned char>(byte) & 0x
 }  // namespace
 
 std::size_t length_of(const std::string& text) {
-  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), begins_character));
+  std::size_t length = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const std::size_t escape = escape_at(text, i);
+    if (escape > 0) {
+      i += escape - 1;
+    } else if (begins_character(text[i])) {
+      ++length;
+    }
+  }
+  return length;
 }
 
 std::string first_characters(const std::string& text, std::size_t count) {
   std::size_t seen = 0;
+  std::size_t last_escape = std::string::npos;
   for (std::size_t i = 0; i < text.size(); ++i) {
-    if (begins_character(text[i]) && seen++ == count) return text.substr(0, i);
+    if (const std::size_t escape = escape_at(text, i); escape > 0) {
+      last_escape = i;
+      i += escape - 1;
+    } else if (begins_character(text[i]) && seen++ == count) {
+      const bool coloured =
+          last_escape != std::string::npos && text.compare(last_escape, 4, "\x1b[0m") != 0;
+      return text.substr(0, i) + (coloured ? "\x1b[0m" : "");
+    }
   }
   return text;
 }
@@ -32,7 +50,12 @@ std::string shortened(const std::string& text, std::size_t columns) {
   return first_characters(text, before) + "…" + text.substr(left_out.size());
 }
 
-std::string cell(const std::string& name, std::size_t columns) {
+std::string cell(const std::string& name, std::size_t at_80) {
+  constexpr std::size_t kMost = 40;  // most names are shorter: numbers should not be far from them
+  constexpr std::size_t kLeast = 8;
+  const std::size_t stretched = at_80 * terminal().columns / 80;
+  const std::size_t columns =
+      std::clamp(stretched, std::min(at_80, kLeast), std::max(at_80, kMost));
   const std::string text = shortened(name, columns);
   return text + std::string(columns - length_of(text), ' ');
 }

@@ -3,21 +3,22 @@
 #include <cstddef>
 #include <string>
 
-// Parts of tables that fit a terminal of 80 columns, however long names and numbers are.
+// Parts of tables that fit a terminal, however long names and numbers are.
 namespace tfdude::cli {
 
-/// Number of characters of a text in UTF-8.
+/// Number of characters of a text in UTF-8, without escapes of colours.
 [[nodiscard]] std::size_t length_of(const std::string& text);
 
-/// The first characters of a text in UTF-8.
+/// The first characters of a text in UTF-8, with the colours that they have.
 [[nodiscard]] std::string first_characters(const std::string& text, std::size_t count);
 
 /// A text of at most so many characters. If it is too long, its middle is left out: names often
 /// differ only at their ends.
 [[nodiscard]] std::string shortened(const std::string& text, std::size_t columns);
 
-/// A name at the left of so many columns, shortened if it is too long.
-[[nodiscard]] std::string cell(const std::string& name, std::size_t columns);
+/// A name at the left of its column, shortened if it is too long.
+/// @param at_80  the width of the column on a terminal of 80 columns; a wider one has more room
+[[nodiscard]] std::string cell(const std::string& name, std::size_t at_80);
 
 /// A number with so many decimals; in powers of ten if it would need too many columns.
 [[nodiscard]] std::string number(double value, int decimals, std::size_t columns);

@@ -3,6 +3,7 @@
 #include "format.hpp"
 #include "render.hpp"
 #include "table.hpp"
+#include "terminal.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -136,7 +137,8 @@ std::string monitor_table(const std::string& partition, const std::vector<Histor
            format(" %10s %10s %11s %10s %9s\n", rate.c_str(), age.c_str(), jitter.c_str(),
                   gap.c_str(), rejected.c_str());
   };
-  text += row("edge", "rate [Hz]", "age [ms]", "jitter [ms]", "gap [ms]", "rejected");
+  text += painted(Look::kHeader,
+                  row("edge", "rate [Hz]", "age [ms]", "jitter [ms]", "gap [ms]", "rejected"));
   for (const HistoryInfo& history : histories) {
     const std::uint64_t rejected =
         history.refused_old + history.refused_equal + history.refused_ahead;

@@ -1,6 +1,7 @@
 #include "uncertainty_render.hpp"
 
 #include <cmath>
+#include <string_view>
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/math/belief.hpp"
@@ -8,6 +9,7 @@
 #include "format.hpp"
 #include "render.hpp"
 #include "table.hpp"
+#include "terminal.hpp"
 #include "time_render.hpp"
 
 namespace tfdude::cli {
@@ -98,12 +100,15 @@ std::string consistency_table(const std::vector<EdgeConsistency>& edges) {
            format(" %8s %8s %9s %10s  %s\n", observed.c_str(), rejected.c_str(), factor.c_str(),
                   deviations.c_str(), covariance);
   };
-  std::string text =
-      row("observed edge", "observed", "rejected", "factor", "deviations", "covariance");
+  std::string text = painted(Look::kHeader, row("observed edge", "observed", "rejected", "factor",
+                                                "deviations", "covariance"));
   for (const EdgeConsistency& edge : edges) {
+    const std::string_view agrees = "agrees";
+    const std::string verdict =
+        painted(verdict_of(edge) == agrees ? Look::kGood : Look::kWarning, verdict_of(edge));
     text += row(edge.id, number(static_cast<double>(edge.observations), 0, 8),
                 number(static_cast<double>(edge.refused), 0, 8), number(factor_of(edge), 2, 9),
-                number(deviation_of(edge), 1, 10), verdict_of(edge));
+                number(deviation_of(edge), 1, 10), verdict.c_str());
   }
   return text;
 }

@@ -195,6 +195,29 @@ TEST_CASE("cli: watch polls, and continues after its daemons have ended") {
   CHECK(watch.wait(in_time()) == 0);
 }
 
+TEST_CASE("cli: answers have colours and wide tables on a terminal only") {
+  const ThesisDaemons d;
+  (void)text(d, {"add", std::string(30, 'n'), "--parent", "camera"});
+  const auto on_terminal = [&](const std::string& before, const std::string& command) {
+    const std::string run = before + TFDUDE_CLI " --domain " + std::to_string(d.domain.number()) +
+                            " --profile " TFDUDE_LOOPBACK_PROFILE " " + command;
+    Process script({"/usr/bin/env", "TERM=xterm", "script", "-qec", run, "/dev/null"});
+    return testing::finish(script).out;
+  };
+  const std::string escape = "\x1b[";
+  CHECK_THAT(text(d, {"tree"}), !ContainsSubstring(escape));
+  CHECK_THAT(on_terminal("", "tree"), ContainsSubstring(escape));
+  CHECK_THAT(on_terminal("NO_COLOR=1 ", "tree"), !ContainsSubstring(escape));
+  CHECK_THAT(on_terminal("TERM=dumb ", "tree"), !ContainsSubstring(escape));
+  CHECK_THAT(on_terminal("", "--json tree"), !ContainsSubstring(escape));
+  CHECK_THAT(on_terminal("", "lookup world nowhere"), ContainsSubstring(escape + "31mtfdude:"));
+  // The column of names has 22 of 80 columns, and 33 of 120.
+  (void)text(d, {"update", std::string(30, 'n'), "--xyz", "1", "0", "0", "--stamp", "-1"});
+  CHECK_THAT(text(d, {"monitor", "--once"}), !ContainsSubstring(std::string(30, 'n')));
+  CHECK_THAT(on_terminal("stty cols 120; ", "monitor --once"),
+             ContainsSubstring(std::string(30, 'n')));
+}
+
 TEST_CASE("cli: every command has help with an example") {
   const testing::TestDomain domain;
   const CliResult all = domain.cli({"--help"});

@@ -2,6 +2,7 @@
 
 #include "../commands.hpp"
 #include "../format.hpp"
+#include "../terminal.hpp"
 #include "domain_facts.hpp"
 
 namespace tfdude::cli {
@@ -59,14 +60,15 @@ int run_doctor(const Arguments& arguments) {
     object["met"].push_back(met_json(met));
     text += met_text(met);
   }
-  for (const std::string& one : unchecked_of(facts)) text += "not checked  " + one + "\n";
+  for (const std::string& one : unchecked_of(facts))
+    text += painted(Look::kWarning, "not checked  " + one) + "\n";
   for (const Finding& finding : findings) {
     object["findings"].push_back(
         {{"code", finding.code}, {"what", finding.what}, {"remedy", finding.remedy}});
-    text += "\n" + finding.code + ": " + printable(finding.what) + "\n  -> " +
-            printable(finding.remedy) + "\n";
+    text += "\n" + painted(Look::kBad, finding.code + ":") + " " + printable(finding.what) +
+            "\n  -> " + printable(finding.remedy) + "\n";
   }
-  if (findings.empty()) text += "\nno problem found\n";
+  if (findings.empty()) text += "\n" + painted(Look::kGood, "no problem found") + "\n";
   (void)answer(arguments, object, text);
   return findings.empty() ? kDone : kRefused;
 }
