@@ -23,7 +23,7 @@ endforeach()
 
 foreach(folder profiles examples)
   if(EXISTS ${CMAKE_SOURCE_DIR}/${folder})
-    install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude)
+    install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude USE_SOURCE_PERMISSIONS)
   endif()
 endforeach()
 if(TARGET tfdude_web)
