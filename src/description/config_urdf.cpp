@@ -9,9 +9,9 @@ namespace tfdude {
 namespace {
 
 constexpr std::array<std::string_view, 13> kUrdfKeys = {
-    "file", "root",       "matrix", "xyz",   "rpy",           "quat",  "stddev",
+    "file", "root",       "xyz",    "rpy",   "quat",          "matrix", "stddev",
     "cov",  "covariance", "prefix", "links", "strict_limits", "joints"};
-constexpr std::array<std::string_view, 7> kRootKeys = {"matrix", "xyz", "rpy",       "quat",
+constexpr std::array<std::string_view, 7> kRootKeys = {"xyz",    "rpy", "quat",      "matrix",
                                                        "stddev", "cov", "covariance"};
 constexpr std::array<std::string_view, 4> kJointKeys = {"position", "stddev", "sample_stddev",
                                                         "origin"};

@@ -29,7 +29,8 @@ TEST_CASE("points: a client transforms as the transform that it looks up") {
   REQUIRE(client);
   const auto X_WH = client->lookup("world", "hand", Query{});
   REQUIRE(X_WH);
-  const std::vector<Point> points = {{random.vector(1)}, {random.vector(1), {}, true}};
+  const std::vector<Point> points = {{random.vector(1)},
+                                     {random.vector(1), Eigen::Matrix3d::Zero(), true}};
   const auto seen = client->transform("world", "hand", points);
   REQUIRE(seen);
   REQUIRE(seen->points.size() == 2);

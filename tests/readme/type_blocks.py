@@ -26,6 +26,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 LINE_SECONDS = 120
 COLUMNS = 80
+COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
 MARK = re.compile(rb"\n=== status (\d+)\n")
 
 
@@ -93,7 +94,7 @@ class Shell:
             new = os.read(self.terminal, 65536) if ready else b""
         except OSError:  # bash has ended
             new = b""
-        self.output = (self.output + new).replace(b"\r\n", b"\n")
+        self.output = COLOUR.sub(b"", (self.output + new).replace(b"\r\n", b"\n"))
         return bool(new)
 
     def __enter__(self):

@@ -88,8 +88,8 @@ TEST_CASE("an invalid entry for a URDF is rejected by name and line") {
   refused("urdf: [{file: x.urdf}]\n",
           "1: urdf[0]: " + folder + "x.urdf: cannot be opened: No such file or directory");
   entry("spam: 1",
-        ": unknown key 'spam'; known are file, root, xyz, rpy, quat, stddev, cov, covariance, "
-        "prefix, links, strict_limits, joints");
+        ": unknown key 'spam'; known are file, root, xyz, rpy, quat, matrix, stddev, cov, "
+        "covariance, prefix, links, strict_limits, joints");
   entry("rpy: [0, 0, 0]", ": rpy needs root: it places the root link in that frame");
   entry("root: ''", ": root is empty");
   entry("root: w, xyz: [1, 2]", ": xyz has 2, not 3 numbers");
