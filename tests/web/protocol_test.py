@@ -248,14 +248,14 @@ class Greedy(unittest.TestCase):
                     page = Page(socket)
                     await page.until(lambda p: p.binary > 0)
                     before = memory()
-                    for i in range(30000):  # of 1.3 kB each
+                    for i in range(20000):  # of 1.3 kB each
                         await page.send(op="past", at=str(i))
                         if i % 100 == 0:
                             await asyncio.sleep(0)
                     await asyncio.sleep(1)
                     self.assertLess(memory() - before, 8000)
                     # The last wish is fulfilled when the page reads again.
-                    await page.until(lambda p: p.base == 29999)
+                    await page.until(lambda p: p.base == 19999)
             asyncio.run(asyncio.wait_for(talk(), 3 * rig.WAIT))
 
 
