@@ -208,7 +208,9 @@ export class Model {
     if (view.getUint32(4, true) !== this.version || past !== this.past) return false;
     const count = view.getUint32(16, true);
     if (kind === 1) {
-      if (past) this.noData.fill(1); else if (this.now === 0n) this.noData.fill(0);
+      // A root has no values.
+      if (past) this.noData = Uint8Array.from(this.parent, (parent) => (parent < 0 ? 0 : 1));
+      else if (this.now === 0n) this.noData.fill(0);
       this.now = base;
       this.takeValues(view, count, base);
     } else {
