@@ -402,26 +402,5 @@ TEST_CASE("an owner's pages list the joints that move its frames") {
   CHECK(arm.directory.joint_owners("elbow").size() == 1);
 }
 
-TEST_CASE("joints that are only shown are listed by name, and move no frame") {
-  Arm arm;
-  arm.load();
-  const Pose before = arm.edge("base", "upper").pose;
-  JointInfo shoulder = arm.info("shoulder");
-  shoulder.position = 0.5;
-  JointInfo ankle = shoulder;
-  ankle.name = "ankle";
-  arm.partition.show({shoulder, ankle});
-  const Reply reply = arm.partition.answer(Request{1, "arm", JointsRequest{}}, kNow);
-  const auto& shown = std::get<std::vector<JointInfo>>(reply.body);
-  REQUIRE(shown.size() == 2);
-  CHECK(shown[0].name == "ankle");
-  CHECK(shown[1].position == 0.5);
-  const Reply next = arm.partition.answer(Request{1, "arm", JointsRequest{"ankle"}}, kNow);
-  CHECK(std::get<std::vector<JointInfo>>(next.body).size() == 1);
-  CHECK(pose_diff(arm.edge("base", "upper").pose, before, 0) == "");
-  arm.partition.show({});
-  CHECK(arm.info("shoulder").position == 0);
-}
-
 }  // namespace
 }  // namespace tfdude

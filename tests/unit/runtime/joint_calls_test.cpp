@@ -48,6 +48,26 @@ TEST_CASE("joints: an update and a sample reach the owner of the joint") {
   CHECK(listed->front().position == 0.25);
 }
 
+TEST_CASE("joints: those that are only shown are listed by name, and move no frame") {
+  LoopbackNetwork network;
+  ScriptedOwner owner(network, "arm", arm());
+  Mover mover(network);
+  const auto before = owner.node().lookup("base", "fore");
+  JointInfo elbow = owner.node().joints("arm")->at(0);
+  elbow.position = 0.5;
+  JointInfo ankle = elbow;
+  ankle.name = "ankle";
+  owner.node().show_joints({elbow, ankle});
+  const auto shown = mover.calls.list("arm");
+  REQUIRE(shown);
+  REQUIRE(shown->size() == 2);
+  CHECK(shown->at(0).name == "ankle");
+  CHECK(shown->at(1).position == 0.5);
+  CHECK(owner.node().lookup("base", "fore")->pose.matrix() == before->pose.matrix());
+  owner.node().show_joints({});
+  CHECK(mover.calls.list("arm")->at(0).position == 0);
+}
+
 TEST_CASE("joints: an unknown joint is reported and the others are published") {
   LoopbackNetwork network;
   ScriptedOwner owner(network, "arm", arm());
