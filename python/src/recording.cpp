@@ -40,24 +40,30 @@ std::vector<Change> events_of(SharedRecording& shared, std::optional<Time> from)
   });
 }
 
-StampedTransform lookup(SharedRecording& shared, const std::string& a, const std::string& b,
-                        const Query& query) {
-  return value_of(shared.call([&](Recording& recording) {
-    return query.at ? recording.lookup_at(a, b, *query.at, query) : recording.lookup(a, b, query);
-  }));
-}
-
 void bind_questions(RecordingClass& cls) {
   cls.def(
       "lookup",
       [](SharedRecording& shared, const std::string& a, const std::string& b, py::handle at,
          py::handle extrapolate, py::handle age_noise_until, int order) {
-        return lookup(shared, a, b, to_query(at, extrapolate, age_noise_until, order));
+        const Query query = to_query(at, extrapolate, age_noise_until, order);
+        return value_of(
+            shared.call([&](Recording& recording) { return recording.lookup(a, b, query); }));
       },
       py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(),
       py::arg("extrapolate") = 0.0, py::arg("age_noise_until") = py::none(), py::arg("order") = 2,
-      "X_AB as Client.lookup() answered it. at: None: at the instant that is shown; else goes\n"
-      "there, and on until all edges have their data. Raises as Client.lookup().");
+      "X_AB as Client.lookup() answered at the instant that is shown. Raises as it does.");
+  cls.def(
+      "lookup_at",
+      [](SharedRecording& shared, const std::string& a, const std::string& b, py::handle at,
+         py::handle timeout) {
+        const Time time = to_time(at);
+        const Milliseconds wait = to_milliseconds(timeout, "timeout");
+        return value_of(shared.call(
+            [&](Recording& recording) { return recording.lookup_at(a, b, time, {}, wait); }));
+      },
+      py::arg("a"), py::arg("b"), py::arg("at"), py::kw_only(), py::arg("timeout") = 10.0,
+      "X_AB at a stamp, as Client.lookup() answered that was asked at that instant and waited:\n"
+      "goes there, and on until all edges have their data. timeout: of the recording's time [s].");
   cls.def(
       "lookup_full",
       [](SharedRecording& shared, const std::string& a, py::handle at_a, const std::string& b,

@@ -80,6 +80,8 @@ def test_a_recording_has_structure_events_and_a_summary(recorded):
     assert recording.step()
     with pytest.raises(LookupException):
         recording.lookup("base", "nowhere")
+    X = recording.lookup_at("base", "hand", max(answers))
+    assert np.allclose(X.matrix, answers[max(answers)].matrix, atol=1e-12)
     with pytest.raises(ExtrapolationException):
         recording.lookup("base", "hand", max(answers) + 3600 * 10**9)
 
