@@ -145,15 +145,23 @@ void fold_level(Boxes& boxes) {
   }
 }
 
-// Leaves out rows at the end of the highest boxes until the picture fits, as far as possible.
+// Leaves out rows at the end of the highest boxes, so that those of one column fit.
 void fold_rows(Boxes& boxes, const GraphMeasures& measures) {
-  while (!fits(boxes, measures)) {
-    const auto highest = std::max_element(
-        boxes.begin(), boxes.end(),
-        [](const GraphBox& a, const GraphBox& b) { return a.rows.size() < b.rows.size(); });
-    if (highest->rows.size() < 2) return;
-    highest->rows.pop_back();
-    ++highest->folded;
+  const auto room_for = [&](std::size_t most) {
+    double height = 0;
+    for (const GraphBox& box : boxes) {
+      const auto rows = static_cast<double>(std::min(box.rows.size(), most) + 1);
+      height += rows * measures.row_height + measures.between;
+    }
+    return kLooseness * height <= kScreenHeight;
+  };
+  constexpr std::size_t kMany = 1000;  // more than a screen has
+  std::size_t most = 1;
+  while (most < kMany && room_for(most + 1)) ++most;
+  for (GraphBox& box : boxes) {
+    if (box.rows.size() <= most) continue;
+    box.folded += box.rows.size() - most;
+    box.rows.erase(box.rows.begin() + static_cast<std::ptrdiff_t>(most), box.rows.end());
   }
 }
 
@@ -170,7 +178,7 @@ std::vector<GraphBox> boxes_of(const std::vector<Frame>& frames, const GraphScop
   Boxes boxes = Builder(frames, scope).build();
   if (scope.depth) return boxes;
   while (levels_of(boxes) > 1 && !fits(boxes, measures)) fold_level(boxes);
-  fold_rows(boxes, measures);
+  if (!fits(boxes, measures)) fold_rows(boxes, measures);
   return boxes;
 }
 

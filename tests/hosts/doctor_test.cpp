@@ -111,6 +111,17 @@ TEST_CASE("hosts: doctor finds a firewall, and the multicast that it drops") {
   CHECK(codes(hosts).empty());
 }
 
+TEST_CASE("hosts: doctor finds a discovery server that does not run") {
+  if (testing::skip_without_hosts()) return;
+  const Hosts hosts(2);
+  const std::string server = testing::discovery_address(kThere);
+  CHECK(codes(hosts, {"--discovery-server", server}) == Codes{"discovery_server", "nobody"});
+  const Process running = testing::start_discovery_server(hosts, kThere);
+  CHECK(codes(hosts, {"--discovery-server", server}) == Codes{"nobody"});
+  const Process daemon = serve(hosts, kThere, {"--discovery-server", server});
+  CHECK(codes(hosts, {"--discovery-server", server}).empty());
+}
+
 TEST_CASE("hosts: doctor measures the clock of another host") {
   if (testing::skip_without_hosts()) return;
   const std::string fake = TFDUDE_FAKETIME;

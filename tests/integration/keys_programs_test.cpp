@@ -6,6 +6,7 @@
 #include <csignal>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -158,6 +159,32 @@ TEST_CASE("keys: each role may do what it says, and is told at once what it may 
   REQUIRE_FALSE(stream);
   CHECK(stream.error().code == Errc::kNotPermitted);
   CHECK(robot.x_of_fore() == 2);
+}
+
+TEST_CASE("keys: doctor finds keys that do not fit, and those about to expire") {
+  SecuredRobot robot;
+  const auto codes = [&](const std::string& keys_of) {
+    const CliResult result = robot.cli(keys_of, {"--json", "doctor"});
+    INFO(result.out << result.err);
+    std::set<std::string> found;
+    for (const json& finding : json::parse(result.out).at("findings")) {
+      found.insert(finding.at("code").get<std::string>());
+    }
+    // They depend on the computer that runs the test, and on other tests there.
+    for (const char* other : {"buffers", "domain", "firewall"}) found.erase(other);
+    return found;
+  };
+  using Codes = std::set<std::string>;
+  CHECK(codes(robot.keys.path("eye")).empty());
+  robot.keys.add("hand", streaming("arm"));
+  CHECK(codes(robot.keys.path("hand")).empty());  // it may not ask for the clock
+  CHECK(codes("") == Codes{"keys_do_not_fit", "nobody"});
+  TestKeys others(now());
+  others.add("eye", looking());
+  CHECK(codes(others.path("eye")) == Codes{"keys_do_not_fit", "nobody"});
+  CHECK(codes(robot.files.path() + "/none") == Codes{"keys_invalid", "nobody"});
+  REQUIRE(renew_identity(robot.keys.path(), "eye", Days(5), now()));
+  CHECK(codes(robot.keys.path("eye")) == Codes{"keys_expire"});
 }
 
 TEST_CASE("keys: who only streams sees the structure, streams, and asks nothing") {

@@ -45,9 +45,6 @@ void ask_domain(Client& client, Facts& facts) {
     if (partition.reachable && partition.compatible()) {
       const auto difference = client.clock_difference(partition.name);
       if (difference) clock = *difference;
-      if (!difference && difference.error().code == Errc::kNotPermitted) {
-        facts.failed = difference.error();
-      }
     }
     facts.met.push_back({std::move(partition), clock});
   }
@@ -84,6 +81,9 @@ Facts gather_facts(const Options& options) {
   facts.profile = profile_of(options);
   facts.discovery_server = options.discovery_server;
   facts.loopback = options.profile == kLocalProfile;
+  if (!options.discovery_server.empty()) {
+    facts.server_fault = fault_of_server(options.discovery_server);
+  }
   if (!options.keys.empty()) facts.keys = find_keys(options.keys, facts.now);
   facts.others = listeners_of(sockets_of(false));
   if (auto client = Client::open(options)) {

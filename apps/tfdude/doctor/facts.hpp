@@ -50,7 +50,8 @@ struct Facts {
   std::uint32_t domain = 0;
   std::string profile;  ///< in words
   std::string discovery_server;
-  bool loopback = false;  ///< this participant uses 127.0.0.1 only
+  std::string server_fault{};  ///< why nobody can listen at its address; empty: not known
+  bool loopback = false;       ///< this participant uses 127.0.0.1 only
 
   // This host.
   std::vector<NetworkInterface> interfaces{};

@@ -126,6 +126,15 @@ void judge_multicast(const Facts& facts, Findings& findings) {
   }
 }
 
+void judge_server(const Facts& facts, Findings& findings) {
+  if (facts.server_fault.empty()) return;
+  findings.push_back({"discovery_server",
+                      "the discovery server " + quote(facts.discovery_server) +
+                          " cannot be reached: " + facts.server_fault,
+                      "start it (examples/discovery-server/start), or correct the address in "
+                      "--discovery-server for all participants"});
+}
+
 void judge_firewall(const Facts& facts, Findings& findings) {
   if (!facts.firewall) return;
   const std::string first = std::to_string(7400 + 250 * facts.domain);
@@ -220,8 +229,10 @@ void judge_nobody(const Facts& facts, Findings& findings) {
   const bool any = here != facts.others.end() && here->second.any();
   const std::string in =
       "no partition answers in domain " + std::to_string(facts.domain) + " with " + facts.profile;
-  const std::string why =
-      facts.failed && facts.failed->code != Errc::kNotPermitted ? ": " + facts.failed->message : "";
+  // What is wrong with keys was found already.
+  const bool by_keys =
+      (facts.keys && !*facts.keys) || (facts.failed && facts.failed->code == Errc::kNotPermitted);
+  const std::string why = facts.failed && !by_keys ? ": " + facts.failed->message : "";
   std::string remedy = any ? "this host has other participants there; a daemon needs up to a "
                              "second until it serves: look at its log"
                            : "this host has no other participant there: start a daemon "
@@ -235,8 +246,9 @@ void judge_nobody(const Facts& facts, Findings& findings) {
 std::vector<Finding> findings_of(const Facts& facts) {
   Findings findings;
   for (const auto judge :
-       {judge_keys, judge_profile, judge_domains, judge_interfaces, judge_multicast, judge_firewall,
-        judge_versions, judge_names, judge_reachable, judge_clocks, judge_buffers, judge_nobody}) {
+       {judge_keys, judge_profile, judge_domains, judge_interfaces, judge_multicast, judge_server,
+        judge_firewall, judge_versions, judge_names, judge_reachable, judge_clocks, judge_buffers,
+        judge_nobody}) {
     judge(facts, findings);
   }
   return findings;
@@ -261,7 +273,8 @@ std::vector<std::string> unchecked_of(const Facts& facts) {
     if (met.partition.reachable && !met.clock) hosts.insert(met.partition.host);
   }
   for (const std::string& host : hosts) {
-    unchecked.push_back("clock of host " + quote(host) + ": it did not answer in time");
+    unchecked.push_back("clock of host " + quote(host) +
+                        ": it did not answer, or may not be asked with these keys");
   }
   return unchecked;
 }

@@ -6,8 +6,10 @@
 #include <fstream>
 #include <ifaddrs.h>
 #include <iterator>
+#include <netdb.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <system_error>
 #include <unistd.h>
 
 #include <arpa/inet.h>
@@ -126,6 +128,29 @@ std::vector<std::uint64_t> own_sockets() {
     inodes.push_back(std::strtoull(target.c_str() + kBegin.size(), nullptr, 10));
   }
   return inodes;
+}
+
+std::string fault_of_server(const std::string& server) {
+  const auto colon = server.rfind(':');
+  const std::string host = server.substr(0, colon);
+  addrinfo wanted{};
+  wanted.ai_family = AF_INET;
+  wanted.ai_socktype = SOCK_DGRAM;
+  addrinfo* found = nullptr;
+  const int failed = getaddrinfo(host.c_str(), server.substr(colon + 1).c_str(), &wanted, &found);
+  if (failed != 0) return std::string("its host is not known: ") + gai_strerror(failed);
+  const Socket socket;
+  const bool connected = connect(socket.get(), found->ai_addr, found->ai_addrlen) == 0;
+  freeaddrinfo(found);
+  // DDS ignores the message. If nobody listens, the host says so.
+  char byte = 0;
+  if (!connected || send(socket.get(), &byte, 1, 0) < 0) {
+    return std::generic_category().message(errno);
+  }
+  pollfd waiting{socket.get(), POLLIN, 0};
+  if (poll(&waiting, 1, kWait) <= 0) return "";
+  if (recv(socket.get(), &byte, 1, 0) >= 0 || errno != ECONNREFUSED) return "";
+  return "nobody listens there";
 }
 
 std::size_t granted_receive_buffer(std::size_t wanted) { return granted(SO_RCVBUF, wanted); }

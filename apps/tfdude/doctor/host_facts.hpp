@@ -14,6 +14,10 @@ namespace tfdude::cli {
 /// The numbers of this process's own sockets.
 [[nodiscard]] std::vector<std::uint64_t> own_sockets();
 
+/// Why nobody can listen at the address of a discovery server (HOST:PORT): its host has no address,
+/// or refuses messages to the port. Empty: somebody may listen.
+[[nodiscard]] std::string fault_of_server(const std::string& server);
+
 /// How much of a requested buffer a UDP socket gets [bytes].
 [[nodiscard]] std::size_t granted_receive_buffer(std::size_t wanted);
 [[nodiscard]] std::size_t granted_send_buffer(std::size_t wanted);

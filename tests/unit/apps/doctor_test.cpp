@@ -72,6 +72,9 @@ TEST_CASE("doctor: an interface is judged if a participant uses it") {
   CHECK(codes(facts) == Codes{"no_multicast"});
   facts.discovery_server = "server:11811";
   CHECK(codes(facts).empty());
+  facts.server_fault = "nobody listens there";
+  CHECK(codes(facts) == Codes{"discovery_server"});
+  facts.server_fault.clear();
   facts.interfaces[1].up = false;
   CHECK(codes(facts) == Codes{"no_network"});
   facts.loopback = true;
