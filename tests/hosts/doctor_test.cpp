@@ -77,6 +77,7 @@ TEST_CASE("hosts: doctor finds other domains and profiles of its host") {
   const Process local = serve(hosts, kHere, {"--local"});
   CHECK(codes(hosts) == Codes{"profile", "nobody"});
   CHECK(codes(hosts, {"--local"}).empty());
+  CHECK(codes(hosts, {"--profile", TFDUDE_LOOPBACK_PROFILE}).empty());
   CHECK(codes(hosts, {"--local", "--domain", "3"}) == Codes{"domain", "nobody"});
   const Process wide = serve(hosts, kHere, {"--domain", "3"});
   CHECK(codes(hosts, {"--local", "--domain", "3"}) == Codes{"profile", "domain", "nobody"});

@@ -166,8 +166,9 @@ TEST_CASE("keys: doctor finds keys that do not fit, and those about to expire") 
   const auto codes = [&](const std::string& keys_of) {
     const CliResult result = robot.cli(keys_of, {"--json", "doctor"});
     INFO(result.out << result.err);
+    const json answer = json::parse(result.out);
     std::set<std::string> found;
-    for (const json& finding : json::parse(result.out).at("findings")) {
+    for (const json& finding : answer.at("findings")) {
       found.insert(finding.at("code").get<std::string>());
     }
     // They depend on the computer that runs the test, and on other tests there.

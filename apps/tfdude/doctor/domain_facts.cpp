@@ -34,6 +34,12 @@ std::vector<PartitionInfo> met_by(Options options) {
   return client->partitions().value_or(std::vector<PartitionInfo>());
 }
 
+// While a participant exists: a profile of a file may be of either kind.
+void look_at_own(Facts& facts) {
+  const Listeners own = listeners_in(sockets_of(true), facts.domain);
+  if (own.any()) facts.loopback = own.everywhere == 0;
+}
+
 void ask_domain(Client& client, Facts& facts) {
   auto partitions = client.partitions();
   if (!partitions) {
@@ -87,13 +93,14 @@ Facts gather_facts(const Options& options) {
   if (!options.keys.empty()) facts.keys = find_keys(options.keys, facts.now);
   facts.others = listeners_of(sockets_of(false));
   if (auto client = Client::open(options)) {
-    // A profile of a file may be of either kind.
-    const auto own = listeners_of(sockets_of(true));
-    const auto here = own.find(options.domain);
-    if (here != own.end()) facts.loopback = here->second.everywhere == 0;
+    look_at_own(facts);
     ask_domain(*client, facts);
   } else {
     facts.failed = client.error();
+    // Perhaps because of its keys.
+    Options plain = options;
+    plain.keys.clear();
+    if (client = Client::open(plain); client) look_at_own(facts);
   }
   look_elsewhere(options, facts);
   facts.interfaces = read_interfaces(facts.loopback);

@@ -89,7 +89,11 @@ struct Finding {
 /// Reads the kernel's list of UDP sockets (/proc/net/udp).
 [[nodiscard]] std::vector<UdpSocket> sockets_in(const std::string& table);
 
-/// The participants that have these sockets, by their domains.
+/// The participants of a domain that have these sockets.
+[[nodiscard]] Listeners listeners_in(const std::vector<UdpSocket>& sockets, std::uint32_t domain);
+
+/// The same for all domains in which somebody listens to multicast, as daemons do. Other ports
+/// may be of any program.
 [[nodiscard]] std::map<std::uint32_t, Listeners> listeners_of(
     const std::vector<UdpSocket>& sockets);
 

@@ -50,22 +50,24 @@ std::vector<UdpSocket> sockets_in(const std::string& table) {
   return sockets;
 }
 
+Listeners listeners_in(const std::vector<UdpSocket>& sockets, std::uint32_t domain) {
+  Listeners listeners;
+  for (const UdpSocket& socket : sockets) {
+    const auto port = port_of(socket);
+    if (!port || port->domain != domain) continue;
+    if (port->offset < kUnicastDiscovery || port->offset % 2 != 0) continue;
+    ++(socket.address == kLoopback ? listeners.loopback : listeners.everywhere);
+  }
+  return listeners;
+}
+
 std::map<std::uint32_t, Listeners> listeners_of(const std::vector<UdpSocket>& sockets) {
   std::map<std::uint32_t, Listeners> domains;
-  // Each participant listens to the multicast of its domain. Ports without that are of others.
   for (const UdpSocket& socket : sockets) {
     const auto port = port_of(socket);
-    if (port && port->offset == 0) domains.emplace(port->domain, Listeners{});
-  }
-  for (const UdpSocket& socket : sockets) {
-    const auto port = port_of(socket);
-    if (!port || port->offset < kUnicastDiscovery || port->offset % 2 != 0) continue;
-    const auto domain = domains.find(port->domain);
-    if (domain == domains.end()) continue;
-    ++(socket.address == kLoopback ? domain->second.loopback : domain->second.everywhere);
-  }
-  for (auto domain = domains.begin(); domain != domains.end();) {
-    domain = domain->second.any() ? std::next(domain) : domains.erase(domain);
+    if (!port || port->offset != 0 || domains.count(port->domain) != 0) continue;
+    const Listeners listeners = listeners_in(sockets, port->domain);
+    if (listeners.any()) domains.emplace(port->domain, listeners);
   }
   return domains;
 }

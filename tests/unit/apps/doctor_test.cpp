@@ -178,6 +178,14 @@ TEST_CASE("doctor: participants are counted by the ports that they listen on") {
   CHECK(listeners.at(61).loopback == 1);
   CHECK(listeners.at(61).everywhere == 0);
   CHECK(listeners.at(62).everywhere == 2);
+  // A client does not listen to multicast.
+  const auto own = sockets_in(
+      "5: 0100007F:5884 00000000:0000 07 00000000:00000000 00:00000000 00000000 0 0 42 2\n");
+  REQUIRE(own.size() == 1);
+  CHECK(own[0].inode == 42);
+  CHECK(listeners_of(own).empty());
+  CHECK(listeners_in(own, 61).loopback == 1);
+  CHECK_FALSE(listeners_in(own, 62).any());
 }
 
 TEST_CASE("doctor: rules of a firewall count if they concern the domain's messages") {
