@@ -40,6 +40,17 @@ std::vector<std::string> labelled(const CLI::App& app, std::string_view label) {
   return found;
 }
 
+// The other lines of a footer.
+std::vector<std::string> unlabelled(const CLI::App& app) {
+  std::vector<std::string> found;
+  std::istringstream lines(app.get_footer());
+  for (std::string line; std::getline(lines, line);) {
+    const bool labelled = line.rfind(kExample, 0) == 0 || line.rfind(kExitStatus, 0) == 0;
+    if (!labelled && !line.empty()) found.push_back(line);
+  }
+  return found;
+}
+
 std::string upper(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
@@ -56,6 +67,20 @@ class Pages : private CLI::Formatter {
   void write() const { write(program_, name_); }
 
  private:
+  void ending(std::ostream& out, const CLI::App& app, bool whole) const {
+    const auto own = labelled(app, kExitStatus);
+    for (const std::string& status : own.empty() ? labelled(program_, kExitStatus) : own) {
+      section(out, "EXIT STATUS", status);
+    }
+    const char* before = ".SH EXAMPLES\n";
+    for (const std::string& example : labelled(app, kExample)) {
+      out << before << ".nf\n" << escaped(example) << "\n.fi\n";
+      before = ".PP\n";
+    }
+    if (whole) return;
+    out << ".SH SEE ALSO\n.BR " << escaped(name_) << " (1),\nfor the options of all commands\n";
+  }
+
   void write(const CLI::App& app, const std::string& called) const {
     std::string page = called;
     std::replace(page.begin(), page.end(), ' ', '-');
@@ -64,6 +89,11 @@ class Pages : private CLI::Formatter {
     out << ".TH \"" << escaped(upper(page)) << "\" 1 \"\" \"" << version() << "\" \"tf\\-dude\"\n";
     section(out, "NAME", page + " - " + description(app));
     out << ".SH SYNOPSIS\n.B " << escaped(called) << '\n' << escaped(usage(app)) << '\n';
+    const char* heading = ".SH DESCRIPTION\n";
+    for (const std::string& line : unlabelled(app)) {
+      out << heading << escaped(line) << '\n';
+      heading = ".PP\n";
+    }
     options(out, app, "ARGUMENTS", true);
     options(out, app, "OPTIONS", false);
     const auto commands = commands_of(app);
@@ -75,17 +105,7 @@ class Pages : private CLI::Formatter {
     for (const ManualSection& one : whole ? more_ : std::vector<ManualSection>()) {
       section(out, one.first, one.second);
     }
-    for (const std::string& status : labelled(program_, kExitStatus)) {
-      section(out, "EXIT STATUS", status);
-    }
-    const char* before = ".SH EXAMPLES\n";
-    for (const std::string& example : labelled(app, kExample)) {
-      out << before << ".nf\n" << escaped(example) << "\n.fi\n";
-      before = ".PP\n";
-    }
-    if (!whole)
-      out << ".SH SEE ALSO\n"
-          << ".BR " << escaped(name_) << " (1), for the options of all commands\n";
+    ending(out, app, whole);
     out.flush();
     if (!out) throw CLI::FileError("cannot write " + folder_ + "/" + page + ".1");
     for (const CLI::App* command : commands) {

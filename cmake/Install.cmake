@@ -39,4 +39,6 @@ configure_file(systemd/tfduded@.service.in ${CMAKE_BINARY_DIR}/systemd/tfduded@.
 install(FILES ${CMAKE_BINARY_DIR}/systemd/tfduded@.service systemd/tfdude.target DESTINATION lib/systemd/system)
 # Where examples/other-dds and examples/ros look for them.
 install(FILES idl/tfdude.idl idl/ros2.idl DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude/idl)
+# What the answers of tfdude --json look like.
+install(FILES docs/cli.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/tfdude)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tfdude)

@@ -73,7 +73,7 @@ void add_pose_options(CLI::App& command, Arguments& arguments) {
 
 void explain_angles(CLI::App& command) {
   command.footer(
-      "Angles are in radians; with --deg in degrees, typed and printed. JSON always has "
+      "Angles are in radians; with --deg in degrees, typed and printed. Answers in JSON have "
       "radians.\n" +
       command.get_footer());
 }

@@ -54,8 +54,7 @@ void add_common_options(CLI::App& app, Arguments& arguments, long& timeout_ms) {
   app.add_flag("--json", arguments.json, "one JSON object per answer");
   app.add_flag_callback(
       "--deg", [&arguments] { arguments.angles = cli::kDegree; },
-      "angles in degrees instead of radians, typed and printed; JSON always has "
-      "radians");
+      "angles in degrees instead of radians, typed and printed; answers in JSON have radians");
 }
 
 // A command about one or two frames asks for them, instead of receiving all frames.
@@ -260,8 +259,10 @@ int main(int argc, char** argv) {
   cli::add_recording_commands(app, arguments, command, local);
   cli::add_web_command(app, argc, argv, local);
   cli::add_keys_commands(app, arguments.keys, local);
-  cli::add_command(app, "doctor", "find out why nobody is met, and what to do", "doctor",
-                   [&local] { local = cli::run_doctor; });
+  auto* doctor = cli::add_command(app, "doctor", "find out why nobody is met, and what to do",
+                                  "doctor", [&local] { local = cli::run_doctor; });
+  doctor->footer("Exit status: 0 no problem found, 1 problems found, 2 wrong usage.\n" +
+                 doctor->get_footer());
   cli::require_numbers(app);
   cli::add_manual(app);
   if (argc > 1 && argv[1] == std::string_view("__complete")) {
