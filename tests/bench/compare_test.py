@@ -44,6 +44,11 @@ class Changes(unittest.TestCase):
             verdicts += bool(self.only(rounds(*before), rounds(*after)).verdict)
         self.assertLess(verdicts, 60, f"seed {seed}")
 
+    def test_only_our_figures_of_which_less_is_better_count(self):
+        for key, unit, counts in (("core/lookup/ours/2/10", "ns", True), ("core/lookup/tf2/2/10", "ns", False),
+                                  ("stream/highest_rate", "Hz", False), ("floor/update/dds/one_core", "us", False)):
+            self.assertEqual(compare.counts({"key": key, "unit": unit, "n": 5}), counts, key)
+
     def test_figures_of_one_side_only_are_left_out(self):
         self.assertEqual(list(compare.changes(rounds(1, 1, 1, 1), [{}, {}, {}, {}])), [])
 
