@@ -20,11 +20,11 @@ Eigen::Matrix3d own_covariance(const Arguments& said) {
 }
 
 Result<std::vector<Point>> points_of(const Arguments& said) {
+  const Eigen::Matrix3d own = own_covariance(said);
   std::vector<Point> points;
   for (std::size_t i = 0; i + 2 < said.points.size(); i += 3) {
-    points.push_back({{said.points[i], said.points[i + 1], said.points[i + 2]},
-                      own_covariance(said),
-                      said.direction});
+    points.push_back(
+        {{said.points[i], said.points[i + 1], said.points[i + 2]}, own, said.direction});
     if (auto ok = check_point(points.back()); !ok) {
       return fail_at("point " + std::to_string(i / 3 + 1), ok.error());
     }
@@ -32,21 +32,10 @@ Result<std::vector<Point>> points_of(const Arguments& said) {
   return points;
 }
 
-nlohmann::json rows_of(const Eigen::MatrixXd& matrix) {
-  nlohmann::json rows = nlohmann::json::array();
-  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
-    const Eigen::VectorXd values = matrix.row(row);
-    rows.push_back(std::vector<double>(values.begin(), values.end()));
-  }
-  return rows;
-}
-
 nlohmann::json json_of(const TransformedPoint& point) {
   const auto list = [](const Eigen::Vector3d& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
-  nlohmann::json json{{"coordinates", list(point.coordinates)},
-                      {"bias", list(point.bias)},
-                      {"covariance", nullptr}};
-  json[point.complete ? "covariance" : "covariance_of_specified"] = rows_of(point.of_specified);
+  nlohmann::json json{{"coordinates", list(point.coordinates)}, {"bias", list(point.bias)}};
+  add_covariance(json, "covariance", point.of_specified, point.complete);
   return json;
 }
 
@@ -63,17 +52,6 @@ std::string describe(const TransformedPoint& point, const Arguments& said,
   constexpr double kVisible = 5e-7;
   return point.bias.cwiseAbs().maxCoeff() < kVisible ? text
                                                      : text + line("mean off by", point.bias);
-}
-
-std::string table_of(const Eigen::MatrixXd& matrix) {
-  std::string text;
-  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
-    for (Eigen::Index column = 0; column < matrix.cols(); ++column) {
-      text += format(" % .5e", matrix(row, column));
-    }
-    text += "\n";
-  }
-  return text;
 }
 
 }  // namespace
@@ -99,10 +77,9 @@ int run_point(Source source, const Arguments& arguments) {
   if (arguments.joint_covariance) {
     const Eigen::MatrixXd joint = joint_covariance(*X_AB, *points, query.order);
     const bool complete = X_AB->covariance.complete();
-    json["joint_covariance"] = nullptr;
-    json[complete ? "joint_covariance" : "joint_covariance_of_specified"] = rows_of(joint);
+    add_covariance(json, "joint_covariance", joint, complete);
     text += std::string("covariance   of all points") + (complete ? "" : ", of the others") +
-            (arguments.direction ? "\n" : " [m²]\n") + table_of(joint);
+            (arguments.direction ? "\n" : " [m²]\n") + rows_text(joint);
   }
   if (X_AB->stamp && !arguments.json) {
     text += describe_stamp(X_AB->stamp, present(source, arguments, arguments.id, arguments.other));

@@ -101,29 +101,38 @@ std::string partition_table(const std::vector<PartitionRow>& rows) {
   return text;
 }
 
-std::string matrix_table(const Matrix6d& sigma, const AngleUnit& angles) {
-  Twist scale = Twist::Ones();
-  scale.tail<3>().setConstant(angles.per_radian);
+std::string rows_text(const Eigen::MatrixXd& matrix) {
   std::string text;
-  for (const char* axis : {"x", "y", "z", "rx", "ry", "rz"}) text += format(" %12s", axis);
-  text += "\n";
-  for (int row = 0; row < 6; ++row) {
-    for (int column = 0; column < 6; ++column) {
-      text += format(" % .5e", scale[row] * sigma(row, column) * scale[column]);
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    for (Eigen::Index column = 0; column < matrix.cols(); ++column) {
+      text += format(" % .5e", matrix(row, column));
     }
     text += "\n";
   }
   return text;
 }
 
-nlohmann::json matrix_json(const Matrix6d& sigma) {
+std::string matrix_table(const Matrix6d& sigma, const AngleUnit& angles) {
+  Twist scale = Twist::Ones();
+  scale.tail<3>().setConstant(angles.per_radian);
+  std::string text;
+  for (const char* axis : {"x", "y", "z", "rx", "ry", "rz"}) text += format(" %12s", axis);
+  return text + "\n" + rows_text(scale.asDiagonal() * sigma * scale.asDiagonal());
+}
+
+nlohmann::json matrix_json(const Eigen::MatrixXd& matrix) {
   nlohmann::json rows = nlohmann::json::array();
-  for (int row = 0; row < 6; ++row) {
-    nlohmann::json line = nlohmann::json::array();
-    for (int column = 0; column < 6; ++column) line.push_back(sigma(row, column));
-    rows.push_back(std::move(line));
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    const Eigen::VectorXd values = matrix.row(row);
+    rows.push_back(std::vector<double>(values.begin(), values.end()));
   }
   return rows;
+}
+
+void add_covariance(nlohmann::json& json, const std::string& key, const Eigen::MatrixXd& sigma,
+                    bool complete) {
+  json[key] = nullptr;
+  json[complete ? key : key + "_of_specified"] = matrix_json(sigma);
 }
 
 std::string unspecified_text(const std::vector<std::string>& edges) {
@@ -185,11 +194,9 @@ nlohmann::json lookup_json(const std::string& a, const std::string& b, const Tra
                          {"to", b},
                          {"translation", {t.x(), t.y(), t.z()}},
                          {"rotation", {q.x(), q.y(), q.z(), q.w()}},
-                         {"covariance", nullptr},
                          {"partitions", partitions}};
-  // Under another key if it is not all, so that nobody takes it for that.
-  json[X_AB.covariance.complete() ? "covariance" : "covariance_of_specified"] =
-      matrix_json(X_AB.covariance.of_specified().matrix());
+  add_covariance(json, "covariance", X_AB.covariance.of_specified().matrix(),
+                 X_AB.covariance.complete());
   return json;
 }
 

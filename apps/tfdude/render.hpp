@@ -37,10 +37,17 @@ struct Shown {
 [[nodiscard]] std::string describe(const Transform& X_AB, const Shown& shown,
                                    const std::vector<std::string>& unspecified = {});
 
-/// A table of the covariance, whose last three rows and columns are of angles, and its rows in
-/// JSON [m, rad].
+/// A table of the covariance, whose last three rows and columns are of angles.
 [[nodiscard]] std::string matrix_table(const Matrix6d& sigma, const AngleUnit& angles);
-[[nodiscard]] nlohmann::json matrix_json(const Matrix6d& sigma);
+
+/// The rows of a matrix, as text and in JSON.
+[[nodiscard]] std::string rows_text(const Eigen::MatrixXd& matrix);
+[[nodiscard]] nlohmann::json matrix_json(const Eigen::MatrixXd& matrix);
+
+/// Adds a covariance under its key; if it is not complete, null there, and the rest under another
+/// key, so that nobody takes it for that.
+void add_covariance(nlohmann::json& json, const std::string& key, const Eigen::MatrixXd& sigma,
+                    bool complete);
 
 /// "unspecified for odom, base"
 [[nodiscard]] std::string unspecified_text(const std::vector<std::string>& edges);

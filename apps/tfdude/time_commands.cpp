@@ -171,11 +171,7 @@ nlohmann::json path_json(Source source, const Arguments& arguments, const Stampe
   auto json = lookup_json(arguments.id, arguments.other, X_AB, partitions);
   add_stamp(json, X_AB.stamp);
   json["basis"] = basis_json(X_AB.basis);
-  if (!arguments.matrix) return json;
-  const Eigen::Matrix4d matrix = X_AB.pose.matrix();
-  for (int row = 0; row < 4; ++row) {
-    json["matrix"].push_back({matrix(row, 0), matrix(row, 1), matrix(row, 2), matrix(row, 3)});
-  }
+  if (arguments.matrix) json["matrix"] = matrix_json(X_AB.pose.matrix());
   return json;
 }
 

@@ -157,12 +157,11 @@ nlohmann::json velocity_json(const std::string& a, const std::string& b, const V
                       {"to", b},
                       {"linear", {v.x(), v.y(), v.z()}},
                       {"angular", {w.x(), w.y(), w.z()}},
-                      {"covariance", nullptr},
                       {"begin_ns", ns(velocity.begin)},
                       {"end_ns", ns(velocity.end)},
                       {"basis", basis_json(velocity.basis)}};
-  json[velocity.covariance.complete() ? "covariance" : "covariance_of_specified"] =
-      matrix_json(velocity.covariance.of_specified().matrix());
+  add_covariance(json, "covariance", velocity.covariance.of_specified().matrix(),
+                 velocity.covariance.complete());
   return json;
 }
 
