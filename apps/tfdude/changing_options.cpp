@@ -74,8 +74,7 @@ void add_frame_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
                              "update tool --rpy 0 0 1.57", run_update, chosen);
   add_id(update, arguments);
   add_pose_options(*update, arguments);
-  add_stamp(update, "--stamp", arguments.stamp,
-            "make it a sample of this instant: seconds since the epoch or, negative, before now");
+  add_sample_stamp(update, arguments);
   add_id(add_command(app, "remove", "remove a frame and all below it", "remove tool", run_remove,
                      chosen),
          arguments);

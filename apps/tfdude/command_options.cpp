@@ -39,6 +39,21 @@ CLI::Option* add_stamp(CLI::App* command, const char* name, std::string& stamp, 
       });
 }
 
+void add_sample_stamp(CLI::App* command, Arguments& arguments) {
+  add_stamp(command, "--stamp", arguments.stamp,
+            "make it a sample of this instant: seconds since the epoch or, negative, before now");
+}
+
+void add_instant(CLI::App* command, Arguments& arguments) {
+  add_stamp(command, "--at", arguments.stamp,
+            "the instant: seconds since the epoch or, negative, before now");
+}
+
+void add_order(CLI::App* command, Arguments& arguments) {
+  command->add_option("--order", arguments.order, "order of covariance propagation: 2 or 4")
+      ->check(CLI::IsMember({2, 4}));
+}
+
 std::function<std::string(const std::string&)> within(double least, double most,
                                                       const char* range) {
   return [=](const std::string& text) {

@@ -29,6 +29,13 @@ void add_ends(CLI::App* command, Arguments& arguments);
 /// Adds an option for a stamp, see parse_stamp().
 CLI::Option* add_stamp(CLI::App* command, const char* name, std::string& stamp, const char* help);
 
+/// The same for the stamp that makes a value a sample, and for the instant of a question.
+void add_sample_stamp(CLI::App* command, Arguments& arguments);
+void add_instant(CLI::App* command, Arguments& arguments);
+
+/// Adds the order of covariance propagation.
+void add_order(CLI::App* command, Arguments& arguments);
+
 /// Checks that a number is within a range, which the message names as `range`. CLI::Range would
 /// accept NaN.
 std::function<std::string(const std::string&)> within(double least, double most, const char* range);

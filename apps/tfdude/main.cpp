@@ -88,8 +88,7 @@ void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen,
   add_ends(lookup, arguments);
   add_printing(lookup, arguments);
   auto* watch = lookup->add_flag("--watch", arguments.watch, kWatchHelp);
-  add_stamp(lookup, "--at", arguments.stamp,
-            "the instant: seconds since the epoch or, negative, before now");
+  cli::add_instant(lookup, arguments);
   auto* fixed =
       lookup->add_option("--fixed", arguments.fixed,
                          "frame that does not move between --at (for A) and --at-b (for B)");
@@ -99,8 +98,7 @@ void add_lookup_command(CLI::App& app, Arguments& arguments, Command& chosen,
                    "how far to extrapolate beyond an edge's newest sample");
   lookup->add_flag("--age-noise", arguments.age_noise,
                    "add the edges' process noise from --at until now");
-  lookup->add_option("--order", arguments.order, "order of covariance propagation: 2 or 4")
-      ->check(CLI::IsMember({2, 4}));
+  cli::add_order(lookup, arguments);
   add_milliseconds(lookup, "--wait", arguments.wait_ms, "how long to wait for frames and data");
   lookup->get_option("--wait")->excludes(fixed);
   cli::add_recording(lookup, arguments, local, cli::run_lookup);
@@ -188,8 +186,7 @@ void add_picture_commands(CLI::App& app, Arguments& arguments, Command& chosen,
   plot->add_option("--samples", arguments.samples,
                    "number of points to sample from the edges' errors")
       ->check(CLI::Range(1, 100000));
-  add_stamp(plot, "--at", arguments.stamp,
-            "the instant: seconds since the epoch or, negative, before now");
+  cli::add_instant(plot, arguments);
   cli::add_recording(plot, arguments, local, cli::run_plot);
   auto* graph = add_command(app, "graph", "draw all frames with their owners, ages, deviations",
                             "graph --out frames.svg", cli::run_graph, chosen);
@@ -295,11 +292,12 @@ int main(int argc, char** argv) {
   sigemptyset(&stop_signals);
   sigaddset(&stop_signals, SIGINT);
   sigaddset(&stop_signals, SIGTERM);
-  for (const char* name :
-       {"watch", "echo", "monitor", "events", "record", "replay", "publish", "joint"}) {
-    if (app.got_subcommand(name) || arguments.watch)
-      pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
-  }
+  const auto follows = {"watch", "echo", "monitor", "events", "record", "replay"};
+  const bool until_interrupted =
+      arguments.watch || !arguments.from.empty() ||
+      std::any_of(follows.begin(), follows.end(),
+                  [&app](const char* name) { return app.got_subcommand(name); });
+  if (until_interrupted) pthread_sigmask(SIG_BLOCK, &stop_signals, nullptr);
   log_fastdds_to_standard_error();
   cli::terminal() = cli::terminal_of(STDOUT_FILENO);
   const int status = run(arguments, command, local);

@@ -3,9 +3,6 @@
 namespace tfdude::cli {
 namespace {
 
-constexpr const char* kStampHelp =
-    "make it a sample of this instant: seconds since the epoch or, negative, before now";
-
 void add_pace(CLI::App* command, Arguments& arguments, CLI::Option* file) {
   command->add_option("--rate", arguments.pace, "lines per second; default: as they come")
       ->type_name("HZ")
@@ -24,11 +21,11 @@ void add_joint_command(CLI::App& app, Arguments& arguments, Command& chosen) {
                    "standard deviation of the positions [rad or m]")
       ->type_name("NUMBER")
       ->check(within(0, 1e9, "0 to 1e9"));
-  auto* stamp = add_stamp(joint, "--stamp", arguments.stamp, kStampHelp);
+  add_sample_stamp(joint, arguments);
   auto* from = joint->add_option("--from", arguments.from,
                                  "positions from this file, or - for standard input: the lines of "
                                  "tfdude publish, each acknowledged");
-  from->type_name("FILE")->excludes(joints)->excludes(stamp)->excludes("--stddev");
+  from->type_name("FILE")->excludes(joints)->excludes("--stamp")->excludes("--stddev");
   add_pace(joint, arguments, from);
   explain_angles(*joint);
 }
@@ -69,10 +66,8 @@ void add_point_command(CLI::App& app, Arguments& arguments, Command& chosen, Loc
   point->add_flag("--direction", arguments.direction, "directions, which are only turned");
   point->add_flag("--joint", arguments.joint_covariance,
                   "print the covariance of all points together");
-  point->add_option("--order", arguments.order, "order of covariance propagation: 2 or 4")
-      ->check(CLI::IsMember({2, 4}));
-  add_stamp(point, "--at", arguments.stamp,
-            "the instant: seconds since the epoch or, negative, before now");
+  add_order(point, arguments);
+  add_instant(point, arguments);
   add_recording(point, arguments, local, run_point);
   point->parse_complete_callback([&arguments] {
     if (arguments.points.size() % 3 == 0) return;
