@@ -240,7 +240,7 @@ Result<Sample> SampleReader::read_row(const std::string& line) const {
       const auto stamp = stamp_of(value);
       if (!stamp) return tl::unexpected(stamp.error());
       sample.stamp = *stamp;
-    } else if (std::find(columns_.begin(), columns_.end(), "edge") != columns_.end()) {
+    } else if (edges_) {
       *place_of(column, spec) = value;
     } else {
       const auto at = position(column, value);
@@ -248,7 +248,10 @@ Result<Sample> SampleReader::read_row(const std::string& line) const {
       sample.joints.push_back({column, *at});
     }
   }
-  if (!sample.joints.empty()) return sample;
+  if (!edges_) {
+    if (sample.joints.empty()) return wrong("neither an edge nor a joint");
+    return sample;
+  }
   auto update = finish_edge(edge, std::move(spec), angles_);
   if (!update) return tl::unexpected(update.error());
   sample.edges.push_back(*std::move(update));
@@ -263,6 +266,7 @@ Result<std::optional<Sample>> SampleReader::read(const std::string& line) {
     if (auto ok = check_columns(columns); !ok) return tl::unexpected(ok.error());
     form_ = Form::kCsv;
     columns_ = columns;
+    edges_ = std::find(columns.begin(), columns.end(), "edge") != columns.end();
     return std::nullopt;
   }
   if (form_ == Form::kUndecided) form_ = Form::kJson;

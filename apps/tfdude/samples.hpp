@@ -48,6 +48,7 @@ class SampleReader {
   std::map<std::string, JointInfo> joints_;
   Form form_ = Form::kUndecided;
   std::vector<std::string> columns_;
+  bool edges_ = false;  // a row is an edge; otherwise its columns are joints
 };
 
 }  // namespace tfdude::cli
