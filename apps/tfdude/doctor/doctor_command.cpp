@@ -50,17 +50,18 @@ std::string interfaces_text(const std::vector<NetworkInterface>& interfaces) {
 int run_doctor(const Arguments& arguments) {
   const Facts facts = gather_facts(arguments.options);
   const auto findings = findings_of(facts);
+  const auto unchecked = unchecked_of(facts);
   json object{{"domain", facts.domain},
               {"met", json::array()},
               {"findings", json::array()},
-              {"unchecked", unchecked_of(facts)}};
+              {"unchecked", unchecked}};
   std::string text = "domain       " + std::to_string(facts.domain) + ", " + facts.profile + "\n" +
                      interfaces_text(facts.interfaces);
   for (const Met& met : facts.met) {
     object["met"].push_back(met_json(met));
     text += met_text(met);
   }
-  for (const std::string& one : unchecked_of(facts))
+  for (const std::string& one : unchecked)
     text += painted(Look::kWarning, "not checked  " + one) + "\n";
   for (const Finding& finding : findings) {
     object["findings"].push_back(

@@ -57,8 +57,7 @@ void ask_domain(Client& client, Facts& facts) {
 }
 
 void look_elsewhere(const Options& options, Facts& facts) {
-  const auto here = facts.others.find(facts.domain);
-  const Listeners others = here != facts.others.end() ? here->second : Listeners{};
+  const Listeners others = facts.others_here();
   if ((facts.loopback ? others.everywhere : others.loopback) > 0) {
     Options other = options;
     other.profile = facts.loopback ? "" : kLocalProfile;

@@ -71,6 +71,12 @@ struct Facts {
 
   std::optional<Result<KeyFiles>> keys{};  ///< absent: none are used
   Time now{};
+
+  /// Others in the same domain.
+  [[nodiscard]] Listeners others_here() const {
+    const auto here = others.find(domain);
+    return here != others.end() ? here->second : Listeners{};
+  }
 };
 
 /// What is wrong, and what to do.
@@ -85,6 +91,18 @@ struct Finding {
 
 /// What could not be checked, and how it could: one sentence each.
 [[nodiscard]] std::vector<std::string> unchecked_of(const Facts& facts);
+
+/// The UDP ports that DDS gives to a domain, both included.
+struct Ports {
+  std::uint32_t first;
+  std::uint32_t last;
+};
+inline constexpr std::uint32_t kFirstPort = 7400;
+inline constexpr std::uint32_t kPortsOfDomain = 250;
+[[nodiscard]] constexpr Ports ports_of(std::uint32_t domain) {
+  const std::uint32_t first = kFirstPort + kPortsOfDomain * domain;
+  return {first, first + kPortsOfDomain - 1};
+}
 
 /// Reads the kernel's list of UDP sockets (/proc/net/udp).
 [[nodiscard]] std::vector<UdpSocket> sockets_in(const std::string& table);

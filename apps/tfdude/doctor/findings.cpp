@@ -63,8 +63,7 @@ void judge_keys(const Facts& facts, Findings& findings) {
 }
 
 void judge_profile(const Facts& facts, Findings& findings) {
-  const auto here = facts.others.find(facts.domain);
-  const Listeners others = here != facts.others.end() ? here->second : Listeners{};
+  const Listeners others = facts.others_here();
   const std::size_t other = facts.loopback ? others.everywhere : others.loopback;
   const bool known = !facts.of_other_profile.empty();
   if (!known && (other == 0 || !facts.met.empty())) return;
@@ -137,12 +136,11 @@ void judge_server(const Facts& facts, Findings& findings) {
 
 void judge_firewall(const Facts& facts, Findings& findings) {
   if (!facts.firewall) return;
-  const std::string first = std::to_string(7400 + 250 * facts.domain);
-  const std::string last = std::to_string(7649 + 250 * facts.domain);
+  const Ports ports = ports_of(facts.domain);
   for (const std::string& rule : blocking_rules(*facts.firewall, facts.domain)) {
-    findings.push_back(
-        {"firewall", "a rule of the firewall may drop messages: " + rule,
-         "accept UDP to the ports " + first + " to " + last + ", as in docs/several-hosts.md"});
+    findings.push_back({"firewall", "a rule of the firewall may drop messages: " + rule,
+                        "accept UDP to the ports " + std::to_string(ports.first) + " to " +
+                            std::to_string(ports.last) + ", as in docs/several-hosts.md"});
   }
 }
 

@@ -7,18 +7,13 @@
 namespace tfdude::cli {
 namespace {
 
-struct Range {
-  unsigned long first;
-  unsigned long last;
-};
-
 bool has(const std::string& line, std::string_view word) {
   return line.find(word) != std::string::npos;
 }
 
 // The destination ports of UDP that a rule names; none: it names none.
-std::vector<Range> udp_ports(const std::string& rule) {
-  std::vector<Range> ports;
+std::vector<Ports> udp_ports(const std::string& rule) {
+  std::vector<Ports> ports;
   const auto at = rule.find("udp dport ");
   if (at == std::string::npos) return ports;
   std::string text = rule.substr(at + 10);
@@ -30,17 +25,19 @@ std::vector<Range> udp_ports(const std::string& rule) {
       continue;
     }
     char* end = nullptr;
-    const unsigned long first = std::strtoul(text.c_str() + i, &end, 10);
-    unsigned long last = first;
-    if (*end == '-') last = std::strtoul(end + 1, &end, 10);
+    const auto number = [&end](const char* at) {
+      return static_cast<std::uint32_t>(std::strtoul(at, &end, 10));
+    };
+    const std::uint32_t first = number(text.c_str() + i);
+    const std::uint32_t last = *end == '-' ? number(end + 1) : first;
     ports.push_back({first, last});
     i = static_cast<std::size_t>(end - text.c_str());
   }
   return ports;
 }
 
-bool any_overlaps(const std::vector<Range>& ports, const Range& range) {
-  for (const Range& one : ports) {
+bool any_overlaps(const std::vector<Ports>& ports, const Ports& range) {
+  for (const Ports& one : ports) {
     if (one.first <= range.last && range.first <= one.last) return true;
   }
   return false;
@@ -70,7 +67,7 @@ struct Chain {
 }  // namespace
 
 std::vector<std::string> blocking_rules(const std::string& ruleset, std::uint32_t domain) {
-  const Range ports{7400 + 250UL * domain, 7649 + 250UL * domain};
+  const Ports ports = ports_of(domain);
   std::vector<std::string> blocking;
   std::string table;
   Chain chain;

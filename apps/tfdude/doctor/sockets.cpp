@@ -7,8 +7,6 @@
 namespace tfdude::cli {
 namespace {
 
-constexpr std::uint32_t kFirstPort = 7400;
-constexpr std::uint32_t kPortsOfDomain = 250;
 constexpr std::uint32_t kLastDomain = 232;
 constexpr std::uint32_t kUnicastDiscovery = 10;  // plus 2 n of the n-th participant
 constexpr std::uint32_t kLoopback = 0x7F000001;
