@@ -30,25 +30,26 @@ std::string escaped(std::string_view text) {
   return roff;
 }
 
-// The rest of each line of a footer that begins with a label.
-std::vector<std::string> labelled(const CLI::App& app, std::string_view label) {
-  std::vector<std::string> found;
-  std::istringstream lines(app.get_footer());
-  for (std::string line; std::getline(lines, line);) {
-    if (line.rfind(label, 0) == 0) found.push_back(line.substr(label.size()));
-  }
-  return found;
-}
+// The lines of a footer, by the label with which they begin.
+struct Footer {
+  std::vector<std::string> remarks;  // without a label
+  std::vector<std::string> statuses;
+  std::vector<std::string> examples;
+};
 
-// The other lines of a footer.
-std::vector<std::string> unlabelled(const CLI::App& app) {
-  std::vector<std::string> found;
+Footer footer_of(const CLI::App& app) {
+  Footer footer;
   std::istringstream lines(app.get_footer());
   for (std::string line; std::getline(lines, line);) {
-    const bool labelled = line.rfind(kExample, 0) == 0 || line.rfind(kExitStatus, 0) == 0;
-    if (!labelled && !line.empty()) found.push_back(line);
+    if (line.rfind(kExample, 0) == 0) {
+      footer.examples.push_back(line.substr(kExample.size()));
+    } else if (line.rfind(kExitStatus, 0) == 0) {
+      footer.statuses.push_back(line.substr(kExitStatus.size()));
+    } else if (!line.empty()) {
+      footer.remarks.push_back(line);
+    }
   }
-  return found;
+  return footer;
 }
 
 std::string upper(std::string text) {
@@ -67,13 +68,13 @@ class Pages : private CLI::Formatter {
   void write() const { write(program_, name_); }
 
  private:
-  void ending(std::ostream& out, const CLI::App& app, bool whole) const {
-    const auto own = labelled(app, kExitStatus);
-    for (const std::string& status : own.empty() ? labelled(program_, kExitStatus) : own) {
+  void ending(std::ostream& out, const Footer& footer, bool whole) const {
+    const auto& own = footer.statuses;
+    for (const std::string& status : own.empty() ? footer_of(program_).statuses : own) {
       section(out, "EXIT STATUS", status);
     }
     const char* before = ".SH EXAMPLES\n";
-    for (const std::string& example : labelled(app, kExample)) {
+    for (const std::string& example : footer.examples) {
       out << before << ".nf\n" << escaped(example) << "\n.fi\n";
       before = ".PP\n";
     }
@@ -89,8 +90,9 @@ class Pages : private CLI::Formatter {
     out << ".TH \"" << escaped(upper(page)) << "\" 1 \"\" \"" << version() << "\" \"tf\\-dude\"\n";
     section(out, "NAME", page + " - " + description(app));
     out << ".SH SYNOPSIS\n.B " << escaped(called) << '\n' << escaped(usage(app)) << '\n';
+    const Footer footer = footer_of(app);
     const char* heading = ".SH DESCRIPTION\n";
-    for (const std::string& line : unlabelled(app)) {
+    for (const std::string& line : footer.remarks) {
       out << heading << escaped(line) << '\n';
       heading = ".PP\n";
     }
@@ -105,7 +107,7 @@ class Pages : private CLI::Formatter {
     for (const ManualSection& one : whole ? more_ : std::vector<ManualSection>()) {
       section(out, one.first, one.second);
     }
-    ending(out, app, whole);
+    ending(out, footer, whole);
     out.flush();
     if (!out) throw CLI::FileError("cannot write " + folder_ + "/" + page + ".1");
     for (const CLI::App* command : commands) {
