@@ -14,15 +14,11 @@
 
 #include <spdlog/pattern_formatter.h>
 
+#include "environment.hpp"
+
 // What a program tells systemd if that has started it: the protocols of sd_notify(3) and of
 // sd-daemon(3). Without systemd all of this does nothing.
 namespace tfdude::cli {
-
-/// A variable of the environment; empty if there is none.
-[[nodiscard]] inline std::string environment(const char* name) {
-  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nothing sets variables
-  return value == nullptr ? std::string() : std::string(value);
-}
 
 /// Tells the service manager a state, such as "READY=1".
 inline void notify(const std::string& state) {

@@ -1,7 +1,6 @@
 #include "arguments.hpp"
 
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +10,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/types/version.hpp"
 
+#include "../environment.hpp"
 #include "../manual.hpp"
 #include "../network_options.hpp"
 #include "../numbers.hpp"
@@ -18,11 +18,6 @@
 
 namespace tfdude::ros {
 namespace {
-
-std::string variable(const char* name) {
-  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): no other threads yet
-  return value == nullptr ? std::string() : std::string(value);
-}
 
 // The options that say the same as the configuration, and have priority over it.
 class Options {
@@ -138,7 +133,7 @@ std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kWrongUsage;
   }
-  auto read = read_environment(variable, settings);
+  auto read = read_environment(cli::environment, settings);
   if (read) read = options.apply(settings);
   if (read) return std::nullopt;
   std::fprintf(stderr, "tfdude-ros: %s\n", read.error().message.c_str());
