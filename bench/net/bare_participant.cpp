@@ -111,7 +111,7 @@ class Bare {
     readers_.push_back(std::make_shared<Reader<Sample>>(
         context(), topic<Type>(name), partition, profile,
         typename Reader<Sample>::Calls{
-            [on_sample](const Sample& sample, const ertps::GUID_t&) { on_sample(sample); },
+            [on_sample](const Sample& sample, const edds::SampleInfo&) { on_sample(sample); },
             nullptr}));
   }
   template <class Type>

@@ -57,7 +57,7 @@ class Member {
       const std::string& profile = "presence_reader") {
     return std::make_unique<Beats>(
         Context{*participant_, profiles_, *gate_, counters_, announced_}, *topic_, "", profile,
-        Beats::Calls{[on_sample](const wire::Presence&, const ertps::GUID_t&) { on_sample(); },
+        Beats::Calls{[on_sample](const wire::Presence&, const edds::SampleInfo&) { on_sample(); },
                      [&matches](const ertps::GUID_t&, int) { ++matches; }});
   }
   [[nodiscard]] std::unique_ptr<Writer> write(const std::string& profile = "presence_writer") {

@@ -12,7 +12,7 @@ ClockChannel::ClockChannel(const Context& context, edds::Topic& topic,
     : context_(context), topic_(topic) {
   if (!on_clock) return;
   const auto take = [on_clock = std::move(on_clock)](const wire::Clock& sample,
-                                                     const ertps::GUID_t&) {
+                                                     const edds::SampleInfo&) {
     const auto now = from_wire(sample);
     if (!now) return log_refused(kClockTopic, now.error());
     on_clock(*now);

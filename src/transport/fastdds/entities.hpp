@@ -12,7 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "tfdude/base/time.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
 #include "base/mutex.hpp"
@@ -108,6 +107,11 @@ class Writer final : public edds::DataWriterListener {
   GrowingStamp source_stamp_;     // under writing_
 };
 
+/// Who has written a sample.
+[[nodiscard]] inline const ertps::GUID_t& writer_of(const edds::SampleInfo& info) {
+  return info.sample_identity.writer_guid();
+}
+
 /// A reader with its own subscriber, hence in its own DDS partition. It passes DDS samples on one
 /// at a time, those of one writer in the order in which they were written.
 template <class Sample>
@@ -115,10 +119,8 @@ class Reader : public edds::DataReaderListener {
  public:
   /// What to call. +1: a writer was matched; -1: no more.
   struct Calls {
-    std::function<void(const Sample&, const ertps::GUID_t& writer)> on_sample;
+    std::function<void(const Sample&, const edds::SampleInfo&)> on_sample;
     std::function<void(const ertps::GUID_t& writer, int change)> on_matched;
-    /// Instead of on_sample, with the time at which it was written, by the writer's system clock.
-    std::function<void(const Sample&, const ertps::GUID_t& writer, Time sent)> on_dated_sample{};
   };
 
   Reader(const Context& context, edds::TopicDescription& topic, const std::string& partition,
@@ -163,15 +165,7 @@ class Reader : public edds::DataReaderListener {
     std::sort(batch_.begin(), end, [](const Taken& a, const Taken& b) {
       return a.info.sample_identity.sequence_number() < b.info.sample_identity.sequence_number();
     });
-    for (auto one = batch_.begin(); one != end; ++one) {
-      const auto& writer = one->info.sample_identity.writer_guid();
-      if (calls_.on_dated_sample) {
-        const Time sent{std::chrono::nanoseconds(one->info.source_timestamp.to_ns())};
-        calls_.on_dated_sample(one->sample, writer, sent);
-      } else {
-        calls_.on_sample(one->sample, writer);
-      }
-    }
+    for (auto one = batch_.begin(); one != end; ++one) calls_.on_sample(one->sample, one->info);
   }
 
   void on_requested_incompatible_qos(edds::DataReader* reader,

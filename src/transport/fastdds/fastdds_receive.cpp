@@ -55,14 +55,14 @@ void FastDdsTransport::take_joints(const wire::Joints& sample) {
 }
 
 // A reply is believed only from whom was asked: it names the owner whose partition it came through.
-void FastDdsTransport::take_reply(const wire::Reply& sample, const ertps::GUID_t& writer,
-                                  Time sent) {
+void FastDdsTransport::take_reply(const wire::Reply& sample, const edds::SampleInfo& info) {
+  const ertps::GUID_t& writer = writer_of(info);
   peers_.replied(writer.guidPrefix);
   if (sample.body()._d() == kAlive) return;  // that it arrives says all
   const std::string owner = owner_of_replies(writer_partitions_.of(writer));
   auto reply = from_wire(sample);
   if (reply) {
-    reply->sent = sent;
+    reply->sent = Time(std::chrono::nanoseconds(info.source_timestamp.to_ns()));
     handler_->on_reply(owner, *reply);
   } else {
     // Who awaits it gets the error; if nobody does, a stranger has sent it.

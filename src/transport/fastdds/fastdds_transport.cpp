@@ -119,7 +119,7 @@ void FastDdsTransport::take_times(edds::DomainParticipantQos& qos) {
 }
 
 Result<void> FastDdsTransport::create_endpoints() {
-  using Guid = ertps::GUID_t;
+  using Info = edds::SampleInfo;
   senders_.emplace(
       Senders::Parts{context(), topics_, peers_, attention_, access_, options_.domain});
   contact_.emplace(peers_, attention_, *senders_, !announced_by_dds_);
@@ -132,22 +132,23 @@ Result<void> FastDdsTransport::create_endpoints() {
   clock_.emplace(context(), *topics_.clock, std::move(on_clock));
   presence_ = std::make_unique<Reader<wire::Presence>>(
       context(), *topics_.presence, kAllOwners, "presence_reader",
-      Reader<wire::Presence>::Calls{
-          [this](const wire::Presence& sample, const Guid& from) { take_presence(sample, from); },
-          nullptr});
+      Reader<wire::Presence>::Calls{[this](const wire::Presence& sample, const Info& info) {
+                                      take_presence(sample, writer_of(info));
+                                    },
+                                    nullptr});
   if (handler_->wants_pages()) {
     pages_ = std::make_unique<Reader<wire::Page>>(
         context(), *topics_.directory, kAllOwners, "directory_reader",
-        Reader<wire::Page>::Calls{
-            [this](const wire::Page& sample, const Guid& from) { take_page(sample, from); },
-            nullptr});
+        Reader<wire::Page>::Calls{[this](const wire::Page& sample, const Info& info) {
+                                    take_page(sample, writer_of(info));
+                                  },
+                                  nullptr});
   }
   replies_ = std::make_unique<Reader<wire::Reply>>(
       context(), *topics_.reply, reply_partition(kAllOwners, self_), "call_reader",
-      Reader<wire::Reply>::Calls{nullptr, nullptr,
-                                 [this](const wire::Reply& sample, const Guid& from, Time sent) {
-                                   take_reply(sample, from, sent);
-                                 }});
+      Reader<wire::Reply>::Calls{
+          [this](const wire::Reply& sample, const Info& info) { take_reply(sample, info); },
+          nullptr});
   if (!presence_->good() || (pages_ != nullptr && !pages_->good()) || !replies_->good() ||
       !clock_->good()) {
     return not_created("the readers");
@@ -179,8 +180,8 @@ std::unique_ptr<Reader<wire::Request>> FastDdsTransport::request_reader(
   auto reader = std::make_unique<Requests>(
       context(), *filtered, partition, "call_reader",
       Requests::Calls{
-          accounted([this, may_change](const wire::Request& sample, const ertps::GUID_t& from) {
-            take_request(sample, from.guidPrefix, may_change);
+          accounted([this, may_change](const wire::Request& sample, const edds::SampleInfo& info) {
+            take_request(sample, writer_of(info).guidPrefix, may_change);
           }),
           [this](const ertps::GUID_t& from, int change) {
             if (change <= 0) return;
@@ -190,7 +191,7 @@ std::unique_ptr<Reader<wire::Request>> FastDdsTransport::request_reader(
 }
 
 Result<void> FastDdsTransport::serve(const std::string& partition) {
-  using Guid = ertps::GUID_t;
+  using Info = edds::SampleInfo;
   filters_ = std::make_unique<OwnedFilters>(partition, *handler_, *counters_, fair_share_);
   if (!ok(participant_->register_content_filter_factory(OwnedFilters::kClassName,
                                                         filters_.get()))) {
@@ -206,12 +207,12 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
   updates_ = std::make_unique<Reader<wire::Update>>(
       context(), *updates, partition, "update_reader",
       Reader<wire::Update>::Calls{
-          accounted([this](const wire::Update& sample, const Guid&) { take_update(sample); }),
+          accounted([this](const wire::Update& sample, const Info&) { take_update(sample); }),
           nullptr});
   joints_ = std::make_unique<Reader<wire::Joints>>(
       context(), *joints, partition, "update_reader",
       Reader<wire::Joints>::Calls{
-          accounted([this](const wire::Joints& sample, const Guid&) { take_joints(sample); }),
+          accounted([this](const wire::Joints& sample, const Info&) { take_joints(sample); }),
           nullptr});
   return updates_->good() && joints_->good() ? Result<void>() : not_created("the readers");
 }

@@ -110,18 +110,18 @@ class FastDdsTransport final : public Transport {
   /// A reader's callback that accounts the time it takes to the sender.
   template <class Take>
   auto accounted(Take take) {
-    return [this, take](const auto& sample, const ertps::GUID_t& writer) {
+    return [this, take](const auto& sample, const edds::SampleInfo& info) {
       const auto begin = FairShare::Clock::now();
-      take(sample, writer);
+      take(sample, info);
       const auto end = FairShare::Clock::now();
-      fair_share_.spent(peer_of(writer.guidPrefix), end - begin, end);
+      fair_share_.spent(peer_of(writer_of(info).guidPrefix), end - begin, end);
     };
   }
   void admit(const PeerId& peer, const Announcement& said);
   void take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from, bool may_change);
   void take_update(const wire::Update& sample);
   void take_joints(const wire::Joints& sample);
-  void take_reply(const wire::Reply& sample, const ertps::GUID_t& writer, Time sent);
+  void take_reply(const wire::Reply& sample, const edds::SampleInfo& info);
   void take_page(const wire::Page& sample, const ertps::GUID_t& writer);
   void take_presence(const wire::Presence& sample, const ertps::GUID_t& writer);
   [[nodiscard]] bool ignores(const ertps::GUID_t& writer) const;

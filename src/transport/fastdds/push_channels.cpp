@@ -20,7 +20,7 @@ Result<void> PushChannels::watch(const std::string& owner, std::uint64_t group) 
   if (reader != nullptr) return {};
   reader = std::make_unique<Reader<wire::State>>(
       context_, topic_, partition_of(owner, group), "update_reader",
-      Reader<wire::State>::Calls{[this](const wire::State& sample, const ertps::GUID_t&) {
+      Reader<wire::State>::Calls{[this](const wire::State& sample, const edds::SampleInfo&) {
                                    if (const auto pushed = from_wire(sample)) {
                                      calls_.on_pushed(*pushed);
                                    } else {
