@@ -9,6 +9,7 @@
 #include "arrays.hpp"
 #include "bind.hpp"
 #include "session.hpp"
+#include "structure.hpp"
 
 namespace tfdude::python {
 namespace {
@@ -123,48 +124,13 @@ void bind_parts(py::class_<Session, std::shared_ptr<Session>>& cls) {
 }
 
 void bind_structure(py::class_<Session, std::shared_ptr<Session>>& cls) {
-  cls.def(
-      "parent",
-      [](const Session& session, const std::string& id) {
-        return value_of(session.call([&](Client& c) { return c.parent(id); }));
-      },
-      py::arg("id"), "The id of the parent; '' for a root.");
-  cls.def(
-      "children",
-      [](const Session& session, const std::string& id) {
-        return value_of(session.call([&](Client& c) { return c.children(id); }));
-      },
-      py::arg("id"), "The ids of the children, sorted.");
-  cls.def(
-      "roots",
-      [](const Session& session) {
-        return value_of(session.call([](Client& c) { return c.roots(); }));
-      },
-      "The ids of frames without an existing parent, sorted.");
+  bind_structure_of(cls);
   cls.def(
       "exists",
       [](const Session& session, const std::string& id) {
         return session.call([&](Client& c) { return c.exists(id); });
       },
       py::arg("id"), "Whether a frame with this id is known.");
-  cls.def(
-      "frames",
-      [](const Session& session) {
-        return value_of(session.call([](Client& c) { return c.frames(); }));
-      },
-      "All frames, sorted by id.");
-  cls.def(
-      "partitions",
-      [](const Session& session) {
-        return value_of(session.call([](Client& c) { return c.partitions(); }));
-      },
-      "All partitions, also unreachable ones, sorted by name.");
-  cls.def(
-      "path",
-      [](const Session& session, const std::string& a, const std::string& b) {
-        return value_of(session.call([&](Client& c) { return c.path(a, b); }));
-      },
-      py::arg("a"), py::arg("b"), "The partitions that a lookup asks, in the order of the path.");
   cls.def(
       "now",
       [](const Session& session) {

@@ -6,6 +6,7 @@
 
 #include "bind.hpp"
 #include "session.hpp"
+#include "structure.hpp"
 
 namespace tfdude::python {
 namespace {
@@ -95,45 +96,6 @@ void bind_questions(RecordingClass& cls) {
       py::arg("start") = py::none(), "All recorded changes from an instant on; reads the file.");
 }
 
-void bind_structure(RecordingClass& cls) {
-  cls.def(
-      "parent",
-      [](SharedRecording& shared, const std::string& id) {
-        return value_of(shared.call([&](Recording& recording) { return recording.parent(id); }));
-      },
-      py::arg("id"), "The id of the parent; '' for a root.");
-  cls.def(
-      "children",
-      [](SharedRecording& shared, const std::string& id) {
-        return value_of(shared.call([&](Recording& recording) { return recording.children(id); }));
-      },
-      py::arg("id"), "The ids of the children, sorted.");
-  cls.def(
-      "path",
-      [](SharedRecording& shared, const std::string& a, const std::string& b) {
-        return value_of(shared.call([&](Recording& recording) { return recording.path(a, b); }));
-      },
-      py::arg("a"), py::arg("b"), "The partitions on a path.");
-  cls.def(
-      "roots",
-      [](SharedRecording& shared) {
-        return shared.call([](Recording& recording) { return recording.roots(); });
-      },
-      "The ids of frames without an existing parent, sorted.");
-  cls.def(
-      "frames",
-      [](SharedRecording& shared) {
-        return shared.call([](Recording& recording) { return recording.frames(); });
-      },
-      "All frames, sorted by id.");
-  cls.def(
-      "partitions",
-      [](SharedRecording& shared) {
-        return shared.call([](Recording& recording) { return recording.partitions(); });
-      },
-      "All partitions, sorted by name.");
-}
-
 void bind_instant(RecordingClass& cls) {
   cls.def(
       "seek",
@@ -193,7 +155,7 @@ void bind_recording(py::module_& module) {
           py::arg("file"));
   bind_instant(cls);
   bind_questions(cls);
-  bind_structure(cls);
+  bind_structure_of(cls);
 }
 
 }  // namespace tfdude::python
