@@ -4,11 +4,13 @@
 #include <csignal>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "support/catch.hpp"
+#include "support/cli_json.hpp"
 #include "support/process.hpp"
 #include "support/test_domain.hpp"
 
@@ -50,24 +52,12 @@ struct Robot {
   }
 
   json answered(Arguments arguments, int status = 0) const {
-    arguments.insert(arguments.begin(), "--json");
-    const CliResult result = domain.cli(arguments);
-    INFO(result.out << result.err);
-    CHECK(result.status == status);
-    return json::parse(result.out);
+    return testing::answered(domain, std::move(arguments), status);
   }
   std::string refused(const Arguments& arguments) const {
     return answered(arguments, 1).at("error").at("message").get<std::string>();
   }
-  json joint(const std::string& name) const {
-    const json all = answered({"joints"});
-    for (const json& partition : all.at("partitions")) {
-      for (const json& one : partition.at("joints")) {
-        if (one.at("name") == name) return one;
-      }
-    }
-    return {};
-  }
+  json joint(const std::string& name) const { return testing::joint_of(domain, name); }
   // The turn about z of a frame in its parent.
   double turn(const std::string& parent, const std::string& frame) const {
     const json q = answered({"lookup", parent, frame}).at("rotation");

@@ -2,11 +2,13 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "support/catch.hpp"
+#include "support/cli_json.hpp"
 #include "support/process.hpp"
 #include "support/test_domain.hpp"
 
@@ -31,11 +33,7 @@ class Robot {
   }
 
   json answered(Arguments arguments, int status = 0) const {
-    arguments.insert(arguments.begin(), "--json");
-    const CliResult result = domain_.cli(arguments);
-    INFO(result.out << result.err);
-    CHECK(result.status == status);
-    return json::parse(result.out);
+    return testing::answered(domain_, std::move(arguments), status);
   }
   CliResult run(const Arguments& arguments) const { return domain_.cli(arguments); }
 

@@ -6,11 +6,13 @@
 #include <string>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "support/catch.hpp"
+#include "support/cli_json.hpp"
 #include "support/process.hpp"
 #include "support/test_domain.hpp"
 
@@ -44,20 +46,10 @@ struct Robot {
     return result.out;
   }
   json answered(Arguments arguments, int status = 0) const {
-    arguments.insert(arguments.begin(), "--json");
-    const CliResult result = domain.cli(arguments);
-    INFO(result.out << result.err);
-    CHECK(result.status == status);
-    return json::parse(result.out);
+    return testing::answered(domain, std::move(arguments), status);
   }
   double position(const std::string& joint) const {
-    const json all = answered({"joints"});
-    for (const json& partition : all.at("partitions")) {
-      for (const json& one : partition.at("joints")) {
-        if (one.at("name") == joint) return one.at("position").get<double>();
-      }
-    }
-    return NAN;
+    return testing::joint_of(domain, joint).at("position").get<double>();
   }
 
   TestDomain domain;

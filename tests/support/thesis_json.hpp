@@ -1,10 +1,12 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "support/cli_json.hpp"
 #include "support/thesis.hpp"
 
 namespace tfdude::testing {
@@ -12,11 +14,7 @@ namespace tfdude::testing {
 /// The answer of a command in JSON.
 [[nodiscard]] inline nlohmann::json answered(const ThesisDaemons& d,
                                              std::vector<std::string> arguments, int status = 0) {
-  arguments.insert(arguments.begin(), "--json");
-  const CliResult result = d.domain.cli(arguments);
-  INFO(result.out << result.err);
-  CHECK(result.status == status);
-  return nlohmann::json::parse(result.out);
+  return answered(d.domain, std::move(arguments), status);
 }
 
 }  // namespace tfdude::testing

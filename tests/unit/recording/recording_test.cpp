@@ -102,6 +102,24 @@ std::string of_ros() {
   return file;
 }
 
+// A file of another program, with one message.
+std::string file_of_ros(const std::string& type, const std::string& definition,
+                        const std::string& topic) {
+  std::string file;
+  McapWriter writer(
+      [&](std::string_view bytes) {
+        file += bytes;
+        return Result<void>();
+      },
+      {"ros2", "other", true, 1, 300});
+  REQUIRE(writer.start());
+  REQUIRE(writer.add_schema({2, type, "ros2msg", definition}));
+  REQUIRE(writer.add_channel({0, 2, topic, "cdr", {}}));
+  REQUIRE(writer.write({0, 1, 1, "hello"}));
+  REQUIRE(writer.finish());
+  return file;
+}
+
 }  // namespace
 
 TEST_CASE("recording: transforms of a recording of ROS have an unspecified covariance") {
@@ -127,18 +145,7 @@ TEST_CASE("recording: transforms of a recording of ROS have an unspecified covar
 }
 
 TEST_CASE("recording: a file without transforms is rejected with a clear error") {
-  std::string file;
-  McapWriter writer(
-      [&](std::string_view bytes) {
-        file += bytes;
-        return Result<void>();
-      },
-      {"ros2", "other", true, 1, 300});
-  REQUIRE(writer.start());
-  REQUIRE(writer.add_schema({2, "std_msgs/msg/String", "ros2msg", "string data"}));
-  REQUIRE(writer.add_channel({0, 2, "/chatter", "cdr", {}}));
-  REQUIRE(writer.write({0, 1, 1, "hello"}));
-  REQUIRE(writer.finish());
+  const std::string file = file_of_ros("std_msgs/msg/String", "string data", "/chatter");
   const auto recording = Recording::read(file);
   REQUIRE_FALSE(recording);
   CHECK_THAT(recording.error().message, testing::ContainsSubstring("no transforms"));
@@ -147,18 +154,7 @@ TEST_CASE("recording: a file without transforms is rejected with a clear error")
 }
 
 TEST_CASE("recording: a compression that cannot be read is named") {
-  std::string file;
-  McapWriter writer(
-      [&](std::string_view bytes) {
-        file += bytes;
-        return Result<void>();
-      },
-      {"ros2", "other", true, 1, 300});
-  REQUIRE(writer.start());
-  REQUIRE(writer.add_schema({2, "tf2_msgs/msg/TFMessage", "ros2msg", ""}));
-  REQUIRE(writer.add_channel({0, 2, "/tf", "cdr", {}}));
-  REQUIRE(writer.write({0, 1, 1, "hello"}));
-  REQUIRE(writer.finish());
+  std::string file = file_of_ros("tf2_msgs/msg/TFMessage", "", "/tf");
   for (auto at = file.find("zstd"); at != std::string::npos; at = file.find("zstd", at)) {
     file.replace(at, 4, "lz77");
   }
