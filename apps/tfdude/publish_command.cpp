@@ -53,6 +53,30 @@ void reject(Sent& sent, const Lines& lines, const Error& error) {
   if (sent.rejected == kToldErrors) std::fputs("tfdude: further errors are only counted\n", stderr);
 }
 
+// Lines that come faster than a controller's, as those of a file, would overwrite each other on
+// their way (Client::flush): so after each few of them it waits until they have arrived.
+class Bursts {
+ public:
+  explicit Bursts(Client& client, Milliseconds timeout) : client_(client), timeout_(timeout) {}
+
+  [[nodiscard]] Result<void> sent_one() {
+    constexpr int kFew = 32;
+    constexpr std::chrono::milliseconds kTime{16};  // at 2 kHz
+    if (++lines_ < kFew) return {};
+    const bool fast = std::chrono::steady_clock::now() - begin_ < kTime;
+    const auto arrived = fast ? client_.flush(timeout_) : Result<void>();
+    lines_ = 0;
+    begin_ = std::chrono::steady_clock::now();
+    return arrived;
+  }
+
+ private:
+  Client& client_;
+  Milliseconds timeout_;
+  int lines_ = 0;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
 void count(Sent& sent, const Sample& sample, const std::map<std::string, JointInfo>& known) {
   ++sent.lines;
   sent.values += sample.edges.size() + sample.joints.size();
@@ -71,12 +95,14 @@ int send_lines(Client& client, const Arguments& arguments, bool acknowledged) {
   const auto known = known_joints(client);
   SampleReader reader(arguments.angles, known);
   Sent sent;
+  Bursts bursts(client, arguments.options.timeout);
   const auto start = std::chrono::steady_clock::now();
   while (const auto line = lines->next()) {
     const auto sample = reader.read(*line);
     if (sample && !*sample) continue;
-    const auto done = sample ? send(client, **sample, acknowledged)
-                             : Result<void>(tl::unexpected(sample.error()));
+    const auto done =
+        sample ? send(client, **sample, acknowledged).and_then([&] { return bursts.sent_one(); })
+               : Result<void>(tl::unexpected(sample.error()));
     if (done) {
       count(sent, **sample, known);
     } else {
