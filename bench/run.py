@@ -10,6 +10,7 @@ import tempfile
 import time
 import traceback
 
+import history
 import machine
 import net_stage
 import plots
@@ -17,6 +18,7 @@ import processes
 import programs
 import pushed
 import report
+import tables
 import targets
 import wire
 
@@ -66,12 +68,17 @@ def measure(names, quick, bin_dir):
 
 
 def write(results, folder, report_file):
-    """Writes the results' file, the plots and the report."""
+    """Writes the results' file, the plots and the report; those of the repository also into its tables."""
     folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps(results, indent=1, sort_keys=True)
     (folder / "latest.json").write_text(text + "\n", encoding="utf-8")
+    past = history.with_entry(history.load(RESULTS / "history.json"), history.entry(results))
+    if not results["settings"].get("quick"):
+        history.save(folder / "history.json", past)
     drawn = plots.draw(results["figures"], folder)
-    report_file.write_text(report.text(results, drawn, report_file.parent), encoding="utf-8")
+    report_file.write_text(report.text(results, past, drawn, report_file.parent), encoding="utf-8")
+    if folder.resolve() == RESULTS:
+        tables.main()
     print(f"Results are in {folder}, the report is {report_file}")
 
 

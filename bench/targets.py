@@ -24,6 +24,11 @@ class Target:
     direction: str = MOST
     unit: str = ""  # empty: a ratio
 
+    @property
+    def full_name(self):
+        """The name of which there is only one."""
+        return f"{self.group}: {self.name}"
+
     def verdict(self, figures):
         """(value, reached), or (None, None) if the figures are missing."""
         value = self.compute(figures)
@@ -182,8 +187,7 @@ TARGETS = tuple(sorted(ALL, key=lambda target: GROUPS.index(target.group)))
 
 def why(target):
     """The known reason for missing a target, or an empty text."""
-    full = f"{target.group}: {target.name}"
-    return next((reason for start, reason in WHY.items() if full.startswith(start)), "")
+    return next((reason for start, reason in WHY.items() if target.full_name.startswith(start)), "")
 
 
 def rows(figures):

@@ -49,6 +49,7 @@ CASES = (
     Case("", "update_other/arms", "update, other, in arms", "other"),
 )
 
+CALLS = 300_000  # for each case
 # Table 5.1: bytes of request and reply by the key of our operation.
 SIZES = {"add": (364, 1), "remove": (10, 1), "lookup_other": (20, 345), "update": (354, 1)}
 WORST_CASE_PER_PROCESS = 365

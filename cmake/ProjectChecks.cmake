@@ -62,4 +62,5 @@ add_test(NAME "readme: the check itself"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/readme/type_blocks.py --self-test)
 set_tests_properties("readme: the check itself" PROPERTIES LABELS unit TIMEOUT 60)
 add_test(NAME "bench: comparing" COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/bench/compare_test.py)
-set_tests_properties("bench: comparing" PROPERTIES LABELS unit)
+add_test(NAME "bench: tables" COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/bench/tables_test.py)
+set_tests_properties("bench: comparing" "bench: tables" PROPERTIES LABELS unit)
