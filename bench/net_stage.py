@@ -27,11 +27,11 @@ ALL_CPUS = ",".join(map(str, sorted(os.sched_getaffinity(0))))
 MEETING_S = 1.0  # time for many daemons to discover each other [s]
 
 
-def patient_profile(work: pathlib.Path) -> pathlib.Path:
-    """The loopback profile with a lease of 9 s, after which a silent participant counts as lost. A failed call ends a
+def patient_profile(work: pathlib.Path, profile: pathlib.Path) -> pathlib.Path:
+    """The profile with a lease of 9 s, after which a silent participant counts as lost. A failed call ends a
     benchmark, and a virtual machine may stop for half a second within a quarter of an hour. The measured values do
     not depend on the lease."""
-    shipped = processes.PROFILE.read_text()
+    shipped = profile.read_text()
     patient = shipped.replace("<leaseDuration><nanosec>450000000</nanosec>",
                               "<leaseDuration><sec>9</sec>")
     assert patient != shipped
@@ -43,10 +43,10 @@ def patient_profile(work: pathlib.Path) -> pathlib.Path:
 class Stage:
     """Runs processes, and ends all of them."""
 
-    def __init__(self, bin_dir: pathlib.Path, work: pathlib.Path):
+    def __init__(self, bin_dir: pathlib.Path, work: pathlib.Path, profile: pathlib.Path = processes.PROFILE):
         self.bin_dir = bin_dir
         self.work = work
-        self.profile = patient_profile(work)
+        self.profile = patient_profile(work, profile)
         self.leases = {}
 
     def domain(self, name: str) -> int:

@@ -47,6 +47,12 @@ THESIS_NOTES = """\
 - **The tree** is that of the thesis's figure 4.1, and the arm of its figure 1.1 is that of the pictures. Both figures
   are drawings without numbers: names and links are theirs, all poses and covariances are ours.
 """
+NARROW = """\
+Milliseconds. The same cases over a link of 1 Mbit/s that delays each packet by 20 ms in each direction.
+The caller is the process `robot`. Its host has its own frames; at the other end are the daemon of the arms and the
+central server. A round trip of such a link takes 40 ms, and 8 µs more for each byte. While nobody asks, discovery
+and presence of the two daemons send {bytes} bytes and {packets} packets a second over it, both directions together.
+"""
 WIRE = """\
 Bytes of request / reply, captured on the loopback interface; the caller owns no frames, and ids
 have ten characters. Payloads are CDR with its header of four bytes. "Other" is UDP packets with
@@ -183,6 +189,23 @@ def thesis_section(figures, drawn, home):
     head = ("case", "centralized, median / p99", "decentralized, median / p99", "ratio",
             "the thesis's", "values")
     return [THESIS.format(calls=thesis.CALLS), table(head, rows), THESIS_NOTES, picture(drawn, "thesis", home)]
+
+
+def narrow_section(figures, _drawn, _home):
+    """The thesis's cases over a narrow link."""
+    def milliseconds(figure, which):
+        return microseconds(figure, which) / 1e3
+
+    rows = []
+    for case in thesis.CASES:
+        keys = [f"narrow/{case.key}/{side}" for side in ("centralized", "decentralized")]
+        if keys[0] in figures:
+            rows.append((f"{case.figure} {case.title}".strip(),
+                         *(both(figures, key, milliseconds) for key in keys), number(ratio(figures, *keys))))
+    head = ("case", "centralized, median / p99", "decentralized, median / p99", "ratio")
+    idle = {name: value(figures, f"narrow/idle/{name}_per_second", convert=as_measured)
+            for name in ("bytes", "packets")}
+    return [NARROW.format(**idle), table(head, rows)]
 
 
 WIRE_NAMES = {"add": "add", "remove": "remove", "lookup_other": "look up, one other owner",
@@ -346,6 +369,7 @@ def scale_section(figures, drawn, home):
 # The heading of a section, the prefixes of its keys, and the function that writes it. It needs at least one such key.
 SECTIONS = (
     ("The thesis's cases", ("thesis/",), thesis_section),
+    ("The thesis's cases over a narrow link", ("narrow/",), narrow_section),
     ("On the wire: the thesis's table 5.1", ("wire/",), wire_section),
     ("The floor", ("floor/",), floor_section),
     ("Streamed updates", ("stream/",), stream_section),

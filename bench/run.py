@@ -12,6 +12,7 @@ import traceback
 
 import history
 import machine
+import narrow
 import net_stage
 import plots
 import processes
@@ -24,12 +25,12 @@ import wire
 
 BENCH = pathlib.Path(__file__).resolve().parent
 RESULTS = BENCH / "results"
-STAGES = ("core", "contention", "net", "wire", "pushed")
+STAGES = ("core", "contention", "net", "wire", "pushed", "narrow")
 
 
 def stage(name):
     """The function of a stage: it yields figures, given quick, the binaries' folder and a working folder."""
-    modules = {"net": net_stage, "wire": wire, "pushed": pushed}
+    modules = {"net": net_stage, "wire": wire, "pushed": pushed, "narrow": narrow}
     if name in modules:
         return modules[name].run
     return getattr(programs, name)
