@@ -71,9 +71,7 @@ inline void log_to_standard_error() {
 /// @return the exit status
 [[nodiscard]] inline int wait_until_stopped(Node& node, const sigset_t& stop_signals) {
   std::atomic<bool> given_up{false};
-  const auto subscription = node.on_change([&](const Change& change) {
-    const bool own = change.partition == node.partition() && change.frame.empty();
-    if (change.kind != ChangeKind::kConflict || !own) return;
+  const auto subscription = node.on_taken([&](const Change&) {
     given_up = true;
     kill(getpid(), SIGTERM);
   });

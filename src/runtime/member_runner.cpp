@@ -272,6 +272,16 @@ std::shared_ptr<void> MemberRunner::on_change(Events::Callback listener) {
     const Lock lock(structure_.mutex);
     structure_.directory.changes().watch();
   }
+  return subscribe(std::move(listener));
+}
+
+std::shared_ptr<void> MemberRunner::on_conflict(const Events::Callback& listener) {
+  return subscribe([listener](const Change& change) {
+    if (change.kind == ChangeKind::kConflict) listener(change);
+  });
+}
+
+std::shared_ptr<void> MemberRunner::subscribe(Events::Callback listener) {
   const std::uint64_t subscriber = events_->subscribe(std::move(listener));
   return {nullptr, [events = events_, subscriber](void*) { events->unsubscribe(subscriber); }};
 }

@@ -121,8 +121,12 @@ class MemberRunner final : private CommitLoop::Effects {
 
   /// @return a handle; the listener ends when its last copy is destroyed
   [[nodiscard]] std::shared_ptr<void> on_change(Events::Callback listener);
+  /// Reports conflicts only, which are recorded anyway.
+  [[nodiscard]] std::shared_ptr<void> on_conflict(const Events::Callback& listener);
 
  private:
+  [[nodiscard]] std::shared_ptr<void> subscribe(Events::Callback listener);
+
   // CommitLoop::Effects
   [[nodiscard]] Ready take(bool values_due) override;
   void publish(const Ready& ready) override;

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/subscription.hpp"
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/joint_spec.hpp"
 #include "tfdude/types/refused.hpp"
@@ -30,8 +32,8 @@ class TFDUDE_EXPORT Node : public Client {
   /// running.
   ///
   /// After a hang or a broken link, a Node may learn that another process has taken over its
-  /// partition. It then yields, reports a conflict without a frame, and answers every call with
-  /// kPartitionTaken.
+  /// partition. It then yields, reports a conflict without a frame (on_taken()), and answers every
+  /// call with kPartitionTaken.
   /// @return kPartitionTaken (naming host and process), kState (naming the file), the error of the
   ///   first invalid frame, errors of Client::open().
   [[nodiscard]] static Result<Node> open(const std::string& partition,
@@ -68,6 +70,10 @@ class TFDUDE_EXPORT Node : public Client {
   /// round, even if that could not store them.
   /// @return false: not within `wait`, because it hangs, or waits for the disk
   [[nodiscard]] bool responds(Milliseconds wait);
+
+  /// Calls a function when another process has taken over the partition. As on_change(), but it
+  /// costs nothing while frames come and go, for which on_change() forms a text each.
+  [[nodiscard]] Subscription on_taken(std::function<void(const Change&)> listener);
 
   /// What limits have rejected since the start.
   [[nodiscard]] RefusedCounts refused() const;
