@@ -6,6 +6,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <unistd.h>
@@ -84,6 +85,12 @@ class Recorded {
     return all->size() == known_.size();
   }
 
+  // Whether the sample of this instant has come. A late one may come after newer ones.
+  bool has(const std::string& frame, Time stamp) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return told_.count({frame, stamp}) > 0;
+  }
+
   void finish() {
     watches_.clear();
     REQUIRE(writer_.finish(now_));
@@ -109,6 +116,7 @@ class Recorded {
     if (values == nullptr) return;
     for (const WatchedValue& value : values->values) {
       const WatchedFrame& frame = frames_[news.partition].at(value.frame);
+      if (value.stamp) told_.emplace(frame.id, *value.stamp);
       WatchedValue& last = known_[{frame.id, frame.parent}];
       if (value.begins || value.stamp >= last.stamp) last = value;
     }
@@ -125,6 +133,7 @@ class Recorded {
   Time now_ = step(0);
   std::map<std::string, std::vector<WatchedFrame>> frames_;
   std::map<std::pair<std::string, std::string>, WatchedValue> known_;  // by frame and parent
+  std::set<std::pair<std::string, Time>> told_;
   std::vector<PartitionWatch> watches_;
 };
 
@@ -169,8 +178,10 @@ class World {
                               moved_by("wrist", "hand", revolute_named("wrist"))}));
   }
 
-  void change(int number) {
+  // @return the stamp of a late sample of the elbow, if there is one
+  std::optional<Time> change(int number) {
     const Time stamp = step(number);
+    std::optional<Time> late;
     switch (random_.index(8)) {
       case 0:
         (void)arm_->update("hand", random_value(random_));
@@ -194,7 +205,8 @@ class World {
         (void)arm_->remove("tool");
         break;
       case 6:  // a late sample
-        (void)arm_->update("elbow", random_value(random_), stamp - std::chrono::milliseconds(2500));
+        late = stamp - std::chrono::milliseconds(2500);
+        if (!arm_->update("elbow", random_value(random_), *late)) late.reset();
         break;
       default:
         break;
@@ -208,6 +220,7 @@ class World {
       if (random_.index(5) == 0) wrist.variance.reset();
       (void)arm_->update_joints({wrist}, at);
     }
+    return late;
   }
 
   Client& arm() { return *arm_; }
@@ -237,8 +250,9 @@ TEST_CASE("recording: it answers as the live system did, with covariance, at any
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
     for (int number = 1; number <= kSteps; ++number) {
       recorded.set_time(step(number));
-      world.change(number);
+      const auto late = world.change(number);
       REQUIRE(eventually([&] { return recorded.has_all(world.arm(), *client); }));
+      if (late) REQUIRE(eventually([&] { return recorded.has("elbow", *late); }));
       frames[number] = lines(*client->frames());
       const std::vector<std::string> names{"world", "lift", "shoulder", "hand", "wrist", "tool"};
       for (int i = 0; i < 8; ++i) {
