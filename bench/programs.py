@@ -1,7 +1,9 @@
-"""The stages without daemons: the core compared with tf2, and readers concurrent with a writer."""
+"""The stages of separate programs: the core compared with tf2, readers concurrent with a writer, and many daemons."""
 
 import json
 import os
+import pathlib
+import sys
 
 import figures
 import processes
@@ -53,3 +55,20 @@ def contention(quick, bin_dir, _work):
     for line in printed.splitlines():
         if line.startswith("{"):
             yield json.loads(line)
+
+
+# What bench/scaling.py calls a value, its key and unit.
+OF_MANY = {"known_s": ("many/32/all_known", "s"), "new_participant_s": ("many/32/newcomer", "s"),
+           "rss_kib": ("many/32/memory", "KiB")}
+
+
+def many(quick, bin_dir, _work):
+    """32 daemons with 100,000 frames: started at once, until a new participant has all frames; after that, until
+    another one has them; the memory of a daemon."""
+    rows = []
+    for _ in range(1 if quick else 3):
+        printed = processes.output_of([sys.executable, pathlib.Path(__file__).with_name("scaling.py"), "--bin", bin_dir,
+                                       "--partitions", "32"], SECONDS_FOR_A_STAGE)
+        rows += [row for row in map(json.loads, printed.splitlines()) if row["frames"] > row["daemons"]]
+    for name, (key, unit) in OF_MANY.items():
+        yield figures.summary(key, unit, [row[name] for row in rows])

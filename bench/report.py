@@ -92,6 +92,10 @@ listeners. Counted on the loopback interface; UDP includes acknowledgements, and
 watchers' renewals. Each watcher is a separate participant and receives its own copy. Presence and
 discovery are left out on both sides.
 """
+MANY = """\
+32 daemons with 100,000 frames in all, on the two cores of this machine. [docs/scaling.md](../docs/scaling.md) has other
+numbers of daemons, and what they cost while idle.
+"""
 SCALE = """\
 How the median grows with each number. The exponent is that of a power law fitted to all measured
 points, so a fixed cost at the small end lowers it.
@@ -351,6 +355,15 @@ def scale_table(figures, what):
     return table((f"{what}; median / p99", *head), rows) if rows else ""
 
 
+def many_section(figures, _drawn, _home):
+    """32 daemons."""
+    rows = [(name, *(value(figures, key, which, as_measured) for which in ("median", "min", "max")))
+            for name, key in (("started at once: until a new participant has all frames [s]", "many/32/all_known"),
+                              ("after that: a new participant has all frames [s]", "many/32/newcomer"),
+                              ("resident memory of a daemon [KiB]", "many/32/memory"))]
+    return [MANY, table(("figure", "median", "least", "most"), rows)]
+
+
 def scale_section(figures, drawn, home):
     """How values grow with the number of partitions, clients and frames."""
     fitted = {f"{what}, {who.replace('_', ' ')}": exponent
@@ -377,6 +390,7 @@ SECTIONS = (
     ("Own frames, beside tf2", ("core/",), core_section),
     ("A reader beside a writer", ("contention/",), contention_section),
     ("Cost as work grows", ("scale/", "core/"), scale_section),
+    ("Many daemons", ("many/",), many_section),
 )
 
 

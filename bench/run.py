@@ -25,7 +25,7 @@ import wire
 
 BENCH = pathlib.Path(__file__).resolve().parent
 RESULTS = BENCH / "results"
-STAGES = ("core", "contention", "net", "wire", "pushed", "narrow")
+STAGES = ("core", "contention", "net", "wire", "pushed", "narrow", "many")
 
 
 def stage(name):
