@@ -72,3 +72,16 @@ def many(quick, bin_dir, _work):
         rows += [row for row in map(json.loads, printed.splitlines()) if row["frames"] > row["daemons"]]
     for name, (key, unit) in OF_MANY.items():
         yield figures.summary(key, unit, [row[name] for row in rows])
+
+
+def around(quick, bin_dir, _work):
+    """What users have around the core: the bridge to ROS 2, the recorder, the Python package."""
+    if os.geteuid() != 0:
+        raise processes.Skipped("needs root, for a network of its own")
+    here = pathlib.Path(__file__).parent
+    seconds = "2" if quick else "10"
+    environment = {**os.environ, "PYTHONPATH": str(bin_dir.parent / "python")}
+    for program, options in (("ros/run.py", ["--seconds", seconds]), ("recorded.py", ["--seconds", seconds]),
+                             ("python.py", ["--rounds", "3" if quick else "10"])):
+        printed = processes.output_of([sys.executable, here / program, *options], SECONDS_FOR_A_STAGE, env=environment)
+        yield from map(json.loads, printed.splitlines())

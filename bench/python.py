@@ -4,13 +4,15 @@
   PYTHONPATH=build/release/python bench/python.py [--bin DIR] [--calls N] [--rounds N]
 
 Lookups over 30 own edges; lookups of the same frames from their owner, in another process over DDS; and 30 joints
-streamed to that owner from an array of numpy. Python and C++ take turns; each figure is the median of the rounds'
-medians. Then the lookup of tf2_py over the same 30 edges, if Debian's python3-tf2 is installed.
+streamed to that owner from an array of numpy. Python and C++ take turns. Prints a line of JSON for each figure, whose
+values are the medians of the rounds. Then the lookup of tf2_py over the same 30 edges, if Debian's python3-tf2 is
+installed.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import pathlib
 import statistics
 import subprocess
@@ -20,6 +22,8 @@ import time
 import numpy as np
 import tfdude
 from tfdude import FrameSpec, Joint, Transform
+
+import figures
 
 JOINTS = [f"joint{i}" for i in range(30)]
 DOMAIN = 217
@@ -75,7 +79,7 @@ def tf2_lookup():
         import rospy
         import tf2_py
     except ImportError as error:
-        print(f"tf2_py cannot be run: {error}")
+        print(f"tf2_py cannot be run: {error}", file=sys.stderr)
         return None
     buffer = tf2_py.BufferCore()
     for i in range(30):
@@ -88,17 +92,17 @@ def tf2_lookup():
 
 
 def measure(cpp, calls, count, rounds):
-    """(figures of Python, figures of C++), by name, one for each round."""
-    figures = {name: ([], []) for name in calls}
+    """(medians of Python, medians of C++), by name, one for each round."""
+    medians = {name: ([], []) for name in calls}
     for i in range(rounds):
         for name, call in calls.items():
             for side in (0, 1) if i % 2 else (1, 0):
                 if side == 0:
-                    figures[name][0].append(median_us(count, call))
+                    medians[name][0].append(median_us(count, call))
                 else:
                     print(name, count, file=cpp.stdin, flush=True)
-                    figures[name][1].append(float(cpp.stdout.readline()))
-    return figures
+                    medians[name][1].append(float(cpp.stdout.readline()))
+    return medians
 
 
 def main():
@@ -120,14 +124,15 @@ def main():
     ):
         if owner.stdout.readline() != "ready\n":
             sys.exit("the owner did not start")
-        figures = measure(cpp, python_calls(arguments.domain), arguments.calls, arguments.rounds)
+        medians = measure(cpp, python_calls(arguments.domain), arguments.calls, arguments.rounds)
         cpp.stdin.close()
         owner.stdin.close()
-    for name, (python, compiled) in figures.items():
-        a, b = statistics.median(python), statistics.median(compiled)
-        print(f"{name:8} Python {a:8.2f} us, C++ {b:8.2f} us: {a - b:+.2f} us, {a / b:.2f} of it")
+    for name, sides in medians.items():
+        for side, values in zip(("python", "cpp"), sides):
+            print(json.dumps(figures.summary(f"python/{name}/{side}", "us", values)))
     if lookup := tf2_lookup():
-        print(f"tf2_py   Python {median_us(arguments.calls, lookup):8.2f} us for the own lookup, without covariance")
+        values = [median_us(arguments.calls, lookup) for _ in range(arguments.rounds)]
+        print(json.dumps(figures.summary("python/own/tf2", "us", values)))
 
 
 if __name__ == "__main__":

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """What a recorder costs beside a bare DDS reader of as many bytes: 100 edges of one owner that move at 1 kHz.
 
-    python3 bench/recorded.py [--edges N] [--rate HZ] [--seconds S]     prints a table; needs push_load of bench/net
+    python3 bench/recorded.py [--edges N] [--rate HZ] [--seconds S]     needs push_load of bench/net
 
-It runs in a network of its own. Processor time is that of the whole process that records or reads, from /proc. That of
-zstd alone is measured on the uncompressed file.
+It prints a line of JSON for each figure, and runs in a network of its own. Processor time is that of the whole process
+that records or reads, from /proc. That of zstd alone is measured on the uncompressed file.
 """
 
 import argparse
+import json
 import os
 import pathlib
 import resource
@@ -16,6 +17,8 @@ import subprocess
 import sys
 import tempfile
 import time
+
+import figures
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BIN = ROOT / "build" / "release" / "bin"
@@ -98,14 +101,11 @@ def main():
     share["bare"], _ = measured(listener, arguments.seconds)
     end(sender)
     end(listener)
-    limit = 1.5 * share["bare"] + zstd
-    print(f"{arguments.edges} edges at {arguments.rate} Hz, {per_message} bytes a message")
-    print(f"bare reader          {share['bare']:.3f} of a core")
-    print(f"zstd alone           {zstd:.3f}")
-    print(f"recorder, raw        {share['raw']:.3f}   {share['raw'] / share['bare']:.2f} times the bare reader")
-    print(f"recorder, compressed {share['compressed']:.3f}   {share['compressed'] / limit:.2f} times 1.5 bare and zstd")
-    print(f"file, raw            {size['raw'] / 1e6:.2f} MB/s")
-    print(f"file, compressed     {size['compressed'] / 1e6:.2f} MB/s   {size['compressed'] / size['raw']:.3f} of it")
+    cores = {"bare": share["bare"], "zstd": zstd, "raw": share["raw"], "compressed": share["compressed"]}
+    lines = [(f"{name}/cpu", "%", 100 * core) for name, core in cores.items()]
+    lines += [(f"{name}/file", "bytes/s", rate) for name, rate in size.items()]
+    for key, unit, value in lines:
+        print(json.dumps(figures.summary(f"recorded/{key}", unit, [value])))
 
 
 if __name__ == "__main__":

@@ -96,6 +96,21 @@ MANY = """\
 32 daemons with 100,000 frames in all, on the two cores of this machine. [docs/scaling.md](../docs/scaling.md) has other
 numbers of daemons, and what they cost while idle.
 """
+KEYS = """\
+Medians with keys and without, in turns: a whole run of `tfdude lookup`, calls with both programs on one core, and 100
+edges at 1 kHz.
+"""
+AROUND = """\
+Latency is that from the write to the reading, in microseconds, with 100 edges at 100 Hz in messages of all edges or of
+one. The relay takes a message of `/tf` by bare Fast DDS and writes it again.
+"""
+RECORDED = """\
+A recorder of 100 edges at 1 kHz takes {compressed} % of a core ({raw} % without compression). A bare DDS reader of as
+many bytes takes {bare} %, and zstd alone {zstd} %.
+"""
+PYTHON = """\
+The same calls in Python and C++: 30 own edges, the same edges of another process, and 30 joints in a stream.
+"""
 SCALE = """\
 How the median grows with each number. The exponent is that of a power law fitted to all measured
 points, so a fixed cost at the small end lowers it.
@@ -343,6 +358,39 @@ def pushed_section(figures, _drawn, _home):
                   sizes)]
 
 
+def keys_section(figures, _drawn, _home):
+    """What keys cost."""
+    rows = []
+    for name, key in (("first lookup of a new process [ms]", "first_meeting"), ("lookup [µs]", "lookup"),
+                      ("update [µs]", "update"), ("100 edges at 1 kHz: latency [µs]", "stream/1khz/latency"),
+                      ("100 edges at 1 kHz: the owner's share of a core [%]", "stream/1khz/owner_cpu")):
+        rows.append((name, *(value(figures, f"secured/{key}/{how}", convert=as_measured)
+                             for how in ("plain", "signed", "encrypted"))))
+    return [KEYS, table(("call", "plain", "signed", "encrypted"), rows)]
+
+
+def around_section(figures, _drawn, _home):
+    """The bridge to ROS 2, the recorder, the Python package."""
+    bridge = []
+    for edges in (100, 1):
+        for way, name in (("bare", "bare relay"), ("in", "into tf-dude"), ("out", "out of tf-dude")):
+            key = f"ros/{way}/{edges}"
+            if f"{key}/latency" in figures:
+                bridge.append((f"{name}, messages of {edges}", both(figures, f"{key}/latency"),
+                               value(figures, f"{key}/cpu", convert=as_measured),
+                               value(figures, f"{key}/bytes_per_edge", convert=as_measured)))
+    python = [(name, value(figures, f"python/{key}/python"), value(figures, f"python/{key}/cpp"),
+               number(ratio(figures, f"python/{key}/python", f"python/{key}/cpp")))
+              for name, key in (("look up own edges [µs]", "own"), ("look up edges of another process [µs]", "remote"),
+                                ("publish joints [µs]", "publish"))]
+    shares = {name: value(figures, f"recorded/{name}/cpu", convert=as_measured)
+              for name in ("compressed", "raw", "bare", "zstd")}
+    return ["### The bridge to ROS 2\n", AROUND,
+            table(("way", "latency, median / p99", "share of a core [%]", "bytes an edge"), bridge),
+            "### The recorder\n", RECORDED.format(**shares),
+            "### Python\n", PYTHON, table(("call", "Python", "C++", "ratio"), python)]
+
+
 def scale_table(figures, what):
     """All measurements for which one number was varied."""
     keys = [key.split("/") for key in figures if key.startswith(f"scale/{what}/")]
@@ -391,6 +439,8 @@ SECTIONS = (
     ("A reader beside a writer", ("contention/",), contention_section),
     ("Cost as work grows", ("scale/", "core/"), scale_section),
     ("Many daemons", ("many/",), many_section),
+    ("Keys", ("secured/",), keys_section),
+    ("Around the core", ("ros/", "recorded/", "python/"), around_section),
 )
 
 

@@ -19,18 +19,20 @@ import processes
 import programs
 import pushed
 import report
+import secured
 import tables
 import targets
 import wire
 
 BENCH = pathlib.Path(__file__).resolve().parent
 RESULTS = BENCH / "results"
-STAGES = ("core", "contention", "net", "wire", "pushed", "narrow", "many")
+QUICK_STAGES = ("core", "contention", "net", "wire", "pushed", "narrow")
+STAGES = (*QUICK_STAGES, "many", "secured", "around")
 
 
 def stage(name):
     """The function of a stage: it yields figures, given quick, the binaries' folder and a working folder."""
-    modules = {"net": net_stage, "wire": wire, "pushed": pushed, "narrow": narrow}
+    modules = {"net": net_stage, "wire": wire, "pushed": pushed, "narrow": narrow, "secured": secured}
     if name in modules:
         return modules[name].run
     return getattr(programs, name)
@@ -93,11 +95,13 @@ def arguments():
                         help="write plots and report from a saved latest.json, without measuring")
     parser.add_argument("--build", type=pathlib.Path, default=processes.ROOT / "build" / "release",
                         help="where the programs were built (%(default)s)")
-    parser.add_argument("--stages", default=",".join(STAGES), help="only these (%(default)s)")
+    parser.add_argument("--stages", help=f"only these, of {','.join(STAGES)}; a quick run has the first "
+                        f"{len(QUICK_STAGES)}, if nothing else is said")
     parser.add_argument("--results", type=pathlib.Path, default=RESULTS,
                         help="the folder to write to (%(default)s)")
     chosen = parser.parse_args()
-    chosen.stages = [name for name in chosen.stages.split(",") if name]
+    usual = QUICK_STAGES if chosen.quick or chosen.check else STAGES
+    chosen.stages = chosen.stages.split(",") if chosen.stages else usual
     if unknown := set(chosen.stages) - set(STAGES):
         parser.error("no such stage: " + ", ".join(sorted(unknown)))
     return chosen

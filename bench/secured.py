@@ -78,6 +78,23 @@ def streams(stage, stores, seconds):
                 yield {**line, "key": f"secured/{line['key']}/{how}"}
 
 
+def measure(stage, calls, seconds):
+    """Yields all figures."""
+    stores = {how: make_keys(stage, how) for how in HOW if how != "plain"}
+    config = net_stage.chain_config(stage.work, "base", 0, 2)
+    daemons = [[*stage.daemon(ONE_CORE, stage.domain(how), config), *map(str, options_of(stores, how, "base"))]
+               for how in HOW]
+    with stage.servers(daemons):
+        yield from first_meetings(stage, stores)
+        yield from requests(stage, stores, calls)
+    yield from streams(stage, stores, seconds)
+
+
+def run(quick, bin_dir, work):
+    """Yields the figures, as a stage of scripts/bench."""
+    yield from measure(net_stage.Stage(bin_dir, work), 500 if quick else 5000, 1 if quick else 4)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--secured", action="store_true", help=argparse.SUPPRESS)
@@ -86,17 +103,7 @@ def main():
     parser.add_argument("--seconds", type=int, default=2)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="tfdude-secured-") as work:
-        stage = net_stage.Stage(arguments.bin, pathlib.Path(work))
-        stores = {how: make_keys(stage, how) for how in HOW if how != "plain"}
-        config = net_stage.chain_config(stage.work, "base", 0, 2)
-        daemons = [[*stage.daemon(ONE_CORE, stage.domain(how), config),
-                    *map(str, options_of(stores, how, "base"))] for how in HOW]
-        with stage.servers(daemons):
-            for line in first_meetings(stage, stores):
-                print(json.dumps(line), flush=True)
-            for line in requests(stage, stores, arguments.calls):
-                print(json.dumps(line), flush=True)
-        for line in streams(stage, stores, arguments.seconds):
+        for line in measure(net_stage.Stage(arguments.bin, pathlib.Path(work)), arguments.calls, arguments.seconds):
             print(json.dumps(line), flush=True)
 
 

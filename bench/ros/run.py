@@ -3,10 +3,10 @@
 
 Needs build/release with the benchmarks: scripts/build --bench ros_bench tfdude_ros
 
-For each way it prints the latency from the write to the reading, the share of a core that the bridge (or the bare
-relay) takes, and the bytes on the loopback interface, all with one message for all edges, and with one for each edge.
-What was not read was overtaken by the next value before the reader looked. Runs in a network namespace of its own,
-because of the bytes, so it needs root.
+For each way it prints, as lines of JSON, the latency from the write to the reading, the share of a core that the bridge
+(or the bare relay) takes, and the bytes on the loopback interface, all with one message for all edges, and with one
+for each edge. Values that the next one overtook before the reader looked are not in the latency. Runs in a network
+namespace of its own, because of the bytes, so it needs root.
 """
 
 import argparse
@@ -16,6 +16,10 @@ import pathlib
 import subprocess
 import sys
 import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+
+import figures  # noqa: E402
 
 BIN = pathlib.Path(__file__).resolve().parents[2] / "build/release/bin"
 ROS_DOMAIN, DOMAIN = 231, 230
@@ -66,6 +70,15 @@ def measure(way, per_message, arguments):
     return result
 
 
+def figures_of(way, per_message, one):
+    """The figures of one way; its quantiles come from the program."""
+    key = f"ros/{way}/{per_message}"
+    latency = {"key": f"{key}/latency", "unit": "us", "n": one["read"], "median": one["p50"], "p90": one["p90"],
+               "p99": one["p99"], "medians": [one["p50"]]}
+    return [latency, figures.summary(f"{key}/cpu", "%", [100 * one["core"]]),
+            figures.summary(f"{key}/bytes_per_edge", "bytes", [one["bytes_per_edge"]])]
+
+
 def resident_kib(pid):
     lines = pathlib.Path(f"/proc/{pid}/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:"))
@@ -102,15 +115,12 @@ def main():
     if arguments.replay:
         replay(arguments)
         return
-    print("| way | edges a message | p50 [us] | p90 | p99 | read | lost | share of a core | bytes on lo an edge |")
-    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     for per_message in (arguments.edges, 1):
         for way in ("bare", "in", "out"):
             if way == "out" and per_message == 1:
                 continue  # the bridge sends one message
-            one = measure(way, per_message, arguments)
-            print(f"| {way} | {per_message} | {one['p50']:.0f} | {one['p90']:.0f} | {one['p99']:.0f} | {one['read']} | "
-                  f"{one['lost']} | {one['core']:.3f} | {one['bytes_per_edge']:.0f} |", flush=True)
+            for figure in figures_of(way, per_message, measure(way, per_message, arguments)):
+                print(json.dumps(figure), flush=True)
 
 
 if __name__ == "__main__":
