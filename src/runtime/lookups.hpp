@@ -32,28 +32,37 @@ class Lookups {
   /// Ends all waiting lookups and callbacks: as PendingLookups::stop().
   void stop() { pending_.stop(); }
 
+  // Each returns one object, so that no answer is copied. The clock is read only if others have to
+  // be asked.
   template <class Name>
   [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
-    auto local = structure_.forest.lookup(a, b);
-    if (local || is_of_time(local.error())) return local;
-    return elsewhere(a, b, {}, discovery_.call_deadline())
-        .map([](const StampedTransform& X_AB) -> Transform { return X_AB; });
+    auto X_AB = structure_.forest.lookup(a, b);
+    if (!X_AB && !is_of_time(X_AB.error())) {
+      X_AB = elsewhere(a, b, {}, discovery_.call_deadline())
+                 .map([](const StampedTransform& found) -> Transform { return found; });
+    }
+    return X_AB;
   }
   template <class Name>
   [[nodiscard]] Result<Pose> lookup_pose(Name a, Name b) {
-    if (auto local = structure_.forest.lookup_pose(a, b)) return local;
-    return lookup(a, b).map([](const Transform& X_AB) { return X_AB.pose; });
+    auto X_AB = structure_.forest.lookup_pose(a, b);
+    if (!X_AB) X_AB = lookup(a, b).map([](const Transform& found) { return found.pose; });
+    return X_AB;
   }
   template <class Name>
   [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Query& query) {
-    return lookup(a, b, query, discovery_.call_deadline());
+    auto X_AB = structure_.forest.lookup(a, b, query);
+    if (!X_AB && !is_of_time(X_AB.error())) {
+      X_AB = elsewhere(a, b, query, discovery_.call_deadline());
+    }
+    return X_AB;
   }
   template <class Name>
   [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Query& query,
                                                 const Deadline& deadline) {
-    auto local = structure_.forest.lookup(a, b, query);
-    if (local || is_of_time(local.error())) return local;
-    return elsewhere(a, b, query, deadline);
+    auto X_AB = structure_.forest.lookup(a, b, query);
+    if (!X_AB && !is_of_time(X_AB.error())) X_AB = elsewhere(a, b, query, deadline);
+    return X_AB;
   }
   [[nodiscard]] Result<StampedTransform> wait(std::string_view a, std::string_view b,
                                               const Query& query, Milliseconds wait);
