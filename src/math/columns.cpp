@@ -1,11 +1,21 @@
 #include "math/columns.hpp"
 
+#include <algorithm>
+#include <cstddef>
+
 namespace tfdude::kernel {
+
+// The layout of the kernel's numbers: quaternion, translation, upper triangle.
+static_assert(std::is_standard_layout_v<Pose> && sizeof(Pose) == 7 * sizeof(double));
+static_assert(std::is_standard_layout_v<Transform> && sizeof(Transform) == 29 * sizeof(double));
+static_assert(offsetof(Transform, covariance) == 7 * sizeof(double));
+static_assert(std::is_standard_layout_v<StatedCovariance> &&
+              sizeof(StatedCovariance) == 22 * sizeof(double));
 
 Columns columns_of(const Pose& X) {
   const Eigen::Matrix3d R = X.rotation().toRotationMatrix();
   const Eigen::Vector3d t = X.translation();
-  Columns columns;
+  Columns columns{};
   for (Eigen::Index k = 0; k < 3; ++k) {
     for (Eigen::Index i = 0; i < 3; ++i) columns.R[k][i] = R(i, k);
     columns.t[k] = t[k];
@@ -13,21 +23,16 @@ Columns columns_of(const Pose& X) {
   return columns;
 }
 
-Pose pose_of(const Columns& X) {
-  Eigen::Matrix3d R;
-  for (Eigen::Index k = 0; k < 3; ++k) {
-    for (Eigen::Index i = 0; i < 3; ++i) R(i, k) = X.R[k][i];
-  }
-  return Pose::trusted(Eigen::Quaterniond(R).normalized(), {X.t[0], X.t[1], X.t[2]});
+Pose pose_of(const Edge& edge) {
+  Pose X;
+  std::copy_n(edge.pose, 7, numbers_of(X));
+  return X;
 }
 
-Covariance::Upper upper_of(const Blocks& sigma) {
-  const auto& P = sigma.P;
-  const auto& C = sigma.C;
-  const auto& Q = sigma.Q;
-  return {P[0][0], P[1][0], P[2][0], C[0][0], C[1][0], C[2][0], P[1][1],
-          P[2][1], C[0][1], C[1][1], C[2][1], P[2][2], C[0][2], C[1][2],
-          C[2][2], Q[0][0], Q[1][0], Q[2][0], Q[1][1], Q[2][1], Q[2][2]};
+Transform transform_of(const Edge& edge) {
+  Covariance::Upper upper{};
+  std::copy_n(edge.upper, upper.size(), upper.begin());
+  return {pose_of(edge), Covariance::trusted(upper)};
 }
 
 }  // namespace tfdude::kernel

@@ -210,9 +210,9 @@ std::array<double, 6> Covariance::stddev() const {
 }
 
 Covariance Covariance::transported(const Pose& X) const {
-  kernel::Blocks sum;
-  kernel::functions().add_transported(kernel::columns_of(X), upper_.data(), sum);
-  return trusted(kernel::upper_of(sum));
+  Covariance sigma;
+  kernel::functions().transport(kernel::columns_of(X), upper_.data(), sigma.upper_.data());
+  return sigma;
 }
 
 Covariance& Covariance::operator+=(const Covariance& other) {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <complex>
 
+#include "math/columns.hpp"
 #include "math/interpolate_far.hpp"
-#include "math/kernel.hpp"
 #include "math/small_angle.hpp"
 
 namespace tfdude {
@@ -65,18 +65,6 @@ Matrix6d carried(const Covariance& sigma, const Twist& xi, double s, double weig
   return weight * (B * sigma.matrix() * B.transpose());
 }
 
-// The layout in which the kernel reads a pose or transform; path_accumulation.cpp asserts it.
-template <class Value>
-const double* numbers(const Value& X) {
-  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
-  return reinterpret_cast<const double*>(&X);
-}
-template <class Value>
-double* numbers(Value& X) {
-  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
-  return reinterpret_cast<double*>(&X);
-}
-
 // Both with the covariance of the one that is not complete.
 struct Alike {
   Transform X0;
@@ -94,11 +82,15 @@ void interpolate(const Transform& X0, const Transform& X1, double s, Transform& 
     const Alike both = alike(X0, X1);
     return interpolate(both.X0, both.X1, s, X);
   }
-  kernel::Blend one{numbers(X0), numbers(X1), numbers(X0.covariance), numbers(X1.covariance),
-                    s,           numbers(X)};
+  kernel::Edge edge{};
+  kernel::Blend one{kernel::edge_of(X0), kernel::edge_of(X1), s, kernel::numbers_of(X), &edge};
   kernel::functions().blend_with_covariance(&one, 1);
-  if (!one.near) interpolate_far(X0, X1, s, X);
-  X.covariance.set_complete(X0.covariance.complete());
+  if (!one.near) return interpolate_far(X0, X1, s, X);
+  if (edge.upper == one.X0.upper) {
+    X.covariance = X0.covariance;
+  } else {
+    X.covariance.set_complete(X0.covariance.complete());
+  }
 }
 
 void interpolate_far(const Transform& X0, const Transform& X1, double s, Transform& X) {
@@ -106,10 +98,12 @@ void interpolate_far(const Transform& X0, const Transform& X1, double s, Transfo
   const Matrix6d sigma = carried(X0.covariance.of_specified(), -xi, 1.0 - s, 1.0 - s) +
                          carried(X1.covariance.of_specified(), xi, s, s);
   X = {X0.pose * exp(s * xi), Covariance::trusted(sigma)};
+  X.covariance.set_complete(X0.covariance.complete());
 }
 
 void interpolate(const Pose& X0, const Pose& X1, double s, Pose& X) {
-  kernel::Blend one{numbers(X0), numbers(X1), nullptr, nullptr, s, numbers(X)};
+  kernel::Edge edge{};
+  kernel::Blend one{kernel::edge_of(X0), kernel::edge_of(X1), s, kernel::numbers_of(X), &edge};
   kernel::functions().blend_poses(&one, 1);
   if (!one.near) interpolate_far(X0, X1, s, X);
 }

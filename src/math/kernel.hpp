@@ -14,43 +14,62 @@ namespace tfdude::kernel {
 
 /// A pose: R and t of X = [R, t].
 struct alignas(32) Columns {
-  double R[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
-  double t[4] = {0, 0, 0, 0};
+  double R[3][4];
+  double t[4];
 };
 
-/// A covariance [P, C; Cᵀ, Q].
+/// A covariance [P + Pᵀ, C; Cᵀ, Q]. P is not symmetric, because a part and its transpose are
+/// computed once.
 struct alignas(32) Blocks {
-  double P[3][4] = {};
-  double C[3][4] = {};
-  double Q[3][4] = {};
+  double P[3][4];
+  double C[3][4];
+  double Q[3][4];
 };
 
-/// An edge as stored in Transform: quaternion x, y, z, w, translation, upper triangle of the
-/// covariance.
-using Edge = const double*;
+/// An edge, where it is stored.
+struct Edge {
+  const double* pose;   ///< quaternion x, y, z, w, translation
+  const double* upper;  ///< upper triangle of the covariance; not read if only poses are computed
+};
+
+/// A climb from a frame S, as far as it is accumulated.
+struct Climb {
+  bool empty = true;  ///< S itself; the rest is not written yet
+  Columns X_SH;       ///< pose of the frame reached (here, H)
+  Blocks sum;         ///< of its left perturbation, expressed in S
+};
+
+/// Edges of a climb that are not accumulated yet, upwards.
+struct Edges {
+  const Edge* first;
+  std::size_t count;
+};
 
 /// One interpolation.
 struct Blend {
-  Edge X0 = nullptr;  ///< of these, the poses are read
-  Edge X1 = nullptr;
-  const double* upper0 = nullptr;  ///< the covariance of X0, as an upper triangle; maybe that of X1
-  const double* upper1 = nullptr;
+  Edge X0{};
+  Edge X1{};  ///< its covariance may be that of X0
   double s = 0;
-  double* X = nullptr;  ///< output; room for an edge, not X0 or X1
-  bool near = false;    ///< output: the two are less than 0.1 rad apart; otherwise X is not written
+  double* X = nullptr;  ///< output: the pose; and the covariance, but not if that of X0 is returned
+  Edge* edge = nullptr;  ///< output: where both are
+  bool near = false;  ///< output: the two are less than 0.1 rad apart; otherwise nothing is written
 };
 
 /// The functions compiled for one instruction set.
 struct Functions {
   /// X_SH := X_SC · X_PC⁻¹ for each edge in turn, C the frame reached so far.
-  void (*accumulate)(Columns& X_SH, const Edge* edges, std::size_t count);
-  /// As accumulate; before each step sum += Ad(X_SC) Σ_C Ad(X_SC)ᵀ.
-  void (*accumulate_with_covariance)(Columns& X_SH, Blocks& sum, const Edge* edges,
-                                     std::size_t count);
-  /// X · Y⁻¹.
-  Columns (*quotient)(const Columns& X, const Columns& Y);
-  /// sum += Ad(X) Σ Ad(X)ᵀ, with Σ as an upper triangle, row by row.
-  void (*add_transported)(const Columns& X, const double* upper, Blocks& sum);
+  void (*climb)(Climb& climb, const Edges& edges);
+  /// As climb(); before each step sum += Ad(X_SC) Σ_C Ad(X_SC)ᵀ.
+  void (*climb_with_covariance)(Climb& climb, const Edges& edges);
+  /// X_AB of two climbs to the same frame: as in Transform, quaternion, translation, and the upper
+  /// triangle of the covariance. The edges of A that are not accumulated yet are walked downwards,
+  /// so that their covariances need not be transported from A to B.
+  void (*join)(const Climb& a, const Edges& from_a, const Climb& b, const Edges& from_b,
+               double* X_AB);
+  void (*join_with_covariance)(const Climb& a, const Edges& from_a, const Climb& b,
+                               const Edges& from_b, double* X_AB);
+  /// Ad(X) Σ Ad(X)ᵀ, both as upper triangles, row by row.
+  void (*transport)(const Columns& X, const double* upper, double* transported);
   /// As interpolate(), for the pairs that are near.
   void (*blend_poses)(Blend* all, std::size_t count);
   void (*blend_with_covariance)(Blend* all, std::size_t count);

@@ -22,11 +22,12 @@ struct Poses {
 
 // Number `i` of each of the four edges.
 template <Edge Blend::*kEdge>
-inline V4 lanes(const Blend* four, int i) {
-  return V4{(four[0].*kEdge)[i], (four[1].*kEdge)[i], (four[2].*kEdge)[i], (four[3].*kEdge)[i]};
+inline V4 lanes(const Blend* const* four, int i) {
+  return V4{(four[0]->*kEdge).pose[i], (four[1]->*kEdge).pose[i], (four[2]->*kEdge).pose[i],
+            (four[3]->*kEdge).pose[i]};
 }
 template <Edge Blend::*kEdge>
-inline Poses poses(const Blend* four) {
+inline Poses poses(const Blend* const* four) {
   return {{lanes<kEdge>(four, 0), lanes<kEdge>(four, 1), lanes<kEdge>(four, 2)},
           lanes<kEdge>(four, 3),
           {lanes<kEdge>(four, 4), lanes<kEdge>(four, 5), lanes<kEdge>(four, 6)}};
@@ -37,49 +38,83 @@ inline Vec rotate(Vec u, V4 w, Vec a) {
   return a + (w + w) * once + cross(u + u, once);
 }
 
-// The differences ξ = Log(X0⁻¹ X1), and their squared angles.
+// All series are cut where the remainder is below 1e-11 for angles up to 0.1.
+constexpr double kSmallSine2 = 0.0025;  // (sin of half the angle)²
+
+// What lies between two poses.
+struct Between {
+  Vec even;  // X1's rotation times the inverse of X0's: the vector of the quaternion is even + odd
+  Vec odd;   // in the parent's axes, and even - odd in the child's
+  V4 sine2;  // (sin of half the angle)²
+  V4 sign;   // that of the shorter way
+  V4 arc;    // rotation vector / vector of the quaternion
+  V4 angle2;
+  Vec way;  // of the translation, in the parent's axes
+};
+
+inline Between between(const Poses& X0, const Poses& X1) {
+  Between b;
+  b.even = X0.w * X1.u - X1.w * X0.u;
+  b.odd = cross(X0.u, X1.u);
+  const Vec v = b.even + b.odd;
+  const V4 n = dot(v, v);
+  b.sine2 = n;
+  b.sign = X0.w * X1.w + dot(X0.u, X1.u) < 0.0 ? V4{} - 1.0 : V4{} + 1.0;
+  b.arc = b.sign * (2.0 + n * (1.0 / 3 + n * (3.0 / 20 + n * (5.0 / 56 + n * (35.0 / 576)))));
+  b.angle2 = b.arc * b.arc * n;
+  b.way = X1.t - X0.t;
+  return b;
+}
+
+// sin(r a) / sin(a) with n = (sin a)².
+inline V4 share(V4 r, V4 n) {
+  const V4 r2 = r * r;
+  return r * (1.0 + n * (1.0 - r2) * (1.0 / 6) *
+                        (1.0 + n * (9.0 - r2) * (1.0 / 20) * (1.0 + n * (25.0 - r2) * (1.0 / 42))));
+}
+
+// X0 · Exp(s ξ). Its rotation is a weighted mean of both. Its translation is t0 + s g(s, [θ]×)
+// (t1 - t0) in the parent's axes, with g(s, x) = (exp(s x) - 1) / (s (exp(x) - 1)), a series of
+// Bernoulli polynomials.
+inline Poses go(const Poses& X0, const Poses& X1, const Between& b, V4 s) {
+  const V4 rest = 1.0 - s;
+  const V4 k0 = share(rest, b.sine2);
+  const V4 k1 = b.sign * share(s, b.sine2);
+  const Vec u = k0 * X0.u + k1 * X1.u;
+  const V4 w = k0 * X0.w + k1 * X1.w;
+  // A Newton step towards unit length.
+  const V4 k = 1.5 - 0.5 * (dot(u, u) + w * w);
+  const V4 s2 = s * s;
+  const V4 c1 = -0.5 * rest;
+  const V4 c2 = rest * (1.0 - 2.0 * s) * (1.0 / 12);
+  const V4 c3 = s * rest * rest * (1.0 / 24);
+  const V4 c4 = s2 * (1.0 / 72 - s * (1.0 / 48) + s2 * (1.0 / 120)) - 1.0 / 720;
+  const V4 c5 = s * (s2 * (2.5 - 3.0 * s + s2) - 0.5) * (1.0 / 720);
+  const V4 c6 = (s2 * (s2 * (3.5 - 3.5 * s + s2) - 7.0 / 6) + 1.0 / 6) * (1.0 / 5040);
+  const Vec theta = b.arc * (b.even + b.odd);
+  const Vec once = cross(theta, b.way);
+  const Vec t = b.way + (c1 - b.angle2 * (c3 - b.angle2 * c5)) * once +
+                (c2 - b.angle2 * (c4 - b.angle2 * c6)) * cross(theta, once);
+  return {k * u, k * w, X0.t + s * t};
+}
+
+// The differences ξ = Log(X0⁻¹ X1).
 struct Ways {
   Vec rho;
   Vec theta;
   V4 angle2;
 };
 
-// All series are cut where the remainder is below 1e-11 for angles up to 0.1.
-constexpr double kSmallSine2 = 0.0025;  // (sin of half the angle)²
-
-// @param sine2  the squared sines of half the angles
-inline Ways ways_between(const Poses& X0, const Poses& X1, V4& sine2) {
-  const V4 w = X0.w * X1.w + dot(X0.u, X1.u);
-  const Vec v = X0.w * X1.u - X1.w * X0.u - cross(X0.u, X1.u);
-  const V4 n = dot(v, v);
-  const V4 arc = 2.0 + n * (1.0 / 3 + n * (3.0 / 20 + n * (5.0 / 56 + n * (35.0 / 576))));
-  sine2 = n;
+inline Ways ways(const Poses& X0, const Between& b) {
   Ways ways;
-  ways.theta = (w < 0.0 ? -arc : arc) * v;
-  ways.angle2 = dot(ways.theta, ways.theta);
+  ways.theta = b.arc * (b.even - b.odd);
+  ways.angle2 = b.angle2;
   const Vec back{-X0.u.x, -X0.u.y, -X0.u.z};
-  const Vec d = rotate(back, X0.w, X1.t - X0.t);
+  const Vec d = rotate(back, X0.w, b.way);
   const Vec once = cross(ways.theta, d);
   const V4 c = (1.0 / 12) + ways.angle2 * (1.0 / 720 + ways.angle2 * (1.0 / 30240));
   ways.rho = d - (V4{} + 0.5) * once + c * cross(ways.theta, once);
   return ways;
-}
-
-// X0 · Exp(s ξ)
-inline Poses go(const Poses& X0, const Ways& ways, V4 s) {
-  const V4 f = s * s * ways.angle2;
-  const Vec once = cross(ways.theta, ways.rho);
-  const Vec t =
-      s * ways.rho + (s * s * (0.5 - f * (1.0 / 24 - f * (1.0 / 720)))) * once +
-      (s * s * s * (1.0 / 6 - f * (1.0 / 120 - f * (1.0 / 5040)))) * cross(ways.theta, once);
-  const V4 h = 0.25 * f;
-  const Vec v = (0.5 * s * (1.0 - h * (1.0 / 6 - h * (1.0 / 120)))) * ways.theta;
-  const V4 w = 1.0 - h * (0.5 - h * (1.0 / 24 - h * (1.0 / 720)));
-  const Vec u = X0.w * v + w * X0.u + cross(X0.u, v);
-  const V4 real = X0.w * w - dot(X0.u, v);
-  // A Newton step towards unit length.
-  const V4 k = 1.5 - 0.5 * (dot(u, u) + real * real);
-  return {k * u, k * real, X0.t + rotate(X0.u, X0.w, t)};
 }
 
 // One lane of Ways.
@@ -89,12 +124,9 @@ struct Way {
   double angle2;
 };
 
-inline double square(const double* a) { return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]; }
-
 // sum += B Σ Bᵀ, B = [M, N; 0, M] = 1 + Σ_k c_k ad(ξ)^k, k = 1 to 4. With Θ = [θ]×, Θ³ = -|θ|² Θ
 // and d|θ|² = 2 θ·ρ along ρ, M = 1 + a Θ + b Θ² with a = c1 - c3 |θ|², b = c2 - c4 |θ|², and N is
 // the derivative of M along ρ.
-// along ρ.
 inline void carry(const Way& way, const double* c, const double* upper, Blocks& sum) {
   const double a = c[0] - c[2] * way.angle2;
   const double b = c[1] - c[3] * way.angle2;
@@ -116,18 +148,7 @@ inline void carry(const Way& way, const double* c, const double* upper, Blocks& 
     N[j] = (-2.0 * b * along - db * way.angle2) * e + a * cross(rho, e) + da * turn +
            (b * t[j]) * rho + (b * r[j] + db * t[j]) * theta;
   }
-  sandwich(M, N, upper, sum);
-}
-
-inline void store_upper(const Blocks& sum, double* u) {
-  int k = 0;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = i; j < 3; ++j) u[k++] = sum.P[j][i];
-    for (int j = 0; j < 3; ++j) u[k++] = sum.C[j][i];
-  }
-  for (int i = 0; i < 3; ++i) {
-    for (int j = i; j < 3; ++j) u[k++] = sum.Q[j][i];
-  }
+  add_sandwich(M, N, upper, sum);
 }
 
 inline void carry_weighted(const Way& way, double s, double weight, const double* upper,
@@ -138,14 +159,14 @@ inline void carry_weighted(const Way& way, double s, double weight, const double
 }
 
 // If both ends have the same covariance, the covariance between them differs from it only by s
-// (1-s)/4 ad(ξ) Σ ad(ξ)ᵀ and terms of fourth order. Adds nothing where that term is below a
-// millionth.
-inline bool add_bulge(const Way& way, double s, const double* upper, Blocks& sum) {
+// (1-s)/4 ad(ξ) Σ ad(ξ)ᵀ and terms of fourth order. Whether that term is below a millionth.
+inline bool stays(const double* upper, double angle2, double distance2) {
   constexpr double kLittle = 16e-6;
   const double turned = upper[15] + upper[18] + upper[20];
-  const bool stays = way.angle2 < kLittle &&
-                     square(way.rho) * turned <= kLittle * (upper[0] + upper[6] + upper[11]);
-  if (stays) return false;
+  return angle2 < kLittle && distance2 * turned <= kLittle * (upper[0] + upper[6] + upper[11]);
+}
+
+inline void add_bulge(const Way& way, double s, const double* upper, Blocks& sum) {
   const V4 theta{way.theta[0], way.theta[1], way.theta[2], 0};
   const V4 rho{way.rho[0], way.rho[1], way.rho[2], 0};
   V4 M[3];
@@ -159,49 +180,69 @@ inline bool add_bulge(const Way& way, double s, const double* upper, Blocks& sum
   double weighted[21];
   const double weight = 0.25 * s * (1.0 - s);
   for (int k = 0; k < 21; ++k) weighted[k] = weight * upper[k];
-  sandwich(M, N, weighted, sum);
-  return true;
+  add_sandwich(M, N, weighted, sum);
+}
+
+inline bool same_covariance(const Blend& one) {
+  return one.X0.upper == one.X1.upper ||
+         std::memcmp(one.X0.upper, one.X1.upper, 21 * sizeof(double)) == 0;
 }
 
 inline void blend_covariance(const Way& way, const Blend& one) {
   // Up to here, what add_bulge() leaves out is below 1e-8.
   constexpr double kQuarticEnds = 1e-3;
-  const double* u0 = one.upper0;
-  const double* u1 = one.upper1;
-  double* u = one.X + 7;
-  const bool same = u0 == u1 || std::memcmp(u0, u1, 21 * sizeof(double)) == 0;
   Blocks sum;
-  if (same && way.angle2 < kQuarticEnds) {
-    if (add_bulge(way, one.s, u0, sum)) {
-      store_upper(sum, u);
-      for (int k = 0; k < 21; ++k) u[k] += u0[k];
-    } else {
-      std::memcpy(u, u0, 21 * sizeof(double));
-    }
-    return;
+  if (same_covariance(one) && way.angle2 < kQuarticEnds) {
+    set(sum, one.X0.upper);
+    add_bulge(way, one.s, one.X0.upper, sum);
+  } else {
+    const Way back{{-way.rho[0], -way.rho[1], -way.rho[2]},
+                   {-way.theta[0], -way.theta[1], -way.theta[2]},
+                   way.angle2};
+    set_zero(sum);
+    carry_weighted(back, 1.0 - one.s, 1.0 - one.s, one.X0.upper, sum);
+    carry_weighted(way, one.s, one.s, one.X1.upper, sum);
   }
-  const Way back{{-way.rho[0], -way.rho[1], -way.rho[2]},
-                 {-way.theta[0], -way.theta[1], -way.theta[2]},
-                 way.angle2};
-  carry_weighted(back, 1.0 - one.s, 1.0 - one.s, u0, sum);
-  carry_weighted(way, one.s, one.s, u1, sum);
-  store_upper(sum, u);
+  store_upper(sum, one.X + 7);
+}
+
+// Of the edges that are near.
+inline void blend_covariances(Blend* some, std::size_t count, const Poses& X0, const Between& b) {
+  const V4 distance2 = dot(b.way, b.way);
+  bool stay[4];
+  bool all_stay = true;
+  for (std::size_t i = 0; i < count; ++i) {
+    Blend& one = some[i];
+    stay[i] = !one.near || (same_covariance(one) && stays(one.X0.upper, b.angle2[i], distance2[i]));
+    one.edge->upper = stay[i] ? one.X0.upper : one.X + 7;
+    all_stay = all_stay && stay[i];
+  }
+  if (all_stay) return;
+  const Ways xi = ways(X0, b);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (stay[i]) continue;
+    blend_covariance({{xi.rho.x[i], xi.rho.y[i], xi.rho.z[i]},
+                      {xi.theta.x[i], xi.theta.y[i], xi.theta.z[i]},
+                      xi.angle2[i]},
+                     some[i]);
+  }
 }
 
 template <bool kWithCovariance>
 inline void blend_all(Blend* all, std::size_t count) {
   for (std::size_t from = 0; from < count; from += 4) {
     const std::size_t here = count - from < 4 ? count - from : 4;
-    Blend four[4];
-    for (std::size_t i = 0; i < 4; ++i) four[i] = all[from + (i < here ? i : 0)];
-    V4 sine2;
+    Blend* some = all + from;
+    const Blend* four[4];
+    for (std::size_t i = 0; i < 4; ++i) four[i] = some + (i < here ? i : 0);
     const Poses X0 = poses<&Blend::X0>(four);
-    const Ways ways = ways_between(X0, poses<&Blend::X1>(four), sine2);
-    const Poses X = go(X0, ways, V4{four[0].s, four[1].s, four[2].s, four[3].s});
+    const Poses X1 = poses<&Blend::X1>(four);
+    const Between b = between(X0, X1);
+    const Poses X = go(X0, X1, b, V4{four[0]->s, four[1]->s, four[2]->s, four[3]->s});
     for (std::size_t i = 0; i < here; ++i) {
-      all[from + i].near = sine2[i] < kSmallSine2;
-      if (!all[from + i].near) continue;
-      double* out = four[i].X;
+      some[i].near = b.sine2[i] < kSmallSine2;
+      if (!some[i].near) continue;
+      double* out = some[i].X;
       out[0] = X.u.x[i];
       out[1] = X.u.y[i];
       out[2] = X.u.z[i];
@@ -209,13 +250,9 @@ inline void blend_all(Blend* all, std::size_t count) {
       out[4] = X.t.x[i];
       out[5] = X.t.y[i];
       out[6] = X.t.z[i];
-      if constexpr (kWithCovariance) {
-        blend_covariance({{ways.rho.x[i], ways.rho.y[i], ways.rho.z[i]},
-                          {ways.theta.x[i], ways.theta.y[i], ways.theta.z[i]},
-                          ways.angle2[i]},
-                         four[i]);
-      }
+      some[i].edge->pose = out;
     }
+    if constexpr (kWithCovariance) blend_covariances(some, here, X0, b);
   }
 }
 

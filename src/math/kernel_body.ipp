@@ -14,45 +14,147 @@ inline V4 load(const double* column) { return *reinterpret_cast<const V4*>(colum
 
 inline void store(double* column, V4 value) { *reinterpret_cast<V4*>(column) = value; }
 
-// sum += Ad Σ Adᵀ for Ad = [R, G; 0, R], where G = [t]×R for Ad(X). With A = R P + G Cᵀ, B = R C +
-// G Q and D = R Q, the parts of Ad Σ Adᵀ are A Rᵀ + B Gᵀ, B Rᵀ and D Rᵀ. 81 products of columns and
-// numbers.
-inline void sandwich(const V4* R, const V4* G, const double* u, Blocks& sum) {
-  // Rows of R and G, as numbers, through memory: loads that broadcast a number to all lanes are
-  // free, shuffles are not.
-  alignas(32) double r[3][4];
-  alignas(32) double g[3][4];
-  for (int k = 0; k < 3; ++k) {
-    store(r[k], R[k]);
-    store(g[k], G[k]);
+inline void add(double* column, V4 value) { store(column, load(column) + value); }
+
+// Numbers of the columns of a 3x3 matrix, through memory: loads that broadcast a number to all
+// lanes are free, shuffles are not.
+struct Numbers {
+  alignas(32) double of[3][4];
+
+  explicit Numbers(const V4* m) {
+    for (int k = 0; k < 3; ++k) store(of[k], m[k]);
   }
-  const V4 A[3] = {combine(R, u[0], u[1], u[2]) + combine(G, u[3], u[4], u[5]),
-                   combine(R, u[1], u[6], u[7]) + combine(G, u[8], u[9], u[10]),
-                   combine(R, u[2], u[7], u[11]) + combine(G, u[12], u[13], u[14])};
-  const V4 B[3] = {combine(R, u[3], u[8], u[12]) + combine(G, u[15], u[16], u[17]),
-                   combine(R, u[4], u[9], u[13]) + combine(G, u[16], u[18], u[19]),
-                   combine(R, u[5], u[10], u[14]) + combine(G, u[17], u[19], u[20])};
-  const V4 D[3] = {combine(R, u[15], u[16], u[17]), combine(R, u[16], u[18], u[19]),
-                   combine(R, u[17], u[19], u[20])};
+  // m times row j, transposed.
+  V4 times_row(const V4* m, int j) const { return combine(m, of[0][j], of[1][j], of[2][j]); }
+};
+
+// Products of a matrix with the blocks of a covariance; of P and Q also with the upper triangle
+// that has half the diagonal, whose sum with its transpose is the block.
+inline void times_half_P(const V4* m, const double* u, V4* product) {
+  product[0] = m[0] * (0.5 * u[0]);
+  product[1] = m[0] * u[1] + m[1] * (0.5 * u[6]);
+  product[2] = combine(m, u[2], u[7], 0.5 * u[11]);
+}
+inline void times_half_Q(const V4* m, const double* u, V4* product) {
+  product[0] = m[0] * (0.5 * u[15]);
+  product[1] = m[0] * u[16] + m[1] * (0.5 * u[18]);
+  product[2] = combine(m, u[17], u[19], 0.5 * u[20]);
+}
+inline void times_C(const V4* m, const double* u, V4* product) {
+  for (int j = 0; j < 3; ++j) product[j] = combine(m, u[3 + j], u[8 + j], u[12 + j]);
+}
+inline void times_Q(const V4* m, const double* u, V4* product) {
+  product[0] = combine(m, u[15], u[16], u[17]);
+  product[1] = combine(m, u[16], u[18], u[19]);
+  product[2] = combine(m, u[17], u[19], u[20]);
+}
+
+// A pose in columns.
+struct Motion {
+  V4 R[3];
+  V4 t;
+};
+
+inline Motion load(const Columns& X) {
+  return {{load(X.R[0]), load(X.R[1]), load(X.R[2])}, load(X.t)};
+}
+
+inline void store(Columns& columns, const Motion& X) {
+  for (int k = 0; k < 3; ++k) store(columns.R[k], X.R[k]);
+  store(columns.t, X.t);
+}
+
+// sum += Ad(X) Σ Ad(X)ᵀ. After the rotation of its blocks, C becomes C + [t]×Q, and P becomes
+// P + M + Mᵀ with M = [t]× (C + [t]×Q / 2)ᵀ. 72 products of columns and numbers; with the two full
+// products of 6x6 matrices there are 87.
+inline void add_transported(const Motion& X, const double* u, Blocks& sum) {
+  const Numbers r(X.R);
+  alignas(32) double t[4];
+  store(t, X.t);
+  V4 A[3];
+  V4 B[3];
+  V4 D[3];
+  times_half_P(X.R, u, A);
+  times_C(X.R, u, B);
+  times_Q(X.R, u, D);
+  V4 Y[3];
   for (int j = 0; j < 3; ++j) {
-    store(sum.P[j], load(sum.P[j]) + combine(A, r[0][j], r[1][j], r[2][j]) +
-                        combine(B, g[0][j], g[1][j], g[2][j]));
-    store(sum.C[j], load(sum.C[j]) + combine(B, r[0][j], r[1][j], r[2][j]));
-    store(sum.Q[j], load(sum.Q[j]) + combine(D, r[0][j], r[1][j], r[2][j]));
+    const V4 Q = r.times_row(D, j);
+    const V4 C = r.times_row(B, j);
+    const V4 arm = cross(X.t, Q);
+    Y[j] = C + 0.5 * arm;
+    add(sum.C[j], C + arm);
+    add(sum.Q[j], Q);
+  }
+  add(sum.P[0], r.times_row(A, 0) + (t[1] * Y[2] - t[2] * Y[1]));
+  add(sum.P[1], r.times_row(A, 1) + (t[2] * Y[0] - t[0] * Y[2]));
+  add(sum.P[2], r.times_row(A, 2) + (t[0] * Y[1] - t[1] * Y[0]));
+}
+
+// sum += B Σ Bᵀ for any B = [M, N; 0, M].
+inline void add_sandwich(const V4* M, const V4* N, const double* u, Blocks& sum) {
+  const Numbers m(M);
+  const Numbers n(N);
+  V4 A[3];
+  V4 B[3];
+  V4 NQ[3];
+  V4 half_NQ[3];
+  V4 D[3];
+  times_half_P(M, u, A);
+  times_C(M, u, B);
+  times_Q(N, u, NQ);
+  times_half_Q(N, u, half_NQ);
+  times_Q(M, u, D);
+  for (int j = 0; j < 3; ++j) {
+    half_NQ[j] += B[j];
+    B[j] += NQ[j];
+  }
+  for (int j = 0; j < 3; ++j) {
+    add(sum.P[j], m.times_row(A, j) + n.times_row(half_NQ, j));
+    add(sum.C[j], m.times_row(B, j));
+    add(sum.Q[j], m.times_row(D, j));
   }
 }
 
-inline void sandwich(const V4* R, V4 t, const double* u, Blocks& sum) {
-  const V4 G[3] = {cross(t, R[0]), cross(t, R[1]), cross(t, R[2])};
-  sandwich(R, G, u, sum);
+inline void set(Blocks& sum, const double* u) {
+  store(sum.P[0], V4{0.5 * u[0]});
+  store(sum.P[1], V4{u[1], 0.5 * u[6]});
+  store(sum.P[2], V4{u[2], u[7], 0.5 * u[11]});
+  for (int j = 0; j < 3; ++j) store(sum.C[j], V4{u[3 + j], u[8 + j], u[12 + j]});
+  store(sum.Q[0], V4{u[15], u[16], u[17]});
+  store(sum.Q[1], V4{u[16], u[18], u[19]});
+  store(sum.Q[2], V4{u[17], u[19], u[20]});
 }
 
-// R_SP = R_SC R_PCᵀ, t_SP = t_SC - R_SP p_PC, with R_PC from the quaternion.
-inline void step(V4* R, V4& t, Edge edge) {
-  const double x = edge[0];
-  const double y = edge[1];
-  const double z = edge[2];
-  const double w = edge[3];
+inline void set_zero(Blocks& sum) {
+  for (int j = 0; j < 3; ++j) {
+    store(sum.P[j], V4{});
+    store(sum.C[j], V4{});
+    store(sum.Q[j], V4{});
+  }
+}
+
+inline void store_upper(const Blocks& sum, double* u) {
+  int k = 0;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = i; j < 3; ++j) u[k++] = sum.P[j][i] + sum.P[i][j];
+    for (int j = 0; j < 3; ++j) u[k++] = sum.C[j][i];
+  }
+  for (int i = 0; i < 3; ++i) {
+    for (int j = i; j < 3; ++j) u[k++] = sum.Q[j][i];
+  }
+}
+
+// The matrix of a unit quaternion, row by row.
+struct Rotation {
+  double row[3][3];
+};
+
+inline Rotation rotation_of(const double* q) {
+  const double x = q[0];
+  const double y = q[1];
+  const double z = q[2];
+  const double w = q[3];
   const double xx = 2 * x * x;
   const double yy = 2 * y * y;
   const double zz = 2 * z * z;
@@ -62,48 +164,146 @@ inline void step(V4* R, V4& t, Edge edge) {
   const double wx = 2 * w * x;
   const double wy = 2 * w * y;
   const double wz = 2 * w * z;
-  const V4 up[3] = {combine(R, 1 - yy - zz, xy - wz, xz + wy),
-                    combine(R, xy + wz, 1 - xx - zz, yz - wx),
-                    combine(R, xz - wy, yz + wx, 1 - xx - yy)};
-  for (int k = 0; k < 3; ++k) R[k] = up[k];
-  t -= combine(R, edge[4], edge[5], edge[6]);
+  return {{{1 - yy - zz, xy - wz, xz + wy},
+           {xy + wz, 1 - xx - zz, yz - wx},
+           {xz - wy, yz + wx, 1 - xx - yy}}};
+}
+
+inline Motion identity() { return {{V4{1, 0, 0, 0}, V4{0, 1, 0, 0}, V4{0, 0, 1, 0}}, V4{}}; }
+
+// X_SP of X_SC: R_SP = R_SC R_PCᵀ, t_SP = t_SC - R_SP p_PC.
+inline void step_up(Motion& X, const double* X_PC) {
+  const Rotation R_PC = rotation_of(X_PC);
+  const auto& m = R_PC.row;
+  const V4 up[3] = {combine(X.R, m[0][0], m[0][1], m[0][2]),
+                    combine(X.R, m[1][0], m[1][1], m[1][2]),
+                    combine(X.R, m[2][0], m[2][1], m[2][2])};
+  for (int k = 0; k < 3; ++k) X.R[k] = up[k];
+  X.t -= combine(X.R, X_PC[4], X_PC[5], X_PC[6]);
+}
+
+// X_SC of X_SP: R_SC = R_SP R_PC, t_SC = t_SP + R_SP p_PC.
+inline void step_down(Motion& X, const double* X_PC) {
+  const Rotation R_PC = rotation_of(X_PC);
+  const auto& m = R_PC.row;
+  X.t += combine(X.R, X_PC[4], X_PC[5], X_PC[6]);
+  const V4 down[3] = {combine(X.R, m[0][0], m[1][0], m[2][0]),
+                      combine(X.R, m[0][1], m[1][1], m[2][1]),
+                      combine(X.R, m[0][2], m[1][2], m[2][2])};
+  for (int k = 0; k < 3; ++k) X.R[k] = down[k];
+}
+
+// @param fresh  nothing is accumulated yet; sum is then not written yet
+template <bool kWithCovariance>
+inline void climb_edges(Motion& X, Blocks& sum, bool fresh, const Edges& edges) {
+  std::size_t i = 0;
+  if (fresh && edges.count > 0) {
+    // The first edge's covariance is already expressed in S.
+    if constexpr (kWithCovariance) set(sum, edges.first[0].upper);
+    step_up(X, edges.first[0].pose);
+    i = 1;
+  } else if (fresh && kWithCovariance) {
+    set_zero(sum);
+  }
+  for (; i < edges.count; ++i) {
+    if constexpr (kWithCovariance) add_transported(X, edges.first[i].upper, sum);
+    step_up(X, edges.first[i].pose);
+  }
 }
 
 template <bool kWithCovariance>
-inline void climb(Columns& X_SH, Blocks* sum, const Edge* edges, std::size_t count) {
-  V4 R[3] = {load(X_SH.R[0]), load(X_SH.R[1]), load(X_SH.R[2])};
-  V4 t = load(X_SH.t);
-  for (std::size_t i = 0; i < count; ++i) {
-    if constexpr (kWithCovariance) sandwich(R, t, edges[i] + 7, *sum);
-    step(R, t, edges[i]);
-  }
-  for (int k = 0; k < 3; ++k) store(X_SH.R[k], R[k]);
-  store(X_SH.t, t);
+inline void climb_on(Climb& climb, const Edges& edges) {
+  Motion X = climb.empty ? identity() : load(climb.X_SH);
+  climb_edges<kWithCovariance>(X, climb.sum, climb.empty, edges);
+  store(climb.X_SH, X);
+  climb.empty = false;
 }
 
-void accumulate_pose(Columns& X_SH, const Edge* edges, std::size_t count) {
-  climb<false>(X_SH, nullptr, edges, count);
-}
+void climb_poses(Climb& climb, const Edges& edges) { climb_on<false>(climb, edges); }
+void climb_both(Climb& climb, const Edges& edges) { climb_on<true>(climb, edges); }
 
-void accumulate_both(Columns& X_SH, Blocks& sum, const Edge* edges, std::size_t count) {
-  climb<true>(X_SH, &sum, edges, count);
-}
-
-Columns quotient(const Columns& X, const Columns& Y) {
-  const V4 R[3] = {load(X.R[0]), load(X.R[1]), load(X.R[2])};
-  Columns Z;
-  V4 turned[3];
-  for (int j = 0; j < 3; ++j) {
-    turned[j] = combine(R, Y.R[0][j], Y.R[1][j], Y.R[2][j]);
-    store(Z.R[j], turned[j]);
-  }
-  store(Z.t, load(X.t) - combine(turned, Y.t[0], Y.t[1], Y.t[2]));
+// X · Y⁻¹.
+inline Motion quotient(const Motion& X, const Columns& Y) {
+  Motion Z;
+  for (int j = 0; j < 3; ++j) Z.R[j] = combine(X.R, Y.R[0][j], Y.R[1][j], Y.R[2][j]);
+  Z.t = X.t - combine(Z.R, Y.t[0], Y.t[1], Y.t[2]);
   return Z;
 }
 
-void transport(const Columns& X, const double* upper, Blocks& sum) {
-  const V4 R[3] = {load(X.R[0]), load(X.R[1]), load(X.R[2])};
-  sandwich(R, load(X.t), upper, sum);
+// The quaternion and translation of X⁻¹. With the unit quaternion (v, w) of R, the largest row of
+// 4 (v, w)ᵀ (v, w) is normalized.
+inline void store_inverse(const Motion& X, double* pose) {
+  alignas(32) double R[3][4];
+  alignas(32) double t[4];
+  for (int k = 0; k < 3; ++k) store(R[k], X.R[k]);
+  store(t, X.t);
+  const double x = R[1][2] - R[2][1];
+  const double y = R[2][0] - R[0][2];
+  const double z = R[0][1] - R[1][0];
+  const double xy = R[0][1] + R[1][0];
+  const double xz = R[0][2] + R[2][0];
+  const double yz = R[1][2] + R[2][1];
+  double row[4] = {x, y, z, 1 + R[0][0] + R[1][1] + R[2][2]};
+  if (row[3] < 1) {
+    const bool by_x = R[0][0] >= R[1][1] && R[0][0] >= R[2][2];
+    const bool by_y = R[1][1] >= R[2][2];
+    if (by_x) {
+      const double chosen[4] = {1 + R[0][0] - R[1][1] - R[2][2], xy, xz, x};
+      std::memcpy(row, chosen, sizeof(row));
+    } else if (by_y) {
+      const double chosen[4] = {xy, 1 - R[0][0] + R[1][1] - R[2][2], yz, y};
+      std::memcpy(row, chosen, sizeof(row));
+    } else {
+      const double chosen[4] = {xz, yz, 1 - R[0][0] - R[1][1] + R[2][2], z};
+      std::memcpy(row, chosen, sizeof(row));
+    }
+  }
+  const double k =
+      1.0 / std::sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2] + row[3] * row[3]);
+  for (int i = 0; i < 3; ++i) pose[i] = -k * row[i];
+  pose[3] = k * row[3];
+  for (int i = 0; i < 3; ++i) pose[4 + i] = -(R[i][0] * t[0] + R[i][1] * t[1] + R[i][2] * t[2]);
+}
+
+template <bool kWithCovariance>
+inline void join_climbs(const Climb& a, const Edges& from_a, const Climb& b, const Edges& from_b,
+                        double* X_AB) {
+  Motion X = b.empty ? identity() : load(b.X_SH);
+  Blocks sum;
+  if constexpr (kWithCovariance) {
+    if (!b.empty) sum = b.sum;
+  }
+  climb_edges<kWithCovariance>(X, sum, b.empty, from_b);
+  for (std::size_t i = from_a.count; i-- > 0;) {
+    step_down(X, from_a.first[i].pose);
+    if constexpr (kWithCovariance) add_transported(X, from_a.first[i].upper, sum);
+  }
+  if (!a.empty) {
+    X = quotient(X, a.X_SH);
+    if constexpr (kWithCovariance) {
+      double upper[21];
+      store_upper(a.sum, upper);
+      add_transported(X, upper, sum);
+    }
+  }
+  store_inverse(X, X_AB);
+  if constexpr (kWithCovariance) store_upper(sum, X_AB + 7);
+}
+
+void join_poses(const Climb& a, const Edges& from_a, const Climb& b, const Edges& from_b,
+                double* X_AB) {
+  join_climbs<false>(a, from_a, b, from_b, X_AB);
+}
+void join_both(const Climb& a, const Edges& from_a, const Climb& b, const Edges& from_b,
+               double* X_AB) {
+  join_climbs<true>(a, from_a, b, from_b, X_AB);
+}
+
+void transport(const Columns& X, const double* upper, double* transported) {
+  Blocks sum;
+  set_zero(sum);
+  add_transported(load(X), upper, sum);
+  store_upper(sum, transported);
 }
 
 #include "math/kernel_blend.ipp"

@@ -1,115 +1,101 @@
 #include "math/path_accumulation.hpp"
 
+#include <algorithm>
 #include <cstddef>
-#include <type_traits>
 
 #include "tfdude/math/interpolate.hpp"
 
-#include "math/columns.hpp"
 #include "math/interpolate_far.hpp"
 
 namespace tfdude {
-
-// The layout in which the kernel reads an edge: quaternion, translation, upper triangle.
-static_assert(std::is_standard_layout_v<Pose> && sizeof(Pose) == 7 * sizeof(double));
-static_assert(std::is_standard_layout_v<Transform> && sizeof(Transform) == 29 * sizeof(double));
-static_assert(offsetof(Transform, covariance) == 7 * sizeof(double));
-static_assert(std::is_standard_layout_v<StatedCovariance> &&
-              sizeof(StatedCovariance) == 22 * sizeof(double));
-
-template <class Value>
-void PathAccumulation<Value>::up_between(const TransformParts& X0, const TransformParts& X1,
-                                         double s) {
-  // NOLINTBEGIN(cppcoreguidelines-pro-type-reinterpret-cast): of doubles only
-  blends_[blend_count_++] = {reinterpret_cast<kernel::Edge>(X0.pose),
-                             reinterpret_cast<kernel::Edge>(X1.pose),
-                             reinterpret_cast<const double*>(X0.covariance),
-                             reinterpret_cast<const double*>(X1.covariance),
-                             s,
-                             reinterpret_cast<double*>(&place())};
-  // NOLINTEND(cppcoreguidelines-pro-type-reinterpret-cast)
-  up(place());
-}
-
 namespace {
 
-// NOLINTBEGIN(cppcoreguidelines-pro-type-reinterpret-cast): what they were before
-TransformParts first_of(const kernel::Blend& one) {
-  return {reinterpret_cast<const Pose*>(one.X0),
-          reinterpret_cast<const StatedCovariance*>(one.upper0)};
-}
-TransformParts second_of(const kernel::Blend& one) {
-  return {reinterpret_cast<const Pose*>(one.X1),
-          reinterpret_cast<const StatedCovariance*>(one.upper1)};
-}
-// NOLINTEND(cppcoreguidelines-pro-type-reinterpret-cast)
+using kernel::Blend;
 
-void finish(const kernel::Blend& one, Transform& X) {
-  const TransformParts X0 = first_of(one);
-  const TransformParts X1 = second_of(one);
-  const bool complete = X0.covariance->complete();
-  if (complete != X1.covariance->complete()) {
-    return interpolate(X0.whole(), X1.whole(), one.s, X);
-  }
-  if (!one.near) interpolate_far(X0.whole(), X1.whole(), one.s, X);
-  X.covariance.set_complete(complete);
+// The number of groups in which the kernel interpolates.
+std::size_t groups(std::size_t blends) { return (blends + 3) / 4; }
+
+void blend_all(Blend* all, std::size_t count, const Pose*) {
+  kernel::functions().blend_poses(all, count);
+}
+void blend_all(Blend* all, std::size_t count, const Transform*) {
+  kernel::functions().blend_with_covariance(all, count);
 }
 
-void finish(const kernel::Blend& one, Pose& X) {
-  if (!one.near) interpolate_far(*first_of(one).pose, *second_of(one).pose, one.s, X);
+void blend_far(const Blend& one, Pose& X) {
+  interpolate_far(kernel::pose_of(one.X0), kernel::pose_of(one.X1), one.s, X);
+}
+void blend_far(const Blend& one, Transform& X) {
+  interpolate_far(kernel::transform_of(one.X0), kernel::transform_of(one.X1), one.s, X);
 }
 
 }  // namespace
 
 template <class Value>
-void PathAccumulation<Value>::blend() {
-  const kernel::Functions& functions = kernel::functions();
+void PathAccumulation<Value>::up_between(const TransformParts& X0, const TransformParts& X1,
+                                         double s) {
   if constexpr (std::is_same_v<Value, Transform>) {
-    functions.blend_with_covariance(blends_.data(), blend_count_);
-  } else {
-    functions.blend_poses(blends_.data(), blend_count_);
+    const bool complete = X0.covariance->complete();
+    if (complete != X1.covariance->complete()) {
+      interpolate(X0.whole(), X1.whole(), s, place());
+      return up(place());
+    }
+    complete_ &= complete;
   }
+  const kernel::Edge edge = kernel::edge_of(place());
+  blends_[blend_count_++] = {kernel::edge_of(*X0.pose, *X0.covariance),
+                             kernel::edge_of(*X1.pose, *X1.covariance), s,
+                             kernel::numbers_of(place()), &pending_[count_]};
+  push(edge);
+}
+
+template <class Value>
+void PathAccumulation<Value>::blend() {
+  blend_all(blends_.data(), blend_count_, static_cast<const Value*>(nullptr));
   for (std::size_t i = 0; i < blend_count_; ++i) {
-    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): what it was before
-    finish(blends_[i], *reinterpret_cast<Value*>(blends_[i].X));
+    const Blend& one = blends_[i];
+    if (one.near) continue;
+    Value X;
+    blend_far(one, X);
+    std::copy_n(kernel::numbers_of(X), std::is_same_v<Value, Pose> ? 7 : 28, one.X);
+    *one.edge = {one.X, one.X + 7};
   }
   blend_count_ = 0;
 }
 
 template <class Value>
-void PathAccumulation<Value>::compute() {
+void PathAccumulation<Value>::climb() {
   if (blend_count_ > 0) blend();
+  const kernel::Functions& compute = kernel::functions();
   if constexpr (std::is_same_v<Value, Transform>) {
-    kernel::functions().accumulate_with_covariance(X_SH_, left_, pending_.data(), count_);
-    for (std::size_t i = 0; i < count_; ++i) {
-      // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): what it was before
-      complete_ &= reinterpret_cast<const Value*>(pending_[i])->covariance.complete();
-    }
+    compute.climb_with_covariance(climbed_, {pending_.data(), count_});
   } else {
-    kernel::functions().accumulate(X_SH_, pending_.data(), count_);
+    compute.climb(climbed_, {pending_.data(), count_});
   }
   count_ = 0;
 }
 
 template <class Value>
-Value join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b) {
-  // Both at once: four take hardly longer than one.
-  const bool together = from_a.blend_count_ + from_b.blend_count_ <= from_a.blends_.size();
-  for (std::size_t i = 0; together && i < from_b.blend_count_; ++i) {
-    from_a.blends_[from_a.blend_count_++] = from_b.blends_[i];
+void join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b, Value& X_AB) {
+  // Four interpolations take hardly longer than one.
+  const std::size_t blends = from_a.blend_count_ + from_b.blend_count_;
+  if (blends <= from_a.blends_.size() &&
+      groups(blends) < groups(from_a.blend_count_) + groups(from_b.blend_count_)) {
+    std::copy_n(from_b.blends_.begin(), from_b.blend_count_,
+                from_a.blends_.begin() + static_cast<std::ptrdiff_t>(from_a.blend_count_));
+    from_a.blend_count_ = blends;
+    from_b.blend_count_ = 0;
   }
-  if (together) from_b.blend_count_ = 0;
-  from_a.compute();
-  from_b.compute();
+  if (from_a.blend_count_ > 0) from_a.blend();
+  if (from_b.blend_count_ > 0) from_b.blend();
   const kernel::Functions& compute = kernel::functions();
-  const Pose X_AB = kernel::pose_of(compute.quotient(from_a.X_SH_, from_b.X_SH_));
+  const kernel::Edges a{from_a.pending_.data(), from_a.count_};
+  const kernel::Edges b{from_b.pending_.data(), from_b.count_};
   if constexpr (std::is_same_v<Value, Transform>) {
-    const kernel::Columns X_BA = compute.quotient(from_b.X_SH_, from_a.X_SH_);
-    compute.add_transported(X_BA, kernel::upper_of(from_a.left_).data(), from_b.left_);
-    return {X_AB, StatedCovariance::trusted(kernel::upper_of(from_b.left_),
-                                            from_a.complete_ && from_b.complete_)};
+    compute.join_with_covariance(from_a.climbed_, a, from_b.climbed_, b, kernel::numbers_of(X_AB));
+    X_AB.covariance.set_complete(from_a.complete_ && from_b.complete_);
   } else {
-    return X_AB;
+    compute.join(from_a.climbed_, a, from_b.climbed_, b, kernel::numbers_of(X_AB));
   }
 }
 
@@ -127,13 +113,14 @@ void PathAccumulation<Belief>::up_between(const TransformParts& X0, const Transf
   up(interpolate(X0.whole(), X1.whole(), s));
 }
 
-Belief join(PathAccumulation<Belief>&& from_a, PathAccumulation<Belief>&& from_b) {
-  return compose(inverse(from_a.X_HS_), from_b.X_HS_, from_a.order_);
+template <>
+void join(PathAccumulation<Belief>&& from_a, PathAccumulation<Belief>&& from_b, Belief& X_AB) {
+  X_AB = compose(inverse(from_a.X_HS_), from_b.X_HS_, from_a.order_);
 }
 
 template class PathAccumulation<Transform>;
 template class PathAccumulation<Pose>;
-template Transform join(PathAccumulation<Transform>&&, PathAccumulation<Transform>&&);
-template Pose join(PathAccumulation<Pose>&&, PathAccumulation<Pose>&&);
+template void join(PathAccumulation<Transform>&&, PathAccumulation<Transform>&&, Transform&);
+template void join(PathAccumulation<Pose>&&, PathAccumulation<Pose>&&, Pose&);
 
 }  // namespace tfdude

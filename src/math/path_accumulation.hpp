@@ -2,11 +2,13 @@
 
 #include <array>
 #include <cstddef>
+#include <type_traits>
+#include <utility>
 
 #include "tfdude/math/belief.hpp"
 #include "tfdude/math/transform.hpp"
 
-#include "math/kernel.hpp"
+#include "math/columns.hpp"
 
 namespace tfdude {
 
@@ -18,10 +20,10 @@ struct TransformParts {
   [[nodiscard]] Transform whole() const { return {*pose, *covariance}; }
 };
 
-/// The path from a frame S up towards its root, accumulated in S itself. The sum Σ Ad(X_SC) Σ_C
-/// Ad(X_SC)ᵀ over the climbed edges (C is the child of each) needs one adjoint per edge, whatever
-/// follows. Edges are computed in batches, which keeps the arithmetic in registers. So a value
-/// passed to up() must stay in place until the accumulation is joined.
+/// The path from a frame S up towards its root. The sum Σ Ad(X_SC) Σ_C Ad(X_SC)ᵀ over the climbed
+/// edges (C is the child of each) needs one adjoint per edge, whatever follows. Edges are computed
+/// in batches, which keeps the arithmetic in registers. So a value passed to up() must stay in place
+/// until the accumulation is joined.
 ///
 /// @tparam Value  Transform, or Pose if no covariance is needed
 template <class Value>
@@ -32,9 +34,8 @@ class PathAccumulation {
 
   /// Goes up one edge with value X_PC, from C, the frame reached so far, to P.
   void up(const Value& X_PC) {
-    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): doubles, path_accumulation.cpp
-    pending_[count_++] = reinterpret_cast<kernel::Edge>(&X_PC);
-    if (count_ == pending_.size()) compute();
+    if constexpr (std::is_same_v<Value, Transform>) complete_ &= X_PC.covariance.complete();
+    push(kernel::edge_of(X_PC));
   }
 
   /// As up(), for X_PC at the fraction s between X0 and X1 (interpolate()), whose parts must also
@@ -46,29 +47,41 @@ class PathAccumulation {
 
   /// X_AB, if A and B climbed to the same frame. Independent errors, first order.
   template <class V>
-  friend V join(PathAccumulation<V>&& from_a, PathAccumulation<V>&& from_b);
+  friend void join(PathAccumulation<V>&& from_a, PathAccumulation<V>&& from_b, V& X_AB);
 
  private:
-  void compute();
+  void push(const kernel::Edge& edge) {
+    pending_[count_++] = edge;
+    if (count_ == pending_.size()) climb();
+  }
+  void climb();
   void blend();
 
-  kernel::Columns X_SH_;  // pose of the frame reached (here, H) in the start S
-  kernel::Blocks left_;   // of the left perturbation of X_SH, expressed in S
+  kernel::Climb climbed_;
+  // The edges after those, and which of them are still to be interpolated. Not zeroed, which would
+  // take as long as a short lookup.
   std::array<kernel::Edge, 16> pending_;
-  // Not zeroed, which would take as long as a short lookup.
   union {
     std::array<Value, 16> computed_;
   };
   union {
-    std::array<kernel::Blend, 16> blends_;  // pending interpolations
+    std::array<kernel::Blend, 16> blends_;
   };
   std::size_t count_ = 0;
   std::size_t blend_count_ = 0;
   bool complete_ = true;  // the covariances of the edges
 };
 
+/// Into an object of the caller, which need not copy it.
 template <class Value>
-[[nodiscard]] Value join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b);
+void join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b, Value& X_AB);
+
+template <class Value>
+[[nodiscard]] Value join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b) {
+  Value X_AB;
+  join(std::move(from_a), std::move(from_b), X_AB);
+  return X_AB;
+}
 
 /// As above with the full error description, edge by edge: about ten times slower.
 template <>
@@ -86,7 +99,8 @@ class PathAccumulation<Belief> {
   void up_between(const TransformParts& X0, const TransformParts& X1, double s);
   [[nodiscard]] Transform& place() { return computed_; }
 
-  friend Belief join(PathAccumulation<Belief>&& from_a, PathAccumulation<Belief>&& from_b);
+  template <class V>
+  friend void join(PathAccumulation<V>&& from_a, PathAccumulation<V>&& from_b, V& X_AB);
 
  private:
   Order order_;

@@ -24,15 +24,23 @@ Result<std::vector<Ends>> all_ends(const Frames& frames, const std::vector<PathE
   return all;
 }
 
+// The value of a segment, with its correlation if there is any.
+struct Reached {
+  Transform X;
+  PathCorrelation correlation;
+
+  [[nodiscard]] Output output() { return {X, correlation}; }
+};
+
 Result<std::vector<Reached>> values_at(const std::vector<Ends>& segments, std::int64_t t,
                                        const Query& query, PathLookup::Met& met) {
   std::vector<Reached> values;
   values.reserve(segments.size());
   for (const Ends& ends : segments) {
     PathLookup::Met of_this;
-    auto X = PathLookup::reach_at(ends, PathLookup::Absent::kMayPass, t, query, of_this);
-    if (!X) return tl::unexpected(X.error());
-    values.push_back(*std::move(X));
+    auto ok = PathLookup::reach_at(ends, PathLookup::Absent::kMayPass, t, query, of_this,
+                                   values.emplace_back().output());
+    if (!ok) return tl::unexpected(std::move(ok.error()));
     met.moving = met.moving || of_this.moving;
   }
   return values;
@@ -47,9 +55,9 @@ Result<std::vector<Reached>> newest_values(const std::vector<Ends>& segments, Or
   bool mixed = false;
   for (const Ends& ends : segments) {
     PathLookup::Met of_this;
-    auto X = PathLookup::reach_newest(ends, PathLookup::Absent::kMayPass, order, of_this);
-    if (!X) return tl::unexpected(X.error());
-    values.push_back(*std::move(X));
+    auto ok = PathLookup::reach_newest(ends, PathLookup::Absent::kMayPass, order, of_this,
+                                       values.emplace_back().output());
+    if (!ok) return tl::unexpected(std::move(ok.error()));
     const HeldVersion* limiting = of_this.limiting;
     if (limiting == nullptr) continue;
     if (met.limiting == nullptr) met.limiting = limiting;

@@ -183,7 +183,8 @@ PathAccumulation<Value> begin_path(Order order) {
 }  // namespace
 
 template <class Value, class Take>
-Result<Value> PathLookup::walk(const Ends& ends, Absent absent, Order order, Take take) {
+Result<void> PathLookup::walk(const Ends& ends, Absent absent, Order order, Take take,
+                              Value& X_AB) {
   const Version* a = ends.a;
   const Version* b = ends.b;
   PathAccumulation<Value> path_a = begin_path<Value>(order);
@@ -208,7 +209,8 @@ Result<Value> PathLookup::walk(const Ends& ends, Absent absent, Order order, Tak
     here = Frames::at(*here->above, ends.commit);
   }
   if (error) return tl::unexpected(*std::move(error));
-  return join(std::move(path_a), std::move(path_b));
+  join(std::move(path_a), std::move(path_b), X_AB);
+  return {};
 }
 
 // Only a Belief can represent correlation.
@@ -218,13 +220,14 @@ bool leaves_out_correlation(const HeldVersion& edge) {
 }
 
 template <class Value>
-Result<Value> PathLookup::walk_newest(const Ends& ends, Absent absent, Order order, Met& met) {
+Result<void> PathLookup::walk_newest(const Ends& ends, Absent absent, Order order, Met& met,
+                                     Value& X_AB) {
   // Usually all dynamic edges have their newest sample at the same instant, or none is dynamic.
   // Then the stored values are used unchanged.
   const HeldVersion* limiting = nullptr;
   bool mixed = false;
   bool correlated = false;
-  auto newest = walk<Value>(ends, absent, order, [&](auto& path, const HeldVersion& edge) {
+  const auto take = [&](auto& path, const HeldVersion& edge) {
     if (edge.moving()) {
       if (limiting == nullptr) limiting = &edge;
       if (edge.stamp != limiting->stamp) {
@@ -235,122 +238,131 @@ Result<Value> PathLookup::walk_newest(const Ends& ends, Absent absent, Order ord
     if (leaves_out_correlation<Value>(edge)) correlated = true;
     if (!mixed && !correlated) path.up(value_of<Value>(edge));
     return Result<void>();
-  });
+  };
+  auto newest = walk(ends, absent, order, take, X_AB);
   met = {limiting, limiting != nullptr, correlated};
   // It has the earliest of all stamps.
   if (newest && limiting != nullptr && limiting->lacks_sample()) return no_sample(*limiting);
   if (!newest || !mixed || correlated) return newest;
   Query query;
   query.order = order;
-  return walk_at<Value>(ends, absent, met.limiting->stamp, query, met);
+  return walk_at(ends, absent, met.limiting->stamp, query, met, X_AB);
 }
 
 template <class Value>
-Result<Value> PathLookup::walk_at(const Ends& ends, Absent absent, std::int64_t t,
-                                  const Query& query, Met& met) {
+Result<void> PathLookup::walk_at(const Ends& ends, Absent absent, std::int64_t t,
+                                 const Query& query, Met& met, Value& X_AB) {
   const std::int64_t age =
       query.age_noise_until
           ? std::max(saturating_subtract(nanoseconds(*query.age_noise_until), t), std::int64_t{0})
           : 0;
   // An edge without samples is behind every instant.
   Moment moment{std::max(t, kNoSample + 1), age, query};
-  return walk<Value>(ends, absent, query.order,
-                     [&](auto& path, const HeldVersion& edge) -> Result<void> {
-                       if (leaves_out_correlation<Value>(edge)) met.correlated = true;
-                       if (edge.moving()) {
-                         met.moving = true;
-                         return accumulate_at<Value>(path, edge, moment);
-                       }
-                       if (!met.correlated) path.up(value_of<Value>(edge));
-                       return {};
-                     });
+  const auto take = [&](auto& path, const HeldVersion& edge) -> Result<void> {
+    if (leaves_out_correlation<Value>(edge)) met.correlated = true;
+    if (edge.moving()) {
+      met.moving = true;
+      return accumulate_at<Value>(path, edge, moment);
+    }
+    if (!met.correlated) path.up(value_of<Value>(edge));
+    return {};
+  };
+  return walk(ends, absent, query.order, take, X_AB);
 }
 
 namespace {
 
-Reached reached_of(Belief&& X) {
-  Reached reached{{X.pose, X.own}, {std::move(X.unknown), std::move(X.common_errors), {}}};
-  reached.X.covariance.set_complete(!X.unspecified);
-  return reached;
+Result<void> pass(Belief&& X_AB, const Output& output) {
+  output.X = {X_AB.pose, X_AB.own};
+  output.X.covariance.set_complete(!X_AB.unspecified);
+  output.correlation = {std::move(X_AB.unknown), std::move(X_AB.common_errors), {}};
+  return {};
 }
 
 }  // namespace
 
-Result<Reached> PathLookup::reach_newest(const Ends& ends, Absent absent, Order order, Met& met) {
+Result<void> PathLookup::reach_newest(const Ends& ends, Absent absent, Order order, Met& met,
+                                      Output X_AB) {
   if (order == Order::kSecond) {
-    const auto plain = walk_newest<Transform>(ends, absent, order, met);
-    if (!plain) return tl::unexpected(plain.error());
-    if (!met.correlated) return Reached{*plain, {}};
+    auto plain = walk_newest(ends, absent, order, met, X_AB.X);
+    if (!plain || !met.correlated) return plain;
   }
   met = {};
-  return walk_newest<Belief>(ends, absent, order, met).map(reached_of);
+  Belief whole;
+  auto walked = walk_newest(ends, absent, order, met, whole);
+  return walked ? pass(std::move(whole), X_AB) : walked;
 }
 
-Result<Reached> PathLookup::reach_at(const Ends& ends, Absent absent, std::int64_t t,
-                                     const Query& query, Met& met) {
+Result<void> PathLookup::reach_at(const Ends& ends, Absent absent, std::int64_t t,
+                                  const Query& query, Met& met, Output X_AB) {
   if (query.order == Order::kSecond) {
-    const auto plain = walk_at<Transform>(ends, absent, t, query, met);
-    if (!plain) return tl::unexpected(plain.error());
-    if (!met.correlated) return Reached{*plain, {}};
+    auto plain = walk_at(ends, absent, t, query, met, X_AB.X);
+    if (!plain || !met.correlated) return plain;
   }
   met = {};
-  return walk_at<Belief>(ends, absent, t, query, met).map(reached_of);
+  Belief whole;
+  auto walked = walk_at(ends, absent, t, query, met, whole);
+  return walked ? pass(std::move(whole), X_AB) : walked;
 }
 
 template <class Value, class Name>
-Result<Value> PathLookup::look_up(Name a, Name b) const {
+Result<void> PathLookup::compute(Name a, Name b, Value& X_AB) const {
   const epoch::Guard guard;
   const auto found = frames_.ends(a, b);
   if (!found) return tl::unexpected(found.error());
   Met met;
-  auto newest = walk_newest<Value>(*found, Absent::kEnds, Order::kSecond, met);
+  auto newest = walk_newest(*found, Absent::kEnds, Order::kSecond, met, X_AB);
   if constexpr (std::is_same_v<Value, Transform>) {
-    // Into the same object, which is not copied if all errors are independent.
     if (newest && met.correlated) {
       met = {};
-      newest = walk_newest<Belief>(*found, Absent::kEnds, Order::kSecond, met).map(collapse);
+      Belief whole;
+      newest = walk_newest(*found, Absent::kEnds, Order::kSecond, met, whole);
+      X_AB = collapse(whole);
     }
   }
   return newest;
 }
 
 template <class Name>
-Result<StampedTransform> PathLookup::look_up(Name a, Name b, const Query& query) const {
+Result<void> PathLookup::compute(Name a, Name b, const Query& query, StampedTransform& X_AB) const {
   const epoch::Guard guard;
   const auto found = frames_.ends(a, b);
   if (!found) return tl::unexpected(found.error());
   Met met;
+  PathCorrelation correlation;
+  const Output output{X_AB, correlation};
   std::optional<Time> at = query.at;
-  Result<Reached> X_AB;
   if (!at) {
-    X_AB = reach_newest(*found, Absent::kEnds, query.order, met);
-    if (X_AB && met.moving) at = time_of(met.limiting->stamp);
+    auto newest = reach_newest(*found, Absent::kEnds, query.order, met, output);
+    if (!newest) return newest;
+    if (met.moving) at = time_of(met.limiting->stamp);
   }
   if (query.at || (at && query.age_noise_until)) {
     met = {};
-    X_AB = reach_at(*found, Absent::kEnds, nanoseconds(*at), query, met);
+    auto then = reach_at(*found, Absent::kEnds, nanoseconds(*at), query, met, output);
+    if (!then) return then;
   }
-  if (!X_AB) return tl::unexpected(std::move(X_AB.error()));
   if (!met.moving) at.reset();
-  const bool complete = X_AB->X.covariance.complete();
-  if (X_AB->correlation.empty() && complete) {
-    return StampedTransform{X_AB->X, at, {query.order, false, {}}};
-  }
-  StampedTransform answer = collapsed(belief_of(X_AB->X, X_AB->correlation), query.order, at);
+  X_AB.stamp = at;
+  X_AB.basis.order = query.order;
+  const bool complete = X_AB.covariance.complete();
+  if (correlation.empty() && complete) return {};
+  X_AB = collapsed(belief_of(X_AB, correlation), query.order, at);
   if (!complete) {
-    answer.basis.unspecified = unspecified_edges(*found, at ? nanoseconds(*at) : kAlways);
+    X_AB.basis.unspecified = unspecified_edges(*found, at ? nanoseconds(*at) : kAlways);
   }
-  return answer;
+  return {};
 }
 
 // For a frame's id, and for its handle.
-template Result<Transform> PathLookup::look_up<Transform>(std::string_view a,
-                                                          std::string_view b) const;
-template Result<Pose> PathLookup::look_up<Pose>(std::string_view a, std::string_view b) const;
-template Result<StampedTransform> PathLookup::look_up(std::string_view a, std::string_view b,
-                                                      const Query& query) const;
-template Result<Transform> PathLookup::look_up<Transform>(Handle a, Handle b) const;
-template Result<Pose> PathLookup::look_up<Pose>(Handle a, Handle b) const;
-template Result<StampedTransform> PathLookup::look_up(Handle a, Handle b, const Query& query) const;
+template Result<void> PathLookup::compute(std::string_view a, std::string_view b,
+                                          Transform& X_AB) const;
+template Result<void> PathLookup::compute(std::string_view a, std::string_view b, Pose& X_AB) const;
+template Result<void> PathLookup::compute(std::string_view a, std::string_view b,
+                                          const Query& query, StampedTransform& X_AB) const;
+template Result<void> PathLookup::compute(Handle a, Handle b, Transform& X_AB) const;
+template Result<void> PathLookup::compute(Handle a, Handle b, Pose& X_AB) const;
+template Result<void> PathLookup::compute(Handle a, Handle b, const Query& query,
+                                          StampedTransform& X_AB) const;
 
 }  // namespace tfdude
