@@ -166,21 +166,48 @@ inline bool stays(const double* upper, double angle2, double distance2) {
   return angle2 < kLittle && distance2 * turned <= kLittle * (upper[0] + upper[6] + upper[11]);
 }
 
-inline void add_bulge(const Way& way, double s, const double* upper, Blocks& sum) {
-  const V4 theta{way.theta[0], way.theta[1], way.theta[2], 0};
-  const V4 rho{way.rho[0], way.rho[1], way.rho[2], 0};
-  V4 M[3];
-  V4 N[3];
-  for (int j = 0; j < 3; ++j) {
-    V4 e{};
-    e[j] = 1;
-    M[j] = cross(theta, e);
-    N[j] = cross(rho, e);
+// A 3x3 matrix of each of four edges.
+struct Mats {
+  Vec column[3];
+
+  Vec row(int i) const {
+    const auto of = [i](const Vec& a) { return i == 0 ? a.x : i == 1 ? a.y : a.z; };
+    return {of(column[0]), of(column[1]), of(column[2])};
   }
-  double weighted[21];
-  const double weight = 0.25 * s * (1.0 - s);
-  for (int k = 0; k < 21; ++k) weighted[k] = weight * upper[k];
-  add_sandwich(M, N, weighted, sum);
+};
+
+inline V4 covariance_lanes(const Blend* const* four, int i) {
+  return V4{four[0]->X0.upper[i], four[1]->X0.upper[i], four[2]->X0.upper[i], four[3]->X0.upper[i]};
+}
+
+// The covariances Σ + s (1-s)/4 ad(ξ) Σ ad(ξ)ᵀ. With ad(ξ) Σ = [L, K; *, H], the blocks of the
+// product are L Θᵀ + K [ρ]×ᵀ, K Θᵀ and H Θᵀ.
+inline void bulged(const Blend* const* four, const Ways& xi, V4 s, V4* upper) {
+  for (int i = 0; i < 21; ++i) upper[i] = covariance_lanes(four, i);
+  const V4* u = upper;
+  const Mats P{{{u[0], u[1], u[2]}, {u[1], u[6], u[7]}, {u[2], u[7], u[11]}}};
+  const Mats C{{{u[3], u[8], u[12]}, {u[4], u[9], u[13]}, {u[5], u[10], u[14]}}};
+  const Mats Q{{{u[15], u[16], u[17]}, {u[16], u[18], u[19]}, {u[17], u[19], u[20]}}};
+  Mats L;
+  Mats K;
+  Mats H;
+  for (int j = 0; j < 3; ++j) {
+    L.column[j] = cross(xi.theta, P.column[j]) + cross(xi.rho, C.row(j));
+    K.column[j] = cross(xi.theta, C.column[j]) + cross(xi.rho, Q.column[j]);
+    H.column[j] = cross(xi.theta, Q.column[j]);
+  }
+  const V4 weight = 0.25 * s * (1.0 - s);
+  int k = 0;
+  const auto add = [&](const Vec& row, int from) {
+    if (from <= 0) upper[k++] += weight * row.x;
+    if (from <= 1) upper[k++] += weight * row.y;
+    upper[k++] += weight * row.z;
+  };
+  for (int i = 0; i < 3; ++i) {
+    add(cross(xi.theta, L.row(i)) + cross(xi.rho, K.row(i)), i);
+    add(cross(xi.theta, K.row(i)), 0);
+  }
+  for (int i = 0; i < 3; ++i) add(cross(xi.theta, H.row(i)), i);
 }
 
 inline bool same_covariance(const Blend& one) {
@@ -189,42 +216,48 @@ inline bool same_covariance(const Blend& one) {
 }
 
 inline void blend_covariance(const Way& way, const Blend& one) {
-  // Up to here, what add_bulge() leaves out is below 1e-8.
-  constexpr double kQuarticEnds = 1e-3;
+  const Way back{{-way.rho[0], -way.rho[1], -way.rho[2]},
+                 {-way.theta[0], -way.theta[1], -way.theta[2]},
+                 way.angle2};
   Blocks sum;
-  if (same_covariance(one) && way.angle2 < kQuarticEnds) {
-    set(sum, one.X0.upper);
-    add_bulge(way, one.s, one.X0.upper, sum);
-  } else {
-    const Way back{{-way.rho[0], -way.rho[1], -way.rho[2]},
-                   {-way.theta[0], -way.theta[1], -way.theta[2]},
-                   way.angle2};
-    set_zero(sum);
-    carry_weighted(back, 1.0 - one.s, 1.0 - one.s, one.X0.upper, sum);
-    carry_weighted(way, one.s, one.s, one.X1.upper, sum);
-  }
+  set_zero(sum);
+  carry_weighted(back, 1.0 - one.s, 1.0 - one.s, one.X0.upper, sum);
+  carry_weighted(way, one.s, one.s, one.X1.upper, sum);
   store_upper(sum, one.X + 7);
 }
 
-// Of the edges that are near.
-inline void blend_covariances(Blend* some, std::size_t count, const Poses& X0, const Between& b) {
+// Of the edges that are near; `some` are those of the four that are different.
+inline void blend_covariances(const Blend* const* four, std::size_t some, const Poses& X0,
+                              const Between& b, V4 s) {
+  // Up to here, what bulged() leaves out is below 1e-8.
+  constexpr double kQuarticEnds = 1e-3;
+  enum { kStays, kBulges, kBlends } how[4];
   const V4 distance2 = dot(b.way, b.way);
-  bool stay[4];
   bool all_stay = true;
-  for (std::size_t i = 0; i < count; ++i) {
-    Blend& one = some[i];
-    stay[i] = !one.near || (same_covariance(one) && stays(one.X0.upper, b.angle2[i], distance2[i]));
-    one.edge->upper = stay[i] ? one.X0.upper : one.X + 7;
-    all_stay = all_stay && stay[i];
+  bool bulges = false;
+  for (std::size_t i = 0; i < some; ++i) {
+    const Blend& one = *four[i];
+    const bool same = same_covariance(one);
+    how[i] = !one.near || (same && stays(one.X0.upper, b.angle2[i], distance2[i])) ? kStays
+             : same && b.angle2[i] < kQuarticEnds                                  ? kBulges
+                                                                                   : kBlends;
+    all_stay = all_stay && how[i] == kStays;
+    bulges = bulges || how[i] == kBulges;
+    one.edge->upper = how[i] == kStays ? one.X0.upper : one.X + 7;
   }
   if (all_stay) return;
   const Ways xi = ways(X0, b);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (stay[i]) continue;
-    blend_covariance({{xi.rho.x[i], xi.rho.y[i], xi.rho.z[i]},
-                      {xi.theta.x[i], xi.theta.y[i], xi.theta.z[i]},
-                      xi.angle2[i]},
-                     some[i]);
+  V4 upper[21];
+  if (bulges) bulged(four, xi, s, upper);
+  for (std::size_t i = 0; i < some; ++i) {
+    if (how[i] == kBulges) {
+      for (int k = 0; k < 21; ++k) four[i]->X[7 + k] = upper[k][i];
+    } else if (how[i] == kBlends) {
+      blend_covariance({{xi.rho.x[i], xi.rho.y[i], xi.rho.z[i]},
+                        {xi.theta.x[i], xi.theta.y[i], xi.theta.z[i]},
+                        xi.angle2[i]},
+                       *four[i]);
+    }
   }
 }
 
@@ -238,7 +271,8 @@ inline void blend_all(Blend* all, std::size_t count) {
     const Poses X0 = poses<&Blend::X0>(four);
     const Poses X1 = poses<&Blend::X1>(four);
     const Between b = between(X0, X1);
-    const Poses X = go(X0, X1, b, V4{four[0]->s, four[1]->s, four[2]->s, four[3]->s});
+    const V4 s{four[0]->s, four[1]->s, four[2]->s, four[3]->s};
+    const Poses X = go(X0, X1, b, s);
     for (std::size_t i = 0; i < here; ++i) {
       some[i].near = b.sine2[i] < kSmallSine2;
       if (!some[i].near) continue;
@@ -252,7 +286,7 @@ inline void blend_all(Blend* all, std::size_t count) {
       out[6] = X.t.z[i];
       some[i].edge->pose = out;
     }
-    if constexpr (kWithCovariance) blend_covariances(some, here, X0, b);
+    if constexpr (kWithCovariance) blend_covariances(four, here, X0, b, s);
   }
 }
 

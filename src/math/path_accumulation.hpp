@@ -22,8 +22,8 @@ struct TransformParts {
 
 /// The path from a frame S up towards its root. The sum Σ Ad(X_SC) Σ_C Ad(X_SC)ᵀ over the climbed
 /// edges (C is the child of each) needs one adjoint per edge, whatever follows. Edges are computed
-/// in batches, which keeps the arithmetic in registers. So a value passed to up() must stay in place
-/// until the accumulation is joined.
+/// in batches, which keeps the arithmetic in registers. So a value passed to up() must stay in
+/// place until the accumulation is joined.
 ///
 /// @tparam Value  Transform, or Pose if no covariance is needed
 template <class Value>
