@@ -2,7 +2,10 @@
 // an edge, look up, add and remove. tf2 has no covariance; tf-dude propagates it unless the name
 // contains "pose".
 //
-// Keys: core/OPERATION/WHO/DEPTH/FRAMES.
+// Keys: core/OPERATION/WHO/DEPTH/FRAMES. Where tf2 has no counterpart, WHO says how the errors of the
+// edges are correlated: independent; all edges share a source; or unknown. The operations are then
+//   lookup_correlated   with covariance to second order
+//   lookup_fourth       to fourth order
 
 #include <cstdlib>
 #include <map>
@@ -79,6 +82,32 @@ void look_up_tf2(benchmark::State& state, Shape shape) {
   }
 }
 
+enum class Errors { kIndependent, kShared, kUnknown };
+
+bench::Tree correlated(bench::Tree tree, Errors errors) {
+  testing::Random random(8);
+  for (FrameSpec& frame : tree.frames) {
+    if (frame.parent.empty()) continue;
+    frame.correlation.unknown = errors == Errors::kUnknown;
+    if (errors == Errors::kShared) {
+      frame.correlation.common_errors = {{"source", false, random.twist(0.01, 0.01)}};
+    }
+  }
+  return tree;
+}
+
+void look_up_correlated(benchmark::State& state, Shape shape, Errors errors, Order order) {
+  const bench::Tree tree = correlated(tree_of(shape), errors);
+  LoopbackNetwork network;
+  auto node = Node::open(network.join(), "bench", tree.frames, Options());
+  if (!node) std::abort();
+  const Handle a = *node->find(tree.from);
+  const Handle b = *node->find(tree.to);
+  Query query;
+  query.order = order;
+  for (auto _ : state) benchmark::DoNotOptimize(node->lookup(a, b, query));
+}
+
 void set_by_handle(benchmark::State& state, Shape shape) {
   Node& node = node_of(shape);
   const Handle edge = *node.find(tree_of(shape).from);
@@ -128,11 +157,11 @@ void add_and_remove_in_forest(benchmark::State& state, Shape shape) {
   }
 }
 
-template <class Function>
-void enter(const char* name, const Shape& shape, Function function) {
+template <class Function, class... More>
+void enter(const char* name, const Shape& shape, Function function, More... more) {
   const std::string key = std::string("core/") + name + "/" + std::to_string(shape.first) + "/" +
                           std::to_string(shape.second);
-  benchmark::RegisterBenchmark(key.c_str(), function, shape);
+  benchmark::RegisterBenchmark(key.c_str(), function, shape, more...);
 }
 
 }  // namespace
@@ -144,6 +173,13 @@ int main(int argc, char** argv) {
     enter("lookup/ours_by_name", shape, look_up_by_name);
     enter("lookup/tf2", shape, look_up_tf2);
   }
+  const auto enter_correlated = [](const char* name, Errors errors, Order order) {
+    enter(name, Shape{30, 100}, look_up_correlated, errors, order);
+  };
+  enter_correlated("lookup_correlated/shared", Errors::kShared, Order::kSecond);
+  enter_correlated("lookup_correlated/unknown", Errors::kUnknown, Order::kSecond);
+  enter_correlated("lookup_fourth/independent", Errors::kIndependent, Order::kFourth);
+  enter_correlated("lookup_fourth/shared", Errors::kShared, Order::kFourth);
   for (const Shape& shape : {Shape{2, 10}, {30, 100}, {30, 1000}, {1000, 10000}}) {
     enter("set/ours_by_handle", shape, set_by_handle);
     enter("set/ours_by_name", shape, set_by_name);
