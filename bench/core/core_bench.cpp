@@ -2,8 +2,8 @@
 // an edge, look up, add and remove. tf2 has no covariance; tf-dude propagates it unless the name
 // contains "pose".
 //
-// Keys: core/OPERATION/WHO/DEPTH/FRAMES. Where tf2 has no counterpart, WHO says how the errors of the
-// edges are correlated: independent; all edges share a source; or unknown. The operations are then
+// Keys: core/OPERATION/WHO/DEPTH/FRAMES. Where tf2 has no counterpart, WHO says how the errors of
+// the edges are correlated: independent; all edges share a source; or unknown. The operations are
 //   lookup_correlated   with covariance to second order
 //   lookup_fourth       to fourth order
 

@@ -6,7 +6,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "math/common_errors.hpp"
-#include "math/moments.hpp"
+#include "math/kernel.hpp"
 #include "math/semidefinite.hpp"
 
 namespace tfdude {
@@ -21,29 +21,10 @@ void add_padded(Loading& sum, const Loading& more) {
   sum.leftCols(more.cols()) += more;
 }
 
-template <class List>
-auto of_same_source(List& common_errors, const CommonError& common_error)
-    -> decltype(common_errors.data()) {
-  const auto found =
-      std::find_if(common_errors.begin(), common_errors.end(),
-                   [&](const CommonError& other) { return same_source(other, common_error); });
-  return found == common_errors.end() ? nullptr : &*found;
-}
-
-CommonErrors sum_of(CommonErrors sum, const CommonErrors& more) {
-  for (const CommonError& common_error : more) {
-    if (CommonError* same = of_same_source(sum, common_error)) {
-      add_padded(same->loading, common_error.loading);
-    } else {
-      sum.push_back(common_error);
-    }
-  }
-  return sum;
-}
-
 CommonErrors product(const Matrix6d& matrix, CommonErrors common_errors) {
-  for (CommonError& common_error : common_errors)
-    common_error.loading = (matrix * common_error.loading).eval();
+  for (CommonError& common_error : common_errors) {
+    for (auto column : common_error.loading.colwise()) column = Twist(matrix * column);
+  }
   return common_errors;
 }
 
@@ -74,34 +55,69 @@ Matrix6d joint_moment(const CommonErrors& first, const CommonErrors& second) {
 // Both errors of a product, transported to the last frame: X_AC as if known exactly, and the two
 // errors there.
 struct Errors {
-  Covariance own[2];
-  CommonErrors common_errors[2];
+  const Covariance& own_1;
+  const Covariance& own_2;
+  CommonErrors common_errors_1;
+  const CommonErrors& common_errors_2;
 };
 
-Covariance add_fourth(const Errors& e, CommonErrors& common_errors) {
-  const Matrix6d own_1 = e.own[0].matrix();
-  const Matrix6d own_2 = e.own[1].matrix();
-  const Matrix6d J_11 = own_1 + second_moment(e.common_errors[0]);
-  const Matrix6d J_22 = own_2 + second_moment(e.common_errors[1]);
-  const Matrix6d J_12 = joint_moment(e.common_errors[0], e.common_errors[1]);
-  // The terms of third order are ([ξ1, [ξ1, ξ2]] + [ξ2, [ξ2, ξ1]]) / 12. Their moment with any z is
-  // D1 E[ξ1 zᵀ] + D2 E[ξ2 zᵀ], with D the mean of their derivatives (Stein's lemma).
-  const Matrix6d P_12 = product_of_adjoints(J_12);
-  const Matrix6d P_21 = product_of_adjoints(J_12.transpose());
-  const Matrix6d D_1 = (product_of_adjoints(J_22) + P_21 - 2.0 * P_12) / 12.0;
-  const Matrix6d D_2 = (product_of_adjoints(J_11) + P_12 - 2.0 * P_21) / 12.0;
-  const Matrix6d brackets = bracket_second_moment(J_11, J_22, J_12) / 4.0;
-  common_errors = sum_of(product(Matrix6d::Identity() + D_1, e.common_errors[0]),
-                         product(Matrix6d::Identity() + D_2, e.common_errors[1]));
+// Of own parts and common errors.
+Covariance whole(const Covariance& own, const CommonErrors& common_errors) {
+  if (common_errors.empty()) return own;
+  return own + Covariance::trusted(second_moment(common_errors));
+}
+
+// D of the error with that number.
+Matrix6d derivative(const kernel::Fourth& terms, std::size_t i) {
+  using Block = Eigen::Map<const Eigen::Matrix3d, 0, Eigen::OuterStride<4>>;
+  Matrix6d D = Matrix6d::Zero();
+  D.topLeftCorner<3, 3>() = Block(terms.M[i][0]);
+  D.topRightCorner<3, 3>() = Block(terms.N[i][0]);
+  D.bottomRightCorner<3, 3>() = Block(terms.M[i][0]);
+  return D;
+}
+
+// @return the own part of the product
+Covariance add_fourth(Errors&& e, CommonErrors& common_errors) {
+  const Covariance J_11 = whole(e.own_1, e.common_errors_1);
+  const Covariance J_22 = whole(e.own_2, e.common_errors_2);
+  Matrix6d J_12;
+  Covariance::Upper series;
+  kernel::Fourth terms{{e.own_1.upper().data(), e.own_2.upper().data()},
+                       {J_11.upper().data(), J_22.upper().data()}};
+  terms.sum = series.data();
+  if (!e.common_errors_1.empty() && !e.common_errors_2.empty()) {
+    J_12 = joint_moment(e.common_errors_1, e.common_errors_2);
+    terms.joint = J_12.data();
+  }
+  kernel::functions().add_fourth(terms);
+  const auto carried = [&](std::size_t i, CommonErrors errors) {
+    if (errors.empty()) return errors;
+    return product(Matrix6d::Identity() + derivative(terms, i), std::move(errors));
+  };
   // For the part due to the common errors, their product contains all but terms of sixth order.
-  const Matrix6d cubic = D_1 * own_1 + D_2 * own_2;
-  const Matrix6d series = own_1 + own_2 + brackets + cubic + cubic.transpose();
-  if (is_semidefinite(series)) return Covariance::trusted(series);
-  return Covariance::trusted(
-      Matrix6d(series + D_1 * own_1 * D_1.transpose() + D_2 * own_2 * D_2.transpose()));
+  common_errors = carried(0, std::move(e.common_errors_1));
+  add_errors(carried(1, e.common_errors_2), common_errors);
+  const Covariance sum = Covariance::trusted(series);
+  if (is_semidefinite(sum)) return sum;
+  const auto sixth = [&](std::size_t i, const Covariance& own) {
+    const Matrix6d D = derivative(terms, i);
+    return Covariance::trusted(Matrix6d(D * own.matrix() * D.transpose()));
+  };
+  return sum + sixth(0, e.own_1) + sixth(1, e.own_2);
 }
 
 }  // namespace
+
+void add_errors(const CommonErrors& more, CommonErrors& sum) {
+  for (const CommonError& common_error : more) {
+    if (CommonError* same = of_same_source(sum, common_error)) {
+      add_padded(same->loading, common_error.loading);
+    } else {
+      sum.push_back(common_error);
+    }
+  }
+}
 
 bool is_observed(const CommonError& common_error) {
   return common_error.source.rfind(kObservedPrefix, 0) == 0;
@@ -122,13 +138,18 @@ Belief compose(const Belief& X_AB, const Belief& X_BC, Order order) {
   const Pose X_CB = X_BC.pose.inverse();
   Belief X_AC;
   X_AC.pose = X_AB.pose * X_BC.pose;
-  Errors e{{X_AB.own.transported(X_CB), X_BC.own}, {{}, X_BC.common_errors}};
-  if (!X_AB.common_errors.empty()) e.common_errors[0] = product(adjoint(X_CB), X_AB.common_errors);
+  const Covariance own_1 = X_AB.own.transported(X_CB);
+  CommonErrors common_errors_1;
+  if (!X_AB.common_errors.empty()) {
+    common_errors_1 = product(adjoint(X_CB), X_AB.common_errors);
+  }
   if (order == Order::kFourth) {
-    X_AC.own = add_fourth(e, X_AC.common_errors);
+    X_AC.own = add_fourth({own_1, X_BC.own, std::move(common_errors_1), X_BC.common_errors},
+                          X_AC.common_errors);
   } else {
-    X_AC.own = e.own[0] + e.own[1];
-    X_AC.common_errors = sum_of(std::move(e.common_errors[0]), e.common_errors[1]);
+    X_AC.own = own_1 + X_BC.own;
+    X_AC.common_errors = std::move(common_errors_1);
+    add_errors(X_BC.common_errors, X_AC.common_errors);
   }
   if (X_AB.unknown) X_AC.unknown = X_AB.unknown->transported(X_CB);
   if (X_BC.unknown) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "math/common_errors.hpp"
+
 namespace tfdude::kernel {
 
 // The layout of the kernel's numbers: quaternion, translation, upper triangle.
@@ -27,6 +29,23 @@ Pose pose_of(const Edge& edge) {
   Pose X;
   std::copy_n(edge.pose, 7, numbers_of(X));
   return X;
+}
+
+Covariance transported(const Columns& X, const Covariance& sigma) {
+  Covariance::Upper upper;
+  functions().transport(X, sigma.upper().data(), upper.data());
+  return Covariance::trusted(upper);
+}
+
+void add_transported(const Columns& X, const Loading& F, Loading& sum) {
+  widen(sum, F.cols());
+  const Eigen::Map<const Eigen::Matrix3d, 0, Eigen::OuterStride<4>> R(X.R[0]);
+  const Eigen::Map<const Eigen::Vector3d> t(X.t);
+  for (Eigen::Index k = 0; k < F.cols(); ++k) {
+    const Eigen::Vector3d theta = R * F.col(k).tail<3>();
+    sum.col(k).head<3>() += R * F.col(k).head<3>() + t.cross(theta);
+    sum.col(k).tail<3>() += theta;
+  }
 }
 
 Transform transform_of(const Edge& edge) {

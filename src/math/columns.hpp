@@ -2,6 +2,7 @@
 
 #include <type_traits>
 
+#include "tfdude/math/belief.hpp"
 #include "tfdude/math/transform.hpp"
 
 #include "math/kernel.hpp"
@@ -12,6 +13,11 @@ namespace tfdude::kernel {
 [[nodiscard]] Columns columns_of(const Pose& X);
 [[nodiscard]] Pose pose_of(const Edge& edge);
 [[nodiscard]] Transform transform_of(const Edge& edge);
+
+/// Ad(X) Σ Ad(X)ᵀ.
+[[nodiscard]] Covariance transported(const Columns& X, const Covariance& sigma);
+/// sum += Ad(X) F; the sum gets as many columns as it needs.
+void add_transported(const Columns& X, const Loading& F, Loading& sum);
 
 /// The numbers of a pose or transform, as the kernel reads and writes them.
 template <class Value>

@@ -1,11 +1,24 @@
 #pragma once
 
+#include <algorithm>
+#include <vector>
+
 #include "tfdude/math/belief.hpp"
 
 namespace tfdude {
 
 [[nodiscard]] inline bool same_source(const CommonError& a, const CommonError& b) {
   return a.source == b.source && a.subtracts == b.subtracts;
+}
+
+/// The entry for the same source in a list; null: none.
+template <class List>
+[[nodiscard]] auto of_same_source(List& common_errors, const CommonError& common_error)
+    -> decltype(common_errors.data()) {
+  const auto found =
+      std::find_if(common_errors.begin(), common_errors.end(),
+                   [&](const CommonError& other) { return same_source(other, common_error); });
+  return found == common_errors.end() ? nullptr : &*found;
 }
 
 /// Appends columns of zeros until the loading has `columns`.
@@ -15,5 +28,8 @@ inline void widen(Loading& loading, Eigen::Index columns) {
   loading.conservativeResize(Eigen::NoChange, columns);
   loading.rightCols(columns - before).setZero();
 }
+
+/// Adds errors, source by source and column by column.
+void add_errors(const std::vector<CommonError>& more, std::vector<CommonError>& sum);
 
 }  // namespace tfdude

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "math/columns.hpp"
+#include "math/semidefinite.hpp"
 #include "math/symmetric_eigen.hpp"
 
 namespace tfdude {
@@ -21,8 +22,6 @@ constexpr double kPsdTolerance = 1e-9;
 // variance. An axis that is known exactly, up to rounding, must not be judged by its rounding
 // error.
 constexpr double kAxisShare = 1e-3;
-// Pivots above this settle the sign of the smallest eigenvalue.
-constexpr double kClearPivot = 1e-7;
 
 std::string number(double value) {
   std::array<char, 32> text{};
@@ -65,36 +64,6 @@ Result<void> scale_to_unit_diagonal(Matrix6d& m, Twist& scale) {
   return {};
 }
 
-bool is_zero_axis(const Covariance::Upper& upper, std::size_t k) {
-  for (std::size_t i = 0; i < 6; ++i) {
-    if (upper[upper_index(std::min(i, k), std::max(i, k))] != 0) return false;
-  }
-  return true;
-}
-
-// Fast test that accepts most matrices: true if an LDLᵀ factorization succeeds with clear pivots.
-// Each pivot is judged by its own variance, as if the diagonal were scaled to one. Rows of zeros
-// are left out. False for NaN.
-bool clearly_psd(const Covariance::Upper& upper) {
-  double a[6][6];
-  for (std::size_t i = 0; i < 6; ++i) {
-    for (std::size_t j = i; j < 6; ++j) a[i][j] = upper[upper_index(i, j)];
-  }
-  for (std::size_t k = 0; k < 6; ++k) {
-    const double variance = upper[upper_index(k, k)];
-    if (variance == 0) {
-      if (!is_zero_axis(upper, k)) return false;
-      continue;
-    }
-    if (!(a[k][k] > kClearPivot * variance && variance <= kMaxVariance)) return false;
-    for (std::size_t i = k + 1; i < 6; ++i) {
-      const double factor = a[k][i] / a[k][k];
-      for (std::size_t j = i; j < 6; ++j) a[i][j] -= factor * a[k][j];
-    }
-  }
-  return true;
-}
-
 // The matrix unchanged, or with eigenvalues raised to zero that are negative by rounding.
 Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
   const Matrix6d sigma = Covariance::trusted(upper).matrix();
@@ -135,7 +104,7 @@ Result<Covariance> Covariance::from_matrix(const Matrix6d& matrix) {
 }
 
 Result<Covariance> Covariance::from_upper(const Upper& upper) {
-  if (clearly_psd(upper)) return trusted(upper);
+  if (is_clearly_semidefinite(upper)) return trusted(upper);
   Twist variances;
   for (std::size_t i = 0; i < 6; ++i) {
     variances[static_cast<Eigen::Index>(i)] = upper[upper_index(i, i)];
@@ -210,9 +179,7 @@ std::array<double, 6> Covariance::stddev() const {
 }
 
 Covariance Covariance::transported(const Pose& X) const {
-  Covariance sigma;
-  kernel::functions().transport(kernel::columns_of(X), upper_.data(), sigma.upper_.data());
-  return sigma;
+  return kernel::transported(kernel::columns_of(X), *this);
 }
 
 Covariance& Covariance::operator+=(const Covariance& other) {

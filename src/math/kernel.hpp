@@ -55,6 +55,18 @@ struct Blend {
   bool near = false;  ///< output: the two are less than 0.1 rad apart; otherwise nothing is written
 };
 
+/// The covariance of the product of two errors to fourth order (compose() in belief.hpp). Each is
+/// an own part and common errors. All covariances are upper triangles.
+struct Fourth {
+  const double* own[2] = {};      ///< of the own parts
+  const double* all[2] = {};      ///< with the common errors
+  const double* joint = nullptr;  ///< E[ξ1 ξ2ᵀ], column by column; null if they are independent
+  double* sum = nullptr;          ///< output: without what only common errors make
+  /// Output: the derivatives D = [M, N; 0, M] of the terms of third order.
+  alignas(32) double M[2][3][4] = {};
+  alignas(32) double N[2][3][4] = {};
+};
+
 /// The functions compiled for one instruction set.
 struct Functions {
   /// X_SH := X_SC · X_PC⁻¹ for each edge in turn, C the frame reached so far.
@@ -73,6 +85,7 @@ struct Functions {
   /// As interpolate(), for the pairs that are near.
   void (*blend_poses)(Blend* all, std::size_t count);
   void (*blend_with_covariance)(Blend* all, std::size_t count);
+  void (*add_fourth)(Fourth& terms);
 };
 
 /// For any processor of the architecture.

@@ -307,3 +307,4 @@ void transport(const Columns& X, const double* upper, double* transported) {
 }
 
 #include "math/kernel_blend.ipp"
+#include "math/kernel_fourth.ipp"

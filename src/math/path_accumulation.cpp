@@ -5,6 +5,7 @@
 
 #include "tfdude/math/interpolate.hpp"
 
+#include "math/common_errors.hpp"
 #include "math/interpolate_far.hpp"
 
 namespace tfdude {
@@ -99,23 +100,79 @@ void join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b, Va
   }
 }
 
+namespace {
+
+const Covariance kExact;
+
+// Adds the common errors, transported by X.
+void add_transported(const kernel::Columns& X, const std::vector<CommonError>& common_errors,
+                     std::vector<CommonError>& sum) {
+  for (const CommonError& one : common_errors) {
+    CommonError* same = of_same_source(sum, one);
+    if (same == nullptr) {
+      same = &sum.emplace_back(CommonError{one.source, one.subtracts, {}});
+    }
+    kernel::add_transported(X, one.loading, same->loading);
+  }
+}
+
+void add_unknown(const kernel::Columns& X, const Covariance& unknown,
+                 std::optional<Covariance>& sum) {
+  const Covariance here = kernel::transported(X, unknown);
+  sum = sum ? bound(*sum, here) : here;
+}
+
+}  // namespace
+
+template <class Value>
+void PathAccumulation<Value>::up_exactly(const Pose& X_PC) {
+  push({kernel::numbers_of(X_PC), kExact.upper().data()});
+}
+
 void PathAccumulation<Belief>::up(const Transform& X_PC) {
-  Belief edge;
-  edge.pose = X_PC.pose;
-  (unknown_ ? edge.unknown.emplace() : edge.own) = X_PC.covariance.of_specified();
-  edge.unspecified = !X_PC.covariance.complete();
-  if (common_errors_ != nullptr) edge.common_errors = *common_errors_;
-  X_HS_ = compose(edge, X_HS_, order_);
+  if (order_ == Order::kFourth) {
+    Belief edge;
+    edge.pose = X_PC.pose;
+    (unknown_ ? edge.unknown.emplace() : edge.own) = X_PC.covariance.of_specified();
+    edge.unspecified = !X_PC.covariance.complete();
+    if (common_errors_ != nullptr) edge.common_errors = *common_errors_;
+    X_HS_ = compose(edge, X_HS_, order_);
+    return;
+  }
+  if (!correlated()) return own_.up(X_PC);
+  const kernel::Columns& X_SC = own_.reached();
+  if (common_errors_ != nullptr) add_transported(X_SC, *common_errors_, X_HS_.common_errors);
+  if (!unknown_) return own_.up(X_PC);
+  add_unknown(X_SC, X_PC.covariance.of_specified(), X_HS_.unknown);
+  X_HS_.unspecified |= !X_PC.covariance.complete();
+  own_.up_exactly(X_PC.pose);
 }
 
 void PathAccumulation<Belief>::up_between(const TransformParts& X0, const TransformParts& X1,
                                           double s) {
-  up(interpolate(X0.whole(), X1.whole(), s));
+  if (order_ == Order::kSecond && !correlated()) return own_.up_between(X0, X1, s);
+  interpolate(X0.whole(), X1.whole(), s, place());
+  up(place());
 }
 
 template <>
 void join(PathAccumulation<Belief>&& from_a, PathAccumulation<Belief>&& from_b, Belief& X_AB) {
-  X_AB = compose(inverse(from_a.X_HS_), from_b.X_HS_, from_a.order_);
+  if (from_a.order_ == Order::kFourth) {
+    X_AB = compose(inverse(from_a.X_HS_), from_b.X_HS_, from_a.order_);
+    return;
+  }
+  Transform own;
+  join(std::move(from_a.own_), std::move(from_b.own_), own);
+  const Belief& a = from_a.X_HS_;
+  const Belief& b = from_b.X_HS_;
+  const kernel::Columns X_BA = kernel::columns_of(own.pose.inverse());
+  X_AB = {own.pose, own.covariance.of_specified(), b.unknown, {}, false};
+  if (a.unknown) add_unknown(X_BA, *a.unknown, X_AB.unknown);
+  // The error of the inverse is the negative one.
+  add_transported(X_BA, a.common_errors, X_AB.common_errors);
+  for (CommonError& one : X_AB.common_errors) one.loading = -one.loading;
+  add_errors(b.common_errors, X_AB.common_errors);
+  X_AB.unspecified = a.unspecified || b.unspecified || !own.covariance.complete();
 }
 
 template class PathAccumulation<Transform>;

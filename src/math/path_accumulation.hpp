@@ -37,6 +37,8 @@ class PathAccumulation {
     if constexpr (std::is_same_v<Value, Transform>) complete_ &= X_PC.covariance.complete();
     push(kernel::edge_of(X_PC));
   }
+  /// As up(), known exactly.
+  void up_exactly(const Pose& X_PC);
 
   /// As up(), for X_PC at the fraction s between X0 and X1 (interpolate()), whose parts must also
   /// stay in place.
@@ -44,6 +46,12 @@ class PathAccumulation {
 
   /// Storage in which to compute a value for the next up().
   [[nodiscard]] Value& place() { return computed_[count_]; }
+
+  /// The pose X_SC of the frame reached so far.
+  [[nodiscard]] const kernel::Columns& reached() {
+    if (count_ > 0 || climbed_.empty) climb();
+    return climbed_.X_SH;
+  }
 
   /// X_AB, if A and B climbed to the same frame. Independent errors, first order.
   template <class V>
@@ -83,7 +91,9 @@ template <class Value>
   return X_AB;
 }
 
-/// As above with the full error description, edge by edge: about ten times slower.
+/// As above with the full error description. To second order, only the common errors of an edge and
+/// its part of unknown correlation are transported edge by edge; to fourth order, the errors of each
+/// edge are composed with those of the climb, which is ten times slower.
 template <>
 class PathAccumulation<Belief> {
  public:
@@ -97,15 +107,22 @@ class PathAccumulation<Belief> {
 
   void up(const Transform& X_PC);
   void up_between(const TransformParts& X0, const TransformParts& X1, double s);
-  [[nodiscard]] Transform& place() { return computed_; }
+  [[nodiscard]] Transform& place() {
+    if (correlated()) (void)own_.reached();  // up() needs it, and it frees all places
+    return own_.place();
+  }
 
   template <class V>
   friend void join(PathAccumulation<V>&& from_a, PathAccumulation<V>&& from_b, V& X_AB);
 
  private:
+  [[nodiscard]] bool correlated() const { return unknown_ || common_errors_ != nullptr; }
+
   Order order_;
-  Belief X_HS_;  // errors in the start's frame, where they are needed
-  Transform computed_;
+  // To second order: own parts, as of a transform; all other parts of the error in the start's
+  // frame, where they are needed, in X_HS_. To fourth order all is in X_HS_.
+  PathAccumulation<Transform> own_;
+  Belief X_HS_;
   bool unknown_ = false;
   const std::vector<CommonError>* common_errors_ = nullptr;
 };

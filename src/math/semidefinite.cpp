@@ -11,6 +11,15 @@ namespace tfdude {
 namespace {
 
 constexpr double kRounding = 1e-12;
+// Pivots above this settle the sign of the smallest eigenvalue.
+constexpr double kClearPivot = 1e-7;
+
+bool is_zero_axis(const Covariance::Upper& upper, std::size_t k) {
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (upper[upper_index(std::min(i, k), std::max(i, k))] != 0) return false;
+  }
+  return true;
+}
 
 // One over the standard deviation of each axis, zero if that is zero.
 Twist units(const Matrix6d& symmetric) {
@@ -28,10 +37,32 @@ Twist inverse_units(const Twist& unit) {
 
 }  // namespace
 
-bool is_semidefinite(const Matrix6d& symmetric) {
-  if (symmetric.diagonal().minCoeff() < 0) return false;
+bool is_clearly_semidefinite(const Covariance::Upper& upper) {
+  double a[6][6];
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = i; j < 6; ++j) a[i][j] = upper[upper_index(i, j)];
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    const double variance = upper[upper_index(k, k)];
+    if (variance == 0) {
+      if (!is_zero_axis(upper, k)) return false;
+      continue;
+    }
+    if (!(a[k][k] > kClearPivot * variance && variance <= kMaxVariance)) return false;
+    for (std::size_t i = k + 1; i < 6; ++i) {
+      const double factor = a[k][i] / a[k][k];
+      for (std::size_t j = i; j < 6; ++j) a[i][j] -= factor * a[k][j];
+    }
+  }
+  return true;
+}
+
+bool is_semidefinite(const Covariance& symmetric) {
+  if (is_clearly_semidefinite(symmetric.upper())) return true;
+  const Matrix6d matrix = symmetric.matrix();
+  if (matrix.diagonal().minCoeff() < 0) return false;
   // Takes a tenth of the time of eigenvalues.
-  const Matrix6d lifted = scaled(symmetric, units(symmetric)) + kRounding * Matrix6d::Identity();
+  const Matrix6d lifted = scaled(matrix, units(matrix)) + kRounding * Matrix6d::Identity();
   return Eigen::LLT<Matrix6d>(lifted).info() == Eigen::Success;
 }
 

@@ -1,11 +1,16 @@
 #pragma once
 
-#include "tfdude/math/pose.hpp"
+#include "tfdude/math/covariance.hpp"
 
 namespace tfdude {
 
+/// Fast test that accepts most matrices: true if an LDLᵀ factorization succeeds with clear pivots.
+/// Each pivot is judged by its own variance, as if the diagonal were scaled to one. Rows of zeros
+/// are left out. False for NaN, and for variances above kMaxVariance.
+[[nodiscard]] bool is_clearly_semidefinite(const Covariance::Upper& upper);
+
 /// Whether a symmetric matrix has no eigenvalue below zero, up to rounding.
-[[nodiscard]] bool is_semidefinite(const Matrix6d& symmetric);
+[[nodiscard]] bool is_semidefinite(const Covariance& symmetric);
 
 /// The matrix, symmetric to the last bit, with negative eigenvalues raised to zero. Each axis is
 /// judged in units of its own variance, so that metres and radians of any size are treated alike.

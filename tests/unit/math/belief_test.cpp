@@ -55,7 +55,9 @@ TEST_CASE("A shared source cancels on the way back and doubles on the way on") {
     const Belief X_AB = belief(exact, {common_error});
     const Transform there_and_back = collapse(compose(X_AB, inverse(X_AB), order));
     CHECK(testing::pose_diff(there_and_back.pose, {}, 1e-12) == "");
-    CHECK(there_and_back.covariance.of_specified().matrix().cwiseAbs().maxCoeff() < 1e-18);
+    // To fourth order the terms cancel up to rounding, which is made a valid covariance.
+    const double rounding = order == Order::kSecond ? 1e-18 : 1e-11;
+    CHECK(there_and_back.covariance.of_specified().matrix().cwiseAbs().maxCoeff() < rounding);
     const Belief still{Pose(), {}, std::nullopt, {common_error}};
     const Transform twice = collapse(compose(still, still, Order::kSecond));
     const Matrix6d expected = 4.0 * common_error.loading * common_error.loading.transpose();
@@ -195,7 +197,7 @@ TEST_CASE("Composed beliefs stay positive semi-definite to fourth order and for 
       for (int k = 0; k < 10; ++k) {
         X = compose(X, belief(random.transform(1.0, size, size)), Order::kFourth);
       }
-      CHECK(is_semidefinite(collapse(X).covariance.of_specified().matrix()));
+      CHECK(is_semidefinite(collapse(X).covariance.of_specified()));
     }
   }
 }
